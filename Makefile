@@ -1,0 +1,62 @@
+# Maquette: one command for each thing a developer does. `make` alone lists them.
+#
+# Every target installs what it needs (Debian packages, pinned Python packages, ONNX Runtime), and does so once:
+# stamps under build/ and .venv/ keep repeated runs quick.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+JOBS ?= $(shell nproc)
+OUT ?= demo-output
+PYTHON ?= python3
+export PYTHON
+# Newer ONNX Runtime libraries than the pinned one write telemetry files unless told not to.
+export ORT_DISABLE_TELEMETRY := 1
+
+.PHONY: help
+help:  ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+
+.PHONY: demo
+demo: build  ## dense pose on a bundled photo and clip, into demo-output/ (no Python, no torch)
+	@scripts/demo.sh $(OUT)
+
+.PHONY: build
+build: packages-demo  ## configure and build the SDK and its command line (release)
+	@cmake --preset release
+	@cmake --build --preset release -j $(JOBS)
+
+.PHONY: test
+test: packages-test  ## all native tests (release and asan) and Python tests; ends with "N passed, N failed"
+	@scripts/make-venv.sh train,dev
+	@for preset in release asan; do \
+	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON && cmake --build --preset $$preset -j $(JOBS); done
+	@scripts/test.sh
+
+.PHONY: bench
+bench: build  ## time each stage on the bundled photo and clip
+	@scripts/bench.sh
+
+.PHONY: format
+format: packages-lint  ## rewrite C++ (clang-format) and Python (ruff) sources in the house layout
+	@scripts/make-venv.sh dev
+	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format -i
+	@.venv/bin/ruff format . && .venv/bin/ruff check --fix .
+
+.PHONY: lint
+lint: packages-lint  ## check layout and lint rules without changing anything
+	@scripts/make-venv.sh dev
+	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format --dry-run --Werror
+	@.venv/bin/ruff format --check . && .venv/bin/ruff check .
+	@cmake --preset release >/dev/null
+	@git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/tools/*.cpp' | xargs -r clang-tidy -p build/release --quiet
+
+.PHONY: clean
+clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)
+	@rm -rf build demo-output
+
+.PHONY: packages-demo packages-test packages-lint
+packages-demo packages-test packages-lint: packages-%:
+	@scripts/install-packages.sh $*

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Runs the built SDK on the bundled photo and clip: scripts/demo.sh [OUTPUT_FOLDER]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out="${1:-demo-output}"
+maquette="$(find build/release -type f -name maquette -perm -u+x 2>/dev/null | head -n 1)"
+if [ -z "$maquette" ]; then
+    echo "The maquette program is not built. Run: make build" >&2
+    exit 1
+fi
+
+mkdir -p "$out"
+"$maquette" info
+for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
+    printf '\n== maquette densepose %s --out %s --overlay --json\n' "$source" "$out"
+    "$maquette" densepose "$source" --out "$out" --overlay --json
+done
+
+printf '\nPictures to look at, in %s:\n' "$out"
+find "$out" -maxdepth 2 \( -name '*overlay*' -o -name '*_IUV.png' \) | sort | sed 's/^/  /' | head -n 12

@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# Installs the Debian packages that a group of make targets needs, and only those that are missing.
+#
+#   scripts/install-packages.sh demo     to build the SDK and run it
+#   scripts/install-packages.sh test     + the native tests, Python and software OpenGL for rendering
+#   scripts/install-packages.sh lint     + clang-format and clang-tidy
+#
+# Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
+set -euo pipefail
+
+usage() { sed -n '2,8s/^# \{0,1\}//p' "$0"; }
+
+group="${1:-}"
+case "$group" in
+    demo | test | lint) ;;
+    -h | --help) usage; exit 0 ;;
+    *) usage >&2; exit 2 ;;
+esac
+
+if ! command -v dpkg-query >/dev/null; then
+    echo "This is not a Debian system, so nothing is installed: see the package list in $0." >&2
+    exit 0
+fi
+
+missing=()
+# needs_command COMMAND PACKAGE: a tool counts as present whoever installed it.
+needs_command() { command -v "$1" >/dev/null || missing+=("$2"); }
+needs_package() {
+    [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null || true)" = installed ] || missing+=("$1")
+}
+
+needs_command g++ g++
+needs_command cmake cmake
+needs_command ninja ninja-build
+needs_command pkg-config pkg-config
+needs_command mvn maven       # fetches the ONNX Runtime library
+needs_command npm npm         # fetches the ONNX Runtime headers
+needs_command unzip unzip
+for module in core imgproc imgcodecs videoio; do needs_package "libopencv-$module-dev"; done
+needs_package ca-certificates
+
+if [ "$group" != demo ]; then
+    needs_command git git
+    needs_package libgtest-dev
+    needs_package libgmock-dev
+    needs_package python3-venv
+    needs_package python3-dev
+    needs_package libegl1             # moderngl draws without a window through EGL
+    needs_package libgl1
+    needs_package libgl1-mesa-dri     # ... on the processor (llvmpipe)
+fi
+if [ "$group" = lint ]; then
+    needs_command clang-format clang-format
+    needs_command clang-tidy clang-tidy
+fi
+
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+    if ! command -v sudo >/dev/null; then
+        echo "Missing Debian packages: ${missing[*]}" >&2
+        echo "Install them as root (apt-get install ${missing[*]}) and run make again." >&2
+        exit 1
+    fi
+    as_root=(sudo)
+fi
+echo "Installing Debian packages: ${missing[*]}"
+export DEBIAN_FRONTEND=noninteractive
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null

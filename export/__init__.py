@@ -1,0 +1,1 @@
+"""Maquette's training side: rendered people, torch networks, training, evaluation, ONNX export."""

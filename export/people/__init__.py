@@ -1,0 +1,1 @@
+"""Rendered people with dense body-surface labels."""

@@ -1,0 +1,238 @@
+"""Poses: limb directions out of motion clips, or drawn at random, and the bone rotations that take them.
+
+Clips: 0 A.D. (`art/animation/biped`, object-space joints, 30 frames a second) and the DeepMimic clips inside
+pybullet. A pose keeps only what carries over between skeletons: the orientation of hips, chest and head
+and the directions of eight limb bones, in the body's axes (x left, y back, z up), with the yaw removed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import struct
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from export.people import assets
+from export.people.body import Body, Shape
+
+LIMBS = ("upper_arm.L", "lower_arm.L", "upper_arm.R", "lower_arm.R",
+         "upper_leg.L", "lower_leg.L", "upper_leg.R", "lower_leg.R")  # fmt: skip
+_LIMB_BONES = {
+    "upperarm01": ("lowerarm01", "upper_arm"),
+    "lowerarm01": ("wrist", "lower_arm"),
+    "upperleg01": ("lowerleg01", "upper_leg"),
+    "lowerleg01": ("foot", "lower_leg"),
+}
+_ZERO_AD_JOINTS = ("hip", "chest", "neck", "arm_L", "forearm_L", "hand_L", "arm_R", "forearm_R", "hand_R",
+                   "thigh_L", "leg_L", "foot_L", "thigh_R", "leg_R", "foot_R")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pose:
+    """root, chest, head: rotations [3, 3]; limbs: unit directions [8, 3] in the order of `LIMBS`."""
+
+    root: np.ndarray
+    chest: np.ndarray
+    head: np.ndarray
+    limbs: np.ndarray
+
+
+@dataclass(frozen=True)
+class Clips:
+    """All frames of a split: root [N, 3, 3], chest [N, 3, 3], limbs [N, 8, 3], rider [N] (seated on something)."""
+
+    root: np.ndarray
+    chest: np.ndarray
+    limbs: np.ndarray
+    rider: np.ndarray
+
+
+def split_of(name: str) -> str:
+    """Which split a clip, texture or photo belongs to: 80 % train, 10 % val, 10 % test, by its name."""
+    tenth = int(hashlib.sha1(name.encode()).hexdigest(), 16) % 10
+    return "test" if tenth == 9 else "val" if tenth == 8 else "train"
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return v / (np.linalg.norm(v, axis=-1, keepdims=True) + 1e-9)
+
+
+def _frames(left: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Rotations [N, 3, 3] whose columns are left, back and up."""
+    left = _unit(left)
+    up = _unit(up - left * (up * left).sum(-1, keepdims=True))
+    return np.stack([left, np.cross(up, left), up], -1)
+
+
+def _without_yaw(root: np.ndarray, chest: np.ndarray, limbs: np.ndarray):
+    back = root[..., 1]
+    turn = Rotation.from_rotvec(np.arctan2(back[:, :1], back[:, 1:2]) * [[0, 0, 1.0]]).as_matrix()
+    return turn @ root, turn @ chest, np.einsum("nij,nlj->nli", turn, limbs)
+
+
+def _zero_ad_clip(path: Path, order: list[str]):
+    """Reads one PSA clip: 7 floats a bone and frame (object-space position, quaternion)."""
+    data = path.read_bytes()
+    at = 16 + struct.unpack_from("<I", data, 12)[0]
+    _, bones, frames = struct.unpack_from("<fII", data, at)
+    joints = np.frombuffer(data, "<f4", bones * frames * 7, at + 12).reshape(frames, bones, 7)[::2, :, :3]
+    # The game's y is up and its axes are left-handed: exchanging y and z makes them right-handed.
+    joints = joints[:, [order.index(n) for n in _ZERO_AD_JOINTS]][..., [0, 2, 1]].astype(np.float64)
+    p = dict(zip(_ZERO_AD_JOINTS, np.moveaxis(joints, 1, 0), strict=True))
+    root = _frames(p["thigh_L"] - p["thigh_R"], p["chest"] - p["hip"])
+    chest = _frames(p["arm_L"] - p["arm_R"], p["neck"] - p["chest"])
+    ends = (("arm", "forearm"), ("forearm", "hand"), ("thigh", "leg"), ("leg", "foot"))
+    limbs = [p[f"{b}_{s}"] - p[f"{a}_{s}"] for pair in (ends[:2], ends[2:]) for s in "LR" for a, b in pair]
+    return _without_yaw(root, chest, _unit(np.stack(limbs, 1)))
+
+
+def _bullet_clip(path: Path):
+    """Reads one DeepMimic clip: duration, root position, then joint rotations (x forward, y up, z right)."""
+    frames = np.array(json.loads(path.read_text())["Frames"])
+
+    def ball(at: int) -> Rotation:
+        return Rotation.from_quat(frames[:, [at + 1, at + 2, at + 3, at]])
+
+    def hinge(at: int) -> Rotation:
+        return Rotation.from_rotvec(frames[:, at : at + 1] * [[0, 0, 1.0]])
+
+    to_body = np.array([[0, 0, -1.0], [-1, 0, 0], [0, 1, 0]])  # columns: forward -> -y, up -> z, right -> -x
+    root = ball(4)
+    chest = root * ball(8)
+    down = np.array([0, -1.0, 0])
+
+    def limb(base: Rotation, joint: int, bend: int) -> list[np.ndarray]:
+        upper = base * ball(joint)
+        return [upper.apply(down), (upper * hinge(bend)).apply(down)]
+
+    right_leg, left_leg = limb(root, 16, 20), limb(root, 30, 34)
+    right_arm, left_arm = limb(chest, 25, 29), limb(chest, 39, 43)
+    limbs = np.stack([*left_arm, *right_arm, *left_leg, *right_leg], 1) @ to_body.T
+    turn = (to_body @ r.as_matrix() @ to_body.T for r in (root, chest))
+    return _without_yaw(*turn, limbs)
+
+
+def load_clips(split: str) -> Clips:
+    """Frames of all clips of a split; parsed once and cached."""
+    cache = assets.cache_dir() / f"clips-{split}.npz"
+    if not cache.exists():
+        skeleton = ElementTree.parse(assets.zero_ad() / "skeletons" / "biped.xml").find("standard_skeleton")
+        order = [bone.get("name") for bone in skeleton.iter("bone")]
+        parts = []
+        for path in sorted((assets.zero_ad() / "animation" / "biped").rglob("*.psa")):
+            if split_of(path.stem) == split:
+                rider = bool(re.search("rider|chariot|elephant", str(path)))
+                parts.append((*_zero_ad_clip(path, order), rider))
+        for path in sorted(assets.bullet_motions().glob("humanoid3d_*.txt")):
+            if split_of(path.stem) == split:
+                parts.append((*_bullet_clip(path), False))
+        root, chest, limbs = (np.concatenate([p[k] for p in parts]).astype(np.float32) for k in range(3))
+        rider = np.concatenate([np.full(len(p[0]), p[3]) for p in parts])
+        ok = np.isfinite(limbs).all((1, 2)) & np.isfinite(root).all((1, 2)) & np.isfinite(chest).all((1, 2))
+        np.savez(cache, root=root[ok], chest=chest[ok], limbs=limbs[ok], rider=rider[ok])
+    with np.load(cache) as data:
+        return Clips(data["root"], data["chest"], data["limbs"], data["rider"])
+
+
+def _euler(x: float, y: float, z: float) -> np.ndarray:
+    return Rotation.from_euler("xyz", [x, y, z], degrees=True).as_matrix()
+
+
+def _mirrored(root: np.ndarray, chest: np.ndarray, limbs: np.ndarray):
+    flip = np.diag([-1.0, 1, 1])
+    return flip @ root @ flip, flip @ chest @ flip, limbs[[2, 3, 0, 1, 6, 7, 4, 5]] * [-1, 1, 1]
+
+
+def _head(rng: np.random.Generator, chest: np.ndarray) -> np.ndarray:
+    pitch, roll, yaw = (np.clip(rng.normal(0, s), -m, m) for s, m in ((14, 35), (8, 20), (25, 65)))
+    return chest @ _euler(pitch, roll, yaw)
+
+
+def clip_pose(rng: np.random.Generator, clips: Clips) -> Pose:
+    """A frame of a clip, mirrored half of the time, with a little noise in the limbs."""
+    seated = rng.random() < 0.15 and clips.rider.any()
+    k = rng.choice(np.flatnonzero(clips.rider == seated))
+    root, chest, limbs = (a[k].astype(np.float64) for a in (clips.root, clips.chest, clips.limbs))
+    if rng.random() < 0.5:
+        root, chest, limbs = _mirrored(root, chest, limbs)
+    return Pose(root, chest, _head(rng, chest), _unit(limbs + rng.normal(0, 0.06, (8, 3))))
+
+
+def drawn_pose(rng: np.random.Generator) -> Pose:
+    """An everyday pose drawn at random: standing or sitting, arms hanging, bent or raised."""
+    u = rng.uniform
+    root = _euler(u(-6, 8), u(-4, 4), 0)
+    chest = root @ _euler(rng.normal(4, 8), rng.normal(0, 5), rng.normal(0, 9))
+    sitting = u() < 0.2
+    arms, legs = [], []
+    for side in (1, -1):
+        if u() < 0.8:
+            upper = np.array([side * abs(rng.normal(0.22, 0.15)), rng.normal(0, 0.2), -1])
+        else:
+            upper = rng.normal(0, 1, 3) * [0.6, 0.5, 0.9] + [side * 0.8, -0.3, 0]
+        upper = _unit(upper)
+        bend = np.radians(u(0, 25) if u() < 0.45 else u(30, 140))
+        inward = _unit(np.array([-side * u(-0.2, 1.1), -1, u(-0.4, 0.5)]))
+        inward = _unit(inward - upper * (inward @ upper) * 0.999)
+        arms += [chest @ upper, chest @ (np.cos(bend) * upper + np.sin(bend) * inward)]
+        if sitting:
+            thigh = np.array([side * u(0, 0.4), -1, u(-0.5, 0.15)])
+            shank = np.array([side * u(-0.2, 0.2), u(-0.4, 0.4), -1])
+        else:
+            thigh = _unit(np.array([side * u(-0.02, 0.2), rng.normal(0, 0.15), -1]))
+            shank = thigh + [side * u(-0.08, 0.05), abs(rng.normal(0, 0.15)), 0]
+        legs += [root @ _unit(thigh), root @ _unit(shank)]
+    limbs = _unit(np.stack(arms + legs) + rng.normal(0, 0.06, (8, 3)))
+    return Pose(root, chest, _head(rng, chest), limbs)
+
+
+def _turn_onto(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Smallest rotation that takes direction a to direction b."""
+    a, b = _unit(a), _unit(b)
+    cosine, axis = a @ b, np.cross(a, b)
+    if cosine < -0.9999:
+        return Rotation.from_rotvec(np.pi * _unit(np.cross(a, [0.3, 0.2, 0.9]))).as_matrix()
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + k + k @ k / (1 + cosine)
+
+
+def posed(body: Body, shape: Shape, pose: Pose, rng: np.random.Generator) -> np.ndarray:
+    """Vertices [V, 3] of a body in a pose; hands, fingers and feet are drawn from `rng`."""
+    limb = dict(zip(LIMBS, pose.limbs, strict=True))
+    given = {"root": pose.root, "head": pose.head}
+    spine = Slerp([0, 1], Rotation.from_matrix([pose.root, pose.chest]))
+    given |= {f"spine0{5 - k}": spine((k + 1) / 5).as_matrix() for k in range(5)}
+    neck = Slerp([0, 1], Rotation.from_matrix([pose.chest, pose.head]))
+    given |= {f"neck0{k}": neck(k / 4).as_matrix() for k in (1, 2, 3)}
+    wrist = {s: _euler(*rng.normal(0, 18, 3)) for s in "LR"}
+    foot = {s: _euler(rng.normal(0, 10), 0, rng.normal(0, 6)) for s in "LR"}
+    curl = {"L": (1, rng.uniform(-5, 45)), "R": (-1, rng.uniform(-5, 45))}
+    rotations = np.zeros((len(body.bones), 3, 3))
+    heads = np.zeros((len(body.bones), 3))
+    for k, name in enumerate(body.bones):
+        parent = body.parents[k]
+        carried = rotations[parent] if parent >= 0 else pose.root
+        base, _, side = name.partition(".")
+        if name in given:
+            rotations[k] = given[name]
+        elif base in _LIMB_BONES:
+            end, key = _LIMB_BONES[base]
+            rest = shape.heads[body.bone[f"{end}.{side}"]] - shape.heads[k]
+            rotations[k] = _turn_onto(carried @ rest, limb[f"{key}.{side}"]) @ carried
+        elif base == "wrist":
+            rotations[k] = carried @ wrist[side]
+        elif base == "foot":
+            rotations[k] = carried @ foot[side]
+        elif base.startswith("finger") and not base.startswith("finger1"):
+            sign, degrees = curl[side]
+            rotations[k] = carried @ Rotation.from_rotvec(np.radians(degrees) * np.array([0, 0.9 * sign, 0])).as_matrix()
+        else:
+            rotations[k] = carried
+        heads[k] = heads[parent] + rotations[parent] @ (shape.heads[k] - shape.heads[parent]) if parent >= 0 else shape.heads[k]
+    return body.skinned(shape, rotations, heads)

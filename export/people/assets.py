@@ -11,11 +11,14 @@ from __future__ import annotations
 import argparse
 import gzip
 import hashlib
+import os
 import subprocess
 import sys
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 DOWNLOADS = Path(".deps/people")
 UNPACKED = Path(".data/assets")
@@ -47,6 +50,13 @@ def cache_dir() -> Path:
     path = UNPACKED / "cache"
     path.mkdir(parents=True, exist_ok=True)
     return path
+
+
+def save_cache(path: Path, **arrays: np.ndarray) -> None:
+    """Writes an .npz whole or not at all: several processes may compute the same cache at once."""
+    temporary = path.with_suffix(f".{os.getpid()}.tmp.npz")
+    np.savez(temporary, **arrays)
+    temporary.rename(path)
 
 
 def _needed(path: Path) -> Path:

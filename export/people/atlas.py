@@ -217,7 +217,7 @@ def load_surface_table(count: int = 4000) -> SurfaceTable:
     path = assets.cache_dir() / f"surface-{count}.npz"
     if not path.exists():
         table = _build_surface_table(Atlas(Body()), count)
-        np.savez(path, vertices=table.vertices, part=table.part, uv=table.uv, geodesic=table.geodesic)
+        assets.save_cache(path, vertices=table.vertices, part=table.part, uv=table.uv, geodesic=table.geodesic)
     with np.load(path) as data:
         return SurfaceTable(data["vertices"], data["part"], data["uv"], data["geodesic"])
 

@@ -124,7 +124,7 @@ class Body:
                 lines = np.array(file.read().split(), np.float64).reshape(-1, 4)
             row[lines[:, 0].astype(int)] = lines[:, 1:]
         self._targets = self._targets.reshape(len(names), -1)
-        np.savez_compressed(cache, targets=self._targets.astype(np.float16))
+        assets.save_cache(cache, targets=self._targets.astype(np.float16))
 
     def _read_rig(self, root: Path) -> None:
         rig = json.loads((root / "rig.default.json").read_text())

@@ -135,7 +135,7 @@ def load_clips(split: str) -> Clips:
         root, chest, limbs = (np.concatenate([p[k] for p in parts]).astype(np.float32) for k in range(3))
         rider = np.concatenate([np.full(len(p[0]), p[3]) for p in parts])
         ok = np.isfinite(limbs).all((1, 2)) & np.isfinite(root).all((1, 2)) & np.isfinite(chest).all((1, 2))
-        np.savez(cache, root=root[ok], chest=chest[ok], limbs=limbs[ok], rider=rider[ok])
+        assets.save_cache(cache, root=root[ok], chest=chest[ok], limbs=limbs[ok], rider=rider[ok])
     with np.load(cache) as data:
         return Clips(data["root"], data["chest"], data["limbs"], data["rider"])
 

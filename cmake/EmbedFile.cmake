@@ -1,0 +1,23 @@
+# Writes a C++ file that holds the bytes of INPUT, for `cmake -DINPUT=… -DOUTPUT=… -DHEADER=… -DFUNCTION=… -P`.
+# FUNCTION returns a maquette::EmbeddedFile, which HEADER declares. Without INPUT the file is embedded as empty.
+if(EXISTS "${INPUT}")
+  file(READ "${INPUT}" bytes HEX)
+  string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
+  string(REGEX REPLACE "(0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,)" "\\1\n"
+    bytes "${bytes}")
+  set(array "const uint8_t kBytes[] = {\n${bytes}};\n")
+  set(value "{kBytes, sizeof kBytes}")
+else()
+  set(array "")
+  set(value "{}")
+endif()
+file(WRITE "${OUTPUT}" "#include \"${HEADER}\"
+
+namespace maquette {
+namespace {
+${array}}  // namespace
+
+EmbeddedFile ${FUNCTION}() { return ${value}; }
+
+}  // namespace maquette
+")

@@ -1,0 +1,95 @@
+# ONNX Runtime, headers and shared library. The SDK opens the library itself at run time, so nothing links it here.
+#
+# Sets MAQ_ONNXRUNTIME_LIBRARY (a file) and the interface target maq_onnxruntime_headers.
+# Taken from MAQ_ONNXRUNTIME_DIR when that is given; otherwise fetched once into MAQ_DEPS_DIR by the ordinary package
+# clients and checked against the SHA-256 below. 1.26.0 is the last release whose binaries send no telemetry.
+set(MAQ_ONNXRUNTIME_VERSION 1.26.0)
+
+# The npm package repacks the official Android archive (which has the C headers and every Android ABI) and the official
+# Linux x86-64 library; the aarch64 library is only in the official jar, which is fetched for that target alone.
+set(_ort_npm_name com.github.asus4.onnxruntime)
+set(_ort_npm_version 0.4.8)
+set(_ort_npm_sha256 007a59a954d2161ffb1b3977a649c7945ee37bf30ad493891d4252c02e9536a4)
+set(_ort_jar_coordinates com.microsoft.onnxruntime:onnxruntime:${MAQ_ONNXRUNTIME_VERSION})
+set(_ort_jar_sha256 cf5a48c6f5d07b15f10634b80433ddce8f5892662b1a122bbbc0907f4f442c60)
+
+function(_maq_check_sha256 file expected)
+  file(SHA256 "${file}" actual)
+  if(NOT actual STREQUAL expected)
+    message(FATAL_ERROR "${file} has SHA-256 ${actual}, but ${expected} is expected. "
+      "Remove the file so that it is fetched again, or set MAQ_ONNXRUNTIME_DIR to an ONNX Runtime of your own.")
+  endif()
+endfunction()
+
+function(_maq_fetch_npm_package archive)
+  if(NOT EXISTS "${archive}")
+    find_program(MAQ_NPM npm REQUIRED)
+    message(STATUS "Fetching ${_ort_npm_name} ${_ort_npm_version} with npm (128 MB, once)")
+    file(MAKE_DIRECTORY "${MAQ_DEPS_DIR}")
+    execute_process(COMMAND "${MAQ_NPM}" pack --silent --pack-destination "${MAQ_DEPS_DIR}"
+      ${_ort_npm_name}@${_ort_npm_version} OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+  endif()
+  _maq_check_sha256("${archive}" ${_ort_npm_sha256})
+endfunction()
+
+function(_maq_fetch_jar archive)
+  if(NOT EXISTS "${archive}")
+    find_program(MAQ_MVN mvn REQUIRED)
+    message(STATUS "Fetching ${_ort_jar_coordinates} with Maven (42 MB, once)")
+    execute_process(COMMAND "${MAQ_MVN}" -B -q org.apache.maven.plugins:maven-dependency-plugin:3.8.1:copy
+      -Dartifact=${_ort_jar_coordinates} "-DoutputDirectory=${MAQ_DEPS_DIR}" -Dmdep.useBaseVersion=true
+      OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+  endif()
+  _maq_check_sha256("${archive}" ${_ort_jar_sha256})
+endfunction()
+
+# Unpacks what this target needs into `root`. The stamp is written last, so an interrupted unpacking starts again.
+function(_maq_unpack_onnxruntime root target)
+  set(stamp "${root}/.${target}")
+  if(EXISTS "${stamp}")
+    return()
+  endif()
+  set(npm_archive "${MAQ_DEPS_DIR}/${_ort_npm_name}-${_ort_npm_version}.tgz")
+  set(aar package/Plugins/Android/onnxruntime.aar)
+  set(linux_x64 package/Plugins/Linux/x64/libonnxruntime.so)
+  _maq_fetch_npm_package("${npm_archive}")
+  file(ARCHIVE_EXTRACT INPUT "${npm_archive}" DESTINATION "${root}/npm" PATTERNS ${aar} ${linux_x64} package/LICENSE)
+  file(ARCHIVE_EXTRACT INPUT "${root}/npm/${aar}" DESTINATION "${root}/android" PATTERNS "headers*" "jni*")
+  file(REMOVE "${root}/npm/${aar}")
+  if(target STREQUAL "linux-aarch64")
+    set(jar "${MAQ_DEPS_DIR}/onnxruntime-${MAQ_ONNXRUNTIME_VERSION}.jar")
+    _maq_fetch_jar("${jar}")
+    file(ARCHIVE_EXTRACT INPUT "${jar}" DESTINATION "${root}/jar" PATTERNS "ai/onnxruntime/native/linux-aarch64/*")
+  endif()
+  file(TOUCH "${stamp}")
+endfunction()
+
+if(MAQ_ONNXRUNTIME_DIR)
+  find_path(MAQ_ONNXRUNTIME_INCLUDE_DIR onnxruntime_c_api.h NO_DEFAULT_PATH
+    HINTS "${MAQ_ONNXRUNTIME_DIR}" PATH_SUFFIXES include include/onnxruntime include/onnxruntime/core/session headers)
+  find_file(MAQ_ONNXRUNTIME_LIBRARY NAMES libonnxruntime.so.1 libonnxruntime.so NO_DEFAULT_PATH
+    HINTS "${MAQ_ONNXRUNTIME_DIR}" PATH_SUFFIXES lib lib64 .)
+  if(NOT MAQ_ONNXRUNTIME_INCLUDE_DIR OR NOT MAQ_ONNXRUNTIME_LIBRARY)
+    message(FATAL_ERROR "MAQ_ONNXRUNTIME_DIR is '${MAQ_ONNXRUNTIME_DIR}', but include/onnxruntime_c_api.h or "
+      "lib/libonnxruntime.so is missing there. Point it at an unpacked ONNX Runtime ${MAQ_ONNXRUNTIME_VERSION} or "
+      "newer, or clear it so that one is fetched.")
+  endif()
+else()
+  if(ANDROID)
+    set(_ort_target android)
+  elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+    set(_ort_target linux-aarch64)
+  else()
+    set(_ort_target linux-x64)
+  endif()
+  set(_ort_root "${MAQ_DEPS_DIR}/onnxruntime-${MAQ_ONNXRUNTIME_VERSION}")
+  _maq_unpack_onnxruntime("${_ort_root}" ${_ort_target})
+  set(MAQ_ONNXRUNTIME_INCLUDE_DIR "${_ort_root}/android/headers")
+  set(_ort_library_of_android "android/jni/${ANDROID_ABI}/libonnxruntime.so")
+  set(_ort_library_of_linux-x64 npm/package/Plugins/Linux/x64/libonnxruntime.so)
+  set(_ort_library_of_linux-aarch64 jar/ai/onnxruntime/native/linux-aarch64/libonnxruntime.so)
+  set(MAQ_ONNXRUNTIME_LIBRARY "${_ort_root}/${_ort_library_of_${_ort_target}}")
+endif()
+
+add_library(maq_onnxruntime_headers INTERFACE)
+target_include_directories(maq_onnxruntime_headers SYSTEM INTERFACE "${MAQ_ONNXRUNTIME_INCLUDE_DIR}")

@@ -1,0 +1,81 @@
+/* Frames: one image with its format, strides and time. They come from a source or wrap memory of the app. */
+#ifndef MAQUETTE_FRAME_H_
+#define MAQUETTE_FRAME_H_
+
+#include "maquette/context.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Images outside these limits are refused with MAQ_ERROR_IMAGE_SIZE, from the file header where the format has one. */
+#define MAQ_MAX_SIDE_PX 16384
+#define MAQ_MAX_PIXELS (64 * 1024 * 1024)
+
+typedef struct maq_frame maq_frame;
+
+/* 8 bits a channel, rows from top to bottom. */
+typedef enum maq_pixel_format {
+  MAQ_PIXEL_RGB8 = 1,  /* one plane, 3 bytes a pixel */
+  MAQ_PIXEL_BGR8 = 2,  /* one plane, 3 bytes a pixel */
+  MAQ_PIXEL_RGBA8 = 3, /* one plane, 4 bytes a pixel; alpha is ignored */
+  MAQ_PIXEL_GREY8 = 4, /* one plane, 1 byte a pixel */
+  MAQ_PIXEL_NV12 = 5,  /* planes Y [h, w] and UV [ceil(h / 2), 2 * ceil(w / 2)] bytes; BT.601, video range */
+  MAQ_PIXEL_YUYV = 6   /* one plane, Y0 U Y1 V for two pixels; rows of 4 * ceil(w / 2) bytes; BT.601, video range */
+} maq_pixel_format;
+
+/* What a timestamp counts from. */
+typedef enum maq_clock {
+  MAQ_CLOCK_MEDIA = 1,    /* presentation time: 0 at the start of the file or of the stub */
+  MAQ_CLOCK_MONOTONIC = 2 /* the system's monotonic clock (CLOCK_MONOTONIC) at the time of capture */
+} maq_clock;
+
+/* Describes a frame: read by maq_frame_create, written by maq_frame_get_desc. */
+typedef struct maq_frame_desc {
+  uint32_t struct_size;
+  maq_pixel_format format;
+  int32_t width_px;
+  int32_t height_px;
+  const uint8_t *planes[2]; /* planes[1] only for NV12 */
+  size_t stride_bytes[2];   /* from one row to the next; 0 in maq_frame_create means rows without padding */
+  int64_t timestamp_ns;
+  maq_clock clock;
+  uint64_t sequence; /* number of the frame in its source, from 0; gaps are frames that were dropped */
+} maq_frame_desc;
+
+/* Called once when the library no longer needs the pixels of a frame made by maq_frame_create. */
+typedef void (*maq_frame_free_callback)(void *user_data);
+
+/* Fills `desc` with zeros, MAQ_CLOCK_MEDIA and struct_size. `struct_size` is sizeof(maq_frame_desc) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_frame_desc_init(maq_frame_desc *desc, uint32_t struct_size);
+
+/* Makes a frame of pixels that the app holds, without a copy.
+ * The pixels stay the app's: they must not change or go away until `free_callback` is called with `user_data`, or,
+ * with a NULL callback, until the frame was released. On failure the callback is not called.
+ * `*frame` is the caller's, to be given to maq_frame_release.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (NULL plane, stride shorter than a row), MAQ_ERROR_IMAGE_SIZE,
+ * MAQ_ERROR_UNSUPPORTED (format). Does not block. */
+MAQ_API maq_status maq_frame_create(maq_context *context, const maq_frame_desc *desc,
+                                    maq_frame_free_callback free_callback, void *user_data, maq_frame **frame);
+
+/* Gives the frame back to its pool or to the app (NULL is fine). Pointers into it are invalid afterwards.
+ * Once for each frame, from any thread. Does not block. */
+MAQ_API void maq_frame_release(maq_frame *frame);
+
+/* Describes the frame; the planes point into it and are valid until it is released. The caller sets desc->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_frame_get_desc(const maq_frame *frame, maq_frame_desc *desc);
+
+/* Writes the frame's pixels to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8), height_px rows of `stride_bytes`
+ * (0: rows without padding); `size_bytes` is what the caller holds there.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory), MAQ_ERROR_UNSUPPORTED (format).
+ * Does not block. */
+MAQ_API maq_status maq_frame_copy_pixels(const maq_frame *frame, maq_pixel_format format, uint8_t *pixels,
+                                         size_t stride_bytes, size_t size_bytes);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* MAQUETTE_FRAME_H_ */

@@ -1,0 +1,135 @@
+#include <algorithm>
+#include <thread>
+
+#include "api/boundary.h"
+
+using namespace maquette;
+
+namespace {
+
+constexpr int kMostThreads = 64;
+// More threads than this do not pay for networks of this size.
+constexpr unsigned kMostDefaultThreads = 4;
+
+maq_densepose_config default_config() {
+  maq_densepose_config config{};
+  config.struct_size = sizeof config;
+  config.score_threshold = -1;
+  config.result_pool_size = 4;
+  return config;
+}
+
+DensePoseSettings checked_settings(const maq_densepose_config& config) {
+  require_argument(config.bundle_path, "config.bundle_path");
+  require_range("config.threads", config.threads, 0, kMostThreads);
+  if (config.long_side_px != 0) require_range("config.long_side_px", config.long_side_px, 32, 2048);
+  if (!(config.score_threshold < 0)) require_range("config.score_threshold", config.score_threshold, 0.0f, 1.0f);
+  if (config.max_people != 0) require_range("config.max_people", config.max_people, 1, 255);
+  require_range("config.result_pool_size", config.result_pool_size, 1u, 64u);
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  return {config.threads > 0 ? config.threads : int(std::min(cores, kMostDefaultThreads)), config.long_side_px,
+          config.score_threshold, config.max_people};
+}
+
+}  // namespace
+
+maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_densepose_config));
+}
+
+maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* given, maq_densepose** densepose) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(given, "config");
+    require_argument(densepose, "densepose");
+    const maq_densepose_config config = read_config(given, "config", default_config(), sizeof(maq_densepose_config));
+    const DensePoseSettings settings = checked_settings(config);
+    const Bundle bundle = read_bundle(config.bundle_path);
+    auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
+    context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
+                                bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");
+    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size);
+    return MAQ_OK;
+  });
+}
+
+void maq_densepose_destroy(maq_densepose* densepose) { delete densepose; }
+
+maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result) {
+  return guarded(densepose, __func__, [&] {
+    require_argument(densepose, "densepose");
+    require_argument(frame, "frame");
+    require_argument(result, "result");
+    const std::shared_ptr<DensePoseResult> pooled = densepose->results.acquire();
+    densepose->densepose->run(frame->frame->image, *pooled);
+    auto handle = std::make_unique<maq_densepose_result>();
+    for (const Person& person : pooled->people) {
+      handle->people.push_back({{person.box.x0, person.box.y0, person.box.x1, person.box.y1}, person.score});
+    }
+    handle->result = pooled;
+    *result = handle.release();
+    return MAQ_OK;
+  });
+}
+
+void maq_densepose_result_release(maq_densepose_result* result) { delete result; }
+
+maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    if (width_px != nullptr) *width_px = result->result->planes.width_px;
+    if (height_px != nullptr) *height_px = result->result->planes.height_px;
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_result_people(const maq_densepose_result* result, const maq_person** people,
+                                       uint32_t* count) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(people, "people");
+    require_argument(count, "count");
+    *people = result->people.data();
+    *count = uint32_t(result->people.size());
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_result_plane(const maq_densepose_result* result, maq_densepose_plane plane,
+                                      const uint8_t** pixels, size_t* stride_bytes) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(pixels, "pixels");
+    require_argument(stride_bytes, "stride_bytes");
+    require_range("plane", int(plane), int(MAQ_PLANE_PART), int(MAQ_PLANE_PERSON));
+    const DensePlanes& planes = result->result->planes;
+    const std::vector<uint8_t>* all[] = {&planes.part, &planes.u, &planes.v, &planes.person};
+    *pixels = all[plane - MAQ_PLANE_PART]->data();
+    *stride_bytes = size_t(planes.width_px);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_densepose_stats* stats) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    const DensePoseStats& from = result->result->stats;
+    maq_densepose_stats filled{};
+    filled.preprocess_ms = from.preprocess_ms;
+    filled.detector_ms = from.detector_ms;
+    filled.proposals_ms = from.proposals_ms;
+    filled.box_head_ms = from.box_head_ms;
+    filled.dense_head_ms = from.dense_head_ms;
+    filled.decode_ms = from.decode_ms;
+    filled.total_ms = from.total_ms;
+    filled.network_width_px = from.network_width_px;
+    filled.network_height_px = from.network_height_px;
+    filled.proposals = from.proposals;
+    filled.people = int32_t(result->people.size());
+    filled.dropped_boxes = from.dropped_boxes;
+    filled.body_pixels = from.decoded.body_pixels;
+    filled.clamped_uv = from.decoded.clamped_uv;
+    write_struct(stats, "stats", filled, sizeof(maq_densepose_stats));
+    return MAQ_OK;
+  });
+}

@@ -1,0 +1,64 @@
+#include "api/boundary.h"
+#include "image/convert.h"
+
+using namespace maquette;
+
+maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size) {
+  maq_frame_desc defaults{};
+  defaults.clock = MAQ_CLOCK_MEDIA;
+  return init_config(__func__, desc, struct_size, defaults, sizeof(maq_frame_desc));
+}
+
+maq_status maq_frame_create(maq_context* context, const maq_frame_desc* given, maq_frame_free_callback free_callback,
+                            void* user_data, maq_frame** frame) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(given, "desc");
+    require_argument(frame, "frame");
+    const maq_frame_desc desc = read_config(given, "desc", maq_frame_desc{}, sizeof(maq_frame_desc));
+    require_range("desc.clock", int(desc.clock), int(MAQ_CLOCK_MEDIA), int(MAQ_CLOCK_MONOTONIC));
+    auto wrapped = std::make_shared<Frame>();
+    wrapped->image = checked_image_view(desc);
+    wrapped->timestamp_ns = desc.timestamp_ns;
+    wrapped->clock = desc.clock;
+    wrapped->sequence = desc.sequence;
+    auto handle = std::make_unique<maq_frame>();
+    handle->frame = std::move(wrapped);
+    handle->free_callback = free_callback;
+    handle->user_data = user_data;
+    *frame = handle.release();
+    return MAQ_OK;
+  });
+}
+
+void maq_frame_release(maq_frame* frame) { delete frame; }
+
+maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
+  return guarded(frame, __func__, [&] {
+    require_argument(frame, "frame");
+    const Frame& from = *frame->frame;
+    maq_frame_desc filled{};
+    filled.format = from.image.format;
+    filled.width_px = from.image.width_px;
+    filled.height_px = from.image.height_px;
+    for (int plane = 0; plane < plane_count(from.image.format); ++plane) {
+      filled.planes[plane] = from.image.planes[plane].data;
+      filled.stride_bytes[plane] = from.image.planes[plane].stride_bytes;
+    }
+    filled.timestamp_ns = from.timestamp_ns;
+    filled.clock = from.clock;
+    filled.sequence = from.sequence;
+    write_struct(desc, "desc", filled, sizeof(maq_frame_desc));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
+                                 size_t stride_bytes, size_t size_bytes) {
+  return guarded(frame, __func__, [&] {
+    require_argument(frame, "frame");
+    require_argument(pixels, "pixels");
+    copy_pixels(frame->frame->image, format, pixels, stride_bytes, size_bytes);
+    return MAQ_OK;
+  });
+}

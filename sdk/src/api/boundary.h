@@ -1,0 +1,86 @@
+// What every function of the C API goes through: argument checks, and exceptions turned into status and text.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <string>
+
+#include "api/handles.h"
+#include "core/error.h"
+
+namespace maquette {
+
+// Keeps the text for maq_last_error: with the handle, or for this thread when there is none.
+maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept;
+
+// Runs `body`, which returns a status or throws. Nothing gets past this.
+template <class Body>
+maq_status guarded(const Handle* handle, const char* function, Body&& body) noexcept {
+  try {
+    return body();
+  } catch (const Error& error) {
+    return keep_error(handle, error.status(), function, error.what());
+  } catch (const std::bad_alloc&) {
+    return keep_error(handle, MAQ_ERROR_OUT_OF_MEMORY, function, "There is not enough memory.");
+  } catch (const std::exception& error) {
+    return keep_error(handle, MAQ_ERROR_INTERNAL, function, error.what());
+  } catch (...) {
+    return keep_error(handle, MAQ_ERROR_INTERNAL, function, "An unknown exception was thrown.");
+  }
+}
+
+template <class T>
+void require_argument(const T* pointer, const char* name) {
+  if (pointer == nullptr) throw Error(MAQ_ERROR_INVALID_ARGUMENT, name, " is NULL.");
+}
+
+template <class T>
+void require_range(const char* name, T value, T least, T most) {
+  if (!(value >= least && value <= most)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, name, " is ", value, ", but must be ", least, " to ", most, ".");
+  }
+}
+
+// Structs grow at their end. `smallest` is the size of the struct's first release: whatever lies between that and this
+// library's size is an older struct; a larger one comes from newer headers and may ask for what this library cannot do.
+inline void require_struct_size(const char* name, uint32_t size, size_t smallest, size_t largest) {
+  if (size < smallest || size > largest) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, name, ".struct_size is ", size, ", but this library knows ", smallest,
+                " to ", largest, " bytes; set it to sizeof the struct, or fill the struct with its _init function.");
+  }
+}
+
+// The caller's config on top of the defaults.
+template <class T>
+T read_config(const T* given, const char* name, const T& defaults, size_t smallest) {
+  T config = defaults;
+  if (given == nullptr) return config;
+  require_struct_size(name, given->struct_size, smallest, sizeof(T));
+  std::memcpy(&config, given, given->struct_size);
+  return config;
+}
+
+// As much of `value` as the caller's struct has room for; its struct_size stays.
+template <class T>
+void write_struct(T* target, const char* name, T value, size_t smallest) {
+  require_argument(target, name);
+  require_struct_size(name, target->struct_size, smallest, sizeof(T));
+  value.struct_size = target->struct_size;
+  std::memcpy(target, &value, target->struct_size);
+}
+
+// For the `_init` functions.
+template <class T>
+maq_status init_config(const char* function, T* config, uint32_t struct_size, const T& defaults, size_t smallest) {
+  return guarded(nullptr, function, [&] {
+    require_argument(config, "config");
+    require_struct_size("config", struct_size, smallest, sizeof(T));
+    T filled = defaults;
+    filled.struct_size = struct_size;
+    std::memcpy(config, &filled, struct_size);
+    return MAQ_OK;
+  });
+}
+
+}  // namespace maquette

@@ -1,0 +1,58 @@
+// A pool of at most `capacity` objects that are made when first needed and reused afterwards, so that memory stays
+// bounded and steady. An acquired object keeps the pool alive; the last owner may be any thread.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "core/error.h"
+
+namespace maquette {
+
+template <class T>
+class BoundedPool {
+ public:
+  // `what` names the pooled thing in the error text: "frames".
+  BoundedPool(size_t capacity, std::string what)
+      : state_(std::make_shared<State>()), capacity_(capacity), what_(std::move(what)) {}
+
+  size_t capacity() const { return capacity_; }
+
+  // Throws MAQ_ERROR_POOL_EMPTY when every object is held. The object comes as its last user left it.
+  std::shared_ptr<T> acquire() {
+    std::unique_ptr<T> object;
+    {
+      std::lock_guard<std::mutex> lock(state_->mutex);
+      if (!state_->idle.empty()) {
+        object = std::move(state_->idle.back());
+        state_->idle.pop_back();
+      } else if (state_->made == capacity_) {
+        throw Error(MAQ_ERROR_POOL_EMPTY, "All ", capacity_, " ", what_,
+                    " of the pool are held; release one, or ask for a larger pool_size.");
+      } else {
+        object = std::make_unique<T>();
+        // Room for every object is kept, so that giving one back never allocates.
+        state_->idle.reserve(capacity_);
+        ++state_->made;
+      }
+    }
+    return std::shared_ptr<T>(object.release(), [state = state_](T* returned) {
+      std::lock_guard<std::mutex> lock(state->mutex);
+      state->idle.emplace_back(returned);
+    });
+  }
+
+ private:
+  struct State {
+    std::mutex mutex;
+    std::vector<std::unique_ptr<T>> idle;
+    size_t made = 0;
+  };
+
+  std::shared_ptr<State> state_;
+  size_t capacity_;
+  std::string what_;
+};
+
+}  // namespace maquette

@@ -1,0 +1,16 @@
+// Reading whole files.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace maquette {
+
+bool file_exists(const std::string& path);  // and is a regular file, not a folder
+bool is_folder(const std::string& path);
+
+// Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE when it cannot be read.
+std::vector<uint8_t> read_file(const std::string& path);
+
+}  // namespace maquette

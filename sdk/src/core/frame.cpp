@@ -1,0 +1,80 @@
+#include "core/frame.h"
+
+#include "core/error.h"
+
+namespace maquette {
+
+uint8_t* Frame::allocate_bgr(int width_px, int height_px) {
+  const size_t stride_bytes = size_t(width_px) * 3;
+  storage.resize(stride_bytes * size_t(height_px));
+  image = ImageView{MAQ_PIXEL_BGR8, width_px, height_px, {{storage.data(), stride_bytes}, {}}};
+  return storage.data();
+}
+
+const char* pixel_format_name(maq_pixel_format format) {
+  switch (format) {
+    case MAQ_PIXEL_RGB8: return "RGB8";
+    case MAQ_PIXEL_BGR8: return "BGR8";
+    case MAQ_PIXEL_RGBA8: return "RGBA8";
+    case MAQ_PIXEL_GREY8: return "GREY8";
+    case MAQ_PIXEL_NV12: return "NV12";
+    case MAQ_PIXEL_YUYV: return "YUYV";
+  }
+  return "unknown";
+}
+
+int plane_count(maq_pixel_format format) { return format == MAQ_PIXEL_NV12 ? 2 : 1; }
+
+size_t row_bytes(maq_pixel_format format, int plane, int width_px) {
+  const size_t width = size_t(width_px);
+  switch (format) {
+    case MAQ_PIXEL_RGB8:
+    case MAQ_PIXEL_BGR8: return width * 3;
+    case MAQ_PIXEL_RGBA8: return width * 4;
+    case MAQ_PIXEL_GREY8: return width;
+    case MAQ_PIXEL_NV12: return plane == 0 ? width : (width + 1) / 2 * 2;
+    case MAQ_PIXEL_YUYV: return (width + 1) / 2 * 4;
+  }
+  return 0;
+}
+
+int plane_rows(maq_pixel_format format, int plane, int height_px) {
+  return format == MAQ_PIXEL_NV12 && plane == 1 ? (height_px + 1) / 2 : height_px;
+}
+
+void check_image_size(int64_t width_px, int64_t height_px, const std::string& what) {
+  if (width_px < 1 || height_px < 1) {
+    throw Error(MAQ_ERROR_IMAGE_SIZE, what, " is ", width_px, " x ", height_px,
+                " pixels; an image needs at least one pixel each way.");
+  }
+  if (width_px > MAQ_MAX_SIDE_PX || height_px > MAQ_MAX_SIDE_PX || width_px * height_px > MAQ_MAX_PIXELS) {
+    throw Error(MAQ_ERROR_IMAGE_SIZE, what, " is ", width_px, " x ", height_px, " pixels, over the limit of ",
+                MAQ_MAX_SIDE_PX, " a side and ", MAQ_MAX_PIXELS / (1024 * 1024),
+                " megapixels; scale it down first.");
+  }
+}
+
+ImageView checked_image_view(const maq_frame_desc& desc) {
+  if (desc.format < MAQ_PIXEL_RGB8 || desc.format > MAQ_PIXEL_YUYV) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(desc.format),
+                " is not known; use one of maq_pixel_format.");
+  }
+  check_image_size(desc.width_px, desc.height_px, "The frame");
+  ImageView view{desc.format, desc.width_px, desc.height_px, {}};
+  for (int plane = 0; plane < plane_count(desc.format); ++plane) {
+    const size_t shortest = row_bytes(desc.format, plane, desc.width_px);
+    const size_t stride = desc.stride_bytes[plane] == 0 ? shortest : desc.stride_bytes[plane];
+    if (desc.planes[plane] == nullptr) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "planes[", plane, "] is NULL, but ", pixel_format_name(desc.format),
+                  " has ", plane_count(desc.format), " plane(s).");
+    }
+    if (stride < shortest) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[", plane, "] is ", stride, ", but a row of ",
+                  desc.width_px, " pixels in ", pixel_format_name(desc.format), " takes ", shortest, " bytes.");
+    }
+    view.planes[plane] = PlaneView{desc.planes[plane], stride};
+  }
+  return view;
+}
+
+}  // namespace maquette

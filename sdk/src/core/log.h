@@ -1,0 +1,30 @@
+// The log hook of a context. The library itself never prints.
+#pragma once
+
+#include <string>
+
+#include "core/error.h"
+#include "maquette/context.h"
+
+namespace maquette {
+
+class Log {
+ public:
+  Log() = default;
+  Log(maq_log_level level, maq_log_callback callback, void* user_data)
+      : level_(level), callback_(callback), user_data_(user_data) {}
+
+  bool wants(maq_log_level level) const { return callback_ != nullptr && level <= level_; }
+
+  template <class... Parts>
+  void write(maq_log_level level, const Parts&... parts) const {
+    if (wants(level)) callback_(user_data_, level, concatenate(parts...).c_str());
+  }
+
+ private:
+  maq_log_level level_ = MAQ_LOG_OFF;
+  maq_log_callback callback_ = nullptr;
+  void* user_data_ = nullptr;
+};
+
+}  // namespace maquette

@@ -1,0 +1,152 @@
+#include "densepose/dense_decode.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace maquette {
+namespace {
+
+constexpr int kMostClasses = 64;
+// Below every logit, yet finite, so that it survives interpolation.
+constexpr float kNever = -1e30f;
+constexpr int kLanes = 8;
+
+int round_up_to_lanes(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
+
+// Where pixel i of `to` lies between two cells of `from`.
+struct Tap {
+  int low = 0;
+  int high = 0;
+  float fraction = 0;  // weight of `high`
+};
+
+std::vector<Tap> resize_taps(int from, int to) {
+  std::vector<Tap> taps(static_cast<size_t>(to));
+  const float scale = float(from) / float(to);
+  for (int i = 0; i < to; ++i) {
+    const float at = std::max(0.0f, (float(i) + 0.5f) * scale - 0.5f);
+    const int low = std::min(int(at), from - 1);
+    taps[size_t(i)] = {low, std::min(low + 1, from - 1), at - float(low)};
+  }
+  return taps;
+}
+
+// One row of the resized logits before its columns are resized, with the classes innermost, so that comparing the
+// classes of a pixel runs over neighbouring memory. Padded with kNever to whole lanes.
+class ClassRow {
+ public:
+  ClassRow(int classes, int size)
+      : classes_(classes), size_(size), padded_(round_up_to_lanes(classes)),
+        values_(size_t(size) * size_t(padded_), kNever) {}
+
+  void fill(const float* logits, const Tap& row) {
+    for (int c = 0; c < classes_; ++c) {
+      const float* plane = logits + size_t(c) * size_t(size_) * size_t(size_);
+      const float* low = plane + size_t(row.low) * size_t(size_);
+      const float* high = plane + size_t(row.high) * size_t(size_);
+      for (int x = 0; x < size_; ++x) {
+        values_[size_t(x) * size_t(padded_) + size_t(c)] = low[x] + (high[x] - low[x]) * row.fraction;
+      }
+    }
+  }
+
+  // The class with the largest resized logit at a pixel; of equal ones the lowest. NaN never wins.
+  int best(const Tap& col) const {
+    alignas(32) std::array<float, kMostClasses> mixed;
+    const float* low = values_.data() + size_t(col.low) * size_t(padded_);
+    const float* high = values_.data() + size_t(col.high) * size_t(padded_);
+    std::array<float, kLanes> lane_best;
+    lane_best.fill(kNever);
+    for (int c = 0; c < padded_; c += kLanes) {
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const float value = low[c + lane] + (high[c + lane] - low[c + lane]) * col.fraction;
+        mixed[size_t(c + lane)] = value;
+        lane_best[size_t(lane)] = value > lane_best[size_t(lane)] ? value : lane_best[size_t(lane)];
+      }
+    }
+    float best = lane_best[0];
+    for (const float value : lane_best) best = value > best ? value : best;
+    for (int c = 0; c < classes_; ++c) {
+      if (mixed[size_t(c)] == best) return c;
+    }
+    return 0;
+  }
+
+ private:
+  int classes_;
+  int size_;
+  int padded_;
+  std::vector<float> values_;
+};
+
+float bilinear(const float* plane, int size, const Tap& row, const Tap& col) {
+  const float* low = plane + size_t(row.low) * size_t(size);
+  const float* high = plane + size_t(row.high) * size_t(size);
+  const float left = low[col.low] + (high[col.low] - low[col.low]) * row.fraction;
+  const float right = low[col.high] + (high[col.high] - low[col.high]) * row.fraction;
+  return left + (right - left) * col.fraction;
+}
+
+// 0 to 255; NaN becomes 0.
+uint8_t to_byte(float value, bool* clamped) {
+  if (!(value >= 0.0f)) {
+    *clamped = true;
+    return 0;
+  }
+  if (value > 1.0f) {
+    *clamped = true;
+    return 255;
+  }
+  return uint8_t(value * 255.0f + 0.5f);
+}
+
+}  // namespace
+
+void DensePlanes::reset(int width, int height) {
+  width_px = width;
+  height_px = height;
+  for (std::vector<uint8_t>* plane : {&part, &u, &v, &person}) plane->assign(size_t(width) * size_t(height), 0);
+}
+
+PixelRect pixel_rect(const Box& box) {
+  return {int(std::floor(box.x0)), int(std::floor(box.y0)), std::max(1, int(box.width())),
+          std::max(1, int(box.height()))};
+}
+
+DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, DensePlanes& planes) {
+  DecodeCounts counts;
+  const PixelRect rect = pixel_rect(box);
+  const std::vector<Tap> rows = resize_taps(logits.size, rect.height);
+  const std::vector<Tap> cols = resize_taps(logits.size, rect.width);
+  ClassRow coarse(logits.coarse_classes, logits.size);
+  ClassRow index(logits.index_classes, logits.size);
+  const size_t plane_size = size_t(logits.size) * size_t(logits.size);
+
+  const int first_row = std::max(0, -rect.y);
+  const int last_row = std::min(rect.height, planes.height_px - rect.y);
+  const int first_col = std::max(0, -rect.x);
+  const int last_col = std::min(rect.width, planes.width_px - rect.x);
+  for (int y = first_row; y < last_row; ++y) {
+    const Tap& row = rows[size_t(y)];
+    coarse.fill(logits.coarse, row);
+    index.fill(logits.index, row);
+    for (int x = first_col; x < last_col; ++x) {
+      const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
+      const Tap& col = cols[size_t(x)];
+      if (planes.person[pixel] != 0 || coarse.best(col) == 0) continue;
+      const int part = index.best(col);
+      if (part == 0) continue;
+      bool clamped = false;
+      planes.part[pixel] = uint8_t(part);
+      planes.u[pixel] = to_byte(bilinear(logits.u + size_t(part) * plane_size, logits.size, row, col), &clamped);
+      planes.v[pixel] = to_byte(bilinear(logits.v + size_t(part) * plane_size, logits.size, row, col), &clamped);
+      planes.person[pixel] = person;
+      ++counts.body_pixels;
+      counts.clamped_uv += clamped ? 1 : 0;
+    }
+  }
+  return counts;
+}
+
+}  // namespace maquette

@@ -1,0 +1,48 @@
+// From the dense head's logits to the planes of a result.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "densepose/box.h"
+
+namespace maquette {
+
+// The dense head's output for one person.
+struct DenseLogits {
+  const float* coarse = nullptr;  // [coarse_classes, size, size]; class 0 is background
+  const float* index = nullptr;   // [index_classes, size, size]; class 0 is background, then the parts
+  const float* u = nullptr;       // [index_classes, size, size]
+  const float* v = nullptr;       // [index_classes, size, size]
+  int coarse_classes = 0;
+  int index_classes = 0;
+  int size = 0;
+};
+
+// One byte a pixel of the image, rows without padding: part, U * 255, V * 255, person.
+struct DensePlanes {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<uint8_t> part, u, v, person;
+
+  void reset(int width, int height);
+};
+
+struct DecodeCounts {
+  int64_t body_pixels = 0;
+  int64_t clamped_uv = 0;
+};
+
+// The pixels a box covers: from the floor of its left top corner, floor(width) x floor(height), at least one each way
+// (the DensePose convention).
+struct PixelRect {
+  int x = 0, y = 0, width = 1, height = 1;
+};
+PixelRect pixel_rect(const Box& box);
+
+// Resizes the logits bilinearly (half-pixel centres) to the box's pixels and takes, where the best coarse class is not
+// background, the best part (of equal ones the lowest) with its U and V, clamped to [0, 1]. Pixels that already belong
+// to somebody, and those outside the image, are left alone. `person` counts from 1.
+DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, DensePlanes& planes);
+
+}  // namespace maquette

@@ -1,0 +1,80 @@
+#include "densepose/proposals.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace maquette {
+namespace {
+
+constexpr std::array<float, 4> kUnitWeights = {1, 1, 1, 1};
+
+struct Candidate {
+  float logit;
+  int32_t index;  // (y * width + x) * anchors + anchor
+};
+
+// The `count` best logits of a level in order; NaN never gets in.
+std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int count, int* dropped) {
+  const int cells = level.width * level.height;
+  std::vector<Candidate> candidates;
+  candidates.reserve(size_t(cells) * size_t(anchors));
+  for (int cell = 0; cell < cells; ++cell) {
+    for (int anchor = 0; anchor < anchors; ++anchor) {
+      const float logit = level.objectness[anchor * cells + cell];
+      if (std::isnan(logit)) {
+        ++*dropped;
+      } else {
+        candidates.push_back({logit, int32_t(cell * anchors + anchor)});
+      }
+    }
+  }
+  const size_t kept = std::min(candidates.size(), size_t(count));
+  std::partial_sort(candidates.begin(), candidates.begin() + std::ptrdiff_t(kept), candidates.end(),
+                    [](const Candidate& a, const Candidate& b) {
+                      return a.logit != b.logit ? a.logit > b.logit : a.index < b.index;
+                    });
+  candidates.resize(kept);
+  return candidates;
+}
+
+}  // namespace
+
+Box anchor_box(int x, int y, int stride, float size_px, float ratio) {
+  const float width = size_px / std::sqrt(ratio);
+  const float height = size_px * std::sqrt(ratio);
+  const float centre_x = float(x * stride);
+  const float centre_y = float(y * stride);
+  return {centre_x - 0.5f * width, centre_y - 0.5f * height, centre_x + 0.5f * width, centre_y + 0.5f * height};
+}
+
+std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width,
+                                        float height, int* dropped) {
+  const int anchors = int(spec.aspect_ratios.size());
+  std::vector<ScoredBox> all;
+  for (size_t l = 0; l < levels.size(); ++l) {
+    const RpnLevel& level = levels[l];
+    const int cells = level.width * level.height;
+    std::vector<ScoredBox> boxes;
+    for (const Candidate& candidate : best_candidates(level, anchors, spec.pre_nms_top_k, dropped)) {
+      const int anchor = candidate.index % anchors;
+      const int cell = candidate.index / anchors;
+      float deltas[4];
+      for (int i = 0; i < 4; ++i) deltas[i] = level.deltas[(4 * anchor + i) * cells + cell];
+      Box box = apply_deltas(anchor_box(cell % level.width, cell / level.width, spec.strides[l],
+                                        spec.anchor_sizes_px[l], spec.aspect_ratios[size_t(anchor)]),
+                             deltas, kUnitWeights);
+      if (clip_box(box, width, height)) {
+        boxes.push_back({box, candidate.logit, int64_t(l) << 32 | candidate.index});
+      } else {
+        ++*dropped;
+      }
+    }
+    const auto kept = non_maximum_suppression(std::move(boxes), spec.nms_iou, size_t(spec.post_nms_top_k));
+    all.insert(all.end(), kept.begin(), kept.end());
+  }
+  std::sort(all.begin(), all.end(), comes_before);
+  if (all.size() > size_t(spec.post_nms_top_k)) all.resize(size_t(spec.post_nms_top_k));
+  return all;
+}
+
+}  // namespace maquette

@@ -1,0 +1,29 @@
+// Proposals of the detector (region proposal network): anchors, their deltas, top-k and NMS.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "densepose/box.h"
+#include "nn/manifest.h"
+
+namespace maquette {
+
+// The detector's output at one level of the pyramid.
+struct RpnLevel {
+  const float* objectness = nullptr;  // logits [anchors, height, width]
+  const float* deltas = nullptr;      // [4 * anchors, height, width]: channel 4 * anchor + (dx, dy, dw, dh)
+  int width = 0;
+  int height = 0;
+};
+
+// The anchor of a cell: centred on (x, y) * stride, of area size^2 and height / width = ratio.
+Box anchor_box(int x, int y, int stride, float size_px, float ratio);
+
+// The best boxes over all levels, best first, clipped to the image (`width` x `height`, pixels of the network's input
+// without padding). Each level keeps its pre_nms_top_k best, then NMS runs within each level; ties go to the lower
+// level, then to the lowest (y, x, anchor). Boxes with NaN or without area are left out and counted in `dropped`.
+std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width,
+                                        float height, int* dropped);
+
+}  // namespace maquette

@@ -1,0 +1,18 @@
+// The size of an encoded image from its first bytes, so that one that is too large is refused before it is decoded.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace maquette {
+
+struct SizePx {
+  int64_t width = 0;
+  int64_t height = 0;
+};
+
+// Knows PNG, JPEG, WebP, BMP and GIF; nothing for other formats and for headers that are cut off.
+std::optional<SizePx> read_image_size(const std::vector<uint8_t>& bytes);
+
+}  // namespace maquette

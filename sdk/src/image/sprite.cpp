@@ -1,0 +1,42 @@
+#include "image/sprite.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+namespace maquette {
+
+BgraImage cut_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
+                     bool mirrored) {
+  const cv::Mat whole(sheet.height_px, sheet.width_px, CV_8UC4, const_cast<uint8_t*>(sheet.pixels.data()));
+  cv::Mat tile = whole(cv::Rect(x, y, width, height)).clone();
+  // Multiplied before scaling: otherwise the colour of transparent pixels bleeds into the edges.
+  for (int row = 0; row < tile.rows; ++row) {
+    for (int col = 0; col < tile.cols; ++col) {
+      auto& pixel = tile.at<cv::Vec4b>(row, col);
+      for (int c = 0; c < 3; ++c) pixel[c] = uint8_t((pixel[c] * pixel[3] + 127) / 255);
+    }
+  }
+  BgraImage sprite{to_width, to_height, std::vector<uint8_t>(size_t(to_width) * size_t(to_height) * 4)};
+  cv::Mat target(to_height, to_width, CV_8UC4, sprite.pixels.data());
+  const bool shrinks = to_width <= width && to_height <= height;
+  cv::resize(tile, target, target.size(), 0, 0, shrinks ? cv::INTER_AREA : cv::INTER_LINEAR);
+  if (mirrored) cv::flip(target, target, 1);
+  return sprite;
+}
+
+void draw_sprite(const BgraImage& sprite, int x, int y, Frame& frame) {
+  const int first_col = std::max(0, -x);
+  const int last_col = std::min(sprite.width_px, frame.image.width_px - x);
+  const int first_row = std::max(0, -y);
+  const int last_row = std::min(sprite.height_px, frame.image.height_px - y);
+  for (int row = first_row; row < last_row; ++row) {
+    const uint8_t* from = sprite.pixels.data() + (size_t(row) * size_t(sprite.width_px) + size_t(first_col)) * 4;
+    uint8_t* to = frame.storage.data() + (size_t(y + row) * size_t(frame.image.width_px) + size_t(x + first_col)) * 3;
+    for (int col = first_col; col < last_col; ++col, from += 4, to += 3) {
+      const int behind = 255 - from[3];
+      for (int c = 0; c < 3; ++c) to[c] = uint8_t(std::min(255, from[c] + (to[c] * behind + 127) / 255));
+    }
+  }
+}
+
+}  // namespace maquette

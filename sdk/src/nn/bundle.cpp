@@ -1,0 +1,42 @@
+#include "nn/bundle.h"
+
+#include "core/error.h"
+#include "core/file.h"
+#include "nn/sha256.h"
+
+namespace maquette {
+
+Bundle read_bundle(const std::string& folder) {
+  if (!is_folder(folder)) {
+    throw Error(MAQ_ERROR_NOT_FOUND, "Model bundle ", folder,
+                " is not a folder; give the folder that holds manifest.json and the .onnx files.");
+  }
+  const std::string manifest_path = folder + "/manifest.json";
+  if (!file_exists(manifest_path)) {
+    throw Error(MAQ_ERROR_NOT_FOUND, folder, " has no manifest.json, so it is not a model bundle; check the path.");
+  }
+  const std::vector<uint8_t> text = read_file(manifest_path);
+
+  Bundle bundle;
+  bundle.folder = folder;
+  bundle.manifest = parse_manifest(std::string(text.begin(), text.end()), manifest_path);
+  for (const auto& [name, spec] : bundle.manifest.files) {
+    const std::string path = folder + "/" + name;
+    if (!file_exists(path)) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, path, " is missing, but the manifest lists it. Fetch or export the bundle again.");
+    }
+    std::vector<uint8_t> bytes = read_file(path);
+    if (int64_t(bytes.size()) != spec.bytes) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has ", bytes.size(), " bytes, but the manifest says ", spec.bytes,
+                  ": it is incomplete or was changed. Fetch or export the bundle again.");
+    }
+    if (const std::string digest = sha256_hex(bytes.data(), bytes.size()); digest != spec.sha256) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has SHA-256 ", digest.substr(0, 12), "…, but the manifest says ",
+                  spec.sha256.substr(0, 12), "…: it is damaged or was changed. Fetch or export the bundle again.");
+    }
+    bundle.files[name] = std::move(bytes);
+  }
+  return bundle;
+}
+
+}  // namespace maquette

@@ -1,0 +1,85 @@
+// The manifest of a model bundle (docs/formats.md), read and checked.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace maquette {
+
+// A size of a tensor: a number, or a name or formula ("height/4") for one that depends on the input.
+using Dimension = std::variant<int64_t, std::string>;
+
+struct TensorSpec {
+  std::string name;
+  std::string type;  // "float32"
+  std::vector<Dimension> shape;
+};
+
+struct GraphSpec {
+  std::string file;
+  std::vector<TensorSpec> inputs;
+  std::vector<TensorSpec> outputs;
+};
+
+struct FileSpec {
+  std::string sha256;
+  int64_t bytes = 0;
+};
+
+struct InputSpec {
+  std::array<float, 3> mean{};  // of R, G, B, in 0..255
+  std::array<float, 3> std{};
+  int multiple_of = 32;
+  int long_side_px = 0;
+};
+
+struct RpnSpec {
+  std::vector<int> strides;
+  std::vector<float> anchor_sizes_px;
+  std::vector<float> aspect_ratios;  // height / width
+  int pre_nms_top_k = 0;             // per level
+  int post_nms_top_k = 0;            // over all levels
+  float nms_iou = 0;
+};
+
+struct BoxHeadSpec {
+  int pool = 0;
+  std::vector<int> strides;
+  int canonical_level = 0;
+  float canonical_size_px = 0;
+  std::array<float, 4> delta_weights{};
+  float score_threshold = 0;
+  float nms_iou = 0;
+  int max_people = 0;
+};
+
+struct DenseHeadSpec {
+  int pool = 0;
+  int stride = 0;
+  int output = 0;
+  int coarse_classes = 0;
+  int index_classes = 0;
+};
+
+struct Manifest {
+  std::string name;
+  std::string version;
+  std::string precision;
+  std::map<std::string, FileSpec> files;
+  std::map<std::string, GraphSpec> graphs;
+  InputSpec input;
+  RpnSpec rpn;
+  BoxHeadSpec box_head;
+  DenseHeadSpec dense_head;
+};
+
+// Reads the text of a dense pose manifest. `origin` names it in errors.
+// Throws MAQ_ERROR_BAD_BUNDLE for what is missing, of the wrong type or out of range, and MAQ_ERROR_UNSUPPORTED for
+// a format version or a task that this library does not know.
+Manifest parse_manifest(const std::string& text, const std::string& origin);
+
+}  // namespace maquette

@@ -1,0 +1,94 @@
+#include "nn/onnxruntime_library.h"
+
+#include <dlfcn.h>
+
+#include <cstdlib>
+#include <vector>
+
+#include "core/error.h"
+
+namespace maquette {
+namespace {
+
+constexpr char kFileName[] = "libonnxruntime.so.1";
+constexpr char kRemedy[] =
+    " Set MAQ_ONNXRUNTIME_LIB to the file, or put libonnxruntime.so.1 in the folder of libmaquette.so.";
+
+// The folder of the shared library (or program) that this function was linked into, with a final '/'.
+std::string own_folder() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<const void*>(&own_folder), &info) == 0 || info.dli_fname == nullptr) return "";
+  const std::string file = info.dli_fname;
+  const size_t slash = file.rfind('/');
+  return slash == std::string::npos ? "./" : file.substr(0, slash + 1);
+}
+
+void* open_privately(const std::string& path) { return dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL); }
+
+// Either the one file that was named, which must open, or the first of the usual places that does.
+void* open_library(const std::string& explicit_path, std::string* opened_path) {
+  const char* from_environment = std::getenv("MAQ_ONNXRUNTIME_LIB");
+  std::string named = explicit_path;
+  if (named.empty() && from_environment != nullptr) named = from_environment;
+  if (!named.empty()) {
+    void* library = open_privately(named);
+    if (library == nullptr) {
+      throw Error(MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime cannot be opened: ", dlerror(), ".",
+                  explicit_path.empty() ? " The file was named by MAQ_ONNXRUNTIME_LIB; correct or unset it."
+                                        : " The file was named by onnxruntime_library of the context's config.");
+    }
+    *opened_path = named;
+    return library;
+  }
+  const std::string folder = own_folder();
+  for (const std::string& path : {folder + "maquette/" + kFileName, folder + kFileName, std::string(kFileName)}) {
+    if (void* library = open_privately(path)) {
+      *opened_path = path;
+      return library;
+    }
+  }
+  throw Error(MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime (", kFileName, ") was not found in ", folder, "maquette, in ",
+              folder, " or on the system's search path.", kRemedy);
+}
+
+// ONNX Runtime has one environment for a process, whose logger is that of whoever came first and may be gone by the
+// time it is called; sessions have loggers of their own (session.cpp), so this one only keeps it from printing.
+void ORT_API_CALL discard_log(void*, OrtLoggingLevel, const char*, const char*, const char*, const char*) {}
+
+}  // namespace
+
+OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const Log& log) : log_(log) {
+  // Releases after 1.26 carry telemetry that starts when the library is loaded; this keeps it off. It does not
+  // overwrite a choice that the process already made.
+  setenv("ORT_DISABLE_TELEMETRY", "1", 0);
+
+  // Never closed again: the library's threads and thread-local storage do not survive unloading.
+  void* library = open_library(explicit_path, &path_);
+  const auto get_api_base = reinterpret_cast<const OrtApiBase* (*)()>(dlsym(library, "OrtGetApiBase"));
+  if (get_api_base == nullptr) {
+    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is not ONNX Runtime: it has no OrtGetApiBase.", kRemedy);
+  }
+  const OrtApiBase* base = get_api_base();
+  version_ = base->GetVersionString();
+  api_ = base->GetApi(ORT_API_VERSION);
+  if (api_ == nullptr) {
+    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is ONNX Runtime ", version_, ", but 1.", ORT_API_VERSION,
+                ".0 or newer is needed.", kRemedy);
+  }
+  check(api_->CreateEnvWithCustomLogger(discard_log, nullptr, ORT_LOGGING_LEVEL_WARNING, "maquette", &env_),
+        MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime does not start");
+  log_.write(MAQ_LOG_INFO, "ONNX Runtime ", version_, " opened from ", path_);
+}
+
+OnnxRuntimeLibrary::~OnnxRuntimeLibrary() {
+  if (env_ != nullptr) api_->ReleaseEnv(env_);
+}
+
+void OnnxRuntimeLibrary::check(OrtStatus* result, maq_status status, const std::string& what) const {
+  if (result == nullptr) return;
+  const std::string text = api_->GetErrorMessage(result);
+  api_->ReleaseStatus(result);
+  throw Error(status, what, ": ", text);
+}
+
+}  // namespace maquette

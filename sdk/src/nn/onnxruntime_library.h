@@ -1,0 +1,39 @@
+// ONNX Runtime, opened privately at run time so that an app with its own copy does not clash.
+#pragma once
+
+#include <onnxruntime_c_api.h>
+
+#include <memory>
+#include <string>
+
+#include "core/log.h"
+
+namespace maquette {
+
+class OnnxRuntimeLibrary {
+ public:
+  // Opens `explicit_path`, or searches as maq_context_create documents when it is empty.
+  // Throws MAQ_ERROR_RUNTIME_LIBRARY.
+  OnnxRuntimeLibrary(const std::string& explicit_path, const Log& log);
+  ~OnnxRuntimeLibrary();
+  OnnxRuntimeLibrary(const OnnxRuntimeLibrary&) = delete;
+  OnnxRuntimeLibrary& operator=(const OnnxRuntimeLibrary&) = delete;
+
+  const OrtApi& api() const { return *api_; }
+  OrtEnv* env() const { return env_; }
+  const Log& log() const { return log_; }
+  const std::string& version() const { return version_; }
+  const std::string& path() const { return path_; }
+
+  // Throws `status` with "<what>: <ONNX Runtime's text>" when `result` is an error, and frees it.
+  void check(OrtStatus* result, maq_status status, const std::string& what) const;
+
+ private:
+  Log log_;
+  const OrtApi* api_ = nullptr;
+  OrtEnv* env_ = nullptr;
+  std::string version_;
+  std::string path_;
+};
+
+}  // namespace maquette

@@ -1,0 +1,195 @@
+#include "nn/session.h"
+
+#include <memory>
+
+#include "core/error.h"
+
+namespace maquette {
+namespace {
+
+void ORT_API_CALL forward_to_log(void* log, OrtLoggingLevel severity, const char*, const char*, const char*,
+                                 const char* message) {
+  const maq_log_level level = severity >= ORT_LOGGING_LEVEL_ERROR ? MAQ_LOG_ERROR : MAQ_LOG_WARNING;
+  static_cast<const Log*>(log)->write(level, "ONNX Runtime: ", message);
+}
+
+std::string to_text(const std::vector<int64_t>& shape) {
+  std::string text = "[";
+  for (const int64_t size : shape) text += (text.size() > 1 ? ", " : "") + (size < 0 ? "?" : std::to_string(size));
+  return text + "]";
+}
+
+std::string to_text(const std::vector<Dimension>& shape) {
+  std::string text = "[";
+  for (const Dimension& size : shape) {
+    text += text.size() > 1 ? ", " : "";
+    text += std::holds_alternative<int64_t>(size) ? std::to_string(std::get<int64_t>(size)) : std::get<std::string>(size);
+  }
+  return text + "]";
+}
+
+// A named or unknown size fits every number.
+bool fits(const std::vector<int64_t>& actual, const std::vector<Dimension>& expected) {
+  if (actual.size() != expected.size()) return false;
+  for (size_t i = 0; i < actual.size(); ++i) {
+    const int64_t* fixed = std::get_if<int64_t>(&expected[i]);
+    if (fixed != nullptr && actual[i] >= 0 && actual[i] != *fixed) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+int64_t TensorView::size() const {
+  int64_t size = 1;
+  for (const int64_t extent : shape) size *= extent;
+  return size;
+}
+
+NetworkOutputs::NetworkOutputs(std::shared_ptr<const OnnxRuntimeLibrary> runtime, std::vector<OrtValue*> values)
+    : runtime_(std::move(runtime)), values_(std::move(values)) {
+  const OrtApi& api = runtime_->api();
+  for (OrtValue* value : values_) {
+    TensorView view;
+    OrtTensorTypeAndShapeInfo* info = nullptr;
+    runtime_->check(api.GetTensorTypeAndShape(value, &info), MAQ_ERROR_INFERENCE, "Output without a shape");
+    size_t rank = 0;
+    OrtStatus* failed = api.GetDimensionsCount(info, &rank);
+    view.shape.resize(rank);
+    if (failed == nullptr) failed = api.GetDimensions(info, view.shape.data(), rank);
+    api.ReleaseTensorTypeAndShapeInfo(info);
+    runtime_->check(failed, MAQ_ERROR_INFERENCE, "Output without a shape");
+    void* data = nullptr;
+    runtime_->check(api.GetTensorMutableData(value, &data), MAQ_ERROR_INFERENCE, "Output without data");
+    view.data = static_cast<const float*>(data);
+    views_.push_back(std::move(view));
+  }
+}
+
+NetworkOutputs::~NetworkOutputs() {
+  for (OrtValue* value : values_) runtime_->api().ReleaseValue(value);
+}
+
+Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
+                 std::string name, int threads)
+    : runtime_(std::move(runtime)), spec_(std::move(spec)), name_(std::move(name)) {
+  const OrtApi& api = runtime_->api();
+  const auto check = [&](OrtStatus* result) {
+    runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be loaded"));
+  };
+  OrtSessionOptions* made = nullptr;
+  check(api.CreateSessionOptions(&made));
+  const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made, api.ReleaseSessionOptions);
+  check(api.SetUserLoggingFunction(options.get(), forward_to_log, const_cast<Log*>(&runtime_->log())));
+  check(api.SetIntraOpNumThreads(options.get(), threads));
+  check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));
+  // The networks run one after another: the threads of one must not keep spinning while the next one works.
+  check(api.AddSessionConfigEntry(options.get(), "session.force_spinning_stop", "1"));
+  check(api.CreateSessionFromArray(runtime_->env(), bytes.data(), bytes.size(), options.get(), &session_));
+  try {
+    check(api.CreateCpuMemoryInfo(OrtDeviceAllocator, OrtMemTypeDefault, &cpu_memory_));
+    compare_with_spec();
+  } catch (...) {
+    api.ReleaseMemoryInfo(cpu_memory_);
+    api.ReleaseSession(session_);
+    throw;
+  }
+}
+
+Session::~Session() {
+  runtime_->api().ReleaseMemoryInfo(cpu_memory_);
+  runtime_->api().ReleaseSession(session_);
+}
+
+void Session::compare_with_spec() const {
+  const OrtApi& api = runtime_->api();
+  const auto check = [&](OrtStatus* result) {
+    runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be inspected"));
+  };
+  OrtAllocator* allocator = nullptr;
+  check(api.GetAllocatorWithDefaultOptions(&allocator));
+
+  const auto compare = [&](const char* kind, const std::vector<TensorSpec>& expected, auto count_of, auto name_of,
+                           auto type_of) {
+    size_t count = 0;
+    check(count_of(session_, &count));
+    for (const TensorSpec& tensor : expected) {
+      bool found = false;
+      for (size_t i = 0; i < count && !found; ++i) {
+        char* actual_name = nullptr;
+        check(name_of(session_, i, allocator, &actual_name));
+        found = tensor.name == actual_name;
+        check(api.AllocatorFree(allocator, actual_name));
+        if (!found) continue;
+
+        OrtTypeInfo* type = nullptr;
+        check(type_of(session_, i, &type));
+        const std::unique_ptr<OrtTypeInfo, decltype(api.ReleaseTypeInfo)> owner(type, api.ReleaseTypeInfo);
+        const OrtTensorTypeAndShapeInfo* info = nullptr;
+        check(api.CastTypeInfoToTensorInfo(type, &info));
+        ONNXTensorElementDataType element = ONNX_TENSOR_ELEMENT_DATA_TYPE_UNDEFINED;
+        std::vector<int64_t> shape;
+        if (info != nullptr) {
+          size_t rank = 0;
+          check(api.GetTensorElementType(info, &element));
+          check(api.GetDimensionsCount(info, &rank));
+          shape.resize(rank);
+          check(api.GetDimensions(info, shape.data(), rank));
+        }
+        if (tensor.type != "float32" || element != ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT) {
+          throw Error(MAQ_ERROR_BAD_BUNDLE, name_, ": ", kind, " ", tensor.name,
+                      " must be float32 in the manifest and in the graph. Export the bundle again.");
+        }
+        if (!fits(shape, tensor.shape)) {
+          throw Error(MAQ_ERROR_BAD_BUNDLE, name_, ": ", kind, " ", tensor.name, " has shape ", to_text(shape),
+                      " in the graph, but ", to_text(tensor.shape), " in the manifest. Export the bundle again.");
+        }
+      }
+      if (!found) {
+        throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has no ", kind, " ", tensor.name,
+                    ", but the manifest lists it. Export the bundle again.");
+      }
+    }
+    return count;
+  };
+  const size_t inputs = compare("input", spec_.inputs, api.SessionGetInputCount, api.SessionGetInputName,
+                                api.SessionGetInputTypeInfo);
+  compare("output", spec_.outputs, api.SessionGetOutputCount, api.SessionGetOutputName, api.SessionGetOutputTypeInfo);
+  if (inputs != 1 || spec_.inputs.size() != 1) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has ", inputs, " inputs, but must have one. Export the bundle again.");
+  }
+}
+
+NetworkOutputs Session::run(const float* input, const std::vector<int64_t>& input_shape,
+                            const std::vector<std::vector<int64_t>>& shape_of_outputs) const {
+  const OrtApi& api = runtime_->api();
+  const auto check = [&](OrtStatus* result) {
+    runtime_->check(result, MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
+  };
+  int64_t size = 1;
+  for (const int64_t extent : input_shape) size *= extent;
+  OrtValue* made = nullptr;
+  // ONNX Runtime takes a mutable pointer but does not write to an input.
+  check(api.CreateTensorWithDataAsOrtValue(cpu_memory_, const_cast<float*>(input), size_t(size) * sizeof(float),
+                                           input_shape.data(), input_shape.size(), ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT,
+                                           &made));
+  const std::unique_ptr<OrtValue, decltype(api.ReleaseValue)> tensor(made, api.ReleaseValue);
+  const OrtValue* inputs[] = {tensor.get()};
+  const char* input_names[] = {spec_.inputs[0].name.c_str()};
+  std::vector<const char*> output_names;
+  for (const TensorSpec& output : spec_.outputs) output_names.push_back(output.name.c_str());
+  std::vector<OrtValue*> values(output_names.size(), nullptr);
+  check(api.Run(session_, nullptr, input_names, inputs, 1, output_names.data(), output_names.size(), values.data()));
+
+  NetworkOutputs outputs(runtime_, std::move(values));
+  for (size_t i = 0; i < shape_of_outputs.size(); ++i) {
+    if (outputs[i].shape != shape_of_outputs[i]) {
+      throw Error(MAQ_ERROR_INFERENCE, name_, ": output ", spec_.outputs[i].name, " came with shape ",
+                  to_text(outputs[i].shape), ", but ", to_text(shape_of_outputs[i]),
+                  " was expected. Export the bundle again.");
+    }
+  }
+  return outputs;
+}
+
+}  // namespace maquette

@@ -1,0 +1,18 @@
+// Sources that read image and video files.
+#pragma once
+
+#include <memory>
+
+#include "sources/source.h"
+#include "sources/uri.h"
+
+namespace maquette {
+
+// One frame, the image. Throws what read_image_file throws.
+std::unique_ptr<Source> open_image_source(SourceUri uri);
+
+// The frames of a clip at their presentation times. Throws MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE,
+// MAQ_ERROR_IMAGE_SIZE; next() throws MAQ_ERROR_UNREADABLE when the clip ends before its header says.
+std::unique_ptr<Source> open_video_source(SourceUri uri);
+
+}  // namespace maquette

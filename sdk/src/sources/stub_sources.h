@@ -1,0 +1,15 @@
+// Sources that draw their own frames, so that everything can be tried without a camera or a file. Frame k is a
+// function of the URI and k alone.
+#pragma once
+
+#include <memory>
+
+#include "sources/source.h"
+#include "sources/uri.h"
+
+namespace maquette {
+
+// stub:people (rendered people who walk through the picture) and stub:pattern (moving colour bars).
+std::unique_ptr<Source> open_stub_source(SourceUri uri);
+
+}  // namespace maquette

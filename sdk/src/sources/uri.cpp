@@ -1,0 +1,144 @@
+#include "sources/uri.h"
+
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <locale>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/frame.h"
+
+namespace maquette {
+namespace {
+
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+// A '%' that no two hexadecimal digits follow stands for itself, so that most file names need no escapes.
+std::string percent_decoded(const std::string& text) {
+  std::string decoded;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 && hex_digit(text[i + 2]) >= 0) {
+      decoded += char(hex_digit(text[i + 1]) * 16 + hex_digit(text[i + 2]));
+      i += 2;
+    } else {
+      decoded += text[i];
+    }
+  }
+  return decoded;
+}
+
+std::optional<int64_t> as_integer(const std::string& text) {
+  int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return {};
+  return value;
+}
+
+// Independent of the process's locale, which may want a comma.
+std::optional<double> as_number(const std::string& text) {
+  std::istringstream in(text);
+  in.imbue(std::locale::classic());
+  double value = 0;
+  if (text.empty() || !(in >> value) || !in.eof() || !std::isfinite(value)) return {};
+  return value;
+}
+
+void read_options(const std::string& query, SourceUri& uri) {
+  size_t begin = 0;
+  while (begin <= query.size()) {
+    const size_t end = std::min(query.find('&', begin), query.size());
+    const std::string pair = query.substr(begin, end - begin);
+    const size_t equals = pair.find('=');
+    if (equals == 0 || equals == std::string::npos) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Option \"", pair, "\" of ", uri.text, " is not key=value.");
+    }
+    const std::string key = percent_decoded(pair.substr(0, equals));
+    if (!uri.options.emplace(key, percent_decoded(pair.substr(equals + 1))).second) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Option ", key, " is given twice in ", uri.text, ".");
+    }
+    begin = end + 1;
+  }
+}
+
+void take_size(SourceUri& uri) {
+  const auto found = uri.options.find("size");
+  if (found == uri.options.end()) return;
+  const std::string value = found->second;
+  const size_t cross = value.find('x');
+  const auto width = as_integer(value.substr(0, cross));
+  const auto height = cross == std::string::npos ? std::nullopt : as_integer(value.substr(cross + 1));
+  if (!width || !height) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "size=", value, " in ", uri.text, " is not a size; write size=640x480.");
+  }
+  check_image_size(*width, *height, "The size asked for in " + uri.text);
+  uri.width_px = int(*width);
+  uri.height_px = int(*height);
+  uri.options.erase(found);
+}
+
+}  // namespace
+
+std::optional<std::string> SourceUri::take(const std::string& key) {
+  const auto found = options.find(key);
+  if (found == options.end()) return {};
+  std::string value = std::move(found->second);
+  options.erase(found);
+  return value;
+}
+
+int64_t SourceUri::take_integer(const std::string& key, int64_t otherwise, int64_t least, int64_t most) {
+  const auto value = take(key);
+  if (!value) return otherwise;
+  const auto number = as_integer(*value);
+  if (!number || *number < least || *number > most) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a whole number from ", least,
+                " to ", most, ".");
+  }
+  return *number;
+}
+
+double SourceUri::take_number(const std::string& key, double otherwise, double least, double most) {
+  const auto value = take(key);
+  if (!value) return otherwise;
+  const auto number = as_number(*value);
+  if (!number || *number < least || *number > most) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a number from ", least, " to ",
+                most, ".");
+  }
+  return *number;
+}
+
+void SourceUri::expect_no_more_options(const std::string& known) const {
+  if (options.empty()) return;
+  throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Option ", options.begin()->first, " in ", text, " is not known; ", scheme,
+              ": has ", known, ".");
+}
+
+SourceUri parse_source_uri(const std::string& text) {
+  SourceUri uri;
+  uri.text = text;
+  const size_t colon = text.find(':');
+  bool well_formed = colon != std::string::npos && colon > 0;
+  for (size_t i = 0; well_formed && i < colon; ++i) {
+    well_formed = std::isalnum(static_cast<unsigned char>(text[i])) != 0;
+  }
+  if (!well_formed) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text,
+                "\" is not a source; write scheme:target, as in image:photo.jpg or stub:people.");
+  }
+  uri.scheme = text.substr(0, colon);
+  const size_t question = text.find('?', colon);
+  uri.target = percent_decoded(text.substr(colon + 1, question == std::string::npos ? question : question - colon - 1));
+  if (question != std::string::npos) read_options(text.substr(question + 1), uri);
+  take_size(uri);
+  uri.fps = uri.take_number("fps", 0, 0.01, 1000);
+  return uri;
+}
+
+}  // namespace maquette

@@ -1,0 +1,92 @@
+"""Measures dense pose on labelled images: trained networks, exported ones and the SDK in one table."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from export.evaluation import report
+from export.evaluation.backends import fingerprint, open_backend
+from export.evaluation.maquette_api import MaquetteError
+from export.evaluation.measure import Figures, measure
+from export.evaluation.shards import ShardError, count_images, read_images, shard_paths
+
+EPILOG = """\
+backends, each `kind` or `kind=path`, separated by commas:
+  torch   a checkpoint of export.densepose     onnx   a bundle, run by ONNX Runtime in Python
+  capi    a bundle, run by libmaquette through its C API (build the SDK first: make build)
+
+examples:
+  python -m export.evaluation --limit 100
+  python -m export.evaluation --data .data/people/val --backends torch=.data/training/b/last.pt
+  python -m export.evaluation --backends onnx,capi=sdk/models/densepose-b-fp32,capi
+
+figures:
+  box AP            COCO average precision of the boxes, at IoU .50 and averaged over .50:.05:.95
+  GPS AP            the same with geodesic point similarity on the body surface (kappa 0.255 m,
+                    196 pixels a person)
+  part accuracy     share of all people's visible pixels painted with the right one of 24 parts;
+                    missed people count
+  mask IoU          person pixels, all images together
+  median |dU| |dV|  where the part is right
+  surface error     median geodesic distance of the painted point from the true one
+"""
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m export.evaluation", description=__doc__, epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument(
+        "--data", type=Path, default=Path(".data/people/test"), metavar="DIR",
+        help="folder of shards with surface points (default: .data/people/test)",
+    )  # fmt: skip
+    parser.add_argument("--backends", default="torch,onnx,capi", help="default: torch,onnx,capi")
+    parser.add_argument("--limit", type=int, metavar="N", help="only the first N images")
+    parser.add_argument(
+        "--score-floor", type=float, default=0.05, metavar="S",
+        help="lowest score that enters AP (default 0.05)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, default=Path("build/evaluation"), metavar="DIR",
+        help="for evaluation.json and evaluation.png (default: build/evaluation)",
+    )  # fmt: skip
+    arguments = parser.parse_args(argv)
+    try:
+        return run(arguments)
+    except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
+        print(f"Evaluation stopped: {error}", file=sys.stderr)
+        return 1
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from export.people.atlas import load_surface_table
+
+    paths = shard_paths(arguments.data)
+    total = count_images(paths)
+    total = total if arguments.limit is None else min(total, arguments.limit)
+    backends = [open_backend(text, arguments.score_floor) for text in arguments.backends.split(",")]
+    table = load_surface_table()
+    results: dict[str, Figures] = {}
+    sources: dict[str, str] = {}
+    for backend in backends:
+        name = report.column_name(backend.kind, backend.precision)
+        if name in results:
+            name = f"{name} ({backend.path.name})"
+        images = read_images(paths, arguments.limit)
+        results[name] = measure(backend, images, table, total)
+        sources[name] = f"{backend.path} {fingerprint(backend.path)}"
+    report.print_table(results)
+    if len(results) > 1:
+        print(f"Largest difference between columns: {report.largest_difference(results):.2f} points")
+    data = {"folder": str(arguments.data), "shards": len(paths), "images": total, "limit": arguments.limit}
+    report.write_json(arguments.out / "evaluation.json", results, sources, data)
+    report.write_picture(arguments.out / "evaluation.png", results)
+    print(f"Written: {arguments.out / 'evaluation.json'}, {arguments.out / 'evaluation.png'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

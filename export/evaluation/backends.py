@@ -1,0 +1,141 @@
+"""Everything that can find people in an image, behind one call, so that the same figures are made for all.
+
+A backend is written `kind` or `kind=path`:
+
+    torch=CHECKPOINT   the networks as they were trained
+    onnx=BUNDLE        the exported graphs, run by ONNX Runtime with the Python reference of decoding
+    capi=BUNDLE        what an app gets: libmaquette through its C API
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+DEFAULT_PATHS = {
+    "torch": Path(".data/training/b/last.pt"),
+    "onnx": Path("sdk/models/densepose-b-fp32"),
+    "capi": Path("sdk/models/densepose-b-int8"),
+}
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """box: float32 [n, 4] x0, y0, x1, y1; score: float32 [n], best first. iuv: uint8 [H, W, 3] holding I,
+    U*255, V*255, all people in one picture, better scores in front. inds: uint8 [H, W], k for box k - 1, 0
+    for nobody.
+    """
+
+    box: np.ndarray
+    score: np.ndarray
+    iuv: np.ndarray
+    inds: np.ndarray
+
+    def above(self, threshold: float) -> Prediction:
+        """The people with at least this score. As better scores are in front, this is what a run with the
+        threshold would have given."""
+        count = int((self.score >= threshold).sum())
+        shown = self.inds <= count
+        return Prediction(
+            self.box[:count],
+            self.score[:count],
+            self.iuv * shown[..., None].astype(np.uint8),
+            self.inds * shown.astype(np.uint8),
+        )
+
+
+class Backend(Protocol):
+    """kind, path: as asked for. precision: `fp32` or `int8`. threshold: score from which people are shown."""
+
+    kind: str
+    path: Path
+    precision: str
+    threshold: float
+
+    def predict(self, image: np.ndarray) -> Prediction:
+        """image: uint8 [H, W, 3] RGB."""
+
+
+class TorchBackend:
+    """The trained networks from a checkpoint of `export.densepose`."""
+
+    kind, precision = "torch", "fp32"
+
+    def __init__(self, path: Path, score_floor: float) -> None:
+        from export.densepose import decode  # here, so that the other backends do without torch
+
+        self.path = path
+        self._network = decode.torch_network(path, score_threshold=score_floor)
+        self.threshold = self._network.score_threshold
+
+    def predict(self, image: np.ndarray) -> Prediction:
+        raise NotImplementedError
+
+
+class OnnxBackend:
+    """The graphs of a bundle, run by ONNX Runtime, with the decoding of `export.densepose.decode`."""
+
+    kind = "onnx"
+
+    def __init__(self, path: Path, score_floor: float) -> None:
+        manifest = read_manifest(path)
+        self.path = path
+        self.precision = manifest["precision"]
+        self.threshold = manifest["box_head"]["score_threshold"]
+
+    def predict(self, image: np.ndarray) -> Prediction:
+        raise NotImplementedError
+
+
+class CApiBackend:
+    """libmaquette with a bundle."""
+
+    kind = "capi"
+
+    def __init__(self, path: Path, score_floor: float) -> None:
+        from export.evaluation.maquette_api import DensePose
+
+        manifest = read_manifest(path)
+        self.path = path
+        self.precision = manifest["precision"]
+        self.threshold = manifest["box_head"]["score_threshold"]
+        self._densepose = DensePose(path, score_threshold=score_floor)
+
+    def predict(self, image: np.ndarray) -> Prediction:
+        result = self._densepose.run(image)
+        return Prediction(result.box, result.score, result.planes[..., :3], result.planes[..., 3])
+
+
+def read_manifest(bundle: Path) -> dict:
+    path = bundle / "manifest.json"
+    if not path.exists():
+        raise FileNotFoundError(f"{bundle} is not a model bundle: it has no manifest.json.")
+    return json.loads(path.read_text())
+
+
+def open_backend(text: str, score_floor: float) -> Backend:
+    """text: `kind` or `kind=path`. score_floor: people with lower scores are not asked for."""
+    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+    kind, _, path = text.partition("=")
+    kinds = {"torch": TorchBackend, "onnx": OnnxBackend, "capi": CApiBackend}
+    if kind not in kinds:
+        raise ValueError(
+            f"unknown backend {kind!r}: write torch, onnx or capi, or e.g. capi={DEFAULT_PATHS['capi']}"
+        )
+    chosen = Path(path) if path else DEFAULT_PATHS[kind]
+    if not chosen.exists():
+        raise FileNotFoundError(f"{kind}: {chosen} is not there. Name another with {kind}=PATH.")
+    return kinds[kind](chosen, score_floor)
+
+
+def fingerprint(path: Path) -> str:
+    """First 12 digits of the SHA-256 of a file, or of a bundle's manifest (which holds the others')."""
+    file = path / "manifest.json" if path.is_dir() else path
+    with open(file, "rb") as data:
+        return hashlib.file_digest(data, "sha256").hexdigest()[:12]

@@ -1,0 +1,219 @@
+"""The C API of the SDK through ctypes: dense pose as an app gets it (sdk/include/maquette)."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from ctypes import POINTER, byref, c_char_p, c_float, c_int32, c_int64, c_size_t, c_uint8, c_uint32, c_uint64
+from ctypes import c_void_p as Handle
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+HEADER_VERSION = 100  # MAQ_HEADER_VERSION of 0.1.0
+LIBRARY = Path("build/release/stage/lib/libmaquette.so")
+PIXEL_RGB8 = 1
+PLANE_PART, PLANE_U, PLANE_V, PLANE_PERSON = 1, 2, 3, 4
+
+
+class MaquetteError(RuntimeError):
+    """A call of the C API failed; the text is the library's own sentence."""
+
+
+class _DenseposeConfig(ctypes.Structure):
+    _fields_ = (
+        ("struct_size", c_uint32),
+        ("threads", c_int32),
+        ("bundle_path", c_char_p),
+        ("long_side_px", c_int32),
+        ("score_threshold", c_float),
+        ("max_people", c_int32),
+        ("result_pool_size", c_uint32),
+    )
+
+
+class _FrameDesc(ctypes.Structure):
+    _fields_ = (
+        ("struct_size", c_uint32),
+        ("format", c_int32),
+        ("width_px", c_int32),
+        ("height_px", c_int32),
+        ("planes", Handle * 2),
+        ("stride_bytes", c_size_t * 2),
+        ("timestamp_ns", c_int64),
+        ("clock", c_int32),
+        ("sequence", c_uint64),
+    )
+
+
+class _Person(ctypes.Structure):
+    _fields_ = (("box_px", c_float * 4), ("score", c_float))
+
+
+class _Stats(ctypes.Structure):
+    _fields_ = (
+        ("struct_size", c_uint32),
+        ("preprocess_ms", c_float),
+        ("detector_ms", c_float),
+        ("proposals_ms", c_float),
+        ("box_head_ms", c_float),
+        ("dense_head_ms", c_float),
+        ("decode_ms", c_float),
+        ("total_ms", c_float),
+        ("network_width_px", c_int32),
+        ("network_height_px", c_int32),
+        ("proposals", c_int32),
+        ("people", c_int32),
+        ("dropped_boxes", c_int32),
+        ("body_pixels", c_int64),
+        ("clamped_uv", c_int64),
+    )
+
+
+@dataclass(frozen=True)
+class Stats:
+    """What one run did; see maq_densepose_stats in densepose.h for the meanings. Times in milliseconds."""
+
+    preprocess_ms: float
+    detector_ms: float
+    proposals_ms: float
+    box_head_ms: float
+    dense_head_ms: float
+    decode_ms: float
+    total_ms: float
+    network_width_px: int
+    network_height_px: int
+    proposals: int
+    people: int
+    dropped_boxes: int
+    body_pixels: int
+    clamped_uv: int
+
+
+@dataclass(frozen=True)
+class DensePoseResult:
+    """box: float32 [n, 4] x0, y0, x1, y1 in pixels; score: float32 [n], best first; planes: uint8 [H, W, 4]
+    holding I, U*255, V*255 and the person's number in `box`, counted from 1.
+    """
+
+    box: np.ndarray
+    score: np.ndarray
+    planes: np.ndarray
+    stats: Stats
+
+
+def _signatures(library: ctypes.CDLL) -> None:
+    """Argument types of the functions used here; every one returns maq_status unless said otherwise."""
+    table = {
+        "maq_context_create": (c_uint32, Handle, POINTER(Handle)),
+        "maq_densepose_config_init": (POINTER(_DenseposeConfig), c_uint32),
+        "maq_densepose_create": (Handle, POINTER(_DenseposeConfig), POINTER(Handle)),
+        "maq_densepose_run": (Handle, Handle, POINTER(Handle)),
+        "maq_densepose_result_people": (Handle, POINTER(POINTER(_Person)), POINTER(c_uint32)),
+        "maq_densepose_result_plane": (Handle, c_int32, POINTER(POINTER(c_uint8)), POINTER(c_size_t)),
+        "maq_densepose_result_stats": (Handle, POINTER(_Stats)),
+        "maq_frame_desc_init": (POINTER(_FrameDesc), c_uint32),
+        "maq_frame_create": (Handle, POINTER(_FrameDesc), Handle, Handle, POINTER(Handle)),
+    }
+    for name, arguments in table.items():
+        function = getattr(library, name)
+        function.argtypes, function.restype = arguments, c_int32
+    for name in (
+        "maq_context_destroy",
+        "maq_densepose_destroy",
+        "maq_densepose_result_release",
+        "maq_frame_release",
+    ):
+        function = getattr(library, name)
+        function.argtypes, function.restype = (Handle,), None
+    library.maq_last_error.argtypes, library.maq_last_error.restype = (Handle,), c_char_p
+    library.maq_status_name.argtypes, library.maq_status_name.restype = (c_int32,), c_char_p
+
+
+class DensePose:
+    """One bundle, loaded by libmaquette. Use it in a `with` statement, or call close().
+
+    bundle: folder with manifest.json. score_threshold: people below it are dropped (None: the bundle's).
+    threads: 0 lets the library choose. library: libmaquette.so (default: MAQ_LIBRARY or the release build).
+    """
+
+    def __init__(
+        self,
+        bundle: Path,
+        score_threshold: float | None = None,
+        threads: int = 0,
+        library: Path | None = None,
+    ) -> None:
+        self._context, self._densepose = Handle(), Handle()
+        path = library or Path(os.environ.get("MAQ_LIBRARY", LIBRARY))
+        if not path.exists():
+            raise MaquetteError(f"{path} is not there. Build the SDK (make build), or set MAQ_LIBRARY.")
+        self._library = ctypes.CDLL(str(path.resolve()))
+        _signatures(self._library)
+        self._call(None, "maq_context_create", HEADER_VERSION, None, byref(self._context))
+        config = _DenseposeConfig()
+        self._call(self._context, "maq_densepose_config_init", byref(config), ctypes.sizeof(config))
+        config.bundle_path = os.fsencode(bundle)
+        config.threads = threads
+        if score_threshold is not None:
+            config.score_threshold = score_threshold
+        self._call(
+            self._context, "maq_densepose_create", self._context, byref(config), byref(self._densepose)
+        )
+
+    def __enter__(self) -> DensePose:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._library.maq_densepose_destroy(self._densepose)
+        self._library.maq_context_destroy(self._context)
+        self._densepose, self._context = Handle(), Handle()
+
+    def run(self, image: np.ndarray) -> DensePoseResult:
+        """image: uint8 [H, W, 3] RGB. Raises MaquetteError."""
+        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+            raise ValueError(f"an image is uint8 [H, W, 3], not {image.dtype} {image.shape}")
+        image = np.ascontiguousarray(image)
+        description = _FrameDesc()
+        self._call(self._context, "maq_frame_desc_init", byref(description), ctypes.sizeof(description))
+        description.format = PIXEL_RGB8
+        description.height_px, description.width_px = image.shape[:2]
+        description.planes[0] = image.ctypes.data
+        frame, result = Handle(), Handle()
+        self._call(
+            self._context, "maq_frame_create", self._context, byref(description), None, None, byref(frame)
+        )
+        try:
+            self._call(self._densepose, "maq_densepose_run", self._densepose, frame, byref(result))
+            return self._copy(result, image.shape[0], image.shape[1])
+        finally:
+            self._library.maq_densepose_result_release(result)
+            self._library.maq_frame_release(frame)
+
+    def _copy(self, result: Handle, height: int, width: int) -> DensePoseResult:
+        people, count = POINTER(_Person)(), c_uint32()
+        self._call(result, "maq_densepose_result_people", result, byref(people), byref(count))
+        found = np.array([[*people[k].box_px, people[k].score] for k in range(count.value)], np.float32)
+        found = found.reshape(-1, 5)
+        planes = np.empty((height, width, 4), np.uint8)
+        for channel, plane in enumerate((PLANE_PART, PLANE_U, PLANE_V, PLANE_PERSON)):
+            pixels, stride = POINTER(c_uint8)(), c_size_t()
+            self._call(result, "maq_densepose_result_plane", result, plane, byref(pixels), byref(stride))
+            rows = np.ctypeslib.as_array(pixels, ((height - 1) * stride.value + width,))
+            planes[..., channel] = np.lib.stride_tricks.as_strided(rows, (height, width), (stride.value, 1))
+        stats = _Stats(struct_size=ctypes.sizeof(_Stats))
+        self._call(result, "maq_densepose_result_stats", result, byref(stats))
+        values = Stats(**{field.name: getattr(stats, field.name) for field in fields(Stats)})
+        return DensePoseResult(found[:, :4], found[:, 4], planes, values)
+
+    def _call(self, handle: Handle | None, function: str, *arguments: object) -> None:
+        """Calls the library; a status other than MAQ_OK becomes MaquetteError with the library's text."""
+        status = getattr(self._library, function)(*arguments)
+        if status:
+            text = self._library.maq_last_error(handle)
+            name = self._library.maq_status_name(status).decode()
+            raise MaquetteError(f"{function}: {(text or b'').decode() or name} ({name})")

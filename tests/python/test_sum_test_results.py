@@ -5,7 +5,8 @@ import sys
 
 import pytest
 
-PYTEST = "<testsuites><testsuite><testcase name='d'/><testcase name='e'><error/></testcase></testsuite></testsuites>"
+PYTEST = """<testsuites><testsuite>
+<testcase name="d"/><testcase name="e"><error/></testcase></testsuite></testsuites>"""
 CTEST = """<testsuite><testcase name="a" status="run"/><testcase name="b" status="fail"><failure/></testcase>
 <testcase name="c" status="notrun"><skipped/></testcase></testsuite>"""
 

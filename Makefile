@@ -25,14 +25,14 @@ demo: build  ## dense pose on a bundled photo and clip, into demo-output/ (no Py
 
 .PHONY: build
 build: packages-demo  ## configure and build the SDK and its command line (release)
-	@cmake --preset release
+	@[ -f build/release/CMakeCache.txt ] || cmake --preset release -DMAQ_BUILD_TESTS=OFF
 	@cmake --build --preset release -j $(JOBS)
 
 .PHONY: test
 test: packages-test  ## all native tests (release and asan) and Python tests; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev
 	@for preset in release asan; do \
-	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON && cmake --build --preset $$preset -j $(JOBS); done
+	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done
 	@scripts/test.sh
 
 .PHONY: bench

@@ -3,8 +3,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out="${1:-demo-output}"
-maquette="$(find build/release -type f -name maquette -perm -u+x 2>/dev/null | head -n 1)"
-if [ -z "$maquette" ]; then
+maquette=build/release/stage/bin/maquette
+if [ ! -x "$maquette" ]; then
     echo "The maquette program is not built. Run: make build" >&2
     exit 1
 fi

@@ -33,9 +33,10 @@ needs_command g++ g++
 needs_command cmake cmake
 needs_command ninja ninja-build
 needs_command pkg-config pkg-config
-needs_command mvn maven       # fetches the ONNX Runtime library
-needs_command npm npm         # fetches the ONNX Runtime headers
-needs_command unzip unzip
+needs_command npm npm                  # brings ONNX Runtime: headers, and the library for x86-64
+[ "$(uname -m)" = x86_64 ] || needs_command mvn maven  # ... and the library for other machines
+needs_package nlohmann-json3-dev
+needs_package libcli11-dev
 for module in core imgproc imgcodecs videoio; do needs_package "libopencv-$module-dev"; done
 needs_package ca-certificates
 

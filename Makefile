@@ -36,8 +36,9 @@ test: packages-test  ## all native tests (release and asan) and Python tests; en
 	@scripts/test.sh
 
 .PHONY: bench
-bench: build  ## time each stage on the bundled photo and clip
-	@scripts/bench.sh
+bench: build packages-test  ## time each stage on the bundled photo and clip
+	@scripts/make-venv.sh
+	@.venv/bin/python -m benchmarks.stage_times
 
 .PHONY: format
 format: packages-lint  ## rewrite C++ (clang-format) and Python (ruff) sources in the house layout

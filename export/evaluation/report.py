@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import platform
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from export.evaluation.average_precision import THRESHOLDS
+from export.evaluation.machine import describe_machine
 from export.evaluation.measure import Figures
 from export.surface import PART_COUNT, PART_NAMES
 
@@ -83,7 +82,7 @@ def write_json(path: Path, results: dict[str, Figures], sources: dict[str, str],
     """sources: path and fingerprint of each column's model. data: what was evaluated."""
     document = {
         "schema": SCHEMA,
-        "machine": {"processor": _processor(), "cores": os.cpu_count(), "system": platform.platform()},
+        "machine": describe_machine(),
         "data": data,
         "thresholds": THRESHOLDS,
         "part_names": PART_NAMES,
@@ -92,16 +91,6 @@ def write_json(path: Path, results: dict[str, Figures], sources: dict[str, str],
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(document, indent=1) + "\n")
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
-    return next(
-        (line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine()
-    )
 
 
 def write_picture(path: Path, results: dict[str, Figures]) -> None:

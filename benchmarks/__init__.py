@@ -1,0 +1,1 @@
+"""Run times, measured through the C API."""

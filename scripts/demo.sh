@@ -12,9 +12,10 @@ fi
 mkdir -p "$out"
 "$maquette" info
 for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
-    printf '\n== maquette densepose %s --out %s --overlay --json\n' "$source" "$out"
-    "$maquette" densepose "$source" --out "$out" --overlay --json
+    printf '\n== maquette densepose %s --out %s --overlay\n' "$source" "$out"
+    "$maquette" densepose "$source" --out "$out" --overlay
 done
 
 printf '\nPictures to look at, in %s:\n' "$out"
-find "$out" -maxdepth 2 \( -name '*overlay*' -o -name '*_IUV.png' \) | sort | sed 's/^/  /' | head -n 12
+find "$out" -name '*_overlay.*' | sort | sed 's/^/  /'
+printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/formats.md).\n'

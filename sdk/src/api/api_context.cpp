@@ -1,7 +1,7 @@
 #include "api/boundary.h"
 #include "core/build_info.h"
 
-using namespace maquette;
+using namespace maq;
 
 namespace {
 
@@ -28,14 +28,11 @@ void check_header_version(uint32_t header_version) {
 
 }  // namespace
 
-namespace maquette {
+namespace maq {
 
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept {
   try {
-    std::string sentence = text;
-    if (status == MAQ_ERROR_INVALID_ARGUMENT || status == MAQ_ERROR_INTERNAL) {
-      sentence = concatenate(function, ": ", text);
-    }
+    std::string sentence = function == nullptr ? text : concatenate(function, ": ", text);
     if (handle != nullptr) {
       handle->set_error(std::move(sentence));
     } else {
@@ -47,7 +44,7 @@ maq_status keep_error(const Handle* handle, maq_status status, const char* funct
   return status;
 }
 
-}  // namespace maquette
+}  // namespace maq
 
 const char* maq_status_name(maq_status status) {
   switch (status) {

@@ -3,7 +3,7 @@
 
 #include "api/boundary.h"
 
-using namespace maquette;
+using namespace maq;
 
 namespace {
 

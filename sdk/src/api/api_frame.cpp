@@ -1,7 +1,7 @@
 #include "api/boundary.h"
 #include "image/convert.h"
 
-using namespace maquette;
+using namespace maq;
 
 maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size) {
   maq_frame_desc defaults{};

@@ -1,6 +1,6 @@
 #include "api/boundary.h"
 
-using namespace maquette;
+using namespace maq;
 
 namespace {
 

@@ -9,9 +9,17 @@
 #include "api/handles.h"
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 
-// Keeps the text for maq_last_error: with the handle, or for this thread when there is none.
+// A wrong argument of a call of the C API: the text names the function too.
+class ArgumentError : public Error {
+ public:
+  template <class... Parts>
+  explicit ArgumentError(const Parts&... parts) : Error(MAQ_ERROR_INVALID_ARGUMENT, parts...) {}
+};
+
+// Keeps the text for maq_last_error: with the handle, or for this thread when there is none. `function` begins the
+// text when it is not NULL.
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept;
 
 // Runs `body`, which returns a status or throws. Nothing gets past this.
@@ -19,10 +27,12 @@ template <class Body>
 maq_status guarded(const Handle* handle, const char* function, Body&& body) noexcept {
   try {
     return body();
-  } catch (const Error& error) {
+  } catch (const ArgumentError& error) {
     return keep_error(handle, error.status(), function, error.what());
+  } catch (const Error& error) {
+    return keep_error(handle, error.status(), nullptr, error.what());
   } catch (const std::bad_alloc&) {
-    return keep_error(handle, MAQ_ERROR_OUT_OF_MEMORY, function, "There is not enough memory.");
+    return keep_error(handle, MAQ_ERROR_OUT_OF_MEMORY, nullptr, "There is not enough memory.");
   } catch (const std::exception& error) {
     return keep_error(handle, MAQ_ERROR_INTERNAL, function, error.what());
   } catch (...) {
@@ -32,13 +42,13 @@ maq_status guarded(const Handle* handle, const char* function, Body&& body) noex
 
 template <class T>
 void require_argument(const T* pointer, const char* name) {
-  if (pointer == nullptr) throw Error(MAQ_ERROR_INVALID_ARGUMENT, name, " is NULL.");
+  if (pointer == nullptr) throw ArgumentError(name, " is NULL.");
 }
 
 template <class T>
 void require_range(const char* name, T value, T least, T most) {
   if (!(value >= least && value <= most)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, name, " is ", value, ", but must be ", least, " to ", most, ".");
+    throw ArgumentError(name, " is ", value, ", but must be ", least, " to ", most, ".");
   }
 }
 
@@ -46,7 +56,7 @@ void require_range(const char* name, T value, T least, T most) {
 // library's size is an older struct; a larger one comes from newer headers and may ask for what this library cannot do.
 inline void require_struct_size(const char* name, uint32_t size, size_t smallest, size_t largest) {
   if (size < smallest || size > largest) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, name, ".struct_size is ", size, ", but this library knows ", smallest,
+    throw ArgumentError(name, ".struct_size is ", size, ", but this library knows ", smallest,
                 " to ", largest, " bytes; set it to sizeof the struct, or fill the struct with its _init function.");
   }
 }
@@ -83,4 +93,4 @@ maq_status init_config(const char* function, T* config, uint32_t struct_size, co
   });
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -13,7 +13,7 @@
 #include "nn/onnxruntime_library.h"
 #include "sources/source.h"
 
-namespace maquette {
+namespace maq {
 
 // Every handle begins with this, so that maq_last_error works on each of them.
 class Handle {
@@ -53,36 +53,36 @@ class ContextState {
   std::shared_ptr<const OnnxRuntimeLibrary> onnxruntime_;
 };
 
-}  // namespace maquette
+}  // namespace maq
 
-struct maq_context : maquette::Handle {
-  explicit maq_context(std::shared_ptr<maquette::ContextState> made) : state(std::move(made)) {}
-  std::shared_ptr<maquette::ContextState> state;
+struct maq_context : maq::Handle {
+  explicit maq_context(std::shared_ptr<maq::ContextState> made) : state(std::move(made)) {}
+  std::shared_ptr<maq::ContextState> state;
 };
 
-struct maq_frame : maquette::Handle {
+struct maq_frame : maq::Handle {
   ~maq_frame() {
     if (free_callback != nullptr) free_callback(user_data);
   }
-  std::shared_ptr<const maquette::Frame> frame;
+  std::shared_ptr<const maq::Frame> frame;
   maq_frame_free_callback free_callback = nullptr;
   void* user_data = nullptr;
 };
 
-struct maq_source : maquette::Handle {
-  explicit maq_source(std::unique_ptr<maquette::Source> made, size_t pool_size) : source(std::move(made), pool_size) {}
-  maquette::PooledSource source;
+struct maq_source : maq::Handle {
+  explicit maq_source(std::unique_ptr<maq::Source> made, size_t pool_size) : source(std::move(made), pool_size) {}
+  maq::PooledSource source;
 };
 
-struct maq_densepose : maquette::Handle {
-  maq_densepose(std::shared_ptr<maquette::ContextState> of, std::unique_ptr<maquette::DensePose> made, size_t pool_size)
+struct maq_densepose : maq::Handle {
+  maq_densepose(std::shared_ptr<maq::ContextState> of, std::unique_ptr<maq::DensePose> made, size_t pool_size)
       : state(std::move(of)), densepose(std::move(made)), results(pool_size, "results") {}
-  std::shared_ptr<maquette::ContextState> state;
-  std::unique_ptr<maquette::DensePose> densepose;
-  maquette::BoundedPool<maquette::DensePoseResult> results;
+  std::shared_ptr<maq::ContextState> state;
+  std::unique_ptr<maq::DensePose> densepose;
+  maq::BoundedPool<maq::DensePoseResult> results;
 };
 
-struct maq_densepose_result : maquette::Handle {
-  std::shared_ptr<const maquette::DensePoseResult> result;
+struct maq_densepose_result : maq::Handle {
+  std::shared_ptr<const maq::DensePoseResult> result;
   std::vector<maq_person> people;
 };

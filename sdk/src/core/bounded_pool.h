@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 
 template <class T>
 class BoundedPool {
@@ -55,4 +55,4 @@ class BoundedPool {
   std::string what_;
 };
 
-}  // namespace maquette
+}  // namespace maq

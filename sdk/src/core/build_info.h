@@ -1,10 +1,10 @@
 // What this library was built from; the texts come from CMake.
 #pragma once
 
-namespace maquette {
+namespace maq {
 
 const char* sdk_version();
 const char* git_commit();
 const char* build_options();
 
-}  // namespace maquette
+}  // namespace maq

@@ -7,7 +7,7 @@
 
 #include "maquette/types.h"
 
-namespace maquette {
+namespace maq {
 
 template <class... Parts>
 std::string concatenate(const Parts&... parts) {
@@ -28,4 +28,4 @@ class Error : public std::runtime_error {
   maq_status status_;
 };
 
-}  // namespace maquette
+}  // namespace maq

@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 
 bool file_exists(const std::string& path) {
   struct stat status {};
@@ -39,4 +39,4 @@ std::vector<uint8_t> read_file(const std::string& path) {
   return bytes;
 }
 
-}  // namespace maquette
+}  // namespace maq

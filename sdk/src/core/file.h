@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace maquette {
+namespace maq {
 
 bool file_exists(const std::string& path);  // and is a regular file, not a folder
 bool is_folder(const std::string& path);
@@ -13,4 +13,4 @@ bool is_folder(const std::string& path);
 // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE when it cannot be read.
 std::vector<uint8_t> read_file(const std::string& path);
 
-}  // namespace maquette
+}  // namespace maq

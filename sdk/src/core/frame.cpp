@@ -2,7 +2,7 @@
 
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 
 uint8_t* Frame::allocate_bgr(int width_px, int height_px) {
   const size_t stride_bytes = size_t(width_px) * 3;
@@ -77,4 +77,4 @@ ImageView checked_image_view(const maq_frame_desc& desc) {
   return view;
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -8,7 +8,7 @@
 
 #include "maquette/frame.h"
 
-namespace maquette {
+namespace maq {
 
 struct PlaneView {
   const uint8_t* data = nullptr;
@@ -48,4 +48,4 @@ void check_image_size(int64_t width_px, int64_t height_px, const std::string& wh
 // Throws when the description is not one of a readable image; fills in strides that are 0.
 ImageView checked_image_view(const maq_frame_desc& desc);
 
-}  // namespace maquette
+}  // namespace maq

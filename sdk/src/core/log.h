@@ -6,7 +6,7 @@
 #include "core/error.h"
 #include "maquette/context.h"
 
-namespace maquette {
+namespace maq {
 
 class Log {
  public:
@@ -27,4 +27,4 @@ class Log {
   void* user_data_ = nullptr;
 };
 
-}  // namespace maquette
+}  // namespace maq

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace maquette {
+namespace maq {
 namespace {
 
 const float kLargestLogSize = std::log(1000.0f / 16.0f);
@@ -57,4 +57,4 @@ std::vector<ScoredBox> non_maximum_suppression(std::vector<ScoredBox> candidates
   return kept;
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace maquette {
+namespace maq {
 
 // Left, top, right, bottom; the right and bottom edges are exclusive.
 struct Box {
@@ -41,4 +41,4 @@ bool comes_before(const ScoredBox& a, const ScoredBox& b);
 // `limit` boxes, in order. `candidates` need not be sorted.
 std::vector<ScoredBox> non_maximum_suppression(std::vector<ScoredBox> candidates, float iou, size_t limit);
 
-}  // namespace maquette
+}  // namespace maq

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace maquette {
+namespace maq {
 namespace {
 
 constexpr int kMostClasses = 64;
@@ -149,4 +149,4 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
   return counts;
 }
 
-}  // namespace maquette
+}  // namespace maq

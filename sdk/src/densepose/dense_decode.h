@@ -6,7 +6,7 @@
 
 #include "densepose/box.h"
 
-namespace maquette {
+namespace maq {
 
 // The dense head's output for one person.
 struct DenseLogits {
@@ -45,4 +45,4 @@ PixelRect pixel_rect(const Box& box);
 // to somebody, and those outside the image, are left alone. `person` counts from 1.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, DensePlanes& planes);
 
-}  // namespace maquette
+}  // namespace maq

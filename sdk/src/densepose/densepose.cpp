@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 // The order in which the networks' outputs are asked for and found again.
@@ -219,4 +219,4 @@ void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredB
   result.stats.decode_ms = stage.lap_ms();
 }
 
-}  // namespace maquette
+}  // namespace maq

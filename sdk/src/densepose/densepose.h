@@ -14,7 +14,7 @@
 #include "nn/bundle.h"
 #include "nn/session.h"
 
-namespace maquette {
+namespace maq {
 
 struct DensePoseSettings {
   int threads = 1;
@@ -81,4 +81,4 @@ class DensePose {
   std::vector<float> rois_;
 };
 
-}  // namespace maquette
+}  // namespace maq

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace maquette {
+namespace maq {
 namespace {
 
 constexpr std::array<float, 4> kUnitWeights = {1, 1, 1, 1};
@@ -77,4 +77,4 @@ std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, con
   return all;
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -7,7 +7,7 @@
 #include "densepose/box.h"
 #include "nn/manifest.h"
 
-namespace maquette {
+namespace maq {
 
 // The detector's output at one level of the pyramid.
 struct RpnLevel {
@@ -26,4 +26,4 @@ Box anchor_box(int x, int y, int stride, float size_px, float ratio);
 std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width,
                                         float height, int* dropped);
 
-}  // namespace maquette
+}  // namespace maq

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-namespace maquette {
+namespace maq {
 namespace {
 
 // Bilinear samples, their mean over a bin and the zero outside of the map all separate into rows and columns, so a RoI
@@ -85,4 +85,4 @@ void roi_align(const FeatureMap& map, const Box& box, int pool, float* output) {
   }
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -3,7 +3,7 @@
 
 #include "densepose/box.h"
 
-namespace maquette {
+namespace maq {
 
 struct FeatureMap {
   const float* data = nullptr;  // [channels, height, width]
@@ -18,4 +18,4 @@ struct FeatureMap {
 // The box must be finite.
 void roi_align(const FeatureMap& map, const Box& box, int pool, float* output);
 
-}  // namespace maquette
+}  // namespace maq

@@ -5,7 +5,7 @@
 #include "core/error.h"
 #include "image/opencv_view.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 cv::Mat plane_as_mat(const ImageView& image, int plane, int rows, int cols, int type) {
@@ -95,4 +95,4 @@ void resize_to_bgr(const ImageView& from, int width_px, int height_px, Frame& to
   cv::resize(bgr, target, target.size(), 0, 0, shrinks ? cv::INTER_AREA : cv::INTER_LINEAR);
 }
 
-}  // namespace maquette
+}  // namespace maq

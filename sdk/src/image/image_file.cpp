@@ -9,7 +9,7 @@
 #include "core/file.h"
 #include "image/image_header.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 // OpenCV throws for some damaged files and returns an empty image for others.
@@ -55,4 +55,4 @@ BgraImage decode_bgra(const uint8_t* bytes, size_t size_bytes, const std::string
   return result;
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -7,7 +7,7 @@
 
 #include "core/frame.h"
 
-namespace maquette {
+namespace maq {
 
 // Decodes an image file into `frame` as BGR, turned upright by its EXIF orientation.
 // Throws MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE and MAQ_ERROR_IMAGE_SIZE.
@@ -23,4 +23,4 @@ struct BgraImage {
 // Decodes an image that is in memory. Throws MAQ_ERROR_UNREADABLE; `what` names it in the error.
 BgraImage decode_bgra(const uint8_t* bytes, size_t size_bytes, const std::string& what);
 
-}  // namespace maquette
+}  // namespace maq

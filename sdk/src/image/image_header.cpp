@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <cstring>
 
-namespace maquette {
+namespace maq {
 namespace {
 
 class Reader {
@@ -75,4 +75,4 @@ std::optional<SizePx> read_image_size(const std::vector<uint8_t>& bytes) {
   return {};
 }
 
-}  // namespace maquette
+}  // namespace maq

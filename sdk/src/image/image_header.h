@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-namespace maquette {
+namespace maq {
 
 struct SizePx {
   int64_t width = 0;
@@ -15,4 +15,4 @@ struct SizePx {
 // Knows PNG, JPEG, WebP, BMP and GIF; nothing for other formats and for headers that are cut off.
 std::optional<SizePx> read_image_size(const std::vector<uint8_t>& bytes);
 
-}  // namespace maquette
+}  // namespace maq

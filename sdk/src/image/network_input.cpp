@@ -7,7 +7,7 @@
 
 #include "image/opencv_view.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
@@ -59,4 +59,4 @@ void make_network_input(const ImageView& image, const NetworkInputSpec& spec, Ne
   }
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -6,7 +6,7 @@
 
 #include "core/frame.h"
 
-namespace maquette {
+namespace maq {
 
 struct NetworkInputSpec {
   int long_side_px = 0;
@@ -29,4 +29,4 @@ void network_size(int width_px, int height_px, int long_side_px, int* network_wi
 // Resizes (area when shrinking, bilinear when growing), normalises and pads. Memory of `input` is reused.
 void make_network_input(const ImageView& image, const NetworkInputSpec& spec, NetworkInput& input);
 
-}  // namespace maquette
+}  // namespace maq

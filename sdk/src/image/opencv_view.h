@@ -5,9 +5,9 @@
 
 #include "core/frame.h"
 
-namespace maquette {
+namespace maq {
 
 // The image as 8-bit BGR: of the same memory when it is BGR already, a converted copy otherwise.
 cv::Mat as_bgr(const ImageView& image);
 
-}  // namespace maquette
+}  // namespace maq

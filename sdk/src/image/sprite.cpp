@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-namespace maquette {
+namespace maq {
 
 BgraImage cut_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
                      bool mirrored) {
@@ -39,4 +39,4 @@ void draw_sprite(const BgraImage& sprite, int x, int y, Frame& frame) {
   }
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -4,7 +4,7 @@
 #include "core/frame.h"
 #include "image/image_file.h"
 
-namespace maquette {
+namespace maq {
 
 // The part of `sheet` at (x, y), scaled to `to_width` x `to_height` and mirrored left to right if asked.
 // Its colours come out multiplied by alpha, as draw_sprite wants them.
@@ -14,4 +14,4 @@ BgraImage cut_sprite(const BgraImage& sheet, int x, int y, int width, int height
 // Draws a sprite with its top left corner at (x, y) over a BGR frame; what lies outside is cut off.
 void draw_sprite(const BgraImage& sprite, int x, int y, Frame& frame);
 
-}  // namespace maquette
+}  // namespace maq

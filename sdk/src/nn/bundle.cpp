@@ -4,7 +4,7 @@
 #include "core/file.h"
 #include "nn/sha256.h"
 
-namespace maquette {
+namespace maq {
 
 Bundle read_bundle(const std::string& folder) {
   if (!is_folder(folder)) {
@@ -39,4 +39,4 @@ Bundle read_bundle(const std::string& folder) {
   return bundle;
 }
 
-}  // namespace maquette
+}  // namespace maq

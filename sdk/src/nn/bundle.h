@@ -8,7 +8,7 @@
 
 #include "nn/manifest.h"
 
-namespace maquette {
+namespace maq {
 
 struct Bundle {
   std::string folder;
@@ -21,4 +21,4 @@ struct Bundle {
 // missing or its size or SHA-256 is not the manifest's.
 Bundle read_bundle(const std::string& folder);
 
-}  // namespace maquette
+}  // namespace maq

@@ -5,7 +5,7 @@
 
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 using nlohmann::json;
@@ -205,4 +205,4 @@ Manifest parse_manifest(const std::string& text, const std::string& origin) {
   return read_manifest(Node(document, "", origin));
 }
 
-}  // namespace maquette
+}  // namespace maq

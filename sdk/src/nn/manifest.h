@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-namespace maquette {
+namespace maq {
 
 // A size of a tensor: a number, or a name or formula ("height/4") for one that depends on the input.
 using Dimension = std::variant<int64_t, std::string>;
@@ -82,4 +82,4 @@ struct Manifest {
 // a format version or a task that this library does not know.
 Manifest parse_manifest(const std::string& text, const std::string& origin);
 
-}  // namespace maquette
+}  // namespace maq

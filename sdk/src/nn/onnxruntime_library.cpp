@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 constexpr char kFileName[] = "libonnxruntime.so.1";
@@ -91,4 +91,4 @@ void OnnxRuntimeLibrary::check(OrtStatus* result, maq_status status, const std::
   throw Error(status, what, ": ", text);
 }
 
-}  // namespace maquette
+}  // namespace maq

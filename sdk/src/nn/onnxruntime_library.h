@@ -8,7 +8,7 @@
 
 #include "core/log.h"
 
-namespace maquette {
+namespace maq {
 
 class OnnxRuntimeLibrary {
  public:
@@ -36,4 +36,4 @@ class OnnxRuntimeLibrary {
   std::string path_;
 };
 
-}  // namespace maquette
+}  // namespace maq

@@ -4,7 +4,7 @@
 
 #include "core/error.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 void ORT_API_CALL forward_to_log(void* log, OrtLoggingLevel severity, const char*, const char*, const char*,
@@ -192,4 +192,4 @@ NetworkOutputs Session::run(const float* input, const std::vector<int64_t>& inpu
   return outputs;
 }
 
-}  // namespace maquette
+}  // namespace maq

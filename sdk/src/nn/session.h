@@ -9,7 +9,7 @@
 #include "nn/manifest.h"
 #include "nn/onnxruntime_library.h"
 
-namespace maquette {
+namespace maq {
 
 // A float tensor [shape], row-major, that somebody else owns.
 struct TensorView {
@@ -61,4 +61,4 @@ class Session {
   OrtMemoryInfo* cpu_memory_ = nullptr;
 };
 
-}  // namespace maquette
+}  // namespace maq

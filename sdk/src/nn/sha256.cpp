@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace maquette {
+namespace maq {
 namespace {
 
 constexpr std::array<uint32_t, 64> kRoundConstants = {
@@ -68,4 +68,4 @@ std::string sha256_hex(const void* data, size_t size_bytes) {
   return hex;
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <string>
 
-namespace maquette {
+namespace maq {
 
 // The digest in lower-case hexadecimal, 64 characters.
 std::string sha256_hex(const void* data, size_t size_bytes);
 
-}  // namespace maquette
+}  // namespace maq

@@ -6,7 +6,7 @@
 #include "sources/source.h"
 #include "sources/uri.h"
 
-namespace maquette {
+namespace maq {
 
 // One frame, the image. Throws what read_image_file throws.
 std::unique_ptr<Source> open_image_source(SourceUri uri);
@@ -15,4 +15,4 @@ std::unique_ptr<Source> open_image_source(SourceUri uri);
 // MAQ_ERROR_IMAGE_SIZE; next() throws MAQ_ERROR_UNREADABLE when the clip ends before its header says.
 std::unique_ptr<Source> open_video_source(SourceUri uri);
 
-}  // namespace maquette
+}  // namespace maq

@@ -2,7 +2,7 @@
 #include "image/image_file.h"
 #include "sources/file_sources.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 class ImageSource : public Source {
@@ -39,4 +39,4 @@ class ImageSource : public Source {
 
 std::unique_ptr<Source> open_image_source(SourceUri uri) { return std::make_unique<ImageSource>(std::move(uri)); }
 
-}  // namespace maquette
+}  // namespace maq

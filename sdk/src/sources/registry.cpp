@@ -4,7 +4,7 @@
 #include "sources/stub_sources.h"
 #include "sources/uri.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 struct Entry {
@@ -48,4 +48,4 @@ std::unique_ptr<Source> open_source(const std::string& text) {
               ".");
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -10,7 +10,7 @@
 #include "core/frame.h"
 #include "core/log.h"
 
-namespace maquette {
+namespace maq {
 
 struct SourceInfo {
   int width_px = 0;
@@ -62,4 +62,4 @@ class PooledSource {
   BoundedPool<Frame> pool_;
 };
 
-}  // namespace maquette
+}  // namespace maq

@@ -8,7 +8,7 @@
 #include "image/sprite.h"
 #include "sources/stub_people_sheet.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 // The sheet's layout: one person a row, one frame of the walk cycle a column, walking to the right.
@@ -120,4 +120,4 @@ void StubPeople::draw(double time_s, Frame& frame) const {
   }
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -7,7 +7,7 @@
 #include "core/frame.h"
 #include "image/image_file.h"
 
-namespace maquette {
+namespace maq {
 
 class StubPeople {
  public:
@@ -36,4 +36,4 @@ class StubPeople {
   std::vector<Walker> walkers_;      // the farthest first
 };
 
-}  // namespace maquette
+}  // namespace maq

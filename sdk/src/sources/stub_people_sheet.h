@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace maquette {
+namespace maq {
 
 struct EmbeddedFile {
   const uint8_t* bytes = nullptr;
@@ -13,4 +13,4 @@ struct EmbeddedFile {
 
 EmbeddedFile stub_people_sheet();
 
-}  // namespace maquette
+}  // namespace maq

@@ -4,7 +4,7 @@
 #include "sources/stub_people.h"
 #include "sources/stub_sources.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 constexpr double kDefaultFps = 30;
@@ -76,4 +76,4 @@ class StubSource : public Source {
 
 std::unique_ptr<Source> open_stub_source(SourceUri uri) { return std::make_unique<StubSource>(std::move(uri)); }
 
-}  // namespace maquette
+}  // namespace maq

@@ -7,9 +7,9 @@
 #include "sources/source.h"
 #include "sources/uri.h"
 
-namespace maquette {
+namespace maq {
 
 // stub:people (rendered people who walk through the picture) and stub:pattern (moving colour bars).
 std::unique_ptr<Source> open_stub_source(SourceUri uri);
 
-}  // namespace maquette
+}  // namespace maq

@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "core/frame.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 int hex_digit(char c) {
@@ -141,4 +141,4 @@ SourceUri parse_source_uri(const std::string& text) {
   return uri;
 }
 
-}  // namespace maquette
+}  // namespace maq

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-namespace maquette {
+namespace maq {
 
 struct SourceUri {
   std::string text;    // as it was given
@@ -33,4 +33,4 @@ struct SourceUri {
 // Throws MAQ_ERROR_INVALID_ARGUMENT for an ill-formed text and MAQ_ERROR_IMAGE_SIZE for a size outside the limits.
 SourceUri parse_source_uri(const std::string& text);
 
-}  // namespace maquette
+}  // namespace maq

@@ -8,7 +8,7 @@
 #include "image/convert.h"
 #include "sources/file_sources.h"
 
-namespace maquette {
+namespace maq {
 namespace {
 
 class VideoSource : public Source {
@@ -126,4 +126,4 @@ class VideoSource : public Source {
 
 std::unique_ptr<Source> open_video_source(SourceUri uri) { return std::make_unique<VideoSource>(std::move(uri)); }
 
-}  // namespace maquette
+}  // namespace maq

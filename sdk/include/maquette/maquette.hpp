@@ -1,0 +1,226 @@
+// Maquette for C++17: owners and exceptions over the C API, in this header alone. The C headers say what each call does.
+//
+//   maquette::Context context;
+//   maquette::Source source(context, "video:clip.mp4");
+//   maquette::DensePose densepose(context, "models/densepose-b-int8");
+//   while (auto frame = source.next()) {
+//     auto result = densepose.run(*frame);
+//     for (const maq_person& person : result.people()) …
+//   }
+//
+// Every class owns one handle, can be moved but not copied, and gives the handle out by get(). Calls that fail throw
+// maquette::Error.
+#ifndef MAQUETTE_MAQUETTE_HPP_
+#define MAQUETTE_MAQUETTE_HPP_
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "maquette/maquette.h"
+
+namespace maquette {
+
+class Error : public std::runtime_error {
+ public:
+  Error(maq_status status, const char* text) : std::runtime_error(text), status_(status) {}
+  maq_status status() const noexcept { return status_; }
+
+ private:
+  maq_status status_;
+};
+
+// Throws the error of the latest call when `status` is one; `handle` is the call's, or null for `_init` functions.
+inline void check(maq_status status, const void* handle) {
+  if (status != MAQ_OK) throw Error(status, maq_last_error(handle));
+}
+
+template <class Handle, void (*destroy)(Handle*)>
+struct HandleDeleter {
+  void operator()(Handle* handle) const noexcept { destroy(handle); }
+};
+template <class Handle, void (*destroy)(Handle*)>
+using Owner = std::unique_ptr<Handle, HandleDeleter<Handle, destroy>>;
+
+// A range over `size` elements that somebody else owns.
+template <class T>
+class Span {
+ public:
+  Span(const T* data, size_t size) : data_(data), size_(size) {}
+  const T* begin() const { return data_; }
+  const T* end() const { return data_ + size_; }
+  size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  const T& operator[](size_t index) const { return data_[index]; }
+
+ private:
+  const T* data_;
+  size_t size_;
+};
+
+inline maq_context_config default_context_config() {
+  maq_context_config config;
+  check(maq_context_config_init(&config, sizeof config), nullptr);
+  return config;
+}
+
+inline maq_densepose_config default_densepose_config() {
+  maq_densepose_config config;
+  check(maq_densepose_config_init(&config, sizeof config), nullptr);
+  return config;
+}
+
+class Context {
+ public:
+  Context() : Context(default_context_config()) {}
+  explicit Context(const maq_context_config& config) {
+    maq_context* made = nullptr;
+    check(maq_context_create(MAQ_HEADER_VERSION, &config, &made), nullptr);
+    owner_.reset(made);
+  }
+
+  maq_context* get() const { return owner_.get(); }
+
+  std::string onnxruntime_version() const {
+    const char* version = "";
+    check(maq_context_onnxruntime(get(), &version, nullptr), get());
+    return version;
+  }
+  std::string onnxruntime_path() const {
+    const char* path = "";
+    check(maq_context_onnxruntime(get(), nullptr, &path), get());
+    return path;
+  }
+
+ private:
+  Owner<maq_context, maq_context_destroy> owner_;
+};
+
+class Frame {
+ public:
+  // Takes over a frame of the C API.
+  explicit Frame(maq_frame* frame) : owner_(frame) {}
+
+  // Pixels of the app, which must stay until the frame is gone.
+  Frame(const Context& context, const maq_frame_desc& desc) {
+    maq_frame* made = nullptr;
+    check(maq_frame_create(context.get(), &desc, nullptr, nullptr, &made), context.get());
+    owner_.reset(made);
+  }
+
+  maq_frame* get() const { return owner_.get(); }
+
+  maq_frame_desc desc() const {
+    maq_frame_desc desc{};
+    desc.struct_size = sizeof desc;
+    check(maq_frame_get_desc(get(), &desc), get());
+    return desc;
+  }
+
+  void copy_pixels(maq_pixel_format format, uint8_t* pixels, size_t stride_bytes, size_t size_bytes) const {
+    check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes), get());
+  }
+
+ private:
+  Owner<maq_frame, maq_frame_release> owner_;
+};
+
+class Source {
+ public:
+  Source(const Context& context, const std::string& uri) {
+    maq_source* made = nullptr;
+    check(maq_source_create(context.get(), uri.c_str(), nullptr, &made), context.get());
+    owner_.reset(made);
+  }
+
+  maq_source* get() const { return owner_.get(); }
+
+  maq_source_info info() const {
+    maq_source_info info{};
+    info.struct_size = sizeof info;
+    check(maq_source_get_info(get(), &info), get());
+    return info;
+  }
+
+  // Nothing after the last frame.
+  std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
+    maq_frame* frame = nullptr;
+    const maq_status status = maq_source_acquire_frame(get(), timeout_ns, &frame);
+    if (status == MAQ_END_OF_STREAM) return std::nullopt;
+    check(status, get());
+    return Frame(frame);
+  }
+
+ private:
+  Owner<maq_source, maq_source_destroy> owner_;
+};
+
+class DensePoseResult {
+ public:
+  // Takes over a result of the C API.
+  explicit DensePoseResult(maq_densepose_result* result) : owner_(result) {
+    check(maq_densepose_result_size(get(), &width_px_, &height_px_), get());
+  }
+
+  maq_densepose_result* get() const { return owner_.get(); }
+  int32_t width_px() const { return width_px_; }
+  int32_t height_px() const { return height_px_; }
+
+  Span<maq_person> people() const {
+    const maq_person* people = nullptr;
+    uint32_t count = 0;
+    check(maq_densepose_result_people(get(), &people, &count), get());
+    return {people, count};
+  }
+
+  // height_px() rows of *stride_bytes.
+  const uint8_t* plane(maq_densepose_plane plane, size_t* stride_bytes) const {
+    const uint8_t* pixels = nullptr;
+    check(maq_densepose_result_plane(get(), plane, &pixels, stride_bytes), get());
+    return pixels;
+  }
+
+  maq_densepose_stats stats() const {
+    maq_densepose_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_densepose_result_stats(get(), &stats), get());
+    return stats;
+  }
+
+ private:
+  Owner<maq_densepose_result, maq_densepose_result_release> owner_;
+  int32_t width_px_ = 0;
+  int32_t height_px_ = 0;
+};
+
+class DensePose {
+ public:
+  DensePose(const Context& context, const maq_densepose_config& config) { create(context, config); }
+  DensePose(const Context& context, const std::string& bundle_path) {
+    maq_densepose_config config = default_densepose_config();
+    config.bundle_path = bundle_path.c_str();
+    create(context, config);
+  }
+
+  maq_densepose* get() const { return owner_.get(); }
+
+  DensePoseResult run(const Frame& frame) {
+    maq_densepose_result* result = nullptr;
+    check(maq_densepose_run(get(), frame.get(), &result), get());
+    return DensePoseResult(result);
+  }
+
+ private:
+  void create(const Context& context, const maq_densepose_config& config) {
+    maq_densepose* made = nullptr;
+    check(maq_densepose_create(context.get(), &config, &made), context.get());
+    owner_.reset(made);
+  }
+
+  Owner<maq_densepose, maq_densepose_destroy> owner_;
+};
+
+}  // namespace maquette
+
+#endif  // MAQUETTE_MAQUETTE_HPP_

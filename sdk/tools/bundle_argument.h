@@ -1,0 +1,7 @@
+// Which model bundle is used when none is named.
+#pragma once
+
+#include <string>
+
+// The environment variable MAQ_BUNDLE, else the bundle installed (or staged) with this program; "" without either.
+std::string default_bundle();

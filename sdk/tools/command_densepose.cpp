@@ -1,0 +1,240 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <maquette/maquette.hpp>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <vector>
+
+#include "bundle_argument.h"
+#include "commands.h"
+#include "overlay.h"
+#include "overlay_clip.h"
+#include "progress_bar.h"
+#include "result_files.h"
+#include "source_argument.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int64_t kFramesOfEndlessSource = 100;
+
+struct Options {
+  std::vector<std::string> sources;
+  std::string bundle;
+  std::string out;
+  bool overlay = false;
+  bool json = false;
+  int size = 0;
+  float threshold = -1;
+  int threads = 0;
+  int64_t max_frames = 0;
+  int64_t every = 1;
+};
+
+// Set by Ctrl-C: the frame at hand is finished, files are completed, and the summary is printed.
+volatile std::sig_atomic_t stop_asked = 0;
+
+// The stages of a run, in order, with their times of every frame.
+class Timings {
+ public:
+  void add(const maq_densepose_stats& stats) {
+    const float values[] = {stats.preprocess_ms, stats.detector_ms,   stats.proposals_ms, stats.box_head_ms,
+                            stats.dense_head_ms, stats.decode_ms, stats.total_ms};
+    for (size_t i = 0; i < kStages; ++i) ms_[i].push_back(values[i]);
+    people_ += stats.people;
+  }
+
+  size_t frames() const { return ms_[0].size(); }
+  int64_t people() const { return people_; }
+  float median_total_ms() const { return median(ms_[kStages - 1]); }
+
+  void print() const {
+    std::printf("%zu frame%s, %lld %s. Median of a frame: %.1f ms (%.1f FPS)\n", frames(), frames() == 1 ? "" : "s",
+                (long long)people_, people_ == 1 ? "person" : "people", double(median_total_ms()),
+                1000.0 / std::max(1e-3, double(median_total_ms())));
+    constexpr const char* kNames[] = {"preprocess", "detector", "proposals", "box head", "dense head", "decode"};
+    for (size_t i = 0; i + 1 < kStages; ++i) {
+      std::printf("%s%s %.1f", i == 0 ? "  " : " | ", kNames[i], double(median(ms_[i])));
+    }
+    std::printf(" ms\n");
+  }
+
+ private:
+  static constexpr size_t kStages = 7;
+
+  static float median(std::vector<float> values) {
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+
+  std::vector<float> ms_[kStages];
+  int64_t people_ = 0;
+};
+
+std::string frame_stem(const std::string& stem, bool is_clip, uint64_t sequence) {
+  if (!is_clip) return stem;
+  char number[32];
+  std::snprintf(number, sizeof number, "_%06llu", (unsigned long long)sequence);
+  return stem + number;
+}
+
+cv::Mat pixels_of(const maquette::Frame& frame) {
+  const maq_frame_desc desc = frame.desc();
+  cv::Mat pixels(desc.height_px, desc.width_px, CV_8UC3);
+  frame.copy_pixels(MAQ_PIXEL_BGR8, pixels.data, pixels.step, pixels.total() * 3);
+  return pixels;
+}
+
+void print_frame(const Options& options, const std::string& stem, const maq_frame_desc& desc,
+                 const maq_densepose_stats& stats) {
+  if (options.json) {
+    const nlohmann::ordered_json line = {{"frame", stem},
+                                         {"timestamp_ns", desc.timestamp_ns},
+                                         {"people", stats.people},
+                                         {"proposals", stats.proposals},
+                                         {"network", {stats.network_width_px, stats.network_height_px}},
+                                         {"ms",
+                                          {{"preprocess", stats.preprocess_ms},
+                                           {"detector", stats.detector_ms},
+                                           {"proposals", stats.proposals_ms},
+                                           {"box_head", stats.box_head_ms},
+                                           {"dense_head", stats.dense_head_ms},
+                                           {"decode", stats.decode_ms},
+                                           {"total", stats.total_ms}}}};
+    std::printf("%s\n", line.dump().c_str());
+  } else {
+    std::printf("%s  %d x %d  %d %s  %.1f ms\n", stem.c_str(), desc.width_px, desc.height_px, stats.people,
+                stats.people == 1 ? "person" : "people", double(stats.total_ms));
+  }
+}
+
+// Runs one source to its end and writes its files.
+void run_source(const Options& options, const SourceArgument& argument, const maquette::Context& context,
+                maquette::DensePose& densepose, Timings& timings) {
+  maquette::Source source(context, argument.uri);
+  const maq_source_info info = source.info();
+  const bool is_clip = info.frame_count != 1;
+  int64_t limit = options.max_frames;
+  if (limit == 0 && info.frame_count < 0 && !is_clip) limit = 1;
+  const bool endless = info.frame_count < 0 && argument.uri.rfind("stub:", 0) == 0;
+  if (limit == 0 && (endless || info.is_live != 0)) limit = kFramesOfEndlessSource;
+
+  int64_t expected = info.frame_count < 0 ? limit : (info.frame_count + options.every - 1) / options.every;
+  if (limit > 0) expected = expected > 0 ? std::min(expected, limit) : limit;
+  ProgressBar progress(argument.stem, is_clip && !options.json ? expected : 1);
+  OverlayClip clip(options.out, argument.stem, info.fps / double(options.every));
+  int64_t done = 0;
+  for (int64_t index = 0; stop_asked == 0 && (limit == 0 || done < limit); ++index) {
+    const auto frame = source.next();
+    if (!frame) break;
+    if (index % options.every != 0) continue;
+    const maq_frame_desc desc = frame->desc();
+    const maquette::DensePoseResult result = densepose.run(*frame);
+    const maq_densepose_stats stats = result.stats();
+    const std::string stem = frame_stem(argument.stem, is_clip, desc.sequence);
+    // Drawn before the first file is written, so that a frame has all its files or none.
+    const cv::Mat overlay = options.overlay ? draw_overlay(pixels_of(*frame), result) : cv::Mat();
+    write_result_files(result, options.out, stem);
+    if (options.overlay && is_clip) clip.add(overlay);
+    if (options.overlay && !is_clip) write_image(fs::path(options.out) / (stem + "_overlay.png"), overlay);
+    timings.add(stats);
+    ++done;
+    if (!is_clip || options.json) print_frame(options, stem, desc, stats);
+    if (is_clip && !options.json) progress.advance(done, std::to_string(stats.people) + " people");
+  }
+  const fs::path overlay_path = clip.finish();
+  if (!overlay_path.empty() && !options.json) {
+    std::printf("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());
+  } else if (is_clip && !options.json) {
+    std::printf("%s  %lld frames\n", argument.stem.c_str(), (long long)done);
+  }
+}
+
+std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts) {
+  std::vector<SourceArgument> arguments;
+  std::set<std::string> stems;
+  for (const std::string& text : texts) {
+    arguments.push_back(parse_source_argument(text));
+    if (!stems.insert(arguments.back().stem).second) {
+      throw std::runtime_error("Two sources would write files named " + arguments.back().stem +
+                               "_…; run them one by one with different --out folders.");
+    }
+  }
+  return arguments;
+}
+
+int run_densepose(const Options& options) {
+  const std::vector<SourceArgument> arguments = parse_sources(options.sources);
+  const std::string bundle = options.bundle.empty() ? default_bundle() : options.bundle;
+  if (bundle.empty()) {
+    throw std::runtime_error("No model bundle was found; name its folder with --bundle or MAQ_BUNDLE.");
+  }
+  const maquette::Context context;
+  maq_densepose_config config = maquette::default_densepose_config();
+  config.bundle_path = bundle.c_str();
+  config.threads = options.threads;
+  config.long_side_px = options.size;
+  config.score_threshold = options.threshold;
+  maquette::DensePose densepose(context, config);
+
+  std::signal(SIGINT, [](int) { stop_asked = 1; });
+  Timings timings;
+  int failed = 0;
+  for (const SourceArgument& argument : arguments) {
+    if (stop_asked != 0) break;
+    try {
+      run_source(options, argument, context, densepose, timings);
+    } catch (const std::exception& error) {
+      // One bad file must not cost the rest of a batch.
+      std::fflush(stdout);
+      std::fprintf(stderr, "maquette: %s\n", error.what());
+      ++failed;
+    }
+  }
+  if (timings.frames() > 0 && !options.json) timings.print();
+  return failed == 0 && stop_asked == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_densepose_command(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("densepose", "Map every pixel of the people in images or clips to body surface");
+  command->add_option("source", options->sources,
+                      "Images, clips or URIs: photo.jpg, video:clip.mp4, stub:people?count=3 (see `maquette sources`)")
+      ->required();
+  command->add_option("-o,--out", options->out, "Folder for the results; made when it is not there")->required();
+  command->add_flag("--overlay", options->overlay,
+                    "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
+  command->add_flag("--json", options->json, "Print one JSON line a frame with counts and times, instead of text");
+  command->add_option("--bundle", options->bundle,
+                      "Model bundle folder; else MAQ_BUNDLE, else the one that came with this program");
+  command->add_option("--size", options->size, "Long side of the network's input in pixels; larger is finer and slower")
+      ->check(CLI::Range(32, 2048));
+  command->add_option("--threshold", options->threshold, "Least score of a person")->check(CLI::Range(0.0f, 1.0f));
+  command->add_option("--threads", options->threads, "Threads of the networks; default: the cores, at most 4")
+      ->check(CLI::Range(1, 64));
+  command->add_option("--max-frames", options->max_frames,
+                      "Stop after so many frames; default: all, and 100 of a source without end")
+      ->check(CLI::Range(int64_t(1), int64_t(1) << 40));
+  command->add_option("--every", options->every, "Take only every N-th frame of a clip")
+      ->check(CLI::Range(int64_t(1), int64_t(1) << 30));
+  command->footer(
+      "Writes for each image, in the DensePose convention:\n"
+      "  <stem>_IUV.png   body part I, U * 255, V * 255 (channels B, G, R of the file)\n"
+      "  <stem>_INDS.png  which person a pixel belongs to, 0 for nobody\n"
+      "  <stem>.json      boxes in pixels and scores\n"
+      "Frames of a clip are named <stem>_<frame number>. Files appear whole or not at all.\n\n"
+      "Examples:\n"
+      "  maquette densepose photo.jpg --out results --overlay\n"
+      "  maquette densepose holiday/*.jpg --out results --size 480\n"
+      "  maquette densepose 'video:dance.mp4?fps=10' --out results --overlay\n"
+      "  maquette densepose 'stub:people?count=3&seed=7' --out results --overlay --max-frames 60");
+  command->callback([=] { *exit_code = run_densepose(*options); });
+}

@@ -1,0 +1,11 @@
+// The commands of `maquette`. Each adds itself to the app; its exit code, if not 0, goes to `*exit_code`, and what it
+// throws is printed as its error.
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+void add_info_command(CLI::App& app, int* exit_code);
+void add_sources_command(CLI::App& app, int* exit_code);
+void add_densepose_command(CLI::App& app, int* exit_code);

@@ -1,0 +1,40 @@
+// The `maquette` command line: each command is one file, built on the public C++ header alone.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <maquette/maquette.h>
+
+#include "commands.h"
+
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // What goes wrong with a file is said once, by the SDK; the decoders below it stay silent unless somebody asks.
+  setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+
+  CLI::App app("Maquette: dense pose of people in images, clips and camera pictures, on the CPU.");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("maquette ") + maq_sdk_version());
+  app.footer("Try it without a camera:\n  maquette densepose stub:people --out demo-output --overlay --max-frames 60\n"
+             "Help on a command:\n  maquette densepose --help");
+  int exit_code = 0;
+  add_info_command(app, &exit_code);
+  add_sources_command(app, &exit_code);
+  add_densepose_command(app, &exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "maquette: %s\n", error.what());
+    return kFailed;
+  }
+  return exit_code;
+}

@@ -1,0 +1,26 @@
+// A progress bar on standard error; nothing when that is not a terminal.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+class ProgressBar {
+ public:
+  // `total` below 1: not known, so only a count is shown.
+  ProgressBar(std::string label, int64_t total);
+  // Ends the line.
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void advance(int64_t done, const std::string& note);
+
+ private:
+  std::string label_;
+  int64_t total_;
+  bool visible_;
+  bool drawn_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point last_drawn_{};
+};

@@ -1,0 +1,13 @@
+// What a person writes for a source, and the names of the files made from it.
+#pragma once
+
+#include <string>
+
+struct SourceArgument {
+  std::string uri;
+  std::string stem;  // of output files: "photo" for image:dir/photo.jpg, "stub_people" for stub:people?count=2
+};
+
+// Takes a URI as it is, and a bare path as image: or video:, by its extension or else its content.
+// Throws std::runtime_error when a bare path does not exist.
+SourceArgument parse_source_argument(const std::string& text);

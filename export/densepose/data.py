@@ -1,0 +1,147 @@
+"""Reads shards (docs/formats.md), draws augmented batches in background threads."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from export import surface
+from export.densepose.targets import Truth
+from export.people.dataset import visible_boxes
+
+MEAN = np.array([123.675, 116.28, 103.53], np.float32)  # RGB, 0..255
+STD = np.array([58.395, 57.12, 57.375], np.float32)
+
+
+@dataclass(frozen=True)
+class Record:
+    """One encoded image with its label."""
+
+    image: bytes
+    label: bytes
+
+    def decoded(self) -> tuple[np.ndarray, np.ndarray]:
+        """BGR uint8 [H, W, 3] and label uint8 [H, W, 4]."""
+        image = cv2.imdecode(np.frombuffer(self.image, np.uint8), cv2.IMREAD_COLOR)
+        label = cv2.imdecode(np.frombuffer(self.label, np.uint8), cv2.IMREAD_UNCHANGED)
+        return image, label
+
+
+def load_records(folder: Path, limit: int | None = None) -> list[Record]:
+    """All images of a split, still encoded (about 40 kB each)."""
+    shards = sorted(folder.glob("shard-?????.npz"))
+    if not shards:
+        raise FileNotFoundError(f"no shards in {folder}: run `python -m export.people.dataset` first")
+    records: list[Record] = []
+    for path in tqdm(shards, desc=f"reading {folder.name}", unit="shard", leave=False):
+        with np.load(path) as data:
+            pieces = []
+            for name in ("image", "label"):
+                ends = data[f"{name}_end"]
+                pieces.append([p.tobytes() for p in np.split(data[name], ends[:-1])])
+            records += [Record(*pair) for pair in zip(*pieces, strict=True)]
+        if limit and len(records) >= limit:
+            return records[:limit]
+    return records
+
+
+def normalised(image: np.ndarray) -> np.ndarray:
+    """BGR [H, W, 3] -> float32 [3, H, W], RGB, zero mean and unit variance."""
+    return ((image[..., ::-1].astype(np.float32) - MEAN) / STD).transpose(2, 0, 1)
+
+
+def augmented(record: Record, size: int, scales: tuple[float, float], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A random square cut at a random scale, mirrored half of the time, with other colours."""
+    image, label = record.decoded()
+    scale = np.exp(rng.uniform(*np.log(scales)))
+    shape = (max(int(image.shape[1] * scale), 8), max(int(image.shape[0] * scale), 8))
+    image = cv2.resize(image, shape, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    label = cv2.resize(label, shape, interpolation=cv2.INTER_NEAREST)
+    corner = _corner(label, size, rng)
+    image, label = _cut(image, corner, size, MEAN[::-1]), _cut(label, corner, size, np.zeros(4))
+    if rng.random() < 0.5:
+        image = image[:, ::-1]
+        label = label[:, ::-1].copy()
+        label[..., :3] = surface.mirror_iuv(label[..., :3])
+    return _recoloured(np.ascontiguousarray(image), rng), label
+
+
+def _corner(label: np.ndarray, size: int, rng: np.random.Generator) -> tuple[int, int]:
+    """Upper left corner (x, y) of the cut; four times of five it is drawn towards a person."""
+    focus = None
+    people = np.unique(label[..., 3])[1:]
+    if len(people) and rng.random() < 0.8:
+        y, x = np.nonzero(label[..., 3] == rng.choice(people))
+        k = rng.integers(len(x))
+        focus = (x[k], y[k])
+    corner = []
+    for axis, length in enumerate((label.shape[1], label.shape[0])):
+        low, high = min(0, length - size), max(0, length - size)
+        if focus is not None:
+            low, high = max(low, focus[axis] - size + 1), min(high, focus[axis])
+        corner.append(int(rng.integers(low, high + 1)))
+    return corner[0], corner[1]
+
+
+def _cut(array: np.ndarray, corner: tuple[int, int], size: int, fill: np.ndarray) -> np.ndarray:
+    out = np.empty((size, size, array.shape[2]), np.uint8)
+    out[:] = fill
+    x, y = corner
+    part = array[max(y, 0) : y + size, max(x, 0) : x + size]
+    out[max(-y, 0) : max(-y, 0) + part.shape[0], max(-x, 0) : max(-x, 0) + part.shape[1]] = part
+    return out
+
+
+def _recoloured(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    colour = image.astype(np.float32)
+    if rng.random() < 0.8:
+        colour = (colour - 128) * rng.uniform(0.7, 1.3) + 128 + rng.normal(0, 15)
+        colour *= 1 + rng.normal(0, 0.06, 3).astype(np.float32)
+    if rng.random() < 0.08:
+        colour[:] = colour.mean(-1, keepdims=True)
+    if rng.random() < 0.15:
+        colour = cv2.GaussianBlur(colour, (0, 0), rng.uniform(0.3, 1.2))
+    return np.clip(colour, 0, 255).astype(np.uint8)
+
+
+def truth_of(label: np.ndarray) -> Truth:
+    box, instance, ignore = visible_boxes(label)
+    return Truth(torch.from_numpy(box), torch.from_numpy(instance), torch.from_numpy(ignore), torch.from_numpy(label))
+
+
+class Batches:
+    """Endless shuffled batches, made ahead by threads (OpenCV releases the interpreter's lock)."""
+
+    def __init__(self, records: list[Record], batch: int, seed: int, threads: int = 2) -> None:
+        self.records, self.batch, self.seed = records, batch, seed
+        self.size, self.scales = 256, (0.6, 1.2)
+        self._ready: queue.Queue = queue.Queue(maxsize=4)
+        for k in range(threads):
+            threading.Thread(target=self._work, args=(k,), daemon=True).start()
+
+    def _work(self, thread: int) -> None:
+        rng = np.random.default_rng([self.seed, thread])
+        order: list[int] = []
+        while True:
+            size, images, truths = self.size, [], []
+            for _ in range(self.batch):
+                if not order:
+                    order = rng.permutation(len(self.records)).tolist()
+                image, label = augmented(self.records[order.pop()], size, self.scales, rng)
+                images.append(normalised(image))
+                truths.append(truth_of(label))
+            self._ready.put((size, torch.from_numpy(np.stack(images)), truths))
+
+    def next(self) -> tuple[torch.Tensor, list[Truth]]:
+        """Image [N, 3, size, size] and its people; batches of an earlier size are thrown away."""
+        while True:
+            size, image, truths = self._ready.get()
+            if size == self.size:
+                return image, truths

@@ -1,0 +1,139 @@
+"""Inference outside the graphs: resize, proposals, NMS, RoIAlign, and composing the IUV picture.
+
+Written against three callables, so that the torch network and ONNX Runtime sessions run the same code. It is
+the reference that the C++ runtime is compared with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+from torchvision.ops import nms
+
+from export.densepose import boxes as bx
+from export.densepose import targets as tg
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.data import MEAN, STD
+from export.densepose.network import MobileParsingRCNN
+
+Detector = Callable[[Tensor], tuple[list[Tensor], list[Tensor], list[Tensor]]]
+BoxHead = Callable[[Tensor], tuple[Tensor, Tensor]]
+DenseHead = Callable[[Tensor], tuple[Tensor, Tensor, Tensor, Tensor]]
+
+
+@dataclass(frozen=True)
+class Graphs:
+    """The three callables; shapes as in docs/formats.md (the detector returns P2..P6, objectness, deltas)."""
+
+    detector: Detector
+    box_head: BoxHead
+    dense_head: DenseHead
+
+    @staticmethod
+    def of_network(net: MobileParsingRCNN) -> Graphs:
+        return Graphs(net.detector, net.box_head, net.dense_head)
+
+
+@dataclass(frozen=True)
+class Result:
+    """boxes float32 [K, 4] in source pixels, scores float32 [K] (falling), iuv uint8 [H, W, 3] = (I, U*255, V*255),
+    instance uint8 [H, W] (k + 1 for person k, 0 for nobody)."""
+
+    boxes: np.ndarray
+    scores: np.ndarray
+    iuv: np.ndarray
+    instance: np.ndarray
+
+
+def network_input(image: np.ndarray, long_side: int) -> tuple[Tensor, float, float]:
+    """RGB uint8 [H, W, 3] -> normalised [1, 3, h, w], zero-padded to multiples of 32, and the scales x, y to the source."""
+    height, width = image.shape[:2]
+    scale = long_side / max(height, width)
+    shape = (max(round(width * scale), 1), max(round(height * scale), 1))
+    if shape != (width, height):
+        image = cv2.resize(image, shape, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    tensor = torch.from_numpy(((image.astype(np.float32) - MEAN) / STD).transpose(2, 0, 1))[None]
+    tensor = F.pad(tensor, (0, -shape[0] % 32, 0, -shape[1] % 32))
+    return tensor.contiguous(), width / shape[0], height / shape[1]
+
+
+@torch.no_grad()
+def infer(graphs: Graphs, image: np.ndarray, network: NetworkConfig | None = None, config: DecodeConfig | None = None) -> Result:
+    """People and their body surface in an RGB image uint8 [H, W, 3]."""
+    network, config = network or NetworkConfig(), config or DecodeConfig()
+    height, width = image.shape[:2]
+    tensor, scale_x, scale_y = network_input(image, config.long_side)
+    inner = (round(height / scale_y), round(width / scale_x))
+    features, objectness, deltas = graphs.detector(tensor)
+    flat = [bx.flat_outputs(o, d) for o, d in zip(objectness, deltas, strict=True)]
+    anchors = bx.anchors(network, [tuple(o.shape[-2:]) for o in objectness])
+    proposed = tg.proposals(
+        [f[0][0] for f in flat], [f[1][0] for f in flat], anchors, inner,
+        config.pre_nms_top_k, config.post_nms_top_k, config.rpn_nms_iou,
+    )  # fmt: skip
+    boxes, scores = _people(graphs, features, proposed, network, config, inner)
+    iuv, instance = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
+    if len(boxes):
+        maps = graphs.dense_head(tg.pooled(features, [boxes], network, network.dense_pool, level=0))
+    scale = boxes.new_tensor([scale_x, scale_y, scale_x, scale_y])
+    for k, box in enumerate(boxes * scale):
+        paint([m[k] for m in maps], box.tolist(), k + 1, iuv, instance)
+    return Result((boxes * scale).numpy(), scores.numpy(), iuv, instance)
+
+
+def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: NetworkConfig,
+            config: DecodeConfig, inner: tuple[int, int]) -> tuple[Tensor, Tensor]:  # fmt: skip
+    """Box head, threshold and NMS: boxes [K, 4] in input pixels and scores [K], best first."""
+    if not len(proposed):
+        return proposed, proposed.new_zeros(0)
+    logits, deltas = graphs.box_head(tg.pooled(features, [proposed], network, network.box_pool))
+    scores = logits.softmax(1)[:, 0]
+    boxes = bx.clip(bx.decode(deltas, proposed, network.delta_weights), *inner)
+    valid = (scores > config.score_threshold) & ((boxes[:, 2:] - boxes[:, :2]) > 0).all(1)
+    boxes, scores = boxes[valid], scores[valid]
+    keep = nms(boxes, scores, config.box_nms_iou)[: config.max_people]
+    return boxes[keep], scores[keep]
+
+
+def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, instance: np.ndarray) -> None:
+    """Writes one person's labels into the still empty pixels of its box.
+
+    maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
+    at least 1); logits are resized (bilinear, half-pixel centres) before the argmax.
+    """
+    height, width = instance.shape
+    x0, y0 = int(box[0]), int(box[1])
+    w, h = max(int(box[2]) - x0, 1), max(int(box[3]) - y0, 1)
+    x1, y1 = min(x0 + w, width), min(y0 + h, height)
+    if x0 >= width or y0 >= height:
+        return
+    coarse, index, u, v = maps
+    both = F.interpolate(torch.cat([coarse, index])[None], (h, w), mode="bilinear", align_corners=False)[0]
+    part = torch.where(both[: len(coarse)].argmax(0) > 0, both[len(coarse) :].argmax(0), 0)
+    chart = [_sampled(m, part).clamp(0, 1).mul(255).round() for m in (u, v)]
+    label = torch.stack([part.float(), *chart], -1).byte().numpy()[: y1 - y0, : x1 - x0]
+    empty = (instance[y0:y1, x0:x1] == 0) & (label[..., 0] > 0)
+    iuv[y0:y1, x0:x1][empty] = label[empty]
+    instance[y0:y1, x0:x1][empty] = number
+
+
+def _sampled(maps: Tensor, channel: Tensor) -> Tensor:
+    """maps [C, s, s] resized bilinearly (half-pixel centres) to channel's [h, w], but only the channel asked for at each pixel."""
+    side = maps.shape[-1]
+    low, high, share = [], [], []
+    for length in channel.shape:
+        at = ((torch.arange(length) + 0.5) * (side / length) - 0.5).clamp(0, side - 1)
+        low.append(at.floor().long())
+        high.append((low[-1] + 1).clamp(max=side - 1))
+        share.append(at - low[-1])
+    (top, left), (bottom, right), (down, across) = low, high, share
+    down, across = down[:, None], across[None]
+    upper = maps[channel, top[:, None], left[None]] * (1 - across) + maps[channel, top[:, None], right[None]] * across
+    lower = maps[channel, bottom[:, None], left[None]] * (1 - across) + maps[channel, bottom[:, None], right[None]] * across
+    return upper * (1 - down) + lower * down

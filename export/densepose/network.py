@@ -1,0 +1,177 @@
+"""Mobile Parsing R-CNN: MobileNetV3-Large, BiFPN, RPN, box head without FC layers, dense head with ASPP."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+from torchvision.models import mobilenet_v3_large
+
+from export.densepose.config import NetworkConfig
+
+
+class Backbone(nn.Module):
+    """MobileNetV3-Large up to its last bottleneck. [N, 3, H, W] -> features at strides 4, 8, 16, 32 with 24, 40, 112, 160 channels.
+
+    The 1x1 expansion to 960 channels of the classifier is left out: nothing reads it.
+    """
+
+    _TAPS = (3, 6, 12, 15)  # indices of the last block of each resolution
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.blocks = mobilenet_v3_large(weights=None).features[:16]
+
+    def forward(self, image: Tensor) -> list[Tensor]:
+        taps, x = [], image
+        for k, block in enumerate(self.blocks):
+            x = block(x)
+            if k in self._TAPS:
+                taps.append(x)
+        return taps
+
+
+class SeparableConv(nn.Sequential):
+    """Depthwise 3x3, pointwise 1x1, BN, ReLU; stride 2 halves the size."""
+
+    def __init__(self, width: int, stride: int = 1) -> None:
+        super().__init__(
+            nn.Conv2d(width, width, 3, stride, 1, groups=width, bias=False),
+            nn.Conv2d(width, width, 1, bias=False),
+            nn.BatchNorm2d(width, momentum=0.03),
+            nn.ReLU(inplace=True),
+        )
+
+
+class Fusion(nn.Module):
+    """Weighted mean of maps with learnt non-negative weights (fast normalised fusion)."""
+
+    def __init__(self, inputs: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.ones(inputs))
+
+    def forward(self, *maps: Tensor) -> Tensor:
+        weight = F.relu(self.weight)
+        weight = weight / (weight.sum() + 1e-4)
+        return sum(weight[k] * x for k, x in enumerate(maps))
+
+
+def _up(x: Tensor) -> Tensor:
+    return F.interpolate(x, scale_factor=2.0, mode="nearest")
+
+
+class BiFPN(nn.Module):
+    """One bidirectional pass over four levels. Returns P2..P6, all `width` channels, strides 4..64."""
+
+    def __init__(self, tap_channels: tuple[int, ...], width: int) -> None:
+        super().__init__()
+        self.lateral = nn.ModuleList(nn.Conv2d(c, width, 1) for c in tap_channels)
+        self.fuse = nn.ModuleDict({n: Fusion(3 if n in ("o3", "o4") else 2) for n in ("t4", "t3", "o2", "o3", "o4", "o5")})
+        self.conv = nn.ModuleDict({n: SeparableConv(width) for n in ("t4", "t3", "o2", "o3", "o4", "o5")})
+        self.down = nn.ModuleDict({n: SeparableConv(width, stride=2) for n in ("o3", "o4", "o5")})
+
+    def forward(self, taps: list[Tensor]) -> list[Tensor]:
+        p2, p3, p4, p5 = (conv(x) for conv, x in zip(self.lateral, taps, strict=True))
+
+        def node(name: str, *maps: Tensor) -> Tensor:
+            return self.conv[name](self.fuse[name](*maps))
+
+        t4 = node("t4", p4, _up(p5))
+        t3 = node("t3", p3, _up(t4))
+        o2 = node("o2", p2, _up(t3))
+        o3 = node("o3", p3, t3, self.down["o3"](o2))
+        o4 = node("o4", p4, t4, self.down["o4"](o3))
+        o5 = node("o5", p5, self.down["o5"](o4))
+        return [o2, o3, o4, o5, F.max_pool2d(o5, 1, 2)]
+
+
+class RpnHead(nn.Module):
+    """Shared over levels: objectness logits [N, A, h, w] and box deltas [N, 4A, h, w], anchor-major."""
+
+    def __init__(self, width: int, anchors: int) -> None:
+        super().__init__()
+        self.conv = nn.Conv2d(width, width, 3, padding=1)
+        self.objectness = nn.Conv2d(width, anchors, 1)
+        self.deltas = nn.Conv2d(width, anchors * 4, 1)
+        for layer in (self.conv, self.objectness, self.deltas):
+            nn.init.normal_(layer.weight, std=0.01)
+            nn.init.zeros_(layer.bias)
+
+    def forward(self, features: list[Tensor]) -> tuple[list[Tensor], list[Tensor]]:
+        hidden = [F.relu(self.conv(x)) for x in features]
+        return [self.objectness(x) for x in hidden], [self.deltas(x) for x in hidden]
+
+
+class BoxHead(nn.Module):
+    """[R, C, 7, 7] -> class logits [R, 2] (person, background) and box deltas [R, 4]."""
+
+    def __init__(self, width: int, pool: int) -> None:
+        super().__init__()
+        self.convs = nn.Sequential(
+            nn.Conv2d(width, width, 3, padding=1), nn.ReLU(inplace=True),
+            nn.Conv2d(width, width, 3, padding=1), nn.ReLU(inplace=True),
+        )  # fmt: skip
+        self.logits = nn.Linear(width * pool * pool, 2)
+        self.deltas = nn.Linear(width * pool * pool, 4)
+        nn.init.normal_(self.logits.weight, std=0.01)
+        nn.init.normal_(self.deltas.weight, std=0.001)
+        nn.init.zeros_(self.logits.bias)
+        nn.init.zeros_(self.deltas.bias)
+
+    def forward(self, rois: Tensor) -> tuple[Tensor, Tensor]:
+        flat = self.convs(rois).flatten(1)
+        return self.logits(flat), self.deltas(flat)
+
+
+class Aspp(nn.Module):
+    """Five branches (1x1, three dilated 3x3, global mean) and their 1x1 mixture."""
+
+    def __init__(self, width: int, dilations: tuple[int, ...]) -> None:
+        super().__init__()
+        self.branches = nn.ModuleList([nn.Conv2d(width, width, 1)])
+        self.branches.extend(nn.Conv2d(width, width, 3, padding=d, dilation=d) for d in dilations)
+        self.context = nn.Conv2d(width, width, 1)
+        self.mix = nn.Conv2d(width * (len(self.branches) + 1), width, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        maps = [F.relu(branch(x)) for branch in self.branches]
+        context = F.relu(self.context(x.mean((2, 3), keepdim=True)))
+        return F.relu(self.mix(torch.cat([*maps, context.expand_as(maps[0])], 1)))
+
+
+class DenseHead(nn.Module):
+    """[P, C, 32, 32] -> coarse [P, 15, 64, 64], index, u and v [P, 25, 64, 64]; all raw logits or values."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        width = config.width
+        self.aspp = Aspp(width, config.aspp_dilations)
+        self.body = nn.Sequential(*(m for _ in range(4) for m in (nn.Conv2d(width, width, 3, padding=1), nn.ReLU(inplace=True))))
+        sizes = {"coarse": config.coarse_classes, "index": config.index_classes, "u": config.index_classes, "v": config.index_classes}
+        self.out = nn.ModuleDict({name: nn.ConvTranspose2d(width, n, 4, 2, 1) for name, n in sizes.items()})
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
+                nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
+                nn.init.zeros_(module.bias)
+
+    def forward(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        x = self.body(self.aspp(rois))
+        return self.out["coarse"](x), self.out["index"](x), self.out["u"](x), self.out["v"](x)
+
+
+class MobileParsingRCNN(nn.Module):
+    """The whole network; `detector` alone is what runs once an image, the heads run on RoI features."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.backbone = Backbone()
+        self.neck = BiFPN(config.tap_channels, config.width)
+        self.rpn = RpnHead(config.width, len(config.aspect_ratios))
+        self.box_head = BoxHead(config.width, config.box_pool)
+        self.dense_head = DenseHead(config)
+
+    def detector(self, image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
+        """Normalised image [N, 3, H, W], H and W multiples of 32 -> P2..P6, objectness, deltas (five levels each)."""
+        features = self.neck(self.backbone(image))
+        return (features, *self.rpn(features))

@@ -1,0 +1,128 @@
+"""What the network is asked for: RPN and box-head samples, dense labels on the RoI grid (networks' section 1.5-1.10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torchvision.ops import batched_nms, box_iou, roi_align
+
+from export.densepose import boxes as bx
+from export.densepose.config import NetworkConfig
+
+
+@dataclass(frozen=True)
+class Truth:
+    """One image's people: box [G, 4], instance number [G], ignore [G], label uint8 [H, W, 4]."""
+
+    box: Tensor
+    instance: Tensor
+    ignore: Tensor
+    label: Tensor
+
+
+def _draw(mask: Tensor, count: int) -> Tensor:
+    """At most `count` random indices where mask is true."""
+    index = mask.nonzero()[:, 0]
+    return index[torch.randperm(len(index), device=mask.device)[:count]]
+
+
+def rpn_samples(anchors: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Anchors to learn from: (index of positives, their target boxes [P, 4], index of negatives).
+
+    IoU >= 0.7 is positive, and so is the best anchor of each person; < 0.3 is negative. Anchors that lie on
+    ignored people are left out.
+    """
+    if not len(truth.box):
+        return anchors.new_zeros(0, dtype=torch.long), anchors.new_zeros(0, 4), _draw(anchors.new_ones(len(anchors), dtype=torch.bool), count)
+    iou = box_iou(anchors, truth.box)
+    best, match = iou.max(1)
+    positive = best >= 0.7
+    # The best anchor of each person counts, however poor: tall people match no anchor at 0.7.
+    top = iou.max(0).values
+    positive |= ((iou == top) & (top > 0.1)).any(1)
+    ties = (iou == top) & (top > 0.1)
+    match = torch.where(ties.any(1), ties.float().argmax(1), match)
+    positive &= ~truth.ignore[match]
+    near_ignored = (iou[:, truth.ignore] > 0.3).any(1)
+    negative = (best < 0.3) & ~near_ignored & ~positive
+    chosen = _draw(positive, count // 2)
+    return chosen, truth.box[match[chosen]], _draw(negative, count - len(chosen))
+
+
+@torch.no_grad()
+def proposals(logits: list[Tensor], deltas: list[Tensor], anchors: list[Tensor], size: tuple[int, int],
+              pre: int, post: int, iou: float = 0.7) -> Tensor:
+    """RPN boxes of one image: per level the `pre` best, NMS within each level, then the `post` best. [K, 4]."""  # fmt: skip
+    found, scores, levels = [], [], []
+    for k, (logit, delta, anchor) in enumerate(zip(logits, deltas, anchors, strict=True)):
+        score, index = logit.topk(min(pre, len(logit)))
+        found.append(bx.clip(bx.decode(delta[index], anchor[index]), *size))
+        scores.append(score)
+        levels.append(torch.full_like(index, k))
+    box, score, level = torch.cat(found), torch.cat(scores), torch.cat(levels)
+    valid = ((box[:, 2:] - box[:, :2]) > 0).all(1) & torch.isfinite(score)
+    box, score, level = box[valid], score[valid], level[valid]
+    return box[batched_nms(box, score, level, iou)[:post]]
+
+
+def box_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tensor, Tensor]:
+    """RoIs for the box head: (boxes [R, 4], is person [R], matched person [R]); a quarter positive (IoU >= 0.5)."""
+    if not len(truth.box):
+        return proposed[:count], proposed.new_zeros(len(proposed[:count]), dtype=torch.bool), proposed.new_zeros(len(proposed[:count]), dtype=torch.long)
+    candidates = torch.cat([proposed, truth.box])
+    best, match = box_iou(candidates, truth.box).max(1)
+    positive = (best >= 0.5) & ~truth.ignore[match]
+    chosen = _draw(positive, count // 4)
+    other = _draw((best < 0.5), count - len(chosen))
+    index = torch.cat([chosen, other])
+    return candidates[index], positive[index], match[index]
+
+
+def dense_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tensor]:
+    """RoIs for the dense head: (boxes [P, 4], person [P]); shaken true boxes and proposals with IoU > 0.7."""
+    wanted = (~truth.ignore).nonzero()[:, 0]
+    wanted = wanted[torch.randperm(len(wanted))[:count]]
+    if not len(wanted):
+        return proposed.new_zeros(0, 4), wanted
+    true = truth.box[wanted]
+    size = (true[:, 2:] - true[:, :2]).repeat(1, 2)
+    shaken = true + size * torch.empty_like(true).uniform_(-0.06, 0.06)
+    if len(proposed):
+        iou, best = box_iou(true, proposed).max(1)
+        use = (iou > 0.7) & (torch.rand(len(wanted)) < 0.5)
+        shaken = torch.where(use[:, None], proposed[best], shaken)
+    return shaken, wanted
+
+
+def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tensor:
+    """Labels at the centres of a grid x grid lattice over each box: uint8 [P, grid, grid, 3] = (I, U*255, V*255).
+
+    Other people's pixels and what lies outside the image are background.
+    """
+    height, width = truth.label.shape[:2]
+    at = (torch.arange(grid) + 0.5) / grid
+    x = (boxes[:, :1] + at * (boxes[:, 2:3] - boxes[:, :1])).floor().long()
+    y = (boxes[:, 1:2] + at * (boxes[:, 3:] - boxes[:, 1:2])).floor().long()
+    inside = ((y >= 0) & (y < height))[:, :, None] & ((x >= 0) & (x < width))[:, None]
+    picked = truth.label[y.clamp(0, height - 1)[:, :, None], x.clamp(0, width - 1)[:, None]]
+    own = (picked[..., 3] == truth.instance[person][:, None, None]) & inside
+    return picked[..., :3] * own[..., None]
+
+
+def pooled(features: list[Tensor], boxes: list[Tensor], config: NetworkConfig, pool: int, level: int | None = None) -> Tensor:
+    """RoIAlign (aligned, adaptive sampling) of each image's boxes: [sum of R, C, pool, pool].
+
+    `level` 0 reads everything from P2 (dense head); None picks P2..P5 by box size.
+    """
+    batch = torch.cat([torch.full((len(b), 1), float(k)) for k, b in enumerate(boxes)]).to(features[0])
+    every = torch.cat([batch, torch.cat(boxes).to(features[0])], 1)
+    which = torch.zeros(len(every), dtype=torch.long) if level is not None else bx.levels_of(every[:, 1:], config)
+    out = features[0].new_zeros(len(every), features[0].shape[1], pool, pool)
+    for k in range(4):
+        own = (which == k).nonzero()[:, 0]
+        if len(own):
+            rois = roi_align(features[k], every[own], pool, 1 / config.tap_strides[k], sampling_ratio=0, aligned=True)
+            out = out.index_copy(0, own, rois)
+    return out

@@ -1,0 +1,217 @@
+"""Trains the network on rendered people.
+
+    python -m export.densepose.train --out .data/runs/b --minutes 120
+
+One loop for CPU, one GPU, and several (`torchrun --nproc-per-node N -m export.densepose.train …`). It resumes
+from `--out` by itself, saves every few minutes and on Ctrl-C, and draws the curves to `curves.png`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import math
+import os
+import signal
+import time
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+import torch
+from torch import nn
+from torchvision.ops import box_iou
+from tqdm import tqdm
+
+from export.densepose import data
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.decode import Graphs, infer
+from export.densepose.losses import batch_loss
+from export.densepose.network import MobileParsingRCNN
+
+# Image size by share of the run: small images first, since early on steps matter more than detail.
+# (share of the run at which the stage begins, image side, scale range of the 320-pixel renderings)
+STAGES = ((0.0, 160, (0.4, 0.85)), (0.5, 192, (0.5, 1.0)), (0.8, 256, (0.6, 1.2)))
+
+
+class Ema:
+    """Exponential mean of weights and BN statistics; what is evaluated and shipped."""
+
+    def __init__(self, net: nn.Module, decay: float) -> None:
+        self.net, self.decay = copy.deepcopy(net).eval().requires_grad_(False), decay
+
+    @torch.no_grad()
+    def update(self, net: nn.Module, step: int) -> None:
+        decay = min(self.decay, (1 + step) / (10 + step))
+        for mean, now in zip(self.net.state_dict().values(), net.state_dict().values(), strict=True):
+            if mean.dtype.is_floating_point:
+                mean.lerp_(now, 1 - decay)
+            else:
+                mean.copy_(now)
+
+
+@torch.no_grad()
+def validate(net: MobileParsingRCNN, records: list[data.Record]) -> dict[str, float]:
+    """Quick figures on a few validation images: box recall and precision at IoU 0.5, part accuracy, mask IoU."""
+    device = next(net.parameters()).device
+    net = copy.deepcopy(net).cpu().eval() if device.type != "cpu" else net.eval()
+    people = found = boxes = pixels = right = both = either = 0
+    for record in records:
+        image, label = record.decoded()
+        result = infer(Graphs.of_network(net), np.ascontiguousarray(image[..., ::-1]), net.config, DecodeConfig(score_threshold=0.3, max_people=6))
+        truth = data.truth_of(label)
+        wanted = truth.box[~truth.ignore]
+        people += len(wanted)
+        boxes += len(result.boxes)
+        if len(wanted) and len(result.boxes):
+            found += int((box_iou(wanted, torch.from_numpy(result.boxes)).max(1).values > 0.5).sum())
+        body, seen = label[..., 0] > 0, result.iuv[..., 0] > 0
+        pixels += body.sum()
+        right += (body & (result.iuv[..., 0] == label[..., 0])).sum()
+        both += (body & seen).sum()
+        either += (body | seen).sum()
+    return {"recall": found / max(people, 1), "precision": found / max(boxes, 1), "part": right / pixels, "mask_iou": both / either}
+
+
+def draw_curves(log: list[dict], path: Path) -> None:
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.5))
+    steps = [row for row in log if "loss" in row]
+    for name in steps[-1]["terms"] if steps else ():
+        left.plot([r["step"] for r in steps], [r["terms"][name] for r in steps], label=name, lw=1)
+    left.plot([r["step"] for r in steps], [r["loss"] for r in steps], "k", label="sum", lw=1.5)
+    left.set(xlabel="step", ylabel="weighted loss", yscale="log")
+    checks = [row for row in log if "part" in row]
+    for name in ("recall", "precision", "part", "mask_iou"):
+        right.plot([r["images"] for r in checks], [r[name] for r in checks], "o-", ms=3, label=name)
+    right.set(xlabel="images seen", ylabel="validation", ylim=(0, 1))
+    for axis in (left, right):
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=90)
+    plt.close(figure)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=Path(".data/people"))
+    parser.add_argument("--out", type=Path, default=Path(".data/runs/b"))
+    parser.add_argument("--width", type=int, default=64, help="channels of neck and heads: 64 (variant B), 88, 112")
+    parser.add_argument("--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in")
+    parser.add_argument("--batch", type=int, default=16, help="images a step and process")
+    parser.add_argument("--lr", type=float, default=2e-3)
+    parser.add_argument("--weight-decay", type=float, default=0.02)
+    parser.add_argument("--ema", type=float, default=0.997)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--threads", type=int, default=os.cpu_count())
+    parser.add_argument("--init", type=Path, help="start from these weights (a checkpoint of an earlier run)")
+    parser.add_argument("--validate-minutes", type=float, default=10)
+    parser.add_argument("--bf16", action=argparse.BooleanOptionalAction, default=torch.cuda.is_available())
+    options = parser.parse_args()
+
+    rank, world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
+    device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0))) if torch.cuda.is_available() else torch.device("cpu")
+    if world > 1:
+        torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
+    torch.set_num_threads(options.threads)
+    torch.manual_seed(options.seed + rank)
+    options.out.mkdir(parents=True, exist_ok=True)
+
+    net = MobileParsingRCNN(NetworkConfig(width=options.width)).to(device, memory_format=torch.channels_last)
+    ema = Ema(net, options.ema)
+    decayed = [p for p in net.parameters() if p.dim() > 1]
+    plain = [p for p in net.parameters() if p.dim() <= 1]
+    optimiser = torch.optim.AdamW([dict(params=decayed, weight_decay=options.weight_decay), dict(params=plain, weight_decay=0)], lr=options.lr)
+    step, images, spent, log = 0, 0, 0.0, []
+    checkpoint = options.out / "checkpoint.pt"
+    if checkpoint.exists():
+        saved = torch.load(checkpoint, map_location=device, weights_only=False)
+        net.load_state_dict(saved["net"])
+        ema.net.load_state_dict(saved["ema"])
+        optimiser.load_state_dict(saved["optimiser"])
+        step, images, spent, log = saved["step"], saved["images"], saved["spent"], saved["log"]
+        torch.set_rng_state(saved["rng"].cpu())
+        print(f"resumed at step {step}, {spent / 60:.1f} of {options.minutes:g} minutes")
+    elif options.init:
+        saved = torch.load(options.init, map_location=device, weights_only=False)
+        net.load_state_dict(saved["ema"])
+        ema.net.load_state_dict(saved["ema"])
+
+    def save() -> None:
+        if rank == 0:
+            state = dict(net=net.state_dict(), ema=ema.net.state_dict(), optimiser=optimiser.state_dict(), step=step,
+                         images=images, spent=spent, log=log, rng=torch.get_rng_state(), width=options.width)  # fmt: skip
+            torch.save(state, checkpoint.with_suffix(".tmp"))
+            checkpoint.with_suffix(".tmp").rename(checkpoint)
+            (options.out / "log.json").write_text(json.dumps(log))
+            draw_curves(log, options.out / "curves.png")
+
+    stopped = False
+
+    def stop(*_: object) -> None:
+        nonlocal stopped
+        stopped = True
+
+    signal.signal(signal.SIGTERM, stop)
+    signal.signal(signal.SIGINT, stop)
+    train = data.load_records(options.data / "train")[rank::world]
+    held_out = data.load_records(options.data / "val", 100)
+    batches = data.Batches(train, options.batch, seed=options.seed * 1000 + rank + step)
+    autocast = torch.autocast(device.type, torch.bfloat16, enabled=options.bf16)
+    net.train()
+    smooth: dict[str, float] = {}
+    length = options.minutes * 60
+    clock = saved_at = checked_at = time.monotonic()
+    bar = tqdm(total=round(length), initial=round(spent), unit="s", disable=rank > 0, smoothing=0)
+    while spent < length and not stopped:
+        share = spent / length
+        _, batches.size, batches.scales = [s for s in STAGES if share >= s[0]][-1]
+        warm = min(1.0, (step + 1) / 200)
+        rate = options.lr * warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(share, 1))))
+        for group in optimiser.param_groups:
+            group["lr"] = rate
+        image, truths = batches.next()
+        image = image.to(device).contiguous(memory_format=torch.channels_last)
+        terms = batch_loss(net, image, truths, autocast)
+        loss = sum(terms.values())
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        if world > 1:
+            for parameter in net.parameters():
+                if parameter.grad is None:
+                    parameter.grad = torch.zeros_like(parameter)
+                torch.distributed.all_reduce(parameter.grad)
+                parameter.grad /= world
+        norm = nn.utils.clip_grad_norm_(net.parameters(), 10.0)
+        if torch.isfinite(norm):
+            optimiser.step()
+            ema.update(net, step)
+        step, images = step + 1, images + len(image) * world
+        for name, value in terms.items():
+            smooth[name] = 0.95 * smooth.get(name, float(value)) + 0.05 * float(value)
+        now = time.monotonic()
+        bar.update(round(spent + now - clock) - bar.n)
+        spent, clock = spent + now - clock, now
+        if step % 20 == 0:
+            log.append({"step": step, "images": images, "loss": sum(smooth.values()), "terms": dict(smooth), "rate": rate, "size": batches.size})
+            bar.set_postfix(step=step, images=images, loss=f"{log[-1]['loss']:.3f}", size=batches.size)
+        if rank == 0 and now - checked_at > options.validate_minutes * 60:
+            log.append({"step": step, "images": images, "spent": spent, **validate(ema.net, held_out)})
+            tqdm.write(json.dumps(log[-1]))
+            checked_at = clock = time.monotonic()
+        if now - saved_at > 180:
+            save()
+            saved_at = time.monotonic()
+    bar.close()
+    if rank == 0:
+        log.append({"step": step, "images": images, "spent": spent, **validate(ema.net, held_out)})
+        print(json.dumps(log[-1]))
+    save()
+
+
+if __name__ == "__main__":
+    main()

@@ -19,7 +19,7 @@ backends, each `kind` or `kind=path`, separated by commas:
 
 examples:
   python -m export.evaluation --limit 100
-  python -m export.evaluation --data .data/people/val --backends torch=.data/training/b/last.pt
+  python -m export.evaluation --data .data/people/val --backends torch=.data/runs/b/checkpoint.pt
   python -m export.evaluation --backends onnx,capi=sdk/models/densepose-b-fp32,capi
 
 figures:

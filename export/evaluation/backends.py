@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 
 DEFAULT_PATHS = {
-    "torch": Path(".data/training/b/last.pt"),
+    "torch": Path(".data/runs/b/checkpoint.pt"),
     "onnx": Path("sdk/models/densepose-b-fp32"),
     "capi": Path("sdk/models/densepose-b-int8"),
 }
@@ -63,19 +63,31 @@ class Backend(Protocol):
 
 
 class TorchBackend:
-    """The trained networks from a checkpoint of `export.densepose`."""
+    """The trained networks (their moving average) from a checkpoint of `export.densepose.train`."""
 
     kind, precision = "torch", "fp32"
 
     def __init__(self, path: Path, score_floor: float) -> None:
-        from export.densepose import decode  # here, so that the other backends do without torch
+        import torch  # here, so that the C API is measured without torch
 
+        from export.densepose.config import DecodeConfig, NetworkConfig
+        from export.densepose.decode import Graphs
+        from export.densepose.network import MobileParsingRCNN
+
+        saved = torch.load(path, map_location="cpu", weights_only=True)
         self.path = path
-        self._network = decode.torch_network(path, score_threshold=score_floor)
-        self.threshold = self._network.score_threshold
+        self.threshold = DecodeConfig().score_threshold
+        self._network = NetworkConfig(width=saved["width"])
+        self._decode = DecodeConfig(score_threshold=score_floor)
+        net = MobileParsingRCNN(self._network)
+        net.load_state_dict(saved["ema"])
+        self._graphs = Graphs.of_network(net.eval())
 
     def predict(self, image: np.ndarray) -> Prediction:
-        raise NotImplementedError
+        from export.densepose.decode import infer
+
+        result = infer(self._graphs, image, self._network, self._decode)
+        return Prediction(result.boxes, result.scores, result.iuv, result.instance)
 
 
 class OnnxBackend:
@@ -84,13 +96,71 @@ class OnnxBackend:
     kind = "onnx"
 
     def __init__(self, path: Path, score_floor: float) -> None:
+        from export.densepose.config import DecodeConfig, NetworkConfig
+        from export.densepose.decode import Graphs
+
         manifest = read_manifest(path)
         self.path = path
         self.precision = manifest["precision"]
         self.threshold = manifest["box_head"]["score_threshold"]
+        rpn, head = manifest["rpn"], manifest["box_head"]
+        self._network = NetworkConfig(
+            anchor_sizes=tuple(rpn["anchor_sizes"]),
+            aspect_ratios=tuple(rpn["aspect_ratios"]),
+            rpn_strides=tuple(rpn["strides"]),
+            delta_weights=tuple(head["delta_weights"]),
+        )
+        self._decode = DecodeConfig(
+            long_side=manifest["input"]["long_side"],
+            pre_nms_top_k=rpn["pre_nms_top_k"],
+            post_nms_top_k=rpn["post_nms_top_k"],
+            rpn_nms_iou=rpn["nms_iou"],
+            score_threshold=score_floor,
+            box_nms_iou=head["nms_iou"],
+            max_people=head["max_people"],
+        )
+        graphs = {name: OnnxGraph(path, entry) for name, entry in manifest["graphs"].items()}
+
+        def detector(image):
+            out = graphs["detector"].run(image)
+            levels = range(2, 7)
+            features = [out[f"p{k}"] for k in levels if f"p{k}" in out]
+            return features, [out[f"objectness{k}"] for k in levels], [out[f"deltas{k}"] for k in levels]
+
+        def box_head(rois):
+            out = graphs["box_head"].run(rois)
+            return out["logits"], out["deltas"]
+
+        def dense_head(rois):
+            out = graphs["dense_head"].run(rois)
+            return out["coarse"], out["index"], out["u"], out["v"]
+
+        self._graphs = Graphs(detector, box_head, dense_head)
 
     def predict(self, image: np.ndarray) -> Prediction:
-        raise NotImplementedError
+        from export.densepose.decode import infer
+
+        result = infer(self._graphs, image, self._network, self._decode)
+        return Prediction(result.boxes, result.scores, result.iuv, result.instance)
+
+
+class OnnxGraph:
+    """One graph of a bundle with one input. Tensors in, tensors out by name."""
+
+    def __init__(self, bundle: Path, entry: dict) -> None:
+        import onnxruntime
+
+        self._input = entry["inputs"][0]["name"]
+        self._outputs = [output["name"] for output in entry["outputs"]]
+        self._session = onnxruntime.InferenceSession(
+            str(bundle / entry["file"]), providers=["CPUExecutionProvider"]
+        )
+
+    def run(self, tensor):
+        import torch
+
+        arrays = self._session.run(self._outputs, {self._input: tensor.contiguous().numpy()})
+        return dict(zip(self._outputs, map(torch.from_numpy, arrays), strict=True))
 
 
 class CApiBackend:

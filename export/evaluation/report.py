@@ -42,11 +42,11 @@ def print_table(results: dict[str, Figures], console: Console | None = None) -> 
     """results: figures by column name; the first column is what the others are compared with."""
     console = console or Console()
     first = next(iter(results.values()))
-    table = Table(
-        title=f"{first.images} images, {first.people} people ({first.ignored} more too small or hidden); "
-        f"AP over all scores, the rest at score >= {first.threshold:g}",
-        title_justify="left",
+    console.print(
+        f"{first.images} images, {first.people} people ({first.ignored} more too small or hidden). "
+        f"AP is over all scores, the rest at score >= {first.threshold:g}."
     )
+    table = Table()
     table.add_column("")
     for name in results:
         table.add_column(name, justify="right")

@@ -99,7 +99,8 @@ def _download(package: Package, folder: Path) -> None:
     # `apt-get source` also asks for Debian's patches; only the upstream tarball is wanted, and it is checked.
     if done.returncode and not (folder / package.file).exists():
         reason = (done.stderr or done.stdout).strip().splitlines()[-3:]
-        raise PackageError(f"{wanted} could not be fetched: {' '.join(reason)}")
+        hint = " If apt does not know it, run `apt-get update` first." if command[0] == "apt-get" else ""
+        raise PackageError(f"{wanted} could not be fetched: {' '.join(reason)}{hint}")
 
 
 def _source_command(wanted: str, folder: Path) -> list[str]:

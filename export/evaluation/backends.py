@@ -96,10 +96,15 @@ class OnnxBackend:
     kind = "onnx"
 
     def __init__(self, path: Path, score_floor: float) -> None:
+        from export.densepose import decode
         from export.densepose.config import DecodeConfig, NetworkConfig
-        from export.densepose.decode import Graphs
 
         manifest = read_manifest(path)
+        given = manifest["input"]
+        if not np.allclose([given["mean"], given["std"]], [decode.MEAN, decode.STD]):
+            raise ValueError(
+                f"{path} normalises by {given['mean']}, {given['std']}: not as export.densepose does"
+            )
         self.path = path
         self.precision = manifest["precision"]
         self.threshold = manifest["box_head"]["score_threshold"]
@@ -111,7 +116,7 @@ class OnnxBackend:
             delta_weights=tuple(head["delta_weights"]),
         )
         self._decode = DecodeConfig(
-            long_side=manifest["input"]["long_side"],
+            long_side=given["long_side"],
             pre_nms_top_k=rpn["pre_nms_top_k"],
             post_nms_top_k=rpn["post_nms_top_k"],
             rpn_nms_iou=rpn["nms_iou"],
@@ -135,7 +140,7 @@ class OnnxBackend:
             out = graphs["dense_head"].run(rois)
             return out["coarse"], out["index"], out["u"], out["v"]
 
-        self._graphs = Graphs(detector, box_head, dense_head)
+        self._graphs = decode.Graphs(detector, box_head, dense_head)
 
     def predict(self, image: np.ndarray) -> Prediction:
         from export.densepose.decode import infer

@@ -119,9 +119,10 @@ def truth_of(label: np.ndarray) -> Truth:
 class Batches:
     """Endless shuffled batches, made ahead by threads (OpenCV releases the interpreter's lock)."""
 
-    def __init__(self, records: list[Record], batch: int, seed: int, threads: int = 2) -> None:
+    def __init__(self, records: list[Record], batch: int, seed: int, threads: int = 1) -> None:
         self.records, self.batch, self.seed = records, batch, seed
         self.size, self.scales = 256, (0.6, 1.2)
+        cv2.setNumThreads(1)
         self._ready: queue.Queue = queue.Queue(maxsize=4)
         for k in range(threads):
             threading.Thread(target=self._work, args=(k,), daemon=True).start()

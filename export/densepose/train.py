@@ -2,7 +2,8 @@
 
     python -m export.densepose.train --out .data/runs/b --minutes 120
 
-One loop for CPU, one GPU, and several (`torchrun --nproc-per-node N -m export.densepose.train …`). It resumes
+One loop for CPU, one GPU, and several processes: `torchrun --nproc-per-node N -m export.densepose.train …` for N GPUs.
+On a CPU one process a core with `--batch 8` is about four times as fast as one process with all cores. It resumes
 from `--out` by itself, saves every few minutes and on Ctrl-C, and draws the curves to `curves.png`.
 """
 
@@ -77,6 +78,19 @@ def validate(net: MobileParsingRCNN, records: list[data.Record]) -> dict[str, fl
     return {"recall": found / max(people, 1), "precision": found / max(boxes, 1), "part": right / pixels, "mask_iou": both / either}
 
 
+def average_gradients(net: nn.Module, spent: float, stopped: bool, world: int) -> tuple[float, bool]:
+    """Means of the gradients over the processes, and one common clock and stop flag, in a single exchange."""
+    gradients = [torch.zeros_like(p) if p.grad is None else p.grad for p in net.parameters()]
+    flat = torch.cat([*(g.flatten() for g in gradients), gradients[0].new_tensor([spent, float(stopped)])])
+    torch.distributed.all_reduce(flat)
+    flat /= world
+    at = 0
+    for parameter in net.parameters():
+        parameter.grad = flat[at : at + parameter.numel()].view_as(parameter).clone()
+        at += parameter.numel()
+    return float(flat[-2]), bool(flat[-1] > 0)
+
+
 def draw_curves(log: list[dict], path: Path) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.5))
     steps = [row for row in log if "loss" in row]
@@ -107,7 +121,7 @@ def main() -> None:
     parser.add_argument("--weight-decay", type=float, default=0.02)
     parser.add_argument("--ema", type=float, default=0.997)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--threads", type=int, default=os.cpu_count())
+    parser.add_argument("--threads", type=int, help="a process; default: the cores shared out")
     parser.add_argument("--init", type=Path, help="start from these weights (a checkpoint of an earlier run)")
     parser.add_argument("--validate-minutes", type=float, default=10)
     parser.add_argument("--bf16", action=argparse.BooleanOptionalAction, default=torch.cuda.is_available())
@@ -117,8 +131,8 @@ def main() -> None:
     device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0))) if torch.cuda.is_available() else torch.device("cpu")
     if world > 1:
         torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
-    torch.set_num_threads(options.threads)
-    torch.manual_seed(options.seed + rank)
+    torch.set_num_threads(options.threads or max(1, (os.cpu_count() or 1) // world))
+    torch.manual_seed(options.seed)  # every process starts from the same weights
     options.out.mkdir(parents=True, exist_ok=True)
 
     net = MobileParsingRCNN(NetworkConfig(width=options.width)).to(device, memory_format=torch.channels_last)
@@ -134,17 +148,18 @@ def main() -> None:
         ema.net.load_state_dict(saved["ema"])
         optimiser.load_state_dict(saved["optimiser"])
         step, images, spent, log = saved["step"], saved["images"], saved["spent"], saved["log"]
-        torch.set_rng_state(saved["rng"].cpu())
         print(f"resumed at step {step}, {spent / 60:.1f} of {options.minutes:g} minutes")
     elif options.init:
         saved = torch.load(options.init, map_location=device, weights_only=False)
         net.load_state_dict(saved["ema"])
         ema.net.load_state_dict(saved["ema"])
 
+    torch.manual_seed(options.seed + 1000 * step + rank)
+
     def save() -> None:
         if rank == 0:
             state = dict(net=net.state_dict(), ema=ema.net.state_dict(), optimiser=optimiser.state_dict(), step=step,
-                         images=images, spent=spent, log=log, rng=torch.get_rng_state(), width=options.width)  # fmt: skip
+                         images=images, spent=spent, log=log, width=options.width)  # fmt: skip
             torch.save(state, checkpoint.with_suffix(".tmp"))
             checkpoint.with_suffix(".tmp").rename(checkpoint)
             (options.out / "log.json").write_text(json.dumps(log))
@@ -181,11 +196,7 @@ def main() -> None:
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         if world > 1:
-            for parameter in net.parameters():
-                if parameter.grad is None:
-                    parameter.grad = torch.zeros_like(parameter)
-                torch.distributed.all_reduce(parameter.grad)
-                parameter.grad /= world
+            spent, stopped = average_gradients(net, spent, stopped, world)
         norm = nn.utils.clip_grad_norm_(net.parameters(), 10.0)
         if torch.isfinite(norm):
             optimiser.step()

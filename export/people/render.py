@@ -24,19 +24,19 @@ _VERTEX = """#version 330
 in vec3 position; in vec3 normal; in vec3 rest; in vec2 texture_uv; in vec3 label; in vec3 point;
 uniform mat4 projection; uniform float offset, bulge, bulge_frequency; uniform vec3 phase;
 uniform mat3 fabric; uniform bool planar;
-out vec3 v_normal; out vec2 v_uv; out vec3 v_label; out vec3 v_rest; out vec3 v_view; out vec3 v_point;
+out vec3 v_normal; out vec2 v_uv; out vec2 v_chart; flat out float v_part; out vec3 v_rest; out vec3 v_view; out vec3 v_point;
 void main() {
   float f = bulge_frequency;
   float wave = sin(rest.x * f + phase.x) * sin(rest.z * f * .8 + phase.y)
              + .6 * sin(rest.y * f * 1.3 + rest.z * f * 1.7 + phase.z);
   vec3 p = position + normal * (offset + bulge * wave);
   gl_Position = projection * vec4(p, 1);
-  v_normal = normal; v_label = label; v_rest = rest; v_view = -p; v_point = point;
+  v_normal = normal; v_chart = label.yz; v_part = label.x; v_rest = rest; v_view = -p; v_point = point;
   v_uv = planar ? (fabric * vec3(rest.x + .6 * rest.y, rest.z, 1)).xy : texture_uv;
 }"""
 
 _FRAGMENT = """#version 330
-in vec3 v_normal; in vec2 v_uv; in vec3 v_label; in vec3 v_rest; in vec3 v_view; in vec3 v_point;
+in vec3 v_normal; in vec2 v_uv; in vec2 v_chart; flat in float v_part; in vec3 v_rest; in vec3 v_view; in vec3 v_point;
 uniform sampler2D albedo; uniform vec3 tint, sky, ground, up, light1, colour1, light2, colour2, phase;
 uniform float wrinkle, wrinkle_frequency, specular, instance;
 layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label; layout(location = 2) out vec4 point;
@@ -51,7 +51,7 @@ void main() {
   vec3 light = mix(ground, sky, dot(n, up) * .5 + .5)
              + colour1 * max(0., dot(n, light1)) + colour2 * max(0., dot(n, light2));
   colour = vec4(texture(albedo, v_uv).rgb * tint * light + specular * colour1 * highlight, 1);
-  label = vec4(v_label, instance);
+  label = vec4(v_part, clamp(v_chart, 0., 1.), instance);
   point = vec4(v_point, 1);
 }"""
 

@@ -4,7 +4,7 @@ The networks see colours. In a black image, one pixel cell of pure colour is one
 red at a cell of P2 is a person of 32 px, green at a cell of P3 one of 64 px, blue at a cell of P4 one of 128 px,
 each in the square anchor of that cell, shifted right by a tenth of its width (box delta 1 at weight 10).
 The dense head answers the same for everybody: the upper quarter of the box is background; of the rest the left half is
-part 3 and the right half part 7; U rises from -0.1 at the left to 1.1 at the right, V from 0 at the top to 1.
+part 3 and the right half part 7; U rises from -0.11 at the left to 1.11 at the right, V from 0 at the top to 1.
 
     python tests/native/make_tiny_bundle.py      needs onnx and numpy
 """
@@ -106,7 +106,7 @@ def dense_head():
     index = np.full((1, INDEX, 1, OUTPUT), -100, np.float32)
     index[0, 3, 0] = -ramp
     index[0, 7, 0] = ramp
-    u = np.tile(0.5 + 0.6 * ramp, (1, INDEX, 1, 1)).astype(np.float32)
+    u = np.tile(0.5 + 0.61 * ramp, (1, INDEX, 1, 1)).astype(np.float32)
     v = np.tile(0.5 + 0.5 * ramp, (1, INDEX, 1, 1)).transpose(0, 1, 3, 2).astype(np.float32)
     nodes = [
         helper.make_node("Shape", ["rois"], ["people"], start=0, end=1),

@@ -25,7 +25,7 @@ typedef void (*maq_log_callback)(void *user_data, maq_log_level level, const cha
 typedef struct maq_context_config {
   uint32_t struct_size;
   maq_log_level log_level;         /* lines above this level are not made; default MAQ_LOG_WARNING */
-  maq_log_callback log_callback;   /* NULL (default): nothing is logged; the library never prints */
+  maq_log_callback log_callback;   /* NULL (default): nothing is logged; the SDK itself never prints */
   void *log_user_data;             /* passed to log_callback */
   const char *onnxruntime_library; /* file to open; NULL (default): search as described below. Copied. */
 } maq_context_config;

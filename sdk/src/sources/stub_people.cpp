@@ -82,10 +82,11 @@ StubPeople::StubPeople(int count, uint64_t seed, int width_px, int height_px)
   background_ = draw_room(width_px, height_px, dice);
   if (count == 0) return;
   const BgraImage sheet = decode_sheet();
+  const int first_row = dice.below(kPeople);
   for (int i = 0; i < count; ++i) {
     Walker walker;
     const double nearness = dice.between(0, 1);
-    walker.row = (dice.below(kPeople) + i) % kPeople;
+    walker.row = (first_row + i) % kPeople;
     walker.height_px = std::max(4, int(height_px * (0.45 + 0.4 * nearness)));
     walker.feet_y_px = height_px * (0.72 + 0.24 * nearness);
     // People begin spread over the picture, so that the first frame already shows them all.

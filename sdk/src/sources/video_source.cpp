@@ -2,6 +2,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <opencv2/videoio/registry.hpp>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -18,7 +19,8 @@ class VideoSource : public Source {
     if (!file_exists(path_)) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
     bool opened = false;
     try {
-      opened = clip_.open(path_, cv::CAP_ANY);
+      // FFmpeg alone where it is there: the other backends of CAP_ANY add nothing for files but their complaints.
+      opened = clip_.open(path_, cv::videoio_registry::hasBackend(cv::CAP_FFMPEG) ? cv::CAP_FFMPEG : cv::CAP_ANY);
     } catch (const cv::Exception&) {
     }
     if (!opened) {

@@ -1,0 +1,48 @@
+# Installs the build, moves the installed tree elsewhere, builds the programs of this folder against it in WAY
+# (find_package or pkg_config), and runs them: cmake -DWAY=… -DBUILD_DIR=… -DWORK_DIR=… -DBUNDLE=… -P run.cmake
+set(installed "${WORK_DIR}/installed")
+set(moved "${WORK_DIR}/moved")
+file(REMOVE_RECURSE "${WORK_DIR}")
+file(MAKE_DIRECTORY "${WORK_DIR}")
+function(run)
+  execute_process(COMMAND ${ARGV} WORKING_DIRECTORY "${WORK_DIR}" OUTPUT_VARIABLE output ERROR_VARIABLE output
+    RESULT_VARIABLE result)
+  if(result)
+    list(JOIN ARGV " " command)
+    message(FATAL_ERROR "${command}\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${installed}")
+# An installed tree must not know where it was installed to.
+file(RENAME "${installed}" "${moved}")
+
+if(WAY STREQUAL "find_package")
+  run("${CMAKE_COMMAND}" -S "${CMAKE_CURRENT_LIST_DIR}" -B build -DCMAKE_BUILD_TYPE=Release
+    "-DCMAKE_PREFIX_PATH=${moved}")
+  run("${CMAKE_COMMAND}" --build build)
+  set(programs build/people build/count_people)
+else()
+  set(ENV{PKG_CONFIG_PATH} "${moved}/${LIBDIR}/pkgconfig")
+  run(pkg-config --cflags --libs "maquette >= 0.1")
+  string(STRIP "${output}" flags)
+  separate_arguments(flags UNIX_COMMAND "${flags}")
+  run("${C_COMPILER}" -std=c99 -Wall -Werror "${CMAKE_CURRENT_LIST_DIR}/people.c" -o people ${flags}
+    "-Wl,-rpath,${moved}/${LIBDIR}")
+  set(programs ./people)
+endif()
+
+foreach(program ${programs})
+  run("${program}" "${BUNDLE}" "stub:pattern?frames=1&size=320x256")
+  # The program's own failure, too, is a sentence and an exit code.
+  execute_process(COMMAND "${program}" "${BUNDLE}" "image:missing.jpg" WORKING_DIRECTORY "${WORK_DIR}"
+    RESULT_VARIABLE result ERROR_VARIABLE error)
+  if(NOT result EQUAL 1 OR NOT error MATCHES "missing.jpg does not exist")
+    message(FATAL_ERROR "${program} with a missing image: exit code ${result}, ${error}")
+  endif()
+endforeach()
+run("${moved}/bin/maquette" info)
+if(NOT output MATCHES "ONNX Runtime   1[.]")
+  message(FATAL_ERROR "The moved command line does not find its ONNX Runtime:\n${output}")
+endif()

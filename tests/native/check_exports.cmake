@@ -1,0 +1,16 @@
+# Compares the dynamic symbols that LIBRARY defines with LIST.
+execute_process(COMMAND "${NM}" --dynamic --defined-only --format=posix "${LIBRARY}" OUTPUT_VARIABLE output
+  COMMAND_ERROR_IS_FATAL ANY)
+string(REGEX REPLACE "\n$" "" output "${output}")
+string(REPLACE "\n" ";" lines "${output}")
+set(exported)
+foreach(line ${lines})
+  string(REGEX REPLACE "[ @].*" "" symbol "${line}")
+  list(APPEND exported "${symbol}")
+endforeach()
+file(STRINGS "${LIST}" listed REGEX "^[a-z]")
+list(SORT exported)
+list(SORT listed)
+if(NOT exported STREQUAL listed)
+  message(FATAL_ERROR "${LIBRARY} exports\n  ${exported}\nbut ${LIST} lists\n  ${listed}")
+endif()

@@ -1,0 +1,198 @@
+// What the C API does with wrong arguments: a status and a sentence, never a crash.
+#include <gtest/gtest.h>
+#include <maquette/maquette.h>
+
+#include <cstring>
+#include <string>
+#include <thread>
+
+namespace {
+
+class ApiArguments : public ::testing::Test {
+ protected:
+  ApiArguments() { EXPECT_EQ(maq_context_create(MAQ_HEADER_VERSION, nullptr, &context_), MAQ_OK); }
+  ~ApiArguments() override { maq_context_destroy(context_); }
+
+  static void expect_error(maq_status actual, maq_status expected, const void* handle, const std::string& text) {
+    EXPECT_EQ(actual, expected) << maq_last_error(handle);
+    EXPECT_NE(std::string(maq_last_error(handle)).find(text), std::string::npos) << maq_last_error(handle);
+  }
+
+  maq_context* context_ = nullptr;
+};
+
+TEST_F(ApiArguments, HeadersOfAnotherVersionAreRefused) {
+  maq_context* context = nullptr;
+  for (const uint32_t version : {0u, MAQ_HEADER_VERSION + 100u, MAQ_HEADER_VERSION + 10000u, 0xFFFFFFFFu}) {
+    expect_error(maq_context_create(version, nullptr, &context), MAQ_ERROR_VERSION_MISMATCH, nullptr,
+                 "build the app again");
+    EXPECT_EQ(context, nullptr);
+  }
+  EXPECT_EQ(maq_context_create(MAQ_HEADER_VERSION + 1, nullptr, &context), MAQ_OK) << "a patch release fits";
+  maq_context_destroy(context);
+}
+
+TEST_F(ApiArguments, NullHandlesAreRefusedByName) {
+  maq_source* source = nullptr;
+  maq_densepose* densepose = nullptr;
+  maq_densepose_result* result = nullptr;
+  maq_frame* frame = nullptr;
+  maq_frame_desc desc{};
+  maq_source_info info{};
+  maq_densepose_stats stats{};
+  maq_densepose_config config{};
+  const maq_person* people = nullptr;
+  const uint8_t* pixels = nullptr;
+  size_t stride = 0;
+  uint32_t count = 0;
+  uint8_t byte = 0;
+  expect_error(maq_context_create(MAQ_HEADER_VERSION, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "maq_context_create: context is NULL");
+  expect_error(maq_context_onnxruntime(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "context");
+  expect_error(maq_source_create(nullptr, "stub:people", nullptr, &source), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "maq_source_create: context is NULL");
+  expect_error(maq_source_get_info(nullptr, &info), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "source is NULL");
+  expect_error(maq_source_acquire_frame(nullptr, 0, &frame), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "source is NULL");
+  expect_error(maq_frame_create(nullptr, &desc, nullptr, nullptr, &frame), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "context is NULL");
+  expect_error(maq_frame_get_desc(nullptr, &desc), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "frame is NULL");
+  expect_error(maq_frame_copy_pixels(nullptr, MAQ_PIXEL_RGB8, &byte, 0, 1), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "frame is NULL");
+  expect_error(maq_densepose_create(nullptr, &config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "context is NULL");
+  expect_error(maq_densepose_run(nullptr, nullptr, &result), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
+  expect_error(maq_densepose_result_size(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
+  expect_error(maq_densepose_result_people(nullptr, &people, &count), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
+  expect_error(maq_densepose_result_plane(nullptr, MAQ_PLANE_PART, &pixels, &stride), MAQ_ERROR_INVALID_ARGUMENT,
+               nullptr, "result");
+  expect_error(maq_densepose_result_stats(nullptr, &stats), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
+  EXPECT_EQ(source, nullptr);
+  EXPECT_EQ(densepose, nullptr);
+  EXPECT_EQ(frame, nullptr);
+}
+
+TEST_F(ApiArguments, NullOutputsAreRefusedAndTheTextIsTheHandles) {
+  maq_frame_desc desc{};
+  maq_densepose_config config{};
+  expect_error(maq_source_create(context_, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "uri");
+  expect_error(maq_source_create(context_, "stub:people", nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
+               "source is NULL");
+  expect_error(maq_frame_create(context_, nullptr, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
+               "desc is NULL");
+  expect_error(maq_frame_create(context_, &desc, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
+               "frame is NULL");
+  expect_error(maq_densepose_create(context_, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "config");
+  expect_error(maq_densepose_create(context_, &config, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "densepose");
+}
+
+TEST_F(ApiArguments, DestroyingNullIsFine) {
+  maq_context_destroy(nullptr);
+  maq_source_destroy(nullptr);
+  maq_frame_release(nullptr);
+  maq_densepose_destroy(nullptr);
+  maq_densepose_result_release(nullptr);
+}
+
+template <class Config>
+void expect_size_checked(maq_status (*init)(Config*, uint32_t)) {
+  Config config;
+  EXPECT_EQ(init(nullptr, sizeof config), MAQ_ERROR_INVALID_ARGUMENT);
+  for (const size_t wrong : {size_t(0), sizeof config - 1, sizeof config + 8, size_t(0xFFFFFFFF)}) {
+    std::memset(static_cast<void*>(&config), 0xAB, sizeof config);
+    EXPECT_EQ(init(&config, uint32_t(wrong)), MAQ_ERROR_INVALID_ARGUMENT) << wrong;
+    EXPECT_EQ(*reinterpret_cast<unsigned char*>(&config), 0xAB) << "nothing is written";
+  }
+  EXPECT_EQ(init(&config, sizeof config), MAQ_OK);
+  EXPECT_EQ(config.struct_size, sizeof config);
+}
+
+TEST_F(ApiArguments, InitFunctionsCheckTheSizeAndSetIt) {
+  expect_size_checked(maq_context_config_init);
+  expect_size_checked(maq_source_config_init);
+  expect_size_checked(maq_densepose_config_init);
+  expect_size_checked(maq_frame_desc_init);
+}
+
+TEST_F(ApiArguments, StructsOfUnknownSizeAreRefused) {
+  for (const uint32_t wrong : {0u, 3u, 100000u}) {
+    maq_context_config context_config;
+    maq_context_config_init(&context_config, sizeof context_config);
+    context_config.struct_size = wrong;
+    maq_context* context = nullptr;
+    expect_error(maq_context_create(MAQ_HEADER_VERSION, &context_config, &context), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+                 "config.struct_size is " + std::to_string(wrong));
+    maq_source_config source_config{wrong, 4};
+    maq_source* source = nullptr;
+    expect_error(maq_source_create(context_, "stub:people", &source_config, &source), MAQ_ERROR_INVALID_ARGUMENT,
+                 context_, "config.struct_size");
+    maq_densepose_config densepose_config{};
+    densepose_config.struct_size = wrong;
+    maq_densepose* densepose = nullptr;
+    expect_error(maq_densepose_create(context_, &densepose_config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, context_,
+                 "config.struct_size");
+    maq_source_scheme scheme{};
+    scheme.struct_size = wrong;
+    expect_error(maq_source_get_scheme(0, &scheme), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "scheme.struct_size");
+  }
+}
+
+TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
+  maq_source_config source_config;
+  maq_source_config_init(&source_config, sizeof source_config);
+  maq_source* source = nullptr;
+  for (const uint32_t pool : {0u, 65u}) {
+    source_config.pool_size = pool;
+    expect_error(maq_source_create(context_, "stub:people", &source_config, &source), MAQ_ERROR_INVALID_ARGUMENT,
+                 context_, "config.pool_size is " + std::to_string(pool));
+  }
+  const auto expect_refused = [&](const char* name, auto change) {
+    maq_densepose_config config;
+    maq_densepose_config_init(&config, sizeof config);
+    config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+    change(config);
+    maq_densepose* densepose = nullptr;
+    expect_error(maq_densepose_create(context_, &config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, context_, name);
+  };
+  expect_refused("bundle_path is NULL", [](auto& config) { config.bundle_path = nullptr; });
+  expect_refused("threads", [](auto& config) { config.threads = -1; });
+  expect_refused("threads", [](auto& config) { config.threads = 65; });
+  expect_refused("long_side_px", [](auto& config) { config.long_side_px = 31; });
+  expect_refused("long_side_px", [](auto& config) { config.long_side_px = 2049; });
+  expect_refused("score_threshold", [](auto& config) { config.score_threshold = 1.5f; });
+  expect_refused("score_threshold", [](auto& config) { config.score_threshold = std::stof("nan"); });
+  expect_refused("max_people", [](auto& config) { config.max_people = 256; });
+  expect_refused("result_pool_size", [](auto& config) { config.result_pool_size = 0; });
+}
+
+TEST_F(ApiArguments, ErrorsWithoutAHandleAreOfTheThread) {
+  maq_context_create(0, nullptr, nullptr);
+  EXPECT_NE(std::string(maq_last_error(nullptr)), "");
+  std::thread([] { EXPECT_STREQ(maq_last_error(nullptr), ""); }).join();
+}
+
+TEST_F(ApiArguments, EveryStatusHasItsName) {
+  for (int status = MAQ_OK; status <= MAQ_END_OF_STREAM; ++status) {
+    EXPECT_EQ(std::string(maq_status_name(maq_status(status))).rfind("MAQ_", 0), 0u) << status;
+  }
+  EXPECT_STREQ(maq_status_name(maq_status(MAQ_END_OF_STREAM + 1)), "unknown status");
+}
+
+TEST_F(ApiArguments, TheVersionOfHeadersAndLibraryAgree) {
+  const std::string header = std::to_string(MAQ_VERSION_MAJOR) + "." + std::to_string(MAQ_VERSION_MINOR) + "." +
+                             std::to_string(MAQ_VERSION_PATCH);
+  EXPECT_EQ(maq_sdk_version(), header);
+  EXPECT_STRNE(maq_git_commit(), "");
+  EXPECT_STRNE(maq_build_options(), "");
+}
+
+// Layouts of version 0.1: an app built with it relies on them.
+static_assert(sizeof(void*) != 8 || sizeof(maq_context_config) == 32, "");
+static_assert(sizeof(maq_source_config) == 8, "");
+static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
+static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 32, "");
+static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
+static_assert(sizeof(maq_person) == 20, "");
+static_assert(sizeof(maq_densepose_stats) == 72, "");
+static_assert(MAQ_END_OF_STREAM == 13 && MAQ_PIXEL_YUYV == 6 && MAQ_PLANE_PERSON == 4, "");
+
+}  // namespace

@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+
+#include <maquette/maquette.hpp>
+#include <vector>
+
+namespace {
+
+maq_frame_desc desc_of(const std::vector<uint8_t>& pixels, int width, int height) {
+  maq_frame_desc desc;
+  maq_frame_desc_init(&desc, sizeof desc);
+  desc.format = MAQ_PIXEL_RGB8;
+  desc.width_px = width;
+  desc.height_px = height;
+  desc.planes[0] = pixels.data();
+  return desc;
+}
+
+TEST(ApiFrames, WrapMemoryOfTheAppWithoutACopy) {
+  const maquette::Context context;
+  const std::vector<uint8_t> pixels(5 * 32);
+  maq_frame_desc desc = desc_of(pixels, 10, 5);
+  desc.stride_bytes[0] = 32;
+  desc.timestamp_ns = 123;
+  desc.clock = MAQ_CLOCK_MONOTONIC;
+  desc.sequence = 9;
+  const maquette::Frame frame(context, desc);
+  const maq_frame_desc back = frame.desc();
+  EXPECT_EQ(back.planes[0], pixels.data());
+  EXPECT_EQ(back.stride_bytes[0], 32u);
+  EXPECT_EQ(back.width_px, 10);
+  EXPECT_EQ(back.timestamp_ns, 123);
+  EXPECT_EQ(back.clock, MAQ_CLOCK_MONOTONIC);
+  EXPECT_EQ(back.sequence, 9u);
+}
+
+TEST(ApiFrames, CallTheAppBackOnceWhenReleased) {
+  const maquette::Context context;
+  const std::vector<uint8_t> pixels(300);
+  int freed = 0;
+  const auto count = [](void* user_data) { ++*static_cast<int*>(user_data); };
+  maq_frame_desc desc = desc_of(pixels, 10, 10);
+  maq_frame* frame = nullptr;
+  ASSERT_EQ(maq_frame_create(context.get(), &desc, count, &freed, &frame), MAQ_OK);
+  EXPECT_EQ(freed, 0);
+  maq_frame_release(frame);
+  EXPECT_EQ(freed, 1);
+  desc.width_px = 0;
+  EXPECT_EQ(maq_frame_create(context.get(), &desc, count, &freed, &frame), MAQ_ERROR_IMAGE_SIZE);
+  EXPECT_EQ(freed, 1) << "a frame that was not made is not freed";
+}
+
+TEST(ApiFrames, OutliveTheirContextAndSource) {
+  std::optional<maquette::Frame> frame;
+  {
+    const maquette::Context context;
+    maquette::Source source(context, "stub:pattern?size=32x24");
+    frame = source.next();
+  }
+  std::vector<uint8_t> pixels(32 * 24 * 3);
+  frame->copy_pixels(MAQ_PIXEL_RGB8, pixels.data(), 0, pixels.size());
+  EXPECT_EQ(pixels[0], 191);
+}
+
+TEST(ApiFrames, WrongDescriptionsAreStatusesOfTheContext) {
+  const maquette::Context context;
+  const std::vector<uint8_t> pixels(300);
+  const auto status_of = [&](auto change) {
+    maq_frame_desc desc = desc_of(pixels, 10, 10);
+    change(desc);
+    try {
+      maquette::Frame(context, desc);
+      return MAQ_OK;
+    } catch (const maquette::Error& error) {
+      EXPECT_STREQ(error.what(), maq_last_error(context.get()));
+      return error.status();
+    }
+  };
+  EXPECT_EQ(status_of([](auto&) {}), MAQ_OK);
+  EXPECT_EQ(status_of([](auto& desc) { desc.planes[0] = nullptr; }), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(status_of([](auto& desc) { desc.stride_bytes[0] = 29; }), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(status_of([](auto& desc) { desc.width_px = 20000; }), MAQ_ERROR_IMAGE_SIZE);
+  EXPECT_EQ(status_of([](auto& desc) { desc.height_px = -1; }), MAQ_ERROR_IMAGE_SIZE);
+  EXPECT_EQ(status_of([](auto& desc) { desc.format = maq_pixel_format(7); }), MAQ_ERROR_UNSUPPORTED);
+  EXPECT_EQ(status_of([](auto& desc) { desc.clock = maq_clock(3); }), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(status_of([](auto& desc) { desc.struct_size = 0; }), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+}  // namespace

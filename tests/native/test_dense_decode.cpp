@@ -1,0 +1,197 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "densepose/dense_decode.h"
+
+namespace {
+
+using maq::Box;
+using maq::DenseLogits;
+using maq::DensePlanes;
+
+constexpr int kCoarse = 15, kIndex = 25;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+struct Logits {
+  explicit Logits(int cells)
+      : coarse(size_t(kCoarse * cells * cells), 0.0f), index(size_t(kIndex * cells * cells), 0.0f), u(index), v(index),
+        size(cells) {}
+  void fill(std::vector<float>& plane, int channel, float value) {
+    std::fill_n(plane.begin() + channel * size * size, size * size, value);
+  }
+  DenseLogits view() const { return {coarse.data(), index.data(), u.data(), v.data(), kCoarse, kIndex, size}; }
+
+  std::vector<float> coarse, index, u, v;
+  int size;
+};
+
+// The value of a bilinearly resized plane (half-pixel centres, edges repeated) in double.
+double resized(const float* plane, int size, double y, double x) {
+  const auto tap = [size](double at, int* low, int* high, double* fraction) {
+    at = std::max(0.0, at);
+    *low = std::min(int(at), size - 1);
+    *high = std::min(*low + 1, size - 1);
+    *fraction = at - *low;
+  };
+  int x0, x1, y0, y1;
+  double fx, fy;
+  tap(x, &x0, &x1, &fx);
+  tap(y, &y0, &y1, &fy);
+  return (1 - fy) * ((1 - fx) * plane[y0 * size + x0] + fx * plane[y0 * size + x1]) +
+         fy * ((1 - fx) * plane[y1 * size + x0] + fx * plane[y1 * size + x1]);
+}
+
+int best_class(const std::vector<float>& logits, int classes, int size, double y, double x, double* margin) {
+  std::vector<double> values;
+  for (int c = 0; c < classes; ++c) values.push_back(resized(logits.data() + c * size * size, size, y, x));
+  const auto best = std::max_element(values.begin(), values.end());
+  std::vector<double> sorted = values;
+  std::sort(sorted.rbegin(), sorted.rend());
+  *margin = std::min(*margin, sorted[0] - sorted[1]);
+  return int(best - values.begin());
+}
+
+void make_everybody_part(Logits& logits, int part) {
+  logits.fill(logits.coarse, 1, 5);
+  logits.fill(logits.index, part, 5);
+}
+
+TEST(DenseDecode, EqualsTheReferenceOnRandomLogits) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> logit(-4, 4), coordinate(-0.2f, 1.2f);
+  for (const Box& box : {Box{3, 5, 43, 65}, Box{-10.5f, -4.2f, 30.7f, 100}, Box{50, 60, 51.5f, 61}}) {
+    Logits logits(16);
+    for (auto* plane : {&logits.coarse, &logits.index}) {
+      for (float& value : *plane) value = logit(random);
+    }
+    for (auto* plane : {&logits.u, &logits.v}) {
+      for (float& value : *plane) value = coordinate(random);
+    }
+    DensePlanes planes;
+    planes.reset(70, 80);
+    const maq::DecodeCounts counts = paint_person(logits.view(), box, 9, planes);
+    const maq::PixelRect rect = maq::pixel_rect(box);
+    int64_t body = 0;
+    for (int y = 0; y < 80; ++y) {
+      for (int x = 0; x < 70; ++x) {
+        const size_t pixel = size_t(y * 70 + x);
+        body += planes.person[pixel] != 0;
+        const int in_x = x - rect.x, in_y = y - rect.y;
+        if (in_x < 0 || in_y < 0 || in_x >= rect.width || in_y >= rect.height) {
+          ASSERT_EQ(planes.person[pixel] + planes.part[pixel], 0) << "outside the box";
+          continue;
+        }
+        const double at_x = (in_x + 0.5) * 16 / rect.width - 0.5, at_y = (in_y + 0.5) * 16 / rect.height - 0.5;
+        double margin = 1e9;
+        const int coarse = best_class(logits.coarse, kCoarse, 16, at_y, at_x, &margin);
+        const int part = coarse == 0 ? 0 : best_class(logits.index, kIndex, 16, at_y, at_x, &margin);
+        if (margin < 1e-4) continue;  // float and double may disagree about a near tie
+        ASSERT_EQ(planes.part[pixel], part) << x << " " << y;
+        ASSERT_EQ(planes.person[pixel], part == 0 ? 0 : 9);
+        if (part == 0) continue;
+        const double u = resized(logits.u.data() + part * 256, 16, at_y, at_x);
+        ASSERT_NEAR(planes.u[pixel], std::clamp(u, 0.0, 1.0) * 255, 0.51);
+      }
+    }
+    EXPECT_EQ(counts.body_pixels, body);
+  }
+}
+
+TEST(DenseDecode, BackgroundOfTheCoarseHeadGatesTheParts) {
+  Logits logits(8);
+  make_everybody_part(logits, 4);
+  logits.fill(logits.coarse, 0, 6);
+  DensePlanes planes;
+  planes.reset(20, 20);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 20, 20}, 1, planes).body_pixels, 0);
+}
+
+TEST(DenseDecode, TiesGoToTheLowestClass) {
+  Logits logits(8);
+  logits.fill(logits.coarse, 3, 1);
+  logits.fill(logits.coarse, 5, 1);
+  logits.fill(logits.index, 6, 2);
+  logits.fill(logits.index, 20, 2);
+  DensePlanes planes;
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  EXPECT_EQ(planes.part[55], 6);
+  // All equal: background, class 0, wins.
+  const Logits equal(8);
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(equal.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+}
+
+TEST(DenseDecode, LargeLogitsAreStable) {
+  Logits logits(8);
+  for (float& value : logits.coarse) value = -80;
+  for (float& value : logits.index) value = -80;
+  logits.fill(logits.coarse, 14, 80);
+  logits.fill(logits.index, 24, 80);
+  DensePlanes planes;
+  planes.reset(4, 4);
+  paint_person(logits.view(), {0, 0, 4, 4}, 1, planes);
+  for (const uint8_t part : planes.part) EXPECT_EQ(part, 24);
+}
+
+TEST(DenseDecode, UAndVAreClampedAndCountedAndNanIsZero) {
+  Logits logits(8);
+  make_everybody_part(logits, 2);
+  logits.fill(logits.u, 2, 1.5f);
+  logits.fill(logits.v, 2, -0.5f);
+  DensePlanes planes;
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).clamped_uv, 100);
+  EXPECT_EQ(planes.u[0], 255);
+  EXPECT_EQ(planes.v[0], 0);
+  logits.fill(logits.u, 2, kNan);
+  logits.fill(logits.v, 2, 0.5f);
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).clamped_uv, 100);
+  EXPECT_EQ(planes.u[0], 0);
+  EXPECT_EQ(planes.v[0], 128);
+}
+
+TEST(DenseDecode, NanLogitsNeverWin) {
+  Logits logits(8);
+  make_everybody_part(logits, 2);
+  logits.fill(logits.coarse, 7, kNan);
+  logits.fill(logits.index, 9, kNan);
+  DensePlanes planes;
+  planes.reset(4, 4);
+  paint_person(logits.view(), {0, 0, 4, 4}, 1, planes);
+  for (const uint8_t part : planes.part) EXPECT_EQ(part, 2);
+  for (float& value : logits.coarse) value = kNan;
+  planes.reset(4, 4);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 4, 4}, 1, planes).body_pixels, 0);
+}
+
+TEST(DenseDecode, WhoIsPaintedFirstStaysInFront) {
+  Logits logits(8);
+  make_everybody_part(logits, 2);
+  DensePlanes planes;
+  planes.reset(20, 10);
+  paint_person(logits.view(), {0, 0, 12, 10}, 1, planes);
+  EXPECT_EQ(paint_person(logits.view(), {8, 0, 20, 10}, 2, planes).body_pixels, 80);
+  EXPECT_EQ(planes.person[10], 1);
+  EXPECT_EQ(planes.person[12], 2);
+}
+
+TEST(DenseDecode, BoxesCoverAtLeastOnePixelAndNothingOutsideTheImage) {
+  const maq::PixelRect tiny = maq::pixel_rect({5.9f, 5.9f, 6.1f, 6.2f});
+  EXPECT_EQ(tiny.x, 5);
+  EXPECT_EQ(tiny.width, 1);
+  EXPECT_EQ(tiny.height, 1);
+  Logits logits(8);
+  make_everybody_part(logits, 2);
+  DensePlanes planes;
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {-100, -100, 200, 200}, 1, planes).body_pixels, 100);
+  planes.reset(1, 1);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 0.5f, 0.5f}, 1, planes).body_pixels, 1);
+}
+
+}  // namespace

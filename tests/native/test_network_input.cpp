@@ -1,0 +1,68 @@
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "image/network_input.h"
+
+namespace {
+
+maq::ImageView view_of(const cv::Mat& bgr) {
+  return {MAQ_PIXEL_BGR8, bgr.cols, bgr.rows, {{bgr.data, bgr.step}, {}}};
+}
+
+const maq::NetworkInputSpec kSpec = {320, 32, {123.675f, 116.28f, 103.53f}, {58.395f, 57.12f, 57.375f}};
+
+// The definition in Python: cv2.resize of the bytes, then (value - mean) / std in float32, RGB planes, zeros around.
+void expect_definition(const cv::Mat& bgr, int width, int height, int interpolation) {
+  maq::NetworkInput input;
+  input.values.assign(1 << 20, 1e9f);  // what an earlier image left
+  make_network_input(view_of(bgr), kSpec, input);
+  ASSERT_EQ(input.width_px, width);
+  ASSERT_EQ(input.height_px, height);
+  ASSERT_EQ(input.padded_width_px % 32, 0);
+  ASSERT_LT(input.padded_width_px - width, 32);
+  ASSERT_LT(input.padded_height_px - height, 32);
+  ASSERT_EQ(input.values.size(), size_t(3 * input.padded_width_px * input.padded_height_px));
+  cv::Mat resized = bgr;
+  if (bgr.size() != cv::Size(width, height)) cv::resize(bgr, resized, cv::Size(width, height), 0, 0, interpolation);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < input.padded_height_px; ++y) {
+      for (int x = 0; x < input.padded_width_px; ++x) {
+        const float value = input.values[size_t((c * input.padded_height_px + y) * input.padded_width_px + x)];
+        const bool inside = x < width && y < height;
+        const float expected =
+            inside ? (float(resized.at<cv::Vec3b>(y, x)[2 - c]) - kSpec.mean[size_t(c)]) / kSpec.std[size_t(c)] : 0;
+        ASSERT_EQ(value, expected) << c << " " << x << " " << y;
+      }
+    }
+  }
+}
+
+cv::Mat noise(int width, int height) {
+  cv::Mat image(height, width, CV_8UC3);
+  cv::theRNG().state = 42;
+  cv::randu(image, 0, 256);
+  return image;
+}
+
+TEST(NetworkInput, ShrinksByAreaAndNormalises) { expect_definition(noise(640, 427), 320, 214, cv::INTER_AREA); }
+
+TEST(NetworkInput, GrowsBilinearly) { expect_definition(noise(100, 160), 200, 320, cv::INTER_LINEAR); }
+
+TEST(NetworkInput, LeavesAnImageOfTheRightSizeAsItIs) { expect_definition(noise(320, 256), 320, 256, -1); }
+
+TEST(NetworkInput, TakesOddSizesDownToOnePixel) {
+  expect_definition(noise(31, 33), 301, 320, cv::INTER_LINEAR);
+  expect_definition(noise(1, 1), 320, 320, cv::INTER_LINEAR);
+  expect_definition(noise(1, 4000), 1, 320, cv::INTER_AREA);
+  expect_definition(noise(4000, 1), 320, 1, cv::INTER_AREA);
+  expect_definition(noise(16, 16), 320, 320, cv::INTER_LINEAR);
+}
+
+TEST(NetworkInput, ReadsRowsByTheirStride) {
+  const cv::Mat large = noise(400, 300);
+  const cv::Mat part = large(cv::Rect(7, 3, 320, 256));
+  expect_definition(part, 320, 256, -1);
+}
+
+}  // namespace

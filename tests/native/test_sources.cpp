@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/bounded_pool.h"
+#include "expect_error.h"
+#include "sources/source.h"
+#include "temp_folder.h"
+
+namespace {
+
+std::vector<uint8_t> frame_of(const std::string& uri, int index, maq::Frame* out = nullptr) {
+  const auto source = maq::open_source(uri);
+  maq::Frame frame;
+  for (int i = 0; i <= index; ++i) EXPECT_TRUE(source->next(0, frame));
+  if (out != nullptr) *out = frame;
+  return frame.storage;
+}
+
+size_t different_pixels(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
+  size_t count = 0;
+  for (size_t i = 0; i + 2 < a.size(); i += 3) count += a[i] != b[i] || a[i + 1] != b[i + 1] || a[i + 2] != b[i + 2];
+  return count;
+}
+
+TEST(Sources, TheSameSeedShowsTheSameFrames) {
+  const std::string uri = "stub:people?count=3&seed=7&size=160x120";
+  EXPECT_EQ(frame_of(uri, 5), frame_of(uri, 5));
+  EXPECT_NE(frame_of(uri, 5), frame_of("stub:people?count=3&seed=8&size=160x120", 5));
+}
+
+TEST(Sources, PeopleMoveAndFillPartOfThePicture) {
+  const std::string uri = "stub:people?count=2&seed=3&size=160x120";
+  const auto empty = frame_of("stub:people?count=0&seed=3&size=160x120", 0);
+  const auto first = frame_of(uri, 0), later = frame_of(uri, 10);
+  const size_t pixels = first.size() / 3;
+  EXPECT_GT(different_pixels(first, empty), pixels / 50) << "there is somebody";
+  EXPECT_LT(different_pixels(first, empty), pixels * 3 / 4) << "there is room around them";
+  EXPECT_GT(different_pixels(first, later), pixels / 100) << "they move";
+}
+
+TEST(Sources, PeopleAreThereAfterHoursAndInTinyFrames) {
+  const auto source = maq::open_source("stub:people?count=5&fps=0.01&size=64x48");
+  maq::Frame frame;
+  for (int i = 0; i < 300; ++i) ASSERT_TRUE(source->next(0, frame));
+  for (const char* size : {"1x1", "2x300", "300x2", "31x33"}) {
+    frame_of(std::string("stub:people?count=4&size=") + size, 40);
+    frame_of(std::string("stub:pattern?size=") + size, 40);
+  }
+}
+
+TEST(Sources, StubsStampTheirFramesAndEndWhenAsked) {
+  const auto source = maq::open_source("stub:pattern?fps=10&frames=3&size=32x24");
+  EXPECT_EQ(source->info().frame_count, 3);
+  maq::Frame frame;
+  for (int64_t i = 0; i < 3; ++i) {
+    ASSERT_TRUE(source->next(0, frame));
+    EXPECT_EQ(frame.timestamp_ns, i * 100000000);
+    EXPECT_EQ(frame.sequence, uint64_t(i));
+    EXPECT_EQ(frame.clock, MAQ_CLOCK_MEDIA);
+  }
+  EXPECT_FALSE(source->next(0, frame));
+  EXPECT_FALSE(source->next(0, frame));
+  EXPECT_EQ(maq::open_source("stub:pattern")->info().frame_count, -1);
+}
+
+TEST(Sources, AnImageIsOneFrameAtTheSizeAskedFor) {
+  const TempFolder folder;
+  cv::imwrite(folder.file("a.png"), cv::Mat(30, 40, CV_8UC3, cv::Scalar(1, 2, 3)));
+  const auto plain = maq::open_source("image:" + folder.file("a.png"));
+  EXPECT_EQ(plain->info().width_px, 40);
+  EXPECT_EQ(plain->info().frame_count, 1);
+  const auto scaled = maq::open_source("image:" + folder.file("a.png") + "?size=80x20&fps=5");
+  maq::Frame frame;
+  ASSERT_TRUE(scaled->next(0, frame));
+  EXPECT_EQ(frame.image.width_px, 80);
+  EXPECT_EQ(frame.image.height_px, 20);
+  EXPECT_EQ(frame.storage[2], 3);
+  EXPECT_FALSE(scaled->next(0, frame));
+}
+
+TEST(Sources, UnknownThingsAreNamedWithWhatThereIs) {
+  expect_error(MAQ_ERROR_UNSUPPORTED, "\"rtsp:\" is not a kind of source", [] { maq::open_source("rtsp:host"); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "stub:people and stub:pattern", [] { maq::open_source("stub:cats"); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "names nothing", [] { maq::open_source("image:"); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "Option colour", [] { maq::open_source("stub:people?colour=red"); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "count=31", [] { maq::open_source("stub:people?count=31"); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "/none.jpg does not exist", [] { maq::open_source("image:/none.jpg"); });
+}
+
+TEST(Sources, ThePoolIsBoundedAndReusesItsFrames) {
+  maq::PooledSource source(maq::open_source("stub:pattern?size=16x16"), 2);
+  auto first = source.next(0);
+  auto second = source.next(0);
+  expect_error(MAQ_ERROR_POOL_EMPTY, "All 2 frames", [&] { source.next(0); });
+  const uint8_t* memory = first->storage.data();
+  first.reset();
+  const auto third = source.next(0);
+  EXPECT_EQ(third->storage.data(), memory);
+  EXPECT_EQ(third->sequence, 2u) << "a refused call takes no frame";
+}
+
+TEST(Sources, FramesOutliveTheirPool) {
+  std::shared_ptr<int> kept;
+  {
+    maq::BoundedPool<int> pool(1, "numbers");
+    kept = pool.acquire();
+  }
+  *kept = 5;
+  EXPECT_EQ(*kept, 5);
+}
+
+}  // namespace

@@ -1,4 +1,4 @@
-"""Anchors, box coding, matching. Boxes are float [..., 4] = x0, y0, x1, y1 in pixels of the network's input."""
+"""Anchors, box coding, matching. Boxes are float [..., 4] = x0, y0, x1, y1 in input pixels."""
 
 from __future__ import annotations
 
@@ -51,7 +51,13 @@ def decode(deltas: Tensor, reference: Tensor, weights: tuple[float, ...] = (1, 1
 def clip(boxes: Tensor, height: int, width: int) -> Tensor:
     """Boxes cut at the image's border."""
     return torch.stack(
-        [boxes[:, 0].clamp(0, width), boxes[:, 1].clamp(0, height), boxes[:, 2].clamp(0, width), boxes[:, 3].clamp(0, height)], 1
+        [
+            boxes[:, 0].clamp(0, width),
+            boxes[:, 1].clamp(0, height),
+            boxes[:, 2].clamp(0, width),
+            boxes[:, 3].clamp(0, height),
+        ],
+        1,
     )
 
 

@@ -1,4 +1,4 @@
-"""The network's settings in one place (Mobile Parsing R-CNN; "Making DensePose Fast and Light", WACV 2021)."""
+"""The network's settings in one place ("Making DensePose Fast and Light", WACV 2021)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Sizes of the network. `width` is the channel count of neck, RPN, box head and dense head (64 = variant B)."""
+    """Sizes of the network. `width`: channels of neck, RPN, box head and dense head (64 = variant B)."""
 
     width: int = 64
     tap_channels: tuple[int, ...] = (24, 40, 112, 160)

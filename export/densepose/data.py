@@ -57,7 +57,9 @@ def normalised(image: np.ndarray) -> np.ndarray:
     return ((image[..., ::-1].astype(np.float32) - MEAN) / STD).transpose(2, 0, 1)
 
 
-def augmented(record: Record, size: int, scales: tuple[float, float], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def augmented(
+    record: Record, size: int, scales: tuple[float, float], rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """A random square cut at a random scale, mirrored half of the time, with other colours."""
     image, label = record.decoded()
     scale = np.exp(rng.uniform(*np.log(scales)))
@@ -113,7 +115,9 @@ def _recoloured(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def truth_of(label: np.ndarray) -> Truth:
     box, instance, ignore = visible_boxes(label)
-    return Truth(torch.from_numpy(box), torch.from_numpy(instance), torch.from_numpy(ignore), torch.from_numpy(label))
+    return Truth(
+        torch.from_numpy(box), torch.from_numpy(instance), torch.from_numpy(ignore), torch.from_numpy(label)
+    )
 
 
 class Batches:

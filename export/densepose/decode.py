@@ -42,8 +42,8 @@ class Graphs:
 
 @dataclass(frozen=True)
 class Result:
-    """boxes float32 [K, 4] in source pixels, scores float32 [K] (falling), iuv uint8 [H, W, 3] = (I, U*255, V*255),
-    instance uint8 [H, W] (k + 1 for person k, 0 for nobody)."""
+    """boxes float32 [K, 4] in source pixels, scores float32 [K] (falling), iuv uint8 [H, W, 3] = (I, U*255,
+    V*255), instance uint8 [H, W] (k + 1 for person k, 0 for nobody)."""
 
     boxes: np.ndarray
     scores: np.ndarray
@@ -52,7 +52,9 @@ class Result:
 
 
 def network_input(image: np.ndarray, long_side: int) -> tuple[Tensor, float, float]:
-    """RGB uint8 [H, W, 3] -> normalised [1, 3, h, w], zero-padded to multiples of 32, and the scales x, y to the source."""
+    """RGB uint8 [H, W, 3] -> normalised [1, 3, h, w], zero-padded to multiples of 32, and the scales x, y
+    from its pixels to the source's.
+    """
     height, width = image.shape[:2]
     scale = long_side / max(height, width)
     shape = (max(round(width * scale), 1), max(round(height * scale), 1))
@@ -63,10 +65,26 @@ def network_input(image: np.ndarray, long_side: int) -> tuple[Tensor, float, flo
     return tensor.contiguous(), width / shape[0], height / shape[1]
 
 
+@dataclass(frozen=True)
+class Detection:
+    """People found, before the dense head.
+
+    tensor: the detector's input [1, 3, h, w]. features: P2..P6 (or P2..P5). proposed: [K, 4] boxes of the
+    RPN, boxes: [P, 4] of the box head, both in pixels of `tensor`. scores: [P]. scale: x and y, from pixels
+    of `tensor` to the source's.
+    """
+
+    tensor: Tensor
+    features: list[Tensor]
+    proposed: Tensor
+    boxes: Tensor
+    scores: Tensor
+    scale: tuple[float, float]
+
+
 @torch.no_grad()
-def infer(graphs: Graphs, image: np.ndarray, network: NetworkConfig | None = None, config: DecodeConfig | None = None) -> Result:
-    """People and their body surface in an RGB image uint8 [H, W, 3]."""
-    network, config = network or NetworkConfig(), config or DecodeConfig()
+def detect(graphs: Graphs, image: np.ndarray, network: NetworkConfig, config: DecodeConfig) -> Detection:
+    """Detector, proposals, box head and NMS on an RGB image uint8 [H, W, 3]."""
     height, width = image.shape[:2]
     tensor, scale_x, scale_y = network_input(image, config.long_side)
     inner = (round(height / scale_y), round(width / scale_x))
@@ -78,13 +96,29 @@ def infer(graphs: Graphs, image: np.ndarray, network: NetworkConfig | None = Non
         config.pre_nms_top_k, config.post_nms_top_k, config.rpn_nms_iou,
     )  # fmt: skip
     boxes, scores = _people(graphs, features, proposed, network, config, inner)
+    return Detection(tensor, features, proposed, boxes, scores, (scale_x, scale_y))
+
+
+@torch.no_grad()
+def infer(
+    graphs: Graphs,
+    image: np.ndarray,
+    network: NetworkConfig | None = None,
+    config: DecodeConfig | None = None,
+) -> Result:
+    """People and their body surface in an RGB image uint8 [H, W, 3]."""
+    network, config = network or NetworkConfig(), config or DecodeConfig()
+    height, width = image.shape[:2]
+    found = detect(graphs, image, network, config)
     iuv, instance = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
-    if len(boxes):
-        maps = graphs.dense_head(tg.pooled(features, [boxes], network, network.dense_pool, level=0))
-    scale = boxes.new_tensor([scale_x, scale_y, scale_x, scale_y])
-    for k, box in enumerate(boxes * scale):
+    if len(found.boxes):
+        maps = graphs.dense_head(
+            tg.pooled(found.features, [found.boxes], network, network.dense_pool, level=0)
+        )
+    scale = found.boxes.new_tensor(found.scale * 2)
+    for k, box in enumerate(found.boxes * scale):
         paint([m[k] for m in maps], box.tolist(), k + 1, iuv, instance)
-    return Result((boxes * scale).numpy(), scores.numpy(), iuv, instance)
+    return Result((found.boxes * scale).numpy(), found.scores.numpy(), iuv, instance)
 
 
 def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: NetworkConfig,
@@ -124,7 +158,9 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
 
 
 def _sampled(maps: Tensor, channel: Tensor) -> Tensor:
-    """maps [C, s, s] resized bilinearly (half-pixel centres) to channel's [h, w], but only the channel asked for at each pixel."""
+    """maps [C, s, s] resized bilinearly (half-pixel centres) to channel's [h, w], of each pixel only the
+    channel asked for there.
+    """
     side = maps.shape[-1]
     low, high, share = [], [], []
     for length in channel.shape:
@@ -134,6 +170,12 @@ def _sampled(maps: Tensor, channel: Tensor) -> Tensor:
         share.append(at - low[-1])
     (top, left), (bottom, right), (down, across) = low, high, share
     down, across = down[:, None], across[None]
-    upper = maps[channel, top[:, None], left[None]] * (1 - across) + maps[channel, top[:, None], right[None]] * across
-    lower = maps[channel, bottom[:, None], left[None]] * (1 - across) + maps[channel, bottom[:, None], right[None]] * across
+    upper = (
+        maps[channel, top[:, None], left[None]] * (1 - across)
+        + maps[channel, top[:, None], right[None]] * across
+    )
+    lower = (
+        maps[channel, bottom[:, None], left[None]] * (1 - across)
+        + maps[channel, bottom[:, None], right[None]] * across
+    )
     return upper * (1 - down) + lower * down

@@ -1,4 +1,7 @@
-"""The training loss of one batch (networks' section 1.10), each term a mean so that batch and grid size do not matter."""
+"""The training loss of one batch; each term is a mean, so that batch and grid size do not matter.
+
+The terms are those of Mobile Parsing R-CNN; the weights are chosen for short trainings from scratch.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,27 @@ from export.densepose import targets as tg
 from export.densepose.network import MobileParsingRCNN
 
 RPN_ANCHORS, BOX_ROIS, DENSE_ROIS, GRID = 256, 24, 2, 64
-WEIGHTS = {"rpn_class": 1.0, "rpn_box": 1.0, "box_class": 1.0, "box_box": 1.0, "coarse": 0.5, "index": 1.0, "u": 3.0, "v": 3.0}
-# Share of person pixels by part in rendered images, rounded; rare parts weigh more, by the square root, at most 3 times.
+WEIGHTS = {
+    "rpn_class": 1.0,
+    "rpn_box": 1.0,
+    "box_class": 1.0,
+    "box_box": 1.0,
+    "coarse": 0.5,
+    "index": 1.0,
+    "u": 3.0,
+    "v": 3.0,
+}
+# Share of person pixels by part in rendered images, rounded; rare parts weigh more, by the square root,
+# at most 3 times.
 _SHARE = np.array([0.30, .10, .15, .012, .012, .012, .012, .035, .035, .045, .045, .02, .02, .025, .025,
                    .018, .018, .025, .025, .014, .014, .018, .018, .05, .05])  # fmt: skip
 INDEX_WEIGHTS = torch.tensor(np.clip(np.sqrt(0.05 / _SHARE), 0.5, 3.0), dtype=torch.float32)
 _TO_COARSE = torch.from_numpy(surface.PART_TO_COARSE.astype(np.int64))
 
 
-def batch_loss(net: MobileParsingRCNN, image: Tensor, truths: list[tg.Truth], autocast: torch.autocast) -> dict[str, Tensor]:
+def batch_loss(
+    net: MobileParsingRCNN, image: Tensor, truths: list[tg.Truth], autocast: torch.autocast
+) -> dict[str, Tensor]:
     """image: normalised [N, 3, H, W]. Returns the weighted terms; their sum is what is minimised."""
     config, size = net.config, image.shape[-2:]
     with autocast:
@@ -35,7 +50,9 @@ def batch_loss(net: MobileParsingRCNN, image: Tensor, truths: list[tg.Truth], au
 
     rois, people, dense = [], [], []
     for n, truth in enumerate(truths):
-        found = tg.proposals([l[0][n].detach() for l in levels], [l[1][n].detach() for l in levels], per_level, size, 300, 100)
+        found = tg.proposals(
+            *([level[k][n].detach() for level in levels] for k in (0, 1)), per_level, size, 300, 100
+        )
         rois.append(tg.box_samples(found, truth, BOX_ROIS))
         dense.append(tg.dense_samples(found, truth, DENSE_ROIS))
         people.append(truth)
@@ -59,18 +76,27 @@ def _rpn_terms(logits: Tensor, offsets: Tensor, anchors: Tensor, truths: list[tg
         index = torch.cat([positive, negative])
         wanted = torch.zeros(len(index), device=logits.device)
         wanted[: len(positive)] = 1
-        class_loss = class_loss + F.binary_cross_entropy_with_logits(logits[n, index], wanted, reduction="sum")
-        box_loss = box_loss + F.l1_loss(offsets[n, positive], bx.encode(target, anchors[positive]), reduction="sum")
+        class_loss = class_loss + F.binary_cross_entropy_with_logits(
+            logits[n, index], wanted, reduction="sum"
+        )
+        box_loss = box_loss + F.l1_loss(
+            offsets[n, positive], bx.encode(target, anchors[positive]), reduction="sum"
+        )
         count += len(index)
     return {"rpn_class": class_loss / count, "rpn_box": box_loss / count}
 
 
-def _box_terms(logits: Tensor, deltas: Tensor, rois: list, truths: list[tg.Truth], weights: tuple[float, ...]) -> dict[str, Tensor]:
+def _box_terms(
+    logits: Tensor, deltas: Tensor, rois: list, truths: list[tg.Truth], weights: tuple[float, ...]
+) -> dict[str, Tensor]:
     boxes, person = torch.cat([r[0] for r in rois]), torch.cat([r[1] for r in rois])
     target = torch.cat([t.box[r[2]] if len(t.box) else r[0] for r, t in zip(rois, truths, strict=True)])
     class_loss = F.cross_entropy(logits, (~person).long())  # class 0 is person, 1 background
     wanted = bx.encode(target[person], boxes[person], weights)
-    return {"box_class": class_loss, "box_box": F.l1_loss(deltas[person], wanted, reduction="sum") / max(len(boxes), 1)}
+    return {
+        "box_class": class_loss,
+        "box_box": F.l1_loss(deltas[person], wanted, reduction="sum") / max(len(boxes), 1),
+    }
 
 
 def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
@@ -84,5 +110,7 @@ def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
     body = part > 0
     for k, (name, value) in enumerate((("u", u), ("v", v)), 1):
         own = value.gather(1, part[:, None])[:, 0][body]
-        terms[name] = F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
+        terms[name] = (
+            F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
+        )
     return terms

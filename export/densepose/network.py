@@ -11,8 +11,9 @@ from export.densepose.config import NetworkConfig
 
 
 class Backbone(nn.Module):
-    """MobileNetV3-Large up to its last bottleneck. [N, 3, H, W] -> features at strides 4, 8, 16, 32 with 24, 40, 112, 160 channels.
+    """MobileNetV3-Large up to its last bottleneck.
 
+    [N, 3, H, W] -> features at strides 4, 8, 16, 32 with 24, 40, 112, 160 channels.
     The 1x1 expansion to 960 channels of the classifier is left out: nothing reads it.
     """
 
@@ -66,7 +67,9 @@ class BiFPN(nn.Module):
     def __init__(self, tap_channels: tuple[int, ...], width: int) -> None:
         super().__init__()
         self.lateral = nn.ModuleList(nn.Conv2d(c, width, 1) for c in tap_channels)
-        self.fuse = nn.ModuleDict({n: Fusion(3 if n in ("o3", "o4") else 2) for n in ("t4", "t3", "o2", "o3", "o4", "o5")})
+        self.fuse = nn.ModuleDict(
+            {n: Fusion(3 if n in ("o3", "o4") else 2) for n in ("t4", "t3", "o2", "o3", "o4", "o5")}
+        )
         self.conv = nn.ModuleDict({n: SeparableConv(width) for n in ("t4", "t3", "o2", "o3", "o4", "o5")})
         self.down = nn.ModuleDict({n: SeparableConv(width, stride=2) for n in ("o3", "o4", "o5")})
 
@@ -146,8 +149,15 @@ class DenseHead(nn.Module):
         super().__init__()
         width = config.width
         self.aspp = Aspp(width, config.aspp_dilations)
-        self.body = nn.Sequential(*(m for _ in range(4) for m in (nn.Conv2d(width, width, 3, padding=1), nn.ReLU(inplace=True))))
-        sizes = {"coarse": config.coarse_classes, "index": config.index_classes, "u": config.index_classes, "v": config.index_classes}
+        self.body = nn.Sequential(
+            *(m for _ in range(4) for m in (nn.Conv2d(width, width, 3, padding=1), nn.ReLU(inplace=True)))
+        )
+        sizes = {
+            "coarse": config.coarse_classes,
+            "index": config.index_classes,
+            "u": config.index_classes,
+            "v": config.index_classes,
+        }
         self.out = nn.ModuleDict({name: nn.ConvTranspose2d(width, n, 4, 2, 1) for name, n in sizes.items()})
         for module in self.modules():
             if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
@@ -172,6 +182,6 @@ class MobileParsingRCNN(nn.Module):
         self.dense_head = DenseHead(config)
 
     def detector(self, image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
-        """Normalised image [N, 3, H, W], H and W multiples of 32 -> P2..P6, objectness, deltas (five levels each)."""
+        """Normalised image [N, 3, H, W], H and W multiples of 32 -> P2..P6, objectness, deltas (5 levels)."""
         features = self.neck(self.backbone(image))
         return (features, *self.rpn(features))

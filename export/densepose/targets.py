@@ -1,4 +1,4 @@
-"""What the network is asked for: RPN and box-head samples, dense labels on the RoI grid (networks' section 1.5-1.10)."""
+"""What the network is asked for: RPN and box head samples, dense labels on the RoI grid."""
 
 from __future__ import annotations
 
@@ -35,7 +35,11 @@ def rpn_samples(anchors: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tens
     ignored people are left out.
     """
     if not len(truth.box):
-        return anchors.new_zeros(0, dtype=torch.long), anchors.new_zeros(0, 4), _draw(anchors.new_ones(len(anchors), dtype=torch.bool), count)
+        return (
+            anchors.new_zeros(0, dtype=torch.long),
+            anchors.new_zeros(0, 4),
+            _draw(anchors.new_ones(len(anchors), dtype=torch.bool), count),
+        )
     iou = box_iou(anchors, truth.box)
     best, match = iou.max(1)
     positive = best >= 0.7
@@ -52,9 +56,16 @@ def rpn_samples(anchors: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tens
 
 
 @torch.no_grad()
-def proposals(logits: list[Tensor], deltas: list[Tensor], anchors: list[Tensor], size: tuple[int, int],
-              pre: int, post: int, iou: float = 0.7) -> Tensor:
-    """RPN boxes of one image: per level the `pre` best, NMS within each level, then the `post` best. [K, 4]."""  # fmt: skip
+def proposals(
+    logits: list[Tensor],
+    deltas: list[Tensor],
+    anchors: list[Tensor],
+    size: tuple[int, int],
+    pre: int,
+    post: int,
+    iou: float = 0.7,
+) -> Tensor:
+    """RPN boxes of one image [K, 4]: the `pre` best of a level, NMS within each level, the `post` best."""
     found, scores, levels = [], [], []
     for k, (logit, delta, anchor) in enumerate(zip(logits, deltas, anchors, strict=True)):
         score, index = logit.topk(min(pre, len(logit)))
@@ -68,9 +79,16 @@ def proposals(logits: list[Tensor], deltas: list[Tensor], anchors: list[Tensor],
 
 
 def box_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tensor, Tensor]:
-    """RoIs for the box head: (boxes [R, 4], is person [R], matched person [R]); a quarter positive (IoU >= 0.5)."""
+    """RoIs for the box head: (boxes [R, 4], is person [R], matched person [R]).
+
+    A quarter is positive (IoU >= 0.5); none lies on an ignored person.
+    """
     if not len(truth.box):
-        return proposed[:count], proposed.new_zeros(len(proposed[:count]), dtype=torch.bool), proposed.new_zeros(len(proposed[:count]), dtype=torch.long)
+        return (
+            proposed[:count],
+            proposed.new_zeros(len(proposed[:count]), dtype=torch.bool),
+            proposed.new_zeros(len(proposed[:count]), dtype=torch.long),
+        )
     candidates = torch.cat([proposed, truth.box])
     best, match = box_iou(candidates, truth.box).max(1)
     positive = (best >= 0.5) & ~truth.ignore[match]
@@ -111,18 +129,24 @@ def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tens
     return picked[..., :3] * own[..., None]
 
 
-def pooled(features: list[Tensor], boxes: list[Tensor], config: NetworkConfig, pool: int, level: int | None = None) -> Tensor:
+def pooled(
+    features: list[Tensor], boxes: list[Tensor], config: NetworkConfig, pool: int, level: int | None = None
+) -> Tensor:
     """RoIAlign (aligned, adaptive sampling) of each image's boxes: [sum of R, C, pool, pool].
 
     `level` 0 reads everything from P2 (dense head); None picks P2..P5 by box size.
     """
     batch = torch.cat([torch.full((len(b), 1), float(k)) for k, b in enumerate(boxes)]).to(features[0])
     every = torch.cat([batch, torch.cat(boxes).to(features[0])], 1)
-    which = torch.zeros(len(every), dtype=torch.long) if level is not None else bx.levels_of(every[:, 1:], config)
+    which = (
+        torch.zeros(len(every), dtype=torch.long) if level is not None else bx.levels_of(every[:, 1:], config)
+    )
     out = features[0].new_zeros(len(every), features[0].shape[1], pool, pool)
     for k in range(4):
         own = (which == k).nonzero()[:, 0]
         if len(own):
-            rois = roi_align(features[k], every[own], pool, 1 / config.tap_strides[k], sampling_ratio=0, aligned=True)
+            rois = roi_align(
+                features[k], every[own], pool, 1 / config.tap_strides[k], sampling_ratio=0, aligned=True
+            )
             out = out.index_copy(0, own, rois)
     return out

@@ -2,9 +2,10 @@
 
     python -m export.densepose.train --out .data/runs/b --minutes 120
 
-One loop for CPU, one GPU, and several processes: `torchrun --nproc-per-node N -m export.densepose.train …` for N GPUs.
-On a CPU one process a core with `--batch 8` is about four times as fast as one process with all cores. It resumes
-from `--out` by itself, saves every few minutes and on Ctrl-C, and draws the curves to `curves.png`.
+One loop for CPU, one GPU, and several processes: `torchrun --nproc-per-node N -m export.densepose.train …`
+for N GPUs. On a CPU one process a core with `--batch 8` is about four times as fast as one process with all
+cores. It resumes from `--out` by itself, saves every few minutes and on Ctrl-C, and draws the curves to
+`curves.png`.
 """
 
 from __future__ import annotations
@@ -57,13 +58,18 @@ class Ema:
 
 @torch.no_grad()
 def validate(net: MobileParsingRCNN, records: list[data.Record]) -> dict[str, float]:
-    """Quick figures on a few validation images: box recall and precision at IoU 0.5, part accuracy, mask IoU."""
+    """Quick figures on validation images: box recall and precision at IoU 0.5, part accuracy, mask IoU."""
     device = next(net.parameters()).device
     net = copy.deepcopy(net).cpu().eval() if device.type != "cpu" else net.eval()
     people = found = boxes = pixels = right = both = either = 0
     for record in records:
         image, label = record.decoded()
-        result = infer(Graphs.of_network(net), np.ascontiguousarray(image[..., ::-1]), net.config, DecodeConfig(score_threshold=0.3, max_people=6))
+        result = infer(
+            Graphs.of_network(net),
+            np.ascontiguousarray(image[..., ::-1]),
+            net.config,
+            DecodeConfig(score_threshold=0.3, max_people=6),
+        )
         truth = data.truth_of(label)
         wanted = truth.box[~truth.ignore]
         people += len(wanted)
@@ -75,11 +81,19 @@ def validate(net: MobileParsingRCNN, records: list[data.Record]) -> dict[str, fl
         right += (body & (result.iuv[..., 0] == label[..., 0])).sum()
         both += (body & seen).sum()
         either += (body | seen).sum()
-    return {"recall": found / max(people, 1), "precision": found / max(boxes, 1), "part": right / pixels, "mask_iou": both / either}
+    return {
+        "recall": found / max(people, 1),
+        "precision": found / max(boxes, 1),
+        "part": float(right / max(pixels, 1)),
+        "mask_iou": float(both / max(either, 1)),
+    }
 
 
 def average_gradients(net: nn.Module, spent: float, stopped: bool, world: int) -> tuple[float, bool]:
-    """Means of the gradients over the processes, and one common clock and stop flag, in a single exchange."""
+    """Means of the gradients over the processes, and one common clock and stop flag, in a single exchange.
+
+    What all processes must decide alike (when to stop) may only depend on what is returned here.
+    """
     gradients = [torch.zeros_like(p) if p.grad is None else p.grad for p in net.parameters()]
     flat = torch.cat([*(g.flatten() for g in gradients), gradients[0].new_tensor([spent, float(stopped)])])
     torch.distributed.all_reduce(flat)
@@ -111,11 +125,17 @@ def draw_curves(log: list[dict], path: Path) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--data", type=Path, default=Path(".data/people"))
     parser.add_argument("--out", type=Path, default=Path(".data/runs/b"))
-    parser.add_argument("--width", type=int, default=64, help="channels of neck and heads: 64 (variant B), 88, 112")
-    parser.add_argument("--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in")
+    parser.add_argument(
+        "--width", type=int, default=64, help="channels of neck and heads: 64 (variant B), 88, 112"
+    )
+    parser.add_argument(
+        "--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in"
+    )
     parser.add_argument("--batch", type=int, default=16, help="images a step and process")
     parser.add_argument("--lr", type=float, default=2e-3)
     parser.add_argument("--weight-decay", type=float, default=0.02)
@@ -128,7 +148,11 @@ def main() -> None:
     options = parser.parse_args()
 
     rank, world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
-    device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0))) if torch.cuda.is_available() else torch.device("cpu")
+    device = (
+        torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0)))
+        if torch.cuda.is_available()
+        else torch.device("cpu")
+    )
     if world > 1:
         torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
     torch.set_num_threads(options.threads or max(1, (os.cpu_count() or 1) // world))
@@ -139,7 +163,13 @@ def main() -> None:
     ema = Ema(net, options.ema)
     decayed = [p for p in net.parameters() if p.dim() > 1]
     plain = [p for p in net.parameters() if p.dim() <= 1]
-    optimiser = torch.optim.AdamW([dict(params=decayed, weight_decay=options.weight_decay), dict(params=plain, weight_decay=0)], lr=options.lr)
+    optimiser = torch.optim.AdamW(
+        [
+            {"params": decayed, "weight_decay": options.weight_decay},
+            {"params": plain, "weight_decay": 0.0},
+        ],
+        lr=options.lr,
+    )
     step, images, spent, log = 0, 0, 0.0, []
     checkpoint = options.out / "checkpoint.pt"
     if checkpoint.exists():
@@ -158,8 +188,16 @@ def main() -> None:
 
     def save() -> None:
         if rank == 0:
-            state = dict(net=net.state_dict(), ema=ema.net.state_dict(), optimiser=optimiser.state_dict(), step=step,
-                         images=images, spent=spent, log=log, width=options.width)  # fmt: skip
+            state = {
+                "net": net.state_dict(),
+                "ema": ema.net.state_dict(),
+                "optimiser": optimiser.state_dict(),
+                "step": step,
+                "images": images,
+                "spent": spent,
+                "log": log,
+                "width": options.width,
+            }
             torch.save(state, checkpoint.with_suffix(".tmp"))
             checkpoint.with_suffix(".tmp").rename(checkpoint)
             (options.out / "log.json").write_text(json.dumps(log))
@@ -182,7 +220,8 @@ def main() -> None:
     length = options.minutes * 60
     clock = saved_at = checked_at = time.monotonic()
     bar = tqdm(total=round(length), initial=round(spent), unit="s", disable=rank > 0, smoothing=0)
-    while spent < length and not stopped:
+    finished = spent >= length
+    while not finished:
         share = spent / length
         _, batches.size, batches.scales = [s for s in STAGES if share >= s[0]][-1]
         warm = min(1.0, (step + 1) / 200)
@@ -195,8 +234,10 @@ def main() -> None:
         loss = sum(terms.values())
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
+        stop_now = stopped
         if world > 1:
-            spent, stopped = average_gradients(net, spent, stopped, world)
+            spent, stop_now = average_gradients(net, spent, stopped, world)
+        finished = stop_now or spent >= length
         norm = nn.utils.clip_grad_norm_(net.parameters(), 10.0)
         if torch.isfinite(norm):
             optimiser.step()
@@ -208,7 +249,16 @@ def main() -> None:
         bar.update(round(spent + now - clock) - bar.n)
         spent, clock = spent + now - clock, now
         if step % 20 == 0:
-            log.append({"step": step, "images": images, "loss": sum(smooth.values()), "terms": dict(smooth), "rate": rate, "size": batches.size})
+            log.append(
+                {
+                    "step": step,
+                    "images": images,
+                    "loss": sum(smooth.values()),
+                    "terms": dict(smooth),
+                    "rate": rate,
+                    "size": batches.size,
+                }
+            )
             bar.set_postfix(step=step, images=images, loss=f"{log[-1]['loss']:.3f}", size=batches.size)
         if rank == 0 and now - checked_at > options.validate_minutes * 60:
             log.append({"step": step, "images": images, "spent": spent, **validate(ema.net, held_out)})

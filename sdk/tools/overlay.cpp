@@ -15,7 +15,7 @@ constexpr int kReadableSidePx = 900;
 constexpr int kLargestEnlargement = 4;
 constexpr int kParts = 24;
 constexpr float kContoursPerPart = 8;  // iso-lines of U, and as many of V
-constexpr float kPaint = 0.62f;        // opacity of the parts' colours
+constexpr float kPaint = 0.70f;        // opacity of the parts' colours
 
 // Colours by limb, so that a body can be read at a glance: torso gold, head rose, right limbs warm, left limbs cool;
 // the front and the outer side of a limb are lighter than its back. In DensePose's order; RGB.

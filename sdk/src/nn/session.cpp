@@ -1,5 +1,6 @@
 #include "nn/session.h"
 
+#include <map>
 #include <memory>
 
 #include "core/error.h"
@@ -40,11 +41,13 @@ bool fits(const std::vector<int64_t>& actual, const std::vector<Dimension>& expe
 
 }  // namespace
 
-int64_t TensorView::size() const {
-  int64_t size = 1;
-  for (const int64_t extent : shape) size *= extent;
-  return size;
-}
+// ONNX Runtime asks the same of inputs and of outputs, by functions of different names.
+struct Session::GraphSide {
+  const char* kind;
+  decltype(OrtApi::SessionGetInputCount) count;
+  decltype(OrtApi::SessionGetInputName) name;
+  decltype(OrtApi::SessionGetInputTypeInfo) type;
+};
 
 NetworkOutputs::NetworkOutputs(std::shared_ptr<const OnnxRuntimeLibrary> runtime, std::vector<OrtValue*> values)
     : runtime_(std::move(runtime)), values_(std::move(values)) {
@@ -103,61 +106,59 @@ Session::~Session() {
 
 void Session::compare_with_spec() const {
   const OrtApi& api = runtime_->api();
+  const GraphSide inputs{"input", api.SessionGetInputCount, api.SessionGetInputName, api.SessionGetInputTypeInfo};
+  const GraphSide outputs{"output", api.SessionGetOutputCount, api.SessionGetOutputName, api.SessionGetOutputTypeInfo};
+  const size_t input_count = compare_side(inputs, spec_.inputs);
+  compare_side(outputs, spec_.outputs);
+  if (input_count != 1 || spec_.inputs.size() != 1) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has ", input_count,
+                " inputs, but must have one. Export the bundle again.");
+  }
+}
+
+size_t Session::compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const {
   const auto check = [&](OrtStatus* result) {
     runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be inspected"));
   };
+  const OrtApi& api = runtime_->api();
   OrtAllocator* allocator = nullptr;
   check(api.GetAllocatorWithDefaultOptions(&allocator));
-
-  const auto compare = [&](const char* kind, const std::vector<TensorSpec>& expected, auto count_of, auto name_of,
-                           auto type_of) {
-    size_t count = 0;
-    check(count_of(session_, &count));
-    for (const TensorSpec& tensor : expected) {
-      bool found = false;
-      for (size_t i = 0; i < count && !found; ++i) {
-        char* actual_name = nullptr;
-        check(name_of(session_, i, allocator, &actual_name));
-        found = tensor.name == actual_name;
-        check(api.AllocatorFree(allocator, actual_name));
-        if (!found) continue;
-
-        OrtTypeInfo* type = nullptr;
-        check(type_of(session_, i, &type));
-        const std::unique_ptr<OrtTypeInfo, decltype(api.ReleaseTypeInfo)> owner(type, api.ReleaseTypeInfo);
-        const OrtTensorTypeAndShapeInfo* info = nullptr;
-        check(api.CastTypeInfoToTensorInfo(type, &info));
-        ONNXTensorElementDataType element = ONNX_TENSOR_ELEMENT_DATA_TYPE_UNDEFINED;
-        std::vector<int64_t> shape;
-        if (info != nullptr) {
-          size_t rank = 0;
-          check(api.GetTensorElementType(info, &element));
-          check(api.GetDimensionsCount(info, &rank));
-          shape.resize(rank);
-          check(api.GetDimensions(info, shape.data(), rank));
-        }
-        if (tensor.type != "float32" || element != ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT) {
-          throw Error(MAQ_ERROR_BAD_BUNDLE, name_, ": ", kind, " ", tensor.name,
-                      " must be float32 in the manifest and in the graph. Export the bundle again.");
-        }
-        if (!fits(shape, tensor.shape)) {
-          throw Error(MAQ_ERROR_BAD_BUNDLE, name_, ": ", kind, " ", tensor.name, " has shape ", to_text(shape),
-                      " in the graph, but ", to_text(tensor.shape), " in the manifest. Export the bundle again.");
-        }
-      }
-      if (!found) {
-        throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has no ", kind, " ", tensor.name,
-                    ", but the manifest lists it. Export the bundle again.");
-      }
-    }
-    return count;
-  };
-  const size_t inputs = compare("input", spec_.inputs, api.SessionGetInputCount, api.SessionGetInputName,
-                                api.SessionGetInputTypeInfo);
-  compare("output", spec_.outputs, api.SessionGetOutputCount, api.SessionGetOutputName, api.SessionGetOutputTypeInfo);
-  if (inputs != 1 || spec_.inputs.size() != 1) {
-    throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has ", inputs, " inputs, but must have one. Export the bundle again.");
+  size_t count = 0;
+  check(side.count(session_, &count));
+  std::map<std::string, size_t> index_of;
+  for (size_t i = 0; i < count; ++i) {
+    char* name = nullptr;
+    check(side.name(session_, i, allocator, &name));
+    index_of[name] = i;
+    check(api.AllocatorFree(allocator, name));
   }
+  for (const TensorSpec& tensor : expected) {
+    const auto found = index_of.find(tensor.name);
+    if (found == index_of.end()) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has no ", side.kind, " ", tensor.name,
+                  ", but the manifest lists it. Export the bundle again.");
+    }
+    OrtTypeInfo* made = nullptr;
+    check(side.type(session_, found->second, &made));
+    const std::unique_ptr<OrtTypeInfo, decltype(api.ReleaseTypeInfo)> type(made, api.ReleaseTypeInfo);
+    const OrtTensorTypeAndShapeInfo* info = nullptr;
+    check(api.CastTypeInfoToTensorInfo(type.get(), &info));
+    ONNXTensorElementDataType element = ONNX_TENSOR_ELEMENT_DATA_TYPE_UNDEFINED;
+    if (info != nullptr) check(api.GetTensorElementType(info, &element));
+    if (tensor.type != "float32" || element != ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, name_, ": ", side.kind, " ", tensor.name,
+                  " must be float32 in the manifest and in the graph. Export the bundle again.");
+    }
+    size_t rank = 0;
+    check(api.GetDimensionsCount(info, &rank));
+    std::vector<int64_t> shape(rank);
+    check(api.GetDimensions(info, shape.data(), rank));
+    if (!fits(shape, tensor.shape)) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, name_, ": ", side.kind, " ", tensor.name, " has shape ", to_text(shape),
+                  " in the graph, but ", to_text(tensor.shape), " in the manifest. Export the bundle again.");
+    }
+  }
+  return count;
 }
 
 NetworkOutputs Session::run(const float* input, const std::vector<int64_t>& input_shape,

@@ -15,8 +15,6 @@ namespace maq {
 struct TensorView {
   const float* data = nullptr;
   std::vector<int64_t> shape;
-
-  int64_t size() const;
 };
 
 // The outputs of one run, in the order of the graph's spec; they own their memory.
@@ -52,7 +50,11 @@ class Session {
                      const std::vector<std::vector<int64_t>>& shape_of_outputs) const;
 
  private:
+  struct GraphSide;
+
   void compare_with_spec() const;
+  // Throws unless the graph has each of `expected` with its type and shape; returns how many it has in all.
+  size_t compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const;
 
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   GraphSpec spec_;

@@ -1,5 +1,5 @@
 # Writes a C++ file that holds the bytes of INPUT, for `cmake -DINPUT=… -DOUTPUT=… -DHEADER=… -DFUNCTION=… -P`.
-# FUNCTION returns a maquette::EmbeddedFile, which HEADER declares. Without INPUT the file is embedded as empty.
+# FUNCTION returns a maq::EmbeddedFile, which HEADER declares. Without INPUT the file is embedded as empty.
 if(EXISTS "${INPUT}")
   file(READ "${INPUT}" bytes HEX)
   string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
@@ -13,11 +13,11 @@ else()
 endif()
 file(WRITE "${OUTPUT}" "#include \"${HEADER}\"
 
-namespace maquette {
+namespace maq {
 namespace {
 ${array}}  // namespace
 
 EmbeddedFile ${FUNCTION}() { return ${value}; }
 
-}  // namespace maquette
+}  // namespace maq
 ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from export.evaluation.measure import Figures
 from export.surface import PART_COUNT, PART_NAMES
 
 SCHEMA = "maquette-evaluation-1"
+WIDTH_OF_FILES = 140  # columns of the table when it does not go to a terminal
 
 # Rows of the table: label, field, unit. Shares are shown in points (hundredths), and so are differences.
 ROWS = (
@@ -40,7 +42,7 @@ def column_name(kind: str, precision: str) -> str:
 
 def print_table(results: dict[str, Figures], console: Console | None = None) -> None:
     """results: figures by column name; the first column is what the others are compared with."""
-    console = console or Console()
+    console = console or Console(width=None if sys.stdout.isatty() else WIDTH_OF_FILES)
     first = next(iter(results.values()))
     console.print(
         f"{first.images} images, {first.people} people ({first.ignored} more too small or hidden). "

@@ -42,8 +42,8 @@ volatile std::sig_atomic_t stop_asked = 0;
 class Timings {
  public:
   void add(const maq_densepose_stats& stats) {
-    const float values[] = {stats.preprocess_ms, stats.detector_ms,   stats.proposals_ms, stats.box_head_ms,
-                            stats.dense_head_ms, stats.decode_ms, stats.total_ms};
+    const float values[] = {stats.preprocess_ms, stats.detector_ms, stats.proposals_ms, stats.box_head_ms,
+                            stats.dense_head_ms, stats.decode_ms,   stats.total_ms};
     for (size_t i = 0; i < kStages; ++i) ms_[i].push_back(values[i]);
     people_ += stats.people;
   }
@@ -205,9 +205,11 @@ int run_densepose(const Options& options) {
 
 void add_densepose_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("densepose", "Map every pixel of the people in images or clips to body surface");
-  command->add_option("source", options->sources,
-                      "Images, clips or URIs: photo.jpg, video:clip.mp4, stub:people?count=3 (see `maquette sources`)")
+  CLI::App* command =
+      app.add_subcommand("densepose", "Map every pixel of the people in images or clips to body surface");
+  command
+      ->add_option("source", options->sources,
+                   "Images, clips or URIs: photo.jpg, video:clip.mp4, stub:people?count=3 (see `maquette sources`)")
       ->required();
   command->add_option("-o,--out", options->out, "Folder for the results; made when it is not there")->required();
   command->add_flag("--overlay", options->overlay,
@@ -217,11 +219,13 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
                       "Model bundle folder; else MAQ_BUNDLE, else the one that came with this program");
   command->add_option("--size", options->size, "Long side of the network's input in pixels; larger is finer and slower")
       ->check(CLI::Range(32, 2048));
-  command->add_option("--threshold", options->threshold, "Least score of a person")->check(CLI::Range(0.0f, 1.0f));
+  command->add_option("--threshold", options->threshold, "Score that a person must exceed")
+      ->check(CLI::Range(0.0f, 1.0f));
   command->add_option("--threads", options->threads, "Threads of the networks; default: the cores, at most 4")
       ->check(CLI::Range(1, 64));
-  command->add_option("--max-frames", options->max_frames,
-                      "Stop after so many frames; default: all, and 100 of a source without end")
+  command
+      ->add_option("--max-frames", options->max_frames,
+                   "Stop after so many frames; default: all, and 100 of a source without end")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 40));
   command->add_option("--every", options->every, "Take only every N-th frame of a clip")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 30));

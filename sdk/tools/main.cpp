@@ -1,9 +1,9 @@
 // The `maquette` command line: each command is one file, built on the public C++ header alone.
+#include <maquette/maquette.h>
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <maquette/maquette.h>
 
 #include "commands.h"
 
@@ -22,8 +22,9 @@ int main(int argc, char** argv) {
   CLI::App app("Maquette: dense pose of people in images, clips and camera pictures, on the CPU.");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("maquette ") + maq_sdk_version());
-  app.footer("Try it without a camera:\n  maquette densepose stub:people --out demo-output --overlay --max-frames 60\n"
-             "Help on a command:\n  maquette densepose --help");
+  app.footer(
+      "Try it without a camera:\n  maquette densepose stub:people --out demo-output --overlay --max-frames 60\n"
+      "Help on a command:\n  maquette densepose --help");
   int exit_code = 0;
   add_info_command(app, &exit_code);
   add_sources_command(app, &exit_code);

@@ -38,10 +38,10 @@ float smooth_step(float low, float high, float value) {
 
 // One person's surface, enlarged: which part, how much of the pixel it covers, and U and V as smooth functions.
 struct Surface {
-  cv::Rect area;      // in the enlarged image
-  cv::Mat part;       // CV_8U
-  cv::Mat coverage;   // CV_32F
-  cv::Mat u, v;       // CV_32F
+  cv::Rect area;     // in the enlarged image
+  cv::Mat part;      // CV_8U
+  cv::Mat coverage;  // CV_32F
+  cv::Mat u, v;      // CV_32F
 };
 
 // Enlarges one part at a time, so that nothing bleeds over from its neighbours: bytes of U and V are steps, and a

@@ -1,12 +1,12 @@
 #include "source_argument.h"
 
+#include <maquette/maquette.h>
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <maquette/maquette.h>
 #include <stdexcept>
 
 namespace fs = std::filesystem;
@@ -15,7 +15,8 @@ namespace {
 
 bool has_video_extension(const fs::path& path) {
   std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
   constexpr const char* kKnown[] = {".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ogv"};
   return std::any_of(std::begin(kKnown), std::end(kKnown), [&](const char* known) { return extension == known; });
 }
@@ -64,11 +65,13 @@ SourceArgument parse_source_argument(const std::string& text) {
     return {(is_video ? "video:" : "image:") + escaped(text), fs::path(text).stem().string()};
   }
   if (scheme.empty()) {
-    throw std::runtime_error(text + " does not exist; check the path, or see `maquette sources` for what else there is.");
+    throw std::runtime_error(text +
+                             " does not exist; check the path, or see `maquette sources` for what else there is.");
   }
   const std::string target = text.substr(colon + 1, text.find('?', colon) - colon - 1);
   if (scheme == "image" || scheme == "video") return {text, fs::path(target).stem().string()};
   std::string stem = scheme + "_" + target;
-  std::replace_if(stem.begin(), stem.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+  std::replace_if(
+      stem.begin(), stem.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
   return {text, stem};
 }

@@ -2,13 +2,13 @@
 #include <maquette/maquette.h>
 #include <stdio.h>
 
-int main(int argc, char **argv) {
-  maq_context *context = NULL;
-  maq_source *source = NULL;
-  maq_densepose *densepose = NULL;
-  maq_frame *frame = NULL;
-  maq_densepose_result *result = NULL;
-  const maq_person *people = NULL;
+int main(int argc, char** argv) {
+  maq_context* context = NULL;
+  maq_source* source = NULL;
+  maq_densepose* densepose = NULL;
+  maq_frame* frame = NULL;
+  maq_densepose_result* result = NULL;
+  const maq_person* people = NULL;
   uint32_t count = 0, i;
   maq_densepose_config config;
   maq_densepose_config_init(&config, sizeof config);
@@ -20,7 +20,8 @@ int main(int argc, char **argv) {
                maq_densepose_run(densepose, frame, &result) != MAQ_OK ||
                maq_densepose_result_people(result, &people, &count) != MAQ_OK;
   if (failed) fprintf(stderr, "%s\n", maq_last_error(context));
-  for (i = 0; i < count; ++i) printf("person %.2f at x %.0f y %.0f\n", people[i].score, people[i].box_px[0], people[i].box_px[1]);
+  for (i = 0; i < count; ++i)
+    printf("person %.2f at x %.0f y %.0f\n", people[i].score, people[i].box_px[0], people[i].box_px[1]);
   maq_densepose_result_release(result), maq_frame_release(frame);
   maq_source_destroy(source), maq_densepose_destroy(densepose), maq_context_destroy(context);
   return failed;

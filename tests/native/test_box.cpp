@@ -21,8 +21,8 @@ std::vector<ScoredBox> reference_nms(std::vector<ScoredBox> left, double iou) {
   while (!left.empty()) {
     size_t best = 0;
     for (size_t i = 1; i < left.size(); ++i) {
-      const bool better = left[i].score > left[best].score ||
-                          (left[i].score == left[best].score && left[i].index < left[best].index);
+      const bool better =
+          left[i].score > left[best].score || (left[i].score == left[best].score && left[i].index < left[best].index);
       if (better) best = i;
     }
     const ScoredBox chosen = left[best];

@@ -17,7 +17,10 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 struct Logits {
   explicit Logits(int cells)
-      : coarse(size_t(kCoarse * cells * cells), 0.0f), index(size_t(kIndex * cells * cells), 0.0f), u(index), v(index),
+      : coarse(size_t(kCoarse * cells * cells), 0.0f),
+        index(size_t(kIndex * cells * cells), 0.0f),
+        u(index),
+        v(index),
         size(cells) {}
   void fill(std::vector<float>& plane, int channel, float value) {
     std::fill_n(plane.begin() + channel * size * size, size * size, value);

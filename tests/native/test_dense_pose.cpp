@@ -54,8 +54,8 @@ cv::Mat black(int width, int height) { return cv::Mat::zeros(height, width, CV_8
 
 TEST_F(DensePose, OneCellOfColourIsOnePersonInItsAnchor) {
   cv::Mat image = black(320, 256);
-  image(cv::Rect(80, 100, 4, 4)) = kRed;      // cell (20, 25) of P2
-  image(cv::Rect(200, 128, 8, 8)) = kGreen;   // cell (25, 16) of P3
+  image(cv::Rect(80, 100, 4, 4)) = kRed;     // cell (20, 25) of P2
+  image(cv::Rect(200, 128, 8, 8)) = kGreen;  // cell (25, 16) of P3
   const maq::DensePoseResult result = run(image);
   ASSERT_EQ(result.people.size(), 2u);
   const maq::Box& red = result.people[0].box;
@@ -81,9 +81,7 @@ TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {
   for (int y = 0; y < 256; ++y) {
     for (int x = 0; x < 320; ++x) {
       const size_t pixel = size_t(y * 320 + x);
-      const auto cell = [](int at, int extent) {
-        return std::clamp((at + 0.5) * 64 / extent - 0.5, 0.0, 63.0);
-      };
+      const auto cell = [](int at, int extent) { return std::clamp((at + 0.5) * 64 / extent - 0.5, 0.0, 63.0); };
       const double col = cell(x - rect.x, rect.width), row = cell(y - rect.y, rect.height);
       const bool in_box = x >= rect.x && y >= rect.y && x < rect.x + rect.width && y < rect.y + rect.height;
       const bool is_body = in_box && row > 15.5;

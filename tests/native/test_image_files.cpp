@@ -65,7 +65,8 @@ TEST(ImageFiles, MissingEmptyAndDamagedFilesAreToldApart) {
   write_text(folder.file("empty.jpg"), "");
   expect_error(MAQ_ERROR_UNREADABLE, "is empty", [&] { maq::read_image_file(folder.file("empty.jpg"), frame); });
   write_text(folder.file("text.jpg"), "this is no image at all, but it is long enough to look for a header in it");
-  expect_error(MAQ_ERROR_UNREADABLE, "cannot be decoded", [&] { maq::read_image_file(folder.file("text.jpg"), frame); });
+  expect_error(MAQ_ERROR_UNREADABLE, "cannot be decoded",
+               [&] { maq::read_image_file(folder.file("text.jpg"), frame); });
   const std::string png = read_text(written_image(folder, "whole.png", 64, 64));
   write_text(folder.file("cut.png"), png.substr(0, 40));
   expect_error(MAQ_ERROR_UNREADABLE, "cannot be decoded", [&] { maq::read_image_file(folder.file("cut.png"), frame); });

@@ -66,11 +66,18 @@ TEST(Manifest, NamesThePlaceOfAMistake) {
 }
 
 TEST(Manifest, RefusesValuesOutOfRange) {
-  const std::pair<const char*, json> wrong[] = {
-      {"/input/std/1", 0},          {"/input/long_side", 100000}, {"/rpn/nms_iou", 1.5},
-      {"/rpn/pre_nms_top_k", 0},    {"/rpn/strides", {4, 8}},     {"/rpn/aspect_ratios", {1}},
-      {"/box_head/max_people", 256}, {"/box_head/score_threshold", -1}, {"/dense_head/index_classes", 1000},
-      {"/files/detector.onnx/sha256", "abc"}, {"/graphs/detector/file", "other.onnx"}, {"/input/color", "BGR"}};
+  const std::pair<const char*, json> wrong[] = {{"/input/std/1", 0},
+                                                {"/input/long_side", 100000},
+                                                {"/rpn/nms_iou", 1.5},
+                                                {"/rpn/pre_nms_top_k", 0},
+                                                {"/rpn/strides", {4, 8}},
+                                                {"/rpn/aspect_ratios", {1}},
+                                                {"/box_head/max_people", 256},
+                                                {"/box_head/score_threshold", -1},
+                                                {"/dense_head/index_classes", 1000},
+                                                {"/files/detector.onnx/sha256", "abc"},
+                                                {"/graphs/detector/file", "other.onnx"},
+                                                {"/input/color", "BGR"}};
   for (const auto& [place, value] : wrong) {
     json changed = tiny();
     changed[json::json_pointer(place)] = value;

@@ -6,9 +6,7 @@
 
 namespace {
 
-maq::ImageView view_of(const cv::Mat& bgr) {
-  return {MAQ_PIXEL_BGR8, bgr.cols, bgr.rows, {{bgr.data, bgr.step}, {}}};
-}
+maq::ImageView view_of(const cv::Mat& bgr) { return {MAQ_PIXEL_BGR8, bgr.cols, bgr.rows, {{bgr.data, bgr.step}, {}}}; }
 
 const maq::NetworkInputSpec kSpec = {320, 32, {123.675f, 116.28f, 103.53f}, {58.395f, 57.12f, 57.375f}};
 
@@ -57,6 +55,14 @@ TEST(NetworkInput, TakesOddSizesDownToOnePixel) {
   expect_definition(noise(1, 4000), 1, 320, cv::INTER_AREA);
   expect_definition(noise(4000, 1), 320, 1, cv::INTER_AREA);
   expect_definition(noise(16, 16), 320, 320, cv::INTER_LINEAR);
+}
+
+TEST(NetworkInput, RoundsHalvesToEvenLikeTheReference) {
+  int width = 0, height = 0;
+  maq::network_size(640, 125, 320, &width, &height);  // 62.5
+  EXPECT_EQ(height, 62);
+  maq::network_size(127, 640, 320, &width, &height);  // 63.5
+  EXPECT_EQ(width, 64);
 }
 
 TEST(NetworkInput, ReadsRowsByTheirStride) {

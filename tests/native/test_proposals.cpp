@@ -25,7 +25,9 @@ maq::RpnSpec spec() {
 // One level of `width` x `height` cells whose logits are all `logit` and whose deltas are 0.
 struct Level {
   Level(int columns, int rows, float everywhere)
-      : objectness(size_t(3 * columns * rows), everywhere), deltas(size_t(12 * columns * rows), 0.0f), width(columns),
+      : objectness(size_t(3 * columns * rows), everywhere),
+        deltas(size_t(12 * columns * rows), 0.0f),
+        width(columns),
         height(rows) {}
   float& logit(int x, int y, int anchor) { return objectness[size_t((anchor * height + y) * width + x)]; }
   float& delta(int x, int y, int anchor, int which) {
@@ -91,6 +93,7 @@ TEST(Proposals, EachLevelKeepsItsBestAndTheWholeItsLimit) {
 TEST(Proposals, NanAndBoxesWithoutAreaAreDroppedAndCounted) {
   Level level(4, 4, 0);
   level.logit(0, 0, 0) = kNan;
+  level.logit(0, 1, 0) = std::numeric_limits<float>::infinity();
   level.delta(1, 1, 1, 2) = kNan;
   level.delta(2, 2, 1, 0) = 1e4f;
   level.delta(3, 3, 1, 1) = -1e4f;
@@ -98,8 +101,8 @@ TEST(Proposals, NanAndBoxesWithoutAreaAreDroppedAndCounted) {
   all.nms_iou = 1;
   int dropped = 0;
   const auto found = select_proposals({level.view()}, all, 16, 16, &dropped);
-  EXPECT_EQ(dropped, 4);
-  EXPECT_EQ(found.size(), size_t(48 - 4));
+  EXPECT_EQ(dropped, 5);
+  EXPECT_EQ(found.size(), size_t(48 - 5));
   for (const maq::ScoredBox& proposal : found) {
     EXPECT_TRUE(proposal.box.x0 >= 0 && proposal.box.x1 <= 16 && proposal.box.y0 >= 0 && proposal.box.y1 <= 16);
   }

@@ -59,7 +59,8 @@ TEST(Uri, TakesEachOptionOnceAndComplainsAboutTheRest) {
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "speed", [&] { uri.expect_no_more_options("count"); });
   for (const char* count : {"31", "-1", "2.5", "two", "99999999999999999999"}) {
     maq::SourceUri wrong = parse_source_uri(std::string("stub:people?count=") + count);
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "whole number from 0 to 30", [&] { wrong.take_integer("count", 1, 0, 30); });
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "whole number from 0 to 30",
+                 [&] { wrong.take_integer("count", 1, 0, 30); });
   }
 }
 

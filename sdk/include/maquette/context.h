@@ -20,19 +20,19 @@ typedef enum maq_log_level {
 
 /* Receives one log line without a line break; `text` is valid during the call. It may be called from any thread that
  * calls into the library, must not call back into it, and must not throw. */
-typedef void (*maq_log_callback)(void *user_data, maq_log_level level, const char *text);
+typedef void (*maq_log_callback)(void* user_data, maq_log_level level, const char* text);
 
 typedef struct maq_context_config {
   uint32_t struct_size;
   maq_log_level log_level;         /* lines above this level are not made; default MAQ_LOG_WARNING */
   maq_log_callback log_callback;   /* NULL (default): nothing is logged; the SDK itself never prints */
-  void *log_user_data;             /* passed to log_callback */
-  const char *onnxruntime_library; /* file to open; NULL (default): search as described below. Copied. */
+  void* log_user_data;             /* passed to log_callback */
+  const char* onnxruntime_library; /* file to open; NULL (default): search as described below. Copied. */
 } maq_context_config;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_context_config) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT for NULL or a size this library does not know. Does not block. */
-MAQ_API maq_status maq_context_config_init(maq_context_config *config, uint32_t struct_size);
+MAQ_API maq_status maq_context_config_init(maq_context_config* config, uint32_t struct_size);
 
 /* Creates a context. `header_version` is MAQ_HEADER_VERSION; `config` may be NULL for the defaults.
  * `*context` is the caller's, to be given to maq_context_destroy. Nothing is opened yet: ONNX Runtime is looked for
@@ -40,16 +40,16 @@ MAQ_API maq_status maq_context_config_init(maq_context_config *config, uint32_t 
  * MAQ_ONNXRUNTIME_LIB; maquette/libonnxruntime.so.1 and libonnxruntime.so.1 in the folder of libmaquette.so; the
  * system's search path. It is opened privately and does not clash with a copy of the app's own.
  * Any thread. Errors: MAQ_ERROR_VERSION_MISMATCH, MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_context_create(uint32_t header_version, const maq_context_config *config, maq_context **context);
+MAQ_API maq_status maq_context_create(uint32_t header_version, const maq_context_config* config, maq_context** context);
 
 /* Destroys the context (NULL is fine). Objects created from it may outlive it; they keep what they need.
  * Once for each context, from any thread. Does not block. */
-MAQ_API void maq_context_destroy(maq_context *context);
+MAQ_API void maq_context_destroy(maq_context* context);
 
 /* The version of the ONNX Runtime library in use ("1.26.0"), and the file it was opened from.
  * Both texts are the context's and live as long as it does; either pointer may be NULL.
  * Any thread. Errors: MAQ_ERROR_RUNTIME_LIBRARY. Blocks the first time, while the library is opened. */
-MAQ_API maq_status maq_context_onnxruntime(maq_context *context, const char **version, const char **library_path);
+MAQ_API maq_status maq_context_onnxruntime(maq_context* context, const char** version, const char** library_path);
 
 #ifdef __cplusplus
 }

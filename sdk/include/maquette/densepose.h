@@ -14,9 +14,9 @@ typedef struct maq_densepose_result maq_densepose_result;
 typedef struct maq_densepose_config {
   uint32_t struct_size;
   int32_t threads;           /* for the networks; 0 (default): the machine's cores, at most 4 */
-  const char *bundle_path;   /* folder with manifest.json; required. Copied. */
+  const char* bundle_path;   /* folder with manifest.json; required. Copied. */
   int32_t long_side_px;      /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
-  float score_threshold;     /* people below it are dropped, 0 to 1; negative (default): the bundle's */
+  float score_threshold;     /* only people above it count, 0 to 1; negative (default): the bundle's */
   int32_t max_people;        /* at most so many, best first, 1 to 255; 0 (default): the bundle's */
   uint32_t result_pool_size; /* results the app may hold at once, 1 to 64; default 4 */
 } maq_densepose_config;
@@ -56,46 +56,46 @@ typedef struct maq_densepose_stats {
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_config_init(maq_densepose_config *config, uint32_t struct_size);
+MAQ_API maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size);
 
 /* Loads a model bundle: checks every file's size and SHA-256, and the networks' inputs and outputs, against its
  * manifest. `*densepose` is the caller's, to be given to maq_densepose_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE,
  * MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read and networks are prepared. */
-MAQ_API maq_status maq_densepose_create(maq_context *context, const maq_densepose_config *config,
-                                        maq_densepose **densepose);
+MAQ_API maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* config,
+                                        maq_densepose** densepose);
 
 /* Frees the networks (NULL is fine). Results still held stay valid until they are released.
  * Once for each handle, from any thread. May block shortly. */
-MAQ_API void maq_densepose_destroy(maq_densepose *densepose);
+MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
 
 /* Finds the people of a frame. The frame is not kept. `*result` comes from a pool of fixed size: give it back with
  * maq_densepose_result_release. Without people no head network runs and the planes are zero.
  * One at a time. Errors: MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the networks run. */
-MAQ_API maq_status maq_densepose_run(maq_densepose *densepose, const maq_frame *frame, maq_densepose_result **result);
+MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
 
 /* Gives the result back (NULL is fine). Pointers into it are invalid afterwards.
  * Once for each result, from any thread. Does not block. */
-MAQ_API void maq_densepose_result_release(maq_densepose_result *result);
+MAQ_API void maq_densepose_result_release(maq_densepose_result* result);
 
 /* Size of the planes: that of the frame. Either pointer may be NULL.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_size(const maq_densepose_result *result, int32_t *width_px, int32_t *height_px);
+MAQ_API maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px);
 
 /* The people found, best score first: `*people` points to `*count` of them, inside the result.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_people(const maq_densepose_result *result, const maq_person **people,
-                                               uint32_t *count);
+MAQ_API maq_status maq_densepose_result_people(const maq_densepose_result* result, const maq_person** people,
+                                               uint32_t* count);
 
 /* A plane of the result: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one
  * with the better score is in front.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_plane(const maq_densepose_result *result, maq_densepose_plane plane,
-                                              const uint8_t **pixels, size_t *stride_bytes);
+MAQ_API maq_status maq_densepose_result_plane(const maq_densepose_result* result, maq_densepose_plane plane,
+                                              const uint8_t** pixels, size_t* stride_bytes);
 
 /* Times and counts of the run. The caller sets stats->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_stats(const maq_densepose_result *result, maq_densepose_stats *stats);
+MAQ_API maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
 #ifdef __cplusplus
 }

@@ -36,7 +36,7 @@ typedef struct maq_frame_desc {
   maq_pixel_format format;
   int32_t width_px;
   int32_t height_px;
-  const uint8_t *planes[2]; /* planes[1] only for NV12 */
+  const uint8_t* planes[2]; /* planes[1] only for NV12 */
   size_t stride_bytes[2];   /* from one row to the next; 0 in maq_frame_create means rows without padding */
   int64_t timestamp_ns;
   maq_clock clock;
@@ -44,11 +44,11 @@ typedef struct maq_frame_desc {
 } maq_frame_desc;
 
 /* Called once when the library no longer needs the pixels of a frame made by maq_frame_create. */
-typedef void (*maq_frame_free_callback)(void *user_data);
+typedef void (*maq_frame_free_callback)(void* user_data);
 
 /* Fills `desc` with zeros, MAQ_CLOCK_MEDIA and struct_size. `struct_size` is sizeof(maq_frame_desc) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_frame_desc_init(maq_frame_desc *desc, uint32_t struct_size);
+MAQ_API maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size);
 
 /* Makes a frame of pixels that the app holds, without a copy.
  * The pixels stay the app's: they must not change or go away until `free_callback` is called with `user_data`, or,
@@ -56,22 +56,22 @@ MAQ_API maq_status maq_frame_desc_init(maq_frame_desc *desc, uint32_t struct_siz
  * `*frame` is the caller's, to be given to maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (NULL plane, stride shorter than a row), MAQ_ERROR_IMAGE_SIZE,
  * MAQ_ERROR_UNSUPPORTED (format). Does not block. */
-MAQ_API maq_status maq_frame_create(maq_context *context, const maq_frame_desc *desc,
-                                    maq_frame_free_callback free_callback, void *user_data, maq_frame **frame);
+MAQ_API maq_status maq_frame_create(maq_context* context, const maq_frame_desc* desc,
+                                    maq_frame_free_callback free_callback, void* user_data, maq_frame** frame);
 
 /* Gives the frame back to its pool or to the app (NULL is fine). Pointers into it are invalid afterwards.
  * Once for each frame, from any thread. Does not block. */
-MAQ_API void maq_frame_release(maq_frame *frame);
+MAQ_API void maq_frame_release(maq_frame* frame);
 
 /* Describes the frame; the planes point into it and are valid until it is released. The caller sets desc->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_frame_get_desc(const maq_frame *frame, maq_frame_desc *desc);
+MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc);
 
 /* Writes the frame's pixels to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8), height_px rows of `stride_bytes`
  * (0: rows without padding); `size_bytes` is what the caller holds there.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory), MAQ_ERROR_UNSUPPORTED (format).
  * Does not block. */
-MAQ_API maq_status maq_frame_copy_pixels(const maq_frame *frame, maq_pixel_format format, uint8_t *pixels,
+MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
                                          size_t stride_bytes, size_t size_bytes);
 
 #ifdef __cplusplus

@@ -1,10 +1,10 @@
 /* Maquette: an on-device vision SDK. This is the whole C API; include this file.
  *
- *   maq_context *context;      maq_context_create(MAQ_HEADER_VERSION, NULL, &context);
- *   maq_source *source;        maq_source_create(context, "image:photo.jpg", NULL, &source);
- *   maq_densepose *densepose;  maq_densepose_create(context, &config, &densepose);
- *   maq_frame *frame;          maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame);
- *   maq_densepose_result *r;   maq_densepose_run(densepose, frame, &r);
+ *   maq_context* context;      maq_context_create(MAQ_HEADER_VERSION, NULL, &context);
+ *   maq_source* source;        maq_source_create(context, "image:photo.jpg", NULL, &source);
+ *   maq_densepose* densepose;  maq_densepose_create(context, &config, &densepose);
+ *   maq_frame* frame;          maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame);
+ *   maq_densepose_result* r;   maq_densepose_run(densepose, frame, &r);
  *   ... read the result ...    then release r and frame, destroy the rest, in any order.
  *
  * Rules that hold everywhere:

@@ -83,8 +83,7 @@ maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t
   });
 }
 
-maq_status maq_densepose_result_people(const maq_densepose_result* result, const maq_person** people,
-                                       uint32_t* count) {
+maq_status maq_densepose_result_people(const maq_densepose_result* result, const maq_person** people, uint32_t* count) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
     require_argument(people, "people");

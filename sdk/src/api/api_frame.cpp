@@ -53,8 +53,8 @@ maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
   });
 }
 
-maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
-                                 size_t stride_bytes, size_t size_bytes) {
+maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels, size_t stride_bytes,
+                                 size_t size_bytes) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
     require_argument(pixels, "pixels");

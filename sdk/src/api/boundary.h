@@ -56,8 +56,8 @@ void require_range(const char* name, T value, T least, T most) {
 // library's size is an older struct; a larger one comes from newer headers and may ask for what this library cannot do.
 inline void require_struct_size(const char* name, uint32_t size, size_t smallest, size_t largest) {
   if (size < smallest || size > largest) {
-    throw ArgumentError(name, ".struct_size is ", size, ", but this library knows ", smallest,
-                " to ", largest, " bytes; set it to sizeof the struct, or fill the struct with its _init function.");
+    throw ArgumentError(name, ".struct_size is ", size, ", but this library knows ", smallest, " to ", largest,
+                        " bytes; set it to sizeof the struct, or fill the struct with its _init function.");
   }
 }
 

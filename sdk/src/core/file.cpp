@@ -27,7 +27,8 @@ std::vector<uint8_t> read_file(const std::string& path) {
   if (file == nullptr) {
     const int reason = errno;
     const bool missing = reason == ENOENT || reason == ENOTDIR;
-    throw Error(missing ? MAQ_ERROR_NOT_FOUND : MAQ_ERROR_UNREADABLE, path, missing ? " does not exist" : " cannot be opened",
+    throw Error(missing ? MAQ_ERROR_NOT_FOUND : MAQ_ERROR_UNREADABLE, path,
+                missing ? " does not exist" : " cannot be opened",
                 missing ? "; check the path." : concatenate(" (", std::strerror(reason), ")."));
   }
   std::vector<uint8_t> bytes;

@@ -49,8 +49,7 @@ void check_image_size(int64_t width_px, int64_t height_px, const std::string& wh
   }
   if (width_px > MAQ_MAX_SIDE_PX || height_px > MAQ_MAX_SIDE_PX || width_px * height_px > MAQ_MAX_PIXELS) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, what, " is ", width_px, " x ", height_px, " pixels, over the limit of ",
-                MAQ_MAX_SIDE_PX, " a side and ", MAQ_MAX_PIXELS / (1024 * 1024),
-                " megapixels; scale it down first.");
+                MAQ_MAX_SIDE_PX, " a side and ", MAQ_MAX_PIXELS / (1024 * 1024), " megapixels; scale it down first.");
   }
 }
 
@@ -69,8 +68,8 @@ ImageView checked_image_view(const maq_frame_desc& desc) {
                   " has ", plane_count(desc.format), " plane(s).");
     }
     if (stride < shortest) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[", plane, "] is ", stride, ", but a row of ",
-                  desc.width_px, " pixels in ", pixel_format_name(desc.format), " takes ", shortest, " bytes.");
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[", plane, "] is ", stride, ", but a row of ", desc.width_px,
+                  " pixels in ", pixel_format_name(desc.format), " takes ", shortest, " bytes.");
     }
     view.planes[plane] = PlaneView{desc.planes[plane], stride};
   }

@@ -49,9 +49,8 @@ std::vector<ScoredBox> non_maximum_suppression(std::vector<ScoredBox> candidates
   std::vector<ScoredBox> kept;
   for (const ScoredBox& candidate : candidates) {
     if (kept.size() == limit) break;
-    const bool suppressed = std::any_of(kept.begin(), kept.end(), [&](const ScoredBox& better) {
-      return overlap(candidate.box, better.box) > iou;
-    });
+    const bool suppressed = std::any_of(
+        kept.begin(), kept.end(), [&](const ScoredBox& better) { return overlap(candidate.box, better.box) > iou; });
     if (!suppressed) kept.push_back(candidate);
   }
   return kept;

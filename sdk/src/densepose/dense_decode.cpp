@@ -37,7 +37,9 @@ std::vector<Tap> resize_taps(int from, int to) {
 class ClassRow {
  public:
   ClassRow(int classes, int size)
-      : classes_(classes), size_(size), padded_(round_up_to_lanes(classes)),
+      : classes_(classes),
+        size_(size),
+        padded_(round_up_to_lanes(classes)),
         values_(size_t(size) * size_t(padded_), kNever) {}
 
   void fill(const float* logits, const Tap& row) {
@@ -98,7 +100,7 @@ uint8_t to_byte(float value, bool* clamped) {
     *clamped = true;
     return 255;
   }
-  return uint8_t(value * 255.0f + 0.5f);
+  return uint8_t(std::lrint(value * 255.0f));
 }
 
 }  // namespace
@@ -110,8 +112,9 @@ void DensePlanes::reset(int width, int height) {
 }
 
 PixelRect pixel_rect(const Box& box) {
-  return {int(std::floor(box.x0)), int(std::floor(box.y0)), std::max(1, int(box.width())),
-          std::max(1, int(box.height()))};
+  const int x = int(std::floor(box.x0));
+  const int y = int(std::floor(box.y0));
+  return {x, y, std::max(1, int(std::floor(box.x1)) - x), std::max(1, int(std::floor(box.y1)) - y)};
 }
 
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, DensePlanes& planes) {

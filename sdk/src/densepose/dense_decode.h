@@ -33,8 +33,7 @@ struct DecodeCounts {
   int64_t clamped_uv = 0;
 };
 
-// The pixels a box covers: from the floor of its left top corner, floor(width) x floor(height), at least one each way
-// (the DensePose convention).
+// The pixels a box is painted into: between the floors of its corners, at least one each way.
 struct PixelRect {
   int x = 0, y = 0, width = 1, height = 1;
 };

@@ -11,8 +11,8 @@ namespace {
 
 // The order in which the networks' outputs are asked for and found again.
 const std::vector<std::string> kDetectorOutputs = {
-    "p2",      "p3",      "p4",      "p5",      "objectness2", "objectness3", "objectness4", "objectness5", "objectness6",
-    "deltas2", "deltas3", "deltas4", "deltas5", "deltas6"};
+    "p2",          "p3",          "p4",      "p5",      "objectness2", "objectness3", "objectness4",
+    "objectness5", "objectness6", "deltas2", "deltas3", "deltas4",     "deltas5",     "deltas6"};
 constexpr size_t kFeatureLevels = 4;
 constexpr size_t kRpnLevels = 5;
 constexpr size_t kFirstObjectness = kFeatureLevels;
@@ -93,9 +93,8 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
   result.people.clear();
   result.planes.reset(image.width_px, image.height_px);
 
-  make_network_input(image,
-                     {settings_.long_side_px, manifest_.input.multiple_of, manifest_.input.mean, manifest_.input.std},
-                     input_);
+  make_network_input(
+      image, {settings_.long_side_px, manifest_.input.multiple_of, manifest_.input.mean, manifest_.input.std}, input_);
   stats.network_width_px = input_.width_px;
   stats.network_height_px = input_.height_px;
   stats.preprocess_ms = stage.lap_ms();
@@ -103,8 +102,8 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
   const Pyramid pyramid = run_detector();
   stats.detector_ms = stage.lap_ms();
 
-  const std::vector<ScoredBox> proposals = select_proposals(
-      pyramid.rpn, manifest_.rpn, float(input_.width_px), float(input_.height_px), &stats.dropped_boxes);
+  const std::vector<ScoredBox> proposals = select_proposals(pyramid.rpn, manifest_.rpn, float(input_.width_px),
+                                                            float(input_.height_px), &stats.dropped_boxes);
   stats.proposals = int(proposals.size());
   stats.proposals_ms = stage.lap_ms();
 
@@ -139,13 +138,13 @@ DensePose::Pyramid DensePose::run_detector() {
   Pyramid pyramid{detector_->run(input_.values.data(), {1, 3, height, width}, shapes), {}, {}};
   for (size_t l = 0; l < kFeatureLevels; ++l) {
     const TensorView& map = pyramid.outputs[l];
-    pyramid.features.push_back({map.data, channels_, int(map.shape[2]), int(map.shape[3]),
-                                manifest_.box_head.strides[l]});
+    pyramid.features.push_back(
+        {map.data, channels_, int(map.shape[2]), int(map.shape[3]), manifest_.box_head.strides[l]});
   }
   for (size_t l = 0; l < kRpnLevels; ++l) {
     const TensorView& objectness = pyramid.outputs[kFirstObjectness + l];
-    pyramid.rpn.push_back({objectness.data, pyramid.outputs[kFirstDeltas + l].data, int(objectness.shape[3]),
-                           int(objectness.shape[2])});
+    pyramid.rpn.push_back(
+        {objectness.data, pyramid.outputs[kFirstDeltas + l].data, int(objectness.shape[3]), int(objectness.shape[2])});
   }
   return pyramid;
 }
@@ -153,8 +152,8 @@ DensePose::Pyramid DensePose::run_detector() {
 // The larger the box, the coarser the level (Lin et al., Feature Pyramid Networks, 2017, equation 1).
 const FeatureMap& DensePose::level_for(const Pyramid& pyramid, const Box& box) const {
   const BoxHeadSpec& spec = manifest_.box_head;
-  const double level = std::floor(spec.canonical_level + std::log2(std::sqrt(double(box.area())) /
-                                                                   double(spec.canonical_size_px) + 1e-8));
+  const double level = std::floor(spec.canonical_level +
+                                  std::log2(std::sqrt(double(box.area())) / double(spec.canonical_size_px) + 1e-8));
   const int first_level = 2;
   const int slot = int(std::clamp(level, double(first_level), double(first_level + kFeatureLevels - 1))) - first_level;
   return pyramid.features[size_t(slot)];
@@ -178,15 +177,14 @@ std::vector<ScoredBox> DensePose::run_box_head(const Pyramid& pyramid, const std
     Box box = apply_deltas(proposals[i].box, outputs[1].data + 4 * i, spec.delta_weights);
     if (std::isnan(score) || !clip_box(box, float(input_.width_px), float(input_.height_px))) {
       ++*dropped;
-    } else if (score >= settings_.score_threshold) {
+    } else if (score > settings_.score_threshold) {
       found.push_back({box, score, int64_t(i)});
     }
   }
   return non_maximum_suppression(std::move(found), spec.nms_iou, size_t(settings_.max_people));
 }
 
-void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredBox>& people,
-                               DensePoseResult& result) {
+void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredBox>& people, DensePoseResult& result) {
   Stopwatch stage;
   const DenseHeadSpec& spec = manifest_.dense_head;
   const int64_t count = int64_t(people.size());

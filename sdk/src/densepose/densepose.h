@@ -52,15 +52,14 @@ struct DensePoseResult {
 class DensePose {
  public:
   // Makes the three networks of `bundle`. Throws MAQ_ERROR_BAD_BUNDLE.
-  DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle,
-            const DensePoseSettings& settings);
+  DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, const DensePoseSettings& settings);
 
   // Memory of `result` is reused. Not for two threads at once. Throws MAQ_ERROR_INFERENCE.
   void run(const ImageView& image, DensePoseResult& result);
 
  private:
   struct Pyramid {
-    NetworkOutputs outputs;  // owns what the rest points to
+    NetworkOutputs outputs;            // owns what the rest points to
     std::vector<FeatureMap> features;  // P2 to P5
     std::vector<RpnLevel> rpn;         // P2 to P6
   };

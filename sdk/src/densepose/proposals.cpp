@@ -13,7 +13,7 @@ struct Candidate {
   int32_t index;  // (y * width + x) * anchors + anchor
 };
 
-// The `count` best logits of a level in order; NaN never gets in.
+// The `count` best logits of a level in order; NaN and infinities never get in.
 std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int count, int* dropped) {
   const int cells = level.width * level.height;
   std::vector<Candidate> candidates;
@@ -21,7 +21,7 @@ std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int c
   for (int cell = 0; cell < cells; ++cell) {
     for (int anchor = 0; anchor < anchors; ++anchor) {
       const float logit = level.objectness[anchor * cells + cell];
-      if (std::isnan(logit)) {
+      if (!std::isfinite(logit)) {
         ++*dropped;
       } else {
         candidates.push_back({logit, int32_t(cell * anchors + anchor)});

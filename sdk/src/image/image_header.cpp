@@ -36,8 +36,7 @@ std::optional<SizePx> jpeg_size(const Reader& in) {
       ++offset;
       continue;
     }
-    const bool start_of_frame =
-        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    const bool start_of_frame = marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (start_of_frame) {
       if (!in.has(offset, 9)) return {};
       return SizePx{in.big16(offset + 7), in.big16(offset + 5)};

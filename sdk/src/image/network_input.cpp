@@ -23,8 +23,8 @@ std::array<float, 256> normalisation_table(float mean, float std) {
 
 void network_size(int width_px, int height_px, int long_side_px, int* network_width_px, int* network_height_px) {
   const double scale = double(long_side_px) / std::max(width_px, height_px);
-  *network_width_px = std::max(1, int(std::floor(width_px * scale + 0.5)));
-  *network_height_px = std::max(1, int(std::floor(height_px * scale + 0.5)));
+  *network_width_px = std::max(1, int(std::nearbyint(width_px * scale)));
+  *network_height_px = std::max(1, int(std::nearbyint(height_px * scale)));
 }
 
 void make_network_input(const ImageView& image, const NetworkInputSpec& spec, NetworkInput& input) {

@@ -10,8 +10,8 @@ namespace maq {
 
 struct NetworkInputSpec {
   int long_side_px = 0;
-  int multiple_of = 1;           // the padded sides are multiples of it
-  std::array<float, 3> mean{};   // of R, G, B, in 0..255
+  int multiple_of = 1;          // the padded sides are multiples of it
+  std::array<float, 3> mean{};  // of R, G, B, in 0..255
   std::array<float, 3> std{};
 };
 
@@ -23,7 +23,8 @@ struct NetworkInput {
   int padded_height_px = 0;
 };
 
-// The size at which an image enters the network: its long side becomes `long_side_px`, no side less than 1.
+// The size at which an image enters the network: its long side becomes `long_side_px`, the other follows (halves are
+// rounded to even, as in Python), no side less than 1.
 void network_size(int width_px, int height_px, int long_side_px, int* network_width_px, int* network_height_px);
 
 // Resizes (area when shrinking, bilinear when growing), normalises and pads. Memory of `input` is reused.

@@ -23,7 +23,8 @@ Bundle read_bundle(const std::string& folder) {
   for (const auto& [name, spec] : bundle.manifest.files) {
     const std::string path = folder + "/" + name;
     if (!file_exists(path)) {
-      throw Error(MAQ_ERROR_BAD_BUNDLE, path, " is missing, but the manifest lists it. Fetch or export the bundle again.");
+      throw Error(MAQ_ERROR_BAD_BUNDLE, path,
+                  " is missing, but the manifest lists it. Fetch or export the bundle again.");
     }
     std::vector<uint8_t> bytes = read_file(path);
     if (int64_t(bytes.size()) != spec.bytes) {

@@ -24,7 +24,8 @@ std::string to_text(const std::vector<Dimension>& shape) {
   std::string text = "[";
   for (const Dimension& size : shape) {
     text += text.size() > 1 ? ", " : "";
-    text += std::holds_alternative<int64_t>(size) ? std::to_string(std::get<int64_t>(size)) : std::get<std::string>(size);
+    text +=
+        std::holds_alternative<int64_t>(size) ? std::to_string(std::get<int64_t>(size)) : std::get<std::string>(size);
   }
   return text + "]";
 }
@@ -82,7 +83,8 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
   };
   OrtSessionOptions* made = nullptr;
   check(api.CreateSessionOptions(&made));
-  const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made, api.ReleaseSessionOptions);
+  const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made,
+                                                                                        api.ReleaseSessionOptions);
   check(api.SetUserLoggingFunction(options.get(), forward_to_log, const_cast<Log*>(&runtime_->log())));
   check(api.SetIntraOpNumThreads(options.get(), threads));
   check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));

@@ -20,13 +20,13 @@ class StubPeople {
 
  private:
   struct Walker {
-    int row = 0;              // of the sheet: which person
-    int height_px = 0;        // of the whole tile as drawn
-    double feet_y_px = 0;     // the nearer, the lower and the larger
-    double start_x_px = 0;    // of the tile's centre at time 0
-    double speed_px_s = 0;    // negative: to the left
-    double phase_frames = 0;  // where in the walk cycle at time 0
-    double cycles_s = 0;      // walk cycles a second
+    int row = 0;                   // of the sheet: which person
+    int height_px = 0;             // of the whole tile as drawn
+    double feet_y_px = 0;          // the nearer, the lower and the larger
+    double start_x_px = 0;         // of the tile's centre at time 0
+    double speed_px_s = 0;         // negative: to the left
+    double phase_frames = 0;       // where in the walk cycle at time 0
+    double cycles_s = 0;           // walk cycles a second
     std::vector<BgraImage> tiles;  // one for each frame of the cycle, at the drawn size, mirrored when going left
   };
 

@@ -86,8 +86,9 @@ class VideoSource : public Source {
   // Containers without times report 0 for every frame; there the frame rate counts. Never runs backwards.
   int64_t presentation_time_ns(int64_t index) {
     const double reported_ms = clip_.get(cv::CAP_PROP_POS_MSEC);
-    int64_t time_ns = std::isfinite(reported_ms) && reported_ms > 0 ? int64_t(std::llround(reported_ms * 1e6))
-                                                                    : int64_t(std::llround(double(index) * 1e9 / clip_fps_));
+    int64_t time_ns = std::isfinite(reported_ms) && reported_ms > 0
+                          ? int64_t(std::llround(reported_ms * 1e6))
+                          : int64_t(std::llround(double(index) * 1e9 / clip_fps_));
     time_ns = std::max(time_ns, last_time_ns_ + 1);
     last_time_ns_ = time_ns;
     return time_ns;

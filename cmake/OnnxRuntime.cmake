@@ -13,6 +13,16 @@ set(_ort_npm_sha256 007a59a954d2161ffb1b3977a649c7945ee37bf30ad493891d4252c02e95
 set(_ort_jar_coordinates com.microsoft.onnxruntime:onnxruntime:${MAQ_ONNXRUNTIME_VERSION})
 set(_ort_jar_sha256 cf5a48c6f5d07b15f10634b80433ddce8f5892662b1a122bbbc0907f4f442c60)
 
+# Runs a package client; `what` names what it fetches.
+function(_maq_fetch what)
+  file(MAKE_DIRECTORY "${MAQ_DEPS_DIR}")
+  execute_process(COMMAND ${ARGN} OUTPUT_QUIET ERROR_VARIABLE error RESULT_VARIABLE result)
+  if(result)
+    message(FATAL_ERROR "${what} could not be fetched (${result}). Check the network, or set MAQ_ONNXRUNTIME_DIR to "
+      "an ONNX Runtime ${MAQ_ONNXRUNTIME_VERSION} of your own.\n${error}")
+  endif()
+endfunction()
+
 function(_maq_check_sha256 file expected)
   file(SHA256 "${file}" actual)
   if(NOT actual STREQUAL expected)
@@ -25,9 +35,8 @@ function(_maq_fetch_npm_package archive)
   if(NOT EXISTS "${archive}")
     find_program(MAQ_NPM npm REQUIRED)
     message(STATUS "Fetching ${_ort_npm_name} ${_ort_npm_version} with npm (128 MB, once)")
-    file(MAKE_DIRECTORY "${MAQ_DEPS_DIR}")
-    execute_process(COMMAND "${MAQ_NPM}" pack --silent --pack-destination "${MAQ_DEPS_DIR}"
-      ${_ort_npm_name}@${_ort_npm_version} OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+    _maq_fetch("${_ort_npm_name}" "${MAQ_NPM}" pack --silent --pack-destination "${MAQ_DEPS_DIR}"
+      ${_ort_npm_name}@${_ort_npm_version})
   endif()
   _maq_check_sha256("${archive}" ${_ort_npm_sha256})
 endfunction()
@@ -36,9 +45,9 @@ function(_maq_fetch_jar archive)
   if(NOT EXISTS "${archive}")
     find_program(MAQ_MVN mvn REQUIRED)
     message(STATUS "Fetching ${_ort_jar_coordinates} with Maven (42 MB, once)")
-    execute_process(COMMAND "${MAQ_MVN}" -B -q org.apache.maven.plugins:maven-dependency-plugin:3.8.1:copy
-      -Dartifact=${_ort_jar_coordinates} "-DoutputDirectory=${MAQ_DEPS_DIR}" -Dmdep.useBaseVersion=true
-      OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+    _maq_fetch("${_ort_jar_coordinates}" "${MAQ_MVN}" -B -q
+      org.apache.maven.plugins:maven-dependency-plugin:3.8.1:copy -Dartifact=${_ort_jar_coordinates}
+      "-DoutputDirectory=${MAQ_DEPS_DIR}" -Dmdep.useBaseVersion=true)
   endif()
   _maq_check_sha256("${archive}" ${_ort_jar_sha256})
 endfunction()
@@ -65,6 +74,9 @@ function(_maq_unpack_onnxruntime root target)
 endfunction()
 
 if(MAQ_ONNXRUNTIME_DIR)
+  # Looked for each time, so that another folder counts at once.
+  unset(MAQ_ONNXRUNTIME_INCLUDE_DIR CACHE)
+  unset(MAQ_ONNXRUNTIME_LIBRARY CACHE)
   find_path(MAQ_ONNXRUNTIME_INCLUDE_DIR onnxruntime_c_api.h NO_DEFAULT_PATH
     HINTS "${MAQ_ONNXRUNTIME_DIR}" PATH_SUFFIXES include include/onnxruntime include/onnxruntime/core/session headers)
   find_file(MAQ_ONNXRUNTIME_LIBRARY NAMES libonnxruntime.so.1 libonnxruntime.so NO_DEFAULT_PATH

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <maquette/maquette.hpp>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
@@ -121,7 +123,6 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
   const maq_source_info info = source.info();
   const bool is_clip = info.frame_count != 1;
   int64_t limit = options.max_frames;
-  if (limit == 0 && info.frame_count < 0 && !is_clip) limit = 1;
   const bool endless = info.frame_count < 0 && argument.uri.rfind("stub:", 0) == 0;
   if (limit == 0 && (endless || info.is_live != 0)) limit = kFramesOfEndlessSource;
 
@@ -148,6 +149,7 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
     if (!is_clip || options.json) print_frame(options, stem, desc, stats);
     if (is_clip && !options.json) progress.advance(done, std::to_string(stats.people) + " people");
   }
+  progress.finish();
   const fs::path overlay_path = clip.finish();
   if (!overlay_path.empty() && !options.json) {
     std::printf("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());

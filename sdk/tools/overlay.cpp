@@ -186,6 +186,7 @@ cv::Mat draw_overlay(const cv::Mat& image, const maquette::DensePoseResult& resu
     box = cv::Rect(box.x - 2, box.y - 2, box.width + 4, box.height + 4) & frame;
     paint(enlarge(part(box), u(box), v(box), mine(box), box, scale), line_px, canvas);
   }
-  for (const maq_person& found : result.people()) draw_box(found, scale, canvas);
+  // The best last, so that its label is on top.
+  for (size_t k = result.people().size(); k-- > 0;) draw_box(result.people()[k], scale, canvas);
   return canvas;
 }

@@ -9,12 +9,13 @@ class ProgressBar {
  public:
   // `total` below 1: not known, so only a count is shown.
   ProgressBar(std::string label, int64_t total);
-  // Ends the line.
-  ~ProgressBar();
+  ~ProgressBar() { finish(); }
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void advance(int64_t done, const std::string& note);
+  // Ends the line of the bar; what is printed afterwards starts on its own.
+  void finish();
 
  private:
   std::string label_;

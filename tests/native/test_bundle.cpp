@@ -57,6 +57,16 @@ TEST(Bundle, AFileThatIsNoNetworkIsSeen) {
   expect_error(MAQ_ERROR_BAD_BUNDLE, "detector.onnx cannot be loaded", [&] { load(bundle); });
 }
 
+TEST(Bundle, WeightsInAnotherFileAreRefused) {
+  const BundleCopy bundle;
+  // An initializer of the graph (fields 7 and 5) with external data (field 13): location = "w".
+  const std::string entry = std::string("\x0a\x08location\x12\x01w");
+  const std::string tensor = std::string("\x6a") + char(entry.size()) + entry;
+  const std::string graph = std::string("\x2a") + char(tensor.size()) + tensor;
+  replace_file(bundle, "box_head.onnx", read_text(bundle.file("box_head.onnx")) + "\x3a" + char(graph.size()) + graph);
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "box_head.onnx keeps weights in another file", [&] { load(bundle); });
+}
+
 TEST(Bundle, ANetworkInTheWrongPlaceIsSeen) {
   const BundleCopy bundle;
   replace_file(bundle, "box_head.onnx", read_text(bundle.file("dense_head.onnx")));

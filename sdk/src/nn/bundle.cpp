@@ -1,10 +1,23 @@
 #include "nn/bundle.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "core/error.h"
 #include "core/file.h"
 #include "nn/sha256.h"
 
 namespace maq {
+namespace {
+
+// Whether an ONNX file keeps weights in other files, which the manifest would not cover. Such a tensor has an entry with
+// the key "location": field 1 of a protobuf message, 8 bytes long.
+bool refers_to_other_files(const std::vector<uint8_t>& onnx) {
+  constexpr uint8_t kEntry[] = {0x0a, 8, 'l', 'o', 'c', 'a', 't', 'i', 'o', 'n'};
+  return std::search(onnx.begin(), onnx.end(), std::begin(kEntry), std::end(kEntry)) != onnx.end();
+}
+
+}  // namespace
 
 Bundle read_bundle(const std::string& folder) {
   if (!is_folder(folder)) {
@@ -34,6 +47,12 @@ Bundle read_bundle(const std::string& folder) {
     if (const std::string digest = sha256_hex(bytes.data(), bytes.size()); digest != spec.sha256) {
       throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has SHA-256 ", digest.substr(0, 12), "…, but the manifest says ",
                   spec.sha256.substr(0, 12), "…: it is damaged or was changed. Fetch or export the bundle again.");
+    }
+    if (refers_to_other_files(bytes)) {
+      throw Error(
+          MAQ_ERROR_BAD_BUNDLE, path,
+          " keeps weights in another file, which the manifest cannot vouch for. Export the bundle with all weights "
+          "inside.");
     }
     bundle.files[name] = std::move(bytes);
   }

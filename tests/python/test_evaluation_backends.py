@@ -75,7 +75,7 @@ def bundle_without_ties(tmp_path):
 
 @needs_library
 @pytest.mark.parametrize("size", [(320, 256), (256, 320), (331, 207), (640, 512)])
-def test_both_ways_give_the_same_people_and_nearly_the_same_picture(size, bundle_without_ties, monkeypatch):
+def test_both_ways_give_the_same_people_and_the_same_picture(size, bundle_without_ties, monkeypatch):
     pytest.importorskip(
         "torch", reason="the reference of decoding needs torch: scripts/make-venv.sh train,dev"
     )
@@ -89,13 +89,9 @@ def test_both_ways_give_the_same_people_and_nearly_the_same_picture(size, bundle
     assert len(api.box) == len(onnx.box) == 3
     assert np.allclose(api.box, onnx.box, atol=0.01)
     assert np.allclose(api.score, onnx.score, atol=1e-4)
-    # A box side that is a whole number up to rounding may differ by one pixel.
-    assert (api.inds == onnx.inds).mean() > 0.99
-    assert (api.iuv[..., 0] == onnx.iuv[..., 0]).mean() > 0.99
-    same = (api.iuv[..., 0] == onnx.iuv[..., 0]) & (api.iuv[..., 0] > 0)
-    gap = np.abs(api.iuv[same, 1:].astype(int) - onnx.iuv[same, 1:])
-    assert np.median(gap) <= 1
-    assert gap.max() <= 10
+    assert (api.inds == onnx.inds).mean() > 0.999
+    assert (api.iuv[..., 0] == onnx.iuv[..., 0]).mean() > 0.999
+    assert np.abs(api.iuv.astype(int) - onnx.iuv).max(-1)[api.iuv[..., 0] == onnx.iuv[..., 0]].max() <= 1
 
 
 def test_people_above_a_threshold_are_a_prefix_of_all():

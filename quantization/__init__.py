@@ -1,0 +1,1 @@
+"""Static int8 quantisation of model bundles, and its error."""

@@ -1,0 +1,60 @@
+"""The settings of a quantisation, read from a TOML file such as `quantization/densepose.toml`."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from export.densepose.bundle import GRAPHS
+
+METHODS = ("minmax", "percentile", "entropy")
+
+
+@dataclass(frozen=True)
+class GraphSettings:
+    """How one graph becomes int8.
+
+    method: how the range of an activation follows from what calibration saw: its extremes ("minmax"), without
+    the outermost 1 - `percentile` / 100 ("percentile"), or with the least information lost ("entropy").
+    reduce_range: weights use 7 bits, so that two products never overflow 16 bits on x86 without VNNI.
+    float_nodes: names of nodes that stay float, `*` matches any text.
+    """
+
+    method: str = "minmax"
+    percentile: float = 99.999
+    reduce_range: bool = True
+    float_nodes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Settings:
+    """graphs: settings by graph name. calibration_images, held_out_images: how many images set the ranges and
+    measure the error. people_per_image: at most so many people of an image calibrate the dense head.
+    """
+
+    graphs: dict[str, GraphSettings]
+    calibration_images: int
+    held_out_images: int
+    people_per_image: int
+
+
+def read_settings(path: Path) -> Settings:
+    """Raises ValueError for unknown keys or methods."""
+    values = tomllib.loads(path.read_text())
+    graphs = {}
+    for name in GRAPHS:
+        given = dict(values.pop(name, {}))
+        given["float_nodes"] = tuple(given.get("float_nodes", ()))
+        try:
+            graphs[name] = GraphSettings(**given)
+        except TypeError as error:
+            raise ValueError(f"{path}, [{name}]: {error}") from error
+        if graphs[name].method not in METHODS:
+            raise ValueError(
+                f"{path}, [{name}]: method {graphs[name].method!r} is none of {', '.join(METHODS)}"
+            )
+    try:
+        return Settings(graphs, **values)
+    except TypeError as error:
+        raise ValueError(f"{path}: {error}") from error

@@ -57,16 +57,30 @@ def normalised(image: np.ndarray) -> np.ndarray:
     return ((image[..., ::-1].astype(np.float32) - MEAN) / STD).transpose(2, 0, 1)
 
 
-def augmented(
-    record: Record, size: int, scales: tuple[float, float], rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """A random square cut at a random scale, mirrored half of the time, with other colours."""
+# A person in focus gets a long side of this many cuts (log-uniform): from far away to cut by the frame.
+FOCUS_SHARE = (0.3, 1.3)
+SCALES = (0.3, 2.0)  # of the stored picture
+
+
+def augmented(record: Record, size: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A random square cut at a random scale, mirrored half of the time, with other colours.
+
+    Four times of five the cut is drawn towards a person and the scale chosen by that person's size, so that
+    people of all sizes in pixels are seen equally often.
+    """
     image, label = record.decoded()
-    scale = np.exp(rng.uniform(*np.log(scales)))
+    people = np.unique(label[..., 3])[1:]
+    focus = int(rng.choice(people)) if len(people) and rng.random() < 0.8 else 0
+    if focus:
+        y, x = np.nonzero(label[..., 3] == focus)
+        long_side = max(np.ptp(x), np.ptp(y)) + 1
+        scale = np.clip(size / long_side * np.exp(rng.uniform(*np.log(FOCUS_SHARE))), *SCALES)
+    else:
+        scale = size / 256 * np.exp(rng.uniform(*np.log((0.6, 1.3))))
     shape = (max(int(image.shape[1] * scale), 8), max(int(image.shape[0] * scale), 8))
     image = cv2.resize(image, shape, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     label = cv2.resize(label, shape, interpolation=cv2.INTER_NEAREST)
-    corner = _corner(label, size, rng)
+    corner = _corner(label, size, focus, rng)
     image, label = _cut(image, corner, size, MEAN[::-1]), _cut(label, corner, size, np.zeros(4))
     if rng.random() < 0.5:
         image = image[:, ::-1]
@@ -75,19 +89,16 @@ def augmented(
     return _recoloured(np.ascontiguousarray(image), rng), label
 
 
-def _corner(label: np.ndarray, size: int, rng: np.random.Generator) -> tuple[int, int]:
-    """Upper left corner (x, y) of the cut; four times of five it is drawn towards a person."""
-    focus = None
-    people = np.unique(label[..., 3])[1:]
-    if len(people) and rng.random() < 0.8:
-        y, x = np.nonzero(label[..., 3] == rng.choice(people))
-        k = rng.integers(len(x))
-        focus = (x[k], y[k])
+def _corner(label: np.ndarray, size: int, focus: int, rng: np.random.Generator) -> tuple[int, int]:
+    """Upper left corner (x, y) of the cut, with the middle of person `focus` well inside it (0: anywhere)."""
+    y, x = np.nonzero(label[..., 3] == focus) if focus else ((), ())
     corner = []
     for axis, length in enumerate((label.shape[1], label.shape[0])):
         low, high = min(0, length - size), max(0, length - size)
-        if focus is not None:
-            low, high = max(low, focus[axis] - size + 1), min(high, focus[axis])
+        if len(x):  # a person shrunk to nothing leaves no pixel
+            middle = (x, y)[axis].mean()
+            low, high = max(low, int(middle - 0.8 * size)), min(high, int(middle - 0.2 * size))
+            low = min(low, high)
         corner.append(int(rng.integers(low, high + 1)))
     return corner[0], corner[1]
 
@@ -125,7 +136,7 @@ class Batches:
 
     def __init__(self, records: list[Record], batch: int, seed: int, threads: int = 1) -> None:
         self.records, self.batch, self.seed = records, batch, seed
-        self.size, self.scales = 256, (0.6, 1.2)
+        self.size = 256
         cv2.setNumThreads(1)
         self._ready: queue.Queue = queue.Queue(maxsize=4)
         for k in range(threads):
@@ -139,7 +150,7 @@ class Batches:
             for _ in range(self.batch):
                 if not order:
                     order = rng.permutation(len(self.records)).tolist()
-                image, label = augmented(self.records[order.pop()], size, self.scales, rng)
+                image, label = augmented(self.records[order.pop()], size, rng)
                 images.append(normalised(image))
                 truths.append(truth_of(label))
             self._ready.put((size, torch.from_numpy(np.stack(images)), truths))

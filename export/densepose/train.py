@@ -35,9 +35,8 @@ from export.densepose.decode import Graphs, infer
 from export.densepose.losses import batch_loss
 from export.densepose.network import MobileParsingRCNN
 
-# Image size by share of the run: small images first, since early on steps matter more than detail.
-# (share of the run at which the stage begins, image side, scale range of the 320-pixel renderings)
-STAGES = ((0.0, 160, (0.4, 0.85)), (0.5, 192, (0.5, 1.0)), (0.8, 256, (0.6, 1.2)))
+# Image side by share of the run: small images first, since early on steps matter more than detail.
+STAGES = ((0.0, 160), (0.5, 192), (0.8, 256))
 
 
 class Ema:
@@ -223,7 +222,7 @@ def main() -> None:
     finished = spent >= length
     while not finished:
         share = spent / length
-        _, batches.size, batches.scales = [s for s in STAGES if share >= s[0]][-1]
+        batches.size = [size for start, size in STAGES if share >= start][-1]
         warm = min(1.0, (step + 1) / 200)
         rate = options.lr * warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(share, 1))))
         for group in optimiser.param_groups:

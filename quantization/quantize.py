@@ -26,6 +26,7 @@ from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from export.densepose import bundle as bundle_format
 from export.densepose import data
+from quantization import transposed_convolution
 from quantization.errors import float_nodes_left, output_sqnr
 from quantization.samples import Bundle, collect, open_bundle
 from quantization.settings import GraphSettings, Settings, read_settings
@@ -53,7 +54,10 @@ def quantise_graph(source: Path, target: Path, samples: list[np.ndarray], settin
         raise ValueError(f"nothing to calibrate {source.name} with: the bundle finds nobody in the images")
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
-        quant_pre_process(source, prepared, skip_symbolic_shape=True)
+        model = onnx.load(source)
+        transposed_convolution.rewrite(model)
+        onnx.save(model, prepared)
+        quant_pre_process(prepared, prepared, skip_symbolic_shape=True)
         graph = onnx.load(prepared).graph
         quantize_static(
             prepared,

@@ -2,8 +2,9 @@
 
     python -m export.densepose.count
 
-Parameters: all that are trained, and in brackets without batch normalisation (as the paper counts). Multiply-adds
-(MAC) of convolutions and matrix products: per pixel of the detector's input, per proposal, per person.
+Parameters: all that are trained, and in brackets without batch normalisation (as the paper counts).
+Multiply-adds (MAC) of convolutions and matrix products: per pixel of the detector's input, per proposal,
+per person.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ PARTS = ("backbone", "neck", "rpn", "box_head", "dense_head")
 
 def parameters(module: nn.Module, batch_norm: bool = True) -> int:
     """Number of trained values, with or without those of batch normalisation."""
-    skipped = set() if batch_norm else {id(p) for m in module.modules() if isinstance(m, nn.BatchNorm2d) for p in m.parameters()}
-    return sum(p.numel() for p in module.parameters() if id(p) not in skipped)
+    norms = [m for m in module.modules() if isinstance(m, nn.BatchNorm2d)]
+    total = sum(p.numel() for p in module.parameters())
+    return total if batch_norm else total - sum(p.numel() for m in norms for p in m.parameters())
 
 
 def _macs(module: nn.Module, output: Tensor) -> int:
@@ -32,7 +34,8 @@ def _macs(module: nn.Module, output: Tensor) -> int:
         taps = module.kernel_size[0] * module.kernel_size[1] / (module.stride[0] * module.stride[1])
         return round(output.numel() * taps * module.in_channels / module.groups)
     if isinstance(module, nn.Conv2d):
-        return output.numel() * module.kernel_size[0] * module.kernel_size[1] * module.in_channels // module.groups
+        taps = module.kernel_size[0] * module.kernel_size[1]
+        return output.numel() * taps * module.in_channels // module.groups
     return output.numel() * module.in_features
 
 
@@ -58,16 +61,22 @@ def macs(net: MobileParsingRCNN, height: int = 256, width: int = 320) -> dict[st
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     height, width = 256, 320
     for channels, paper in PAPER_MILLIONS.items():
         net = MobileParsingRCNN(NetworkConfig(width=channels))
         total, plain = parameters(net), parameters(net, batch_norm=False)
-        print(f"\nwidth {channels}: {total / 1e6:.3f} M parameters ({plain / 1e6:.3f} M), paper {paper} M, {total / paper / 1e4 - 100:+.1f} %")
+        print(
+            f"\nwidth {channels}: {total / 1e6:.3f} M parameters ({plain / 1e6:.3f} M), "
+            f"paper {paper} M, {total / paper / 1e4 - 100:+.1f} %"
+        )
         work = macs(net, height, width)
         for part in PARTS:
             per_image = part in PARTS[:3]
-            unit = "MAC per input pixel" if per_image else "M MAC per proposal" if part == "box_head" else "M MAC per person"
+            roi = "proposal" if part == "box_head" else "person"
+            unit = "MAC per input pixel" if per_image else f"M MAC per {roi}"
             value = work[part] / (height * width) if per_image else work[part] / 1e6
             print(f"  {part:11} {parameters(getattr(net, part)) / 1e3:8.1f} k parameters {value:9.2f} {unit}")
         print(f"  detector at {width} x {height}: {sum(work[p] for p in PARTS[:3]) / 1e6:.0f} M MAC")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import threading
 from dataclasses import dataclass
@@ -132,32 +133,63 @@ def truth_of(label: np.ndarray) -> Truth:
 
 
 class Batches:
-    """Endless shuffled batches, made ahead by threads (OpenCV releases the interpreter's lock)."""
+    """Endless shuffled batches, made ahead by a thread (OpenCV releases the interpreter's lock).
 
-    def __init__(self, records: list[Record], batch: int, seed: int, threads: int = 1) -> None:
+    Batch k depends on `seed` and k alone, so that a run resumed at step k sees what it would have seen.
+    """
+
+    def __init__(self, records: list[Record], batch: int, seed: int, first: int = 0) -> None:
         self.records, self.batch, self.seed = records, batch, seed
         self.size = 256
+        self._epoch, self._order = -1, np.empty(0, np.int64)
         cv2.setNumThreads(1)
         self._ready: queue.Queue = queue.Queue(maxsize=4)
-        for k in range(threads):
-            threading.Thread(target=self._work, args=(k,), daemon=True).start()
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._work, args=(first,), daemon=True)
 
-    def _work(self, thread: int) -> None:
-        rng = np.random.default_rng([self.seed, thread])
-        order: list[int] = []
-        while True:
-            size, images, truths = self.size, [], []
-            for _ in range(self.batch):
-                if not order:
-                    order = rng.permutation(len(self.records)).tolist()
-                image, label = augmented(self.records[order.pop()], size, rng)
-                images.append(normalised(image))
-                truths.append(truth_of(label))
-            self._ready.put((size, torch.from_numpy(np.stack(images)), truths))
+    def make(self, number: int, size: int) -> tuple[torch.Tensor, list[Truth]]:
+        """Batch `number` at an image side of `size` pixels."""
+        rng = np.random.default_rng([self.seed, number])
+        images, truths = [], []
+        for k in range(number * self.batch, (number + 1) * self.batch):
+            image, label = augmented(self.records[self._shuffled(k)], size, rng)
+            images.append(normalised(image))
+            truths.append(truth_of(label))
+        return torch.from_numpy(np.stack(images)), truths
 
     def next(self) -> tuple[torch.Tensor, list[Truth]]:
         """Image [N, 3, size, size] and its people; batches of an earlier size are thrown away."""
+        if self._thread.ident is None:
+            self._thread.start()
         while True:
-            size, image, truths = self._ready.get()
+            try:
+                size, (image, truths) = self._ready.get(timeout=10)
+            except queue.Empty:
+                if not self._thread.is_alive():
+                    raise RuntimeError(
+                        "the thread that makes batches has stopped; see its error above"
+                    ) from None
+                continue
             if size == self.size:
                 return image, truths
+
+    def close(self) -> None:
+        """Ends the thread; a process that leaves while it runs may crash."""
+        self._closed.set()
+        while self._thread.ident is not None and self._thread.is_alive():
+            with contextlib.suppress(queue.Empty):
+                self._ready.get(timeout=0.1)
+
+    def _shuffled(self, k: int) -> int:
+        """The k-th record drawn: every record once before any comes again."""
+        epoch, place = divmod(k, len(self.records))
+        if epoch != self._epoch:
+            self._order = np.random.default_rng([self.seed, epoch, 1]).permutation(len(self.records))
+            self._epoch = epoch
+        return int(self._order[place])
+
+    def _work(self, number: int) -> None:
+        while not self._closed.is_set():
+            size = self.size
+            self._ready.put((size, self.make(number, size)))
+            number += 1

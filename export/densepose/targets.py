@@ -115,9 +115,9 @@ def dense_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, T
 
 
 def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tensor:
-    """Labels at the centres of a grid x grid lattice over each box: uint8 [P, grid, grid, 3] = (I, U*255, V*255).
+    """Labels at the centres of a grid x grid lattice over each box: uint8 [P, grid, grid, 3].
 
-    Other people's pixels and what lies outside the image are background.
+    Channels are I, U*255, V*255. Other people's pixels and what lies outside the image are background.
     """
     height, width = truth.label.shape[:2]
     at = (torch.arange(grid) + 0.5) / grid

@@ -135,13 +135,16 @@ def main() -> None:
     parser.add_argument(
         "--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in"
     )
+    parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
     parser.add_argument("--batch", type=int, default=16, help="images a step and process")
     parser.add_argument("--lr", type=float, default=2e-3)
     parser.add_argument("--weight-decay", type=float, default=0.02)
     parser.add_argument("--ema", type=float, default=0.997)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, help="a process; default: the cores shared out")
-    parser.add_argument("--init", type=Path, help="start from these weights: weights.pt or checkpoint.pt of another run")
+    parser.add_argument(
+        "--init", type=Path, help="start from these weights: weights.pt or checkpoint.pt of another run"
+    )
     parser.add_argument("--validate-minutes", type=float, default=10)
     parser.add_argument("--bf16", action=argparse.BooleanOptionalAction, default=torch.cuda.is_available())
     options = parser.parse_args()
@@ -183,8 +186,6 @@ def main() -> None:
         net.load_state_dict(saved["ema"])
         ema.net.load_state_dict(saved["ema"])
 
-    torch.manual_seed(options.seed + 1000 * step + rank)
-
     def save() -> None:
         if rank == 0:
             state = {
@@ -199,7 +200,7 @@ def main() -> None:
             }
             torch.save(state, checkpoint.with_suffix(".tmp"))
             checkpoint.with_suffix(".tmp").rename(checkpoint)
-            # What is shipped and what another run may start from: the averaged weights alone, in half precision.
+            # What is shipped, and what another run may start from: the averaged weights, in half precision.
             averaged = {k: v.half() if v.is_floating_point() else v for k, v in ema.net.state_dict().items()}
             torch.save({"ema": averaged, "width": options.width}, options.out / "weights.pt")
             (options.out / "log.json").write_text(json.dumps(log))
@@ -215,16 +216,17 @@ def main() -> None:
     signal.signal(signal.SIGINT, stop)
     train = data.load_records(options.data / "train")[rank::world]
     held_out = data.load_records(options.data / "val", 100)
-    batches = data.Batches(train, options.batch, seed=options.seed * 1000 + rank + step)
+    batches = data.Batches(train, options.batch, options.seed * 1000 + rank, first=step)
     autocast = torch.autocast(device.type, torch.bfloat16, enabled=options.bf16)
     net.train()
     smooth: dict[str, float] = {}
     length = options.minutes * 60
     clock = saved_at = checked_at = time.monotonic()
     bar = tqdm(total=round(length), initial=round(spent), unit="s", disable=rank > 0, smoothing=0)
-    finished = spent >= length
+    finished = step >= options.steps if options.steps else spent >= length
     while not finished:
-        share = spent / length
+        torch.manual_seed(((options.seed * 1000 + rank) << 32) + step)  # as in a run that never stopped
+        share = step / options.steps if options.steps else spent / length
         batches.size = [size for start, size in STAGES if share >= start][-1]
         warm = min(1.0, (step + 1) / 200)
         rate = options.lr * warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(share, 1))))
@@ -239,7 +241,7 @@ def main() -> None:
         stop_now = stopped
         if world > 1:
             spent, stop_now = average_gradients(net, spent, stopped, world)
-        finished = stop_now or spent >= length
+        finished = stop_now or (step + 1 >= options.steps if options.steps else spent >= length)
         norm = nn.utils.clip_grad_norm_(net.parameters(), 10.0)
         if torch.isfinite(norm):
             optimiser.step()
@@ -270,6 +272,7 @@ def main() -> None:
             save()
             saved_at = time.monotonic()
     bar.close()
+    batches.close()
     if rank == 0:
         log.append({"step": step, "images": images, "spent": spent, **validate(ema.net, held_out)})
         print(json.dumps(log[-1]))

@@ -1,0 +1,133 @@
+"""The reference decode gives a right picture, also for networks and images that are not well behaved."""
+
+import numpy as np
+import pytest
+import torch
+
+from export.densepose import boxes as bx
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.decode import Graphs, infer, paint
+from export.densepose.network import MobileParsingRCNN
+
+CONFIG = NetworkConfig()
+IMAGE = np.full((120, 160, 3), 90, np.uint8)
+DECODE = DecodeConfig(long_side=160)
+
+
+def fake_graphs(objectness=0.0, delta=0.0, person=10.0, part=3, u=0.5, v=0.25) -> Graphs:
+    """Networks that answer the same everywhere: these logits, deltas, part and coordinates."""
+
+    def detector(image):
+        sizes = [(-(-image.shape[2] // s), -(-image.shape[3] // s)) for s in CONFIG.rpn_strides]
+        features = [torch.zeros(1, 64, *size) for size in sizes]
+        scores = [torch.full((1, 3, *size), float(objectness)) for size in sizes]
+        return features, scores, [torch.full((1, 12, *size), float(delta)) for size in sizes]
+
+    def box_head(rois):
+        logits = torch.tensor([float(person), 0.0]).expand(len(rois), 2)
+        return logits, torch.full((len(rois), 4), float(delta))
+
+    def dense_head(rois):
+        coarse, index = torch.zeros(len(rois), 15, 64, 64), torch.zeros(len(rois), 25, 64, 64)
+        coarse[:, 2], index[:, part] = 5.0, 5.0
+        return coarse, index, torch.full_like(index, u), torch.full_like(index, v)
+
+    return Graphs(detector, box_head, dense_head)
+
+
+def assert_sound(result, image) -> None:
+    height, width = image.shape[:2]
+    assert result.iuv.shape == (height, width, 3)
+    assert result.instance.shape == (height, width)
+    assert np.isfinite(result.boxes).all()
+    assert np.isfinite(result.scores).all()
+    assert (result.boxes >= -1e-3).all()
+    assert (result.boxes[:, [0, 2]] <= width + 1e-3).all()
+    assert (result.boxes[:, [1, 3]] <= height + 1e-3).all()
+    assert (result.iuv[..., 0] > 0).sum() == (result.instance > 0).sum()
+    assert result.instance.max() <= len(result.boxes)
+
+
+def test_nobody_gives_an_empty_picture():
+    result = infer(fake_graphs(person=-10), IMAGE, CONFIG, DECODE)
+    assert len(result.boxes) == 0
+    assert not result.iuv.any()
+
+
+def test_people_are_painted_with_their_part_and_coordinates():
+    result = infer(fake_graphs(), IMAGE, CONFIG, DECODE)
+    assert_sound(result, IMAGE)
+    assert len(result.boxes)
+    assert np.unique(result.iuv[result.instance > 0], axis=0).tolist() == [[3, 128, 64]]
+
+
+@pytest.mark.parametrize("size", [(1, 1), (16, 16), (31, 33), (1, 400), (400, 1), (97, 640)])
+def test_any_image_size_gives_boxes_inside_the_image(size):
+    image = np.zeros((*size, 3), np.uint8)
+    assert_sound(infer(fake_graphs(), image, CONFIG, DECODE), image)
+
+
+@pytest.mark.parametrize("broken", [float("nan"), float("inf"), 1e4, -1e4])
+def test_broken_deltas_give_no_broken_boxes(broken):
+    assert_sound(infer(fake_graphs(delta=broken), IMAGE, CONFIG, DECODE), IMAGE)
+
+
+def test_not_a_number_scores_give_nobody():
+    assert len(infer(fake_graphs(objectness=float("nan")), IMAGE, CONFIG, DECODE).boxes) == 0
+    assert len(infer(fake_graphs(person=float("nan")), IMAGE, CONFIG, DECODE).boxes) == 0
+
+
+def test_coordinates_outside_the_chart_are_clamped():
+    result = infer(fake_graphs(u=-3.0, v=7.0), IMAGE, CONFIG, DECODE)
+    assert np.unique(result.iuv[result.instance > 0], axis=0).tolist() == [[3, 0, 255]]
+
+
+def test_no_more_people_than_asked_for():
+    few = DecodeConfig(long_side=160, max_people=2)
+    assert len(infer(fake_graphs(), IMAGE, CONFIG, few).boxes) == 2
+
+
+def test_the_first_person_stays_in_front():
+    maps = [m[0] for m in fake_graphs(part=3).dense_head(torch.zeros(1, 64, 32, 32))]
+    later = [m[0] for m in fake_graphs(part=7).dense_head(torch.zeros(1, 64, 32, 32))]
+    iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
+    paint(maps, [0, 0, 20, 20], 1, iuv, instance)
+    paint(later, [10, 10, 40, 40], 2, iuv, instance)
+    assert instance[15, 15] == 1
+    assert iuv[15, 15, 0] == 3
+    assert instance[30, 30] == 2
+    assert iuv[30, 30, 0] == 7
+
+
+def test_coarse_background_wins_over_a_part():
+    coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
+    coarse[:, :32] = 0
+    coarse[0, :32] = 5.0
+    iuv, instance = np.zeros((64, 64, 3), np.uint8), np.zeros((64, 64), np.uint8)
+    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance)
+    assert not instance[:32].any()
+    assert instance[32:].all()
+
+
+def test_coordinates_are_resized_with_half_pixel_centres():
+    coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
+    u = (torch.arange(64) / 63).expand(25, 64, 64)
+    iuv, instance = np.zeros((30, 100, 3), np.uint8), np.zeros((30, 100), np.uint8)
+    paint([coarse, index, u, v], [0, 0, 100, 30], 1, iuv, instance)
+    at = np.clip((np.arange(100) + 0.5) * 0.64 - 0.5, 0, 63)
+    assert np.abs(iuv[15, :, 1] - at / 63 * 255).max() <= 0.51
+
+
+def test_an_untrained_network_runs_end_to_end():
+    torch.manual_seed(0)
+    net = MobileParsingRCNN(CONFIG).eval()
+    anyone = DecodeConfig(long_side=160, score_threshold=0.0, max_people=3)
+    result = infer(Graphs.of_network(net), IMAGE, CONFIG, anyone)
+    assert_sound(result, IMAGE)
+    assert len(result.boxes) == 3
+    assert list(result.scores) == sorted(result.scores, reverse=True)
+
+
+def test_boxes_are_clipped_at_the_picture_not_at_its_padding():
+    boxes = bx.clip(torch.tensor([[-5.0, -5.0, 500.0, 500.0]]), 120, 160)
+    assert boxes.tolist() == [[0, 0, 160, 120]]

@@ -1,0 +1,130 @@
+"""Training learns, resumes where it stopped, and stops when it is told to."""
+
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+import torch
+from rectangle_people import write_shard
+
+from export.densepose import data, train
+from export.densepose.config import NetworkConfig
+from export.densepose.losses import batch_loss
+from export.densepose.network import MobileParsingRCNN
+
+
+@pytest.fixture(scope="module")
+def shards(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("people")
+    write_shard(folder / "train", 8)
+    write_shard(folder / "val", 2, seed=1)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def short_pictures(monkeypatch):
+    monkeypatch.setattr(train, "STAGES", ((0.0, 96),))
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    handlers = {name: signal.getsignal(name) for name in (signal.SIGTERM, signal.SIGINT)}
+    yield
+    torch.set_num_threads(threads)
+    for name, handler in handlers.items():
+        signal.signal(name, handler)
+
+
+def run(monkeypatch, shards, out, *options, stop_after=None) -> list[float]:
+    """Losses of the steps of one call of the training's main program."""
+    losses = []
+
+    def recorded(*given):
+        terms = batch_loss(*given)
+        losses.append(sum(terms.values()).item())
+        if len(losses) == stop_after:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return terms
+
+    monkeypatch.setattr(train, "batch_loss", recorded)
+    given = ["train", "--data", str(shards), "--out", str(out), "--batch", "2", "--threads", "1", "--no-bf16"]
+    monkeypatch.setattr("sys.argv", [*given, *options])
+    train.main()
+    return losses
+
+
+def test_a_resumed_run_goes_on_exactly_as_one_that_never_stopped(monkeypatch, shards, tmp_path):
+    straight = run(monkeypatch, shards, tmp_path / "straight", "--steps", "4")
+    first = run(monkeypatch, shards, tmp_path / "stopped", "--steps", "4", stop_after=2)
+    second = run(monkeypatch, shards, tmp_path / "stopped", "--steps", "4")
+    assert len(first) == len(second) == 2
+    assert first + second == pytest.approx(straight, rel=1e-5)
+
+
+def test_a_run_leaves_checkpoint_weights_log_and_curves(monkeypatch, shards, tmp_path):
+    run(monkeypatch, shards, tmp_path, "--steps", "1")
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"checkpoint.pt", "weights.pt", "log.json", "curves.png"}
+    last = json.loads((tmp_path / "log.json").read_text())[-1]
+    assert {"recall", "precision", "part", "mask_iou"} <= set(last)
+    # Weights alone, without code: other programs load them the safe way.
+    saved = torch.load(tmp_path / "weights.pt", weights_only=True)
+    MobileParsingRCNN(NetworkConfig(width=saved["width"])).load_state_dict(saved["ema"])
+    torch.load(tmp_path / "checkpoint.pt", weights_only=True)
+
+
+def test_a_finished_run_is_not_trained_on(monkeypatch, shards, tmp_path):
+    assert len(run(monkeypatch, shards, tmp_path, "--steps", "1")) == 1
+    assert run(monkeypatch, shards, tmp_path, "--steps", "1") == []
+
+
+def test_the_loss_falls_on_a_few_pictures(shards):
+    torch.manual_seed(0)
+    batches = data.Batches(data.load_records(shards / "train"), 4, seed=0)
+    fixed = [batches.make(k, 96) for k in range(2)]
+    net = MobileParsingRCNN(NetworkConfig(width=16)).train()
+    optimiser = torch.optim.AdamW(net.parameters(), lr=3e-3)
+    autocast = torch.autocast("cpu", enabled=False)
+    history = []
+    for step in range(24):
+        terms = batch_loss(net, *fixed[step % 2], autocast)
+        loss = sum(terms.values())
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 10.0)
+        optimiser.step()
+        history.append({name: float(value) for name, value in terms.items()})
+    first, last = (
+        {n: np.mean([h[n] for h in part]) for n in history[0]} for part in (history[:2], history[-2:])
+    )
+    assert sum(last.values()) < 0.6 * sum(first.values())
+    for name in ("rpn_class", "box_class", "coarse", "index", "u", "v"):
+        assert last[name] < first[name], name
+
+
+def test_every_weight_gets_a_gradient(shards):
+    torch.manual_seed(0)
+    net = MobileParsingRCNN(NetworkConfig(width=16)).train()
+    image, truths = data.Batches(data.load_records(shards / "train"), 4, seed=0).make(0, 96)
+    sum(batch_loss(net, image, truths, torch.autocast("cpu", enabled=False)).values()).backward()
+    assert [name for name, p in net.named_parameters() if p.grad is None] == []
+
+
+def test_pictures_without_people_can_be_learnt_from():
+    net = MobileParsingRCNN(NetworkConfig(width=16)).train()
+    label = np.zeros((64, 64, 4), np.uint8)
+    truths = [data.truth_of(label), data.truth_of(label)]
+    terms = batch_loss(net, torch.randn(2, 3, 64, 64), truths, torch.autocast("cpu", enabled=False))
+    loss = sum(terms.values())
+    assert torch.isfinite(loss)
+    loss.backward()
+
+
+def test_averaged_weights_follow_slowly():
+    net = torch.nn.Linear(2, 2)
+    mean = train.Ema(net, decay=0.5)
+    before = mean.net.weight.clone()
+    with torch.no_grad():
+        net.weight += 1
+    mean.update(net, step=100)
+    assert torch.allclose(mean.net.weight, before + 0.5)

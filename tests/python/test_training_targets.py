@@ -1,0 +1,163 @@
+"""What the network is asked to learn from a labelled picture."""
+
+import numpy as np
+import pytest
+import torch
+from rectangle_people import picture
+from torchvision.ops import box_iou
+
+from export import surface
+from export.densepose import boxes as bx
+from export.densepose import data
+from export.densepose import targets as tg
+from export.densepose.config import NetworkConfig
+
+
+def truth(boxes, ignore=None) -> tg.Truth:
+    boxes = torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4)
+    ignore = torch.tensor(ignore or [False] * len(boxes), dtype=torch.bool)
+    instance = torch.arange(1, len(boxes) + 1, dtype=torch.uint8)
+    return tg.Truth(boxes, instance, ignore, torch.zeros(160, 160, 4, dtype=torch.uint8))
+
+
+@pytest.fixture
+def anchors():
+    return torch.cat(bx.anchors(NetworkConfig(), [(40, 40), (20, 20), (10, 10), (5, 5), (3, 3)]))
+
+
+def test_anchors_far_from_people_are_negative_and_close_ones_positive(anchors):
+    torch.manual_seed(0)
+    people = truth([[20, 20, 84, 84]])
+    positive, target, negative = tg.rpn_samples(anchors, people, 256)
+    iou = box_iou(anchors, people.box)[:, 0]
+    assert len(positive) > 0
+    assert (iou[positive] >= 0.7).all() or (iou[positive] == iou.max()).all()
+    assert (iou[negative] < 0.3).all()
+    assert len(positive) + len(negative) == 256
+    assert (target == people.box[0]).all()
+
+
+def test_a_person_that_no_anchor_fits_still_gets_its_best_anchor(anchors):
+    people = truth([[60, 5, 80, 155]])
+    assert box_iou(anchors, people.box).max() < 0.7
+    positive, _, _ = tg.rpn_samples(anchors, people, 256)
+    assert len(positive) >= 1
+
+
+def test_ignored_people_are_neither_positive_nor_negative(anchors):
+    people = truth([[20, 20, 84, 84]], [True])
+    positive, _, negative = tg.rpn_samples(anchors, people, 10**6)
+    assert len(positive) == 0
+    assert (box_iou(anchors, people.box)[negative, 0] <= 0.3).all()
+
+
+def test_a_picture_without_people_gives_negatives_only(anchors):
+    positive, target, negative = tg.rpn_samples(anchors, truth([]), 64)
+    assert (len(positive), tuple(target.shape), len(negative)) == (0, (0, 4), 64)
+
+
+def test_box_samples_are_at_most_a_quarter_people_and_know_whom():
+    torch.manual_seed(0)
+    people = truth([[10, 10, 60, 110], [80, 20, 140, 150]])
+    near = people.box.repeat(30, 1) + torch.randn(60, 4) * 2
+    far = torch.tensor([[0.0, 0.0, 20.0, 20.0]]).repeat(60, 1)
+    boxes, person, match = tg.box_samples(torch.cat([near, far]), people, 32)
+    assert len(boxes) == 32
+    assert int(person.sum()) == 8
+    overlap = box_iou(boxes, people.box)[torch.arange(32), match]
+    assert (overlap[person] >= 0.5).all()
+    assert (overlap[~person] < 0.5).all()
+
+
+def test_true_boxes_are_samples_even_without_proposals():
+    people = truth([[10, 10, 60, 110]])
+    _, person, _ = tg.box_samples(torch.zeros(0, 4), people, 16)
+    assert person.tolist() == [True]
+
+
+def test_dense_samples_leave_out_ignored_people():
+    torch.manual_seed(0)
+    people = truth([[10, 10, 60, 110], [80, 20, 140, 150]], [True, False])
+    boxes, person = tg.dense_samples(people.box, people, 4)
+    assert person.tolist() == [1]
+    assert box_iou(boxes, people.box[1:]).min() > 0.7
+
+
+def test_dense_labels_are_the_pixels_under_the_grid():
+    people = truth([[0, 0, 160, 160]])
+    people.label[..., 0] = 2
+    people.label[..., 1] = torch.arange(160, dtype=torch.uint8)[None]
+    people.label[..., 2] = torch.arange(160, dtype=torch.uint8)[:, None]
+    people.label[..., 3] = 1
+    label = tg.dense_labels(torch.tensor([[32.0, 64.0, 96.0, 128.0]]), torch.tensor([0]), people, 64)
+    assert label[0, 0, 0].tolist() == [2, 32, 64]
+    assert label[0, 63, 10].tolist() == [2, 42, 127]
+
+
+def test_other_people_and_the_outside_are_background_for_a_person():
+    people = truth([[0, 0, 160, 160], [80, 0, 160, 160]])
+    people.label[..., 0] = 2
+    people.label[:, :80, 3], people.label[:, 80:, 3] = 1, 2
+    label = tg.dense_labels(torch.tensor([[-160.0, 0.0, 160.0, 160.0]]), torch.tensor([0]), people, 64)
+    assert not label[0, :, :32].any()
+    assert (label[0, :, 32:48, 0] == 2).all()
+    assert not label[0, :, 48:].any()
+
+
+def test_a_mirrored_cut_carries_the_mirrored_labels():
+    """Among random cuts both straight and mirrored ones turn up, and each part is where it belongs."""
+    image, label = picture(np.random.default_rng(3), people=1)
+    record = as_record(image, label)
+    seen = set()
+    for seed in range(12):
+        cut, marked = data.augmented(record, 128, np.random.default_rng(seed))
+        assert cut.shape == (128, 128, 3)
+        columns = {part: np.nonzero(marked[..., 0] == part)[1] for part in (9, 10, 23, 24)}
+        if min(len(c) for c in (columns[9], columns[10])) < 20:
+            continue
+        # Part 9 is to the left of part 10 in the picture, and stays so: mirroring swaps places and names.
+        assert columns[9].mean() < columns[10].mean()
+        # U rises to the right in part 9; V of it is turned round in a mirror.
+        inside = marked[..., 0] == 9
+        rising = np.corrcoef(np.nonzero(inside)[1], marked[..., 1][inside])[0, 1] > 0
+        falling = np.corrcoef(np.nonzero(inside)[0], marked[..., 2][inside])[0, 1] < 0
+        assert rising != falling
+        seen.add(bool(falling))
+    assert seen == {False, True}
+    assert surface.MIRROR_FLIPS_V[9]
+    assert not surface.MIRROR_FLIPS_U[9]
+
+
+def as_record(image: np.ndarray, label: np.ndarray) -> data.Record:
+    import cv2
+
+    files = [cv2.imencode(".png", array)[1].tobytes() for array in (image, label)]
+    return data.Record(*files)
+
+
+def test_boxes_of_a_cut_are_around_what_is_left_of_a_person():
+    image, label = picture(np.random.default_rng(0), people=2)
+    _, marked = data.augmented(as_record(image, label), 96, np.random.default_rng(1))
+    people = data.truth_of(marked)
+    for box, number in zip(people.box.int().tolist(), people.instance.tolist(), strict=True):
+        y, x = np.nonzero(marked[..., 3] == number)
+        assert box == [x.min(), y.min(), x.max() + 1, y.max() + 1]
+
+
+def test_batches_depend_on_seed_and_number_alone():
+    rng = np.random.default_rng(0)
+    records = [as_record(*picture(rng)) for _ in range(5)]
+    straight = data.Batches(records, 2, seed=7)
+    straight.size = 64
+    third = data.Batches(records, 2, seed=7).make(3, 64)[0]
+    assert torch.equal(straight.make(3, 64)[0], third)
+    assert not torch.equal(straight.make(2, 64)[0], third)
+    assert not torch.equal(data.Batches(records, 2, seed=8).make(3, 64)[0], third)
+
+
+def test_every_record_is_drawn_once_before_any_comes_again():
+    batches = data.Batches([], 3, seed=1)
+    batches.records = list(range(7))
+    drawn = [batches._shuffled(k) for k in range(14)]
+    assert sorted(drawn[:7]) == sorted(drawn[7:]) == list(range(7))
+    assert drawn[:7] != drawn[7:]

@@ -1,0 +1,124 @@
+"""The exported graphs compute what the torch network computes, at any size; the manifest describes them."""
+
+import hashlib
+import json
+
+import numpy as np
+import onnx
+import pytest
+import torch
+
+from export.densepose import bundle, export_onnx
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.network import MobileParsingRCNN
+
+WIDTH = 16
+torch.set_num_threads(1)  # the graphs are small
+
+
+@pytest.fixture(scope="module")
+def net():
+    """An untrained network whose normalisation and fusion do something."""
+    torch.manual_seed(0)
+    net = MobileParsingRCNN(NetworkConfig(width=WIDTH))
+    for module in net.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            module.running_mean.uniform_(-0.2, 0.2)
+            module.running_var.uniform_(0.5, 1.5)
+            torch.nn.init.uniform_(module.weight, 0.7, 1.3)
+            torch.nn.init.uniform_(module.bias, -0.2, 0.2)
+    for fusion in net.neck.fuse.values():
+        torch.nn.init.uniform_(fusion.weight, -0.5, 1.5)
+    return net.eval()
+
+
+@pytest.fixture(scope="module")
+def folder(net, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bundle")
+    export_onnx.export_graphs(net, folder)
+    bundle.write_manifest(folder, bundle.BundleInfo("tiny", "fp32"), net.config, DecodeConfig())
+    return folder
+
+
+def run(folder, graph, given):
+    session = export_onnx.session(folder / f"{graph}.onnx")
+    return session.run(None, {session.get_inputs()[0].name: given.numpy()})
+
+
+def assert_close(expected, found):
+    for tensor, array in zip(expected, found, strict=True):
+        assert tuple(tensor.shape) == array.shape
+        scale = float(tensor.abs().max())
+        assert scale > 0
+        assert np.abs(tensor.numpy() - array).max() <= export_onnx.TOLERANCE * scale
+
+
+@pytest.mark.parametrize(("height", "width"), [(32, 32), (96, 160), (256, 320), (320, 224)])
+def test_detector_agrees_with_torch_at_any_size(net, folder, height, width):
+    image = torch.randn(1, 3, height, width)
+    with torch.no_grad():
+        expected = export_onnx.Detector(net)(image)
+    assert_close(expected, run(folder, "detector", image))
+
+
+@pytest.mark.parametrize("people", [1, 7])
+def test_heads_agree_with_torch_for_any_number_of_people(net, folder, people):
+    for name, pool in (("box_head", 7), ("dense_head", 32)):
+        rois = torch.randn(people, WIDTH, pool, pool)
+        with torch.no_grad():
+            expected = getattr(net, name)(rois)
+        assert_close(expected, run(folder, name, rois))
+
+
+def test_parity_on_pictures_is_measured_for_every_output(net, folder):
+    image = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
+    errors = export_onnx.parity(net, folder, [image])
+    assert len(errors) == 14 + 2 + 4
+    assert max(errors.values()) <= export_onnx.TOLERANCE
+
+
+def test_parity_notices_other_weights(net, folder):
+    other = export_onnx.copy.deepcopy(net)
+    other.dense_head.out["u"].bias.data += 0.1
+    image = np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)
+    errors = export_onnx.parity(other, folder, [image])
+    assert errors["dense_head.u"] > export_onnx.TOLERANCE
+    assert errors["dense_head.v"] <= export_onnx.TOLERANCE
+
+
+def test_no_batch_normalisation_is_left(folder):
+    for name in bundle.GRAPHS:
+        kinds = {node.op_type for node in onnx.load(folder / f"{name}.onnx").graph.node}
+        assert not kinds & {"BatchNormalization", "Identity", "Shape", "Expand"}
+
+
+def test_manifest_signs_the_files_and_lists_their_tensors(folder):
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert set(manifest["files"]) == {f"{name}.onnx" for name in bundle.GRAPHS}
+    for name, entry in manifest["graphs"].items():
+        data = (folder / entry["file"]).read_bytes()
+        assert manifest["files"][entry["file"]] == {
+            "sha256": hashlib.sha256(data).hexdigest(),
+            "bytes": len(data),
+        }
+        model = onnx.load(folder / entry["file"])
+        assert [(o.domain, o.version) for o in model.opset_import] == [("", entry["opset"])]
+        for side, values in (("inputs", model.graph.input), ("outputs", model.graph.output)):
+            assert [tensor["name"] for tensor in entry[side]] == [value.name for value in values], name
+            for tensor, value in zip(entry[side], values, strict=True):
+                sizes = [d.dim_param or d.dim_value for d in value.type.tensor_type.shape.dim]
+                fixed = [(a, b) for a, b in zip(tensor["shape"], sizes, strict=True) if isinstance(a, int)]
+                assert all(a == b for a, b in fixed), tensor["name"]
+    assert manifest["licence"]
+    assert all({"name", "licence", "used_for"} <= set(entry) for entry in manifest["training_data"])
+
+
+def test_a_manifest_is_refused_for_graphs_with_other_names(folder, tmp_path):
+    for name in bundle.GRAPHS:
+        model = onnx.load(folder / f"{name}.onnx")
+        if name == "box_head":
+            model.graph.output[0].name = "scores"
+        onnx.save(model, tmp_path / f"{name}.onnx")
+    info = bundle.BundleInfo("tiny", "fp32")
+    with pytest.raises(ValueError, match="scores"):
+        bundle.write_manifest(tmp_path, info, NetworkConfig(width=WIDTH), DecodeConfig())

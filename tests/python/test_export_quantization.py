@@ -1,0 +1,117 @@
+"""Int8 graphs stay close to their float originals, and what must stay float does."""
+
+import numpy as np
+import onnx
+import pytest
+import torch
+
+from export.densepose import export_onnx
+from export.densepose.config import NetworkConfig
+from export.densepose.network import MobileParsingRCNN
+from quantization import transposed_convolution
+from quantization.errors import float_nodes_left, output_sqnr, sqnr_db
+from quantization.quantize import matching_nodes, quantise_graph, spread
+from quantization.settings import GraphSettings, read_settings
+
+WIDTH = 16
+torch.set_num_threads(1)  # the graphs are small
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    torch.manual_seed(0)
+    folder = tmp_path_factory.mktemp("bundle")
+    net = MobileParsingRCNN(NetworkConfig(width=WIDTH)).eval()
+    torch.nn.init.normal_(net.box_head.logits.weight)
+    export_onnx.export_graphs(net, folder)
+    return folder
+
+
+def rois(count: int, pool: int) -> list[np.ndarray]:
+    rng = np.random.default_rng(count)
+    return [np.abs(rng.standard_normal((2, WIDTH, pool, pool))).astype(np.float32) for _ in range(count)]
+
+
+def test_transposed_convolutions_become_plain_ones_with_the_same_result(folder, tmp_path):
+    model = onnx.load(folder / "dense_head.onnx")
+    assert transposed_convolution.rewrite(model) == 4
+    onnx.checker.check_model(model, full_check=True)
+    onnx.save(model, tmp_path / "dense_head.onnx")
+    quality = output_sqnr(folder / "dense_head.onnx", tmp_path / "dense_head.onnx", rois(1, 32))
+    assert min(quality.values()) > 110
+    assert "ConvTranspose" not in {node.op_type for node in model.graph.node}
+
+
+def test_transposed_convolutions_of_another_shape_are_left_alone():
+    weight = onnx.numpy_helper.from_array(np.ones((2, 3, 2, 2), np.float32), "w")
+    node = onnx.helper.make_node("ConvTranspose", ["x", "w"], ["y"], kernel_shape=[2, 2], strides=[2, 2])
+    value = onnx.helper.make_tensor_value_info
+    graph = onnx.helper.make_graph(
+        [node], "g", [value("x", 1, [1, 2, 4, 4])], [value("y", 1, [1, 3, 8, 8])], [weight]
+    )
+    model = onnx.helper.make_model(graph)
+    assert transposed_convolution.rewrite(model) == 0
+    assert model.graph.node[0].op_type == "ConvTranspose"
+
+
+def test_the_int8_dense_head_is_small_and_close(folder, tmp_path):
+    source, target = folder / "dense_head.onnx", tmp_path / "dense_head.onnx"
+    quantise_graph(source, target, rois(6, 32), GraphSettings())
+    quality = output_sqnr(source, target, rois(2, 32))
+    assert min(quality.values()) > 20
+    assert target.stat().st_size < 0.7 * source.stat().st_size
+    assert float_nodes_left(target) == []
+    names = [output.name for output in onnx.load(target).graph.output]
+    assert names == ["coarse", "index", "u", "v"]
+
+
+def test_named_nodes_stay_float(folder, tmp_path):
+    settings = GraphSettings(float_nodes=("/logits/*",))
+    quantise_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", rois(4, 7), settings)
+    assert float_nodes_left(tmp_path / "box_head.onnx") == ["/logits/Gemm"]
+
+
+def test_reduced_weights_use_seven_bits(folder, tmp_path):
+    largest = {}
+    for reduced in (True, False):
+        target = tmp_path / f"{reduced}.onnx"
+        quantise_graph(folder / "box_head.onnx", target, rois(2, 7), GraphSettings(reduce_range=reduced))
+        arrays = [onnx.numpy_helper.to_array(value) for value in onnx.load(target).graph.initializer]
+        largest[reduced] = max(int(np.abs(a.astype(int)).max()) for a in arrays if a.dtype == np.int8)
+    assert largest[True] <= 64
+    assert largest[False] > 100
+
+
+def test_a_name_that_matches_nothing_is_an_error(folder):
+    graph = onnx.load(folder / "box_head.onnx").graph
+    assert matching_nodes(graph, ("/logits/*", "/deltas/Gemm")) == ["/logits/Gemm", "/deltas/Gemm"]
+    with pytest.raises(ValueError, match="/scores/"):
+        matching_nodes(graph, ("/scores/*",))
+
+
+def test_nobody_to_calibrate_with_is_an_error(folder, tmp_path):
+    with pytest.raises(ValueError, match="nobody"):
+        quantise_graph(folder / "dense_head.onnx", tmp_path / "x.onnx", [], GraphSettings())
+
+
+def test_the_shipped_settings_name_every_graph():
+    settings = read_settings(export_onnx.Path("quantization/densepose.toml"))
+    assert set(settings.graphs) == {"detector", "box_head", "dense_head"}
+
+
+@pytest.mark.parametrize("text", ["[detector]\nmethod = 'magic'", "[detector]\nbits = 4", "images = 3"])
+def test_wrong_settings_are_errors(tmp_path, text):
+    path = tmp_path / "settings.toml"
+    path.write_text(f"calibration_images = 1\nheld_out_images = 1\npeople_per_image = 1\n{text}")
+    with pytest.raises(ValueError, match=str(path)):
+        read_settings(path)
+
+
+def test_signal_to_noise_in_decibels():
+    assert sqnr_db(100.0, 1.0) == pytest.approx(20.0)
+    assert sqnr_db(1.0, 0.0) == float("inf")
+
+
+def test_calibration_pictures_are_spread_over_the_shards():
+    assert spread(list(range(100)), 5) == [0, 20, 40, 60, 80]
+    assert spread([1, 2], 5) == [1, 2]

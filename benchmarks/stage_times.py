@@ -25,7 +25,7 @@ EPILOG = """\
 examples:
   python -m benchmarks.stage_times
   python -m benchmarks.stage_times --threads 1 --runs 100 my-photo.jpg
-  python -m benchmarks.stage_times --bundle sdk/models/densepose-b-fp32 tests/media/clip.mp4
+  python -m benchmarks.stage_times --bundle .data/bundles/densepose-b-fp32 tests/media/clip.mp4
 """
 
 

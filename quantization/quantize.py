@@ -1,6 +1,6 @@
 """Makes an int8 bundle from a fp32 bundle: static, per output channel, calibrated on rendered people.
 
-    python -m quantization.quantize --bundle sdk/models/densepose-b-fp32 --out sdk/models/densepose-b-int8
+    python -m quantization.quantize --bundle .data/bundles/densepose-b-fp32 --out sdk/models/densepose-b-int8
 
 Activations are unsigned, weights signed 8-bit numbers. What stays float is in `quantization/densepose.toml`.
 Prints sizes and each output's signal to noise ratio on images that were not used for calibration.
@@ -113,7 +113,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--bundle", type=Path, default=Path("sdk/models/densepose-b-fp32"))
+    parser.add_argument("--bundle", type=Path, default=Path(".data/bundles/densepose-b-fp32"))
     parser.add_argument("--out", type=Path, default=Path("sdk/models/densepose-b-int8"))
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--data", type=Path, default=Path(".data/people/train"), help="calibration shards")

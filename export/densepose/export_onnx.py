@@ -1,6 +1,6 @@
 """Exports trained weights as a fp32 model bundle, and compares the graphs with the torch network.
 
-    python -m export.densepose.export_onnx --checkpoint RUN/checkpoint.pt --out sdk/models/densepose-b-fp32
+    python -m export.densepose.export_onnx --checkpoint RUN/checkpoint.pt --out .data/bundles/densepose-b-fp32
     python -m export.densepose.export_onnx --random --out .data/bundles/random-fp32
 
 The graphs compute the same as the network, written more simply: batch normalisation is folded into the

@@ -19,8 +19,8 @@ backends, each `kind` or `kind=path`, separated by commas:
 
 examples:
   python -m export.evaluation --limit 100
-  python -m export.evaluation --data .data/people/val --backends torch=.data/runs/b/checkpoint.pt
-  python -m export.evaluation --backends onnx,capi=sdk/models/densepose-b-fp32,capi
+  python -m export.evaluation --data .data/people/val --backends torch=.data/runs/b/weights.pt
+  python -m export.evaluation --backends onnx,capi=.data/bundles/densepose-b-fp32,capi
 
 figures:
   box AP            COCO average precision of the boxes, at IoU .50 and averaged over .50:.05:.95

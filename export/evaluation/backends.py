@@ -19,8 +19,8 @@ from typing import Protocol
 import numpy as np
 
 DEFAULT_PATHS = {
-    "torch": Path(".data/runs/b/checkpoint.pt"),
-    "onnx": Path("sdk/models/densepose-b-fp32"),
+    "torch": Path("export/weights/densepose-b.pt"),
+    "onnx": Path(".data/bundles/densepose-b-fp32"),
     "capi": Path("sdk/models/densepose-b-int8"),
 }
 

@@ -45,9 +45,7 @@ def frames_of(path: Path) -> list[np.ndarray]:
     return frames
 
 
-def time_stages(
-    model: DensePose, frames: list[np.ndarray], runs: int, warm_up: int, name: str
-) -> list[Stats]:
+def time_stages(model: DensePose, frames: list[np.ndarray], runs: int, warm_up: int, name: str) -> list[Stats]:
     """One Stats a run, going round the frames; the first warm_up runs are left out."""
     stats = []
     for k in tqdm(range(warm_up + runs), desc=name, unit="run", disable=None):
@@ -60,10 +58,7 @@ def time_stages(
 def percentiles(stats: list[Stats]) -> dict[str, dict[str, float]]:
     """Milliseconds at PERCENTILES for each stage."""
     return {
-        stage: {
-            f"p{p}": round(float(np.percentile([getattr(s, stage) for s in stats], p)), 3)
-            for p in PERCENTILES
-        }
+        stage: {f"p{p}": round(float(np.percentile([getattr(s, stage) for s in stats], p)), 3) for p in PERCENTILES}
         for stage in STAGES
     }
 

@@ -138,6 +138,4 @@ def _check_names(path: Path, tensors: dict[str, dict[str, list[int | str]]]) -> 
     for side, found in (("inputs", graph.input), ("outputs", graph.output)):
         names = [value.name for value in found]
         if names != list(tensors[side]):
-            raise ValueError(
-                f"{path} has the {side} {names}; the bundle format asks for {list(tensors[side])}"
-            )
+            raise ValueError(f"{path} has the {side} {names}; the bundle format asks for {list(tensors[side])}")

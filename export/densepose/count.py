@@ -61,9 +61,7 @@ def macs(net: MobileParsingRCNN, height: int = 256, width: int = 320) -> dict[st
 
 
 def main() -> None:
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     height, width = 256, 320
     for channels, paper in PAPER_MILLIONS.items():
         net = MobileParsingRCNN(NetworkConfig(width=channels))

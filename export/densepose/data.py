@@ -127,9 +127,7 @@ def _recoloured(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def truth_of(label: np.ndarray) -> Truth:
     box, instance, ignore = visible_boxes(label)
-    return Truth(
-        torch.from_numpy(box), torch.from_numpy(instance), torch.from_numpy(ignore), torch.from_numpy(label)
-    )
+    return Truth(torch.from_numpy(box), torch.from_numpy(instance), torch.from_numpy(ignore), torch.from_numpy(label))
 
 
 class Batches:
@@ -166,9 +164,7 @@ class Batches:
                 size, (image, truths) = self._ready.get(timeout=10)
             except queue.Empty:
                 if not self._thread.is_alive():
-                    raise RuntimeError(
-                        "the thread that makes batches has stopped; see its error above"
-                    ) from None
+                    raise RuntimeError("the thread that makes batches has stopped; see its error above") from None
                 continue
             if size == self.size:
                 return image, truths

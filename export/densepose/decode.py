@@ -112,9 +112,7 @@ def infer(
     found = detect(graphs, image, network, config)
     iuv, instance = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
     if len(found.boxes):
-        maps = graphs.dense_head(
-            tg.pooled(found.features, [found.boxes], network, network.dense_pool, level=0)
-        )
+        maps = graphs.dense_head(tg.pooled(found.features, [found.boxes], network, network.dense_pool, level=0))
     scale = found.boxes.new_tensor(found.scale * 2)
     for k, box in enumerate(found.boxes * scale):
         paint([m[k] for m in maps], box.tolist(), k + 1, iuv, instance)
@@ -170,12 +168,8 @@ def _sampled(maps: Tensor, channel: Tensor) -> Tensor:
         share.append(at - low[-1])
     (top, left), (bottom, right), (down, across) = low, high, share
     down, across = down[:, None], across[None]
-    upper = (
-        maps[channel, top[:, None], left[None]] * (1 - across)
-        + maps[channel, top[:, None], right[None]] * across
-    )
+    upper = maps[channel, top[:, None], left[None]] * (1 - across) + maps[channel, top[:, None], right[None]] * across
     lower = (
-        maps[channel, bottom[:, None], left[None]] * (1 - across)
-        + maps[channel, bottom[:, None], right[None]] * across
+        maps[channel, bottom[:, None], left[None]] * (1 - across) + maps[channel, bottom[:, None], right[None]] * across
     )
     return upper * (1 - down) + lower * down

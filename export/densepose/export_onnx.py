@@ -186,9 +186,7 @@ def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> di
         rois = found.proposed
         compare("detector", found.tensor)
         compare("box_head", tg.pooled(found.features, [rois], net.config, net.config.box_pool))
-        compare(
-            "dense_head", tg.pooled(found.features, [rois[:4]], net.config, net.config.dense_pool, level=0)
-        )
+        compare("dense_head", tg.pooled(found.features, [rois[:4]], net.config, net.config.dense_pool, level=0))
     return worst
 
 
@@ -201,27 +199,19 @@ def load_network(checkpoint: Path) -> MobileParsingRCNN:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--checkpoint", type=Path, help="checkpoint.pt of export.densepose.train")
     source.add_argument("--random", action="store_true", help="untrained weights, to try the runtime with")
     parser.add_argument("--out", type=Path, required=True, help="the bundle's folder")
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--width", type=int, default=64, help="channels, with --random")
-    parser.add_argument(
-        "--data", type=Path, default=Path(".data/people/val"), help="shards for the comparison"
-    )
+    parser.add_argument("--data", type=Path, default=Path(".data/people/val"), help="shards for the comparison")
     parser.add_argument("--images", type=int, default=8, help="images for the comparison")
     options = parser.parse_args()
     torch.set_num_threads(1)
     torch.manual_seed(0)
-    net = (
-        MobileParsingRCNN(NetworkConfig(width=options.width))
-        if options.random
-        else load_network(options.checkpoint)
-    )
+    net = MobileParsingRCNN(NetworkConfig(width=options.width)) if options.random else load_network(options.checkpoint)
     export_graphs(net.eval(), options.out)
     records = data.load_records(options.data, options.images)
     images = [np.ascontiguousarray(record.decoded()[0][..., ::-1]) for record in records]

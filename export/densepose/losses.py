@@ -50,9 +50,7 @@ def batch_loss(
 
     rois, people, dense = [], [], []
     for n, truth in enumerate(truths):
-        found = tg.proposals(
-            *([level[k][n].detach() for level in levels] for k in (0, 1)), per_level, size, 300, 100
-        )
+        found = tg.proposals(*([level[k][n].detach() for level in levels] for k in (0, 1)), per_level, size, 300, 100)
         rois.append(tg.box_samples(found, truth, BOX_ROIS))
         dense.append(tg.dense_samples(found, truth, DENSE_ROIS))
         people.append(truth)
@@ -76,12 +74,8 @@ def _rpn_terms(logits: Tensor, offsets: Tensor, anchors: Tensor, truths: list[tg
         index = torch.cat([positive, negative])
         wanted = torch.zeros(len(index), device=logits.device)
         wanted[: len(positive)] = 1
-        class_loss = class_loss + F.binary_cross_entropy_with_logits(
-            logits[n, index], wanted, reduction="sum"
-        )
-        box_loss = box_loss + F.l1_loss(
-            offsets[n, positive], bx.encode(target, anchors[positive]), reduction="sum"
-        )
+        class_loss = class_loss + F.binary_cross_entropy_with_logits(logits[n, index], wanted, reduction="sum")
+        box_loss = box_loss + F.l1_loss(offsets[n, positive], bx.encode(target, anchors[positive]), reduction="sum")
         count += len(index)
     return {"rpn_class": class_loss / count, "rpn_box": box_loss / count}
 
@@ -110,7 +104,5 @@ def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
     body = part > 0
     for k, (name, value) in enumerate((("u", u), ("v", v)), 1):
         own = value.gather(1, part[:, None])[:, 0][body]
-        terms[name] = (
-            F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
-        )
+        terms[name] = F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
     return terms

@@ -138,15 +138,11 @@ def pooled(
     """
     batch = torch.cat([torch.full((len(b), 1), float(k)) for k, b in enumerate(boxes)]).to(features[0])
     every = torch.cat([batch, torch.cat(boxes).to(features[0])], 1)
-    which = (
-        torch.zeros(len(every), dtype=torch.long) if level is not None else bx.levels_of(every[:, 1:], config)
-    )
+    which = torch.zeros(len(every), dtype=torch.long) if level is not None else bx.levels_of(every[:, 1:], config)
     out = features[0].new_zeros(len(every), features[0].shape[1], pool, pool)
     for k in range(4):
         own = (which == k).nonzero()[:, 0]
         if len(own):
-            rois = roi_align(
-                features[k], every[own], pool, 1 / config.tap_strides[k], sampling_ratio=0, aligned=True
-            )
+            rois = roi_align(features[k], every[own], pool, 1 / config.tap_strides[k], sampling_ratio=0, aligned=True)
             out = out.index_copy(0, own, rois)
     return out

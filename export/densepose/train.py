@@ -124,17 +124,11 @@ def draw_curves(log: list[dict], path: Path) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/people"))
     parser.add_argument("--out", type=Path, default=Path(".data/runs/b"))
-    parser.add_argument(
-        "--width", type=int, default=64, help="channels of neck and heads: 64 (variant B), 88, 112"
-    )
-    parser.add_argument(
-        "--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in"
-    )
+    parser.add_argument("--width", type=int, default=64, help="channels of neck and heads: 64 (variant B), 88, 112")
+    parser.add_argument("--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in")
     parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
     parser.add_argument("--batch", type=int, default=16, help="images a step and process")
     parser.add_argument("--lr", type=float, default=2e-3)
@@ -151,9 +145,7 @@ def main() -> None:
 
     rank, world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
     device = (
-        torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0)))
-        if torch.cuda.is_available()
-        else torch.device("cpu")
+        torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0))) if torch.cuda.is_available() else torch.device("cpu")
     )
     if world > 1:
         torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")

@@ -55,9 +55,7 @@ def match(matches: ImageMatches, threshold: float, ignore_threshold: float) -> t
     return correct, ~correct & (matches.ignorable >= ignore_threshold)
 
 
-def average_precision(
-    images: list[ImageMatches], threshold: float, ignore_threshold: float | None = None
-) -> float:
+def average_precision(images: list[ImageMatches], threshold: float, ignore_threshold: float | None = None) -> float:
     """Mean over 101 recalls of the best precision at that recall or a higher one.
 
     threshold: similarity from which a detection is right. ignore_threshold: the same for being dropped

@@ -102,9 +102,7 @@ class OnnxBackend:
         manifest = read_manifest(path)
         given = manifest["input"]
         if not np.allclose([given["mean"], given["std"]], [decode.MEAN, decode.STD]):
-            raise ValueError(
-                f"{path} normalises by {given['mean']}, {given['std']}: not as export.densepose does"
-            )
+            raise ValueError(f"{path} normalises by {given['mean']}, {given['std']}: not as export.densepose does")
         self.path = path
         self.precision = manifest["precision"]
         self.threshold = manifest["box_head"]["score_threshold"]
@@ -157,9 +155,7 @@ class OnnxGraph:
 
         self._input = entry["inputs"][0]["name"]
         self._outputs = [output["name"] for output in entry["outputs"]]
-        self._session = onnxruntime.InferenceSession(
-            str(bundle / entry["file"]), providers=["CPUExecutionProvider"]
-        )
+        self._session = onnxruntime.InferenceSession(str(bundle / entry["file"]), providers=["CPUExecutionProvider"])
 
     def run(self, tensor):
         import torch
@@ -200,9 +196,7 @@ def open_backend(text: str, score_floor: float) -> Backend:
     kind, _, path = text.partition("=")
     kinds = {"torch": TorchBackend, "onnx": OnnxBackend, "capi": CApiBackend}
     if kind not in kinds:
-        raise ValueError(
-            f"unknown backend {kind!r}: write torch, onnx or capi, or e.g. capi={DEFAULT_PATHS['capi']}"
-        )
+        raise ValueError(f"unknown backend {kind!r}: write torch, onnx or capi, or e.g. capi={DEFAULT_PATHS['capi']}")
     chosen = Path(path) if path else DEFAULT_PATHS[kind]
     if not chosen.exists():
         raise FileNotFoundError(f"{kind}: {chosen} is not there. Name another with {kind}=PATH.")

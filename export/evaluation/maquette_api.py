@@ -158,9 +158,7 @@ class DensePose:
         config.threads = threads
         if score_threshold is not None:
             config.score_threshold = score_threshold
-        self._call(
-            self._context, "maq_densepose_create", self._context, byref(config), byref(self._densepose)
-        )
+        self._call(self._context, "maq_densepose_create", self._context, byref(config), byref(self._densepose))
 
     def __enter__(self) -> DensePose:
         return self
@@ -184,9 +182,7 @@ class DensePose:
         description.height_px, description.width_px = image.shape[:2]
         description.planes[0] = image.ctypes.data
         frame, result = Handle(), Handle()
-        self._call(
-            self._context, "maq_frame_create", self._context, byref(description), None, None, byref(frame)
-        )
+        self._call(self._context, "maq_frame_create", self._context, byref(description), None, None, byref(frame))
         try:
             self._call(self._densepose, "maq_densepose_run", self._densepose, frame, byref(result))
             return self._copy(result, image.shape[0], image.shape[1])

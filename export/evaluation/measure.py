@@ -70,9 +70,7 @@ def measure(
     boxes, ignorable, scores, shown = [], [], [], []
     people = ignored = 0
     seconds = 0.0
-    for image in tqdm(
-        images, total=total, desc=f"{backend.kind} {backend.precision}", unit="image", disable=None
-    ):
+    for image in tqdm(images, total=total, desc=f"{backend.kind} {backend.precision}", unit="image", disable=None):
         start = time.perf_counter()
         found = backend.predict(image.image)
         seconds += time.perf_counter() - start

@@ -55,9 +55,7 @@ def print_table(results: dict[str, Figures], console: Console | None = None) -> 
     for name in list(results)[1:]:
         table.add_column(f"{name}: difference", justify="right")
     for label, field, unit in ROWS:
-        values = [
-            getattr(figures, field) * {"points": 100, "ms": 1000}.get(unit, 1) for figures in results.values()
-        ]
+        values = [getattr(figures, field) * {"points": 100, "ms": 1000}.get(unit, 1) for figures in results.values()]
         cells = [_text(value, unit) for value in values]
         differences = [_text(value - values[0], unit, signed=True) for value in values[1:]]
         table.add_row(label, *cells, *differences)

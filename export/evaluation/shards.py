@@ -59,9 +59,7 @@ def read_images(paths: list[Path], limit: int | None = None) -> Iterator[Labelle
         with np.load(path) as file:
             missing = {"image", "image_end", "label", "label_end", "box", "box_image"} - set(file.files)
             if missing:
-                raise ShardError(
-                    f"{path} lacks {', '.join(sorted(missing))}: it is not a shard of this project."
-                )
+                raise ShardError(f"{path} lacks {', '.join(sorted(missing))}: it is not a shard of this project.")
             shard = {name: file[name] for name in file.files}
         for k in range(len(shard["image_end"])):
             if given == limit:

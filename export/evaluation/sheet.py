@@ -65,22 +65,16 @@ def main(argv: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("source", type=Path, help="a photo, a folder of photos, a clip or a shard")
-    parser.add_argument(
-        "--backend", default="capi", help="kind or kind=path, as in export.evaluation (default: capi)"
-    )
+    parser.add_argument("--backend", default="capi", help="kind or kind=path, as in export.evaluation (default: capi)")
     parser.add_argument("--out", type=Path, default=Path("build/evaluation/sheet.png"), metavar="PNG")
     parser.add_argument("--threshold", type=float, help="lowest score shown (default: the model's)")
-    parser.add_argument(
-        "--limit", type=int, default=48, metavar="N", help="at most so many photos (default 48)"
-    )
+    parser.add_argument("--limit", type=int, default=48, metavar="N", help="at most so many photos (default 48)")
     parser.add_argument("--frames", type=int, default=12, metavar="N", help="frames of a clip (default 12)")
     parser.add_argument("--columns", type=int, default=6)
     parser.add_argument("--side", type=int, default=320, metavar="PX", help="tile size (default 320)")
     arguments = parser.parse_args(argv)
     try:
-        backend = open_backend(
-            arguments.backend, 0.05 if arguments.threshold is None else arguments.threshold
-        )
+        backend = open_backend(arguments.backend, 0.05 if arguments.threshold is None else arguments.threshold)
         threshold = backend.threshold if arguments.threshold is None else arguments.threshold
         tiles = []
         for name, image in tqdm(

@@ -41,9 +41,7 @@ class PixelAccuracy:
         """label: uint8 [H, W, 4] (or more channels than 3); iuv: uint8 [H, W, 3]."""
         true, predicted = label[..., 0].astype(np.int64), iuv[..., 0].astype(np.int64)
         size = PART_COUNT + 1
-        self.confusion += np.bincount((true * size + predicted).ravel(), minlength=size * size).reshape(
-            size, size
-        )
+        self.confusion += np.bincount((true * size + predicted).ravel(), minlength=size * size).reshape(size, size)
         right = (true > 0) & (true == predicted)
         for axis in (0, 1):
             gap = np.abs(label[right, 1 + axis].astype(np.int64) - iuv[right, 1 + axis].astype(np.int64))
@@ -97,9 +95,7 @@ class PointAccuracy:
 
     def solve(self, table: SurfaceTable) -> SurfacePoints:
         if not self._point:
-            return SurfacePoints(
-                np.zeros(0, np.float32), np.zeros(0, bool), np.zeros(0, np.uint8), self.images
-            )
+            return SurfacePoints(np.zeros(0, np.float32), np.zeros(0, bool), np.zeros(0, np.uint8), self.images)
         part, owner = np.concatenate(self._part), np.concatenate(self._owner)
         iuv, point = np.concatenate(self._iuv), np.concatenate(self._point)
         painted = (owner > 0) & (iuv[:, 0] > 0)

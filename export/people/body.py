@@ -26,7 +26,18 @@ HEIGHTS = ("minheight", "maxheight")
 PROPORTIONS = ("idealproportions", "uncommonproportions")
 
 # Bones of the face, tongue, eyes and breast move with the bone that carries them.
-_CARRIED = ("eye", "jaw", "levator", "oculi", "orbicularis", "oris", "risorius", "special", "temporalis", "tongue")
+_CARRIED = (
+    "eye",
+    "jaw",
+    "levator",
+    "oculi",
+    "orbicularis",
+    "oris",
+    "risorius",
+    "special",
+    "temporalis",
+    "tongue",
+)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ MIN_PIXELS, MIN_SIDE_PX = 64, 12  # smaller people are marked "ignore"
 def visible_boxes(label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Boxes around each instance's visible pixels.
 
-    label: uint8 [H, W, 4]. Returns box float32 [n, 4] (right and bottom exclusive), instance uint8 [n], ignore bool [n].
+    label: uint8 [H, W, 4]. Returns box float32 [n, 4] (right, bottom exclusive), instance uint8 [n], ignore bool [n].
     """
     box, instance, ignore = [], [], []
     for number in np.unique(label[..., 3]):

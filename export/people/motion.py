@@ -231,8 +231,14 @@ def posed(body: Body, shape: Shape, pose: Pose, rng: np.random.Generator) -> np.
             rotations[k] = carried @ foot[side]
         elif base.startswith("finger") and not base.startswith("finger1"):
             sign, degrees = curl[side]
-            rotations[k] = carried @ Rotation.from_rotvec(np.radians(degrees) * np.array([0, 0.9 * sign, 0])).as_matrix()
+            rotations[k] = (
+                carried @ Rotation.from_rotvec(np.radians(degrees) * np.array([0, 0.9 * sign, 0])).as_matrix()
+            )
         else:
             rotations[k] = carried
-        heads[k] = heads[parent] + rotations[parent] @ (shape.heads[k] - shape.heads[parent]) if parent >= 0 else shape.heads[k]
+        heads[k] = (
+            heads[parent] + rotations[parent] @ (shape.heads[k] - shape.heads[parent])
+            if parent >= 0
+            else shape.heads[k]
+        )
     return body.skinned(shape, rotations, heads)

@@ -24,7 +24,8 @@ _VERTEX = """#version 330
 in vec3 position; in vec3 normal; in vec3 rest; in vec2 texture_uv; in vec3 label; in vec3 point;
 uniform mat4 projection; uniform float offset, bulge, bulge_frequency; uniform vec3 phase;
 uniform mat3 fabric; uniform bool planar;
-out vec3 v_normal; out vec2 v_uv; out vec2 v_chart; flat out float v_part; out vec3 v_rest; out vec3 v_view; out vec3 v_point;
+out vec3 v_normal; out vec2 v_uv; out vec2 v_chart; flat out float v_part;
+out vec3 v_rest; out vec3 v_view; out vec3 v_point;
 void main() {
   float f = bulge_frequency;
   float wave = sin(rest.x * f + phase.x) * sin(rest.z * f * .8 + phase.y)

@@ -21,12 +21,18 @@ SPLITS = {"train": 0, "val": 1, "test": 2}
 BODIES = {"train": 400, "val": 60, "test": 60}
 PEOPLE_SHARE = (0.04, 0.46, 0.27, 0.14, 0.09)  # images with 0, 1, 2, 3, 4 people
 # Framing: (share, centre of view in body heights, visible height in body heights: low, high)
-FRAMINGS = ((0.34, 0.5, 1.05, 1.7), (0.14, 0.66, 0.75, 0.95), (0.2, 0.78, 0.45, 0.65), (0.12, 0.9, 0.28, 0.4), (0.2, 0.5, 1.8, 4.5))
+FRAMINGS = (
+    (0.34, 0.5, 1.05, 1.7),
+    (0.14, 0.66, 0.75, 0.95),
+    (0.2, 0.78, 0.45, 0.65),
+    (0.12, 0.9, 0.28, 0.4),
+    (0.2, 0.5, 1.8, 4.5),
+)
 
 
 @dataclass(frozen=True)
 class Sample:
-    """image uint8 [H, W, 3] BGR; label uint8 [H, W, 4] = (I, U*255, V*255, instance); point float32 [H, W, 3] or None."""
+    """image uint8 [H, W, 3] BGR; label uint8 [H, W, 4] = (I, U*255, V*255, instance); point float32 [H, W, 3]."""
 
     image: np.ndarray
     label: np.ndarray
@@ -43,7 +49,9 @@ class Studio:
         self.clips = load_clips(split)
         files = sorted((backgrounds / split).glob("*.jpg"))
         if not files:
-            raise FileNotFoundError(f"no photos in {backgrounds / split}: run `python -m export.photos backgrounds` first")
+            raise FileNotFoundError(
+                f"no photos in {backgrounds / split}: run `python -m export.photos backgrounds` first"
+            )
         self.photos = [_shrunk(cv2.imread(str(f))) for f in files]
         self.fabrics = Fabrics(split, self.photos)
         skin = cv2.resize(cv2.imread(str(assets.skin_texture())), (1024, 1024), interpolation=cv2.INTER_AREA)
@@ -116,7 +124,13 @@ class Studio:
         look = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])
         rotation = Rotation.from_euler("xz", [pitch, roll]).as_matrix() @ look
         aspect = self.width / self.height
-        target = np.array([u(-0.35, 0.35) * visible * aspect * min(1, visible / tall), 0, middle * tall + u(-0.08, 0.08) * visible])
+        target = np.array(
+            [
+                u(-0.35, 0.35) * visible * aspect * min(1, visible / tall),
+                0,
+                middle * tall + u(-0.08, 0.08) * visible,
+            ]
+        )
         eye = target - distance * rotation[2]
         camera = Camera(self.width, self.height, focal, np.concatenate([rotation, -(rotation @ eye)[:, None]], 1))
         taken = [np.zeros(2)]
@@ -124,7 +138,11 @@ class Studio:
         for person in people[1:]:
             for _ in range(20):
                 depth = distance * u(0.75, 2.5) if u() < 0.6 else distance + u(-0.4, 0.8)
-                spot = eye + depth * rotation[2] + u(-0.6, 0.6) * depth * aspect * np.tan(field_of_view / 2) * 2 * rotation[0]
+                spot = (
+                    eye
+                    + depth * rotation[2]
+                    + u(-0.6, 0.6) * depth * aspect * np.tan(field_of_view / 2) * 2 * rotation[0]
+                )
                 if depth > 0.9 and min(np.linalg.norm(spot[:2] - t) for t in taken) > 0.4:
                     taken.append(spot[:2])
                     placed.append(Person(person.vertices + [spot[0], spot[1], 0], person.layers))

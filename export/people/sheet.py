@@ -1,6 +1,6 @@
 """Draws a contact sheet of rendered samples beside their labels, to be looked at.
 
-    python -m export.people.sheet --split test --out sheet.png
+python -m export.people.sheet --split test --out sheet.png
 """
 
 from __future__ import annotations

@@ -40,7 +40,13 @@ def main() -> None:
     options = parser.parse_args()
     studio = Studio("test", TILE_WIDTH, TILE_HEIGHT, options.backgrounds, points=False)
     up = np.array([0, -1.0, 0])
-    light = Light(up, np.full(3, 0.6), np.full(3, 0.4), np.array([[-0.4, -0.7, -0.6], [0.9, 0, -0.4]]), np.array([[0.6] * 3, [0.2] * 3]))
+    light = Light(
+        up,
+        np.full(3, 0.6),
+        np.full(3, 0.4),
+        np.array([[-0.4, -0.7, -0.6], [0.9, 0, -0.4]]),
+        np.array([[0.6] * 3, [0.2] * 3]),
+    )
     focal = 900.0
     look = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])
     cycle, rows = walk_cycle(FRAMES), []
@@ -58,7 +64,9 @@ def main() -> None:
             vertices = motion.posed(studio.body, shape, pose, np.random.default_rng([9, number])) @ turn.T
             body = vertices[studio.body.groups["body"]]
             vertices = vertices - [*body[:, :2].mean(0), body[:, 2].min()]
-            picture = studio.renderer.draw([Person(vertices, layers)], camera, light, np.random.default_rng([10, number]))
+            picture = studio.renderer.draw(
+                [Person(vertices, layers)], camera, light, np.random.default_rng([10, number])
+            )
             colour = picture.rgb[..., ::-1] / np.maximum(picture.alpha, 1e-3)[..., None]
             tiles.append(np.dstack([np.clip(colour, 0, 255), picture.alpha * 255]).astype(np.uint8))
         rows.append(np.concatenate(tiles, 1))

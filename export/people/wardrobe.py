@@ -20,7 +20,8 @@ from export.people.motion import split_of
 
 # Skin tones from light to dark (RGB), and the mean colour of the skin texture that they re-tint.
 _TONES = np.array(
-    [(255, 222, 196), (244, 200, 165), (228, 176, 132), (200, 140, 98), (150, 95, 62), (100, 64, 44), (66, 42, 32)], float
+    [(255, 222, 196), (244, 200, 165), (228, 176, 132), (200, 140, 98), (150, 95, 62), (100, 64, 44), (66, 42, 32)],
+    float,
 )  # fmt: skip
 _SKIN_MEAN = np.array([185.0, 145.0, 123.0])
 _HAIR_COLOURS = (
@@ -184,7 +185,9 @@ def _game_fabrics(split: str) -> np.ndarray:
     rng = np.random.default_rng(0)
     wrong = ("norm", "spec", "_n.", "animal", "horse", "eleph", "camel", "_ao")
     root = assets.zero_ad() / "textures" / "skins" / "skeletal"
-    files = [p for p in sorted(root.rglob("*.dds")) if split_of(p.stem) == split and not any(w in str(p) for w in wrong)]
+    files = [
+        p for p in sorted(root.rglob("*.dds")) if split_of(p.stem) == split and not any(w in str(p) for w in wrong)
+    ]
     tiles = []
     for path in files[:200]:
         try:
@@ -234,9 +237,9 @@ def dress(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Laye
 
 def _cloth(rng: np.random.Generator, **more) -> dict:
     u = rng.uniform
-    return dict(offset=u(0.003, 0.013), bulge=u(0, 0.007), bulge_frequency=u(8, 30), wrinkle=u(0, 0.45),
-                wrinkle_frequency=u(20, 90), repeats=u(1, 5), specular=0.0 if u() < 0.8 else u(0, 0.2),
-                phase=u(0, 6, 3)) | more  # fmt: skip
+    return {"offset": u(0.003, 0.013), "bulge": u(0, 0.007), "bulge_frequency": u(8, 30), "wrinkle": u(0, 0.45),
+                "wrinkle_frequency": u(20, 90), "repeats": u(1, 5), "specular": 0.0 if u() < 0.8 else u(0, 0.2),
+                "phase": u(0, 6, 3)} | more  # fmt: skip
 
 
 def _lower(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Layer]:
@@ -246,10 +249,20 @@ def _lower(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Lay
     fabric, cloth = fabrics.draw(rng), _cloth(rng)
     waist = torso & (model.height < u(0.1, 0.3))
     if kind == "trousers":
-        return [Layer(np.flatnonzero(waist | upper | (lower & (model.along["lower_leg"] < u(0.8, 1.1)))), fabric, **cloth)]
+        return [
+            Layer(
+                np.flatnonzero(waist | upper | (lower & (model.along["lower_leg"] < u(0.8, 1.1)))),
+                fabric,
+                **cloth,
+            )
+        ]
     if kind == "shorts":
         return [Layer(np.flatnonzero(waist | (upper & (model.along["upper_leg"] < u(0.3, 1)))), fabric, **cloth)]
-    under = Layer(np.flatnonzero((torso & (model.height < 0.15)) | (upper & (model.along["upper_leg"] < 0.3))), fabric, **cloth)
+    under = Layer(
+        np.flatnonzero((torso & (model.height < 0.15)) | (upper & (model.along["upper_leg"] < 0.3))),
+        fabric,
+        **cloth,
+    )
     if kind == "briefs":
         return [under]
     skirt = model.range["skirt"]
@@ -285,7 +298,7 @@ def _upper(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Lay
     layers = [Layer(top(sleeve, u(-0.12, 0.18), u(0, 0.35), 0), fabrics.draw(rng), **cloth)]
     if u() < 0.28:
         opening = u(0.02, 0.1) if u() < 0.6 else 0
-        jacket = cloth | dict(offset=cloth["offset"] + u(0.008, 0.025), bulge=u(0, 0.008))
+        jacket = cloth | {"offset": cloth["offset"] + u(0.008, 0.025), "bulge": u(0, 0.008)}
         layers.append(Layer(top(3, u(-0.35, 0.1), u(0, 0.5), opening), fabrics.draw(rng), **jacket))
     return layers
 
@@ -306,7 +319,7 @@ def _hair(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Laye
     centre, eye, radius = model.centre, model.eye_z, model.head_radius
     skull = model.within("body", "head")
     layers = []
-    style = dict(wrinkle=u(0.1, 0.6), repeats=u(3, 14), specular=u(0, 0.15), phase=u(0, 6, 3))
+    style = {"wrinkle": u(0.1, 0.6), "repeats": u(3, 14), "specular": u(0, 0.15), "phase": u(0, 6, 3)}
     if u() < 0.93:
         tilt = np.array([0, u(0.6, 1.6), 1])
         above = (centre - [0, model.head_y, eye + 0.45 * radius]) @ (tilt / np.linalg.norm(tilt)) / radius

@@ -82,9 +82,7 @@ def build(folder: Path, force: bool = False) -> dict[str, int]:
                 for photo in wanted:
                     image = cv2.imdecode(np.frombuffer(reader.read(photo.member), np.uint8), cv2.IMREAD_COLOR)
                     if image is None:
-                        raise PackageError(
-                            f"{photo.package}: {photo.member} is not an image that can be read."
-                        )
+                        raise PackageError(f"{photo.package}: {photo.member} is not an image that can be read.")
                     path = folder / photo.split / f"{photo.name}.jpg"
                     partial = path.with_suffix(".partial.jpg")
                     cv2.imwrite(str(partial), shrink(image), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])

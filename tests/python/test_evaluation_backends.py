@@ -76,9 +76,7 @@ def bundle_without_ties(tmp_path):
 @needs_library
 @pytest.mark.parametrize("size", [(320, 256), (256, 320), (331, 207), (640, 512)])
 def test_both_ways_give_the_same_people_and_the_same_picture(size, bundle_without_ties, monkeypatch):
-    pytest.importorskip(
-        "torch", reason="the reference of decoding needs torch: scripts/make-venv.sh train,dev"
-    )
+    pytest.importorskip("torch", reason="the reference of decoding needs torch: scripts/make-venv.sh train,dev")
     from export.densepose import decode
 
     given = read_manifest(BUNDLE)["input"]

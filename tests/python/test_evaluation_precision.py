@@ -15,9 +15,7 @@ from export.evaluation.average_precision import (
 def image(scores, similarity, ignorable=None):
     scores = np.array(scores, float)
     similarity = np.array(similarity, float)
-    return ImageMatches(
-        scores, similarity, np.zeros(len(scores)) if ignorable is None else np.array(ignorable)
-    )
+    return ImageMatches(scores, similarity, np.zeros(len(scores)) if ignorable is None else np.array(ignorable))
 
 
 def test_box_iou_of_half_shifted_equal_and_empty_boxes():
@@ -68,9 +66,7 @@ def test_only_the_twenty_best_of_an_image_are_looked_at():
 
 
 def test_agrees_with_pycocotools_on_random_boxes():
-    coco = pytest.importorskip(
-        "pycocotools.coco", reason="pycocotools is not installed: pip install -e '.[dev]'"
-    )
+    coco = pytest.importorskip("pycocotools.coco", reason="pycocotools is not installed: pip install -e '.[dev]'")
     cocoeval = pytest.importorskip("pycocotools.cocoeval")
     rng = np.random.default_rng(1)
     images, truth, found = [], [], []

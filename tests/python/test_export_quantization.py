@@ -46,9 +46,7 @@ def test_transposed_convolutions_of_another_shape_are_left_alone():
     weight = onnx.numpy_helper.from_array(np.ones((2, 3, 2, 2), np.float32), "w")
     node = onnx.helper.make_node("ConvTranspose", ["x", "w"], ["y"], kernel_shape=[2, 2], strides=[2, 2])
     value = onnx.helper.make_tensor_value_info
-    graph = onnx.helper.make_graph(
-        [node], "g", [value("x", 1, [1, 2, 4, 4])], [value("y", 1, [1, 3, 8, 8])], [weight]
-    )
+    graph = onnx.helper.make_graph([node], "g", [value("x", 1, [1, 2, 4, 4])], [value("y", 1, [1, 3, 8, 8])], [weight])
     model = onnx.helper.make_model(graph)
     assert transposed_convolution.rewrite(model) == 0
     assert model.graph.node[0].op_type == "ConvTranspose"

@@ -53,7 +53,8 @@ def test_a_person_facing_the_camera_shows_its_front_and_its_left_hand_on_the_rig
     parts = np.bincount(label[..., 0].reshape(-1), minlength=25)
     assert parts[2] > 20 * max(parts[1], 1)  # torso front, not back
     column = {p: np.nonzero(label[..., 0] == p)[1].mean() for p in (3, 4, 23, 24)}
-    assert column[4] > WIDTH / 2 + 20 and column[3] < WIDTH / 2 - 20
+    assert column[4] > WIDTH / 2 + 20
+    assert column[3] < WIDTH / 2 - 20
     assert column[24] > column[23]
     rows = {p: np.nonzero(label[..., 0] == p)[0].mean() for p in (2, 5, 6, 23)}
     assert rows[23] < rows[2] < rows[5]

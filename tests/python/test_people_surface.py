@@ -40,7 +40,8 @@ def test_mirrored_part_lies_in_the_mirrored_coarse_group():
 def test_every_part_has_triangles_and_uv_in_the_unit_square(atlas):
     assert (np.bincount(atlas.part, minlength=25)[1:] > 100).all()
     assert (atlas.part > 0).all()
-    assert atlas.uv.min() >= 0 and atlas.uv.max() <= 1
+    assert atlas.uv.min() >= 0
+    assert atlas.uv.max() <= 1
 
 
 def test_atlas_of_the_mirrored_body_is_the_mirrored_atlas(atlas):
@@ -68,7 +69,18 @@ def test_left_parts_lie_on_the_left_and_front_parts_in_front(atlas):
 def test_u_runs_along_the_limb_in_the_conventions_direction(atlas):
     """U at the body-near end is small where the convention says so (facts of the DensePose atlas), large elsewhere."""
     height = atlas.rest[atlas.faces][..., 2]
-    grows_downwards = {1: True, 2: True, 7: True, 8: True, 9: False, 10: False, 11: False, 12: False, 13: True, 14: True}
+    grows_downwards = {
+        1: True,
+        2: True,
+        7: True,
+        8: True,
+        9: False,
+        10: False,
+        11: False,
+        12: False,
+        13: True,
+        14: True,
+    }
     for part, downwards in grows_downwards.items():
         own = atlas.part == part
         slope = np.corrcoef(height[own].reshape(-1), atlas.uv[own, :, 0].reshape(-1))[0, 1]
@@ -79,7 +91,15 @@ def test_phenotypes_change_the_body_as_their_names_say(body):
     from export.people.body import Phenotype
 
     def height(**traits):
-        given = dict(gender=0.5, age=2 / 3, muscle=0.5, weight=0.5, height=0.5, proportions=0.5, races=(1 / 3,) * 3)
+        given = {
+            "gender": 0.5,
+            "age": 2 / 3,
+            "muscle": 0.5,
+            "weight": 0.5,
+            "height": 0.5,
+            "proportions": 0.5,
+            "races": (1 / 3,) * 3,
+        }
         vertices = body.shape(Phenotype(**(given | traits))).vertices[body.groups["body"]]
         return np.ptp(vertices[:, 2]), np.ptp(vertices[:, 0])
 
@@ -102,7 +122,8 @@ def test_posing_takes_limbs_to_the_asked_directions(body):
     vertices = posed(body, body.template, Pose(np.eye(3), np.eye(3), np.eye(3), limbs), np.random.default_rng(0))
     hand = vertices[body.skin.argmax(1) == body.bone["wrist.L"]].mean(0)
     shoulder = vertices[body.skin.argmax(1) == body.bone["upperarm01.L"]].mean(0)
-    assert hand[0] - shoulder[0] > 0.3 and abs(hand[2] - shoulder[2]) < 0.1  # a T-pose
+    assert hand[0] - shoulder[0] > 0.3
+    assert abs(hand[2] - shoulder[2]) < 0.1
 
 
 def test_surface_table_distances_are_geodesic():

@@ -46,9 +46,7 @@ def test_all_passed_is_success(report):
 
 
 def test_a_missing_or_broken_report_and_no_test_at_all_are_failures(report, tmp_path):
-    code, line, text = run(
-        report("a.xml", '<testsuite><testcase name="a"/></testsuite>'), tmp_path / "none.xml"
-    )
+    code, line, text = run(report("a.xml", '<testsuite><testcase name="a"/></testsuite>'), tmp_path / "none.xml")
     assert (code, line) == (1, "1 passed, 1 failed")
     assert "none.xml" in text
     assert run(report("c.xml", "<testsuite"))[0] == 1

@@ -94,9 +94,7 @@ def test_the_loss_falls_on_a_few_pictures(shards):
         torch.nn.utils.clip_grad_norm_(net.parameters(), 10.0)
         optimiser.step()
         history.append({name: float(value) for name, value in terms.items()})
-    first, last = (
-        {n: np.mean([h[n] for h in part]) for n in history[0]} for part in (history[:2], history[-2:])
-    )
+    first, last = ({n: np.mean([h[n] for h in part]) for n in history[0]} for part in (history[:2], history[-2:]))
     assert sum(last.values()) < 0.6 * sum(first.values())
     for name in ("rpn_class", "box_class", "coarse", "index", "u", "v"):
         assert last[name] < first[name], name

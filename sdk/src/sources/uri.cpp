@@ -33,11 +33,10 @@ std::string percent_decoded(const std::string& text) {
   return decoded;
 }
 
-std::optional<int64_t> as_integer(const std::string& text) {
-  int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return {};
-  return value;
+// False when the text is not a whole number, or one that does not fit.
+bool read_integer(const std::string& text, int64_t* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
 }
 
 // Independent of the process's locale, which may want a comma.
@@ -71,14 +70,15 @@ void take_size(SourceUri& uri) {
   if (found == uri.options.end()) return;
   const std::string value = found->second;
   const size_t cross = value.find('x');
-  const auto width = as_integer(value.substr(0, cross));
-  const auto height = cross == std::string::npos ? std::nullopt : as_integer(value.substr(cross + 1));
-  if (!width || !height) {
+  int64_t width = 0;
+  int64_t height = 0;
+  if (cross == std::string::npos || !read_integer(value.substr(0, cross), &width) ||
+      !read_integer(value.substr(cross + 1), &height)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "size=", value, " in ", uri.text, " is not a size; write size=640x480.");
   }
-  check_image_size(*width, *height, "The size asked for in " + uri.text);
-  uri.width_px = int(*width);
-  uri.height_px = int(*height);
+  check_image_size(width, height, "The size asked for in " + uri.text);
+  uri.width_px = int(width);
+  uri.height_px = int(height);
   uri.options.erase(found);
 }
 
@@ -95,12 +95,12 @@ std::optional<std::string> SourceUri::take(const std::string& key) {
 int64_t SourceUri::take_integer(const std::string& key, int64_t otherwise, int64_t least, int64_t most) {
   const auto value = take(key);
   if (!value) return otherwise;
-  const auto number = as_integer(*value);
-  if (!number || *number < least || *number > most) {
+  int64_t number = 0;
+  if (!read_integer(*value, &number) || number < least || number > most) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a whole number from ", least,
                 " to ", most, ".");
   }
-  return *number;
+  return number;
 }
 
 double SourceUri::take_number(const std::string& key, double otherwise, double least, double most) {

@@ -240,7 +240,7 @@ def main() -> None:
             ema.update(net, step)
         step, images = step + 1, images + len(image) * world
         for name, value in terms.items():
-            smooth[name] = 0.95 * smooth.get(name, float(value)) + 0.05 * float(value)
+            smooth[name] = 0.95 * smooth.get(name, value.item()) + 0.05 * value.item()
         now = time.monotonic()
         bar.update(round(spent + now - clock) - bar.n)
         spent, clock = spent + now - clock, now

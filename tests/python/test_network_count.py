@@ -27,9 +27,9 @@ def test_head_multiply_adds_equal_the_count_by_hand():
 
 def test_detector_multiply_adds_grow_with_the_picture():
     net = MobileParsingRCNN(NetworkConfig())
-    small, large = macs(net, 64, 64), macs(net, 128, 64)
+    small, large = macs(net, 192, 192), macs(net, 384, 192)
     for part in ("backbone", "neck"):
-        assert large[part] == pytest.approx(2 * small[part], rel=0.01)  # squeeze-and-excitation does not grow
+        assert large[part] == pytest.approx(2 * small[part], rel=0.015)  # squeeze-and-excitation does not grow
 
 
 def test_detector_gives_five_levels_at_the_strides_of_the_format():

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional as F
 
 from export import surface
 from export.densepose import boxes as bx
 from export.densepose import targets as tg
+from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 
 RPN_ANCHORS, BOX_ROIS, DENSE_ROIS, GRID = 256, 24, 2, 64
@@ -25,6 +26,9 @@ WEIGHTS = {
     "index": 1.0,
     "u": 3.0,
     "v": 3.0,
+    "pixel_index": 1.0,
+    "pixel_u": 1.5,
+    "pixel_v": 1.5,
 }
 # Share of person pixels by part in rendered images, rounded; rare parts weigh more, by the square root,
 # at most 3 times.
@@ -34,8 +38,22 @@ INDEX_WEIGHTS = torch.tensor(np.clip(np.sqrt(0.05 / _SHARE), 0.5, 3.0), dtype=to
 _TO_COARSE = torch.from_numpy(surface.PART_TO_COARSE.astype(np.int64))
 
 
+class PixelHead(nn.Conv2d):
+    """Part index, U and V of every cell of P2, for training alone: [N, C, h, w] -> [N, 75, h, w].
+
+    RoIs teach the trunk slowly from scratch, since few pixels of a batch lie in them; this asks every pixel.
+    """
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__(config.width, 3 * config.index_classes, 1)
+
+
 def batch_loss(
-    net: MobileParsingRCNN, image: Tensor, truths: list[tg.Truth], autocast: torch.autocast
+    net: MobileParsingRCNN,
+    image: Tensor,
+    truths: list[tg.Truth],
+    autocast: torch.autocast,
+    pixel_head: PixelHead | None = None,
 ) -> dict[str, Tensor]:
     """image: normalised [N, 3, H, W]. Returns the weighted terms; their sum is what is minimised."""
     config, size = net.config, image.shape[-2:]
@@ -64,6 +82,8 @@ def batch_loss(
             outputs = net.dense_head(pooled)
         label = torch.cat([tg.dense_labels(*d, t, GRID) for d, t in zip(dense, truths, strict=True)])
         terms |= _dense_terms([o.float() for o in outputs], label)
+    if pixel_head is not None:
+        terms |= _pixel_terms(pixel_head(features[0]), torch.stack([t.label for t in truths]))
     return {name: WEIGHTS[name] * value for name, value in terms.items()}
 
 
@@ -103,6 +123,19 @@ def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
     }
     body = part > 0
     for k, (name, value) in enumerate((("u", u), ("v", v)), 1):
+        own = value.gather(1, part[:, None])[:, 0][body]
+        terms[name] = F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
+    return terms
+
+
+def _pixel_terms(output: Tensor, label: Tensor) -> dict[str, Tensor]:
+    """output [N, 75, h, w] of P2; label uint8 [N, 4h, 4w, 4], read at the middle of each cell."""
+    label = label[:, 2::4, 2::4]
+    part = label[..., 0].long()
+    index, u, v = output.chunk(3, 1)
+    terms = {"pixel_index": F.cross_entropy(index, part, weight=INDEX_WEIGHTS.to(index.device))}
+    body = part > 0
+    for k, (name, value) in enumerate((("pixel_u", u), ("pixel_v", v)), 1):
         own = value.gather(1, part[:, None])[:, 0][body]
         terms[name] = F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
     return terms

@@ -32,7 +32,7 @@ from tqdm import tqdm
 from export.densepose import data
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.decode import Graphs, infer
-from export.densepose.losses import batch_loss
+from export.densepose.losses import PixelHead, batch_loss
 from export.densepose.network import MobileParsingRCNN
 
 # Image side by share of the run: small images first, since early on steps matter more than detail.
@@ -154,9 +154,11 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
 
     net = MobileParsingRCNN(NetworkConfig(width=options.width)).to(device, memory_format=torch.channels_last)
+    pixel_head = PixelHead(net.config).to(device)
+    trained = nn.ModuleList([net, pixel_head])
     ema = Ema(net, options.ema)
-    decayed = [p for p in net.parameters() if p.dim() > 1]
-    plain = [p for p in net.parameters() if p.dim() <= 1]
+    decayed = [p for p in trained.parameters() if p.dim() > 1]
+    plain = [p for p in trained.parameters() if p.dim() <= 1]
     optimiser = torch.optim.AdamW(
         [
             {"params": decayed, "weight_decay": options.weight_decay},
@@ -169,6 +171,7 @@ def main() -> None:
     if checkpoint.exists():
         saved = torch.load(checkpoint, map_location=device, weights_only=False)
         net.load_state_dict(saved["net"])
+        pixel_head.load_state_dict(saved["pixel_head"])
         ema.net.load_state_dict(saved["ema"])
         optimiser.load_state_dict(saved["optimiser"])
         step, images, spent, log = saved["step"], saved["images"], saved["spent"], saved["log"]
@@ -182,6 +185,7 @@ def main() -> None:
         if rank == 0:
             state = {
                 "net": net.state_dict(),
+                "pixel_head": pixel_head.state_dict(),
                 "ema": ema.net.state_dict(),
                 "optimiser": optimiser.state_dict(),
                 "step": step,
@@ -226,15 +230,15 @@ def main() -> None:
             group["lr"] = rate
         image, truths = batches.next()
         image = image.to(device).contiguous(memory_format=torch.channels_last)
-        terms = batch_loss(net, image, truths, autocast)
+        terms = batch_loss(net, image, truths, autocast, pixel_head)
         loss = sum(terms.values())
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         stop_now = stopped
         if world > 1:
-            spent, stop_now = average_gradients(net, spent, stopped, world)
+            spent, stop_now = average_gradients(trained, spent, stopped, world)
         finished = stop_now or (step + 1 >= options.steps if options.steps else spent >= length)
-        norm = nn.utils.clip_grad_norm_(net.parameters(), 10.0)
+        norm = nn.utils.clip_grad_norm_(trained.parameters(), 10.0)
         if torch.isfinite(norm):
             optimiser.step()
             ema.update(net, step)

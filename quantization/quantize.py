@@ -52,6 +52,8 @@ def quantise_graph(source: Path, target: Path, samples: list[np.ndarray], settin
     """Writes the int8 form (QDQ) of one graph. Raises ValueError for a pattern that matches nothing."""
     if not samples:
         raise ValueError(f"nothing to calibrate {source.name} with: the bundle finds nobody in the images")
+    if settings.method != "minmax":
+        samples = equal_sizes(samples)
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
         model = onnx.load(source)
@@ -74,14 +76,22 @@ def quantise_graph(source: Path, target: Path, samples: list[np.ndarray], settin
         )
 
 
+def equal_sizes(arrays: list[np.ndarray]) -> list[np.ndarray]:
+    """[N, C, h, w] arrays as single samples [1, C, H, W] of one size, which histograms of activations need.
+
+    Pictures get zeros at the right and bottom, as at run time.
+    """
+    height, width = (max(array.shape[axis] for array in arrays) for axis in (2, 3))
+    singles = [single for array in arrays for single in np.split(array, len(array))]
+    return [np.pad(x, [(0, 0), (0, 0), (0, height - x.shape[2]), (0, width - x.shape[3])]) for x in singles]
+
+
 def matching_nodes(graph: onnx.GraphProto, patterns: tuple[str, ...]) -> list[str]:
     """Names of the nodes that match any of the patterns; every pattern must match some node."""
     names = [node.name for node in graph.node]
     for pattern in patterns:
         if not fnmatch.filter(names, pattern):
-            raise ValueError(
-                f"no node of {graph.name} is called {pattern}; names are like {', '.join(names[:4])}"
-            )
+            raise ValueError(f"no node of {graph.name} is called {pattern}; names are like {', '.join(names[:4])}")
     return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
@@ -110,16 +120,12 @@ def quantise_bundle(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bundle", type=Path, default=Path(".data/bundles/densepose-b-fp32"))
     parser.add_argument("--out", type=Path, default=Path("sdk/models/densepose-b-int8"))
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--data", type=Path, default=Path(".data/people/train"), help="calibration shards")
-    parser.add_argument(
-        "--held-out", type=Path, default=Path(".data/people/val"), help="shards to measure on"
-    )
+    parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), help="shards to measure on")
     parser.add_argument("--settings", type=Path, default=Path(__file__).with_name("densepose.toml"))
     options = parser.parse_args()
     settings = read_settings(options.settings)

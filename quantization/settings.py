@@ -51,9 +51,7 @@ def read_settings(path: Path) -> Settings:
         except TypeError as error:
             raise ValueError(f"{path}, [{name}]: {error}") from error
         if graphs[name].method not in METHODS:
-            raise ValueError(
-                f"{path}, [{name}]: method {graphs[name].method!r} is none of {', '.join(METHODS)}"
-            )
+            raise ValueError(f"{path}, [{name}]: method {graphs[name].method!r} is none of {', '.join(METHODS)}")
     try:
         return Settings(graphs, **values)
     except TypeError as error:

@@ -47,12 +47,9 @@ def rewrite(model: onnx.ModelProto) -> int:
             bias = numpy_helper.to_array(constants[node.input[2]])
             names.append(f"{node.name}/phases.bias")
             graph.initializer.append(numpy_helper.from_array(np.tile(bias, 4), names[2]))
-        phases = f"{node.name}/phases"
         phases, size = f"{node.name}/phases", {"kernel_shape": [3, 3], "pads": [1, 1, 1, 1]}
         nodes.append(helper.make_node("Conv", names, [phases], f"{node.name}/Conv", **size))
-        nodes.append(
-            helper.make_node("DepthToSpace", [phases], node.output, f"{node.name}/Spread", blocksize=2)
-        )
+        nodes.append(helper.make_node("DepthToSpace", [phases], node.output, f"{node.name}/Spread", blocksize=2))
         count += 1
     used = {name for node in nodes for name in node.input}
     kept = [value for value in graph.initializer if value.name in used]

@@ -10,7 +10,7 @@ from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 from quantization import transposed_convolution
 from quantization.errors import float_nodes_left, output_sqnr, sqnr_db
-from quantization.quantize import matching_nodes, quantise_graph, spread
+from quantization.quantize import equal_sizes, matching_nodes, quantise_graph, spread
 from quantization.settings import GraphSettings, read_settings
 
 WIDTH = 16
@@ -113,3 +113,18 @@ def test_signal_to_noise_in_decibels():
 def test_calibration_pictures_are_spread_over_the_shards():
     assert spread(list(range(100)), 5) == [0, 20, 40, 60, 80]
     assert spread([1, 2], 5) == [1, 2]
+
+
+def test_pictures_of_both_orientations_calibrate_together(folder, tmp_path):
+    arrays = [np.ones((1, 3, 32, 64), np.float32), np.ones((1, 3, 64, 32), np.float32)]
+    settings = GraphSettings(method="percentile")
+    quantise_graph(folder / "detector.onnx", tmp_path / "detector.onnx", arrays, settings)
+    padded = equal_sizes(arrays)
+    assert [array.shape for array in padded] == [(1, 3, 64, 64)] * 2
+    assert (padded[0][..., :32, :] == 1).all()
+    assert not padded[0][..., 32:, :].any()
+
+
+def test_people_calibrate_one_by_one():
+    people = np.arange(2 * 4 * 7 * 7, dtype=np.float32).reshape(2, 4, 7, 7)
+    assert np.array_equal(np.concatenate(equal_sizes([people, people[:1]])), people[[0, 1, 0]])

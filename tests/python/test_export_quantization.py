@@ -21,7 +21,12 @@ torch.set_num_threads(1)  # the graphs are small
 def folder(tmp_path_factory):
     torch.manual_seed(0)
     folder = tmp_path_factory.mktemp("bundle")
-    net = MobileParsingRCNN(NetworkConfig(width=WIDTH)).eval()
+    net = MobileParsingRCNN(NetworkConfig(width=WIDTH)).train()
+    for norm in (m for m in net.modules() if isinstance(m, torch.nn.BatchNorm2d)):
+        norm.momentum = None  # one pass sets the statistics, so that activations do not fade from layer to layer
+    with torch.no_grad():
+        net.detector(torch.randn(4, 3, 96, 96))
+    net.eval()
     torch.nn.init.normal_(net.box_head.logits.weight)
     export_onnx.export_graphs(net, folder)
     return folder
@@ -116,13 +121,15 @@ def test_calibration_pictures_are_spread_over_the_shards():
 
 
 def test_pictures_of_both_orientations_calibrate_together(folder, tmp_path):
-    arrays = [np.ones((1, 3, 32, 64), np.float32), np.ones((1, 3, 64, 32), np.float32)]
+    rng = np.random.default_rng(0)
+    arrays = [rng.standard_normal(shape).astype(np.float32) for shape in ((1, 3, 64, 96), (1, 3, 96, 64))]
+    padded = equal_sizes(arrays)
+    assert [array.shape for array in padded] == [(1, 3, 96, 96)] * 2
+    assert np.array_equal(padded[0][..., :64, :], arrays[0])
+    assert not padded[0][..., 64:, :].any()
     settings = GraphSettings(method="percentile")
     quantise_graph(folder / "detector.onnx", tmp_path / "detector.onnx", arrays, settings)
-    padded = equal_sizes(arrays)
-    assert [array.shape for array in padded] == [(1, 3, 64, 64)] * 2
-    assert (padded[0][..., :32, :] == 1).all()
-    assert not padded[0][..., 32:, :].any()
+    assert float_nodes_left(tmp_path / "detector.onnx") == []
 
 
 def test_people_calibrate_one_by_one():

@@ -92,7 +92,7 @@ def _zero_ad_clip(path: Path, order: list[str]):
     return _without_yaw(root, chest, _unit(np.stack(limbs, 1)))
 
 
-def _bullet_clip(path: Path):
+def bullet_clip(path: Path):
     """Reads one DeepMimic clip: duration, root position, then joint rotations (x forward, y up, z right)."""
     frames = np.array(json.loads(path.read_text())["Frames"])
 
@@ -131,7 +131,7 @@ def load_clips(split: str) -> Clips:
                 parts.append((*_zero_ad_clip(path, order), rider))
         for path in sorted(assets.bullet_motions().glob("humanoid3d_*.txt")):
             if split_of(path.stem) == split:
-                parts.append((*_bullet_clip(path), False))
+                parts.append((*bullet_clip(path), False))
         root, chest, limbs = (np.concatenate([p[k] for p in parts]).astype(np.float32) for k in range(3))
         rider = np.concatenate([np.full(len(p[0]), p[3]) for p in parts])
         ok = np.isfinite(limbs).all((1, 2)) & np.isfinite(root).all((1, 2)) & np.isfinite(chest).all((1, 2))

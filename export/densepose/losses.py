@@ -47,6 +47,29 @@ class PixelHead(nn.Conv2d):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__(config.width, 3 * config.index_classes, 1)
 
+    def index(self, features: Tensor) -> Tensor:
+        """Part logits [N, 25, h, w]."""
+        return self(features).chunk(3, 1)[0]
+
+    @staticmethod
+    def cells(label):
+        """Label [N, 4h, 4w, C] at the middle of each cell of P2: [N, h, w, C]."""
+        return label[:, 2::4, 2::4]
+
+
+def surface_loss(
+    net: MobileParsingRCNN,
+    image: Tensor,
+    truths: list[tg.Truth],
+    autocast: torch.autocast,
+    pixel_head: PixelHead,
+) -> dict[str, Tensor]:
+    """`pixel_head`'s weighted terms alone: backbone and neck learn the surface without boxes and RoIs."""
+    with autocast:
+        features = net.neck(net.backbone(image))[0]
+    terms = _pixel_terms(pixel_head(features.float()), torch.stack([t.label for t in truths]))
+    return {name: WEIGHTS[name] * value for name, value in terms.items()}
+
 
 def batch_loss(
     net: MobileParsingRCNN,
@@ -130,7 +153,7 @@ def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
 
 def _pixel_terms(output: Tensor, label: Tensor) -> dict[str, Tensor]:
     """output [N, 75, h, w] of P2; label uint8 [N, 4h, 4w, 4], read at the middle of each cell."""
-    label = label[:, 2::4, 2::4]
+    label = PixelHead.cells(label)
     part = label[..., 0].long()
     index, u, v = output.chunk(3, 1)
     terms = {"pixel_index": F.cross_entropy(index, part, weight=INDEX_WEIGHTS.to(index.device))}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
@@ -20,6 +20,9 @@ class Truth:
     instance: Tensor
     ignore: Tensor
     label: Tensor
+
+    def to(self, device: torch.device) -> Truth:
+        return Truth(*(getattr(self, field.name).to(device) for field in fields(self)))
 
 
 def _draw(mask: Tensor, count: int) -> Tensor:
@@ -101,7 +104,7 @@ def box_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, Ten
 def dense_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tensor]:
     """RoIs for the dense head: (boxes [P, 4], person [P]); shaken true boxes and proposals with IoU > 0.7."""
     wanted = (~truth.ignore).nonzero()[:, 0]
-    wanted = wanted[torch.randperm(len(wanted))[:count]]
+    wanted = wanted[torch.randperm(len(wanted), device=wanted.device)[:count]]
     if not len(wanted):
         return proposed.new_zeros(0, 4), wanted
     true = truth.box[wanted]
@@ -109,7 +112,7 @@ def dense_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, T
     shaken = true + size * torch.empty_like(true).uniform_(-0.06, 0.06)
     if len(proposed):
         iou, best = box_iou(true, proposed).max(1)
-        use = (iou > 0.7) & (torch.rand(len(wanted)) < 0.5)
+        use = (iou > 0.7) & (torch.rand(len(wanted), device=wanted.device) < 0.5)
         shaken = torch.where(use[:, None], proposed[best], shaken)
     return shaken, wanted
 
@@ -120,7 +123,7 @@ def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tens
     Channels are I, U*255, V*255. Other people's pixels and what lies outside the image are background.
     """
     height, width = truth.label.shape[:2]
-    at = (torch.arange(grid) + 0.5) / grid
+    at = (torch.arange(grid, device=boxes.device) + 0.5) / grid
     x = (boxes[:, :1] + at * (boxes[:, 2:3] - boxes[:, :1])).floor().long()
     y = (boxes[:, 1:2] + at * (boxes[:, 3:] - boxes[:, 1:2])).floor().long()
     inside = ((y >= 0) & (y < height))[:, :, None] & ((x >= 0) & (x < width))[:, None]
@@ -138,7 +141,7 @@ def pooled(
     """
     batch = torch.cat([torch.full((len(b), 1), float(k)) for k, b in enumerate(boxes)]).to(features[0])
     every = torch.cat([batch, torch.cat(boxes).to(features[0])], 1)
-    which = torch.zeros(len(every), dtype=torch.long) if level is not None else bx.levels_of(every[:, 1:], config)
+    which = every.new_zeros(len(every), dtype=torch.long) if level is not None else bx.levels_of(every[:, 1:], config)
     out = features[0].new_zeros(len(every), features[0].shape[1], pool, pool)
     for k in range(4):
         own = (which == k).nonzero()[:, 0]

@@ -147,12 +147,23 @@ def test_boxes_of_a_cut_are_around_what_is_left_of_a_person():
 def test_batches_depend_on_seed_and_number_alone():
     rng = np.random.default_rng(0)
     records = [as_record(*picture(rng)) for _ in range(5)]
-    straight = data.Batches(records, 2, seed=7)
-    straight.size = 64
     third = data.Batches(records, 2, seed=7).make(3, 64)[0]
-    assert torch.equal(straight.make(3, 64)[0], third)
-    assert not torch.equal(straight.make(2, 64)[0], third)
+    assert torch.equal(data.Batches(records, 2, seed=7).make(3, 64)[0], third)
+    assert not torch.equal(data.Batches(records, 2, seed=7).make(2, 64)[0], third)
     assert not torch.equal(data.Batches(records, 2, seed=8).make(3, 64)[0], third)
+    straight = data.Batches(records, 2, seed=7)
+    # Made ahead in another size or not: the fourth batch drawn is batch 3.
+    drawn = [straight.next(size)[0] for size in (32, 32, 96, 64, 96)]
+    straight.close()
+    assert torch.equal(drawn[3], third)
+    assert torch.equal(drawn[4], data.Batches(records, 2, seed=7).make(4, 96)[0])
+
+
+def test_an_error_while_a_batch_is_made_reaches_the_caller():
+    broken = data.Batches([data.Record(b"no picture", b"no label")], 1, seed=0)
+    with pytest.raises(ValueError, match="damaged picture"):
+        broken.next(64)
+    broken.close()
 
 
 def test_every_record_is_drawn_once_before_any_comes_again():

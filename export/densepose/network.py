@@ -126,20 +126,34 @@ class BoxHead(nn.Module):
         return self.logits(flat), self.deltas(flat)
 
 
+class ConvBnRelu(nn.Sequential):
+    """Convolution without bias, BN (folded into it at export), ReLU."""
+
+    def __init__(self, inputs: int, outputs: int, kernel: int, dilation: int = 1) -> None:
+        super().__init__(
+            nn.Conv2d(inputs, outputs, kernel, padding=dilation * (kernel // 2), dilation=dilation, bias=False),
+            nn.BatchNorm2d(outputs, momentum=0.03),
+            nn.ReLU(inplace=True),
+        )
+
+
 class Aspp(nn.Module):
-    """Five branches (1x1, three dilated 3x3, global mean) and their 1x1 mixture."""
+    """Five branches (1x1, three dilated 3x3, global mean) and their 1x1 mixture.
+
+    The mean's branch has one value a channel and RoI, too few for BN.
+    """
 
     def __init__(self, width: int, dilations: tuple[int, ...]) -> None:
         super().__init__()
-        self.branches = nn.ModuleList([nn.Conv2d(width, width, 1)])
-        self.branches.extend(nn.Conv2d(width, width, 3, padding=d, dilation=d) for d in dilations)
+        self.branches = nn.ModuleList([ConvBnRelu(width, width, 1)])
+        self.branches.extend(ConvBnRelu(width, width, 3, d) for d in dilations)
         self.context = nn.Conv2d(width, width, 1)
-        self.mix = nn.Conv2d(width * (len(self.branches) + 1), width, 1)
+        self.mix = ConvBnRelu(width * (len(self.branches) + 1), width, 1)
 
     def forward(self, x: Tensor) -> Tensor:
-        maps = [F.relu(branch(x)) for branch in self.branches]
+        maps = [branch(x) for branch in self.branches]
         context = F.relu(self.context(x.mean((2, 3), keepdim=True)))
-        return F.relu(self.mix(torch.cat([*maps, context.expand_as(maps[0])], 1)))
+        return self.mix(torch.cat([*maps, context.expand_as(maps[0])], 1))
 
 
 class DenseHead(nn.Module):
@@ -149,9 +163,7 @@ class DenseHead(nn.Module):
         super().__init__()
         width = config.width
         self.aspp = Aspp(width, config.aspp_dilations)
-        self.body = nn.Sequential(
-            *(m for _ in range(4) for m in (nn.Conv2d(width, width, 3, padding=1), nn.ReLU(inplace=True)))
-        )
+        self.body = nn.Sequential(*(ConvBnRelu(width, width, 3) for _ in range(4)))
         sizes = {
             "coarse": config.coarse_classes,
             "index": config.index_classes,
@@ -162,7 +174,8 @@ class DenseHead(nn.Module):
         for module in self.modules():
             if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
-                nn.init.zeros_(module.bias)
+                if module.bias is not None:
+                    nn.init.zeros_(module.bias)
 
     def forward(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         x = self.body(self.aspp(rois))

@@ -50,7 +50,7 @@ class Stage:
 # The trunk learns the surface first, on every pixel of small cuts, at four times the rate of the whole network.
 # Then small images first, since early on steps matter more than detail.
 CLOSE = data.Framing(towards_person=0.95, share=(0.6, 1.3))
-STAGES = (Stage(0.0, 128, CLOSE, surface_only=True), Stage(0.42, 160), Stage(0.7, 192), Stage(0.9, 256))
+STAGES = (Stage(0.0, 128, CLOSE, surface_only=True), Stage(0.36, 160), Stage(0.75, 192))
 
 
 class Ema:
@@ -120,19 +120,20 @@ def validate_surface(net: MobileParsingRCNN, pixel_head: PixelHead, records: lis
     return {"pixel_part": float(right / max(body, 1)), "pixel_mask_iou": float(both / max(either, 1))}
 
 
-def average_gradients(net: nn.Module, spent: float, stopped: bool, world: int) -> tuple[float, bool]:
+def average_gradients(parameters: list[nn.Parameter], spent: float, stopped: bool, world: int) -> tuple[float, bool]:
     """Means of the gradients over the processes, and one common clock and stop flag, in a single exchange.
 
     What all processes must decide alike (when to stop) may only depend on what is returned here.
     """
-    gradients = [torch.zeros_like(p) if p.grad is None else p.grad for p in net.parameters()]
+    gradients = [torch.zeros_like(p) if p.grad is None else p.grad for p in parameters]
     flat = torch.cat([*(g.flatten() for g in gradients), gradients[0].new_tensor([spent, float(stopped)])])
     torch.distributed.all_reduce(flat)
     flat /= world
     at = 0
-    for parameter in net.parameters():
-        parameter.grad = flat[at : at + parameter.numel()].view_as(parameter).clone()
-        at += parameter.numel()
+    for parameter, gradient in zip(parameters, gradients, strict=True):
+        # In the gradient's own memory: the fused optimiser takes for granted that it is laid out as the parameter.
+        parameter.grad = gradient.copy_(flat[at : at + gradient.numel()].view_as(gradient))
+        at += gradient.numel()
     return float(flat[-2]), bool(flat[-1] > 0)
 
 
@@ -182,6 +183,11 @@ def main() -> None:
     )
     if world > 1:
         torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
+    if world > 1 and device.type == "cpu" and hasattr(os, "sched_setaffinity"):
+        # Left to the scheduler, two processes spend a fifth of their time on one core.
+        local, beside = int(os.environ["LOCAL_RANK"]), int(os.environ["LOCAL_WORLD_SIZE"])
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, cores[local % len(cores) :: beside])
     torch.set_num_threads(options.threads or max(1, (os.cpu_count() or 1) // world))
     torch.manual_seed(options.seed)  # every process starts from the same weights
     options.out.mkdir(parents=True, exist_ok=True)
@@ -214,9 +220,11 @@ def main() -> None:
         print(f"resumed at step {step}, {spent / 60:.1f} of {options.minutes:g} minutes")
     elif options.init:
         saved = torch.load(options.init, map_location=device, weights_only=False)
-        net.load_state_dict(saved["ema"])
-        if "pixel_head" in saved:
-            pixel_head.load_state_dict(saved["pixel_head"])
+        fresh = net.load_state_dict(saved["ema"], strict=False).missing_keys
+        if fresh:
+            print(f"not in {options.init}, so untrained: {', '.join(sorted({n.split('.')[0] for n in fresh}))}")
+        if "pixel_ema" in saved:
+            pixel_head.load_state_dict(saved["pixel_ema"])
         ema.net.load_state_dict(trained.state_dict())
 
     def save() -> None:
@@ -285,7 +293,9 @@ def main() -> None:
         loss.backward()
         stop_now = stopped
         if world > 1:
-            spent, stop_now = average_gradients(trained, spent, stopped, world)
+            # What a stage leaves alone must keep no gradient, else weight decay would wear it down.
+            used = nn.ModuleList([net.backbone, net.neck, pixel_head]) if stage.surface_only else trained
+            spent, stop_now = average_gradients(list(used.parameters()), spent, stopped, world)
         finished = stop_now or (step + 1 >= options.steps if options.steps else spent >= length)
         norm = nn.utils.clip_grad_norm_(trained.parameters(), 10.0)
         if torch.isfinite(norm):

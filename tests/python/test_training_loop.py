@@ -1,5 +1,6 @@
 """Training learns, resumes where it stopped, and stops when it is told to."""
 
+import copy
 import json
 import os
 import signal
@@ -170,3 +171,24 @@ def test_averaged_weights_follow_slowly():
         net.weight += 1
     mean.update(net, step=100)
     assert torch.allclose(mean.net.weight, before + 0.5)
+
+
+def test_gradients_averaged_over_processes_move_weights_as_alone(tmp_path):
+    """Channels-last weights under the fused optimiser, which reads gradients as they lie in memory."""
+    torch.manual_seed(0)
+    alone = torch.nn.Conv2d(6, 8, 3).to(memory_format=torch.channels_last)
+    shared = copy.deepcopy(alone)
+    image = torch.randn(4, 6, 9, 9)
+    torch.distributed.init_process_group("gloo", init_method=f"file://{tmp_path}/meet", rank=0, world_size=1)
+    try:
+        for layer in (alone, shared):
+            optimiser = torch.optim.AdamW(layer.parameters(), lr=0.01, fused=True)
+            for _ in range(3):
+                optimiser.zero_grad()
+                layer(image)[:, :4].square().sum().backward()
+                if layer is shared:
+                    assert train.average_gradients(list(layer.parameters()), 2.5, False, 1) == (2.5, False)
+                optimiser.step()
+    finally:
+        torch.distributed.destroy_process_group()
+    assert torch.allclose(alone.weight, shared.weight, atol=1e-6)

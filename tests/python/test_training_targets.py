@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 from rectangle_people import picture
-from torchvision.ops import box_iou
+from torchvision.ops import box_iou, roi_align
 
 from export import surface
 from export.densepose import boxes as bx
@@ -172,3 +172,38 @@ def test_every_record_is_drawn_once_before_any_comes_again():
     drawn = [batches._shuffled(k) for k in range(14)]
     assert sorted(drawn[:7]) == sorted(drawn[7:]) == list(range(7))
     assert drawn[:7] != drawn[7:]
+
+
+def test_align_rois_equals_torchvisions_forwards_and_backwards():
+    torch.manual_seed(0)
+    corner = torch.rand(12, 2) * 30 - 6  # some reach over the border, some are long, some small
+    boxes = torch.cat([corner, corner + torch.rand(12, 2) * torch.tensor([40.0, 70.0]) + 0.5], 1)
+    boxes[0] = torch.tensor([-200.0, -200, 300, 300])
+    boxes[1] = torch.tensor([3.0, 4, 3.01, 4.01])
+    grad = torch.randn(12, 5, 16, 16)
+    results = []
+    for align in (
+        lambda f: tg.align_rois(f, boxes, 16),
+        lambda f: roi_align(f[None], [boxes], 16, 1.0, sampling_ratio=0, aligned=True),
+    ):
+        features = torch.linspace(-1, 1, 5 * 21 * 34).sin().mul(3).view(5, 21, 34).requires_grad_()
+        out = align(features)
+        out.backward(grad)
+        results.append((out, features.grad))
+    for own, theirs in zip(*results, strict=True):
+        assert torch.allclose(own, theirs, atol=2e-5)
+
+
+def test_pooled_rois_come_in_the_order_of_the_boxes():
+    config = NetworkConfig()
+    size = 256
+    features = [torch.randn(2, 3, size // s, size // s) for s in config.tap_strides]
+    boxes = [torch.tensor([[5.0, 5, 240, 250], [9, 9, 30, 40], [0, 0, 120, 130]]), torch.zeros(0, 4)]
+    boxes.append(torch.tensor([[50.0, 60, 70, 90], [3, 4, 200, 256]]))
+    features = [torch.cat([f, f.flip(2)[:1]]) for f in features]
+    for level in (None, 0):
+        found = tg.pooled(features, boxes, config, 7, level)
+        alone = [tg.pooled([f[n : n + 1] for f in features], [b[None]], config, 7, level)
+                 for n in (0, 2) for b in boxes[n]]  # fmt: skip
+        assert torch.allclose(found, torch.cat(alone), atol=1e-6)
+    assert tg.pooled(features, [torch.zeros(0, 4)] * 3, config, 7).shape == (0, 3, 7, 7)

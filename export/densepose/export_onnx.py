@@ -46,21 +46,21 @@ class FixedFusion(nn.Module):
 
 
 class SplitAspp(nn.Module):
-    """`Aspp` whose mixture is applied to the maps and to the context apart, then added."""
+    """`Aspp`, its batch normalisation folded, whose mixture takes the maps and the context apart, then adds."""
 
     def __init__(self, aspp: Aspp) -> None:
         super().__init__()
         self.branches, self.context = aspp.branches, aspp.context
-        width = aspp.context.out_channels
-        maps, weight = width * len(aspp.branches), aspp.mix.weight.detach()
+        width, mix = aspp.context.out_channels, aspp.mix[0]
+        maps, weight = width * len(aspp.branches), mix.weight.detach()
         self.mix_maps = nn.Conv2d(maps, width, 1)
         self.mix_context = nn.Conv2d(width, width, 1, bias=False)
         self.mix_maps.weight.data.copy_(weight[:, :maps])
-        self.mix_maps.bias.data.copy_(aspp.mix.bias.detach())
+        self.mix_maps.bias.data.copy_(mix.bias.detach())
         self.mix_context.weight.data.copy_(weight[:, maps:])
 
     def forward(self, x: Tensor) -> Tensor:
-        maps = torch.cat([F.relu(branch(x)) for branch in self.branches], 1)
+        maps = torch.cat([branch(x) for branch in self.branches], 1)
         context = F.relu(self.context(F.adaptive_avg_pool2d(x, 1)))
         return F.relu(self.mix_maps(maps) + self.mix_context(context))
 
@@ -83,6 +83,7 @@ def simplified(net: MobileParsingRCNN) -> MobileParsingRCNN:
     for module in list(net.modules()):
         if isinstance(module, nn.Sequential):
             _fold_batch_norm(module)
+    for module in list(net.modules()):
         for name, child in module.named_children():
             if isinstance(child, Fusion):
                 setattr(module, name, FixedFusion(child))

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,13 @@ def bundle_without_ties(tmp_path):
     return copy
 
 
+def from_left_to_right(found):
+    """The same people in another order: scores of the tiny bundle differ by rounding alone."""
+    order = np.argsort(found.box[:, 0])
+    number = np.concatenate([[0], 1 + np.argsort(order)]).astype(np.uint8)
+    return replace(found, box=found.box[order], score=found.score[order], inds=number[found.inds])
+
+
 @needs_library
 @pytest.mark.parametrize("size", [(320, 256), (256, 320), (331, 207), (640, 512)])
 def test_both_ways_give_the_same_people_and_the_same_picture(size, bundle_without_ties, monkeypatch):
@@ -85,6 +93,7 @@ def test_both_ways_give_the_same_people_and_the_same_picture(size, bundle_withou
     image = picture(*size)
     api, onnx = (kind(bundle_without_ties, 0.05).predict(image) for kind in (CApiBackend, OnnxBackend))
     assert len(api.box) == len(onnx.box) == 3
+    api, onnx = from_left_to_right(api), from_left_to_right(onnx)
     assert np.allclose(api.box, onnx.box, atol=0.01)
     assert np.allclose(api.score, onnx.score, atol=1e-4)
     assert (api.inds == onnx.inds).mean() > 0.999

@@ -137,7 +137,10 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     """Writes one person's labels into the still empty pixels of its box.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
-    at least 1); logits are resized (bilinear, half-pixel centres) before the argmax.
+    at least 1). A pixel is painted where the coarse classes other than background are together likelier than
+    background, with the best of the 24 parts. (The best single class against background, as DensePose decodes,
+    loses pixels between parts: each part's share is small there, their sum is not.) Log-odds and logits are
+    resized bilinearly with half-pixel centres.
     """
     height, width = instance.shape
     x0, y0 = int(box[0]), int(box[1])
@@ -146,8 +149,9 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     if x0 >= width or y0 >= height:
         return
     coarse, index, u, v = maps
-    both = F.interpolate(torch.cat([coarse, index])[None], (h, w), mode="bilinear", align_corners=False)[0]
-    part = torch.where(both[: len(coarse)].argmax(0) > 0, both[len(coarse) :].argmax(0), 0)
+    odds = coarse[1:].logsumexp(0, keepdim=True) - coarse[:1]
+    resized = F.interpolate(torch.cat([odds, index[1:]])[None], (h, w), mode="bilinear", align_corners=False)[0]
+    part = torch.where(resized[0] > 0, resized[1:].argmax(0) + 1, 0)
     chart = [_sampled(m, part).clamp(0, 1).mul(255).round() for m in (u, v)]
     label = torch.stack([part.float(), *chart], -1).byte().numpy()[: y1 - y0, : x1 - x0]
     empty = (instance[y0:y1, x0:x1] == 0) & (label[..., 0] > 0)

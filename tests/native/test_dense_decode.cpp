@@ -70,9 +70,17 @@ TEST(DenseDecode, EqualsTheReferenceOnRandomLogits) {
     for (auto* plane : {&logits.coarse, &logits.index}) {
       for (float& value : *plane) value = logit(random);
     }
+    for (size_t cell = 0; cell < 256; ++cell) logits.coarse[cell] += 4;  // about half of the cells are background
     for (auto* plane : {&logits.u, &logits.v}) {
       for (float& value : *plane) value = coordinate(random);
     }
+    std::vector<float> odds(256);
+    for (size_t cell = 0; cell < odds.size(); ++cell) {
+      double sum = 0;
+      for (size_t c = 1; c < kCoarse; ++c) sum += std::exp(double(logits.coarse[c * 256 + cell]));
+      odds[cell] = float(std::log(sum) - logits.coarse[cell]);
+    }
+    const std::vector<float> parts(logits.index.begin() + 256, logits.index.end());
     DensePlanes planes;
     planes.reset(70, 80);
     const maq::DecodeCounts counts = paint_person(logits.view(), box, 9, planes);
@@ -89,8 +97,9 @@ TEST(DenseDecode, EqualsTheReferenceOnRandomLogits) {
         }
         const double at_x = (in_x + 0.5) * 16 / rect.width - 0.5, at_y = (in_y + 0.5) * 16 / rect.height - 0.5;
         double margin = 1e9;
-        const int coarse = best_class(logits.coarse, kCoarse, 16, at_y, at_x, &margin);
-        const int part = coarse == 0 ? 0 : best_class(logits.index, kIndex, 16, at_y, at_x, &margin);
+        const double person = resized(odds.data(), 16, at_y, at_x);
+        margin = std::min(margin, std::abs(person));
+        const int part = person <= 0 ? 0 : 1 + best_class(parts, kIndex - 1, 16, at_y, at_x, &margin);
         if (margin < 1e-4) continue;  // float and double may disagree about a near tie
         ASSERT_EQ(planes.part[pixel], part) << x << " " << y;
         ASSERT_EQ(planes.person[pixel], part == 0 ? 0 : 9);
@@ -122,10 +131,42 @@ TEST(DenseDecode, TiesGoToTheLowestClass) {
   planes.reset(10, 10);
   EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
   EXPECT_EQ(planes.part[55], 6);
-  // All equal: background, class 0, wins.
-  const Logits equal(8);
+  // As likely as not: background.
+  for (float& value : logits.coarse) value = kNan;
+  logits.fill(logits.coarse, 0, 2);
+  logits.fill(logits.coarse, 3, 2);
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(equal.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+}
+
+TEST(DenseDecode, PartsCountTogetherAgainstBackground) {
+  Logits logits(8);
+  logits.fill(logits.index, 0, 9);
+  logits.fill(logits.index, 17, 1);
+  logits.fill(logits.coarse, 0, 1);  // 14 parts at 0: log(14) > 1, though background is the best single class
+  DensePlanes planes;
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  EXPECT_EQ(planes.part[55], 17);
+  logits.fill(logits.coarse, 0, 3);
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+}
+
+TEST(DenseDecode, InfiniteLogitsAreStable) {
+  Logits logits(8);
+  make_everybody_part(logits, 4);
+  const float infinity = std::numeric_limits<float>::infinity();
+  logits.fill(logits.coarse, 2, infinity);
+  DensePlanes planes;
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  logits.fill(logits.coarse, 2, -infinity);
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  logits.fill(logits.coarse, 0, infinity);
+  planes.reset(10, 10);
+  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
 }
 
 TEST(DenseDecode, LargeLogitsAreStable) {

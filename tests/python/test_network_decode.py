@@ -109,6 +109,17 @@ def test_coarse_background_wins_over_a_part():
     assert instance[32:].all()
 
 
+def test_parts_count_together_against_background():
+    coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
+    coarse[:] = 0
+    coarse[0, :32], coarse[0, 32:] = 1.0, 3.0  # log(14) = 2.64 lies between
+    index[0] = 20.0
+    iuv, instance = np.zeros((64, 64, 3), np.uint8), np.zeros((64, 64), np.uint8)
+    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance)
+    assert instance[:31].all()
+    assert not instance[33:].any()
+
+
 def test_coordinates_are_resized_with_half_pixel_centres():
     coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
     u = (torch.arange(64) / 63).expand(25, 64, 64)

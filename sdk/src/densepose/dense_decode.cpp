@@ -8,7 +8,7 @@ namespace maq {
 namespace {
 
 constexpr int kMostClasses = 64;
-// Below every logit, yet finite, so that it survives interpolation.
+// Below every logit, yet finite, so that it survives interpolation; -kNever bounds them from above.
 constexpr float kNever = -1e30f;
 constexpr int kLanes = 8;
 
@@ -53,7 +53,7 @@ class ClassRow {
     }
   }
 
-  // The class with the largest resized logit at a pixel; of equal ones the lowest. NaN never wins.
+  // The class with the largest resized logit at a pixel; of equal ones the lowest. NaN never wins; -1 if all are NaN.
   int best(const Tap& col) const {
     alignas(32) std::array<float, kMostClasses> mixed;
     const float* low = values_.data() + size_t(col.low) * size_t(padded_);
@@ -72,7 +72,7 @@ class ClassRow {
     for (int c = 0; c < classes_; ++c) {
       if (mixed[size_t(c)] == best) return c;
     }
-    return 0;
+    return -1;
   }
 
  private:
@@ -81,6 +81,25 @@ class ClassRow {
   int padded_;
   std::vector<float> values_;
 };
+
+// Of each cell log(p / (1 - p)), p the probability that it shows the person, whichever part: the logits of all coarse
+// classes but the background, summed as probabilities, against the background's. A class that is NaN counts as absent.
+std::vector<float> person_log_odds(const DenseLogits& logits) {
+  const size_t cells = size_t(logits.size) * size_t(logits.size);
+  const auto value = [&](int c, size_t cell) {
+    const float logit = logits.coarse[size_t(c) * cells + cell];
+    return std::isnan(logit) ? kNever : std::clamp(logit, kNever, -kNever);
+  };
+  std::vector<float> odds(cells);
+  for (size_t cell = 0; cell < cells; ++cell) {
+    float most = kNever;
+    for (int c = 1; c < logits.coarse_classes; ++c) most = std::max(most, value(c, cell));
+    float sum = 0;
+    for (int c = 1; c < logits.coarse_classes; ++c) sum += std::exp(value(c, cell) - most);
+    odds[cell] = most == kNever ? kNever : most + std::log(sum) - value(0, cell);
+  }
+  return odds;
+}
 
 float bilinear(const float* plane, int size, const Tap& row, const Tap& col) {
   const float* low = plane + size_t(row.low) * size_t(size);
@@ -122,9 +141,9 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
   const PixelRect rect = pixel_rect(box);
   const std::vector<Tap> rows = resize_taps(logits.size, rect.height);
   const std::vector<Tap> cols = resize_taps(logits.size, rect.width);
-  ClassRow coarse(logits.coarse_classes, logits.size);
-  ClassRow index(logits.index_classes, logits.size);
+  const std::vector<float> odds = person_log_odds(logits);
   const size_t plane_size = size_t(logits.size) * size_t(logits.size);
+  ClassRow parts(logits.index_classes - 1, logits.size);  // all but the background
 
   const int first_row = std::max(0, -rect.y);
   const int last_row = std::min(rect.height, planes.height_px - rect.y);
@@ -132,13 +151,12 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
   const int last_col = std::min(rect.width, planes.width_px - rect.x);
   for (int y = first_row; y < last_row; ++y) {
     const Tap& row = rows[size_t(y)];
-    coarse.fill(logits.coarse, row);
-    index.fill(logits.index, row);
+    parts.fill(logits.index + plane_size, row);
     for (int x = first_col; x < last_col; ++x) {
       const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
       const Tap& col = cols[size_t(x)];
-      if (planes.person[pixel] != 0 || coarse.best(col) == 0) continue;
-      const int part = index.best(col);
+      if (planes.person[pixel] != 0 || !(bilinear(odds.data(), logits.size, row, col) > 0)) continue;
+      const int part = parts.best(col) + 1;
       if (part == 0) continue;
       bool clamped = false;
       planes.part[pixel] = uint8_t(part);

@@ -11,7 +11,7 @@ namespace maq {
 // The dense head's output for one person.
 struct DenseLogits {
   const float* coarse = nullptr;  // [coarse_classes, size, size]; class 0 is background
-  const float* index = nullptr;   // [index_classes, size, size]; class 0 is background, then the parts
+  const float* index = nullptr;   // [index_classes, size, size]; class 0 is background (not read), then the parts
   const float* u = nullptr;       // [index_classes, size, size]
   const float* v = nullptr;       // [index_classes, size, size]
   int coarse_classes = 0;
@@ -39,9 +39,10 @@ struct PixelRect {
 };
 PixelRect pixel_rect(const Box& box);
 
-// Resizes the logits bilinearly (half-pixel centres) to the box's pixels and takes, where the best coarse class is not
-// background, the best part (of equal ones the lowest) with its U and V, clamped to [0, 1]. Pixels that already belong
-// to somebody, and those outside the image, are left alone. `person` counts from 1.
+// Paints where the coarse classes other than background are together likelier than it (log-odds of each cell, resized
+// bilinearly with half-pixel centres to the box's pixels): the best part of the resized index logits (of equal ones the
+// lowest; background is no longer asked) with its U and V, clamped to [0, 1]. Pixels that already belong to somebody,
+// and those outside the image, are left alone. `person` counts from 1.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, DensePlanes& planes);
 
 }  // namespace maq

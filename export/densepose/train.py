@@ -50,7 +50,7 @@ class Stage:
 # The trunk learns the surface first, on every pixel of small cuts, at four times the rate of the whole network.
 # Then small images first, since early on steps matter more than detail.
 CLOSE = data.Framing(towards_person=0.95, share=(0.6, 1.3))
-STAGES = (Stage(0.0, 128, CLOSE, surface_only=True), Stage(0.36, 160), Stage(0.75, 192))
+STAGES = (Stage(0.0, 128, CLOSE, surface_only=True), Stage(0.25, 160), Stage(0.78, 192))
 
 
 class Ema:

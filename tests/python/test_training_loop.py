@@ -12,7 +12,7 @@ from rectangle_people import write_shard
 
 from export.densepose import data, train
 from export.densepose.config import NetworkConfig
-from export.densepose.losses import PixelHead, batch_loss, surface_loss
+from export.densepose.losses import PixelHead, _dense_terms, batch_loss, surface_loss
 from export.densepose.network import MobileParsingRCNN
 
 
@@ -192,3 +192,21 @@ def test_gradients_averaged_over_processes_move_weights_as_alone(tmp_path):
     finally:
         torch.distributed.destroy_process_group()
     assert torch.allclose(alone.weight, shared.weight, atol=1e-6)
+
+
+def test_the_index_is_asked_about_body_pixels_alone():
+    torch.manual_seed(0)
+    label = torch.zeros(2, 4, 4, 3, dtype=torch.uint8)
+    label[:, 1:3, 1:3, 0] = 7
+    coarse, index, u, v = (
+        torch.randn(2, 15, 4, 4),
+        torch.randn(2, 25, 4, 4),
+        torch.zeros(2, 25, 4, 4),
+        torch.zeros(2, 25, 4, 4),
+    )
+    index.requires_grad_()
+    _dense_terms([coarse, index, u, v], label)["index"].backward()
+    assert index.grad[:, 1:, 1:3, 1:3].abs().min() > 0
+    assert not index.grad[:, 0].any()
+    assert not index.grad[:, :, 0].any()
+    assert _dense_terms([coarse, index, u, v], torch.zeros_like(label))["index"] == 0

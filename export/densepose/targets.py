@@ -155,8 +155,8 @@ def align_rois(features: Tensor, boxes: Tensor, pool: int) -> Tensor:
     """What torchvision's roi_align (aligned, sampling_ratio 0) gives for one image, by two matrix products.
 
     features: [C, h, w]; boxes: [R, 4] in cells. Returns [R, C, pool, pool]. A mean of bilinear samples on a
-    lattice is linear along each axis apart; torchvision takes ten times as long backwards, where it scatters
-    sample by sample.
+    lattice is linear along each axis apart; torchvision takes two to eight times as long backwards, where it
+    scatters sample by sample.
     """
     (rois, (channels, height, width)) = (len(boxes), features.shape)
     start, length = boxes[:, :2] - 0.5, boxes[:, 2:] - boxes[:, :2]

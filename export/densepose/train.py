@@ -268,7 +268,7 @@ def main() -> None:
     net.train()
     smooth: dict[str, float] = {}
     length = options.minutes * 60
-    stage = STAGES[0]
+    stage = STAGES[-1]  # of a run that is already finished
     clock = saved_at = checked_at = time.monotonic()
     bar = tqdm(total=round(length), initial=round(spent), unit="s", disable=rank > 0, smoothing=0)
     finished = step >= options.steps if options.steps else spent >= length

@@ -43,7 +43,7 @@ class Graphs:
 @dataclass(frozen=True)
 class Result:
     """boxes float32 [K, 4] in source pixels, scores float32 [K] (falling), iuv uint8 [H, W, 3] = (I, U*255,
-    V*255), instance uint8 [H, W] (k + 1 for person k, 0 for nobody)."""
+    V*255), instance uint8 [H, W] (k + 1 for person k, 0 for nobody). Everybody has at least one pixel."""
 
     boxes: np.ndarray
     scores: np.ndarray
@@ -113,10 +113,13 @@ def infer(
     iuv, instance = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
     if len(found.boxes):
         maps = graphs.dense_head(tg.pooled(found.features, [found.boxes], network, network.dense_pool, level=0))
-    scale = found.boxes.new_tensor(found.scale * 2)
-    for k, box in enumerate(found.boxes * scale):
-        paint([m[k] for m in maps], box.tolist(), k + 1, iuv, instance)
-    return Result((found.boxes * scale).numpy(), found.scores.numpy(), iuv, instance)
+    boxes = found.boxes * found.boxes.new_tensor(found.scale * 2)
+    painted: list[int] = []
+    for k, box in enumerate(boxes):
+        # A box without a single pixel of a body is a false alarm, or hidden behind the people in front of it.
+        if paint([m[k] for m in maps], box.tolist(), len(painted) + 1, iuv, instance):
+            painted.append(k)
+    return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance)
 
 
 def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: NetworkConfig,
@@ -133,8 +136,8 @@ def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: N
     return boxes[keep], scores[keep]
 
 
-def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, instance: np.ndarray) -> None:
-    """Writes one person's labels into the still empty pixels of its box.
+def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, instance: np.ndarray) -> int:
+    """Writes one person's labels into the still empty pixels of its box; returns how many it wrote.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
     at least 1). A pixel is painted where the coarse classes other than background are together likelier than
@@ -147,7 +150,7 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     w, h = max(int(box[2]) - x0, 1), max(int(box[3]) - y0, 1)
     x1, y1 = min(x0 + w, width), min(y0 + h, height)
     if x0 >= width or y0 >= height:
-        return
+        return 0
     coarse, index, u, v = maps
     odds = coarse[1:].logsumexp(0, keepdim=True) - coarse[:1]
     resized = F.interpolate(torch.cat([odds, index[1:]])[None], (h, w), mode="bilinear", align_corners=False)[0]
@@ -157,6 +160,7 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     empty = (instance[y0:y1, x0:x1] == 0) & (label[..., 0] > 0)
     iuv[y0:y1, x0:x1][empty] = label[empty]
     instance[y0:y1, x0:x1][empty] = number
+    return int(empty.sum())
 
 
 def _sampled(maps: Tensor, channel: Tensor) -> Tensor:

@@ -99,6 +99,18 @@ TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {
   EXPECT_EQ(result.stats.decoded.clamped_uv, clamped);
 }
 
+TEST_F(DensePose, ABoxHiddenBehindAnotherIsNoPerson) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;  // a person of 128 px
+  const maq::DensePoseResult alone = run(image);
+  image(cv::Rect(180, 132, 4, 4)) = kRed * 0.75;  // one of 32 px inside its body, with a worse score
+  const maq::DensePoseResult result = run(image);
+  EXPECT_EQ(result.people.size(), 1u);
+  EXPECT_EQ(result.planes.person, alone.planes.person);
+  image(cv::Rect(160, 96, 16, 16)) = cv::Scalar::all(0);
+  EXPECT_EQ(run(image).people.size(), 1u);  // it is seen when nobody is in front
+}
+
 TEST_F(DensePose, BoxesComeBackInPixelsOfTheFrame) {
   cv::Mat image = black(640, 512);
   image(cv::Rect(160, 200, 8, 8)) = kRed;  // the cell of the first test, at twice the size

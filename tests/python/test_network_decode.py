@@ -87,6 +87,22 @@ def test_no_more_people_than_asked_for():
     assert len(infer(fake_graphs(), IMAGE, CONFIG, few).boxes) == 2
 
 
+def test_a_box_without_a_painted_pixel_is_no_person():
+    someone, halves = fake_graphs(), iter([True, False] * 100)
+
+    def every_other_one_empty(rois):
+        coarse, *others = someone.dense_head(rois)
+        coarse[[k for k in range(len(rois)) if next(halves)], 0] = 20.0
+        return coarse, *others
+
+    everybody = infer(someone, IMAGE, CONFIG, DECODE)
+    left = infer(Graphs(someone.detector, someone.box_head, every_other_one_empty), IMAGE, CONFIG, DECODE)
+    assert 0 < len(left.boxes) < len(everybody.boxes)
+    assert len(left.scores) == len(left.boxes)
+    assert_sound(left, IMAGE)
+    assert sorted(set(left.instance.flat) - {0}) == list(range(1, len(left.boxes) + 1))
+
+
 def test_the_first_person_stays_in_front():
     maps = [m[0] for m in fake_graphs(part=3).dense_head(torch.zeros(1, 64, 32, 32))]
     later = [m[0] for m in fake_graphs(part=7).dense_head(torch.zeros(1, 64, 32, 32))]
@@ -135,7 +151,7 @@ def test_an_untrained_network_runs_end_to_end():
     anyone = DecodeConfig(long_side=160, score_threshold=0.0, max_people=3)
     result = infer(Graphs.of_network(net), IMAGE, CONFIG, anyone)
     assert_sound(result, IMAGE)
-    assert len(result.boxes) == 3
+    assert 1 <= len(result.boxes) <= 3  # whom the first ones cover has no pixel left
     assert list(result.scores) == sorted(result.scores, reverse=True)
 
 

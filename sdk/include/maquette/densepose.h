@@ -48,7 +48,7 @@ typedef struct maq_densepose_stats {
   int32_t network_width_px; /* the resized image, without padding */
   int32_t network_height_px;
   int32_t proposals;     /* boxes that reached the box head */
-  int32_t people;        /* boxes that reached the dense head */
+  int32_t people;        /* in the result */
   int32_t dropped_boxes; /* boxes with NaN, or with no area inside the frame */
   int64_t body_pixels;   /* pixels that belong to somebody */
   int64_t clamped_uv;    /* of these, pixels where the network's U or V was outside 0 to 1 */
@@ -82,7 +82,8 @@ MAQ_API void maq_densepose_result_release(maq_densepose_result* result);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px);
 
-/* The people found, best score first: `*people` points to `*count` of them, inside the result.
+/* The people found, best score first: `*people` points to `*count` of them, inside the result. Each has a pixel at
+ * least: a box with nothing of a body left to paint in it is no person.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_people(const maq_densepose_result* result, const maq_person** people,
                                                uint32_t* count);

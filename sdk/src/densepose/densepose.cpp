@@ -111,13 +111,6 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
       proposals.empty() ? proposals : run_box_head(pyramid, proposals, &stats.dropped_boxes);
   stats.box_head_ms = stage.lap_ms();
 
-  const float scale_x = float(image.width_px) / float(input_.width_px);
-  const float scale_y = float(image.height_px) / float(input_.height_px);
-  for (const ScoredBox& person : people) {
-    Box box = scaled(person.box, scale_x, scale_y);
-    clip_box(box, float(image.width_px), float(image.height_px));
-    result.people.push_back({box, person.score});
-  }
   if (!people.empty()) run_dense_head(pyramid, people, result);
   stats.total_ms = total.lap_ms();
 }
@@ -199,6 +192,8 @@ void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredB
                                                   {coarse_shape, index_shape, index_shape, index_shape});
   result.stats.dense_head_ms = stage.lap_ms();
 
+  const float scale_x = float(result.planes.width_px) / float(input_.width_px);
+  const float scale_y = float(result.planes.height_px) / float(input_.height_px);
   const size_t plane = size_t(spec.output) * size_t(spec.output);
   for (size_t i = 0; i < people.size(); ++i) {
     const size_t coarse_offset = i * size_t(spec.coarse_classes) * plane;
@@ -210,7 +205,11 @@ void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredB
                              spec.coarse_classes,
                              spec.index_classes,
                              spec.output};
-    const DecodeCounts counts = paint_person(logits, result.people[i].box, uint8_t(i + 1), result.planes);
+    Box box = scaled(people[i].box, scale_x, scale_y);
+    clip_box(box, float(result.planes.width_px), float(result.planes.height_px));
+    const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), result.planes);
+    // A box without a single pixel of a body is a false alarm, or hidden behind the people in front of it.
+    if (counts.body_pixels > 0) result.people.push_back({box, people[i].score});
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
   }

@@ -44,7 +44,7 @@ struct DensePoseStats {
 };
 
 struct DensePoseResult {
-  std::vector<Person> people;  // best score first
+  std::vector<Person> people;  // best score first; each has at least one pixel of `planes`
   DensePlanes planes;
   DensePoseStats stats;
 };
@@ -66,7 +66,7 @@ class DensePose {
 
   Pyramid run_detector();
   std::vector<ScoredBox> run_box_head(const Pyramid& pyramid, const std::vector<ScoredBox>& proposals, int* dropped);
-  // Paints the people, whose boxes are in pixels of the network's input.
+  // Paints the people, whose boxes are in pixels of the network's input, and adds those that got a pixel to `result`.
   void run_dense_head(const Pyramid& pyramid, const std::vector<ScoredBox>& people, DensePoseResult& result);
   const FeatureMap& level_for(const Pyramid& pyramid, const Box& box) const;
 

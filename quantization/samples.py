@@ -12,6 +12,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from export.densepose import targets as tg
+from export.densepose.bundle import decode_config
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import Record
 from export.densepose.decode import Graphs, detect
@@ -35,16 +36,6 @@ class Bundle:
 def open_bundle(folder: Path, threads: int = 1) -> Bundle:
     """Opens the graphs in ONNX Runtime."""
     manifest = json.loads((folder / "manifest.json").read_text())
-    rpn, head = manifest["rpn"], manifest["box_head"]
-    decode = DecodeConfig(
-        long_side=manifest["input"]["long_side"],
-        pre_nms_top_k=rpn["pre_nms_top_k"],
-        post_nms_top_k=rpn["post_nms_top_k"],
-        rpn_nms_iou=rpn["nms_iou"],
-        score_threshold=head["score_threshold"],
-        box_nms_iou=head["nms_iou"],
-        max_people=head["max_people"],
-    )
     width = manifest["graphs"]["box_head"]["inputs"][0]["shape"][1]
     sessions = {name: session(folder / entry["file"], threads) for name, entry in manifest["graphs"].items()}
 
@@ -59,7 +50,7 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
         return found[:4], found[4:9], found[9:]
 
     graphs = Graphs(detector, lambda x: tuple(run("box_head", x)), lambda x: tuple(run("dense_head", x)))
-    return Bundle(folder, manifest, NetworkConfig(width=width), decode, graphs)
+    return Bundle(folder, manifest, NetworkConfig(width=width), decode_config(manifest), graphs)
 
 
 def collect(bundle: Bundle, records: list[Record], people: int) -> dict[str, list[np.ndarray]]:

@@ -121,6 +121,7 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
             "output": 2 * network.dense_pool,
             "coarse_classes": network.coarse_classes,
             "index_classes": network.index_classes,
+            "mask_threshold": decode.mask_threshold,
         },
         "licence": LICENCE,
         "training_data": list(info.training_data),
@@ -128,6 +129,21 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
     }
     (folder / "manifest.json").write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n")
     return manifest
+
+
+def decode_config(manifest: dict) -> DecodeConfig:
+    """Thresholds and limits that a manifest asks for."""
+    rpn, head = manifest["rpn"], manifest["box_head"]
+    return DecodeConfig(
+        long_side=manifest["input"]["long_side"],
+        pre_nms_top_k=rpn["pre_nms_top_k"],
+        post_nms_top_k=rpn["post_nms_top_k"],
+        rpn_nms_iou=rpn["nms_iou"],
+        score_threshold=head["score_threshold"],
+        box_nms_iou=head["nms_iou"],
+        max_people=head["max_people"],
+        mask_threshold=manifest["dense_head"]["mask_threshold"],
+    )
 
 
 def bytes_of(folder: Path) -> int:

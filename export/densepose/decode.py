@@ -6,6 +6,7 @@ the reference that the C++ runtime is compared with.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -117,7 +118,7 @@ def infer(
     painted: list[int] = []
     for k, box in enumerate(boxes):
         # A box without a single pixel of a body is a false alarm, or hidden behind the people in front of it.
-        if paint([m[k] for m in maps], box.tolist(), len(painted) + 1, iuv, instance):
+        if paint([m[k] for m in maps], box.tolist(), len(painted) + 1, iuv, instance, config.mask_threshold):
             painted.append(k)
     return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance)
 
@@ -136,12 +137,13 @@ def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: N
     return boxes[keep], scores[keep]
 
 
-def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, instance: np.ndarray) -> int:
+def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, instance: np.ndarray,
+          mask_threshold: float = 0.5) -> int:  # fmt: skip
     """Writes one person's labels into the still empty pixels of its box; returns how many it wrote.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
-    at least 1). A pixel is painted where the coarse classes other than background are together likelier than
-    background, with the best of the 24 parts. (The best single class against background, as DensePose decodes,
+    at least 1). A pixel is painted where the coarse classes other than background together have a probability above
+    `mask_threshold`, with the best of the 24 parts. (The best single class against background, as DensePose decodes,
     loses pixels between parts: each part's share is small there, their sum is not.) Log-odds and logits are
     resized bilinearly with half-pixel centres.
     """
@@ -154,7 +156,8 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     coarse, index, u, v = maps
     odds = coarse[1:].logsumexp(0, keepdim=True) - coarse[:1]
     resized = F.interpolate(torch.cat([odds, index[1:]])[None], (h, w), mode="bilinear", align_corners=False)[0]
-    part = torch.where(resized[0] > 0, resized[1:].argmax(0) + 1, 0)
+    least = math.log(mask_threshold / (1 - mask_threshold))
+    part = torch.where(resized[0] > least, resized[1:].argmax(0) + 1, 0)
     chart = [_sampled(m, part).clamp(0, 1).mul(255).round() for m in (u, v)]
     label = torch.stack([part.float(), *chart], -1).byte().numpy()[: y1 - y0, : x1 - x0]
     empty = (instance[y0:y1, x0:x1] == 0) & (label[..., 0] > 0)

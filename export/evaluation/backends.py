@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -97,7 +97,8 @@ class OnnxBackend:
 
     def __init__(self, path: Path, score_floor: float) -> None:
         from export.densepose import decode
-        from export.densepose.config import DecodeConfig, NetworkConfig
+        from export.densepose.bundle import decode_config
+        from export.densepose.config import NetworkConfig
 
         manifest = read_manifest(path)
         given = manifest["input"]
@@ -113,15 +114,7 @@ class OnnxBackend:
             rpn_strides=tuple(rpn["strides"]),
             delta_weights=tuple(head["delta_weights"]),
         )
-        self._decode = DecodeConfig(
-            long_side=given["long_side"],
-            pre_nms_top_k=rpn["pre_nms_top_k"],
-            post_nms_top_k=rpn["post_nms_top_k"],
-            rpn_nms_iou=rpn["nms_iou"],
-            score_threshold=score_floor,
-            box_nms_iou=head["nms_iou"],
-            max_people=head["max_people"],
-        )
+        self._decode = replace(decode_config(manifest), score_threshold=score_floor)
         graphs = {name: OnnxGraph(path, entry) for name, entry in manifest["graphs"].items()}
 
         def detector(image):

@@ -185,6 +185,7 @@ def main():
             "output": OUTPUT,
             "coarse_classes": COARSE,
             "index_classes": INDEX,
+            "mask_threshold": 0.5,
         },
         "licence": "Apache-2.0",
         "training_data": [],

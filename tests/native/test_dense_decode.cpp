@@ -31,6 +31,11 @@ struct Logits {
   int size;
 };
 
+maq::DecodeCounts paint(const Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
+                        float mask_threshold = 0.5f) {
+  return paint_person(logits.view(), box, person, mask_threshold, planes);
+}
+
 // The value of a bilinearly resized plane (half-pixel centres, edges repeated) in double.
 double resized(const float* plane, int size, double y, double x) {
   const auto tap = [size](double at, int* low, int* high, double* fraction) {
@@ -83,7 +88,7 @@ TEST(DenseDecode, EqualsTheReferenceOnRandomLogits) {
     const std::vector<float> parts(logits.index.begin() + 256, logits.index.end());
     DensePlanes planes;
     planes.reset(70, 80);
-    const maq::DecodeCounts counts = paint_person(logits.view(), box, 9, planes);
+    const maq::DecodeCounts counts = paint(logits, box, 9, planes);
     const maq::PixelRect rect = maq::pixel_rect(box);
     int64_t body = 0;
     for (int y = 0; y < 80; ++y) {
@@ -118,7 +123,7 @@ TEST(DenseDecode, BackgroundOfTheCoarseHeadGatesTheParts) {
   logits.fill(logits.coarse, 0, 6);
   DensePlanes planes;
   planes.reset(20, 20);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 20, 20}, 1, planes).body_pixels, 0);
+  EXPECT_EQ(paint(logits, {0, 0, 20, 20}, 1, planes).body_pixels, 0);
 }
 
 TEST(DenseDecode, TiesGoToTheLowestClass) {
@@ -129,14 +134,14 @@ TEST(DenseDecode, TiesGoToTheLowestClass) {
   logits.fill(logits.index, 20, 2);
   DensePlanes planes;
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).body_pixels, 100);
   EXPECT_EQ(planes.part[55], 6);
   // As likely as not: background.
   for (float& value : logits.coarse) value = kNan;
   logits.fill(logits.coarse, 0, 2);
   logits.fill(logits.coarse, 3, 2);
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).body_pixels, 0);
 }
 
 TEST(DenseDecode, PartsCountTogetherAgainstBackground) {
@@ -146,11 +151,23 @@ TEST(DenseDecode, PartsCountTogetherAgainstBackground) {
   logits.fill(logits.coarse, 0, 1);  // 14 parts at 0: log(14) > 1, though background is the best single class
   DensePlanes planes;
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).body_pixels, 100);
   EXPECT_EQ(planes.part[55], 17);
   logits.fill(logits.coarse, 0, 3);
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+}
+
+TEST(DenseDecode, PaintsAboveTheMaskThreshold) {
+  Logits logits(8);
+  for (float& value : logits.coarse) value = kNan;
+  logits.fill(logits.coarse, 0, 0);
+  logits.fill(logits.coarse, 7, std::log(0.3f / 0.7f));  // a person with probability 0.3
+  for (const auto& [threshold, painted] : {std::pair{0.5f, 0}, {0.31f, 0}, {0.29f, 100}}) {
+    DensePlanes planes;
+    planes.reset(10, 10);
+    EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes, threshold).body_pixels, painted) << threshold;
+  }
 }
 
 TEST(DenseDecode, InfiniteLogitsAreStable) {
@@ -160,13 +177,13 @@ TEST(DenseDecode, InfiniteLogitsAreStable) {
   logits.fill(logits.coarse, 2, infinity);
   DensePlanes planes;
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).body_pixels, 100);
   logits.fill(logits.coarse, 2, -infinity);
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 100);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).body_pixels, 100);
   logits.fill(logits.coarse, 0, infinity);
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).body_pixels, 0);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).body_pixels, 0);
 }
 
 TEST(DenseDecode, LargeLogitsAreStable) {
@@ -177,7 +194,7 @@ TEST(DenseDecode, LargeLogitsAreStable) {
   logits.fill(logits.index, 24, 80);
   DensePlanes planes;
   planes.reset(4, 4);
-  paint_person(logits.view(), {0, 0, 4, 4}, 1, planes);
+  paint(logits, {0, 0, 4, 4}, 1, planes);
   for (const uint8_t part : planes.part) EXPECT_EQ(part, 24);
 }
 
@@ -188,13 +205,13 @@ TEST(DenseDecode, UAndVAreClampedAndCountedAndNanIsZero) {
   logits.fill(logits.v, 2, -0.5f);
   DensePlanes planes;
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).clamped_uv, 100);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).clamped_uv, 100);
   EXPECT_EQ(planes.u[0], 255);
   EXPECT_EQ(planes.v[0], 0);
   logits.fill(logits.u, 2, kNan);
   logits.fill(logits.v, 2, 0.5f);
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 10, 10}, 1, planes).clamped_uv, 100);
+  EXPECT_EQ(paint(logits, {0, 0, 10, 10}, 1, planes).clamped_uv, 100);
   EXPECT_EQ(planes.u[0], 0);
   EXPECT_EQ(planes.v[0], 128);
 }
@@ -206,11 +223,11 @@ TEST(DenseDecode, NanLogitsNeverWin) {
   logits.fill(logits.index, 9, kNan);
   DensePlanes planes;
   planes.reset(4, 4);
-  paint_person(logits.view(), {0, 0, 4, 4}, 1, planes);
+  paint(logits, {0, 0, 4, 4}, 1, planes);
   for (const uint8_t part : planes.part) EXPECT_EQ(part, 2);
   for (float& value : logits.coarse) value = kNan;
   planes.reset(4, 4);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 4, 4}, 1, planes).body_pixels, 0);
+  EXPECT_EQ(paint(logits, {0, 0, 4, 4}, 1, planes).body_pixels, 0);
 }
 
 TEST(DenseDecode, WhoIsPaintedFirstStaysInFront) {
@@ -218,8 +235,8 @@ TEST(DenseDecode, WhoIsPaintedFirstStaysInFront) {
   make_everybody_part(logits, 2);
   DensePlanes planes;
   planes.reset(20, 10);
-  paint_person(logits.view(), {0, 0, 12, 10}, 1, planes);
-  EXPECT_EQ(paint_person(logits.view(), {8, 0, 20, 10}, 2, planes).body_pixels, 80);
+  paint(logits, {0, 0, 12, 10}, 1, planes);
+  EXPECT_EQ(paint(logits, {8, 0, 20, 10}, 2, planes).body_pixels, 80);
   EXPECT_EQ(planes.person[10], 1);
   EXPECT_EQ(planes.person[12], 2);
 }
@@ -233,9 +250,9 @@ TEST(DenseDecode, BoxesCoverAtLeastOnePixelAndNothingOutsideTheImage) {
   make_everybody_part(logits, 2);
   DensePlanes planes;
   planes.reset(10, 10);
-  EXPECT_EQ(paint_person(logits.view(), {-100, -100, 200, 200}, 1, planes).body_pixels, 100);
+  EXPECT_EQ(paint(logits, {-100, -100, 200, 200}, 1, planes).body_pixels, 100);
   planes.reset(1, 1);
-  EXPECT_EQ(paint_person(logits.view(), {0, 0, 0.5f, 0.5f}, 1, planes).body_pixels, 1);
+  EXPECT_EQ(paint(logits, {0, 0, 0.5f, 0.5f}, 1, planes).body_pixels, 1);
 }
 
 }  // namespace

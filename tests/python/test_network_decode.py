@@ -1,5 +1,7 @@
 """The reference decode gives a right picture, also for networks and images that are not well behaved."""
 
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -101,6 +103,16 @@ def test_a_box_without_a_painted_pixel_is_no_person():
     assert len(left.scores) == len(left.boxes)
     assert_sound(left, IMAGE)
     assert sorted(set(left.instance.flat) - {0}) == list(range(1, len(left.boxes) + 1))
+
+
+def test_painted_where_the_person_is_likelier_than_the_threshold():
+    coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
+    coarse[:] = -torch.inf
+    coarse[0], coarse[7] = 0.0, math.log(0.3 / 0.7)  # a person with probability 0.3
+    for threshold, painted in ((0.5, 0), (0.31, 0), (0.29, 1600)):
+        iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
+        assert paint([coarse, index, u, v], [0, 0, 40, 40], 1, iuv, instance, threshold) == painted
+        assert instance.sum() == painted
 
 
 def test_the_first_person_stays_in_front():

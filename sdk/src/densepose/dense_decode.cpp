@@ -136,12 +136,14 @@ PixelRect pixel_rect(const Box& box) {
   return {x, y, std::max(1, int(std::floor(box.x1)) - x), std::max(1, int(std::floor(box.y1)) - y)};
 }
 
-DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, DensePlanes& planes) {
+DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
+                          DensePlanes& planes) {
   DecodeCounts counts;
   const PixelRect rect = pixel_rect(box);
   const std::vector<Tap> rows = resize_taps(logits.size, rect.height);
   const std::vector<Tap> cols = resize_taps(logits.size, rect.width);
   const std::vector<float> odds = person_log_odds(logits);
+  const float least_odds = std::log(mask_threshold / (1 - mask_threshold));
   const size_t plane_size = size_t(logits.size) * size_t(logits.size);
   ClassRow parts(logits.index_classes - 1, logits.size);  // all but the background
 
@@ -155,7 +157,7 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
     for (int x = first_col; x < last_col; ++x) {
       const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
       const Tap& col = cols[size_t(x)];
-      if (planes.person[pixel] != 0 || !(bilinear(odds.data(), logits.size, row, col) > 0)) continue;
+      if (planes.person[pixel] != 0 || !(bilinear(odds.data(), logits.size, row, col) > least_odds)) continue;
       const int part = parts.best(col) + 1;
       if (part == 0) continue;
       bool clamped = false;

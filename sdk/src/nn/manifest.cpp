@@ -161,6 +161,7 @@ DenseHeadSpec read_dense_head(const Node& node) {
   head.output = node.at("output").integer(1, 512);
   head.coarse_classes = node.at("coarse_classes").integer(2, 64);
   head.index_classes = node.at("index_classes").integer(2, 64);
+  head.mask_threshold = node.at("mask_threshold").number(0.001, 0.999);
   return head;
 }
 

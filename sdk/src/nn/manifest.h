@@ -63,6 +63,7 @@ struct DenseHeadSpec {
   int output = 0;
   int coarse_classes = 0;
   int index_classes = 0;
+  float mask_threshold = 0;
 };
 
 struct Manifest {

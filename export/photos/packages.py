@@ -46,8 +46,8 @@ class Package:
     notice: str = ""
 
 
-def load_packages() -> dict[str, Package]:
-    with open(FOLDER / "packages.toml", "rb") as file:
+def load_packages(path: Path = FOLDER / "packages.toml") -> dict[str, Package]:
+    with open(path, "rb") as file:
         table = tomllib.load(file)
     return {name: Package(name=name, **entry) for name, entry in table.items()}
 

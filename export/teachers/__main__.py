@@ -1,0 +1,95 @@
+"""Labels real photographs by permissively licensed networks: boxes, 33 landmarks and a mask for each person."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+from tqdm import tqdm
+
+from export.photos.packages import PackageError
+from export.teachers.label import PhotoLabels, draw, label_photo
+
+EPILOG = """\
+example:
+  python -m export.photos people && python -m export.teachers
+
+Writes OUT/NAME.npz for every photo (export.teachers.label.PhotoLabels) and OUT/sheet.jpg to look at: green boxes where
+detector, landmarks and mask agree, red ones where only the detector speaks. Photos with labels are not asked again.
+"""
+TILE = (420, 320)
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m export.teachers", description=__doc__, epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("--photos", type=Path, default=Path(".data/photos/photo"), metavar="DIR")
+    parser.add_argument("--out", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
+    parser.add_argument("--force", action="store_true", help="ask again for photos that have labels")
+    arguments = parser.parse_args(argv)
+    photos = sorted(p for p in arguments.photos.glob("*") if p.suffix in (".jpg", ".jpeg", ".png"))
+    if not photos:
+        print(f"No photos in {arguments.photos}: run `python -m export.photos people` first.", file=sys.stderr)
+        return 1
+    try:
+        found = label_all(photos, arguments.out, arguments.force)
+    except PackageError as error:
+        print(error, file=sys.stderr)
+        return 1
+    tiles = [tile(draw(cv2.imread(str(path)), labels)) for path, labels in found.items()]
+    cv2.imwrite(str(arguments.out / "sheet.jpg"), sheet(tiles))
+    people, sure = (sum(int(count(labels)) for labels in found.values()) for count in (_people, _sure))
+    print(
+        f"{len(found)} photos, {people} people found, {sure} of them with landmarks and mask; {arguments.out}/sheet.jpg"
+    )
+    return 0
+
+
+def label_all(photos: list[Path], out: Path, force: bool = False) -> dict[Path, PhotoLabels]:
+    teachers = None
+    found = {}
+    for photo in tqdm(photos, desc="labelling", unit="photo", disable=None):
+        path = out / f"{photo.stem}.npz"
+        if force or not path.exists():
+            teachers = teachers or _teachers()
+            label_photo(cv2.imread(str(photo)), *teachers).save(path)
+        found[photo] = PhotoLabels.load(path)
+    return found
+
+
+def _teachers():
+    from export.teachers.detector import PersonDetector
+    from export.teachers.landmarks import LandmarkNetwork
+
+    return PersonDetector().detect, LandmarkNetwork().find
+
+
+def _people(labels: PhotoLabels) -> int:
+    return len(labels.box)
+
+
+def _sure(labels: PhotoLabels) -> int:
+    return int(labels.sure.sum())
+
+
+def tile(image: np.ndarray) -> np.ndarray:
+    scale = min(TILE[0] / image.shape[1], TILE[1] / image.shape[0])
+    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)[: TILE[1], : TILE[0]]
+    out = np.zeros((TILE[1], TILE[0], 3), np.uint8)
+    out[: small.shape[0], : small.shape[1]] = small
+    return out
+
+
+def sheet(tiles: list[np.ndarray], columns: int = 4) -> np.ndarray:
+    blank = np.zeros_like(tiles[0])
+    rows = [tiles[k : k + columns] for k in range(0, len(tiles), columns)]
+    return np.vstack([np.hstack(row + [blank] * (columns - len(row))) for row in rows])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

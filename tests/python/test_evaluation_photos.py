@@ -1,0 +1,107 @@
+"""The figures on real photographs, where the answer is known."""
+
+import numpy as np
+import pytest
+
+from export.evaluation.average_precision import ImageMatches
+from export.evaluation.backends import Prediction
+from export.evaluation.photos import Tally, recall_at_precision
+from export.teachers.label import PhotoLabels
+from export.teachers.landmarks import NAMES
+
+SIZE = 200
+BOX = np.array([[40, 20, 120, 180]], np.float32)
+
+
+def labels(box=BOX, score=0.9, sure=True, **landmarks) -> PhotoLabels:
+    """One person whose mask fills the box; landmarks by name (underscores for blanks), the others not visible."""
+    point, visible = np.zeros((1, 33, 2), np.float32), np.zeros((1, 33), np.float32)
+    for name, at in landmarks.items():
+        point[0, NAMES.index(name.replace("_", " "))], visible[0, NAMES.index(name.replace("_", " "))] = at, 0.9
+    mask = np.zeros((1, SIZE, SIZE), bool)
+    x0, y0, x1, y1 = box[0].astype(int)
+    mask[0, y0:y1, x0:x1] = True
+    world = np.zeros((1, 33, 3), np.float32)
+    return PhotoLabels(box, np.array([score], np.float32), np.array([sure]), point, visible, world, mask)
+
+
+def painted(part: int, box=BOX, score=0.8, rows=slice(None)) -> Prediction:
+    """One person whose box is painted with one part, or only some of its rows."""
+    iuv, inds = np.zeros((SIZE, SIZE, 3), np.uint8), np.zeros((SIZE, SIZE), np.uint8)
+    x0, y0, x1, y1 = box[0].astype(int)
+    inds[y0:y1, x0:x1][rows] = 1
+    iuv[..., 0] = part * inds
+    return Prediction(box, np.array([score], np.float32), iuv, inds)
+
+
+NOBODY = Prediction(
+    np.zeros((0, 4)), np.zeros(0), np.zeros((SIZE, SIZE, 3), np.uint8), np.zeros((SIZE, SIZE), np.uint8)
+)
+
+
+def figures(found: Prediction, truth: PhotoLabels):
+    tally = Tally(0.5)
+    tally.add(found, truth)
+    return tally.figures()
+
+
+def test_a_perfect_answer_has_perfect_figures():
+    got = figures(painted(10), labels(left_hip=(60, 100), left_knee=(60, 150)))
+    assert (got.recall_at_precision, got.recall_shown, got.precision_shown) == (1, 1, 1)
+    assert (got.mask_iou, got.part_at_landmark, got.left_right) == (1, 1, 1)
+
+
+def test_nobody_found_counts_as_wrong_everywhere():
+    got = figures(NOBODY, labels(left_hip=(60, 100)))
+    assert (got.recall_at_precision, got.mask_iou, got.part_at_landmark) == (0, 0, 0)
+    assert np.isnan(got.precision_shown)
+    assert np.isnan(got.left_right)  # no limb is painted there
+
+
+def test_half_a_mask_is_half_an_iou():
+    assert figures(painted(2, rows=slice(0, 80)), labels()).mask_iou == pytest.approx(0.5)
+
+
+def test_the_wrong_leg_is_wrong_in_part_and_side_but_the_torso_has_no_side():
+    truth = labels(left_knee=(60, 150), right_knee=(100, 150))
+    assert (figures(painted(9), truth).part_at_landmark, figures(painted(9), truth).left_right) == (0.5, 0.5)
+    assert np.isnan(figures(painted(1), truth).left_right)
+
+
+def test_landmarks_outside_photo_or_mask_are_not_asked_for():
+    truth = labels(left_knee=(60, 500), right_knee=(10, 10), left_hip=(60, 100))
+    assert figures(painted(8), truth).landmark["left hip"] == 1
+    assert np.isnan(figures(painted(8), truth).landmark["left knee"])
+    assert np.isnan(figures(painted(8), truth).landmark["right knee"])
+
+
+@pytest.mark.parametrize("truth", [labels(score=0.4), labels(box=BOX * [1, 1, 1, 0.3])])
+def test_unsure_and_small_people_count_neither_way(truth):
+    hit, missed = figures(painted(2, box=truth.box), truth), figures(NOBODY, truth)
+    assert hit.people == missed.people == hit.masks == 0
+    assert np.isnan(hit.recall_shown)
+    assert np.isnan(hit.precision_shown)
+
+
+def test_a_second_box_on_the_same_person_is_a_false_one():
+    first = painted(2)
+    twice = Prediction(np.repeat(BOX, 2, 0), np.array([0.9, 0.8]), first.iuv, first.inds)
+    assert figures(twice, labels()).precision_shown == 0.5
+
+
+def test_people_in_empty_photos_are_counted_from_the_threshold_on():
+    tally = Tally(0.5)
+    for found in (painted(2, score=0.8), painted(2, score=0.4), NOBODY, NOBODY):
+        tally.add_empty(found)
+    assert tally.figures().false_people == 0.25
+
+
+def test_recall_at_precision_takes_the_best_cut():
+    score = np.array([0.9, 0.8, 0.7, 0.6, 0.5])
+    right = np.array([1, 1, 0, 1, 1.0])
+    one_each = np.diag(right)  # five people, each detection right or on nobody
+    assert recall_at_precision([ImageMatches(score, one_each, np.zeros(5))], 0.9) == pytest.approx(2 / 5)
+    assert recall_at_precision([ImageMatches(score, one_each, np.zeros(5))], 0.8) == pytest.approx(4 / 5)
+    assert recall_at_precision([ImageMatches(score, one_each, np.array([0, 0, 1, 0, 0.0]))], 0.9) == pytest.approx(
+        4 / 5
+    )

@@ -1,0 +1,141 @@
+"""Labels from teachers are kept where the teachers agree. The teachers here are stand-ins: no model is fetched."""
+
+import numpy as np
+import pytest
+
+from export.teachers import detector, landmarks
+from export.teachers.label import PhotoLabels, agrees, draw, label_photo
+from export.teachers.landmarks import SIDE, LandmarkNetwork, Landmarks
+
+IMAGE = np.full((120, 200, 3), 128, np.uint8)
+BOXES = np.array([[20, 10, 60, 110], [100, 10, 150, 110], [160, 20, 190, 100]], np.float32)
+
+
+def person(box, shrink=0) -> Landmarks:
+    mask = np.zeros(IMAGE.shape[:2], np.float32)
+    x0, y0, x1, y1 = np.asarray(box, int)
+    mask[y0 + shrink : y1 - shrink, x0:x1] = 0.9
+    point = np.full((33, 2), [x0 + 1, y0 + 1], np.float32)
+    return Landmarks(point, np.zeros(33), np.ones(33), np.zeros((33, 3)), 0.9, mask)
+
+
+def labelled(find) -> PhotoLabels:
+    return label_photo(IMAGE, lambda image: (BOXES, np.array([0.9, 0.8, 0.7], np.float32)), find)
+
+
+def test_people_on_whom_the_teachers_agree_are_sure():
+    found = labelled(lambda image, box: person(box) if box[0] < 150 else None)
+    assert found.sure.tolist() == [True, True, False]
+    assert found.mask.sum((1, 2)).tolist() == [4000, 5000, 0]
+    assert found.point[1, 0].tolist() == [101, 11]
+
+
+def test_a_mask_of_the_neighbour_or_a_fragment_is_not_taken():
+    assert agrees(person(BOXES[0]), BOXES[0])
+    assert not agrees(person(BOXES[1]), BOXES[0])
+    assert not agrees(person(BOXES[0], shrink=40), BOXES[0])
+    assert not agrees(person([0, 0, 0, 0]), BOXES[0])
+
+
+def test_the_same_person_is_taken_once():
+    twice = np.array([[20, 10, 60, 110], [22, 10, 62, 110]], np.float32)
+    found = label_photo(IMAGE, lambda image: (twice, np.array([0.9, 0.8])), lambda image, box: person(BOXES[0]))
+    assert found.sure.tolist() == [True, False]
+
+
+def test_a_photo_without_people_has_empty_labels_that_can_be_kept(tmp_path):
+    nobody = label_photo(IMAGE, lambda image: (np.zeros((0, 4), np.float32), np.zeros(0, np.float32)), None)
+    nobody.save(tmp_path / "a.npz")
+    kept = PhotoLabels.load(tmp_path / "a.npz")
+    assert kept.mask.shape == (0, 120, 200)
+    assert kept.point.shape == (0, 33, 2)
+    assert np.array_equal(draw(IMAGE, kept), IMAGE)
+
+
+def test_labels_come_back_as_they_were_saved(tmp_path):
+    found = labelled(lambda image, box: person(box))
+    found.save(tmp_path / "deep" / "a.npz")
+    kept = PhotoLabels.load(tmp_path / "deep" / "a.npz")
+    for name, value in found.__dict__.items():
+        assert np.array_equal(value, getattr(kept, name)), name
+    assert list((tmp_path / "deep").iterdir()) == [tmp_path / "deep" / "a.npz"]
+
+
+class FakeTflite:
+    """Answers with landmarks in the middle of the crop and a mask of its right half."""
+
+    def __init__(self, up=(0.0, -64.0)) -> None:
+        self.up, self.crops = np.array(up), []
+
+    def set_tensor(self, index, value):
+        self.crops.append(value[0])
+
+    def invoke(self):
+        pass
+
+    def get_tensor(self, index):
+        rows = np.zeros((39, 5), np.float32)
+        rows[:, :2] = SIDE / 2
+        rows[34, :2] += self.up
+        mask = np.full((SIDE, SIDE, 1), -20.0, np.float32)
+        mask[:, SIDE // 2 :] = 20
+        world = np.tile([0.0, -1.0, 0.0], 39).astype(np.float32)
+        return [rows.reshape(1, -1), np.ones((1, 1)), mask[None], world[None]][index]
+
+
+def network(fake) -> LandmarkNetwork:
+    made = LandmarkNetwork.__new__(LandmarkNetwork)
+    made._net, made._input, made._outputs = fake, 0, [0, 1, 2, 3]
+    return made
+
+
+def test_landmarks_and_mask_lie_in_pixels_of_the_photo():
+    found = network(FakeTflite()).find(IMAGE, np.array([80, 20, 120, 100]), passes=1)
+    assert np.allclose(found.point, [100, 60])
+    assert found.mask[60, 110] > 0.99
+    assert found.mask[60, 90] < 0.01
+
+
+def test_a_lying_person_is_asked_about_upright():
+    """The second pass turns the crop so that the person's head is up, and turns its answers back."""
+    fake = FakeTflite(up=(64.0, 0.0))  # the head lies to the right
+    image = IMAGE.copy()
+    image[:, 110:] = 255
+    found = network(fake).find(image, np.array([80, 20, 120, 100]))
+    top, bottom = fake.crops[1][SIDE // 4, SIDE // 2], fake.crops[1][3 * SIDE // 4, SIDE // 2]
+    assert top.mean() > 0.9 > bottom.mean() > 0.4
+    assert np.allclose(found.world[0], [1, 0, 0], atol=1e-5)  # up in the crop is right in the photo
+
+
+def test_a_crop_without_a_person_gives_none():
+    fake = FakeTflite()
+    answer = fake.get_tensor
+    fake.get_tensor = lambda index: np.zeros((1, 1)) if index == 1 else answer(index)
+    assert network(fake).find(IMAGE, np.array([80, 20, 120, 100])) is None
+
+
+class FakeSsd:
+    """Sees one person over the whole of every window, and one chair."""
+
+    def setInput(self, blob):
+        assert blob.shape == (1, 3, 300, 300)
+
+    def forward(self):
+        rows = [[0, 1, 0.8, 0.1, 0.2, 0.9, 0.8], [0, 62, 0.9, 0, 0, 1, 1], [0, 1, 0.1, 0, 0, 1, 1]]
+        return np.array([[rows]], np.float32)
+
+
+@pytest.mark.parametrize(("shape", "windows"), [((120, 200), 1), ((600, 1000), 5)])
+def test_large_photos_are_also_asked_in_quarters(shape, windows):
+    made = detector.PersonDetector.__new__(detector.PersonDetector)
+    made._net = FakeSsd()
+    boxes, scores = made.detect(np.zeros((*shape, 3), np.uint8))
+    assert len(boxes) == windows
+    assert np.allclose(scores, 0.8)
+    whole = np.array([0.1, 0.2, 0.9, 0.8]) * [shape[1], shape[0], shape[1], shape[0]]
+    assert np.abs(boxes - whole).max(1).min() < 1e-3
+    assert (boxes[:, 2:] <= [shape[1], shape[0]]).all()
+
+
+def test_each_landmark_has_a_name():
+    assert len(set(landmarks.NAMES)) == 33

@@ -16,31 +16,31 @@ import moderngl
 import numpy as np
 import scipy.sparse as sp
 
+from export.people.lookup import LabelLookup
 from export.people.wardrobe import Layer, Model
 
 SUPERSAMPLING = 2
 
 _VERTEX = """#version 330
-in vec3 position; in vec3 normal; in vec3 rest; in vec2 texture_uv; in vec3 label; in vec3 point;
+in vec3 position; in vec3 normal; in vec3 rest; in vec2 texture_uv; in vec3 point;
 uniform mat4 projection; uniform float offset, bulge, bulge_frequency; uniform vec3 phase;
 uniform mat3 fabric; uniform bool planar;
-out vec3 v_normal; out vec2 v_uv; out vec2 v_chart; flat out float v_part;
-out vec3 v_rest; out vec3 v_view; out vec3 v_point;
+out vec3 v_normal; out vec2 v_uv; out vec3 v_rest; out vec3 v_view; out vec3 v_point;
 void main() {
   float f = bulge_frequency;
   float wave = sin(rest.x * f + phase.x) * sin(rest.z * f * .8 + phase.y)
              + .6 * sin(rest.y * f * 1.3 + rest.z * f * 1.7 + phase.z);
   vec3 p = position + normal * (offset + bulge * wave);
   gl_Position = projection * vec4(p, 1);
-  v_normal = normal; v_chart = label.yz; v_part = label.x; v_rest = rest; v_view = -p; v_point = point;
+  v_normal = normal; v_rest = rest; v_view = -p; v_point = point;
   v_uv = planar ? (fabric * vec3(rest.x + .6 * rest.y, rest.z, 1)).xy : texture_uv;
 }"""
 
 _FRAGMENT = """#version 330
-in vec3 v_normal; in vec2 v_uv; in vec2 v_chart; flat in float v_part; in vec3 v_rest; in vec3 v_view; in vec3 v_point;
+in vec3 v_normal; in vec2 v_uv; in vec3 v_rest; in vec3 v_view; in vec3 v_point;
 uniform sampler2D albedo; uniform vec3 tint, sky, ground, up, light1, colour1, light2, colour2, phase;
 uniform float wrinkle, wrinkle_frequency, specular, instance;
-layout(location = 0) out vec4 colour; layout(location = 1) out vec4 label; layout(location = 2) out vec4 point;
+layout(location = 0) out vec4 colour; layout(location = 1) out vec4 point;
 void main() {
   vec3 r = v_rest * wrinkle_frequency;
   vec3 n = v_normal + wrinkle * vec3(sin(r.z + 3. * sin(r.x * .5 + phase.x)),
@@ -52,8 +52,7 @@ void main() {
   vec3 light = mix(ground, sky, dot(n, up) * .5 + .5)
              + colour1 * max(0., dot(n, light1)) + colour2 * max(0., dot(n, light2));
   colour = vec4(texture(albedo, v_uv).rgb * tint * light + specular * colour1 * highlight, 1);
-  label = vec4(v_part, clamp(v_chart, 0., 1.), instance);
-  point = vec4(v_point, 1);
+  point = vec4(v_point, instance);
 }"""
 
 
@@ -89,30 +88,27 @@ class Person:
 @dataclass(frozen=True)
 class Picture:
     """rgb float32 [H, W, 3] (0..255, premultiplied), alpha float32 [H, W], label uint8 [H, W, 4] = (I, U, V, instance),
-    point float32 [H, W, 3] or None."""
+    point float32 [H, W, 3] of the template's surface, metres."""
 
     rgb: np.ndarray
     alpha: np.ndarray
     label: np.ndarray
-    point: np.ndarray | None
+    point: np.ndarray
 
 
 class Renderer:
     """Owns the OpenGL context; one a process."""
 
-    def __init__(self, model: Model, skin: np.ndarray, width: int, height: int, points: bool) -> None:
-        self.model, self.points = model, points
+    def __init__(self, model: Model, labels: LabelLookup, skin: np.ndarray, width: int, height: int) -> None:
+        self.model, self.labels = model, labels
         self.context = moderngl.create_context(standalone=True, backend="egl")
         self.program = self.context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
         size = (width * SUPERSAMPLING, height * SUPERSAMPLING)
-        targets = [self.context.texture(size, 4), self.context.texture(size, 4)]
-        if points:
-            targets.append(self.context.texture(size, 4, dtype="f4"))
+        targets = [self.context.texture(size, 4), self.context.texture(size, 4, dtype="f4")]
         self.target = self.context.framebuffer(targets, self.context.depth_renderbuffer(size))
         self.size = size
         faces, count = model.faces, len(model.faces)
-        part = np.repeat(model.part[:, None, None], 3, 1) / 255
-        fixed = [model.rest[faces], model.texture_uv, part, np.clip(model.uv, 0, 1), model.point]
+        fixed = [model.rest[faces], model.texture_uv, model.point]
         self.fixed = self.context.buffer(np.concatenate(fixed, 2).astype(np.float32).tobytes())
         self.moving = self.context.buffer(reserve=count * 3 * 24)
         ones = np.ones(count * 3, np.float32)
@@ -145,7 +141,7 @@ class Renderer:
         rotation, shift = camera.world_to_camera[:, :3], camera.world_to_camera[:, 3]
         for number, person in enumerate(people, 1):
             self._place((person.vertices @ rotation.T + shift).astype(np.float32))
-            self._set("instance", number / 255)
+            self._set("instance", float(number))
             for layer in person.layers:
                 self._layer(layer, rng)
         return self._read()
@@ -178,7 +174,7 @@ class Renderer:
             self._set(name, float(getattr(layer, name)))
         index = (layer.faces[:, None] * 3 + np.arange(3)).astype(np.int32)
         indices = self.context.buffer(index.tobytes())
-        names = [("rest", "3f"), ("texture_uv", "2f"), ("label", "3f"), ("point", "3f")]
+        names = [("rest", "3f"), ("texture_uv", "2f"), ("point", "3f")]
         skipped = [n in self.program for n, _ in names]
         layout = " ".join(f if used else f"{4 * int(f[0])}x" for (_, f), used in zip(names, skipped, strict=True))
         used = [n for (n, _), keep in zip(names, skipped, strict=True) if keep]
@@ -199,10 +195,12 @@ class Renderer:
             raw = self.target.read(components=4, attachment=attachment, dtype=dtype)
             return np.frombuffer(raw, kind).reshape(height, width, 4)
 
-        colour, label = plane(0, "f1", np.uint8), plane(1, "f1", np.uint8)
+        colour, surface_point = plane(0, "f1", np.uint8), plane(1, "f4", np.float32)
         mean = cv2.resize(colour, small, interpolation=cv2.INTER_AREA).astype(np.float32)
         pick = np.s_[SUPERSAMPLING // 2 :: SUPERSAMPLING, SUPERSAMPLING // 2 :: SUPERSAMPLING]
-        label = label[pick].copy()
-        label[label[..., 3] == 0] = 0
-        point = plane(2, "f4", np.float32)[pick][..., :3].copy() if self.points else None
-        return Picture(mean[..., :3], mean[..., 3] / 255, label, point)
+        surface_point = surface_point[pick]
+        label = np.zeros(surface_point.shape, np.uint8)
+        label[..., 3] = surface_point[..., 3]
+        body = label[..., 3] > 0
+        label[body, :3] = self.labels.iuv(surface_point[body, :3])
+        return Picture(mean[..., :3], mean[..., 3] / 255, label, surface_point[..., :3].copy())

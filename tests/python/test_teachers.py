@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from export import surface
 from export.teachers import detector, landmarks
+from export.teachers.coarse import SOMEWHERE, coarse_labels
 from export.teachers.label import PhotoLabels, agrees, draw, label_photo
 from export.teachers.landmarks import SIDE, LandmarkNetwork, Landmarks
 
@@ -139,3 +141,58 @@ def test_large_photos_are_also_asked_in_quarters(shape, windows):
 
 def test_each_landmark_has_a_name():
     assert len(set(landmarks.NAMES)) == 33
+
+
+def standing() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Landmarks, visibility and mask of somebody who stands facing us; the person's left is on our right."""
+    place = {
+        "nose": (100, 30), "shoulder": (25, 60), "elbow": (40, 100), "wrist": (45, 140), "index finger": (46, 155),
+        "little finger": (48, 155), "hip": (15, 140), "knee": (18, 200), "ankle": (20, 260), "heel": (20, 268),
+        "toe": (24, 272),
+    }  # fmt: skip
+    point = np.full((33, 2), [100.0, 30.0], np.float32)
+    for k, name in enumerate(landmarks.NAMES):
+        side, _, joint = name.partition(" ")
+        if joint in place:
+            x, y = place[joint]
+            point[k] = 100 + x * (1 if side == "left" else -1), y
+    mask = np.zeros((290, 200), bool)
+    mask[10:280, 40:160] = True
+    return point, np.ones(33, np.float32), mask
+
+
+def test_pixels_near_a_bone_get_its_region_and_doubtful_ones_none():
+    point, visible, mask = standing()
+    label = coarse_labels(point, visible, mask)
+    expected = {
+        (30, 100): 14, (90, 100): 1, (230, 119): 9, (230, 81): 8, (175, 117): 7, (175, 83): 6, (120, 143): 12,
+        (120, 57): 13, (150, 147): 3, (150, 53): 2, (272, 124): 4, (272, 76): 5, (80, 134): 10, (80, 66): 11,
+    }  # fmt: skip
+    assert {at: int(label[at]) for at in expected} == expected
+    assert label[200, 100] == SOMEWHERE  # between the knees
+    assert label[285, 100] == label[100, 20] == 0
+    assert ((label > 0) == mask).all()
+
+
+def test_labels_of_the_mirrored_person_are_mirrored():
+    point, visible, mask = standing()
+    other = [landmarks.NAMES.index(_swapped(name)) for name in landmarks.NAMES]
+    label = coarse_labels(point, visible, mask)
+    mirrored = coarse_labels((point * [-1, 1] + [200, 0])[other], visible[other], mask[:, ::-1])
+    table = np.arange(256, dtype=np.uint8)
+    table[: len(surface.MIRROR_COARSE)] = surface.MIRROR_COARSE
+    assert np.array_equal(mirrored, table[label[:, ::-1]])
+
+
+def _swapped(name: str) -> str:
+    return " ".join({"left": "right", "right": "left"}.get(word, word) for word in name.split())
+
+
+def test_limbs_that_are_not_seen_give_no_labels():
+    point, visible, mask = standing()
+    visible[[landmarks.NAMES.index(f"left {joint}") for joint in ("knee", "ankle", "toe")]] = 0.1
+    label = coarse_labels(point, visible, mask)
+    assert not np.isin([4, 7, 9], label).any()
+    assert np.isin([5, 6, 8], label).all()
+    assert not coarse_labels(point, 0 * visible, mask)[mask].min() < SOMEWHERE
+    assert not coarse_labels(point, visible, 0 * mask > 0).any()

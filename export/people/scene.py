@@ -20,7 +20,7 @@ from export.people.wardrobe import Fabrics, Model, dress
 
 SPLITS = {"train": 0, "val": 1, "test": 2}
 BODIES = {"train": 400, "val": 60, "test": 60}
-PEOPLE_SHARE = (0.04, 0.46, 0.27, 0.14, 0.09)  # images with 0, 1, 2, 3, 4 people
+PEOPLE_SHARE = (0.12, 0.4, 0.22, 0.11, 0.06, 0.04, 0.03, 0.02)  # images with 0, 1, 2, … 7 people
 # Framing: (share, centre of view in body heights, visible height in body heights: low, high)
 FRAMINGS = (
     (0.34, 0.5, 1.05, 1.7),

@@ -303,6 +303,16 @@ def _shoes(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Lay
     return [Layer(faces, fabrics.draw(rng), **_cloth(rng, offset=u(0.004, 0.012), bulge=0.0, wrinkle=0.1))]
 
 
+def _long_hair(model: Model, rng: np.random.Generator) -> np.ndarray:
+    """Triangles of the hair helper down to a drawn length, without the strands that hang over the face."""
+    hair, radius = model.range["hair"], model.head_radius
+    x, y, z = model.centre[hair].T
+    before_face = (y < model.head_y - 0.15 * radius) & (np.abs(x) < 0.66 * radius) & (z > model.neck_z - 0.06)
+    fringe = before_face & (z > model.eye_z + 0.35 * radius)
+    shown = ~before_face | (fringe & (rng.random() < 0.3))
+    return hair[shown & (z > rng.uniform(z.min() - 0.2, model.neck_z))]
+
+
 def _hair(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Layer]:
     u = rng.uniform
     colour = tuple(_HAIR_COLOURS[rng.integers(len(_HAIR_COLOURS))] * u(0.6, 1.3) * 2)
@@ -323,7 +333,7 @@ def _hair(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Laye
         )  # fmt: skip
         if u() < 0.33:
             layers.append(
-                Layer(model.range["hair"], strands, colour, offset=u(-0.005, 0.015), bulge=u(0, 0.01),
+                Layer(_long_hair(model, rng), strands, colour, offset=u(-0.005, 0.015), bulge=u(0, 0.01),
                       bulge_frequency=30.0, wrinkle_frequency=u(60, 200), **style)
             )  # fmt: skip
     if u() < 0.15:

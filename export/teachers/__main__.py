@@ -43,7 +43,8 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     tiles = [tile(draw(cv2.imread(str(path)), labels)) for path, labels in found.items()]
     cv2.imwrite(str(arguments.out / "sheet.jpg"), sheet(tiles))
-    people, sure = (sum(int(count(labels)) for labels in found.values()) for count in (_people, _sure))
+    people = sum(len(labels.sure) for labels in found.values())
+    sure = sum(int(labels.sure.sum()) for labels in found.values())
     print(
         f"{len(found)} photos, {people} people found, {sure} of them with landmarks and mask; {arguments.out}/sheet.jpg"
     )
@@ -67,14 +68,6 @@ def _teachers():
     from export.teachers.landmarks import LandmarkNetwork
 
     return PersonDetector().detect, LandmarkNetwork().find
-
-
-def _people(labels: PhotoLabels) -> int:
-    return len(labels.box)
-
-
-def _sure(labels: PhotoLabels) -> int:
-    return int(labels.sure.sum())
 
 
 def tile(image: np.ndarray) -> np.ndarray:

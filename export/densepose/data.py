@@ -68,7 +68,7 @@ class Framing:
 
 
 ANY_FRAMING = Framing()
-SCALES = (0.3, 2.0)  # of the stored picture
+SCALES = (0.15, 2.0)  # of the stored picture
 
 
 def augmented(
@@ -143,13 +143,18 @@ def truth_of(label: np.ndarray) -> Truth:
 class Batches:
     """Endless shuffled batches, made ahead by a thread (OpenCV releases the interpreter's lock).
 
-    Batch k depends on `seed` and k alone, so that a run resumed at step k sees what it would have seen.
+    Batch k depends on `seed` and k alone, so that a run resumed at step k sees what it would have seen. `photos`
+    take the place of the share `photo_share` of the records; they are few, and so drawn with replacement.
     """
 
     AHEAD = 4
 
-    def __init__(self, records: list[Record], batch: int, seed: int, first: int = 0) -> None:
+    def __init__(
+        self, records: list[Record], batch: int, seed: int, first: int = 0,
+        photos: list[Record] | None = None, photo_share: float = 0.0,
+    ) -> None:  # fmt: skip
         self.records, self.batch, self.seed = records, batch, seed
+        self.photos, self.photo_share = photos or [], photo_share if photos else 0.0
         self._epoch, self._order = -1, np.empty(0, np.int64)
         cv2.setNumThreads(1)
         self._number, self._kind = first, None
@@ -161,7 +166,10 @@ class Batches:
         rng = np.random.default_rng([self.seed, number])
         images, truths = [], []
         for k in range(number * self.batch, (number + 1) * self.batch):
-            image, label = augmented(self.records[self._shuffled(k)], size, rng, framing)
+            record = self.records[self._shuffled(k)]
+            if rng.random() < self.photo_share:
+                record = self.photos[rng.integers(len(self.photos))]
+            image, label = augmented(record, size, rng, framing)
             images.append(normalised(image))
             truths.append(truth_of(label))
         return torch.from_numpy(np.stack(images)), truths

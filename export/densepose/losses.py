@@ -36,7 +36,23 @@ WEIGHTS = {
 _SHARE = np.array([.092, .253, .0165, .0165, .010, .010, .0135, .0135, .053, .053, .0105, .0105, .015, .015,
                    .046, .046, .0245, .0245, .021, .021, .0145, .0145, .104, .104])  # fmt: skip
 INDEX_WEIGHTS = torch.tensor([0.5, *np.clip(np.sqrt(0.04 / _SHARE), 0.5, 2.5)], dtype=torch.float32)
-_TO_COARSE = torch.from_numpy(surface.PART_TO_COARSE.astype(np.int64))
+
+# By value of I (export.surface): the classes that it leaves possible, [256, 25] and [256, 15], and how much it weighs.
+_PARTS = torch.from_numpy(surface.POSSIBLE_PARTS)
+_REGIONS = torch.stack([_PARTS[:, surface.PART_TO_COARSE == k].any(1) for k in range(surface.COARSE_COUNT + 1)], 1)
+_WEIGHT = (_PARTS * INDEX_WEIGHTS).sum(1) / _PARTS.sum(1).clamp(min=1)
+_WEIGHT[surface.UNSURE] = 0
+
+
+def possible_classes_loss(logits: Tensor, value: Tensor, possible: Tensor, weight: Tensor) -> Tensor:
+    """-log of the probability of all classes that a label leaves possible, as a weighted mean.
+
+    logits: [K, C]; value: [K] in 0..255; possible: bool [256, C]; weight: [256]. Where only one class is possible
+    this is the cross entropy. Without any weight: 0.
+    """
+    possible, weight = possible.to(logits.device)[value], weight.to(logits.device)[value]
+    among = logits.masked_fill(~possible, -torch.inf).logsumexp(1)
+    return (weight * (logits.logsumexp(1) - among)).sum() / weight.sum().clamp(min=1e-6)
 
 
 class PixelHead(nn.Conv2d):
@@ -139,28 +155,36 @@ def _box_terms(
 
 def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
     coarse, index, u, v = outputs
-    part = label[..., 0].long()
-    body = part > 0
+    value = label[..., 0].long()
+    told = (value > 0) & (value < surface.UNSURE)
     # Decoding takes background from `coarse` alone, so the index is asked about body pixels only, as in DensePose.
-    of_body, weights = index[:, 1:].permute(0, 2, 3, 1)[body], INDEX_WEIGHTS[1:].to(index.device)
-    terms = {
-        "coarse": F.cross_entropy(coarse, _TO_COARSE.to(part.device)[part]),
-        "index": F.cross_entropy(of_body, part[body] - 1, weight=weights) if body.any() else index.sum() * 0,
+    of_body = index[:, 1:].permute(0, 2, 3, 1)[told]
+    every, sure = coarse.permute(0, 2, 3, 1).flatten(0, 2), (torch.arange(256) != surface.UNSURE).float()
+    return {
+        "coarse": possible_classes_loss(every, value.flatten(), _REGIONS, sure),
+        "index": possible_classes_loss(of_body, value[told], _PARTS[:, 1:], _WEIGHT),
+        "u": _coordinate_loss(u, value, label[..., 1]),
+        "v": _coordinate_loss(v, value, label[..., 2]),
     }
-    for k, (name, value) in enumerate((("u", u), ("v", v)), 1):
-        own = value.gather(1, part[:, None])[:, 0][body]
-        terms[name] = F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
-    return terms
+
+
+def _coordinate_loss(output: Tensor, value: Tensor, wanted: Tensor) -> Tensor:
+    """output [N, 25, h, w] of U or V, read in the channel of the labelled part; wanted: uint8 [N, h, w]."""
+    known = (value > 0) & (value <= surface.PART_COUNT)
+    if not known.any():
+        return output.sum() * 0
+    own = output.gather(1, torch.where(known, value, 0)[:, None])[:, 0][known]
+    return F.smooth_l1_loss(own, wanted[known] / 255, beta=0.05)
 
 
 def _pixel_terms(output: Tensor, label: Tensor) -> dict[str, Tensor]:
     """output [N, 75, h, w] of P2; label uint8 [N, 4h, 4w, 4], read at the middle of each cell."""
     label = PixelHead.cells(label)
-    part = label[..., 0].long()
+    value = label[..., 0].long()
     index, u, v = output.chunk(3, 1)
-    terms = {"pixel_index": F.cross_entropy(index, part, weight=INDEX_WEIGHTS.to(index.device))}
-    body = part > 0
-    for k, (name, value) in enumerate((("pixel_u", u), ("pixel_v", v)), 1):
-        own = value.gather(1, part[:, None])[:, 0][body]
-        terms[name] = F.smooth_l1_loss(own, label[..., k][body] / 255, beta=0.05) if body.any() else value.sum() * 0
-    return terms
+    every = index.permute(0, 2, 3, 1).flatten(0, 2)
+    return {
+        "pixel_index": possible_classes_loss(every, value.flatten(), _PARTS, _WEIGHT),
+        "pixel_u": _coordinate_loss(u, value, label[..., 1]),
+        "pixel_v": _coordinate_loss(v, value, label[..., 2]),
+    }

@@ -8,8 +8,10 @@ import torch
 from torch import Tensor
 from torchvision.ops import batched_nms, box_iou
 
+from export import surface
 from export.densepose import boxes as bx
 from export.densepose.config import NetworkConfig
+from export.people.dataset import BOX_ALONE
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def box_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, Ten
 
 def dense_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, Tensor]:
     """RoIs for the dense head: (boxes [P, 4], person [P]); shaken true boxes and proposals with IoU > 0.7."""
-    wanted = (~truth.ignore).nonzero()[:, 0]
+    wanted = (~truth.ignore & (truth.instance < BOX_ALONE)).nonzero()[:, 0]
     wanted = wanted[torch.randperm(len(wanted), device=wanted.device)[:count]]
     if not len(wanted):
         return proposed.new_zeros(0, 4), wanted
@@ -120,7 +122,8 @@ def dense_samples(proposed: Tensor, truth: Truth, count: int) -> tuple[Tensor, T
 def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tensor:
     """Labels at the centres of a grid x grid lattice over each box: uint8 [P, grid, grid, 3].
 
-    Channels are I, U*255, V*255. Other people's pixels and what lies outside the image are background.
+    Channels are I, U*255, V*255. Other people's pixels and what lies outside the image are background; what is
+    `surface.UNSURE` stays so, whosever it may be.
     """
     height, width = truth.label.shape[:2]
     at = (torch.arange(grid, device=boxes.device) + 0.5) / grid
@@ -128,7 +131,8 @@ def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tens
     y = (boxes[:, 1:2] + at * (boxes[:, 3:] - boxes[:, 1:2])).floor().long()
     inside = ((y >= 0) & (y < height))[:, :, None] & ((x >= 0) & (x < width))[:, None]
     picked = truth.label[y.clamp(0, height - 1)[:, :, None], x.clamp(0, width - 1)[:, None]]
-    own = (picked[..., 3] == truth.instance[person][:, None, None]) & inside
+    own = (picked[..., 3] == truth.instance[person][:, None, None]) | (picked[..., 0] == surface.UNSURE)
+    own &= inside
     return picked[..., :3] * own[..., None]
 
 

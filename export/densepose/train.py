@@ -159,6 +159,8 @@ def draw_curves(log: list[dict], path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/people"))
+    parser.add_argument("--photos", type=Path, help="also shards of labelled photographs (export.teachers.shards)")
+    parser.add_argument("--photo-share", type=float, default=0.3, help="of the images, where there are --photos")
     parser.add_argument("--out", type=Path, default=Path(".data/runs/b"))
     parser.add_argument("--width", type=int, default=64, help="channels of neck and heads: 64 (variant B), 88, 112")
     parser.add_argument("--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in")
@@ -262,7 +264,8 @@ def main() -> None:
     signal.signal(signal.SIGINT, stop)
     train = data.load_records(options.data / "train")[rank::world]
     held_out = data.load_records(options.data / "val", 100)
-    batches = data.Batches(train, options.batch, options.seed * 1000 + rank, first=step)
+    photos = data.load_records(options.photos)[rank::world] if options.photos else []
+    batches = data.Batches(train, options.batch, options.seed * 1000 + rank, step, photos, options.photo_share)
     autocast = torch.autocast(device.type, torch.bfloat16, enabled=options.bf16)
     net.train()
     smooth: dict[str, float] = {}

@@ -24,6 +24,9 @@ VERSION = "people-1"
 SIZES = ((320, 256), (320, 256), (256, 320))  # landscape, landscape, portrait, by shard number
 POINT_RANGE = np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 2.1]], np.float32)
 MIN_PIXELS, MIN_SIDE_PX = 64, 12  # smaller people are marked "ignore"
+# Instance numbers of photographs: from BOX_ALONE on people of whom only the box is known, from UNCERTAIN on regions in
+# which there may be people or not ("ignore").
+BOX_ALONE, UNCERTAIN = 128, 192
 
 
 def visible_boxes(label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -37,11 +40,12 @@ def visible_boxes(label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
             y, x = np.nonzero(label[..., 3] == number)
             box.append([x.min(), y.min(), x.max() + 1, y.max() + 1])
             instance.append(number)
-            ignore.append(len(x) < MIN_PIXELS or max(np.ptp(x), np.ptp(y)) + 1 < MIN_SIDE_PX)
+            small = len(x) < MIN_PIXELS or max(np.ptp(x), np.ptp(y)) + 1 < MIN_SIDE_PX
+            ignore.append(small or number >= UNCERTAIN)
     return (np.array(box, np.float32).reshape(-1, 4), np.array(instance, np.uint8), np.array(ignore, bool))
 
 
-class _Strings:
+class EncodedImages:
     """Encoded images one after another, with their ends."""
 
     def __init__(self) -> None:
@@ -60,7 +64,7 @@ class _Strings:
 
 def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
     """Draws one shard and writes it whole (temporary name, then rename)."""
-    stores = {"image": _Strings(), "label": _Strings(), "point": _Strings()}
+    stores = {"image": EncodedImages(), "label": EncodedImages(), "point": EncodedImages()}
     boxes, owners, instances, ignored = [], [], [], []
     for k in range(images):
         rng = np.random.default_rng([SPLITS[studio.split], 7, number, k])

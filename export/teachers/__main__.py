@@ -18,7 +18,7 @@ example:
   python -m export.photos people && python -m export.teachers
 
 Writes OUT/NAME.npz for every photo (export.teachers.label.PhotoLabels) and OUT/sheet.jpg to look at: green boxes where
-detector, landmarks and mask agree, red ones where only the detector speaks. Photos with labels are not asked again.
+detector, landmarks and mask agree, yellow ones without landmarks, red ones where only the detector speaks. Photos with labels are not asked again.
 """
 TILE = (420, 320)
 
@@ -66,8 +66,9 @@ def label_all(photos: list[Path], out: Path, force: bool = False) -> dict[Path, 
 def _teachers():
     from export.teachers.detector import PersonDetector
     from export.teachers.landmarks import LandmarkNetwork
+    from export.teachers.matte import MatteNetwork
 
-    return PersonDetector().detect, LandmarkNetwork().find
+    return PersonDetector().detect, LandmarkNetwork().find, MatteNetwork().find
 
 
 def tile(image: np.ndarray) -> np.ndarray:

@@ -30,15 +30,14 @@ SHARES_OF_PHOTOS = (
 def write_picture(path: Path, results: dict[str, Figures], photo_results: dict[str, PhotoFigures]) -> None:
     """AP, calibration, groups and photographs above; the body parts below. One colour a column of the table; groups
     are those of the last column. photo_results may be empty."""
-    mosaic = [["ap", "calibration", "groups", "photos"], ["part"] * 4, ["error"] * 4]
-    figure, axes = pyplot.subplot_mosaic(
-        mosaic, figsize=(18, 14), width_ratios=(1, 1, 1.3, 1), height_ratios=(1.25, 1, 0.8), layout="constrained"
-    )
-    _draw_precision(axes["ap"], results)
-    _draw_calibration(axes["calibration"], results)
-    _draw_groups(axes["groups"], *list(results.items())[-1])
-    _draw_photos(axes["photos"], photo_results)
-    _draw_parts(axes["part"], axes["error"], results)
+    figure = pyplot.figure(figsize=(18, 14), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(1, 1.4), hspace=0.03)
+    precision, calibration, groups, photos = above.subplots(1, 4)
+    _draw_precision(precision, results)
+    _draw_calibration(calibration, results)
+    _draw_groups(groups, *list(results.items())[-1])
+    _draw_photos(photos, photo_results)
+    _draw_parts(*below.subplots(2, 1, sharex=True), results)
     first = next(iter(results.values()))
     figure.suptitle(f"{first.images} rendered images, {first.people} people", fontsize=13)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -68,7 +67,7 @@ def _draw_calibration(axes: Axes, results: dict[str, Figures]) -> None:
     counts.set_ylim(0, 4 * max(table.count))
     counts.set_yticks([0, max(table.count)])
     counts.tick_params(labelsize=8)
-    counts.set_ylabel(f"detections, {name} (bars)", fontsize=8)
+    counts.set_ylabel(f"bars: detections, {name}", fontsize=8, loc="bottom")
     axes.set(title="calibration", xlabel="score", ylabel="share of right boxes, IoU .5", xlim=(0, 1), ylim=(0, 1))
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="upper left")
@@ -89,7 +88,7 @@ def _draw_groups(axes: Axes, name: str, figures: Figures) -> None:
             axes.axhline(k - 0.5, color="0.5", linewidth=0.8)
     axes.set(title=f"by group of people: {name}", xlim=(0, 1), ylim=(len(groups) - 0.5, -0.5))
     axes.grid(axis="x", alpha=0.3)
-    axes.legend(fontsize=8, loc="lower left")
+    axes.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.05))
 
 
 def _draw_photos(axes: Axes, results: dict[str, PhotoFigures]) -> None:
@@ -102,12 +101,12 @@ def _draw_photos(axes: Axes, results: dict[str, PhotoFigures]) -> None:
     width = 0.8 / len(results)
     for k, (name, figures) in enumerate(results.items()):
         values = [getattr(figures, field) for _, field in SHARES_OF_PHOTOS]
-        label = f"{name}: {figures.false_people:.2f} false people a photo of nobody"
+        label = f"{name}; {figures.false_people:.2f} false people a photo without any"
         axes.bar(place + (k - (len(results) - 1) / 2) * width, values, width, color=f"C{k}", label=label)
     axes.set_xticks(place, [label.replace(" ", "\n") for label, _ in SHARES_OF_PHOTOS], fontsize=8)
     axes.set(ylim=(0, 1), xlabel=f"{figures.photos} photos, {figures.people} people, {figures.masks} with a mask")
     axes.grid(axis="y", alpha=0.3)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=7, loc="upper right")
 
 
 def _draw_parts(above: Axes, below: Axes, results: dict[str, Figures]) -> None:
@@ -122,7 +121,7 @@ def _draw_parts(above: Axes, below: Axes, results: dict[str, Figures]) -> None:
     above.set(title="body parts", ylabel="share of pixels", ylim=(0, 1))
     below.set_ylabel("median surface error, cm")
     above.legend(fontsize=8, ncols=len(results))
-    for axes, names in ((above, [""] * PART_COUNT), (below, PART_NAMES[1:])):
-        axes.set_xlim(0.4, PART_COUNT + 0.6)
-        axes.set_xticks(range(1, PART_COUNT + 1), names, rotation=90, fontsize=8)
+    below.set_xlim(0.4, PART_COUNT + 0.6)
+    below.set_xticks(range(1, PART_COUNT + 1), PART_NAMES[1:], rotation=90, fontsize=8)
+    for axes in (above, below):
         axes.grid(axis="y", alpha=0.3)

@@ -136,3 +136,17 @@ def write_json(
         }
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(document, indent=1) + "\n")
+
+
+def column_of(document: dict, digest: str) -> dict:
+    """The figures in a file of `write_json` that belong to the model with this fingerprint.
+
+    Raises ValueError for files of another schema and when that model was not measured.
+    """
+    if document.get("schema") != SCHEMA:
+        raise ValueError(f"the figures are of schema {document.get('schema')}, not {SCHEMA}; measure again.")
+    for figures in document["results"].values():
+        if figures["fingerprint"] == digest:
+            return figures
+    measured = ", ".join(f"{f['model']} {f['fingerprint']}" for f in document["results"].values())
+    raise ValueError(f"the figures are of {measured}, not of the model {digest}; run `python -m export.evaluation`.")

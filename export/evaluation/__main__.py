@@ -102,6 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         print(f"No real photographs: {arguments.labels} has no labels (python -m export.teachers makes them).")
     data = {"folder": str(arguments.data), "shards": len(paths), "images": total, "limit": arguments.limit,
+            "score_floor": arguments.score_floor,
             "photos": str(arguments.photos), "empty": str(arguments.empty)}  # fmt: skip
     report.write_json(arguments.out / "evaluation.json", results, photo_results, sources, data)
     write_picture(arguments.out / "evaluation.png", results, photo_results)

@@ -19,6 +19,7 @@ from export.evaluation.report import FORMATS, ROWS, column_of
 
 NAME = "MODEL_CARD.md"
 CASES_IN_WORDS = 3
+BAR = r"\|"  # a bar inside a cell
 NUMBERS = FORMATS | {"rate": "{:.2f}"}
 PHOTO_ROWS = (
     ("recall at precision .9", "recall_at_precision"),
@@ -128,7 +129,7 @@ def _rendered_figures(data: dict, figures: dict) -> str:
 ## Figures on rendered people
 
 {figures["images"]} rendered images{whole}, {figures["people"]} people; {figures["ignored"]} more are
-too small or hidden to be asked for. AP and calibration are over all scores, the rest at score
+too small or hidden to be asked for. AP and calibration are over scores from {data["score_floor"]:g} up, the rest at
 {figures["threshold"]:g} or better. Shares are in hundredths. Definitions: `python -m export.evaluation --help`.
 
 """
@@ -158,7 +159,8 @@ def _parts(names: list[str], figures: dict) -> str:
     ]
     text = (
         "Recall: share of the part's visible pixels painted with it. "
-        "Precision: share of the pixels painted with it that show it.\n\n"
+        "Precision: share of the pixels painted with it that show it. "
+        "Surface error: of the part's painted pixels, whatever they are painted with.\n\n"
     )
     return f"### By body part\n\n{text}" + _table(("part", "recall", "precision", "median surface error"), rows)
 
@@ -233,7 +235,7 @@ def _number(value: float | None, unit: str) -> str:
 
 def _table(heads: tuple[str, ...], rows: list) -> str:
     lines = [heads, ["---"] * len(heads), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return "".join(f"| {' | '.join(cell.replace('|', BAR) for cell in line)} |\n" for line in lines)
 
 
 if __name__ == "__main__":

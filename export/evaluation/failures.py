@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from export.evaluation.people import FalseAlarm, PersonRecord
 
 KINDS = {
-    "missed": "missed people, the tallest first",
-    "false": "people where nobody is, the best score first",
-    "mask": "people found, the lowest mask IoU first",
-    "side": "left and right confused, the worst share first",
+    "missed": "people without a box (IoU .5), the tallest first",
+    "false": "boxes that fit nobody, the best score first",
+    "mask": "people with a box, the lowest mask IoU first",
+    "side": "left and right confused, the smallest correct share first",
 }
 LEAST_HEIGHT_PX = 64  # of people whose mask is judged: in smaller ones a pixel more or less decides
 CASES = 6
@@ -19,7 +19,8 @@ CASES = 6
 
 @dataclass(frozen=True)
 class Case:
-    """image: name. box: x0, y0, x1, y1 pixels. figure: height in px, score, mask IoU or share of the right side."""
+    """image: name. box: x0, y0, x1, y1 pixels. figure: height in px, score, mask IoU, or share of limb pixels
+    (landmarks) of the correct side."""
 
     image: str
     box: tuple[float, float, float, float]

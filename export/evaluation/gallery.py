@@ -16,7 +16,7 @@ import numpy as np
 from export.evaluation.backends import Backend, fingerprint, open_backend
 from export.evaluation.failures import KINDS
 from export.evaluation.maquette_api import MaquetteError
-from export.evaluation.paint import labelled_tile, paint
+from export.evaluation.paint import labelled_tile, mosaic, paint
 from export.evaluation.photos import read_photo
 from export.evaluation.report import column_of
 from export.evaluation.shards import ShardError, read_image
@@ -27,9 +27,10 @@ CAPTIONS = {
     "missed": "missed, {:.0f} px high",
     "false": "score {:.2f}",
     "mask": "mask IoU {:.2f}",
-    "side": "right side {:.2f}",
+    "side": "side correct {:.2f}",
 }
 TILE = (480, 216)  # width, height
+COLUMNS = 4
 HEADER_PX = 22
 JPEG_QUALITY = 85
 _MARK = (255, 230, 0)
@@ -49,7 +50,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--evaluation", type=Path, default=Path("build/evaluation/evaluation.json"), metavar="JSON")
     parser.add_argument("--backend", default="capi", help="one that was measured (default: capi)")
     parser.add_argument("--out", type=Path, default=Path("docs/pictures/failures.jpg"), metavar="JPG")
-    parser.add_argument("--columns", type=int, default=3, metavar="N", help="cases of each kind (default 3)")
+    parser.add_argument("--cases", type=int, default=3, metavar="N", help="rendered cases of each kind (default 3)")
     parser.add_argument(
         "--all-photos", action="store_true", help="also photographs that may not be redistributed: do not commit"
     )
@@ -59,16 +60,13 @@ def main(argv: list[str] | None = None) -> int:
         backend = open_backend(arguments.backend, 0.05)
         figures = column_of(document, fingerprint(backend.path))
         rows = [
-            draw_row(kind, backend, document["data"], figures, arguments.columns, arguments.all_photos)
-            for kind in KINDS
+            draw_kind(kind, backend, document["data"], figures, arguments.cases, arguments.all_photos) for kind in KINDS
         ]
     except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"No gallery was drawn: {error}", file=sys.stderr)
         return 1
-    width = max(row.shape[1] for row in rows)
-    sheet = np.vstack([np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in rows])
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(arguments.out), sheet[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    cv2.imwrite(str(arguments.out), np.vstack(rows)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     print(f"{arguments.out}: {arguments.out.stat().st_size / 1e3:.0f} kB")
     for kind in KINDS if figures["photos"] else ():
         print(f"photographs, {KINDS[kind]}:")
@@ -77,13 +75,14 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def draw_row(kind: str, backend: Backend, data: dict, figures: dict, columns: int, all_photos: bool) -> np.ndarray:
-    """The worst cases of one kind: `columns` rendered images, then the photographs that may be shown.
+def draw_kind(kind: str, backend: Backend, data: dict, figures: dict, count: int, all_photos: bool) -> np.ndarray:
+    """The worst cases of one kind: at most `count` rendered images, then the photographs that may be shown.
 
-    data, figures: as in evaluation.json. Returns uint8 [HEADER_PX + tile height, W, 3] RGB.
+    data, figures: as in evaluation.json. Returns uint8 [H, COLUMNS * tile width, 3] RGB: a title and rows of tiles.
     """
-    shown = [(case, read_image(Path(data["folder"]), case["image"]).image) for case in figures["failures"][kind]]
-    shown = shown[:columns]
+    shown = [
+        (case, read_image(Path(data["folder"]), case["image"]).image) for case in figures["failures"][kind][:count]
+    ]
     for case in figures["photos"]["failures"][kind] if figures["photos"] else ():
         path = REDISTRIBUTABLE.get(case["image"])
         if path is None and all_photos:
@@ -92,11 +91,10 @@ def draw_row(kind: str, backend: Backend, data: dict, figures: dict, columns: in
         if path is not None:
             shown.append((case, read_photo(path)))
     tiles = [draw_case(kind, case, image, backend) for case, image in shown]
-    row = np.hstack(tiles) if tiles else np.zeros((TILE[1], TILE[0], 3), np.uint8)
-    header = np.zeros((HEADER_PX, row.shape[1], 3), np.uint8)
+    header = np.zeros((HEADER_PX, COLUMNS * TILE[0], 3), np.uint8)
     title = KINDS[kind] if tiles else f"{KINDS[kind]}: none"
     cv2.putText(header, title, (3, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.5, _MARK, 1, cv2.LINE_AA)
-    return np.vstack([header, row])
+    return np.vstack([header, mosaic(tiles, COLUMNS)]) if tiles else header
 
 
 def draw_case(kind: str, case: dict, image: np.ndarray, backend: Backend) -> np.ndarray:

@@ -15,7 +15,7 @@ from export.evaluation.breakdown import GroupFigures
 from export.evaluation.calibration import BINS
 from export.evaluation.card import card, main
 from export.evaluation.failures import KINDS
-from export.evaluation.gallery import HEADER_PX, TILE, draw_row
+from export.evaluation.gallery import COLUMNS, HEADER_PX, TILE, draw_kind
 from export.evaluation.measure import Figures
 from export.evaluation.photos import PhotoFigures
 from export.evaluation.report import SCHEMA
@@ -61,7 +61,7 @@ def document(start: float, step: float) -> dict:
         figures[field] = [next_share() for _ in range(PART_COUNT + 1)]
     return {
         "schema": SCHEMA,
-        "data": {"limit": next_count()},
+        "data": {"limit": next_count(), "score_floor": next_share()},
         "part_names": PART_NAMES,
         "calibration_bins": BINS,
         "results": {"int8 capi": figures},
@@ -95,6 +95,11 @@ def test_the_cards_figures_are_those_of_the_json():
     photos = text[text.index("real photographs") :]
     assert row(photos, "left/right") == ["65.8"]
     assert f"({figures['photos']['empty_photos']} photos) | 1.59 |" in photos
+
+
+def test_every_row_of_a_table_has_as_many_cells_as_its_head():
+    for table in re.findall(r"(?:^\|.*\n)+", written(document(0.1, 0.001)), re.MULTILINE):
+        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1, table
 
 
 def test_no_number_of_the_card_but_those_of_labels_and_manifest_stays_when_all_figures_change():
@@ -175,7 +180,7 @@ def shard(folder: Path) -> None:
     )  # fmt: skip
 
 
-def test_a_row_of_the_gallery_shows_image_and_paint_of_the_named_cases_and_no_private_photograph(tmp_path, monkeypatch):
+def test_the_gallery_shows_image_and_paint_of_the_named_cases_and_no_private_photograph(tmp_path, monkeypatch):
     shard(tmp_path)
     cases = [{"image": f"shard-00000/000{k}", "box": [10, 10, 50, 70], "figure": 0.9 - 0.1 * k} for k in range(2)]
     private = {"image": "private.jpg", "box": [0, 0, 5, 5], "figure": 0.99}
@@ -185,14 +190,19 @@ def test_a_row_of_the_gallery_shows_image_and_paint_of_the_named_cases_and_no_pr
     monkeypatch.setattr(gallery, "REDISTRIBUTABLE", {"public.jpg": tmp_path / "public.jpg"})
     figures = {"failures": {"false": cases}, "photos": {"failures": {"false": [private, public]}}}
     data = {"folder": str(tmp_path), "photos": str(tmp_path), "empty": str(tmp_path)}
-    row = draw_row("false", Painter(), data, figures, columns=1, all_photos=False)
-    assert row.shape == (HEADER_PX + TILE[1], 2 * TILE[0], 3)  # one rendered image, one photograph
-    tile = row[HEADER_PX:, : TILE[0]]
+    drawn = draw_kind("false", Painter(), data, figures, count=1, all_photos=False)
+    assert drawn.shape == (HEADER_PX + TILE[1], COLUMNS * TILE[0], 3)
+    tiles = drawn[HEADER_PX:].reshape(TILE[1], COLUMNS, TILE[0], 3)
+    assert tiles.any((0, 2, 3)).tolist() == [True, True, False, False]  # one rendered image, one photograph
+    tile = tiles[:, 0]
     assert tile[100, 120].tolist() == [128] * 3  # the image itself on the left,
     assert np.ptp(tile[100, 270].astype(int)) > 50  # in colour on the right
-    assert draw_row("false", Painter(), data, figures, 3, all_photos=True).shape[1] == 4 * TILE[0]
+    everything = draw_kind("false", Painter(), data, figures, count=3, all_photos=True)[HEADER_PX:]
+    assert everything.reshape(TILE[1], COLUMNS, TILE[0], 3).any((0, 2, 3)).all()
 
 
-def test_a_row_without_cases_says_so(tmp_path):
+def test_a_kind_without_cases_is_a_title_alone(tmp_path):
     figures = {"failures": {"side": []}, "photos": None}
-    assert draw_row("side", Painter(), {"folder": str(tmp_path)}, figures, 3, all_photos=False).any()
+    drawn = draw_kind("side", Painter(), {"folder": str(tmp_path)}, figures, 3, all_photos=False)
+    assert drawn.shape == (HEADER_PX, COLUMNS * TILE[0], 3)
+    assert drawn.any()

@@ -81,7 +81,7 @@ def test_every_limb_has_a_side_and_torso_and_head_have_none():
 
 
 def crowd() -> tuple[LabelledImage, Prediction]:
-    """Three people of 10 x 10 px in a 40 x 20 image: a left hand (half painted as a right one) at the frame, a torso
+    """Three people of 10 x 10 px in a 40 x 20 image: a left hand (three rows painted as a right one) at the frame, a torso
     that is missed, and one nobody asks for. The third detection is of nobody."""
     label = np.zeros((20, 40, 4), np.uint8)
     box = np.array([[0, 5, 10, 15], [10, 5, 20, 15], [25, 5, 35, 15]], np.float32)
@@ -89,7 +89,7 @@ def crowd() -> tuple[LabelledImage, Prediction]:
         label[y0:y1, x0:x1] = part, 0, 0, number
     iuv, inds = label[..., :3].copy(), np.zeros((20, 40), np.uint8)
     inds[5:15, :10], inds[5:15, 25:35] = 2, 1
-    iuv[5:10, :10, 0] = 3
+    iuv[5:8, :10, 0] = 3
     iuv[:, 10:20] = 0
     point = np.zeros((20, 40, 3), np.float32)
     image = LabelledImage("a/0000", label[..., :3], label, point, box, np.array([1, 2, 3], np.uint8),
@@ -106,7 +106,7 @@ def test_a_rendered_image_tells_who_was_found_and_how():
     masks = np.array([[0, 0], [0.6, 0], [0, 0]])
     hand, torso = rendered_people(image, comparison, masks)
     assert (hand.found, hand.mask_iou, hand.cut, hand.height_px) == (True, 0.6, True, 80)  # 10 px of 40, of 320
-    assert (hand.asked, hand.right, hand.limb, hand.same_side) == (100, 50, 100, 50)
+    assert (hand.asked, hand.right, hand.limb, hand.same_side) == (100, 70, 100, 70)
     assert hand.groups_seen == pytest.approx(1 / 14)
     assert (torso.found, torso.mask_iou, torso.cut, torso.right, torso.limb) == (False, 0, False, 0, 0)
 
@@ -118,7 +118,7 @@ def test_people_below_the_threshold_are_missed():
 
 def test_failures_are_the_worst_first_and_one_an_image():
     people = [
-        replace(SOMEBODY, image="small", found=False, height_px=70),
+        replace(SOMEBODY, image="small", found=False, mask_iou=0, height_px=70),
         replace(SOMEBODY, image="tall", found=False, height_px=200),
         replace(SOMEBODY, image="tall", found=False, height_px=150),
         replace(SOMEBODY, image="bad", mask_iou=0.1),

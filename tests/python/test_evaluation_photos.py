@@ -58,6 +58,12 @@ def test_nobody_found_counts_as_wrong_everywhere():
     assert np.isnan(got.left_right)  # no limb is painted there
 
 
+def test_people_about_whom_the_teachers_disagree_are_asked_for_by_box_alone():
+    got = figures(painted(10), labels(sure=False, left_hip=(60, 100)))
+    assert (got.people, got.masks, got.recall_shown) == (1, 0, 1)
+    assert np.isnan([got.mask_iou, got.part_at_landmark]).all()
+
+
 def test_half_a_mask_is_half_an_iou():
     assert figures(painted(2, rows=slice(0, 80)), labels()).mask_iou == pytest.approx(0.5)
 
@@ -120,7 +126,8 @@ def test_failures_name_the_photo_and_the_worst_landmarks():
 
 
 def test_people_of_a_photo_are_grouped_as_if_its_long_side_were_320_pixels():
-    groups = {group.name: group for group in figures(painted(10), labels(left_hip=(60, 100))).groups}
-    assert groups["higher than 128 px"].people == 1  # 160 of 200 px are 256 of 320
+    low = np.array([[40, 20, 120, 120]], np.float32)
+    groups = {group.name: group for group in figures(painted(10, low), labels(low, left_hip=(60, 100))).groups}
+    assert groups["higher than 128 px"].people == 1  # 100 of 200 px are 160 of 320
     assert groups["inside the frame"].part_accuracy == 1
     assert not any(group.by == "visibility" for group in groups.values())

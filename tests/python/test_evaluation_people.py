@@ -81,8 +81,8 @@ def test_every_limb_has_a_side_and_torso_and_head_have_none():
 
 
 def crowd() -> tuple[LabelledImage, Prediction]:
-    """Three people of 10 x 10 px in a 40 x 20 image: a left hand (three rows painted as a right one) at the frame, a torso
-    that is missed, and one nobody asks for. The third detection is of nobody."""
+    """Three people of 10 x 10 px in 40 x 20: a left hand at the frame (three of its rows painted as a right one),
+    a torso that is missed, and one nobody asks for. The third detection is of nobody."""
     label = np.zeros((20, 40, 4), np.uint8)
     box = np.array([[0, 5, 10, 15], [10, 5, 20, 15], [25, 5, 35, 15]], np.float32)
     for number, (part, (x0, y0, x1, y1)) in enumerate(zip((4, 1, 1), box.astype(int), strict=True), 1):

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from export.evaluation import __main__ as command
 from export.evaluation import report
-from export.evaluation.backends import Prediction, open_backend
+from export.evaluation.backends import Prediction, fingerprint, open_backend
 from export.evaluation.measure import measure
 from export.evaluation.paint import mosaic, paint
 from export.evaluation.picture import write_picture
-from export.evaluation.shards import ShardError, read_images, sample_pixels, shard_paths
+from export.evaluation.shards import ShardError, read_image, read_images, sample_pixels, shard_paths
 from export.evaluation.surface_accuracy import PixelAccuracy, SurfacePoints, mask_overlap
+from export.teachers.label import PhotoLabels
 
 HEIGHT, WIDTH = 40, 60
 
@@ -250,6 +252,36 @@ def test_table_and_files_show_differences_and_hold_no_nan(folder, tmp_path):
     assert document["results"]["int8 capi"]["photos"] is None
     write_picture(tmp_path / "e.png", results, {})
     assert cv2.imread(str(tmp_path / "e.png")) is not None
+
+
+def test_one_command_measures_rendered_images_and_labelled_photographs(folder, tmp_path, monkeypatch):
+    images = list(read_images(shard_paths(folder)))
+    backend = Fake(images)
+    backend.path = tmp_path / "weights.pt"
+    backend.path.write_bytes(b"weights")
+    monkeypatch.setattr(command, "open_backend", lambda text, score_floor: backend)
+    monkeypatch.setattr("export.people.atlas.load_surface_table", LineSurface)
+    (tmp_path / "photos").mkdir()
+    cv2.imwrite(str(tmp_path / "photos/one.png"), images[0].image[..., ::-1])
+    people, mask = len(images[0].box), np.zeros((2, HEIGHT, WIDTH), bool)
+    landmarks = np.zeros((people, 33, 2)), np.zeros((people, 33)), np.zeros((people, 33, 3))
+    labels = PhotoLabels(images[0].box, np.ones(people), np.zeros(people, bool), *landmarks, mask)
+    labels.save(tmp_path / "labels/one.npz")
+    arguments = ["--data", str(folder), "--photos", str(tmp_path / "photos"), "--labels", str(tmp_path / "labels")]
+    arguments += ["--empty", str(tmp_path / "empty"), "--out", str(tmp_path / "out"), "--backends", "fake"]
+    assert command.main(arguments) == 0
+    document = json.loads((tmp_path / "out/evaluation.json").read_text())
+    figures = report.column_of(document, fingerprint(backend.path))
+    assert (figures["images"], figures["photos"]["photos"]) == (2, 1)
+    assert (tmp_path / "out/evaluation.png").exists()
+
+
+def test_an_image_is_found_again_by_its_name(folder):
+    second = list(read_images(shard_paths(folder)))[1]
+    assert np.array_equal(read_image(folder, second.name).image, second.image)
+    for name in ("shard-00000/0002", "shard-00009/0000", "photo.jpg"):
+        with pytest.raises(ShardError, match=name):
+            read_image(folder, name)
 
 
 def test_painting_changes_people_and_leaves_the_rest_alone(folder):

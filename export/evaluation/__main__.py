@@ -1,4 +1,7 @@
-"""Measures dense pose on labelled images: trained networks, exported ones and the SDK in one table."""
+"""Measures dense pose: trained networks, exported ones and the SDK in one table.
+
+On rendered images with exact labels, and on real photographs if the teachers have labelled them (export.teachers).
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from export.evaluation import report
+from export.evaluation import photos, report
 from export.evaluation.backends import fingerprint, open_backend
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.measure import Figures, measure
+from export.evaluation.picture import write_picture
 from export.evaluation.shards import ShardError, count_images, read_images, shard_paths
 
 EPILOG = """\
@@ -26,11 +30,16 @@ figures:
   box AP            COCO average precision of the boxes, at IoU .50 and averaged over .50:.05:.95
   GPS AP            the same with geodesic point similarity on the body surface (kappa 0.255 m,
                     196 pixels a person)
+  GPSm AP           the same with sqrt(GPS * mask IoU)
+  recall, precision share of the people found, share of the shown boxes that are right, at IoU .50
   part accuracy     share of all people's visible pixels painted with the right one of 24 parts;
                     missed people count
-  mask IoU          person pixels, all images together
+  left/right        of the limb pixels painted as a limb, those with the right side
+  mask IoU          person pixels, all images together; in groups the mean over people
   median |dU| |dV|  where the part is right
   surface error     median geodesic distance of the painted point from the true one
+  calibration error mean gap between score and share of right boxes, over ten bins of score
+real photographs: python -m export.evaluation.photos --help
 """
 
 
@@ -43,8 +52,9 @@ def main(argv: list[str] | None = None) -> int:
         "--data", type=Path, default=Path(".data/people/test"), metavar="DIR",
         help="folder of shards with surface points (default: .data/people/test)",
     )  # fmt: skip
+    photos.add_arguments(parser)
     parser.add_argument("--backends", default="torch,onnx,capi", help="default: torch,onnx,capi")
-    parser.add_argument("--limit", type=int, metavar="N", help="only the first N images")
+    parser.add_argument("--limit", type=int, metavar="N", help="only the first N rendered images")
     parser.add_argument(
         "--score-floor", type=float, default=0.05, metavar="S",
         help="lowest score that enters AP (default 0.05)",
@@ -69,21 +79,33 @@ def run(arguments: argparse.Namespace) -> int:
     total = total if arguments.limit is None else min(total, arguments.limit)
     backends = [open_backend(text, arguments.score_floor) for text in arguments.backends.split(",")]
     table = load_surface_table()
+    photo_set = photos.PhotoSet.find(arguments.photos, arguments.labels, arguments.empty)
     results: dict[str, Figures] = {}
-    sources: dict[str, str] = {}
+    photo_results: dict[str, photos.PhotoFigures] = {}
+    sources: dict[str, tuple[Path, str]] = {}
     for backend in backends:
         name = report.column_name(backend.kind, backend.precision)
         if name in results:
             name = f"{name} ({backend.path.name})"
         images = read_images(paths, arguments.limit)
         results[name] = measure(backend, images, table, total)
-        sources[name] = f"{backend.path} {fingerprint(backend.path)}"
+        if photo_set.photos:
+            photo_results[name] = photos.measure(backend, photo_set)
+        sources[name] = (backend.path, fingerprint(backend.path))
     report.print_table(results)
     if len(results) > 1:
         print(f"Largest difference between columns: {report.largest_difference(results):.2f} points")
-    data = {"folder": str(arguments.data), "shards": len(paths), "images": total, "limit": arguments.limit}
-    report.write_json(arguments.out / "evaluation.json", results, sources, data)
-    report.write_picture(arguments.out / "evaluation.png", results)
+    report.print_groups(f"people of the rendered images, {name}", results[name].groups)
+    if photo_results:
+        photos.print_figures(f"real photographs, {name}", photo_results[name])
+        report.print_groups(f"people of the photographs, {name}", photo_results[name].groups)
+    else:
+        print(f"No real photographs: {arguments.labels} has no labels (python -m export.teachers makes them).")
+    data = {"folder": str(arguments.data), "shards": len(paths), "images": total, "limit": arguments.limit,
+            "score_floor": arguments.score_floor,
+            "photos": str(arguments.photos), "empty": str(arguments.empty)}  # fmt: skip
+    report.write_json(arguments.out / "evaluation.json", results, photo_results, sources, data)
+    write_picture(arguments.out / "evaluation.png", results, photo_results)
     print(f"Written: {arguments.out / 'evaluation.json'}, {arguments.out / 'evaluation.png'}")
     return 0
 

@@ -42,37 +42,48 @@ def box_iou(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def match(matches: ImageMatches, threshold: float, ignore_threshold: float) -> tuple[np.ndarray, np.ndarray]:
     """Gives each detection, best score first, the most similar person that is still free.
 
-    Returns (correct, dropped), bool [D] each in the order of `matches`. Dropped detections matched nobody,
-    but are similar enough to something ignored.
+    Returns (person, dropped), int64 and bool [D] each in the order of `matches`: the person's column, or -1 for a
+    detection that is right about nobody. Dropped ones are among those, but similar enough to something ignored.
     """
-    correct = np.zeros(len(matches.score), bool)
+    person = np.full(len(matches.score), -1)
     free = np.ones(matches.similarity.shape[1], bool)
     for d in np.argsort(-matches.score, kind="stable"):
         similarity = np.where(free, matches.similarity[d], -1)
         if len(similarity) and similarity.max() >= threshold:
-            free[similarity.argmax()] = False
-            correct[d] = True
-    return correct, ~correct & (matches.ignorable >= ignore_threshold)
+            person[d] = similarity.argmax()
+            free[person[d]] = False
+    return person, (person < 0) & (matches.ignorable >= ignore_threshold)
+
+
+def ranked(
+    images: list[ImageMatches], threshold: float, ignore_threshold: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Score and rightness, float and bool [N], of all images' detections but the dropped ones, best score first.
+
+    threshold: similarity from which a detection is right. ignore_threshold: the same for being dropped
+    (default: threshold).
+    """
+    scores, hits = [np.zeros(0)], [np.zeros(0, bool)]
+    for image in images:
+        best = np.argsort(-image.score, kind="stable")[:MAX_DETECTIONS]
+        kept = ImageMatches(image.score[best], image.similarity[best], image.ignorable[best])
+        person, dropped = match(kept, threshold, threshold if ignore_threshold is None else ignore_threshold)
+        scores.append(kept.score[~dropped])
+        hits.append(person[~dropped] >= 0)
+    score = np.concatenate(scores)
+    order = np.argsort(-score, kind="stable")
+    return score[order], np.concatenate(hits)[order]
 
 
 def average_precision(images: list[ImageMatches], threshold: float, ignore_threshold: float | None = None) -> float:
-    """Mean over 101 recalls of the best precision at that recall or a higher one.
+    """Mean over 101 recalls of the best precision at that recall or a higher one; thresholds as in `ranked`.
 
-    threshold: similarity from which a detection is right. ignore_threshold: the same for being dropped
-    (default: threshold). Without anybody to find the value is NaN.
+    Without anybody to find the value is NaN.
     """
     wanted = sum(image.similarity.shape[1] for image in images)
     if wanted == 0:
         return float("nan")
-    scores, hits = [], []
-    for image in images:
-        best = np.argsort(-image.score, kind="stable")[:MAX_DETECTIONS]
-        kept = ImageMatches(image.score[best], image.similarity[best], image.ignorable[best])
-        correct, dropped = match(kept, threshold, threshold if ignore_threshold is None else ignore_threshold)
-        scores.append(kept.score[~dropped])
-        hits.append(correct[~dropped])
-    order = np.argsort(-np.concatenate(scores), kind="stable")
-    hit = np.concatenate(hits)[order]
+    _, hit = ranked(images, threshold, ignore_threshold)
     found = np.cumsum(hit)
     precision = found / np.arange(1, len(hit) + 1)
     precision = np.maximum.accumulate(precision[::-1])[::-1]

@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from tqdm import tqdm
 
-from export.evaluation.average_precision import THRESHOLDS, ImageMatches, average_precision, box_iou
+from export.evaluation.average_precision import THRESHOLDS, ImageMatches, average_precision
 from export.evaluation.backends import Backend, Prediction
+from export.evaluation.breakdown import GroupFigures, breakdown, left_right
+from export.evaluation.calibration import Calibration, calibrate
+from export.evaluation.failures import Case, worst_cases
+from export.evaluation.people import FalseAlarm, PersonRecord, compare, rendered_people
 from export.evaluation.shards import LabelledImage
-from export.evaluation.surface_accuracy import PixelAccuracy, PointAccuracy, SurfaceTable
+from export.evaluation.surface_accuracy import PixelAccuracy, PointAccuracy, SurfaceTable, mask_overlap, share
 
 # Under GPS a detection that overlaps somebody too small or too hidden by this much counts neither way.
 IGNORE_IOU = 0.5
+LEAST_LIMB_PX = 200  # of a person who is judged by left and right
 
 
 @dataclass(frozen=True)
 class Figures:
     """One backend's figures. Shares are 0..1, errors in cm, times in seconds; NaN: nothing to measure.
 
-    ap_box, ap_gps: mean over THRESHOLDS; *_by_threshold: at each. Pixel figures are at `threshold`, AP over
-    all scores. part_recall: of parts 0 (background) to 24.
+    ap_box, ap_gps, ap_gpsm: mean over THRESHOLDS; *_by_threshold: at each. AP and calibration are over all scores, the
+    others at `threshold`. part_recall, part_precision, part_error_cm: of parts 0 (background) to 24.
     """
 
     images: int
@@ -35,7 +40,12 @@ class Figures:
     ap_box_50: float
     ap_gps: float
     ap_gps_50: float
+    ap_gpsm: float
+    ap_gpsm_50: float
+    recall_shown: float
+    precision_shown: float
     part_accuracy: float
+    left_right: float
     mask_iou: float
     median_du: float
     median_dv: float
@@ -44,19 +54,13 @@ class Figures:
     seconds_per_image: float
     ap_box_by_threshold: list[float]
     ap_gps_by_threshold: list[float]
+    ap_gpsm_by_threshold: list[float]
     part_recall: list[float]
-
-    def as_json(self) -> dict:
-        """Plain values; NaN becomes None."""
-
-        def plain(value: object) -> object:
-            if isinstance(value, list):
-                return [plain(v) for v in value]
-            if isinstance(value, float):
-                return None if np.isnan(value) else round(value, 6)
-            return value
-
-        return {name: plain(value) for name, value in asdict(self).items()}
+    part_precision: list[float]
+    part_error_cm: list[float]
+    calibration: Calibration
+    groups: list[GroupFigures]
+    failures: dict[str, list[Case]]
 
 
 def measure(
@@ -67,8 +71,12 @@ def measure(
 ) -> Figures:
     """images: labelled images with surface points. total: their number, for the progress bar."""
     pixels, points = PixelAccuracy(), PointAccuracy()
-    boxes, ignorable, scores, shown = [], [], [], []
-    people = ignored = 0
+    matches: list[ImageMatches] = []
+    masks: list[np.ndarray] = []
+    people: list[PersonRecord] = []
+    alarms: list[FalseAlarm] = []
+    shown: list[int] = []
+    ignored = 0
     seconds = 0.0
     for image in tqdm(images, total=total, desc=f"{backend.kind} {backend.precision}", unit="image", disable=None):
         start = time.perf_counter()
@@ -76,26 +84,28 @@ def measure(
         seconds += time.perf_counter() - start
         check(found, image)
         asked = ~image.ignore
-        people, ignored = people + int(asked.sum()), ignored + int(image.ignore.sum())
-        overlap = box_iou(found.box, image.box)
-        boxes.append(overlap[:, asked])
-        ignorable.append(overlap[:, image.ignore].max(1, initial=0.0))
-        scores.append(found.score)
-        above = found.above(backend.threshold)
-        shown.append(len(above.score))
-        pixels.add(image.label, above.iuv)
+        ignored += int(image.ignore.sum())
+        comparison = compare(found, image.box, asked, backend.threshold)
+        matches.append(comparison.matches)
+        masks.append(mask_overlap(found.inds, len(found.score), image.label[..., 3], image.instance[asked]))
+        people += rendered_people(image, comparison, masks[-1])
+        alarms += comparison.false_alarms(image.name)
+        shown.append(len(comparison.shown.score))
+        pixels.add(image.label, comparison.shown.iuv)
         points.add(image, found.iuv, found.inds, len(found.score))
 
     surface = points.solve(table)
-    box_matches = [ImageMatches(*row) for row in zip(scores, boxes, ignorable, strict=True)]
-    gps_matches = [ImageMatches(*row) for row in zip(scores, surface.similarity(), ignorable, strict=True)]
-    ap_box = [average_precision(box_matches, t) for t in THRESHOLDS]
-    ap_gps = [average_precision(gps_matches, t, ignore_threshold=IGNORE_IOU) for t in THRESHOLDS]
-    right_part, painted = surface.median_error_cm(_visible(surface, shown))
+    gps = surface.similarity()
+    gpsm = [np.sqrt(similarity * mask) for similarity, mask in zip(gps, masks, strict=True)]
+    ap_box = [average_precision(matches, t) for t in THRESHOLDS]
+    ap_gps, ap_gpsm = (_surface_precision(matches, similarity) for similarity in (gps, gpsm))
+    visible = _visible(surface, shown)
+    right_part, painted = surface.median_error_cm(visible)
     du, dv = pixels.median_difference()
+    right = sum(person.found for person in people)
     return Figures(
-        images=len(scores),
-        people=people,
+        images=len(matches),
+        people=len(people),
         ignored=ignored,
         found=sum(shown),
         threshold=float(backend.threshold),
@@ -103,17 +113,34 @@ def measure(
         ap_box_50=ap_box[0],
         ap_gps=float(np.mean(ap_gps)),
         ap_gps_50=ap_gps[0],
+        ap_gpsm=float(np.mean(ap_gpsm)),
+        ap_gpsm_50=ap_gpsm[0],
+        recall_shown=share(right, len(people)),
+        precision_shown=share(right, right + len(alarms)),
         part_accuracy=pixels.part_accuracy(),
+        left_right=left_right(people),
         mask_iou=pixels.mask_iou(),
         median_du=du,
         median_dv=dv,
         error_cm_right_part=right_part,
         error_cm_painted=painted,
-        seconds_per_image=seconds / max(len(scores), 1),
+        seconds_per_image=seconds / max(len(matches), 1),
         ap_box_by_threshold=ap_box,
         ap_gps_by_threshold=ap_gps,
-        part_recall=[float(r) for r in pixels.part_recall()],
+        ap_gpsm_by_threshold=ap_gpsm,
+        part_recall=pixels.part_recall().tolist(),
+        part_precision=pixels.part_precision().tolist(),
+        part_error_cm=surface.part_error_cm(visible),
+        calibration=calibrate(matches),
+        groups=breakdown(people),
+        failures=worst_cases(people, alarms, LEAST_LIMB_PX),
     )
+
+
+def _surface_precision(boxes: list[ImageMatches], similarity: list[np.ndarray]) -> list[float]:
+    """AP at each of THRESHOLDS by GPS or GPSm [D, G] of each image; who is ignored is still a question of boxes."""
+    matches = [ImageMatches(b.score, s, b.ignorable) for b, s in zip(boxes, similarity, strict=True)]
+    return [average_precision(matches, t, ignore_threshold=IGNORE_IOU) for t in THRESHOLDS]
 
 
 def _visible(surface: object, shown: list[int]) -> np.ndarray:

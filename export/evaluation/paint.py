@@ -56,14 +56,13 @@ def _contours(iuv: np.ndarray, steps: int = 8) -> np.ndarray:
     return lines
 
 
-def labelled_tile(picture: np.ndarray, text: str, side: int) -> np.ndarray:
-    """The picture fitted into a square of `side` pixels with a line of text below it."""
-    height, width = picture.shape[:2]
-    scale = min(side / width, (side - 16) / height)
+def labelled_tile(picture: np.ndarray, text: str, width: int, height: int) -> np.ndarray:
+    """The picture fitted into width x height pixels with a line of text below it."""
+    scale = min(width / picture.shape[1], (height - 16) / picture.shape[0])
     fitted = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    tile = np.zeros((side, side, 3), np.uint8)
-    tile[: fitted.shape[0], : fitted.shape[1]] = fitted
-    cv2.putText(tile, text, (3, side - 5), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (230, 230, 230), 1, cv2.LINE_AA)
+    tile = np.zeros((height, width, 3), np.uint8)
+    tile[: fitted.shape[0], : fitted.shape[1]] = fitted[:height, :width]
+    cv2.putText(tile, text, (3, height - 5), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (230, 230, 230), 1, cv2.LINE_AA)
     return tile
 
 

@@ -8,26 +8,41 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.evaluation.average_precision import ImageMatches, box_iou, match
+from export.evaluation.average_precision import ImageMatches, ranked
 from export.evaluation.backends import Backend, Prediction, fingerprint, open_backend
+from export.evaluation.breakdown import GroupFigures, breakdown, left_right, mean_mask_iou, part_accuracy
+from export.evaluation.calibration import Calibration, calibrate
+from export.evaluation.failures import Case, worst_cases
 from export.evaluation.machine import describe_machine
 from export.evaluation.maquette_api import MaquetteError
+from export.evaluation.people import (
+    LIMB_SIDE,
+    LONG_SIDE_PX,
+    MATCH_IOU,
+    FalseAlarm,
+    PersonRecord,
+    compare,
+    crowding,
+    plain_box,
+    touches_frame,
+)
+from export.evaluation.plain import plain
+from export.evaluation.surface_accuracy import share
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
 
 LEAST_HEIGHT_PX = 64
 LEAST_TEACHER_SCORE = 0.5
 LEAST_VISIBLE = 0.6
-MATCH_IOU = 0.5
+LEAST_LIMB_LANDMARKS = 4  # of a person who is judged by left and right
 PRECISION = 0.9
-_LEFT, _RIGHT = {4, 5, 8, 10, 12, 14, 15, 17, 19, 21, 24}, {3, 6, 7, 9, 11, 13, 16, 18, 20, 22, 23}
 # Which parts may be painted at a landmark of BlazePose. A landmark lies inside the body, so front and back both count.
 _ALLOWED = {
     "nose": {23, 24}, "left ear": {23, 24}, "right ear": {23, 24},
@@ -57,8 +72,23 @@ example:
 
 
 @dataclass(frozen=True)
+class PhotoSet:
+    """photos: image files that have labels; labels: folder of NAME.npz (PhotoLabels); empty: photos of nobody."""
+
+    photos: list[Path]
+    labels: Path
+    empty: list[Path]
+
+    @staticmethod
+    def find(photos: Path, labels: Path, empty: Path) -> PhotoSet:
+        labelled = [p for p in sorted(photos.glob("*")) if (labels / f"{p.stem}.npz").exists()]
+        return PhotoSet(labelled, labels, sorted(empty.glob("*.jpg")))
+
+
+@dataclass(frozen=True)
 class PhotoFigures:
-    """Shares 0..1; NaN: nothing to measure. landmark: share right by landmark name."""
+    """Shares 0..1; NaN: nothing to measure. Calibration is over photos with people. landmark: share right by landmark
+    name. groups, failures: as for rendered images, with landmarks in place of pixels."""
 
     photos: int
     people: int
@@ -72,6 +102,9 @@ class PhotoFigures:
     empty_photos: int
     false_people: float
     landmark: dict[str, float]
+    calibration: Calibration
+    groups: list[GroupFigures]
+    failures: dict[str, list[Case]]
 
 
 class Tally:
@@ -80,78 +113,85 @@ class Tally:
     def __init__(self, threshold: float) -> None:
         self.threshold = threshold
         self.matches: list[ImageMatches] = []
-        self.shown = [0, 0, 0]  # right, wrong, wanted
-        self.ious: list[float] = []
+        self.people: list[PersonRecord] = []
+        self.alarms: list[FalseAlarm] = []
+        self.in_empty: list[FalseAlarm] = []
         self.landmarks: dict[str, list[bool]] = {name: [] for name in _ALLOWED}
-        self.sides: list[bool] = []
-        self.photos = self.empty = self.false = 0
+        self.photos = self.empty = 0
 
-    def add(self, found: Prediction, labels: PhotoLabels) -> None:
+    def add(self, name: str, found: Prediction, labels: PhotoLabels) -> None:
         self.photos += 1
-        height = labels.box[:, 3] - labels.box[:, 1]
-        wanted = (height > LEAST_HEIGHT_PX) & (labels.score >= LEAST_TEACHER_SCORE)
-        overlap = box_iou(found.box, labels.box)
-        this = ImageMatches(found.score, overlap[:, wanted], overlap[:, ~wanted].max(1, initial=0.0))
-        self.matches.append(this)
-        above = found.above(self.threshold)
-        count = len(above.score)
-        kept = ImageMatches(this.score[:count], this.similarity[:count], this.ignorable[:count])
-        correct, dropped = match(kept, MATCH_IOU, MATCH_IOU)
-        right = int(correct.sum())
-        self.shown[0] += right
-        self.shown[1] += int((~correct & ~dropped).sum())
-        self.shown[2] += int(wanted.sum())
-        for k in np.flatnonzero(labels.sure & wanted):
-            self._person(above, labels, k)
-
-    def _person(self, found: Prediction, labels: PhotoLabels, k: int) -> None:
-        overlap = box_iou(found.box, labels.box[k : k + 1])[:, 0]
-        own = int(overlap.argmax()) + 1 if len(overlap) and overlap.max() >= MATCH_IOU else 0
-        painted = found.inds == own if own else np.zeros(found.inds.shape, bool)
-        self.ious.append(float((painted & labels.mask[k]).sum() / max((painted | labels.mask[k]).sum(), 1)))
+        heights = labels.box[:, 3] - labels.box[:, 1]
+        wanted = (heights > LEAST_HEIGHT_PX) & (labels.score >= LEAST_TEACHER_SCORE)
+        comparison = compare(found, labels.box, wanted, self.threshold)
+        self.matches.append(comparison.matches)
+        self.alarms += comparison.false_alarms(name)
         height, width = found.inds.shape
+        close = crowding(labels.box)
+        for k, number in zip(np.flatnonzero(wanted), comparison.number.tolist(), strict=True):
+            painted = (comparison.shown.inds == number) & (number > 0)
+            part = np.where(painted, comparison.shown.iuv[..., 0], 0)
+            asked, right, limb, same_side = self._landmarks(part, labels, k) if labels.sure[k] else (0, 0, 0, 0)
+            iou = float((painted & labels.mask[k]).sum() / max((painted | labels.mask[k]).sum(), 1))
+            self.people.append(
+                PersonRecord(
+                    image=name,
+                    box=plain_box(labels.box[k]),
+                    height_px=float(heights[k]) * LONG_SIDE_PX / max(height, width),
+                    cut=touches_frame(labels.box[k], width, height),
+                    crowding=float(close[k]),
+                    groups_seen=float("nan"),
+                    found=number > 0,
+                    mask_iou=iou if labels.sure[k] else float("nan"),
+                    asked=asked,
+                    right=right,
+                    limb=limb,
+                    same_side=same_side,
+                )
+            )
+
+    def _landmarks(self, part: np.ndarray, labels: PhotoLabels, k: int) -> tuple[int, int, int, int]:
+        """part: uint8 [H, W], painted on person k. Landmarks asked for, with the right part, of limbs, of their side"""
+        height, width = part.shape
+        hits, sides = [], []
         for name, allowed in _ALLOWED.items():
             index = NAMES.index(name)
             x, y = np.floor(labels.point[k, index]).astype(int)
             inside = 0 <= x < width and 0 <= y < height
             if not inside or labels.visible[k, index] < LEAST_VISIBLE or not labels.mask[k, y, x]:
                 continue
-            part = int(found.iuv[y, x, 0]) if painted[y, x] else 0
-            self.landmarks[name].append(part in allowed)
-            side = _LEFT if name.startswith("left") else _RIGHT
-            if "ear" not in name and name != "nose" and part in (_LEFT | _RIGHT) - {23, 24}:
-                self.sides.append(part in side)
+            hits.append(int(part[y, x]) in allowed)
+            self.landmarks[name].append(hits[-1])
+            side = LIMB_SIDE[part[y, x]]
+            if side and "ear" not in name and name != "nose":
+                sides.append(side == (1 if name.startswith("left") else 2))
+        return len(hits), sum(hits), len(sides), int(sum(sides))
 
-    def add_empty(self, found: Prediction) -> None:
+    def add_empty(self, name: str, found: Prediction) -> None:
         """found: on a photo without people."""
         self.empty += 1
-        self.false += len(found.above(self.threshold).score)
+        nobody = np.zeros((0, 4)), np.zeros(0, bool)
+        self.in_empty += compare(found, *nobody, self.threshold).false_alarms(name)
 
     def figures(self) -> PhotoFigures:
-        right, wrong, wanted = self.shown
-        every = [hit for hits in self.landmarks.values() for hit in hits]
+        right = sum(person.found for person in self.people)
         return PhotoFigures(
             photos=self.photos,
-            people=wanted,
-            masks=len(self.ious),
+            people=len(self.people),
+            masks=sum(not np.isnan(person.mask_iou) for person in self.people),
             recall_at_precision=recall_at_precision(self.matches, PRECISION),
-            recall_shown=_share(right, wanted),
-            precision_shown=_share(right, right + wrong),
-            mask_iou=_mean(self.ious),
-            part_at_landmark=_mean(every),
-            left_right=_mean(self.sides),
+            recall_shown=share(right, len(self.people)),
+            precision_shown=share(right, right + len(self.alarms)),
+            mask_iou=mean_mask_iou(self.people),
+            part_at_landmark=part_accuracy(self.people),
+            left_right=left_right(self.people),
             empty_photos=self.empty,
-            false_people=_share(self.false, self.empty),
-            landmark={name: _mean(hits) for name, hits in self.landmarks.items()},
+            false_people=share(len(self.in_empty), self.empty),
+            landmark={name: share(sum(hits), len(hits)) for name, hits in self.landmarks.items()},
+            calibration=calibrate(self.matches),
+            groups=breakdown(self.people),
+            failures=worst_cases(self.people, self.alarms + self.in_empty, LEAST_LIMB_LANDMARKS),
         )
-
-
-def _share(part: int, whole: int) -> float:
-    return part / whole if whole else float("nan")
-
-
-def _mean(values: list) -> float:
-    return float(np.mean(values)) if values else float("nan")
 
 
 def recall_at_precision(matches: list[ImageMatches], precision: float) -> float:
@@ -159,35 +199,39 @@ def recall_at_precision(matches: list[ImageMatches], precision: float) -> float:
     wanted = sum(image.similarity.shape[1] for image in matches)
     if not wanted:
         return float("nan")
-    scores, hits = [], []
-    for image in matches:
-        correct, dropped = match(image, MATCH_IOU, MATCH_IOU)
-        scores.append(image.score[~dropped])
-        hits.append(correct[~dropped])
-    hit = np.concatenate(hits)[np.argsort(-np.concatenate(scores), kind="stable")]
+    _, hit = ranked(matches, MATCH_IOU)
     found = np.cumsum(hit)
     enough = found >= precision * np.arange(1, len(hit) + 1)
     return float(found[enough].max(initial=0) / wanted)
 
 
-def measure(backend: Backend, photos: list[Path], labels: Path, empty: list[Path]) -> PhotoFigures:
+def measure(backend: Backend, chosen: PhotoSet) -> PhotoFigures:
     tally = Tally(backend.threshold)
-    bar = tqdm(total=len(photos) + len(empty), desc=f"{backend.kind} {backend.precision}", unit="photo", disable=None)
-    with bar:
-        for path in photos:
-            tally.add(backend.predict(_read(path)), PhotoLabels.load(labels / f"{path.stem}.npz"))
+    total = len(chosen.photos) + len(chosen.empty)
+    with tqdm(total=total, desc=f"{backend.kind} {backend.precision}", unit="photo", disable=None) as bar:
+        for path in chosen.photos:
+            labels = PhotoLabels.load(chosen.labels / f"{path.stem}.npz")
+            tally.add(path.name, backend.predict(read_photo(path)), labels)
             bar.update()
-        for path in empty:
-            tally.add_empty(backend.predict(_read(path)))
+        for path in chosen.empty:
+            tally.add_empty(path.name, backend.predict(read_photo(path)))
             bar.update()
     return tally.figures()
 
 
-def _read(path: Path) -> np.ndarray:
+def read_photo(path: Path) -> np.ndarray:
+    """uint8 [H, W, 3] RGB. Raises ValueError for a file that is no image."""
     image = cv2.imread(str(path))
     if image is None:
         raise ValueError(f"{path} is not an image that can be read")
     return np.ascontiguousarray(image[..., ::-1])
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """--photos, --labels and --empty: the folders of a PhotoSet."""
+    parser.add_argument("--photos", type=Path, default=Path(".data/photos/photo"), metavar="DIR")
+    parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
+    parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/test"), metavar="DIR", help="no people")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -195,30 +239,27 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m export.evaluation.photos", description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("--photos", type=Path, default=Path(".data/photos/photo"), metavar="DIR")
-    parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
-    parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/test"), metavar="DIR", help="no people")
+    add_arguments(parser)
     parser.add_argument("--backends", default="capi", help="as for export.evaluation; default: capi")
     parser.add_argument("--out", type=Path, default=Path("build/evaluation/photos.json"), metavar="FILE")
     arguments = parser.parse_args(argv)
-    photos = [p for p in sorted(arguments.photos.glob("*")) if (arguments.labels / f"{p.stem}.npz").exists()]
-    if not photos:
+    chosen = PhotoSet.find(arguments.photos, arguments.labels, arguments.empty)
+    if not chosen.photos:
         print(f"No labels in {arguments.labels}: run `python -m export.teachers` first.", file=sys.stderr)
         return 1
     results = {}
     try:
         for text in arguments.backends.split(","):
             backend = open_backend(text, 0.05)
-            figures = measure(backend, photos, arguments.labels, sorted(arguments.empty.glob("*.jpg")))
             name = f"{backend.precision} {backend.kind} {backend.path}"
-            results[name] = {"model": fingerprint(backend.path), **asdict(figures)}
+            figures = measure(backend, chosen)
+            results[name] = {"model": fingerprint(backend.path), **plain(figures)}
             print_figures(name, figures)
     except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Evaluation stopped: {error}", file=sys.stderr)
         return 1
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps({"machine": describe_machine(), "results": results}, indent=1)
-    arguments.out.write_text(text.replace("NaN", "null") + "\n")
+    arguments.out.write_text(json.dumps({"machine": describe_machine(), "results": results}, indent=1) + "\n")
     print(f"Written: {arguments.out}")
     return 0
 

@@ -1,4 +1,4 @@
-"""The evaluation's results as a table on the terminal, a JSON file and a picture."""
+"""The evaluation's results as tables on the terminal and a JSON file."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ from rich.console import Console
 from rich.table import Table
 
 from export.evaluation.average_precision import THRESHOLDS
+from export.evaluation.breakdown import GroupFigures
+from export.evaluation.calibration import BINS
 from export.evaluation.machine import describe_machine
 from export.evaluation.measure import Figures
-from export.surface import PART_COUNT, PART_NAMES
+from export.evaluation.photos import PhotoFigures
+from export.evaluation.plain import plain
+from export.surface import PART_NAMES
 
-SCHEMA = "maquette-evaluation-1"
+SCHEMA = "maquette-evaluation-2"
 WIDTH_OF_FILES = 140  # columns of the table when it does not go to a terminal
 
 # Rows of the table: label, field, unit. Shares are shown in points (hundredths), and so are differences.
@@ -24,7 +28,12 @@ ROWS = (
     ("box AP .50:.95", "ap_box", "points"),
     ("GPS AP50", "ap_gps_50", "points"),
     ("GPS AP .50:.95", "ap_gps", "points"),
+    ("GPSm AP50", "ap_gpsm_50", "points"),
+    ("GPSm AP .50:.95", "ap_gpsm", "points"),
+    ("recall, as shown", "recall_shown", "points"),
+    ("precision, as shown", "precision_shown", "points"),
     ("part accuracy", "part_accuracy", "points"),
+    ("left/right", "left_right", "points"),
     ("mask IoU", "mask_iou", "points"),
     ("median |dU|", "median_du", "plain"),
     ("median |dV|", "median_dv", "plain"),
@@ -56,10 +65,14 @@ def print_table(results: dict[str, Figures], console: Console | None = None) -> 
         table.add_column(f"{name}: difference", justify="right")
     for label, field, unit in ROWS:
         values = [getattr(figures, field) * {"points": 100, "ms": 1000}.get(unit, 1) for figures in results.values()]
-        cells = [_text(value, unit) for value in values]
-        differences = [_text(value - values[0], unit, signed=True) for value in values[1:]]
-        table.add_row(label, *cells, *differences)
+        _add_row(table, label, unit, values)
+    _add_row(table, "calibration error", "points", [100 * f.calibration.expected_error for f in results.values()])
     console.print(table)
+
+
+def _add_row(table: Table, label: str, unit: str, values: list[float]) -> None:
+    differences = [_text(value - values[0], unit, signed=True) for value in values[1:]]
+    table.add_row(label, *(_text(value, unit) for value in values), *differences)
 
 
 def _text(value: float, unit: str, signed: bool = False) -> str:
@@ -78,43 +91,62 @@ def largest_difference(results: dict[str, Figures]) -> float:
     return max(spans)
 
 
-def write_json(path: Path, results: dict[str, Figures], sources: dict[str, str], data: dict) -> None:
+def print_groups(title: str, groups: list[GroupFigures], console: Console | None = None) -> None:
+    """Figures by size, truncation, crowding and visibility."""
+    console = console or Console(width=None if sys.stdout.isatty() else WIDTH_OF_FILES)
+    table = Table(title=title, title_justify="left")
+    table.add_column("")
+    for name in ("people", "recall", "part accuracy", "mask IoU"):
+        table.add_column(name, justify="right")
+    for before, group in zip([None, *groups], groups, strict=False):
+        if before is not None and before.by != group.by:
+            table.add_section()
+        shares = (group.recall, group.part_accuracy, group.mask_iou)
+        cells = [_text(100 * value, "points") for value in shares]
+        table.add_row(f"{group.by}: {group.name}", str(group.people), *cells)
+    console.print(table)
+
+
+def write_json(
+    path: Path,
+    results: dict[str, Figures],
+    photo_results: dict[str, PhotoFigures],
+    sources: dict[str, tuple[Path, str]],
+    data: dict,
+) -> None:
     """sources: path and fingerprint of each column's model. data: what was evaluated."""
     document = {
         "schema": SCHEMA,
         "machine": describe_machine(),
         "data": data,
         "thresholds": THRESHOLDS,
+        "calibration_bins": BINS,
         "part_names": PART_NAMES,
-        "results": {name: {"model": sources[name], **figures.as_json()} for name, figures in results.items()},
+        "results": {},
         "largest_difference_points": round(largest_difference(results), 3),
     }
+    for name, figures in results.items():
+        model, digest = sources[name]
+        photos = photo_results.get(name)
+        document["results"][name] = {
+            "model": str(model),
+            "fingerprint": digest,
+            **plain(figures),
+            "photos": None if photos is None else plain(photos),
+        }
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(document, indent=1) + "\n")
 
 
-def write_picture(path: Path, results: dict[str, Figures]) -> None:
-    """AP against the threshold on the left, recall of each body part on the right; one colour a column."""
-    import matplotlib
+def column_of(document: dict, digest: str) -> dict:
+    """The figures in a file of `write_json` that belong to the model with this fingerprint.
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(13, 5), width_ratios=(1, 2), layout="constrained")
-    width = 0.8 / len(results)
-    for k, (name, figures) in enumerate(results.items()):
-        color = f"C{k}"
-        left.plot(THRESHOLDS, figures.ap_box_by_threshold, "--", color=color, label=f"{name}: box")
-        left.plot(THRESHOLDS, figures.ap_gps_by_threshold, "-", color=color, label=f"{name}: GPS")
-        position = np.arange(1, PART_COUNT + 1) + (k - (len(results) - 1) / 2) * width
-        right.bar(position, figures.part_recall[1:], width, color=color, label=name)
-    left.set(xlabel="similarity threshold", ylabel="average precision", ylim=(0, 1), xlim=(0.5, 0.95))
-    left.grid(alpha=0.3)
-    left.legend(fontsize=8)
-    right.set(ylabel="share of the part's pixels painted with it", ylim=(0, 1), xlim=(0.4, PART_COUNT + 0.6))
-    right.set_xticks(range(1, PART_COUNT + 1), PART_NAMES[1:], rotation=90, fontsize=8)
-    right.grid(axis="y", alpha=0.3)
-    right.legend(fontsize=8)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    Raises ValueError for files of another schema and when that model was not measured.
+    """
+    if document.get("schema") != SCHEMA:
+        raise ValueError(f"the figures are of schema {document.get('schema')}, not {SCHEMA}; measure again.")
+    for figures in document["results"].values():
+        if figures["fingerprint"] == digest:
+            return figures
+    measured = ", ".join(f"{f['model']} {f['fingerprint']}" for f in document["results"].values())
+    raise ValueError(f"the figures are of {measured}, not of the model {digest}; run `python -m export.evaluation`.")

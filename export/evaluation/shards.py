@@ -56,16 +56,30 @@ def read_images(paths: list[Path], limit: int | None = None) -> Iterator[Labelle
     """The images of the shards in order, at most `limit` of them. Raises ShardError for other files."""
     given = 0
     for path in paths:
-        with np.load(path) as file:
-            missing = {"image", "image_end", "label", "label_end", "box", "box_image"} - set(file.files)
-            if missing:
-                raise ShardError(f"{path} lacks {', '.join(sorted(missing))}: it is not a shard of this project.")
-            shard = {name: file[name] for name in file.files}
+        shard = _read_shard(path)
         for k in range(len(shard["image_end"])):
             if given == limit:
                 return
             yield _labelled_image(f"{path.stem}/{k:04d}", shard, k)
             given += 1
+
+
+def read_image(folder: Path, name: str) -> LabelledImage:
+    """The image that `read_images` calls `name`. Raises ShardError when the folder has no such image."""
+    stem, _, number = name.partition("/")
+    path = folder / f"{stem}.npz"
+    shard = _read_shard(path) if path.exists() else {"image_end": ()}
+    if not number.isdigit() or int(number) >= len(shard["image_end"]):
+        raise ShardError(f"{folder} has no image {name}: were the figures made from another folder?")
+    return _labelled_image(name, shard, int(number))
+
+
+def _read_shard(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as file:
+        missing = {"image", "image_end", "label", "label_end", "box", "box_image"} - set(file.files)
+        if missing:
+            raise ShardError(f"{path} lacks {', '.join(sorted(missing))}: it is not a shard of this project.")
+        return {name: file[name] for name in file.files}
 
 
 def _labelled_image(name: str, shard: dict[str, np.ndarray], k: int) -> LabelledImage:

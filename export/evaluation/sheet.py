@@ -81,7 +81,7 @@ def main(argv: list[str] | None = None) -> int:
             pictures(arguments.source, arguments.limit, arguments.frames), unit="photo", disable=None
         ):
             shown = backend.predict(image).above(threshold)
-            tiles.append(labelled_tile(paint(image, shown), caption(name, shown), arguments.side))
+            tiles.append(labelled_tile(paint(image, shown), caption(name, shown), arguments.side, arguments.side))
     except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"No sheet was drawn: {error}", file=sys.stderr)
         return 1

@@ -3,6 +3,9 @@
 GPS of a person (Guler et al., CVPR 2018): mean over its points of exp(-d^2 / (2 kappa^2)), d the geodesic
 distance in metres between the predicted and the true surface point, 0 where the detection has no such pixel;
 kappa = 0.255, so 30 cm count one half. Distances are those of our own template body.
+
+GPSm (DensePose task of the COCO 2019 challenge): sqrt(GPS * mask IoU) of the detection and the person. GPS alone does
+not mind pixels painted outside the person.
 """
 
 from __future__ import annotations
@@ -48,16 +51,22 @@ class PixelAccuracy:
             self.difference[axis] += np.bincount(gap, minlength=256)
 
     def part_accuracy(self) -> float:
-        return _share(np.trace(self.confusion[1:, 1:]), self.confusion[1:].sum())
+        return share(np.trace(self.confusion[1:, 1:]), self.confusion[1:].sum())
 
     def mask_iou(self) -> float:
         both = self.confusion[1:, 1:].sum()
-        return _share(both, self.confusion.sum() - self.confusion[0, 0])
+        return share(both, self.confusion.sum() - self.confusion[0, 0])
 
     def part_recall(self) -> np.ndarray:
         """float64 [25]: share of each true part's pixels painted with that part; NaN for unseen parts."""
-        seen = self.confusion.sum(1)
-        return np.where(seen > 0, np.diag(self.confusion) / np.maximum(seen, 1), np.nan)
+        return self._diagonal_over(self.confusion.sum(1))
+
+    def part_precision(self) -> np.ndarray:
+        """float64 [25]: share of the pixels painted with each part that show it; NaN for unpainted parts."""
+        return self._diagonal_over(self.confusion.sum(0))
+
+    def _diagonal_over(self, total: np.ndarray) -> np.ndarray:
+        return np.where(total > 0, np.diag(self.confusion) / np.maximum(total, 1), np.nan)
 
     def median_difference(self) -> tuple[float, float]:
         """Median |dU| and |dV|, 0..1, over pixels whose part is right."""
@@ -95,7 +104,8 @@ class PointAccuracy:
 
     def solve(self, table: SurfaceTable) -> SurfacePoints:
         if not self._point:
-            return SurfacePoints(np.zeros(0, np.float32), np.zeros(0, bool), np.zeros(0, np.uint8), self.images)
+            nothing = np.zeros(0, np.uint8)
+            return SurfacePoints(np.zeros(0, np.float32), nothing, np.zeros(0, bool), nothing, self.images)
         part, owner = np.concatenate(self._part), np.concatenate(self._owner)
         iuv, point = np.concatenate(self._iuv), np.concatenate(self._point)
         painted = (owner > 0) & (iuv[:, 0] > 0)
@@ -104,14 +114,17 @@ class PointAccuracy:
             true = table.nearest_by_point(point[painted])
             predicted = table.nearest_by_iuv(iuv[painted, 0], iuv[painted, 1:].astype(np.float32) / 255)
             distance[painted] = table.geodesic[true, predicted]
-        return SurfacePoints(distance, part == iuv[:, 0], owner, self.images)
+        return SurfacePoints(distance, part, part == iuv[:, 0], owner, self.images)
 
 
 class SurfacePoints:
-    """distance: float32 [K] m, inf where nothing is painted; same_part: bool [K]; owner: detection or 0."""
+    """distance: float32 [K] m, inf where nothing is painted; part: uint8 [K], the true one; same_part: bool [K];
+    owner: detection or 0."""
 
-    def __init__(self, distance: np.ndarray, same_part: np.ndarray, owner: np.ndarray, images: list) -> None:
-        self.distance, self.same_part, self.owner, self.images = distance, same_part, owner, images
+    def __init__(
+        self, distance: np.ndarray, part: np.ndarray, same_part: np.ndarray, owner: np.ndarray, images: list
+    ) -> None:
+        self.distance, self.part, self.same_part, self.owner, self.images = distance, part, same_part, owner, images
 
     def similarity(self) -> list[np.ndarray]:
         """For each image GPS of its detections with its people: float64 [D, G]."""
@@ -135,6 +148,23 @@ class SurfacePoints:
         both = painted & self.same_part
         return tuple(100 * float(np.median(self.distance[m])) if m.any() else np.nan for m in (both, painted))
 
+    def part_error_cm(self, shown: np.ndarray) -> list[float]:
+        """[25]: median distance in cm over the painted points of each true part; NaN where there are none."""
+        painted = np.isfinite(self.distance) & shown
+        chosen = [painted & (self.part == part) for part in range(PART_COUNT + 1)]
+        return [100 * float(np.median(self.distance[m])) if m.any() else np.nan for m in chosen]
 
-def _share(part: int, whole: int) -> float:
+
+def mask_overlap(inds: np.ndarray, detections: int, instance: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """IoU of what each detection painted in front with each person's visible pixels: float64 [detections, G].
+
+    inds, instance: uint8 [H, W], detection and person of each pixel, 0 for none. numbers: [G], those of the people.
+    """
+    shared = np.bincount(inds.astype(np.int64).ravel() * 256 + instance.ravel(), minlength=256 * 256).reshape(256, 256)
+    union = shared.sum(1)[:, None] + shared.sum(0)[None] - shared
+    return (shared / np.maximum(union, 1))[1 : detections + 1, numbers]
+
+
+def share(part: int, whole: int) -> float:
+    """part / whole; NaN of nothing."""
     return float(part / whole) if whole else float("nan")

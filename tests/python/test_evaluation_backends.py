@@ -45,6 +45,14 @@ def test_the_c_api_finds_the_people_of_the_tiny_bundle():
 
 
 @needs_library
+def test_a_model_card_beside_the_manifest_does_no_harm(tmp_path):
+    bundle = shutil.copytree(BUNDLE, tmp_path / "bundle")
+    (bundle / "MODEL_CARD.md").write_text("# Model card\n")
+    with maquette_api.DensePose(bundle) as model:
+        assert len(model.run(picture()).box) == 3
+
+
+@needs_library
 def test_rows_with_padding_and_views_are_read_right():
     image = picture()
     with maquette_api.DensePose(BUNDLE) as model:

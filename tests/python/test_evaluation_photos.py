@@ -41,7 +41,7 @@ NOBODY = Prediction(
 
 def figures(found: Prediction, truth: PhotoLabels):
     tally = Tally(0.5)
-    tally.add(found, truth)
+    tally.add("photo.jpg", found, truth)
     return tally.figures()
 
 
@@ -56,6 +56,12 @@ def test_nobody_found_counts_as_wrong_everywhere():
     assert (got.recall_at_precision, got.mask_iou, got.part_at_landmark) == (0, 0, 0)
     assert np.isnan(got.precision_shown)
     assert np.isnan(got.left_right)  # no limb is painted there
+
+
+def test_people_about_whom_the_teachers_disagree_are_asked_for_by_box_alone():
+    got = figures(painted(10), labels(sure=False, left_hip=(60, 100)))
+    assert (got.people, got.masks, got.recall_shown) == (1, 0, 1)
+    assert np.isnan([got.mask_iou, got.part_at_landmark]).all()
 
 
 def test_half_a_mask_is_half_an_iou():
@@ -92,7 +98,7 @@ def test_a_second_box_on_the_same_person_is_a_false_one():
 def test_people_in_empty_photos_are_counted_from_the_threshold_on():
     tally = Tally(0.5)
     for found in (painted(2, score=0.8), painted(2, score=0.4), NOBODY, NOBODY):
-        tally.add_empty(found)
+        tally.add_empty("room.jpg", found)
     assert tally.figures().false_people == 0.25
 
 
@@ -105,3 +111,23 @@ def test_recall_at_precision_takes_the_best_cut():
     assert recall_at_precision([ImageMatches(score, one_each, np.array([0, 0, 1, 0, 0.0]))], 0.9) == pytest.approx(
         4 / 5
     )
+
+
+def test_failures_name_the_photo_and_the_worst_landmarks():
+    limbs = dict.fromkeys(("left_knee", "left_ankle", "left_elbow", "left_hip"), (60, 100))
+    tally = Tally(0.5)
+    tally.add("swapped.jpg", painted(9), labels(**limbs))  # all painted as a right leg
+    tally.add("missed.jpg", NOBODY, labels())
+    tally.add_empty("room.jpg", painted(2))
+    failures = tally.figures().failures
+    assert [(case.image, case.figure) for case in failures["side"]] == [("swapped.jpg", 0)]
+    assert [case.image for case in failures["missed"]] == ["missed.jpg"]
+    assert [(case.image, case.figure) for case in failures["false"]] == [("room.jpg", pytest.approx(0.8))]
+
+
+def test_people_of_a_photo_are_grouped_as_if_its_long_side_were_320_pixels():
+    low = np.array([[40, 20, 120, 120]], np.float32)
+    groups = {group.name: group for group in figures(painted(10, low), labels(low, left_hip=(60, 100))).groups}
+    assert groups["higher than 128 px"].people == 1  # 100 of 200 px are 160 of 320
+    assert groups["inside the frame"].part_accuracy == 1
+    assert not any(group.by == "visibility" for group in groups.values())

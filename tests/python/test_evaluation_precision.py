@@ -41,13 +41,13 @@ def test_a_missed_person_cuts_the_recalls_above_one_half():
 
 
 def test_a_second_detection_of_the_same_person_is_a_false_alarm():
-    correct, _ = match(image([0.8, 0.9], [[0.9], [0.6]]), 0.5, 0.5)
-    assert correct.tolist() == [False, True]
+    person, _ = match(image([0.8, 0.9], [[0.9], [0.6]]), 0.5, 0.5)
+    assert person.tolist() == [-1, 0]
 
 
 def test_a_detection_takes_the_next_best_person_when_its_best_is_taken():
-    correct, _ = match(image([0.9, 0.8], [[0.9, 0.6], [0.9, 0.6]]), 0.5, 0.5)
-    assert correct.tolist() == [True, True]
+    person, _ = match(image([0.9, 0.8], [[0.9, 0.6], [0.9, 0.6]]), 0.5, 0.5)
+    assert person.tolist() == [0, 1]
 
 
 def test_detections_of_ignored_people_count_neither_way():

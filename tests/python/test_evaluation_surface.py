@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from export.evaluation import __main__ as command
 from export.evaluation import report
-from export.evaluation.backends import Prediction, open_backend
+from export.evaluation.backends import Prediction, fingerprint, open_backend
 from export.evaluation.measure import measure
 from export.evaluation.paint import mosaic, paint
-from export.evaluation.shards import ShardError, read_images, sample_pixels, shard_paths
-from export.evaluation.surface_accuracy import PixelAccuracy
+from export.evaluation.picture import write_picture
+from export.evaluation.shards import ShardError, read_image, read_images, sample_pixels, shard_paths
+from export.evaluation.surface_accuracy import PixelAccuracy, SurfacePoints, mask_overlap
+from export.teachers.label import PhotoLabels
 
 HEIGHT, WIDTH = 40, 60
 
@@ -126,7 +129,8 @@ def test_the_truth_itself_gets_full_marks(folder):
     result = figures(folder)
     assert (result.images, result.people, result.ignored) == (2, 3, 1)
     assert (result.ap_box, result.part_accuracy, result.mask_iou) == (1, 1, 1)
-    assert result.ap_gps == 1
+    assert (result.ap_gps, result.ap_gpsm) == (1, 1)
+    assert (result.recall_shown, result.precision_shown) == (1, 1)
     assert (result.median_du, result.median_dv) == (0, 0)
     assert result.error_cm_painted < 0.3
 
@@ -183,6 +187,38 @@ def test_a_person_painted_by_another_detection_is_not_that_detections_merit(fold
     assert one.ap_gps_50 == pytest.approx(51 / 101)
 
 
+def test_pixels_painted_beside_the_person_lower_gpsm_but_not_gps(folder):
+    def spill(prediction):
+        """The first person's paint goes on over 30 columns on background, so that its mask IoU is .4."""
+        only = prediction.above(0.85)
+        iuv, inds = only.iuv.copy(), only.inds.copy()
+        free = (inds == 0) & (np.arange(WIDTH) < 55)[None]
+        spilled = np.flatnonzero(free.ravel())[: int(1.5 * (inds == 1).sum())]
+        inds.ravel()[spilled] = 1
+        iuv.reshape(-1, 3)[spilled] = 1
+        return Prediction(only.box, only.score, iuv, inds)
+
+    images = list(read_images(shard_paths(folder)))[1:]  # its second person is ignored
+    result = measure(Fake(images, spill), images, LineSurface())
+    assert result.ap_gps == 1
+    assert result.ap_gpsm_by_threshold == [1, 1, 1] + [0] * 7  # sqrt(.4) = .632
+
+
+def test_the_overlap_of_masks_is_intersection_over_union_of_each_pair():
+    inds = np.array([[1, 1, 1, 2, 0, 0]], np.uint8)
+    instance = np.array([[0, 4, 4, 4, 4, 7]], np.uint8)
+    assert np.allclose(mask_overlap(inds, 2, instance, np.array([4, 7])), [[2 / 5, 0], [1 / 4, 0]])
+
+
+def test_the_surface_error_of_a_part_is_that_of_its_own_painted_points():
+    distance = np.array([0.1, 0.3, np.inf, 0.5, 0.9], np.float32)
+    part, owner = np.array([3, 3, 3, 4, 4], np.uint8), np.array([1, 1, 0, 1, 2], np.uint8)
+    points = SurfacePoints(distance, part, np.ones(5, bool), owner, [])
+    error = points.part_error_cm(shown=owner < 2)  # the last point belongs to somebody not shown
+    assert error[3:5] == pytest.approx([20, 50])
+    assert np.isnan(error[5])
+
+
 def test_an_answer_of_the_wrong_size_is_refused(folder):
     with pytest.raises(ValueError, match="planes"):
         figures(folder, lambda p: Prediction(p.box, p.score, p.iuv[1:], p.inds[1:]))
@@ -198,6 +234,8 @@ def test_median_difference_is_over_right_parts_only():
     pixels.add(label, iuv)
     assert pixels.median_difference() == (20 / 255, 0)
     assert pixels.part_recall()[[1, 2]].tolist() == [1, 0]
+    assert pixels.part_precision()[[1, 3]].tolist() == [1, 0]
+    assert np.isnan(pixels.part_precision()[2])  # painted nowhere
 
 
 def test_table_and_files_show_differences_and_hold_no_nan(folder, tmp_path):
@@ -208,11 +246,42 @@ def test_table_and_files_show_differences_and_hold_no_nan(folder, tmp_path):
     assert "part accuracy" in text
     assert "-45.5" in text
     assert report.largest_difference(results) > 40
-    report.write_json(tmp_path / "e.json", results, dict.fromkeys(results, "model"), {"images": 2})
+    report.write_json(tmp_path / "e.json", results, {}, dict.fromkeys(results, ("model", "0123")), {"images": 2})
     document = json.loads((tmp_path / "e.json").read_text(), parse_constant=pytest.fail)
     assert document["results"]["int8 capi"]["images"] == 2
-    report.write_picture(tmp_path / "e.png", results)
+    assert document["results"]["int8 capi"]["photos"] is None
+    write_picture(tmp_path / "e.png", results, {})
     assert cv2.imread(str(tmp_path / "e.png")) is not None
+
+
+def test_one_command_measures_rendered_images_and_labelled_photographs(folder, tmp_path, monkeypatch):
+    images = list(read_images(shard_paths(folder)))
+    backend = Fake(images)
+    backend.path = tmp_path / "weights.pt"
+    backend.path.write_bytes(b"weights")
+    monkeypatch.setattr(command, "open_backend", lambda text, score_floor: backend)
+    monkeypatch.setattr("export.people.atlas.load_surface_table", LineSurface)
+    (tmp_path / "photos").mkdir()
+    cv2.imwrite(str(tmp_path / "photos/one.png"), images[0].image[..., ::-1])
+    people, mask = len(images[0].box), np.zeros((2, HEIGHT, WIDTH), bool)
+    landmarks = np.zeros((people, 33, 2)), np.zeros((people, 33)), np.zeros((people, 33, 3))
+    labels = PhotoLabels(images[0].box, np.ones(people), np.zeros(people, bool), *landmarks, mask)
+    labels.save(tmp_path / "labels/one.npz")
+    arguments = ["--data", str(folder), "--photos", str(tmp_path / "photos"), "--labels", str(tmp_path / "labels")]
+    arguments += ["--empty", str(tmp_path / "empty"), "--out", str(tmp_path / "out"), "--backends", "fake"]
+    assert command.main(arguments) == 0
+    document = json.loads((tmp_path / "out/evaluation.json").read_text())
+    figures = report.column_of(document, fingerprint(backend.path))
+    assert (figures["images"], figures["photos"]["photos"]) == (2, 1)
+    assert (tmp_path / "out/evaluation.png").exists()
+
+
+def test_an_image_is_found_again_by_its_name(folder):
+    second = list(read_images(shard_paths(folder)))[1]
+    assert np.array_equal(read_image(folder, second.name).image, second.image)
+    for name in ("shard-00000/0002", "shard-00009/0000", "photo.jpg"):
+        with pytest.raises(ShardError, match=name):
+            read_image(folder, name)
 
 
 def test_painting_changes_people_and_leaves_the_rest_alone(folder):

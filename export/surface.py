@@ -42,9 +42,7 @@ UNSURE = 254  # a person or not
 # Which of the 25 classes (0 background) each value of I leaves possible: bool [256, 25].
 POSSIBLE_PARTS = np.zeros((256, 25), bool)
 POSSIBLE_PARTS[np.arange(25), np.arange(25)] = True
-POSSIBLE_PARTS[REGION + 1 : REGION + 1 + COARSE_COUNT] = (
-    PART_TO_COARSE == np.arange(1, COARSE_COUNT + 1)[:, None]
-)
+POSSIBLE_PARTS[REGION + 1 : REGION + 1 + COARSE_COUNT] = np.arange(1, COARSE_COUNT + 1)[:, None] == PART_TO_COARSE
 POSSIBLE_PARTS[PERSON, 1:] = True
 POSSIBLE_PARTS[UNSURE] = True
 

@@ -39,7 +39,7 @@ INDEX_WEIGHTS = torch.tensor([0.5, *np.clip(np.sqrt(0.04 / _SHARE), 0.5, 2.5)], 
 
 # By value of I (export.surface): the classes that it leaves possible, [256, 25] and [256, 15], and how much it weighs.
 _PARTS = torch.from_numpy(surface.POSSIBLE_PARTS)
-_REGIONS = torch.stack([_PARTS[:, surface.PART_TO_COARSE == k].any(1) for k in range(surface.COARSE_COUNT + 1)], 1)
+_REGIONS = torch.stack([_PARTS[:, k == surface.PART_TO_COARSE].any(1) for k in range(surface.COARSE_COUNT + 1)], 1)
 _WEIGHT = (_PARTS * INDEX_WEIGHTS).sum(1) / _PARTS.sum(1).clamp(min=1)
 _WEIGHT[surface.UNSURE] = 0
 

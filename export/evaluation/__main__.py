@@ -103,7 +103,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"No real photographs: {arguments.labels} has no labels (python -m export.teachers makes them).")
     data = {"folder": str(arguments.data), "shards": len(paths), "images": total, "limit": arguments.limit,
             "score_floor": arguments.score_floor,
-            "photos": str(arguments.photos), "empty": str(arguments.empty)}  # fmt: skip
+            "photos": [str(folder) for folder in arguments.photos],
+            "empty": [str(folder) for folder in arguments.empty]}  # fmt: skip
     report.write_json(arguments.out / "evaluation.json", results, photo_results, sources, data)
     write_picture(arguments.out / "evaluation.png", results, photo_results)
     print(f"Written: {arguments.out / 'evaluation.json'}, {arguments.out / 'evaluation.png'}")

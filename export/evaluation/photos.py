@@ -80,9 +80,10 @@ class PhotoSet:
     empty: list[Path]
 
     @staticmethod
-    def find(photos: Path, labels: Path, empty: Path) -> PhotoSet:
-        labelled = [p for p in sorted(photos.glob("*")) if (labels / f"{p.stem}.npz").exists()]
-        return PhotoSet(labelled, labels, sorted(empty.glob("*.jpg")))
+    def find(photos: list[Path], labels: Path, empty: list[Path]) -> PhotoSet:
+        every = [p for folder in photos for p in sorted(folder.glob("*"))]
+        labelled = [p for p in every if (labels / f"{p.stem}.npz").exists()]
+        return PhotoSet(labelled, labels, [p for folder in empty for p in sorted(folder.glob("*.jpg"))])
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ class Tally:
                     crowding=float(close[k]),
                     groups_seen=float("nan"),
                     found=number > 0,
-                    mask_iou=iou if labels.sure[k] else float("nan"),
+                    mask_iou=iou if labels.outlined[k] else float("nan"),
                     asked=asked,
                     right=right,
                     limb=limb,
@@ -229,9 +230,16 @@ def read_photo(path: Path) -> np.ndarray:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """--photos, --labels and --empty: the folders of a PhotoSet."""
-    parser.add_argument("--photos", type=Path, default=Path(".data/photos/photo"), metavar="DIR")
+    folder = Path(".data/photos")
+    parser.add_argument(
+        "--photos", type=Path, nargs="+", default=[folder / "photo", folder / "test"], metavar="DIR",
+        help="of people (default: the two of the test; .data/photos/val to choose between recipes)",
+    )  # fmt: skip
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
-    parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/test"), metavar="DIR", help="no people")
+    parser.add_argument(
+        "--empty", type=Path, nargs="+", default=[Path(".data/backgrounds/test"), folder / "empty"], metavar="DIR",
+        help="photos of nobody",
+    )  # fmt: skip
 
 
 def main(argv: list[str] | None = None) -> int:

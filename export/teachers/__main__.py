@@ -18,7 +18,8 @@ example:
   python -m export.photos people && python -m export.teachers
 
 Writes OUT/NAME.npz for every photo (export.teachers.label.PhotoLabels) and OUT/sheet.jpg to look at: green boxes where
-detector, landmarks and mask agree, yellow ones without landmarks, red ones where only the detector speaks. Photos with labels are not asked again.
+detector, landmarks and mask agree, yellow ones without landmarks, red ones where only the detector speaks. Photos with
+labels are not asked again.
 """
 TILE = (420, 320)
 

@@ -13,7 +13,7 @@ SIZE = 200
 BOX = np.array([[40, 20, 120, 180]], np.float32)
 
 
-def labels(box=BOX, score=0.9, sure=True, **landmarks) -> PhotoLabels:
+def labels(box=BOX, score=0.9, sure=True, outlined=True, **landmarks) -> PhotoLabels:
     """One person whose mask fills the box; landmarks by name (underscores for blanks), the others not visible."""
     point, visible = np.zeros((1, 33, 2), np.float32), np.zeros((1, 33), np.float32)
     for name, at in landmarks.items():
@@ -22,7 +22,11 @@ def labels(box=BOX, score=0.9, sure=True, **landmarks) -> PhotoLabels:
     x0, y0, x1, y1 = box[0].astype(int)
     mask[0, y0:y1, x0:x1] = True
     world = np.zeros((1, 33, 3), np.float32)
-    return PhotoLabels(box, np.array([score], np.float32), np.array([sure]), point, visible, world, mask)
+    flags = {"outlined": np.array([outlined]), "sure": np.array([sure])}
+    return PhotoLabels(
+        box=box, score=np.array([score], np.float32), **flags, point=point, visible=visible, world=world, mask=mask,
+        doubt=0 * mask > 0,
+    )  # fmt: skip
 
 
 def painted(part: int, box=BOX, score=0.8, rows=slice(None)) -> Prediction:
@@ -58,8 +62,14 @@ def test_nobody_found_counts_as_wrong_everywhere():
     assert np.isnan(got.left_right)  # no limb is painted there
 
 
-def test_people_about_whom_the_teachers_disagree_are_asked_for_by_box_alone():
+def test_people_without_landmarks_are_asked_for_by_box_and_mask():
     got = figures(painted(10), labels(sure=False, left_hip=(60, 100)))
+    assert (got.people, got.masks, got.mask_iou) == (1, 1, 1)
+    assert np.isnan(got.part_at_landmark)
+
+
+def test_people_about_whom_the_teachers_disagree_are_asked_for_by_box_alone():
+    got = figures(painted(10), labels(sure=False, outlined=False, left_hip=(60, 100)))
     assert (got.people, got.masks, got.recall_shown) == (1, 0, 1)
     assert np.isnan([got.mask_iou, got.part_at_landmark]).all()
 

@@ -15,8 +15,8 @@ from export.photos.packages import Package, PackageError, PackageReader, fetch
 
 def test_every_photo_comes_from_a_listed_package_and_every_package_is_used():
     listed = set(packages.load_packages())
-    used = {p.package for p in backgrounds.load_backgrounds()} | {m.package for m in people.load_people()}
-    assert used == listed
+    photos = backgrounds.load_backgrounds() + backgrounds.load_photographs()
+    assert {p.package for p in photos} | {m.package for m in people.load_people()} == listed
 
 
 def test_no_package_is_under_a_copyleft_or_non_commercial_licence():
@@ -35,11 +35,18 @@ def test_there_are_enough_photos_and_every_split_has_some():
     assert sum(m.kind == "photo" for m in people.load_people()) >= 12
 
 
-def test_photos_of_one_scene_share_a_split():
-    scenes = {}
-    for photo in backgrounds.load_backgrounds():
-        scenes.setdefault(photo.scene, set()).add(photo.split)
-    assert all(len(splits) == 1 for splits in scenes.values())
+def test_no_photograph_is_both_trained_on_and_tested_on():
+    photos = backgrounds.load_photographs()
+    assert len({p.name for p in photos}) == len({(p.package, p.member) for p in photos}) == len(photos)
+    looked_at = {(m.package, m.member) for m in people.load_people()}
+    assert not looked_at & {(p.package, p.member) for p in photos}
+    assert {p.split for p in photos} == {"train", "val", "test", "empty"}
+
+
+def test_photographs_without_a_licence_for_more_are_tested_on_alone():
+    listed = packages.load_packages()
+    for photo in backgrounds.load_photographs():
+        assert photo.split in ("test", "empty") or "tests only" not in listed[photo.package].licence, photo.name
 
 
 def test_the_split_of_a_name_never_changes():
@@ -91,12 +98,11 @@ def test_building_writes_each_photo_once_into_its_split(tmp_path, monkeypatch):
     png = cv2.imencode(".png", np.full((700, 900, 3), 90, np.uint8))[1].tobytes()
     path = archive(tmp_path, ".whl", png)
     package = Package("a", "pip", "a", "1", path.name, packages.sha256_of(path), "MIT")
-    photo = backgrounds.Background("one", "a", "in/side.txt", "one")
+    photo = backgrounds.Photograph("one", "a", "in/side.txt", "val")
     monkeypatch.setattr(packages, "ARCHIVES", tmp_path)
     monkeypatch.setattr(backgrounds, "load_packages", lambda: {"a": package})
-    monkeypatch.setattr(backgrounds, "load_backgrounds", lambda: [photo])
-    assert sum(backgrounds.build(tmp_path / "out").values()) == 1
-    written = tmp_path / "out" / photo.split / "one.jpg"
+    assert backgrounds.build([photo], tmp_path / "out") == {"val": 1}
+    written = tmp_path / "out" / "val" / "one.jpg"
     assert cv2.imread(str(written)).shape == (576, 741, 3)
     path.unlink()
-    backgrounds.build(tmp_path / "out")  # nothing is missing, so the package is not needed
+    backgrounds.build([photo], tmp_path / "out")  # nothing is missing, so the package is not needed

@@ -6,8 +6,9 @@ import pytest
 from export import surface
 from export.teachers import detector, landmarks
 from export.teachers.coarse import SOMEWHERE, coarse_labels
-from export.teachers.label import PhotoLabels, agrees, draw, label_photo
+from export.teachers.label import PhotoLabels, agrees, draw, label_photo, whole_bodies
 from export.teachers.landmarks import SIDE, LandmarkNetwork, Landmarks
+from export.teachers.matte import MatteNetwork
 
 IMAGE = np.full((120, 200, 3), 128, np.uint8)
 BOXES = np.array([[20, 10, 60, 110], [100, 10, 150, 110], [160, 20, 190, 100]], np.float32)
@@ -21,32 +22,116 @@ def person(box, shrink=0) -> Landmarks:
     return Landmarks(point, np.zeros(33), np.ones(33), np.zeros((33, 3)), 0.9, mask)
 
 
-def labelled(find) -> PhotoLabels:
-    return label_photo(IMAGE, lambda image: (BOXES, np.array([0.9, 0.8, 0.7], np.float32)), find)
+def filled(box) -> np.ndarray:
+    return person(box).mask > 0.5
+
+
+def labelled(find, outline=lambda image, box: filled(box), boxes=BOXES) -> PhotoLabels:
+    scores = np.linspace(0.9, 0.7, len(boxes)).astype(np.float32)
+    return label_photo(IMAGE, lambda image: (boxes, scores), find, outline)
 
 
 def test_people_on_whom_the_teachers_agree_are_sure():
     found = labelled(lambda image, box: person(box) if box[0] < 150 else None)
     assert found.sure.tolist() == [True, True, False]
-    assert found.mask.sum((1, 2)).tolist() == [4000, 5000, 0]
+    assert found.outlined.tolist() == [True, True, True]
+    assert found.mask.sum((1, 2)).tolist() == [4000, 5000, 2400]
     assert found.point[1, 0].tolist() == [101, 11]
+    assert not found.doubt.any()
+
+
+def test_of_somebody_alone_the_matte_is_the_mask_and_where_the_other_mask_differs_there_is_doubt():
+    found = labelled(lambda image, box: person(box, shrink=10))
+    assert found.mask.sum((1, 2)).tolist() == [4000, 5000, 2400]
+    assert found.doubt.sum((1, 2)).tolist() == [800, 1000, 600]
+
+
+def test_landmarks_whose_mask_is_another_one_are_not_taken():
+    found = labelled(lambda image, box: person(box, shrink=16))
+    assert not found.sure.any()
+    assert found.outlined.all()
+
+
+def test_landmarks_off_the_mask_are_not_taken():
+    def find(image, box):
+        found = person(box)
+        found.point[:10] = 0
+        return found
+
+    assert not labelled(find).sure.any()
+
+
+def test_in_company_the_matte_does_not_count():
+    close = np.array([[20, 10, 60, 110], [40, 10, 80, 110]], np.float32)
+
+    def outline(image, box):
+        raise AssertionError("it cannot tell these two apart")
+
+    found = labelled(lambda image, box: person(box), outline, close)
+    assert found.sure.all()
+    assert not labelled(lambda image, box: None, outline, close).outlined.any()
 
 
 def test_a_mask_of_the_neighbour_or_a_fragment_is_not_taken():
-    assert agrees(person(BOXES[0]), BOXES[0])
-    assert not agrees(person(BOXES[1]), BOXES[0])
-    assert not agrees(person(BOXES[0], shrink=40), BOXES[0])
-    assert not agrees(person([0, 0, 0, 0]), BOXES[0])
+    assert agrees(filled(BOXES[0]), BOXES[0])
+    assert not agrees(filled(BOXES[1]), BOXES[0])
+    assert not agrees(person(BOXES[0], shrink=40).mask > 0.5, BOXES[0])
+    assert not agrees(filled([0, 0, 0, 0]), BOXES[0])
 
 
 def test_the_same_person_is_taken_once():
     twice = np.array([[20, 10, 60, 110], [22, 10, 62, 110]], np.float32)
-    found = label_photo(IMAGE, lambda image: (twice, np.array([0.9, 0.8])), lambda image, box: person(BOXES[0]))
-    assert found.sure.tolist() == [True, False]
+    found = labelled(lambda image, box: person(BOXES[0]), boxes=twice)
+    assert found.sure.tolist() == found.outlined.tolist() == [True, False]
+
+
+def test_somebody_cut_by_the_lower_border_is_looked_for_below_it_too():
+    """The network takes a head for a whole body; what agrees with the matte is taken."""
+    cut = np.array([[20, 40, 80, 120]], np.float32)
+    asked = []
+
+    def find(image, box):
+        asked.append(box[3])
+        return person(cut[0], shrink=0 if box[3] > 200 else 20)
+
+    found = labelled(find, boxes=cut)
+    assert len(asked) == len(whole_bodies(cut[0], 120)) == 4
+    assert asked[0] == 120 < asked[1] < asked[2] < asked[3]
+    assert found.sure.all()
+    assert not found.doubt.any()
+    assert len(whole_bodies(np.array([20, 0, 80, 100]), 120)) == 1
+
+
+class FakeMatte:
+    """A person in the left half of the crop, with a hole, and a speck far from it."""
+
+    def set_tensor(self, index, value):
+        assert value.shape == (1, 256, 256, 3)
+        assert value.min() >= 0
+        assert value.max() <= 1
+
+    def invoke(self):
+        pass
+
+    def get_tensor(self, index):
+        out = np.zeros((1, 256, 256, 1), np.float32)
+        out[:, :, :128] = 1
+        out[:, 60:64, 60:64] = 0
+        out[:, 20:30, 220:230] = 1
+        return out
+
+
+def test_the_matte_lies_in_pixels_of_the_photo_without_specks_and_holes():
+    made = MatteNetwork.__new__(MatteNetwork)
+    made._net, made._input, made._output = FakeMatte(), 0, 0
+    mask = made.find(IMAGE, np.array([80, 40, 120, 80], np.float32))
+    y, x = np.nonzero(mask)
+    assert (x.min(), x.max() + 1, y.min(), y.max() + 1) == (74, 100, 34, 86)
+    assert mask[34:86, 74:100].all()
 
 
 def test_a_photo_without_people_has_empty_labels_that_can_be_kept(tmp_path):
-    nobody = label_photo(IMAGE, lambda image: (np.zeros((0, 4), np.float32), np.zeros(0, np.float32)), None)
+    nobody = label_photo(IMAGE, lambda image: (np.zeros((0, 4), np.float32), np.zeros(0, np.float32)), None, None)
     nobody.save(tmp_path / "a.npz")
     kept = PhotoLabels.load(tmp_path / "a.npz")
     assert kept.mask.shape == (0, 120, 200)

@@ -11,6 +11,8 @@ from export.densepose import boxes as bx
 from export.densepose import data
 from export.densepose import targets as tg
 from export.densepose.config import NetworkConfig
+from export.densepose.losses import possible_classes_loss
+from export.people.dataset import BOX_ALONE
 
 
 def truth(boxes, ignore=None) -> tg.Truth:
@@ -207,3 +209,41 @@ def test_pooled_rois_come_in_the_order_of_the_boxes():
                  for n in (0, 2) for b in boxes[n]]  # fmt: skip
         assert torch.allclose(found, torch.cat(alone), atol=1e-6)
     assert tg.pooled(features, [torch.zeros(0, 4)] * 3, config, 7).shape == (0, 3, 7, 7)
+
+
+def test_people_known_by_box_alone_teach_boxes_but_no_surface():
+    label = torch.zeros(40, 40, 4, dtype=torch.uint8)
+    label[5:35, 5:35] = torch.tensor([surface.UNSURE, 0, 0, BOX_ALONE], dtype=torch.uint8)
+    truth = data.truth_of(label.numpy())
+    assert len(truth.box) == 1
+    assert not truth.ignore.any()
+    assert tg.box_samples(torch.zeros(0, 4), truth, 8)[1].any()
+    assert not len(tg.dense_samples(torch.zeros(0, 4), truth, 8)[0])
+
+
+def test_unsure_pixels_stay_unsure_for_everybody():
+    label = torch.zeros(40, 40, 4, dtype=torch.uint8)
+    label[..., 0], label[..., 3] = 3, 1
+    label[:, 20:] = torch.tensor([surface.UNSURE, 0, 0, BOX_ALONE], dtype=torch.uint8)
+    truth = data.truth_of(label.numpy())
+    found = tg.dense_labels(torch.tensor([[0.0, 0, 40, 40]]), torch.tensor([0]), truth, 4)[0, ..., 0]
+    assert found.tolist() == [[3, 3, surface.UNSURE, surface.UNSURE]] * 4
+
+
+def test_a_label_asks_only_for_what_it_tells():
+    logits = torch.tensor([[2.0, 1.0, 0.0, -1.0]])
+    probability = logits.softmax(1)[0].numpy()
+    possible = torch.zeros(256, 4, dtype=torch.bool)
+    possible[0, 1], possible[1, 1:3], possible[2] = True, True, True
+    weight = torch.ones(256)
+
+    def loss(value: int) -> float:
+        return possible_classes_loss(logits, torch.tensor([value]), possible, weight).item()
+
+    assert loss(0) == pytest.approx(-np.log(probability[1]), rel=1e-5)
+    assert loss(1) == pytest.approx(-np.log(probability[1] + probability[2]), rel=1e-5)
+    assert loss(2) == pytest.approx(0, abs=1e-6)
+    weight[1] = 3
+    both = possible_classes_loss(logits.repeat(2, 1), torch.tensor([0, 1]), possible, weight).item()
+    assert both == pytest.approx((loss(0) + 3 * loss(1)) / 4, rel=1e-5)
+    assert possible_classes_loss(logits[:0], torch.zeros(0, dtype=torch.long), possible, weight).item() == 0

@@ -1,0 +1,94 @@
+"""Labels of photographs as training sees them: what is known is asked for, what is not known is left open."""
+
+import cv2
+import numpy as np
+import pytest
+
+from export import surface
+from export.densepose import data
+from export.people.dataset import BOX_ALONE, UNCERTAIN
+from export.teachers.label import PhotoLabels
+from export.teachers.landmarks import NAMES
+from export.teachers.shards import LONG_SIDE, main, weak_label
+
+SHAPE = (100, 200)
+BOXES = np.array([[10, 10, 50, 90], [60, 10, 100, 90], [110, 10, 150, 90], [160, 10, 190, 90]], np.float32)
+
+
+def photo_labels() -> PhotoLabels:
+    """Somebody with landmarks (a left forearm alone is seen), with a mask, with a box, and a doubtful box."""
+    mask, doubt = np.zeros((4, *SHAPE), bool), np.zeros((4, *SHAPE), bool)
+    mask[0, 20:80, 15:45] = mask[1, 20:80, 65:95] = True
+    doubt[1, 20:80, 90:95] = doubt[1, 80:85, 65:95] = True
+    point, visible = np.zeros((4, 33, 2), np.float32), np.zeros((4, 33), np.float32)
+    for name, at in {"left elbow": (40, 30), "left wrist": (40, 70), "left shoulder": (20, 30),
+                     "right shoulder": (20, 31), "left hip": (20, 60), "right hip": (20, 60)}.items():  # fmt: skip
+        point[0, NAMES.index(name)], visible[0, NAMES.index(name)] = at, 0.9
+    return PhotoLabels(
+        box=BOXES, score=np.array([0.9, 0.9, 0.8, 0.4], np.float32), outlined=np.array([True, True, False, False]),
+        sure=np.array([True, False, False, False]), point=point, visible=visible,
+        world=np.zeros((4, 33, 3), np.float32), mask=mask, doubt=doubt,
+    )  # fmt: skip
+
+
+def test_what_each_kind_of_person_is_labelled_with():
+    label = weak_label(photo_labels(), SHAPE)
+    assert label[50, 40].tolist() == [surface.REGION + 12, 0, 0, 1]  # left lower arm
+    assert label[78, 30].tolist() == [surface.PERSON, 0, 0, 1]
+    assert label[50, 70].tolist() == [surface.PERSON, 0, 0, 2]
+    assert label[82, 80].tolist() == [surface.UNSURE, 0, 0, 0]
+    assert label[50, 130].tolist() == [surface.UNSURE, 0, 0, BOX_ALONE + 2]
+    assert label[50, 170].tolist() == [surface.UNSURE, 0, 0, UNCERTAIN + 3]
+    assert label[50, 5].tolist() == [0, 0, 0, 0]
+
+
+def test_boxes_and_masks_become_people_and_doubtful_boxes_are_ignored():
+    truth = data.truth_of(weak_label(photo_labels(), SHAPE))
+    assert truth.instance.tolist() == [1, 2, BOX_ALONE + 2, UNCERTAIN + 3]
+    assert truth.ignore.tolist() == [False, False, False, True]
+    assert truth.box[2].tolist() == BOXES[2].tolist()
+
+
+def test_every_value_has_its_mirror_image():
+    value = np.arange(256, dtype=np.uint8)
+    once = surface.mirror_iuv(np.stack([value, 0 * value, 0 * value], -1))[:, 0]
+    assert np.array_equal(once[once], value)
+    # What a value leaves possible is mirrored with it.
+    assert np.array_equal(surface.POSSIBLE_PARTS[once][:, surface.MIRROR_PART], surface.POSSIBLE_PARTS)
+    assert once[surface.REGION + 12] == surface.REGION + 13
+
+
+@pytest.fixture
+def folders(tmp_path):
+    for name in ("people", "labels", "empty"):
+        (tmp_path / name).mkdir()
+    rng = np.random.default_rng(0)
+    cv2.imwrite(str(tmp_path / "people" / "a.jpg"), rng.integers(0, 255, (*SHAPE, 3), np.uint8))
+    cv2.imwrite(str(tmp_path / "empty" / "b.jpg"), rng.integers(0, 255, (600, 900, 3), np.uint8))
+    return tmp_path
+
+
+def arguments(folder) -> list[str]:
+    names = {"photos": "people", "labels": "labels", "empty": "empty", "out": "shards"}
+    return [text for option, name in names.items() for text in (f"--{option}", str(folder / name))]
+
+
+def test_shards_are_read_by_the_training(folders, capsys):
+    photo_labels().save(folders / "labels" / "a.npz")
+    assert main(arguments(folders)) == 0
+    told = capsys.readouterr().out
+    assert "2 photographs, 1 of them without people; 2 people with a mask, 1 with a box alone" in told
+    records = data.load_records(folders / "shards")
+    sizes = sorted(record.decoded()[0].shape[:2] for record in records)
+    assert sizes == [SHAPE, (round(600 * LONG_SIDE / 900), LONG_SIDE)]
+    batches = data.Batches(records[:1] * 4, 8, 0, photos=records, photo_share=1.0)
+    image, truths = batches.make(0, 64)
+    batches.close()
+    assert image.shape == (8, 3, 64, 64)
+    assert len(truths) == 8
+
+
+def test_photos_without_labels_are_named_before_anything_is_written(folders, capsys):
+    assert main(arguments(folders)) == 1
+    assert "export.teachers" in capsys.readouterr().err
+    assert not (folders / "shards").exists()

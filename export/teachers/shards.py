@@ -1,4 +1,5 @@
-"""Labelled photographs as shards for training: people as far as the teachers know them, and photographs without people.
+"""Labelled photographs as shards for training: people as far as the teachers know them, photographs without people, and
+people cut out and set before other places.
 
     python -m export.teachers.shards --photos .data/photos/train --out .data/photos/shards
 
@@ -8,8 +9,11 @@ The format is that of rendered people (docs/formats.md), with the weaker labels 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -17,13 +21,14 @@ import numpy as np
 from tqdm import tqdm
 
 from export import surface
-from export.people.dataset import BOX_ALONE, UNCERTAIN, EncodedImages, visible_boxes
+from export.people.dataset import BOX_ALONE, SIZES, UNCERTAIN, EncodedImages, visible_boxes
 from export.teachers.coarse import SOMEWHERE, coarse_labels
 from export.teachers.label import PhotoLabels
 
 LONG_SIDE = 512
 LEAST_SCORE = 0.5  # of the detector; less sure boxes are regions that training leaves out
 _BORDER = 0.012  # of the person's height: this close to the mask's edge a pixel may be the person or not
+LEAST_CUT_OUT_PX = 60  # height of people worth cutting out
 PER_SHARD = 100
 
 
@@ -55,44 +60,121 @@ def weak_label(labels: PhotoLabels, shape: tuple[int, int]) -> np.ndarray:
     return out
 
 
-def add_photo(stores: dict[str, EncodedImages], image: np.ndarray, label: np.ndarray) -> None:
-    """image: uint8 [H, W, 3] BGR and its label, shrunk to LONG_SIDE."""
+@dataclass(frozen=True)
+class CutOut:
+    """One person out of a photo. image: uint8 [h, w, 3]; label: uint8 [h, w, 4] with instance 1, 0 and UNSURE around
+    it; opacity: float32 [h, w]; cut: the person is cut by the photo's left, upper, right, lower border."""
+
+    image: np.ndarray
+    label: np.ndarray
+    opacity: np.ndarray
+    cut: tuple[bool, bool, bool, bool]
+
+
+def cut_outs(image: np.ndarray, label: np.ndarray) -> list[CutOut]:
+    """People with a mask whom nobody else's label touches; who is cut on opposite sides cannot be put elsewhere."""
+    out = []
+    height, width = label.shape[:2]
+    others = label[..., 3]
+    for number in np.unique(others[(others > 0) & (others < BOX_ALONE)]):
+        own = others == number
+        near = cv2.dilate(own.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+        if np.isin(others[near], (0, number)).all():
+            y, x = np.nonzero(own)
+            x0, y0, x1, y1 = x.min(), y.min(), x.max() + 1, y.max() + 1
+            cut = (x0 < 3, y0 < 3, x1 > width - 3, y1 > height - 3)
+            if y1 - y0 >= LEAST_CUT_OUT_PX and not (cut[0] and cut[2]) and not (cut[1] and cut[3]):
+                place = np.s_[y0:y1, x0:x1]
+                this = label[place].copy()
+                this[~own[place]] = 0
+                this[..., 3] = own[place]
+                # The photo's own background shows through at hair and edges: two pixels less, and soft.
+                inner = cv2.erode(own.astype(np.float32), np.ones((3, 3)), borderType=cv2.BORDER_REPLICATE)
+                out.append(CutOut(image[place], this, cv2.GaussianBlur(inner, (0, 0), 1.0)[place], cut))
+    return out
+
+
+def composed(
+    background: np.ndarray, people: list[CutOut], size: tuple[int, int], rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """One to four people, the later ones in front, on a piece of a photo without people: image and label.
+
+    size: width, height of the result. Borders that cut a person in the photo cut them here too.
+    """
+    width, height = size
+    scale = max(width / background.shape[1], height / background.shape[0]) * rng.uniform(1.0, 1.6)
+    shape = (max(width, round(background.shape[1] * scale)), max(height, round(background.shape[0] * scale)))
+    large = cv2.resize(background, shape, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    x, y = int(rng.integers(shape[0] - width + 1)), int(rng.integers(shape[1] - height + 1))
+    image = large[y : y + height, x : x + width].astype(np.float32)
+    label = np.zeros((height, width, 4), np.uint8)
+    for number in range(1, int(rng.choice(4, p=(0.45, 0.3, 0.15, 0.1))) + 2):
+        person = people[rng.integers(len(people))]
+        tall = height * np.exp(rng.uniform(np.log(0.3), np.log(1.2)))
+        scale = min(tall / person.image.shape[0], 1.5 * width / person.image.shape[1], 1.5)
+        shape = (max(8, round(person.image.shape[1] * scale)), max(8, round(person.image.shape[0] * scale)))
+        interpolation = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+        pixels = cv2.resize(person.image, shape, interpolation=interpolation).astype(np.float32)
+        pixels = pixels * rng.uniform(0.7, 1.2) * (1 + rng.normal(0, 0.05, 3)) + rng.normal(0, 6)
+        opacity = cv2.resize(person.opacity, shape, interpolation=cv2.INTER_LINEAR)[..., None]
+        own = cv2.resize(person.label, shape, interpolation=cv2.INTER_NEAREST)
+        left = _place(shape[0], width, person.cut[0], person.cut[2], rng)
+        top = _place(shape[1], height, person.cut[1], person.cut[3], rng)
+        into = np.s_[max(top, 0) : max(top + shape[1], 0), max(left, 0) : max(left + shape[0], 0)]
+        rows, columns = image[into].shape[:2]
+        part = np.s_[max(-top, 0) : max(-top, 0) + rows, max(-left, 0) : max(-left, 0) + columns]
+        image[into] += opacity[part] * (pixels[part] - image[into])
+        seen = own[part][..., 3] > 0
+        own[..., 3] *= number
+        label[into][seen] = own[part][seen]
+        edge = cv2.morphologyEx(np.pad(seen, 1).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))[
+            1:-1, 1:-1
+        ]
+        label[into][(edge > 0) & ~seen & (label[into][..., 3] == 0), 0] = surface.UNSURE
+    return np.clip(image, 0, 255).astype(np.uint8), label
+
+
+def _place(length: int, room: int, cut_low: bool, cut_high: bool, rng: np.random.Generator) -> int:
+    beyond = int(rng.integers(0, max(1, length // 8)))
+    if cut_low or cut_high:
+        return -beyond if cut_low else room - length + beyond
+    low = -length // 4
+    return int(rng.integers(low, max(room - 3 * length // 4, low) + 1))
+
+
+def shrunk(image: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """image: uint8 [H, W, 3] BGR and its label, with a long side of at most LONG_SIDE."""
     scale = LONG_SIDE / max(image.shape[:2])
-    if scale < 1:
-        size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
-        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-        label = cv2.resize(label, size, interpolation=cv2.INTER_NEAREST)
-    stores["image"].add(".jpg", image, cv2.IMWRITE_JPEG_QUALITY, 92)
-    stores["label"].add(".png", label, cv2.IMWRITE_PNG_COMPRESSION, 3)
+    if scale >= 1:
+        return image, label
+    size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return small, cv2.resize(label, size, interpolation=cv2.INTER_NEAREST)
 
 
-def write_shards(photos: list[tuple[Path, Path | None]], out: Path) -> tuple[int, int, int]:
-    """photos: image and labels (None: nobody in it). Returns the number of images, people with masks, by box alone."""
+def write_shards(pictures: Iterator[tuple[np.ndarray, np.ndarray]], count: int, out: Path) -> None:
+    """Writes `count` images and labels to out/shard-00000.npz and so on."""
     out.mkdir(parents=True, exist_ok=True)
-    masks = alone = 0
-    # Mixed, so that every shard holds both kinds whatever their order in the folders.
-    order = np.random.default_rng(0).permutation(len(photos))
-    for first in tqdm(range(0, len(photos), PER_SHARD), desc="photographs", unit="shard", disable=None):
-        stores = {"image": EncodedImages(), "label": EncodedImages()}
-        for index in order[first : first + PER_SHARD]:
-            path, labels = photos[index]
-            image = cv2.imread(str(path))
-            if image is None:
-                raise ValueError(f"{path} is not an image that can be read")
-            label = np.zeros((*image.shape[:2], 4), np.uint8)
-            if labels is not None:
-                label = weak_label(PhotoLabels.load(labels), image.shape[:2])
-            _, instance, ignore = visible_boxes(label)
-            masks += int((instance[~ignore] < BOX_ALONE).sum())
-            alone += int((instance[~ignore] >= BOX_ALONE).sum())
-            add_photo(stores, image, label)
-        arrays = {"meta": np.array(json.dumps({"split": out.name, "shard": first // PER_SHARD, "generator": "photos"}))}
-        for name, store in stores.items():
-            arrays |= store.arrays(name)
-        temporary = out / "partial.npz"
-        np.savez(temporary, **arrays)
-        temporary.replace(out / f"shard-{first // PER_SHARD:05d}.npz")
-    return len(photos), masks, alone
+    with tqdm(total=count, desc=str(out), unit="image", disable=None) as bar:
+        for number in range(-(-count // PER_SHARD)):
+            stores = {"image": EncodedImages(), "label": EncodedImages()}
+            for image, label in itertools.islice(pictures, PER_SHARD):
+                stores["image"].add(".jpg", image, cv2.IMWRITE_JPEG_QUALITY, 92)
+                stores["label"].add(".png", label, cv2.IMWRITE_PNG_COMPRESSION, 3)
+                bar.update()
+            arrays = {"meta": np.array(json.dumps({"split": out.name, "shard": number, "generator": "photos"}))}
+            for name, store in stores.items():
+                arrays |= store.arrays(name)
+            temporary = out / "partial.npz"
+            np.savez(temporary, **arrays)
+            temporary.replace(out / f"shard-{number:05d}.npz")
+
+
+def read(path: Path) -> np.ndarray:
+    image = cv2.imread(str(path))
+    if image is None:
+        raise ValueError(f"{path} is not an image that can be read")
+    return image
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -103,18 +185,40 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--photos", type=Path, default=Path(".data/photos/train"), metavar="DIR")
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
     parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/train"), metavar="DIR", help="no people")
+    parser.add_argument(
+        "--composed", type=int, default=800, metavar="N",
+        help="images with people cut out of photos in front of other places (default %(default)s)",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(".data/photos/shards/train"), metavar="DIR")
     arguments = parser.parse_args(argv)
-    people = [(p, arguments.labels / f"{p.stem}.npz") for p in sorted(arguments.photos.glob("*.jpg"))]
-    missing = [str(p) for p, labels in people if not labels.exists()]
-    if missing or not people:
-        print(f"No labels for {len(missing)} of {len(people)} photos in {arguments.photos}: run "
+    photos = [(p, arguments.labels / f"{p.stem}.npz") for p in sorted(arguments.photos.glob("*.jpg"))]
+    missing = sum(not labels.exists() for _, labels in photos)
+    if missing or not photos:
+        print(f"No labels for {missing} of {len(photos)} photos in {arguments.photos}: run "
               f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip
         return 1
-    empty = [(p, None) for p in sorted(arguments.empty.glob("*.jpg"))]
-    count, masks, alone = write_shards(people + empty, arguments.out)
-    print(f"{arguments.out}: {count} photographs, {len(empty)} of them without people; "
-          f"{masks} people with a mask, {alone} with a box alone")  # fmt: skip
+    pictures, people = [], []
+    for path, labels in photos:
+        image = read(path)
+        pictures.append(shrunk(image, weak_label(PhotoLabels.load(labels), image.shape[:2])))
+        people += cut_outs(*pictures[-1])
+    known = np.concatenate([instance[~ignore] for _, instance, ignore in (visible_boxes(p[1]) for p in pictures)])
+    empty = []
+    for path in sorted(arguments.empty.glob("*.jpg")):
+        image = read(path)
+        empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
+    pictures += empty
+    rng = np.random.default_rng(0)
+    rng.shuffle(pictures)  # so that every shard holds both kinds
+    count = arguments.composed if people and empty else 0
+    more = (
+        composed(empty[rng.integers(len(empty))][0], people, SIZES[rng.integers(len(SIZES))], rng)
+        for _ in range(count)
+    )  # fmt: skip
+    write_shards(itertools.chain(pictures, more), len(pictures) + count, arguments.out)
+    print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
+          f"{int((known < BOX_ALONE).sum())} people with a mask, {int((known >= BOX_ALONE).sum())} with a box alone; "
+          f"{count} images composed of {len(people)} people cut out")  # fmt: skip
     return 0
 
 

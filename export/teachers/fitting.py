@@ -48,6 +48,9 @@ _SHOWN_BY = {
     "upper_arm": ("shoulder", "elbow"), "lower_arm": ("elbow", "wrist"), "hand": ("wrist",),
     "upper_leg": ("hip", "knee"), "lower_leg": ("knee", "ankle"), "foot": ("ankle",),
 }  # fmt: skip
+_SHOULDERS, _HIPS = ([NAMES.index(f"{side} {n}") for side in ("left", "right")] for n in ("shoulder", "hip"))
+_ARMS = [NAMES.index(f"{side} {n}") for n in ("elbow", "wrist", "index finger") for side in ("left", "right")]
+_ARM_RADIUS_M = 0.03
 _HIDDEN_SHARE = 0.05  # of the mask's pull on limbs that something hides
 
 
@@ -295,7 +298,7 @@ class _Problem:
         loss = loss + 2 * (self.limb_weight * (1 - (limb * self.limb).sum(1))).sum()
         loss = loss + 0.5 * ((turn / self.loose) ** 2).sum() + 0.5 * (shape**2).sum()
         loss = loss + 0.5 * ((clothes / self.cloth) ** 2).sum() + 0.5 * ((clothes.clamp(max=0) / 0.003) ** 2).sum()
-        loss = loss + self._hyperextension(turn)
+        loss = loss + self._hyperextension(turn) + self._arms_in_torso(joints, clothes)
         if share > 0.2:
             error = 0.07 - 0.045 * share
             loss = loss + min(1.0, (share - 0.2) / 0.2) * self._silhouette(bones, shape, clothes, shift, error)
@@ -307,6 +310,27 @@ class _Problem:
         # The shank's downward axis in the thigh's axes: its y component is how far it points backwards.
         back = -(self.start[knees] @ turns(turn[knees]))[:, 1, 2]
         return 0.5 * (((-back - 0.05).clamp(min=0) / 0.1) ** 2).sum()
+
+    @staticmethod
+    def _arms_in_torso(joints: torch.Tensor, clothes: torch.Tensor) -> torch.Tensor:
+        """Arms stay outside the torso, which hides them when it swells to a coat: an elliptic cylinder between the
+        middles of hips and shoulders, as wide as shoulders allow. Silhouettes cannot tell an arm that sank in."""
+        shoulders, hips = joints[_SHOULDERS], joints[_HIPS]
+        low, high = hips.mean(0), shoulders.mean(0)
+        left = shoulders[0] - shoulders[1]
+        half = 0.5 * left.norm()
+        axis = high - low
+        length = axis.norm()
+        axis = axis / length
+        left = functional.normalize(left - axis * (left @ axis), dim=0)
+        back = torch.linalg.cross(axis, left)
+        arms = torch.cat([joints[_ARMS], (joints[_ARMS[:2]] + joints[_ARMS[2:4]]) / 2])
+        relative = arms - low
+        swollen = clothes[REGIONS.index("torso")] + _ARM_RADIUS_M
+        x, y = relative @ left / (0.85 * half + swollen), relative @ back / (0.6 * half + swollen)
+        radius = torch.sqrt(x**2 + y**2 + 1e-6)
+        beside = (relative @ axis > -0.1) & (relative @ axis < 0.9 * length)
+        return 0.5 * (beside * ((1 - radius).clamp(min=0) / 0.08) ** 2).sum()
 
     def _silhouette(self, bones, shape, clothes, shift, error: float) -> torch.Tensor:
         """error: distance from the mask's border that counts as one, torsos."""

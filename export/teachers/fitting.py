@@ -25,6 +25,7 @@ _FIELD_SIDE = 256  # longer side of the map of distances from the mask
 _BORDER_POINTS = 250
 _LEAST_LANDMARKS = 6  # of the body, seen and inside the photo: with fewer there is no pose to start from
 _LEAST_MASK_PX = 400
+_MOST_FACE = 0.6  # face by torso; of head shots the landmark network squeezes a torso into the photo
 
 # How far a joint turns from its start, radians (standard deviations about x, y, z of its bones at rest).
 _LOOSE = {
@@ -51,6 +52,7 @@ _SHOWN_BY = {
 _SHOULDERS, _HIPS = ([NAMES.index(f"{side} {n}") for side in ("left", "right")] for n in ("shoulder", "hip"))
 _ARMS = [NAMES.index(f"{side} {n}") for n in ("elbow", "wrist", "index finger") for side in ("left", "right")]
 _ARM_RADIUS_M = 0.03
+_FACE = [NAMES.index(n) for n in ("nose", "left eye", "right eye", "left ear", "right ear")]
 _HIDDEN_SHARE = 0.05  # of the mask's pull on limbs that something hides
 
 
@@ -95,6 +97,14 @@ def torso_px(point: np.ndarray) -> float:
     return max(float(np.linalg.norm(middle[0] - middle[1])), 1.2 * float(across))
 
 
+def face_by_torso(point: np.ndarray) -> float:
+    """Longest distance within the face by the distance of shoulders and hips: 0.2 to 0.5 of people seen upright."""
+    shoulders, hips = point[_SHOULDERS].mean(0), point[_HIPS].mean(0)
+    face = point[_FACE]
+    longest = np.linalg.norm(face[:, None] - face[None], axis=2).max()
+    return float(longest / max(np.linalg.norm(shoulders - hips), 1e-6))
+
+
 def inside(point: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Which points [K, 2] lie in an image of shape [H, W]."""
     return ((point >= 0) & (point < [shape[1], shape[0]])).all(1)
@@ -124,6 +134,8 @@ def fit_person(puppet: Puppet, target: Target, iterations: int = ITERATIONS) -> 
     torso = torso_px(target.point)
     if torso < 8:
         raise CannotFit(f"torso of {torso:.0f} pixels, 8 needed")
+    if face_by_torso(target.point) > _MOST_FACE:
+        raise CannotFit(f"face {face_by_torso(target.point):.1f} times as long as the torso: head and shoulders only")
     return _Problem(puppet, target, torso).solve(iterations)
 
 

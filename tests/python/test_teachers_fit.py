@@ -140,7 +140,11 @@ def test_a_face_that_the_body_does_not_show_is_rejected(teacher):
 @needs_body
 def test_people_with_too_little_to_fit_to_get_a_reason(teacher):
     target, _ = truth(teacher, {})
+    head_shot = target.point.copy()
+    hips = [_INDEX["left hip"], _INDEX["right hip"]]
+    head_shot[hips] = head_shot[[_INDEX["left shoulder"], _INDEX["right shoulder"]]] + [0, 10]
     nothing = {
+        "head and shoulders only": replace(target, point=head_shot),
         "0 landmarks visible": replace(target, visible=np.zeros(33)),
         "mask of 0 pixels": replace(target, mask=np.zeros_like(target.mask)),
         "not numbers": replace(target, point=np.full((33, 2), np.nan)),

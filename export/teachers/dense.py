@@ -26,11 +26,12 @@ MOST_LANDMARK_ERROR = 0.12  # median, in torsos
 MOST_NECK_DEGREES = 100.0
 _DRAWN = 512  # side of the square that a person is drawn in, pixels
 _NEAR = 0.06  # torsos beside the body that take its label
-MOST_JOINT_ERROR = 0.35  # of the worst shoulder, elbow, wrist, hip, knee or ankle, torsos
+MOST_JOINT_ERROR = 0.35  # of the worst shoulder, elbow, wrist, knee or ankle, torsos
 _SEEN_WITHIN_M = 0.03
 _NOSE = NAMES.index("nose")
 _FACE_SURE_M = 0.05  # a face seen from the side is neither towards the camera nor away from it
-_JOINT_LANDMARK = np.array([name.endswith(("shoulder", "elbow", "wrist", "hip", "knee", "ankle")) for name in NAMES])
+# Hips are left out: near the photo's lower edge the landmark network draws them up into it.
+_JOINT_LANDMARK = np.array([name.endswith(("shoulder", "elbow", "wrist", "knee", "ankle")) for name in NAMES])
 # Joint of the puppet whose bones each coarse region (0..14) shows.
 _COARSE_JOINTS = ("chest", "chest", "hand.R", "hand.L", "foot.L", "foot.R", "upper_leg.R", "upper_leg.L",
                   "lower_leg.R", "lower_leg.L", "upper_arm.L", "upper_arm.R", "lower_arm.L", "lower_arm.R",

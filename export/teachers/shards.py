@@ -23,6 +23,7 @@ from tqdm import tqdm
 from export import surface
 from export.people.dataset import BOX_ALONE, SIZES, UNCERTAIN, EncodedImages, visible_boxes
 from export.teachers.coarse import SOMEWHERE, coarse_labels
+from export.teachers.fit import PhotoFits
 from export.teachers.label import PhotoLabels
 
 LONG_SIDE = 512
@@ -32,14 +33,17 @@ LEAST_CUT_OUT_PX = 60  # height of people worth cutting out
 PER_SHARD = 100
 
 
-def weak_label(labels: PhotoLabels, shape: tuple[int, int]) -> np.ndarray:
+def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | None = None) -> np.ndarray:
     """uint8 [H, W, 4] = (I, U, V, instance) of a photo of `shape` pixels, with I as in `export.surface`.
+
+    Whose body was fitted well has the fit's labels, others the coarse regions of their landmarks.
 
     Boxes without a mask are filled with UNSURE; masks lie over them. Instances: 1.. with a mask, BOX_ALONE.. with a
     box alone, UNCERTAIN.. where the detector itself is not sure.
     """
     out = np.zeros((*shape, 4), np.uint8)
     outlined = np.flatnonzero(labels.outlined)
+    dense = {} if fits is None else dict(zip(fits.person[fits.accepted], fits.label[fits.accepted], strict=True))
     for k in sorted(np.flatnonzero(~labels.outlined), key=lambda k: labels.score[k]):
         x0, y0, x1, y1 = np.round(labels.box[k]).astype(int)
         first = BOX_ALONE if labels.score[k] >= LEAST_SCORE else UNCERTAIN
@@ -56,6 +60,11 @@ def weak_label(labels: PhotoLabels, shape: tuple[int, int]) -> np.ndarray:
             value[(region == SOMEWHERE) & labels.doubt[k]] = surface.UNSURE
         out[mask, 0] = value[mask]
         out[mask, 1:3] = 0
+        if k in dense:
+            fitted = cv2.resize(dense[k], shape[::-1], interpolation=cv2.INTER_NEAREST)
+            known = mask & (fitted[..., 0] > 0) & (fitted[..., 0] <= surface.PART_COUNT)
+            out[mask & ~known, 0] = surface.PERSON
+            out[known, :3] = fitted[known]
         out[mask, 3] = k + 1
     return out
 
@@ -184,6 +193,9 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--photos", type=Path, default=Path(".data/photos/train"), metavar="DIR")
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
+    parser.add_argument(
+        "--fits", type=Path, default=Path(".data/teachers/fits"), metavar="DIR", help="if there are any"
+    )
     parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/train"), metavar="DIR", help="no people")
     parser.add_argument(
         "--composed", type=int, default=800, metavar="N",
@@ -197,10 +209,12 @@ def main(argv: list[str] | None = None) -> int:
         print(f"No labels for {missing} of {len(photos)} photos in {arguments.photos}: run "
               f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip
         return 1
-    pictures, people = [], []
+    pictures, people, fitted = [], [], 0
     for path, labels in photos:
         image = read(path)
-        pictures.append(shrunk(image, weak_label(PhotoLabels.load(labels), image.shape[:2])))
+        fits = PhotoFits.load(kept) if (kept := arguments.fits / labels.name).exists() else None
+        fitted += 0 if fits is None else int(fits.accepted.sum())
+        pictures.append(shrunk(image, weak_label(PhotoLabels.load(labels), image.shape[:2], fits)))
         people += cut_outs(*pictures[-1])
     known = np.concatenate([instance[~ignore] for _, instance, ignore in (visible_boxes(p[1]) for p in pictures)])
     empty = []
@@ -217,7 +231,8 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     write_shards(itertools.chain(pictures, more), len(pictures) + count, arguments.out)
     print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
-          f"{int((known < BOX_ALONE).sum())} people with a mask, {int((known >= BOX_ALONE).sum())} with a box alone; "
+          f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body), "
+          f"{int((known >= BOX_ALONE).sum())} with a box alone; "
           f"{count} images composed of {len(people)} people cut out")  # fmt: skip
     return 0
 

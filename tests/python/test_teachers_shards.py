@@ -7,6 +7,7 @@ import pytest
 from export import surface
 from export.densepose import data
 from export.people.dataset import BOX_ALONE, UNCERTAIN
+from export.teachers.fit import PhotoFits
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
 from export.teachers.shards import LONG_SIDE, composed, cut_outs, main, weak_label
@@ -42,6 +43,18 @@ def test_what_each_kind_of_person_is_labelled_with():
     assert label[50, 5].tolist() == [0, 0, 0, 0]
 
 
+def test_a_fitted_body_gives_part_u_and_v_where_it_is_believed():
+    label = np.zeros((2, 50, 100, 3), np.uint8)  # half the photo's size
+    label[0, 10:40, 7:15], label[1, 10:40, 30:50] = (2, 50, 60), (2, 70, 80)
+    label[0, 30:40, 7:15] = (surface.PERSON, 0, 0)
+    fits = PhotoFits(np.array([0, 1]), np.ones(2), np.zeros(2), np.array(["", "IoU"]), label)
+    found = weak_label(photo_labels(), SHAPE, fits)
+    assert found[50, 20].tolist() == [2, 50, 60, 1]
+    assert found[70, 20].tolist() == [surface.PERSON, 0, 0, 1]  # of the fit's own
+    assert found[50, 40].tolist() == [surface.PERSON, 0, 0, 1]  # beside the fit
+    assert found[50, 70].tolist() == [surface.PERSON, 0, 0, 2]  # not believed
+
+
 def test_boxes_and_masks_become_people_and_doubtful_boxes_are_ignored():
     truth = data.truth_of(weak_label(photo_labels(), SHAPE))
     assert truth.instance.tolist() == [1, 2, BOX_ALONE + 2, UNCERTAIN + 3]
@@ -69,7 +82,7 @@ def folders(tmp_path):
 
 
 def arguments(folder) -> list[str]:
-    names = {"photos": "people", "labels": "labels", "empty": "empty", "out": "shards"}
+    names = {"photos": "people", "labels": "labels", "fits": "fits", "empty": "empty", "out": "shards"}
     return [text for option, name in names.items() for text in (f"--{option}", str(folder / name))]
 
 
@@ -77,7 +90,8 @@ def test_shards_are_read_by_the_training(folders, capsys):
     photo_labels().save(folders / "labels" / "a.npz")
     assert main([*arguments(folders), "--composed", "3"]) == 0
     told = capsys.readouterr().out
-    assert "1 photographs of people, 1 without; 2 people with a mask, 1 with a box alone; 3 images composed" in told
+    assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body)" in told
+    assert "1 with a box alone; 3 images composed" in told
     records = data.load_records(folders / "shards")
     sizes = sorted(record.decoded()[0].shape[:2] for record in records)
     assert sizes[0] == SHAPE

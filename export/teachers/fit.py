@@ -150,8 +150,9 @@ def main(argv: list[str] | None = None) -> int:
     add("--out", type=Path, default=Path(".data/teachers/fits"), metavar="DIR", help="(%(default)s)")
     add("--force", action="store_true", help="fit again photos that have fits")
     arguments = parser.parse_args(argv)
-    photos = {arguments.labels / f"{p.stem}.npz": p for p in sorted(arguments.photos.glob("*"))}
-    photos = {labels: photo for labels, photo in photos.items() if labels.exists()}
+    images = sorted(p for p in arguments.photos.glob("*") if p.suffix in (".jpg", ".jpeg", ".png"))
+    named = {arguments.labels / f"{p.stem}.npz": p for p in images}
+    photos = {labels: photo for labels, photo in named.items() if labels.exists()}
     if not photos:
         print(f"No labels in {arguments.labels} for the photos in {arguments.photos}: run "
               f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip

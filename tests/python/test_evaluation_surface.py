@@ -264,9 +264,11 @@ def test_one_command_measures_rendered_images_and_labelled_photographs(folder, t
     (tmp_path / "photos").mkdir()
     cv2.imwrite(str(tmp_path / "photos/one.png"), images[0].image[..., ::-1])
     people, mask = len(images[0].box), np.zeros((2, HEIGHT, WIDTH), bool)
-    landmarks = np.zeros((people, 33, 2)), np.zeros((people, 33)), np.zeros((people, 33, 3))
-    labels = PhotoLabels(images[0].box, np.ones(people), np.zeros(people, bool), *landmarks, mask)
-    labels.save(tmp_path / "labels/one.npz")
+    nobody = np.zeros(people, bool)
+    PhotoLabels(
+        box=images[0].box, score=np.ones(people), outlined=nobody, sure=nobody, point=np.zeros((people, 33, 2)),
+        visible=np.zeros((people, 33)), world=np.zeros((people, 33, 3)), mask=mask, doubt=mask,
+    ).save(tmp_path / "labels/one.npz")  # fmt: skip
     arguments = ["--data", str(folder), "--photos", str(tmp_path / "photos"), "--labels", str(tmp_path / "labels")]
     arguments += ["--empty", str(tmp_path / "empty"), "--out", str(tmp_path / "out"), "--backends", "fake"]
     assert command.main(arguments) == 0

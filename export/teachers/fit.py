@@ -17,6 +17,7 @@ import numpy as np
 from tqdm import tqdm
 
 from export.teachers.label import PhotoLabels
+from export.teachers.stored import Stored
 
 EPILOG = """\
 example:
@@ -33,7 +34,7 @@ _SHEET_TILES = 120  # more make a picture that nobody opens
 
 
 @dataclass(frozen=True)
-class PhotoFits:
+class PhotoFits(Stored):
     """N fitted people of one photo.
 
     person: int64 [N], their index in `PhotoLabels`. iou: float32 [N] of silhouette and mask. landmark_error: float32
@@ -52,18 +53,6 @@ class PhotoFits:
     def accepted(self) -> np.ndarray:
         """bool [N]: pseudo-labels to learn from."""
         return self.reason == ""
-
-    def save(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(path.name + ".partial")
-        with open(partial, "wb") as file:
-            np.savez_compressed(file, **self.__dict__)
-        partial.replace(path)
-
-    @staticmethod
-    def load(path: Path) -> PhotoFits:
-        with np.load(path) as data:
-            return PhotoFits(**data)
 
 
 def fit_photo(labels: PhotoLabels, teacher) -> PhotoFits:

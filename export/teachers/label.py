@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 
 from export.teachers.landmarks import Landmarks
+from export.teachers.stored import Stored
 
 _SAME_PERSON_IOU = 0.5  # of two masks
 _AGREE_IOU = 0.4  # of the detector's box and the mask's
@@ -25,7 +25,7 @@ Outline = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class PhotoLabels:
+class PhotoLabels(Stored):
     """N people of one photo of H x W pixels, best score first.
 
     box: float32 [N, 4] x0, y0, x1, y1. score: float32 [N], of the detector. outlined: bool [N], there is a mask that
@@ -43,18 +43,6 @@ class PhotoLabels:
     world: np.ndarray
     mask: np.ndarray
     doubt: np.ndarray
-
-    def save(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(path.name + ".partial")
-        with open(partial, "wb") as file:
-            np.savez_compressed(file, **self.__dict__)
-        partial.replace(path)
-
-    @staticmethod
-    def load(path: Path) -> PhotoLabels:
-        with np.load(path) as data:
-            return PhotoLabels(**data)
 
 
 def label_photo(image: np.ndarray, detect: Detect, find: Find, outline: Outline) -> PhotoLabels:

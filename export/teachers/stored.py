@@ -1,0 +1,25 @@
+"""What is said about one photo, kept as one file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+
+class Stored:
+    """A dataclass of arrays that is kept as a compressed .npz file, one entry a field."""
+
+    def save(self, path: Path) -> None:
+        """Writes it whole (temporary name, then rename); folders are made."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(path.name + ".partial")
+        with open(partial, "wb") as file:
+            np.savez_compressed(file, **self.__dict__)
+        partial.replace(path)
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        with np.load(path) as data:
+            return cls(**data)

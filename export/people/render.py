@@ -21,7 +21,7 @@ from export.people.props import Prop
 from export.people.wardrobe import Layer, Model
 
 SUPERSAMPLING = 2
-_SHADOW_MAP = 768  # texels a side
+_SHADOW_MAP = 512  # texels a side
 _SHADOW_RADIUS = 5.0  # metres: what is farther from the middle of the people casts no shadow
 _NEAR, _FAR = 0.05, 60.0  # metres
 _OCCLUSION_RADIUS = 0.12  # metres: how far neighbours take light from each other
@@ -43,6 +43,7 @@ void main() {
 
 # The rotation of the shadow's samples is "interleaved gradient noise" (Jimenez, SIGGRAPH 2014 course notes).
 _FRAGMENT = """#version 330
+#define CUT 1
 in vec3 v_normal; in vec2 v_uv; in vec3 v_rest; in vec3 v_view; in vec3 v_point; in float v_cut;
 uniform sampler2D albedo, folds, shadow_map; uniform mat4 shadow_matrix;
 uniform vec3 tint, sky, ground, up, light1, colour1, light2, colour2, phase, panel_tint; uniform vec4 panel;
@@ -53,17 +54,17 @@ float reached_by_light(vec3 n) {
   vec3 q = (shadow_matrix * vec4(.02 * n - v_view, 1)).xyz * .5 + .5;
   if (shadow == 0. || any(lessThan(q.xy, vec2(0))) || any(greaterThan(q.xy, vec2(1)))) return 1.;
   float turn = 6.2832 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(.06711056, .00583715))));
-  float lit = 0.;
-  for (int k = 0; k < 4; ++k) {
-    vec2 tap = softness * sqrt((k + .5) / 4.) * vec2(cos(turn + 2.4 * k), sin(turn + 2.4 * k));
-    lit += texture(shadow_map, q.xy + tap).r + .003 > min(q.z, 1.) ? .25 : 0.;
-  }
-  return lit;
+  vec2 tap = softness * vec2(cos(turn), sin(turn));
+  float depth = min(q.z, 1.) - .003;
+  return (float(texture(shadow_map, q.xy + tap).r > depth) + float(texture(shadow_map, q.xy - .8 * tap).r > depth)
+        + float(texture(shadow_map, q.xy + .5 * vec2(tap.y, -tap.x)).r > depth)) / 3.;
 }
 void main() {
+#if CUT
   float frayed = sin(fray_frequency * (v_rest.x + .7 * v_rest.y) + phase.x)
                + sin(fray_frequency * 2.7 * (v_rest.x - .6 * v_rest.y + .4 * v_rest.z) + phase.y);
   if (v_cut + fray * frayed < 0.) discard;
+#endif
   if (catcher > 0.) {
     colour = vec4(0, 0, 0, catcher * (1. - reached_by_light(v_normal)));
     point = vec4(0, 0, 0, -1);
@@ -82,11 +83,12 @@ void main() {
   if (max(inside.x, inside.y) < 0. && v_rest.y * panel.w < 0.)  // the sign of panel.w: chest or back
     base = texture(albedo, v_uv * 2.7 + .3).brg * panel_tint;
   float lit = mix(1., reached_by_light(n), shadow);
-  float highlight = pow(max(0., dot(n, normalize(light1 + view))), gloss);
   vec3 light = mix(ground, sky, dot(n, up) * .5 + .5)
              + lit * colour1 * max(0., dot(n, light1)) + colour2 * max(0., dot(n, light2));
-  vec3 gleam = specular * highlight * lit * colour1 + sheen * pow(1. - abs(dot(n, view)), 3.) * (sky + ground);
-  colour = vec4(base * light + gleam, 1);
+  vec3 shown = base * light;
+  if (specular > 0.) shown += specular * pow(max(0., dot(n, normalize(light1 + view))), gloss) * lit * colour1;
+  if (sheen > 0.) shown += sheen * pow(1. - abs(dot(n, view)), 3.) * (sky + ground);
+  colour = vec4(shown, 1);
   point = vec4(v_point, instance);
 }"""
 
@@ -171,9 +173,12 @@ def neighbour_shade(depth: np.ndarray, focal_px: float) -> np.ndarray:
     if not seen.any():
         return np.zeros_like(depth)
     filled = np.where(seen, depth, depth[seen].max() + _OCCLUSION_RADIUS).astype(np.float32)
-    sigma = np.clip(focal_px * _OCCLUSION_RADIUS / np.median(depth[seen]), 1, 25)
+    sigma = np.clip(focal_px * _OCCLUSION_RADIUS / np.median(depth[seen]), 2, 25)
+    # What is smooth needs few pixels: the mean of the neighbourhood is taken at a quarter of the size.
+    small = cv2.resize(filled, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
+    around = cv2.resize(cv2.GaussianBlur(small, (0, 0), float(sigma) / 4), filled.shape[::-1])
     # A neighbour far in front of a surface does not touch it: its darkening fades with the distance.
-    gap = np.maximum(filled - cv2.GaussianBlur(filled, (0, 0), float(sigma)), 0) / _OCCLUSION_RADIUS * 2
+    gap = np.maximum(filled - around, 0) / _OCCLUSION_RADIUS * 2
     return np.where(seen, gap * np.exp(1 - gap), 0)
 
 
@@ -183,7 +188,11 @@ class Renderer:
     def __init__(self, model: Model, labels: LabelLookup, skin: np.ndarray, width: int, height: int) -> None:
         self.model, self.labels = model, labels
         self.context = moderngl.create_context(standalone=True, backend="egl")
-        self.program = self.context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
+        # Hidden pixels are skipped before shading only where no `discard` may come: whole surfaces have their own.
+        self.cutting = self.context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
+        self.whole = self.context.program(
+            vertex_shader=_VERTEX, fragment_shader=_FRAGMENT.replace("#define CUT 1", "#define CUT 0")
+        )
         self.shadow_program = self.context.program(vertex_shader=_SHADOW_VERTEX, fragment_shader=_SHADOW_FRAGMENT)
         size = (width * SUPERSAMPLING, height * SUPERSAMPLING)
         targets = [self.context.texture(size, 4), self.context.texture(size, 4, dtype="f4")]
@@ -211,8 +220,13 @@ class Renderer:
             self._set(name, unit)
 
     def _set(self, name: str, value) -> None:
-        if name in self.program:  # the compiler drops uniforms that nothing uses
-            self.program[name] = value
+        for program in (self.cutting, self.whole):
+            if name not in program:  # the compiler drops uniforms that nothing uses
+                continue
+            if isinstance(value, np.ndarray):
+                program[name].write(value.astype(np.float32).T.tobytes())
+            else:
+                program[name] = value
 
     def draw(
         self,
@@ -243,14 +257,14 @@ class Renderer:
         for number, person in enumerate(people, 1):
             self._set("instance", float(number))
             near = max(float(np.quantile(seen[number - 1][::50, 2], 0.1)), 0.2)
-            for layer in person.layers:
+            for layer in reversed(person.layers):  # the outermost first: what it hides need not be shaded
                 self._layer(layer, self.moving[number - 1], SUPERSAMPLING * camera.focal_px / near, rng)
         for prop, buffer in things:
             self._prop(prop, buffer, 0)
         for prop, number, buffer in worn:
             self._prop(prop, buffer, number)
         if light.catcher:
-            self._catch_shadows(rotation, shift, light)
+            self._catch_shadows(people, rotation, shift, light)
         return self._read(camera, light)
 
     def _set_view(self, camera: Camera, light: Light, shadow_matrix: np.ndarray) -> None:
@@ -260,8 +274,8 @@ class Renderer:
         a, b = (_FAR + _NEAR) / (_FAR - _NEAR), -2 * _FAR * _NEAR / (_FAR - _NEAR)
         # y stays "down", so that the first row read back is the top row.
         matrix = np.array([[x, 0, 0, 0], [0, y, 0, 0], [0, 0, a, b], [0, 0, 1, 0]], np.float32)
-        self.program["projection"].write(matrix.T.tobytes())
-        self.program["shadow_matrix"].write(shadow_matrix.astype(np.float32).T.tobytes())
+        self._set("projection", matrix)
+        self._set("shadow_matrix", shadow_matrix)
         for name in ("up", "sky", "ground"):
             self._set(name, tuple(getattr(light, name)))
         for k in (0, 1):
@@ -296,11 +310,14 @@ class Renderer:
             array.release()
         return matrix
 
-    def _catch_shadows(self, rotation: np.ndarray, shift: np.ndarray, light: Light) -> None:
-        """Draws the ground as black that covers the photo only where the light does not reach."""
-        eye = -rotation.T @ shift
-        quad = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0.0]]) * 30
-        ground = Prop((quad + [eye[0], eye[1], 0]).reshape(2, 3, 3), np.zeros((2, 3, 2)), np.zeros((1, 1, 3), np.uint8))
+    def _catch_shadows(self, people: list[Person], rotation: np.ndarray, shift: np.ndarray, light: Light) -> None:
+        """Draws the ground around people as black that covers the photo only where the light does not reach."""
+        if not people:
+            return
+        points = np.concatenate([p.vertices[::40, :2] for p in people])
+        (x0, y0), (x1, y1) = points.min(0) - 2, points.max(0) + 2
+        quad = np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y0, 0], [x1, y1, 0], [x0, y1, 0]])
+        ground = Prop(quad.reshape(2, 3, 3), np.zeros((2, 3, 2)), np.zeros((1, 1, 3), np.uint8))
         self._set("shadow", 1.0)
         self._set("catcher", float(light.catcher))
         self._prop(ground, self.context.buffer(ground.corners_in(rotation, shift).tobytes()), 0)
@@ -329,13 +346,13 @@ class Renderer:
         if prop:
             self._set("specular", prop.specular)
 
-    def _array(self, buffers: list[tuple[moderngl.Buffer, list[tuple[str, int]]]], indices: moderngl.Buffer | None):
+    def _array(self, program, buffers: list[tuple[moderngl.Buffer, list[tuple[str, int]]]], indices=None):
         """A vertex array of those attributes (name, floats) that the compiler has kept."""
         content = []
         for buffer, attributes in buffers:
-            layout = " ".join(f"{n}f" if name in self.program else f"{4 * n}x" for name, n in attributes)
-            content.append((buffer, layout, *[name for name, _ in attributes if name in self.program]))
-        return self.context.vertex_array(self.program, content, indices)
+            layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in attributes)
+            content.append((buffer, layout, *[name for name, _ in attributes if name in program]))
+        return self.context.vertex_array(program, [c for c in content if len(c) > 2], indices)
 
     def _layer(self, layer: Layer, moving: moderngl.Buffer, px_per_metre: float, rng: np.random.Generator) -> None:
         planar = layer.texture is not None
@@ -348,16 +365,20 @@ class Renderer:
         fabric = np.eye(3, dtype=np.float32)
         fabric[:2, :2] = layer.repeats * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
         fabric[:2, 2] = shift
-        self.program["fabric"].write(fabric.T.tobytes())
+        self._set("fabric", fabric)
         self._set("planar", planar)
         self._set_surface(layer, None)
         index = (layer.faces[:, None] * 3 + np.arange(3)).astype(np.int32)
-        cut = np.ones(len(self.model.faces) * 3, np.float32)
+        program = self.whole
         if layer.cut is not None:
-            cut[index] = layer.cut
-        self.cuts.write(cut)
+            program = self.cutting
+            first, last = index.min(), index.max() + 1
+            cut = np.zeros(last - first, np.float32)
+            cut[index - first] = layer.cut
+            self.cuts.write(cut, offset=int(first) * 4)
         indices = self.context.buffer(index.tobytes())
         array = self._array(
+            program,
             [(moving, [("position", 3), ("normal", 3)]),
              (self.fixed, [("rest", 3), ("texture_uv", 2), ("point", 3)]),
              (self.cuts, [("cut", 1)])], indices,
@@ -383,11 +404,12 @@ class Renderer:
         self._set("instance", float(instance))
         self._set_surface(None, prop)
         points = np.zeros_like(prop.corners) if prop.points is None else prop.points
-        fixed = np.concatenate([prop.corners, prop.uv, points, np.ones((*prop.uv.shape[:2], 1))], 2)
+        fixed = np.concatenate([prop.corners, prop.uv, points], 2)
         buffer = self.context.buffer(fixed.astype(np.float32).tobytes())
         array = self._array(
+            self.whole,
             [(moving, [("position", 3), ("normal", 3)]),
-             (buffer, [("rest", 3), ("texture_uv", 2), ("point", 3), ("cut", 1)])], None,
+             (buffer, [("rest", 3), ("texture_uv", 2), ("point", 3)])],
         )  # fmt: skip
         array.render()
         for used in (array, buffer, moving, texture):

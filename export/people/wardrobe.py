@@ -89,6 +89,7 @@ class Model:
         self.texture_uv = np.concatenate(texture).astype(np.float32)
         self.rest = rest.astype(np.float32)
         self.bare = np.concatenate([self.range["body"], self.range["eyes"]])
+        self._within: dict[tuple[str, ...], np.ndarray] = {}
         self._measure(vertex_regions(body))
 
     def _measure(self, weights: np.ndarray) -> None:
@@ -142,10 +143,12 @@ class Model:
         self.skull = np.flatnonzero(member["head"] & (self.rest[:, 2] > self.eye_z))
 
     def within(self, mesh: str, *regions: str) -> np.ndarray:
-        """Which triangles belong to a helper mesh and body regions: bool over all triangles."""
-        mask = np.zeros(len(self.faces), bool)
-        mask[self.range[mesh]] = True
-        return mask & np.isin(self.region, [REGIONS.index(r) for r in regions])
+        """Numbers of the triangles that belong to a helper mesh and to one of the body regions."""
+        key = (mesh, *regions)
+        if key not in self._within:
+            own = np.isin(self.region[self.range[mesh]], [REGIONS.index(r) for r in regions])
+            self._within[key] = self.range[mesh][own]
+        return self._within[key]
 
 
 def _mask(members: np.ndarray, count: int) -> np.ndarray:
@@ -154,11 +157,11 @@ def _mask(members: np.ndarray, count: int) -> np.ndarray:
     return mask
 
 
-def cut_out(mask: np.ndarray, *insides: np.ndarray) -> dict[str, np.ndarray]:
-    """Fields of a `Layer`: triangles of `mask` with a corner where all `insides` [F, 3] (metres) are above 0."""
+def cut_out(faces: np.ndarray, *insides: np.ndarray) -> dict[str, np.ndarray]:
+    """Fields of a `Layer`: those of `faces` [F] with a corner where all `insides` [F, 3] (metres) are above 0."""
     inside = np.minimum.reduce(insides)
-    faces = np.flatnonzero(mask & (inside > 0).any(1))
-    return {"faces": faces, "cut": inside[faces].astype(np.float32)}
+    shown = np.maximum(np.maximum(inside[:, 0], inside[:, 1]), inside[:, 2]) > 0
+    return {"faces": faces[shown], "cut": inside[shown].astype(np.float32)}
 
 
 class _NearestPoint:
@@ -303,17 +306,16 @@ def _lower(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Lay
     u = rng.uniform
     kind = rng.choice(["trousers", "shorts", "skirt", "briefs"], p=[0.6, 0.17, 0.18, 0.05])
     fabric, cloth = _denim(rng) if kind != "skirt" and u() < 0.3 else fabrics.draw(rng), _cloth(rng)
-    below_waist = (u(0.1, 0.3) - model.height) * model.trunk
     region = model.within("tights", "torso", "upper_leg", "lower_leg", "foot")
+    below_waist = (u(0.1, 0.3) - model.height[region]) * model.trunk
     end = {"trousers": u(1.8, 2.1), "shorts": u(0.3, 1.0)}.get(kind, 0.3)
-    layer = Layer(**cut_out(region, below_waist, (end - model.leg) * 0.4), texture=fabric, **cloth)
+    layer = Layer(**cut_out(region, below_waist, (end - model.leg[region]) * 0.4), texture=fabric, **cloth)
     if kind != "skirt":
         return [layer]
     skirt = model.range["skirt"]
     z = model.corner[skirt][..., 2]
-    inside = np.full(model.faces.shape, -1.0)
-    inside[skirt] = z - u(z.min(), z.min() + 0.55 * np.ptp(z))
-    return [layer, Layer(**cut_out(_mask(skirt, len(model.faces)), inside), texture=fabric, **cloth)]
+    end = u(z.min(), z.min() + 0.55 * np.ptp(z))
+    return [layer, Layer(**cut_out(skirt, z - end), texture=fabric, **cloth)]
 
 
 def _upper(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Layer]:
@@ -321,18 +323,18 @@ def _upper(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Lay
     if u() < 0.06:
         return []
     region = model.within("tights", "torso", "head", "upper_arm", "lower_arm", "upper_leg")
-    x, y = model.corner[..., 0], model.corner[..., 1]
+    x, y, height, arm = (*model.corner[region][..., :2].transpose(2, 0, 1), model.height[region], model.arm[region])
     middle = model.centre[model.within("tights", "torso"), 1].mean()
     front = 1 / (1 + np.exp((y - middle) / 0.015))
-    on_arm = model.arm > 0
+    on_arm = arm > 0
 
     def top(sleeve: int, hem: float, neckline: float, opening: float) -> dict[str, np.ndarray]:
         end = (u(0.02, 0.2), u(0.35, 1), u(1.2, 1.7), u(1.85, 2.05))[sleeve]
         collar = 1 + u(-0.03, 0.08) - neckline * np.exp(-((x / u(0.05, 0.12)) ** 2)) * front
         insides = [
-            np.where(on_arm, 1, (model.height - hem) * model.trunk),
-            (end - model.arm) * 0.25,
-            np.where(on_arm, 1, (collar - model.height) * model.trunk),
+            np.where(on_arm, 1, (height - hem) * model.trunk),
+            (end - arm) * 0.25,
+            np.where(on_arm, 1, (collar - height) * model.trunk),
         ]
         if opening:
             insides.append(np.where(on_arm, 1, np.maximum(np.abs(x) - opening, y - middle)))
@@ -361,21 +363,23 @@ def _shoes(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Lay
     u = rng.uniform
     if u() < 0.1:
         return []
-    inside = (model.leg - u(1.85, 2.0) if u() < 0.75 else model.leg - u(1.2, 1.85)) * 0.4
+    region = model.within("tights", "foot", "lower_leg")
+    inside = (model.leg[region] - (u(1.85, 2.0) if u() < 0.75 else u(1.2, 1.85))) * 0.4
     leather = _cloth(rng, offset=u(0.004, 0.012), bulge=0.0, wrinkle=0.1, fray=0.0)
-    return [Layer(**cut_out(model.within("tights", "foot", "lower_leg"), inside), texture=fabrics.draw(rng), **leather)]
+    return [Layer(**cut_out(region, inside), texture=fabrics.draw(rng), **leather)]
 
 
 def _long_hair(model: Model, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """The hair helper down to a drawn length, without the strands that hang over the face."""
     radius = model.head_radius
-    x, y, z = model.centre.T
+    hair = model.range["hair"]
+    x, y, z = model.centre[hair].T
     before_face = (y < model.head_y - 0.15 * radius) & (np.abs(x) < 0.66 * radius) & (z > model.neck_z - 0.06)
     fringe = before_face & (z > model.eye_z + 0.35 * radius)
     shown = ~before_face | (fringe & (rng.random() < 0.3))
-    low = model.corner[model.range["hair"]][..., 2].min()
-    end = rng.uniform(low - 0.2, model.neck_z)
-    return cut_out(shown & _mask(model.range["hair"], len(x)), model.corner[..., 2] - end)
+    corner_z = model.corner[hair[shown]][..., 2]
+    end = rng.uniform(z.min() - 0.2, model.neck_z)
+    return cut_out(hair[shown], corner_z - end)
 
 
 def _hair(model: Model, rng: np.random.Generator) -> list[Layer]:
@@ -384,7 +388,7 @@ def _hair(model: Model, rng: np.random.Generator) -> list[Layer]:
     strands = _grey(128 + rng.normal(0, u(10, 45), (1, 256, 1)) + rng.normal(0, 12, (256, 256, 1)))
     eye, radius = model.eye_z, model.head_radius
     skull = model.within("body", "head")
-    y, z = model.corner[..., 1], model.corner[..., 2]
+    y, z = model.corner[skull][..., 1], model.corner[skull][..., 2]
     layers = []
     style = {"wrinkle": u(0.1, 0.6), "repeats": u(3, 14), "specular": u(0, 0.25), "gloss": u(8, 30),
              "phase": u(0, 6, 3)}  # fmt: skip
@@ -407,7 +411,7 @@ def _hair(model: Model, rng: np.random.Generator) -> list[Layer]:
         inside = np.minimum(model.head_y - 0.25 * radius - y, eye - u(0.5, 0.65) * radius - z)
         layers.append(
             Layer(**cut_out(skull, inside, z - model.neck_z + 0.02), texture=strands, tint=colour,
-                  offset=u(0.001, 0.01), bulge=0.002, bulge_frequency=60.0, wrinkle=0.4, wrinkle_frequency=6.0,
+                  offset=u(0.003, 0.01), bulge=0.002, bulge_frequency=60.0, wrinkle=0.4, wrinkle_frequency=6.0,
                   repeats=8.0, fray=u(0.001, 0.004), fray_frequency=u(150, 400))
         )  # fmt: skip
     return layers
@@ -417,7 +421,7 @@ def _on_head(model: Model, fabrics: Fabrics, upper: list[Layer], rng: np.random.
     """Hat, hood or headscarf; glasses; a mask over mouth and nose. Each follows the head's surface."""
     u = rng.uniform
     radius, skull = model.head_radius, model.within("body", "head")
-    x, y, z = (model.corner[..., k] for k in range(3))
+    x, y, z = model.corner[skull].transpose(2, 0, 1)
     layers = []
     kind = u()
     if kind < 0.1:  # hat; `brim` gives some of them a brim
@@ -446,7 +450,7 @@ def _on_head(model: Model, fabrics: Fabrics, upper: list[Layer], rng: np.random.
 def _glasses(model: Model, skull: np.ndarray, rng: np.random.Generator) -> Layer:
     """Frames, or dark lenses, as rings around the eyes on the face's surface, with bridge and temples."""
     u = rng.uniform
-    x, y, z = (model.corner[..., k] for k in range(3))
+    x, y, z = model.corner[skull].transpose(2, 0, 1)
     lens, thick = u(0.42, 0.7) * model.eye_x, u(0.0025, 0.005)
     ring = np.hypot((np.abs(x) - model.eye_x) / u(1.0, 1.4), z - model.eye_z) - lens
     rim = -ring if u() < 0.35 else thick - np.abs(ring)

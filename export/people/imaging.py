@@ -51,6 +51,8 @@ def camera_faults(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
     if u() < 0.35:  # vignetting: light falls off towards the corners, about as cos^4 of the angle
         x, y = np.meshgrid(np.linspace(-1, 1, width, dtype=np.float32), np.linspace(-1, 1, height, dtype=np.float32))
         image = image * ((1 + u(0.05, 0.35) * (x * x + y * y) / 2) ** -2)[..., None]
+    if u() < 0.6:  # automatic exposure: most photographs are neither dark nor burnt out
+        image = image * np.clip((u(80, 140) / max(float(image.mean()), 1)) ** u(0.4, 0.9), 0.6, 2.5)
     image = 255 * np.clip(image * u(0.7, 1.2) / 255, 0, 1) ** u(0.8, 1.25)
     image = (image - 128) * u(0.75, 1.15) + 128
     if u() < 0.06:

@@ -301,6 +301,8 @@ class PropMaker:
         floor = box((16, 16, 0.02), (eye[0], far - 7.9, -0.011))
         wall = box((16, 0.05, 6), (eye[0], far, 2.9))
         props = [self.finished(rng, floor, repeats=u(0.3, 2)), self.finished(rng, wall, repeats=u(0.1, 1.2))]
+        # Most walls are light.
+        props[1] = replace(props[1], tint=tuple(u(0.8, 1.5) * np.array(props[1].tint)))
         if u() < 0.5:
             side = 1 if u() < 0.5 else -1
             props.append(self.finished(rng, box((0.05, 16, 6), (eye[0] + side * u(1.5, 4), far - 7.9, 2.9))))

@@ -177,9 +177,11 @@ def neighbour_shade(depth: np.ndarray, focal_px: float) -> np.ndarray:
     # What is smooth needs few pixels: the mean of the neighbourhood is taken at a quarter of the size.
     small = cv2.resize(filled, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
     around = cv2.resize(cv2.GaussianBlur(small, (0, 0), float(sigma) / 4), filled.shape[::-1])
-    # A neighbour far in front of a surface does not touch it: its darkening fades with the distance.
-    gap = np.maximum(filled - around, 0) / _OCCLUSION_RADIUS * 2
-    return np.where(seen, gap * np.exp(1 - gap), 0)
+    # A neighbour far in front of a surface does not touch it: without this, people would have dark outlines.
+    reach = int(sigma / 4 * 2) * 2 + 1
+    nearest = cv2.resize(cv2.erode(small, np.ones((reach, reach))), filled.shape[::-1])
+    touching = np.clip(2 - (filled - nearest) / (1.5 * _OCCLUSION_RADIUS), 0, 1)
+    return np.where(seen, touching * np.clip((filled - around) / _OCCLUSION_RADIUS * 2, 0, 1), 0)
 
 
 class Renderer:
@@ -294,7 +296,8 @@ class Renderer:
         radius = min(float(np.linalg.norm(points - centre, axis=1).max()) + 0.5, _SHADOW_RADIUS)
         side = np.cross(towards, [0.31, 0.17, 0.93])
         side /= np.linalg.norm(side)
-        axes = np.stack([side, np.cross(towards, side), -towards]) / radius
+        # What casts a shadow may stand well in front of those whom it falls on.
+        axes = np.stack([side, np.cross(towards, side), -towards / 3]) / radius
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = axes, -axes @ centre
         self.shadow_target.use()

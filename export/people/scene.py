@@ -124,12 +124,12 @@ def _light(rng: np.random.Generator, camera: Camera, photo: np.ndarray, indoors:
     key = np.array([rng.normal(0, 1), -abs(rng.normal(0.6, 0.6)), -abs(rng.normal(0.7, 0.5))])
     sky, ground, sun = (1 + rng.normal(0, spread, 3) for spread in (0.08, 0.08, 0.06))
     brightness = 1.0
-    if rng.random() < 0.65:
+    if rng.random() < 0.7 and not indoors:
         height, width = photo.shape[:2]
         rgb = photo[..., ::-1] / 255 + 0.02
         above, below = rgb[: height // 2].mean((0, 1)), rgb[height // 2 :].mean((0, 1))
         sky, ground = (own * (c / c.mean()) ** 0.6 for own, c in ((sky, above), (ground, below)))
-        brightness = float(np.clip((rgb.mean() / 0.45) ** 0.7, 0.4, 1.4))
+        brightness = float(np.clip((rgb.mean() / 0.45) ** 0.6, 0.55, 1.4))
         if rgb[:, : width // 2].mean() > rgb[:, width // 2 :].mean():
             key[0] = -abs(key[0])
         else:

@@ -93,15 +93,26 @@ def test_what_is_worn_carries_the_labels_of_its_wearer(renderer, model):
 
 
 @needs_body
-def test_shadows_and_occlusion_darken_pixels_and_leave_labels_alone(renderer, model):
-    roof = plain(box((3.0, 3.0, 0.05), (0, 0, 2.6)))  # out of sight, between the body and the light
+def test_a_shadow_darkens_pixels_and_leaves_labels_alone(renderer, model):
+    roof = plain(box((6.0, 6.0, 0.05), (0, 0, 2.6)))  # out of sight, between the body and the light
     lit, shaded = (picture(renderer, model, [roof], shadow=s) for s in (0.0, 1.0))
     body = lit.label[..., 3] > 0
     assert np.array_equal(lit.label, shaded.label)
     assert shaded.rgb[body].mean() < 0.8 * lit.rgb[body].mean()
-    occluded = picture(renderer, model, [roof], occlusion=0.6)
-    assert np.array_equal(lit.label, occluded.label)
-    assert occluded.rgb[body].mean() < 0.99 * lit.rgb[body].mean()
+
+
+@needs_body
+def test_ambient_occlusion_darkens_what_a_thing_touches_and_not_what_is_far_behind_it(renderer, model):
+    belly = model.rest[model.torso, 1].min()
+    for gap, darker in ((0.05, True), (1.5, False)):
+        bar = plain(box((2.0, 0.05, 0.1), (0, belly - gap - 0.025, 1.0)))
+        without, occluded = (picture(renderer, model, [bar], occlusion=o) for o in (0.0, 0.8))
+        assert np.array_equal(without.label, occluded.label)
+        torso = np.isin(without.label[..., 0], (1, 2))
+        near = torso & (np.roll(without.label[..., 0] == 0, 5, 0) & (np.roll(without.alpha > 0.9, 5, 0)))
+        assert near.sum() > 30
+        ratio = occluded.rgb[near].mean() / without.rgb[near].mean()
+        assert ratio < 0.93 if darker else ratio > 0.99
 
 
 @needs_body

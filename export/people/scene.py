@@ -156,9 +156,9 @@ def _composed(rng: np.random.Generator, picture: Picture, behind: np.ndarray) ->
     alpha, colour = picture.alpha, picture.rgb[..., ::-1]
     if rng.random() < 0.5:
         # Haze, lens and film give a photo one range of tones, of which people in it have their part.
-        share = rng.uniform(0.3, 0.9)
+        share = rng.uniform(0.2, 0.75)
         low, high = np.quantile(behind[::4, ::4].reshape(-1, 3), (0.01, 0.99), axis=0)
-        high = np.maximum(high, low + 60)
+        high = np.maximum(high, low + 110)
         low, high = share * low, 255 * (1 - share) + share * high
         colour = alpha[..., None] * low + colour * (high - low) / 255
     if rng.random() < 0.3:

@@ -32,9 +32,10 @@ uniform mat4 projection; uniform float offset, bulge, bulge_frequency; uniform v
 uniform mat3 fabric; uniform bool planar;
 out vec3 v_normal; out vec2 v_uv; out vec3 v_rest; out vec3 v_view; out vec3 v_point; out float v_cut;
 void main() {
-  float f = bulge_frequency;
-  float wave = sin(rest.x * f + phase.x) * sin(rest.z * f * .8 + phase.y)
-             + .6 * sin(rest.y * f * 1.3 + rest.z * f * 1.7 + phase.z);
+  float f = bulge_frequency, wave = 0.;
+  if (bulge > 0.)
+    wave = sin(rest.x * f + phase.x) * sin(rest.z * f * .8 + phase.y)
+         + .6 * sin(rest.y * f * 1.3 + rest.z * f * 1.7 + phase.z);
   vec3 p = position + normal * (offset + bulge * wave);
   gl_Position = projection * vec4(p, 1);
   v_normal = normal; v_rest = rest; v_view = -p; v_point = point; v_cut = cut;
@@ -210,7 +211,8 @@ class Renderer:
         self.fixed = self.context.buffer(np.concatenate(fixed, 2).astype(np.float32).tobytes())
         self.moving: list[moderngl.Buffer] = []  # one a person
         self.cuts = self.context.buffer(np.ones(count * 3, np.float32).tobytes())
-        self.body = self.context.buffer((model.range["body"][:, None] * 3 + np.arange(3)).astype(np.int32).tobytes())
+        self.body = self.context.buffer(faces[model.range["body"]].astype(np.int32).tobytes())
+        self.body_vertices = self.context.buffer(reserve=len(model.rest) * 12)
         ones = np.ones(count * 3, np.float32)
         corner_of = (faces.reshape(-1), np.repeat(np.arange(count), 3))
         self.gather = sp.csr_matrix((ones, corner_of), shape=(len(model.rest), count))
@@ -303,8 +305,9 @@ class Renderer:
         self.shadow_target.use()
         self.shadow_target.clear(depth=1.0)
         self.shadow_program["shadow_matrix"].write(matrix.astype(np.float32).T.tobytes())
-        for k in range(len(people)):
-            array = self.context.vertex_array(self.shadow_program, [(self.moving[k], "3f 12x", "position")], self.body)
+        for vertices in people:
+            self.body_vertices.write(vertices.tobytes())
+            array = self.context.vertex_array(self.shadow_program, [(self.body_vertices, "3f", "position")], self.body)
             array.render()
             array.release()
         for buffer in things:

@@ -256,14 +256,16 @@ def _plain(rng: np.random.Generator) -> np.ndarray:
         colour = value * (1 + rng.normal(0, 0.03 if kind < 0.55 else 0.22, 3))
     # Woven or knitted: noise along threads beside the noise of single texels.
     threads = rng.normal(0, rng.uniform(0, 6), (256, 1, 1)) + rng.normal(0, rng.uniform(0, 6), (1, 256, 1))
-    return np.clip(colour + threads + rng.normal(0, rng.uniform(1, 6), (256, 256, 1)), 0, 255).astype(np.uint8)
+    return np.clip(
+        colour + threads + rng.standard_normal((256, 256, 1), np.float32) * rng.uniform(1, 6), 0, 255
+    ).astype(np.uint8)
 
 
 def _denim(rng: np.random.Generator) -> np.ndarray:
     """Blue, grey or black twill, worn unevenly."""
     colour = np.array([(52, 68, 102), (88, 110, 148), (32, 38, 58), (70, 72, 76), (26, 26, 29)][rng.integers(5)], float)
     worn = cv2.resize(rng.normal(0, 1, (6, 6)).astype(np.float32), (256, 256), interpolation=cv2.INTER_CUBIC)[..., None]
-    noise = rng.normal(0, 6, (256, 256, 1))
+    noise = 6 * rng.standard_normal((256, 256, 1), np.float32)
     return np.clip(colour * (1 + rng.uniform(0, 0.22) * worn) + noise, 0, 255).astype(np.uint8)
 
 

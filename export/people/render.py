@@ -196,6 +196,13 @@ class Renderer:
         self.whole = self.context.program(
             vertex_shader=_VERTEX, fragment_shader=_FRAGMENT.replace("#define CUT 1", "#define CUT 0")
         )
+        self.uniforms: dict[str, list[moderngl.Uniform]] = {}
+        self.attributes: dict[int, set[str]] = {}
+        for program in (self.cutting, self.whole):
+            self.attributes[program.glo] = {n for n in program if isinstance(program[n], moderngl.Attribute)}
+            for name in program:
+                if isinstance(program[name], moderngl.Uniform):
+                    self.uniforms.setdefault(name, []).append(program[name])
         self.shadow_program = self.context.program(vertex_shader=_SHADOW_VERTEX, fragment_shader=_SHADOW_FRAGMENT)
         size = (width * SUPERSAMPLING, height * SUPERSAMPLING)
         targets = [self.context.texture(size, 4), self.context.texture(size, 4, dtype="f4")]
@@ -224,13 +231,11 @@ class Renderer:
             self._set(name, unit)
 
     def _set(self, name: str, value) -> None:
-        for program in (self.cutting, self.whole):
-            if name not in program:  # the compiler drops uniforms that nothing uses
-                continue
+        for uniform in self.uniforms.get(name, ()):  # the compiler drops those that nothing uses
             if isinstance(value, np.ndarray):
-                program[name].write(value.astype(np.float32).T.tobytes())
+                uniform.write(value.astype(np.float32).T.tobytes())
             else:
-                program[name] = value
+                uniform.value = value
 
     def draw(
         self,
@@ -354,10 +359,10 @@ class Renderer:
 
     def _array(self, program, buffers: list[tuple[moderngl.Buffer, list[tuple[str, int]]]], indices=None):
         """A vertex array of those attributes (name, floats) that the compiler has kept."""
-        content = []
+        content, kept = [], self.attributes[program.glo]
         for buffer, attributes in buffers:
-            layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in attributes)
-            content.append((buffer, layout, *[name for name, _ in attributes if name in program]))
+            layout = " ".join(f"{n}f" if name in kept else f"{4 * n}x" for name, n in attributes)
+            content.append((buffer, layout, *[name for name, _ in attributes if name in kept]))
         return self.context.vertex_array(program, [c for c in content if len(c) > 2], indices)
 
     def _layer(self, layer: Layer, moving: moderngl.Buffer, px_per_metre: float, rng: np.random.Generator) -> None:

@@ -87,7 +87,7 @@ class Director:
     ) -> None:
         self.model, self.fabrics, self.clips, self.shape, self.bodies = model, fabrics, clips, shape, bodies
         self.width, self.height = size
-        self.maker = PropMaker(fabrics.draw)
+        self.maker = PropMaker(lambda rng: fabrics.draw(rng, worn=False))
 
     def stage(self, rng: np.random.Generator) -> Stage:
         name = list(LAYOUTS)[rng.choice(len(LAYOUTS), p=[share for share, _ in LAYOUTS.values()])]

@@ -199,9 +199,9 @@ class Fabrics:
         with np.load(cache) as data:
             self.tiles = data["tiles"]
 
-    def draw(self, rng: np.random.Generator) -> np.ndarray:
-        """A texture, uint8 [256, 256, 3]."""
-        kind = rng.random()
+    def draw(self, rng: np.random.Generator, worn: bool = True) -> np.ndarray:
+        """A texture, uint8 [256, 256, 3]; not `worn`: none of the game's skins, which may show bare limbs."""
+        kind = rng.random() * (1 if worn else 0.8)
         if kind < 0.45:
             return _plain(rng)
         if kind < 0.6:

@@ -157,7 +157,7 @@ def test_furniture_is_under_who_uses_it_and_leaves_most_of_the_person_to_see(mod
 
     class Cloth:
         @staticmethod
-        def draw(rng):
+        def draw(rng, worn=True):
             return np.full((256, 256, 3), rng.integers(256), np.uint8)
 
     director = Director(model, Cloth(), None, lambda number: model.body.template, 1, (WIDTH, HEIGHT))

@@ -35,12 +35,16 @@ _ZERO_AD_JOINTS = ("hip", "chest", "neck", "arm_L", "forearm_L", "hand_L", "arm_
 
 @dataclass(frozen=True)
 class Pose:
-    """root, chest, head: rotations [3, 3]; limbs: unit directions [8, 3] in the order of `LIMBS`."""
+    """root, chest, head: rotations [3, 3]; limbs: unit directions [8, 3] in the order of `LIMBS`.
+
+    `rests` is how the body is carried: "stands" (or moves), "sits" (on something below the buttocks), "lies".
+    """
 
     root: np.ndarray
     chest: np.ndarray
     head: np.ndarray
     limbs: np.ndarray
+    rests: str = "stands"
 
 
 @dataclass(frozen=True)
@@ -161,15 +165,22 @@ def clip_pose(rng: np.random.Generator, clips: Clips) -> Pose:
     root, chest, limbs = (a[k].astype(np.float64) for a in (clips.root, clips.chest, clips.limbs))
     if rng.random() < 0.5:
         root, chest, limbs = _mirrored(root, chest, limbs)
-    return Pose(root, chest, _head(rng, chest), _unit(limbs + rng.normal(0, 0.06, (8, 3))))
+    limbs = _unit(limbs + rng.normal(0, 0.06, (8, 3)))
+    return Pose(root, chest, _head(rng, chest), limbs, "sits" if seated else "stands")
 
 
-def drawn_pose(rng: np.random.Generator) -> Pose:
+def lying(rng: np.random.Generator, pose: Pose) -> Pose:
+    """The pose laid down: on the back, the belly or a side."""
+    turn = _euler(-90 + rng.normal(0, 6), 0, 0) @ _euler(0, 0, rng.choice([0, 0, 180, 90, -90]) + rng.normal(0, 12))
+    return Pose(turn @ pose.root, turn @ pose.chest, turn @ pose.head, pose.limbs @ turn.T, "lies")
+
+
+def drawn_pose(rng: np.random.Generator, sitting_share: float = 0.25) -> Pose:
     """An everyday pose drawn at random: standing or sitting, arms hanging, bent or raised."""
     u = rng.uniform
     root = _euler(u(-6, 8), u(-4, 4), 0)
     chest = root @ _euler(rng.normal(4, 8), rng.normal(0, 5), rng.normal(0, 9))
-    sitting = u() < 0.2
+    sitting = u() < sitting_share
     arms, legs = [], []
     for side in (1, -1):
         if u() < 0.8:
@@ -189,7 +200,7 @@ def drawn_pose(rng: np.random.Generator) -> Pose:
             shank = thigh + [side * u(-0.08, 0.05), abs(rng.normal(0, 0.15)), 0]
         legs += [root @ _unit(thigh), root @ _unit(shank)]
     limbs = _unit(np.stack(arms + legs) + rng.normal(0, 0.06, (8, 3)))
-    return Pose(root, chest, _head(rng, chest), limbs)
+    return Pose(root, chest, _head(rng, chest), limbs, "sits" if sitting else "stands")
 
 
 def _turn_onto(a: np.ndarray, b: np.ndarray) -> np.ndarray:

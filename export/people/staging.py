@@ -1,0 +1,245 @@
+"""Who stands, sits or lies where, among which things, and where the camera is.
+
+World axes: z up, the ground at z = 0; the camera looks towards +y. Everybody is made facing the camera (-y).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from export.people.body import Shape
+from export.people.motion import Clips, Pose, clip_pose, drawn_pose, lying, posed
+from export.people.props import Prop, PropMaker
+from export.people.render import Camera, Person
+from export.people.wardrobe import Fabrics, Model, brim, dress
+
+# Layouts: share of the images, and the shares of 1, 2, 3, … people.
+LAYOUTS = {
+    "empty": (0.1, ()),
+    "scattered": (0.5, (0.48, 0.26, 0.13, 0.07, 0.04, 0.02)),
+    "group": (0.18, (0, 0.24, 0.24, 0.18, 0.12, 0.09, 0.07, 0.06)),
+    "webcam": (0.22, (0.54, 0.26, 0.13, 0.07)),
+}
+# Framing of the scattered: (share, centre of view in body heights, visible height in body heights: low, high)
+FRAMINGS = (
+    (0.38, 0.5, 1.05, 1.7),
+    (0.16, 0.66, 0.75, 0.95),
+    (0.16, 0.78, 0.45, 0.65),
+    (0.08, 0.9, 0.28, 0.4),
+    (0.22, 0.5, 1.8, 4.5),
+)
+_LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])  # camera axes in the world before pitch and roll
+_MIN_DEPTH = 0.9  # metres from the camera to whoever is not framed
+
+
+@dataclass
+class Stage:
+    """What is to be drawn. `indoors`: the props have a floor."""
+
+    people: list[Person]
+    props: list[Prop]
+    camera: Camera
+    indoors: bool = False
+
+
+@dataclass
+class Actor:
+    """A dressed person at the origin with what belongs to them: seat, table, what they hold. `tall`: top above ground;
+    `extent`: the larger of height and three quarters of the horizontal size, metres."""
+
+    person: Person
+    props: list[Prop]
+    tall: float
+    extent: float
+    rests: str
+
+    def moved(self, x: float, y: float) -> Actor:
+        return Actor(self.person.moved(x, y), [p.moved(x, y) for p in self.props], self.tall, self.extent, self.rests)
+
+
+@dataclass
+class Aim:
+    """A camera and what placing others needs to know of it."""
+
+    camera: Camera
+    eye: np.ndarray
+    distance: float
+    forward: np.ndarray
+    right: np.ndarray
+    width_per_depth: float = field(default=1.0)  # visible width at one metre
+
+
+class Director:
+    """Puts people, things and the camera into place; `shape(number)` gives body `number` of `bodies`."""
+
+    def __init__(
+        self,
+        model: Model,
+        fabrics: Fabrics,
+        clips: Clips,
+        shape: Callable[[int], Shape],
+        bodies: int,
+        size: tuple[int, int],
+    ) -> None:
+        self.model, self.fabrics, self.clips, self.shape, self.bodies = model, fabrics, clips, shape, bodies
+        self.width, self.height = size
+        self.maker = PropMaker(lambda rng: fabrics.draw(rng, worn=False))
+
+    def stage(self, rng: np.random.Generator) -> Stage:
+        name = list(LAYOUTS)[rng.choice(len(LAYOUTS), p=[share for share, _ in LAYOUTS.values()])]
+        counts = LAYOUTS[name][1]
+        count = 1 + int(rng.choice(len(counts), p=counts)) if counts else 0
+        if name == "group":
+            actors, aim = self._group(rng, count)
+        elif name == "webcam":
+            actors, aim = self._webcam(rng, count)
+        else:
+            actors, aim = self._scattered(rng, count)
+        props = [p for a in actors for p in a.props]
+        if name in ("empty", "scattered"):
+            for _ in range(rng.poisson(0.5 if actors else 2.0)):
+                depth = aim.distance * rng.uniform(0.5, 2.5)
+                if depth > _MIN_DEPTH:
+                    spot = self._spot(rng, aim, depth)
+                    props.append(self.maker.standing(rng).moved(*spot[:2], rng.uniform(0, 6)))
+        indoors = rng.random() < {"webcam": 0.4, "empty": 0.3}.get(name, 0.15)
+        if indoors:
+            behind = [a.person.vertices[self.model.torso, 1].max() + 0.3 for a in actors]
+            far = max([aim.eye[1] + aim.distance, *behind]) + rng.uniform(0.3, 2.5)
+            props += self.maker.room(rng, aim.eye, far)
+        return Stage([a.person for a in actors], props, aim.camera, indoors)
+
+    def actor(self, rng: np.random.Generator, pose: Pose, yaw: float, table_share: float = 0.0) -> Actor:
+        """Dresses a body in a pose, feet (or whatever is lowest) on z = 0, turned by `yaw` radians."""
+        model, u = self.model, rng.uniform
+        layers = dress(model, self.fabrics, rng)
+        vertices = posed(model.body, self.shape(int(rng.integers(self.bodies))), pose, rng)
+        body = model.body.groups["body"]
+        vertices -= [*vertices[body, :2].mean(0), vertices[body, 2].min()]
+        props, front = [], float(vertices[model.torso, 1].min())
+        if pose.rests == "sits":
+            below = vertices[model.buttocks]
+            height = float(np.quantile(below[:, 2], 0.03)) + 0.015
+            x, y = below[below[:, 2] < height + 0.08][:, :2].mean(0)
+            if height > 0.1 and u() < 0.85:
+                back = float(vertices[model.torso, 1].max() - y) + 0.01
+                props += [p.moved(x, y) for p in self.maker.seat(rng, height, back)]
+            if u() < table_share:
+                props += self.maker.table(rng, max(height + u(0.18, 0.32), 0.3), front - u(0.02, 0.15))
+        elif pose.rests == "lies":
+            if u() < 0.6:
+                vertices[:, 2] += u(0, 0.55)
+            lowest = vertices[body, 2].min() + 0.02  # the body sinks in a little
+            low, high = vertices[body].min(0), vertices[body].max(0)
+            props += self.maker.bed(rng, (low[0], low[1], lowest), high)
+        elif u() < table_share * 0.4:
+            props += self.maker.table(rng, u(0.7, 1.1), front - u(0.02, 0.3))
+        if u() < 0.18:
+            side = rng.integers(2)
+            hand, arm = (vertices[index[side]].mean(0) for index in (model.hand, model.lower_arm))
+            props.append(self.maker.held(rng, hand, arm))
+        vertices = vertices @ Rotation.from_euler("z", yaw).as_matrix().T
+        props = [p.moved(0, 0, yaw) for p in props]
+        size = np.ptp(vertices[body], axis=0)
+        tall = float(vertices[body, 2].max())
+        person = Person(vertices, layers, brim(model, layers, vertices, rng))
+        return Actor(person, props, tall, max(tall, 0.75 * float(size[:2].max())), pose.rests)
+
+    def _anybody(self, rng: np.random.Generator) -> Actor:
+        pose = clip_pose(rng, self.clips) if rng.random() < 0.5 else drawn_pose(rng)
+        if rng.random() < 0.07:
+            pose = lying(rng, pose)
+            return self.actor(rng, pose, rng.uniform(-np.pi, np.pi))
+        yaw = np.radians(rng.normal(0, 40) if rng.random() < 0.6 else rng.uniform(-180, 180))
+        return self.actor(rng, pose, yaw, table_share=0.25)
+
+    def _aim(self, target: np.ndarray, visible: float, degrees: float, pitch: float, roll: float) -> Aim:
+        """A camera that shows `visible` metres of height at `target` [3]; angles in degrees, pitch > 0 looks down."""
+        tangent = np.tan(np.radians(degrees) / 2)
+        distance = max(visible / (2 * tangent), 0.35)
+        rotation = Rotation.from_euler("xz", [pitch, roll], degrees=True).as_matrix() @ _LOOK
+        eye = target - distance * rotation[2]
+        matrix = np.concatenate([rotation, -(rotation @ eye)[:, None]], 1)
+        camera = Camera(self.width, self.height, self.height / (2 * tangent), matrix)
+        return Aim(camera, eye, distance, rotation[2], rotation[0], 2 * tangent * self.width / self.height)
+
+    def _spot(self, rng: np.random.Generator, aim: Aim, depth: float) -> np.ndarray:
+        return aim.eye + depth * aim.forward + rng.uniform(-0.6, 0.6) * depth * aim.width_per_depth * aim.right
+
+    def _scattered(self, rng: np.random.Generator, count: int) -> tuple[list[Actor], Aim]:
+        """The first person is framed; the others are around on the same ground."""
+        u = rng.uniform
+        actors = [self._anybody(rng) for _ in range(count)]
+        tall, extent = (actors[0].tall, actors[0].extent) if actors else (1.7, 1.7)
+        lies = bool(actors) and actors[0].rests == "lies"
+        kind = rng.choice(len(FRAMINGS), p=[f[0] for f in FRAMINGS])
+        _, middle, low, high = FRAMINGS[0 if lies and low_view(kind) else kind]
+        visible = extent * u(low, high)
+        shift = u(-0.35, 0.35) * visible * self.width / self.height * min(1, visible / extent)
+        target = np.array([shift, 0, middle * tall + u(-0.08, 0.08) * visible])
+        roll = rng.normal(0, 4) if u() < 0.9 else u(-50, 50)
+        aim = self._aim(target, max(visible, 0.6), u(28, 68), rng.normal(22 if lies else 5, 12 if lies else 9), roll)
+        taken, placed = [np.zeros(2)], actors[:1]
+        for actor in actors[1:]:
+            for _ in range(20):
+                depth = aim.distance * u(0.75, 2.5) if u() < 0.6 else aim.distance + u(-0.4, 0.8)
+                spot = self._spot(rng, aim, depth)
+                if depth > _MIN_DEPTH and min(np.linalg.norm(spot[:2] - t) for t in taken) > 0.4:
+                    taken.append(spot[:2])
+                    placed.append(actor.moved(*spot[:2]))
+                    break
+        return placed, aim
+
+    def _group(self, rng: np.random.Generator, count: int) -> tuple[list[Actor], Aim]:
+        """Shoulder to shoulder in one or two rows, as people stand for a photograph or in a queue."""
+        u = rng.uniform
+        rows = 2 if count >= 4 and u() < 0.6 else 1
+        front = count // rows
+        spacing, turned = u(0.34, 0.62), (np.pi if u() < 0.12 else np.radians(rng.normal(0, 15)))
+        front_sits = u() < 0.4
+        actors = []
+        for k in range(count):
+            back_row = k >= front
+            place, length = (k - front, count - front) if back_row else (k, front)
+            x = (place - (length - 1) / 2 + (0.5 if back_row and length == front else 0)) * spacing
+            sits = rows == 2 and front_sits and not back_row
+            pose = clip_pose(rng, self.clips) if u() < 0.15 else drawn_pose(rng, 0.9 if sits else 0.05)
+            yaw = turned + np.radians(rng.normal(0, 16)) if u() < 0.9 else u(-np.pi, np.pi)
+            at = (x + rng.normal(0, 0.05), u(0.45, 0.8) * back_row + rng.normal(0, 0.08))
+            actors.append(self.actor(rng, pose, yaw).moved(*at))
+        tall = float(np.median([a.tall for a in actors]))
+        wide = spacing * count / rows * self.height / self.width
+        visible = u(0.45, 0.9) * tall if u() < 0.45 else max(u(1.02, 1.5) * tall, wide * u(0.7, 1.3))
+        z = tall * (0.52 if visible > tall else 0.95) - (0 if visible > tall else u(0.25, 0.45) * visible)
+        target = np.array([u(-0.25, 0.25) * spacing * front, 0.2, z])
+        return actors, self._aim(target, visible, u(28, 65), rng.normal(3, 5), rng.normal(0, 2.5))
+
+    def _webcam(self, rng: np.random.Generator, count: int) -> tuple[list[Actor], Aim]:
+        """Head and shoulders close to a wide lens, others beside or behind."""
+        u = rng.uniform
+        actors = []
+        for k in range(count):
+            sits = actors[0].rests == "sits" if k and u() < 0.7 else u() < 0.65
+            pose = drawn_pose(rng, 1.0 if sits else 0.0)
+            yaw = np.radians(rng.normal(0, 22)) if k == 0 or u() < 0.7 else u(-np.pi, np.pi)
+            actors.append(self.actor(rng, pose, yaw, table_share=0.35 if k == 0 else 0.05))
+        head = float(np.median(actors[0].person.vertices[self.model.skull, 2]))
+        visible = u(0.36, 0.95) * (1 if count == 1 else u(1.0, 1.4))
+        target = np.array([u(-0.22, 0.22) * visible, 0, head - u(-0.02, 0.3) * visible])
+        roll = rng.normal(0, 3) if u() < 0.9 else u(-25, 25)
+        aim = self._aim(target, visible, u(38, 75), rng.normal(2, 8), roll)
+        placed = actors[:1]
+        for k, actor in enumerate(actors[1:]):
+            side = (-1) ** k * (1 if u() < 0.8 else -1)
+            behind = u(-0.15, 0.35) if u() < 0.6 else u(0.5, 2.2)
+            placed.append(actor.moved(side * u(0.32, 0.6) * (1 + k // 2) * (1 + 0.5 * behind), behind))
+        return placed, aim
+
+
+def low_view(kind: int) -> bool:
+    """Whether a framing shows less than the whole body."""
+    return FRAMINGS[kind][2] < 1

@@ -16,7 +16,7 @@ for preset in release asan; do
 done
 
 printf '\n== Python tests\n'
-.venv/bin/python -m pytest --junitxml "$results/pytest.xml" || status=1
+.venv/bin/python -m pytest -rs --junitxml "$results/pytest.xml" || status=1
 
 printf '\n'
 .venv/bin/python scripts/sum_test_results.py "$results"/*.xml || status=1

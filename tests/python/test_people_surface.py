@@ -18,20 +18,6 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module")
-def body():
-    from export.people.body import Body
-
-    return Body()
-
-
-@pytest.fixture(scope="module")
-def atlas(body):
-    from export.people.atlas import Atlas
-
-    return Atlas(body)
-
-
 def grid(side: int) -> Mesh:
     """A square of side * side cells, each cut into two triangles, with its x coordinate as value."""
     x, y = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))

@@ -136,6 +136,7 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
             "coarse_classes": network.coarse_classes,
             "index_classes": network.index_classes,
             "mask_threshold": decode.mask_threshold,
+            "least_own_share": decode.least_own_share,
         },
         "surface": {"file": SURFACE_GRID},
         "licence": LICENCE,
@@ -158,6 +159,7 @@ def decode_config(manifest: dict) -> DecodeConfig:
         box_nms_iou=head["nms_iou"],
         max_people=head["max_people"],
         mask_threshold=manifest["dense_head"]["mask_threshold"],
+        least_own_share=manifest["dense_head"]["least_own_share"],
     )
 
 

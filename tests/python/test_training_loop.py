@@ -70,7 +70,7 @@ def test_a_run_leaves_checkpoint_weights_log_and_curves(monkeypatch, shards, tmp
     assert {"recall", "precision", "part", "mask_iou"} <= set(last)
     # Weights alone, without code: other programs load them the safe way.
     saved = torch.load(tmp_path / "weights.pt", weights_only=True)
-    MobileParsingRCNN(NetworkConfig(width=saved["width"])).load_state_dict(saved["ema"])
+    MobileParsingRCNN(NetworkConfig.of(saved)).load_state_dict(saved["ema"])
     torch.load(tmp_path / "checkpoint.pt", weights_only=True)
 
 

@@ -137,8 +137,9 @@ PixelRect pixel_rect(const Box& box) {
 }
 
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
-                          DensePlanes& planes) {
+                          float least_own_share, DensePlanes& planes) {
   DecodeCounts counts;
+  int64_t taken = 0;  // pixels of the person that are somebody else's already
   const PixelRect rect = pixel_rect(box);
   const std::vector<Tap> rows = resize_taps(logits.size, rect.height);
   const std::vector<Tap> cols = resize_taps(logits.size, rect.width);
@@ -157,7 +158,11 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
     for (int x = first_col; x < last_col; ++x) {
       const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
       const Tap& col = cols[size_t(x)];
-      if (planes.person[pixel] != 0 || !(bilinear(odds.data(), logits.size, row, col) > least_odds)) continue;
+      if (!(bilinear(odds.data(), logits.size, row, col) > least_odds)) continue;
+      if (planes.person[pixel] != 0) {
+        ++taken;
+        continue;
+      }
       const int part = parts.best(col) + 1;
       if (part == 0) continue;
       bool clamped = false;
@@ -169,7 +174,15 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
       counts.clamped_uv += clamped ? 1 : 0;
     }
   }
-  return counts;
+  if (float(counts.body_pixels) >= least_own_share * float(counts.body_pixels + taken)) return counts;
+  for (int y = first_row; y < last_row; ++y) {
+    const size_t start = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x);
+    for (size_t pixel = start + size_t(first_col); pixel < start + size_t(last_col); ++pixel) {
+      if (planes.person[pixel] != person) continue;
+      for (std::vector<uint8_t>* plane : {&planes.part, &planes.u, &planes.v, &planes.person}) (*plane)[pixel] = 0;
+    }
+  }
+  return {};
 }
 
 }  // namespace maq

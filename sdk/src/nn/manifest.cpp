@@ -162,6 +162,7 @@ DenseHeadSpec read_dense_head(const Node& node) {
   head.coarse_classes = node.at("coarse_classes").integer(2, 64);
   head.index_classes = node.at("index_classes").integer(2, 64);
   head.mask_threshold = node.at("mask_threshold").number(0.001, 0.999);
+  head.least_own_share = node.at("least_own_share").number(0, 1);
   return head;
 }
 

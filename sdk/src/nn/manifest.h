@@ -64,6 +64,7 @@ struct DenseHeadSpec {
   int coarse_classes = 0;
   int index_classes = 0;
   float mask_threshold = 0;
+  float least_own_share = 0;
 };
 
 struct Manifest {

@@ -29,10 +29,10 @@ class FakeDetector:
         self.blobs["FeatureExtractor/MobilenetV2/" + conv] = [layer.conv.weight.detach().numpy()]
         self.blobs[f"FeatureExtractor/MobilenetV2/{scope}BatchNorm/batchnorm/add_1"] = norm
 
-    def getLayerId(self, name):  # noqa: N802 (OpenCV's name)
+    def getLayerId(self, name):
         return name
 
-    def getLayer(self, name):  # noqa: N802
+    def getLayer(self, name):
         return SimpleNamespace(blobs=self.blobs[name])
 
 

@@ -1,6 +1,7 @@
-"""Makes an int8 bundle from a fp32 bundle: static, per output channel, calibrated on rendered people.
+"""Makes an int8 bundle from a fp32 bundle: static, per output channel, calibrated on rendered people and on photographs.
 
-    python -m quantization.quantize --bundle .data/bundles/densepose-b-fp32 --out sdk/models/densepose-b-int8
+    python -m quantization.quantize --bundle .data/bundles/densepose-b-fp32 --out sdk/models/densepose-b-int8 \\
+        --photos .data/photos/shards/train
 
 Activations are unsigned, weights signed 8-bit numbers. What stays float is in `quantization/densepose.toml`.
 Prints sizes and each output's signal to noise ratio on images that were not used for calibration.
@@ -125,12 +126,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("sdk/models/densepose-b-int8"))
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--data", type=Path, default=Path(".data/people/train"), help="calibration shards")
+    parser.add_argument("--photos", type=Path, help="calibrate on these shards too (export.teachers.shards)")
     parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), help="shards to measure on")
     parser.add_argument("--settings", type=Path, default=Path(__file__).with_name("densepose.toml"))
     options = parser.parse_args()
     settings = read_settings(options.settings)
     source = open_bundle(options.bundle)
     records = spread(data.load_records(options.data), settings.calibration_images)
+    if options.photos:
+        records += spread(data.load_records(options.photos), settings.calibration_photos)
     held_out = spread(data.load_records(options.held_out), settings.held_out_images)
     quality = quantise_bundle(source, options.out, settings, records, held_out)
     info = bundle_format.BundleInfo(

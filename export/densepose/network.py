@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -10,7 +12,7 @@ from torchvision.models import mobilenet_v3_large
 from export.densepose.config import NetworkConfig
 
 
-class ConvBn(nn.Module):
+class ConvBn(nn.Sequential):
     """Convolution, BN and, if asked, ReLU6.
 
     Where BN stands still (`MobileNetV2.freeze`), it is folded into the convolution before it is applied, which
@@ -20,9 +22,8 @@ class ConvBn(nn.Module):
     def __init__(
         self, inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1, activation: bool = True
     ) -> None:
-        super().__init__()
-        self.conv = nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups, bias=False)
-        self.bn = nn.BatchNorm2d(outputs, eps=1e-3)
+        conv = nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups, bias=False)
+        super().__init__(OrderedDict(conv=conv, bn=nn.BatchNorm2d(outputs, eps=1e-3)))
         self.activation = activation
 
     def forward(self, x: Tensor) -> Tensor:
@@ -93,7 +94,7 @@ class MobileNetV2(nn.Module):
             for k in range(count):
                 self.blocks.append(InvertedResidual(inputs, outputs, stride if k == 0 else 1, expansion))
                 inputs = outputs
-        self._frozen = False
+        self.frozen = False
         for module in self.modules():
             if isinstance(module, nn.Conv2d):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out")
@@ -103,14 +104,14 @@ class MobileNetV2(nn.Module):
 
         For pretrained weights: batches are too small for BN, and what the first layers see is no different.
         """
-        self._frozen = True
+        self.frozen = True
         for module in (self.stem, *self.blocks[: self._FROZEN_BLOCKS]):
             module.requires_grad_(False)
         self.train(self.training)
 
     def train(self, mode: bool = True) -> MobileNetV2:
         super().train(mode)
-        if self._frozen:
+        if self.frozen:
             for module in self.modules():
                 if isinstance(module, nn.BatchNorm2d):
                     module.eval()

@@ -137,6 +137,28 @@ def average_gradients(parameters: list[nn.Parameter], spent: float, stopped: boo
     return float(flat[-2]), bool(flat[-1] > 0)
 
 
+def optimiser_of(net: MobileParsingRCNN, pixel_head: PixelHead, rate: float, weight_decay: float) -> torch.optim.AdamW:
+    """Each of its groups has a "rate": its share of the learning rate."""
+    # Without BN to undo it, a full rate would wipe out what a pretrained backbone knows.
+    backbone_rate = FROZEN_BACKBONE_RATE if getattr(net.backbone, "frozen", False) else 1.0
+    others = nn.ModuleList([m for m in net.children() if m is not net.backbone] + [pixel_head])
+    groups = [
+        {
+            "params": [p for p in part.parameters() if p.requires_grad and (p.dim() > 1) == decayed],
+            "weight_decay": weight_decay if decayed else 0.0,
+            "rate": share,
+        }
+        for part, share in ((net.backbone, backbone_rate), (others, 1.0))
+        for decayed in (True, False)
+    ]
+    return torch.optim.AdamW(groups, lr=rate, fused=True)
+
+
+def rate_at(step: int, share: float, rate: float) -> float:
+    """Learning rate after `step` steps and that share of the run: a short rise, then a cosine down to a fiftieth."""
+    return rate * min(1.0, (step + 1) / 200) * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(share, 1))))
+
+
 def start_from(net: nn.Module, weights: dict[str, torch.Tensor], name: Path) -> None:
     """Takes over what fits; says which modules keep their random weights because of another shape or name."""
     own = net.state_dict()
@@ -223,23 +245,7 @@ def main() -> None:
     trained = nn.ModuleList([net, pixel_head])
     ema = Ema(trained, options.ema)
     averaged, averaged_pixel_head = ema.net
-    # Without BN to undo it, a full rate would wipe out what a pretrained backbone knows.
-    backbone_rate = FROZEN_BACKBONE_RATE if frozen else 1.0
-    others = nn.ModuleList([m for m in net.children() if m is not net.backbone] + [pixel_head])
-    groups = [
-        {
-            "params": [p for p in part.parameters() if p.requires_grad and (p.dim() > 1) == decayed],
-            "weight_decay": options.weight_decay if decayed else 0.0,
-            "rate": rate,
-        }
-        for part, rate in ((net.backbone, backbone_rate), (others, 1.0))
-        for decayed in (True, False)
-    ]
-    optimiser = torch.optim.AdamW(
-        groups,
-        lr=options.lr,
-        fused=True,
-    )
+    optimiser = optimiser_of(net, pixel_head, options.lr, options.weight_decay)
     step, images, spent, log = 0, 0, 0.0, []
     if checkpoint.exists():
         net.load_state_dict(saved["net"])
@@ -311,8 +317,7 @@ def main() -> None:
         torch.manual_seed(((options.seed * 1000 + rank) << 32) + step)  # as in a run that never stopped
         share = step / options.steps if options.steps else spent / length
         stage = [s for s in STAGES if share >= s.start][-1]
-        warm = min(1.0, (step + 1) / 200)
-        rate = options.lr * warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(share, 1))))
+        rate = rate_at(step, share, options.lr)
         for group in optimiser.param_groups:
             group["lr"] = rate * group["rate"]
         image, truths = batches.next(stage.size, stage.framing)

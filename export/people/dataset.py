@@ -101,11 +101,11 @@ def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
 _studios: dict[tuple[int, int], Studio] = {}
 
 
-def _work(job: tuple[str, int, int, Path, Path]) -> int:
-    split, number, images, out, backgrounds = job
+def _work(job: tuple[str, int, int, Path, Path, bool]) -> int:
+    split, number, images, out, backgrounds, bare = job
     size = SIZES[number % len(SIZES)]
     if size not in _studios:
-        _studios[size] = Studio(split, *size, backgrounds, points=split != "train")
+        _studios[size] = Studio(split, *size, backgrounds, points=split != "train", bare=bare)
     render_shard(_studios[size], number, images, out / f"shard-{number:05d}.npz")
     return images
 
@@ -119,11 +119,12 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path(".data/people"))
     parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
+    parser.add_argument("--bare", action="store_true", help="nobody wears clothes (export.evaluation.ablation)")
     options = parser.parse_args()
     out = options.out / options.split
     out.mkdir(parents=True, exist_ok=True)
     shards = range(options.first_shard, options.first_shard + -(-options.images // options.per_shard))
-    jobs = [(options.split, n, options.per_shard, out, options.backgrounds) for n in shards]
+    jobs = [(options.split, n, options.per_shard, out, options.backgrounds, options.bare) for n in shards]
     jobs = [job for job in jobs if not (out / f"shard-{job[1]:05d}.npz").exists()]
     cv2.setNumThreads(1)
     pool = multiprocessing.get_context("spawn").Pool(options.processes)

@@ -35,7 +35,9 @@ class Sample:
 class Studio:
     """Everything one process needs to draw images of one split and size."""
 
-    def __init__(self, split: str, width: int, height: int, backgrounds: Path, points: bool) -> None:
+    def __init__(
+        self, split: str, width: int, height: int, backgrounds: Path, points: bool, bare: bool = False
+    ) -> None:
         self.split, self.width, self.height = split, width, height
         self.body = Body()
         atlas = Atlas(self.body)
@@ -47,7 +49,7 @@ class Studio:
                 f"no photos in {backgrounds / split}: run `python -m export.photos backgrounds` first"
             )
         self.photos = [_shrunk(cv2.imread(str(f))) for f in files]
-        self.fabrics = Fabrics(split, self.photos)
+        self.fabrics = Fabrics(split, self.photos, bare)
         skin = cv2.resize(cv2.imread(str(assets.skin_texture())), (1024, 1024), interpolation=cv2.INTER_AREA)
         self.renderer = Renderer(self.model, LabelLookup(atlas), skin[..., ::-1], width, height)
         self.points = points

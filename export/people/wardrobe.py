@@ -191,7 +191,8 @@ class _NearestPoint:
 class Fabrics:
     """Cloth for a split: crops of 0 A.D. skins and of photos of that split, and plain or striped procedural cloth."""
 
-    def __init__(self, split: str, photos: list[np.ndarray]) -> None:
+    def __init__(self, split: str, photos: list[np.ndarray], bare: bool = False) -> None:
+        self.bare = bare  # nobody wears anything: to see what clothes teach
         self.photos = photos
         cache = assets.cache_dir() / f"fabrics-{split}.npz"
         if not cache.exists():
@@ -290,6 +291,8 @@ def dress(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Laye
     eyes = Layer(
         model.range["eyes"], _grey(np.clip(rng.normal(u(60, 130), 50, (256, 256, 1)), 10, 230)), (0.9, 0.9, 0.9)
     )
+    if fabrics.bare:
+        return [skin, eyes, *_hair(model, rng)]
     upper = _upper(model, fabrics, rng)
     return [skin, eyes, *_lower(model, fabrics, rng), *upper, *_shoes(model, fabrics, rng), *_hair(model, rng),
             *_on_head(model, fabrics, upper, rng)]  # fmt: skip

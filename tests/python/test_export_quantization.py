@@ -105,7 +105,9 @@ def test_the_shipped_settings_name_every_graph():
 @pytest.mark.parametrize("text", ["[detector]\nmethod = 'magic'", "[detector]\nbits = 4", "images = 3"])
 def test_wrong_settings_are_errors(tmp_path, text):
     path = tmp_path / "settings.toml"
-    path.write_text(f"calibration_images = 1\nheld_out_images = 1\npeople_per_image = 1\n{text}")
+    path.write_text(
+        f"calibration_images = 1\ncalibration_photos = 1\nheld_out_images = 1\npeople_per_image = 1\n{text}"
+    )
     with pytest.raises(ValueError, match=str(path)):
         read_settings(path)
 

@@ -135,6 +135,8 @@ def test_furniture_is_under_who_uses_it_and_leaves_most_of_the_person_to_see(mod
     from export.people.staging import Director
 
     class Cloth:
+        bare = False
+
         @staticmethod
         def draw(rng, worn=True):
             return np.full((256, 256, 3), rng.integers(256), np.uint8)

@@ -13,7 +13,7 @@ from rectangle_people import write_shard
 from export.densepose import data, train
 from export.densepose.config import NetworkConfig
 from export.densepose.losses import PixelHead, _dense_terms, batch_loss, surface_loss
-from export.densepose.network import MobileParsingRCNN
+from export.densepose.network import MobileNetV2, MobileParsingRCNN
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +60,25 @@ def test_a_resumed_run_goes_on_exactly_as_one_that_never_stopped(monkeypatch, sh
     second = run(monkeypatch, shards, tmp_path / "stopped", "--steps", "4")
     assert len(first) == len(second) == 2
     assert first + second == pytest.approx(straight, rel=1e-5)
+
+
+def test_a_pretrained_backbone_keeps_its_first_layers_and_its_norms(monkeypatch, shards, tmp_path):
+    torch.manual_seed(9)
+    pretrained = MobileNetV2().state_dict()
+    torch.save(pretrained, tmp_path / "backbone.pt")
+    run(monkeypatch, shards, tmp_path / "run", "--steps", "2", "--pretrained", str(tmp_path / "backbone.pt"))
+    run(monkeypatch, shards, tmp_path / "run", "--steps", "3")  # goes on as it began
+    run(monkeypatch, shards, tmp_path / "next", "--steps", "1", "--init", str(tmp_path / "run" / "weights.pt"))
+    for name in ("run", "next"):
+        saved = torch.load(tmp_path / name / "weights.pt", weights_only=True)
+        found = {key: saved["ema"][f"backbone.{key}"] for key in pretrained}
+        assert saved["frozen"]
+        for key, value in pretrained.items():
+            if key.startswith(("stem.", "blocks.0.", "blocks.1.")) or "running" in key:
+                torch.testing.assert_close(found[key].float(), value.float(), rtol=1e-3, atol=1e-5)
+        assert not torch.allclose(
+            found["blocks.9.expand.conv.weight"].float(), pretrained["blocks.9.expand.conv.weight"]
+        )
 
 
 def test_a_run_leaves_checkpoint_weights_log_and_curves(monkeypatch, shards, tmp_path):

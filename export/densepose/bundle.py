@@ -39,6 +39,11 @@ TRAINING_DATA = (
         "licence": "Apache-2.0",
         "used_for": "training",
     },
+    {
+        "name": "MobileNetV2 in ssd_mobilenet_v2_coco_2018_03_29 (TensorFlow detection model zoo, trained on COCO)",
+        "licence": "Apache-2.0",
+        "used_for": "first weights of the backbone",
+    },
 )
 
 

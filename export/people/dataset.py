@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from export.people.scene import SPLITS, Studio
 
-VERSION = "people-2"
+VERSION = "people-3"
 SIZES = ((320, 256), (320, 256), (256, 320))  # landscape, landscape, portrait, by shard number
 POINT_RANGE = np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 2.1]], np.float32)
 MIN_PIXELS, MIN_SIDE_PX = 64, 12  # smaller people are marked "ignore"
@@ -102,10 +102,10 @@ _studios: dict[tuple[int, int], Studio] = {}
 
 
 def _work(job: tuple[str, int, int, Path, Path, bool]) -> int:
-    split, number, images, out, backgrounds, bare = job
+    split, number, images, out, places, bare = job
     size = SIZES[number % len(SIZES)]
     if size not in _studios:
-        _studios[size] = Studio(split, *size, backgrounds, points=split != "train", bare=bare)
+        _studios[size] = Studio(split, *size, places, points=split != "train", bare=bare)
     render_shard(_studios[size], number, images, out / f"shard-{number:05d}.npz")
     return images
 
@@ -118,13 +118,13 @@ def main() -> None:
     parser.add_argument("--first-shard", type=int, default=0)
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path(".data/people"))
-    parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
+    parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
     parser.add_argument("--bare", action="store_true", help="nobody wears clothes (export.evaluation.ablation)")
     options = parser.parse_args()
     out = options.out / options.split
     out.mkdir(parents=True, exist_ok=True)
     shards = range(options.first_shard, options.first_shard + -(-options.images // options.per_shard))
-    jobs = [(options.split, n, options.per_shard, out, options.backgrounds, options.bare) for n in shards]
+    jobs = [(options.split, n, options.per_shard, out, options.places, options.bare) for n in shards]
     jobs = [job for job in jobs if not (out / f"shard-{job[1]:05d}.npz").exists()]
     cv2.setNumThreads(1)
     pool = multiprocessing.get_context("spawn").Pool(options.processes)

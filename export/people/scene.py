@@ -15,11 +15,13 @@ from export.people.body import Body, Shape, sample_phenotype
 from export.people.imaging import camera_faults, lens_map, through_lens
 from export.people.lookup import LabelLookup
 from export.people.motion import load_clips
+from export.people.panoramas import load_panoramas
 from export.people.render import Camera, Light, Picture, Renderer
 from export.people.staging import Director
 from export.people.wardrobe import Fabrics, Model
 
 SPLITS = {"train": 0, "val": 1, "test": 2}
+PANORAMA_SHARE = 0.2  # of the images outside rendered rooms
 BODIES = {"train": 400, "val": 60, "test": 60}
 
 
@@ -35,19 +37,17 @@ class Sample:
 class Studio:
     """Everything one process needs to draw images of one split and size."""
 
-    def __init__(
-        self, split: str, width: int, height: int, backgrounds: Path, points: bool, bare: bool = False
-    ) -> None:
+    def __init__(self, split: str, width: int, height: int, places: Path, points: bool, bare: bool = False) -> None:
         self.split, self.width, self.height = split, width, height
         self.body = Body()
         atlas = Atlas(self.body)
         self.model = Model(self.body, atlas)
         self.clips = load_clips(split)
-        files = sorted((backgrounds / split).glob("*.jpg"))
+        backgrounds = places / "backgrounds" / split
+        files = sorted(backgrounds.glob("*.jpg"))
         if not files:
-            raise FileNotFoundError(
-                f"no photos in {backgrounds / split}: run `python -m export.photos backgrounds` first"
-            )
+            raise FileNotFoundError(f"no photos in {backgrounds}: run `python -m export.photos backgrounds` first")
+        self.panoramas = load_panoramas(places / "panoramas" / split)
         self.photos = [_shrunk(cv2.imread(str(f))) for f in files]
         self.fabrics = Fabrics(split, self.photos, bare)
         skin = cv2.resize(cv2.imread(str(assets.skin_texture())), (1024, 1024), interpolation=cv2.INTER_AREA)
@@ -61,9 +61,15 @@ class Studio:
         return self.body.shape(sample_phenotype(np.random.default_rng([SPLITS[self.split], number])))
 
     def sample(self, rng: np.random.Generator) -> Sample:
-        behind = self._background(rng, self.width, self.height)
         stage = self.director.stage(rng)
-        light = _light(rng, stage.camera, behind, stage.indoors)
+        if not stage.indoors and rng.random() < PANORAMA_SHARE:
+            panorama, yaw = self.panoramas[rng.integers(len(self.panoramas))], rng.uniform(0, 2 * np.pi)
+            exposure = panorama.exposure(rng.uniform(0.35, 1.1))
+            behind = panorama.seen(stage.camera, yaw, exposure)
+            light = panorama.light(stage.camera, yaw, exposure, rng)
+        else:
+            behind = self._background(rng, self.width, self.height)
+            light = _light(rng, stage.camera, behind, stage.indoors)
         picture = self.renderer.draw(stage.people, stage.camera, light, rng, stage.props)
         image = _composed(rng, picture, behind)
         label, point = picture.label, picture.point

@@ -44,9 +44,9 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=5)
     parser.add_argument("--columns", type=int, default=3)
     parser.add_argument("--out", type=Path, default=Path("people-sheet.png"))
-    parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
+    parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
     options = parser.parse_args()
-    studio = Studio(options.split, 320, 256, options.backgrounds, points=False)
+    studio = Studio(options.split, 320, 256, options.places, points=False)
     rng = np.random.default_rng([SPLITS[options.split], options.seed, 99])
     rows = []
     for _ in range(options.rows):

@@ -36,9 +36,9 @@ def walk_cycle(count: int) -> list[motion.Pose]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("sdk/assets/stub_people.webp"))
-    parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
+    parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
     options = parser.parse_args()
-    studio = Studio("test", TILE_WIDTH, TILE_HEIGHT, options.backgrounds, points=False)
+    studio = Studio("test", TILE_WIDTH, TILE_HEIGHT, options.places, points=False)
     up = np.array([0, -1.0, 0])
     light = Light(
         up,

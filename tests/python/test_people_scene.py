@@ -203,10 +203,15 @@ def studio(tmp_path_factory):
     from export.people.wardrobe import Fabrics
 
     folder, rng = tmp_path_factory.mktemp("studio"), np.random.default_rng(5)
-    (folder / "val").mkdir()
+    (folder / "backgrounds" / "val").mkdir(parents=True)
+    (folder / "panoramas" / "val").mkdir(parents=True)
+    np.save(folder / "panoramas" / "val" / "noise.npy", rng.uniform(0, 2, (64, 128, 3)).astype(np.float16))
     for k in range(4):
         coarse = rng.integers(0, 255, (9, 12, 3), np.uint8)
-        cv2.imwrite(str(folder / "val" / f"{k}.jpg"), cv2.resize(coarse, (640, 480), interpolation=cv2.INTER_CUBIC))
+        cv2.imwrite(
+            str(folder / "backgrounds" / "val" / f"{k}.jpg"),
+            cv2.resize(coarse, (640, 480), interpolation=cv2.INTER_CUBIC),
+        )
     cv2.imwrite(str(folder / "skin.png"), np.full((64, 64, 3), (110, 140, 190), np.uint8))
     poses = [drawn_pose(rng) for _ in range(24)]
     clips = Clips(
@@ -214,8 +219,8 @@ def studio(tmp_path_factory):
     )
 
     class FewFabrics(Fabrics):
-        def __init__(self, split, photos):
-            self.photos, self.tiles = photos, rng.integers(0, 255, (6, 256, 256, 3), np.uint8)
+        def __init__(self, split, photos, bare=False):
+            self.bare, self.photos, self.tiles = bare, photos, rng.integers(0, 255, (6, 256, 256, 3), np.uint8)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(scene, "load_clips", lambda split: clips)

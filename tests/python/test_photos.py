@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
-from export.photos import backgrounds, packages, people
+from export.photos import backgrounds, packages, panoramas, people
 from export.photos.packages import Package, PackageError, PackageReader, fetch
 
 
 def test_every_photo_comes_from_a_listed_package_and_every_package_is_used():
     listed = set(packages.load_packages())
     photos = backgrounds.load_backgrounds() + backgrounds.load_photographs()
-    assert {p.package for p in photos} | {m.package for m in people.load_people()} == listed
+    assert {p.package for p in photos} | {m.package for m in people.load_people()} | {panoramas.PACKAGE} == listed
 
 
 def test_no_package_is_under_a_copyleft_or_non_commercial_licence():

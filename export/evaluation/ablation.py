@@ -1,6 +1,7 @@
 """What decides: short trainings of the surface alone that differ in one thing, judged on real photographs.
 
-    python -m export.evaluation.ablation --out .data/ablation
+    python -m export.evaluation.ablation --prepare      half of the photographs to train on, half to judge by
+    python -m export.evaluation.ablation                all variations; resumes; takes hours
 
 Each variation changes one thing of the reference and is trained with several seeds, one process a core, on the loss of
 the surface stage (`export.densepose.losses.surface_loss`). Judged are photographs that none of them trained on, with
@@ -33,12 +34,15 @@ from export.densepose.network import MobileParsingRCNN
 from export.densepose.train import CLOSE, Ema, optimiser_of, rate_at, validate_surface
 from export.evaluation.backends import Prediction
 from export.evaluation.photos import PhotoSet, Tally, read_photo
+from export.photos.backgrounds import load_photographs
+from export.teachers import shards
 from export.teachers.label import PhotoLabels
 
 SIZE = 128
 BATCH = 8
 FIGURES = ("part_at_landmark", "left_right", "mask_iou", "pixel_part")
 MARGIN = 1.15  # of the box judged
+PHOTO_SHARE = 0.33
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Variation:
     count: int | None = None  # of the rendered images
     size: int = SIZE
     framing: data.Framing = CLOSE
-    photo_share: float = 0.0
+    photos: str = ""  # shards of photographs in place of a third of the images
     backbone: str = "mobilenet_v2"
     pretrained: bool = True
     keep: Callable[[np.ndarray], bool] | None = None  # of the label; images that are left in
@@ -61,7 +65,8 @@ VARIATIONS = {
     "reference": Variation("people-2, close cuts of 128 pixels, pretrained MobileNetV2"),
     "scratch": Variation("MobileNetV2 from random weights", pretrained=False),
     "v3": Variation("MobileNetV3-Large from random weights", pretrained=False, backbone="mobilenet_v3_large"),
-    "photos": Variation("a third of the images photographs with the teachers' labels", photo_share=0.33),
+    "photos": Variation("a third of the images photographs: masks, regions, fitted bodies", photos="ablation"),
+    "photos-unfitted": Variation("a third photographs: masks and regions alone", photos="ablation-unfitted"),
     "people-1": Variation("rendered without furniture, shadows, lens and blur", rendered="people-1"),
     "bare": Variation("rendered without clothes", rendered="people-bare"),
     "plain": Variation("one colour in place of the background", plain=True),
@@ -140,8 +145,8 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
         net.backbone.freeze()
     trained = nn.ModuleList([net, pixel_head])
     ema, optimiser = Ema(trained, 0.997), optimiser_of(net, pixel_head, 2e-3, 0.02)
-    photos = data.load_records(options.photos) if variation.photo_share else []
-    batches = data.Batches(records_of(variation, options.data), BATCH, seed, 0, photos, variation.photo_share)
+    photos = data.load_records(options.data / "photos" / "shards" / variation.photos) if variation.photos else []
+    batches = data.Batches(records_of(variation, options.data), BATCH, seed, 0, photos, PHOTO_SHARE)
     steps = options.images // BATCH
     net.train()
     autocast = torch.autocast("cpu", enabled=False)
@@ -157,10 +162,28 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
             ema.update(trained, step)
     batches.close()
     averaged, averaged_head = ema.net
-    dev = PhotoSet.find(options.dev, options.labels, [])
+    dev = [options.data / "photos" / "val", options.data / "photos" / "ablation" / "dev"]
+    dev = PhotoSet.find(dev, options.data / "teachers" / "labels", [])
     return judge(averaged, averaged_head, dev) | validate_surface(
         averaged, averaged_head, data.load_records(options.data / "people-2" / "val", 100)
     )
+
+
+def prepare(folder: Path) -> None:
+    """Of the photographs to train on, by package, half into `photos/ablation/train` with shards, half into `dev`."""
+    photos = folder / "photos"
+    for photo in load_photographs():
+        if photo.split == "train":
+            half = photos / "ablation" / ("train", "dev")[zlib.crc32(photo.package.encode()) % 2]
+            half.mkdir(parents=True, exist_ok=True)
+            link = half / f"{photo.name}.jpg"
+            if not link.exists():
+                link.symlink_to((photos / "train" / link.name).resolve())
+    for name, fits in (("ablation", folder / "teachers" / "fits"), ("ablation-unfitted", folder / "nothing")):
+        wanted = {"photos": photos / "ablation" / "train", "labels": folder / "teachers" / "labels", "fits": fits,
+                  "empty": folder / "backgrounds" / "train", "out": photos / "shards" / name}  # fmt: skip
+        if shards.main([text for key, value in wanted.items() for text in (f"--{key}", str(value))]):
+            raise SystemExit(1)
 
 
 def _work(job: tuple[str, int, argparse.Namespace, int]) -> tuple[str, int]:
@@ -186,17 +209,20 @@ def table(folder: Path) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path(".data/ablation"))
-    parser.add_argument("--data", type=Path, default=Path(".data"), help="folder of people-1, people-2, people-bare")
-    parser.add_argument("--photos", type=Path, default=Path(".data/photos/shards/half"), help="shards to train on")
-    parser.add_argument("--dev", type=Path, nargs="+", default=[Path(".data/photos/val")], help="photographs to judge")
-    parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), help="what the teachers say")
+    parser.add_argument(
+        "--data", type=Path, default=Path(".data"), help="people-1, people-2, people-bare, photos, teachers"
+    )
     parser.add_argument("--pretrained", type=Path, default=Path(".data/teachers/backbone.pt"))
     parser.add_argument("--images", type=int, default=30_000, help="cuts a training (default %(default)s)")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--only", nargs="+", choices=VARIATIONS, default=list(VARIATIONS), metavar="NAME")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument("--prepare", action="store_true", help="share the photographs out, once, and stop")
     parser.add_argument("--table", action="store_true", help="print the table of the trainings that are done")
     options = parser.parse_args()
+    if options.prepare:
+        prepare(options.data)
+        return
     if not options.table:
         options.out.mkdir(parents=True, exist_ok=True)
         jobs = [(name, seed) for name in options.only for seed in range(options.seeds)]

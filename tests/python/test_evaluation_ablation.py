@@ -23,11 +23,12 @@ def dev(tmp_path) -> PhotoSet:
     """One photograph: a white person on black."""
     image = np.zeros((SIZE, SIZE, 3), np.uint8)
     image[20:180, 40:120] = 255
-    (tmp_path / "photos").mkdir()
-    (tmp_path / "labels").mkdir()
-    cv2.imwrite(str(tmp_path / "photos" / "white.png"), image)
-    labels(BOX, left_hip=(60, 100), right_hip=(100, 100), nose=(80, 30)).save(tmp_path / "labels" / "white.npz")
-    return PhotoSet.find([tmp_path / "photos"], tmp_path / "labels", [])
+    photos, known = tmp_path / "photos" / "val", tmp_path / "teachers" / "labels"
+    photos.mkdir(parents=True)
+    known.mkdir(parents=True)
+    cv2.imwrite(str(photos / "white.png"), image)
+    labels(BOX, left_hip=(60, 100), right_hip=(100, 100), nose=(80, 30)).save(known / "white.npz")
+    return PhotoSet.find([photos], known, [])
 
 
 def test_a_cut_shows_the_whole_box_in_its_middle():
@@ -79,8 +80,7 @@ def test_a_training_leaves_its_figures_and_is_not_repeated(tmp_path, dev, monkey
         write_shard(tmp_path / "people-2" / split, 4)
     torch.save(MobileNetV2().state_dict(), tmp_path / "backbone.pt")
     options = argparse.Namespace(
-        out=tmp_path, data=tmp_path, dev=[tmp_path / "photos"], labels=dev.labels, images=16,
-        pretrained=tmp_path / "backbone.pt",
+        out=tmp_path, data=tmp_path, images=16, pretrained=tmp_path / "backbone.pt"
     )  # fmt: skip
     ablation._work(("reference", 0, options, 1))
     found = json.loads((tmp_path / "reference-0.json").read_text())

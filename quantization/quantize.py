@@ -73,7 +73,8 @@ def quantise_graph(source: Path, target: Path, samples: list[np.ndarray], settin
             weight_type=QuantType.QInt8,
             nodes_to_exclude=matching_nodes(graph, settings.float_nodes),
             calibrate_method=METHODS[settings.method],
-            extra_options={"CalibPercentile": settings.percentile, "CalibMaxIntermediateOutputs": 16},
+            # Not CalibMaxIntermediateOutputs: "minmax" then forgets all samples but those of the last batch.
+            extra_options={"CalibPercentile": settings.percentile},
         )
 
 

@@ -137,3 +137,12 @@ def test_pictures_of_both_orientations_calibrate_together(folder, tmp_path):
 def test_people_calibrate_one_by_one():
     people = np.arange(2 * 4 * 7 * 7, dtype=np.float32).reshape(2, 4, 7, 7)
     assert np.array_equal(np.concatenate(equal_sizes([people, people[:1]])), people[[0, 1, 0]])
+
+
+def test_ranges_come_from_all_samples_not_only_the_last_ones(folder, tmp_path):
+    loud, quiet = (10 * roi for roi in rois(1, 7)), rois(40, 7)
+    quantise_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", [*loud, *quiet], GraphSettings())
+    graph = onnx.load(tmp_path / "box_head.onnx").graph
+    constants = {c.name: onnx.numpy_helper.to_array(c) for c in graph.initializer}
+    (first,) = (n for n in graph.node if n.op_type == "QuantizeLinear" and n.input[0] == "rois")
+    assert 255 * constants[first.input[1]] == pytest.approx(max(np.abs(10 * r).max() for r in rois(1, 7)), rel=0.02)

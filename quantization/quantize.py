@@ -1,4 +1,4 @@
-"""Makes an int8 bundle from a fp32 bundle: static, per output channel, calibrated on rendered people and on photographs.
+"""Makes an int8 bundle from a fp32 bundle: static, per output channel, calibrated on rendered people and photographs.
 
     python -m quantization.quantize --bundle .data/bundles/densepose-b-fp32 --out sdk/models/densepose-b-int8 \\
         --photos .data/photos/shards/train

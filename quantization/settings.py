@@ -30,8 +30,8 @@ class GraphSettings:
 @dataclass(frozen=True)
 class Settings:
     """graphs: settings by graph name. calibration_images, calibration_photos, held_out_images: how many images
-    and photographs set the ranges, and how many images measure the error. people_per_image: at most so many people of an
-    image calibrate the dense head.
+    and photographs set the ranges, and how many images measure the error. people_per_image: at most so many people
+    of an image calibrate the dense head.
     """
 
     graphs: dict[str, GraphSettings]

@@ -32,7 +32,7 @@ TRAINING_DATA = (
     {
         "name": "photographs of people in export/photos/photographs.toml (train)",
         "licence": "MIT",
-        "used_for": "training",
+        "used_for": "training, calibration",
     },
     {
         "name": "labels of these by SSD MobileNetV2, BlazePose heavy and MediaPipe selfie segmentation",

@@ -207,9 +207,8 @@ void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredB
                              spec.output};
     Box box = scaled(people[i].box, scale_x, scale_y);
     clip_box(box, float(result.planes.width_px), float(result.planes.height_px));
-    const DecodeCounts counts =
-        paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold, spec.least_own_share,
-                     result.planes);
+    const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold,
+                                             spec.least_own_share, result.planes);
     // A box without a body is a false alarm; one whose body is somebody else's already shows that person again.
     if (counts.body_pixels > 0) result.people.push_back({box, people[i].score});
     result.stats.decoded.body_pixels += counts.body_pixels;

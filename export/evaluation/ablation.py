@@ -100,8 +100,12 @@ def cut_around(image: np.ndarray, box: np.ndarray, size: int) -> tuple[np.ndarra
     scale = size / (MARGIN * max(x1 - x0, y1 - y0))
     shift = size / 2 - scale * np.array([(x0 + x1) / 2, (y0 + y1) / 2])
     into = np.array([[scale, 0, shift[0]], [0, scale, shift[1]]])
+    step = into
+    if scale < 1:  # warpAffine alone would skip pixels
+        image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        step = np.array([[1.0, 0, shift[0]], [0, 1.0, shift[1]]])
     fill = tuple(float(x) for x in data.MEAN[::-1])
-    return cv2.warpAffine(image, into, (size, size), flags=cv2.INTER_AREA, borderValue=fill), into
+    return cv2.warpAffine(image, step, (size, size), flags=cv2.INTER_LINEAR, borderValue=fill), into
 
 
 @torch.no_grad()
@@ -126,9 +130,8 @@ def judge(net: MobileParsingRCNN, pixel_head: PixelHead, photos: PhotoSet, size:
             mine = np.zeros((height, width), bool)
             mine[y0:y1, x0:x1] = (back[y0:y1, x0:x1] > 0) & (person[y0:y1, x0:x1] == 0)
             part[mine], person[mine] = back[mine], k + 1
-        order = np.arange(len(labels.box))
         iuv = np.stack([part, np.zeros_like(part), np.zeros_like(part)], -1)
-        tally.add(path.name, Prediction(labels.box, np.ones(len(order), np.float32), iuv, person), labels)
+        tally.add(path.name, Prediction(labels.box, np.ones(len(labels.box), np.float32), iuv, person), labels)
     figures = tally.figures()
     return {name: getattr(figures, name) for name in FIGURES if hasattr(figures, name)}
 
@@ -195,7 +198,7 @@ def _work(job: tuple[str, int, argparse.Namespace, int]) -> tuple[str, int]:
 
 
 def table(folder: Path) -> str:
-    """Markdown: mean and half the range over the seeds of each figure, and how far it is from the reference."""
+    """Markdown: mean and half the range over the seeds of each figure."""
     rows = [json.loads(path.read_text()) for path in sorted(folder.glob("*-*.json"))]
     lines = ["| what is different | seeds | " + " | ".join(FIGURES) + " |", "| --- | --- |" + " --- |" * len(FIGURES)]
     for name, variation in VARIATIONS.items():

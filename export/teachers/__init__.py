@@ -1,4 +1,4 @@
 """Networks of others, permissively licensed, that label real photographs: boxes, 33 landmarks, masks.
 
-They teach and check; none of their weights enter ours.
+They teach and check; the backbone of one is where ours starts (`backbone.py`).
 """

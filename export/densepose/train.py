@@ -236,7 +236,8 @@ def main() -> None:
     saved, frozen = None, options.pretrained is not None
     if checkpoint.exists() or options.init:
         saved = torch.load(checkpoint if checkpoint.exists() else options.init, map_location=device, weights_only=False)
-        frozen |= saved.get("frozen", False)
+        # Another backbone's weights are not taken over, so there is nothing in it to keep.
+        frozen |= saved.get("frozen", False) and options.backbone == "mobilenet_v2"
     net = MobileParsingRCNN(NetworkConfig(width=options.width, backbone=options.backbone))
     net = net.to(device, memory_format=torch.channels_last)
     pixel_head = PixelHead(net.config).to(device)

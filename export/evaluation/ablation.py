@@ -1,5 +1,6 @@
 """What decides: short trainings of the surface alone that differ in one thing, judged on real photographs.
 
+    python -m export.people.dataset --images 12000 --bare --out .data/people-bare
     python -m export.evaluation.ablation --prepare      half of the photographs to train on, half to judge by
     python -m export.evaluation.ablation                all variations; resumes; takes hours
 
@@ -50,7 +51,7 @@ class Variation:
     """One training. `says`: what is different, for the table."""
 
     says: str
-    rendered: str = "people-2"
+    rendered: str = "people"
     count: int | None = None  # of the rendered images
     size: int = SIZE
     framing: data.Framing = CLOSE
@@ -62,12 +63,11 @@ class Variation:
 
 
 VARIATIONS = {
-    "reference": Variation("people-2, close cuts of 128 pixels, pretrained MobileNetV2"),
+    "reference": Variation("close cuts of 128 pixels, pretrained MobileNetV2"),
     "scratch": Variation("MobileNetV2 from random weights", pretrained=False),
     "v3": Variation("MobileNetV3-Large from random weights", pretrained=False, backbone="mobilenet_v3_large"),
     "photos": Variation("a third of the images photographs: masks, regions, fitted bodies", photos="ablation"),
     "photos-unfitted": Variation("a third photographs: masks and regions alone", photos="ablation-unfitted"),
-    "people-1": Variation("rendered without furniture, shadows, lens and blur", rendered="people-1"),
     "bare": Variation("rendered without clothes", rendered="people-bare"),
     "plain": Variation("one colour in place of the background", plain=True),
     "alone": Variation("only images of one person or nobody", keep=lambda label: label[..., 3].max() < 2),
@@ -168,7 +168,7 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     dev = [options.data / "photos" / "val", options.data / "photos" / "ablation" / "dev"]
     dev = PhotoSet.find(dev, options.data / "teachers" / "labels", [])
     return judge(averaged, averaged_head, dev) | validate_surface(
-        averaged, averaged_head, data.load_records(options.data / "people-2" / "val", 100)
+        averaged, averaged_head, data.load_records(options.data / "people" / "val", 100)
     )
 
 
@@ -212,9 +212,7 @@ def table(folder: Path) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path(".data/ablation"))
-    parser.add_argument(
-        "--data", type=Path, default=Path(".data"), help="people-1, people-2, people-bare, photos, teachers"
-    )
+    parser.add_argument("--data", type=Path, default=Path(".data"), help="people, people-bare, photos, teachers")
     parser.add_argument("--pretrained", type=Path, default=Path(".data/teachers/backbone.pt"))
     parser.add_argument("--images", type=int, default=30_000, help="cuts a training (default %(default)s)")
     parser.add_argument("--seeds", type=int, default=2)

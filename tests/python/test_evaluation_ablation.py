@@ -61,7 +61,7 @@ def test_judged_is_what_the_head_paints_inside_the_box(dev):
 
 
 def test_variations_change_the_images_they_say(tmp_path):
-    write_shard(tmp_path / "people-2" / "train", 8)
+    write_shard(tmp_path / "people" / "train", 8)
     every = ablation.records_of(ablation.Variation("all"), tmp_path)
     alone = ablation.Variation("alone", keep=ablation.VARIATIONS["alone"].keep)
     assert len(every) == 8
@@ -77,7 +77,7 @@ def test_variations_change_the_images_they_say(tmp_path):
 
 def test_a_training_leaves_its_figures_and_is_not_repeated(tmp_path, dev, monkeypatch, capsys):
     for split in ("train", "val"):
-        write_shard(tmp_path / "people-2" / split, 4)
+        write_shard(tmp_path / "people" / split, 4)
     torch.save(MobileNetV2().state_dict(), tmp_path / "backbone.pt")
     options = argparse.Namespace(
         out=tmp_path, data=tmp_path, images=16, pretrained=tmp_path / "backbone.pt"

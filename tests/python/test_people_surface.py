@@ -254,10 +254,10 @@ def on_surface(atlas, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np
 def test_the_shipped_surface_grid_is_that_of_the_atlas_and_leads_there_and_back(atlas):
     shipped = SurfaceGrid.load(Path(bundle.__file__).parent / FILE)
     built = surface_grid(atlas)
-    # Processors round differently, which moves a node by up to .3 mm where a chart is stretched, and may put one on the
-    # other side of a chart's border. Another atlas moves them by centimetres.
-    assert (np.isnan(shipped.points) != np.isnan(built.points)).mean() < 0.002
-    assert np.nanmax(np.abs(shipped.points - built.points)) < 1e-3
+    assert np.array_equal(np.isnan(shipped.points), np.isnan(built.points))
+    # Processors round differently, which was seen to move a node by .23 mm where a chart is stretched; another atlas
+    # moves them by centimetres.
+    assert np.nanmax(np.abs(shipped.points - built.points)) < 5e-4
     points, part, uv = on_surface(atlas, 4000, 1)
     error = np.linalg.norm(shipped.point_of(part, uv) - points, axis=1)
     assert np.isnan(error).mean() < 0.02  # fingertips and toes between the nodes

@@ -81,6 +81,16 @@ def test_a_pretrained_backbone_keeps_its_first_layers_and_its_norms(monkeypatch,
         )
 
 
+def test_weights_of_another_backbone_are_left_out_and_freeze_nothing(monkeypatch, shards, tmp_path, capsys):
+    torch.save(MobileNetV2().state_dict(), tmp_path / "backbone.pt")
+    run(monkeypatch, shards, tmp_path / "v2", "--steps", "1", "--pretrained", str(tmp_path / "backbone.pt"))
+    first = str(tmp_path / "v2" / "weights.pt")
+    run(monkeypatch, shards, tmp_path / "v3", "--steps", "1", "--init", first, "--backbone", "mobilenet_v3_large")
+    assert "untrained: backbone.blocks" in capsys.readouterr().out
+    saved = torch.load(tmp_path / "v3" / "weights.pt", weights_only=True)
+    assert (saved["backbone"], saved["frozen"]) == ("mobilenet_v3_large", False)
+
+
 def test_a_run_leaves_checkpoint_weights_log_and_curves(monkeypatch, shards, tmp_path):
     run(monkeypatch, shards, tmp_path, "--steps", "1")
     names = {path.name for path in tmp_path.iterdir()}

@@ -16,8 +16,7 @@ from export.densepose import targets as tg
 from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 
-# One dense RoI an image: a second one mostly shows the same person again, and costs a third of a step.
-RPN_ANCHORS, BOX_ROIS, DENSE_ROIS, GRID = 256, 24, 1, 64
+RPN_ANCHORS, BOX_ROIS, DENSE_ROIS, GRID = 256, 24, 2, 64
 WEIGHTS = {
     "rpn_class": 1.0,
     "rpn_box": 1.0,
@@ -83,8 +82,8 @@ def surface_loss(
 ) -> dict[str, Tensor]:
     """`pixel_head`'s weighted terms alone: backbone and neck learn the surface without boxes and RoIs."""
     with autocast:
-        features = net.neck(net.backbone(image))[0]
-    terms = _pixel_terms(pixel_head(features.float()), torch.stack([t.label for t in truths]))
+        output = pixel_head(net.neck(net.backbone(image))[0])
+    terms = _pixel_terms(output.float(), torch.stack([t.label for t in truths]))
     return {name: WEIGHTS[name] * value for name, value in terms.items()}
 
 
@@ -123,7 +122,9 @@ def batch_loss(
         label = torch.cat([tg.dense_labels(*d, t, GRID) for d, t in zip(dense, truths, strict=True)])
         terms |= _dense_terms([o.float() for o in outputs], label)
     if pixel_head is not None:
-        terms |= _pixel_terms(pixel_head(features[0]), torch.stack([t.label for t in truths]))
+        with autocast:
+            output = pixel_head(features[0])
+        terms |= _pixel_terms(output.float(), torch.stack([t.label for t in truths]))
     return {name: WEIGHTS[name] * value for name, value in terms.items()}
 
 

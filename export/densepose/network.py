@@ -12,6 +12,50 @@ from torchvision.models import mobilenet_v3_large
 from export.densepose.config import NetworkConfig
 
 
+class _DepthwiseStride2(torch.autograd.Function):
+    """Depthwise 3x3 of stride 2 and padding 1, [N, C, H, W] and [C, 1, 3, 3] -> [N, C, ceil(H/2), ceil(W/2)].
+
+    The gradient of the input is a convolution of stride 1 over the gradient with zeros between. What oneDNN takes for
+    it in bfloat16 goes through the groups one by one, ten times as long, and so decides the time of a whole step.
+    """
+
+    @staticmethod
+    def forward(ctx: torch.autograd.function.FunctionCtx, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
+        ctx.save_for_backward(x, weight)
+        ctx.biased = bias is not None
+        return F.conv2d(x, weight, bias, 2, 1, groups=len(weight))
+
+    @staticmethod
+    def backward(ctx: torch.autograd.function.FunctionCtx, gradient: Tensor) -> tuple[Tensor, Tensor, Tensor | None]:
+        x, weight = ctx.saved_tensors
+        channels = len(weight)
+        spread = torch.zeros_like(x)
+        spread[:, :, ::2, ::2] = gradient
+        of_input = F.conv2d(spread, weight.flip(2, 3), None, 1, 1, groups=channels)
+        _, of_weight, of_bias = torch.ops.aten.convolution_backward(
+            gradient, x, weight, [channels], [2, 2], [1, 1], [1, 1], False, [0, 0], channels, [False, True, ctx.biased]
+        )
+        return of_input, of_weight, of_bias
+
+
+def _depthwise(x: Tensor, weight: Tensor, bias: Tensor | None, stride: int) -> Tensor:
+    """Depthwise 3x3 with padding 1."""
+    if stride == 2 and x.device.type == "cpu" and torch.is_autocast_enabled("cpu") and torch.is_grad_enabled():
+        kind = torch.get_autocast_dtype("cpu")
+        return _DepthwiseStride2.apply(x.to(kind), weight.to(kind), None if bias is None else bias.to(kind))
+    return F.conv2d(x, weight, bias, stride, 1, groups=len(weight))
+
+
+class DepthwiseConv(nn.Conv2d):
+    """Depthwise 3x3 with padding 1, without bias."""
+
+    def __init__(self, channels: int, stride: int = 1) -> None:
+        super().__init__(channels, channels, 3, stride, 1, groups=channels, bias=False)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return _depthwise(x, self.weight, None, self.stride[0])
+
+
 class ConvBn(nn.Sequential):
     """Convolution, BN and, if asked, ReLU6.
 
@@ -33,7 +77,10 @@ class ConvBn(nn.Sequential):
         else:
             scale = bn.weight * (bn.running_var + bn.eps).rsqrt()
             weight, bias = conv.weight * scale[:, None, None, None], bn.bias - bn.running_mean * scale
-            x = F.conv2d(x, weight, bias, conv.stride, conv.padding, groups=conv.groups)
+            if conv.groups > 1:
+                x = _depthwise(x, weight, bias, conv.stride[0])
+            else:
+                x = F.conv2d(x, weight, bias, conv.stride, conv.padding)
         return F.relu6(x, inplace=True) if self.activation else x
 
 
@@ -134,7 +181,7 @@ class SeparableConv(nn.Sequential):
 
     def __init__(self, width: int, stride: int = 1) -> None:
         super().__init__(
-            nn.Conv2d(width, width, 3, stride, 1, groups=width, bias=False),
+            DepthwiseConv(width, stride),
             nn.Conv2d(width, width, 1, bias=False),
             nn.BatchNorm2d(width, momentum=0.03),
             nn.ReLU(inplace=True),

@@ -144,12 +144,13 @@ def pooled(
     `level` 0 reads everything from P2 (dense head); None picks P2..P5 by box size.
     """
     pieces, order, before = [features[0].new_zeros(0, features[0].shape[1], pool, pool)], [], 0
+    images = [f.unbind() for f in features]  # at once: the gradient of features[k][n] is a whole batch's, mostly zeros
     for n, box in enumerate(boxes):
         which = bx.levels_of(box, config) if level is None else torch.full_like(box[:, 0], level)
         for k in range(len(config.tap_strides)):
             own = (which == k).nonzero()[:, 0]
             if len(own):
-                pieces.append(align_rois(features[k][n], box[own].to(features[k]) / config.tap_strides[k], pool))
+                pieces.append(align_rois(images[k][n], box[own].to(features[k]) / config.tap_strides[k], pool))
                 order.append(before + own)
         before += len(box)
     return torch.cat(pieces)[torch.cat(order).argsort()] if order else pieces[0]

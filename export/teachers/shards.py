@@ -31,6 +31,8 @@ LEAST_SCORE = 0.5  # of the detector; less sure boxes are regions that training 
 _BORDER = 0.012  # of the person's height: this close to the mask's edge a pixel may be the person or not
 LEAST_CUT_OUT_PX = 60  # height of people worth cutting out
 PER_SHARD = 100
+_SIZES_APART = (0.5, 0.3, 0.15, 0.05, 0.0, 0.0)  # of 1, 2, ... 6 people
+_GROUP_SIZES = (0.0, 0.4, 0.25, 0.15, 0.1, 0.1)
 
 
 def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | None = None) -> np.ndarray:
@@ -106,8 +108,9 @@ def cut_outs(image: np.ndarray, label: np.ndarray) -> list[CutOut]:
 def composed(
     background: np.ndarray, people: list[CutOut], size: tuple[int, int], rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One to four people, the later ones in front, on a piece of a photo without people: image and label.
+    """One to six people, the later ones in front, on a piece of a photo without people: image and label.
 
+    Half of the images show a group: people of about one size side by side, each hiding a part of the one before.
     size: width, height of the result. Borders that cut a person in the photo cut them here too.
     """
     width, height = size
@@ -117,9 +120,13 @@ def composed(
     x, y = int(rng.integers(shape[0] - width + 1)), int(rng.integers(shape[1] - height + 1))
     image = large[y : y + height, x : x + width].astype(np.float32)
     label = np.zeros((height, width, 4), np.uint8)
-    for number in range(1, int(rng.choice(4, p=(0.45, 0.3, 0.15, 0.1))) + 2):
+    group = rng.random() < 0.5
+    before = None  # left, top, width, height of the person before
+    for number in range(1, int(rng.choice(6, p=_GROUP_SIZES if group else _SIZES_APART)) + 2):
         person = people[rng.integers(len(people))]
         tall = height * np.exp(rng.uniform(np.log(0.3), np.log(1.2)))
+        if group and before:
+            tall = before[3] * rng.uniform(0.8, 1.25)
         scale = min(tall / person.image.shape[0], 1.5 * width / person.image.shape[1], 1.5)
         shape = (max(8, round(person.image.shape[1] * scale)), max(8, round(person.image.shape[0] * scale)))
         interpolation = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
@@ -129,6 +136,13 @@ def composed(
         own = cv2.resize(person.label, shape, interpolation=cv2.INTER_NEAREST)
         left = _place(shape[0], width, person.cut[0], person.cut[2], rng)
         top = _place(shape[1], height, person.cut[1], person.cut[3], rng)
+        if group and before:
+            step = rng.choice((-1, 1)) * rng.uniform(0.25, 0.8) * (before[2] + shape[0]) / 2
+            if not (person.cut[0] or person.cut[2]):
+                left = round(before[0] + (before[2] - shape[0]) / 2 + step)
+            if not (person.cut[1] or person.cut[3]):
+                top = round(before[1] + before[3] - shape[1] + rng.normal(0, 0.05) * before[3])
+        before = (left, top, *shape)
         into = np.s_[max(top, 0) : max(top + shape[1], 0), max(left, 0) : max(left + shape[0], 0)]
         rows, columns = image[into].shape[:2]
         part = np.s_[max(-top, 0) : max(-top, 0) + rows, max(-left, 0) : max(-left, 0) + columns]
@@ -198,7 +212,7 @@ def main(argv: list[str] | None = None) -> int:
     )
     parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/train"), metavar="DIR", help="no people")
     parser.add_argument(
-        "--composed", type=int, default=800, metavar="N",
+        "--composed", type=int, default=2400, metavar="N",
         help="images with people cut out of photos in front of other places (default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(".data/photos/shards/train"), metavar="DIR")

@@ -1,5 +1,7 @@
 """Labels of photographs as training sees them: what is known is asked for, what is not known is left open."""
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -139,7 +141,19 @@ def test_composed_images_label_each_person_where_it_is_seen():
         outside = (label[..., 0] == 0) & (cv2.dilate(body.astype(np.uint8), np.ones((7, 7), np.uint8)) == 0)
         assert (image[inside][:, 2].astype(int) > image[inside][:, 1]).mean() > 0.9  # red, softer between two people
         assert (image[outside] == (0, 200, 0)).all()
-        assert set(np.unique(label[..., 3])) <= {0, 1, 2, 3, 4}
+        assert set(np.unique(label[..., 3])) <= set(range(7))
         # The person was cut by the lower border, and still is.
         assert body.any()
         assert body[-1].any()
+
+
+def test_half_of_the_composed_images_show_people_side_by_side():
+    (person,) = cut_outs(*cut_out_scene())
+    free = dataclasses.replace(person, cut=(False, False, False, False))
+    close = 0
+    for seed in range(60):
+        label = composed(np.zeros((90, 120, 3), np.uint8), [free], (160, 128), np.random.default_rng(seed))[1]
+        numbers = np.unique(label[..., 3])[1:]
+        masks = {n: cv2.dilate((label[..., 3] == n).astype(np.uint8), np.ones((5, 5))) > 0 for n in numbers}
+        close += any((masks[n] & masks[n + 1]).any() for n in numbers if n + 1 in masks)
+    assert 24 <= close <= 48  # the groups, and some of those who stand anywhere

@@ -192,6 +192,17 @@ def test_pictures_without_people_can_be_learnt_from():
     loss.backward()
 
 
+def test_bfloat16_is_taken_where_a_probe_says_so_and_survives(monkeypatch):
+    assert train.bf16_pays() in (False, True)
+    for probe, pays in (
+        ("raise SystemExit(0)", True),
+        ("raise SystemExit(1)", False),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGILL)", False),
+    ):
+        monkeypatch.setattr(train, "_BF16_PROBE", probe)
+        assert train.bf16_pays() == pays
+
+
 def test_averaged_weights_follow_slowly():
     net = torch.nn.Linear(2, 2)
     mean = train.Ema(net, decay=0.5)

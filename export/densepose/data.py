@@ -141,24 +141,22 @@ def truth_of(label: np.ndarray) -> Truth:
 
 
 class Batches:
-    """Endless shuffled batches, made ahead by a thread (OpenCV releases the interpreter's lock).
+    """Endless shuffled batches, `ahead` of them made ahead by a thread (OpenCV releases the interpreter's lock).
 
     Batch k depends on `seed` and k alone, so that a run resumed at step k sees what it would have seen. `photos`
     take the place of the share `photo_share` of the records; they are few, and so drawn with replacement.
     """
 
-    AHEAD = 4
-
     def __init__(
         self, records: list[Record], batch: int, seed: int, first: int = 0,
-        photos: list[Record] | None = None, photo_share: float = 0.0,
+        photos: list[Record] | None = None, photo_share: float = 0.0, ahead: int = 4,
     ) -> None:  # fmt: skip
-        self.records, self.batch, self.seed = records, batch, seed
+        self.records, self.batch, self.seed, self.ahead = records, batch, seed, ahead
         self.photos, self.photo_share = photos or [], photo_share if photos else 0.0
         self._epoch, self._order = -1, np.empty(0, np.int64)
         cv2.setNumThreads(1)
         self._number, self._kind = first, None
-        self._ahead: deque[Future] = deque()
+        self._made: deque[Future] = deque()
         self._worker = ThreadPoolExecutor(1)
 
     def make(self, number: int, size: int, framing: Framing = ANY_FRAMING) -> tuple[torch.Tensor, list[Truth]]:
@@ -176,13 +174,16 @@ class Batches:
 
     def next(self, size: int, framing: Framing = ANY_FRAMING) -> tuple[torch.Tensor, list[Truth]]:
         """Image [N, 3, size, size] and its people; those made ahead of another kind are thrown away."""
+        if not self.ahead:
+            self._number += 1
+            return self.make(self._number - 1, size, framing)
         if self._kind != (size, framing):
             self._drop()
             self._kind = (size, framing)
-        while len(self._ahead) <= self.AHEAD:
-            self._ahead.append(self._worker.submit(self.make, self._number + len(self._ahead), size, framing))
+        while len(self._made) <= self.ahead:
+            self._made.append(self._worker.submit(self.make, self._number + len(self._made), size, framing))
         self._number += 1
-        return self._ahead.popleft().result()
+        return self._made.popleft().result()
 
     def close(self) -> None:
         """Ends the thread; a process that leaves while it runs may crash."""
@@ -190,9 +191,9 @@ class Batches:
         self._worker.shutdown()
 
     def _drop(self) -> None:
-        for batch in self._ahead:
+        for batch in self._made:
             batch.cancel()
-        self._ahead.clear()
+        self._made.clear()
 
     def _shuffled(self, k: int) -> int:
         """The k-th record drawn: every record once before any comes again."""

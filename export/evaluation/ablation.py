@@ -32,7 +32,7 @@ from export.densepose import data
 from export.densepose.config import NetworkConfig
 from export.densepose.losses import PixelHead, surface_loss
 from export.densepose.network import MobileParsingRCNN
-from export.densepose.train import CLOSE, Ema, optimiser_of, rate_at, validate_surface
+from export.densepose.train import CLOSE, Ema, bf16_pays, optimiser_of, rate_at, validate_surface
 from export.evaluation.backends import Prediction
 from export.evaluation.photos import PhotoSet, Tally, read_photo
 from export.photos.backgrounds import load_photographs
@@ -149,10 +149,10 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     trained = nn.ModuleList([net, pixel_head])
     ema, optimiser = Ema(trained, 0.997), optimiser_of(net, pixel_head, 2e-3, 0.02)
     photos = data.load_records(options.data / "photos" / "shards" / variation.photos) if variation.photos else []
-    batches = data.Batches(records_of(variation, options.data), BATCH, seed, 0, photos, PHOTO_SHARE)
+    batches = data.Batches(records_of(variation, options.data), BATCH, seed, 0, photos, PHOTO_SHARE, ahead=0)
     steps = options.images // BATCH
     net.train()
-    autocast = torch.autocast("cpu", enabled=False)
+    autocast = torch.autocast("cpu", torch.bfloat16, enabled=options.bf16)
     for step in tqdm(range(steps), desc=f"{name} {seed}", unit="step", disable=not shown):
         for group in optimiser.param_groups:
             group["lr"] = group["rate"] * rate_at(step, step / steps, 2e-3)
@@ -225,6 +225,7 @@ def main() -> None:
         prepare(options.data)
         return
     if not options.table:
+        options.bf16 = bf16_pays()
         options.out.mkdir(parents=True, exist_ok=True)
         jobs = [(name, seed) for name in options.only for seed in range(options.seeds)]
         jobs = [(*job, options) for job in jobs if not (options.out / f"{job[0]}-{job[1]}.json").exists()]

@@ -80,7 +80,7 @@ def test_a_training_leaves_its_figures_and_is_not_repeated(tmp_path, dev, monkey
         write_shard(tmp_path / "people" / split, 4)
     torch.save(MobileNetV2().state_dict(), tmp_path / "backbone.pt")
     options = argparse.Namespace(
-        out=tmp_path, data=tmp_path, images=16, pretrained=tmp_path / "backbone.pt"
+        out=tmp_path, data=tmp_path, images=16, pretrained=tmp_path / "backbone.pt", bf16=False
     )  # fmt: skip
     ablation._work(("reference", 0, options, 1))
     found = json.loads((tmp_path / "reference-0.json").read_text())

@@ -153,12 +153,13 @@ def test_batches_depend_on_seed_and_number_alone():
     assert torch.equal(data.Batches(records, 2, seed=7).make(3, 64)[0], third)
     assert not torch.equal(data.Batches(records, 2, seed=7).make(2, 64)[0], third)
     assert not torch.equal(data.Batches(records, 2, seed=8).make(3, 64)[0], third)
-    straight = data.Batches(records, 2, seed=7)
-    # Made ahead in another size or not: the fourth batch drawn is batch 3.
-    drawn = [straight.next(size)[0] for size in (32, 32, 96, 64, 96)]
-    straight.close()
-    assert torch.equal(drawn[3], third)
-    assert torch.equal(drawn[4], data.Batches(records, 2, seed=7).make(4, 96)[0])
+    # Made ahead, in another size, or when it is asked for: the fourth batch drawn is batch 3.
+    for ahead in (4, 0):
+        straight = data.Batches(records, 2, seed=7, ahead=ahead)
+        drawn = [straight.next(size)[0] for size in (32, 32, 96, 64, 96)]
+        straight.close()
+        assert torch.equal(drawn[3], third)
+        assert torch.equal(drawn[4], data.Batches(records, 2, seed=7).make(4, 96)[0])
 
 
 def test_an_error_while_a_batch_is_made_reaches_the_caller():

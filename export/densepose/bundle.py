@@ -31,7 +31,7 @@ TRAINING_DATA = (
     },
     {
         "name": "photographs of people in export/photos/photographs.toml (train)",
-        "licence": "MIT",
+        "licence": "MIT, BSD-3-Clause, Apache-2.0",
         "used_for": "training, calibration",
     },
     {

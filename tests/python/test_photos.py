@@ -106,3 +106,18 @@ def test_building_writes_each_photo_once_into_its_split(tmp_path, monkeypatch):
     assert cv2.imread(str(written)).shape == (576, 741, 3)
     path.unlink()
     backgrounds.build([photo], tmp_path / "out")  # nothing is missing, so the package is not needed
+
+
+def test_a_photo_may_be_a_frame_of_a_clip(tmp_path, monkeypatch):
+    writer = cv2.VideoWriter(str(tmp_path / "clip.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (64, 48))
+    for k in range(5):
+        writer.write(np.full((48, 64, 3), 50 * k, np.uint8))
+    writer.release()
+    path = archive(tmp_path, ".whl", (tmp_path / "clip.avi").read_bytes())
+    package = Package("a", "pip", "a", "1", path.name, packages.sha256_of(path), "MIT")
+    monkeypatch.setattr(packages, "ARCHIVES", tmp_path)
+    monkeypatch.setattr(backgrounds, "load_packages", lambda: {"a": package})
+    backgrounds.build([backgrounds.Photograph("third", "a", "in/side.txt#3", "train")], tmp_path)
+    assert cv2.imread(str(tmp_path / "train" / "third.jpg")).mean() == pytest.approx(150, abs=3)
+    with pytest.raises(PackageError, match=r"side\.txt#9 is not an image"):
+        backgrounds.build([backgrounds.Photograph("beyond", "a", "in/side.txt#9", "train")], tmp_path)

@@ -90,15 +90,15 @@ def arguments(folder) -> list[str]:
 
 def test_shards_are_read_by_the_training(folders, capsys):
     photo_labels().save(folders / "labels" / "a.npz")
-    assert main([*arguments(folders), "--composed", "3"]) == 0
+    assert main([*arguments(folders), "--composed", "3", "--repeat", "2"]) == 0
     told = capsys.readouterr().out
     assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body)" in told
-    assert "1 with a box alone; 3 images composed" in told
+    assert "1 with a box alone; each 2 times; 3 images composed" in told
     records = data.load_records(folders / "shards")
     sizes = sorted(record.decoded()[0].shape[:2] for record in records)
     assert sizes[0] == SHAPE
     assert sizes[-1] == (round(600 * LONG_SIDE / 900), LONG_SIDE)
-    assert len(sizes) == 5
+    assert len(sizes) == 2 * 2 + 3
     batches = data.Batches(records[:1] * 4, 8, 0, photos=records, photo_share=1.0)
     image, truths = batches.make(0, 64)
     batches.close()

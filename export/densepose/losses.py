@@ -49,8 +49,13 @@ def possible_classes_loss(logits: Tensor, value: Tensor, possible: Tensor, weigh
     logits: [K, C]; value: [K] in 0..255; possible: bool [256, C]; weight: [256]. Where only one class is possible
     this is the cross entropy. Without any weight: 0.
     """
-    possible, weight = possible.to(logits.device)[value], weight.to(logits.device)[value]
-    among = logits.masked_fill(~possible, -torch.inf).logsumexp(1)
+    possible, weight = possible.to(logits.device), weight.to(logits.device)[value]
+    among = logits.gather(1, possible.byte().argmax(1)[value][:, None])[:, 0]
+    # Rendered labels leave one class, so that this is short beside all the rest.
+    several = (possible.sum(1) > 1)[value].nonzero()[:, 0]
+    if len(several):
+        masked = logits[several].masked_fill(~possible[value[several]], -torch.inf)
+        among = among.index_copy(0, several, masked.logsumexp(1))
     return (weight * (logits.logsumexp(1) - among)).sum() / weight.sum().clamp(min=1e-6)
 
 

@@ -1,6 +1,6 @@
 """What decides: short trainings of the surface alone that differ in one thing, judged on real photographs.
 
-    python -m export.people.dataset --images 12000 --bare --out .data/people-bare
+    python -m export.people.dataset --images 3000 --bare --out .data/people-bare
     python -m export.evaluation.ablation --prepare      half of the photographs to train on, half to judge by
     python -m export.evaluation.ablation                all variations; resumes; takes hours
 
@@ -68,12 +68,12 @@ VARIATIONS = {
     "v3": Variation("MobileNetV3-Large from random weights", pretrained=False, backbone="mobilenet_v3_large"),
     "photos": Variation("a third of the images photographs: masks, regions, fitted bodies", photos="ablation"),
     "photos-unfitted": Variation("a third photographs: masks and regions alone", photos="ablation-unfitted"),
-    "bare": Variation("rendered without clothes", rendered="people-bare"),
+    "few": Variation("3,000 rendered images", count=3000),
+    "bare": Variation("3,000 rendered images without clothes", rendered="people-bare", count=3000),
     "plain": Variation("one colour in place of the background", plain=True),
     "alone": Variation("only images of one person or nobody", keep=lambda label: label[..., 3].max() < 2),
     "any-framing": Variation("people of a third to 1.3 times the cut", framing=data.ANY_FRAMING),
     "small-cuts": Variation("cuts of 96 pixels", size=96),
-    "few": Variation("a tenth of the rendered images", count=1200),
 }
 
 

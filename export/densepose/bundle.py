@@ -24,6 +24,7 @@ TRAINING_DATA = (
     {"name": "DeepMimic motions in pybullet", "licence": "Zlib", "used_for": "rendering"},
     {"name": "MakeHuman skin texture in morse-simulator-data", "licence": "BSD-3-Clause", "used_for": "rendering"},
     {"name": "0 A.D. motions and fabrics", "licence": "CC-BY-SA-3.0", "used_for": "rendering"},
+    {"name": "panoramas of @pmndrs/assets", "licence": "CC0-1.0", "used_for": "rendering"},
     {
         "name": "background photographs of export/photos/packages.toml",
         "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",

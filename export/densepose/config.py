@@ -44,7 +44,7 @@ class NetworkConfig:
 class DecodeConfig:
     """Thresholds and limits of inference."""
 
-    long_side: int = 256
+    long_side: int = 288
     pre_nms_top_k: int = 1000
     post_nms_top_k: int = 100
     rpn_nms_iou: float = 0.7

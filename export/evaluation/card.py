@@ -85,6 +85,7 @@ def card(manifest: dict, digest: str, document: dict, gallery: str) -> str:
         _what_it_does(manifest, digest),
         _training_data(manifest),
         _rendered_figures(document["data"], figures),
+        _fates(figures["pixel_fates"]),
         _groups("By group of people", "part accuracy", figures["groups"]),
         _parts(document["part_names"], figures),
         _calibration(document["calibration_bins"], figures["calibration"]),
@@ -135,6 +136,12 @@ too small or hidden to be asked for. AP and calibration are over scores from {da
 """
     rows = [(label, _number(figures[field], unit)) for label, field, unit in ROWS if unit != "ms"]
     return text + _table(("figure", "value"), rows)
+
+
+def _fates(fates: dict[str, float]) -> str:
+    rows = [(name, _number(value, "points")) for name, value in fates.items()]
+    text = "What people's pixels are painted with; background: also everything of people who were missed.\n\n"
+    return "### Where pixels go\n\n" + text + _table(("painted with", "share"), rows)
 
 
 def _groups(title: str, accuracy: str, groups: list[dict]) -> str:

@@ -28,7 +28,8 @@ class Figures:
     """One backend's figures. Shares are 0..1, errors in cm, times in seconds; NaN: nothing to measure.
 
     ap_box, ap_gps, ap_gpsm: mean over THRESHOLDS; *_by_threshold: at each. AP and calibration are over all scores, the
-    others at `threshold`. part_recall, part_precision, part_error_cm: of parts 0 (background) to 24.
+    others at `threshold`. pixel_fates: by the names of `surface_accuracy.FATES`. part_recall, part_precision,
+    part_error_cm: of parts 0 (background) to 24.
     """
 
     images: int
@@ -55,6 +56,7 @@ class Figures:
     ap_box_by_threshold: list[float]
     ap_gps_by_threshold: list[float]
     ap_gpsm_by_threshold: list[float]
+    pixel_fates: dict[str, float]
     part_recall: list[float]
     part_precision: list[float]
     part_error_cm: list[float]
@@ -128,6 +130,7 @@ def measure(
         ap_box_by_threshold=ap_box,
         ap_gps_by_threshold=ap_gps,
         ap_gpsm_by_threshold=ap_gpsm,
+        pixel_fates=pixels.fates(),
         part_recall=pixels.part_recall().tolist(),
         part_precision=pixels.part_precision().tolist(),
         part_error_cm=surface.part_error_cm(visible),

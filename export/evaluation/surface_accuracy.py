@@ -15,9 +15,27 @@ from typing import Protocol
 import numpy as np
 
 from export.evaluation.shards import LabelledImage, sample_pixels
-from export.surface import PART_COUNT
+from export.surface import MIRROR_COARSE, PART_COUNT, PART_TO_COARSE
 
 KAPPA_M = 0.255
+
+
+FATES = ("the right part", "front for back", "left for right", "another part", "background")
+
+
+def _fate_of() -> np.ndarray:
+    """Index in FATES of [true part, painted part]. A head's halves are left and right."""
+    true, painted = PART_TO_COARSE[:, None].astype(int), PART_TO_COARSE[None].astype(int)
+    head = PART_TO_COARSE.max()
+    fate = np.full((PART_COUNT + 1, PART_COUNT + 1), 3)
+    fate[(true == painted) & (true != head)] = 1
+    fate[(painted == MIRROR_COARSE[true]) & ((painted != true) | (true == head))] = 2
+    fate[np.diag_indices(PART_COUNT + 1)] = 0
+    fate[:, 0] = 4
+    return fate
+
+
+_FATE = _fate_of()
 
 
 class SurfaceTable(Protocol):
@@ -64,6 +82,11 @@ class PixelAccuracy:
     def part_precision(self) -> np.ndarray:
         """float64 [25]: share of the pixels painted with each part that show it; NaN for unpainted parts."""
         return self._diagonal_over(self.confusion.sum(0))
+
+    def fates(self) -> dict[str, float]:
+        """What people's pixels are painted with: shares of all, by the names of `FATES`."""
+        total = self.confusion[1:].sum()
+        return {name: share(self.confusion[1:][_FATE[1:] == k].sum(), total) for k, name in enumerate(FATES)}
 
     def _diagonal_over(self, total: np.ndarray) -> np.ndarray:
         return np.where(total > 0, np.diag(self.confusion) / np.maximum(total, 1), np.nan)

@@ -19,6 +19,7 @@ from export.evaluation.gallery import COLUMNS, HEADER_PX, TILE, draw_kind
 from export.evaluation.measure import Figures
 from export.evaluation.photos import PhotoFigures
 from export.evaluation.report import SCHEMA
+from export.evaluation.surface_accuracy import FATES
 from export.surface import PART_COUNT, PART_NAMES
 
 BUNDLE = Path("sdk/models/densepose-b-int8")
@@ -56,7 +57,11 @@ def document(start: float, step: float) -> dict:
         }
         return values
 
-    figures = own(Figures) | {"model": "somewhere", "fingerprint": DIGEST, "photos": own(PhotoFigures)}
+    figures = (
+        own(Figures)
+        | {"pixel_fates": {name: next_share() for name in FATES}}
+        | {"model": "somewhere", "fingerprint": DIGEST, "photos": own(PhotoFigures)}
+    )
     for field in ("part_recall", "part_precision", "part_error_cm"):
         figures[field] = [next_share() for _ in range(PART_COUNT + 1)]
     return {

@@ -238,6 +238,19 @@ def test_median_difference_is_over_right_parts_only():
     assert np.isnan(pixels.part_precision()[2])  # painted nowhere
 
 
+def test_pixels_painted_wrong_are_told_apart_by_how():
+    #        right; front for back; left for right, twice, and a head's half; another part; background; a missed one
+    true = [2, 1, 15, 10, 23, 2, 2, 9]
+    painted = [2, 2, 16, 7, 24, 23, 0, 0]
+    pixels = PixelAccuracy()
+    label, iuv = np.zeros((1, 9, 4), np.uint8), np.zeros((1, 9, 3), np.uint8)
+    label[0, :8, 0], iuv[0, :8, 0] = true, painted  # the last pixel is nobody's
+    pixels.add(label, iuv)
+    assert pixels.fates() == {
+        "the right part": 1 / 8, "front for back": 1 / 8, "left for right": 3 / 8, "another part": 1 / 8, "background": 2 / 8
+    }  # fmt: skip
+
+
 def test_table_and_files_show_differences_and_hold_no_nan(folder, tmp_path):
     results = {"fp32 torch": figures(folder), "int8 capi": figures(folder, lambda p: p.above(0.85))}
     console = Console(width=140, record=True)

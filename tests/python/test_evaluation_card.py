@@ -57,11 +57,8 @@ def document(start: float, step: float) -> dict:
         }
         return values
 
-    figures = (
-        own(Figures)
-        | {"pixel_fates": {name: next_share() for name in FATES}}
-        | {"model": "somewhere", "fingerprint": DIGEST, "photos": own(PhotoFigures)}
-    )
+    figures = own(Figures) | {"model": "somewhere", "fingerprint": DIGEST, "photos": own(PhotoFigures)}
+    figures["pixel_fates"] = {name: next_share() for name in FATES}
     for field in ("part_recall", "part_precision", "part_error_cm"):
         figures[field] = [next_share() for _ in range(PART_COUNT + 1)]
     return {

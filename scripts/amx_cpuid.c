@@ -19,23 +19,23 @@ enum { ARCH_SET_CPUID = 0x1012, LEAF_TILES = 0x1d, LEAF_TMUL = 0x1e };
 
 static int trapping;
 
-static int set_action(int signal, const struct sigaction *action, struct sigaction *before) {
-  static int (*next)(int, const struct sigaction *, struct sigaction *);
-  if (!next) *(void **)&next = dlsym(RTLD_NEXT, "sigaction");
+static int set_action(int signal, const struct sigaction* action, struct sigaction* before) {
+  static int (*next)(int, const struct sigaction*, struct sigaction*);
+  if (!next) *(void**)&next = dlsym(RTLD_NEXT, "sigaction");
   return next(signal, action, before);
 }
 
 // Python's faulthandler, which torchrun switches on, would take the trap for a crash.
-int sigaction(int signal, const struct sigaction *action, struct sigaction *before) {
+int sigaction(int signal, const struct sigaction* action, struct sigaction* before) {
   if (signal != SIGSEGV || !trapping || !action) return set_action(signal, action, before);
   if (before) memset(before, 0, sizeof *before);
   return 0;
 }
 
-static void on_fault(int signal, siginfo_t *info, void *context) {
+static void on_fault(int signal, siginfo_t* info, void* context) {
   (void)info;
-  greg_t *registers = ((ucontext_t *)context)->uc_mcontext.gregs;
-  const unsigned char *at = (const unsigned char *)registers[REG_RIP];
+  greg_t* registers = ((ucontext_t*)context)->uc_mcontext.gregs;
+  const unsigned char* at = (const unsigned char*)registers[REG_RIP];
   if (at[0] != 0x0f || at[1] != 0xa2) {  // no CPUID: a true fault, which comes again when this returns
     trapping = 0;
     const struct sigaction standard = {.sa_handler = SIG_DFL};
@@ -48,9 +48,9 @@ static void on_fault(int signal, siginfo_t *info, void *context) {
   __cpuid_count(leaf, part, a, b, c, d);
   syscall(SYS_arch_prctl, ARCH_SET_CPUID, 0);
   if (leaf == 0 && a < LEAF_TMUL) a = LEAF_TMUL;
-  if (leaf == LEAF_TILES && part == 0) a = 1, b = c = d = 0;                                  // highest palette
+  if (leaf == LEAF_TILES && part == 0) a = 1, b = c = d = 0;                                      // highest palette
   if (leaf == LEAF_TILES && part == 1) a = 1024u << 16 | 8192, b = 8u << 16 | 64, c = 16, d = 0;  // bytes, tiles, rows
-  if (leaf == LEAF_TMUL && part == 0) a = 0, b = 64u << 8 | 16, c = d = 0;                     // 16 rows by 64 bytes
+  if (leaf == LEAF_TMUL && part == 0) a = 0, b = 64u << 8 | 16, c = d = 0;                        // 16 rows by 64 bytes
   registers[REG_RAX] = a, registers[REG_RBX] = b, registers[REG_RCX] = c, registers[REG_RDX] = d;
   registers[REG_RIP] += 2;
 }

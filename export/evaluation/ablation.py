@@ -3,11 +3,12 @@
     python -m export.people.dataset --images 3000 --bare --out .data/people-bare
     python -m export.evaluation.ablation --prepare      half of the photographs to train on, half to judge by
     python -m export.evaluation.ablation                all variations; resumes; takes hours
+    python -m export.evaluation.ablation --show         docs/ablation.json and docs/pictures/ablation.png from them
 
 Each variation changes one thing of the reference and is trained with several seeds, one process a core, on the loss of
 the surface stage (`export.densepose.losses.surface_loss`). Judged are photographs that none of them trained on, with
 boxes, masks and landmarks of the teachers: the labels of the last layer of the trunk (PixelHead) inside each box.
-Trainings that are done are not repeated; `--table` writes the table of those that are.
+Trainings that are done are not repeated.
 """
 
 from __future__ import annotations
@@ -23,8 +24,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import matplotlib
+
+matplotlib.use("Agg")
 import numpy as np
 import torch
+from matplotlib import pyplot
 from torch import nn
 from tqdm import tqdm
 
@@ -41,7 +46,12 @@ from export.teachers.label import PhotoLabels
 
 SIZE = 128
 BATCH = 8
-FIGURES = ("part_at_landmark", "left_right", "mask_iou", "pixel_part")
+FIGURES = {  # of photographs, the last one of rendered people
+    "mask_iou": "mask IoU",
+    "part_at_landmark": "part at landmark",
+    "left_right": "left/right",
+    "pixel_part": "part, rendered",
+}
 MARGIN = 1.15  # of the box judged
 PHOTO_SHARE = 0.33
 
@@ -56,6 +66,7 @@ class Variation:
     size: int = SIZE
     framing: data.Framing = CLOSE
     photos: str = ""  # shards of photographs in place of a third of the images
+    width: int = 64
     backbone: str = "mobilenet_v2"
     pretrained: bool = True
     keep: Callable[[np.ndarray], bool] | None = None  # of the label; images that are left in
@@ -69,11 +80,13 @@ VARIATIONS = {
     "photos": Variation("a third of the images photographs: masks, regions, fitted bodies", photos="ablation"),
     "photos-unfitted": Variation("a third photographs: masks and regions alone", photos="ablation-unfitted"),
     "few": Variation("3,000 rendered images", count=3000),
+    "fewer": Variation("1,000 rendered images", count=1000),
     "bare": Variation("3,000 rendered images without clothes", rendered="people-bare", count=3000),
     "plain": Variation("one colour in place of the background", plain=True),
     "alone": Variation("only images of one person or nobody", keep=lambda label: label[..., 3].max() < 2),
     "any-framing": Variation("people of a third to 1.3 times the cut", framing=data.ANY_FRAMING),
     "small-cuts": Variation("cuts of 96 pixels", size=96),
+    "wide": Variation("neck and heads 112 channels wide", width=112),
 }
 
 
@@ -141,7 +154,7 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     variation = VARIATIONS[name]
     torch.set_num_threads(1)
     torch.manual_seed(seed)
-    net = MobileParsingRCNN(NetworkConfig(backbone=variation.backbone)).to(memory_format=torch.channels_last)
+    net = MobileParsingRCNN(NetworkConfig(variation.width, variation.backbone)).to(memory_format=torch.channels_last)
     pixel_head = PixelHead(net.config)
     if variation.pretrained:
         net.backbone.load_state_dict(torch.load(options.pretrained))
@@ -149,7 +162,8 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     trained = nn.ModuleList([net, pixel_head])
     ema, optimiser = Ema(trained, 0.997), optimiser_of(net, pixel_head, 2e-3, 0.02)
     photos = data.load_records(options.data / "photos" / "shards" / variation.photos) if variation.photos else []
-    batches = data.Batches(records_of(variation, options.data), BATCH, seed, 0, photos, PHOTO_SHARE, ahead=0)
+    records = records_of(variation, options.data)
+    batches = data.Batches(records, BATCH, seed, 0, photos, PHOTO_SHARE, ahead=0)
     steps = options.images // BATCH
     net.train()
     autocast = torch.autocast("cpu", torch.bfloat16, enabled=options.bf16)
@@ -167,9 +181,8 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     averaged, averaged_head = ema.net
     dev = [options.data / "photos" / "val", options.data / "photos" / "ablation" / "dev"]
     dev = PhotoSet.find(dev, options.data / "teachers" / "labels", [])
-    return judge(averaged, averaged_head, dev) | validate_surface(
-        averaged, averaged_head, data.load_records(options.data / "people" / "val", 100)
-    )
+    rendered = validate_surface(averaged, averaged_head, data.load_records(options.data / "people" / "val", 100))
+    return judge(averaged, averaged_head, dev) | rendered | {"rendered": len(records)}
 
 
 def prepare(folder: Path) -> None:
@@ -197,16 +210,52 @@ def _work(job: tuple[str, int, argparse.Namespace, int]) -> tuple[str, int]:
     return name, seed
 
 
-def table(folder: Path) -> str:
+def gathered(folder: Path) -> list[dict]:
+    """The trainings done, in the order of `VARIATIONS`."""
+    rows = [json.loads(path.read_text()) for path in folder.glob("*-*.json")]
+    return sorted(rows, key=lambda row: (list(VARIATIONS).index(row["variation"]), row["seed"]))
+
+
+def table(rows: list[dict]) -> str:
     """Markdown: mean and half the range over the seeds of each figure."""
-    rows = [json.loads(path.read_text()) for path in sorted(folder.glob("*-*.json"))]
-    lines = ["| what is different | seeds | " + " | ".join(FIGURES) + " |", "| --- | --- |" + " --- |" * len(FIGURES)]
+    lines = ["| what is different | " + " | ".join(FIGURES.values()) + " |", "| --- |" + " --- |" * len(FIGURES)]
     for name, variation in VARIATIONS.items():
         own = [row for row in rows if row["variation"] == name]
         if own:
             cells = [f"{statistics.mean(x := [r[f] for r in own]):.3f} ± {np.ptp(x) / 2:.3f}" for f in FIGURES]
-            lines.append(f"| {variation.says} | {len(own)} | " + " | ".join(cells) + " |")
+            lines.append(f"| {variation.says} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def draw(rows: list[dict], path: Path) -> None:
+    """Left: every seed's distance from the mean of `reference`, in points. Right: the figures against the number of
+    rendered images, where only that is different."""
+    done = [name for name in VARIATIONS if any(row["variation"] == name for row in rows)]
+    figure, (left, right) = pyplot.subplots(
+        1, 2, figsize=(13, 1.6 + 0.45 * len(done)), width_ratios=(3, 1.2), layout="constrained"
+    )
+    mean = {f: statistics.mean(row[f] for row in rows if row["variation"] == "reference") for f in FIGURES}
+    for k, (field, label) in enumerate(FIGURES.items()):
+        y = [done.index(row["variation"]) + 0.17 * (k - (len(FIGURES) - 1) / 2) for row in rows]
+        left.plot([100 * (row[field] - mean[field]) for row in rows], y, "o", color=f"C{k}", label=label, alpha=0.8)
+        amounts = sorted(
+            (row["rendered"], row[field]) for row in rows if row["variation"] in ("fewer", "few", "reference")
+        )
+        right.plot(*zip(*amounts, strict=True), "o", color=f"C{k}", alpha=0.8)
+        counts = sorted({count for count, _ in amounts})
+        right.plot(counts, [statistics.mean(v for n, v in amounts if n == count) for count in counts], color=f"C{k}")
+    left.axvline(0, color="0.6", linewidth=1)
+    for k in range(1, len(done)):
+        left.axhline(k - 0.5, color="0.9", linewidth=1)
+    left.set_yticks(range(len(done)), [VARIATIONS[name].says for name in done])
+    left.invert_yaxis()
+    left.set(xlabel="points from the reference (a dot a seed)")
+    left.legend(fontsize=8, loc="best")
+    right.set(xlabel="rendered images", ylim=(0, 1), xlim=(0, None))
+    for axis in (left, right):
+        axis.grid(alpha=0.3, axis="x" if axis is left else "both")
+    figure.savefig(path, dpi=90)
+    pyplot.close(figure)
 
 
 def main() -> None:
@@ -219,12 +268,13 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=VARIATIONS, default=list(VARIATIONS), metavar="NAME")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--prepare", action="store_true", help="share the photographs out, once, and stop")
-    parser.add_argument("--table", action="store_true", help="print the table of the trainings that are done")
+    parser.add_argument("--show", action="store_true", help="write docs/ablation.json, its picture and its table")
+    parser.add_argument("--docs", type=Path, default=Path("docs"))
     options = parser.parse_args()
     if options.prepare:
         prepare(options.data)
         return
-    if not options.table:
+    if not options.show:
         options.bf16 = bf16_pays()
         options.out.mkdir(parents=True, exist_ok=True)
         jobs = [(name, seed) for name in options.only for seed in range(options.seeds)]
@@ -233,7 +283,11 @@ def main() -> None:
             numbered = [(*job, k % options.processes) for k, job in enumerate(jobs)]
             for name, seed in pool.imap_unordered(_work, numbered):
                 tqdm.write(f"{name}, seed {seed}: done")
-    print(table(options.out))
+    rows = gathered(options.out)
+    print(table(rows))
+    if options.show:
+        (options.docs / "ablation.json").write_text(json.dumps(rows, indent=1) + "\n")
+        draw(rows, options.docs / "pictures" / "ablation.png")
 
 
 if __name__ == "__main__":

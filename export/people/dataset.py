@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from export.people.scene import SPLITS, Studio
 
-VERSION = "people-3"
+VERSION = "people-4"
 SIZES = ((320, 256), (320, 256), (256, 320))  # landscape, landscape, portrait, by shard number
 POINT_RANGE = np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 2.1]], np.float32)
 MIN_PIXELS, MIN_SIDE_PX = 64, 12  # smaller people are marked "ignore"

@@ -1,7 +1,8 @@
-"""Poses: limb directions out of motion clips, or drawn at random, and the bone rotations that take them.
+"""Poses: limb directions of motion clips and photographs, or drawn at random, and the bone rotations that take them.
 
 Clips: 0 A.D. (`art/animation/biped`, object-space joints, 30 frames a second) and the DeepMimic clips inside
-pybullet. A pose keeps only what carries over between skeletons: the orientation of hips, chest and head
+pybullet. Photographs: bodies fitted to people in those to train on (`photo_poses.json`, written by
+`export.teachers.poses`). A pose keeps only what carries over between skeletons: the orientation of hips, chest and head
 and the directions of eight limb bones, in the body's axes (x left, y back, z up), with the yaw removed.
 """
 
@@ -29,6 +30,8 @@ _LIMB_BONES = {
     "upperleg01": ("lowerleg01", "upper_leg"),
     "lowerleg01": ("foot", "lower_leg"),
 }
+PHOTO_POSES = Path(__file__).with_name("photo_poses.json")
+_FLIP = np.diag([-1.0, 1, 1])
 _ZERO_AD_JOINTS = ("hip", "chest", "neck", "arm_L", "forearm_L", "hand_L", "arm_R", "forearm_R", "hand_R",
                    "thigh_L", "leg_L", "foot_L", "thigh_R", "leg_R", "foot_R")  # fmt: skip
 
@@ -57,6 +60,17 @@ class Clips:
     rider: np.ndarray
 
 
+@dataclass(frozen=True)
+class PhotoPoses:
+    """Poses of people in photographs: root, chest, head [N, 3, 3], limbs [N, 8, 3], NaN where the photo does not show
+    the limb."""
+
+    root: np.ndarray
+    chest: np.ndarray
+    head: np.ndarray
+    limbs: np.ndarray
+
+
 def split_of(name: str) -> str:
     """Which split a clip, texture or photo belongs to: 80 % train, 10 % val, 10 % test, by its name."""
     tenth = int(hashlib.sha1(name.encode()).hexdigest(), 16) % 10
@@ -74,10 +88,12 @@ def _frames(left: np.ndarray, up: np.ndarray) -> np.ndarray:
     return np.stack([left, np.cross(up, left), up], -1)
 
 
-def _without_yaw(root: np.ndarray, chest: np.ndarray, limbs: np.ndarray):
+def without_yaw(root: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:
+    """Rotations [N, 3, 3] and directions [N, K, 3] turned about the vertical so that `root` faces the front."""
     back = root[..., 1]
     turn = Rotation.from_rotvec(np.arctan2(back[:, :1], back[:, 1:2]) * [[0, 0, 1.0]]).as_matrix()
-    return turn @ root, turn @ chest, np.einsum("nij,nlj->nli", turn, limbs)
+    *rotations, limbs = (root, *others)
+    return [*(turn @ r for r in rotations), np.einsum("nij,nlj->nli", turn, limbs)]
 
 
 def _zero_ad_clip(path: Path, order: list[str]):
@@ -93,7 +109,7 @@ def _zero_ad_clip(path: Path, order: list[str]):
     chest = _frames(p["arm_L"] - p["arm_R"], p["neck"] - p["chest"])
     ends = (("arm", "forearm"), ("forearm", "hand"), ("thigh", "leg"), ("leg", "foot"))
     limbs = [p[f"{b}_{s}"] - p[f"{a}_{s}"] for pair in (ends[:2], ends[2:]) for s in "LR" for a, b in pair]
-    return _without_yaw(root, chest, _unit(np.stack(limbs, 1)))
+    return without_yaw(root, chest, _unit(np.stack(limbs, 1)))
 
 
 def bullet_clip(path: Path):
@@ -119,7 +135,7 @@ def bullet_clip(path: Path):
     right_arm, left_arm = limb(chest, 25, 29), limb(chest, 39, 43)
     limbs = np.stack([*left_arm, *right_arm, *left_leg, *right_leg], 1) @ to_body.T
     turn = (to_body @ r.as_matrix() @ to_body.T for r in (root, chest))
-    return _without_yaw(*turn, limbs)
+    return without_yaw(*turn, limbs)
 
 
 def load_clips(split: str) -> Clips:
@@ -144,13 +160,34 @@ def load_clips(split: str) -> Clips:
         return Clips(data["root"], data["chest"], data["limbs"], data["rider"])
 
 
+def limb_directions(body: Body, rotations: dict[str, np.ndarray]) -> np.ndarray:
+    """Directions [8, 3] of `LIMBS` of a body whose limbs are turned by `rotations` [3, 3] from rest, by name."""
+    heads = body.template.heads
+    out = []
+    for limb in LIMBS:
+        bone, (end, _) = next((b, row) for b, row in _LIMB_BONES.items() if row[1] == limb[:-2])
+        rest = heads[body.bone[f"{end}{limb[-2:]}"]] - heads[body.bone[f"{bone}{limb[-2:]}"]]
+        out.append(_unit(rotations[limb] @ rest))
+    return np.array(out)
+
+
+def load_photo_poses(split: str) -> PhotoPoses:
+    """Poses of the photographs to train on; the other splits have none."""
+    rows = json.loads(PHOTO_POSES.read_text())["poses"] if split == "train" and PHOTO_POSES.exists() else []
+    root, chest, head = (
+        Rotation.from_rotvec(np.reshape([row[key] for row in rows], (-1, 3))).as_matrix()
+        for key in ("root", "chest", "head")
+    )
+    limbs = [[limb or [np.nan] * 3 for limb in row["limbs"]] for row in rows]
+    return PhotoPoses(root, chest, head, _unit(np.reshape(np.array(limbs, float), (-1, len(LIMBS), 3))))
+
+
 def _euler(x: float, y: float, z: float) -> np.ndarray:
     return Rotation.from_euler("xyz", [x, y, z], degrees=True).as_matrix()
 
 
 def _mirrored(root: np.ndarray, chest: np.ndarray, limbs: np.ndarray):
-    flip = np.diag([-1.0, 1, 1])
-    return flip @ root @ flip, flip @ chest @ flip, limbs[[2, 3, 0, 1, 6, 7, 4, 5]] * [-1, 1, 1]
+    return _FLIP @ root @ _FLIP, _FLIP @ chest @ _FLIP, limbs[[2, 3, 0, 1, 6, 7, 4, 5]] * [-1, 1, 1]
 
 
 def _head(rng: np.random.Generator, chest: np.ndarray) -> np.ndarray:
@@ -167,6 +204,21 @@ def clip_pose(rng: np.random.Generator, clips: Clips) -> Pose:
         root, chest, limbs = _mirrored(root, chest, limbs)
     limbs = _unit(limbs + rng.normal(0, 0.06, (8, 3)))
     return Pose(root, chest, _head(rng, chest), limbs, "sits" if seated else "stands")
+
+
+def photo_pose(rng: np.random.Generator, poses: PhotoPoses) -> Pose:
+    """Somebody's pose in a photograph, mirrored half of the time, with a little noise; hidden limbs as `drawn_pose`."""
+    k = rng.integers(len(poses.root))
+    root, chest, head, limbs = poses.root[k], poses.chest[k], poses.head[k], poses.limbs[k]
+    if rng.random() < 0.5:
+        head = _FLIP @ head @ _FLIP
+        root, chest, limbs = _mirrored(root, chest, limbs)
+    drawn = drawn_pose(rng)
+    shown = np.isfinite(limbs).all(1, keepdims=True)
+    limbs = _unit(np.where(shown, limbs, drawn.limbs) + rng.normal(0, 0.06, limbs.shape))
+    thighs = [LIMBS.index(f"upper_leg.{side}") for side in "LR"]
+    level = limbs[thighs, 2].mean() > -0.5  # thighs more than 60 degrees away from hanging down
+    return Pose(root, chest, head, limbs, "lies" if root[2, 2] < 0.5 else "sits" if level else "stands")
 
 
 def lying(rng: np.random.Generator, pose: Pose) -> Pose:

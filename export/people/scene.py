@@ -14,7 +14,7 @@ from export.people.atlas import Atlas
 from export.people.body import Body, Shape, sample_phenotype
 from export.people.imaging import camera_faults, lens_map, through_lens
 from export.people.lookup import LabelLookup
-from export.people.motion import load_clips
+from export.people.motion import load_clips, load_photo_poses
 from export.people.panoramas import load_panoramas
 from export.people.render import Camera, Light, Picture, Renderer
 from export.people.staging import Director
@@ -42,7 +42,6 @@ class Studio:
         self.body = Body()
         atlas = Atlas(self.body)
         self.model = Model(self.body, atlas)
-        self.clips = load_clips(split)
         backgrounds = places / "backgrounds" / split
         files = sorted(backgrounds.glob("*.jpg"))
         if not files:
@@ -54,7 +53,10 @@ class Studio:
         self.renderer = Renderer(self.model, LabelLookup(atlas), skin[..., ::-1], width, height)
         self.points = points
         self.shape = lru_cache(maxsize=128)(self._shape)
-        self.director = Director(self.model, self.fabrics, self.clips, self.shape, BODIES[split], (width, height))
+        self.director = Director(
+            self.model, self.fabrics, load_clips(split), load_photo_poses(split), self.shape, BODIES[split],
+            (width, height),
+        )  # fmt: skip
 
     def _shape(self, number: int) -> Shape:
         """Body `number` of this split: the same phenotype whenever it is asked for."""

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from export.people.body import Shape
-from export.people.motion import Clips, Pose, clip_pose, drawn_pose, lying, posed
+from export.people.motion import Clips, PhotoPoses, Pose, clip_pose, drawn_pose, lying, photo_pose, posed
 from export.people.props import Prop, PropMaker
 from export.people.render import Camera, Person
 from export.people.wardrobe import Fabrics, Model, brim, dress
@@ -32,6 +32,7 @@ FRAMINGS = (
     (0.08, 0.9, 0.28, 0.4),
     (0.22, 0.5, 1.8, 4.5),
 )
+PHOTO_POSE_SHARE = 0.25  # of the people scattered or before a webcam, where there are poses of photographs
 _LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])  # camera axes in the world before pitch and roll
 _MIN_DEPTH = 0.9  # metres from the camera to whoever is not framed
 
@@ -81,11 +82,13 @@ class Director:
         model: Model,
         fabrics: Fabrics,
         clips: Clips,
+        photo_poses: PhotoPoses,
         shape: Callable[[int], Shape],
         bodies: int,
         size: tuple[int, int],
     ) -> None:
-        self.model, self.fabrics, self.clips, self.shape, self.bodies = model, fabrics, clips, shape, bodies
+        self.model, self.fabrics, self.shape, self.bodies = model, fabrics, shape, bodies
+        self.clips, self.photo_poses = clips, photo_poses
         self.width, self.height = size
         self.maker = PropMaker(lambda rng: fabrics.draw(rng, worn=False))
 
@@ -149,8 +152,15 @@ class Director:
         person = Person(vertices, layers, brim(model, layers, vertices, rng))
         return Actor(person, props, tall, max(tall, 0.75 * float(size[:2].max())), pose.rests)
 
+    def _photographed(self, rng: np.random.Generator) -> bool:
+        """Whether the next pose is one of a photograph; only the split to train on has any."""
+        return len(self.photo_poses.root) > 0 and rng.random() < PHOTO_POSE_SHARE
+
     def _anybody(self, rng: np.random.Generator) -> Actor:
-        pose = clip_pose(rng, self.clips) if rng.random() < 0.5 else drawn_pose(rng)
+        if self._photographed(rng):
+            pose = photo_pose(rng, self.photo_poses)
+        else:
+            pose = clip_pose(rng, self.clips) if rng.random() < 0.5 else drawn_pose(rng)
         if rng.random() < 0.07:
             pose = lying(rng, pose)
             return self.actor(rng, pose, rng.uniform(-np.pi, np.pi))
@@ -224,7 +234,10 @@ class Director:
         actors = []
         for k in range(count):
             sits = actors[0].rests == "sits" if k and u() < 0.7 else u() < 0.65
-            pose = drawn_pose(rng, 1.0 if sits else 0.0)
+            if self._photographed(rng):
+                pose = photo_pose(rng, self.photo_poses)
+            else:
+                pose = drawn_pose(rng, 1.0 if sits else 0.0)
             yaw = np.radians(rng.normal(0, 22)) if k == 0 or u() < 0.7 else u(-np.pi, np.pi)
             actors.append(self.actor(rng, pose, yaw, table_share=0.35 if k == 0 else 0.05))
         head = float(np.median(actors[0].person.vertices[self.model.skull, 2]))

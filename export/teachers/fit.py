@@ -40,7 +40,8 @@ class PhotoFits(Stored):
     person: int64 [N], their index in `PhotoLabels`. iou: float32 [N] of silhouette and mask. landmark_error: float32
     [N], median, torsos (inf: not fitted). reason: str [N], empty if the label may be believed. label: uint8
     [N, h, w, 3] (I, U*255, V*255), 0 beside the mask, I = 255 where no part is known; h, w: the photo's size, at most
-    1024 on the longer side.
+    1024 on the longer side. rotations: float32 [N, 19, 3, 3] of `export.teachers.puppet.JOINTS`, in the body's axes
+    (NaN: not fitted); shown: bool [N, 19], whether the photo shows the joint's bones.
     """
 
     person: np.ndarray
@@ -48,6 +49,8 @@ class PhotoFits(Stored):
     landmark_error: np.ndarray
     reason: np.ndarray
     label: np.ndarray
+    rotations: np.ndarray
+    shown: np.ndarray
 
     @property
     def accepted(self) -> np.ndarray:
@@ -58,16 +61,21 @@ class PhotoFits(Stored):
 def fit_photo(labels: PhotoLabels, teacher) -> PhotoFits:
     """teacher: an `export.teachers.dense.DenseTeacher`."""
     from export.teachers.dense import label_size
+    from export.teachers.puppet import JOINTS
 
     found = teacher.photo(labels)
     size = (*label_size(labels.mask.shape[1:]), 3)
-    people = list(found.values())
+    people, joints = list(found.values()), len(JOINTS)
+    rotations = [np.full((joints, 3, 3), np.nan) if p.rotations is None else p.rotations for p in people]
+    shown = [np.zeros(joints, bool) if p.shown is None else p.shown for p in people]
     return PhotoFits(
         person=np.array(list(found), np.int64),
         iou=np.array([p.iou for p in people], np.float32),
         landmark_error=np.array([p.landmark_error for p in people], np.float32),
         reason=np.array([p.reason for p in people], np.str_),
         label=np.array([p.label for p in people], np.uint8).reshape(len(people), *size),
+        rotations=np.array(rotations, np.float32).reshape(-1, joints, 3, 3),
+        shown=np.array(shown, bool).reshape(-1, joints),
     )
 
 
@@ -148,7 +156,7 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     try:
         reasons = fit_all(list(photos), arguments.out, arguments.force)
-    except FileNotFoundError as error:
+    except (FileNotFoundError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1
     write_sheet(photos, arguments.out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Self
 
@@ -21,5 +22,8 @@ class Stored:
 
     @classmethod
     def load(cls, path: Path) -> Self:
+        """ValueError if the file was written when there was less to keep."""
         with np.load(path) as data:
+            if missing := {field.name for field in fields(cls)} - set(data):
+                raise ValueError(f"{path} lacks {', '.join(sorted(missing))}: make it again with --force.")
             return cls(**data)

@@ -87,6 +87,20 @@ def test_a_training_leaves_its_figures_and_is_not_repeated(tmp_path, dev, monkey
     assert found["images"] == 16
     assert all(0 <= found[name] <= 1 for name in ("mask_iou", "part_at_landmark", "pixel_part"))
 
-    monkeypatch.setattr("sys.argv", ["ablation", "--out", str(tmp_path), "--table"])
+    assert found["rendered"] == 4
+
+    docs = tmp_path / "docs"
+    (docs / "pictures").mkdir(parents=True)
+    monkeypatch.setattr("sys.argv", ["ablation", "--out", str(tmp_path), "--docs", str(docs), "--show"])
     ablation.main()
-    assert ablation.VARIATIONS["reference"].says in capsys.readouterr().out
+    assert f"| {found['mask_iou']:.3f} ± 0.000 |" in capsys.readouterr().out
+    assert json.loads((docs / "ablation.json").read_text()) == [found]
+    assert cv2.imread(str(docs / "pictures" / "ablation.png")).shape[1] > 800
+
+
+def test_the_table_gives_mean_and_half_the_range_of_the_seeds(tmp_path):
+    for seed, value in enumerate((0.5, 0.6)):
+        row = {"variation": "few", "seed": seed} | dict.fromkeys(ablation.FIGURES, value)
+        (tmp_path / f"few-{seed}.json").write_text(json.dumps(row))
+    *_, line = ablation.table(ablation.gathered(tmp_path)).splitlines()
+    assert line == "| 3,000 rendered images |" + " 0.550 ± 0.050 |" * len(ablation.FIGURES)

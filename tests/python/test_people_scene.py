@@ -141,7 +141,7 @@ def test_furniture_is_under_who_uses_it_and_leaves_most_of_the_person_to_see(mod
         def draw(rng, worn=True):
             return np.full((256, 256, 3), rng.integers(256), np.uint8)
 
-    director = Director(model, Cloth(), None, lambda number: model.body.template, 1, (WIDTH, HEIGHT))
+    director = Director(model, Cloth(), None, None, lambda number: model.body.template, 1, (WIDTH, HEIGHT))
     tops = []
     for seed in range(12):
         rng = np.random.default_rng(seed)

@@ -230,6 +230,63 @@ def test_photos_with_fits_are_not_fitted_again(tmp_path, monkeypatch, capsys):
     assert fake.asked == 2
 
 
+def test_fits_of_before_poses_were_kept_are_said_to_be_old(tmp_path):
+    from export.teachers.fit import PhotoFits
+
+    np.savez(tmp_path / "old.npz", person=np.zeros(0), iou=np.zeros(0))
+    with pytest.raises(ValueError, match=r"old.npz lacks .*rotations.*--force"):
+        PhotoFits.load(tmp_path / "old.npz")
+
+
+def fits_file(path, turned, shown, reason):
+    """One fitted person of a photo, in a known pose."""
+    from export.teachers.fit import PhotoFits
+
+    one = np.ones(1, np.float32)
+    PhotoFits(np.array([0]), one, 0 * one, np.array([reason]), np.zeros((1, 2, 2, 3), np.uint8), turned[None],
+              shown[None]).save(path)  # fmt: skip
+
+
+@needs_body
+def test_poses_of_believed_fits_can_be_drawn_from(tmp_path, monkeypatch, capsys):
+    import torch
+
+    from export.people import motion
+    from export.teachers import poses
+    from export.teachers.puppet import JOINT, JOINTS, chained, turns
+
+    def rotations(bend):
+        local = torch.zeros(len(JOINTS), 3)
+        for name, degrees in bend.items():
+            local[JOINT[name]] = torch.tensor(np.radians(degrees), dtype=torch.float32)
+        return chained(turns(local)).numpy()
+
+    shown = np.ones(len(JOINTS), bool)
+    shown[JOINT["lower_arm.R"]] = False
+    for k, yaw in enumerate((0, 70, 180)):
+        turned = rotations(WALKING | {"upper_leg.L": (-80, 0, 0), "upper_leg.R": (-80, 0, 0), "pelvis": (0, 0, yaw)})
+        fits_file(tmp_path / "fits" / f"{k}.npz", turned, shown, "")
+    fits_file(tmp_path / "fits" / "bad.npz", rotations({}), shown, "IoU 0.10, 0.85 needed")
+    out = tmp_path / "poses.json"
+    assert poses.main(["--fits", str(tmp_path / "fits"), "--out", str(out)]) == 0
+    assert "3 poses of 3 photographs" in capsys.readouterr().out
+
+    monkeypatch.setattr(motion, "PHOTO_POSES", out)
+    assert len(motion.load_photo_poses("test").root) == 0
+    found = motion.load_photo_poses("train")
+    # Which way they face is out; the thighs point forwards (-y), the hidden lower arm nowhere.
+    np.testing.assert_allclose(found.limbs[1:], found.limbs[[0, 0]], atol=5e-3)
+    limbs = dict(zip(motion.LIMBS, found.limbs[0], strict=True))
+    assert limbs["upper_leg.L"][1] < -0.9
+    assert limbs["upper_arm.L"][0] > 0.2 > -0.2 > limbs["upper_arm.R"][0]
+    assert np.isnan(limbs["lower_arm.R"]).all()
+    drawn = [motion.photo_pose(np.random.default_rng(seed), found) for seed in range(20)]
+    np.testing.assert_allclose([np.linalg.norm(pose.limbs, axis=1) for pose in drawn], 1, atol=1e-6)
+    assert {pose.rests for pose in drawn} == {"sits"}
+    side = [pose.limbs[motion.LIMBS.index("upper_arm.L")][1] > 0 for pose in drawn]
+    assert 3 < sum(side) < 17  # mirrored half of the time: the left arm is swung back, the right one forwards
+
+
 def test_a_folder_without_labels_is_said_to_be_one(tmp_path, capsys):
     from export.teachers import fit
 

@@ -173,7 +173,7 @@ def limb_directions(body: Body, rotations: dict[str, np.ndarray]) -> np.ndarray:
 
 def load_photo_poses(split: str) -> PhotoPoses:
     """Poses of the photographs to train on; the other splits have none."""
-    rows = json.loads(PHOTO_POSES.read_text())["poses"] if split == "train" and PHOTO_POSES.exists() else []
+    rows = json.loads(PHOTO_POSES.read_text())["poses"] if split == "train" else []
     root, chest, head = (
         Rotation.from_rotvec(np.reshape([row[key] for row in rows], (-1, 3))).as_matrix()
         for key in ("root", "chest", "head")

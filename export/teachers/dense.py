@@ -43,15 +43,14 @@ _PART_JOINTS = np.array([JOINT[name] for name in _COARSE_JOINTS])[surface.PART_T
 class DensePerson:
     """label uint8 [h, w, 3] (I, U*255, V*255), 0 beside the mask, I = UNKNOWN where no part is known; of a photo whose
     longer side is at most LONGEST_SIDE. iou: of the body's silhouette and the mask. landmark_error: median over
-    visible landmarks, torsos. reason: empty if the label may be believed, else why not. rotations [19, 3, 3] and shown
-    [19] as in `Fit`; None where nothing could be fitted."""
+    visible landmarks, torsos. reason: empty if the label may be believed, else why not. rotations [19, 3, 3] as
+    in `Fit`, None where nothing could be fitted."""
 
     label: np.ndarray
     iou: float
     landmark_error: float
     reason: str
     rotations: np.ndarray | None = None
-    shown: np.ndarray | None = None
 
     @property
     def accepted(self) -> bool:
@@ -155,7 +154,7 @@ def judged(fit: Fit, target: Target, drawn: np.ndarray, point: np.ndarray, nose:
         if abs(ahead) > _FACE_SURE_M and shown != (ahead > 0):
             reasons.append(f"the face looks {'towards' if ahead > 0 else 'away from'} the camera, the body's does not")
     near = _NEAR * fit.torso_px * height / target.mask.shape[0]
-    return DensePerson(_filled(drawn, mask, near), iou, median, "; ".join(reasons), fit.rotations, fit.shown)
+    return DensePerson(_filled(drawn, mask, near), iou, median, "; ".join(reasons), fit.rotations)
 
 
 def _face_towards_camera(world: np.ndarray) -> float:

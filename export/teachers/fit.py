@@ -41,7 +41,7 @@ class PhotoFits(Stored):
     [N], median, torsos (inf: not fitted). reason: str [N], empty if the label may be believed. label: uint8
     [N, h, w, 3] (I, U*255, V*255), 0 beside the mask, I = 255 where no part is known; h, w: the photo's size, at most
     1024 on the longer side. rotations: float32 [N, 19, 3, 3] of `export.teachers.puppet.JOINTS`, in the body's axes
-    (NaN: not fitted); shown: bool [N, 19], whether the photo shows the joint's bones.
+    (NaN: not fitted).
     """
 
     person: np.ndarray
@@ -50,7 +50,6 @@ class PhotoFits(Stored):
     reason: np.ndarray
     label: np.ndarray
     rotations: np.ndarray
-    shown: np.ndarray
 
     @property
     def accepted(self) -> np.ndarray:
@@ -67,7 +66,6 @@ def fit_photo(labels: PhotoLabels, teacher) -> PhotoFits:
     size = (*label_size(labels.mask.shape[1:]), 3)
     people, joints = list(found.values()), len(JOINTS)
     rotations = [np.full((joints, 3, 3), np.nan) if p.rotations is None else p.rotations for p in people]
-    shown = [np.zeros(joints, bool) if p.shown is None else p.shown for p in people]
     return PhotoFits(
         person=np.array(list(found), np.int64),
         iou=np.array([p.iou for p in people], np.float32),
@@ -75,7 +73,6 @@ def fit_photo(labels: PhotoLabels, teacher) -> PhotoFits:
         reason=np.array([p.reason for p in people], np.str_),
         label=np.array([p.label for p in people], np.uint8).reshape(len(people), *size),
         rotations=np.array(rotations, np.float32).reshape(-1, joints, 3, 3),
-        shown=np.array(shown, bool).reshape(-1, joints),
     )
 
 

@@ -238,13 +238,19 @@ def test_fits_of_before_poses_were_kept_are_said_to_be_old(tmp_path):
         PhotoFits.load(tmp_path / "old.npz")
 
 
-def fits_file(path, turned, shown, reason):
-    """One fitted person of a photo, in a known pose."""
+def posed_photo(folder, name, turned, seen, reason):
+    """Labels and fit of one person in a known pose, whose landmarks `seen` [33] are seen."""
     from export.teachers.fit import PhotoFits
+    from export.teachers.label import PhotoLabels
 
-    one = np.ones(1, np.float32)
-    PhotoFits(np.array([0]), one, 0 * one, np.array([reason]), np.zeros((1, 2, 2, 3), np.uint8), turned[None],
-              shown[None]).save(path)  # fmt: skip
+    one, mask = np.ones(1, np.float32), np.ones((1, 40, 60), bool)
+    PhotoFits(np.array([0]), one, 0 * one, np.array([reason]), np.zeros((1, 2, 2, 3), np.uint8),
+              turned[None]).save(folder / "fits" / f"{name}.npz")  # fmt: skip
+    point = np.full((1, 33, 2), 20.0)
+    PhotoLabels(
+        box=np.zeros((1, 4)), score=one, outlined=one > 0, sure=one > 0, point=point, visible=np.float32([seen]),
+        world=np.zeros((1, 33, 3)), mask=mask, doubt=~mask[0],
+    ).save(folder / "labels" / f"{name}.npz")  # fmt: skip
 
 
 @needs_body
@@ -261,14 +267,15 @@ def test_poses_of_believed_fits_can_be_drawn_from(tmp_path, monkeypatch, capsys)
             local[JOINT[name]] = torch.tensor(np.radians(degrees), dtype=torch.float32)
         return chained(turns(local)).numpy()
 
-    shown = np.ones(len(JOINTS), bool)
-    shown[JOINT["lower_arm.R"]] = False
+    seen = np.ones(33)
+    seen[_INDEX["right wrist"]] = 0.1
     for k, yaw in enumerate((0, 70, 180)):
         turned = rotations(WALKING | {"upper_leg.L": (-80, 0, 0), "upper_leg.R": (-80, 0, 0), "pelvis": (0, 0, yaw)})
-        fits_file(tmp_path / "fits" / f"{k}.npz", turned, shown, "")
-    fits_file(tmp_path / "fits" / "bad.npz", rotations({}), shown, "IoU 0.10, 0.85 needed")
+        posed_photo(tmp_path, str(k), turned, seen, "")
+    posed_photo(tmp_path, "bad", rotations({}), seen, "IoU 0.10, 0.85 needed")
     out = tmp_path / "poses.json"
-    assert poses.main(["--fits", str(tmp_path / "fits"), "--out", str(out)]) == 0
+    folders = ["--fits", str(tmp_path / "fits"), "--labels", str(tmp_path / "labels")]
+    assert poses.main([*folders, "--out", str(out)]) == 0
     assert "3 poses of 3 photographs" in capsys.readouterr().out
 
     monkeypatch.setattr(motion, "PHOTO_POSES", out)

@@ -49,8 +49,8 @@ def test_a_fitted_body_gives_part_u_and_v_where_it_is_believed():
     label = np.zeros((2, 50, 100, 3), np.uint8)  # half the photo's size
     label[0, 10:40, 7:15], label[1, 10:40, 30:50] = (2, 50, 60), (2, 70, 80)
     label[0, 30:40, 7:15] = (surface.PERSON, 0, 0)
-    turned, shown = np.zeros((2, 19, 3, 3)), np.zeros((2, 19), bool)
-    fits = PhotoFits(np.array([0, 1]), np.ones(2), np.zeros(2), np.array(["", "IoU"]), label, turned, shown)
+    turned = np.zeros((2, 19, 3, 3))
+    fits = PhotoFits(np.array([0, 1]), np.ones(2), np.zeros(2), np.array(["", "IoU"]), label, turned)
     found = weak_label(photo_labels(), SHAPE, fits)
     assert found[50, 20].tolist() == [2, 50, 60, 1]
     assert found[70, 20].tolist() == [surface.PERSON, 0, 0, 1]  # of the fit's own

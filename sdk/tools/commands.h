@@ -9,3 +9,4 @@ class App;
 void add_info_command(CLI::App& app, int* exit_code);
 void add_sources_command(CLI::App& app, int* exit_code);
 void add_densepose_command(CLI::App& app, int* exit_code);
+void add_bench_command(CLI::App& app, int* exit_code);

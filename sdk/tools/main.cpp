@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   add_info_command(app, &exit_code);
   add_sources_command(app, &exit_code);
   add_densepose_command(app, &exit_code);
+  add_bench_command(app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

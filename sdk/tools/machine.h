@@ -1,0 +1,22 @@
+// The machine a measurement was made on, and what it was doing meanwhile (Linux: /proc).
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+// Processor, cores, instruction sets that matter to networks, memory, system, frequency governor and load. What the
+// system does not say is null.
+nlohmann::ordered_json describe_machine();
+
+// Seconds that processors worked for this process, all threads, since it started.
+double own_processor_seconds();
+
+// Seconds that processors worked for other processes, or that the host of a virtual machine kept, since the system
+// started; resolution .01 s.
+double others_processor_seconds();
+
+// The most memory that this process has held so far ("peak RSS"); 0 if the system does not say.
+int64_t peak_memory_bytes();
+
+// Since the process was started, loading of libraries included; resolution .01 s.
+double seconds_since_start();

@@ -10,6 +10,7 @@ from export.evaluation.progress import entry, main
 
 def document(ap: float, columns: int = 1, photos: bool = True) -> dict:
     column = {"fingerprint": "abc", "images": 9, "ap_box": ap, "ap_gps": 0.2, "part_accuracy": 0.3, "mask_iou": 0.4}
+    column["error_cm_painted"] = 7.0
     shares = {"recall_at_precision": 0.5, "mask_iou": 0.6, "part_at_landmark": 0.7, "left_right": 0.8}
     column["photos"] = shares | {"false_people": 1.5} if photos else None
     return {"results": {f"column {k}": column for k in range(columns)}}
@@ -17,7 +18,8 @@ def document(ap: float, columns: int = 1, photos: bool = True) -> dict:
 
 def test_an_entry_holds_the_figures_of_the_evaluation():
     row = entry("first", 2.5, 1000, document(0.1))
-    assert row["rendered"] == {"ap_box": 0.1, "ap_gps": 0.2, "part_accuracy": 0.3, "mask_iou": 0.4}
+    shares = {"ap_box": 0.1, "ap_gps": 0.2, "part_accuracy": 0.3, "mask_iou": 0.4}
+    assert row["rendered"] == shares | {"error_cm_painted": 7.0}
     assert row["photos"]["false_people"] == 1.5
     assert (row["name"], row["hours"], row["images"], row["model"], row["test_images"]) == (
         "first", 2.5, 1000, "abc", 9,

@@ -249,6 +249,8 @@ def draw(rows: list[dict], path: Path) -> None:
         left.axhline(k - 0.5, color="0.9", linewidth=1)
     left.set_yticks(range(len(done)), [VARIATIONS[name].says for name in done])
     left.invert_yaxis()
+    left.set_xscale("symlog", linthresh=5)  # one variation differs ten times as much as the others
+    left.set_xticks([-20, -10, -5, -2, 0, 2, 5, 10, 20], ["-20", "-10", "-5", "-2", "0", "2", "5", "10", "20"])
     left.set(xlabel="points from the reference (a dot a seed)")
     left.legend(fontsize=8, loc="best")
     right.set(xlabel="rendered images", ylim=(0, 1), xlim=(0, None))

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import onnx
 
-from export.densepose.export_onnx import session
+from export.densepose.graphs import session
+from quantization.samples import Sample
 
 
 def sqnr_db(signal_power: float, noise_power: float) -> float:
@@ -16,18 +17,17 @@ def sqnr_db(signal_power: float, noise_power: float) -> float:
     return float("inf") if noise_power == 0 else float(10 * np.log10(max(signal_power, 1e-30) / noise_power))
 
 
-def output_sqnr(reference: Path, quantised: Path, samples: list[np.ndarray]) -> dict[str, float]:
+def output_sqnr(reference: Path, quantised: Path, samples: list[Sample]) -> dict[str, float]:
     """SQNR in dB of each output over the samples."""
     first, second = session(reference), session(quantised)
     names = [output.name for output in first.get_outputs()]
-    (value,) = first.get_inputs()
     signal: dict[str, float] = defaultdict(float)
     noise: dict[str, float] = defaultdict(float)
     for sample in samples:
         pairs = zip(
             names,
-            first.run(names, {value.name: sample}),
-            second.run(names, {value.name: sample}),
+            first.run(names, sample),
+            second.run(names, sample),
             strict=True,
         )
         for name, expected, actual in pairs:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import fnmatch
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -27,9 +28,10 @@ from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from export.densepose import bundle as bundle_format
 from export.densepose import data
+from export.densepose.graphs import Bundle, open_bundle
 from quantization import transposed_convolution
 from quantization.errors import float_nodes_left, output_sqnr
-from quantization.samples import Bundle, collect, open_bundle
+from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, Settings, read_settings
 
 METHODS = {
@@ -42,14 +44,14 @@ METHODS = {
 class Samples(CalibrationDataReader):
     """Hands the calibration inputs of one graph to ONNX Runtime, one by one."""
 
-    def __init__(self, name: str, arrays: list[np.ndarray]) -> None:
-        self._left = iter([{name: array} for array in arrays])
+    def __init__(self, samples: list[Sample]) -> None:
+        self._left = iter(samples)
 
-    def get_next(self) -> dict[str, np.ndarray] | None:
+    def get_next(self) -> Sample | None:
         return next(self._left, None)
 
 
-def quantise_graph(source: Path, target: Path, samples: list[np.ndarray], settings: GraphSettings) -> None:
+def quantise_graph(source: Path, target: Path, samples: list[Sample], settings: GraphSettings) -> None:
     """Writes the int8 form (QDQ) of one graph. Raises ValueError for a pattern that matches nothing."""
     if not samples:
         raise ValueError(f"nothing to calibrate {source.name} with: the bundle finds nobody in the images")
@@ -65,7 +67,7 @@ def quantise_graph(source: Path, target: Path, samples: list[np.ndarray], settin
         quantize_static(
             prepared,
             target,
-            Samples(graph.input[0].name, samples),
+            Samples(samples),
             quant_format=QuantFormat.QDQ,
             per_channel=True,
             reduce_range=settings.reduce_range,
@@ -78,14 +80,22 @@ def quantise_graph(source: Path, target: Path, samples: list[np.ndarray], settin
         )
 
 
-def equal_sizes(arrays: list[np.ndarray]) -> list[np.ndarray]:
-    """[N, C, h, w] arrays as single samples [1, C, H, W] of one size, which histograms of activations need.
+def equal_sizes(samples: list[Sample]) -> list[Sample]:
+    """Samples of [N, C, h, w] arrays as single ones of one size, [1, C, H, W], which histograms of activations need.
 
-    Pictures get zeros at the right and bottom, as at run time.
+    Pictures and their features get zeros at the right and bottom, as at run time.
     """
-    height, width = (max(array.shape[axis] for array in arrays) for axis in (2, 3))
-    singles = [single for array in arrays for single in np.split(array, len(array))]
-    return [np.pad(x, [(0, 0), (0, 0), (0, height - x.shape[2]), (0, width - x.shape[3])]) for x in singles]
+    shape = {name: [max(s[name].shape[axis] for s in samples) for axis in (2, 3)] for name in samples[0]}
+    singles = [
+        {name: array[k : k + 1] for name, array in sample.items()}
+        for sample in samples
+        for k in range(len(next(iter(sample.values()))))
+    ]
+    return [{name: _padded(array, *shape[name]) for name, array in single.items()} for single in singles]
+
+
+def _padded(array: np.ndarray, height: int, width: int) -> np.ndarray:
+    return np.pad(array, [(0, 0), (0, 0), (0, height - array.shape[2]), (0, width - array.shape[3])])
 
 
 def matching_nodes(graph: onnx.GraphProto, patterns: tuple[str, ...]) -> list[str]:
@@ -105,8 +115,10 @@ def spread(records: list[data.Record], count: int) -> list[data.Record]:
 def quantise_bundle(
     source: Bundle, target: Path, settings: Settings, records: list[data.Record], held_out: list[data.Record]
 ) -> dict[str, dict[str, float]]:
-    """Quantises the three graphs of `source` into the folder `target`. Returns each output's SQNR in dB."""
+    """Quantises the graphs of `source` into the folder `target`; chart weights stay float. Returns each output's SQNR
+    in dB."""
     target.mkdir(parents=True, exist_ok=True)
+    shutil.copy(source.folder / bundle_format.CHARTS, target)
     calibration = collect(source, records, settings.people_per_image)
     test = collect(source, held_out, settings.people_per_image)
     quality = {}

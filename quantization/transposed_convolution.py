@@ -6,32 +6,28 @@ import numpy as np
 import onnx
 from onnx import helper, numpy_helper
 
-# For output row 2y + phase a transposed convolution of kernel 4, stride 2, padding 1 reads these pairs of
-# (kernel row, input row - y); the same holds for columns.
-_TAPS = {0: ((1, 0), (3, -1)), 1: ((0, 1), (2, 0))}
+# For output row 2y + phase a transposed convolution of kernel 4, stride 2, padding 1 reads these kernel rows, of input
+# rows y - 1 and y (phase 0), or y and y + 1 (phase 1); the same holds for columns. So each of the four output phases is
+# a convolution of kernel 2, padded on one side.
+_TAPS = ((3, 1), (2, 0))
+_PHASES = tuple((row, column) for row in (0, 1) for column in (0, 1))
 
 
-def phase_weights(weight: np.ndarray) -> np.ndarray:
-    """The weights of a transposed convolution (stride 2, padding 1) as those of a 3x3 convolution.
+def phase_weights(weight: np.ndarray, row_phase: int, column_phase: int) -> np.ndarray:
+    """The weights [out, in, 2, 2] of one output phase of a transposed convolution of kernel 4, stride 2, padding 1.
 
-    weight: [in, out, 4, 4]. The result, [4 * out, in, 3, 3], holds the four output phases one
-    after another, as DepthToSpace (DCR) reads them.
+    weight: [in, out, 4, 4].
     """
-    inputs, outputs = weight.shape[:2]
-    phases = np.zeros((2, 2, outputs, inputs, 3, 3), weight.dtype)
-    for row_phase, rows in _TAPS.items():
-        for column_phase, columns in _TAPS.items():
-            for kernel_row, row in rows:
-                for kernel_column, column in columns:
-                    taps = weight[:, :, kernel_row, kernel_column].T
-                    phases[row_phase, column_phase, ..., row + 1, column + 1] = taps
-    return phases.reshape(4 * outputs, inputs, 3, 3)
+    taps = weight[:, :, _TAPS[row_phase]][..., _TAPS[column_phase]]
+    return np.ascontiguousarray(taps.transpose(1, 0, 2, 3))
 
 
 def rewrite(model: onnx.ModelProto) -> int:
-    """Replaces transposed convolutions of kernel 4, stride 2, padding 1 by Conv and DepthToSpace, in place.
+    """Replaces transposed convolutions of kernel 4, stride 2, padding 1 by four convolutions, which DepthToSpace
+    interleaves, in place.
 
-    The result is the same but for rounding. Returns how many were replaced; others are left alone.
+    The result is the same but for rounding, and so is the number of multiply-adds. Returns how many were replaced;
+    others are left alone.
     """
     graph = model.graph
     constants = {value.name: value for value in graph.initializer}
@@ -41,15 +37,18 @@ def rewrite(model: onnx.ModelProto) -> int:
             nodes.append(node)
             continue
         weight = numpy_helper.to_array(constants[node.input[1]])
-        names = [node.input[0], f"{node.name}/phases.weight"]
-        graph.initializer.append(numpy_helper.from_array(phase_weights(weight), names[1]))
-        if len(node.input) > 2:
-            bias = numpy_helper.to_array(constants[node.input[2]])
-            names.append(f"{node.name}/phases.bias")
-            graph.initializer.append(numpy_helper.from_array(np.tile(bias, 4), names[2]))
-        phases, size = f"{node.name}/phases", {"kernel_shape": [3, 3], "pads": [1, 1, 1, 1]}
-        nodes.append(helper.make_node("Conv", names, [phases], f"{node.name}/Conv", **size))
-        nodes.append(helper.make_node("DepthToSpace", [phases], node.output, f"{node.name}/Spread", blocksize=2))
+        phases = []
+        for row, column in _PHASES:
+            name = f"{node.name}/phase{row}{column}"
+            graph.initializer.append(numpy_helper.from_array(phase_weights(weight, row, column), f"{name}.weight"))
+            given = [node.input[0], f"{name}.weight", *node.input[2:]]
+            pads = [1 - row, 1 - column, row, column]  # top, left, bottom, right
+            nodes.append(helper.make_node("Conv", given, [name], f"{name}/Conv", kernel_shape=[2, 2], pads=pads))
+            phases.append(name)
+        nodes.append(helper.make_node("Concat", phases, [f"{node.name}/phases"], f"{node.name}/Concat", axis=1))
+        nodes.append(
+            helper.make_node("DepthToSpace", [f"{node.name}/phases"], node.output, f"{node.name}/Spread", blocksize=2)
+        )
         count += 1
     used = {name for node in nodes for name in node.input}
     kept = [value for value in graph.initializer if value.name in used]

@@ -1,4 +1,5 @@
-"""Writes a model bundle: three ONNX graphs, the surface grid and the manifest that describes them (docs/formats.md)."""
+"""Writes a model bundle: ONNX graphs, chart weights, the surface grid and the manifest that describes them
+(docs/formats.md)."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from export.densepose.data import MEAN, STD
 from export.surface_grid import FILE as SURFACE_GRID
 
 OPSET = 17
-GRAPHS = ("detector", "box_head", "dense_head")
+GRAPHS = ("trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head")
+CHARTS = "charts.f32"
 LEVELS = (2, 3, 4, 5, 6)
 LICENCE = "Apache-2.0"
 # What the pictures are rendered from; the packages are named in export/people/assets.py and export/photos.
@@ -65,26 +67,36 @@ def signatures(network: NetworkConfig) -> dict[str, dict[str, dict[str, list[int
     sizes = {k: [f"height/{2**k}", f"width/{2**k}"] for k in LEVELS}
     # P6 is every second cell of P5, rounded up; that is no plain quotient of the input.
     sizes[6] = ["height6", "width6"]
-    outputs: dict[str, list[int | str]] = {f"p{k}": [1, width, *sizes[k]] for k in LEVELS[:4]}
-    outputs |= {f"objectness{k}": [1, anchors, *sizes[k]] for k in LEVELS}
-    outputs |= {f"deltas{k}": [1, 4 * anchors, *sizes[k]] for k in LEVELS}
-    maps: dict[str, list[int | str]] = {"coarse": ["people", network.coarse_classes, side, side]}
-    maps |= {name: ["people", network.index_classes, side, side] for name in ("index", "u", "v")}
+
+    def features(levels: tuple[int, ...]) -> dict[str, list[int | str]]:
+        return {f"p{k}": [1, width, *sizes[k]] for k in levels}
+
+    def rpn(levels: tuple[int, ...]) -> dict[str, dict[str, list[int | str]]]:
+        outputs: dict[str, list[int | str]] = {f"objectness{k}": [1, anchors, *sizes[k]] for k in levels}
+        outputs |= {f"deltas{k}": [1, 4 * anchors, *sizes[k]] for k in levels}
+        return {"inputs": features(levels), "outputs": outputs}
+
     return {
-        "detector": {"inputs": {"image": [1, 3, "height", "width"]}, "outputs": outputs},
+        "trunk": {"inputs": {"image": [1, 3, "height", "width"]}, "outputs": features(LEVELS)},
+        "rpn_fine": rpn(LEVELS[:1]),
+        "rpn_coarse": rpn(LEVELS[1:]),
         "box_head": {
             "inputs": {"rois": ["people", width, network.box_pool, network.box_pool]},
             "outputs": {"logits": ["people", 2], "deltas": ["people", 4]},
         },
         "dense_head": {
             "inputs": {"rois": ["people", width, network.dense_pool, network.dense_pool]},
-            "outputs": maps,
+            "outputs": {
+                "coarse": ["people", network.coarse_classes, side, side],
+                "index": ["people", network.index_classes, side, side],
+                "surface": ["people", width, network.dense_pool, network.dense_pool],
+            },
         },
     }
 
 
 def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decode: DecodeConfig) -> dict:
-    """Describes the three graphs that lie in `folder` and writes `manifest.json`, which it returns.
+    """Describes the graphs and chart weights that lie in `folder` and writes `manifest.json`, which it returns.
 
     Raises ValueError when a graph's inputs and outputs are not those of the format.
     """
@@ -92,18 +104,18 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
     for name, tensors in signatures(network).items():
         path = folder / f"{name}.onnx"
         _check_names(path, tensors)
-        data = path.read_bytes()
-        files[path.name] = {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
+        files[path.name] = _signed(path)
         entry: dict[str, object] = {"file": path.name, "opset": OPSET}
         for side, shapes in tensors.items():
             entry[side] = [{"name": n, "type": "float32", "shape": s} for n, s in shapes.items()]
         graphs[name] = entry
     grid = (Path(__file__).parent / SURFACE_GRID).read_bytes()
     (folder / SURFACE_GRID).write_bytes(grid)
-    files[SURFACE_GRID] = {"sha256": hashlib.sha256(grid).hexdigest(), "bytes": len(grid)}
+    for name in (CHARTS, SURFACE_GRID):
+        files[name] = _signed(folder / name)
     manifest = {
         "format": "maquette-bundle",
-        "format_version": 1,
+        "format_version": 2,
         "name": info.name,
         "version": info.version,
         "task": "densepose",
@@ -138,6 +150,7 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
         "dense_head": {
             "pool": network.dense_pool,
             "stride": network.tap_strides[0],
+            "charts": CHARTS,
             "output": 2 * network.dense_pool,
             "coarse_classes": network.coarse_classes,
             "index_classes": network.index_classes,
@@ -167,6 +180,11 @@ def decode_config(manifest: dict) -> DecodeConfig:
         mask_threshold=manifest["dense_head"]["mask_threshold"],
         least_own_share=manifest["dense_head"]["least_own_share"],
     )
+
+
+def _signed(path: Path) -> dict[str, object]:
+    data = path.read_bytes()
+    return {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
 
 
 def bytes_of(folder: Path) -> int:

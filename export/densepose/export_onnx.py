@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import onnx
-import onnxruntime
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -28,6 +27,7 @@ from export.densepose import bundle, data
 from export.densepose import targets as tg
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.decode import Graphs, detect
+from export.densepose.graphs import chart_maps, read_charts, session
 from export.densepose.network import Aspp, Fusion, MobileParsingRCNN
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the tensor's largest value
@@ -65,16 +65,49 @@ class SplitAspp(nn.Module):
         return F.relu(self.mix_maps(maps) + self.mix_context(context))
 
 
-class Detector(nn.Module):
-    """The detector with its outputs in the bundle's order: P2..P5, objectness of P2..P6, deltas of P2..P6."""
+class Trunk(nn.Module):
+    """Backbone and neck: image -> P2..P6."""
 
     def __init__(self, net: MobileParsingRCNN) -> None:
         super().__init__()
-        self.net = net
+        self.backbone, self.neck = net.backbone, net.neck
 
     def forward(self, image: Tensor) -> tuple[Tensor, ...]:
-        features, objectness, deltas = self.net.detector(image)
-        return (*features[:4], *objectness, *deltas)
+        return tuple(self.neck(self.backbone(image)))
+
+
+class Rpn(nn.Module):
+    """The RPN on some levels: objectness of each, then deltas of each. The finest level, which is as dear as all the
+    others and more, has a graph of its own, so that it can be left out where nobody is small."""
+
+    def __init__(self, net: MobileParsingRCNN) -> None:
+        super().__init__()
+        self.rpn = net.rpn
+
+    def forward(self, *features: Tensor) -> tuple[Tensor, ...]:
+        objectness, deltas = self.rpn(list(features))
+        return (*objectness, *deltas)
+
+
+class DenseHeadGraph(nn.Module):
+    """The dense head without U and V: these need few pixels of few parts, and are computed where they are needed
+    from `surface` and the chart weights."""
+
+    def __init__(self, net: MobileParsingRCNN) -> None:
+        super().__init__()
+        self.head = net.dense_head
+
+    def forward(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        surface = self.head.surface(rois)
+        return self.head.out["coarse"](surface), self.head.out["index"](surface), surface
+
+
+def chart_weights(net: MobileParsingRCNN) -> np.ndarray:
+    """U's and V's transposed convolutions, float32: weight [2, parts, 4, 4, C], then bias [2, parts]; no background."""
+    layers = [net.dense_head.out[name] for name in ("u", "v")]
+    weight = torch.stack([layer.weight.detach()[:, 1:].permute(1, 2, 3, 0) for layer in layers])
+    bias = torch.stack([layer.bias.detach()[1:] for layer in layers])
+    return torch.cat([weight.flatten(), bias.flatten()]).float().cpu().numpy()
 
 
 def simplified(net: MobileParsingRCNN) -> MobileParsingRCNN:
@@ -104,19 +137,28 @@ def _fold_batch_norm(layers: nn.Sequential) -> None:
 
 
 def graph_modules(net: MobileParsingRCNN) -> dict[str, nn.Module]:
-    """The three parts that become graphs."""
-    return {"detector": Detector(net), "box_head": net.box_head, "dense_head": net.dense_head}
+    """The parts that become graphs."""
+    rpn = Rpn(net)
+    return {
+        "trunk": Trunk(net),
+        "rpn_fine": rpn,
+        "rpn_coarse": rpn,
+        "box_head": net.box_head,
+        "dense_head": DenseHeadGraph(net),
+    }
 
 
 def export_graphs(net: MobileParsingRCNN, folder: Path) -> None:
-    """Writes detector.onnx, box_head.onnx and dense_head.onnx (opset 17, batch normalisation folded)."""
+    """Writes the graphs of `bundle.GRAPHS` (opset 17, batch normalisation folded) and the chart weights."""
     folder.mkdir(parents=True, exist_ok=True)
-    modules = graph_modules(simplified(net))
+    simple = simplified(net)
+    modules = graph_modules(simple)
+    chart_weights(simple).astype("<f4").tofile(folder / bundle.CHARTS)
+    # Odd sizes, so that no size of the example can be mistaken for a constant.
+    example = {"height": 96, "width": 160, "people": 3, "height6": 2, "width6": 3}
+    example |= {f"{side}/{2**k}": example[side] // 2**k for k in range(2, 6) for side in ("height", "width")}
     for name, tensors in bundle.signatures(net.config).items():
-        # Odd sizes, so that no size of the example can be mistaken for a constant.
-        example = {"height": 96, "width": 160, "people": 3}
-        (input_name, shape), *_ = tensors["inputs"].items()
-        given = torch.randn([example.get(size, size) for size in shape])
+        given = [torch.randn([example.get(size, size) for size in shape]) for shape in tensors["inputs"].values()]
         axes = {
             tensor: {axis: size for axis, size in enumerate(sizes) if isinstance(size, str)}
             for side in tensors.values()
@@ -127,9 +169,9 @@ def export_graphs(net: MobileParsingRCNN, folder: Path) -> None:
             warnings.simplefilter("ignore", DeprecationWarning)
             torch.onnx.export(
                 modules[name],
-                (given,),
+                tuple(given),
                 path,
-                input_names=[input_name],
+                input_names=list(tensors["inputs"]),
                 output_names=list(tensors["outputs"]),
                 dynamic_axes=axes,
                 opset_version=bundle.OPSET,
@@ -155,39 +197,42 @@ def _finish(path: Path, name: str) -> None:
     onnx.save(model, path)
 
 
-def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
-    """A CPU session of one graph."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
-
-
 @torch.no_grad()
 def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> dict[str, float]:
     """Largest |ONNX - torch| of each output over the images, relative to the output's largest value.
 
-    images: RGB uint8 [H, W, 3]. The heads get the torch network's own RoI features of its proposals.
+    images: RGB uint8 [H, W, 3]. Every graph gets the torch network's own features; the heads those of its proposals.
+    `dense_head.u` and `.v` are what chart weights and `surface` give.
     """
     net = copy.deepcopy(net).cpu().eval()
     modules = graph_modules(net)
-    sessions = {name: session(folder / f"{name}.onnx") for name in modules}
     names = {name: list(s["outputs"]) for name, s in bundle.signatures(net.config).items()}
+    sessions = {name: session(folder / f"{name}.onnx") for name in names}
+    charts = read_charts(folder / bundle.CHARTS, net.config.index_classes - 1)
     worst: dict[str, float] = {}
 
-    def compare(graph: str, given: Tensor) -> None:
-        (input_name,) = (value.name for value in sessions[graph].get_inputs())
-        found = sessions[graph].run(names[graph], {input_name: given.numpy()})
-        for name, expected, actual in zip(names[graph], modules[graph](given), found, strict=True):
-            scale = max(float(expected.abs().max()), 1e-9)
-            error = float((expected - torch.from_numpy(actual)).abs().max()) / scale
-            worst[f"{graph}.{name}"] = max(worst.get(f"{graph}.{name}", 0.0), error)
+    def note(name: str, expected: Tensor, actual: Tensor) -> None:
+        scale = max(float(expected.abs().max()), 1e-9)
+        worst[name] = max(worst.get(name, 0.0), float((expected - actual).abs().max()) / scale)
+
+    def compare(graph: str, *given: Tensor) -> list[Tensor]:
+        feed = {x.name: tensor.numpy() for x, tensor in zip(sessions[graph].get_inputs(), given, strict=True)}
+        found = [torch.from_numpy(x) for x in sessions[graph].run(names[graph], feed)]
+        for name, expected, actual in zip(names[graph], modules[graph](*given), found, strict=True):
+            note(f"{graph}.{name}", expected, actual)
+        return found
 
     for image in images:
         found = detect(Graphs.of_network(net), image, net.config, DecodeConfig())
-        rois = found.proposed
-        compare("detector", found.tensor)
-        compare("box_head", tg.pooled(found.features, [rois], net.config, net.config.box_pool))
-        compare("dense_head", tg.pooled(found.features, [rois[:4]], net.config, net.config.dense_pool, level=0))
+        compare("trunk", found.tensor)
+        compare("rpn_fine", found.features[0])
+        compare("rpn_coarse", *found.features[1:])
+        compare("box_head", tg.pooled(found.features, [found.proposed], net.config, net.config.box_pool))
+        rois = tg.pooled(found.features, [found.proposed[:4]], net.config, net.config.dense_pool, level=0)
+        *_, surface = compare("dense_head", rois)
+        expected = net.dense_head(rois)[2:]
+        for name, maps, actual in zip("uv", expected, chart_maps(surface, *charts), strict=True):
+            note(f"dense_head.{name}", maps[:, 1:], actual[:, 1:])
     return worst
 
 

@@ -321,8 +321,12 @@ class DenseHead(nn.Module):
                 if module.bias is not None:
                     nn.init.zeros_(module.bias)
 
+    def surface(self, rois: Tensor) -> Tensor:
+        """What the four predictors see, [P, C, 32, 32]."""
+        return self.body(self.aspp(rois))
+
     def forward(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        x = self.body(self.aspp(rois))
+        x = self.surface(rois)
         return self.out["coarse"](x), self.out["index"](x), self.out["u"](x), self.out["v"](x)
 
 

@@ -97,64 +97,22 @@ class OnnxBackend:
 
     def __init__(self, path: Path, score_floor: float) -> None:
         from export.densepose import decode
-        from export.densepose.bundle import decode_config
-        from export.densepose.config import NetworkConfig
+        from export.densepose.graphs import open_bundle
 
-        manifest = read_manifest(path)
-        given = manifest["input"]
+        self._bundle = bundle = open_bundle(path)
+        given = bundle.manifest["input"]
         if not np.allclose([given["mean"], given["std"]], [decode.MEAN, decode.STD]):
             raise ValueError(f"{path} normalises by {given['mean']}, {given['std']}: not as export.densepose does")
         self.path = path
-        self.precision = manifest["precision"]
-        self.threshold = manifest["box_head"]["score_threshold"]
-        rpn, head = manifest["rpn"], manifest["box_head"]
-        self._network = NetworkConfig(
-            anchor_sizes=tuple(rpn["anchor_sizes"]),
-            aspect_ratios=tuple(rpn["aspect_ratios"]),
-            rpn_strides=tuple(rpn["strides"]),
-            delta_weights=tuple(head["delta_weights"]),
-        )
-        self._decode = replace(decode_config(manifest), score_threshold=score_floor)
-        graphs = {name: OnnxGraph(path, entry) for name, entry in manifest["graphs"].items()}
-
-        def detector(image):
-            out = graphs["detector"].run(image)
-            levels = range(2, 7)
-            features = [out[f"p{k}"] for k in levels if f"p{k}" in out]
-            return features, [out[f"objectness{k}"] for k in levels], [out[f"deltas{k}"] for k in levels]
-
-        def box_head(rois):
-            out = graphs["box_head"].run(rois)
-            return out["logits"], out["deltas"]
-
-        def dense_head(rois):
-            out = graphs["dense_head"].run(rois)
-            return out["coarse"], out["index"], out["u"], out["v"]
-
-        self._graphs = decode.Graphs(detector, box_head, dense_head)
+        self.precision = bundle.manifest["precision"]
+        self.threshold = bundle.decode.score_threshold
+        self._decode = replace(bundle.decode, score_threshold=score_floor)
 
     def predict(self, image: np.ndarray) -> Prediction:
         from export.densepose.decode import infer
 
-        result = infer(self._graphs, image, self._network, self._decode)
+        result = infer(self._bundle.graphs, image, self._bundle.network, self._decode)
         return Prediction(result.boxes, result.scores, result.iuv, result.instance)
-
-
-class OnnxGraph:
-    """One graph of a bundle with one input. Tensors in, tensors out by name."""
-
-    def __init__(self, bundle: Path, entry: dict) -> None:
-        import onnxruntime
-
-        self._input = entry["inputs"][0]["name"]
-        self._outputs = [output["name"] for output in entry["outputs"]]
-        self._session = onnxruntime.InferenceSession(str(bundle / entry["file"]), providers=["CPUExecutionProvider"])
-
-    def run(self, tensor):
-        import torch
-
-        arrays = self._session.run(self._outputs, {self._input: tensor.contiguous().numpy()})
-        return dict(zip(self._outputs, map(torch.from_numpy, arrays), strict=True))
 
 
 class CApiBackend:

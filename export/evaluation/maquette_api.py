@@ -30,6 +30,11 @@ class _DenseposeConfig(ctypes.Structure):
         ("score_threshold", c_float),
         ("max_people", c_int32),
         ("result_pool_size", c_uint32),
+        ("max_proposals", c_int32),
+        ("key_frame_interval", c_int32),
+        ("least_person_px", c_int32),
+        ("detail", c_int32),
+        ("spin", c_int32),
     )
 
 
@@ -55,7 +60,7 @@ class _Stats(ctypes.Structure):
     _fields_ = (
         ("struct_size", c_uint32),
         ("preprocess_ms", c_float),
-        ("detector_ms", c_float),
+        ("trunk_ms", c_float),
         ("proposals_ms", c_float),
         ("box_head_ms", c_float),
         ("dense_head_ms", c_float),
@@ -68,6 +73,7 @@ class _Stats(ctypes.Structure):
         ("dropped_boxes", c_int32),
         ("body_pixels", c_int64),
         ("clamped_uv", c_int64),
+        ("key_frame", c_int32),
     )
 
 
@@ -76,7 +82,7 @@ class Stats:
     """What one run did; see maq_densepose_stats in densepose.h for the meanings. Times in milliseconds."""
 
     preprocess_ms: float
-    detector_ms: float
+    trunk_ms: float
     proposals_ms: float
     box_head_ms: float
     dense_head_ms: float
@@ -89,6 +95,7 @@ class Stats:
     dropped_boxes: int
     body_pixels: int
     clamped_uv: int
+    key_frame: int
 
 
 @dataclass(frozen=True)
@@ -136,6 +143,7 @@ class DensePose:
 
     bundle: folder with manifest.json. score_threshold: people below it are dropped (None: the bundle's).
     threads: 0 lets the library choose. library: libmaquette.so (default: MAQ_LIBRARY or the release build).
+    settings: further fields of maq_densepose_config by their names.
     """
 
     def __init__(
@@ -144,6 +152,7 @@ class DensePose:
         score_threshold: float | None = None,
         threads: int = 0,
         library: Path | None = None,
+        **settings: int,
     ) -> None:
         self._context, self._densepose = Handle(), Handle()
         path = library or Path(os.environ.get("MAQ_LIBRARY", LIBRARY))
@@ -158,6 +167,10 @@ class DensePose:
         config.threads = threads
         if score_threshold is not None:
             config.score_threshold = score_threshold
+        for name, value in settings.items():
+            if name not in (field for field, _ in config._fields_):
+                raise TypeError(f"maq_densepose_config has no field {name}")
+            setattr(config, name, value)
         self._call(self._context, "maq_densepose_create", self._context, byref(config), byref(self._densepose))
 
     def __enter__(self) -> DensePose:

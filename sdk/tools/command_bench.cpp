@@ -10,9 +10,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "bundle_argument.h"
 #include "commands.h"
 #include "machine.h"
+#include "model_options.h"
 #include "output_file.h"
 #include "progress_bar.h"
 #include "source_argument.h"
@@ -28,11 +28,8 @@ constexpr double kMibibyte = 1024.0 * 1024.0;
 
 struct Options {
   std::vector<std::string> sources = {"stub:people?count=1", "stub:people?count=4", "stub:people?count=0"};
-  std::string bundle;
+  ModelOptions model;
   std::string json;
-  int size = 0;
-  float threshold = -1;
-  int threads = 0;
   int warm_up = 10;
   int runs = 100;
   double seconds = 3;
@@ -47,8 +44,8 @@ double ms_between(Clock::time_point from, Clock::time_point to) {
 }
 
 // The stages of a frame in their order: taking it from the source, those of maq_densepose_stats, and all of it.
-constexpr const char* kStages[] = {"capture",  "preprocess", "detector", "proposals",
-                                   "box_head", "dense_head", "decode",   "frame"};
+constexpr const char* kStages[] = {"capture",  "preprocess", "trunk",  "proposals",
+                                   "box_head", "dense_head", "decode", "frame"};
 constexpr size_t kStageCount = std::size(kStages);
 
 // One source with the times of its frames.
@@ -83,8 +80,8 @@ class Scene {
     if (!counted) return total_ms;
 
     const double values[kStageCount] = {
-        ms_between(start, taken), stats.preprocess_ms, stats.detector_ms, stats.proposals_ms,
-        stats.box_head_ms,        stats.dense_head_ms, stats.decode_ms,   total_ms};
+        ms_between(start, taken), stats.preprocess_ms, stats.trunk_ms,  stats.proposals_ms,
+        stats.box_head_ms,        stats.dense_head_ms, stats.decode_ms, total_ms};
     for (size_t i = 0; i < kStageCount; ++i) ms_[i].push_back(values[i]);
     seconds_ += total_ms / 1e3;
     cpu_s_ += own_processor_seconds() - cpu_before_s;
@@ -186,18 +183,10 @@ void print_table(const std::vector<std::unique_ptr<Scene>>& scenes) {
 }
 
 int run_bench(const Options& options) {
-  const std::string bundle = options.bundle.empty() ? default_bundle() : options.bundle;
-  if (bundle.empty()) {
-    throw std::runtime_error("No model bundle was found; name its folder with --bundle or MAQ_BUNDLE.");
-  }
+  const std::string bundle = bundle_of(options.model);
   const auto start = Clock::now();
   const maquette::Context context;
-  maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = bundle.c_str();
-  config.threads = options.threads;
-  config.long_side_px = options.size;
-  config.score_threshold = options.threshold;
-  maquette::DensePose densepose(context, config);
+  maquette::DensePose densepose(context, config_of(options.model, bundle));
   const double create_ms = ms_between(start, Clock::now());
 
   std::vector<std::unique_ptr<Scene>> scenes;
@@ -224,6 +213,7 @@ int run_bench(const Options& options) {
       if (!unfinished(*scene)) continue;
       any = true;
       scene->pause();
+      densepose.restart();
       for (int i = 0; i < kBlock && stop_asked == 0; ++i) scene->run(densepose, true);
       done += kBlock;
       progress.advance(done, scene->uri());
@@ -241,29 +231,33 @@ int run_bench(const Options& options) {
     std::snprintf(text, sizeof text, "other processes had %.0f %% of the processor", 100 * others);
     reasons.emplace_back(text);
   }
-  nlohmann::ordered_json document = {{"schema", kSchema},
-                                     {"machine", machine},
-                                     {"build",
-                                      {{"sdk", maq_sdk_version()},
-                                       {"commit", maq_git_commit()},
-                                       {"options", maq_build_options()},
-                                       {"onnxruntime", context.onnxruntime_version()}}},
-                                     {"bundle", bundle},
-                                     {"settings",
-                                      {{"threads", options.threads},
-                                       {"size", options.size},
-                                       {"threshold", options.threshold},
-                                       {"warm_up", options.warm_up},
-                                       {"runs", options.runs},
-                                       {"seconds", options.seconds}}},
-                                     {"create_ms", create_ms},
-                                     {"first_frame_ms", first_frame_ms},
-                                     {"start_to_first_result_ms", first_result_ms},
-                                     {"peak_memory_mib", double(peak_memory_bytes()) / kMibibyte},
-                                     {"others_share", others},
-                                     {"valid", reasons.empty()},
-                                     {"doubts", reasons},
-                                     {"scenes", nlohmann::ordered_json::array()}};
+  nlohmann::ordered_json document;
+  document["schema"] = kSchema;
+  document["machine"] = machine;
+  document["build"] = {{"sdk", maq_sdk_version()},
+                       {"commit", maq_git_commit()},
+                       {"options", maq_build_options()},
+                       {"onnxruntime", context.onnxruntime_version()}};
+  document["bundle"] = bundle;
+  document["settings"] = {{"threads", options.model.threads},
+                          {"size", options.model.size},
+                          {"threshold", options.model.threshold},
+                          {"max_proposals", options.model.max_proposals},
+                          {"key_frames", options.model.key_frames},
+                          {"least_person", options.model.least_person},
+                          {"surface", !options.model.no_surface},
+                          {"spin", !options.model.no_spin},
+                          {"warm_up", options.warm_up},
+                          {"runs", options.runs},
+                          {"seconds", options.seconds}};
+  document["create_ms"] = create_ms;
+  document["first_frame_ms"] = first_frame_ms;
+  document["start_to_first_result_ms"] = first_result_ms;
+  document["peak_memory_mib"] = double(peak_memory_bytes()) / kMibibyte;
+  document["others_share"] = others;
+  document["valid"] = reasons.empty();
+  document["doubts"] = reasons;
+  document["scenes"] = nlohmann::ordered_json::array();
   for (const auto& scene : scenes) document["scenes"].push_back(scene->json(options));
 
   print_table(scenes);
@@ -291,14 +285,7 @@ void add_bench_command(CLI::App& app, int* exit_code) {
   command->add_option("source", options->sources,
                       "Images, clips or URIs, measured in turns; default: one, four and no people of stub:people");
   command->add_option("--json", options->json, "Also write everything to this file (docs/formats.md, \"Benchmarks\")");
-  command->add_option("--bundle", options->bundle,
-                      "Model bundle folder; else MAQ_BUNDLE, else the one that came with this program");
-  command->add_option("--size", options->size, "Long side of the network's input in pixels")
-      ->check(CLI::Range(32, 2048));
-  command->add_option("--threshold", options->threshold, "Score that a person must exceed")
-      ->check(CLI::Range(0.0f, 1.0f));
-  command->add_option("--threads", options->threads, "Threads of the networks; default: the cores, at most 4")
-      ->check(CLI::Range(1, 64));
+  add_model_options(*command, options->model);
   command->add_option("--warm-up", options->warm_up, "Frames of each source that are not counted (default 10)")
       ->check(CLI::Range(0, 100000));
   command->add_option("--runs", options->runs, "Frames of each source, at least (default 100)")

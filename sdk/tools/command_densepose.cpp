@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "bundle_argument.h"
 #include "commands.h"
+#include "model_options.h"
 #include "overlay.h"
 #include "overlay_clip.h"
 #include "progress_bar.h"
@@ -26,13 +26,10 @@ constexpr int64_t kFramesOfEndlessSource = 100;
 
 struct Options {
   std::vector<std::string> sources;
-  std::string bundle;
+  ModelOptions model;
   std::string out;
   bool overlay = false;
   bool json = false;
-  int size = 0;
-  float threshold = -1;
-  int threads = 0;
   int64_t max_frames = 0;
   int64_t every = 1;
 };
@@ -44,8 +41,8 @@ volatile std::sig_atomic_t stop_asked = 0;
 class Timings {
  public:
   void add(const maq_densepose_stats& stats) {
-    const float values[] = {stats.preprocess_ms, stats.detector_ms, stats.proposals_ms, stats.box_head_ms,
-                            stats.dense_head_ms, stats.decode_ms,   stats.total_ms};
+    const float values[] = {stats.preprocess_ms, stats.trunk_ms,  stats.proposals_ms, stats.box_head_ms,
+                            stats.dense_head_ms, stats.decode_ms, stats.total_ms};
     for (size_t i = 0; i < kStages; ++i) ms_[i].push_back(values[i]);
     people_ += stats.people;
   }
@@ -58,7 +55,7 @@ class Timings {
     std::printf("%zu frame%s, %lld %s. Median of a frame: %.1f ms (%.1f FPS)\n", frames(), frames() == 1 ? "" : "s",
                 (long long)people_, people_ == 1 ? "person" : "people", double(median_total_ms()),
                 1000.0 / std::max(1e-3, double(median_total_ms())));
-    constexpr const char* kNames[] = {"preprocess", "detector", "proposals", "box head", "dense head", "decode"};
+    constexpr const char* kNames[] = {"preprocess", "trunk", "proposals", "box head", "dense head", "decode"};
     for (size_t i = 0; i + 1 < kStages; ++i) {
       std::printf("%s%s %.1f", i == 0 ? "  " : " | ", kNames[i], double(median(ms_[i])));
     }
@@ -99,11 +96,12 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
     const nlohmann::ordered_json line = {{"frame", stem},
                                          {"timestamp_ns", desc.timestamp_ns},
                                          {"people", stats.people},
+                                         {"key_frame", stats.key_frame != 0},
                                          {"proposals", stats.proposals},
                                          {"network", {stats.network_width_px, stats.network_height_px}},
                                          {"ms",
                                           {{"preprocess", stats.preprocess_ms},
-                                           {"detector", stats.detector_ms},
+                                           {"trunk", stats.trunk_ms},
                                            {"proposals", stats.proposals_ms},
                                            {"box_head", stats.box_head_ms},
                                            {"dense_head", stats.dense_head_ms},
@@ -120,6 +118,7 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
 void run_source(const Options& options, const SourceArgument& argument, const maquette::Context& context,
                 maquette::DensePose& densepose, Timings& timings) {
   maquette::Source source(context, argument.uri);
+  densepose.restart();
   const maq_source_info info = source.info();
   const bool is_clip = info.frame_count != 1;
   int64_t limit = options.max_frames;
@@ -173,17 +172,9 @@ std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts)
 
 int run_densepose(const Options& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
-  const std::string bundle = options.bundle.empty() ? default_bundle() : options.bundle;
-  if (bundle.empty()) {
-    throw std::runtime_error("No model bundle was found; name its folder with --bundle or MAQ_BUNDLE.");
-  }
+  const std::string bundle = bundle_of(options.model);
   const maquette::Context context;
-  maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = bundle.c_str();
-  config.threads = options.threads;
-  config.long_side_px = options.size;
-  config.score_threshold = options.threshold;
-  maquette::DensePose densepose(context, config);
+  maquette::DensePose densepose(context, config_of(options.model, bundle));
 
   std::signal(SIGINT, [](int) { stop_asked = 1; });
   Timings timings;
@@ -217,14 +208,7 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
   command->add_flag("--overlay", options->overlay,
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
   command->add_flag("--json", options->json, "Print one JSON line a frame with counts and times, instead of text");
-  command->add_option("--bundle", options->bundle,
-                      "Model bundle folder; else MAQ_BUNDLE, else the one that came with this program");
-  command->add_option("--size", options->size, "Long side of the network's input in pixels; larger is finer and slower")
-      ->check(CLI::Range(32, 2048));
-  command->add_option("--threshold", options->threshold, "Score that a person must exceed")
-      ->check(CLI::Range(0.0f, 1.0f));
-  command->add_option("--threads", options->threads, "Threads of the networks; default: the cores, at most 4")
-      ->check(CLI::Range(1, 64));
+  add_model_options(*command, options->model);
   command
       ->add_option("--max-frames", options->max_frames,
                    "Stop after so many frames; default: all, and 100 of a source without end")

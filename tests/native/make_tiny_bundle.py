@@ -19,7 +19,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 CHANNELS = 3
 POOL, DENSE_POOL, OUTPUT = 7, 32, 64
-COARSE, INDEX = 15, 25
+COARSE, INDEX, SURFACE = 15, 25, 4
 
 
 def tensor(name, value):
@@ -40,17 +40,26 @@ def graph(name, nodes, inputs, outputs, constants):
     return model, inputs, outputs
 
 
-def detector():
-    """Features are mean colours; objectness is 20 where the level's colour fills a cell and -20 where it is absent."""
-    nodes, constants, outputs = [], [], []
+def features(levels):
+    return [(f"p{level}", [1, CHANNELS, f"h{level}", f"w{level}"]) for level in levels]
+
+
+def trunk():
+    """Features are mean colours."""
+    nodes = []
     for level in range(2, 6):
         size = 2**level
         nodes.append(
             helper.make_node("AveragePool", ["image"], [f"p{level}"], kernel_shape=[size] * 2, strides=[size] * 2)
         )
-        outputs.append((f"p{level}", [1, CHANNELS, f"height/{size}", f"width/{size}"]))
     nodes.append(helper.make_node("MaxPool", ["p5"], ["p6"], kernel_shape=[1, 1], strides=[2, 2]))
-    for level in range(2, 7):
+    return graph("trunk", nodes, [("image", [1, 3, "height", "width"])], features(range(2, 7)), [])
+
+
+def rpn(name, levels):
+    """Objectness is 20 where the level's colour fills a cell and -20 where it is absent."""
+    nodes, constants = [], []
+    for level in levels:
         weight = np.zeros((3, CHANNELS, 1, 1), np.float32)
         if level <= 4:
             weight[1, level - 2] = 40  # anchor 1 is the square one; colours in the order R, G, B
@@ -65,11 +74,9 @@ def detector():
             ),
             helper.make_node("Conv", [f"p{level}", f"deltas{level}.weight"], [f"deltas{level}"]),
         ]
-    for level in range(2, 7):
-        outputs.append((f"objectness{level}", [1, 3, f"h{level}", f"w{level}"]))
-    for level in range(2, 7):
-        outputs.append((f"deltas{level}", [1, 12, f"h{level}", f"w{level}"]))
-    return graph("detector", nodes, [("image", [1, 3, "height", "width"])], outputs, constants)
+    outputs = [(f"objectness{level}", [1, 3, f"h{level}", f"w{level}"]) for level in levels]
+    outputs += [(f"deltas{level}", [1, 12, f"h{level}", f"w{level}"]) for level in levels]
+    return graph(name, nodes, features(levels), outputs, constants)
 
 
 def box_head():
@@ -106,31 +113,41 @@ def dense_head():
     index = np.full((1, INDEX, 1, OUTPUT), -100, np.float32)
     index[0, 3, 0] = -ramp
     index[0, 7, 0] = ramp
-    u = np.tile(0.5 + 0.61 * ramp, (1, INDEX, 1, 1)).astype(np.float32)
-    v = np.tile(0.5 + 0.5 * ramp, (1, INDEX, 1, 1)).transpose(0, 1, 3, 2).astype(np.float32)
-    nodes = [
-        helper.make_node("Shape", ["rois"], ["people"], start=0, end=1),
-        helper.make_node("Concat", ["people", "coarse.rest"], ["coarse.shape"], axis=0),
-        helper.make_node("Concat", ["people", "index.rest"], ["index.shape"], axis=0),
-    ]
-    constants = [
-        tensor("coarse.rest", np.array([COARSE, OUTPUT, OUTPUT], np.int64)),
-        tensor("index.rest", np.array([INDEX, OUTPUT, OUTPUT], np.int64)),
-    ]
-    for name, value in (("coarse", coarse), ("index", index), ("u", u), ("v", v)):
-        constants.append(tensor(f"{name}.value", value))
-        shape = "coarse.shape" if name == "coarse" else "index.shape"
-        nodes.append(helper.make_node("Expand", [f"{name}.value", shape], [name]))
+    # A cell of `surface` is four of the output. U of its even and of its odd columns, V of its even and its odd rows.
+    surface = np.zeros((1, SURFACE, DENSE_POOL, DENSE_POOL), np.float32)
+    for parity in (0, 1):
+        surface[0, parity] = 0.61 * ramp[parity::2]
+        surface[0, 2 + parity] = 0.5 * ramp[parity::2, None]
+    sizes = {"coarse": [COARSE, OUTPUT, OUTPUT], "index": [INDEX, OUTPUT, OUTPUT]}
+    sizes["surface"] = [SURFACE, DENSE_POOL, DENSE_POOL]
+    nodes = [helper.make_node("Shape", ["rois"], ["people"], start=0, end=1)]
+    constants = []
+    for name, value in (("coarse", coarse), ("index", index), ("surface", surface)):
+        constants += [tensor(f"{name}.rest", np.array(sizes[name], np.int64)), tensor(f"{name}.value", value)]
+        nodes += [
+            helper.make_node("Concat", ["people", f"{name}.rest"], [f"{name}.shape"], axis=0),
+            helper.make_node("Expand", [f"{name}.value", f"{name}.shape"], [name]),
+        ]
     return graph(
         "dense_head",
         nodes,
         [("rois", ["people", CHANNELS, DENSE_POOL, DENSE_POOL])],
-        [
-            (name, ["people", COARSE if name == "coarse" else INDEX, OUTPUT, OUTPUT])
-            for name in ("coarse", "index", "u", "v")
-        ],
+        [(name, ["people", *size]) for name, size in sizes.items()],
         constants,
     )
+
+
+def charts():
+    """Weights [2, parts, 4, 4, SURFACE] and bias [2, parts] that take U and V from `surface` as they are, plus a half.
+
+    Kernel row (or column) 1 makes the even output rows of a cell, kernel row 2 the odd ones.
+    """
+    weight = np.zeros((2, INDEX - 1, 4, 4, SURFACE), np.float32)
+    for parity in (0, 1):
+        weight[0, :, 1:3, 1 + parity, parity] = 1
+        weight[1, :, 1 + parity, 1:3, 2 + parity] = 1
+    bias = np.full((2, INDEX - 1), 0.5, np.float32)
+    return np.concatenate([weight.ravel(), bias.ravel()]).astype("<f4").tobytes()
 
 
 def main():
@@ -138,7 +155,9 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     files, graphs = {}, {}
     for name, (model, inputs, outputs) in (
-        ("detector", detector()),
+        ("trunk", trunk()),
+        ("rpn_fine", rpn("rpn_fine", range(2, 3))),
+        ("rpn_coarse", rpn("rpn_coarse", range(3, 7))),
         ("box_head", box_head()),
         ("dense_head", dense_head()),
     ):
@@ -151,9 +170,11 @@ def main():
             "inputs": [{"name": n, "type": "float32", "shape": s} for n, s in inputs],
             "outputs": [{"name": n, "type": "float32", "shape": s} for n, s in outputs],
         }
+    (folder / "charts.f32").write_bytes(charts())
+    files["charts.f32"] = {"sha256": hashlib.sha256(charts()).hexdigest(), "bytes": len(charts())}
     manifest = {
         "format": "maquette-bundle",
-        "format_version": 1,
+        "format_version": 2,
         "name": "tiny",
         "version": "1",
         "task": "densepose",
@@ -182,6 +203,7 @@ def main():
         "dense_head": {
             "pool": DENSE_POOL,
             "stride": 4,
+            "charts": "charts.f32",
             "output": OUTPUT,
             "coarse_classes": COARSE,
             "index_classes": INDEX,

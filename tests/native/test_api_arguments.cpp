@@ -60,6 +60,7 @@ TEST_F(ApiArguments, NullHandlesAreRefusedByName) {
                "frame is NULL");
   expect_error(maq_densepose_create(nullptr, &config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "context is NULL");
+  expect_error(maq_densepose_restart(nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
   expect_error(maq_densepose_run(nullptr, nullptr, &result), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
   expect_error(maq_densepose_result_size(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
   expect_error(maq_densepose_result_people(nullptr, &people, &count), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
@@ -162,6 +163,11 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   expect_refused("score_threshold", [](auto& config) { config.score_threshold = std::stof("nan"); });
   expect_refused("max_people", [](auto& config) { config.max_people = 256; });
   expect_refused("result_pool_size", [](auto& config) { config.result_pool_size = 0; });
+  expect_refused("max_proposals", [](auto& config) { config.max_proposals = 1001; });
+  expect_refused("key_frame_interval", [](auto& config) { config.key_frame_interval = 0; });
+  expect_refused("least_person_px", [](auto& config) { config.least_person_px = -1; });
+  expect_refused("detail", [](auto& config) { config.detail = maq_densepose_detail(std::stoi("2")); });
+  expect_refused("spin", [](auto& config) { config.spin = 2; });
 }
 
 TEST_F(ApiArguments, ErrorsWithoutAHandleAreOfTheThread) {
@@ -189,10 +195,10 @@ TEST_F(ApiArguments, TheVersionOfHeadersAndLibraryAgree) {
 static_assert(sizeof(void*) != 8 || sizeof(maq_context_config) == 32, "");
 static_assert(sizeof(maq_source_config) == 8, "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
-static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 32, "");
+static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 56, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 20, "");
-static_assert(sizeof(maq_densepose_stats) == 72, "");
+static_assert(sizeof(maq_densepose_stats) == 80, "");
 static_assert(MAQ_END_OF_STREAM == 13 && MAQ_PIXEL_YUYV == 6 && MAQ_PLANE_PERSON == 4, "");
 
 }  // namespace

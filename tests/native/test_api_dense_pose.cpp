@@ -47,7 +47,7 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
   EXPECT_EQ(stats.people, 1);
   EXPECT_EQ(stats.network_width_px, 320);
   EXPECT_GT(stats.total_ms, 0);
-  EXPECT_GE(stats.total_ms, stats.detector_ms);
+  EXPECT_GE(stats.total_ms, stats.trunk_ms);
   const uint8_t* pixels = nullptr;
   EXPECT_EQ(maq_densepose_result_plane(result.get(), maq_densepose_plane(5), &pixels, &stride),
             MAQ_ERROR_INVALID_ARGUMENT);
@@ -89,13 +89,13 @@ TEST(ApiDensePose, EachThreadCanHaveItsOwnAndShareTheContext) {
 TEST(ApiDensePose, ADamagedBundleIsAStatusOfTheContext) {
   const maquette::Context context;
   const BundleCopy bundle;
-  bundle.flip_byte("detector.onnx");
+  bundle.flip_byte("trunk.onnx");
   maq_densepose_config config = maquette::default_densepose_config();
   const std::string path = bundle.path();
   config.bundle_path = path.c_str();
   maq_densepose* densepose = nullptr;
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_BAD_BUNDLE);
-  EXPECT_NE(std::string(maq_last_error(context.get())).find("detector.onnx"), std::string::npos);
+  EXPECT_NE(std::string(maq_last_error(context.get())).find("trunk.onnx"), std::string::npos);
   config.bundle_path = "/no/such/bundle";
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_NOT_FOUND);
   EXPECT_EQ(densepose, nullptr);

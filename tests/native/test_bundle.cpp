@@ -15,7 +15,7 @@ std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime() {
 
 void load(const BundleCopy& bundle) {
   const maq::Bundle read = maq::read_bundle(bundle.path());
-  const maq::DensePose densepose(runtime(), read, {1, 0, -1, 0});
+  const maq::DensePose densepose(runtime(), read, {});
 }
 
 // Puts `content` in place of a file and its hash into the manifest, as one who makes a bundle could.
@@ -35,7 +35,7 @@ TEST(Bundle, AMissingFolderOrManifestIsNotFound) {
 }
 
 TEST(Bundle, AChangedByteIsSeen) {
-  for (const char* name : {"detector.onnx", "box_head.onnx", "dense_head.onnx"}) {
+  for (const char* name : {"trunk.onnx", "box_head.onnx", "dense_head.onnx"}) {
     const BundleCopy bundle;
     bundle.flip_byte(name);
     expect_error(MAQ_ERROR_BAD_BUNDLE, std::string(name) + " has SHA-256", [&] { load(bundle); });
@@ -44,8 +44,8 @@ TEST(Bundle, AChangedByteIsSeen) {
 
 TEST(Bundle, ACutOrMissingFileIsSeen) {
   const BundleCopy cut, missing;
-  const std::string bytes = read_text(cut.file("detector.onnx"));
-  write_text(cut.file("detector.onnx"), bytes.substr(0, bytes.size() - 1));
+  const std::string bytes = read_text(cut.file("trunk.onnx"));
+  write_text(cut.file("trunk.onnx"), bytes.substr(0, bytes.size() - 1));
   expect_error(MAQ_ERROR_BAD_BUNDLE, "incomplete", [&] { load(cut); });
   std::filesystem::remove(missing.file("box_head.onnx"));
   expect_error(MAQ_ERROR_BAD_BUNDLE, "box_head.onnx is missing", [&] { load(missing); });
@@ -53,8 +53,8 @@ TEST(Bundle, ACutOrMissingFileIsSeen) {
 
 TEST(Bundle, AFileThatIsNoNetworkIsSeen) {
   const BundleCopy bundle;
-  replace_file(bundle, "detector.onnx", "no network, but its hash is right");
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "detector.onnx cannot be loaded", [&] { load(bundle); });
+  replace_file(bundle, "trunk.onnx", "no network, but its hash is right");
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "trunk.onnx cannot be loaded", [&] { load(bundle); });
 }
 
 TEST(Bundle, WeightsInAnotherFileAreRefused) {
@@ -84,19 +84,19 @@ TEST(Bundle, AShapeThatIsNotTheManifestsIsSeen) {
 TEST(Bundle, AMissingTensorIsSeenInTheGraphAndInTheManifest) {
   const BundleCopy in_graph, in_manifest;
   nlohmann::json manifest = in_graph.manifest();
-  manifest["graphs"]["detector"]["outputs"][0]["name"] = "p7";
+  manifest["graphs"]["trunk"]["outputs"][0]["name"] = "p7";
   in_graph.write_manifest(manifest);
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "no output p2", [&] { load(in_graph); });
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "graph trunk lists no output p2", [&] { load(in_graph); });
   manifest = in_manifest.manifest();
-  manifest["graphs"]["detector"]["inputs"][0]["name"] = "picture";
+  manifest["graphs"]["trunk"]["inputs"][0]["name"] = "picture";
   in_manifest.write_manifest(manifest);
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "has no input picture", [&] { load(in_manifest); });
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "graph trunk lists no input image", [&] { load(in_manifest); });
 }
 
 TEST(Bundle, ATypeOtherThanFloatIsSeen) {
   const BundleCopy bundle;
   nlohmann::json manifest = bundle.manifest();
-  manifest["graphs"]["detector"]["inputs"][0]["type"] = "uint8";
+  manifest["graphs"]["trunk"]["inputs"][0]["type"] = "uint8";
   bundle.write_manifest(manifest);
   expect_error(MAQ_ERROR_BAD_BUNDLE, "must be float32", [&] { load(bundle); });
 }

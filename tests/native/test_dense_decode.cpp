@@ -15,6 +15,20 @@ using maq::DensePlanes;
 constexpr int kCoarse = 15, kIndex = 25;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
+// U and V from whole planes [parts, size, size], background first, as a network would give them.
+class Planes : public maq::ChartValues {
+ public:
+  Planes(const std::vector<float>& u, const std::vector<float>& v, int size) : u_(u), v_(v), size_(size) {}
+  maq::ChartPoint at(int part, int row, int column) override {
+    const size_t cell = size_t(((part + 1) * size_ + row) * size_ + column);
+    return {u_[cell], v_[cell]};
+  }
+
+ private:
+  const std::vector<float>&u_, &v_;
+  int size_;
+};
+
 struct Logits {
   explicit Logits(int cells)
       : coarse(size_t(kCoarse * cells * cells), 0.0f),
@@ -25,7 +39,9 @@ struct Logits {
   void fill(std::vector<float>& plane, int channel, float value) {
     std::fill_n(plane.begin() + channel * size * size, size * size, value);
   }
-  DenseLogits view() const { return {coarse.data(), index.data(), u.data(), v.data(), kCoarse, kIndex, size}; }
+  DenseLogits view(maq::ChartValues* charts) const {
+    return {coarse.data(), index.data(), charts, kCoarse, kIndex, size};
+  }
 
   std::vector<float> coarse, index, u, v;
   int size;
@@ -33,7 +49,8 @@ struct Logits {
 
 maq::DecodeCounts paint(const Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
                         float mask_threshold = 0.5f, float least_own_share = 0) {
-  return paint_person(logits.view(), box, person, mask_threshold, least_own_share, planes);
+  Planes charts(logits.u, logits.v, logits.size);
+  return paint_person(logits.view(&charts), box, person, mask_threshold, least_own_share, planes);
 }
 
 // The value of a bilinearly resized plane (half-pixel centres, edges repeated) in double.

@@ -21,7 +21,7 @@ class DensePose : public ::testing::Test {
     return {runtime_, maq::read_bundle(std::string(MAQ_TEST_DATA) + "/tiny_bundle"), settings};
   }
 
-  maq::DensePoseResult run(const cv::Mat& bgr, maq::DensePoseSettings settings = {1, 0, -1, 0}) {
+  maq::DensePoseResult run(const cv::Mat& bgr, maq::DensePoseSettings settings = {}) {
     maq::DensePoseResult result;
     make(settings).run({MAQ_PIXEL_BGR8, bgr.cols, bgr.rows, {{bgr.data, bgr.step}, {}}}, result);
     return result;
@@ -152,11 +152,84 @@ TEST_F(DensePose, ExtremeFramesGiveSaneResults) {
   }
 }
 
+TEST_F(DensePose, BetweenKeyFramesPeopleAreFollowedAndNobodyNewIsFound) {
+  maq::DensePoseSettings settings;
+  settings.key_frame_interval = 3;
+  maq::DensePose densepose = make(settings);
+  maq::DensePoseResult result;
+  const auto see = [&](const cv::Mat& image) {
+    densepose.run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    return result.people.size();
+  };
+  cv::Mat one = black(320, 256);
+  one(cv::Rect(80, 100, 4, 4)) = kRed;
+  cv::Mat two = one.clone();
+  two(cv::Rect(200, 128, 8, 8)) = kGreen;
+  EXPECT_EQ(see(one), 1u);
+  EXPECT_TRUE(result.stats.key_frame);
+  const float first_x0 = result.people[0].box.x0;
+  EXPECT_EQ(see(two), 1u);
+  EXPECT_FALSE(result.stats.key_frame);
+  EXPECT_EQ(result.stats.proposals, 1);
+  EXPECT_NEAR(result.people[0].box.x0, first_x0 + 3.2, 1e-3) << "this box head moves what it is given";
+  EXPECT_EQ(see(black(320, 256)), 0u) << "who is gone is not made up";
+  EXPECT_EQ(see(two), 2u);
+  EXPECT_TRUE(result.stats.key_frame);
+  EXPECT_EQ(see(black(160, 256)), 0u);
+  EXPECT_TRUE(result.stats.key_frame) << "another size is another stream";
+  EXPECT_EQ(see(black(160, 256)), 0u);
+  EXPECT_EQ(result.stats.trunk_ms, 0) << "with nobody to follow nothing runs";
+  expect_sane(result, 160, 256);
+  densepose.restart();
+  EXPECT_EQ(see(black(160, 256)), 0u);
+  EXPECT_TRUE(result.stats.key_frame);
+}
+
+TEST_F(DensePose, PeopleBelowTheLeastHeightMayBeMissedAndNobodyElse) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(80, 100, 4, 4)) = kRed;     // 32 px, found at the finest level
+  image(cv::Rect(200, 128, 8, 8)) = kGreen;  // 64 px
+  maq::DensePoseSettings settings;
+  settings.least_person_px = 70;  // sqrt(3 * 32 * 64) = 78 px
+  EXPECT_EQ(run(image, settings).people.size(), 2u);
+  settings.least_person_px = 90;
+  const maq::DensePoseResult result = run(image, settings);
+  ASSERT_EQ(result.people.size(), 1u);
+  EXPECT_NEAR(result.people[0].box.width(), 64, 1e-3);
+  cv::Mat small = black(160, 128);  // the same people, now 90 px count as 180
+  small(cv::Rect(40, 50, 2, 2)) = kRed;
+  settings.least_person_px = 45;
+  EXPECT_EQ(run(small, settings).people.size(), 0u);
+  settings.least_person_px = 35;
+  EXPECT_GT(run(small, settings).people.size(), 0u);
+}
+
+TEST_F(DensePose, PartsAloneAreTheSamePartsWithoutUAndV) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;
+  maq::DensePoseSettings settings;
+  settings.surface = false;
+  const maq::DensePoseResult whole = run(image), parts = run(image, settings);
+  EXPECT_EQ(parts.planes.part, whole.planes.part);
+  EXPECT_EQ(cv::countNonZero(parts.planes.u) + cv::countNonZero(parts.planes.v), 0);
+  EXPECT_EQ(parts.stats.decoded.clamped_uv, 0);
+}
+
+TEST_F(DensePose, ProposalsAreBounded) {
+  cv::Mat image = black(320, 256);
+  for (const int x : {40, 120, 200, 280}) image(cv::Rect(x, 100, 4, 4)) = kRed;
+  maq::DensePoseSettings settings;
+  settings.max_proposals = 3;
+  const maq::DensePoseResult result = run(image, settings);
+  EXPECT_EQ(result.stats.proposals, 3);
+  EXPECT_EQ(result.people.size(), 3u);
+}
+
 TEST_F(DensePose, TwoThreadsAndReusedMemoryGiveTheSameResult) {
   cv::Mat image(200, 300, CV_8UC3);
   cv::randu(image, 0, 256);
   const maq::ImageView view{MAQ_PIXEL_BGR8, 300, 200, {{image.data, image.step}, {}}};
-  maq::DensePose densepose = make({2, 0, -1, 0});
+  maq::DensePose densepose = make({2});
   maq::DensePoseResult first, again;
   densepose.run(view, first);
   densepose.run({MAQ_PIXEL_BGR8, 100, 50, {{image.data, image.step}, {}}}, again);

@@ -16,10 +16,12 @@ maq::Manifest parse(const json& document) { return maq::parse_manifest(document.
 TEST(Manifest, ReadsEveryField) {
   const maq::Manifest manifest = parse(tiny());
   EXPECT_EQ(manifest.name, "tiny");
-  EXPECT_EQ(manifest.files.size(), 3u);
-  EXPECT_EQ(manifest.graphs.at("detector").outputs.size(), 14u);
-  EXPECT_EQ(std::get<int64_t>(manifest.graphs.at("detector").outputs[0].shape[1]), 3);
-  EXPECT_EQ(std::get<std::string>(manifest.graphs.at("detector").inputs[0].shape[2]), "height");
+  EXPECT_EQ(manifest.files.size(), 6u);
+  EXPECT_EQ(manifest.graphs.at("trunk").outputs.size(), 5u);
+  EXPECT_EQ(manifest.graphs.at("rpn_coarse").inputs.size(), 4u);
+  EXPECT_EQ(manifest.dense_head.charts_file, "charts.f32");
+  EXPECT_EQ(std::get<int64_t>(manifest.graphs.at("trunk").outputs[0].shape[1]), 3);
+  EXPECT_EQ(std::get<std::string>(manifest.graphs.at("trunk").inputs[0].shape[2]), "height");
   EXPECT_EQ(manifest.input.long_side_px, 320);
   EXPECT_EQ(manifest.rpn.strides, (std::vector<int>{4, 8, 16, 32, 64}));
   EXPECT_FLOAT_EQ(manifest.box_head.delta_weights[2], 5);
@@ -77,8 +79,8 @@ TEST(Manifest, RefusesValuesOutOfRange) {
                                                 {"/dense_head/index_classes", 1000},
                                                 {"/dense_head/mask_threshold", 1},
                                                 {"/dense_head/least_own_share", 1.5},
-                                                {"/files/detector.onnx/sha256", "abc"},
-                                                {"/graphs/detector/file", "other.onnx"},
+                                                {"/files/trunk.onnx/sha256", "abc"},
+                                                {"/graphs/trunk/file", "other.onnx"},
                                                 {"/input/color", "BGR"}};
   for (const auto& [place, value] : wrong) {
     json changed = tiny();
@@ -90,16 +92,16 @@ TEST(Manifest, RefusesValuesOutOfRange) {
 TEST(Manifest, RefusesFilesOutsideItsFolder) {
   for (const char* name : {"../secret", "/etc/passwd", "a/b.onnx", ".."}) {
     json changed = tiny();
-    changed["files"][name] = changed["files"]["detector.onnx"];
+    changed["files"][name] = changed["files"]["trunk.onnx"];
     expect_error(MAQ_ERROR_BAD_BUNDLE, "not a plain file name", [&] { parse(changed); });
   }
 }
 
 TEST(Manifest, TellsOtherVersionsAndTasksFromDamage) {
   json newer = tiny(), other = tiny();
-  newer["format_version"] = 2;
+  newer["format_version"] = 3;
   other["task"] = "scene";
-  expect_error(MAQ_ERROR_UNSUPPORTED, "format version 2", [&] { parse(newer); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "format version 3", [&] { parse(newer); });
   expect_error(MAQ_ERROR_UNSUPPORTED, "scene", [&] { parse(other); });
 }
 

@@ -8,7 +8,7 @@ import onnx
 import pytest
 import torch
 
-from export.densepose import bundle, export_onnx
+from export.densepose import bundle, export_onnx, graphs
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 
@@ -40,9 +40,10 @@ def folder(net, tmp_path_factory):
     return folder
 
 
-def run(folder, graph, given):
+def run(folder, graph, *given):
     session = export_onnx.session(folder / f"{graph}.onnx")
-    return session.run(None, {session.get_inputs()[0].name: given.numpy()})
+    names = [value.name for value in session.get_inputs()]
+    return session.run(None, {name: tensor.numpy() for name, tensor in zip(names, given, strict=True)})
 
 
 def assert_close(expected, found):
@@ -54,26 +55,45 @@ def assert_close(expected, found):
 
 
 @pytest.mark.parametrize(("height", "width"), [(32, 32), (96, 160), (256, 320), (320, 224)])
-def test_detector_agrees_with_torch_at_any_size(net, folder, height, width):
+def test_trunk_and_rpn_agree_with_torch_at_any_size(net, folder, height, width):
     image = torch.randn(1, 3, height, width)
     with torch.no_grad():
-        expected = export_onnx.Detector(net)(image)
-    assert_close(expected, run(folder, "detector", image))
+        features, objectness, deltas = net.detector(image)
+    assert_close(features, run(folder, "trunk", image))
+    assert_close([objectness[0], deltas[0]], run(folder, "rpn_fine", features[0]))
+    assert_close([*objectness[1:], *deltas[1:]], run(folder, "rpn_coarse", *features[1:]))
 
 
 @pytest.mark.parametrize("people", [1, 7])
 def test_heads_agree_with_torch_for_any_number_of_people(net, folder, people):
-    for name, pool in (("box_head", 7), ("dense_head", 32)):
-        rois = torch.randn(people, WIDTH, pool, pool)
-        with torch.no_grad():
-            expected = getattr(net, name)(rois)
-        assert_close(expected, run(folder, name, rois))
+    with torch.no_grad():
+        rois = torch.randn(people, WIDTH, 7, 7)
+        assert_close(net.box_head(rois), run(folder, "box_head", rois))
+        rois = torch.randn(people, WIDTH, 32, 32)
+        surface = net.dense_head.surface(rois)
+        assert_close([*net.dense_head(rois)[:2], surface], run(folder, "dense_head", rois))
+
+
+def test_a_bundle_opens_as_what_decoding_works_with(net, folder):
+    opened = graphs.open_bundle(folder)
+    image, rois = torch.randn(1, 3, 96, 160), torch.randn(2, WIDTH, 32, 32)
+    with torch.no_grad():
+        expected, found = net.detector(image), opened.graphs.detector(image)
+        maps = net.dense_head(rois)
+    for tensors, arrays in zip(expected, found, strict=True):
+        assert_close(tensors, [array.numpy() for array in arrays])
+    *logits, u, v = opened.graphs.dense_head(rois)
+    assert_close(maps[:2], [array.numpy() for array in logits])
+    # The charts have no background: what the network says of it is nobody's.
+    assert_close([m[:, 1:] for m in maps[2:]], [u[:, 1:].numpy(), v[:, 1:].numpy()])
+    assert not u[:, 0].any()
+    assert opened.network.width == WIDTH
 
 
 def test_parity_on_pictures_is_measured_for_every_output(net, folder):
     image = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
     errors = export_onnx.parity(net, folder, [image])
-    assert len(errors) == 14 + 2 + 4
+    assert len(errors) == 5 + 2 + 8 + 2 + 5
     assert max(errors.values()) <= export_onnx.TOLERANCE
 
 
@@ -94,7 +114,8 @@ def test_no_batch_normalisation_is_left(folder):
 
 def test_manifest_signs_the_files_and_lists_their_tensors(folder):
     manifest = json.loads((folder / "manifest.json").read_text())
-    assert set(manifest["files"]) == {f"{name}.onnx" for name in bundle.GRAPHS} | {manifest["surface"]["file"]}
+    others = {manifest["surface"]["file"], manifest["dense_head"]["charts"]}
+    assert set(manifest["files"]) == {f"{name}.onnx" for name in bundle.GRAPHS} | others
     for name, entry in manifest["files"].items():
         data = (folder / name).read_bytes()
         assert entry == {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}

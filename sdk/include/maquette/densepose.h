@@ -11,14 +11,29 @@ extern "C" {
 typedef struct maq_densepose maq_densepose;
 typedef struct maq_densepose_result maq_densepose_result;
 
+/* What is computed of each pixel of a person. */
+typedef enum maq_densepose_detail {
+  MAQ_DETAIL_SURFACE = 0, /* part, U and V */
+  MAQ_DETAIL_PART = 1     /* part alone: faster; U and V stay 0 */
+} maq_densepose_detail;
+
+/* The later fields leave out work that a scene does not need. */
 typedef struct maq_densepose_config {
   uint32_t struct_size;
-  int32_t threads;           /* for the networks; 0 (default): the machine's cores, at most 4 */
-  const char* bundle_path;   /* folder with manifest.json; required. Copied. */
-  int32_t long_side_px;      /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
-  float score_threshold;     /* only people above it count, 0 to 1; negative (default): the bundle's */
-  int32_t max_people;        /* at most so many, best first, 1 to 255; 0 (default): the bundle's */
-  uint32_t result_pool_size; /* results the app may hold at once, 1 to 64; default 4 */
+  int32_t threads;            /* for the networks; 0 (default): the machine's cores, at most 4 */
+  const char* bundle_path;    /* folder with manifest.json; required. Copied. */
+  int32_t long_side_px;       /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
+  float score_threshold;      /* only people above it count, 0 to 1; negative (default): the bundle's */
+  int32_t max_people;         /* at most so many, best first, 1 to 255; 0 (default): the bundle's */
+  uint32_t result_pool_size;  /* results the app may hold at once, 1 to 64; default 4 */
+  int32_t max_proposals;      /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's. Fewer are faster
+                                and may miss people in a crowd. */
+  int32_t key_frame_interval; /* 1 (default): people are looked for in every frame. N, to 1000: in every N-th frame of a
+                                 stream; in between those found are followed, nobody new is, and frames without anybody
+                                 cost nothing. A frame of another size starts anew. */
+  int32_t least_person_px;    /* people less tall than this in the frame may be missed; 0 (default): nobody */
+  maq_densepose_detail detail; /* default MAQ_DETAIL_SURFACE */
+  int32_t spin;                /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
 } maq_densepose_config;
 
 /* One person. The box is in pixels of the frame: left, top, right, bottom, the latter two exclusive. */
@@ -39,11 +54,11 @@ typedef enum maq_densepose_plane {
 typedef struct maq_densepose_stats {
   uint32_t struct_size;
   float preprocess_ms; /* resize and normalise */
-  float detector_ms;   /* detector network */
-  float proposals_ms;  /* anchors, top-k, NMS */
+  float trunk_ms;      /* backbone and neck: features of the whole image */
+  float proposals_ms;  /* region proposal network, top-k, NMS */
   float box_head_ms;   /* RoIAlign, box network, NMS */
   float dense_head_ms; /* RoIAlign, dense network */
-  float decode_ms;     /* logits to planes */
+  float decode_ms;     /* logits to planes, with U and V */
   float total_ms;
   int32_t network_width_px; /* the resized image, without padding */
   int32_t network_height_px;
@@ -52,6 +67,7 @@ typedef struct maq_densepose_stats {
   int32_t dropped_boxes; /* boxes with NaN, or with no area inside the frame */
   int64_t body_pixels;   /* pixels that belong to somebody */
   int64_t clamped_uv;    /* of these, pixels where the network's U or V was outside 0 to 1 */
+  int32_t key_frame;     /* 1: people were looked for; 0: those of the frame before were followed */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
@@ -73,6 +89,10 @@ MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
  * maq_densepose_result_release. Without people no head network runs and the planes are zero.
  * One at a time. Errors: MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the networks run. */
 MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
+
+/* Forgets whom it followed: the next frame is a key frame, of another stream. Only of use with key_frame_interval
+ * above 1. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_densepose_restart(maq_densepose* densepose);
 
 /* Gives the result back (NULL is fine). Pointers into it are invalid afterwards.
  * Once for each result, from any thread. Does not block. */

@@ -211,6 +211,8 @@ class DensePose {
     return DensePoseResult(result);
   }
 
+  void restart() { check(maq_densepose_restart(get()), get()); }
+
  private:
   void create(const Context& context, const maq_densepose_config& config) {
     maq_densepose* made = nullptr;

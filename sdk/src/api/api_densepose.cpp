@@ -16,6 +16,9 @@ maq_densepose_config default_config() {
   config.struct_size = sizeof config;
   config.score_threshold = -1;
   config.result_pool_size = 4;
+  config.key_frame_interval = 1;
+  config.detail = MAQ_DETAIL_SURFACE;
+  config.spin = 1;
   return config;
 }
 
@@ -26,9 +29,23 @@ DensePoseSettings checked_settings(const maq_densepose_config& config) {
   if (!(config.score_threshold < 0)) require_range("config.score_threshold", config.score_threshold, 0.0f, 1.0f);
   if (config.max_people != 0) require_range("config.max_people", config.max_people, 1, 255);
   require_range("config.result_pool_size", config.result_pool_size, 1u, 64u);
+  if (config.max_proposals != 0) require_range("config.max_proposals", config.max_proposals, 1, 1000);
+  require_range("config.key_frame_interval", config.key_frame_interval, 1, 1000);
+  require_range("config.least_person_px", config.least_person_px, 0, 100000);
+  require_range("config.detail", int(config.detail), int(MAQ_DETAIL_SURFACE), int(MAQ_DETAIL_PART));
+  require_range("config.spin", config.spin, 0, 1);
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
-  return {config.threads > 0 ? config.threads : int(std::min(cores, kMostDefaultThreads)), config.long_side_px,
-          config.score_threshold, config.max_people};
+  DensePoseSettings settings;
+  settings.threads = config.threads > 0 ? config.threads : int(std::min(cores, kMostDefaultThreads));
+  settings.long_side_px = config.long_side_px;
+  settings.score_threshold = config.score_threshold;
+  settings.max_people = config.max_people;
+  settings.max_proposals = config.max_proposals;
+  settings.key_frame_interval = config.key_frame_interval;
+  settings.least_person_px = config.least_person_px;
+  settings.surface = config.detail == MAQ_DETAIL_SURFACE;
+  settings.spin = config.spin == 1;
+  return settings;
 }
 
 }  // namespace
@@ -68,6 +85,14 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     }
     handle->result = pooled;
     *result = handle.release();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_restart(maq_densepose* densepose) {
+  return guarded(densepose, __func__, [&] {
+    require_argument(densepose, "densepose");
+    densepose->densepose->restart();
     return MAQ_OK;
   });
 }
@@ -115,7 +140,7 @@ maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_de
     const DensePoseStats& from = result->result->stats;
     maq_densepose_stats filled{};
     filled.preprocess_ms = from.preprocess_ms;
-    filled.detector_ms = from.detector_ms;
+    filled.trunk_ms = from.trunk_ms;
     filled.proposals_ms = from.proposals_ms;
     filled.box_head_ms = from.box_head_ms;
     filled.dense_head_ms = from.dense_head_ms;
@@ -128,6 +153,7 @@ maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_de
     filled.dropped_boxes = from.dropped_boxes;
     filled.body_pixels = from.decoded.body_pixels;
     filled.clamped_uv = from.decoded.clamped_uv;
+    filled.key_frame = from.key_frame ? 1 : 0;
     write_struct(stats, "stats", filled, sizeof(maq_densepose_stats));
     return MAQ_OK;
   });

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+
+#include "core/simd_clones.h"
 
 namespace maq {
 namespace {
@@ -109,6 +112,33 @@ float bilinear(const float* plane, int size, const Tap& row, const Tap& col) {
   return left + (right - left) * col.fraction;
 }
 
+// U and V between the four cells around a pixel. Neighbouring pixels mostly lie between the same ones.
+class ChartSampler {
+ public:
+  ChartSampler(ChartValues& charts, const Tap& row) : charts_(charts), row_(row) {}
+
+  ChartPoint at(int part, const Tap& col) {
+    if (part != part_ || col.low != column_) {
+      part_ = part;
+      column_ = col.low;
+      left_ = between(charts_.at(part, row_.low, col.low), charts_.at(part, row_.high, col.low), row_.fraction);
+      right_ = between(charts_.at(part, row_.low, col.high), charts_.at(part, row_.high, col.high), row_.fraction);
+    }
+    return between(left_, right_, col.fraction);
+  }
+
+ private:
+  static ChartPoint between(const ChartPoint& a, const ChartPoint& b, float fraction) {
+    return {a.u + (b.u - a.u) * fraction, a.v + (b.v - a.v) * fraction};
+  }
+
+  ChartValues& charts_;
+  const Tap& row_;
+  int part_ = -1;
+  int column_ = -1;
+  ChartPoint left_, right_;
+};
+
 // 0 to 255; NaN becomes 0.
 uint8_t to_byte(float value, bool* clamped) {
   if (!(value >= 0.0f)) {
@@ -119,7 +149,7 @@ uint8_t to_byte(float value, bool* clamped) {
     *clamped = true;
     return 255;
   }
-  return uint8_t(std::lrint(value * 255.0f));
+  return uint8_t(value * 255.0f + 0.5f);
 }
 
 }  // namespace
@@ -136,8 +166,8 @@ PixelRect pixel_rect(const Box& box) {
   return {x, y, std::max(1, int(std::floor(box.x1)) - x), std::max(1, int(std::floor(box.y1)) - y)};
 }
 
-DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
-                          float least_own_share, DensePlanes& planes) {
+MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person,
+                                          float mask_threshold, float least_own_share, DensePlanes& planes) {
   DecodeCounts counts;
   int64_t taken = 0;  // pixels of the person that are somebody else's already
   const PixelRect rect = pixel_rect(box);
@@ -154,7 +184,9 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
   const int last_col = std::min(rect.width, planes.width_px - rect.x);
   for (int y = first_row; y < last_row; ++y) {
     const Tap& row = rows[size_t(y)];
-    parts.fill(logits.index + plane_size, row);
+    std::optional<ChartSampler> charts;
+    if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
+    bool filled = false;  // many rows of a box show nobody
     for (int x = first_col; x < last_col; ++x) {
       const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
       const Tap& col = cols[size_t(x)];
@@ -163,12 +195,17 @@ DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t per
         ++taken;
         continue;
       }
+      if (!filled) parts.fill(logits.index + plane_size, row);
+      filled = true;
       const int part = parts.best(col) + 1;
       if (part == 0) continue;
       bool clamped = false;
       planes.part[pixel] = uint8_t(part);
-      planes.u[pixel] = to_byte(bilinear(logits.u + size_t(part) * plane_size, logits.size, row, col), &clamped);
-      planes.v[pixel] = to_byte(bilinear(logits.v + size_t(part) * plane_size, logits.size, row, col), &clamped);
+      if (charts) {
+        const ChartPoint point = charts->at(part - 1, col);
+        planes.u[pixel] = to_byte(point.u, &clamped);
+        planes.v[pixel] = to_byte(point.v, &clamped);
+      }
       planes.person[pixel] = person;
       ++counts.body_pixels;
       counts.clamped_uv += clamped ? 1 : 0;

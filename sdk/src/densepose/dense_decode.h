@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "densepose/box.h"
+#include "densepose/chart_predictor.h"
 
 namespace maq {
 
@@ -12,8 +13,7 @@ namespace maq {
 struct DenseLogits {
   const float* coarse = nullptr;  // [coarse_classes, size, size]; class 0 is background
   const float* index = nullptr;   // [index_classes, size, size]; class 0 is background (not read), then the parts
-  const float* u = nullptr;       // [index_classes, size, size]
-  const float* v = nullptr;       // [index_classes, size, size]
+  ChartValues* charts = nullptr;  // U and V of the parts; null: they stay 0
   int coarse_classes = 0;
   int index_classes = 0;
   int size = 0;
@@ -41,7 +41,7 @@ PixelRect pixel_rect(const Box& box);
 
 // Paints where the coarse classes other than background together have a probability above `mask_threshold` (log-odds of
 // each cell, resized bilinearly with half-pixel centres to the box's pixels): the best part of the index logits, resized
-// alike (of equal ones the lowest; background is not asked), with its U and V, clamped to [0, 1]. Pixels that already
+// alike (of equal ones the lowest; background is not asked), with its U and V, resized alike and clamped to [0, 1]. Pixels that already
 // belong to somebody, and those outside the image, are left alone; where fewer than `least_own_share` of the person's
 // pixels remain, nothing is painted. `person` counts from 1.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,

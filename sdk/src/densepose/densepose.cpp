@@ -9,14 +9,18 @@
 namespace maq {
 namespace {
 
-// The order in which the networks' outputs are asked for and found again.
-const std::vector<std::string> kDetectorOutputs = {
-    "p2",          "p3",          "p4",      "p5",      "objectness2", "objectness3", "objectness4",
-    "objectness5", "objectness6", "deltas2", "deltas3", "deltas4",     "deltas5",     "deltas6"};
-constexpr size_t kFeatureLevels = 4;
-constexpr size_t kRpnLevels = 5;
-constexpr size_t kFirstObjectness = kFeatureLevels;
-constexpr size_t kFirstDeltas = kFirstObjectness + kRpnLevels;
+constexpr size_t kFeatureLevels = 4;  // P2 to P5, which the heads draw on
+constexpr size_t kRpnLevels = 5;      // P2 to P6
+constexpr int kFirstLevel = 2;
+
+// Names of tensors at the levels from `first` to `last`: "p3", "p4", …
+std::vector<std::string> at_levels(const std::vector<std::string>& names, int first, int last) {
+  std::vector<std::string> all;
+  for (const std::string& name : names) {
+    for (int level = first; level <= last; ++level) all.push_back(name + std::to_string(level));
+  }
+  return all;
+}
 
 class Stopwatch {
  public:
@@ -32,29 +36,25 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// The graph's spec with exactly these outputs, in this order; the manifest may list more, in any order.
-GraphSpec with_outputs(const Manifest& manifest, const std::string& graph, const std::vector<std::string>& names) {
-  GraphSpec spec = manifest.graphs.at(graph);
-  std::vector<TensorSpec> outputs;
+// Those of a graph's tensors that are called `names`, in this order; the manifest may list more, in any order.
+std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std::vector<std::string>& names,
+                              const std::string& where) {
+  std::vector<TensorSpec> chosen;
   for (const std::string& name : names) {
-    const auto found = std::find_if(spec.outputs.begin(), spec.outputs.end(),
-                                    [&](const TensorSpec& tensor) { return tensor.name == name; });
-    if (found == spec.outputs.end()) {
-      throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": graph ", graph, " lists no output ", name,
-                  ". Export the bundle again.");
-    }
-    outputs.push_back(*found);
+    const auto found =
+        std::find_if(tensors.begin(), tensors.end(), [&](const TensorSpec& tensor) { return tensor.name == name; });
+    if (found == tensors.end()) throw Error(MAQ_ERROR_BAD_BUNDLE, where, " ", name, ". Export the bundle again.");
+    chosen.push_back(*found);
   }
-  spec.outputs = std::move(outputs);
-  return spec;
+  return chosen;
 }
 
-int feature_channels(const Manifest& manifest, const GraphSpec& detector) {
-  const std::vector<Dimension>& shape = detector.outputs[0].shape;
+int feature_channels(const Manifest& manifest) {
+  const std::vector<Dimension>& shape = manifest.graphs.at("trunk").outputs[0].shape;
   const int64_t* channels = shape.size() == 4 ? std::get_if<int64_t>(&shape[1]) : nullptr;
   if (channels == nullptr) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name,
-                ": output p2 of the detector must have the shape [1, channels, h, w] with a number of channels. "
+                ": output p2 of the trunk must have the shape [1, channels, h, w] with a number of channels. "
                 "Export the bundle again.");
   }
   return int(*channels);
@@ -69,21 +69,40 @@ float first_of_two(const float* logits) { return 1.0f / (1.0f + std::exp(logits[
 
 DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle,
                      const DensePoseSettings& settings)
-    : manifest_(bundle.manifest), settings_(settings) {
+    : manifest_(bundle.manifest),
+      settings_(settings),
+      charts_(bundle.files.at(manifest_.dense_head.charts_file), manifest_.dense_head.index_classes - 1,
+              bundle.folder + "/" + manifest_.dense_head.charts_file) {
   if (settings_.long_side_px == 0) settings_.long_side_px = manifest_.input.long_side_px;
   if (settings_.score_threshold < 0) settings_.score_threshold = manifest_.box_head.score_threshold;
   if (settings_.max_people == 0) settings_.max_people = manifest_.box_head.max_people;
 
-  const auto make = [&](const std::string& graph, const std::vector<std::string>& outputs) {
-    GraphSpec spec = with_outputs(manifest_, graph, outputs);
-    if (graph == "detector") channels_ = feature_channels(manifest_, spec);
-    const std::vector<uint8_t>& bytes = bundle.files.at(spec.file);
-    const std::string name = bundle.folder + "/" + spec.file;
-    return std::make_unique<Session>(runtime, bytes, std::move(spec), name, settings_.threads);
+  if (settings_.max_proposals == 0) settings_.max_proposals = manifest_.rpn.post_nms_top_k;
+  manifest_.rpn.post_nms_top_k = settings_.max_proposals;
+
+  const auto make = [&](const std::string& graph, const std::vector<std::string>& inputs,
+                        const std::vector<std::string>& outputs) {
+    const std::string where = concatenate("Bundle ", manifest_.name, ": graph ", graph, " lists no ");
+    GraphSpec& spec = manifest_.graphs.at(graph);
+    spec.inputs = named(spec.inputs, inputs, where + "input");
+    spec.outputs = named(spec.outputs, outputs, where + "output");
+    return std::make_unique<Session>(runtime, bundle.files.at(spec.file), spec, bundle.folder + "/" + spec.file,
+                                     SessionSettings{settings_.threads, settings_.spin});
   };
-  detector_ = make("detector", kDetectorOutputs);
-  box_head_ = make("box_head", {"logits", "deltas"});
-  dense_head_ = make("dense_head", {"coarse", "index", "u", "v"});
+  const int last_level = kFirstLevel + int(kRpnLevels) - 1;
+  trunk_ = make("trunk", {"image"}, at_levels({"p"}, kFirstLevel, last_level));
+  channels_ = feature_channels(manifest_);
+  rpn_fine_ = make("rpn_fine", at_levels({"p"}, kFirstLevel, kFirstLevel),
+                   at_levels({"objectness", "deltas"}, kFirstLevel, kFirstLevel));
+  rpn_coarse_ = make("rpn_coarse", at_levels({"p"}, kFirstLevel + 1, last_level),
+                     at_levels({"objectness", "deltas"}, kFirstLevel + 1, last_level));
+  box_head_ = make("box_head", {"rois"}, {"logits", "deltas"});
+  dense_head_ = make("dense_head", {"rois"}, {"coarse", "index", "surface"});
+  if (manifest_.dense_head.output != 2 * manifest_.dense_head.pool) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest_.name, ": the dense head's output is ",
+                manifest_.dense_head.output, " cells wide, but must be twice its pool of ", manifest_.dense_head.pool,
+                ". Export the bundle again.");
+  }
 }
 
 void DensePose::run(const ImageView& image, DensePoseResult& result) {
@@ -93,76 +112,102 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
   result.people.clear();
   result.planes.reset(image.width_px, image.height_px);
 
-  make_network_input(
-      image, {settings_.long_side_px, manifest_.input.multiple_of, manifest_.input.mean, manifest_.input.std}, input_);
-  stats.network_width_px = input_.width_px;
-  stats.network_height_px = input_.height_px;
-  stats.preprocess_ms = stage.lap_ms();
+  const int width_before = input_.width_px;
+  const int height_before = input_.height_px;
+  network_size(image.width_px, image.height_px, settings_.long_side_px, &stats.network_width_px,
+               &stats.network_height_px);
+  const bool same_stream = stats.network_width_px == width_before && stats.network_height_px == height_before;
+  stats.key_frame = !same_stream || frames_since_key_ == 0;
+  frames_since_key_ = stats.key_frame ? 1 : frames_since_key_ + 1;
+  if (frames_since_key_ >= settings_.key_frame_interval) frames_since_key_ = 0;
+  if (stats.key_frame ||
+      !followed_.empty()) {  // else nobody was there, and nobody is looked for until the next key frame
+    make_network_input(image,
+                       {settings_.long_side_px, manifest_.input.multiple_of, manifest_.input.mean, manifest_.input.std},
+                       input_);
+    stats.preprocess_ms = stage.lap_ms();
 
-  const Pyramid pyramid = run_detector();
-  stats.detector_ms = stage.lap_ms();
+    run_trunk();
+    stats.trunk_ms = stage.lap_ms();
 
-  const std::vector<ScoredBox> proposals = select_proposals(pyramid.rpn, manifest_.rpn, float(input_.width_px),
-                                                            float(input_.height_px), &stats.dropped_boxes);
-  stats.proposals = int(proposals.size());
-  stats.proposals_ms = stage.lap_ms();
+    const std::vector<ScoredBox> proposals = stats.key_frame ? propose(image, &stats.dropped_boxes) : followed_;
+    followed_.clear();
+    stats.proposals = int(proposals.size());
+    stats.proposals_ms = stage.lap_ms();
 
-  const std::vector<ScoredBox> people =
-      proposals.empty() ? proposals : run_box_head(pyramid, proposals, &stats.dropped_boxes);
-  stats.box_head_ms = stage.lap_ms();
+    const std::vector<ScoredBox> people = proposals.empty() ? proposals : run_box_head(proposals, &stats.dropped_boxes);
+    stats.box_head_ms = stage.lap_ms();
 
-  if (!people.empty()) run_dense_head(pyramid, people, result);
+    if (!people.empty()) run_dense_head(people, result);
+  }
   stats.total_ms = total.lap_ms();
 }
 
-DensePose::Pyramid DensePose::run_detector() {
+void DensePose::restart() {
+  frames_since_key_ = 0;
+  followed_.clear();
+}
+
+void DensePose::run_trunk() {
   const int64_t height = input_.padded_height_px;
   const int64_t width = input_.padded_width_px;
   const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
-  const std::vector<int>& strides = manifest_.rpn.strides;
-  std::vector<std::vector<int64_t>> shapes;
-  for (size_t l = 0; l < kFeatureLevels; ++l) {
-    const int stride = manifest_.box_head.strides[l];
+  std::vector<Shape> shapes;
+  for (const int stride : manifest_.rpn.strides) {
     shapes.push_back({1, channels_, cells(height, stride), cells(width, stride)});
   }
-  for (const int64_t channels : {3, 12}) {
-    for (const int stride : strides) shapes.push_back({1, channels, cells(height, stride), cells(width, stride)});
-  }
-  Pyramid pyramid{detector_->run(input_.values.data(), {1, 3, height, width}, shapes), {}, {}};
+  pyramid_ = trunk_->run({{input_.values.data(), {1, 3, height, width}}}, shapes);
+  features_.clear();
   for (size_t l = 0; l < kFeatureLevels; ++l) {
-    const TensorView& map = pyramid.outputs[l];
-    pyramid.features.push_back(
-        {map.data, channels_, int(map.shape[2]), int(map.shape[3]), manifest_.box_head.strides[l]});
+    const TensorView& map = pyramid_[l];
+    features_.push_back({map.data, channels_, int(map.shape[2]), int(map.shape[3]), manifest_.box_head.strides[l]});
   }
-  for (size_t l = 0; l < kRpnLevels; ++l) {
-    const TensorView& objectness = pyramid.outputs[kFirstObjectness + l];
-    pyramid.rpn.push_back(
-        {objectness.data, pyramid.outputs[kFirstDeltas + l].data, int(objectness.shape[3]), int(objectness.shape[2])});
-  }
-  return pyramid;
+}
+
+std::vector<ScoredBox> DensePose::propose(const ImageView& image, int* dropped) {
+  std::vector<RpnLevel> levels(kRpnLevels);
+  // Runs a graph of the RPN on the levels from `first` on.
+  const auto ask = [&](Session& rpn, size_t first, size_t count) {
+    std::vector<TensorView> inputs(pyramid_.begin() + std::ptrdiff_t(first),
+                                   pyramid_.begin() + std::ptrdiff_t(first + count));
+    const int64_t anchors = int64_t(manifest_.rpn.aspect_ratios.size());
+    std::vector<Shape> shapes;
+    for (const int64_t values : {anchors, 4 * anchors}) {
+      for (const TensorView& map : inputs) shapes.push_back({1, values, map.shape[2], map.shape[3]});
+    }
+    const std::vector<TensorView>& found = rpn.run(inputs, shapes);
+    for (size_t l = 0; l < count; ++l) {
+      levels[first + l] = {found[l].data, found[count + l].data, int(inputs[l].shape[3]), int(inputs[l].shape[2])};
+    }
+  };
+  ask(*rpn_coarse_, 1, kRpnLevels - 1);
+  // The finest anchors are for boxes smaller than the geometric mean of their side and the next level's. Somebody who
+  // stands is about three times as high as wide, so that the box's side (root of its area) is height / sqrt(3).
+  const float scale = float(input_.height_px) / float(image.height_px);
+  const std::vector<float>& sizes = manifest_.rpn.anchor_sizes_px;
+  if (float(settings_.least_person_px) * scale < std::sqrt(3.0f * sizes[0] * sizes[1])) ask(*rpn_fine_, 0, 1);
+  return select_proposals(levels, manifest_.rpn, float(input_.width_px), float(input_.height_px), dropped);
 }
 
 // The larger the box, the coarser the level (Lin et al., Feature Pyramid Networks, 2017, equation 1).
-const FeatureMap& DensePose::level_for(const Pyramid& pyramid, const Box& box) const {
+const FeatureMap& DensePose::level_for(const Box& box) const {
   const BoxHeadSpec& spec = manifest_.box_head;
   const double level = std::floor(spec.canonical_level +
                                   std::log2(std::sqrt(double(box.area())) / double(spec.canonical_size_px) + 1e-8));
-  const int first_level = 2;
-  const int slot = int(std::clamp(level, double(first_level), double(first_level + kFeatureLevels - 1))) - first_level;
-  return pyramid.features[size_t(slot)];
+  const int slot = int(std::clamp(level, double(kFirstLevel), double(kFirstLevel + kFeatureLevels - 1))) - kFirstLevel;
+  return features_[size_t(slot)];
 }
 
-std::vector<ScoredBox> DensePose::run_box_head(const Pyramid& pyramid, const std::vector<ScoredBox>& proposals,
-                                               int* dropped) {
+std::vector<ScoredBox> DensePose::run_box_head(const std::vector<ScoredBox>& proposals, int* dropped) {
   const BoxHeadSpec& spec = manifest_.box_head;
   const int64_t count = int64_t(proposals.size());
   const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
   rois_.resize(size_t(count) * roi_size);
   for (size_t i = 0; i < proposals.size(); ++i) {
-    roi_align(level_for(pyramid, proposals[i].box), proposals[i].box, spec.pool, rois_.data() + i * roi_size);
+    roi_align(level_for(proposals[i].box), proposals[i].box, spec.pool, rois_.data() + i * roi_size);
   }
-  const NetworkOutputs outputs =
-      box_head_->run(rois_.data(), {count, channels_, spec.pool, spec.pool}, {{count, 2}, {count, 4}});
+  const std::vector<TensorView>& outputs =
+      box_head_->run({{rois_.data(), {count, channels_, spec.pool, spec.pool}}}, {{count, 2}, {count, 4}});
 
   std::vector<ScoredBox> found;
   for (size_t i = 0; i < proposals.size(); ++i) {
@@ -177,31 +222,31 @@ std::vector<ScoredBox> DensePose::run_box_head(const Pyramid& pyramid, const std
   return non_maximum_suppression(std::move(found), spec.nms_iou, size_t(settings_.max_people));
 }
 
-void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredBox>& people, DensePoseResult& result) {
+void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result) {
   Stopwatch stage;
   const DenseHeadSpec& spec = manifest_.dense_head;
   const int64_t count = int64_t(people.size());
   const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
   rois_.resize(size_t(count) * roi_size);
   for (size_t i = 0; i < people.size(); ++i) {
-    roi_align(pyramid.features[0], people[i].box, spec.pool, rois_.data() + i * roi_size);
+    roi_align(features_[0], people[i].box, spec.pool, rois_.data() + i * roi_size);
   }
-  const std::vector<int64_t> coarse_shape = {count, spec.coarse_classes, spec.output, spec.output};
-  const std::vector<int64_t> index_shape = {count, spec.index_classes, spec.output, spec.output};
-  const NetworkOutputs outputs = dense_head_->run(rois_.data(), {count, channels_, spec.pool, spec.pool},
-                                                  {coarse_shape, index_shape, index_shape, index_shape});
+  const Shape coarse_shape = {count, spec.coarse_classes, spec.output, spec.output};
+  const Shape index_shape = {count, spec.index_classes, spec.output, spec.output};
+  const Shape surface_shape = {count, charts_.channels(), spec.pool, spec.pool};
+  const std::vector<TensorView>& outputs = dense_head_->run({{rois_.data(), {count, channels_, spec.pool, spec.pool}}},
+                                                            {coarse_shape, index_shape, surface_shape});
   result.stats.dense_head_ms = stage.lap_ms();
 
   const float scale_x = float(result.planes.width_px) / float(input_.width_px);
   const float scale_y = float(result.planes.height_px) / float(input_.height_px);
   const size_t plane = size_t(spec.output) * size_t(spec.output);
   for (size_t i = 0; i < people.size(); ++i) {
-    const size_t coarse_offset = i * size_t(spec.coarse_classes) * plane;
-    const size_t index_offset = i * size_t(spec.index_classes) * plane;
-    const DenseLogits logits{outputs[0].data + coarse_offset,
-                             outputs[1].data + index_offset,
-                             outputs[2].data + index_offset,
-                             outputs[3].data + index_offset,
+    const size_t surface_size = size_t(charts_.channels()) * size_t(spec.pool) * size_t(spec.pool);
+    if (settings_.surface) charts_.begin(outputs[2].data + i * surface_size, spec.pool);
+    const DenseLogits logits{outputs[0].data + i * size_t(spec.coarse_classes) * plane,
+                             outputs[1].data + i * size_t(spec.index_classes) * plane,
+                             settings_.surface ? &charts_ : nullptr,
                              spec.coarse_classes,
                              spec.index_classes,
                              spec.output};
@@ -210,7 +255,10 @@ void DensePose::run_dense_head(const Pyramid& pyramid, const std::vector<ScoredB
     const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold,
                                              spec.least_own_share, result.planes);
     // A box without a body is a false alarm; one whose body is somebody else's already shows that person again.
-    if (counts.body_pixels > 0) result.people.push_back({box, people[i].score});
+    if (counts.body_pixels > 0) {
+      result.people.push_back({box, people[i].score});
+      followed_.push_back(people[i]);
+    }
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
   }

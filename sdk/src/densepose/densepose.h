@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/frame.h"
+#include "densepose/chart_predictor.h"
 #include "densepose/dense_decode.h"
 #include "densepose/proposals.h"
 #include "densepose/roi_align.h"
@@ -16,11 +17,17 @@
 
 namespace maq {
 
+// Of maq_densepose_config, whose comments say what they mean; 0 (a negative threshold): the bundle's.
 struct DensePoseSettings {
   int threads = 1;
   int long_side_px = 0;
-  float score_threshold = 0;
+  float score_threshold = -1;
   int max_people = 0;
+  int max_proposals = 0;
+  int key_frame_interval = 1;
+  int least_person_px = 0;
+  bool surface = true;
+  bool spin = true;
 };
 
 struct Person {
@@ -30,7 +37,7 @@ struct Person {
 
 struct DensePoseStats {
   float preprocess_ms = 0;
-  float detector_ms = 0;
+  float trunk_ms = 0;
   float proposals_ms = 0;
   float box_head_ms = 0;
   float dense_head_ms = 0;
@@ -38,6 +45,7 @@ struct DensePoseStats {
   float total_ms = 0;
   int network_width_px = 0;
   int network_height_px = 0;
+  bool key_frame = false;
   int proposals = 0;
   int dropped_boxes = 0;
   DecodeCounts decoded;
@@ -54,30 +62,37 @@ class DensePose {
   // Makes the three networks of `bundle`. Throws MAQ_ERROR_BAD_BUNDLE.
   DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, const DensePoseSettings& settings);
 
-  // Memory of `result` is reused. Not for two threads at once. Throws MAQ_ERROR_INFERENCE.
+  // Memory of `result` is reused. Not for two threads at once. With key_frame_interval above 1 images are frames of one
+  // stream: in between key frames people are followed from where they were. Throws MAQ_ERROR_INFERENCE.
   void run(const ImageView& image, DensePoseResult& result);
+  // The next image begins another stream.
+  void restart();
 
  private:
-  struct Pyramid {
-    NetworkOutputs outputs;            // owns what the rest points to
-    std::vector<FeatureMap> features;  // P2 to P5
-    std::vector<RpnLevel> rpn;         // P2 to P6
-  };
-
-  Pyramid run_detector();
-  std::vector<ScoredBox> run_box_head(const Pyramid& pyramid, const std::vector<ScoredBox>& proposals, int* dropped);
+  void run_trunk();
+  // The best boxes of the RPN. The finest level is asked only if somebody may be that small.
+  std::vector<ScoredBox> propose(const ImageView& image, int* dropped);
+  std::vector<ScoredBox> run_box_head(const std::vector<ScoredBox>& proposals, int* dropped);
   // Paints the people, whose boxes are in pixels of the network's input, and adds those that got a pixel to `result`.
-  void run_dense_head(const Pyramid& pyramid, const std::vector<ScoredBox>& people, DensePoseResult& result);
-  const FeatureMap& level_for(const Pyramid& pyramid, const Box& box) const;
+  void run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result);
+  const FeatureMap& level_for(const Box& box) const;
 
   Manifest manifest_;
   DensePoseSettings settings_;
   int channels_ = 0;
-  std::unique_ptr<Session> detector_;
+  std::unique_ptr<Session> trunk_;
+  std::unique_ptr<Session> rpn_fine_;
+  std::unique_ptr<Session> rpn_coarse_;
   std::unique_ptr<Session> box_head_;
   std::unique_ptr<Session> dense_head_;
+  ChartPredictor charts_;
   NetworkInput input_;
+  std::vector<TensorView> pyramid_;   // P2 to P6, in memory of the trunk
+  std::vector<FeatureMap> features_;  // P2 to P5, the same
   std::vector<float> rois_;
+  // People of the frame before, in pixels of the network's input, and frames since the RPN was asked last.
+  std::vector<ScoredBox> followed_;
+  int frames_since_key_ = 0;
 };
 
 }  // namespace maq

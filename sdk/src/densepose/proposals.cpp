@@ -28,12 +28,15 @@ std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int c
       }
     }
   }
-  const size_t kept = std::min(candidates.size(), size_t(count));
-  std::partial_sort(candidates.begin(), candidates.begin() + std::ptrdiff_t(kept), candidates.end(),
-                    [](const Candidate& a, const Candidate& b) {
-                      return a.logit != b.logit ? a.logit > b.logit : a.index < b.index;
-                    });
-  candidates.resize(kept);
+  const auto comes_before = [](const Candidate& a, const Candidate& b) {
+    return a.logit != b.logit ? a.logit > b.logit : a.index < b.index;
+  };
+  // Finding the best and then sorting them is several times as fast as std::partial_sort here.
+  if (candidates.size() > size_t(count)) {
+    std::nth_element(candidates.begin(), candidates.begin() + count, candidates.end(), comes_before);
+    candidates.resize(size_t(count));
+  }
+  std::sort(candidates.begin(), candidates.end(), comes_before);
   return candidates;
 }
 

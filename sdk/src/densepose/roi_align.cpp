@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/simd_clones.h"
+
 namespace maq {
 namespace {
 
@@ -55,7 +57,7 @@ AxisWeights axis_weights(float low, float high, int stride, int pool, int cells)
 
 }  // namespace
 
-void roi_align(const FeatureMap& map, const Box& box, int pool, float* output) {
+MAQ_SIMD_CLONES void roi_align(const FeatureMap& map, const Box& box, int pool, float* output) {
   const AxisWeights rows = axis_weights(box.y0, box.y1, map.stride, pool, map.height);
   const AxisWeights cols = axis_weights(box.x0, box.x1, map.stride, pool, map.width);
   std::fill(output, output + size_t(map.channels) * size_t(pool) * size_t(pool), 0.0f);

@@ -1,25 +1,55 @@
 #include "image/network_input.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
+#include "core/simd_clones.h"
 #include "image/opencv_view.h"
 
 namespace maq {
 namespace {
 
+constexpr int kChannels = 3;
+
 int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 
-// Pixels are bytes, so normalising one is a look-up among 256 values.
-std::array<float, 256> normalisation_table(float mean, float std) {
-  std::array<float, 256> table{};
-  for (size_t value = 0; value < table.size(); ++value) table[value] = (float(value) - mean) / std;
-  return table;
+// row[i] = sum of weight[k] * line_k[i] over the taps' lines. The compiler makes vectors of it.
+MAQ_SIMD_CLONES void weighted_lines(const uint8_t* first_line, size_t stride_bytes, const float* weight, int taps,
+                                    size_t count, float* row) {
+  for (size_t i = 0; i < count; ++i) row[i] = weight[0] * float(first_line[i]);
+  for (int k = 1; k < taps; ++k) {
+    if (weight[k] == 0) continue;
+    const uint8_t* line = first_line + size_t(k) * stride_bytes;
+    for (size_t i = 0; i < count; ++i) row[i] += weight[k] * float(line[i]);
+  }
 }
 
 }  // namespace
+
+void ResizeAxis::prepare(int from, int to, bool shrinks) {
+  if (from_px == from && to_px == to) return;
+  from_px = from;
+  to_px = to;
+  const double scale = double(from) / double(to);
+  taps = std::min(from, shrinks ? int(std::ceil(scale)) + 1 : 2);
+  first.assign(size_t(to), 0);
+  weight.assign(size_t(to) * size_t(taps), 0);
+  for (int i = 0; i < to; ++i) {
+    float* own = weight.data() + size_t(i) * size_t(taps);
+    // The interval of old pixels, or the point between two, that the new pixel covers.
+    const double low = shrinks ? i * scale : std::clamp((i + 0.5) * scale - 0.5, 0.0, double(from - 1));
+    const double high = shrinks ? std::min((i + 1) * scale, double(from)) : low + 1;
+    first[size_t(i)] = std::clamp(int(std::floor(low + 1e-9)), 0, from - taps);
+    double sum = 0;
+    for (int k = 0; k < taps; ++k) {
+      const double cell = first[size_t(i)] + k;
+      const double covered = std::max(0.0, std::min(high, cell + 1) - std::max(low, cell));
+      own[k] = float(covered);
+      sum += covered;
+    }
+    for (int k = 0; k < taps; ++k) own[k] = float(own[k] / sum);
+  }
+}
 
 void network_size(int width_px, int height_px, int long_side_px, int* network_width_px, int* network_height_px) {
   const double scale = double(long_side_px) / std::max(width_px, height_px);
@@ -32,29 +62,43 @@ void make_network_input(const ImageView& image, const NetworkInputSpec& spec, Ne
   input.padded_width_px = round_up(input.width_px, spec.multiple_of);
   input.padded_height_px = round_up(input.height_px, spec.multiple_of);
 
-  cv::Mat bgr = as_bgr(image);
-  if (bgr.cols != input.width_px || bgr.rows != input.height_px) {
-    const bool shrinks = spec.long_side_px < std::max(image.width_px, image.height_px);
-    cv::Mat resized;
-    cv::resize(bgr, resized, cv::Size(input.width_px, input.height_px), 0, 0,
-               shrinks ? cv::INTER_AREA : cv::INTER_LINEAR);
-    bgr = resized;
-  }
+  const cv::Mat bgr = as_bgr(image);
+  const bool shrinks = spec.long_side_px < std::max(image.width_px, image.height_px);
+  input.across.prepare(image.width_px, input.width_px, shrinks);
+  input.down.prepare(image.height_px, input.height_px, shrinks);
+  const size_t row_values = size_t(image.width_px) * kChannels;
+  input.row.resize(row_values);
 
   const size_t plane = size_t(input.padded_width_px) * size_t(input.padded_height_px);
-  input.values.assign(3 * plane, 0.0f);
-  const std::array<float, 256> tables[3] = {normalisation_table(spec.mean[0], spec.std[0]),
-                                            normalisation_table(spec.mean[1], spec.std[1]),
-                                            normalisation_table(spec.mean[2], spec.std[2])};
-  for (int y = 0; y < input.height_px; ++y) {
-    const uint8_t* pixel = bgr.ptr<uint8_t>(y);
+  input.values.resize(kChannels * plane);
+  float scale[kChannels], shift[kChannels];
+  for (size_t c = 0; c < kChannels; ++c) {
+    scale[c] = 1 / spec.std[c];
+    shift[c] = -spec.mean[c] / spec.std[c];
+  }
+  const int taps = input.across.taps;
+  for (int y = 0; y < input.padded_height_px; ++y) {
     float* red = input.values.data() + size_t(y) * size_t(input.padded_width_px);
     float* green = red + plane;
     float* blue = green + plane;
-    for (int x = 0; x < input.width_px; ++x, pixel += 3) {
-      blue[x] = tables[2][pixel[0]];
-      green[x] = tables[1][pixel[1]];
-      red[x] = tables[0][pixel[2]];
+    const int used = y < input.height_px ? input.width_px : 0;
+    for (float* line : {red, green, blue}) std::fill(line + used, line + input.padded_width_px, 0.0f);
+    if (used == 0) continue;
+    weighted_lines(bgr.ptr<uint8_t>(input.down.first[size_t(y)]), bgr.step,
+                   input.down.weight.data() + size_t(y) * size_t(input.down.taps), input.down.taps, row_values,
+                   input.row.data());
+    const float* weight = input.across.weight.data();
+    for (int x = 0; x < used; ++x, weight += taps) {
+      const float* pixel = input.row.data() + kChannels * input.across.first[size_t(x)];
+      float b = 0, g = 0, r = 0;
+      for (int k = 0; k < taps; ++k, pixel += kChannels) {
+        b += weight[k] * pixel[0];
+        g += weight[k] * pixel[1];
+        r += weight[k] * pixel[2];
+      }
+      red[x] = r * scale[0] + shift[0];
+      green[x] = g * scale[1] + shift[1];
+      blue[x] = b * scale[2] + shift[2];
     }
   }
 }

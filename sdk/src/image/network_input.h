@@ -15,19 +15,38 @@ struct NetworkInputSpec {
   std::array<float, 3> std{};
 };
 
+// How one side of an image is resized: for each new pixel the first of the old ones that it draws on, and their weights.
+struct ResizeAxis {
+  int from_px = 0;
+  int to_px = 0;
+  int taps = 0;               // weights of a new pixel; those that it does not need are zero
+  std::vector<int> first;     // [to_px]; first + taps <= from_px
+  std::vector<float> weight;  // [to_px, taps]
+
+  // Area weights when shrinking, bilinear ones with half-pixel centres when growing, as OpenCV has them. Does nothing
+  // when it is made for these sizes already.
+  void prepare(int from, int to, bool shrinks);
+};
+
 struct NetworkInput {
   std::vector<float> values;  // [3, padded_height_px, padded_width_px]: R, G, B, normalised; zero in the padding
   int width_px = 0;           // of the resized image
   int height_px = 0;
   int padded_width_px = 0;  // rounded up to the spec's multiple
   int padded_height_px = 0;
+
+  // Scratch, kept so that frames of one size allocate nothing.
+  ResizeAxis across;
+  ResizeAxis down;
+  std::vector<float> row;
 };
 
 // The size at which an image enters the network: its long side becomes `long_side_px`, the other follows (halves are
 // rounded to even, as in Python), no side less than 1.
 void network_size(int width_px, int height_px, int long_side_px, int* network_width_px, int* network_height_px);
 
-// Resizes (area when shrinking, bilinear when growing), normalises and pads. Memory of `input` is reused.
+// Resizes (area when shrinking, bilinear when growing), normalises and pads, in one pass and without rounding to bytes
+// in between. Memory of `input` is reused.
 void make_network_input(const ImageView& image, const NetworkInputSpec& spec, NetworkInput& input);
 
 }  // namespace maq

@@ -154,8 +154,12 @@ BoxHeadSpec read_box_head(const Node& node) {
   return head;
 }
 
-DenseHeadSpec read_dense_head(const Node& node) {
+DenseHeadSpec read_dense_head(const Node& node, const std::map<std::string, FileSpec>& files) {
   DenseHeadSpec head;
+  head.charts_file = node.at("charts").text();
+  if (files.count(head.charts_file) == 0) {
+    node.at("charts").fail("names ", head.charts_file, ", which \"files\" does not list");
+  }
   head.pool = node.at("pool").integer(1, 128);
   head.stride = node.at("stride").integer(1, 1024);
   head.output = node.at("output").integer(1, 512);
@@ -169,9 +173,9 @@ DenseHeadSpec read_dense_head(const Node& node) {
 Manifest read_manifest(const Node& root) {
   if (root.at("format").text() != "maquette-bundle") root.at("format").fail("must be maquette-bundle");
   const int format_version = root.at("format_version").integer(0, 1 << 20);
-  if (format_version != 1) {
+  if (format_version != 2) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "The bundle has format version ", format_version,
-                ", but this library reads version 1; use a bundle made for it, or a newer library.");
+                ", but this library reads version 2; use a bundle made for it, or a newer library.");
   }
   Manifest manifest;
   manifest.name = root.at("name").text();
@@ -189,11 +193,12 @@ Manifest read_manifest(const Node& root) {
   for (const auto& [name, node] : root.at("graphs").members()) {
     manifest.graphs[name] = read_graph(node, manifest.files);
   }
-  for (const char* required : {"detector", "box_head", "dense_head"}) root.at("graphs").at(required);
+  for (const char* required : {"trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head"})
+    root.at("graphs").at(required);
   manifest.input = read_input(root.at("input"));
   manifest.rpn = read_rpn(root.at("rpn"));
   manifest.box_head = read_box_head(root.at("box_head"));
-  manifest.dense_head = read_dense_head(root.at("dense_head"));
+  manifest.dense_head = read_dense_head(root.at("dense_head"), manifest.files);
   return manifest;
 }
 

@@ -58,6 +58,7 @@ struct BoxHeadSpec {
 };
 
 struct DenseHeadSpec {
+  std::string charts_file;
   int pool = 0;
   int stride = 0;
   int output = 0;

@@ -50,32 +50,8 @@ struct Session::GraphSide {
   decltype(OrtApi::SessionGetInputTypeInfo) type;
 };
 
-NetworkOutputs::NetworkOutputs(std::shared_ptr<const OnnxRuntimeLibrary> runtime, std::vector<OrtValue*> values)
-    : runtime_(std::move(runtime)), values_(std::move(values)) {
-  const OrtApi& api = runtime_->api();
-  for (OrtValue* value : values_) {
-    TensorView view;
-    OrtTensorTypeAndShapeInfo* info = nullptr;
-    runtime_->check(api.GetTensorTypeAndShape(value, &info), MAQ_ERROR_INFERENCE, "Output without a shape");
-    size_t rank = 0;
-    OrtStatus* failed = api.GetDimensionsCount(info, &rank);
-    view.shape.resize(rank);
-    if (failed == nullptr) failed = api.GetDimensions(info, view.shape.data(), rank);
-    api.ReleaseTensorTypeAndShapeInfo(info);
-    runtime_->check(failed, MAQ_ERROR_INFERENCE, "Output without a shape");
-    void* data = nullptr;
-    runtime_->check(api.GetTensorMutableData(value, &data), MAQ_ERROR_INFERENCE, "Output without data");
-    view.data = static_cast<const float*>(data);
-    views_.push_back(std::move(view));
-  }
-}
-
-NetworkOutputs::~NetworkOutputs() {
-  for (OrtValue* value : values_) runtime_->api().ReleaseValue(value);
-}
-
 Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
-                 std::string name, int threads)
+                 std::string name, const SessionSettings& settings)
     : runtime_(std::move(runtime)), spec_(std::move(spec)), name_(std::move(name)) {
   const OrtApi& api = runtime_->api();
   const auto check = [&](OrtStatus* result) {
@@ -86,24 +62,38 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
   const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made,
                                                                                         api.ReleaseSessionOptions);
   check(api.SetUserLoggingFunction(options.get(), forward_to_log, const_cast<Log*>(&runtime_->log())));
-  check(api.SetIntraOpNumThreads(options.get(), threads));
+  check(api.SetIntraOpNumThreads(options.get(), settings.threads));
   check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));
   // The networks run one after another: the threads of one must not keep spinning while the next one works.
   check(api.AddSessionConfigEntry(options.get(), "session.force_spinning_stop", "1"));
+  check(api.AddSessionConfigEntry(options.get(), "session.intra_op.allow_spinning", settings.spin ? "1" : "0"));
   check(api.CreateSessionFromArray(runtime_->env(), bytes.data(), bytes.size(), options.get(), &session_));
   try {
     check(api.CreateCpuMemoryInfo(OrtDeviceAllocator, OrtMemTypeDefault, &cpu_memory_));
     compare_with_spec();
   } catch (...) {
-    api.ReleaseMemoryInfo(cpu_memory_);
-    api.ReleaseSession(session_);
+    release();
     throw;
   }
+  for (const TensorSpec& input : spec_.inputs) input_names_.push_back(input.name.c_str());
+  for (const TensorSpec& output : spec_.outputs) output_names_.push_back(output.name.c_str());
+  inputs_.resize(input_names_.size());
+  outputs_.resize(output_names_.size());
+  input_values_.resize(input_names_.size());
+  output_values_.resize(output_names_.size());
+  buffers_.resize(output_names_.size());
+  views_.resize(output_names_.size());
 }
 
-Session::~Session() {
-  runtime_->api().ReleaseMemoryInfo(cpu_memory_);
-  runtime_->api().ReleaseSession(session_);
+Session::~Session() { release(); }
+
+void Session::release() {
+  const OrtApi& api = runtime_->api();
+  for (std::vector<Binding>* side : {&inputs_, &outputs_}) {
+    for (const Binding& binding : *side) api.ReleaseValue(binding.value);
+  }
+  api.ReleaseMemoryInfo(cpu_memory_);
+  api.ReleaseSession(session_);
 }
 
 void Session::compare_with_spec() const {
@@ -112,9 +102,9 @@ void Session::compare_with_spec() const {
   const GraphSide outputs{"output", api.SessionGetOutputCount, api.SessionGetOutputName, api.SessionGetOutputTypeInfo};
   const size_t input_count = compare_side(inputs, spec_.inputs);
   compare_side(outputs, spec_.outputs);
-  if (input_count != 1 || spec_.inputs.size() != 1) {
-    throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has ", input_count,
-                " inputs, but must have one. Export the bundle again.");
+  if (input_count != spec_.inputs.size()) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, name_, " has ", input_count, " inputs, but the manifest lists ",
+                spec_.inputs.size(), ". Export the bundle again.");
   }
 }
 
@@ -163,36 +153,44 @@ size_t Session::compare_side(const GraphSide& side, const std::vector<TensorSpec
   return count;
 }
 
-NetworkOutputs Session::run(const float* input, const std::vector<int64_t>& input_shape,
-                            const std::vector<std::vector<int64_t>>& shape_of_outputs) const {
+void Session::bind(Binding& binding, const float* data, const Shape& shape) {
+  if (binding.value != nullptr && binding.data == data && binding.shape == shape) return;
   const OrtApi& api = runtime_->api();
-  const auto check = [&](OrtStatus* result) {
-    runtime_->check(result, MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
-  };
+  api.ReleaseValue(binding.value);
+  binding.value = nullptr;
   int64_t size = 1;
-  for (const int64_t extent : input_shape) size *= extent;
-  OrtValue* made = nullptr;
+  for (const int64_t extent : shape) size *= extent;
   // ONNX Runtime takes a mutable pointer but does not write to an input.
-  check(api.CreateTensorWithDataAsOrtValue(cpu_memory_, const_cast<float*>(input), size_t(size) * sizeof(float),
-                                           input_shape.data(), input_shape.size(), ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT,
-                                           &made));
-  const std::unique_ptr<OrtValue, decltype(api.ReleaseValue)> tensor(made, api.ReleaseValue);
-  const OrtValue* inputs[] = {tensor.get()};
-  const char* input_names[] = {spec_.inputs[0].name.c_str()};
-  std::vector<const char*> output_names;
-  for (const TensorSpec& output : spec_.outputs) output_names.push_back(output.name.c_str());
-  std::vector<OrtValue*> values(output_names.size(), nullptr);
-  check(api.Run(session_, nullptr, input_names, inputs, 1, output_names.data(), output_names.size(), values.data()));
+  runtime_->check(api.CreateTensorWithDataAsOrtValue(cpu_memory_, const_cast<float*>(data),
+                                                     size_t(size) * sizeof(float), shape.data(), shape.size(),
+                                                     ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT, &binding.value),
+                  MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
+  binding.data = data;
+  binding.shape = shape;
+}
 
-  NetworkOutputs outputs(runtime_, std::move(values));
-  for (size_t i = 0; i < shape_of_outputs.size(); ++i) {
-    if (outputs[i].shape != shape_of_outputs[i]) {
-      throw Error(MAQ_ERROR_INFERENCE, name_, ": output ", spec_.outputs[i].name, " came with shape ",
-                  to_text(outputs[i].shape), ", but ", to_text(shape_of_outputs[i]),
-                  " was expected. Export the bundle again.");
-    }
+const std::vector<TensorView>& Session::run(const std::vector<TensorView>& inputs,
+                                            const std::vector<Shape>& output_shapes) {
+  for (size_t i = 0; i < inputs_.size(); ++i) {
+    bind(inputs_[i], inputs[i].data, inputs[i].shape);
+    input_values_[i] = inputs_[i].value;
   }
-  return outputs;
+  for (size_t i = 0; i < outputs_.size(); ++i) {
+    int64_t size = 1;
+    for (const int64_t extent : output_shapes[i]) size *= extent;
+    if (buffers_[i].size() < size_t(size)) buffers_[i].resize(size_t(size));
+    bind(outputs_[i], buffers_[i].data(), output_shapes[i]);
+    output_values_[i] = outputs_[i].value;
+    views_[i].data = buffers_[i].data();
+    views_[i].shape = output_shapes[i];
+  }
+  OrtStatus* status =
+      runtime_->api().Run(session_, nullptr, input_names_.data(), input_values_.data(), input_values_.size(),
+                          output_names_.data(), output_names_.size(), output_values_.data());
+  if (status != nullptr) {
+    runtime_->check(status, MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
+  }
+  return views_;
 }
 
 }  // namespace maq

@@ -11,43 +11,34 @@
 
 namespace maq {
 
-// A float tensor [shape], row-major, that somebody else owns.
+// The sizes of a tensor; at most four.
+using Shape = std::vector<int64_t>;
+
+// A float tensor, row-major, that somebody else owns.
 struct TensorView {
   const float* data = nullptr;
-  std::vector<int64_t> shape;
+  Shape shape;
 };
 
-// The outputs of one run, in the order of the graph's spec; they own their memory.
-class NetworkOutputs {
- public:
-  NetworkOutputs(std::shared_ptr<const OnnxRuntimeLibrary> runtime, std::vector<OrtValue*> values);
-  ~NetworkOutputs();
-  NetworkOutputs(NetworkOutputs&&) = default;
-  NetworkOutputs(const NetworkOutputs&) = delete;
-  NetworkOutputs& operator=(const NetworkOutputs&) = delete;
-
-  const TensorView& operator[](size_t index) const { return views_[index]; }
-
- private:
-  std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
-  std::vector<OrtValue*> values_;
-  std::vector<TensorView> views_;
+struct SessionSettings {
+  int threads = 1;
+  bool spin = true;  // idle threads wait for work awake for a while: faster, and dearer in energy
 };
 
 class Session {
  public:
-  // Prepares `bytes` (an ONNX model without external data) to run on `threads` threads, and compares its inputs and
-  // outputs with `spec`. `name` names it in errors. Throws MAQ_ERROR_BAD_BUNDLE.
+  // Prepares `bytes` (an ONNX model without external data) to run, and compares its inputs and outputs with `spec`.
+  // `name` names it in errors. Throws MAQ_ERROR_BAD_BUNDLE.
   Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
-          std::string name, int threads);
+          std::string name, const SessionSettings& settings);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // Runs the network on its one input. Throws MAQ_ERROR_INFERENCE, also when an output has not the spec's shape:
-  // `shape_of_outputs` are those expected, one for each output.
-  NetworkOutputs run(const float* input, const std::vector<int64_t>& input_shape,
-                     const std::vector<std::vector<int64_t>>& shape_of_outputs) const;
+  // Runs the network on its inputs, in the order of the spec. The outputs, of the shapes that the caller expects and in
+  // the order of the spec, lie in memory of the session and stay until the next run. Not for two threads at once.
+  // Throws MAQ_ERROR_INFERENCE, also when an output has another shape.
+  const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes);
 
  private:
   struct GraphSide;
@@ -56,11 +47,26 @@ class Session {
   // Throws unless the graph has each of `expected` with its type and shape; returns how many it has in all.
   size_t compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const;
 
+  // A tensor as ONNX Runtime wants it, made anew only when its place or shape changes.
+  struct Binding {
+    OrtValue* value = nullptr;
+    const float* data = nullptr;
+    Shape shape;
+  };
+  void bind(Binding& binding, const float* data, const Shape& shape);
+  void release();
+
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   GraphSpec spec_;
   std::string name_;
   OrtSession* session_ = nullptr;
   OrtMemoryInfo* cpu_memory_ = nullptr;
+  std::vector<const char*> input_names_, output_names_;
+  std::vector<Binding> inputs_, outputs_;
+  std::vector<const OrtValue*> input_values_;
+  std::vector<OrtValue*> output_values_;
+  std::vector<std::vector<float>> buffers_;  // of the outputs
+  std::vector<TensorView> views_;
 };
 
 }  // namespace maq

@@ -1,0 +1,85 @@
+"""The graphs of a bundle in ONNX Runtime, put together to what `export.densepose.decode` works with."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from export.densepose.bundle import decode_config
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.decode import Graphs
+
+
+def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
+    """A CPU session of one graph."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A bundle's graphs as callables, and the settings that its manifest names."""
+
+    folder: Path
+    manifest: dict
+    network: NetworkConfig
+    decode: DecodeConfig
+    graphs: Graphs
+
+
+def open_bundle(folder: Path, threads: int = 1) -> Bundle:
+    """Raises FileNotFoundError where there is no manifest."""
+    path = folder / "manifest.json"
+    if not path.exists():
+        raise FileNotFoundError(f"{folder} is not a model bundle: it has no manifest.json.")
+    manifest = json.loads(path.read_text())
+    rpn, head, dense = manifest["rpn"], manifest["box_head"], manifest["dense_head"]
+    network = NetworkConfig(
+        width=manifest["graphs"]["box_head"]["inputs"][0]["shape"][1],
+        anchor_sizes=tuple(rpn["anchor_sizes"]),
+        aspect_ratios=tuple(rpn["aspect_ratios"]),
+        rpn_strides=tuple(rpn["strides"]),
+        delta_weights=tuple(head["delta_weights"]),
+    )
+    sessions = {name: session(folder / entry["file"], threads) for name, entry in manifest["graphs"].items()}
+    charts = read_charts(folder / dense["charts"], dense["index_classes"] - 1)
+
+    def run(name: str, *given: Tensor) -> list[Tensor]:
+        entry = manifest["graphs"][name]
+        feed = {x["name"]: np.ascontiguousarray(t.numpy()) for x, t in zip(entry["inputs"], given, strict=True)}
+        return [torch.from_numpy(x) for x in sessions[name].run([x["name"] for x in entry["outputs"]], feed)]
+
+    def detector(image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
+        features = run("trunk", image)
+        fine, coarse = run("rpn_fine", features[0]), run("rpn_coarse", *features[1:])
+        return features, [fine[0], *coarse[:4]], [fine[1], *coarse[4:]]
+
+    def dense_head(rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        coarse, index, surface = run("dense_head", rois)
+        return coarse, index, *chart_maps(surface, *charts)
+
+    graphs = Graphs(detector, lambda x: tuple(run("box_head", x)), dense_head)
+    return Bundle(folder, manifest, network, decode_config(manifest), graphs)
+
+
+def read_charts(path: Path, parts: int) -> tuple[Tensor, Tensor]:
+    """The transposed convolution that gives U and V: weight [2, parts, 4, 4, C], bias [2, parts] (docs/formats.md)."""
+    values = torch.from_numpy(np.fromfile(path, "<f4"))
+    biases = 2 * parts
+    return values[:-biases].reshape(2, parts, 4, 4, -1), values[-biases:].reshape(2, parts)
+
+
+def chart_maps(surface: Tensor, weight: Tensor, bias: Tensor) -> tuple[Tensor, Tensor]:
+    """U and V [P, 1 + parts, 2h, 2w] of every part; zero for the background, which has none. surface: [P, C, h, w]."""
+    kernel = weight.permute(4, 0, 1, 2, 3).flatten(1, 2)
+    maps = F.conv_transpose2d(surface, kernel, bias.flatten(), stride=2, padding=1)
+    maps = F.pad(maps.unflatten(1, (2, -1)), (0, 0, 0, 0, 1, 0))
+    return maps[:, 0], maps[:, 1]

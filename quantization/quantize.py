@@ -29,10 +29,10 @@ from onnxruntime.quantization.shape_inference import quant_pre_process
 from export.densepose import bundle as bundle_format
 from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
-from quantization import transposed_convolution
 from quantization.errors import float_nodes_left, output_sqnr
 from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, Settings, read_settings
+from quantization.simplify import simplify
 
 METHODS = {
     "minmax": CalibrationMethod.MinMax,
@@ -42,10 +42,22 @@ METHODS = {
 
 
 class Samples(CalibrationDataReader):
-    """Hands the calibration inputs of one graph to ONNX Runtime, one by one."""
+    """Hands the calibration inputs of one graph to ONNX Runtime, some at a time: it keeps what every layer makes of
+    those that it is handed."""
+
+    MOST_AT_ONCE = 8
 
     def __init__(self, samples: list[Sample]) -> None:
+        self._all = samples
         self._left = iter(samples)
+        # ONNX Runtime wants equal portions.
+        self.portion = max(k for k in range(1, self.MOST_AT_ONCE + 1) if len(samples) % k == 0)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def set_range(self, start_index: int, end_index: int) -> None:
+        self._left = iter(self._all[start_index:end_index])
 
     def get_next(self) -> Sample | None:
         return next(self._left, None)
@@ -59,15 +71,13 @@ def quantise_graph(source: Path, target: Path, samples: list[Sample], settings: 
         samples = equal_sizes(samples)
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
-        model = onnx.load(source)
-        transposed_convolution.rewrite(model)
-        onnx.save(model, prepared)
-        quant_pre_process(prepared, prepared, skip_symbolic_shape=True)
+        quant_pre_process(source, prepared, skip_symbolic_shape=True)
         graph = onnx.load(prepared).graph
+        reader = Samples(samples)
         quantize_static(
             prepared,
             target,
-            Samples(samples),
+            reader,
             quant_format=QuantFormat.QDQ,
             per_channel=True,
             reduce_range=settings.reduce_range,
@@ -76,26 +86,29 @@ def quantise_graph(source: Path, target: Path, samples: list[Sample], settings: 
             nodes_to_exclude=matching_nodes(graph, settings.float_nodes),
             calibrate_method=METHODS[settings.method],
             # Not CalibMaxIntermediateOutputs: "minmax" then forgets all samples but those of the last batch.
-            extra_options={"CalibPercentile": settings.percentile},
+            extra_options={"CalibPercentile": settings.percentile, "CalibStridedMinMax": reader.portion},
         )
+    model = onnx.load(target)
+    simplify(model)
+    onnx.save(model, target)
 
 
 def equal_sizes(samples: list[Sample]) -> list[Sample]:
-    """Samples of [N, C, h, w] arrays as single ones of one size, [1, C, H, W], which histograms of activations need.
+    """Samples of [N, …] arrays as single ones of one size, [1, …], which histograms of activations need.
 
     Pictures and their features get zeros at the right and bottom, as at run time.
     """
-    shape = {name: [max(s[name].shape[axis] for s in samples) for axis in (2, 3)] for name in samples[0]}
+    shape = {name: np.max([s[name].shape[1:] for s in samples], axis=0) for name in samples[0]}
     singles = [
         {name: array[k : k + 1] for name, array in sample.items()}
         for sample in samples
         for k in range(len(next(iter(sample.values()))))
     ]
-    return [{name: _padded(array, *shape[name]) for name, array in single.items()} for single in singles]
+    return [{name: _padded(array, shape[name]) for name, array in single.items()} for single in singles]
 
 
-def _padded(array: np.ndarray, height: int, width: int) -> np.ndarray:
-    return np.pad(array, [(0, 0), (0, 0), (0, height - array.shape[2]), (0, width - array.shape[3])])
+def _padded(array: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    return np.pad(array, [(0, 0), *((0, size - given) for size, given in zip(shape, array.shape[1:], strict=True))])
 
 
 def matching_nodes(graph: onnx.GraphProto, patterns: tuple[str, ...]) -> list[str]:

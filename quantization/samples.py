@@ -35,6 +35,10 @@ def collect(bundle: Bundle, records: list[Record], people: int) -> dict[str, lis
             rois = tg.pooled(found.features, [found.boxes[:people]], network, network.dense_pool, level=0)
             given["dense_head"] = [rois]
         for name, tensors in given.items():
+            if name != "trunk":
+                tensors = [tensor.permute(0, 2, 3, 1) for tensor in tensors]
             inputs = [value["name"] for value in bundle.manifest["graphs"][name]["inputs"]]
-            samples[name].append({x: tensor.numpy() for x, tensor in zip(inputs, tensors, strict=True)})
+            samples[name].append(
+                {x: np.ascontiguousarray(tensor.numpy()) for x, tensor in zip(inputs, tensors, strict=True)}
+            )
     return samples

@@ -63,34 +63,29 @@ class BundleInfo:
 
 def signatures(network: NetworkConfig) -> dict[str, dict[str, dict[str, list[int | str]]]]:
     """Names and shapes of each graph's inputs and outputs, in order. A text is a size known at run time."""
-    width, side, anchors = network.width, 2 * network.dense_pool, len(network.aspect_ratios)
+    width, anchors = network.width, len(network.aspect_ratios)
     sizes = {k: [f"height/{2**k}", f"width/{2**k}"] for k in LEVELS}
     # P6 is every second cell of P5, rounded up; that is no plain quotient of the input.
     sizes[6] = ["height6", "width6"]
 
-    def features(levels: tuple[int, ...]) -> dict[str, list[int | str]]:
-        return {f"p{k}": [1, width, *sizes[k]] for k in levels}
+    def maps(name: str, levels: tuple[int, ...], channels: int) -> dict[str, list[int | str]]:
+        return {f"{name}{k}": [1, *sizes[k], channels] for k in levels}
 
     def rpn(levels: tuple[int, ...]) -> dict[str, dict[str, list[int | str]]]:
-        outputs: dict[str, list[int | str]] = {f"objectness{k}": [1, anchors, *sizes[k]] for k in levels}
-        outputs |= {f"deltas{k}": [1, 4 * anchors, *sizes[k]] for k in levels}
-        return {"inputs": features(levels), "outputs": outputs}
+        return {"inputs": maps("p", levels, width), "outputs": maps("rpn", levels, 5 * anchors)}
 
+    def rois(pool: int) -> dict[str, list[int | str]]:
+        return {"rois": ["people", pool, pool, width]}
+
+    pool, classes = network.dense_pool, network.coarse_classes + network.index_classes
     return {
-        "trunk": {"inputs": {"image": [1, 3, "height", "width"]}, "outputs": features(LEVELS)},
+        "trunk": {"inputs": {"image": [1, 3, "height", "width"]}, "outputs": maps("p", LEVELS, width)},
         "rpn_fine": rpn(LEVELS[:1]),
         "rpn_coarse": rpn(LEVELS[1:]),
-        "box_head": {
-            "inputs": {"rois": ["people", width, network.box_pool, network.box_pool]},
-            "outputs": {"logits": ["people", 2], "deltas": ["people", 4]},
-        },
+        "box_head": {"inputs": rois(network.box_pool), "outputs": {"boxes": ["people", 6]}},
         "dense_head": {
-            "inputs": {"rois": ["people", width, network.dense_pool, network.dense_pool]},
-            "outputs": {
-                "coarse": ["people", network.coarse_classes, side, side],
-                "index": ["people", network.index_classes, side, side],
-                "surface": ["people", width, network.dense_pool, network.dense_pool],
-            },
+            "inputs": rois(pool),
+            "outputs": {"labels": ["people", pool, pool, 4 * classes], "surface": ["people", pool, pool, width]},
         },
     }
 
@@ -115,7 +110,7 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
         files[name] = _signed(folder / name)
     manifest = {
         "format": "maquette-bundle",
-        "format_version": 2,
+        "format_version": 3,
         "name": info.name,
         "version": info.version,
         "task": "densepose",

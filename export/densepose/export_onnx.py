@@ -65,6 +65,35 @@ class SplitAspp(nn.Module):
         return F.relu(self.mix_maps(maps) + self.mix_context(context))
 
 
+def channels_last(x: Tensor) -> Tensor:
+    """[N, C, h, w] as [N, h, w, C]: the layout at the graphs' borders, which int8 kernels and RoIAlign work in."""
+    return x.permute(0, 2, 3, 1).contiguous()
+
+
+def channels_first(x: Tensor) -> Tensor:
+    return x.permute(0, 3, 1, 2)
+
+
+class Doubled(torch.autograd.Function):
+    """Nearest upsampling of [N, C, h, w] by two to the size of `like`, by writing cells and rows twice.
+
+    ONNX Runtime's Resize takes ten times as long on channels-last bytes.
+    """
+
+    @staticmethod
+    def forward(ctx: object, x: Tensor, like: Tensor) -> Tensor:
+        return F.interpolate(x, size=like.shape[2:], mode="nearest")
+
+    @staticmethod
+    def symbolic(g: object, x: object, like: object) -> object:
+        cells = g.op("Transpose", x, perm_i=[0, 2, 3, 1])
+        line = g.op("Constant", value_t=torch.tensor([0, 0, 1, -1]))
+        rows = g.op("Reshape", g.op("Concat", cells, cells, axis_i=3), line)
+        shape = g.op("Shape", g.op("Transpose", like, perm_i=[0, 2, 3, 1]))
+        twice = g.op("Reshape", g.op("Concat", rows, rows, axis_i=2), shape)
+        return g.op("Transpose", twice, perm_i=[0, 3, 1, 2])
+
+
 class Trunk(nn.Module):
     """Backbone and neck: image -> P2..P6."""
 
@@ -73,33 +102,93 @@ class Trunk(nn.Module):
         self.backbone, self.neck = net.backbone, net.neck
 
     def forward(self, image: Tensor) -> tuple[Tensor, ...]:
-        return tuple(self.neck(self.backbone(image)))
+        return tuple(channels_last(x) for x in self.neck(self.backbone(image)))
 
 
 class Rpn(nn.Module):
-    """The RPN on some levels: objectness of each, then deltas of each. The finest level, which is as dear as all the
+    """The RPN on some levels, objectness and deltas by one convolution. The finest level, which is as dear as all the
     others and more, has a graph of its own, so that it can be left out where nobody is small."""
 
     def __init__(self, net: MobileParsingRCNN) -> None:
         super().__init__()
-        self.rpn = net.rpn
+        self.conv = net.rpn.conv
+        # A matrix product needs no other layout than the output's.
+        self.predict = joined(net.rpn.objectness, net.rpn.deltas)
 
     def forward(self, *features: Tensor) -> tuple[Tensor, ...]:
-        objectness, deltas = self.rpn(list(features))
-        return (*objectness, *deltas)
+        return tuple(self.predict(channels_last(F.relu(self.conv(channels_first(x))))) for x in features)
+
+
+class BoxHeadGraph(nn.Module):
+    """The box head, logits and deltas by one matrix, whose rows are in channels-last order."""
+
+    def __init__(self, net: MobileParsingRCNN) -> None:
+        super().__init__()
+        self.convs = net.box_head.convs
+        self.predict = joined(net.box_head.logits, net.box_head.deltas)
+        width, pool = net.config.width, net.config.box_pool
+        weight = self.predict.weight.data.unflatten(1, (width, pool, pool))
+        self.predict.weight.data = weight.permute(0, 2, 3, 1).flatten(1).contiguous()
+
+    def forward(self, rois: Tensor) -> Tensor:
+        return self.predict(self.convs(channels_first(rois)).permute(0, 2, 3, 1).flatten(1))
 
 
 class DenseHeadGraph(nn.Module):
     """The dense head without U and V: these need few pixels of few parts, and are computed where they are needed
-    from `surface` and the chart weights."""
+    from `surface` and the chart weights.
+
+    The transposed convolutions (kernel 4, stride 2, padding 1) of the other two predictors are written as one plain
+    convolution of kernel 2 for each phase of the output, which int8 kernels exist for, with the same multiply-adds.
+    """
 
     def __init__(self, net: MobileParsingRCNN) -> None:
         super().__init__()
         self.head = net.dense_head
+        layers = [net.dense_head.out[name] for name in ("coarse", "index")]
+        weight = torch.cat([layer.weight.detach() for layer in layers], 1)
+        bias = torch.cat([layer.bias.detach() for layer in layers])
+        self.bias = nn.Parameter(bias)
+        self.phases = nn.ParameterList([phase_weights(weight, *divmod(k, 2)) for k in range(4)])
 
-    def forward(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        surface = self.head.surface(rois)
-        return self.head.out["coarse"](surface), self.head.out["index"](surface), surface
+    def forward(self, rois: Tensor) -> tuple[Tensor, Tensor]:
+        surface = self.head.surface(channels_first(rois))
+        labels = [PhaseConv.apply(surface, w, self.bias, *divmod(k, 2)) for k, w in enumerate(self.phases)]
+        return channels_last(torch.cat(labels, 1)), channels_last(surface)
+
+
+class PhaseConv(torch.autograd.Function):
+    """A convolution of kernel 2 with a line of zeros above (row 0) or below (row 1), and left or right (column)."""
+
+    @staticmethod
+    def forward(ctx: object, x: Tensor, weight: Tensor, bias: Tensor, row: int, column: int) -> Tensor:
+        return F.conv2d(F.pad(x, (1 - column, column, 1 - row, row)), weight, bias)
+
+    @staticmethod
+    def symbolic(g: object, x: object, weight: object, bias: object, row: int, column: int) -> object:
+        pads = [1 - row, 1 - column, row, column]  # top, left, bottom, right
+        return g.op("Conv", x, weight, bias, kernel_shape_i=[2, 2], pads_i=pads)
+
+
+# For output row 2y + phase a transposed convolution of kernel 4, stride 2, padding 1 reads these kernel rows, of input
+# rows y - 1 and y (phase 0), or y and y + 1 (phase 1); the same holds for columns.
+_TAPS = ((3, 1), (2, 0))
+
+
+def phase_weights(weight: Tensor, row: int, column: int) -> Tensor:
+    """The weights [out, in, 2, 2] of one output phase of a transposed convolution of kernel 4, stride 2, padding 1.
+
+    weight: [in, out, 4, 4].
+    """
+    return weight[:, :, _TAPS[row]][..., _TAPS[column]].transpose(0, 1).contiguous()
+
+
+def joined(*layers: nn.Module) -> nn.Linear:
+    """One matrix that gives the outputs of all layers (nn.Linear, or nn.Conv2d of kernel 1), in their order."""
+    weight = torch.cat([layer.weight.detach().flatten(1) for layer in layers])
+    linear = nn.Linear(weight.shape[1], weight.shape[0])
+    linear.weight.data, linear.bias.data = weight, torch.cat([layer.bias.detach() for layer in layers])
+    return linear
 
 
 def chart_weights(net: MobileParsingRCNN) -> np.ndarray:
@@ -122,6 +211,7 @@ def simplified(net: MobileParsingRCNN) -> MobileParsingRCNN:
                 setattr(module, name, FixedFusion(child))
             elif isinstance(child, Aspp):
                 setattr(module, name, SplitAspp(child))
+    net.neck.up = Doubled.apply
     left = [name for name, module in net.named_modules() if isinstance(module, nn.BatchNorm2d)]
     if left:
         raise ValueError(f"batch normalisation without a convolution before it: {', '.join(left)}")
@@ -143,7 +233,7 @@ def graph_modules(net: MobileParsingRCNN) -> dict[str, nn.Module]:
         "trunk": Trunk(net),
         "rpn_fine": rpn,
         "rpn_coarse": rpn,
-        "box_head": net.box_head,
+        "box_head": BoxHeadGraph(net),
         "dense_head": DenseHeadGraph(net),
     }
 
@@ -197,6 +287,10 @@ def _finish(path: Path, name: str) -> None:
     onnx.save(model, path)
 
 
+def tuple_of(outputs: Tensor | tuple[Tensor, ...]) -> tuple[Tensor, ...]:
+    return outputs if isinstance(outputs, tuple) else (outputs,)
+
+
 @torch.no_grad()
 def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> dict[str, float]:
     """Largest |ONNX - torch| of each output over the images, relative to the output's largest value.
@@ -218,18 +312,19 @@ def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> di
     def compare(graph: str, *given: Tensor) -> list[Tensor]:
         feed = {x.name: tensor.numpy() for x, tensor in zip(sessions[graph].get_inputs(), given, strict=True)}
         found = [torch.from_numpy(x) for x in sessions[graph].run(names[graph], feed)]
-        for name, expected, actual in zip(names[graph], modules[graph](*given), found, strict=True):
+        for name, expected, actual in zip(names[graph], tuple_of(modules[graph](*given)), found, strict=True):
             note(f"{graph}.{name}", expected, actual)
         return found
 
     for image in images:
         found = detect(Graphs.of_network(net), image, net.config, DecodeConfig())
         compare("trunk", found.tensor)
-        compare("rpn_fine", found.features[0])
-        compare("rpn_coarse", *found.features[1:])
-        compare("box_head", tg.pooled(found.features, [found.proposed], net.config, net.config.box_pool))
+        compare("rpn_fine", channels_last(found.features[0]))
+        compare("rpn_coarse", *(channels_last(x) for x in found.features[1:]))
+        rois = tg.pooled(found.features, [found.proposed], net.config, net.config.box_pool)
+        compare("box_head", channels_last(rois))
         rois = tg.pooled(found.features, [found.proposed[:4]], net.config, net.config.dense_pool, level=0)
-        *_, surface = compare("dense_head", rois)
+        *_, surface = compare("dense_head", channels_last(rois))
         expected = net.dense_head(rois)[2:]
         for name, maps, actual in zip("uv", expected, chart_maps(surface, *charts), strict=True):
             note(f"dense_head.{name}", maps[:, 1:], actual[:, 1:])

@@ -21,6 +21,7 @@ def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
     """A CPU session of one graph."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
+    options.log_severity_level = 3  # else every constant that quantisation left behind is worth a warning
     return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
 
 
@@ -43,7 +44,7 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
     manifest = json.loads(path.read_text())
     rpn, head, dense = manifest["rpn"], manifest["box_head"], manifest["dense_head"]
     network = NetworkConfig(
-        width=manifest["graphs"]["box_head"]["inputs"][0]["shape"][1],
+        width=manifest["graphs"]["box_head"]["inputs"][0]["shape"][3],
         anchor_sizes=tuple(rpn["anchor_sizes"]),
         aspect_ratios=tuple(rpn["aspect_ratios"]),
         rpn_strides=tuple(rpn["strides"]),
@@ -59,14 +60,22 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
 
     def detector(image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
         features = run("trunk", image)
-        fine, coarse = run("rpn_fine", features[0]), run("rpn_coarse", *features[1:])
-        return features, [fine[0], *coarse[:4]], [fine[1], *coarse[4:]]
+        found = [x.permute(0, 3, 1, 2) for x in run("rpn_fine", features[0]) + run("rpn_coarse", *features[1:])]
+        anchors = len(network.aspect_ratios)
+        maps = [x.permute(0, 3, 1, 2).contiguous() for x in features]
+        return maps, [x[:, :anchors] for x in found], [x[:, anchors:] for x in found]
+
+    def box_head(rois: Tensor) -> tuple[Tensor, Tensor]:
+        (found,) = run("box_head", rois.permute(0, 2, 3, 1))
+        return found[:, :2], found[:, 2:]
 
     def dense_head(rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        coarse, index, surface = run("dense_head", rois)
+        labels, surface = run("dense_head", rois.permute(0, 2, 3, 1))
+        both = interleaved(labels)
+        coarse, index = both[:, : dense["coarse_classes"]], both[:, dense["coarse_classes"] :]
         return coarse, index, *chart_maps(surface, *charts)
 
-    graphs = Graphs(detector, lambda x: tuple(run("box_head", x)), dense_head)
+    graphs = Graphs(detector, box_head, dense_head)
     return Bundle(folder, manifest, network, decode_config(manifest), graphs)
 
 
@@ -77,9 +86,15 @@ def read_charts(path: Path, parts: int) -> tuple[Tensor, Tensor]:
     return values[:-biases].reshape(2, parts, 4, 4, -1), values[-biases:].reshape(2, parts)
 
 
+def interleaved(labels: Tensor) -> Tensor:
+    """The dense head's four phases [P, h, w, 4 C] as maps [P, C, 2h, 2w]."""
+    phases = labels.unflatten(3, (2, 2, -1))  # row and column of the phase
+    return phases.permute(0, 5, 1, 3, 2, 4).flatten(4, 5).flatten(2, 3)
+
+
 def chart_maps(surface: Tensor, weight: Tensor, bias: Tensor) -> tuple[Tensor, Tensor]:
-    """U and V [P, 1 + parts, 2h, 2w] of every part; zero for the background, which has none. surface: [P, C, h, w]."""
+    """U and V [P, 1 + parts, 2h, 2w] of every part; zero for the background, which has none. surface: [P, h, w, C]."""
     kernel = weight.permute(4, 0, 1, 2, 3).flatten(1, 2)
-    maps = F.conv_transpose2d(surface, kernel, bias.flatten(), stride=2, padding=1)
+    maps = F.conv_transpose2d(surface.permute(0, 3, 1, 2), kernel, bias.flatten(), stride=2, padding=1)
     maps = F.pad(maps.unflatten(1, (2, -1)), (0, 0, 0, 0, 1, 0))
     return maps[:, 0], maps[:, 1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 
 import torch
 from torch import Tensor, nn
@@ -201,12 +202,18 @@ class Fusion(nn.Module):
         return sum(weight[k] * x for k, x in enumerate(maps))
 
 
-def _up(x: Tensor) -> Tensor:
-    return F.interpolate(x, scale_factor=2.0, mode="nearest")
+def _up(x: Tensor, like: Tensor) -> Tensor:
+    """x as large as `like`, which is twice as large."""
+    return F.interpolate(x, size=like.shape[2:], mode="nearest")
 
 
 class BiFPN(nn.Module):
-    """One bidirectional pass over four levels. Returns P2..P6, all `width` channels, strides 4..64."""
+    """One bidirectional pass over four levels. Returns P2..P6, all `width` channels, strides 4..64.
+
+    up: makes a map twice as large, as large as a second one; exported graphs do it another way.
+    """
+
+    up: Callable[[Tensor, Tensor], Tensor] = staticmethod(_up)
 
     def __init__(self, tap_channels: tuple[int, ...], width: int) -> None:
         super().__init__()
@@ -223,9 +230,9 @@ class BiFPN(nn.Module):
         def node(name: str, *maps: Tensor) -> Tensor:
             return self.conv[name](self.fuse[name](*maps))
 
-        t4 = node("t4", p4, _up(p5))
-        t3 = node("t3", p3, _up(t4))
-        o2 = node("o2", p2, _up(t3))
+        t4 = node("t4", p4, self.up(p5, p4))
+        t3 = node("t3", p3, self.up(t4, p3))
+        o2 = node("o2", p2, self.up(t3, p2))
         o3 = node("o3", p3, t3, self.down["o3"](o2))
         o4 = node("o4", p4, t4, self.down["o4"](o3))
         o5 = node("o5", p5, self.down["o5"](o4))

@@ -120,6 +120,7 @@ def _signatures(library: ctypes.CDLL) -> None:
         "maq_densepose_result_people": (Handle, POINTER(POINTER(_Person)), POINTER(c_uint32)),
         "maq_densepose_result_plane": (Handle, c_int32, POINTER(POINTER(c_uint8)), POINTER(c_size_t)),
         "maq_densepose_result_stats": (Handle, POINTER(_Stats)),
+        "maq_densepose_restart": (Handle,),
         "maq_frame_desc_init": (POINTER(_FrameDesc), c_uint32),
         "maq_frame_create": (Handle, POINTER(_FrameDesc), Handle, Handle, POINTER(Handle)),
     }
@@ -183,6 +184,10 @@ class DensePose:
         self._library.maq_densepose_destroy(self._densepose)
         self._library.maq_context_destroy(self._context)
         self._densepose, self._context = Handle(), Handle()
+
+    def restart(self) -> None:
+        """The next image begins another stream (key_frame_interval above 1)."""
+        self._call(self._densepose, "maq_densepose_restart", self._densepose)
 
     def run(self, image: np.ndarray) -> DensePoseResult:
         """image: uint8 [H, W, 3] RGB. Raises MaquetteError."""

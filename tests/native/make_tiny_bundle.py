@@ -40,8 +40,8 @@ def graph(name, nodes, inputs, outputs, constants):
     return model, inputs, outputs
 
 
-def features(levels):
-    return [(f"p{level}", [1, CHANNELS, f"h{level}", f"w{level}"]) for level in levels]
+def maps(name, levels, channels):
+    return [(f"{name}{level}", [1, f"h{level}", f"w{level}", channels]) for level in levels]
 
 
 def trunk():
@@ -50,91 +50,85 @@ def trunk():
     for level in range(2, 6):
         size = 2**level
         nodes.append(
-            helper.make_node("AveragePool", ["image"], [f"p{level}"], kernel_shape=[size] * 2, strides=[size] * 2)
+            helper.make_node("AveragePool", ["image"], [f"mean{level}"], kernel_shape=[size] * 2, strides=[size] * 2)
         )
-    nodes.append(helper.make_node("MaxPool", ["p5"], ["p6"], kernel_shape=[1, 1], strides=[2, 2]))
-    return graph("trunk", nodes, [("image", [1, 3, "height", "width"])], features(range(2, 7)), [])
+    nodes.append(helper.make_node("MaxPool", ["mean5"], ["mean6"], kernel_shape=[1, 1], strides=[2, 2]))
+    nodes += [
+        helper.make_node("Transpose", [f"mean{level}"], [f"p{level}"], perm=[0, 2, 3, 1]) for level in range(2, 7)
+    ]
+    return graph("trunk", nodes, [("image", [1, 3, "height", "width"])], maps("p", range(2, 7), CHANNELS), [])
 
 
 def rpn(name, levels):
-    """Objectness is 20 where the level's colour fills a cell and -20 where it is absent."""
+    """Objectness is 20 where the level's colour fills a cell and -20 where it is absent. Deltas are 0."""
     nodes, constants = [], []
     for level in levels:
-        weight = np.zeros((3, CHANNELS, 1, 1), np.float32)
+        weight = np.zeros((CHANNELS, 15), np.float32)
         if level <= 4:
-            weight[1, level - 2] = 40  # anchor 1 is the square one; colours in the order R, G, B
-        constants += [
-            tensor(f"objectness{level}.weight", weight),
-            tensor(f"objectness{level}.bias", np.full(3, -20, np.float32)),
-            tensor(f"deltas{level}.weight", np.zeros((12, CHANNELS, 1, 1), np.float32)),
-        ]
+            weight[level - 2, 1] = 40  # anchor 1 is the square one; colours in the order R, G, B
+        bias = np.array([-20] * 3 + [0] * 12, np.float32)
+        constants += [tensor(f"weight{level}", weight), tensor(f"bias{level}", bias)]
         nodes += [
-            helper.make_node(
-                "Conv", [f"p{level}", f"objectness{level}.weight", f"objectness{level}.bias"], [f"objectness{level}"]
-            ),
-            helper.make_node("Conv", [f"p{level}", f"deltas{level}.weight"], [f"deltas{level}"]),
+            helper.make_node("MatMul", [f"p{level}", f"weight{level}"], [f"product{level}"]),
+            helper.make_node("Add", [f"product{level}", f"bias{level}"], [f"rpn{level}"]),
         ]
-    outputs = [(f"objectness{level}", [1, 3, f"h{level}", f"w{level}"]) for level in levels]
-    outputs += [(f"deltas{level}", [1, 12, f"h{level}", f"w{level}"]) for level in levels]
-    return graph(name, nodes, features(levels), outputs, constants)
+    return graph(name, nodes, maps("p", levels, CHANNELS), maps("rpn", levels, 15), constants)
 
 
 def box_head():
     """A person where the middle of the RoI has colour: logit 24 * brightest - 3 against 0."""
     nodes = [
         helper.make_node("Slice", ["rois", "begin", "end", "axes"], ["middle"]),
-        helper.make_node("ReduceMax", ["middle"], ["brightest"], axes=[2, 3], keepdims=0),
-        helper.make_node("Gemm", ["brightest", "weight", "bias"], ["logits"]),
-        helper.make_node("Gemm", ["brightest", "no_weight", "shift"], ["deltas"]),
+        helper.make_node("ReduceMax", ["middle"], ["brightest"], axes=[1, 2], keepdims=0),
+        helper.make_node("Gemm", ["brightest", "weight", "bias"], ["boxes"]),
     ]
     constants = [
         tensor("begin", np.array([2, 2], np.int64)),
         tensor("end", np.array([5, 5], np.int64)),
-        tensor("axes", np.array([2, 3], np.int64)),
-        tensor("weight", np.array([[24, 0]] * CHANNELS, np.float32)),
-        tensor("bias", np.array([-3, 0], np.float32)),
-        tensor("no_weight", np.zeros((CHANNELS, 4), np.float32)),
-        tensor("shift", np.array([1, 0, 0, 0], np.float32)),
+        tensor("axes", np.array([1, 2], np.int64)),
+        tensor("weight", np.array([[24, 0, 0, 0, 0, 0]] * CHANNELS, np.float32)),
+        tensor("bias", np.array([-3, 0, 1, 0, 0, 0], np.float32)),
     ]
-    return graph(
-        "box_head",
-        nodes,
-        [("rois", ["people", CHANNELS, POOL, POOL])],
-        [("logits", ["people", 2]), ("deltas", ["people", 4])],
-        constants,
-    )
+    return graph("box_head", nodes, [("rois", ["people", POOL, POOL, CHANNELS])], [("boxes", ["people", 6])], constants)
+
+
+def fours(cells):
+    """[h, w, C] (either side may be 1) with four neighbouring cells together, [1, h / 2, w / 2, 4 C]."""
+    height, width, channels = cells.shape
+    both = np.broadcast_to(cells, (max(height, 2), max(width, 2), channels))
+    both = both.reshape(len(both) // 2, 2, both.shape[1] // 2, 2, channels)
+    return np.ascontiguousarray(both.transpose(0, 2, 1, 3, 4).reshape(1, len(both), both.shape[2], 4 * channels))
 
 
 def dense_head():
     ramp = np.linspace(-1, 1, OUTPUT, dtype=np.float32)
-    coarse = np.full((1, COARSE, OUTPUT, 1), -100, np.float32)
-    coarse[0, 0] = 0
-    coarse[0, 1, :, 0] = np.where(np.arange(OUTPUT) >= OUTPUT // 4, 10, -10)
-    index = np.full((1, INDEX, 1, OUTPUT), -100, np.float32)
-    index[0, 3, 0] = -ramp
-    index[0, 7, 0] = ramp
+    # Coarse classes depend on the row, the index on the column: two small constants whose sum they are.
+    rows = np.zeros((OUTPUT, 1, COARSE + INDEX), np.float32)
+    rows[:, 0, 1:COARSE] = -100
+    rows[:, 0, 1] = np.where(np.arange(OUTPUT) >= OUTPUT // 4, 10, -10)
+    columns = np.zeros((1, OUTPUT, COARSE + INDEX), np.float32)
+    columns[0, :, COARSE:] = -100
+    columns[0, :, COARSE + 3] = -ramp
+    columns[0, :, COARSE + 7] = ramp
     # A cell of `surface` is four of the output. U of its even and of its odd columns, V of its even and its odd rows.
-    surface = np.zeros((1, SURFACE, DENSE_POOL, DENSE_POOL), np.float32)
+    surface = np.zeros((1, DENSE_POOL, DENSE_POOL, SURFACE), np.float32)
     for parity in (0, 1):
-        surface[0, parity] = 0.61 * ramp[parity::2]
-        surface[0, 2 + parity] = 0.5 * ramp[parity::2, None]
-    sizes = {"coarse": [COARSE, OUTPUT, OUTPUT], "index": [INDEX, OUTPUT, OUTPUT]}
-    sizes["surface"] = [SURFACE, DENSE_POOL, DENSE_POOL]
-    nodes = [helper.make_node("Shape", ["rois"], ["people"], start=0, end=1)]
-    constants = []
-    for name, value in (("coarse", coarse), ("index", index), ("surface", surface)):
-        constants += [tensor(f"{name}.rest", np.array(sizes[name], np.int64)), tensor(f"{name}.value", value)]
+        surface[0, ..., parity] = 0.61 * ramp[parity::2]
+        surface[0, ..., 2 + parity] = 0.5 * ramp[parity::2, None]
+    nodes = [
+        helper.make_node("Shape", ["rois"], ["people"], start=0, end=1),
+        helper.make_node("Add", ["rows", "columns"], ["labels.value"]),
+    ]
+    constants = [tensor("rows", fours(rows)), tensor("columns", fours(columns)), tensor("surface.value", surface)]
+    outputs = []
+    for name, channels in (("labels", 4 * (COARSE + INDEX)), ("surface", SURFACE)):
+        constants.append(tensor(f"{name}.rest", np.array([DENSE_POOL, DENSE_POOL, channels], np.int64)))
         nodes += [
             helper.make_node("Concat", ["people", f"{name}.rest"], [f"{name}.shape"], axis=0),
             helper.make_node("Expand", [f"{name}.value", f"{name}.shape"], [name]),
         ]
-    return graph(
-        "dense_head",
-        nodes,
-        [("rois", ["people", CHANNELS, DENSE_POOL, DENSE_POOL])],
-        [(name, ["people", *size]) for name, size in sizes.items()],
-        constants,
-    )
+        outputs.append((name, ["people", DENSE_POOL, DENSE_POOL, channels]))
+    return graph("dense_head", nodes, [("rois", ["people", DENSE_POOL, DENSE_POOL, CHANNELS])], outputs, constants)
 
 
 def charts():
@@ -174,7 +168,7 @@ def main():
     files["charts.f32"] = {"sha256": hashlib.sha256(charts()).hexdigest(), "bytes": len(charts())}
     manifest = {
         "format": "maquette-bundle",
-        "format_version": 2,
+        "format_version": 3,
         "name": "tiny",
         "version": "1",
         "task": "densepose",

@@ -166,7 +166,7 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   expect_refused("max_proposals", [](auto& config) { config.max_proposals = 1001; });
   expect_refused("key_frame_interval", [](auto& config) { config.key_frame_interval = 0; });
   expect_refused("least_person_px", [](auto& config) { config.least_person_px = -1; });
-  expect_refused("detail", [](auto& config) { config.detail = maq_densepose_detail(std::stoi("2")); });
+  expect_refused("detail", [](auto& config) { config.detail = 2; });
   expect_refused("spin", [](auto& config) { config.spin = 2; });
 }
 

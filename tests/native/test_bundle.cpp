@@ -76,9 +76,9 @@ TEST(Bundle, ANetworkInTheWrongPlaceIsSeen) {
 TEST(Bundle, AShapeThatIsNotTheManifestsIsSeen) {
   const BundleCopy bundle;
   nlohmann::json manifest = bundle.manifest();
-  manifest["graphs"]["dense_head"]["outputs"][0]["shape"][1] = 2;
+  manifest["graphs"]["dense_head"]["outputs"][0]["shape"][3] = 2;
   bundle.write_manifest(manifest);
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "output coarse has shape [?, 15, 64, 64] in the graph", [&] { load(bundle); });
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "output labels has shape [?, 32, 32, 160] in the graph", [&] { load(bundle); });
 }
 
 TEST(Bundle, AMissingTensorIsSeenInTheGraphAndInTheManifest) {

@@ -34,7 +34,7 @@ double transposed_convolution(const std::vector<float>& surface, int which, int 
       const int ky = row - 2 * y + 1, kx = column - 2 * x + 1;
       if (ky < 0 || ky >= 4 || kx < 0 || kx >= 4) continue;
       for (int c = 0; c < kChannels; ++c) {
-        sum += double(surface[size_t((c * kSize + y) * kSize + x)]) *
+        sum += double(surface[size_t((y * kSize + x) * kChannels + c)]) *
                double(kWeights[size_t((((which * kParts + part) * 4 + ky) * 4 + kx) * kChannels + c)]);
       }
     }

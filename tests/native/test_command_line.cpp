@@ -160,7 +160,7 @@ TEST_F(CommandLine, BadBundlesAreOneSentenceAndNothingIsWritten) {
   nlohmann::json manifest = reshaped.manifest();
   manifest["graphs"]["box_head"]["outputs"][0]["shape"][1] = 3;
   reshaped.write_manifest(manifest);
-  expect_failure("densepose two.png --out o --bundle '" + reshaped.path() + "'", "output logits has shape");
+  expect_failure("densepose two.png --out o --bundle '" + reshaped.path() + "'", "output boxes has shape");
 }
 
 TEST_F(CommandLine, AMissingRuntimeLibraryIsOneSentence) {

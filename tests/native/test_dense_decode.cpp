@@ -39,15 +39,26 @@ struct Logits {
   void fill(std::vector<float>& plane, int channel, float value) {
     std::fill_n(plane.begin() + channel * size * size, size * size, value);
   }
-  DenseLogits view(maq::ChartValues* charts) const {
-    return {coarse.data(), index.data(), charts, kCoarse, kIndex, size};
+  DenseLogits view(maq::ChartValues* charts) {
+    labels.resize(coarse.size() + index.size());
+    const DenseLogits view{labels.data(), charts, kCoarse, kIndex, size};
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        const size_t four = size_t((y / 2) * (size / 2) + x / 2);
+        float* cell = labels.data() + (four * 4 + size_t(y % 2 * 2 + x % 2)) * (kCoarse + kIndex);
+        for (int c = 0; c < kCoarse; ++c) cell[c] = coarse[size_t((c * size + y) * size + x)];
+        for (int c = 0; c < kIndex; ++c) cell[kCoarse + c] = index[size_t((c * size + y) * size + x)];
+      }
+    }
+    return view;
   }
 
-  std::vector<float> coarse, index, u, v;
+  std::vector<float> coarse, index, u, v;  // planes [classes, size, size]
+  std::vector<float> labels;               // the same as the dense head gives them
   int size;
 };
 
-maq::DecodeCounts paint(const Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
+maq::DecodeCounts paint(Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
                         float mask_threshold = 0.5f, float least_own_share = 0) {
   Planes charts(logits.u, logits.v, logits.size);
   return paint_person(logits.view(&charts), box, person, mask_threshold, least_own_share, planes);

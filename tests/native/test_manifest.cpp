@@ -20,7 +20,7 @@ TEST(Manifest, ReadsEveryField) {
   EXPECT_EQ(manifest.graphs.at("trunk").outputs.size(), 5u);
   EXPECT_EQ(manifest.graphs.at("rpn_coarse").inputs.size(), 4u);
   EXPECT_EQ(manifest.dense_head.charts_file, "charts.f32");
-  EXPECT_EQ(std::get<int64_t>(manifest.graphs.at("trunk").outputs[0].shape[1]), 3);
+  EXPECT_EQ(std::get<int64_t>(manifest.graphs.at("trunk").outputs[0].shape[3]), 3);
   EXPECT_EQ(std::get<std::string>(manifest.graphs.at("trunk").inputs[0].shape[2]), "height");
   EXPECT_EQ(manifest.input.long_side_px, 320);
   EXPECT_EQ(manifest.rpn.strides, (std::vector<int>{4, 8, 16, 32, 64}));
@@ -99,9 +99,9 @@ TEST(Manifest, RefusesFilesOutsideItsFolder) {
 
 TEST(Manifest, TellsOtherVersionsAndTasksFromDamage) {
   json newer = tiny(), other = tiny();
-  newer["format_version"] = 3;
+  newer["format_version"] = 4;
   other["task"] = "scene";
-  expect_error(MAQ_ERROR_UNSUPPORTED, "format version 3", [&] { parse(newer); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "format version 4", [&] { parse(newer); });
   expect_error(MAQ_ERROR_UNSUPPORTED, "scene", [&] { parse(other); });
 }
 

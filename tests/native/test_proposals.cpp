@@ -25,17 +25,16 @@ maq::RpnSpec spec() {
 // One level of `width` x `height` cells whose logits are all `logit` and whose deltas are 0.
 struct Level {
   Level(int columns, int rows, float everywhere)
-      : objectness(size_t(3 * columns * rows), everywhere),
-        deltas(size_t(12 * columns * rows), 0.0f),
-        width(columns),
-        height(rows) {}
-  float& logit(int x, int y, int anchor) { return objectness[size_t((anchor * height + y) * width + x)]; }
-  float& delta(int x, int y, int anchor, int which) {
-    return deltas[size_t(((4 * anchor + which) * height + y) * width + x)];
+      : values(size_t(15 * columns * rows), 0.0f), width(columns), height(rows) {
+    for (int cell = 0; cell < columns * rows; ++cell) std::fill_n(values.begin() + 15 * cell, 3, everywhere);
   }
-  maq::RpnLevel view() const { return {objectness.data(), deltas.data(), width, height}; }
+  float& logit(int x, int y, int anchor) { return values[size_t(15 * (y * width + x) + anchor)]; }
+  float& delta(int x, int y, int anchor, int which) {
+    return values[size_t(15 * (y * width + x) + 3 + 4 * anchor + which)];
+  }
+  maq::RpnLevel view() const { return {values.data(), width, height}; }
 
-  std::vector<float> objectness, deltas;
+  std::vector<float> values;
   int width, height;
 };
 

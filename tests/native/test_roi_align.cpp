@@ -13,7 +13,11 @@ using maq::FeatureMap;
 constexpr int kChannels = 3;
 
 // RoIAlign by its definition, sample by sample in double.
-double sample(const float* plane, int height, int width, double y, double x) {
+double sample(const FeatureMap& map, int channel, double y, double x) {
+  const int height = map.height, width = map.width;
+  const auto cell = [&](int row, int column) {
+    return double(map.data[size_t((row * width + column) * map.channels + channel)]);
+  };
   if (y < -1 || y > height || x < -1 || x > width) return 0;
   y = std::max(y, 0.0);
   x = std::max(x, 0.0);
@@ -22,8 +26,7 @@ double sample(const float* plane, int height, int width, double y, double x) {
   if (y0 >= height - 1) y0 = y1 = height - 1, y = y0;
   if (x0 >= width - 1) x0 = x1 = width - 1, x = x0;
   const double fy = y - y0, fx = x - x0;
-  return (1 - fy) * ((1 - fx) * plane[y0 * width + x0] + fx * plane[y0 * width + x1]) +
-         fy * ((1 - fx) * plane[y1 * width + x0] + fx * plane[y1 * width + x1]);
+  return (1 - fy) * ((1 - fx) * cell(y0, x0) + fx * cell(y0, x1)) + fy * ((1 - fx) * cell(y1, x0) + fx * cell(y1, x1));
 }
 
 std::vector<double> reference(const FeatureMap& map, const Box& box, int pool) {
@@ -31,15 +34,14 @@ std::vector<double> reference(const FeatureMap& map, const Box& box, int pool) {
   const double width = double(box.x1) / map.stride - 0.5 - x0, height = double(box.y1) / map.stride - 0.5 - y0;
   const int nx = int(std::ceil(float(width) / float(pool))), ny = int(std::ceil(float(height) / float(pool)));
   std::vector<double> result;
-  for (int c = 0; c < map.channels; ++c) {
-    const float* plane = map.data + size_t(c) * size_t(map.height * map.width);
-    for (int py = 0; py < pool; ++py) {
-      for (int px = 0; px < pool; ++px) {
+  for (int py = 0; py < pool; ++py) {
+    for (int px = 0; px < pool; ++px) {
+      for (int c = 0; c < map.channels; ++c) {
         double sum = 0;
         for (int iy = 0; iy < ny; ++iy) {
           for (int ix = 0; ix < nx; ++ix) {
-            sum += sample(plane, map.height, map.width, y0 + (py + (iy + 0.5) / ny) * height / pool,
-                          x0 + (px + (ix + 0.5) / nx) * width / pool);
+            sum +=
+                sample(map, c, y0 + (py + (iy + 0.5) / ny) * height / pool, x0 + (px + (ix + 0.5) / nx) * width / pool);
           }
         }
         result.push_back(sum / std::max(1, nx * ny));

@@ -32,8 +32,8 @@ typedef struct maq_densepose_config {
                                  stream; in between those found are followed, nobody new is, and frames without anybody
                                  cost nothing. A frame of another size starts anew. */
   int32_t least_person_px;    /* people less tall than this in the frame may be missed; 0 (default): nobody */
-  maq_densepose_detail detail; /* default MAQ_DETAIL_SURFACE */
-  int32_t spin;                /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
+  int32_t detail;             /* a maq_densepose_detail; default MAQ_DETAIL_SURFACE */
+  int32_t spin;               /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
 } maq_densepose_config;
 
 /* One person. The box is in pixels of the frame: left, top, right, bottom, the latter two exclusive. */

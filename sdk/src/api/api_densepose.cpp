@@ -32,7 +32,7 @@ DensePoseSettings checked_settings(const maq_densepose_config& config) {
   if (config.max_proposals != 0) require_range("config.max_proposals", config.max_proposals, 1, 1000);
   require_range("config.key_frame_interval", config.key_frame_interval, 1, 1000);
   require_range("config.least_person_px", config.least_person_px, 0, 100000);
-  require_range("config.detail", int(config.detail), int(MAQ_DETAIL_SURFACE), int(MAQ_DETAIL_PART));
+  require_range("config.detail", config.detail, int32_t(MAQ_DETAIL_SURFACE), int32_t(MAQ_DETAIL_PART));
   require_range("config.spin", config.spin, 0, 1);
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   DensePoseSettings settings;

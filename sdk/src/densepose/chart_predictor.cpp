@@ -71,15 +71,7 @@ ChartPredictor::ChartPredictor(const std::vector<uint8_t>& bytes, int parts, con
 
 void ChartPredictor::begin(const float* surface, int size) {
   const size_t cells = size_t(size) * size_t(size);
-  features_.resize(cells * size_t(channels_));
-  // Few cells at a time, so that what is written stays in the nearest cache.
-  constexpr size_t kCells = 16;
-  for (size_t first = 0; first < cells; first += kCells) {
-    const size_t end = std::min(first + kCells, cells);
-    for (size_t c = 0; c < size_t(channels_); ++c) {
-      for (size_t cell = first; cell < end; ++cell) features_[cell * size_t(channels_) + c] = surface[c * cells + cell];
-    }
-  }
+  surface_ = surface;
   const size_t outputs = 4 * cells * size_t(parts_);
   if (size != size_ || ++person_ == 0) {
     known_.resize(outputs);
@@ -98,7 +90,7 @@ ChartPoint ChartPredictor::at(int part, int row, int column) {
   const size_t u = size_t(part);
   const size_t v = size_t(parts_) + u;
   const size_t kernel = kKernel * kKernel * size_t(channels_);
-  point = transposed_convolution(features_.data(), size_, size_t(channels_), weight_.data() + u * kernel,
+  point = transposed_convolution(surface_, size_, size_t(channels_), weight_.data() + u * kernel,
                                  weight_.data() + v * kernel, row, column);
   point.u += bias_[u];
   point.v += bias_[v];

@@ -28,7 +28,7 @@ class ChartPredictor : public ChartValues {
   ChartPredictor(const std::vector<uint8_t>& bytes, int parts, const std::string& name);
 
   int channels() const { return channels_; }
-  // Looks at another person from now on: `surface` [channels, size, size], which may go afterwards.
+  // Looks at another person from now on: `surface` [size, size, channels], which must stay until the next.
   void begin(const float* surface, int size);
   // Of the output [2 * size, 2 * size].
   ChartPoint at(int part, int row, int column) override;
@@ -39,7 +39,7 @@ class ChartPredictor : public ChartValues {
   int size_ = 0;
   std::vector<float> weight_;
   std::vector<float> bias_;
-  std::vector<float> features_;        // [size, size, channels]
+  const float* surface_ = nullptr;
   std::vector<ChartPoint> known_;      // [parts, 2 * size, 2 * size]
   std::vector<uint32_t> known_since_;  // the person for whom it was computed
   uint32_t person_ = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 #include "core/simd_clones.h"
@@ -45,14 +46,13 @@ class ClassRow {
         padded_(round_up_to_lanes(classes)),
         values_(size_t(size) * size_t(padded_), kNever) {}
 
-  void fill(const float* logits, const Tap& row) {
-    for (int c = 0; c < classes_; ++c) {
-      const float* plane = logits + size_t(c) * size_t(size_) * size_t(size_);
-      const float* low = plane + size_t(row.low) * size_t(size_);
-      const float* high = plane + size_t(row.high) * size_t(size_);
-      for (int x = 0; x < size_; ++x) {
-        values_[size_t(x) * size_t(padded_) + size_t(c)] = low[x] + (high[x] - low[x]) * row.fraction;
-      }
+  // The classes from `first` on of each cell.
+  void fill(const DenseLogits& logits, int first, const Tap& row) {
+    for (int x = 0; x < size_; ++x) {
+      const float* low = logits.cell(row.low, x) + first;
+      const float* high = logits.cell(row.high, x) + first;
+      float* mixed = values_.data() + size_t(x) * size_t(padded_);
+      for (int c = 0; c < classes_; ++c) mixed[c] = low[c] + (high[c] - low[c]) * row.fraction;
     }
   }
 
@@ -85,21 +85,59 @@ class ClassRow {
   std::vector<float> values_;
 };
 
+// exp(x) for x from -87 to 0 within 3e-7 of its value, without a call, so that a loop of it becomes vectors: 2^x by the
+// whole part in the exponent and a polynomial (Taylor) for the rest, which lies within half a unit.
+inline float exp_of_negative(float x) {
+  constexpr float kLog2E = 1.44269504f, kLn2 = 0.69314718f,
+                  kRound = 12582912.0f;  // 1.5 * 2^23: rounds what it is added to
+  const float scaled = x * kLog2E;
+  const float whole = (scaled + kRound) - kRound;
+  const float rest = (scaled - whole) * kLn2;
+  float sum = 1.0f / 720.0f;
+  for (const float factor : {1.0f / 120.0f, 1.0f / 24.0f, 1.0f / 6.0f, 0.5f, 1.0f, 1.0f}) sum = sum * rest + factor;
+  const int32_t bits = (int32_t(whole) + 127) << 23;
+  float power;
+  std::memcpy(&power, &bits, sizeof power);
+  return sum * power;
+}
+
 // Of each cell log(p / (1 - p)), p the probability that it shows the person, whichever part: the logits of all coarse
 // classes but the background, summed as probabilities, against the background's. A class that is NaN counts as absent.
-std::vector<float> person_log_odds(const DenseLogits& logits) {
-  const size_t cells = size_t(logits.size) * size_t(logits.size);
-  const auto value = [&](int c, size_t cell) {
-    const float logit = logits.coarse[size_t(c) * cells + cell];
-    return std::isnan(logit) ? kNever : std::clamp(logit, kNever, -kNever);
+MAQ_SIMD_CLONES std::vector<float> person_log_odds(const DenseLogits& logits) {
+  const int parts = logits.coarse_classes - 1;
+  const int padded = round_up_to_lanes(parts);
+  alignas(64) std::array<float, kMostClasses> values;
+  values.fill(kNever);
+  const auto finite = [](float logit) {
+    const float low = logit > kNever ? logit : kNever;  // also where it is NaN
+    return low < -kNever ? low : -kNever;
   };
-  std::vector<float> odds(cells);
-  for (size_t cell = 0; cell < cells; ++cell) {
-    float most = kNever;
-    for (int c = 1; c < logits.coarse_classes; ++c) most = std::max(most, value(c, cell));
-    float sum = 0;
-    for (int c = 1; c < logits.coarse_classes; ++c) sum += std::exp(value(c, cell) - most);
-    odds[cell] = most == kNever ? kNever : most + std::log(sum) - value(0, cell);
+  std::vector<float> odds(size_t(logits.size) * size_t(logits.size));
+  for (int y = 0; y < logits.size; ++y) {
+    for (int x = 0; x < logits.size; ++x) {
+      const float* classes = logits.cell(y, x);
+      for (int c = 0; c < parts; ++c) values[size_t(c)] = finite(classes[1 + c]);
+      std::array<float, kLanes> most;
+      most.fill(kNever);
+      for (int c = 0; c < padded; c += kLanes) {
+        for (int lane = 0; lane < kLanes; ++lane) {
+          const float value = values[size_t(c + lane)];
+          most[size_t(lane)] = value > most[size_t(lane)] ? value : most[size_t(lane)];
+        }
+      }
+      const float best = *std::max_element(most.begin(), most.end());
+      std::array<float, kLanes> sums{};
+      for (int c = 0; c < padded; c += kLanes) {
+        for (int lane = 0; lane < kLanes; ++lane) {
+          const float below = values[size_t(c + lane)] - best;
+          sums[size_t(lane)] += exp_of_negative(below > -87.0f ? below : -87.0f);
+        }
+      }
+      float sum = 0;
+      for (const float part_sum : sums) sum += part_sum;
+      odds[size_t(y) * size_t(logits.size) + size_t(x)] =
+          best == kNever ? kNever : best + std::log(sum) - finite(classes[0]);
+    }
   }
   return odds;
 }
@@ -175,7 +213,6 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
   const std::vector<Tap> cols = resize_taps(logits.size, rect.width);
   const std::vector<float> odds = person_log_odds(logits);
   const float least_odds = std::log(mask_threshold / (1 - mask_threshold));
-  const size_t plane_size = size_t(logits.size) * size_t(logits.size);
   ClassRow parts(logits.index_classes - 1, logits.size);  // all but the background
 
   const int first_row = std::max(0, -rect.y);
@@ -195,7 +232,7 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
         ++taken;
         continue;
       }
-      if (!filled) parts.fill(logits.index + plane_size, row);
+      if (!filled) parts.fill(logits, logits.coarse_classes + 1, row);
       filled = true;
       const int part = parts.best(col) + 1;
       if (part == 0) continue;

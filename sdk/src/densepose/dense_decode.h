@@ -11,12 +11,19 @@ namespace maq {
 
 // The dense head's output for one person.
 struct DenseLogits {
-  const float* coarse = nullptr;  // [coarse_classes, size, size]; class 0 is background
-  const float* index = nullptr;   // [index_classes, size, size]; class 0 is background (not read), then the parts
+  // [size / 2, size / 2, 2, 2, coarse_classes + index_classes]: four neighbouring cells (rows, then columns) lie together.
+  // Class 0 of both kinds is background (that of the index is not read), then come the parts.
+  const float* labels = nullptr;
   ChartValues* charts = nullptr;  // U and V of the parts; null: they stay 0
   int coarse_classes = 0;
   int index_classes = 0;
   int size = 0;
+
+  // The classes of a cell: coarse, then index.
+  const float* cell(int row, int column) const {
+    const size_t four = size_t(row / 2) * size_t(size / 2) + size_t(column / 2);
+    return labels + (4 * four + size_t(row % 2 * 2 + column % 2)) * size_t(coarse_classes + index_classes);
+  }
 };
 
 // One byte a pixel of the image, rows without padding: part, U * 255, V * 255, person.

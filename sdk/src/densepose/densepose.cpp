@@ -14,11 +14,9 @@ constexpr size_t kRpnLevels = 5;      // P2 to P6
 constexpr int kFirstLevel = 2;
 
 // Names of tensors at the levels from `first` to `last`: "p3", "p4", …
-std::vector<std::string> at_levels(const std::vector<std::string>& names, int first, int last) {
+std::vector<std::string> at_levels(const std::string& name, int first, int last) {
   std::vector<std::string> all;
-  for (const std::string& name : names) {
-    for (int level = first; level <= last; ++level) all.push_back(name + std::to_string(level));
-  }
+  for (int level = first; level <= last; ++level) all.push_back(name + std::to_string(level));
   return all;
 }
 
@@ -51,10 +49,10 @@ std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std:
 
 int feature_channels(const Manifest& manifest) {
   const std::vector<Dimension>& shape = manifest.graphs.at("trunk").outputs[0].shape;
-  const int64_t* channels = shape.size() == 4 ? std::get_if<int64_t>(&shape[1]) : nullptr;
+  const int64_t* channels = shape.size() == 4 ? std::get_if<int64_t>(&shape[3]) : nullptr;
   if (channels == nullptr) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name,
-                ": output p2 of the trunk must have the shape [1, channels, h, w] with a number of channels. "
+                ": output p2 of the trunk must have the shape [1, h, w, channels] with a number of channels. "
                 "Export the bundle again.");
   }
   return int(*channels);
@@ -90,14 +88,13 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
                                      SessionSettings{settings_.threads, settings_.spin});
   };
   const int last_level = kFirstLevel + int(kRpnLevels) - 1;
-  trunk_ = make("trunk", {"image"}, at_levels({"p"}, kFirstLevel, last_level));
+  trunk_ = make("trunk", {"image"}, at_levels("p", kFirstLevel, last_level));
   channels_ = feature_channels(manifest_);
-  rpn_fine_ = make("rpn_fine", at_levels({"p"}, kFirstLevel, kFirstLevel),
-                   at_levels({"objectness", "deltas"}, kFirstLevel, kFirstLevel));
-  rpn_coarse_ = make("rpn_coarse", at_levels({"p"}, kFirstLevel + 1, last_level),
-                     at_levels({"objectness", "deltas"}, kFirstLevel + 1, last_level));
-  box_head_ = make("box_head", {"rois"}, {"logits", "deltas"});
-  dense_head_ = make("dense_head", {"rois"}, {"coarse", "index", "surface"});
+  rpn_fine_ = make("rpn_fine", at_levels("p", kFirstLevel, kFirstLevel), at_levels("rpn", kFirstLevel, kFirstLevel));
+  rpn_coarse_ =
+      make("rpn_coarse", at_levels("p", kFirstLevel + 1, last_level), at_levels("rpn", kFirstLevel + 1, last_level));
+  box_head_ = make("box_head", {"rois"}, {"boxes"});
+  dense_head_ = make("dense_head", {"rois"}, {"labels", "surface"});
   if (manifest_.dense_head.output != 2 * manifest_.dense_head.pool) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest_.name, ": the dense head's output is ",
                 manifest_.dense_head.output, " cells wide, but must be twice its pool of ", manifest_.dense_head.pool,
@@ -154,13 +151,13 @@ void DensePose::run_trunk() {
   const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
   std::vector<Shape> shapes;
   for (const int stride : manifest_.rpn.strides) {
-    shapes.push_back({1, channels_, cells(height, stride), cells(width, stride)});
+    shapes.push_back({1, cells(height, stride), cells(width, stride), channels_});
   }
   pyramid_ = trunk_->run({{input_.values.data(), {1, 3, height, width}}}, shapes);
   features_.clear();
   for (size_t l = 0; l < kFeatureLevels; ++l) {
     const TensorView& map = pyramid_[l];
-    features_.push_back({map.data, channels_, int(map.shape[2]), int(map.shape[3]), manifest_.box_head.strides[l]});
+    features_.push_back({map.data, channels_, int(map.shape[1]), int(map.shape[2]), manifest_.box_head.strides[l]});
   }
 }
 
@@ -172,12 +169,10 @@ std::vector<ScoredBox> DensePose::propose(const ImageView& image, int* dropped) 
                                    pyramid_.begin() + std::ptrdiff_t(first + count));
     const int64_t anchors = int64_t(manifest_.rpn.aspect_ratios.size());
     std::vector<Shape> shapes;
-    for (const int64_t values : {anchors, 4 * anchors}) {
-      for (const TensorView& map : inputs) shapes.push_back({1, values, map.shape[2], map.shape[3]});
-    }
+    for (const TensorView& map : inputs) shapes.push_back({1, map.shape[1], map.shape[2], 5 * anchors});
     const std::vector<TensorView>& found = rpn.run(inputs, shapes);
     for (size_t l = 0; l < count; ++l) {
-      levels[first + l] = {found[l].data, found[count + l].data, int(inputs[l].shape[3]), int(inputs[l].shape[2])};
+      levels[first + l] = {found[l].data, int(inputs[l].shape[2]), int(inputs[l].shape[1])};
     }
   };
   ask(*rpn_coarse_, 1, kRpnLevels - 1);
@@ -206,13 +201,14 @@ std::vector<ScoredBox> DensePose::run_box_head(const std::vector<ScoredBox>& pro
   for (size_t i = 0; i < proposals.size(); ++i) {
     roi_align(level_for(proposals[i].box), proposals[i].box, spec.pool, rois_.data() + i * roi_size);
   }
-  const std::vector<TensorView>& outputs =
-      box_head_->run({{rois_.data(), {count, channels_, spec.pool, spec.pool}}}, {{count, 2}, {count, 4}});
+  // Of each: logits of person and background, then dx, dy, dw, dh.
+  const TensorView& boxes =
+      box_head_->run({{rois_.data(), {count, spec.pool, spec.pool, channels_}}}, {{count, 6}}).front();
 
   std::vector<ScoredBox> found;
   for (size_t i = 0; i < proposals.size(); ++i) {
-    const float score = first_of_two(outputs[0].data + 2 * i);
-    Box box = apply_deltas(proposals[i].box, outputs[1].data + 4 * i, spec.delta_weights);
+    const float score = first_of_two(boxes.data + 6 * i);
+    Box box = apply_deltas(proposals[i].box, boxes.data + 6 * i + 2, spec.delta_weights);
     if (std::isnan(score) || !clip_box(box, float(input_.width_px), float(input_.height_px))) {
       ++*dropped;
     } else if (score > settings_.score_threshold) {
@@ -231,25 +227,21 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
   for (size_t i = 0; i < people.size(); ++i) {
     roi_align(features_[0], people[i].box, spec.pool, rois_.data() + i * roi_size);
   }
-  const Shape coarse_shape = {count, spec.coarse_classes, spec.output, spec.output};
-  const Shape index_shape = {count, spec.index_classes, spec.output, spec.output};
-  const Shape surface_shape = {count, charts_.channels(), spec.pool, spec.pool};
-  const std::vector<TensorView>& outputs = dense_head_->run({{rois_.data(), {count, channels_, spec.pool, spec.pool}}},
-                                                            {coarse_shape, index_shape, surface_shape});
+  const int classes = spec.coarse_classes + spec.index_classes;
+  const Shape labels_shape = {count, spec.pool, spec.pool, 4 * classes};
+  const Shape surface_shape = {count, spec.pool, spec.pool, charts_.channels()};
+  const std::vector<TensorView>& outputs =
+      dense_head_->run({{rois_.data(), {count, spec.pool, spec.pool, channels_}}}, {labels_shape, surface_shape});
   result.stats.dense_head_ms = stage.lap_ms();
 
   const float scale_x = float(result.planes.width_px) / float(input_.width_px);
   const float scale_y = float(result.planes.height_px) / float(input_.height_px);
-  const size_t plane = size_t(spec.output) * size_t(spec.output);
+  const size_t labels_size = size_t(spec.output) * size_t(spec.output) * size_t(classes);
+  const size_t surface_size = size_t(charts_.channels()) * size_t(spec.pool) * size_t(spec.pool);
   for (size_t i = 0; i < people.size(); ++i) {
-    const size_t surface_size = size_t(charts_.channels()) * size_t(spec.pool) * size_t(spec.pool);
-    if (settings_.surface) charts_.begin(outputs[2].data + i * surface_size, spec.pool);
-    const DenseLogits logits{outputs[0].data + i * size_t(spec.coarse_classes) * plane,
-                             outputs[1].data + i * size_t(spec.index_classes) * plane,
-                             settings_.surface ? &charts_ : nullptr,
-                             spec.coarse_classes,
-                             spec.index_classes,
-                             spec.output};
+    if (settings_.surface) charts_.begin(outputs[1].data + i * surface_size, spec.pool);
+    const DenseLogits logits{outputs[0].data + i * labels_size, settings_.surface ? &charts_ : nullptr,
+                             spec.coarse_classes, spec.index_classes, spec.output};
     Box box = scaled(people[i].box, scale_x, scale_y);
     clip_box(box, float(result.planes.width_px), float(result.planes.height_px));
     const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold,

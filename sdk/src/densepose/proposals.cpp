@@ -20,7 +20,7 @@ std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int c
   candidates.reserve(size_t(cells) * size_t(anchors));
   for (int cell = 0; cell < cells; ++cell) {
     for (int anchor = 0; anchor < anchors; ++anchor) {
-      const float logit = level.objectness[anchor * cells + cell];
+      const float logit = level.values[size_t(cell) * size_t(5 * anchors) + size_t(anchor)];
       if (!std::isfinite(logit)) {
         ++*dropped;
       } else {
@@ -56,13 +56,11 @@ std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, con
   std::vector<ScoredBox> all;
   for (size_t l = 0; l < levels.size(); ++l) {
     const RpnLevel& level = levels[l];
-    const int cells = level.width * level.height;
     std::vector<ScoredBox> boxes;
     for (const Candidate& candidate : best_candidates(level, anchors, spec.pre_nms_top_k, dropped)) {
       const int anchor = candidate.index % anchors;
       const int cell = candidate.index / anchors;
-      float deltas[4];
-      for (int i = 0; i < 4; ++i) deltas[i] = level.deltas[(4 * anchor + i) * cells + cell];
+      const float* deltas = level.values + size_t(cell) * size_t(5 * anchors) + size_t(anchors + 4 * anchor);
       Box box = apply_deltas(anchor_box(cell % level.width, cell / level.width, spec.strides[l],
                                         spec.anchor_sizes_px[l], spec.aspect_ratios[size_t(anchor)]),
                              deltas, kUnitWeights);

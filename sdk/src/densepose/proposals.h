@@ -11,8 +11,8 @@ namespace maq {
 
 // The detector's output at one level of the pyramid.
 struct RpnLevel {
-  const float* objectness = nullptr;  // logits [anchors, height, width]
-  const float* deltas = nullptr;      // [4 * anchors, height, width]: channel 4 * anchor + (dx, dy, dw, dh)
+  // [height, width, 5 * anchors]: a logit for each anchor, then dx, dy, dw, dh for each.
+  const float* values = nullptr;
   int width = 0;
   int height = 0;
 };

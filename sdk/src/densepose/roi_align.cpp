@@ -64,24 +64,26 @@ MAQ_SIMD_CLONES void roi_align(const FeatureMap& map, const Box& box, int pool, 
   const int width = cols.end_cell - cols.first_cell;
   if (width <= 0) return;
 
-  std::vector<float> line(static_cast<size_t>(width));
-  for (int channel = 0; channel < map.channels; ++channel) {
-    const float* plane = map.data + size_t(channel) * size_t(map.height) * size_t(map.width);
-    for (int y = 0; y < pool; ++y, output += pool) {
-      const AxisWeights::Bin& row = rows.bins[size_t(y)];
-      if (row.weights.empty()) continue;
-      std::fill(line.begin(), line.end(), 0.0f);
-      for (size_t i = 0; i < row.weights.size(); ++i) {
-        const float weight = row.weights[i];
-        const float* cells = plane + (size_t(row.first_cell) + i) * size_t(map.width) + cols.first_cell;
-        for (int x = 0; x < width; ++x) line[size_t(x)] += weight * cells[x];
-      }
-      for (int x = 0; x < pool; ++x) {
-        const AxisWeights::Bin& col = cols.bins[size_t(x)];
-        const float* cells = line.data() + (col.first_cell - cols.first_cell);
-        float sum = 0;
-        for (size_t i = 0; i < col.weights.size(); ++i) sum += col.weights[i] * cells[i];
-        output[x] = sum;
+  const size_t channels = size_t(map.channels);
+  const size_t line_size = size_t(width) * channels;
+  std::vector<float> line(line_size);
+  for (int y = 0; y < pool; ++y, output += size_t(pool) * channels) {
+    const AxisWeights::Bin& row = rows.bins[size_t(y)];
+    if (row.weights.empty()) continue;
+    std::fill(line.begin(), line.end(), 0.0f);
+    for (size_t i = 0; i < row.weights.size(); ++i) {
+      const float weight = row.weights[i];
+      const size_t first = (size_t(row.first_cell) + i) * size_t(map.width) + size_t(cols.first_cell);
+      const float* cells = map.data + first * channels;
+      for (size_t k = 0; k < line_size; ++k) line[k] += weight * cells[k];
+    }
+    for (int x = 0; x < pool; ++x) {
+      const AxisWeights::Bin& col = cols.bins[size_t(x)];
+      float* bin = output + size_t(x) * channels;
+      for (size_t i = 0; i < col.weights.size(); ++i) {
+        const float weight = col.weights[i];
+        const float* cell = line.data() + (size_t(col.first_cell - cols.first_cell) + i) * channels;
+        for (size_t c = 0; c < channels; ++c) bin[c] += weight * cell[c];
       }
     }
   }

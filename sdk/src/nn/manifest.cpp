@@ -173,9 +173,9 @@ DenseHeadSpec read_dense_head(const Node& node, const std::map<std::string, File
 Manifest read_manifest(const Node& root) {
   if (root.at("format").text() != "maquette-bundle") root.at("format").fail("must be maquette-bundle");
   const int format_version = root.at("format_version").integer(0, 1 << 20);
-  if (format_version != 2) {
+  if (format_version != 3) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "The bundle has format version ", format_version,
-                ", but this library reads version 2; use a bundle made for it, or a newer library.");
+                ", but this library reads version 3; use a bundle made for it, or a newer library.");
   }
   Manifest manifest;
   manifest.name = root.at("name").text();

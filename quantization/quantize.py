@@ -17,19 +17,17 @@ from pathlib import Path
 
 import numpy as np
 import onnx
-from onnxruntime.quantization import (
-    CalibrationDataReader,
-    CalibrationMethod,
-    QuantFormat,
-    QuantType,
-    quantize_static,
-)
-from onnxruntime.quantization.shape_inference import quant_pre_process
+from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, QuantType
+from onnxruntime.quantization.calibrate import TensorsData, create_calibrator
+from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
+from onnxruntime.quantization.registry import QDQRegistry, QLinearOpsRegistry
 
 from export.densepose import bundle as bundle_format
 from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
+from quantization.bias_correction import correct_biases
 from quantization.errors import float_nodes_left, output_sqnr
+from quantization.prepare import prepare
 from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, Settings, read_settings
 from quantization.simplify import simplify
@@ -39,25 +37,14 @@ METHODS = {
     "percentile": CalibrationMethod.Percentile,
     "entropy": CalibrationMethod.Entropy,
 }
+OPERATORS = sorted({*QLinearOpsRegistry, *QDQRegistry})
 
 
 class Samples(CalibrationDataReader):
-    """Hands the calibration inputs of one graph to ONNX Runtime, some at a time: it keeps what every layer makes of
-    those that it is handed."""
-
-    MOST_AT_ONCE = 8
+    """Hands the calibration inputs of one graph to ONNX Runtime, one by one."""
 
     def __init__(self, samples: list[Sample]) -> None:
-        self._all = samples
         self._left = iter(samples)
-        # ONNX Runtime wants equal portions.
-        self.portion = max(k for k in range(1, self.MOST_AT_ONCE + 1) if len(samples) % k == 0)
-
-    def __len__(self) -> int:
-        return len(self._all)
-
-    def set_range(self, start_index: int, end_index: int) -> None:
-        self._left = iter(self._all[start_index:end_index])
 
     def get_next(self) -> Sample | None:
         return next(self._left, None)
@@ -67,30 +54,66 @@ def quantise_graph(source: Path, target: Path, samples: list[Sample], settings: 
     """Writes the int8 form (QDQ) of one graph. Raises ValueError for a pattern that matches nothing."""
     if not samples:
         raise ValueError(f"nothing to calibrate {source.name} with: the bundle finds nobody in the images")
+    with tempfile.TemporaryDirectory() as folder:
+        prepared = Path(folder) / "prepared.onnx"
+        prepare(source, prepared)
+        quantise_prepared(prepared, target, calibrate(prepared, samples, settings), settings)
+        if settings.bias_correction:
+            correct_biases(prepared, target, samples)
+
+
+def calibrate(prepared: Path, samples: list[Sample], settings: GraphSettings) -> TensorsData:
+    """Ranges of all activations of a prepared graph. They do not depend on what stays float."""
     if settings.method != "minmax":
         samples = equal_sizes(samples)
     with tempfile.TemporaryDirectory() as folder:
-        prepared = Path(folder) / "prepared.onnx"
-        quant_pre_process(source, prepared, skip_symbolic_shape=True)
-        graph = onnx.load(prepared).graph
-        reader = Samples(samples)
-        quantize_static(
+        calibrator = create_calibrator(
             prepared,
-            target,
-            reader,
-            quant_format=QuantFormat.QDQ,
-            per_channel=True,
-            reduce_range=settings.reduce_range,
-            activation_type=QuantType.QUInt8,
-            weight_type=QuantType.QInt8,
-            nodes_to_exclude=matching_nodes(graph, settings.float_nodes),
+            OPERATORS,
+            augmented_model_path=str(Path(folder) / "augmented.onnx"),
             calibrate_method=METHODS[settings.method],
-            # Not CalibMaxIntermediateOutputs: "minmax" then forgets all samples but those of the last batch.
-            extra_options={"CalibPercentile": settings.percentile, "CalibStridedMinMax": reader.portion},
+            # Not max_intermediate_outputs: "minmax" then forgets all samples but those of the last batch.
+            extra_options={"percentile": settings.percentile} if settings.method == "percentile" else {},
         )
-    model = onnx.load(target)
-    simplify(model)
-    onnx.save(model, target)
+        # Few at a time: it keeps what every layer made of them.
+        for start in range(0, len(samples), 8):
+            calibrator.collect_data(Samples(samples[start : start + 8]))
+        return calibrator.compute_data()
+
+
+def quantise_prepared(prepared: Path, target: Path, ranges: TensorsData, settings: GraphSettings) -> None:
+    """Writes the int8 form of a prepared graph with known ranges: `quantize_static` without its calibration, so that
+    many choices of what stays float can be tried at the cost of one calibration."""
+    model = onnx.load(prepared)
+    quantizer = QDQQuantizer(
+        model,
+        per_channel=True,
+        reduce_range=settings.reduce_range,
+        weight_qType=QuantType.QInt8,
+        activation_qType=QuantType.QUInt8,
+        tensors_range=ranges,
+        nodes_to_quantize=[],
+        nodes_to_exclude=matching_nodes(model.graph, settings.float_nodes),
+        op_types_to_quantize=OPERATORS,
+        extra_options={"TensorQuantOverrides": eight_bit_weights(model.graph) if settings.depthwise_8_bit else {}},
+    )
+    quantizer.quantize_model()
+    simplify(quantizer.model.model)
+    quantizer.model.save_model_to_file(str(target))
+
+
+def eight_bit_weights(graph: onnx.GraphProto) -> dict[str, list[dict[str, object]]]:
+    """Asks ONNX Runtime for all 8 bits in depthwise convolutions: their kernel adds in 32 bits on every processor
+    (quantization.saturation), so that they have nothing to fear from 16-bit sums."""
+    shapes = {value.name: list(value.dims) for value in graph.initializer}
+    found = {}
+    for node in graph.node:
+        group = next((a.i for a in node.attribute if a.name == "group"), 1)
+        if node.op_type == "Conv" and group > 1 and shapes[node.input[1]][:2] == [group, 1]:
+            found[node.input[1]] = [
+                {"quant_type": QuantType.QInt8, "symmetric": True, "reduce_range": False, "axis": 0}
+            ]
+    return found
 
 
 def equal_sizes(samples: list[Sample]) -> list[Sample]:

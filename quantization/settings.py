@@ -18,13 +18,17 @@ class GraphSettings:
     method: how the range of an activation follows from what calibration saw: its extremes ("minmax"), without
     the outermost 1 - `percentile` / 100 ("percentile"), or with the least information lost ("entropy").
     reduce_range: weights use 7 bits, so that two products never overflow 16 bits on x86 without VNNI.
+    depthwise_8_bit: depthwise convolutions keep 8 bits all the same: their kernels add in 32 bits.
     float_nodes: names of nodes that stay float, `*` matches any text.
+    bias_correction: biases take up the mean error that rounded weights cause.
     """
 
     method: str = "minmax"
     percentile: float = 99.999
     reduce_range: bool = True
+    depthwise_8_bit: bool = False
     float_nodes: tuple[str, ...] = ()
+    bias_correction: bool = False
 
 
 @dataclass(frozen=True)

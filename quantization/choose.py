@@ -1,0 +1,297 @@
+"""Chooses which nodes stay float: what gains most for its bytes, until int8 labels agree with fp32 ones.
+
+Candidates are blocks of nodes whose names begin alike. Each alone is left float, on top of what the settings already
+leave float; its gain is the drop of the outputs' noise relative to their signal (mean over the graph's outputs), its
+cost the bytes that the graph grows by, and the multiply-adds that are done in float. The candidates with the most gain
+a byte are then taken one by one, the bundle is made and compared with the fp32 one (quantization.agreement) after each,
+until the gate holds or nothing that fits is left. Ranges are found once: they do not depend on the choice.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+from onnxruntime.quantization.calibrate import TensorsData
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from export.densepose import bundle as bundle_format
+from export.densepose import data
+from export.densepose.graphs import Bundle, open_bundle
+from export.evaluation.maquette_api import MaquetteError
+from export.evaluation.shards import ShardError
+from quantization import agreement, qdq
+from quantization.activations import Activations
+from quantization.bias_correction import correct_biases
+from quantization.errors import output_sqnr
+from quantization.prepare import prepare
+from quantization.quantize import calibrate, quantise_prepared, spread
+from quantization.samples import Sample, collect
+from quantization.settings import GraphSettings, read_settings
+
+BUDGET_MB = 3.6
+EPILOG = """\
+examples:
+  python -m quantization.choose --out build/chosen.toml
+  python -m quantization.choose --graphs trunk dense_head --budget 3.2 --out quantization/densepose.toml
+  python -m quantization.quantize --settings build/chosen.toml --out build/quantised
+The exit status is 1 when the budget is spent before the gate holds; the settings are written all the same.
+"""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """graph; pattern: for float_nodes; gain: drop of noise over signal, mean of the graph's outputs; sqnr: the same as
+    the mean of the outputs in dB, before and after; bytes: that the graph grows; macs: multiply-adds of one sample in
+    float."""
+
+    graph: str
+    pattern: str
+    gain: float
+    sqnr: tuple[float, float]
+    bytes: int
+    macs: int
+
+    @property
+    def rank(self) -> float:
+        """Gain a byte; what costs nothing counts as one byte."""
+        return self.gain / max(self.bytes, 1)
+
+
+@dataclass
+class Workpiece:
+    """One prepared graph with its ranges: everything that making it int8 needs."""
+
+    name: str
+    path: Path
+    ranges: TensorsData
+    settings: GraphSettings
+    calibration: list[Sample]
+    held_out: list[Sample]
+
+    def quantise(self, target: Path, extra: tuple[str, ...] = ()) -> None:
+        settings = replace(self.settings, float_nodes=self.settings.float_nodes + extra)
+        quantise_prepared(self.path, target, self.ranges, settings)
+        if settings.bias_correction:
+            correct_biases(self.path, target, self.calibration)
+
+
+def block_of(name: str) -> str:
+    """The pattern of the block that a node belongs to: the first two parts of its name, /backbone/blocks.3/*."""
+    parts = name.strip("/").split("/")
+    return f"/{'/'.join(parts[:2])}/*" if len(parts) > 2 else name
+
+
+def blocks(graph: onnx.GraphProto, float_nodes: tuple[str, ...]) -> list[str]:
+    """Patterns of the blocks with convolutions or matrix products that do not all stay float already."""
+    names = [n.name for n in qdq.heavy_nodes(graph)]
+    left = [n for n in names if not any(fnmatch.fnmatchcase(n, pattern) for pattern in float_nodes)]
+    return list(dict.fromkeys(block_of(name) for name in left))
+
+
+def relative_noise(sqnr: dict[str, float]) -> float:
+    """Mean over outputs of noise over signal."""
+    return float(np.mean([10 ** (-value / 10) for value in sqnr.values()]))
+
+
+def multiply_adds(piece: Workpiece) -> dict[str, int]:
+    """Multiply-adds of each convolution and matrix product on the first held-out sample."""
+    model = onnx.load(piece.path)
+    known = qdq.constants(model.graph)
+    heavy = [n for n in qdq.heavy_nodes(model.graph) if n.input[1] in known]
+    made = Activations(model, [n.output[0] for n in heavy])(piece.held_out[0])
+    counts = {}
+    for node in heavy:
+        weight = known[node.input[1]]
+        transposed = any(a.name == "transB" and a.i for a in node.attribute)
+        each = weight[0].size if node.op_type == "Conv" or transposed else weight.shape[0]
+        counts[node.name] = int(made[node.output[0]].size * each)
+    return counts
+
+
+def candidates(piece: Workpiece) -> list[Candidate]:
+    """Every block of one graph, tried alone; best first."""
+    macs = multiply_adds(piece)
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "tried.onnx"
+        piece.quantise(target)
+        before, size = output_sqnr(piece.path, target, piece.held_out), target.stat().st_size
+        patterns = blocks(onnx.load(piece.path).graph, piece.settings.float_nodes)
+        for pattern in tqdm(patterns, desc=f"blocks of {piece.name}", unit="block", leave=False, disable=None):
+            piece.quantise(target, (pattern,))
+            after = output_sqnr(piece.path, target, piece.held_out)
+            found.append(
+                Candidate(
+                    piece.name,
+                    pattern,
+                    relative_noise(before) - relative_noise(after),
+                    (float(np.mean(list(before.values()))), float(np.mean(list(after.values())))),
+                    target.stat().st_size - size,
+                    sum(count for name, count in macs.items() if fnmatch.fnmatchcase(name, pattern)),
+                )
+            )
+    return sorted(found, key=lambda c: -c.rank)
+
+
+def pick(
+    ranked: list[Candidate], size: int, budget: int, measure: Callable[[list[Candidate]], float], gate: float
+) -> tuple[list[Candidate], list[float]]:
+    """Takes candidates that gain and fit, in order, until `measure` of those taken reaches `gate`.
+
+    size, budget: bytes of the bundle now, and at most. Returns what was taken, and the measurements: first without any,
+    then after each.
+    """
+    taken: list[Candidate] = []
+    measured = [measure(taken)]
+    for candidate in ranked:
+        if measured[-1] >= gate:
+            break
+        if candidate.gain <= 0 or size + candidate.bytes > budget:
+            continue
+        taken.append(candidate)
+        size += candidate.bytes
+        measured.append(measure(taken))
+    return taken, measured
+
+
+def with_float_nodes(text: str, chosen: dict[str, tuple[str, ...]]) -> str:
+    """A settings file with other `float_nodes` for the graphs named; everything else, comments too, stays.
+
+    Raises ValueError for a graph whose section does not set `float_nodes`.
+    """
+    for graph, patterns in chosen.items():
+        section = re.search(rf"^\[{re.escape(graph)}\]\n(.*?)(?=^\[|\Z)", text, re.M | re.S)
+        setting = section and re.search(r"^float_nodes\s*=\s*\[[^\]]*\]", section[1], re.M)
+        if not setting:
+            raise ValueError(f"the settings have no float_nodes in [{graph}] to write to: add `float_nodes = []`")
+        lines = "".join(f'    "{pattern}",\n' for pattern in patterns)
+        value = f"float_nodes = [\n{lines}]" if patterns else "float_nodes = []"
+        start = section.start(1) + setting.start()
+        text = text[:start] + value + text[section.start(1) + setting.end() :]
+    return text
+
+
+def write_bundle(target: Path, source: Bundle, graphs: Callable[[str, Path], None]) -> Path:
+    """A bundle whose graphs `graphs(name, path)` writes; the rest is that of `source`."""
+    target.mkdir(parents=True, exist_ok=True)
+    shutil.copy(source.folder / bundle_format.CHARTS, target)
+    for name in bundle_format.GRAPHS:
+        graphs(name, target / f"{name}.onnx")
+    bundle_format.write_manifest(target, bundle_format.BundleInfo(target.name, "int8"), source.network, source.decode)
+    return target
+
+
+def print_candidates(ranked: list[Candidate], taken: list[Candidate], console: Console) -> None:
+    table = Table(title="candidates, best first", title_justify="left")
+    for column in ("graph", "stays float"):
+        table.add_column(column, overflow="fold")
+    for column in ("outputs, dB", "kB", "M multiply-adds", "gain a kB", "taken"):
+        table.add_column(column, justify="right")
+    for c in ranked:
+        decibels = f"{c.sqnr[0]:.2f} -> {c.sqnr[1]:.2f}"
+        cells = (decibels, f"{c.bytes / 1e3:.1f}", f"{c.macs / 1e6:.1f}", f"{1e3 * c.rank:.1e}")
+        table.add_row(c.graph, c.pattern, *cells, "yes" if c in taken else "")
+    console.print(table)
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m quantization.choose", description=__doc__, epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("--bundle", type=Path, default=agreement.FLOAT_BUNDLE, metavar="DIR", help="fp32 bundle")
+    parser.add_argument("--settings", type=Path, default=Path(__file__).with_name("densepose.toml"), metavar="TOML")
+    parser.add_argument("--out", type=Path, required=True, metavar="TOML", help="where the settings go")
+    parser.add_argument("--data", type=Path, default=Path(".data/people/train"), metavar="DIR", help="for calibration")
+    parser.add_argument("--photos", type=Path, metavar="DIR", help="calibrate on these shards too")
+    parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), metavar="DIR", help="to measure on")
+    parser.add_argument("--graphs", nargs="+", default=list(bundle_format.GRAPHS), choices=bundle_format.GRAPHS)
+    parser.add_argument("--budget", type=float, default=BUDGET_MB, metavar="MB", help=f"bundle (default {BUDGET_MB})")
+    parser.add_argument("--gate", type=float, default=agreement.GATE, metavar="SHARE", help="label agreement wanted")
+    parser.add_argument("--samples", type=int, default=6, metavar="N", help="images a candidate is judged by")
+    parser.add_argument("--images", type=int, metavar="N", help="images labels are compared on (default: all)")
+    parser.add_argument("--backend", choices=("capi", "onnx"), default="capi", help="default: capi")
+    arguments = parser.parse_args(argv)
+    onnxruntime.set_default_logger_severity(3)
+    try:
+        return run(arguments)
+    except (MaquetteError, ShardError, FileNotFoundError, ValueError) as error:
+        print(f"Nothing was chosen: {error}", file=sys.stderr)
+        return 1
+
+
+def workpieces(arguments: argparse.Namespace, source: Bundle, folder: Path) -> dict[str, Workpiece]:
+    """Prepared and calibrated graphs of the bundle, written to `folder`."""
+    settings = read_settings(arguments.settings)
+    records = spread(data.load_records(arguments.data), settings.calibration_images)
+    if arguments.photos:
+        records += spread(data.load_records(arguments.photos), settings.calibration_photos)
+    calibration = collect(source, records, settings.people_per_image)
+    held_out = collect(source, spread(data.load_records(arguments.held_out), arguments.samples), 4)
+    pieces = {}
+    for name, graph_settings in tqdm(settings.graphs.items(), desc="calibrating", unit="graph", disable=None):
+        path = folder / f"{name}.onnx"
+        prepare(source.folder / f"{name}.onnx", path)
+        ranges = calibrate(path, calibration[name], graph_settings)
+        pieces[name] = Workpiece(name, path, ranges, graph_settings, calibration[name], held_out[name])
+    return pieces
+
+
+def run(arguments: argparse.Namespace) -> int:
+    console = Console(width=None if sys.stdout.isatty() else 140)
+    source = open_bundle(arguments.bundle)
+    text = arguments.settings.read_text()
+    images = agreement.load_images(arguments.held_out, arguments.images)
+    backend = agreement.open_bundle(arguments.bundle, arguments.backend)
+    expected = list(agreement.predictions(backend, images))
+    with tempfile.TemporaryDirectory() as folder:
+        pieces = workpieces(arguments, source, Path(folder))
+        ranked = [c for name in arguments.graphs for c in candidates(pieces[name])]
+        ranked.sort(key=lambda c: -c.rank)
+
+        def made(taken: list[Candidate]) -> Path:
+            def graph(name: str, path: Path) -> None:
+                pieces[name].quantise(path, tuple(c.pattern for c in taken if c.graph == name))
+
+            return write_bundle(Path(folder) / "bundle", source, graph)
+
+        def measure(taken: list[Candidate]) -> float:
+            target = made(taken)
+            found = agreement.open_bundle(target, arguments.backend)
+            figures = agreement.compare(expected, agreement.predictions(found, images))
+            last = f"{taken[-1].graph}: {taken[-1].pattern}" if taken else "as the settings are"
+            megabytes = bundle_format.bytes_of(target) / 1e6
+            console.print(f"{100 * figures.labels:6.2f} %  {megabytes:.2f} MB  {last}", highlight=False)
+            return figures.labels
+
+        size = bundle_format.bytes_of(made([]))
+        taken, measured = pick(ranked, size, int(1e6 * arguments.budget), measure, arguments.gate)
+    print_candidates(ranked, taken, console)
+    chosen = {}
+    for name in dict.fromkeys(c.graph for c in taken):
+        chosen[name] = pieces[name].settings.float_nodes + tuple(c.pattern for c in taken if c.graph == name)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    arguments.out.write_text(with_float_nodes(text, chosen))
+    reached = measured[-1] >= arguments.gate
+    verdict = "The gate holds" if reached else "The gate does not hold within the budget"
+    console.print(
+        f"{verdict}: {100 * measured[-1]:.2f} %, {len(taken)} blocks more stay float. Written: {arguments.out}"
+    )
+    return 0 if reached else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import functools
 import itertools
 import warnings
 from pathlib import Path
@@ -94,6 +95,10 @@ class Doubled(torch.autograd.Function):
         return g.op("Transpose", twice, perm_i=[0, 3, 1, 2])
 
 
+def doubled(x: Tensor, like: Tensor) -> Tensor:
+    return Doubled.apply(x, like) if torch.onnx.is_in_onnx_export() else Doubled.forward(None, x, like)
+
+
 class Trunk(nn.Module):
     """Backbone and neck: image -> P2..P6."""
 
@@ -153,7 +158,8 @@ class DenseHeadGraph(nn.Module):
 
     def forward(self, rois: Tensor) -> tuple[Tensor, Tensor]:
         surface = self.head.surface(channels_first(rois))
-        labels = [PhaseConv.apply(surface, w, self.bias, *divmod(k, 2)) for k, w in enumerate(self.phases)]
+        conv = PhaseConv.apply if torch.onnx.is_in_onnx_export() else functools.partial(PhaseConv.forward, None)
+        labels = [conv(surface, weight, self.bias, *divmod(k, 2)) for k, weight in enumerate(self.phases)]
         return channels_last(torch.cat(labels, 1)), channels_last(surface)
 
 
@@ -211,7 +217,7 @@ def simplified(net: MobileParsingRCNN) -> MobileParsingRCNN:
                 setattr(module, name, FixedFusion(child))
             elif isinstance(child, Aspp):
                 setattr(module, name, SplitAspp(child))
-    net.neck.up = Doubled.apply
+    net.neck.up = doubled
     left = [name for name, module in net.named_modules() if isinstance(module, nn.BatchNorm2d)]
     if left:
         raise ValueError(f"batch normalisation without a convolution before it: {', '.join(left)}")

@@ -36,6 +36,25 @@ std::vector<Tap> resize_taps(int from, int to) {
   return taps;
 }
 
+// The first of `count` values (of `padded`, a multiple of kLanes, the rest kNever) that is the largest. NaN never wins; -1
+// if all are NaN or kNever.
+inline int best_of(const float* values, int count, int padded) {
+  std::array<float, kLanes> lane_best;
+  lane_best.fill(kNever);
+  for (int c = 0; c < padded; c += kLanes) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const float value = values[c + lane];
+      lane_best[size_t(lane)] = value > lane_best[size_t(lane)] ? value : lane_best[size_t(lane)];
+    }
+  }
+  float best = lane_best[0];
+  for (const float value : lane_best) best = value > best ? value : best;
+  for (int c = 0; c < count; ++c) {
+    if (values[c] == best) return c;
+  }
+  return -1;
+}
+
 // One row of the resized logits before its columns are resized, with the classes innermost, so that comparing the
 // classes of a pixel runs over neighbouring memory. Padded with kNever to whole lanes.
 class ClassRow {
@@ -61,21 +80,8 @@ class ClassRow {
     alignas(32) std::array<float, kMostClasses> mixed;
     const float* low = values_.data() + size_t(col.low) * size_t(padded_);
     const float* high = values_.data() + size_t(col.high) * size_t(padded_);
-    std::array<float, kLanes> lane_best;
-    lane_best.fill(kNever);
-    for (int c = 0; c < padded_; c += kLanes) {
-      for (int lane = 0; lane < kLanes; ++lane) {
-        const float value = low[c + lane] + (high[c + lane] - low[c + lane]) * col.fraction;
-        mixed[size_t(c + lane)] = value;
-        lane_best[size_t(lane)] = value > lane_best[size_t(lane)] ? value : lane_best[size_t(lane)];
-      }
-    }
-    float best = lane_best[0];
-    for (const float value : lane_best) best = value > best ? value : best;
-    for (int c = 0; c < classes_; ++c) {
-      if (mixed[size_t(c)] == best) return c;
-    }
-    return -1;
+    for (int c = 0; c < padded_; ++c) mixed[size_t(c)] = low[c] + (high[c] - low[c]) * col.fraction;
+    return best_of(mixed.data(), classes_, padded_);
   }
 
  private:
@@ -140,6 +146,22 @@ MAQ_SIMD_CLONES std::vector<float> person_log_odds(const DenseLogits& logits) {
     }
   }
   return odds;
+}
+
+// Of each cell the part with the largest logit, from 0 (of equal ones the lowest); -1 if all are NaN.
+MAQ_SIMD_CLONES std::vector<int8_t> best_parts(const DenseLogits& logits) {
+  const int parts = logits.index_classes - 1;
+  const int padded = round_up_to_lanes(parts);
+  std::array<float, kMostClasses> values;
+  values.fill(kNever);
+  std::vector<int8_t> best(size_t(logits.size) * size_t(logits.size));
+  for (int y = 0; y < logits.size; ++y) {
+    for (int x = 0; x < logits.size; ++x) {
+      std::copy_n(logits.cell(y, x) + logits.coarse_classes + 1, parts, values.begin());
+      best[size_t(y) * size_t(logits.size) + size_t(x)] = int8_t(best_of(values.data(), parts, padded));
+    }
+  }
+  return best;
 }
 
 float bilinear(const float* plane, int size, const Tap& row, const Tap& col) {
@@ -214,6 +236,7 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
   const std::vector<float> odds = person_log_odds(logits);
   const float least_odds = std::log(mask_threshold / (1 - mask_threshold));
   ClassRow parts(logits.index_classes - 1, logits.size);  // all but the background
+  const std::vector<int8_t> best = best_parts(logits);
 
   const int first_row = std::max(0, -rect.y);
   const int last_row = std::min(rect.height, planes.height_px - rect.y);
@@ -223,7 +246,9 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
     const Tap& row = rows[size_t(y)];
     std::optional<ChartSampler> charts;
     if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
-    bool filled = false;  // many rows of a box show nobody
+    bool filled = false;  // many rows of a box need no resized logits
+    const int8_t* best_low = best.data() + size_t(row.low) * size_t(logits.size);
+    const int8_t* best_high = best.data() + size_t(row.high) * size_t(logits.size);
     for (int x = first_col; x < last_col; ++x) {
       const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
       const Tap& col = cols[size_t(x)];
@@ -232,10 +257,15 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
         ++taken;
         continue;
       }
-      if (!filled) parts.fill(logits, logits.coarse_classes + 1, row);
-      filled = true;
-      const int part = parts.best(col) + 1;
-      if (part == 0) continue;
+      // What is largest in all four cells around a pixel is so between them.
+      int part = best_low[col.low] + 1;
+      if (part == 0 || best_low[col.high] + 1 != part || best_high[col.low] + 1 != part ||
+          best_high[col.high] + 1 != part) {
+        if (!filled) parts.fill(logits, logits.coarse_classes + 1, row);
+        filled = true;
+        part = parts.best(col) + 1;
+        if (part == 0) continue;
+      }
       bool clamped = false;
       planes.part[pixel] = uint8_t(part);
       if (charts) {

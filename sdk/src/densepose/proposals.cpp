@@ -56,21 +56,24 @@ std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, con
   std::vector<ScoredBox> all;
   for (size_t l = 0; l < levels.size(); ++l) {
     const RpnLevel& level = levels[l];
-    std::vector<ScoredBox> boxes;
+    // Greedy suppression in order of score, so that boxes are only made of candidates until enough are kept.
+    std::vector<ScoredBox> kept;
     for (const Candidate& candidate : best_candidates(level, anchors, spec.pre_nms_top_k, dropped)) {
+      if (kept.size() == size_t(spec.post_nms_top_k)) break;
       const int anchor = candidate.index % anchors;
       const int cell = candidate.index / anchors;
       const float* deltas = level.values + size_t(cell) * size_t(5 * anchors) + size_t(anchors + 4 * anchor);
       Box box = apply_deltas(anchor_box(cell % level.width, cell / level.width, spec.strides[l],
                                         spec.anchor_sizes_px[l], spec.aspect_ratios[size_t(anchor)]),
                              deltas, kUnitWeights);
-      if (clip_box(box, width, height)) {
-        boxes.push_back({box, candidate.logit, int64_t(l) << 32 | candidate.index});
-      } else {
+      if (!clip_box(box, width, height)) {
         ++*dropped;
+        continue;
       }
+      const bool suppressed = std::any_of(
+          kept.begin(), kept.end(), [&](const ScoredBox& better) { return overlap(box, better.box) > spec.nms_iou; });
+      if (!suppressed) kept.push_back({box, candidate.logit, int64_t(l) << 32 | candidate.index});
     }
-    const auto kept = non_maximum_suppression(std::move(boxes), spec.nms_iou, size_t(spec.post_nms_top_k));
     all.insert(all.end(), kept.begin(), kept.end());
   }
   std::sort(all.begin(), all.end(), comes_before);

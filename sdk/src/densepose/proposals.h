@@ -22,7 +22,8 @@ Box anchor_box(int x, int y, int stride, float size_px, float ratio);
 
 // The best boxes over all levels, best first, clipped to the image (`width` x `height`, pixels of the network's input
 // without padding). Each level keeps its pre_nms_top_k best, then NMS runs within each level; ties go to the lower
-// level, then to the lowest (y, x, anchor). Boxes with NaN or infinite numbers or without area are left out and counted in `dropped`.
+// level, then to the lowest (y, x, anchor). Boxes with NaN or infinite numbers or without area are left out, and counted in
+// `dropped` as far as they were looked at before enough were found.
 std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width,
                                         float height, int* dropped);
 

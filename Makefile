@@ -37,9 +37,9 @@ test: packages-test  ## all native tests (release and asan) and Python tests; en
 	@scripts/test.sh
 
 .PHONY: bench
-bench: build packages-test  ## time each stage on the bundled photo and clip
-	@scripts/make-venv.sh
-	@.venv/bin/python -m benchmarks.stage_times
+bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
+	@scripts/make-venv.sh train,bench
+	@.venv/bin/python -m benchmarks
 
 .PHONY: format
 format: packages-lint  ## rewrite C++ (clang-format) and Python (ruff) sources in the house layout

@@ -1,0 +1,190 @@
+"""Measures what Maquette promises, checks it against benchmarks/targets.toml, and writes a report to read.
+
+    python -m benchmarks                  everything, about 15 minutes; `make bench` builds first
+    python -m benchmarks --quick          fewer rounds and images, to see that it runs
+    python -m benchmarks --only peers     one part; the others' figures are taken from the last run in --out
+    python -m benchmarks --publish        also copies the report to docs/benchmarks
+
+Parts: scenes (people, pixels, threads; start, memory), sweep (error against run time), agreement (int8 against fp32),
+peers (other runtimes and the roofline). Exit status: 0 when every gate is met, 1 when one is missed, 2 when something
+could not be measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks import gates, report, scenes
+from export.evaluation.maquette_api import LIBRARY, MaquetteError
+from export.evaluation.shards import ShardError, read_images, shard_paths
+
+SCHEMA = "maquette-benchmark-1"
+PARTS = ("scenes", "sweep", "agreement", "peers")
+INT8 = Path("sdk/models/densepose-b-int8")
+CHECKPOINT = Path("export/weights/densepose-b.pt")
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("build/benchmarks"), metavar="DIR", help="default: build/benchmarks"
+    )
+    parser.add_argument(
+        "--data", type=Path, default=Path(".data/people/test"), metavar="DIR", help="rendered people; made if not there"
+    )
+    parser.add_argument("--images", type=int, default=150, help="of them (default 150)")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
+    parser.add_argument("--publish", action="store_true")
+    options = parser.parse_args(argv)
+    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        document = measure(options)
+    except (MaquetteError, ShardError, FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
+        print(f"The benchmark stopped: {error}", file=sys.stderr)
+        return 2
+    verdicts = gates.check(document["figures"], document["machine"], document["missing"])
+    document["gates"] = [vars(verdict) for verdict in verdicts]
+    path = options.out / "benchmark.json"
+    path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    written = [path, *report.write(document, options.out)]
+    print_verdicts(verdicts)
+    print("Written: " + ", ".join(str(x) for x in written))
+    if options.publish:
+        target = Path("docs/benchmarks")
+        target.mkdir(parents=True, exist_ok=True)
+        for x in written:
+            shutil.copy(x, target)
+        print(f"Published: {target}")
+    states = [verdict.state for verdict in verdicts]
+    return 1 if "missed" in states else 0
+
+
+def measure(options: argparse.Namespace) -> dict:
+    """The document without its verdicts. Parts that are not asked for come from the last run."""
+    previous = options.out / "benchmark.json"
+    document = json.loads(previous.read_text()) if previous.exists() and set(options.only) != set(PARTS) else {}
+    if document.get("schema", SCHEMA) != SCHEMA:
+        document = {}
+    document |= {"schema": SCHEMA, "quick": options.quick, "threads": options.threads}
+    figures, missing = document.setdefault("figures", {}), document.setdefault("missing", {})
+    figures["bundle_mb"] = round(sum(p.stat().st_size for p in INT8.iterdir()) / 1e6, 3)
+    figures["library_mb"] = round(LIBRARY.resolve().stat().st_size / 1e6, 3)
+    float_bundle = float_bundle_in(options.out)
+    if "scenes" in options.only or "machine" not in document:
+        document["scenes"], found, document["machine"] = scenes.measure(options.out, options.threads, options.quick)
+        figures |= found
+    if "sweep" in options.only:
+        document["sweep"], found = sweep_part(options, float_bundle)
+        figures |= found
+    if "agreement" in options.only:
+        document["agreement"], found = agreement_part(options, float_bundle)
+        figures |= found
+    if "peers" in options.only:
+        document["peers"], found, why = peers_part(options, float_bundle)
+        figures |= found
+        missing.clear()
+        missing |= why
+    for name in ("scenes", "sweep", "agreement", "peers"):
+        if name not in document:
+            raise ValueError(f"{name} was never measured in {options.out}; run it too")
+    return document
+
+
+def float_bundle_in(folder: Path) -> Path:
+    """The fp32 bundle of the shipped weights, exported once and again when these change."""
+    from export.densepose import bundle, export_onnx
+    from quantization.check import fp32_bundle
+
+    target, stamp = folder / "densepose-b-fp32", folder / "densepose-b-fp32.made-from"
+    # The exporter decides too what the graphs look like.
+    made_from = "".join(str(Path(p).stat().st_mtime_ns) for p in (CHECKPOINT, export_onnx.__file__, bundle.__file__))
+    if not (target / "manifest.json").exists() or not stamp.exists() or stamp.read_text() != made_from:
+        print(f"Exporting {CHECKPOINT} as fp32 graphs")
+        fp32_bundle(CHECKPOINT, target)
+        stamp.write_text(made_from)
+    return target
+
+
+def test_images(options: argparse.Namespace) -> list:
+    if not list(options.data.glob("shard-*.npz")):
+        print(f"Rendering {options.images} images into {options.data}")
+        commands = [["export.people.assets"], ["export.photos", "fetch"]]
+        commands.append(["export.people.dataset", "--split", "test", "--images", str(options.images), "--out",
+                         str(options.data.parent), "--per-shard", "150"])  # fmt: skip
+        for command in commands:
+            subprocess.run([sys.executable, "-m", *command], check=True)
+    return list(read_images(shard_paths(options.data), 30 if options.quick else options.images))
+
+
+def sweep_part(options: argparse.Namespace, float_bundle: Path) -> tuple[list[dict], dict[str, float]]:
+    from benchmarks import sweep
+    from export.evaluation.backends import read_manifest
+    from export.people.atlas import load_surface_table
+
+    wanted = sweep.settings()
+    threshold = read_manifest(INT8)["box_head"]["score_threshold"]
+    bundles = {"int8": INT8, "fp32": float_bundle}
+    measured = sweep.measure(
+        test_images(options), bundles, load_surface_table(), wanted, threshold, threads=options.threads
+    )
+    rows = [vars(m) | {"setting": m.setting.name} | {"axis": m.setting.axis} for m in measured]
+    by_name = {row["setting"]: row for row in rows}
+    loss = 100 * (by_name["as shipped"]["error"] - by_name["fp32"]["error"])
+    return rows, {"int8_gps_loss_points": round(loss, 2)}
+
+
+def agreement_part(options: argparse.Namespace, float_bundle: Path) -> tuple[dict, dict[str, float]]:
+    from quantization.agreement import agreement
+
+    found = agreement(float_bundle, INT8, [image.image for image in test_images(options)])
+    return asdict(found), {"int8_label_agreement": round(100 * found.labels, 2)}
+
+
+def peers_part(options: argparse.Namespace, float_bundle: Path) -> tuple[dict, dict[str, float], dict[str, str]]:
+    """In a process of its own: another runtime may take this one down with it."""
+    path = options.out / "peers.json"
+    path.unlink(missing_ok=True)
+    rounds = 3 if options.quick else 25
+    command = [sys.executable, "-m", "benchmarks.peers", "--fp32", str(float_bundle), "--threads", str(options.threads),
+               "--rounds", str(rounds), "--out", str(path)]  # fmt: skip
+    # Some runtimes die of AMX where a virtual machine hides how its tiles look.
+    has_amx = "amx_bf16" in Path("/proc/cpuinfo").read_text().split()
+    subprocess.run([*(["scripts/with-amx.sh"] if has_amx else []), *command], check=True)
+    document = json.loads(path.read_text())
+    figures, missing = {"roofline_share": document["roofline"]["share"]}, {}
+    for name, runtime, precision in (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32")):
+        row = next(r for r in document["runtimes"] if (r["name"], r["precision"]) == (runtime, precision))
+        if row["ours_int8_ratio"] is None:
+            missing[f"time_by_{name}"] = row["missing"]
+        else:
+            figures[f"time_by_{name}"] = row["ours_int8_ratio"]
+    return document, figures, missing
+
+
+def print_verdicts(verdicts: list[gates.Verdict]) -> None:
+    colours = {"stretch": "bold green", "met": "green", "missed": "bold red", "not measured": "yellow"}
+    table = Table(title="Gates", title_justify="left")
+    for column in ("what", "figure", "gate", "stretch", "state"):
+        table.add_column(column, justify="left" if column in ("what", "state") else "right")
+    for v in verdicts:
+        value = "" if v.value is None else f"{v.value:.4g}"
+        state = f"[{colours[v.state]}]{v.state}[/]" + (f": {v.why}" if v.why else "")
+        table.add_row(v.says, value, v.gate, v.stretch, state)
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,54 @@
+"""Compares figures with targets.toml."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+TARGETS = Path(__file__).with_name("targets.toml")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """state: "stretch" (better than wished), "met", "missed", or "not measured" with the reason in `why`."""
+
+    figure: str
+    says: str
+    value: float | None
+    gate: str
+    stretch: str
+    state: str
+    why: str = ""
+
+
+def check(figures: dict[str, float], machine: dict, missing: dict[str, str], targets: Path = TARGETS) -> list[Verdict]:
+    """figures: value by name. machine: as `maquette bench` describes it. missing: why a figure was not measured.
+
+    Raises ValueError for targets that cannot be read.
+    """
+    document = tomllib.loads(targets.read_text())
+    verdicts = []
+    for gate in document["gate"]:
+        name = gate["figure"]
+        if ("at_least" in gate) == ("at_most" in gate):
+            raise ValueError(f"{targets}: {name} needs either at_least or at_most")
+        least = "at_least" in gate
+        bound, stretch, sign = gate["at_least" if least else "at_most"], gate["stretch"], "≥" if least else "≤"
+        state, why, value = "not measured", missing.get(name, ""), figures.get(name)
+        wanted = document["machine"][gate["machine"]] if "machine" in gate else None
+        if wanted and not same_machine(machine, wanted):
+            why = f"the gate is for a {wanted['says']}"
+        elif value is not None:
+            reached = [value >= limit if least else value <= limit for limit in (bound, stretch)]
+            state = "stretch" if reached[1] else "met" if reached[0] else "missed"
+        elif not why:
+            raise ValueError(f"{targets}: no figure is called {name}")
+        verdicts.append(Verdict(name, gate["says"], value, f"{sign} {bound}", f"{sign} {stretch}", state, why))
+    return verdicts
+
+
+def same_machine(machine: dict, wanted: dict) -> bool:
+    sets = set(machine.get("instruction_sets") or [])
+    same = all(machine.get(key) == wanted[key] for key in ("architecture", "cores"))
+    return same and set(wanted["instruction_sets"]) <= sets

@@ -1,0 +1,248 @@
+"""The benchmark as pictures, a Markdown page and an HTML page, for readers who never saw the project."""
+
+from __future__ import annotations
+
+import base64
+import html
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+from benchmarks.sweep import pareto
+
+STAGES = ("capture", "preprocess", "trunk", "proposals", "box_head", "dense_head", "decode")
+COLOURS = {"shipped": "black", "precision": "tab:red", "input size": "tab:blue", "proposals": "tab:green",
+           "key frames": "tab:orange", "least person": "tab:purple", "detail": "tab:brown",
+           "together": "tab:cyan"}  # fmt: skip
+
+
+def write(document: dict, folder: Path) -> list[Path]:
+    """Writes pictures, report.md and index.html into `folder`; returns their paths."""
+    pictures = {
+        "error-against-run-time.png": error_against_time,
+        "scaling.png": scaling,
+        "stages.png": stages,
+        "runtimes.png": runtimes,
+    }
+    written = []
+    for name, draw in pictures.items():
+        figure = draw(document)
+        figure.savefig(folder / name, dpi=110, bbox_inches="tight")
+        plt.close(figure)
+        written.append(folder / name)
+    sections = text_sections(document)
+    (folder / "report.md").write_text(markdown(sections))
+    (folder / "index.html").write_text(page(sections, folder))
+    return [*written, folder / "report.md", folder / "index.html"]
+
+
+def error_against_time(document: dict) -> plt.Figure:
+    # Parts alone have no U and V to be right.
+    rows = [row for row in document["sweep"] if row["axis"] != "detail"]
+    figure, axes = plt.subplots(1, 2, figsize=(15, 6))
+    for axis, key, label in ((axes[0], "error", "1 - AP by GPS"), (axes[1], "error_cm", "median surface error, cm")):
+        front = pareto([(row["ms"], row[key]) for row in rows])
+        axis.plot([rows[k]["ms"] for k in front], [rows[k][key] for k in front], color="0.7", zorder=0,
+                  label="no other is faster and better")  # fmt: skip
+        for kind, colour in COLOURS.items():
+            chosen = [row for row in rows if row["axis"] == kind]
+            if chosen:
+                axis.scatter([r["ms"] for r in chosen], [r[key] for r in chosen], color=colour, label=kind)
+        for k in front:
+            axis.annotate(rows[k]["setting"], (rows[k]["ms"], rows[k][key]), fontsize=7, rotation=20,
+                          xytext=(3, 4), textcoords="offset points")  # fmt: skip
+        axis.set(xlabel="milliseconds a frame (median)", ylabel=label, xscale="log")
+        axis.grid(alpha=0.3, which="both")
+    axes[0].legend(fontsize=8)
+    return figure
+
+
+def scaling(document: dict) -> plt.Figure:
+    scenes = document["scenes"]
+    figure, axes = plt.subplots(1, 3, figsize=(15, 4))
+    for name, label in (("people", f"{document['threads']} threads"), ("one_thread", "1 thread")):
+        shown = [(scene["people"], scene["ms"]["frame"]["p50"]) for scene in scenes[name]["scenes"]]
+        axes[0].plot(*zip(*sorted(shown), strict=True), "o-", label=label)
+    axes[0].set(xlabel="people found (mean)", ylabel="milliseconds a frame (p50)")
+    axes[0].legend()
+    sizes = scenes["sizes"]["scenes"]
+    pixels = [scene["size_px"][0] * scene["size_px"][1] / 1e6 for scene in sizes]
+    axes[1].plot(pixels, [scene["ms"]["frame"]["p50"] for scene in sizes], "o-")
+    axes[1].set(xlabel="megapixels of the source, one person", ylabel="milliseconds a frame (p50)")
+    rows = [row for row in document["sweep"] if row["axis"] == "input size"]
+    axes[2].plot([int(row["setting"].split()[0]) for row in rows], [row["ms"] for row in rows], "o-")
+    axes[2].set(xlabel="long side of the network's input, px", ylabel="milliseconds a frame (median)")
+    for axis in axes:
+        axis.set_ylim(bottom=0)
+        axis.grid(alpha=0.3)
+    figure.tight_layout()
+    return figure
+
+
+def stages(document: dict) -> plt.Figure:
+    scenes = document["scenes"]["people"]["scenes"]
+    figure, axis = plt.subplots(figsize=(10, 0.5 + 0.5 * len(scenes)))
+    for k, scene in enumerate(scenes):
+        left = 0.0
+        for stage, colour in zip(STAGES, plt.cm.tab10.colors, strict=False):
+            width = scene["ms"][stage]["p50"]
+            axis.barh(k, width, left=left, color=colour, label=stage if k == 0 else None)
+            left += width
+    axis.set_yticks(range(len(scenes)), [f"{scene['people']:.1f} people" for scene in scenes])
+    axis.set(xlabel="milliseconds (p50 of each stage)")
+    axis.legend(fontsize=8, loc="lower right")
+    axis.invert_yaxis()
+    return figure
+
+
+def runtimes(document: dict) -> plt.Figure:
+    rows = [row for row in document["peers"]["runtimes"] if row["total_ms"]]
+    figure, axis = plt.subplots(figsize=(10, 0.6 + 0.5 * len(rows)))
+    for k, row in enumerate(rows):
+        left = 0.0
+        for (graph, ms), colour in zip(row["ms"].items(), plt.cm.tab10.colors, strict=False):
+            axis.barh(k, ms, left=left, color=colour, label=graph if k == 0 else None)
+            left += ms
+    axis.set_yticks(range(len(rows)), [f"{row['name']} {row['precision']}" for row in rows])
+    axis.set(xlabel="milliseconds, one person, same inputs")
+    axis.legend(fontsize=8)
+    axis.invert_yaxis()
+    return figure
+
+
+Section = tuple[str, list]  # title, and what follows: a text, a picture's (name, caption), or a table as lists of cells
+
+
+def text_sections(document: dict) -> list[Section]:
+    machine, scenes, peers = document["machine"], document["scenes"], document["peers"]
+    described = (f"{machine['processor']}, {machine['cores']} cores, {machine['memory_mib'] / 1024:.0f} GiB, "
+                 f"{machine['system']}; instruction sets: {', '.join(machine['instruction_sets'])}.")  # fmt: skip
+    doubts = {name: scenes[name]["doubts"] + [d for s in scenes[name]["scenes"] for d in s["doubts"]]
+              for name in ("people", "sizes", "one_thread")}  # fmt: skip
+    doubtful = sorted({text for texts in doubts.values() for text in texts})
+    gate_rows = [["what", "figure", "gate", "wish", "state"]]
+    for gate in document["gates"]:
+        value = "" if gate["value"] is None else f"{gate['value']:.4g}"
+        why = f": {gate['why']}" if gate["why"] else ""
+        gate_rows.append([gate["says"], value, gate["gate"], gate["stretch"], gate["state"] + why])
+    sweep_rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
+    front = set(pareto([(row["ms"], row["error"]) for row in document["sweep"]]))
+    for k, row in enumerate(document["sweep"]):
+        figures = [f"{row['ms']:.1f}", f"{row['error']:.3f}", f"{row['error_cm']:.1f}", f"{row['box_ap']:.3f}"]
+        figures.append(f"{row['part_accuracy']:.3f}")
+        sweep_rows.append([row["setting"], *figures, "●" if k in front else ""])
+    scene_rows = [["scene", "people found", "p50 ms", "p90", "p99", "frames a second", "CPU ms"]]
+    for name in ("people", "sizes", "one_thread", "no_spin"):
+        for scene in scenes[name]["scenes"]:
+            ms = scene["ms"]["frame"]
+            label = scene["source"] + {"one_thread": ", 1 thread", "no_spin": ", threads sleep"}.get(name, "")
+            scene_rows.append([label, f"{scene['people']:.1f}", *(f"{ms[p]:.1f}" for p in ("p50", "p90", "p99")),
+                               f"{scene['fps']:.0f}", f"{scene['cpu_ms']:.1f}"])  # fmt: skip
+    graphs = list(peers["roofline"]["graphs"])
+    peer_rows = [["runtime", *graphs, "all, ms", "Maquette int8 by it"]]
+    for row in peers["runtimes"]:
+        name = f"{row['name']} {row['version']} {row['precision']}"
+        if row["total_ms"] is None:
+            peer_rows.append([name, row["missing"], *[""] * (len(graphs) + 1)])
+        else:
+            peer_rows.append([name, *(f"{row['ms'][g]:.2f}" for g in graphs), f"{row['total_ms']:.2f}",
+                              f"{row['ours_int8_ratio']:.2f}"])  # fmt: skip
+    line = peers["roofline"]
+    line_rows = [["graph", "million multiply-adds", "of these int8", "least ms", "share reached"]]
+    for name, graph in line["graphs"].items():
+        line_rows.append([name, f"{graph['macs'] / 1e6:.1f}", f"{graph['int8_macs'] / max(graph['macs'], 1):.0%}",
+                          f"{graph['least_ms']:.2f}", f"{graph['share']:.0%}"])  # fmt: skip
+    agreement = document["agreement"]
+    return [
+        ("Maquette: how fast, how large, how exact", [
+            "Maquette finds people in a camera's pictures and maps each of their pixels to a body surface, on two "
+            "processor cores. This page says what that costs here, and what each setting trades.",
+            f"Measured on: {described}",
+            *(["A quick run, to see that it works: do not quote it."] if document["quick"] else []),
+            *([f"Doubts that the measurement itself has: {'; '.join(doubtful)}."] if doubtful else []),
+        ]),
+        ("Gates", [gate_rows]),
+        ("Error against run time", [
+            ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
+            "Rendered people that no training saw; all settings took turns on the same pictures. AP by GPS: average "
+            "precision by geodesic point similarity (1 is perfect). With key frames the picture moves by 1 % of its "
+            "width a frame; the error is that of the last frame before the next key frame.",
+            sweep_rows,
+        ]),
+        ("Time of a frame", [
+            ("scaling.png", "Time against people in view, pixels of the source, and the network's input."),
+            ("stages.png", "Where the time goes."),
+            "From asking the source for a picture to having the result; walking people of the stand-in source. "
+            "CPU ms: work of all threads a frame, the nearest to energy that every machine can tell.",
+            scene_rows,
+        ]),
+        ("Other runtimes on the same graphs", [
+            ("runtimes.png", "The five networks for a picture with one person."),
+            peer_rows,
+            f"Roofline: this machine reached {line['float32_macs_s'] / 1e9:.0f} billion float32 and "
+            f"{line['int8_macs_s'] / 1e9:.0f} billion int8 multiply-adds a second in large matrix products, and copied "
+            f"{line['bytes_s'] / 1e9:.0f} GB/s within its caches. The least time is that of each layer by its numbers' "
+            f"rate or its bytes, whichever is larger; the networks reach {line['share']:.0%} of it.",
+            line_rows,
+        ]),
+        ("int8 against fp32", [
+            f"Of the pixels that are somebody in fp32, {agreement['labels']:.1%} have the same part in int8; of those "
+            f"that are somebody in both, {agreement['parts']:.1%}. The outlines agree by {agreement['mask_iou']:.1%} "
+            f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} pictures show as many people."
+        ]),
+    ]  # fmt: skip
+
+
+def markdown(sections: list[Section]) -> str:
+    lines = []
+    for level, (title, parts) in enumerate(sections):
+        lines += ["#" * (1 if level == 0 else 2) + " " + title, ""]
+        for part in parts:
+            if isinstance(part, str):
+                lines += [part, ""]
+            elif isinstance(part, tuple):
+                lines += [f"![{part[1]}]({part[0]})", "", f"*{part[1]}*", ""]
+            else:
+                head, *rows = part
+                lines += ["| " + " | ".join(head) + " |", "| " + " | ".join(["---"] * len(head)) + " |"]
+                lines += ["| " + " | ".join(row) + " |" for row in rows] + [""]
+    return "\n".join(lines)
+
+
+STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; }
+img { max-width: 100%; } table { border-collapse: collapse; font-size: 0.85rem; margin: 1rem 0; }
+td, th { border-bottom: 1px solid #ddd; padding: 0.2rem 0.6rem; text-align: right; }
+td:first-child, th:first-child { text-align: left; } figcaption { color: #555; font-size: 0.85rem; }
+.missed { color: #b00020; font-weight: bold; } .met, .stretch { color: #176f2c; }"""
+
+
+def page(sections: list[Section], folder: Path) -> str:
+    """One HTML file with its pictures inside."""
+    body = []
+    for level, (title, parts) in enumerate(sections):
+        body.append(f"<h{min(level, 1) + 1}>{html.escape(title)}</h{min(level, 1) + 1}>")
+        for part in parts:
+            if isinstance(part, str):
+                body.append(f"<p>{html.escape(part)}</p>")
+            elif isinstance(part, tuple):
+                data = base64.b64encode((folder / part[0]).read_bytes()).decode()
+                body.append(f'<figure><img alt="{html.escape(part[1])}" src="data:image/png;base64,{data}">'
+                            f"<figcaption>{html.escape(part[1])}</figcaption></figure>")  # fmt: skip
+            else:
+                body.append(table(part))
+    return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(sections[0][0])}</title>'
+            f"<style>{STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n")  # fmt: skip
+
+
+def table(rows: list[list[str]]) -> str:
+    head, *rest = rows
+    lines = ["<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
+    for row in rest:
+        state = row[-1].split(":")[0]
+        mark = f' class="{state}"' if state in ("met", "missed", "stretch") else ""
+        cells = "".join(f"<td>{html.escape(cell)}</td>" for cell in row[:-1])
+        lines.append(f"<tr>{cells}<td{mark}>{html.escape(row[-1])}</td></tr>")
+    return "<table>" + "\n".join(lines) + "</table>"

@@ -1,0 +1,166 @@
+"""Error against run time: what each setting of dense pose costs and saves, on rendered people that no training saw."""
+
+from __future__ import annotations
+
+import statistics
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+from tqdm import tqdm
+
+from export.evaluation.backends import Prediction
+from export.evaluation.maquette_api import DensePose
+from export.evaluation.measure import measure as measure_figures
+from export.evaluation.shards import LabelledImage
+from export.evaluation.surface_accuracy import SurfaceTable
+
+SCORE_FLOOR = 0.05  # boxes below it enter no figure
+BLOCK = 10  # images that one setting works on before the next one's turn
+MOTION = 0.01  # of the picture's width and a frame, where people are followed
+
+
+@dataclass(frozen=True)
+class Setting:
+    """axis: which option is varied. bundle: "int8" or "fp32". options: fields of maq_densepose_config."""
+
+    name: str
+    axis: str
+    bundle: str = "int8"
+    options: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def frames(self) -> int:
+        """Of each moving picture: as many as from one key frame to the last that follows it."""
+        return self.options.get("key_frame_interval", 1)
+
+
+def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 320, 384)) -> list[Setting]:
+    """What is measured. The first is the shipped bundle as it is."""
+    made = [Setting("as shipped", "shipped"), Setting("fp32", "precision", "fp32")]
+    made += [Setting(f"{side} px", "input size", options={"long_side_px": side}) for side in long_sides]
+    made += [Setting(f"fp32, {side} px", "precision", "fp32", {"long_side_px": side}) for side in (192, 384)]
+    made += [Setting(f"{n} proposals", "proposals", options={"max_proposals": n}) for n in (10, 25, 50)]
+    made += [Setting(f"key frame every {n}", "key frames", options={"key_frame_interval": n}) for n in (2, 4, 8)]
+    made += [Setting(f"nobody below {n} px", "least person", options={"least_person_px": n}) for n in (64, 128)]
+    made.append(Setting("parts alone", "detail", options={"detail": 1}))
+    for side, proposals in ((224, 50), (192, 25), (160, 25)):
+        options = {"long_side_px": side, "max_proposals": proposals, "key_frame_interval": 4}
+        made.append(Setting(f"{side} px, {proposals} proposals, key frame every 4", "together", options=options))
+    return made
+
+
+@dataclass
+class Measured:
+    """ms: milliseconds of a frame, median; of a moving picture the mean over its frames. error: 1 - AP by GPS.
+    error_cm: median surface error of painted pixels."""
+
+    setting: Setting
+    ms: float
+    ms_p90: float
+    error: float
+    error_cm: float
+    box_ap: float
+    part_accuracy: float
+
+
+def moving(image: np.ndarray, frames: int) -> Iterator[np.ndarray]:
+    """`frames` pictures that move by MOTION of the width each, the last of which is `image`."""
+    height, width = image.shape[:2]
+    for k in range(frames - 1, 0, -1):
+        shift = np.float64([[1, 0, -k * MOTION * width], [0, 1, 0]])
+        yield cv2.warpAffine(image, shift, (width, height), borderMode=cv2.BORDER_REPLICATE)
+    yield image
+
+
+class Column:
+    """One setting with its results, image by image."""
+
+    def __init__(self, setting: Setting, bundle: Path, threads: int) -> None:
+        self.setting = setting
+        options = dict(setting.options)
+        self._densepose = DensePose(bundle, score_threshold=SCORE_FLOOR, threads=threads, **options)
+        # Time is that of an app, which does not ask for boxes below the shown score.
+        self._timed = DensePose(bundle, threads=threads, **options)
+        self.ms: list[float] = []
+        self._results: list[tuple] = []
+
+    def run(self, image: np.ndarray, counted: bool) -> None:
+        self._densepose.restart(), self._timed.restart()
+        total = 0.0
+        for frame in moving(image, self.setting.frames):
+            result = self._densepose.run(frame)
+            total += self._timed.run(frame).stats.total_ms
+        if counted:
+            self.ms.append(total / self.setting.frames)
+        planes = result.planes
+        self._results.append((result.box, result.score, planes.shape, zlib.compress(planes.tobytes(), 1)))
+
+    def predictions(self) -> Iterator[Prediction]:
+        for box, score, shape, packed in self._results:
+            planes = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(shape)
+            yield Prediction(box, score, planes[..., :3], planes[..., 3])
+
+    def close(self) -> None:
+        self._densepose.close(), self._timed.close()
+
+
+class Replay:
+    """A backend (export.evaluation.backends) that gives what was found before."""
+
+    kind = "capi"
+
+    def __init__(self, column: Column, precision: str, path: Path, threshold: float) -> None:
+        self.precision, self.path, self.threshold = precision, path, threshold
+        self._left = column.predictions()
+
+    def predict(self, image: np.ndarray) -> Prediction:
+        return next(self._left)
+
+
+def measure(
+    images: list[LabelledImage],
+    bundles: dict[str, Path],
+    table: SurfaceTable,
+    wanted: list[Setting],
+    threshold: float,
+    threads: int = 2,
+) -> list[Measured]:
+    """All settings on the same images, in turns of BLOCK images. The first image of a turn is not timed."""
+    columns = [Column(setting, bundles[setting.bundle], threads) for setting in wanted]
+    with tqdm(total=len(images) * len(columns), desc="error against run time", unit="image", disable=None) as progress:
+        for start in range(0, len(images), BLOCK):
+            for column in columns:
+                for k, image in enumerate(images[start : start + BLOCK]):
+                    column.run(image.image, counted=k > 0)
+                    progress.update()
+    measured = []
+    for column in columns:
+        column.close()
+        backend = Replay(column, column.setting.bundle, bundles[column.setting.bundle], threshold)
+        figures = measure_figures(backend, images, table, len(images))
+        measured.append(
+            Measured(
+                setting=column.setting,
+                ms=round(statistics.median(column.ms), 3),
+                ms_p90=round(float(np.percentile(column.ms, 90)), 3),
+                error=round(1 - figures.ap_gps, 4),
+                error_cm=round(figures.error_cm_painted, 2),
+                box_ap=round(figures.ap_box, 4),
+                part_accuracy=round(figures.part_accuracy, 4),
+            )
+        )
+    return measured
+
+
+def pareto(points: list[tuple[float, float]]) -> list[int]:
+    """Which (run time, error) no other beats in both, by rising run time."""
+    front, least = [], float("inf")
+    for k in sorted(range(len(points)), key=lambda k: points[k]):
+        if points[k][1] < least:
+            front.append(k)
+            least = points[k][1]
+    return front

@@ -1,0 +1,161 @@
+"""Gates say what they should, counts of work are right, and a report holds its tables and pictures."""
+
+import json
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+
+from benchmarks import compare, gates, graphs, report, roofline, sweep
+
+MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2", "fma"], "processor": "P",
+           "memory_mib": 2048, "system": "S"}  # fmt: skip
+GATES = """
+[machine.two]
+says = "two cores"
+architecture = "x86_64"
+cores = 2
+instruction_sets = ["avx2"]
+
+[[gate]]
+figure = "fps"
+says = "speed"
+at_least = 30
+stretch = 60
+machine = "two"
+
+[[gate]]
+figure = "mb"
+says = "size"
+at_most = 3.6
+stretch = 3.0
+"""
+
+
+def states(tmp_path, figures, machine=MACHINE, missing=None):
+    path = tmp_path / "targets.toml"
+    path.write_text(GATES)
+    return {v.figure: v for v in gates.check(figures, machine, missing or {}, path)}
+
+
+@pytest.mark.parametrize(
+    ("fps", "mb", "expected"),
+    [(61, 2.9, ("stretch", "stretch")), (30, 3.6, ("met", "met")), (29.9, 3.7, ("missed", "missed"))],
+)
+def test_figures_meet_or_miss_their_gates_from_both_sides(tmp_path, fps, mb, expected):
+    found = states(tmp_path, {"fps": fps, "mb": mb})
+    assert (found["fps"].state, found["mb"].state) == expected
+
+
+@pytest.mark.parametrize(
+    "other", [{"cores": 8}, {"architecture": "aarch64"}, {"instruction_sets": ["sse4_1"]}], ids=str
+)
+def test_speeds_of_another_machine_are_not_measured_rather_than_passed(tmp_path, other):
+    found = states(tmp_path, {"fps": 1000, "mb": 1}, MACHINE | other)
+    assert found["fps"].state == "not measured"
+    assert "two cores" in found["fps"].why
+    assert found["mb"].state == "stretch"
+
+
+def test_a_figure_that_is_missing_needs_a_reason(tmp_path):
+    assert states(tmp_path, {"fps": 40}, missing={"mb": "no bundle"})["mb"].state == "not measured"
+    with pytest.raises(ValueError, match="no figure is called mb"):
+        states(tmp_path, {"fps": 40})
+
+
+def test_the_shipped_targets_can_be_read():
+    names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "library_mb", "peak_memory_mb",
+             "first_result_ms", "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8",
+             "time_by_pytorch_fp32", "roofline_share"}  # fmt: skip
+    assert {v.figure for v in gates.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
+
+
+def test_the_front_holds_what_no_other_beats():
+    points = [(10, 0.5), (5, 0.7), (20, 0.4), (12, 0.6), (20, 0.45), (5, 0.8)]
+    assert sweep.pareto(points) == [1, 0, 2]
+
+
+def test_a_moving_picture_ends_where_it_is_labelled():
+    image = np.random.default_rng(0).integers(0, 255, (40, 200, 3), np.uint8)
+    frames = list(sweep.moving(image, 3))
+    assert len(frames) == 3
+    assert np.array_equal(frames[-1], image)
+    step = int(sweep.MOTION * 200)
+    assert np.array_equal(frames[0][:, : -2 * step], image[:, 2 * step :])
+
+
+def convolution(weight_shape, size, **attributes):
+    weight = numpy_helper.from_array(np.ones(weight_shape, np.float32), "w")
+    value = helper.make_tensor_value_info
+    channels = weight_shape[1] * attributes.get("group", 1)
+    node = helper.make_node("Conv", ["x", "w"], ["y"], "conv", **attributes)
+    inputs, outputs = [value("x", TensorProto.FLOAT, [1, channels, "h", "w"])], [value("y", TensorProto.FLOAT, None)]
+    graph = helper.make_graph([node], "g", inputs, outputs, [weight])
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    return model, {"x": np.ones((1, channels, size, size), np.float32)}
+
+
+@pytest.mark.parametrize(
+    ("weight", "attributes", "expected"),
+    [((8, 4, 3, 3), {"pads": [1] * 4}, 10 * 10 * 8 * 4 * 9), ((6, 1, 3, 3), {"group": 6}, 8 * 8 * 6 * 9)],
+)
+def test_multiply_adds_are_counted_at_the_sizes_of_the_input(tmp_path, weight, attributes, expected):
+    model, feed = convolution(weight, 10, **attributes)
+    onnx.save(model, tmp_path / "g.onnx")
+    (work,) = graphs.work_of(tmp_path / "g.onnx", feed)
+    assert (work.node, work.macs, work.integer) == ("conv", expected, False)
+
+
+def test_the_roofline_is_the_slower_of_work_and_bytes():
+    work = [graphs.Work("a", 1000, 10, True), graphs.Work("b", 1000, 10, False), graphs.Work("c", 1, 1000, True)]
+    assert roofline.least_seconds(work, 100, 1000, 100) == pytest.approx(1 + 10 + 10)
+
+
+def test_runs_that_differ_are_told_apart(tmp_path, capsys):
+    figures = {"time_by_openvino_int8": 0.9, "time_by_pytorch_fp32": 0.2, "roofline_share": 0.3}
+    for name, scale in (("a", 1.0), ("b", 1.04), ("c", 1.06)):
+        values = {key: value * scale for key, value in figures.items()}
+        (tmp_path / f"{name}.json").write_text(json.dumps({"figures": values}))
+    assert compare.main([str(tmp_path / "a.json"), str(tmp_path / "b.json")]) == 0
+    assert compare.main([str(tmp_path / "a.json"), str(tmp_path / "c.json")]) == 1
+    assert "roofline_share" in capsys.readouterr().out
+
+
+def scene(source, people, ms):
+    times = {stage: {"p50": ms / 8, "p90": ms / 7, "p99": ms / 6} for stage in report.STAGES}
+    times["frame"] = {"p50": ms, "p90": ms + 1, "p99": ms + 2}
+    return {"source": source, "people": people, "ms": times, "fps": 1000 / ms, "cpu_ms": 2 * ms, "doubts": [],
+            "size_px": [640, 480]}  # fmt: skip
+
+
+def document():
+    scenes = {name: {"scenes": [scene("s0", 0, 8.0), scene("s1", 1, 10.0)], "doubts": ["others were busy"]}
+              for name in ("people", "sizes", "one_thread", "no_spin")}  # fmt: skip
+    rows = [{"setting": name, "axis": axis, "ms": ms, "error": error, "error_cm": 10 * error, "box_ap": 0.5,
+             "part_accuracy": 0.6}
+            for name, axis, ms, error in (("as shipped", "shipped", 10.0, 0.6), ("192 px", "input size", 7.0, 0.65),
+                                          ("fp32 <slow>", "precision", 20.0, 0.61))]  # fmt: skip
+    runtimes = [{"name": "Maquette", "version": "1", "precision": "int8", "ms": {"trunk": 4.0}, "total_ms": 4.0,
+                 "ours_int8_ratio": 1.0, "missing": ""},
+                {"name": "Other", "version": "", "precision": "fp32", "ms": {}, "total_ms": None,
+                 "ours_int8_ratio": None, "missing": "does not load it"}]  # fmt: skip
+    line = {"float32_macs_s": 1e11, "int8_macs_s": 4e11, "bytes_s": 1e11, "share": 0.4,
+            "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "least_ms": 1.6, "share": 0.4}}}  # fmt: skip
+    gate = {"says": "speed", "value": 40.0, "gate": "≥ 30", "stretch": "≥ 60", "state": "met", "why": ""}
+    return {"machine": MACHINE, "scenes": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
+            "peers": {"runtimes": runtimes, "roofline": line},
+            "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
+
+
+def test_a_report_holds_its_figures_and_pictures(tmp_path):
+    written = report.write(document(), tmp_path)
+    assert all(path.stat().st_size > 1000 for path in written if path.suffix == ".png")
+    text, page = (tmp_path / "report.md").read_text(), (tmp_path / "index.html").read_text()
+    for said in ("others were busy", "does not load it", "192 px", "quick run"):
+        assert said in text
+        assert said in page
+    assert "fp32 &lt;slow&gt;" in page
+    assert page.count("data:image/png;base64,") == 4
+    assert "| as shipped | 10.0 | 0.600 | 6.0 | 0.500 | 0.600 | ● |" in text
+    assert "| fp32 <slow> | 20.0 | 0.610 | 6.1 | 0.500 | 0.600 |  |" in text

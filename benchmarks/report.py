@@ -55,6 +55,9 @@ def error_against_time(document: dict) -> plt.Figure:
             axis.annotate(rows[k]["setting"], (rows[k]["ms"], rows[k][key]), fontsize=7, rotation=20,
                           xytext=(3, 4), textcoords="offset points")  # fmt: skip
         axis.set(xlabel="milliseconds a frame (median)", ylabel=label, xscale="log")
+        for direction in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
+            direction("{x:g}")
+        axis.margins(y=0.2)
         axis.grid(alpha=0.3, which="both")
     axes[0].legend(fontsize=8)
     return figure
@@ -123,7 +126,7 @@ def text_sections(document: dict) -> list[Section]:
     doubts = {name: scenes[name]["doubts"] + [d for s in scenes[name]["scenes"] for d in s["doubts"]]
               for name in ("people", "sizes", "one_thread")}  # fmt: skip
     doubtful = sorted({text for texts in doubts.values() for text in texts})
-    gate_rows = [["what", "figure", "gate", "wish", "state"]]
+    gate_rows = [["what", "figure", "gate", "stretch", "state"]]
     for gate in document["gates"]:
         value = "" if gate["value"] is None else f"{gate['value']:.4g}"
         why = f": {gate['why']}" if gate["why"] else ""

@@ -43,11 +43,11 @@ def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 320, 384)) -> li
     made = [Setting("as shipped", "shipped"), Setting("fp32", "precision", "fp32")]
     made += [Setting(f"{side} px", "input size", options={"long_side_px": side}) for side in long_sides]
     made += [Setting(f"fp32, {side} px", "precision", "fp32", {"long_side_px": side}) for side in (192, 384)]
-    made += [Setting(f"{n} proposals", "proposals", options={"max_proposals": n}) for n in (10, 25, 50)]
+    made += [Setting(f"{n} proposals", "proposals", options={"max_proposals": n}) for n in (10, 25, 100)]
     made += [Setting(f"key frame every {n}", "key frames", options={"key_frame_interval": n}) for n in (2, 4, 8)]
     made += [Setting(f"nobody below {n} px", "least person", options={"least_person_px": n}) for n in (64, 128)]
     made.append(Setting("parts alone", "detail", options={"detail": 1}))
-    for side, proposals in ((224, 50), (192, 25), (160, 25)):
+    for side, proposals in ((224, 25), (192, 25), (160, 10)):
         options = {"long_side_px": side, "max_proposals": proposals, "key_frame_interval": 4}
         made.append(Setting(f"{side} px, {proposals} proposals, key frame every 4", "together", options=options))
     return made

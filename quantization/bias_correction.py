@@ -25,23 +25,23 @@ def correct_biases(prepared: Path, quantised: Path, samples: list[Sample]) -> in
     Means are taken over everything but channels; the zeros of padding are left out of account.
     """
     reference, model = onnx.load(prepared), onnx.load(quantised)
-    held = qdq.weights(model.graph, reference.graph)
-    kernels = {w.node: w for w in held if w.slot == 1 and w.op_type == "Conv"}
-    biases = {w.node: w for w in held if w.slot == 2 and w.node in kernels}
-    groups = {n.name: next((a.i for a in n.attribute if a.name == "group"), 1) for n in qdq.heavy_nodes(model.graph)}
-    inputs = {n.name: n.input[0] for n in qdq.heavy_nodes(reference.graph) if n.name in biases}
+    held = {w.output: w for w in qdq.weights(model.graph, reference.graph)}
+    layers = {n.name: n for n in qdq.heavy_nodes(model.graph) if n.op_type == "Conv" and len(n.input) == 3}
+    layers = {name: n for name, n in layers.items() if n.input[1] in held and n.input[2] in held}
+    inputs = {n.name: n.input[0] for n in qdq.heavy_nodes(reference.graph) if n.name in layers}
     means = _channel_means(reference, sorted(set(inputs.values())), samples)
     stored = {value.name: value for value in model.graph.initializer}
-    for node, bias in biases.items():
-        kernel = kernels[node]
+    for node, layer in layers.items():
+        kernel, bias = held[layer.input[1]], held[layer.input[2]]
+        groups = next((a.i for a in layer.attribute if a.name == "group"), 1)
         taps = (kernel.dequantised() - kernel.expected).sum((2, 3))  # [out, in of the group]
-        mean = means[inputs[node]].reshape(groups[node], -1).repeat(len(taps) // groups[node], 0)
+        mean = means[inputs[node]].reshape(groups, -1).repeat(len(taps) // groups, 0)
         shift = (taps * mean).sum(1)
         values = np.rint((bias.expected - shift) / bias.scale.astype(np.float64)).astype(np.int32)
         name = bias.name + TENSOR_NAME_QUANT_SUFFIX
         stored[name].CopyFrom(numpy_helper.from_array(values, name))
     onnx.save(model, quantised)
-    return len(biases)
+    return len(layers)
 
 
 def _channel_means(model: onnx.ModelProto, names: list[str], samples: list[Sample]) -> dict[str, np.ndarray]:

@@ -119,7 +119,8 @@ def activation_errors(
     for sample in tqdm(samples, desc=f"comparing {graph}", unit="sample", leave=False, disable=None):
         expected, actual = expect(sample), run(sample)
         for name in names:
-            gathered[name].add(expected[name], actual[seen[name]])
+            factor = pairs[name].factor if name in pairs else 1.0
+            gathered[name].add(expected[name], actual[seen[name]] / factor)
             if name in pairs:
                 here[name].add(expected[name], pairs[name].applied(expected[name]))
     makers = _makers(quantised.graph)

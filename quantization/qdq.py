@@ -8,17 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 import onnx
 from onnx import numpy_helper
-from onnxruntime.quantization.quant_utils import QUANT_INPUT_SUFFIX, TENSOR_NAME_QUANT_SUFFIX
+from onnxruntime.quantization.quant_utils import DEQUANT_OUTPUT_SUFFIX, QUANT_INPUT_SUFFIX, TENSOR_NAME_QUANT_SUFFIX
 
 HEAVY = ("Conv", "ConvTranspose", "Gemm", "MatMul")
 
 
 @dataclass(frozen=True)
 class Weight:
-    """A constant stored as integers. name: as in the float graph. node: that reads it; slot: which of its inputs.
-    stored: integers; scale: float32, one or one per channel along `axis`; zero_point: likewise."""
+    """A constant stored as integers. name: as in the float graph; output: what the int8 graph calls it where it is
+    read. node: the first that reads it; slot: which of its inputs. stored: integers; scale: float32, one or one per
+    channel along `axis`; zero_point: likewise. expected: the float constant."""
 
     name: str
+    output: str
     node: str
     op_type: str
     slot: int
@@ -46,13 +48,14 @@ class Weight:
 @dataclass(frozen=True)
 class Pair:
     """An activation that is quantised and dequantised. name: as in the float graph; before, after: names in the
-    int8 graph of the tensor that goes in and of the one that comes out."""
+    int8 graph of the tensor that goes in and of the one that comes out; factor: what the latter is multiplied by."""
 
     name: str
     before: str
     after: str
     scale: float
     zero_point: int
+    factor: float = 1.0
 
     def applied(self, values: np.ndarray) -> np.ndarray:
         """values, through this pair (unsigned 8 bit)."""
@@ -90,7 +93,8 @@ def weights(quantised: onnx.GraphProto, reference: onnx.GraphProto) -> list[Weig
         label = node.input[0].removesuffix(TENSOR_NAME_QUANT_SUFFIX)
         found.append(
             Weight(
-                label, reader.name, reader.op_type, slot, known[node.input[0]], scale, zero, axis,
+                label,
+                node.output[0], reader.name, reader.op_type, slot, known[node.input[0]], scale, zero, axis,
                 expected[name].reshape(known[node.input[0]].shape),
             )
         )  # fmt: skip
@@ -98,17 +102,28 @@ def weights(quantised: onnx.GraphProto, reference: onnx.GraphProto) -> list[Weig
 
 
 def pairs(quantised: onnx.GraphProto) -> list[Pair]:
-    """All activations with a quantise-dequantise pair, in the order of the graph."""
+    """All activations with a quantise-dequantise pair, in the order of the graph.
+
+    Where a map times a number is the same map with another scale (quantization.simplify), the product is a pair too.
+    """
     known = constants(quantised)
-    after = {n.input[0]: n.output[0] for n in quantised.node if n.op_type == "DequantizeLinear"}
+    readers: dict[str, list[onnx.NodeProto]] = {}
+    for node in quantised.node:
+        if node.op_type == "DequantizeLinear":
+            readers.setdefault(node.input[0], []).append(node)
     found = []
     for node in quantised.node:
         if node.op_type != "QuantizeLinear":
             continue
-        before, behind = node.input[0], after[node.output[0]]
-        name = before.removesuffix(QUANT_INPUT_SUFFIX)
         scale, zero = float(known[node.input[1]]), int(known[node.input[2]])
-        found.append(Pair(name, before, behind, scale, zero))
+        plain = [reader for reader in readers[node.output[0]] if reader.input[1] == node.input[1]]
+        scaled = [reader for reader in readers[node.output[0]] if reader.input[1] != node.input[1]]
+        first = (plain + scaled)[0]
+        name = node.input[0].removesuffix(QUANT_INPUT_SUFFIX)
+        found.append(Pair(name, node.input[0], first.output[0], scale, zero, float(known[first.input[1]]) / scale))
+        for reader in scaled:
+            product = reader.output[0].removesuffix(DEQUANT_OUTPUT_SUFFIX)
+            found.append(Pair(product, node.input[0], reader.output[0], float(known[reader.input[1]]), zero))
     return found
 
 

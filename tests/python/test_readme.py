@@ -21,3 +21,18 @@ def test_every_make_target_that_it_names_exists():
     makefile = Path("Makefile").read_text()
     for target in re.findall(r"make ([a-z]+)", README):
         assert f"\n{target}:" in makefile, target
+
+
+def test_every_native_test_that_the_list_of_extreme_cases_names_exists():
+    listed = Path("tests/native/README.md").read_text().split("## Extreme cases")[1]
+    tests = {
+        (suite, name)
+        for path in Path("tests/native").glob("test_*.cpp")
+        for suite, name in re.findall(r"^TEST(?:_F)?\((\w+), (\w+)\)", path.read_text(), re.MULTILINE)
+    }
+    named, suite = [], ""
+    for written_suite, name in re.findall(r"`(\w*)\.([A-Z]\w+)`", listed):
+        suite = written_suite or suite  # `.Name` is of the suite before it
+        named.append((suite, name))
+    assert len(named) > 20
+    assert [test for test in named if test not in tests] == []

@@ -1,0 +1,320 @@
+"""Compares the labels that `maquette densepose` gives on this processor with those on others, which qemu emulates.
+
+The same bundle and the same pictures on x86-64 with AVX2 but without VNNI (whose 8-bit products saturate), and on
+aarch64 without and with the dot product and matrix instructions. Needs both builds and Debian's qemu-user-static;
+`make test-isa` makes them and runs this.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import json
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from export.evaluation.average_precision import box_iou
+
+ROOT = Path(__file__).parents[1]
+SYSROOT = ROOT / ".deps/aarch64-sysroot"
+CLIP = ROOT / "tests/media/clip.mp4"
+CLIP_FRAMES = (10, 50)
+SOURCES = (str(ROOT / "tests/media/photo.jpg"), "stub:people?count=3&seed=7&size=480x270")
+STUB_FRAMES = 2
+BAR = 0.995
+SAME_PERSON_IOU = 0.5
+
+EPILOG = """\
+examples:
+  python -m benchmarks.label_agreement                                five bundled pictures, all processors
+  python -m benchmarks.label_agreement --only avx2 my-photo.jpg       one processor, a picture of one's own
+  python -m benchmarks.label_agreement --bundle .data/bundles/other   another bundle
+"""
+
+
+@dataclass(frozen=True)
+class Processor:
+    """A processor, how to run programs on it, and the features (names of Linux) that it must and must not offer."""
+
+    name: str
+    title: str
+    build: str
+    emulator: tuple[str, ...] = ()
+    has: frozenset[str] = frozenset()
+    lacks: frozenset[str] = frozenset()
+
+    def command(self, program: str) -> list[str]:
+        """The command that runs a program of the build folder on this processor."""
+        return [*self.emulator, str(ROOT / "build" / self.build / program)]
+
+
+def _arm(name: str, title: str, cpu: str, has: set[str], lacks: set[str]) -> Processor:
+    emulator = ("qemu-aarch64-static", "-L", str(SYSROOT), "-cpu", cpu)
+    return Processor(name, title, "aarch64", emulator, frozenset(has), frozenset(lacks))
+
+
+HERE = Processor("here", "this processor", "release")
+VNNI = {"avx512f", "avx512_vnni", "avx_vnni", "amx_int8"}
+OTHERS = (
+    Processor(
+        "avx2",
+        "x86-64, AVX2 without VNNI",
+        "release",
+        ("qemu-x86_64-static", "-cpu", "Haswell"),
+        frozenset({"avx2", "fma"}),
+        frozenset(VNNI),
+    ),
+    _arm("asimd", "aarch64 without dot product", "cortex-a72", {"asimd"}, {"asimddp", "i8mm"}),
+    _arm("asimddp", "aarch64 with dot product", "neoverse-n1", {"asimd", "asimddp"}, {"i8mm"}),
+    _arm("i8mm", "aarch64 with 8-bit matrix product", "max", {"asimd", "asimddp", "i8mm"}, set()),
+)
+
+
+@dataclass
+class Agreement:
+    """How far the labels of two folders of results agree, over all pictures."""
+
+    pictures: int = 0
+    people: int = 0  # of the reference
+    unmatched: int = 0  # people whose box overlaps none of the other's by SAME_PERSON_IOU, of either
+    pixels: int = 0
+    equal: int = 0
+    person_pixels: int = 0  # painted in either
+    person_equal: int = 0
+    worst_picture: float = 1.0  # the least share of equal pixels
+    box_px: float = 0.0  # largest difference of a coordinate of a matched box, pixels of the picture
+
+    @property
+    def share(self) -> float:
+        """Pixels with the same part (background counts), of all."""
+        return self.equal / self.pixels
+
+    @property
+    def person_share(self) -> float:
+        """The same of those that are a person in either; 1 if there are none."""
+        return self.person_equal / self.person_pixels if self.person_pixels else 1.0
+
+    def passes(self, bar: float) -> bool:
+        """Enough of all pixels are the same, and nobody is lost or new. The worst picture is reported, not barred:
+        one value that float sums of another order push over a rounding step changes a picture of small people.
+        """
+        return self.share >= bar and self.unmatched == 0
+
+
+def read_parts(path: Path) -> np.ndarray:
+    """Part of each pixel, uint8 [H, W], of an `_IUV.png`. Raises ValueError when it cannot be read."""
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if image is None:
+        raise ValueError(f"{path} cannot be read; run maquette densepose again.")
+    return image[..., 0]
+
+
+def read_boxes(path: Path) -> np.ndarray:
+    """Boxes of the people, float64 [N, 4], of a result's JSON."""
+    people = json.loads(path.read_text())["people"]
+    return np.array([person["box"] for person in people], np.float64).reshape(-1, 4)
+
+
+def compare(reference: Path, other: Path) -> Agreement:
+    """Compares two folders of results of the same pictures.
+
+    Raises ValueError when they are not of the same pictures, or when the reference shows nobody: then there is nothing
+    to compare.
+    """
+    agreement = Agreement()
+    names = sorted(path.name for path in reference.glob("*_IUV.png"))
+    others = sorted(path.name for path in other.glob("*_IUV.png"))
+    if names != others:
+        raise ValueError(f"{reference} has results of {len(names)} pictures, but {other} of {len(others)} or others.")
+    for name in names:
+        ours, theirs = read_parts(reference / name), read_parts(other / name)
+        if ours.shape != theirs.shape:
+            raise ValueError(f"{name} is {ours.shape} in {reference}, but {theirs.shape} in {other}.")
+        same, person = ours == theirs, (ours > 0) | (theirs > 0)
+        agreement.pictures += 1
+        agreement.pixels += same.size
+        agreement.equal += int(same.sum())
+        agreement.person_pixels += int(person.sum())
+        agreement.person_equal += int((same & person).sum())
+        agreement.worst_picture = min(agreement.worst_picture, float(same.mean()))
+        stem = name.removesuffix("_IUV.png")
+        compare_boxes(read_boxes(reference / f"{stem}.json"), read_boxes(other / f"{stem}.json"), agreement)
+    if agreement.people == 0:
+        raise ValueError(f"{reference} shows nobody, so there is nothing to compare. Take pictures of people.")
+    return agreement
+
+
+def compare_boxes(ours: np.ndarray, theirs: np.ndarray, agreement: Agreement) -> None:
+    """Adds the people of one picture, boxes [N, 4] and [M, 4], to `agreement`; the most alike are the same person."""
+    iou = box_iou(ours, theirs)
+    matched = 0
+    while iou.size and iou.max() >= SAME_PERSON_IOU:
+        i, j = np.unravel_index(iou.argmax(), iou.shape)
+        agreement.box_px = max(agreement.box_px, float(np.abs(ours[i] - theirs[j]).max()))
+        iou[i], iou[:, j] = -1, -1
+        matched += 1
+    agreement.people += len(ours)
+    agreement.unmatched += len(ours) + len(theirs) - 2 * matched
+
+
+def clip_frames(clip: Path, numbers: Sequence[int], folder: Path) -> list[str]:
+    """Writes frames of a clip as PNG, so that all processors see the same pixels, and returns their paths."""
+    capture, paths = cv2.VideoCapture(str(clip)), []
+    for k in range(max(numbers) + 1):
+        ok, frame = capture.read()
+        if not ok:
+            raise ValueError(f"{clip} has {k} frames, but frame {max(numbers)} was asked for.")
+        if k in numbers:
+            paths.append(str(folder / f"{clip.stem}_{k:03d}.png"))
+            cv2.imwrite(paths[-1], frame)
+    return paths
+
+
+def check_features(processor: Processor) -> list[str]:
+    """The features that programs see on this processor. Raises ValueError if they are not those it is here for."""
+    done = subprocess.run(
+        processor.command("tests/native/processor_features"), capture_output=True, text=True, check=True
+    )
+    seen = set(done.stdout.split())
+    if not processor.has <= seen or processor.lacks & seen:
+        raise ValueError(
+            f"{processor.title} should offer {', '.join(sorted(processor.has))} and not "
+            f"{', '.join(sorted(processor.lacks))}, but offers {', '.join(sorted(seen)) or 'nothing'}. "
+            f"Check that {processor.emulator[0]} is version 7.2 or newer."
+        )
+    return sorted(seen)
+
+
+def run(processor: Processor, bundle: Path, sources: Sequence[str], out: Path) -> None:
+    """Writes the results of the pictures into `out`, which is emptied first. Raises ValueError with what went wrong."""
+    shutil.rmtree(out, ignore_errors=True)
+    command = [
+        *processor.command("stage/bin/maquette"), "densepose", *sources, "--bundle", str(bundle), "--out", str(out),
+        "--threads", "1", "--max-frames", str(STUB_FRAMES),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise ValueError(f"{processor.title}: maquette densepose failed ({done.returncode}).\n{done.stderr.strip()}")
+
+
+def print_table(bundle: Path, results: dict[str, Agreement | str], features: dict[str, list[str]], bar: float) -> None:
+    title = f"Labels of {bundle.name} against those on this processor"
+    table = Table(title=title, title_justify="left")
+    table.add_column("processor", no_wrap=True)
+    for column in ("people", "lost, new", "same %", "worst %", "on people %", "box px"):
+        table.add_column(column, justify="right")
+    table.add_column("bar", no_wrap=True)
+    for name, found in results.items():
+        if isinstance(found, str):
+            table.add_row(name, *["-"] * 6, "failed")
+            continue
+        shares = [f"{100 * share:.3f}" for share in (found.share, found.worst_picture, found.person_share)]
+        verdict = "held" if found.passes(bar) else "missed"
+        table.add_row(name, str(found.people), str(found.unmatched), *shares, f"{found.box_px:.2f}", verdict)
+    Console(width=110).print(table)
+    print(
+        f"same: pixels with the same part, of all (bar: {100 * bar:g} %); worst: of the worst picture; on people: of "
+        "those painted in either;\nbox: the largest difference of a coordinate. What programs see of each processor:"
+    )
+    for name, seen in features.items():
+        print(f"  {name}: {' '.join(seen)}")
+    for name, found in results.items():
+        if isinstance(found, str):
+            print(f"{name}: {found}", file=sys.stderr)
+
+
+def failure_of(found: Agreement | str, bar: float) -> str | None:
+    """What is wrong, as a sentence; None if nothing is."""
+    if isinstance(found, str):
+        return found
+    if found.passes(bar):
+        return None
+    return (
+        f"The same label on {100 * found.share:.3f} % of the pixels, where {100 * bar:g} % are asked for; "
+        f"{found.unmatched} people lost or new."
+    )
+
+
+def write_junit(path: Path, results: dict[str, Agreement | str], bar: float) -> None:
+    """One test case a processor, which scripts/sum_test_results.py counts."""
+    suite = ElementTree.Element("testsuite", name="label_agreement", tests=str(len(results)))
+    for title, found in results.items():
+        case = ElementTree.SubElement(suite, "testcase", name=title, classname="label_agreement")
+        failure = failure_of(found, bar)
+        if failure is not None:
+            ElementTree.SubElement(case, "failure", message=failure)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    ElementTree.ElementTree(suite).write(path, encoding="unicode")
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.label_agreement",
+        description=__doc__,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "pictures", nargs="*", help="default: the bundled photo, frames of the bundled clip, stub:people"
+    )
+    parser.add_argument("--bundle", type=Path, default=ROOT / "sdk/models/densepose-b-int8")
+    parser.add_argument("--out", type=Path, default=ROOT / "build/label-agreement", help="folder for the results")
+    parser.add_argument("--only", action="append", choices=[processor.name for processor in OTHERS])
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processors at a time (default: the cores)")
+    parser.add_argument(
+        "--bar", type=float, default=BAR, help="least share of equal pixels, of all pictures (default %(default)s)"
+    )
+    parser.add_argument("--junit", type=Path, help="also write the outcome as JUnit XML")
+    options = parser.parse_args(argv)
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    sources = options.pictures or [*SOURCES, *clip_frames(CLIP, CLIP_FRAMES, options.out)]
+    others = [processor for processor in OTHERS if not options.only or processor.name in options.only]
+    results: dict[str, Agreement | str] = {}
+    features: dict[str, list[str]] = {}
+
+    def labels_on(processor: Processor) -> Agreement:
+        features[processor.title] = check_features(processor)
+        run(processor, options.bundle, sources, options.out / processor.name)
+        return compare(options.out / HERE.name, options.out / processor.name)
+
+    try:
+        print(f"This processor offers {' '.join(check_features(HERE)) or 'none of the features asked about'}.")
+        run(HERE, options.bundle, sources, options.out / HERE.name)
+    except (ValueError, OSError, subprocess.CalledProcessError) as error:
+        print(f"label_agreement: {error}", file=sys.stderr)
+        return 1
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        running = {pool.submit(labels_on, processor): processor for processor in others}
+        for future in tqdm(
+            concurrent.futures.as_completed(running),
+            total=len(running),
+            desc="emulating",
+            unit="processor",
+            disable=None,
+        ):
+            try:
+                results[running[future].title] = future.result()
+            except (ValueError, OSError, subprocess.CalledProcessError) as error:
+                results[running[future].title] = str(error)
+    results = {processor.title: results[processor.title] for processor in others}
+    print_table(options.bundle, results, features, options.bar)
+    if options.junit:
+        write_junit(options.junit, results, options.bar)
+    return 1 if any(failure_of(found, options.bar) for found in results.values()) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

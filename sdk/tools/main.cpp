@@ -1,18 +1,10 @@
 // The `maquette` command line: each command is one file, built on the public C++ header alone.
 #include <maquette/maquette.h>
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <cstdlib>
-#include <exception>
 
 #include "commands.h"
-
-namespace {
-
-constexpr int kFailed = 1;
-constexpr int kWrongUsage = 2;
-
-}  // namespace
+#include "program.h"
 
 int main(int argc, char** argv) {
   // What goes wrong with a file is said once, by the SDK; the decoders below it stay silent unless somebody asks.
@@ -30,13 +22,5 @@ int main(int argc, char** argv) {
   add_sources_command(app, &exit_code);
   add_densepose_command(app, &exit_code);
   add_bench_command(app, &exit_code);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kWrongUsage;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "maquette: %s\n", error.what());
-    return kFailed;
-  }
-  return exit_code;
+  return run_program(app, argc, argv, &exit_code);
 }

@@ -1,7 +1,11 @@
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <maquette/maquette.hpp>
 #include <set>
+
+#include "temp_folder.h"
 
 namespace {
 
@@ -49,6 +53,64 @@ TEST(ApiSources, SayWhenEveryFrameIsHeld) {
   EXPECT_EQ(frame, nullptr);
   held.pop_back();
   EXPECT_TRUE(source.next().has_value());
+}
+
+// A copy of the SDK that lies alone.
+class LoneCopy {
+ public:
+  LoneCopy() : path_(folder_.file("libmaquette.so")) {
+    Dl_info info{};
+    dladdr(reinterpret_cast<const void*>(&maq_source_create), &info);
+    std::filesystem::copy_file(info.dli_fname, path_);
+    library_ = dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL);
+    EXPECT_NE(library_, nullptr) << dlerror();
+    EXPECT_EQ(function<decltype(maq_context_create)>("maq_context_create")(MAQ_HEADER_VERSION, nullptr, &context_),
+              MAQ_OK);
+  }
+  ~LoneCopy() {
+    function<decltype(maq_context_destroy)>("maq_context_destroy")(context_);
+    dlclose(library_);
+  }
+
+  std::string beside(const std::string& name) const { return folder_.file(name); }
+
+  maq_status open(const char* uri) {
+    maq_source* source = nullptr;
+    const maq_status status =
+        function<decltype(maq_source_create)>("maq_source_create")(context_, uri, nullptr, &source);
+    function<decltype(maq_source_destroy)>("maq_source_destroy")(source);
+    return status;
+  }
+  std::string last_error() { return function<decltype(maq_last_error)>("maq_last_error")(context_); }
+
+ private:
+  template <typename Function>
+  Function* function(const char* name) const {
+    return reinterpret_cast<Function*>(dlsym(library_, name));
+  }
+
+  TempFolder folder_;
+  std::string path_;
+  void* library_ = nullptr;
+  maq_context* context_ = nullptr;
+};
+
+TEST(ApiSources, FilesNeedTheirLibraryAndNothingElseDoes) {
+  LoneCopy sdk;
+  const std::string image = "image:" + sdk.beside("libmaquette.so");  // exists; that it is no image comes later
+  const std::string video = "video:" + sdk.beside("libmaquette.so");
+  EXPECT_EQ(sdk.open("stub:people"), MAQ_OK) << sdk.last_error();
+  for (const std::string& uri : {image, video}) {
+    EXPECT_EQ(sdk.open(uri.c_str()), MAQ_ERROR_RUNTIME_LIBRARY);
+    EXPECT_NE(sdk.last_error().find("maquette/libmaquette_files.so"), std::string::npos) << sdk.last_error();
+  }
+  EXPECT_EQ(sdk.open("stub:people"), MAQ_OK) << sdk.last_error();
+
+  std::filesystem::create_directory(sdk.beside("maquette"));
+  const std::string library = sdk.beside("maquette/libmaquette_files.so");
+  std::filesystem::copy_file(sdk.beside("libmaquette.so"), library);
+  EXPECT_EQ(sdk.open(image.c_str()), MAQ_ERROR_RUNTIME_LIBRARY) << "the SDK itself is not the library of files";
+  EXPECT_NE(sdk.last_error().find("install both from the same build"), std::string::npos) << sdk.last_error();
 }
 
 TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {

@@ -1,10 +1,23 @@
 // Cutting sprites from a sheet and drawing them into a frame.
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "core/frame.h"
-#include "image/image_file.h"
 
 namespace maq {
+
+// An image with alpha, 4 bytes a pixel in the order B, G, R, A, rows without padding.
+struct BgraImage {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<uint8_t> pixels;
+};
+
+// Decodes a WebP file that is in memory. Throws MAQ_ERROR_UNREADABLE; `what` names it in the error.
+BgraImage decode_webp(const uint8_t* bytes, size_t size_bytes, const std::string& what);
 
 // The part of `sheet` at (x, y), scaled to `to_width` x `to_height` and mirrored left to right if asked.
 // Its colours come out multiplied by alpha, as draw_sprite wants them.

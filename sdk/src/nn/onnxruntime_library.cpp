@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/own_folder.h"
 
 namespace maq {
 namespace {
@@ -13,15 +14,6 @@ namespace {
 constexpr char kFileName[] = "libonnxruntime.so.1";
 constexpr char kRemedy[] =
     " Set MAQ_ONNXRUNTIME_LIB to the file, or put libonnxruntime.so.1 in the folder of libmaquette.so.";
-
-// The folder of the shared library (or program) that this function was linked into, with a final '/'.
-std::string own_folder() {
-  Dl_info info{};
-  if (dladdr(reinterpret_cast<const void*>(&own_folder), &info) == 0 || info.dli_fname == nullptr) return "";
-  const std::string file = info.dli_fname;
-  const size_t slash = file.rfind('/');
-  return slash == std::string::npos ? "./" : file.substr(0, slash + 1);
-}
 
 void* open_privately(const std::string& path) { return dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL); }
 

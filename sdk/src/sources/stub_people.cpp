@@ -66,7 +66,7 @@ BgraImage decode_sheet() {
     throw Error(MAQ_ERROR_UNSUPPORTED, "This build has no sprites for stub:people; ",
                 "use stub:pattern, or build with MAQ_STUB_PEOPLE_SHEET.");
   }
-  BgraImage image = decode_bgra(sheet.bytes, sheet.size_bytes, "The sprite sheet of stub:people");
+  BgraImage image = decode_webp(sheet.bytes, sheet.size_bytes, "The sprite sheet of stub:people");
   if (image.width_px != kTileWidthPx * kCycleFrames || image.height_px != kTileHeightPx * kPeople) {
     throw Error(MAQ_ERROR_INTERNAL, "The sprite sheet of stub:people is ", image.width_px, " x ", image.height_px,
                 ", but must be ", kTileWidthPx * kCycleFrames, " x ", kTileHeightPx * kPeople, ".");

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/frame.h"
-#include "image/image_file.h"
+#include "image/sprite.h"
 
 namespace maq {
 

@@ -1,12 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
-#include <opencv2/videoio/registry.hpp>
 
 #include "core/error.h"
 #include "core/file.h"
 #include "image/convert.h"
+#include "image/file_decoders.h"
 #include "sources/file_sources.h"
 
 namespace maq {
@@ -17,28 +16,23 @@ class VideoSource : public Source {
   explicit VideoSource(SourceUri uri) : path_(uri.target), asked_fps_(uri.fps) {
     uri.expect_no_more_options("size and fps");
     if (!file_exists(path_)) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
-    bool opened = false;
-    try {
-      // FFmpeg alone where it is there: the other backends of CAP_ANY add nothing for files but their complaints.
-      opened = clip_.open(path_, cv::videoio_registry::hasBackend(cv::CAP_FFMPEG) ? cv::CAP_FFMPEG : cv::CAP_ANY);
-    } catch (const cv::Exception&) {
-    }
-    if (!opened) {
+    clip_ = file_decoders().open_clip(path_);
+    if (clip_ == nullptr) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be opened as a video: it is truncated, damaged or no video. ",
                   "Use a whole MP4, AVI, MOV or WebM file.");
     }
-    const int width = int(clip_.get(cv::CAP_PROP_FRAME_WIDTH));
-    const int height = int(clip_.get(cv::CAP_PROP_FRAME_HEIGHT));
+    const int width = clip_->width_px();
+    const int height = clip_->height_px();
     check_image_size(width, height, path_);
     info_.width_px = uri.width_px > 0 ? uri.width_px : width;
     info_.height_px = uri.height_px > 0 ? uri.height_px : height;
 
-    clip_fps_ = clip_.get(cv::CAP_PROP_FPS);
+    clip_fps_ = clip_->fps();
     if (!std::isfinite(clip_fps_) || clip_fps_ <= 0 || clip_fps_ > 1000) clip_fps_ = 25;
     const bool thinned = asked_fps_ > 0 && asked_fps_ < clip_fps_;
     info_.fps = thinned ? asked_fps_ : clip_fps_;
 
-    const double count = clip_.get(cv::CAP_PROP_FRAME_COUNT);
+    const double count = clip_->frame_count();
     if (std::isfinite(count) && count >= 1 && count < 1e9) {
       promised_frames_ = int64_t(count);
       info_.frame_count = thinned ? int64_t(std::ceil(count * asked_fps_ / clip_fps_)) : promised_frames_;
@@ -66,11 +60,7 @@ class VideoSource : public Source {
  private:
   bool read() {
     if (ended_) return false;
-    try {
-      ended_ = !clip_.read(decoded_) || decoded_.empty();
-    } catch (const cv::Exception&) {
-      ended_ = true;
-    }
+    ended_ = !clip_->read(decoded_);
     if (!ended_) return true;
     if (frames_read_ == 0) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " has no frame that can be decoded: it is truncated or damaged.");
@@ -85,7 +75,7 @@ class VideoSource : public Source {
 
   // Containers without times report 0 for every frame; there the frame rate counts. Never runs backwards.
   int64_t presentation_time_ns(int64_t index) {
-    const double reported_ms = clip_.get(cv::CAP_PROP_POS_MSEC);
+    const double reported_ms = clip_->position_ms();
     int64_t time_ns = std::isfinite(reported_ms) && reported_ms > 0
                           ? int64_t(std::llround(reported_ms * 1e6))
                           : int64_t(std::llround(double(index) * 1e9 / clip_fps_));
@@ -113,7 +103,7 @@ class VideoSource : public Source {
   }
 
   std::string path_;
-  cv::VideoCapture clip_;
+  std::unique_ptr<Clip> clip_;
   cv::Mat decoded_;
   SourceInfo info_;
   double clip_fps_ = 0;

@@ -1,0 +1,24 @@
+#include "program.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+}  // namespace
+
+int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "maquette: %s\n", error.what());
+    return kFailed;
+  }
+  return *exit_code;
+}

@@ -61,7 +61,8 @@ struct Logits {
 maq::DecodeCounts paint(Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
                         float mask_threshold = 0.5f, float least_own_share = 0) {
   Planes charts(logits.u, logits.v, logits.size);
-  return paint_person(logits.view(&charts), box, person, mask_threshold, least_own_share, planes);
+  maq::DecodeMemory memory;
+  return paint_person(logits.view(&charts), box, person, mask_threshold, least_own_share, memory, planes);
 }
 
 // The value of a bilinearly resized plane (half-pixel centres, edges repeated) in double.

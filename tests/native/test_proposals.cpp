@@ -38,6 +38,14 @@ struct Level {
   int width, height;
 };
 
+std::vector<maq::ScoredBox> select(const std::vector<maq::RpnLevel>& levels, const maq::RpnSpec& spec, float width,
+                                   float height, int* dropped) {
+  std::vector<maq::RpnCandidate> candidates(3);  // what they hold, and what is in `found`, is of no matter
+  std::vector<maq::ScoredBox> found(2);
+  select_proposals(levels, spec, width, height, candidates, found, dropped);
+  return found;
+}
+
 TEST(Proposals, AnchorsAreCentredOnCellsAndKeepTheirArea) {
   const Box square = maq::anchor_box(3, 5, 8, 64, 1);
   EXPECT_FLOAT_EQ(square.x0, 24 - 32);
@@ -52,7 +60,7 @@ TEST(Proposals, TheBestAnchorComesFirstMovedByItsDeltas) {
   level.logit(10, 12, 1) = 4;
   level.delta(10, 12, 1, 0) = 0.25f;
   int dropped = 0;
-  const auto found = select_proposals({level.view()}, spec(), 80, 80, &dropped);
+  const auto found = select({level.view()}, spec(), 80, 80, &dropped);
   ASSERT_FALSE(found.empty());
   EXPECT_FLOAT_EQ(found[0].score, 4);
   EXPECT_NEAR(found[0].box.x0, 40 + 8 - 16, 1e-4);
@@ -65,7 +73,7 @@ TEST(Proposals, EqualScoresGoByLevelThenRowThenColumnThenAnchor) {
   maq::RpnSpec all = spec();
   all.nms_iou = 1;  // nothing suppressed
   int dropped = 0;
-  const auto found = select_proposals({fine.view(), coarse.view()}, all, 16, 16, &dropped);
+  const auto found = select({fine.view(), coarse.view()}, all, 16, 16, &dropped);
   ASSERT_EQ(found.size(), size_t(3 * (16 + 4)));
   for (size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].index, i < 48 ? int64_t(i) : (int64_t(1) << 32) + int64_t(i - 48));
@@ -79,11 +87,11 @@ TEST(Proposals, EachLevelKeepsItsBestAndTheWholeItsLimit) {
   few.nms_iou = 1;
   few.pre_nms_top_k = 7;
   int dropped = 0;
-  auto found = select_proposals({level.view()}, few, 1000, 1000, &dropped);
+  auto found = select({level.view()}, few, 1000, 1000, &dropped);
   ASSERT_EQ(found.size(), 7u);
   EXPECT_FLOAT_EQ(found[6].score, 93);
   few.post_nms_top_k = 3;
-  found = select_proposals({level.view(), level.view()}, few, 1000, 1000, &dropped);
+  found = select({level.view(), level.view()}, few, 1000, 1000, &dropped);
   ASSERT_EQ(found.size(), 3u);
   EXPECT_FLOAT_EQ(found[0].score, 99);
   EXPECT_FLOAT_EQ(found[1].score, 99);
@@ -99,7 +107,7 @@ TEST(Proposals, NanAndBoxesWithoutAreaAreDroppedAndCounted) {
   maq::RpnSpec all = spec();
   all.nms_iou = 1;
   int dropped = 0;
-  const auto found = select_proposals({level.view()}, all, 16, 16, &dropped);
+  const auto found = select({level.view()}, all, 16, 16, &dropped);
   EXPECT_EQ(dropped, 5);
   EXPECT_EQ(found.size(), size_t(48 - 5));
   for (const maq::ScoredBox& proposal : found) {
@@ -110,7 +118,7 @@ TEST(Proposals, NanAndBoxesWithoutAreaAreDroppedAndCounted) {
 TEST(Proposals, AModelThatIsAllNanGivesNothing) {
   Level level(8, 8, kNan);
   int dropped = 0;
-  EXPECT_TRUE(select_proposals({level.view()}, spec(), 32, 32, &dropped).empty());
+  EXPECT_TRUE(select({level.view()}, spec(), 32, 32, &dropped).empty());
   EXPECT_EQ(dropped, 3 * 64);
 }
 

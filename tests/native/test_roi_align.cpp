@@ -63,7 +63,7 @@ class RoiAlign : public ::testing::Test {
   void expect_reference(const Box& box, int pool) {
     // Filled first, so that a value that is not written is seen.
     std::vector<float> output(size_t(kChannels * pool * pool), 1e9f);
-    roi_align(map_, box, pool, output.data());
+    roi_align_.run(map_, box, pool, output.data());
     const std::vector<double> expected = reference(map_, box, pool);
     for (size_t i = 0; i < output.size(); ++i) {
       ASSERT_NEAR(double(output[i]), expected[i], 1e-5)
@@ -74,6 +74,7 @@ class RoiAlign : public ::testing::Test {
   static constexpr int kHeight = 20, kWidth = 24;  // 80 x 96 pixels at stride 4
   std::vector<float> values_;
   FeatureMap map_;
+  maq::RoiAlign roi_align_;
 };
 
 TEST_F(RoiAlign, EqualsTheReferenceInsideTheMap) {
@@ -100,7 +101,7 @@ TEST_F(RoiAlign, EqualsTheReferenceForTinyAndHugeBoxes) {
 TEST_F(RoiAlign, GivesZerosOutsideTheMapAndForBoxesWithoutArea) {
   for (const Box& box : {Box{500, 500, 600, 600}, Box{-600, 0, -500, 50}, Box{30, 30, 30, 60}, Box{30, 60, 60, 30}}) {
     std::vector<float> output(kChannels * 49, 1e9f);
-    roi_align(map_, box, 7, output.data());
+    roi_align_.run(map_, box, 7, output.data());
     for (const float value : output) EXPECT_EQ(value, 0);
   }
 }

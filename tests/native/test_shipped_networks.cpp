@@ -204,7 +204,7 @@ class ShippedNetworks : public ::testing::Test {
     for (int k = 0; k < people; ++k) {
       const float shift = 3.0f * float(k);
       const maq::Box box{shift, 4 + shift / 2, 222 - shift, 256 - shift / 3};
-      maq::roi_align(map, box, pool, pooled.data() + size_t(k) * size);
+      maq::RoiAlign().run(map, box, pool, pooled.data() + size_t(k) * size);
     }
     return pooled;
   }

@@ -77,14 +77,13 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     require_argument(densepose, "densepose");
     require_argument(frame, "frame");
     require_argument(result, "result");
-    const std::shared_ptr<DensePoseResult> pooled = densepose->results.acquire();
-    densepose->densepose->run(frame->frame->image, *pooled);
-    auto handle = std::make_unique<maq_densepose_result>();
-    for (const Person& person : pooled->people) {
+    BoundedPool<maq_densepose_result>::Pooled handle = densepose->results.acquire();
+    densepose->densepose->run(frame->frame.image, handle->result);
+    handle->people.clear();
+    for (const Person& person : handle->result.people) {
       handle->people.push_back({{person.box.x0, person.box.y0, person.box.x1, person.box.y1}, person.score});
     }
-    handle->result = pooled;
-    *result = handle.release();
+    *result = hand_out<maq_densepose_result>(std::move(handle));
     return MAQ_OK;
   });
 }
@@ -97,13 +96,13 @@ maq_status maq_densepose_restart(maq_densepose* densepose) {
   });
 }
 
-void maq_densepose_result_release(maq_densepose_result* result) { delete result; }
+void maq_densepose_result_release(maq_densepose_result* result) { take_back(result); }
 
 maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
-    if (width_px != nullptr) *width_px = result->result->planes.width_px;
-    if (height_px != nullptr) *height_px = result->result->planes.height_px;
+    if (width_px != nullptr) *width_px = result->result.planes.width_px;
+    if (height_px != nullptr) *height_px = result->result.planes.height_px;
     return MAQ_OK;
   });
 }
@@ -126,7 +125,7 @@ maq_status maq_densepose_result_plane(const maq_densepose_result* result, maq_de
     require_argument(pixels, "pixels");
     require_argument(stride_bytes, "stride_bytes");
     require_range("plane", int(plane), int(MAQ_PLANE_PART), int(MAQ_PLANE_PERSON));
-    const DensePlanes& planes = result->result->planes;
+    const DensePlanes& planes = result->result.planes;
     const std::vector<uint8_t>* all[] = {&planes.part, &planes.u, &planes.v, &planes.person};
     *pixels = all[plane - MAQ_PLANE_PART]->data();
     *stride_bytes = size_t(planes.width_px);
@@ -137,7 +136,7 @@ maq_status maq_densepose_result_plane(const maq_densepose_result* result, maq_de
 maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_densepose_stats* stats) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
-    const DensePoseStats& from = result->result->stats;
+    const DensePoseStats& from = result->result.stats;
     maq_densepose_stats filled{};
     filled.preprocess_ms = from.preprocess_ms;
     filled.trunk_ms = from.trunk_ms;

@@ -17,13 +17,11 @@ maq_status maq_frame_create(maq_context* context, const maq_frame_desc* given, m
     require_argument(frame, "frame");
     const maq_frame_desc desc = read_config(given, "desc", maq_frame_desc{}, sizeof(maq_frame_desc));
     require_range("desc.clock", int(desc.clock), int(MAQ_CLOCK_MEDIA), int(MAQ_CLOCK_MONOTONIC));
-    auto wrapped = std::make_shared<Frame>();
-    wrapped->image = checked_image_view(desc);
-    wrapped->timestamp_ns = desc.timestamp_ns;
-    wrapped->clock = desc.clock;
-    wrapped->sequence = desc.sequence;
     auto handle = std::make_unique<maq_frame>();
-    handle->frame = std::move(wrapped);
+    handle->frame.image = checked_image_view(desc);
+    handle->frame.timestamp_ns = desc.timestamp_ns;
+    handle->frame.clock = desc.clock;
+    handle->frame.sequence = desc.sequence;
     handle->free_callback = free_callback;
     handle->user_data = user_data;
     *frame = handle.release();
@@ -31,12 +29,12 @@ maq_status maq_frame_create(maq_context* context, const maq_frame_desc* given, m
   });
 }
 
-void maq_frame_release(maq_frame* frame) { delete frame; }
+void maq_frame_release(maq_frame* frame) { take_back(frame); }
 
 maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
-    const Frame& from = *frame->frame;
+    const Frame& from = frame->frame;
     maq_frame_desc filled{};
     filled.format = from.image.format;
     filled.width_px = from.image.width_px;
@@ -58,7 +56,7 @@ maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
     require_argument(pixels, "pixels");
-    copy_pixels(frame->frame->image, format, pixels, stride_bytes, size_bytes);
+    copy_pixels(frame->frame.image, format, pixels, stride_bytes, size_bytes);
     return MAQ_OK;
   });
 }

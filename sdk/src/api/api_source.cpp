@@ -38,7 +38,7 @@ void maq_source_destroy(maq_source* source) { delete source; }
 maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) {
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
-    const SourceInfo& from = source->source.info();
+    const SourceInfo& from = source->source->info();
     maq_source_info filled{};
     filled.width_px = from.width_px;
     filled.height_px = from.height_px;
@@ -46,7 +46,7 @@ maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) 
     filled.frame_count = from.frame_count;
     filled.is_live = from.is_live ? 1 : 0;
     filled.clock = from.clock;
-    filled.pool_size = uint32_t(source->source.pool_size());
+    filled.pool_size = uint32_t(source->frames.capacity());
     write_struct(info, "info", filled, sizeof(maq_source_info));
     return MAQ_OK;
   });
@@ -56,10 +56,9 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
     require_argument(frame, "frame");
-    auto handle = std::make_unique<maq_frame>();
-    handle->frame = source->source.next(timeout_ns);
-    if (handle->frame == nullptr) return MAQ_END_OF_STREAM;
-    *frame = handle.release();
+    BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
+    if (!source->source->next(timeout_ns, handle->frame)) return MAQ_END_OF_STREAM;
+    *frame = hand_out<maq_frame>(std::move(handle));
     return MAQ_OK;
   });
 }

@@ -5,7 +5,9 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
+#include "core/bounded_pool.h"
 #include "core/frame.h"
 #include "core/log.h"
 #include "densepose/densepose.h"
@@ -60,18 +62,28 @@ struct maq_context : maq::Handle {
   std::shared_ptr<maq::ContextState> state;
 };
 
+// Frames of sources and results are whole handles from pools, so that handing one out takes nothing from the heap.
 struct maq_frame : maq::Handle {
   ~maq_frame() {
     if (free_callback != nullptr) free_callback(user_data);
   }
-  std::shared_ptr<const maq::Frame> frame;
+  maq::Frame frame;
   maq_frame_free_callback free_callback = nullptr;
   void* user_data = nullptr;
+  maq::BoundedPool<maq_frame>::Home home;  // none: an app's own memory
 };
 
 struct maq_source : maq::Handle {
-  explicit maq_source(std::unique_ptr<maq::Source> made, size_t pool_size) : source(std::move(made), pool_size) {}
-  maq::PooledSource source;
+  explicit maq_source(std::unique_ptr<maq::Source> made, size_t pool_size)
+      : source(std::move(made)), frames(pool_size, "frames") {}
+  std::unique_ptr<maq::Source> source;
+  maq::BoundedPool<maq_frame> frames;
+};
+
+struct maq_densepose_result : maq::Handle {
+  maq::DensePoseResult result;
+  std::vector<maq_person> people;
+  maq::BoundedPool<maq_densepose_result>::Home home;
 };
 
 struct maq_densepose : maq::Handle {
@@ -79,10 +91,23 @@ struct maq_densepose : maq::Handle {
       : state(std::move(of)), densepose(std::move(made)), results(pool_size, "results") {}
   std::shared_ptr<maq::ContextState> state;
   std::unique_ptr<maq::DensePose> densepose;
-  maq::BoundedPool<maq::DensePoseResult> results;
+  maq::BoundedPool<maq_densepose_result> results;
 };
 
-struct maq_densepose_result : maq::Handle {
-  std::shared_ptr<const maq::DensePoseResult> result;
-  std::vector<maq_person> people;
-};
+namespace maq {
+
+// Gives a handle to the caller.
+template <class T>
+T* hand_out(typename BoundedPool<T>::Pooled handle) {
+  handle->set_error({});  // of whoever had it before
+  handle->home = handle.get_deleter();
+  return handle.release();
+}
+
+// Takes it back; NULL is fine.
+template <class T>
+void take_back(T* handle) {
+  if (handle != nullptr) std::exchange(handle->home, {})(handle);
+}
+
+}  // namespace maq

@@ -12,44 +12,58 @@ namespace maq {
 
 template <class T>
 class BoundedPool {
- public:
-  // `what` names the pooled thing in the error text: "frames".
-  BoundedPool(size_t capacity, std::string what)
-      : state_(std::make_shared<State>()), capacity_(capacity), what_(std::move(what)) {}
-
-  size_t capacity() const { return capacity_; }
-
-  // Throws MAQ_ERROR_POOL_EMPTY when every object is held. The object comes as its last user left it.
-  std::shared_ptr<T> acquire() {
-    std::unique_ptr<T> object;
-    {
-      std::lock_guard<std::mutex> lock(state_->mutex);
-      if (!state_->idle.empty()) {
-        object = std::move(state_->idle.back());
-        state_->idle.pop_back();
-      } else if (state_->made == capacity_) {
-        throw Error(MAQ_ERROR_POOL_EMPTY, "All ", capacity_, " ", what_,
-                    " of the pool are held; release one, or ask for a larger pool_size.");
-      } else {
-        object = std::make_unique<T>();
-        // Room for every object is kept, so that giving one back never allocates.
-        state_->idle.reserve(capacity_);
-        ++state_->made;
-      }
-    }
-    return std::shared_ptr<T>(object.release(), [state = state_](T* returned) {
-      std::lock_guard<std::mutex> lock(state->mutex);
-      state->idle.emplace_back(returned);
-    });
-  }
-
- private:
   struct State {
     std::mutex mutex;
     std::vector<std::unique_ptr<T>> idle;
     size_t made = 0;
   };
 
+ public:
+  // Gives an object back to its pool, or deletes one that is of none.
+  class Home {
+   public:
+    Home() = default;
+    void operator()(T* object) const {
+      std::unique_ptr<T> owned(object);
+      if (state_ == nullptr) return;
+      std::lock_guard<std::mutex> lock(state_->mutex);
+      state_->idle.push_back(std::move(owned));
+    }
+
+   private:
+    friend BoundedPool;
+    explicit Home(std::shared_ptr<State> state) : state_(std::move(state)) {}
+    std::shared_ptr<State> state_;
+  };
+  using Pooled = std::unique_ptr<T, Home>;
+
+  // `what` names the pooled thing in the error text: "frames".
+  BoundedPool(size_t capacity, std::string what)
+      : state_(std::make_shared<State>()), capacity_(capacity), what_(std::move(what)) {
+    // Room for every object, so that giving one back never allocates.
+    state_->idle.reserve(capacity_);
+  }
+
+  size_t capacity() const { return capacity_; }
+
+  // Throws MAQ_ERROR_POOL_EMPTY when every object is held. The object comes as its last user left it.
+  Pooled acquire() {
+    std::lock_guard<std::mutex> lock(state_->mutex);
+    std::unique_ptr<T> object;
+    if (!state_->idle.empty()) {
+      object = std::move(state_->idle.back());
+      state_->idle.pop_back();
+    } else if (state_->made == capacity_) {
+      throw Error(MAQ_ERROR_POOL_EMPTY, "All ", capacity_, " ", what_,
+                  " of the pool are held; release one, or ask for a larger pool_size.");
+    } else {
+      object = std::make_unique<T>();
+      ++state_->made;
+    }
+    return Pooled(object.release(), Home(state_));
+  }
+
+ private:
   std::shared_ptr<State> state_;
   size_t capacity_;
   std::string what_;

@@ -44,16 +44,16 @@ bool comes_before(const ScoredBox& a, const ScoredBox& b) {
   return a.score != b.score ? a.score > b.score : a.index < b.index;
 }
 
-std::vector<ScoredBox> non_maximum_suppression(std::vector<ScoredBox> candidates, float iou, size_t limit) {
-  std::sort(candidates.begin(), candidates.end(), comes_before);
-  std::vector<ScoredBox> kept;
-  for (const ScoredBox& candidate : candidates) {
-    if (kept.size() == limit) break;
+void non_maximum_suppression(std::vector<ScoredBox>& boxes, float iou, size_t limit) {
+  std::sort(boxes.begin(), boxes.end(), comes_before);
+  auto end = boxes.begin();  // of those that are kept, which move to the front
+  for (const ScoredBox& candidate : boxes) {
+    if (size_t(end - boxes.begin()) == limit) break;
     const bool suppressed = std::any_of(
-        kept.begin(), kept.end(), [&](const ScoredBox& better) { return overlap(candidate.box, better.box) > iou; });
-    if (!suppressed) kept.push_back(candidate);
+        boxes.begin(), end, [&](const ScoredBox& better) { return overlap(candidate.box, better.box) > iou; });
+    if (!suppressed) *end++ = candidate;
   }
-  return kept;
+  boxes.erase(end, boxes.end());
 }
 
 }  // namespace maq

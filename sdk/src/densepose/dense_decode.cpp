@@ -18,22 +18,17 @@ constexpr int kLanes = 8;
 
 int round_up_to_lanes(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
-// Where pixel i of `to` lies between two cells of `from`.
-struct Tap {
-  int low = 0;
-  int high = 0;
-  float fraction = 0;  // weight of `high`
-};
+using Tap = ResizeTap;
 
-std::vector<Tap> resize_taps(int from, int to) {
-  std::vector<Tap> taps(static_cast<size_t>(to));
+// Where each pixel of `to` lies between two cells of `from`.
+void fill_taps(int from, int to, std::vector<Tap>& taps) {
+  taps.resize(static_cast<size_t>(to));
   const float scale = float(from) / float(to);
   for (int i = 0; i < to; ++i) {
     const float at = std::max(0.0f, (float(i) + 0.5f) * scale - 0.5f);
     const int low = std::min(int(at), from - 1);
     taps[size_t(i)] = {low, std::min(low + 1, from - 1), at - float(low)};
   }
-  return taps;
 }
 
 // The first of `count` values (of `padded`, a multiple of kLanes, the rest kNever) that is the largest. NaN never wins; -1
@@ -59,11 +54,10 @@ inline int best_of(const float* values, int count, int padded) {
 // classes of a pixel runs over neighbouring memory. Padded with kNever to whole lanes.
 class ClassRow {
  public:
-  ClassRow(int classes, int size)
-      : classes_(classes),
-        size_(size),
-        padded_(round_up_to_lanes(classes)),
-        values_(size_t(size) * size_t(padded_), kNever) {}
+  ClassRow(int classes, int size, std::vector<float>& values)
+      : classes_(classes), size_(size), padded_(round_up_to_lanes(classes)), values_(values) {
+    values_.assign(size_t(size) * size_t(padded_), kNever);
+  }
 
   // The classes from `first` on of each cell.
   void fill(const DenseLogits& logits, int first, const Tap& row) {
@@ -88,7 +82,7 @@ class ClassRow {
   int classes_;
   int size_;
   int padded_;
-  std::vector<float> values_;
+  std::vector<float>& values_;
 };
 
 // exp(x) for x from -87 to 0 within 3e-7 of its value, without a call, so that a loop of it becomes vectors: 2^x by the
@@ -109,7 +103,7 @@ inline float exp_of_negative(float x) {
 
 // Of each cell log(p / (1 - p)), p the probability that it shows the person, whichever part: the logits of all coarse
 // classes but the background, summed as probabilities, against the background's. A class that is NaN counts as absent.
-MAQ_SIMD_CLONES std::vector<float> person_log_odds(const DenseLogits& logits) {
+MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<float>& odds) {
   const int parts = logits.coarse_classes - 1;
   const int padded = round_up_to_lanes(parts);
   alignas(64) std::array<float, kMostClasses> values;
@@ -118,7 +112,7 @@ MAQ_SIMD_CLONES std::vector<float> person_log_odds(const DenseLogits& logits) {
     const float low = logit > kNever ? logit : kNever;  // also where it is NaN
     return low < -kNever ? low : -kNever;
   };
-  std::vector<float> odds(size_t(logits.size) * size_t(logits.size));
+  odds.resize(size_t(logits.size) * size_t(logits.size));
   for (int y = 0; y < logits.size; ++y) {
     for (int x = 0; x < logits.size; ++x) {
       const float* classes = logits.cell(y, x);
@@ -145,23 +139,21 @@ MAQ_SIMD_CLONES std::vector<float> person_log_odds(const DenseLogits& logits) {
           best == kNever ? kNever : best + std::log(sum) - finite(classes[0]);
     }
   }
-  return odds;
 }
 
 // Of each cell the part with the largest logit, from 0 (of equal ones the lowest); -1 if all are NaN.
-MAQ_SIMD_CLONES std::vector<int8_t> best_parts(const DenseLogits& logits) {
+MAQ_SIMD_CLONES void best_parts(const DenseLogits& logits, std::vector<int8_t>& best) {
   const int parts = logits.index_classes - 1;
   const int padded = round_up_to_lanes(parts);
   std::array<float, kMostClasses> values;
   values.fill(kNever);
-  std::vector<int8_t> best(size_t(logits.size) * size_t(logits.size));
+  best.resize(size_t(logits.size) * size_t(logits.size));
   for (int y = 0; y < logits.size; ++y) {
     for (int x = 0; x < logits.size; ++x) {
       std::copy_n(logits.cell(y, x) + logits.coarse_classes + 1, parts, values.begin());
       best[size_t(y) * size_t(logits.size) + size_t(x)] = int8_t(best_of(values.data(), parts, padded));
     }
   }
-  return best;
 }
 
 float bilinear(const float* plane, int size, const Tap& row, const Tap& col) {
@@ -227,16 +219,18 @@ PixelRect pixel_rect(const Box& box) {
 }
 
 MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person,
-                                          float mask_threshold, float least_own_share, DensePlanes& planes) {
+                                          float mask_threshold, float least_own_share, DecodeMemory& memory,
+                                          DensePlanes& planes) {
   DecodeCounts counts;
   int64_t taken = 0;  // pixels of the person that are somebody else's already
   const PixelRect rect = pixel_rect(box);
-  const std::vector<Tap> rows = resize_taps(logits.size, rect.height);
-  const std::vector<Tap> cols = resize_taps(logits.size, rect.width);
-  const std::vector<float> odds = person_log_odds(logits);
+  auto& [rows, cols, odds, best, mixed_row] = memory;
+  fill_taps(logits.size, rect.height, rows);
+  fill_taps(logits.size, rect.width, cols);
+  person_log_odds(logits, odds);
   const float least_odds = std::log(mask_threshold / (1 - mask_threshold));
-  ClassRow parts(logits.index_classes - 1, logits.size);  // all but the background
-  const std::vector<int8_t> best = best_parts(logits);
+  ClassRow parts(logits.index_classes - 1, logits.size, mixed_row);  // all but the background
+  best_parts(logits, best);
 
   const int first_row = std::max(0, -rect.y);
   const int last_row = std::min(rect.height, planes.height_px - rect.y);

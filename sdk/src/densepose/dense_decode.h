@@ -40,6 +40,21 @@ struct DecodeCounts {
   int64_t clamped_uv = 0;
 };
 
+// Where a pixel lies between two cells along one axis.
+struct ResizeTap {
+  int low = 0;
+  int high = 0;
+  float fraction = 0;  // weight of `high`
+};
+
+// What painting a person needs in between; kept from person to person.
+struct DecodeMemory {
+  std::vector<ResizeTap> rows, columns;
+  std::vector<float> odds;       // of each cell
+  std::vector<int8_t> best;      // part of each cell
+  std::vector<float> mixed_row;  // logits of a row of cells
+};
+
 // The pixels a box is painted into: between the floors of its corners, at least one each way.
 struct PixelRect {
   int x = 0, y = 0, width = 1, height = 1;
@@ -52,6 +67,6 @@ PixelRect pixel_rect(const Box& box);
 // belong to somebody, and those outside the image, are left alone; where fewer than `least_own_share` of the person's
 // pixels remain, nothing is painted. `person` counts from 1.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
-                          float least_own_share, DensePlanes& planes);
+                          float least_own_share, DecodeMemory& memory, DensePlanes& planes);
 
 }  // namespace maq

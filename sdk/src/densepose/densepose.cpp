@@ -127,15 +127,20 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
     run_trunk();
     stats.trunk_ms = stage.lap_ms();
 
-    const std::vector<ScoredBox> proposals = stats.key_frame ? propose(image, &stats.dropped_boxes) : followed_;
+    if (stats.key_frame) {
+      propose(image, proposals_, &stats.dropped_boxes);
+    } else {
+      proposals_ = followed_;
+    }
     followed_.clear();
-    stats.proposals = int(proposals.size());
+    stats.proposals = int(proposals_.size());
     stats.proposals_ms = stage.lap_ms();
 
-    const std::vector<ScoredBox> people = proposals.empty() ? proposals : run_box_head(proposals, &stats.dropped_boxes);
+    found_.clear();
+    if (!proposals_.empty()) run_box_head(proposals_, found_, &stats.dropped_boxes);
     stats.box_head_ms = stage.lap_ms();
 
-    if (!people.empty()) run_dense_head(people, result);
+    if (!found_.empty()) run_dense_head(found_, result);
   }
   stats.total_ms = total.lap_ms();
 }
@@ -149,11 +154,12 @@ void DensePose::run_trunk() {
   const int64_t height = input_.padded_height_px;
   const int64_t width = input_.padded_width_px;
   const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
-  std::vector<Shape> shapes;
+  shapes_.clear();
   for (const int stride : manifest_.rpn.strides) {
-    shapes.push_back({1, cells(height, stride), cells(width, stride), channels_});
+    shapes_.push_back({1, cells(height, stride), cells(width, stride), channels_});
   }
-  pyramid_ = trunk_->run({{input_.values.data(), {1, 3, height, width}}}, shapes);
+  inputs_.assign(1, {input_.values.data(), {1, 3, height, width}});
+  pyramid_ = trunk_->run(inputs_, shapes_);
   features_.clear();
   for (size_t l = 0; l < kFeatureLevels; ++l) {
     const TensorView& map = pyramid_[l];
@@ -161,18 +167,17 @@ void DensePose::run_trunk() {
   }
 }
 
-std::vector<ScoredBox> DensePose::propose(const ImageView& image, int* dropped) {
-  std::vector<RpnLevel> levels(kRpnLevels);
+void DensePose::propose(const ImageView& image, std::vector<ScoredBox>& found, int* dropped) {
+  rpn_levels_.assign(kRpnLevels, {});
   // Runs a graph of the RPN on the levels from `first` on.
   const auto ask = [&](Session& rpn, size_t first, size_t count) {
-    std::vector<TensorView> inputs(pyramid_.begin() + std::ptrdiff_t(first),
-                                   pyramid_.begin() + std::ptrdiff_t(first + count));
+    inputs_.assign(pyramid_.begin() + std::ptrdiff_t(first), pyramid_.begin() + std::ptrdiff_t(first + count));
     const int64_t anchors = int64_t(manifest_.rpn.aspect_ratios.size());
-    std::vector<Shape> shapes;
-    for (const TensorView& map : inputs) shapes.push_back({1, map.shape[1], map.shape[2], 5 * anchors});
-    const std::vector<TensorView>& found = rpn.run(inputs, shapes);
+    shapes_.clear();
+    for (const TensorView& map : inputs_) shapes_.push_back({1, map.shape[1], map.shape[2], 5 * anchors});
+    const std::vector<TensorView>& outputs = rpn.run(inputs_, shapes_);
     for (size_t l = 0; l < count; ++l) {
-      levels[first + l] = {found[l].data, int(inputs[l].shape[2]), int(inputs[l].shape[1])};
+      rpn_levels_[first + l] = {outputs[l].data, int(inputs_[l].shape[2]), int(inputs_[l].shape[1])};
     }
   };
   ask(*rpn_coarse_, 1, kRpnLevels - 1);
@@ -181,7 +186,8 @@ std::vector<ScoredBox> DensePose::propose(const ImageView& image, int* dropped) 
   const float scale = float(input_.height_px) / float(image.height_px);
   const std::vector<float>& sizes = manifest_.rpn.anchor_sizes_px;
   if (float(settings_.least_person_px) * scale < std::sqrt(3.0f * sizes[0] * sizes[1])) ask(*rpn_fine_, 0, 1);
-  return select_proposals(levels, manifest_.rpn, float(input_.width_px), float(input_.height_px), dropped);
+  select_proposals(rpn_levels_, manifest_.rpn, float(input_.width_px), float(input_.height_px), candidates_, found,
+                   dropped);
 }
 
 // The larger the box, the coarser the level (Lin et al., Feature Pyramid Networks, 2017, equation 1).
@@ -193,19 +199,20 @@ const FeatureMap& DensePose::level_for(const Box& box) const {
   return features_[size_t(slot)];
 }
 
-std::vector<ScoredBox> DensePose::run_box_head(const std::vector<ScoredBox>& proposals, int* dropped) {
+void DensePose::run_box_head(const std::vector<ScoredBox>& proposals, std::vector<ScoredBox>& found, int* dropped) {
   const BoxHeadSpec& spec = manifest_.box_head;
   const int64_t count = int64_t(proposals.size());
   const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
   rois_.resize(size_t(count) * roi_size);
   for (size_t i = 0; i < proposals.size(); ++i) {
-    roi_align(level_for(proposals[i].box), proposals[i].box, spec.pool, rois_.data() + i * roi_size);
+    roi_align_.run(level_for(proposals[i].box), proposals[i].box, spec.pool, rois_.data() + i * roi_size);
   }
   // Of each: logits of person and background, then dx, dy, dw, dh.
-  const TensorView& boxes =
-      box_head_->run({{rois_.data(), {count, spec.pool, spec.pool, channels_}}}, {{count, 6}}).front();
+  inputs_.assign(1, {rois_.data(), {count, spec.pool, spec.pool, channels_}});
+  shapes_.assign(1, {count, 6});
+  const TensorView& boxes = box_head_->run(inputs_, shapes_).front();
 
-  std::vector<ScoredBox> found;
+  found.clear();
   for (size_t i = 0; i < proposals.size(); ++i) {
     const float score = first_of_two(boxes.data + 6 * i);
     Box box = apply_deltas(proposals[i].box, boxes.data + 6 * i + 2, spec.delta_weights);
@@ -215,7 +222,7 @@ std::vector<ScoredBox> DensePose::run_box_head(const std::vector<ScoredBox>& pro
       found.push_back({box, score, int64_t(i)});
     }
   }
-  return non_maximum_suppression(std::move(found), spec.nms_iou, size_t(settings_.max_people));
+  non_maximum_suppression(found, spec.nms_iou, size_t(settings_.max_people));
 }
 
 void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result) {
@@ -225,13 +232,13 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
   const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
   rois_.resize(size_t(count) * roi_size);
   for (size_t i = 0; i < people.size(); ++i) {
-    roi_align(features_[0], people[i].box, spec.pool, rois_.data() + i * roi_size);
+    roi_align_.run(features_[0], people[i].box, spec.pool, rois_.data() + i * roi_size);
   }
   const int classes = spec.coarse_classes + spec.index_classes;
-  const Shape labels_shape = {count, spec.pool, spec.pool, 4 * classes};
-  const Shape surface_shape = {count, spec.pool, spec.pool, charts_.channels()};
-  const std::vector<TensorView>& outputs =
-      dense_head_->run({{rois_.data(), {count, spec.pool, spec.pool, channels_}}}, {labels_shape, surface_shape});
+  inputs_.assign(1, {rois_.data(), {count, spec.pool, spec.pool, channels_}});
+  shapes_.assign(2, {count, spec.pool, spec.pool, 4 * classes});
+  shapes_[1][3] = charts_.channels();
+  const std::vector<TensorView>& outputs = dense_head_->run(inputs_, shapes_);
   result.stats.dense_head_ms = stage.lap_ms();
 
   const float scale_x = float(result.planes.width_px) / float(input_.width_px);
@@ -245,7 +252,7 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
     Box box = scaled(people[i].box, scale_x, scale_y);
     clip_box(box, float(result.planes.width_px), float(result.planes.height_px));
     const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold,
-                                             spec.least_own_share, result.planes);
+                                             spec.least_own_share, decode_memory_, result.planes);
     // A box without a body is a false alarm; one whose body is somebody else's already shows that person again.
     if (counts.body_pixels > 0) {
       result.people.push_back({box, people[i].score});

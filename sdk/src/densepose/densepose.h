@@ -71,8 +71,8 @@ class DensePose {
  private:
   void run_trunk();
   // The best boxes of the RPN. The finest level is asked only if somebody may be that small.
-  std::vector<ScoredBox> propose(const ImageView& image, int* dropped);
-  std::vector<ScoredBox> run_box_head(const std::vector<ScoredBox>& proposals, int* dropped);
+  void propose(const ImageView& image, std::vector<ScoredBox>& found, int* dropped);
+  void run_box_head(const std::vector<ScoredBox>& proposals, std::vector<ScoredBox>& found, int* dropped);
   // Paints the people, whose boxes are in pixels of the network's input, and adds those that got a pixel to `result`.
   void run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result);
   const FeatureMap& level_for(const Box& box) const;
@@ -90,6 +90,14 @@ class DensePose {
   std::vector<TensorView> pyramid_;   // P2 to P6, in memory of the trunk
   std::vector<FeatureMap> features_;  // P2 to P5, the same
   std::vector<float> rois_;
+  // What a frame needs in between, kept so that the next one takes nothing from the heap.
+  RoiAlign roi_align_;
+  DecodeMemory decode_memory_;
+  std::vector<RpnCandidate> candidates_;
+  std::vector<RpnLevel> rpn_levels_;
+  std::vector<ScoredBox> proposals_, found_;
+  std::vector<TensorView> inputs_;
+  std::vector<Shape> shapes_;
   // People of the frame before, in pixels of the network's input, and frames since the RPN was asked last.
   std::vector<ScoredBox> followed_;
   int frames_since_key_ = 0;

@@ -8,15 +8,11 @@ namespace {
 
 constexpr std::array<float, 4> kUnitWeights = {1, 1, 1, 1};
 
-struct Candidate {
-  float logit;
-  int32_t index;  // (y * width + x) * anchors + anchor
-};
-
 // The `count` best logits of a level in order; NaN and infinities never get in.
-std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int count, int* dropped) {
+void best_candidates(const RpnLevel& level, int anchors, int count, std::vector<RpnCandidate>& candidates,
+                     int* dropped) {
   const int cells = level.width * level.height;
-  std::vector<Candidate> candidates;
+  candidates.clear();
   candidates.reserve(size_t(cells) * size_t(anchors));
   for (int cell = 0; cell < cells; ++cell) {
     for (int anchor = 0; anchor < anchors; ++anchor) {
@@ -28,7 +24,7 @@ std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int c
       }
     }
   }
-  const auto comes_before = [](const Candidate& a, const Candidate& b) {
+  const auto comes_before = [](const RpnCandidate& a, const RpnCandidate& b) {
     return a.logit != b.logit ? a.logit > b.logit : a.index < b.index;
   };
   // Finding the best and then sorting them is several times as fast as std::partial_sort here.
@@ -37,7 +33,6 @@ std::vector<Candidate> best_candidates(const RpnLevel& level, int anchors, int c
     candidates.resize(size_t(count));
   }
   std::sort(candidates.begin(), candidates.end(), comes_before);
-  return candidates;
 }
 
 }  // namespace
@@ -50,16 +45,17 @@ Box anchor_box(int x, int y, int stride, float size_px, float ratio) {
   return {centre_x - 0.5f * width, centre_y - 0.5f * height, centre_x + 0.5f * width, centre_y + 0.5f * height};
 }
 
-std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width,
-                                        float height, int* dropped) {
+void select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width, float height,
+                      std::vector<RpnCandidate>& candidates, std::vector<ScoredBox>& found, int* dropped) {
   const int anchors = int(spec.aspect_ratios.size());
-  std::vector<ScoredBox> all;
+  found.clear();
   for (size_t l = 0; l < levels.size(); ++l) {
     const RpnLevel& level = levels[l];
     // Greedy suppression in order of score, so that boxes are only made of candidates until enough are kept.
-    std::vector<ScoredBox> kept;
-    for (const Candidate& candidate : best_candidates(level, anchors, spec.pre_nms_top_k, dropped)) {
-      if (kept.size() == size_t(spec.post_nms_top_k)) break;
+    best_candidates(level, anchors, spec.pre_nms_top_k, candidates, dropped);
+    const size_t before = found.size();
+    for (const RpnCandidate& candidate : candidates) {
+      if (found.size() - before == size_t(spec.post_nms_top_k)) break;
       const int anchor = candidate.index % anchors;
       const int cell = candidate.index / anchors;
       const float* deltas = level.values + size_t(cell) * size_t(5 * anchors) + size_t(anchors + 4 * anchor);
@@ -70,15 +66,14 @@ std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, con
         ++*dropped;
         continue;
       }
-      const bool suppressed = std::any_of(
-          kept.begin(), kept.end(), [&](const ScoredBox& better) { return overlap(box, better.box) > spec.nms_iou; });
-      if (!suppressed) kept.push_back({box, candidate.logit, int64_t(l) << 32 | candidate.index});
+      const bool suppressed =
+          std::any_of(found.begin() + std::ptrdiff_t(before), found.end(),
+                      [&](const ScoredBox& better) { return overlap(box, better.box) > spec.nms_iou; });
+      if (!suppressed) found.push_back({box, candidate.logit, int64_t(l) << 32 | candidate.index});
     }
-    all.insert(all.end(), kept.begin(), kept.end());
   }
-  std::sort(all.begin(), all.end(), comes_before);
-  if (all.size() > size_t(spec.post_nms_top_k)) all.resize(size_t(spec.post_nms_top_k));
-  return all;
+  std::sort(found.begin(), found.end(), comes_before);
+  if (found.size() > size_t(spec.post_nms_top_k)) found.resize(size_t(spec.post_nms_top_k));
 }
 
 }  // namespace maq

@@ -17,6 +17,11 @@ struct RpnLevel {
   int height = 0;
 };
 
+struct RpnCandidate {
+  float logit;
+  int32_t index;  // (y * width + x) * anchors + anchor
+};
+
 // The anchor of a cell: centred on (x, y) * stride, of area size^2 and height / width = ratio.
 Box anchor_box(int x, int y, int stride, float size_px, float ratio);
 
@@ -24,7 +29,8 @@ Box anchor_box(int x, int y, int stride, float size_px, float ratio);
 // without padding). Each level keeps its pre_nms_top_k best, then NMS runs within each level; ties go to the lower
 // level, then to the lowest (y, x, anchor). Boxes with NaN or infinite numbers or without area are left out, and counted in
 // `dropped` as far as they were looked at before enough were found.
-std::vector<ScoredBox> select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width,
-                                        float height, int* dropped);
+// They go to `found`; the memory of `candidates` is reused.
+void select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width, float height,
+                      std::vector<RpnCandidate>& candidates, std::vector<ScoredBox>& found, int* dropped);
 
 }  // namespace maq

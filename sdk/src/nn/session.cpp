@@ -153,6 +153,10 @@ size_t Session::compare_side(const GraphSide& side, const std::vector<TensorSpec
   return count;
 }
 
+void Session::check_run(OrtStatus* status) const {
+  if (status != nullptr) runtime_->check(status, MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
+}
+
 void Session::bind(Binding& binding, const float* data, const Shape& shape) {
   if (binding.value != nullptr && binding.data == data && binding.shape == shape) return;
   const OrtApi& api = runtime_->api();
@@ -161,10 +165,9 @@ void Session::bind(Binding& binding, const float* data, const Shape& shape) {
   int64_t size = 1;
   for (const int64_t extent : shape) size *= extent;
   // ONNX Runtime takes a mutable pointer but does not write to an input.
-  runtime_->check(api.CreateTensorWithDataAsOrtValue(cpu_memory_, const_cast<float*>(data),
-                                                     size_t(size) * sizeof(float), shape.data(), shape.size(),
-                                                     ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT, &binding.value),
-                  MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
+  check_run(api.CreateTensorWithDataAsOrtValue(cpu_memory_, const_cast<float*>(data), size_t(size) * sizeof(float),
+                                               shape.data(), shape.size(), ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT,
+                                               &binding.value));
   binding.data = data;
   binding.shape = shape;
 }
@@ -184,12 +187,8 @@ const std::vector<TensorView>& Session::run(const std::vector<TensorView>& input
     views_[i].data = buffers_[i].data();
     views_[i].shape = output_shapes[i];
   }
-  OrtStatus* status =
-      runtime_->api().Run(session_, nullptr, input_names_.data(), input_values_.data(), input_values_.size(),
-                          output_names_.data(), output_names_.size(), output_values_.data());
-  if (status != nullptr) {
-    runtime_->check(status, MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
-  }
+  check_run(runtime_->api().Run(session_, nullptr, input_names_.data(), input_values_.data(), input_values_.size(),
+                                output_names_.data(), output_names_.size(), output_values_.data()));
   return views_;
 }
 

@@ -1,7 +1,10 @@
 // One network of a bundle, ready to run.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,8 +14,26 @@
 
 namespace maq {
 
-// The sizes of a tensor; at most four.
-using Shape = std::vector<int64_t>;
+// The sizes of a tensor, at most four, without memory of their own.
+class Shape {
+ public:
+  Shape() = default;
+  Shape(std::initializer_list<int64_t> sizes) : rank_(std::min(sizes.size(), sizes_.size())) {
+    std::copy_n(sizes.begin(), rank_, sizes_.begin());
+  }
+
+  size_t size() const { return rank_; }
+  const int64_t* data() const { return sizes_.data(); }
+  const int64_t* begin() const { return data(); }
+  const int64_t* end() const { return data() + rank_; }
+  int64_t& operator[](size_t axis) { return sizes_[axis]; }
+  int64_t operator[](size_t axis) const { return sizes_[axis]; }
+  bool operator==(const Shape& other) const { return rank_ == other.rank_ && sizes_ == other.sizes_; }
+
+ private:
+  std::array<int64_t, 4> sizes_{};
+  size_t rank_ = 0;
+};
 
 // A float tensor, row-major, that somebody else owns.
 struct TensorView {
@@ -54,6 +75,8 @@ class Session {
     Shape shape;
   };
   void bind(Binding& binding, const float* data, const Shape& shape);
+  // Throws MAQ_ERROR_INFERENCE for an error.
+  void check_run(OrtStatus* status) const;
   void release();
 
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "core/bounded_pool.h"
 #include "core/frame.h"
 #include "core/log.h"
 
@@ -40,26 +39,5 @@ const std::vector<SourceScheme>& source_schemes();
 
 // Throws MAQ_ERROR_UNSUPPORTED for a scheme that is not in the list, and what the source throws.
 std::unique_ptr<Source> open_source(const std::string& uri);
-
-// A source with its pool: what the C API hands out.
-class PooledSource {
- public:
-  PooledSource(std::unique_ptr<Source> source, size_t pool_size)
-      : source_(std::move(source)), pool_(pool_size, "frames") {}
-
-  const SourceInfo& info() const { return source_->info(); }
-  size_t pool_size() const { return pool_.capacity(); }
-
-  // Nothing after the last frame.
-  std::shared_ptr<Frame> next(int64_t timeout_ns) {
-    std::shared_ptr<Frame> frame = pool_.acquire();
-    if (!source_->next(timeout_ns, *frame)) return nullptr;
-    return frame;
-  }
-
- private:
-  std::unique_ptr<Source> source_;
-  BoundedPool<Frame> pool_;
-};
 
 }  // namespace maq

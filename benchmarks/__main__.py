@@ -183,7 +183,11 @@ def print_verdicts(verdicts: list[gates.Verdict]) -> None:
         value = "" if v.value is None else f"{v.value:.4g}"
         state = f"[{colours[v.state]}]{v.state}[/]" + (f": {v.why}" if v.why else "")
         table.add_row(v.says, value, v.gate, v.stretch, state)
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    for v in verdicts:
+        if v.tried:
+            console.print(f"[bold red]Missed[/]: {v.says}. {v.tried}")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ TARGETS = Path(__file__).with_name("targets.toml")
 
 @dataclass(frozen=True)
 class Verdict:
-    """state: "stretch" (better than wished), "met", "missed", or "not measured" with the reason in `why`."""
+    """state: "stretch" (better than wished), "met", "missed", or "not measured" with the reason in `why`. tried: what
+    was done about a gate that is missed."""
 
     figure: str
     says: str
@@ -20,6 +21,7 @@ class Verdict:
     stretch: str
     state: str
     why: str = ""
+    tried: str = ""
 
 
 def check(figures: dict[str, float], machine: dict, missing: dict[str, str], targets: Path = TARGETS) -> list[Verdict]:
@@ -44,7 +46,8 @@ def check(figures: dict[str, float], machine: dict, missing: dict[str, str], tar
             state = "stretch" if reached[1] else "met" if reached[0] else "missed"
         elif not why:
             raise ValueError(f"{targets}: no figure is called {name}")
-        verdicts.append(Verdict(name, gate["says"], value, f"{sign} {bound}", f"{sign} {stretch}", state, why))
+        tried = " ".join(gate.get("tried", "").split()) if state == "missed" else ""
+        verdicts.append(Verdict(name, gate["says"], value, f"{sign} {bound}", f"{sign} {stretch}", state, why, tried))
     return verdicts
 
 

@@ -131,6 +131,7 @@ def text_sections(document: dict) -> list[Section]:
         value = "" if gate["value"] is None else f"{gate['value']:.4g}"
         why = f": {gate['why']}" if gate["why"] else ""
         gate_rows.append([gate["says"], value, gate["gate"], gate["stretch"], gate["state"] + why])
+    tried = [f"Missed: {gate['says']}. {gate['tried']}" for gate in document["gates"] if gate["tried"]]
     sweep_rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
     front = set(pareto([(row["ms"], row["error"]) for row in document["sweep"]]))
     for k, row in enumerate(document["sweep"]):
@@ -167,7 +168,7 @@ def text_sections(document: dict) -> list[Section]:
             *(["A quick run, to see that it works: do not quote it."] if document["quick"] else []),
             *([f"Doubts that the measurement itself has: {'; '.join(doubtful)}."] if doubtful else []),
         ]),
-        ("Gates", [gate_rows]),
+        ("Gates", [gate_rows, *tried]),
         ("Error against run time", [
             ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
             "Rendered people that no training saw; all settings took turns on the same pictures. AP by GPS: average "

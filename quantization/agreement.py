@@ -7,8 +7,11 @@ int8 result. Both bundles run on the same pictures at the bundle's own threshold
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
+import shutil
 import sys
+import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -33,6 +36,7 @@ examples:
   python -m quantization.agreement
   python -m quantization.agreement --images .data/photos/val --int8 build/quantised
   python -m quantization.agreement --images tests/media/clip.mp4 --backend onnx
+  python -m quantization.agreement --in-float trunk       what would be left if the trunk were not int8?
 
 label agreement   of the pixels that are somebody in fp32, the share with the same part in int8 (gate: 98 %)
 where both paint  the same over the pixels that are somebody in both: parts alone, without outlines
@@ -130,6 +134,22 @@ def agreement(float_bundle: Path, int8_bundle: Path, images: list[np.ndarray], k
     return compare(predictions(first, images), predictions(second, images))
 
 
+def mixed(float_bundle: Path, int8_bundle: Path, in_float: list[str], folder: Path) -> Path:
+    """A copy of the int8 bundle in `folder` whose graphs `in_float` are the fp32 ones. Raises ValueError for a graph
+    that neither has."""
+    shutil.copytree(int8_bundle, folder, dirs_exist_ok=True)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    for name in in_float:
+        if name not in manifest["graphs"]:
+            raise ValueError(f"{name} is none of the graphs {', '.join(manifest['graphs'])}")
+        file = manifest["graphs"][name]["file"]
+        data = (float_bundle / file).read_bytes()
+        (folder / file).write_bytes(data)
+        manifest["files"][file] = {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    return folder
+
+
 def load_images(source: Path, limit: int | None = None) -> list[np.ndarray]:
     """RGB images uint8 [H, W, 3] of a folder of shards (`limit` of them, evenly spread), a photo, a folder of photos or
     a clip. Raises ShardError or FileNotFoundError for anything else."""
@@ -169,17 +189,21 @@ def main(argv: list[str] | None = None) -> int:
         "--images", type=Path, default=Path(".data/people/val"), metavar="PATH",
         help="shards, a photo, a folder of photos or a clip (default: .data/people/val)",
     )  # fmt: skip
+    parser.add_argument("--in-float", nargs="+", default=[], metavar="GRAPH", help="of the int8 bundle, not int8")
     parser.add_argument("--limit", type=int, metavar="N", help="at most so many images")
     parser.add_argument("--backend", choices=("capi", "onnx"), default="capi", help="default: capi")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
     arguments = parser.parse_args(argv)
     try:
         images = load_images(arguments.images, arguments.limit)
-        figures = agreement(arguments.reference, arguments.int8, images, arguments.backend)
+        with tempfile.TemporaryDirectory() as folder:
+            int8 = mixed(arguments.reference, arguments.int8, arguments.in_float, Path(folder) / arguments.int8.name)
+            figures = agreement(arguments.reference, int8, images, arguments.backend)
     except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Nothing was compared: {error}", file=sys.stderr)
         return 1
-    print_figures(figures, f"{arguments.int8} against {arguments.reference}, {arguments.images}")
+    name = " with float ".join([str(arguments.int8), *filter(None, [", ".join(arguments.in_float)])])
+    print_figures(figures, f"{name} against {arguments.reference}, {arguments.images}")
     if arguments.json:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         document = {"schema": "maquette-agreement-1", "gate": GATE, "stretch": STRETCH, "images": str(arguments.images)}

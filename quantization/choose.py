@@ -34,10 +34,9 @@ from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.shards import ShardError
 from quantization import agreement, qdq
 from quantization.activations import Activations
-from quantization.bias_correction import correct_biases
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import calibrate, quantise_prepared, spread
+from quantization.quantize import calibrate, correct, quantise_prepared, spread
 from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, read_settings
 
@@ -84,8 +83,7 @@ class Workpiece:
     def quantise(self, target: Path, extra: tuple[str, ...] = ()) -> None:
         settings = replace(self.settings, float_nodes=self.settings.float_nodes + extra)
         quantise_prepared(self.path, target, self.ranges, settings)
-        if settings.bias_correction:
-            correct_biases(self.path, target, self.calibration)
+        correct(self.path, target, self.calibration, settings)
 
 
 def block_of(name: str) -> str:

@@ -23,10 +23,9 @@ from export.densepose import data
 from export.densepose.bundle import GRAPHS
 from export.densepose.graphs import open_bundle
 from quantization import agreement
-from quantization.bias_correction import correct_biases
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import calibrate, quantise_prepared, spread
+from quantization.quantize import calibrate, correct, quantise_prepared, spread
 from quantization.report import JSON, compact
 from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, read_settings
@@ -42,14 +41,15 @@ Entropy is slow: minutes for the trunk.
 
 def variants(settings: GraphSettings) -> Iterator[tuple[str, GraphSettings]]:
     """Ways to find ranges, without corrections; then the graph's own with the corrections."""
-    plain = replace(settings, bias_correction=False, depthwise_8_bit=False)
+    plain = replace(settings, bias_correction=False, round_together=False, depthwise_8_bit=False)
     for method, percentile in RANGES:
         name = method if percentile is None else f"{method} {percentile:g}"
         yield name, replace(plain, method=method, percentile=percentile or settings.percentile)
     own = f"{settings.method} {settings.percentile:g}" if settings.method == "percentile" else settings.method
     yield f"{own}, depthwise 8 bit", replace(plain, depthwise_8_bit=True)
     yield f"{own}, bias correction", replace(plain, bias_correction=True)
-    yield f"{own}, both", replace(plain, bias_correction=True, depthwise_8_bit=True)
+    yield f"{own}, rounded together", replace(plain, round_together=True)
+    yield f"{own}, all", replace(plain, bias_correction=True, round_together=True, depthwise_8_bit=True)
 
 
 def compare(
@@ -65,8 +65,7 @@ def compare(
             if key not in known:
                 known[key] = calibrate(prepared, calibration, variant)
             quantise_prepared(prepared, target, known[key], variant)
-            if variant.bias_correction:
-                correct_biases(prepared, target, calibration)
+            correct(prepared, target, calibration, variant)
             values = list(output_sqnr(prepared, target, held_out).values())
             yield {
                 "graph": name,

@@ -28,6 +28,7 @@ from export.densepose.graphs import Bundle, open_bundle
 from quantization.bias_correction import correct_biases
 from quantization.errors import float_nodes_left, output_sqnr
 from quantization.prepare import prepare
+from quantization.rounding import round_together
 from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, Settings, read_settings
 from quantization.simplify import simplify
@@ -37,6 +38,8 @@ METHODS = {
     "percentile": CalibrationMethod.Percentile,
     "entropy": CalibrationMethod.Entropy,
 }
+# The largest integer of a weight, as onnxruntime.quantization has it.
+SEVEN_BITS, EIGHT_BITS = 64, 127
 OPERATORS = sorted({*QLinearOpsRegistry, *QDQRegistry})
 
 
@@ -58,8 +61,15 @@ def quantise_graph(source: Path, target: Path, samples: list[Sample], settings: 
         prepared = Path(folder) / "prepared.onnx"
         prepare(source, prepared)
         quantise_prepared(prepared, target, calibrate(prepared, samples, settings), settings)
-        if settings.bias_correction:
-            correct_biases(prepared, target, samples)
+        correct(prepared, target, samples, settings)
+
+
+def correct(prepared: Path, target: Path, samples: list[Sample], settings: GraphSettings) -> None:
+    """What makes the integers of a quantised graph better once scales are fixed."""
+    if settings.round_together:
+        round_together(prepared, target, samples, SEVEN_BITS if settings.reduce_range else EIGHT_BITS)
+    if settings.bias_correction:
+        correct_biases(prepared, target, samples)
 
 
 def calibrate(prepared: Path, samples: list[Sample], settings: GraphSettings) -> TensorsData:

@@ -20,6 +20,7 @@ class GraphSettings:
     reduce_range: weights use 7 bits, so that two products never overflow 16 bits on x86 without VNNI.
     depthwise_8_bit: depthwise convolutions keep 8 bits all the same: their kernels add in 32 bits.
     float_nodes: names of nodes that stay float, `*` matches any text.
+    round_together: weights are rounded so that their errors cancel on real inputs (quantization.rounding).
     bias_correction: biases take up the mean error that rounded weights cause.
     """
 
@@ -28,6 +29,7 @@ class GraphSettings:
     reduce_range: bool = True
     depthwise_8_bit: bool = False
     float_nodes: tuple[str, ...] = ()
+    round_together: bool = False
     bias_correction: bool = False
 
 

@@ -141,7 +141,8 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
             "score_threshold": decode.score_threshold,
             "nms_iou": decode.box_nms_iou,
             "max_people": decode.max_people,
-        },
+        }
+        | ({} if decode.second_look_score is None else {"second_look_score": decode.second_look_score}),
         "dense_head": {
             "pool": network.dense_pool,
             "stride": network.tap_strides[0],
@@ -171,6 +172,7 @@ def decode_config(manifest: dict) -> DecodeConfig:
         rpn_nms_iou=rpn["nms_iou"],
         score_threshold=head["score_threshold"],
         box_nms_iou=head["nms_iou"],
+        second_look_score=head.get("second_look_score"),
         max_people=head["max_people"],
         mask_threshold=manifest["dense_head"]["mask_threshold"],
         least_own_share=manifest["dense_head"]["least_own_share"],

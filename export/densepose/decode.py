@@ -125,13 +125,23 @@ def infer(
 
 def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: NetworkConfig,
             config: DecodeConfig, inner: tuple[int, int]) -> tuple[Tensor, Tensor]:  # fmt: skip
-    """Box head, threshold and NMS: boxes [K, 4] in input pixels and scores [K], best first."""
-    if not len(proposed):
-        return proposed, proposed.new_zeros(0)
-    logits, deltas = graphs.box_head(tg.pooled(features, [proposed], network, network.box_pool))
+    """Box head, threshold and NMS, twice if the config asks for it: boxes [K, 4] in input pixels and scores [K], best
+    first."""
+    threshold = config.score_threshold
+    if config.second_look_score is not None:
+        least = min(config.second_look_score, threshold)
+        proposed, _ = _look(graphs, features, proposed, network, config, inner, least)
+    return _look(graphs, features, proposed, network, config, inner, threshold)
+
+
+def _look(graphs: Graphs, features: list[Tensor], boxes: Tensor, network: NetworkConfig, config: DecodeConfig,
+          inner: tuple[int, int], threshold: float) -> tuple[Tensor, Tensor]:  # fmt: skip
+    if not len(boxes):
+        return boxes, boxes.new_zeros(0)
+    logits, deltas = graphs.box_head(tg.pooled(features, [boxes], network, network.box_pool))
     scores = logits.softmax(1)[:, 0]
-    boxes = bx.clip(bx.decode(deltas, proposed, network.delta_weights), *inner)
-    valid = (scores > config.score_threshold) & ((boxes[:, 2:] - boxes[:, :2]) > 0).all(1)
+    boxes = bx.clip(bx.decode(deltas, boxes, network.delta_weights), *inner)
+    valid = (scores > threshold) & ((boxes[:, 2:] - boxes[:, :2]) > 0).all(1)
     boxes, scores = boxes[valid], scores[valid]
     keep = nms(boxes, scores, config.box_nms_iou)[: config.max_people]
     return boxes[keep], scores[keep]

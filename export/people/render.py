@@ -186,7 +186,7 @@ def neighbour_shade(depth: np.ndarray, focal_px: float) -> np.ndarray:
 
 
 class Renderer:
-    """Owns the OpenGL context; one a process."""
+    """Owns an OpenGL context. There may be several in a process: each draws into its own."""
 
     def __init__(self, model: Model, labels: LabelLookup, skin: np.ndarray, width: int, height: int) -> None:
         self.model, self.labels = model, labels
@@ -246,6 +246,8 @@ class Renderer:
         props: list[Prop] = (),
     ) -> Picture:
         """Instances are numbered 1.. in the order of `people`; props are background that can hide them."""
+        # OpenGL works on the context that was made or entered last, in which names mean other objects.
+        self.context.__enter__()
         rotation, shift = camera.world_to_camera[:, :3], camera.world_to_camera[:, 3]
         while len(self.moving) < len(people):
             self.moving.append(self.context.buffer(reserve=len(self.model.faces) * 3 * 24))

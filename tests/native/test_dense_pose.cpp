@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "bundle_copy.h"
 #include "densepose/densepose.h"
 
 namespace {
@@ -17,8 +18,9 @@ class DensePose : public ::testing::Test {
   }
   static void TearDownTestSuite() { runtime_.reset(); }
 
-  static maq::DensePose make(maq::DensePoseSettings settings) {
-    return {runtime_, maq::read_bundle(std::string(MAQ_TEST_DATA) + "/tiny_bundle"), settings};
+  static maq::DensePose make(maq::DensePoseSettings settings,
+                             const std::string& bundle = std::string(MAQ_TEST_DATA) + "/tiny_bundle") {
+    return {runtime_, maq::read_bundle(bundle), settings};
   }
 
   maq::DensePoseResult run(const cv::Mat& bgr, maq::DensePoseSettings settings = {}) {
@@ -97,6 +99,26 @@ TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {
   }
   EXPECT_EQ(result.stats.decoded.body_pixels, body);
   EXPECT_EQ(result.stats.decoded.clamped_uv, clamped);
+}
+
+TEST_F(DensePose, ASecondLookStartsWhereTheFirstEnded) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(80, 100, 4, 4)) = kRed;
+  const BundleCopy bundle;
+  const auto box_of = [&](std::optional<float> second_look_score, maq::DensePoseSettings settings) {
+    nlohmann::json manifest = bundle.manifest();
+    if (second_look_score) manifest["box_head"]["second_look_score"] = *second_look_score;
+    bundle.write_manifest(manifest);
+    maq::DensePoseResult result;
+    make(settings, bundle.path()).run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    return result.people.empty() ? maq::Box{} : result.people[0].box;
+  };
+  const maq::Box once = box_of(std::nullopt, {});
+  const maq::Box twice = box_of(0.3f, {});
+  EXPECT_NEAR(once.width(), 32, 1e-3);
+  EXPECT_NEAR(twice.x0, once.x0 + 3.2f, 1e-3) << "each look moves the box by a tenth of its width";
+  EXPECT_NEAR(twice.width(), once.width(), 1e-3);
+  EXPECT_NEAR(box_of(1.0f, {}).x0, twice.x0, 1e-3) << "who is sure enough to be shown is always looked at again";
 }
 
 TEST_F(DensePose, ABoxHiddenBehindAnotherIsNoPerson) {

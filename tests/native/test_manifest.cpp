@@ -76,6 +76,7 @@ TEST(Manifest, RefusesValuesOutOfRange) {
                                                 {"/rpn/aspect_ratios", {1}},
                                                 {"/box_head/max_people", 256},
                                                 {"/box_head/score_threshold", -1},
+                                                {"/box_head/second_look_score", 2},
                                                 {"/dense_head/index_classes", 1000},
                                                 {"/dense_head/mask_threshold", 1},
                                                 {"/dense_head/least_own_share", 1.5},

@@ -142,7 +142,15 @@ def document():
                  "ours_int8_ratio": None, "missing": "does not load it"}]  # fmt: skip
     line = {"float32_macs_s": 1e11, "int8_macs_s": 4e11, "bytes_s": 1e11, "share": 0.4,
             "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "least_ms": 1.6, "share": 0.4}}}  # fmt: skip
-    gate = {"says": "speed", "value": 40.0, "gate": "≥ 30", "stretch": "≥ 60", "state": "met", "why": ""}
+    gate = {
+        "says": "speed",
+        "value": 40.0,
+        "gate": "≥ 30",
+        "stretch": "≥ 60",
+        "state": "missed",
+        "why": "",
+        "tried": "All of it.",
+    }
     return {"machine": MACHINE, "scenes": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
@@ -152,7 +160,7 @@ def test_a_report_holds_its_figures_and_pictures(tmp_path):
     written = report.write(document(), tmp_path)
     assert all(path.stat().st_size > 1000 for path in written if path.suffix == ".png")
     text, page = (tmp_path / "report.md").read_text(), (tmp_path / "index.html").read_text()
-    for said in ("others were busy", "does not load it", "192 px", "quick run"):
+    for said in ("Missed: speed. All of it.", "others were busy", "does not load it", "192 px", "quick run"):
         assert said in text
         assert said in page
     assert "fp32 &lt;slow&gt;" in page

@@ -1,5 +1,6 @@
 """The reference decode gives a right picture, also for networks and images that are not well behaved."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -62,6 +63,25 @@ def test_people_are_painted_with_their_part_and_coordinates():
     assert_sound(result, IMAGE)
     assert len(result.boxes)
     assert np.unique(result.iuv[result.instance > 0], axis=0).tolist() == [[3, 128, 64]]
+
+
+def test_the_second_look_decides():
+    graphs, looks = fake_graphs(), []
+
+    def box_head(rois):
+        looks.append(len(rois))
+        logits = torch.tensor([0.0 if len(looks) == 1 else 3.0, 0.0]).expand(len(rois), 2)
+        return logits, torch.zeros(len(rois), 4)
+
+    unsure = dataclasses.replace(graphs, box_head=box_head)
+    once = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_look_score=None))
+    assert len(once.boxes) == 0
+    assert len(looks) == 1
+    looks.clear()
+    twice = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_look_score=0.3))
+    assert len(twice.boxes) > 0
+    assert len(looks) == 2
+    assert looks[1] < looks[0], "only boxes that survived the first look's suppression"
 
 
 @pytest.mark.parametrize("size", [(1, 1), (16, 16), (31, 33), (1, 400), (400, 1), (97, 640)])

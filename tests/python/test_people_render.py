@@ -79,6 +79,19 @@ def test_surface_points_lie_where_the_labels_say(renderer, model):
 
 
 @needs_body
+def test_a_second_renderer_does_not_disturb_the_first(renderer, model, atlas):
+    from export.people.lookup import LabelLookup
+    from export.people.render import Renderer
+
+    alone = picture(renderer, model)
+    other = Renderer(model, LabelLookup(atlas), np.full((16, 16, 3), 200, np.uint8), 96, 128)
+    again = picture(renderer, model)
+    assert np.array_equal(alone.label, again.label)
+    assert np.array_equal(alone.rgb, again.rgb)
+    other.context.release()
+
+
+@needs_body
 def test_drawing_twice_gives_the_same_picture(renderer, model):
     first, second = (picture(renderer, model, shifts=(0.0, 0.3)) for _ in range(2))
     assert np.array_equal(first.label, second.label)

@@ -1,5 +1,6 @@
 """The quantisation report names every tensor, sees a broken scale, and finds layers that overflow 16 bits."""
 
+import hashlib
 import json
 import shutil
 
@@ -10,7 +11,7 @@ import torch
 from onnx import helper, numpy_helper
 
 from export.densepose.bundle import GRAPHS
-from quantization import check, qdq, report, report_files
+from quantization import check, qdq, report, report_files, rounding
 from quantization.bias_correction import correct_biases
 from quantization.comparison import TensorError, activation_errors, pair_errors, weight_errors, worst_first
 from quantization.errors import output_sqnr
@@ -256,6 +257,62 @@ def test_bias_correction_takes_the_mean_error_out(tmp_path):
         means = [np.mean([r.run(["y"], s)[0].mean((0, 2, 3)) for s in given], 0) for r in run]
         gaps.append(np.abs(means[0] - means[1]).mean())
     assert gaps[1] < 0.7 * gaps[0]
+
+
+def test_weights_rounded_together_lose_less_than_each_by_itself():
+    chance = np.random.default_rng(3)
+    inputs = np.maximum(chance.normal(1, 1, (24, 4000)) + chance.normal(0, 1, (1, 4000)), 0)  # alike, never negative
+    moment = inputs @ inputs.T / 4000
+    weights = chance.normal(0, 1, (16, 24))
+    scale = np.abs(weights).max(1) / 64
+    alone = np.clip(np.rint(weights / scale[:, None]), -64, 64)
+    together = rounding.rounded(weights, moment, scale, 64)
+    assert np.array_equal(together, np.rint(together))
+    assert np.abs(together).max() <= 64
+
+    def loss(integers):
+        error = integers * scale[:, None] - weights
+        return np.einsum("oi,ij,oj->", error, moment, error)
+
+    assert loss(together) < 0.5 * loss(alone)
+
+
+def test_weights_of_independent_inputs_are_rounded_to_the_nearest():
+    weights = np.random.default_rng(4).normal(0, 1, (5, 9))
+    scale = np.abs(weights).max(1) / 64
+    together = rounding.rounded(weights, np.diag(np.arange(1.0, 10.0)), scale, 64)
+    assert np.array_equal(together, np.rint(weights / scale[:, None]))
+
+
+def test_rounding_together_changes_integers_alone_and_helps_the_graph(tmp_path):
+    small_graph(tmp_path / "float.onnx")
+    # Channels that are alike, as those of real features are: there is something to make up for.
+    shared = RNG.random((1, 1, 12, 16)).astype(np.float32)
+    given = [{"x": 0.05 * sample["x"] + shared} for sample in samples(4)]
+    reference = prepare(tmp_path / "float.onnx", tmp_path / "prepared.onnx")
+    held, quality = [], []
+    for together in (False, True):
+        settings = GraphSettings(round_together=together, bias_correction=True)
+        quantise_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", given, settings)
+        held.append({w.name: w for w in qdq.weights(onnx.load(tmp_path / "int8.onnx").graph, reference.graph)})
+        quality.append(output_sqnr(tmp_path / "prepared.onnx", tmp_path / "int8.onnx", given)["y"])
+    for name, weight in held[0].items():
+        assert np.array_equal(weight.scale, held[1][name].scale)
+    assert not np.array_equal(held[0]["a.weight"].stored, held[1]["a.weight"].stored)
+    assert np.array_equal(held[0]["b.weight"].stored, held[1]["b.weight"].stored), "depthwise layers stay"
+    assert quality[1] > quality[0] + 0.2
+
+
+def test_a_mixed_bundle_is_whole_and_has_the_graphs_asked_for(tmp_path):
+    (tmp_path / "trunk.onnx").write_bytes(b"in float")
+    folder = report.agreement.mixed(tmp_path, SHIPPED, ["trunk"], tmp_path / "mixed")
+    assert (folder / "trunk.onnx").read_bytes() == b"in float"
+    assert (folder / "box_head.onnx").read_bytes() == (SHIPPED / "box_head.onnx").read_bytes()
+    manifest = json.loads((folder / "manifest.json").read_text())
+    for name, entry in manifest["files"].items():
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == entry["sha256"], name
+    with pytest.raises(ValueError, match="none of the graphs"):
+        report.agreement.mixed(tmp_path, SHIPPED, ["head"], tmp_path / "other")
 
 
 def report_session(model):

@@ -136,8 +136,15 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
     stats.proposals = int(proposals_.size());
     stats.proposals_ms = stage.lap_ms();
 
-    found_.clear();
-    if (!proposals_.empty()) run_box_head(proposals_, found_, &stats.dropped_boxes);
+    // People who are followed come from a look at the frame before.
+    const bool looks_again = stats.key_frame && manifest_.box_head.second_look_score.has_value();
+    const float least_score = settings_.score_threshold;
+    if (looks_again) {
+      run_box_head(proposals_, std::min(least_score, *manifest_.box_head.second_look_score), found_,
+                   &stats.dropped_boxes);
+      proposals_.swap(found_);
+    }
+    run_box_head(proposals_, least_score, found_, &stats.dropped_boxes);
     stats.box_head_ms = stage.lap_ms();
 
     if (!found_.empty()) run_dense_head(found_, result);
@@ -199,26 +206,28 @@ const FeatureMap& DensePose::level_for(const Box& box) const {
   return features_[size_t(slot)];
 }
 
-void DensePose::run_box_head(const std::vector<ScoredBox>& proposals, std::vector<ScoredBox>& found, int* dropped) {
+void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float least_score, std::vector<ScoredBox>& found,
+                             int* dropped) {
+  found.clear();
+  if (boxes.empty()) return;
   const BoxHeadSpec& spec = manifest_.box_head;
-  const int64_t count = int64_t(proposals.size());
+  const int64_t count = int64_t(boxes.size());
   const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
   rois_.resize(size_t(count) * roi_size);
-  for (size_t i = 0; i < proposals.size(); ++i) {
-    roi_align_.run(level_for(proposals[i].box), proposals[i].box, spec.pool, rois_.data() + i * roi_size);
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    roi_align_.run(level_for(boxes[i].box), boxes[i].box, spec.pool, rois_.data() + i * roi_size);
   }
   // Of each: logits of person and background, then dx, dy, dw, dh.
   inputs_.assign(1, {rois_.data(), {count, spec.pool, spec.pool, channels_}});
   shapes_.assign(1, {count, 6});
-  const TensorView& boxes = box_head_->run(inputs_, shapes_).front();
+  const TensorView& outputs = box_head_->run(inputs_, shapes_).front();
 
-  found.clear();
-  for (size_t i = 0; i < proposals.size(); ++i) {
-    const float score = first_of_two(boxes.data + 6 * i);
-    Box box = apply_deltas(proposals[i].box, boxes.data + 6 * i + 2, spec.delta_weights);
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    const float score = first_of_two(outputs.data + 6 * i);
+    Box box = apply_deltas(boxes[i].box, outputs.data + 6 * i + 2, spec.delta_weights);
     if (std::isnan(score) || !clip_box(box, float(input_.width_px), float(input_.height_px))) {
       ++*dropped;
-    } else if (score > settings_.score_threshold) {
+    } else if (score > least_score) {
       found.push_back({box, score, int64_t(i)});
     }
   }

@@ -72,7 +72,9 @@ class DensePose {
   void run_trunk();
   // The best boxes of the RPN. The finest level is asked only if somebody may be that small.
   void propose(const ImageView& image, std::vector<ScoredBox>& found, int* dropped);
-  void run_box_head(const std::vector<ScoredBox>& proposals, std::vector<ScoredBox>& found, int* dropped);
+  // Those of `boxes` that show somebody with more than `least_score`, moved to where they are.
+  void run_box_head(const std::vector<ScoredBox>& boxes, float least_score, std::vector<ScoredBox>& found,
+                    int* dropped);
   // Paints the people, whose boxes are in pixels of the network's input, and adds those that got a pixel to `result`.
   void run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result);
   const FeatureMap& level_for(const Box& box) const;

@@ -29,6 +29,12 @@ class Node {
     return Node(value_.at(key), path, origin_);
   }
 
+  // For what may be missing.
+  std::optional<Node> find(const std::string& key) const {
+    if (value_.is_object() && !value_.contains(key)) return std::nullopt;
+    return at(key);
+  }
+
   std::vector<Node> elements() const {
     if (!value_.is_array()) fail("is not a list");
     std::vector<Node> nodes;
@@ -150,6 +156,7 @@ BoxHeadSpec read_box_head(const Node& node) {
   head.delta_weights = node.at("delta_weights").numbers<4>(1e-3, 1e3);
   head.score_threshold = node.at("score_threshold").number(0, 1);
   head.nms_iou = node.at("nms_iou").number(0, 1);
+  if (const auto score = node.find("second_look_score")) head.second_look_score = score->number(0, 1);
   head.max_people = node.at("max_people").integer(1, 255);
   return head;
 }

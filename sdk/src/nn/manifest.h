@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -54,6 +55,7 @@ struct BoxHeadSpec {
   std::array<float, 4> delta_weights{};
   float score_threshold = 0;
   float nms_iou = 0;
+  std::optional<float> second_look_score;  // boxes with more are looked at again
   int max_people = 0;
 };
 

@@ -1,10 +1,10 @@
 """Weights rounded together: what rounding one weight loses, those that are rounded after it make up for.
 
 Rounded each by itself, the weights of a layer err independently. Its inputs are not independent (neighbouring pixels
-are alike, and what follows a ReLU is never negative), so that errors of some weights can cancel those of others. With H
-the mean of x x^T over the layer's inputs x, an output's expected squared error is e^T H e; weights are rounded one after
-another, and the rest moves to where the error is least (Frantar et al., "GPTQ", ICLR 2023, after Hassibi and Stork's
-"Optimal Brain Surgeon"). The integers change, scales do not.
+are alike, and what follows a ReLU is never negative), so that errors of some weights can cancel those of others. With
+H the mean of x x^T over the layer's inputs x, an output's expected squared error is e^T H e; weights are rounded one
+after another, and the rest moves to where the error is least (Frantar et al., "GPTQ", ICLR 2023, after Hassibi and
+Stork's "Optimal Brain Surgeon"). The integers change, scales do not.
 """
 
 from __future__ import annotations

@@ -94,22 +94,30 @@ TEST_F(ApiArguments, DestroyingNullIsFine) {
   maq_densepose_result_release(nullptr);
 }
 
+// first_size: of the struct's first release, which apps that were built then still give.
 template <class Config>
-void expect_size_checked(maq_status (*init)(Config*, uint32_t)) {
+void expect_size_checked(maq_status (*init)(Config*, uint32_t), size_t first_size = sizeof(Config)) {
   Config config;
   EXPECT_EQ(init(nullptr, sizeof config), MAQ_ERROR_INVALID_ARGUMENT);
-  for (const size_t wrong : {size_t(0), sizeof config - 1, sizeof config + 8, size_t(0xFFFFFFFF)}) {
+  for (const size_t wrong : {size_t(0), first_size - 1, sizeof config + 8, size_t(0xFFFFFFFF)}) {
     std::memset(static_cast<void*>(&config), 0xAB, sizeof config);
     EXPECT_EQ(init(&config, uint32_t(wrong)), MAQ_ERROR_INVALID_ARGUMENT) << wrong;
     EXPECT_EQ(*reinterpret_cast<unsigned char*>(&config), 0xAB) << "nothing is written";
   }
-  EXPECT_EQ(init(&config, sizeof config), MAQ_OK);
-  EXPECT_EQ(config.struct_size, sizeof config);
+  for (const size_t right : {first_size, sizeof config}) {
+    std::memset(static_cast<void*>(&config), 0xAB, sizeof config);
+    EXPECT_EQ(init(&config, uint32_t(right)), MAQ_OK);
+    EXPECT_EQ(config.struct_size, right);
+    if (right < sizeof config) {
+      EXPECT_EQ(reinterpret_cast<unsigned char*>(&config)[right], 0xAB)
+          << "what lies behind an older struct is not its own";
+    }
+  }
 }
 
 TEST_F(ApiArguments, InitFunctionsCheckTheSizeAndSetIt) {
   expect_size_checked(maq_context_config_init);
-  expect_size_checked(maq_source_config_init);
+  expect_size_checked(maq_source_config_init, offsetof(maq_source_config, queue_length));
   expect_size_checked(maq_densepose_config_init);
   expect_size_checked(maq_frame_desc_init);
 }
@@ -122,7 +130,8 @@ TEST_F(ApiArguments, StructsOfUnknownSizeAreRefused) {
     maq_context* context = nullptr;
     expect_error(maq_context_create(MAQ_HEADER_VERSION, &context_config, &context), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                  "config.struct_size is " + std::to_string(wrong));
-    maq_source_config source_config{wrong, 4};
+    maq_source_config source_config{};
+    source_config.struct_size = wrong;
     maq_source* source = nullptr;
     expect_error(maq_source_create(context_, "stub:people", &source_config, &source), MAQ_ERROR_INVALID_ARGUMENT,
                  context_, "config.struct_size");
@@ -177,10 +186,10 @@ TEST_F(ApiArguments, ErrorsWithoutAHandleAreOfTheThread) {
 }
 
 TEST_F(ApiArguments, EveryStatusHasItsName) {
-  for (int status = MAQ_OK; status <= MAQ_END_OF_STREAM; ++status) {
+  for (int status = MAQ_OK; status <= MAQ_ERROR_NO_PERMISSION; ++status) {
     EXPECT_EQ(std::string(maq_status_name(maq_status(status))).rfind("MAQ_", 0), 0u) << status;
   }
-  EXPECT_STREQ(maq_status_name(maq_status(MAQ_END_OF_STREAM + 1)), "unknown status");
+  EXPECT_STREQ(maq_status_name(maq_status(MAQ_ERROR_NO_PERMISSION + 1)), "unknown status");
 }
 
 TEST_F(ApiArguments, TheVersionOfHeadersAndLibraryAgree) {
@@ -193,12 +202,16 @@ TEST_F(ApiArguments, TheVersionOfHeadersAndLibraryAgree) {
 
 // Layouts of version 0.1: an app built with it relies on them.
 static_assert(sizeof(void*) != 8 || sizeof(maq_context_config) == 32, "");
-static_assert(sizeof(maq_source_config) == 8, "");
+static_assert(offsetof(maq_source_config, queue_length) == 8, "");
+static_assert(sizeof(void*) != 8 || sizeof(maq_source_config) == 40, "");
+static_assert(sizeof(void*) != 8 || (offsetof(maq_source_info, drops) == 48 && sizeof(maq_source_info) == 56), "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 56, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 20, "");
 static_assert(sizeof(maq_densepose_stats) == 80, "");
-static_assert(MAQ_END_OF_STREAM == 13 && MAQ_PIXEL_YUYV == 6 && MAQ_PLANE_PERSON == 4, "");
+static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_NO_PERMISSION == 17 && MAQ_SOURCE_BACK == 5 && MAQ_PIXEL_YUYV == 6 &&
+                  MAQ_PLANE_PERSON == 4,
+              "");
 
 }  // namespace

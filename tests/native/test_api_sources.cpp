@@ -19,13 +19,34 @@ TEST(ApiSources, EverySchemeOfTheListHasAnExampleThatIsKnown) {
     names.insert(scheme.name);
     maq_source* source = nullptr;
     const maq_status status = maq_source_create(context.get(), scheme.example, nullptr, &source);
-    EXPECT_TRUE(status == MAQ_OK || status == MAQ_ERROR_NOT_FOUND) << maq_last_error(context.get());
+    EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_last_error(context.get());
     maq_source_destroy(source);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"image", "stub", "video"}));
+  EXPECT_EQ(names, (std::set<std::string>{"image", "stub", "v4l2", "video"}));
   maq_source_scheme scheme{};
   scheme.struct_size = sizeof scheme;
   EXPECT_EQ(maq_source_get_scheme(maq_source_scheme_count(), &scheme), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(ApiSources, CamerasAreListedAndWrongIndicesRefused) {
+  const maquette::Context context;
+  maq_camera_list* list = nullptr;
+  ASSERT_EQ(maq_camera_list_create(context.get(), &list), MAQ_OK);
+  maq_camera_info info{};
+  info.struct_size = sizeof info;
+  const uint32_t count = maq_camera_list_count(list);  // none on most machines that run tests
+  for (uint32_t i = 0; i < count; ++i) {
+    ASSERT_EQ(maq_camera_list_get(list, i, &info), MAQ_OK);
+    EXPECT_EQ(std::string(info.uri).rfind("v4l2:/dev/video", 0), 0u);
+  }
+  EXPECT_EQ(maq_camera_list_get(list, count, &info), MAQ_ERROR_INVALID_ARGUMENT);
+  maq_camera_mode mode{};
+  mode.struct_size = sizeof mode;
+  EXPECT_EQ(maq_camera_list_get_mode(list, count, 0, &mode), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_camera_list_create(context.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_camera_list_count(nullptr), 0u);
+  maq_camera_list_destroy(list);
+  maq_camera_list_destroy(nullptr);
 }
 
 TEST(ApiSources, DescribeThemselvesAndDeliverUntilTheEnd) {
@@ -134,7 +155,7 @@ TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {
   maq_source* source = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "rtsp:camera", nullptr, &source), MAQ_ERROR_UNSUPPORTED);
   EXPECT_STREQ(maq_last_error(context.get()),
-               "\"rtsp:\" is not a kind of source of this build; there are image:, video:, stub:.");
+               "\"rtsp:\" is not a kind of source of this build; there are image:, video:, stub:, v4l2:.");
   EXPECT_EQ(maq_source_create(context.get(), "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND);
   EXPECT_STREQ(maq_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
   EXPECT_EQ(source, nullptr);

@@ -12,9 +12,10 @@ namespace {
 std::vector<uint8_t> frame_of(const std::string& uri, int index, maq::Frame* out = nullptr) {
   const auto source = maq::open_source(uri);
   maq::Frame frame;
-  for (int i = 0; i <= index; ++i) EXPECT_TRUE(source->next(0, frame));
-  if (out != nullptr) *out = frame;
-  return frame.storage;
+  for (int i = 0; i <= index; ++i) EXPECT_EQ(source->next(0, frame), maq::NextFrame::kFrame);
+  const std::vector<uint8_t> pixels = frame.storage;
+  if (out != nullptr) *out = std::move(frame);
+  return pixels;
 }
 
 size_t different_pixels(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
@@ -42,7 +43,7 @@ TEST(Sources, PeopleMoveAndFillPartOfThePicture) {
 TEST(Sources, PeopleAreThereAfterHoursAndInTinyFrames) {
   const auto source = maq::open_source("stub:people?count=5&fps=0.01&size=64x48");
   maq::Frame frame;
-  for (int i = 0; i < 300; ++i) ASSERT_TRUE(source->next(0, frame));
+  for (int i = 0; i < 300; ++i) ASSERT_EQ(source->next(0, frame), maq::NextFrame::kFrame);
   for (const char* size : {"1x1", "2x300", "300x2", "31x33"}) {
     frame_of(std::string("stub:people?count=4&size=") + size, 40);
     frame_of(std::string("stub:pattern?size=") + size, 40);
@@ -54,13 +55,13 @@ TEST(Sources, StubsStampTheirFramesAndEndWhenAsked) {
   EXPECT_EQ(source->info().frame_count, 3);
   maq::Frame frame;
   for (int64_t i = 0; i < 3; ++i) {
-    ASSERT_TRUE(source->next(0, frame));
+    ASSERT_EQ(source->next(0, frame), maq::NextFrame::kFrame);
     EXPECT_EQ(frame.timestamp_ns, i * 100000000);
     EXPECT_EQ(frame.sequence, uint64_t(i));
     EXPECT_EQ(frame.clock, MAQ_CLOCK_MEDIA);
   }
-  EXPECT_FALSE(source->next(0, frame));
-  EXPECT_FALSE(source->next(0, frame));
+  EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
+  EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
   EXPECT_EQ(maq::open_source("stub:pattern")->info().frame_count, -1);
 }
 
@@ -72,11 +73,11 @@ TEST(Sources, AnImageIsOneFrameAtTheSizeAskedFor) {
   EXPECT_EQ(plain->info().frame_count, 1);
   const auto scaled = maq::open_source("image:" + folder.file("a.png") + "?size=80x20&fps=5");
   maq::Frame frame;
-  ASSERT_TRUE(scaled->next(0, frame));
+  ASSERT_EQ(scaled->next(0, frame), maq::NextFrame::kFrame);
   EXPECT_EQ(frame.image.width_px, 80);
   EXPECT_EQ(frame.image.height_px, 20);
   EXPECT_EQ(frame.storage[2], 3);
-  EXPECT_FALSE(scaled->next(0, frame));
+  EXPECT_EQ(scaled->next(0, frame), maq::NextFrame::kEnd);
 }
 
 TEST(Sources, UnknownThingsAreNamedWithWhatThereIs) {

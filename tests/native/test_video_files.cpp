@@ -27,13 +27,13 @@ TEST(VideoFiles, FramesComeInOrderWithTheirTimes) {
     EXPECT_NEAR(source->info().fps, 10, 0.01);
     maq::Frame frame;
     for (int k = 0; k < 20; ++k) {
-      ASSERT_TRUE(source->next(0, frame)) << name << " frame " << k;
+      ASSERT_EQ(source->next(0, frame), maq::NextFrame::kFrame) << name << " frame " << k;
       EXPECT_NEAR(frame.storage[0], 8 * k, 6);  // lossy, and stored as YUV
       EXPECT_NEAR(double(frame.timestamp_ns), k * 1e8, 1e6);
       EXPECT_EQ(frame.sequence, uint64_t(k));
     }
-    EXPECT_FALSE(source->next(0, frame));
-    EXPECT_FALSE(source->next(0, frame));
+    EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
+    EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
   }
 }
 
@@ -42,7 +42,7 @@ TEST(VideoFiles, ALowerRateThinsTheClipOutAndASizeScalesIt) {
   const auto source = maq::open_source("video:" + written_clip(folder, "a.avi", 20, 10) + "?fps=2.5&size=32x32");
   maq::Frame frame;
   std::vector<uint64_t> sequence;
-  while (source->next(0, frame)) {
+  while (source->next(0, frame) == maq::NextFrame::kFrame) {
     sequence.push_back(frame.sequence);
     EXPECT_EQ(frame.image.width_px, 32);
   }
@@ -58,7 +58,7 @@ TEST(VideoFiles, ATruncatedClipGivesItsFramesAndThenSaysSo) {
   maq::Frame frame;
   int frames = 0;
   expect_error(MAQ_ERROR_UNREADABLE, "truncated", [&] {
-    while (source->next(0, frame)) ++frames;
+    while (source->next(0, frame) == maq::NextFrame::kFrame) ++frames;
   });
   EXPECT_GT(frames, 10);
   EXPECT_LT(frames, 55);

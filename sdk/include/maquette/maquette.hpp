@@ -128,9 +128,9 @@ class Frame {
 
 class Source {
  public:
-  Source(const Context& context, const std::string& uri) {
+  Source(const Context& context, const std::string& uri, const maq_source_config* config = nullptr) {
     maq_source* made = nullptr;
-    check(maq_source_create(context.get(), uri.c_str(), nullptr, &made), context.get());
+    check(maq_source_create(context.get(), uri.c_str(), config, &made), context.get());
     owner_.reset(made);
   }
 
@@ -143,7 +143,7 @@ class Source {
     return info;
   }
 
-  // Nothing after the last frame.
+  // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when none came in time.
   std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
     maq_frame* frame = nullptr;
     const maq_status status = maq_source_acquire_frame(get(), timeout_ns, &frame);

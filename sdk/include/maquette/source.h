@@ -13,9 +13,29 @@ extern "C" {
 
 typedef struct maq_source maq_source;
 
+/* What happens to a camera. */
+typedef enum maq_source_state {
+  MAQ_SOURCE_STARTED = 1,
+  MAQ_SOURCE_STALLED = 2,      /* no frame for stall_ms; it may still go on by itself */
+  MAQ_SOURCE_LOST = 3,         /* unplugged or broken */
+  MAQ_SOURCE_RECONNECTING = 4, /* opened anew every 100 ms, for reconnect_ms */
+  MAQ_SOURCE_BACK = 5          /* frames come again */
+} maq_source_state;
+
+/* Called from a thread of the source; it must return soon and must not destroy the source. `reason` is valid during the
+ * call. After maq_source_destroy has returned no call begins. */
+typedef void (*maq_source_state_callback)(void* user_data, maq_source_state state, const char* reason);
+
 typedef struct maq_source_config {
   uint32_t struct_size;
   uint32_t pool_size; /* frames the app may hold at once, 1 to 64; default 4 */
+  /* The rest is for cameras (is_live). */
+  uint32_t
+      queue_length; /* frames that wait for the app, 1 to 64; a new one pushes out the oldest; default 1: the newest */
+  int32_t stall_ms; /* without a frame for so long the camera counts as stalled, 50 to 60000; default 2000 */
+  int32_t reconnect_ms;                     /* how long a lost camera is waited for, 0 to 86400000; default 30000 */
+  maq_source_state_callback state_callback; /* may be NULL */
+  void* user_data;                          /* of state_callback */
 } maq_source_config;
 
 typedef struct maq_source_info {
@@ -27,6 +47,7 @@ typedef struct maq_source_info {
   int32_t is_live;     /* 1 for a camera: frames that are not fetched in time are lost */
   maq_clock clock;     /* of the timestamps of its frames */
   uint32_t pool_size;  /* frames the app may hold at once */
+  uint64_t drops;      /* frames of a camera that were lost so far, on their way or because nobody took them */
 } maq_source_info;
 
 /* One kind of source that this build knows; all texts are static. */
@@ -41,26 +62,28 @@ typedef struct maq_source_scheme {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
-/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "stub:people?count=2&fps=30&seed=7" or
- * "stub:pattern". "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out to
- * that rate. A '?' that is part of a file name is written %3F, '%' is written %25. `config` may be NULL.
+/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "stub:people?count=2&fps=30&seed=7" "stub:pattern"
+ * or "v4l2:/dev/video0". "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out
+ * to that rate; a camera takes the nearest that it offers, which maq_source_get_info tells. A '?' that is part of a file name is written %3F, '%' is written %25. `config` may be NULL.
  * `*source` is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),
- * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE. Blocks while files are read. */
+ * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE; for cameras MAQ_ERROR_DEVICE_LOST,
+ * MAQ_ERROR_BUSY, MAQ_ERROR_NO_PERMISSION too. Blocks while files are read and devices start. */
 MAQ_API maq_status maq_source_create(maq_context* context, const char* uri, const maq_source_config* config,
                                      maq_source** source);
 
 /* Closes the source (NULL is fine). Frames of it that are still held stay valid until they are released.
- * Once for each source, from any thread. May block shortly. */
+ * Once for each source, from any thread. Blocks for at most 50 ms, also when a device hangs. */
 MAQ_API void maq_source_destroy(maq_source* source);
 
 /* Describes the source. The caller sets info->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info* info);
 
-/* Takes the next frame. `timeout_ns` bounds the wait for live sources (MAQ_WAIT_FOREVER: no bound); files and stubs
+/* Takes the next frame: of a camera the oldest that waits. A camera's frame is in memory of the device, which has a few
+ * such buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources (MAQ_WAIT_FOREVER: no bound); files and stubs
  * deliver at once and ignore it. `*frame` comes from a pool of fixed size: give it back with maq_frame_release soon.
- * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_ERROR_POOL_EMPTY when all frames are held,
+ * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_POOL_EMPTY when all frames are held,
  * MAQ_ERROR_UNREADABLE when a file ends before its header says, after all readable frames. Blocks while decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
 
@@ -68,6 +91,42 @@ MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Do not block. */
 MAQ_API uint32_t maq_source_scheme_count(void);
 MAQ_API maq_status maq_source_get_scheme(uint32_t index, maq_source_scheme* scheme);
+
+/* The cameras that are there when the list is made. */
+typedef struct maq_camera_list maq_camera_list;
+
+/* A camera; texts stay valid until its list is destroyed. */
+typedef struct maq_camera_info {
+  uint32_t struct_size;
+  const char* uri;     /* for maq_source_create: "v4l2:/dev/video0" */
+  const char* name;    /* as the device calls itself; "" when it cannot be opened */
+  const char* bus;     /* where it is plugged in */
+  maq_status status;   /* MAQ_OK, or why it cannot be opened now */
+  const char* problem; /* that in a sentence, and what to do */
+  uint32_t mode_count;
+} maq_camera_info;
+
+/* A format, size and rate that a camera offers. */
+typedef struct maq_camera_mode {
+  uint32_t struct_size;
+  char format[8];   /* four letters, as the device calls it: "YUYV", "MJPG" */
+  int32_t usable;   /* 1 if this build understands the format */
+  int32_t width_px; /* with height_px the largest, where a device offers every size up to it */
+  int32_t height_px;
+  double fps; /* the fastest; 0 when the device does not say */
+} maq_camera_mode;
+
+/* Looks for cameras; none is no error. `*list` is the caller's, to be given to maq_camera_list_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Blocks while devices are asked. */
+MAQ_API maq_status maq_camera_list_create(maq_context* context, maq_camera_list** list);
+/* NULL is fine. */
+MAQ_API void maq_camera_list_destroy(maq_camera_list* list);
+MAQ_API uint32_t maq_camera_list_count(const maq_camera_list* list);
+/* The caller sets struct_size of `info` and `mode`.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (also an index out of range). Do not block. */
+MAQ_API maq_status maq_camera_list_get(const maq_camera_list* list, uint32_t index, maq_camera_info* info);
+MAQ_API maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index, uint32_t mode_index,
+                                            maq_camera_mode* mode);
 
 #ifdef __cplusplus
 }

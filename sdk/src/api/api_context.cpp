@@ -62,6 +62,10 @@ const char* maq_status_name(maq_status status) {
     case MAQ_ERROR_OUT_OF_MEMORY: return "MAQ_ERROR_OUT_OF_MEMORY";
     case MAQ_ERROR_INTERNAL: return "MAQ_ERROR_INTERNAL";
     case MAQ_END_OF_STREAM: return "MAQ_END_OF_STREAM";
+    case MAQ_TIMEOUT: return "MAQ_TIMEOUT";
+    case MAQ_ERROR_DEVICE_LOST: return "MAQ_ERROR_DEVICE_LOST";
+    case MAQ_ERROR_BUSY: return "MAQ_ERROR_BUSY";
+    case MAQ_ERROR_NO_PERMISSION: return "MAQ_ERROR_NO_PERMISSION";
   }
   return "unknown status";
 }

@@ -1,23 +1,31 @@
+#include <cstddef>
+
 #include "api/boundary.h"
 
 using namespace maq;
 
 namespace {
 
-constexpr uint32_t kDefaultPoolSize = 4;
 constexpr uint32_t kLargestPoolSize = 64;
+// Of the structs of version 0.1, which had no cameras.
+constexpr size_t kFirstConfigSize = offsetof(maq_source_config, queue_length);
+constexpr size_t kFirstInfoSize = offsetof(maq_source_info, drops);
 
 maq_source_config default_config() {
   maq_source_config config{};
   config.struct_size = sizeof config;
-  config.pool_size = kDefaultPoolSize;
+  const SourceSettings defaults;
+  config.pool_size = uint32_t(defaults.pool_size);
+  config.queue_length = uint32_t(defaults.queue_length);
+  config.stall_ms = defaults.stall_ms;
+  config.reconnect_ms = defaults.reconnect_ms;
   return config;
 }
 
 }  // namespace
 
 maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_source_config));
+  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
 }
 
 maq_status maq_source_create(maq_context* context, const char* uri, const maq_source_config* given,
@@ -26,9 +34,20 @@ maq_status maq_source_create(maq_context* context, const char* uri, const maq_so
     require_argument(context, "context");
     require_argument(uri, "uri");
     require_argument(source, "source");
-    const maq_source_config config = read_config(given, "config", default_config(), sizeof(maq_source_config));
+    const maq_source_config config = read_config(given, "config", default_config(), kFirstConfigSize);
     require_range("config.pool_size", config.pool_size, 1u, kLargestPoolSize);
-    *source = new maq_source(open_source(uri), config.pool_size);
+    require_range("config.queue_length", config.queue_length, 1u, kLargestPoolSize);
+    require_range("config.stall_ms", config.stall_ms, 50, 60000);
+    require_range("config.reconnect_ms", config.reconnect_ms, 0, 86400000);
+    SourceSettings settings;
+    settings.pool_size = int(config.pool_size);
+    settings.queue_length = int(config.queue_length);
+    settings.stall_ms = config.stall_ms;
+    settings.reconnect_ms = config.reconnect_ms;
+    settings.on_state = config.state_callback;
+    settings.user_data = config.user_data;
+    settings.log = context->state->log();
+    *source = new maq_source(open_source(uri, settings), config.pool_size);
     return MAQ_OK;
   });
 }
@@ -47,7 +66,8 @@ maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) 
     filled.is_live = from.is_live ? 1 : 0;
     filled.clock = from.clock;
     filled.pool_size = uint32_t(source->frames.capacity());
-    write_struct(info, "info", filled, sizeof(maq_source_info));
+    filled.drops = source->source->drops();
+    write_struct(info, "info", filled, kFirstInfoSize);
     return MAQ_OK;
   });
 }
@@ -57,7 +77,13 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
     require_argument(source, "source");
     require_argument(frame, "frame");
     BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
-    if (!source->source->next(timeout_ns, handle->frame)) return MAQ_END_OF_STREAM;
+    switch (source->source->next(timeout_ns, handle->frame)) {
+      case NextFrame::kFrame: break;
+      case NextFrame::kEnd: return MAQ_END_OF_STREAM;
+      case NextFrame::kTimeout:
+        return keep_error(source, MAQ_TIMEOUT, nullptr,
+                          concatenate("No frame came within ", timeout_ns / 1000000, " ms.").c_str());
+    }
     *frame = hand_out<maq_frame>(std::move(handle));
     return MAQ_OK;
   });
@@ -78,6 +104,55 @@ maq_status maq_source_get_scheme(uint32_t index, maq_source_scheme* scheme) {
     const SourceScheme& from = schemes[index];
     write_struct(scheme, "scheme", maq_source_scheme{0, from.name, from.example, from.summary},
                  sizeof(maq_source_scheme));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_camera_list_create(maq_context* context, maq_camera_list** list) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(list, "list");
+    auto made = std::make_unique<maq_camera_list>();
+    made->cameras = list_cameras();
+    *list = made.release();
+    return MAQ_OK;
+  });
+}
+
+void maq_camera_list_destroy(maq_camera_list* list) { delete list; }
+
+uint32_t maq_camera_list_count(const maq_camera_list* list) {
+  return list == nullptr ? 0 : uint32_t(list->cameras.size());
+}
+
+maq_status maq_camera_list_get(const maq_camera_list* list, uint32_t index, maq_camera_info* info) {
+  return guarded(list, __func__, [&] {
+    require_argument(list, "list");
+    if (index >= list->cameras.size()) throw ArgumentError("index is ", index, " of ", list->cameras.size(), ".");
+    const CameraListing& from = list->cameras[index];
+    write_struct(info, "info",
+                 maq_camera_info{0, from.uri.c_str(), from.name.c_str(), from.bus.c_str(), from.status,
+                                 from.problem.c_str(), uint32_t(from.modes.size())},
+                 sizeof(maq_camera_info));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index, uint32_t mode_index,
+                                    maq_camera_mode* mode) {
+  return guarded(list, __func__, [&] {
+    require_argument(list, "list");
+    if (index >= list->cameras.size()) throw ArgumentError("index is ", index, " of ", list->cameras.size(), ".");
+    const std::vector<CameraMode>& modes = list->cameras[index].modes;
+    if (mode_index >= modes.size()) throw ArgumentError("mode_index is ", mode_index, " of ", modes.size(), ".");
+    const CameraMode& from = modes[mode_index];
+    maq_camera_mode filled{};
+    from.format.copy(filled.format, sizeof filled.format - 1);
+    filled.usable = from.usable ? 1 : 0;
+    filled.width_px = from.width_px;
+    filled.height_px = from.height_px;
+    filled.fps = from.fps;
+    write_struct(mode, "mode", filled, sizeof(maq_camera_mode));
     return MAQ_OK;
   });
 }

@@ -80,6 +80,10 @@ struct maq_source : maq::Handle {
   maq::BoundedPool<maq_frame> frames;
 };
 
+struct maq_camera_list : maq::Handle {
+  std::vector<maq::CameraListing> cameras;
+};
+
 struct maq_densepose_result : maq::Handle {
   maq::DensePoseResult result;
   std::vector<maq_person> people;
@@ -105,9 +109,13 @@ T* hand_out(typename BoundedPool<T>::Pooled handle) {
 }
 
 // Takes it back; NULL is fine.
-template <class T>
-void take_back(T* handle) {
-  if (handle != nullptr) std::exchange(handle->home, {})(handle);
+inline void take_back(maq_frame* frame) {
+  if (frame == nullptr) return;
+  frame->frame.lease.reset();
+  std::exchange(frame->home, {})(frame);
+}
+inline void take_back(maq_densepose_result* result) {
+  if (result != nullptr) std::exchange(result->home, {})(result);
 }
 
 }  // namespace maq

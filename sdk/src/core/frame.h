@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "maquette/frame.h"
@@ -23,6 +24,40 @@ struct ImageView {
   PlaneView planes[2];
 };
 
+// Who owns the pixels of a frame that are not its own: buffers of a camera.
+class FrameOwner {
+ public:
+  virtual ~FrameOwner() = default;
+  // From any thread, once for each buffer.
+  virtual void give_back(int slot) = 0;
+};
+
+// Holds a buffer of an owner, and gives it back.
+class PixelLease {
+ public:
+  PixelLease() = default;
+  PixelLease(std::shared_ptr<FrameOwner> owner, int slot) : owner_(std::move(owner)), slot_(slot) {}
+  PixelLease(PixelLease&& other) noexcept : owner_(std::move(other.owner_)), slot_(other.slot_) {}
+  PixelLease& operator=(PixelLease&& other) noexcept {
+    if (this != &other) {
+      reset();
+      owner_ = std::move(other.owner_);
+      slot_ = other.slot_;
+    }
+    return *this;
+  }
+  ~PixelLease() { reset(); }
+
+  void reset() {
+    if (owner_ != nullptr) owner_->give_back(slot_);
+    owner_.reset();
+  }
+
+ private:
+  std::shared_ptr<FrameOwner> owner_;
+  int slot_ = 0;
+};
+
 struct Frame {
   ImageView image;
   int64_t timestamp_ns = 0;
@@ -30,6 +65,8 @@ struct Frame {
   uint64_t sequence = 0;
   // Memory of the pixels when the library owns them; kept between uses of a pooled frame.
   std::vector<uint8_t> storage;
+  // Of pixels that are a camera's; empty for those in `storage`, or of an app.
+  PixelLease lease;
 
   // Makes `storage` hold one BGR image of that size without row padding and points `image` at it.
   uint8_t* allocate_bgr(int width_px, int height_px);

@@ -22,11 +22,11 @@ class ImageSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
 
-  bool next(int64_t, Frame& frame) override {
-    if (delivered_) return false;
+  NextFrame next(int64_t, Frame& frame) override {
+    if (delivered_) return NextFrame::kEnd;
     frame = std::move(image_);
     delivered_ = true;
-    return true;
+    return NextFrame::kFrame;
   }
 
  private:

@@ -3,21 +3,33 @@
 #include "sources/source.h"
 #include "sources/stub_sources.h"
 #include "sources/uri.h"
+#include "sources/v4l2_camera.h"
+#include "sources/v4l2_source.h"
 
 namespace maq {
 namespace {
 
 struct Entry {
   SourceScheme scheme;
-  std::unique_ptr<Source> (*open)(SourceUri uri);
+  std::unique_ptr<Source> (*open)(SourceUri uri, const SourceSettings& settings);
 };
 
+// Files and stubs need none.
+template <std::unique_ptr<Source> (*open)(SourceUri uri)>
+std::unique_ptr<Source> without_settings(SourceUri uri, const SourceSettings&) {
+  return open(std::move(uri));
+}
+
 const Entry kEntries[] = {
-    {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"}, &open_image_source},
-    {{"video", "video:clip.mp4", "a video file, frame by frame; ?fps=10 thins it out"}, &open_video_source},
+    {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"},
+     &without_settings<open_image_source>},
+    {{"video", "video:clip.mp4", "a video file, frame by frame; ?fps=10 thins it out"},
+     &without_settings<open_video_source>},
     {{"stub", "stub:people?count=2&fps=30&seed=7",
       "frames without a camera: people (rendered people who walk; count, seed, frames) or pattern (colour bars)"},
-     &open_stub_source},
+     &without_settings<open_stub_source>},
+    {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30", "a camera of Linux; the nearest size and rate that it offers"},
+     &open_v4l2_source},
 };
 
 }  // namespace
@@ -31,7 +43,9 @@ const std::vector<SourceScheme>& source_schemes() {
   return schemes;
 }
 
-std::unique_ptr<Source> open_source(const std::string& text) {
+std::vector<CameraListing> list_cameras() { return list_v4l2_cameras(SystemCalls::real()); }
+
+std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {
   SourceUri uri = parse_source_uri(text);
   for (const Entry& entry : kEntries) {
     if (uri.scheme == entry.scheme.name) {
@@ -39,7 +53,7 @@ std::unique_ptr<Source> open_source(const std::string& text) {
         throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
                     entry.scheme.example, ".");
       }
-      return entry.open(std::move(uri));
+      return entry.open(std::move(uri), settings);
     }
   }
   std::string known;

@@ -8,6 +8,8 @@
 
 #include "core/frame.h"
 #include "core/log.h"
+#include "maquette/source.h"
+#include "sources/camera.h"
 
 namespace maq {
 
@@ -20,12 +22,27 @@ struct SourceInfo {
   maq_clock clock = MAQ_CLOCK_MEDIA;
 };
 
+enum class NextFrame { kFrame, kEnd, kTimeout };
+
 class Source {
  public:
   virtual ~Source() = default;
   virtual const SourceInfo& info() const = 0;
-  // Fills `frame` (pixels, time, sequence) with the next frame; false after the last one.
-  virtual bool next(int64_t timeout_ns, Frame& frame) = 0;
+  // Frames that were lost so far, on their way or because nobody took them.
+  virtual uint64_t drops() const { return 0; }
+  // Fills `frame` (pixels, time, sequence) with the next frame, unless it says something else.
+  virtual NextFrame next(int64_t timeout_ns, Frame& frame) = 0;
+};
+
+// Of maq_source_config, whose comments say what they mean. Cameras heed them.
+struct SourceSettings {
+  int pool_size = 4;
+  int queue_length = 1;
+  int stall_ms = 2000;
+  int reconnect_ms = 30000;
+  maq_source_state_callback on_state = nullptr;
+  void* user_data = nullptr;
+  Log log;
 };
 
 struct SourceScheme {
@@ -37,7 +54,10 @@ struct SourceScheme {
 // Every scheme of this build.
 const std::vector<SourceScheme>& source_schemes();
 
+// The cameras that are there now.
+std::vector<CameraListing> list_cameras();
+
 // Throws MAQ_ERROR_UNSUPPORTED for a scheme that is not in the list, and what the source throws.
-std::unique_ptr<Source> open_source(const std::string& uri);
+std::unique_ptr<Source> open_source(const std::string& uri, const SourceSettings& settings = {});
 
 }  // namespace maq

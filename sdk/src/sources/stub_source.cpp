@@ -51,8 +51,8 @@ class StubSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
 
-  bool next(int64_t, Frame& frame) override {
-    if (index_ == info_.frame_count) return false;
+  NextFrame next(int64_t, Frame& frame) override {
+    if (index_ == info_.frame_count) return NextFrame::kEnd;
     frame.allocate_bgr(info_.width_px, info_.height_px);
     if (people_ != nullptr) {
       people_->draw(double(index_) / info_.fps, frame);
@@ -63,7 +63,7 @@ class StubSource : public Source {
     frame.clock = MAQ_CLOCK_MEDIA;
     frame.sequence = uint64_t(index_);
     ++index_;
-    return true;
+    return NextFrame::kFrame;
   }
 
  private:

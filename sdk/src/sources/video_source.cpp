@@ -41,7 +41,7 @@ class VideoSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
 
-  bool next(int64_t, Frame& frame) override {
+  NextFrame next(int64_t, Frame& frame) override {
     while (read()) {
       const int64_t index = frames_read_++;
       const int64_t timestamp_ns = presentation_time_ns(index);
@@ -52,9 +52,9 @@ class VideoSource : public Source {
         next_due_ns_ = int64_t((std::floor(double(timestamp_ns) / period_ns + 1e-3) + 1) * period_ns) - 500000;
       }
       deliver(frame, timestamp_ns, index);
-      return true;
+      return NextFrame::kFrame;
     }
-    return false;
+    return NextFrame::kEnd;
   }
 
  private:

@@ -1,0 +1,32 @@
+// A camera as a source: a thread of its own takes the camera's frames, keeps the newest, and opens the camera anew when it
+// was lost.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "sources/camera.h"
+#include "sources/source.h"
+
+namespace maq {
+
+class LiveSource : public Source {
+ public:
+  // Opens the camera at once, and throws what `open` throws. `name` begins error texts.
+  LiveSource(CameraOpener open, std::string name, const SourceSettings& settings);
+  // Returns within 50 ms, also when the device hangs in a system call: the thread then ends by itself later.
+  ~LiveSource() override;
+
+  const SourceInfo& info() const override { return info_; }
+  uint64_t drops() const override;
+  // Throws MAQ_ERROR_DEVICE_LOST when the camera was lost and did not come back in time.
+  NextFrame next(int64_t timeout_ns, Frame& frame) override;
+
+ private:
+  struct State;
+
+  std::shared_ptr<State> state_;
+  SourceInfo info_;
+};
+
+}  // namespace maq

@@ -1,0 +1,27 @@
+// The system calls that a camera needs, so that a test can take the kernel's place.
+#pragma once
+
+#include <poll.h>
+#include <sys/types.h>
+
+#include <cstddef>
+
+namespace maq {
+
+class SystemCalls {
+ public:
+  virtual ~SystemCalls() = default;
+
+  // As the calls of these names: -1 (mmap: MAP_FAILED) and errno when they fail. mmap is shared, to read and write.
+  virtual int open(const char* path, int flags);
+  virtual int close(int fd);
+  virtual int ioctl(int fd, unsigned long request, void* argument);
+  virtual void* mmap(size_t length, int fd, off_t offset);
+  virtual int munmap(void* address, size_t length);
+  virtual int poll(pollfd* fds, nfds_t count, int timeout_ms);
+
+  // Those of the system.
+  static SystemCalls& real();
+};
+
+}  // namespace maq

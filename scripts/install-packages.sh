@@ -1,19 +1,20 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that a group of make targets needs, and only those that are missing.
 #
-#   scripts/install-packages.sh demo     to build the SDK and run it
-#   scripts/install-packages.sh test     + the native tests, Python and software OpenGL for rendering
-#   scripts/install-packages.sh isa      + to build for aarch64 and to run other processors' programs (120 MB)
-#   scripts/install-packages.sh lint     + clang-format and clang-tidy
+#   scripts/install-packages.sh demo        to build the SDK and run it
+#   scripts/install-packages.sh test        + the native tests, Python and software OpenGL for rendering
+#   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (120 MB)
+#   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (20 MB)
+#   scripts/install-packages.sh lint        + clang-format and clang-tidy
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,9s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,10s/^# \{0,1\}//p' "$0"; }
 
 group="${1:-}"
 case "$group" in
-    demo | test | isa | lint) ;;
+    demo | test | isa | camera-vm | lint) ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
 esac
@@ -57,6 +58,13 @@ if [ "$group" = isa ]; then
     needs_command qemu-aarch64-static qemu-user-static
     needs_command aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
     needs_command mvn maven           # brings ONNX Runtime for aarch64
+fi
+if [ "$group" = camera-vm ]; then
+    needs_command qemu-system-x86_64 qemu-system-x86
+    needs_package busybox-static      # static: the virtual machine has no libraries but those packed
+    needs_command cpio cpio
+    needs_package kmod                # its programs are not in the PATH of users
+    needs_command v4l2-ctl v4l-utils
 fi
 if [ "$group" = lint ]; then
     needs_command clang-format clang-format

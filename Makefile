@@ -43,6 +43,10 @@ test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2
 	@cmake --build --preset release -j $(JOBS) --target processor_features
 	@scripts/test-isa.sh $(JOBS)
 
+.PHONY: test-camera-vm
+test-camera-vm: build  ## camera tests on a real kernel in qemu, with test cameras; not part of `test` yet
+	@tests/camera_vm/run.sh
+
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench

@@ -27,7 +27,7 @@ PATH="$PATH:/usr/sbin:/sbin"  # where Debian keeps modprobe, out of the way of u
 root="$(mktemp -d)"
 trap 'rm -rf "$root"' EXIT
 # /lib and others are links as on the host: a library is then found by each of its names.
-mkdir -p "$root"/{dev,proc,sys,tmp,run,etc,usr/bin,usr/lib,usr/lib64,usr/sbin}
+mkdir -p "$root"/{dev,proc,sys,tmp,run,etc,usr/bin,usr/lib64,usr/sbin,"usr/lib/modules/$release"}
 for folder in bin lib lib64 sbin; do ln -s "usr/$folder" "$root/$folder"; done
 
 # add_libraries FILE [TREE]: those that FILE loads, but for those in TREE, which come with it.

@@ -11,7 +11,6 @@ unplug() {
     wait_until test ! -e /dev/video0
 }
 brightness_reaches_the_camera() {
-    # The driver keeps values it has set: a camera plugged in anew is asked for its own.
     v4l2-ctl -d /dev/video0 -c brightness=77 && v4l2-ctl -d /dev/video0 -C brightness | grep 'brightness: 77'
 }
 unplug_while_streaming() {

@@ -10,7 +10,7 @@ cd "$(dirname "$0")/../.."
 usage() { sed -n '2,7s/^# \{0,1\}//p' "$0"; }
 
 guests=(vivid uvc)
-limit_s=300  # for one guest; each takes less than half a minute where nothing else runs
+limit_s=120  # for one guest; each takes 20 s where nothing else runs
 work=build/camera-vm
 report=build/test-results/camera-vm.xml
 

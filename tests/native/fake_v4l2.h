@@ -82,9 +82,10 @@ class FakeV4l2 : public maq::SystemCalls {
     plugged_ = false;
     wake();
   }
-  void plug() {
+  void plug(const std::string& path = "/dev/video0") {
     std::lock_guard<std::mutex> lock(mutex_);
     plugged_ = true;
+    path_ = path;
   }
   // Files and mappings that somebody has not closed.
   int open_files() const {
@@ -113,7 +114,7 @@ class FakeV4l2 : public maq::SystemCalls {
 
   int open(const char* path, int) override {
     std::lock_guard<std::mutex> lock(mutex_);
-    if (!plugged_ || path != std::string("/dev/video0")) return failed(ENOENT);
+    if (!plugged_ || path != path_) return failed(ENOENT);
     if (fails(kOpen)) return -1;
     const int fd = eventfd(0, EFD_NONBLOCK | EFD_SEMAPHORE);
     files_.insert(fd);
@@ -351,5 +352,6 @@ class FakeV4l2 : public maq::SystemCalls {
   size_t frame_bytes_ = 0;
   double fps_ = 30;
   bool plugged_ = true;
+  std::string path_ = "/dev/video0";
   bool streaming_ = false;
 };

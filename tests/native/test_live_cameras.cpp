@@ -81,10 +81,12 @@ TEST_F(LiveCameras, TakeTheNearestOfWhatIsOffered) {
                  {v4l2_fourcc('X', 'Y', 'Z', '1'), 640, 480, 60}};
   EXPECT_EQ(camera()->format().width_px, 640);
   EXPECT_EQ(camera()->format().pixels, MAQ_PIXEL_YUYV);
-  EXPECT_TRUE(camera({1280, 720, 30})->format().jpeg) << "at that size only JPEG is fast enough";
-  EXPECT_FALSE(camera({1280, 720, 10})->format().jpeg) << "slow is enough: no decoding";
-  EXPECT_EQ(camera({700, 500, 30})->format().width_px, 640);
-  EXPECT_NEAR(camera({640, 480, 12.5})->format().fps, 12.5, 1e-3);
+  EXPECT_TRUE(camera({"", 1280, 720, 30})->format().jpeg) << "at that size only JPEG is fast enough";
+  EXPECT_FALSE(camera({"", 1280, 720, 10})->format().jpeg) << "slow is enough: no decoding";
+  EXPECT_TRUE(camera({"MJPG", 640, 480, 30})->format().jpeg) << "asked for by name";
+  expect_error(MAQ_ERROR_UNSUPPORTED, "offers YUYV, MJPG, XYZ1, but not NV12", [&] { camera({"NV12", 640, 480, 30}); });
+  EXPECT_EQ(camera({"", 700, 500, 30})->format().width_px, 640);
+  EXPECT_NEAR(camera({"", 640, 480, 12.5})->format().fps, 12.5, 1e-3);
 }
 
 TEST_F(LiveCameras, AreListedWithWhatTheyOfferOrWhyTheyCannotBeOpened) {
@@ -122,7 +124,7 @@ TEST_F(LiveCameras, FramesComeWithPixelsTimeAndNumber) {
       fake_.planar = planar;
       wait_until_closed(fake_);  // the source of the round before
       fake_.modes = {{uint32_t(fourcc), 64, 48, 30}};
-      const auto live = source(settings(), {64, 48, 0});
+      const auto live = source(settings(), {"", 64, 48, 0});
       EXPECT_TRUE(live->info().is_live);
       ASSERT_TRUE(fake_.deliver(77));
       maq::Frame frame;
@@ -151,7 +153,7 @@ TEST_F(LiveCameras, JpegFramesAreDecodedAndDamagedOnesSkipped) {
   ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC3, cv::Scalar(20, 120, 220)), jpeg));
   maq::SourceSettings ordered = settings();
   ordered.queue_length = 4;
-  const auto live = source(ordered, {64, 48, 0});
+  const auto live = source(ordered, {"", 64, 48, 0});
   const std::vector<uint8_t> cut(jpeg.begin(), jpeg.begin() + std::ptrdiff_t(jpeg.size() / 2));
   for (const auto& bytes : {cut, std::vector<uint8_t>{1, 2, 3}, jpeg}) ASSERT_TRUE(fake_.deliver(bytes));
   maq::Frame frame;
@@ -236,7 +238,24 @@ TEST_F(LiveCameras, ALostCameraIsReportedAndComesBackWithNumbersThatGoOn) {
   EXPECT_EQ(fake_.opened(), 2);
 }
 
-TEST_F(LiveCameras, ACameraThatStaysAwayIsAnErrorAfterTheLastFrame) {
+TEST_F(LiveCameras, ACameraThatComesBackUnderAnotherNumberIsFound) {
+  const auto live =
+      std::make_unique<maq::LiveSource>(maq::v4l2_opener(fake_, "/dev/video0", {}, 6), "/dev/video0", settings());
+  ASSERT_TRUE(fake_.deliver(1));
+  maq::Frame held;
+  ASSERT_EQ(live->next(5 * kSecond, held), NextFrame::kFrame);
+  fake_.unplug();
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
+  fake_.plug("/dev/video3");
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  ASSERT_TRUE(fake_.deliver(2));
+  maq::Frame frame;
+  ASSERT_EQ(live->next(5 * kSecond, frame), NextFrame::kFrame);
+  EXPECT_EQ(frame.image.planes[0].data[0], 2);
+  EXPECT_EQ(held.image.planes[0].data[0], 1);
+}
+
+TEST_F(LiveCameras, ACameraThatStaysAwayIsAnError) {
   maq::SourceSettings impatient = settings();
   impatient.reconnect_ms = 200;
   const auto live = source(impatient);
@@ -244,9 +263,8 @@ TEST_F(LiveCameras, ACameraThatStaysAwayIsAnErrorAfterTheLastFrame) {
   std::this_thread::sleep_for(50ms);
   fake_.unplug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_LOST));
+  EXPECT_EQ(fake_.mappings(), 0) << "nobody holds a frame, so that the device can be had under its old number";
   maq::Frame frame;
-  ASSERT_EQ(live->next(5 * kSecond, frame), NextFrame::kFrame) << "what came before is still delivered";
-  frame.lease.reset();
   expect_error(MAQ_ERROR_DEVICE_LOST, "/dev/video0 was lost and did not come back within 200 ms",
                [&] { live->next(-1, frame); });
   expect_error(MAQ_ERROR_DEVICE_LOST, "was lost", [&] { live->next(0, frame); });
@@ -358,7 +376,7 @@ TEST_F(LiveCameras, FailuresSayWhatToDo) {
   expect_error(MAQ_ERROR_UNSUPPORTED, "cannot stream", [&] { camera(); });
   fake_.capabilities |= V4L2_CAP_STREAMING;
   fake_.modes = {{v4l2_fourcc('X', 'Y', 'Z', '1'), 640, 480, 30}};
-  expect_error(MAQ_ERROR_UNSUPPORTED, "no format that is understood (XYZ1)", [&] { camera(); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "offers XYZ1, but none of them is understood", [&] { camera(); });
 }
 
 TEST_F(LiveCameras, ADriverThatAnswersNonsenseIsRefused) {

@@ -11,8 +11,9 @@
 
 namespace maq {
 
-// What the app asks for; 0: as the device has it. The nearest that the device offers is taken.
+// What the app asks for; 0 or empty: as the device has it. The nearest that the device offers is taken.
 struct CameraWish {
+  std::string format;  // four letters, as the device calls it: "MJPG"
   int width_px = 0;
   int height_px = 0;
   double fps = 0;
@@ -43,6 +44,8 @@ class Camera : public FrameOwner {
   enum class Event { kFrame, kTimeout, kWoken, kLost };
 
   virtual const CameraFormat& format() const = 0;
+  // The same for the same device in the same socket, whatever number it gets.
+  virtual const std::string& identity() const = 0;
   // Waits until a buffer is filled, `timeout_ms` are over, `wake_fd` can be read, or the device is gone (`reason` says
   // how). Only one thread at a time.
   virtual Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) = 0;
@@ -62,6 +65,7 @@ struct CameraListing {
   std::string uri;             // "v4l2:/dev/video0"
   std::string name;            // as the device calls itself
   std::string bus;             // where it is plugged in
+  std::string identity;        // as Camera::identity
   maq_status status = MAQ_OK;  // whether it can be opened
   std::string problem;         // why not
   std::vector<CameraMode> modes;

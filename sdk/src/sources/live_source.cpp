@@ -124,6 +124,9 @@ struct LiveSource::State {
         }
       } else {
         camera->close();
+        // As long as anything of it is mapped, the device keeps its number, and comes back under another.
+        camera.reset();
+        forget_frames();
         report(MAQ_SOURCE_LOST, reason);
         camera = reconnect();
         if (camera == nullptr) break;
@@ -137,6 +140,18 @@ struct LiveSource::State {
     std::lock_guard<std::mutex> lock(mutex);
     ended = true;
     changed.notify_all();
+  }
+
+  // Those that nobody took.
+  void forget_frames() {
+    std::vector<Entry> left;  // given back after the lock is released
+    {
+      std::lock_guard<std::mutex> lock(mutex);
+      left.resize(ring.size());
+      left.swap(ring);
+      dropped += count;
+      first = count = 0;
+    }
   }
 
   void add_drops(uint64_t more) {

@@ -28,7 +28,8 @@ const Entry kEntries[] = {
     {{"stub", "stub:people?count=2&fps=30&seed=7",
       "frames without a camera: people (rendered people who walk; count, seed, frames) or pattern (colour bars)"},
      &without_settings<open_stub_source>},
-    {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30", "a camera of Linux; the nearest size and rate that it offers"},
+    {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
+      "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
      &open_v4l2_source},
 };
 

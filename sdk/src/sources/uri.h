@@ -23,6 +23,8 @@ struct SourceUri {
   // Throws MAQ_ERROR_INVALID_ARGUMENT when it is no number, or not within `least` and `most`.
   int64_t take_integer(const std::string& key, int64_t otherwise, int64_t least, int64_t most);
   double take_number(const std::string& key, double otherwise, double least, double most);
+  // "" when it was not given.
+  std::string take_text(const std::string& key) { return take(key).value_or(""); }
   // Throws MAQ_ERROR_INVALID_ARGUMENT when an option is left that nobody took. `known` names those there are.
   void expect_no_more_options(const std::string& known) const;
 

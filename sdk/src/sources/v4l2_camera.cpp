@@ -43,6 +43,12 @@ const KnownFormat* known_format(uint32_t fourcc) {
   return nullptr;
 }
 
+// Of a field of fixed size, which may lack the zero at its end.
+std::string text_of(const uint8_t* bytes, size_t size) {
+  const char* begin = reinterpret_cast<const char*>(bytes);
+  return std::string(begin, strnlen(begin, size));
+}
+
 int64_t monotonic_ns() {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
@@ -78,13 +84,10 @@ class V4l2Camera : public Camera {
     if (fd_ < 0) fail("cannot be opened", errno);
     v4l2_capability found{};
     if (control(VIDIOC_QUERYCAP, &found) != 0) return false;
-    const auto text = [](const uint8_t* bytes, size_t size) {
-      const char* begin = reinterpret_cast<const char*>(bytes);
-      return std::string(begin, strnlen(begin, size));
-    };
-    listing.name = text(found.card, sizeof found.card);
-    listing.bus = text(found.bus_info, sizeof found.bus_info);
+    listing.name = text_of(found.card, sizeof found.card);
+    listing.bus = text_of(found.bus_info, sizeof found.bus_info);
     check_capabilities();
+    listing.identity = identity_;
     for (uint32_t index = 0; index < kMostEnumerated; ++index) {
       v4l2_fmtdesc described{};
       described.index = index;
@@ -96,6 +99,7 @@ class V4l2Camera : public Camera {
   }
 
   const CameraFormat& format() const override { return format_; }
+  const std::string& identity() const override { return identity_; }
 
   Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) override {
     pollfd fds[2] = {{fd_, POLLIN, 0}, {wake_fd, POLLIN, 0}};
@@ -220,6 +224,7 @@ class V4l2Camera : public Camera {
       if (errno == ENOTTY || errno == EINVAL) fail("is not a video device", errno);
       fail("does not tell what it can do", errno);
     }
+    identity_ = text_of(found.card, sizeof found.card) + " at " + text_of(found.bus_info, sizeof found.bus_info);
     const uint32_t able = (found.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? found.device_caps : found.capabilities;
     is_planar_ = (able & V4L2_CAP_VIDEO_CAPTURE) == 0 && (able & V4L2_CAP_VIDEO_CAPTURE_MPLANE) != 0;
     if ((able & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) == 0) {
@@ -322,6 +327,7 @@ class V4l2Camera : public Camera {
       char name[5] = {};
       std::memcpy(name, &described.pixelformat, 4);
       offered += (offered.empty() ? "" : ", ") + std::string(name);
+      if (!wish.format.empty() && wish.format != name) continue;
       const KnownFormat* known = known_format(described.pixelformat);
       if (known == nullptr) continue;
       v4l2_format request = format_request(described.pixelformat, width, height);
@@ -338,7 +344,8 @@ class V4l2Camera : public Camera {
                          found.fourcc});
     }
     if (choices.empty()) {
-      fail(concatenate("offers no format that is understood (", offered.empty() ? "none at all" : offered, ")"),
+      fail(concatenate("offers ", offered.empty() ? "no format" : offered, ", but ",
+                       wish.format.empty() ? "none of them is understood" : "not " + wish.format),
            EINVAL);
     }
     const Choice best = *std::min_element(choices.begin(), choices.end(), [](const Choice& a, const Choice& b) {
@@ -428,6 +435,7 @@ class V4l2Camera : public Camera {
   v4l2_buf_type type_ = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   bool is_planar_ = false;
   CameraFormat format_;
+  std::string identity_;
   size_t frame_bytes_ = 0;
   std::vector<Mapping> mappings_;
   std::mutex mutex_;  // of fd_ and streaming_ between wait's thread and those who give frames back
@@ -435,6 +443,24 @@ class V4l2Camera : public Camera {
 };
 
 }  // namespace
+
+CameraOpener v4l2_opener(SystemCalls& calls, const std::string& path, CameraWish wish, int buffers) {
+  return [&calls, path, wish = std::move(wish), buffers, identity = std::string()]() mutable {
+    std::string place = path;
+    if (!identity.empty()) {
+      for (const CameraListing& listing : list_v4l2_cameras(calls)) {
+        if (listing.identity == identity) place = listing.uri.substr(listing.uri.find(':') + 1);
+      }
+    }
+    std::shared_ptr<Camera> camera = open_v4l2_camera(calls, place, wish, buffers);
+    if (!identity.empty() && camera->identity() != identity) {
+      camera->close();
+      throw Error(MAQ_ERROR_DEVICE_LOST, path, " is ", camera->identity(), " now, but was ", identity, ".");
+    }
+    identity = camera->identity();
+    return camera;
+  };
+}
 
 std::vector<CameraListing> list_v4l2_cameras(SystemCalls& calls) {
   constexpr int kMostDevices = 64;

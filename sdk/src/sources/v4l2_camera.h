@@ -16,6 +16,10 @@ namespace maq {
 std::shared_ptr<Camera> open_v4l2_camera(SystemCalls& calls, const std::string& path, const CameraWish& wish,
                                          int buffers);
 
+// Opens the camera at `path`, and after that the same device wherever it is: one that was plugged in again gets another
+// number while somebody holds frames of before.
+CameraOpener v4l2_opener(SystemCalls& calls, const std::string& path, CameraWish wish, int buffers);
+
 // The cameras among /dev/video0 to /dev/video63. One that cannot be opened is listed with the reason.
 std::vector<CameraListing> list_v4l2_cameras(SystemCalls& calls);
 

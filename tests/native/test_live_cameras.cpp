@@ -282,6 +282,14 @@ TEST_F(LiveCameras, AStallIsReportedOnceAndSoIsItsEnd) {
             (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_STALLED, MAQ_SOURCE_BACK}));
 }
 
+TEST_F(LiveCameras, ACallbackThatThrowsEndsTheSourceAndNotTheApp) {
+  maq::SourceSettings broken = settings();
+  broken.on_state = [](void*, maq_source_state, const char*) { throw 5; };
+  const auto live = source(broken);
+  maq::Frame frame;
+  expect_error(MAQ_ERROR_DEVICE_LOST, "callback threw", [&] { live->next(5 * kSecond, frame); });
+}
+
 // A device that does not answer any more.
 class HangingV4l2 : public FakeV4l2 {
  public:

@@ -3,6 +3,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <optional>
@@ -20,7 +21,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kReconnectPause(100);
 constexpr milliseconds kStopPatience(50);
-constexpr int kWaitMs = 200;  // how long one wait lasts; whether the camera stalls is looked at in between
+constexpr int kLongestWaitMs = 200;  // whether the camera stalls is looked at between two waits
 
 }  // namespace
 
@@ -87,17 +88,41 @@ struct LiveSource::State {
     return changed.wait_for(lock, time, [&] { return stopping; });
   }
 
-  void run(std::shared_ptr<Camera> camera) {
+  // What the thread does. Nothing gets past it: an exception would end the app.
+  void run(std::shared_ptr<Camera> camera) noexcept {
+    try {
+      stream(camera);
+    } catch (const std::exception& error) {
+      fail(concatenate(name, " stopped: ", error.what()));
+    } catch (...) {
+      fail(name + " stopped: its state callback threw an exception");
+    }
+    if (camera != nullptr) camera->close();
+    camera.reset();
+    std::lock_guard<std::mutex> lock(mutex);
+    ended = true;
+    changed.notify_all();
+  }
+
+  void fail(std::string reason) {
+    std::lock_guard<std::mutex> lock(mutex);
+    failure = std::move(reason);
+    changed.notify_all();
+  }
+
+  // Until somebody asks to stop, or the camera stays away; `camera` is null then.
+  void stream(std::shared_ptr<Camera>& camera) {
     uint64_t base = 0, next_sequence = 0;  // sequence numbers go on where they were when the camera is opened anew
     uint32_t first_sequence = 0;
     bool is_first = true;  // of the camera as it was opened last
     auto last_frame = Clock::now();
     bool stalled = false;
+    const int wait_ms = std::min(kLongestWaitMs, settings.stall_ms);
     report(MAQ_SOURCE_STARTED, "started");
     for (;;) {
       CameraBuffer buffer;
       std::string reason;
-      const Camera::Event event = camera->wait(wake_fd, kWaitMs, buffer, reason);
+      const Camera::Event event = camera->wait(wake_fd, wait_ms, buffer, reason);
       if (event == Camera::Event::kWoken || stop_asked()) {
         if (event == Camera::Event::kFrame) camera->give_back(buffer.slot);
         break;
@@ -136,10 +161,6 @@ struct LiveSource::State {
         stalled = false;
       }
     }
-    if (camera != nullptr) camera->close();
-    std::lock_guard<std::mutex> lock(mutex);
-    ended = true;
-    changed.notify_all();
   }
 
   // Those that nobody took.
@@ -174,9 +195,7 @@ struct LiveSource::State {
         reason = error.what();
       }
     }
-    std::lock_guard<std::mutex> lock(mutex);
-    failure = concatenate(name, " was lost and did not come back within ", settings.reconnect_ms, " ms: ", reason);
-    changed.notify_all();
+    fail(concatenate(name, " was lost and did not come back within ", settings.reconnect_ms, " ms: ", reason));
     return nullptr;
   }
 };

@@ -51,8 +51,8 @@ class DecodeConfig:
     score_threshold: float = 0.7
     box_nms_iou: float = 0.5
     # Boxes with more than this score are looked at again, from where the first look put them (None: they are not). The
-    # second look depends less on which proposals there were: recall .72 -> .74 at the same precision, box AP + .6, and
-    # int8 paints 1.3 points more pixels like fp32. A third look gained nothing.
+    # second look depends less on which proposals there were: recall .72 -> .74 at the same precision, box AP + .6 on
+    # 300 images. A third look gained nothing.
     second_look_score: float | None = 0.3
     # Painted where the person is likelier than this. Below a half, since the best mask by IoU is the more generous the
     # less sure a network is (for Dice d, the best threshold is d / 2); this one gave the best IoU on validation.

@@ -1,8 +1,8 @@
 // What decodes image and video files: OpenCV's imgcodecs and videoio.
 //
-// They bring two hundred shared libraries on Debian (GDAL and FFmpeg among them), 70 MB of memory and a quarter of a
-// second, which an app with a camera does not need. So they are in a library of their own, libmaquette_files.so, which
-// is opened when the first file is.
+// They bring some two hundred shared libraries on Debian (GDAL and FFmpeg among them), 65 MB of memory and more than a
+// tenth of a second, which an app with a camera does not need. So they are in a library of their own,
+// libmaquette_files.so, which is opened when the first file is.
 #pragma once
 
 #include <cstdint>

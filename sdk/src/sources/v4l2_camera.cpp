@@ -68,9 +68,7 @@ class V4l2Camera : public Camera {
   }
 
   void start(const CameraWish& wish, int buffers) {
-    fd_ = calls_.open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-    if (fd_ < 0) fail("cannot be opened", errno);
-    check_capabilities();
+    open();
     negotiate(wish);
     make_buffers(buffers);
     int type = int(type_);
@@ -78,15 +76,11 @@ class V4l2Camera : public Camera {
     streaming_ = true;
   }
 
-  // What the device is and offers, without starting it. False when it is no camera.
-  bool describe(CameraListing& listing) {
-    fd_ = calls_.open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-    if (fd_ < 0) fail("cannot be opened", errno);
-    v4l2_capability found{};
-    if (control(VIDIOC_QUERYCAP, &found) != 0) return false;
-    listing.name = text_of(found.card, sizeof found.card);
-    listing.bus = text_of(found.bus_info, sizeof found.bus_info);
-    check_capabilities();
+  // What the device is and offers, without starting it. Throws what start() throws.
+  void describe(CameraListing& listing) {
+    open();
+    listing.name = name_;
+    listing.bus = bus_;
     listing.identity = identity_;
     for (uint32_t index = 0; index < kMostEnumerated; ++index) {
       v4l2_fmtdesc described{};
@@ -95,7 +89,6 @@ class V4l2Camera : public Camera {
       if (control(VIDIOC_ENUM_FMT, &described) != 0) break;
       list_sizes(described.pixelformat, listing.modes);
     }
-    return true;
   }
 
   const CameraFormat& format() const override { return format_; }
@@ -218,13 +211,18 @@ class V4l2Camera : public Camera {
     throw Error(status, path_, " ", what, ": ", std::strerror(error), ".", remedy);
   }
 
-  void check_capabilities() {
+  // Opens the device and looks whether it is a camera that can stream.
+  void open() {
+    fd_ = calls_.open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+    if (fd_ < 0) fail("cannot be opened", errno);
     v4l2_capability found{};
     if (control(VIDIOC_QUERYCAP, &found) != 0) {
       if (errno == ENOTTY || errno == EINVAL) fail("is not a video device", errno);
       fail("does not tell what it can do", errno);
     }
-    identity_ = text_of(found.card, sizeof found.card) + " at " + text_of(found.bus_info, sizeof found.bus_info);
+    name_ = text_of(found.card, sizeof found.card);
+    bus_ = text_of(found.bus_info, sizeof found.bus_info);
+    identity_ = name_ + " at " + bus_;
     const uint32_t able = (found.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? found.device_caps : found.capabilities;
     is_planar_ = (able & V4L2_CAP_VIDEO_CAPTURE) == 0 && (able & V4L2_CAP_VIDEO_CAPTURE_MPLANE) != 0;
     if ((able & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) == 0) {
@@ -435,7 +433,7 @@ class V4l2Camera : public Camera {
   v4l2_buf_type type_ = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   bool is_planar_ = false;
   CameraFormat format_;
-  std::string identity_;
+  std::string name_, bus_, identity_;
   size_t frame_bytes_ = 0;
   std::vector<Mapping> mappings_;
   std::mutex mutex_;  // of fd_ and streaming_ between wait's thread and those who give frames back
@@ -470,7 +468,7 @@ std::vector<CameraListing> list_v4l2_cameras(SystemCalls& calls) {
     CameraListing listing;
     listing.uri = "v4l2:" + path;
     try {
-      if (!V4l2Camera(calls, path).describe(listing)) continue;
+      V4l2Camera(calls, path).describe(listing);
     } catch (const Error& error) {
       // Encoders, decoders and metadata have such files as well.
       if (error.status() == MAQ_ERROR_NOT_FOUND || error.status() == MAQ_ERROR_UNSUPPORTED) continue;

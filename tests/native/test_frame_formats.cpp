@@ -45,6 +45,7 @@ class OneColour {
       case MAQ_PIXEL_RGBA8: return i % 4 == 3 ? 77 : rgb[i % 4];
       case MAQ_PIXEL_GREY8: return uint8_t(std::lround(0.299 * r + 0.587 * g + 0.114 * b));
       case MAQ_PIXEL_NV12: return plane == 0 ? y : i % 2 == 0 ? u : v;
+      case MAQ_PIXEL_DEPTH16: break;
       case MAQ_PIXEL_YUYV: return i % 4 == 1 ? u : i % 4 == 3 ? v : y;
     }
     return 0;
@@ -123,8 +124,8 @@ TEST(FrameFormats, DescriptionsAreCheckedPlaneByPlane) {
   EXPECT_EQ(maq::checked_image_view(desc).planes[1].stride_bytes, 6u) << "colour of an odd width is rounded up";
   desc.stride_bytes[1] = 5;
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[1] is 5", [&] { maq::checked_image_view(desc); });
-  desc.format = maq_pixel_format(7);
-  expect_error(MAQ_ERROR_UNSUPPORTED, "Pixel format 7", [&] { maq::checked_image_view(desc); });
+  desc.format = maq_pixel_format(99);
+  expect_error(MAQ_ERROR_UNSUPPORTED, "Pixel format 99", [&] { maq::checked_image_view(desc); });
 }
 
 }  // namespace

@@ -14,14 +14,15 @@ extern "C" {
 
 typedef struct maq_frame maq_frame;
 
-/* 8 bits a channel, rows from top to bottom. */
+/* Rows from top to bottom; 8 bits a channel but for depth. */
 typedef enum maq_pixel_format {
-  MAQ_PIXEL_RGB8 = 1,  /* one plane, 3 bytes a pixel */
-  MAQ_PIXEL_BGR8 = 2,  /* one plane, 3 bytes a pixel */
-  MAQ_PIXEL_RGBA8 = 3, /* one plane, 4 bytes a pixel; alpha is ignored */
-  MAQ_PIXEL_GREY8 = 4, /* one plane, 1 byte a pixel */
-  MAQ_PIXEL_NV12 = 5,  /* planes Y [h, w] and UV [ceil(h / 2), 2 * ceil(w / 2)] bytes; BT.601, video range */
-  MAQ_PIXEL_YUYV = 6   /* one plane, Y0 U Y1 V for two pixels; rows of 4 * ceil(w / 2) bytes; BT.601, video range */
+  MAQ_PIXEL_RGB8 = 1,   /* one plane, 3 bytes a pixel */
+  MAQ_PIXEL_BGR8 = 2,   /* one plane, 3 bytes a pixel */
+  MAQ_PIXEL_RGBA8 = 3,  /* one plane, 4 bytes a pixel; alpha is ignored */
+  MAQ_PIXEL_GREY8 = 4,  /* one plane, 1 byte a pixel */
+  MAQ_PIXEL_NV12 = 5,   /* planes Y [h, w] and UV [ceil(h / 2), 2 * ceil(w / 2)] bytes; BT.601, video range */
+  MAQ_PIXEL_YUYV = 6,   /* one plane, Y0 U Y1 V for two pixels; rows of 4 * ceil(w / 2) bytes; BT.601, video range */
+  MAQ_PIXEL_DEPTH16 = 7 /* one plane, uint16_t a pixel: millimetres along the optical axis, 0 where nothing is known */
 } maq_pixel_format;
 
 /* What a timestamp counts from. */
@@ -66,6 +67,17 @@ MAQ_API void maq_frame_release(maq_frame* frame);
 /* Describes the frame; the planes point into it and are valid until it is released. The caller sets desc->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc);
+
+/* Describes the depth image that came with the frame, pixel by pixel aligned with its picture (of which it may be a
+ * smaller version): MAQ_PIXEL_DEPTH16, valid until the frame is released. The caller sets desc->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (it came without). Does not block. */
+MAQ_API maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc);
+
+/* The frame's memory as a dma-buf, for a GPU or an encoder to read without a copy. `*fd` stays the frame's: it is valid
+ * until the frame is released, and duplicated (dup) by who needs it longer; the planes lie in it as in maq_frame_desc.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the memory is none of a device, or the device
+ * cannot). Does not block. */
+MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 
 /* Writes the frame's pixels to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8), height_px rows of `stride_bytes`
  * (0: rows without padding); `size_bytes` is what the caller holds there.

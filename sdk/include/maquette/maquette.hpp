@@ -118,6 +118,16 @@ class Frame {
     return desc;
   }
 
+  // Nothing when the frame came without depth.
+  std::optional<maq_frame_desc> depth() const {
+    maq_frame_desc desc{};
+    desc.struct_size = sizeof desc;
+    const maq_status status = maq_frame_get_depth(get(), &desc);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status, get());
+    return desc;
+  }
+
   void copy_pixels(maq_pixel_format format, uint8_t* pixels, size_t stride_bytes, size_t size_bytes) const {
     check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes), get());
   }
@@ -142,6 +152,18 @@ class Source {
     check(maq_source_get_info(get(), &info), get());
     return info;
   }
+
+  // Nothing when the source does not know.
+  std::optional<maq_calibration> calibration() const {
+    maq_calibration calibration{};
+    calibration.struct_size = sizeof calibration;
+    const maq_status status = maq_source_get_calibration(get(), &calibration);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status, get());
+    return calibration;
+  }
+
+  void seek(int64_t time_ns) { check(maq_source_seek(get(), time_ns), get()); }
 
   // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when none came in time.
   std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {

@@ -50,6 +50,36 @@ typedef struct maq_source_info {
   uint64_t drops;      /* frames of a camera that were lost so far, on their way or because nobody took them */
 } maq_source_info;
 
+/* How a camera maps the world into its picture, in the convention of OpenCV: x to the right, y down, z forward; the
+ * centre of the top left pixel is (0, 0). With x' = x / z and y' = y / z, distorted by the rational model
+ * (k1, k2, p1, p2, k3, k4, k5, k6), a point appears at (fx x' + cx, fy y' + cy). */
+typedef struct maq_calibration {
+  uint32_t struct_size;
+  int32_t width_px; /* of the picture that the figures are for */
+  int32_t height_px;
+  double fx_px, fy_px, cx_px, cy_px;
+  double distortion[8]; /* 0: none */
+} maq_calibration;
+
+/* What can be set of a camera, where the device has it. */
+typedef enum maq_control {
+  MAQ_CONTROL_AUTO_EXPOSURE = 1,      /* 1: the device chooses exposure and, on most, gain; 0: they stay */
+  MAQ_CONTROL_EXPOSURE = 2,           /* microseconds */
+  MAQ_CONTROL_GAIN = 3,               /* in units of the device */
+  MAQ_CONTROL_AUTO_FOCUS = 4,         /* 1 or 0 */
+  MAQ_CONTROL_FOCUS = 5,              /* in units of the device */
+  MAQ_CONTROL_AUTO_WHITE_BALANCE = 6, /* 1 or 0 */
+  MAQ_CONTROL_WHITE_BALANCE = 7,      /* kelvin */
+  MAQ_CONTROL_BRIGHTNESS = 8          /* in units of the device */
+} maq_control;
+
+typedef struct maq_control_info {
+  uint32_t struct_size;
+  double least, most, step; /* values in between are rounded to the nearest step */
+  double preset;            /* what the device starts with */
+  double value;             /* now */
+} maq_control_info;
+
 /* One kind of source that this build knows; all texts are static. */
 typedef struct maq_source_scheme {
   uint32_t struct_size;
@@ -86,6 +116,26 @@ MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info
  * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_POOL_EMPTY when all frames are held,
  * MAQ_ERROR_UNREADABLE when a file ends before its header says, after all readable frames. Blocks while decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
+
+/* How the camera maps the world into its picture. The caller sets calibration->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the source does not know). Does not block. */
+MAQ_API maq_status maq_source_get_calibration(const maq_source* source, maq_calibration* calibration);
+
+/* What a control of the camera is now and what it can be. The caller sets info->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the device does not have it),
+ * MAQ_ERROR_DEVICE_LOST. Blocks while the device is asked. */
+MAQ_API maq_status maq_source_get_control(maq_source* source, maq_control control, maq_control_info* info);
+
+/* Sets a control. A manual exposure, focus or white balance switches its automatic off. What was set is set again when a
+ * lost camera comes back.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (out of range), MAQ_ERROR_UNSUPPORTED (the device does not have it),
+ * MAQ_ERROR_BUSY (not now), MAQ_ERROR_DEVICE_LOST. Blocks while the device is asked. */
+MAQ_API maq_status maq_source_set_control(maq_source* source, maq_control control, double value);
+
+/* Goes to the first frame at `time_ns` after the source's first frame, or later; it is the next that is acquired.
+ * Not while a frame is being acquired. Errors: MAQ_ERROR_INVALID_ARGUMENT (negative), MAQ_ERROR_UNSUPPORTED (only
+ * recordings and stubs can). Does not block. */
+MAQ_API maq_status maq_source_seek(maq_source* source, int64_t time_ns);
 
 /* The kinds of sources of this build: their number, and the one at `index`. The caller sets scheme->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Do not block. */

@@ -3,6 +3,25 @@
 
 using namespace maq;
 
+namespace {
+
+maq_frame_desc description(const ImageView& image, const Frame& frame) {
+  maq_frame_desc desc{};
+  desc.format = image.format;
+  desc.width_px = image.width_px;
+  desc.height_px = image.height_px;
+  for (int plane = 0; plane < plane_count(image.format); ++plane) {
+    desc.planes[plane] = image.planes[plane].data;
+    desc.stride_bytes[plane] = image.planes[plane].stride_bytes;
+  }
+  desc.timestamp_ns = frame.timestamp_ns;
+  desc.clock = frame.clock;
+  desc.sequence = frame.sequence;
+  return desc;
+}
+
+}  // namespace
+
 maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size) {
   maq_frame_desc defaults{};
   defaults.clock = MAQ_CLOCK_MEDIA;
@@ -34,19 +53,27 @@ void maq_frame_release(maq_frame* frame) { take_back(frame); }
 maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
-    const Frame& from = frame->frame;
-    maq_frame_desc filled{};
-    filled.format = from.image.format;
-    filled.width_px = from.image.width_px;
-    filled.height_px = from.image.height_px;
-    for (int plane = 0; plane < plane_count(from.image.format); ++plane) {
-      filled.planes[plane] = from.image.planes[plane].data;
-      filled.stride_bytes[plane] = from.image.planes[plane].stride_bytes;
-    }
-    filled.timestamp_ns = from.timestamp_ns;
-    filled.clock = from.clock;
-    filled.sequence = from.sequence;
-    write_struct(desc, "desc", filled, sizeof(maq_frame_desc));
+    write_struct(desc, "desc", description(frame->frame.image, frame->frame), sizeof(maq_frame_desc));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc) {
+  return guarded(frame, __func__, [&] {
+    require_argument(frame, "frame");
+    if (frame->frame.depth.width_px == 0) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame came without depth.");
+    write_struct(desc, "desc", description(frame->frame.depth, frame->frame), sizeof(maq_frame_desc));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd) {
+  return guarded(frame, __func__, [&] {
+    require_argument(frame, "frame");
+    require_argument(fd, "fd");
+    const int found = frame->frame.lease.dma_buf();
+    if (found < 0) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame's memory cannot be had as a dma-buf; use its planes.");
+    *fd = found;
     return MAQ_OK;
   });
 }

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstddef>
 
 #include "api/boundary.h"
@@ -20,6 +21,10 @@ maq_source_config default_config() {
   config.stall_ms = defaults.stall_ms;
   config.reconnect_ms = defaults.reconnect_ms;
   return config;
+}
+
+void require_control(maq_control control) {
+  require_range("control", int(control), int(MAQ_CONTROL_AUTO_EXPOSURE), int(MAQ_CONTROL_BRIGHTNESS));
 }
 
 }  // namespace
@@ -77,6 +82,7 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
     require_argument(source, "source");
     require_argument(frame, "frame");
     BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
+    handle->frame.depth.width_px = 0;  // of whoever had it before
     switch (source->source->next(timeout_ns, handle->frame)) {
       case NextFrame::kFrame: break;
       case NextFrame::kEnd: return MAQ_END_OF_STREAM;
@@ -85,6 +91,45 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
                           concatenate("No frame came within ", timeout_ns / 1000000, " ms.").c_str());
     }
     *frame = hand_out<maq_frame>(std::move(handle));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_source_get_calibration(const maq_source* source, maq_calibration* calibration) {
+  return guarded(source, __func__, [&] {
+    require_argument(source, "source");
+    const maq_calibration* found = source->source->calibration();
+    if (found == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The source does not know its calibration.");
+    write_struct(calibration, "calibration", *found, sizeof(maq_calibration));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_source_get_control(maq_source* source, maq_control control, maq_control_info* info) {
+  return guarded(source, __func__, [&] {
+    require_argument(source, "source");
+    require_argument(info, "info");
+    require_control(control);
+    write_struct(info, "info", source->source->control(control), sizeof(maq_control_info));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_source_set_control(maq_source* source, maq_control control, double value) {
+  return guarded(source, __func__, [&] {
+    require_argument(source, "source");
+    require_control(control);
+    if (!std::isfinite(value)) throw ArgumentError("value is ", value, ".");
+    source->source->set_control(control, value);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_source_seek(maq_source* source, int64_t time_ns) {
+  return guarded(source, __func__, [&] {
+    require_argument(source, "source");
+    if (time_ns < 0) throw ArgumentError("time_ns is ", time_ns, ", but must not be negative.");
+    source->source->seek(time_ns);
     return MAQ_OK;
   });
 }

@@ -19,6 +19,7 @@ const char* pixel_format_name(maq_pixel_format format) {
     case MAQ_PIXEL_GREY8: return "GREY8";
     case MAQ_PIXEL_NV12: return "NV12";
     case MAQ_PIXEL_YUYV: return "YUYV";
+    case MAQ_PIXEL_DEPTH16: return "DEPTH16";
   }
   return "unknown";
 }
@@ -34,6 +35,7 @@ size_t row_bytes(maq_pixel_format format, int plane, int width_px) {
     case MAQ_PIXEL_GREY8: return width;
     case MAQ_PIXEL_NV12: return plane == 0 ? width : (width + 1) / 2 * 2;
     case MAQ_PIXEL_YUYV: return (width + 1) / 2 * 4;
+    case MAQ_PIXEL_DEPTH16: return width * 2;
   }
   return 0;
 }
@@ -54,7 +56,7 @@ void check_image_size(int64_t width_px, int64_t height_px, const std::string& wh
 }
 
 ImageView checked_image_view(const maq_frame_desc& desc) {
-  if (desc.format < MAQ_PIXEL_RGB8 || desc.format > MAQ_PIXEL_YUYV) {
+  if (desc.format < MAQ_PIXEL_RGB8 || desc.format > MAQ_PIXEL_DEPTH16) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(desc.format),
                 " is not known; use one of maq_pixel_format.");
   }

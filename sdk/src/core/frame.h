@@ -30,6 +30,8 @@ class FrameOwner {
   virtual ~FrameOwner() = default;
   // From any thread, once for each buffer.
   virtual void give_back(int slot) = 0;
+  // The buffer as a dma-buf, which stays the owner's; -1 when there is none. From any thread, for a buffer that is held.
+  virtual int dma_buf(int) { return -1; }
 };
 
 // Holds a buffer of an owner, and gives it back.
@@ -48,6 +50,8 @@ class PixelLease {
   }
   ~PixelLease() { reset(); }
 
+  int dma_buf() const { return owner_ == nullptr ? -1 : owner_->dma_buf(slot_); }
+
   void reset() {
     if (owner_ != nullptr) owner_->give_back(slot_);
     owner_.reset();
@@ -60,12 +64,14 @@ class PixelLease {
 
 struct Frame {
   ImageView image;
+  ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the image; no width when there is none
   int64_t timestamp_ns = 0;
   maq_clock clock = MAQ_CLOCK_MEDIA;
   uint64_t sequence = 0;
   // Memory of the pixels when the library owns them; kept between uses of a pooled frame.
   std::vector<uint8_t> storage;
-  // Of pixels that are a camera's; empty for those in `storage`, or of an app.
+  std::vector<uint8_t> depth_storage;
+  // Of pixels that are a camera's; empty for those in memory of the frame, or of an app.
   PixelLease lease;
 
   // Makes `storage` hold one BGR image of that size without row padding and points `image` at it.

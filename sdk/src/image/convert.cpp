@@ -61,6 +61,7 @@ cv::Mat as_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
     case MAQ_PIXEL_GREY8: return converted(image, CV_8UC1, cv::COLOR_GRAY2BGR, memory);
     case MAQ_PIXEL_NV12: return nv12_to_bgr(image, memory);
     case MAQ_PIXEL_YUYV: return yuyv_to_bgr(image, memory);
+    case MAQ_PIXEL_DEPTH16: throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours; give the picture.");
   }
   throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(image.format), " is not known.");
 }

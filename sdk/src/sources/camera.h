@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/frame.h"
+#include "maquette/source.h"
 
 namespace maq {
 
@@ -25,14 +26,15 @@ struct CameraFormat {
   bool jpeg = false;
   int width_px = 0;
   int height_px = 0;
-  size_t stride_bytes = 0;  // of the first plane; that of a second plane is the same
-  double fps = 0;           // 0: the device does not say
+  double fps = 0;  // 0: the device does not say
 };
 
 // A filled buffer of the device. It belongs to whoever got it until it is given back.
 struct CameraBuffer {
-  const uint8_t* data = nullptr;
-  size_t size_bytes = 0;
+  ImageView image;                // of pixels as they come
+  const uint8_t* jpeg = nullptr;  // of a JPEG image
+  size_t jpeg_bytes = 0;
+  ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the picture; no width when there is none
   int slot = 0;
   int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the picture was taken
   uint32_t sequence = 0;     // counts the device's frames, those that were lost included
@@ -41,13 +43,19 @@ struct CameraBuffer {
 
 class Camera : public FrameOwner {
  public:
-  enum class Event { kFrame, kTimeout, kWoken, kLost };
+  enum class Event { kFrame, kTimeout, kWoken, kLost, kEnd };
 
   virtual const CameraFormat& format() const = 0;
   // The same for the same device in the same socket, whatever number it gets.
   virtual const std::string& identity() const = 0;
-  // Waits until a buffer is filled, `timeout_ms` are over, `wake_fd` can be read, or the device is gone (`reason` says
-  // how). Only one thread at a time.
+  // Null when the device does not know.
+  virtual const maq_calibration* calibration() const { return nullptr; }
+  // From any thread. Throw MAQ_ERROR_UNSUPPORTED for what the device does not have, MAQ_ERROR_INVALID_ARGUMENT for values
+  // out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
+  virtual maq_control_info control(maq_control which);
+  virtual void set_control(maq_control which, double value);
+  // Waits until a buffer is filled, `timeout_ms` are over, `wake_fd` can be read, the device is gone (`reason` says how),
+  // or what plays a camera has no more frames. Only one thread at a time.
   virtual Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) = 0;
   // Ends streaming and closes the device. Buffers that are held stay readable until the camera is destroyed.
   virtual void close() = 0;

@@ -30,7 +30,6 @@ struct LiveSource::State {
   struct Entry {
     PixelLease lease;
     CameraBuffer buffer;
-    CameraFormat format;
     uint64_t sequence = 0;
   };
 
@@ -46,6 +45,7 @@ struct LiveSource::State {
   size_t first = 0, count = 0;
   uint64_t dropped = 0;
   std::optional<std::string> failure;
+  bool at_end = false;  // after the frames that wait
   bool stopping = false;
   bool ended = false;  // the thread
   std::thread thread;
@@ -110,6 +110,12 @@ struct LiveSource::State {
     changed.notify_all();
   }
 
+  void end_of_stream() {
+    std::lock_guard<std::mutex> lock(mutex);
+    at_end = true;
+    changed.notify_all();
+  }
+
   // Until somebody asks to stop, or the camera stays away; `camera` is null then.
   void stream(std::shared_ptr<Camera>& camera) {
     uint64_t base = 0, next_sequence = 0;  // sequence numbers go on where they were when the camera is opened anew
@@ -140,13 +146,16 @@ struct LiveSource::State {
         if (buffer.damaged) {
           add_drops(1);
         } else {
-          push({std::move(lease), buffer, camera->format(), sequence});
+          push({std::move(lease), buffer, sequence});
         }
       } else if (event == Camera::Event::kTimeout) {
         if (!stalled && Clock::now() - last_frame >= milliseconds(settings.stall_ms)) {
           stalled = true;
           report(MAQ_SOURCE_STALLED, concatenate("no frame for ", settings.stall_ms, " ms"));
         }
+      } else if (event == Camera::Event::kEnd) {
+        end_of_stream();
+        break;
       } else {
         camera->close();
         // As long as anything of it is mapped, the device keeps its number, and comes back under another.
@@ -215,6 +224,7 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
   info_.fps = format.fps;
   info_.is_live = true;
   info_.clock = MAQ_CLOCK_MONOTONIC;
+  if (camera->calibration() != nullptr) calibration_ = *camera->calibration();
   state_->thread =
       std::thread([state = state_, camera = std::move(camera)]() mutable { state->run(std::move(camera)); });
 }
@@ -253,31 +263,28 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
     State::Entry entry;
     {
       std::unique_lock<std::mutex> lock(state_->mutex);
-      const auto ready = [&] { return state_->count > 0 || state_->failure; };
+      const auto ready = [&] { return state_->count > 0 || state_->failure || state_->at_end; };
       if (!has_end) {
         state_->changed.wait(lock, ready);
       } else if (!state_->changed.wait_until(lock, deadline, ready)) {
         return NextFrame::kTimeout;
       }
+      if (state_->count == 0 && state_->at_end) return NextFrame::kEnd;
       if (state_->count == 0) throw Error(MAQ_ERROR_DEVICE_LOST, *state_->failure, ".");
       entry = std::move(state_->ring[state_->first]);
       state_->first = (state_->first + 1) % state_->ring.size();
       --state_->count;
     }
-    const CameraFormat& format = entry.format;
-    if (format.jpeg) {
-      if (!state_->jpeg.decode(entry.buffer.data, entry.buffer.size_bytes, frame)) {
-        state_->add_drops(1);  // cut short on its way; the next one follows soon
-        continue;
-      }
-    } else {
-      const uint8_t* data = entry.buffer.data;
-      const uint8_t* second = data + format.stride_bytes * size_t(format.height_px);
-      frame.image = {format.pixels, format.width_px, format.height_px, {{data, format.stride_bytes}, {}}};
-      if (plane_count(format.pixels) == 2) frame.image.planes[1] = {second, format.stride_bytes};
-      frame.lease = std::move(entry.lease);
+    const CameraBuffer& buffer = entry.buffer;
+    if (buffer.jpeg == nullptr) {
+      frame.image = buffer.image;
+    } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, frame)) {
+      state_->add_drops(1);  // cut short on its way; the next one follows soon
+      continue;
     }
-    frame.timestamp_ns = entry.buffer.timestamp_ns;
+    frame.depth = buffer.depth;
+    if (buffer.jpeg == nullptr || buffer.depth.width_px > 0) frame.lease = std::move(entry.lease);
+    frame.timestamp_ns = buffer.timestamp_ns;
     frame.clock = MAQ_CLOCK_MONOTONIC;
     frame.sequence = entry.sequence;
     return NextFrame::kFrame;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "sources/camera.h"
@@ -19,6 +20,7 @@ class LiveSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
   uint64_t drops() const override;
+  const maq_calibration* calibration() const override { return calibration_ ? &*calibration_ : nullptr; }
   // Throws MAQ_ERROR_DEVICE_LOST when the camera was lost and did not come back in time.
   NextFrame next(int64_t timeout_ns, Frame& frame) override;
 
@@ -27,6 +29,7 @@ class LiveSource : public Source {
 
   std::shared_ptr<State> state_;
   SourceInfo info_;
+  std::optional<maq_calibration> calibration_;
 };
 
 }  // namespace maq

@@ -30,7 +30,15 @@ class Source {
   virtual const SourceInfo& info() const = 0;
   // Frames that were lost so far, on their way or because nobody took them.
   virtual uint64_t drops() const { return 0; }
-  // Fills `frame` (pixels, time, sequence) with the next frame, unless it says something else.
+  // Null when the source does not know.
+  virtual const maq_calibration* calibration() const { return nullptr; }
+  // As those of a camera; every other source throws MAQ_ERROR_UNSUPPORTED.
+  virtual maq_control_info control(maq_control which);
+  virtual void set_control(maq_control which, double value);
+  // Throws MAQ_ERROR_UNSUPPORTED where it cannot be done.
+  virtual void seek(int64_t time_ns);
+  // Fills `frame` (pixels, time, sequence) with the next frame, unless it says something else. Pixels may be those that
+  // the frame had before; depth and lease are empty when it is called.
   virtual NextFrame next(int64_t timeout_ns, Frame& frame) = 0;
 };
 

@@ -72,7 +72,7 @@ class V4l2Camera : public Camera {
     negotiate(wish);
     make_buffers(buffers);
     int type = int(type_);
-    if (control(VIDIOC_STREAMON, &type) != 0) fail("does not start", errno);
+    if (call(VIDIOC_STREAMON, &type) != 0) fail("does not start", errno);
     streaming_ = true;
   }
 
@@ -86,7 +86,7 @@ class V4l2Camera : public Camera {
       v4l2_fmtdesc described{};
       described.index = index;
       described.type = type_;
-      if (control(VIDIOC_ENUM_FMT, &described) != 0) break;
+      if (call(VIDIOC_ENUM_FMT, &described) != 0) break;
       list_sizes(described.pixelformat, listing.modes);
     }
   }
@@ -107,7 +107,7 @@ class V4l2Camera : public Camera {
     v4l2_buffer filled{};
     v4l2_plane plane{};
     prepare(filled, plane);
-    if (control(VIDIOC_DQBUF, &filled) != 0) {
+    if (call(VIDIOC_DQBUF, &filled) != 0) {
       const int error = errno;
       if (error == EAGAIN && (fds[0].revents & (POLLERR | POLLHUP | POLLNVAL)) == 0) return Event::kTimeout;
       return lost("VIDIOC_DQBUF", error, reason);
@@ -117,11 +117,20 @@ class V4l2Camera : public Camera {
     }
     const Mapping& mapping = mappings_[filled.index];
     const size_t used = is_planar_ ? plane.bytesused : filled.bytesused;
-    buffer.data = static_cast<const uint8_t*>(mapping.data);
-    buffer.size_bytes = std::min(used, mapping.size_bytes);
+    const auto* data = static_cast<const uint8_t*>(mapping.data);
+    const size_t size_bytes = std::min(used, mapping.size_bytes);
+    if (format_.jpeg) {
+      buffer.jpeg = data;
+      buffer.jpeg_bytes = size_bytes;
+    } else {
+      buffer.image = {format_.pixels, format_.width_px, format_.height_px, {{data, stride_bytes_}, {}}};
+      if (plane_count(format_.pixels) == 2) {
+        buffer.image.planes[1] = {data + stride_bytes_ * size_t(format_.height_px), stride_bytes_};
+      }
+    }
     buffer.slot = int(filled.index);
     buffer.sequence = filled.sequence;
-    buffer.damaged = (filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || (!format_.jpeg && buffer.size_bytes < frame_bytes_);
+    buffer.damaged = (filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || (!format_.jpeg && size_bytes < frame_bytes_);
     const bool is_monotonic = (filled.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
     buffer.timestamp_ns = is_monotonic
                               ? int64_t(filled.timestamp.tv_sec) * 1000000000 + int64_t(filled.timestamp.tv_usec) * 1000
@@ -137,7 +146,7 @@ class V4l2Camera : public Camera {
     prepare(buffer, plane);
     buffer.index = uint32_t(slot);
     // Fails only when the device is gone, which the next wait() reports.
-    control(VIDIOC_QBUF, &buffer);
+    call(VIDIOC_QBUF, &buffer);
   }
 
   void close() override {
@@ -145,7 +154,7 @@ class V4l2Camera : public Camera {
     if (fd_ < 0) return;
     if (streaming_) {
       int type = int(type_);
-      control(VIDIOC_STREAMOFF, &type);
+      call(VIDIOC_STREAMOFF, &type);
       streaming_ = false;
     }
     calls_.close(fd_);
@@ -158,7 +167,7 @@ class V4l2Camera : public Camera {
     size_t size_bytes;
   };
 
-  int control(unsigned long request, void* argument) {
+  int call(unsigned long request, void* argument) {
     int result;
     do {
       result = calls_.ioctl(fd_, request, argument);
@@ -216,7 +225,7 @@ class V4l2Camera : public Camera {
     fd_ = calls_.open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
     if (fd_ < 0) fail("cannot be opened", errno);
     v4l2_capability found{};
-    if (control(VIDIOC_QUERYCAP, &found) != 0) {
+    if (call(VIDIOC_QUERYCAP, &found) != 0) {
       if (errno == ENOTTY || errno == EINVAL) fail("is not a video device", errno);
       fail("does not tell what it can do", errno);
     }
@@ -275,7 +284,7 @@ class V4l2Camera : public Camera {
       v4l2_frmsizeenum size{};
       size.index = index;
       size.pixel_format = fourcc;
-      if (control(VIDIOC_ENUM_FRAMESIZES, &size) != 0) break;
+      if (call(VIDIOC_ENUM_FRAMESIZES, &size) != 0) break;
       const bool is_discrete = size.type == V4L2_FRMSIZE_TYPE_DISCRETE;
       const int width = int(is_discrete ? size.discrete.width : size.stepwise.max_width);
       const int height = int(is_discrete ? size.discrete.height : size.stepwise.max_height);
@@ -294,7 +303,7 @@ class V4l2Camera : public Camera {
       interval.pixel_format = fourcc;
       interval.width = uint32_t(width);
       interval.height = uint32_t(height);
-      if (control(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) break;
+      if (call(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) break;
       const bool is_discrete = interval.type == V4L2_FRMIVAL_TYPE_DISCRETE;
       const v4l2_fract& shortest = is_discrete ? interval.discrete : interval.stepwise.min;
       if (shortest.numerator > 0) best = std::max(best.value_or(0), double(shortest.denominator) / shortest.numerator);
@@ -318,7 +327,7 @@ class V4l2Camera : public Camera {
       v4l2_fmtdesc described{};
       described.index = index;
       described.type = type_;
-      if (control(VIDIOC_ENUM_FMT, &described) != 0) {
+      if (call(VIDIOC_ENUM_FMT, &described) != 0) {
         if (means_lost(errno)) fail("was lost while its formats were read", errno);
         break;
       }
@@ -329,7 +338,7 @@ class V4l2Camera : public Camera {
       const KnownFormat* known = known_format(described.pixelformat);
       if (known == nullptr) continue;
       v4l2_format request = format_request(described.pixelformat, width, height);
-      if (control(VIDIOC_TRY_FMT, &request) != 0) {
+      if (call(VIDIOC_TRY_FMT, &request) != 0) {
         if (means_lost(errno)) fail("was lost while its formats were read", errno);
         continue;
       }
@@ -350,7 +359,7 @@ class V4l2Camera : public Camera {
       return std::tie(a.size_error, a.fps_missing, a.order) < std::tie(b.size_error, b.fps_missing, b.order);
     });
     v4l2_format request = format_request(best.fourcc, width, height);
-    if (control(VIDIOC_S_FMT, &request) != 0) fail("does not take its own format", errno);
+    if (call(VIDIOC_S_FMT, &request) != 0) fail("does not take its own format", errno);
     adopt(answer(request));
     set_rate(wish.fps);
   }
@@ -371,22 +380,21 @@ class V4l2Camera : public Camera {
     format_.height_px = agreed.height;
     if (known->jpeg) return;
     const size_t row = row_bytes(known->pixels, 0, agreed.width);
-    format_.stride_bytes = agreed.stride_bytes == 0 ? row : agreed.stride_bytes;
+    stride_bytes_ = agreed.stride_bytes == 0 ? row : agreed.stride_bytes;
     const size_t rows = size_t(agreed.height) + (known->pixels == MAQ_PIXEL_NV12 ? size_t(agreed.height + 1) / 2 : 0);
-    frame_bytes_ = format_.stride_bytes * rows;
-    if (format_.stride_bytes < row || format_.stride_bytes > 16 * row) {
-      fail(concatenate("answered with lines of ", format_.stride_bytes, " bytes for ", agreed.width, " pixels"),
-           EINVAL);
+    frame_bytes_ = stride_bytes_ * rows;
+    if (stride_bytes_ < row || stride_bytes_ > 16 * row) {
+      fail(concatenate("answered with lines of ", stride_bytes_, " bytes for ", agreed.width, " pixels"), EINVAL);
     }
   }
 
   void set_rate(double fps) {
     v4l2_streamparm parameters{};
     parameters.type = type_;
-    if (control(VIDIOC_G_PARM, &parameters) != 0) return;  // not every device has a rate
+    if (call(VIDIOC_G_PARM, &parameters) != 0) return;  // not every device has a rate
     if (fps > 0) {
       parameters.parm.capture.timeperframe = {1000, uint32_t(std::lround(fps * 1000))};
-      if (control(VIDIOC_S_PARM, &parameters) != 0) return;
+      if (call(VIDIOC_S_PARM, &parameters) != 0) return;
     }
     const v4l2_fract& period = parameters.parm.capture.timeperframe;
     if (period.numerator > 0) format_.fps = double(period.denominator) / period.numerator;
@@ -406,7 +414,7 @@ class V4l2Camera : public Camera {
     request.count = uint32_t(count);
     request.type = type_;
     request.memory = V4L2_MEMORY_MMAP;
-    if (control(VIDIOC_REQBUFS, &request) != 0) fail("gives no buffers", errno);
+    if (call(VIDIOC_REQBUFS, &request) != 0) fail("gives no buffers", errno);
     if (request.count < 2 || request.count > 256) {
       fail(concatenate("gives ", request.count, " buffers, of which at least 2 are needed"), EINVAL);
     }
@@ -415,7 +423,7 @@ class V4l2Camera : public Camera {
       v4l2_plane plane{};
       prepare(buffer, plane);
       buffer.index = index;
-      if (control(VIDIOC_QUERYBUF, &buffer) != 0) fail("does not describe its buffers", errno);
+      if (call(VIDIOC_QUERYBUF, &buffer) != 0) fail("does not describe its buffers", errno);
       const size_t size = is_planar_ ? plane.length : buffer.length;
       if (size < frame_bytes_ || size == 0) {
         fail(concatenate("has buffers of ", size, " bytes for images of ", frame_bytes_), EINVAL);
@@ -423,7 +431,7 @@ class V4l2Camera : public Camera {
       void* data = calls_.mmap(size, fd_, off_t(is_planar_ ? plane.m.mem_offset : buffer.m.offset));
       if (data == MAP_FAILED) fail("does not map its buffers into memory", errno);
       mappings_.push_back({data, size});
-      if (control(VIDIOC_QBUF, &buffer) != 0) fail("takes no buffers", errno);
+      if (call(VIDIOC_QBUF, &buffer) != 0) fail("takes no buffers", errno);
     }
   }
 
@@ -434,7 +442,8 @@ class V4l2Camera : public Camera {
   bool is_planar_ = false;
   CameraFormat format_;
   std::string name_, bus_, identity_;
-  size_t frame_bytes_ = 0;
+  size_t frame_bytes_ = 0;   // of pixels as they come
+  size_t stride_bytes_ = 0;  // of both planes
   std::vector<Mapping> mappings_;
   std::mutex mutex_;  // of fd_ and streaming_ between wait's thread and those who give frames back
   bool streaming_ = false;

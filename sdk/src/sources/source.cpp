@@ -1,0 +1,24 @@
+#include "sources/source.h"
+
+#include "core/error.h"
+
+namespace maq {
+namespace {
+
+[[noreturn]] void refuse_control(maq_control which) {
+  throw Error(MAQ_ERROR_UNSUPPORTED, "The source has no control ", int(which), " (maq_control).");
+}
+
+}  // namespace
+
+// What a camera or another source can do unless it says otherwise: nothing.
+maq_control_info Camera::control(maq_control which) { refuse_control(which); }
+void Camera::set_control(maq_control which, double) { refuse_control(which); }
+maq_control_info Source::control(maq_control which) { refuse_control(which); }
+void Source::set_control(maq_control which, double) { refuse_control(which); }
+
+void Source::seek(int64_t) {
+  throw Error(MAQ_ERROR_UNSUPPORTED, "This source cannot go to a time; recordings and stubs can.");
+}
+
+}  // namespace maq

@@ -80,7 +80,7 @@ TEST(ApiFrames, WrongDescriptionsAreStatusesOfTheContext) {
   EXPECT_EQ(status_of([](auto& desc) { desc.stride_bytes[0] = 29; }), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(status_of([](auto& desc) { desc.width_px = 20000; }), MAQ_ERROR_IMAGE_SIZE);
   EXPECT_EQ(status_of([](auto& desc) { desc.height_px = -1; }), MAQ_ERROR_IMAGE_SIZE);
-  EXPECT_EQ(status_of([](auto& desc) { desc.format = maq_pixel_format(99); }), MAQ_ERROR_UNSUPPORTED);
+  EXPECT_EQ(status_of([](auto& desc) { desc.format = maq_pixel_format(0); }), MAQ_ERROR_UNSUPPORTED);
   EXPECT_EQ(status_of([](auto& desc) { desc.clock = maq_clock(3); }), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(status_of([](auto& desc) { desc.struct_size = 0; }), MAQ_ERROR_INVALID_ARGUMENT);
 }

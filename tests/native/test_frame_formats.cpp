@@ -124,8 +124,8 @@ TEST(FrameFormats, DescriptionsAreCheckedPlaneByPlane) {
   EXPECT_EQ(maq::checked_image_view(desc).planes[1].stride_bytes, 6u) << "colour of an odd width is rounded up";
   desc.stride_bytes[1] = 5;
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[1] is 5", [&] { maq::checked_image_view(desc); });
-  desc.format = maq_pixel_format(99);
-  expect_error(MAQ_ERROR_UNSUPPORTED, "Pixel format 99", [&] { maq::checked_image_view(desc); });
+  desc.format = maq_pixel_format(0);
+  expect_error(MAQ_ERROR_UNSUPPORTED, "Pixel format 0", [&] { maq::checked_image_view(desc); });
 }
 
 }  // namespace

@@ -1,13 +1,14 @@
 #include "core/frame.h"
 
+#include <cstring>
+
 #include "core/error.h"
 
 namespace maq {
 
-uint8_t* Frame::allocate_bgr(int width_px, int height_px) {
-  const size_t stride_bytes = size_t(width_px) * 3;
-  storage.resize(stride_bytes * size_t(height_px));
-  image = ImageView{MAQ_PIXEL_BGR8, width_px, height_px, {{storage.data(), stride_bytes}, {}}};
+uint8_t* Frame::allocate(maq_pixel_format format, int width_px, int height_px) {
+  storage.resize(packed_bytes(format, width_px, height_px));
+  image = packed_view(format, width_px, height_px, storage.data());
   return storage.data();
 }
 
@@ -42,6 +43,36 @@ size_t row_bytes(maq_pixel_format format, int plane, int width_px) {
 
 int plane_rows(maq_pixel_format format, int plane, int height_px) {
   return format == MAQ_PIXEL_NV12 && plane == 1 ? (height_px + 1) / 2 : height_px;
+}
+
+size_t packed_bytes(maq_pixel_format format, int width_px, int height_px) {
+  size_t bytes = 0;
+  for (int plane = 0; plane < plane_count(format); ++plane) {
+    bytes += row_bytes(format, plane, width_px) * size_t(plane_rows(format, plane, height_px));
+  }
+  return bytes;
+}
+
+ImageView packed_view(maq_pixel_format format, int width_px, int height_px, const uint8_t* pixels) {
+  ImageView view{format, width_px, height_px, {}};
+  for (int plane = 0; plane < plane_count(format); ++plane) {
+    const size_t row = row_bytes(format, plane, width_px);
+    view.planes[plane] = {pixels, row};
+    pixels += row * size_t(plane_rows(format, plane, height_px));
+  }
+  return view;
+}
+
+void copy_packed(const ImageView& image, uint8_t* pixels) {
+  for (int plane = 0; plane < plane_count(image.format); ++plane) {
+    const size_t row = row_bytes(image.format, plane, image.width_px);
+    const uint8_t* from = image.planes[plane].data;
+    for (int y = 0; y < plane_rows(image.format, plane, image.height_px); ++y) {
+      std::memcpy(pixels, from, row);
+      pixels += row;
+      from += image.planes[plane].stride_bytes;
+    }
+  }
 }
 
 void check_image_size(int64_t width_px, int64_t height_px, const std::string& what) {

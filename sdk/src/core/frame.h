@@ -74,8 +74,9 @@ struct Frame {
   // Of pixels that are a camera's; empty for those in memory of the frame, or of an app.
   PixelLease lease;
 
-  // Makes `storage` hold one BGR image of that size without row padding and points `image` at it.
-  uint8_t* allocate_bgr(int width_px, int height_px);
+  // Makes `storage` hold one image of that size without row padding and points `image` at it.
+  uint8_t* allocate(maq_pixel_format format, int width_px, int height_px);
+  uint8_t* allocate_bgr(int width_px, int height_px) { return allocate(MAQ_PIXEL_BGR8, width_px, height_px); }
 };
 
 const char* pixel_format_name(maq_pixel_format format);
@@ -83,6 +84,11 @@ int plane_count(maq_pixel_format format);
 // Bytes of pixels in a row of plane `plane`, without padding.
 size_t row_bytes(maq_pixel_format format, int plane, int width_px);
 int plane_rows(maq_pixel_format format, int plane, int height_px);
+
+// Of an image whose rows follow one another without padding, and so do its planes.
+size_t packed_bytes(maq_pixel_format format, int width_px, int height_px);
+ImageView packed_view(maq_pixel_format format, int width_px, int height_px, const uint8_t* pixels);
+void copy_packed(const ImageView& image, uint8_t* pixels);
 
 // Throws MAQ_ERROR_IMAGE_SIZE unless 1 <= side <= MAQ_MAX_SIDE_PX and the area is at most MAQ_MAX_PIXELS.
 // `what` begins the sentence: "photo.jpg" or "The frame".

@@ -54,6 +54,8 @@ class Camera : public FrameOwner {
   // out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
   virtual maq_control_info control(maq_control which);
   virtual void set_control(maq_control which, double value);
+  // From any thread, of what plays a camera: the next frame is the first at that time or later.
+  virtual void seek(int64_t time_ns);
   // Waits until a buffer is filled, `timeout_ms` are over, `wake_fd` can be read, the device is gone (`reason` says how),
   // or what plays a camera has no more frames. Only one thread at a time.
   virtual Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) = 0;

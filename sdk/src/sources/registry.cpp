@@ -1,5 +1,8 @@
 #include "core/error.h"
+#include "sources/faults.h"
 #include "sources/file_sources.h"
+#include "sources/live_source.h"
+#include "sources/played_camera.h"
 #include "sources/source.h"
 #include "sources/stub_sources.h"
 #include "sources/uri.h"
@@ -9,29 +12,53 @@
 namespace maq {
 namespace {
 
+// Of one kind of sources: either opens one, or makes what opens its cameras.
 struct Entry {
   SourceScheme scheme;
-  std::unique_ptr<Source> (*open)(SourceUri uri, const SourceSettings& settings);
+  std::unique_ptr<Source> (*open)(SourceUri uri);
+  CameraOpener (*camera)(SourceUri uri, int buffers);
 };
-
-// Files and stubs need none.
-template <std::unique_ptr<Source> (*open)(SourceUri uri)>
-std::unique_ptr<Source> without_settings(SourceUri uri, const SourceSettings&) {
-  return open(std::move(uri));
-}
 
 const Entry kEntries[] = {
-    {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"},
-     &without_settings<open_image_source>},
-    {{"video", "video:clip.mp4", "a video file, frame by frame; ?fps=10 thins it out"},
-     &without_settings<open_video_source>},
+    {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"}, open_image_source, nullptr},
+    {{"video", "video:clip.mp4", "a video file, frame by frame; ?fps=10 thins it out"}, open_video_source, nullptr},
     {{"stub", "stub:people?count=2&fps=30&seed=7",
       "frames without a camera: people (rendered people who walk; count, seed, frames) or pattern (colour bars)"},
-     &without_settings<open_stub_source>},
+     open_stub_source,
+     nullptr},
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
       "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
-     &open_v4l2_source},
+     nullptr,
+     v4l2_camera_opener},
 };
+
+// Of a source that is played as if it were a camera.
+CameraOpener played(const Entry& entry, SourceUri uri, int buffers) {
+  PlayOptions play;
+  play.buffers = buffers;
+  play.speed = uri.take_number("speed", 1, 0.01, 100);
+  play.loop = uri.take_integer("loop", 0, 0, 1) == 1;
+  std::string name = uri.scheme + ":" + uri.target;
+  return played_as_camera([&entry, uri = std::move(uri)] { return entry.open(uri); }, std::move(name), play);
+}
+
+std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
+  const FaultPlan faults = take_faults(uri);
+  const bool is_camera = entry.camera != nullptr;
+  // Faults happen in time, so that a file or a stub with faults runs as a camera does.
+  if (!is_camera && uri.take_integer("live", faults.is_empty() ? 0 : 1, 0, 1) == 0) {
+    if (!faults.is_empty()) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "live=0 in ", uri.text, " does not go with ", kFaultOptions, ".");
+    }
+    return entry.open(std::move(uri));
+  }
+  const std::string name = is_camera ? uri.target : uri.scheme + ":" + uri.target;
+  // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
+  const int buffers = settings.pool_size + settings.queue_length + 2;
+  CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers) : played(entry, std::move(uri), buffers);
+  if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
+  return std::make_unique<LiveSource>(std::move(opener), name, settings);
+}
 
 }  // namespace
 
@@ -54,7 +81,7 @@ std::unique_ptr<Source> open_source(const std::string& text, const SourceSetting
         throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
                     entry.scheme.example, ".");
       }
-      return entry.open(std::move(uri), settings);
+      return open_entry(entry, std::move(uri), settings);
     }
   }
   std::string known;

@@ -9,16 +9,18 @@ namespace {
   throw Error(MAQ_ERROR_UNSUPPORTED, "The source has no control ", int(which), " (maq_control).");
 }
 
+[[noreturn]] void refuse_to_seek() {
+  throw Error(MAQ_ERROR_UNSUPPORTED, "This source cannot go to a time; recordings and stubs can.");
+}
+
 }  // namespace
 
 // What a camera or another source can do unless it says otherwise: nothing.
 maq_control_info Camera::control(maq_control which) { refuse_control(which); }
 void Camera::set_control(maq_control which, double) { refuse_control(which); }
+void Camera::seek(int64_t) { refuse_to_seek(); }
 maq_control_info Source::control(maq_control which) { refuse_control(which); }
 void Source::set_control(maq_control which, double) { refuse_control(which); }
-
-void Source::seek(int64_t) {
-  throw Error(MAQ_ERROR_UNSUPPORTED, "This source cannot go to a time; recordings and stubs can.");
-}
+void Source::seek(int64_t) { refuse_to_seek(); }
 
 }  // namespace maq

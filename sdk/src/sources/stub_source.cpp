@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -50,6 +51,11 @@ class StubSource : public Source {
   }
 
   const SourceInfo& info() const override { return info_; }
+
+  void seek(int64_t time_ns) override {
+    const double index = std::ceil(double(time_ns) / 1e9 * info_.fps - 1e-6);
+    index_ = int64_t(std::min(index, double(info_.frame_count < 0 ? kMostFrames : info_.frame_count)));
+  }
 
   NextFrame next(int64_t, Frame& frame) override {
     if (index_ == info_.frame_count) return NextFrame::kEnd;

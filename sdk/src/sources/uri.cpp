@@ -39,26 +39,18 @@ bool read_integer(const std::string& text, int64_t* value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// Independent of the process's locale, which may want a comma.
-std::optional<double> as_number(const std::string& text) {
-  std::istringstream in(text);
-  in.imbue(std::locale::classic());
-  double value = 0;
-  if (text.empty() || !(in >> value) || !in.eof() || !std::isfinite(value)) return {};
-  return value;
-}
-
 void read_options(const std::string& query, SourceUri& uri) {
   size_t begin = 0;
   while (begin <= query.size()) {
     const size_t end = std::min(query.find('&', begin), query.size());
     const std::string pair = query.substr(begin, end - begin);
-    const size_t equals = pair.find('=');
+    const size_t equals = pair.find_first_of("=@");
     if (equals == 0 || equals == std::string::npos) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Option \"", pair, "\" of ", uri.text, " is not key=value.");
     }
     const std::string key = percent_decoded(pair.substr(0, equals));
-    if (!uri.options.emplace(key, percent_decoded(pair.substr(equals + 1))).second) {
+    const std::string value = pair.substr(pair[equals] == '=' ? equals + 1 : equals);  // unplug@5s: the value is "@5s"
+    if (!uri.options.emplace(key, percent_decoded(value)).second) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Option ", key, " is given twice in ", uri.text, ".");
     }
     begin = end + 1;
@@ -83,6 +75,14 @@ void take_size(SourceUri& uri) {
 }
 
 }  // namespace
+
+std::optional<double> as_number(const std::string& text) {
+  std::istringstream in(text);
+  in.imbue(std::locale::classic());
+  double value = 0;
+  if (text.empty() || !(in >> value) || !in.eof() || !std::isfinite(value)) return {};
+  return value;
+}
 
 std::optional<std::string> SourceUri::take(const std::string& key) {
   const auto found = options.find(key);

@@ -1,14 +1,12 @@
-// v4l2: as a source.
+// v4l2: URIs.
 #pragma once
 
-#include <memory>
-
-#include "sources/source.h"
+#include "sources/camera.h"
 #include "sources/uri.h"
 
 namespace maq {
 
-// "v4l2:/dev/video0", with size and fps as wishes. Throws what open_v4l2_camera throws.
-std::unique_ptr<Source> open_v4l2_source(SourceUri uri, const SourceSettings& settings);
+// For "v4l2:/dev/video0", with size, fps and format as wishes. Throws for options that are none.
+CameraOpener v4l2_camera_opener(SourceUri uri, int buffers);
 
 }  // namespace maq

@@ -282,8 +282,10 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
       state_->add_drops(1);  // cut short on its way; the next one follows soon
       continue;
     }
+    frame.jpeg = buffer.jpeg;
+    frame.jpeg_bytes = buffer.jpeg_bytes;
     frame.depth = buffer.depth;
-    if (buffer.jpeg == nullptr || buffer.depth.width_px > 0) frame.lease = std::move(entry.lease);
+    frame.lease = std::move(entry.lease);
     frame.timestamp_ns = buffer.timestamp_ns;
     frame.clock = MAQ_CLOCK_MONOTONIC;
     frame.sequence = entry.sequence;

@@ -39,7 +39,7 @@ class Reel {
 
   // Reads the next frame; nothing at the end.
   std::optional<Next> read(Frame& frame) {
-    frame.depth.width_px = 0;
+    frame.clear();
     bool damaged = false;
     for (bool again = false;; again = true) {
       try {

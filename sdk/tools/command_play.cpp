@@ -44,7 +44,7 @@ int play(const Options& options) {
     if (uri.find("live=") == std::string::npos) uri = with_option(uri, "live", "1");
     if (options.speed != 1) uri = with_option(uri, "speed", std::to_string(options.speed));
   }
-  PlayStatistics statistics;
+  PlayStatistics statistics(options.frames);
   const maquette::Context context;
   maq_source_config config = maquette::default_source_config();
   config.state_callback = PlayStatistics::note_state;
@@ -55,8 +55,8 @@ int play(const Options& options) {
   const bool shows = options.picture.value_or(terminal_shows_pictures());
   TerminalPicture picture;
   std::string failure;
-  int64_t first_ns = -1;
-  while (!interrupted() && (options.frames == 0 || statistics.frames() < options.frames)) {
+  const int64_t end_ns = options.seconds > 0 ? monotonic_ns() + int64_t(options.seconds * 1e9) : INT64_MAX;
+  while (!interrupted() && monotonic_ns() < end_ns && (options.frames == 0 || statistics.frames() < options.frames)) {
     constexpr int64_t kPatienceNs = 250000000;  // how soon Ctrl-C is heard while no frame comes
     maq_frame* taken = nullptr;
     const maq_status status = maq_source_acquire_frame(source.get(), kPatienceNs, &taken);
@@ -68,12 +68,11 @@ int play(const Options& options) {
     }
     const maquette::Frame frame(taken);
     const maq_frame_desc desc = frame.desc();
-    if (first_ns < 0) first_ns = desc.timestamp_ns;
-    if (options.seconds > 0 && double(desc.timestamp_ns - first_ns) >= options.seconds * 1e9) break;
     statistics.add(desc);
     if (shows) picture.show(frame, statistics.line(source.info().drops));
   }
   const maq_source_info info = source.info();
+  statistics.close(std::move(source));
   statistics.print(info);
   if (!options.json.empty()) {
     const std::string text = statistics.report(info).dump(1) + "\n";
@@ -94,8 +93,7 @@ void add_play_command(CLI::App& app, int* exit_code) {
   command->add_option("--from", options->from_s, "Begin so many seconds after the start of a recording")
       ->check(CLI::NonNegativeNumber);
   command->add_option("-n,--frames", options->frames, "End after so many frames")->check(CLI::PositiveNumber);
-  command->add_option("-t,--seconds", options->seconds, "End after so much time of the source")
-      ->check(CLI::PositiveNumber);
+  command->add_option("-t,--seconds", options->seconds, "End after so much time")->check(CLI::PositiveNumber);
   command->add_flag_callback(
       "--no-picture", [=] { options->picture = false; }, "Only figures; so it is where no terminal is");
   command->add_option("--json", options->json, "Write the figures to this file");

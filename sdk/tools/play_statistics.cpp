@@ -36,7 +36,13 @@ int64_t monotonic_ns() {
   return int64_t(now.tv_sec) * 1000000000 + now.tv_nsec;
 }
 
-PlayStatistics::PlayStatistics() : begin_ns_(monotonic_ns()), processor_s_(own_processor_seconds()) {}
+PlayStatistics::PlayStatistics(int64_t expected_frames)
+    : begin_ns_(monotonic_ns()), processor_s_(own_processor_seconds()) {
+  const size_t room = size_t(std::min<int64_t>(expected_frames, 1 << 20));
+  timestamps_ns_.reserve(room);
+  ages_ms_.reserve(room);
+  arrivals_s_.reserve(room);
+}
 
 void PlayStatistics::note_state(void* self, maq_source_state state, const char* reason) {
   auto* statistics = static_cast<PlayStatistics*>(self);
@@ -73,6 +79,12 @@ std::string PlayStatistics::line(uint64_t drops) const {
   return text;
 }
 
+void PlayStatistics::close(maquette::Source source) {
+  const int64_t before_ns = monotonic_ns();
+  { const maquette::Source closed = std::move(source); }
+  close_ms_ = double(monotonic_ns() - before_ns) / 1e6;
+}
+
 nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const {
   std::vector<double> intervals_ms;
   int64_t backwards = 0;
@@ -93,7 +105,9 @@ nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const
       {"missing_numbers", frames() == 0 ? 0 : int64_t(last_sequence_ - first_sequence_) + 1 - frames()},
       {"times_not_later", backwards},
       {"interval_ms", {{"median", quantile(intervals_ms, .5)}, {"p99", quantile(intervals_ms, .99)}}},
+      {"begin_monotonic_s", double(begin_ns_) / 1e9},
       {"wall_seconds", wall_s},
+      {"close_ms", close_ms_},
       {"processor_share", (own_processor_seconds() - processor_s_) / wall_s},
       {"events", nlohmann::ordered_json::array()},
   };

@@ -11,7 +11,8 @@ int64_t monotonic_ns();
 
 class PlayStatistics {
  public:
-  PlayStatistics();
+  // Has room for so many frames, so that counting them takes nothing from the heap.
+  explicit PlayStatistics(int64_t expected_frames);
 
   // As the source's state_callback, with the statistics as its user_data.
   static void note_state(void* self, maq_source_state state, const char* reason);
@@ -23,7 +24,9 @@ class PlayStatistics {
   double rate_now() const;
   // "frame 120  4.0 s  30.0 a second  0 lost", for a line that changes.
   std::string line(uint64_t drops) const;
-  // Everything, at the end. `drops` is the source's.
+  // Closes the source, and says how long that took.
+  void close(maquette::Source source);
+  // Everything, at the end; `info` is what the source said last.
   nlohmann::ordered_json report(const maq_source_info& info) const;
   void print(const maq_source_info& info) const;
 
@@ -37,6 +40,7 @@ class PlayStatistics {
 
   int64_t begin_ns_;
   double processor_s_;
+  double close_ms_ = 0;
   std::vector<int64_t> timestamps_ns_;
   std::vector<float> ages_ms_;  // of frames with times of the monotonic clock
   std::vector<double> arrivals_s_;

@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kReconnectPause(100);
-constexpr milliseconds kStopPatience(50);
+constexpr milliseconds kStopPatience(40);  // of the 50 ms that closing may take
 constexpr int kLongestWaitMs = 200;  // whether the camera stalls is looked at between two waits
 
 }  // namespace

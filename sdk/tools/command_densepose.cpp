@@ -14,6 +14,7 @@
 #include "model_options.h"
 #include "overlay.h"
 #include "overlay_clip.h"
+#include "program.h"
 #include "progress_bar.h"
 #include "result_files.h"
 #include "source_argument.h"
@@ -170,7 +171,7 @@ std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts)
 int run_densepose(const Options& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
   const std::string bundle = bundle_of(options.model);
-  const maquette::Context context;
+  const maquette::Context context = open_context();
   maquette::DensePose densepose(context, config_of(options.model, bundle));
 
   catch_interrupts();

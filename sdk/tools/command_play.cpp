@@ -8,6 +8,7 @@
 #include "interrupt.h"
 #include "output_file.h"
 #include "play_statistics.h"
+#include "program.h"
 #include "source_argument.h"
 #include "terminal_picture.h"
 
@@ -45,7 +46,7 @@ int play(const Options& options) {
     if (options.speed != 1) uri = with_option(uri, "speed", std::to_string(options.speed));
   }
   PlayStatistics statistics(options.frames);
-  const maquette::Context context;
+  const maquette::Context context = open_context();
   maq_source_config config = maquette::default_source_config();
   config.state_callback = PlayStatistics::note_state;
   config.user_data = &statistics;

@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "interrupt.h"
+#include "program.h"
 #include "progress_bar.h"
 #include "source_argument.h"
 
@@ -26,7 +27,7 @@ constexpr uint32_t kWaitingFrames = 30;
 
 int record(const Options& options) {
   catch_interrupts();
-  const maquette::Context context;
+  const maquette::Context context = open_context();
   maq_source_config config = maquette::default_source_config();
   config.queue_length = kWaitingFrames;
   const SourceArgument argument = parse_source_argument(options.source);

@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "sources/depthai_source.h"
 #include "sources/file_sources.h"
 #include "sources/source.h"
 #include "sources/stub_sources.h"
@@ -12,6 +13,7 @@ namespace {
 struct Entry {
   SourceScheme scheme;
   std::unique_ptr<Source> (*open)(SourceUri uri, const SourceSettings& settings);
+  bool needs_target = true;  // otherwise nothing after the scheme means the first there is
 };
 
 // Files and stubs need none.
@@ -31,6 +33,10 @@ const Entry kEntries[] = {
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
       "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
      &open_v4l2_source},
+    {{"depthai", "depthai:?size=640x480&fps=30",
+      "an OAK camera with depth, the first or depthai:<id or IP>; ?depth=0 for colour alone"},
+     &open_depthai_source,
+     false},
 };
 
 }  // namespace
@@ -44,13 +50,17 @@ const std::vector<SourceScheme>& source_schemes() {
   return schemes;
 }
 
-std::vector<CameraListing> list_cameras() { return list_v4l2_cameras(SystemCalls::real()); }
+std::vector<CameraListing> list_cameras() {
+  std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
+  for (CameraListing& listing : list_depthai_sources()) all.push_back(std::move(listing));
+  return all;
+}
 
 std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {
   SourceUri uri = parse_source_uri(text);
   for (const Entry& entry : kEntries) {
     if (uri.scheme == entry.scheme.name) {
-      if (uri.target.empty()) {
+      if (entry.needs_target && uri.target.empty()) {
         throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
                     entry.scheme.example, ".");
       }

@@ -16,7 +16,9 @@ namespace {
 std::string library_path() { return own_folder() + "maquette/libmaquette_depthai.so"; }
 
 DepthAiDriver* open_library() {
-  // Newer versions of the vendor's library report usage over the network unless they are told not to, before they load.
+  // Unless it is told not to before it loads, the vendor's library prints, and newer versions of it report usage over
+  // the network.
+  setenv("DEPTHAI_LEVEL", "off", 0);
   setenv("DEPTHAI_TELEMETRY", "0", 0);
   const std::string path = library_path();
   // Never closed again: threads of the vendor's library may still run.

@@ -113,8 +113,15 @@ class FakeDepthAi : public maq::DepthAiDriver {
     std::lock_guard<std::mutex> lock(mutex_);
     return opened_device_;
   }
-  int opened() const { return opened_; }
-  int sessions() const { return sessions_; }    // that are not closed
+  // Under the lock, so that whoever sees a session closed may destroy this.
+  int opened() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return opened_;
+  }
+  int sessions() const {  // that are not closed
+    std::lock_guard<std::mutex> lock(mutex_);
+    return sessions_;
+  }
   int frames_alive() const { return *alive_; }  // that somebody keeps
   bool is_listened_to() { return receiver() != nullptr; }
 
@@ -223,6 +230,6 @@ class FakeDepthAi : public maq::DepthAiDriver {
   std::shared_ptr<maq::DepthAiReceiver> receiver_;
   std::vector<std::string> commands_;
   std::string opened_device_;
-  std::atomic<int> opened_{0}, sessions_{0};
+  int opened_ = 0, sessions_ = 0;
   std::shared_ptr<std::atomic<int>> alive_ = std::make_shared<std::atomic<int>>(0);
 };

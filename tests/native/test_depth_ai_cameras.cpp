@@ -545,6 +545,10 @@ TEST_F(DepthAiCameras, ClosingDoesNotWaitForACallThatHangs) {
   const auto before = std::chrono::steady_clock::now();
   live.reset();
   EXPECT_LT(std::chrono::steady_clock::now() - before, 500ms);
+  const int opened = fake_.opened();
+  hang.unlock();
+  for (int i = 0; i < 500 && fake_.opened() == opened; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(fake_.opened(), opened + 1) << "it was opening, and is closed when it answers";
 }
 
 TEST_F(DepthAiCameras, FramesThatComeAfterTheCloseAreDropped) {

@@ -123,7 +123,11 @@ class FakeDepthAi : public maq::DepthAiDriver {
     return sessions_;
   }
   int frames_alive() const { return *alive_; }  // that somebody keeps
-  bool is_listened_to() { return receiver() != nullptr; }
+  // Null when nobody listens.
+  std::shared_ptr<maq::DepthAiReceiver> receiver() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return receiver_;
+  }
 
  private:
   class Session : public maq::DepthAiSession {
@@ -198,11 +202,6 @@ class FakeDepthAi : public maq::DepthAiDriver {
       case Fault::kError: throw maq::Error(MAQ_ERROR_BUSY, fault_text);
       case Fault::kInt: throw 5;
     }
-  }
-
-  std::shared_ptr<maq::DepthAiReceiver> receiver() {
-    std::lock_guard<std::mutex> lock(mutex_);
-    return receiver_;
   }
 
   maq::DepthAiFrame filled(std::vector<uint8_t> bytes, size_t stride_bytes) {

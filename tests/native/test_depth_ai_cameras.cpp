@@ -207,6 +207,7 @@ TEST_F(DepthAiCameras, DepthThatIsLateIsWaitedForAndThenDoneWithout) {
   EXPECT_EQ(picture.depth_mm, -1);
   EXPECT_GT(waited, 60ms);
   EXPECT_LT(waited, 1s);
+  EXPECT_EQ(fake_.frames_alive(), 0) << "what is given back is freed";
   fake_.send_depth(fake_.depth(1, 1));
   EXPECT_EQ(take_and_return(*opened, 50).event, Camera::Event::kTimeout) << "too late: the picture is gone";
 }
@@ -356,11 +357,14 @@ TEST_F(DepthAiCameras, WhoHoldsEveryBufferGetsTheNewestFramesLater) {
   EXPECT_EQ(take(*opened, 30).event, Camera::Event::kTimeout);
   EXPECT_LT(fake_.frames_alive(), 20) << "old ones make room";
   for (int i = 0; i < 3; ++i) EXPECT_EQ(held[size_t(i)].value, i);
-  std::thread([&] {
+  std::thread giver([&] {
     std::this_thread::sleep_for(50ms);
     opened->give_back(held[1].buffer.slot);
-  }).join();
-  const Picture next = take_and_return(*opened);
+  });
+  const auto before = std::chrono::steady_clock::now();
+  const Picture next = take_and_return(*opened, 10000);
+  EXPECT_LT(std::chrono::steady_clock::now() - before, 5s) << "a buffer that comes back ends the wait";
+  giver.join();
   EXPECT_GT(next.value, 90);
   EXPECT_EQ(next.buffer.slot, held[1].buffer.slot);
   EXPECT_EQ(next.buffer.sequence, uint32_t(next.value)) << "the gap counts what was lost";
@@ -553,15 +557,16 @@ TEST_F(DepthAiCameras, ClosingDoesNotWaitForACallThatHangs) {
 
 TEST_F(DepthAiCameras, FramesThatComeAfterTheCloseAreDropped) {
   const auto opened = camera();
-  const maq::DepthAiFrame late = fake_.colour(1, 1);
-  std::shared_ptr<Camera> held = camera();  // the newest session gets the frames
+  const std::shared_ptr<maq::DepthAiReceiver> late = fake_.receiver();  // of a thread that was about to call
   fake_.send_colour(fake_.colour(1, 1));
-  held->close();
-  EXPECT_FALSE(fake_.send_colour(late));
-  EXPECT_EQ(fake_.frames_alive(), 1) << "what waited is forgotten";
+  opened->close();
+  EXPECT_EQ(fake_.frames_alive(), 0) << "what waited is forgotten";
+  late->receive_colour(fake_.colour(1, 2));
+  late->receive_depth(fake_.depth(1, 2));
+  EXPECT_EQ(fake_.frames_alive(), 0);
   std::string reason;
   maq::CameraBuffer buffer;
-  EXPECT_EQ(held->wait(-1, 10, buffer, reason), Camera::Event::kLost);
+  EXPECT_EQ(opened->wait(-1, 10, buffer, reason), Camera::Event::kLost);
   EXPECT_EQ(reason, "it is closed");
 }
 

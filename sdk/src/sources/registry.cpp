@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "sources/depthai_source.h"
 #include "sources/faults.h"
 #include "sources/file_sources.h"
 #include "sources/live_source.h"
@@ -21,7 +22,8 @@ std::unique_ptr<Source> without_log(SourceUri uri, const Log&) {
 struct Entry {
   SourceScheme scheme;
   std::unique_ptr<Source> (*open)(SourceUri uri, const Log& log);
-  CameraOpener (*camera)(SourceUri uri, int buffers);
+  CameraOpener (*camera)(SourceUri uri, int buffers, const Log& log);
+  bool needs_target = true;  // otherwise nothing after the scheme means the first there is
 };
 
 const Entry kEntries[] = {
@@ -42,6 +44,11 @@ const Entry kEntries[] = {
       "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
      nullptr,
      v4l2_camera_opener},
+    {{"depthai", "depthai:?size=640x480&fps=30",
+      "an OAK camera with depth, the first or depthai:<id or IP>; ?depth=0 for colour alone"},
+     nullptr,
+     depthai_camera_opener,
+     false},
 };
 
 // Of a source that is played as if it were a camera.
@@ -64,11 +71,12 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
     }
     return entry.open(std::move(uri), settings.log);
   }
-  const std::string name = is_camera ? uri.target : uri.scheme + ":" + uri.target;
+  const bool is_path = is_camera && uri.target.rfind("/", 0) == 0;
+  const std::string name = is_path ? uri.target : uri.scheme + ":" + uri.target;
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
-  CameraOpener opener =
-      is_camera ? entry.camera(std::move(uri), buffers) : played(entry, std::move(uri), settings.log, buffers);
+  CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers, settings.log)
+                                  : played(entry, std::move(uri), settings.log, buffers);
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
   return std::make_unique<LiveSource>(std::move(opener), name, settings);
 }
@@ -87,13 +95,17 @@ const std::vector<SourceScheme>& source_schemes() {
   return schemes;
 }
 
-std::vector<CameraListing> list_cameras() { return list_v4l2_cameras(SystemCalls::real()); }
+std::vector<CameraListing> list_cameras() {
+  std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
+  for (CameraListing& listing : list_depthai_sources()) all.push_back(std::move(listing));
+  return all;
+}
 
 std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {
   SourceUri uri = parse_source_uri(text);
   for (const Entry& entry : kEntries) {
     if (uri.scheme == entry.scheme.name) {
-      if (uri.target.empty()) {
+      if (entry.needs_target && uri.target.empty()) {
         throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
                     entry.scheme.example, ".");
       }

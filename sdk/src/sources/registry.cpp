@@ -29,7 +29,7 @@ const Entry kEntries[] = {
       "frames without a camera: people (rendered people who walk; count, seed, frames) or pattern (colour bars)"},
      &without_settings<open_stub_source>},
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
-      "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
+      "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG&exposure=10000 (microseconds)"},
      &open_v4l2_source},
 };
 

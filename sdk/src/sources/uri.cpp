@@ -39,15 +39,6 @@ bool read_integer(const std::string& text, int64_t* value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// Independent of the process's locale, which may want a comma.
-std::optional<double> as_number(const std::string& text) {
-  std::istringstream in(text);
-  in.imbue(std::locale::classic());
-  double value = 0;
-  if (text.empty() || !(in >> value) || !in.eof() || !std::isfinite(value)) return {};
-  return value;
-}
-
 void read_options(const std::string& query, SourceUri& uri) {
   size_t begin = 0;
   while (begin <= query.size()) {
@@ -84,6 +75,14 @@ void take_size(SourceUri& uri) {
 
 }  // namespace
 
+std::optional<double> read_number(const std::string& text) {
+  std::istringstream in(text);
+  in.imbue(std::locale::classic());
+  double value = 0;
+  if (text.empty() || !(in >> value) || !in.eof() || !std::isfinite(value)) return {};
+  return value;
+}
+
 std::optional<std::string> SourceUri::take(const std::string& key) {
   const auto found = options.find(key);
   if (found == options.end()) return {};
@@ -106,7 +105,7 @@ int64_t SourceUri::take_integer(const std::string& key, int64_t otherwise, int64
 double SourceUri::take_number(const std::string& key, double otherwise, double least, double most) {
   const auto value = take(key);
   if (!value) return otherwise;
-  const auto number = as_number(*value);
+  const auto number = read_number(*value);
   if (!number || *number < least || *number > most) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a number from ", least, " to ",
                 most, ".");

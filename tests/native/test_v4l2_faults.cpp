@@ -347,15 +347,15 @@ TEST_F(V4l2Faults, NumbersThatRepeatGoBackOrLeapCountOn) {
   EXPECT_EQ(live->drops(), 3u);
 }
 
-TEST_F(V4l2Faults, JpegImagesThatAreShortOrOfAnotherSizeAreDropped) {
-  fake_.modes = {{V4L2_PIX_FMT_MJPEG, 64, 48, 30}};
+TEST_F(V4l2Faults, JpegImagesThatAreShortOrTooLargeAreDropped) {
+  fake_.modes = {{V4L2_PIX_FMT_MJPEG, 60, 41, 30}};
   const auto encoded = [](int width, int height) {
     std::vector<uint8_t> jpeg;
     EXPECT_TRUE(cv::imencode(".jpg", cv::Mat(height, width, CV_8UC3, cv::Scalar(20, 120, 220)), jpeg));
     return jpeg;
   };
-  const std::vector<uint8_t> whole = encoded(64, 48);
-  std::vector<uint8_t> huge = whole;  // whose header says 16000 x 16000
+  const std::vector<uint8_t> whole = encoded(64, 48);  // the same in blocks of 16 x 16
+  std::vector<uint8_t> huge = whole;                   // whose header says 16000 x 16000
   for (size_t i = 0; i + 9 < huge.size(); ++i) {
     if (huge[i] != 0xFF || huge[i + 1] != 0xC0) continue;
     for (const size_t side : {i + 5, i + 7}) {
@@ -364,7 +364,7 @@ TEST_F(V4l2Faults, JpegImagesThatAreShortOrOfAnotherSizeAreDropped) {
     }
     break;
   }
-  std::vector<std::vector<uint8_t>> bad = {{}, {0xFF}, {0xFF, 0xD8}, encoded(32, 24), encoded(64, 64), huge};
+  std::vector<std::vector<uint8_t>> bad = {{}, {0xFF}, {0xFF, 0xD8}, encoded(64, 64), encoded(80, 48), huge};
   for (size_t size = 3; size + 3 < whole.size(); size += 61)
     bad.emplace_back(whole.begin(), whole.begin() + long(size));
   const auto live = source(settings());
@@ -377,6 +377,8 @@ TEST_F(V4l2Faults, JpegImagesThatAreShortOrOfAnotherSizeAreDropped) {
     ASSERT_TRUE(fake_.deliver(whole));
     EXPECT_EQ(next(*live).image.width_px, 64) << "the decoder is as good as new after " << jpeg.size() << " bytes";
   }
+  ASSERT_TRUE(fake_.deliver(encoded(32, 24)));
+  EXPECT_EQ(next(*live).image.width_px, 32);
 }
 
 TEST_F(V4l2Faults, WithoutDmaBufsFramesComeAllTheSame) {

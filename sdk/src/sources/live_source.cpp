@@ -25,6 +25,13 @@ constexpr milliseconds kStopPatience(50);
 constexpr uint32_t kMostLostAtOnce = 100000;  // minutes of frames
 constexpr int kLongestWaitMs = 200;           // whether the camera stalls is looked at between two waits
 
+// Of a JPEG image for which a size was agreed on: cameras send smaller ones too, and ones of whole blocks.
+int64_t most_pixels(const ImageView& agreed) {
+  constexpr int64_t kBlock = 16;
+  if (agreed.width_px == 0) return MAQ_MAX_PIXELS;
+  return ((agreed.width_px + kBlock - 1) / kBlock * kBlock) * ((agreed.height_px + kBlock - 1) / kBlock * kBlock);
+}
+
 }  // namespace
 
 // What the source and its thread share. The thread may outlive the source, when the device hangs.
@@ -163,8 +170,8 @@ struct LiveSource::State {
   void drop_jpeg(const CameraBuffer& buffer) {
     add_drops(1);
     if (std::exchange(told_of_bad_jpeg, true)) return;
-    settings.log.write(MAQ_LOG_WARNING, name, ": a JPEG image is damaged or not of ", buffer.image.width_px, " x ",
-                       buffer.image.height_px, " pixels; it is dropped, and so are others like it.");
+    settings.log.write(MAQ_LOG_WARNING, name, ": a JPEG image is damaged, or larger than the ", buffer.image.width_px,
+                       " x ", buffer.image.height_px, " pixels agreed on; it is dropped, and so are others like it.");
   }
 
   void end_of_stream() {
@@ -359,8 +366,7 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
     const CameraBuffer& buffer = entry.buffer;
     if (buffer.jpeg == nullptr) {
       frame.image = buffer.image;
-    } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, buffer.image.width_px, buffer.image.height_px,
-                                    frame)) {
+    } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, most_pixels(buffer.image), frame)) {
       state_->drop_jpeg(buffer);
       continue;
     }

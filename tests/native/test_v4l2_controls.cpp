@@ -22,7 +22,7 @@ class V4l2Controls : public LiveCameraTest {
                           {V4L2_CID_EXPOSURE_ABSOLUTE, {3, 2047, 1, 250}},
                           {V4L2_CID_GAIN, {0, 100, 1, 10}},
                           {V4L2_CID_FOCUS_AUTO, {0, 1, 1, 1}},
-                          {V4L2_CID_FOCUS_ABSOLUTE, {1, 252, 5, 51}},
+                          {V4L2_CID_FOCUS_ABSOLUTE, {1, 254, 5, 51}},
                           {V4L2_CID_AUTO_WHITE_BALANCE, {0, 1, 1, 1}},
                           {V4L2_CID_WHITE_BALANCE_TEMPERATURE, {2800, 6500, 10, 4600}},
                           {V4L2_CID_BRIGHTNESS, {-64, 64, 1, 0}}};
@@ -37,7 +37,7 @@ TEST_F(V4l2Controls, AreReadInUnitsOfTheApi) {
       {MAQ_CONTROL_EXPOSURE, 300, 204700, 100, 25000},
       {MAQ_CONTROL_GAIN, 0, 100, 1, 10},
       {MAQ_CONTROL_AUTO_FOCUS, 0, 1, 1, 1},
-      {MAQ_CONTROL_FOCUS, 1, 252, 5, 51},
+      {MAQ_CONTROL_FOCUS, 1, 254, 5, 51},
       {MAQ_CONTROL_AUTO_WHITE_BALANCE, 0, 1, 1, 1},
       {MAQ_CONTROL_WHITE_BALANCE, 2800, 6500, 10, 4600},
       {MAQ_CONTROL_BRIGHTNESS, -64, 64, 1, 0},
@@ -54,7 +54,6 @@ TEST_F(V4l2Controls, AreReadInUnitsOfTheApi) {
 }
 
 TEST_F(V4l2Controls, AreRoundedToStepsAndSwitchTheirAutomaticOff) {
-  control(V4L2_CID_GAIN).maximum = 100;
   fake_.controls.all[V4L2_CID_AUTOGAIN] = {0, 1, 1, 1};
   const struct {
     maq_control which;
@@ -68,8 +67,8 @@ TEST_F(V4l2Controls, AreRoundedToStepsAndSwitchTheirAutomaticOff) {
       {MAQ_CONTROL_EXPOSURE, 149.9 + 300, V4L2_CID_EXPOSURE_ABSOLUTE, 4, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL},
       {MAQ_CONTROL_GAIN, 5, V4L2_CID_GAIN, 5, V4L2_CID_AUTOGAIN, 0},
       {MAQ_CONTROL_FOCUS, 8.6, V4L2_CID_FOCUS_ABSOLUTE, 11, V4L2_CID_FOCUS_AUTO, 0},
-      {MAQ_CONTROL_FOCUS, 252, V4L2_CID_FOCUS_ABSOLUTE, 251, V4L2_CID_FOCUS_AUTO,
-       0},  // 256 would be a step, but too far
+      // The nearest step, 256, is too far.
+      {MAQ_CONTROL_FOCUS, 254, V4L2_CID_FOCUS_ABSOLUTE, 251, V4L2_CID_FOCUS_AUTO, 0},
       {MAQ_CONTROL_WHITE_BALANCE, 3004, V4L2_CID_WHITE_BALANCE_TEMPERATURE, 3000, V4L2_CID_AUTO_WHITE_BALANCE, 0},
       {MAQ_CONTROL_BRIGHTNESS, -64, V4L2_CID_BRIGHTNESS, -64, 0, 0},
   };

@@ -99,9 +99,8 @@ class FakeV4l2 : public maq::SystemCalls {
   }
   // The same with these bytes: a JPEG image.
   bool deliver(const std::vector<uint8_t>& jpeg) {
-    return fill(0, jpeg.size(), [&](int, uint8_t* data, size_t size) {
-      std::copy_n(jpeg.begin(), std::min(size, jpeg.size()), data);
-    });
+    return fill(0, jpeg.size(),
+                [&](int, uint8_t* data, size_t size) { std::copy_n(jpeg.begin(), std::min(size, jpeg.size()), data); });
   }
   void unplug() {
     std::lock_guard<std::mutex> lock(mutex_);

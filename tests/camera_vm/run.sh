@@ -53,8 +53,12 @@ pack() {
         vivid) contents+=(--module vivid) ;;
         uvc) contents+=(--module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
             --file tests/media/photo.jpg=photo.jpg) ;;
-        sdk) contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
-            --file tests/media/photo.jpg=photo.jpg --tree build/release/stage=/opt/maquette) ;;
+        sdk)
+            cc -std=c99 -Wall -Wextra -Werror -O2 -Isdk/include tests/camera_vm/dma_buf.c -o "$work/dma_buf" \
+                -Lbuild/release/stage/lib -lmaquette
+            contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
+                --program "$work/dma_buf" --file tests/media/photo.jpg=photo.jpg
+                --tree build/release/stage=/opt/maquette) ;;
     esac
     tests/camera_vm/make-initramfs.sh "$work/$1.cpio" "${contents[@]}"
 }

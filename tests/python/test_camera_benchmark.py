@@ -12,9 +12,20 @@ MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2"], "
 
 
 def played(frames=100, drops=0, share=0.01, wall_s=4.0, events=()):
-    return {"schema": "maquette-play-1", "width_px": 640, "height_px": 360, "frames": frames, "fps": 29.97,
-            "drops": drops, "interval_ms": {"median": 33.3, "p99": 34.0}, "age_ms": {"median": 0.1, "p99": 0.4}, "wall_seconds": wall_s,
-            "processor_share": share, "begin_monotonic_s": 50.0, "events": list(events)}  # fmt: skip
+    return {
+        "schema": "maquette-play-1",
+        "width_px": 640,
+        "height_px": 360,
+        "frames": frames,
+        "fps": 29.97,
+        "drops": drops,
+        "interval_ms": {"median": 33.3, "p99": 34.0},
+        "age_ms": {"median": 0.1, "p99": 0.4},
+        "wall_seconds": wall_s,
+        "processor_share": share,
+        "begin_monotonic_s": 50.0,
+        "events": list(events),
+    }
 
 
 def event(state, at_s, before_next_frame_s=None):

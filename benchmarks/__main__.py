@@ -1,13 +1,13 @@
 """Measures what Maquette promises, checks it against benchmarks/targets.toml, and writes a report to read.
 
-    python -m benchmarks                  everything, 5 to 15 minutes; `make bench` builds first
+    python -m benchmarks                  everything, 10 to 20 minutes; `make bench` builds first
     python -m benchmarks --quick          fewer rounds and images, to see that it runs
     python -m benchmarks --only peers     one part; the others' figures are taken from the last run in --out
     python -m benchmarks --publish        also copies the report to docs/benchmarks
 
 Parts: scenes (people, pixels, threads; start, memory), sweep (error against run time), agreement (int8 against fp32),
-peers (other runtimes and the roofline). Exit status: 0 when every gate is met, 1 when one is missed, 2 when something
-could not be measured.
+peers (other runtimes and the roofline), cameras (how frames get to the app; `python -m benchmarks.cameras` alone).
+Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
 
 from __future__ import annotations
@@ -17,18 +17,17 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
-
-from benchmarks import gates, report, scenes
+from benchmarks import cameras, gates, report, scenes
 from export.evaluation.maquette_api import LIBRARY, MaquetteError
 from export.evaluation.shards import ShardError, read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-1"
-PARTS = ("scenes", "sweep", "agreement", "peers")
+PARTS = ("scenes", "sweep", "agreement", "peers", "cameras")
+PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
 
@@ -60,7 +59,7 @@ def main(argv: list[str] | None = None) -> int:
     path = options.out / "benchmark.json"
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
     written = [path, *report.write(document, options.out)]
-    print_verdicts(verdicts)
+    gates.print_verdicts(verdicts)
     print("Written: " + ", ".join(str(x) for x in written))
     if options.publish:
         # What is published says nothing about where it was made.
@@ -96,13 +95,23 @@ def measure(options: argparse.Namespace) -> dict:
         figures |= found
     if "peers" in options.only:
         document["peers"], found, why = peers_part(options, float_bundle)
-        figures |= found
-        missing.clear()
-        missing |= why
-    for name in ("scenes", "sweep", "agreement", "peers"):
+        replace(figures, missing, [f"time_by_{name}" for name, _, _ in PEER_RATIOS], found, why)
+    if "cameras" in options.only:
+        document["cameras"], found, why = cameras.measure(options.quick)
+        replace(figures, missing, cameras.FIGURES, found, why)
+    for name in PARTS:
         if name not in document:
             raise ValueError(f"{name} was never measured in {options.out}; run it too")
     return document
+
+
+def replace(figures: dict, missing: dict, names: Iterable[str], found: dict, why: dict) -> None:
+    """Of the figures `names`, which one part measures: what it found, or why not; nothing of a run before."""
+    for name in names:
+        figures.pop(name, None)
+        missing.pop(name, None)
+    figures |= found
+    missing |= why
 
 
 def float_bundle_in(folder: Path) -> Path:
@@ -167,29 +176,13 @@ def peers_part(options: argparse.Namespace, float_bundle: Path) -> tuple[dict, d
     subprocess.run([*(["scripts/with-amx.sh"] if has_amx else []), *command], check=True)
     document = json.loads(path.read_text())
     figures, missing = {"roofline_share": document["roofline"]["share"]}, {}
-    for name, runtime, precision in (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32")):
+    for name, runtime, precision in PEER_RATIOS:
         row = next(r for r in document["runtimes"] if (r["name"], r["precision"]) == (runtime, precision))
         if row["ours_int8_ratio"] is None:
             missing[f"time_by_{name}"] = row["missing"]
         else:
             figures[f"time_by_{name}"] = row["ours_int8_ratio"]
     return document, figures, missing
-
-
-def print_verdicts(verdicts: list[gates.Verdict]) -> None:
-    colours = {"stretch": "bold green", "met": "green", "missed": "bold red", "not measured": "yellow"}
-    table = Table(title="Gates", title_justify="left")
-    for column in ("what", "figure", "gate", "stretch", "state"):
-        table.add_column(column, justify="left" if column in ("what", "state") else "right")
-    for v in verdicts:
-        value = "" if v.value is None else f"{v.value:.4g}"
-        state = f"[{colours[v.state]}]{v.state}[/]" + (f": {v.why}" if v.why else "")
-        table.add_row(v.says, value, v.gate, v.stretch, state)
-    console = Console()
-    console.print(table)
-    for v in verdicts:
-        if v.tried:
-            console.print(f"[bold red]Missed[/]: {v.says}. {v.tried}")
 
 
 if __name__ == "__main__":

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
 
 TARGETS = Path(__file__).with_name("targets.toml")
 
@@ -24,8 +28,15 @@ class Verdict:
     tried: str = ""
 
 
-def check(figures: dict[str, float], machine: dict, missing: dict[str, str], targets: Path = TARGETS) -> list[Verdict]:
+def check(
+    figures: dict[str, float],
+    machine: dict,
+    missing: dict[str, str],
+    targets: Path = TARGETS,
+    only: Collection[str] | None = None,
+) -> list[Verdict]:
     """figures: value by name. machine: as `maquette bench` describes it. missing: why a figure was not measured.
+    only: the figures that are meant; without it, all.
 
     Raises ValueError for targets that cannot be read.
     """
@@ -33,6 +44,8 @@ def check(figures: dict[str, float], machine: dict, missing: dict[str, str], tar
     verdicts = []
     for gate in document["gate"]:
         name = gate["figure"]
+        if only is not None and name not in only:
+            continue
         if ("at_least" in gate) == ("at_most" in gate):
             raise ValueError(f"{targets}: {name} needs either at_least or at_most")
         least = "at_least" in gate
@@ -55,3 +68,19 @@ def same_machine(machine: dict, wanted: dict) -> bool:
     sets = set(machine.get("instruction_sets") or [])
     same = all(machine.get(key) == wanted[key] for key in ("architecture", "cores"))
     return same and set(wanted["instruction_sets"]) <= sets
+
+
+def print_verdicts(verdicts: list[Verdict]) -> None:
+    colours = {"stretch": "bold green", "met": "green", "missed": "bold red", "not measured": "yellow"}
+    table = Table(title="Gates", title_justify="left")
+    for column in ("what", "figure", "gate", "stretch", "state"):
+        table.add_column(column, justify="left" if column in ("what", "state") else "right")
+    for v in verdicts:
+        value = "" if v.value is None else f"{v.value:.4g}"
+        state = f"[{colours[v.state]}]{v.state}[/]" + (f": {v.why}" if v.why else "")
+        table.add_row(v.says, value, v.gate, v.stretch, state)
+    console = Console()
+    console.print(table)
+    for v in verdicts:
+        if v.tried:
+            console.print(f"[bold red]Missed[/]: {v.says}. {v.tried}")

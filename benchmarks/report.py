@@ -11,6 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+from benchmarks import camera_section
 from benchmarks.sweep import pareto
 
 STAGES = ("capture", "preprocess", "trunk", "proposals", "box_head", "dense_head", "decode")
@@ -120,18 +121,10 @@ Section = tuple[str, list]  # title, and what follows: a text, a picture's (name
 
 
 def text_sections(document: dict) -> list[Section]:
-    machine, scenes, peers = document["machine"], document["scenes"], document["peers"]
-    described = (f"{machine['processor']}, {machine['cores']} cores, {machine['memory_mib'] / 1024:.0f} GiB, "
-                 f"{machine['system']}; instruction sets: {', '.join(machine['instruction_sets'])}.")  # fmt: skip
+    scenes, peers = document["scenes"], document["peers"]
     doubts = {name: scenes[name]["doubts"] + [d for s in scenes[name]["scenes"] for d in s["doubts"]]
               for name in ("people", "sizes", "one_thread")}  # fmt: skip
-    doubtful = sorted({text for texts in doubts.values() for text in texts})
-    gate_rows = [["what", "figure", "gate", "stretch", "state"]]
-    for gate in document["gates"]:
-        value = "" if gate["value"] is None else f"{gate['value']:.4g}"
-        why = f": {gate['why']}" if gate["why"] else ""
-        gate_rows.append([gate["says"], value, gate["gate"], gate["stretch"], gate["state"] + why])
-    tried = [f"Missed: {gate['says']}. {gate['tried']}" for gate in document["gates"] if gate["tried"]]
+    doubtful = {text for texts in doubts.values() for text in texts} | set(document["cameras"]["doubts"])
     sweep_rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
     front = set(pareto([(row["ms"], row["error"]) for row in document["sweep"]]))
     for k, row in enumerate(document["sweep"]):
@@ -164,11 +157,9 @@ def text_sections(document: dict) -> list[Section]:
         ("Maquette: how fast, how large, how exact", [
             "Maquette finds people in a camera's pictures and maps each of their pixels to a body surface, on two "
             "processor cores. This page says what that costs here, and what each setting trades.",
-            f"Measured on: {described}",
-            *(["A quick run, to see that it works: do not quote it."] if document["quick"] else []),
-            *([f"Doubts that the measurement itself has: {'; '.join(doubtful)}."] if doubtful else []),
+            *circumstances(document, doubtful),
         ]),
-        ("Gates", [gate_rows, *tried]),
+        gates_section(document),
         ("Error against run time", [
             ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
             "Rendered people that no training saw; all settings took turns on the same pictures. AP by GPS: average "
@@ -197,7 +188,41 @@ def text_sections(document: dict) -> list[Section]:
             f"that are somebody in both, {agreement['parts']:.1%}. The outlines agree by {agreement['mask_iou']:.1%} "
             f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} pictures show as many people."
         ]),
+        camera_section.section(document["cameras"]),
     ]  # fmt: skip
+
+
+def circumstances(document: dict, doubts: set[str]) -> list[str]:
+    machine = document["machine"]
+    return [
+        f"Measured on: {machine['processor']}, {machine['cores']} cores, {machine['memory_mib'] / 1024:.0f} GiB, "
+        f"{machine['system']}; instruction sets: {', '.join(machine['instruction_sets'])}.",
+        *(["A quick run, to see that it works: do not quote it."] if document["quick"] else []),
+        *([f"Doubts that the measurement itself has: {'; '.join(sorted(doubts))}."] if doubts else []),
+    ]
+
+
+def gates_section(document: dict) -> Section:
+    rows = [["what", "figure", "gate", "stretch", "state"]]
+    for gate in document["gates"]:
+        value = "" if gate["value"] is None else f"{gate['value']:.4g}"
+        why = f": {gate['why']}" if gate["why"] else ""
+        rows.append([gate["says"], value, gate["gate"], gate["stretch"], gate["state"] + why])
+    tried = [f"Missed: {gate['says']}. {gate['tried']}" for gate in document["gates"] if gate["tried"]]
+    return "Gates", [rows, *tried]
+
+
+def write_cameras(document: dict, folder: Path) -> list[Path]:
+    """Writes what benchmarks.cameras measured alone into `folder`; returns the paths."""
+    measured = document["cameras"]
+    sections = [
+        ("Maquette: cameras", circumstances(document, set(measured["doubts"]))),
+        gates_section(document),
+        camera_section.section(measured),
+    ]
+    (folder / "cameras.md").write_text(markdown(sections))
+    (folder / "cameras.html").write_text(page(sections, folder))
+    return [folder / "cameras.md", folder / "cameras.html"]
 
 
 def markdown(sections: list[Section]) -> str:

@@ -1,23 +1,25 @@
 #!/usr/bin/env bash
 # Runs the camera tests: boots Debian's kernel in qemu, with test cameras, and programs against them.
 #
-#   tests/camera_vm/run.sh [vivid|uvc|sdk]...      default: all; sdk needs `make build`
+#   tests/camera_vm/run.sh [vivid|uvc|sdk|figures]...      default: all; sdk and figures need `make build`
 #
+# In the environment, FRAMES: how many figures takes from each camera (100).
 # Closes with "N passed, N failed"; results also in build/test-results/camera-vm.xml (JUnit), what the kernel said in
 # build/camera-vm. Exit status 77: it could not be run, and the last line says why.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-usage() { sed -n '2,7s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,9s/^# \{0,1\}//p' "$0"; }
 
-guests=(vivid uvc sdk)
-limit_s=180  # for one guest; each takes up to 40 s where nothing else runs
+guests=(vivid uvc sdk figures)
+frames="${FRAMES:-100}"
+limit_s=$((180 + frames / 2))  # for one guest; each takes up to 40 s where nothing else runs
 work=build/camera-vm
 report=build/test-results/camera-vm.xml
 
 for argument in "$@"; do
     case "$argument" in
         -h | --help) usage; exit 0 ;;
-        vivid | uvc | sdk) ;;
+        vivid | uvc | sdk | figures) ;;
         *) usage >&2; exit 2 ;;
     esac
 done
@@ -44,6 +46,8 @@ tests/camera_vm/fetch-guest.sh || not_run "Debian's kernel could not be fetched"
 for program in capture virtual_uvc_camera; do
     cc -std=c99 -Wall -Wextra -Werror -O2 -static -o "$work/$program" "tests/camera_vm/$program.c"
 done
+cc -std=c11 -Wall -Wextra -Werror -O2 -shared -fPIC -I sdk/include -o "$work/count_allocations.so" \
+    benchmarks/count_allocations.c
 
 # What each guest gets; its script is guest-NAME.sh.
 pack() {
@@ -59,18 +63,23 @@ pack() {
             contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
                 --program "$work/dma_buf" --file tests/media/photo.jpg=photo.jpg
                 --tree build/release/stage=/opt/maquette) ;;
+        figures) contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
+            --file "$work/count_allocations.so=count_allocations.so" --tree build/release/stage=/opt/maquette) ;;
     esac
     tests/camera_vm/make-initramfs.sh "$work/$1.cpio" "${contents[@]}"
 }
 
 # boot NAME: its results, one a line, on standard output. The image is unpacked into memory, beside the image itself.
 boot() {
-    local kernel memory_mb
+    local kernel memory_mb processor=(-accel tcg,thread=multi -smp 2)
+    # An instruction takes a nanosecond and waiting takes none of ours: however busy this machine is, times in the guest
+    # come out alike.
+    [ "$1" != figures ] || processor=(-accel tcg,thread=single -icount "shift=0,sleep=off" -smp 1)
     kernel="$(echo .deps/camera-vm/root/boot/vmlinuz-*)"
     memory_mb=$((512 + 3 * $(stat -c %s "$work/$1.cpio") / 1048576))
-    timeout "$limit_s" qemu-system-x86_64 -accel tcg,thread=multi -cpu max -smp 2 -m "$memory_mb" \
+    timeout "$limit_s" qemu-system-x86_64 "${processor[@]}" -cpu max -m "$memory_mb" \
         -nodefaults -no-reboot -display none -serial "file:$work/$1-kernel.log" -serial stdio \
-        -kernel "$kernel" -initrd "$work/$1.cpio" -append "console=ttyS0 panic=-1" </dev/null |
+        -kernel "$kernel" -initrd "$work/$1.cpio" -append "console=ttyS0 panic=-1 frames=$frames" </dev/null |
         tr -d '\r'
 }
 

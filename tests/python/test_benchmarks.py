@@ -7,7 +7,8 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from benchmarks import compare, gates, graphs, report, roofline, sweep
+from benchmarks import __main__ as benchmark
+from benchmarks import cameras, compare, gates, graphs, report, roofline, sweep
 
 MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2", "fma"], "processor": "P",
            "memory_mib": 2048, "system": "S"}  # fmt: skip
@@ -64,10 +65,24 @@ def test_a_figure_that_is_missing_needs_a_reason(tmp_path):
         states(tmp_path, {"fps": 40})
 
 
+def test_gates_of_one_part_can_be_checked_alone(tmp_path):
+    path = tmp_path / "targets.toml"
+    path.write_text(GATES)
+    (found,) = gates.check({"mb": 1}, MACHINE, {}, path, only=["mb"])
+    assert (found.figure, found.state) == ("mb", "stretch")
+
+
+def test_a_part_that_is_measured_again_leaves_nothing_of_before():
+    figures, missing = {"a": 1, "b": 2, "other": 3}, {"c": "no machine", "other_missing": "x"}
+    benchmark.replace(figures, missing, ("a", "b", "c"), {"c": 4}, {"a": "gone", "b": "gone"})
+    assert figures == {"other": 3, "c": 4}
+    assert missing == {"other_missing": "x", "a": "gone", "b": "gone"}
+
+
 def test_the_shipped_targets_can_be_read():
     names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "library_mb", "peak_memory_mb",
              "first_result_ms", "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8",
-             "time_by_pytorch_fp32", "roofline_share"}  # fmt: skip
+             "time_by_pytorch_fp32", "roofline_share", *cameras.FIGURES}  # fmt: skip
     assert {v.figure for v in gates.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
 
 
@@ -129,6 +144,13 @@ def scene(source, people, ms):
             "size_px": [640, 480]}  # fmt: skip
 
 
+def camera_host():
+    run = {"age_ms": {"median": 0.1, "p99": 0.4}, "lost": 0, "processor_share": 0.01}
+    return {"stub": [run, run | {"age_ms": {"median": 0.3, "p99": 0.9}}, run], "recording": [run],
+            "closing": [40.0, 44.0, 41.0], "outages": [{"noticed_ms": 4.0, "replug_ms": 90.0, "reopen_ms": 90.0}],
+            "allocations": {"frames": 1000, "allocations": 5}, "others_share": 0.0}  # fmt: skip
+
+
 def document():
     scenes = {name: {"scenes": [scene("s0", 0, 8.0), scene("s1", 1, 10.0)], "doubts": ["others were busy"]}
               for name in ("people", "sizes", "one_thread", "no_spin")}  # fmt: skip
@@ -151,7 +173,9 @@ def document():
         "why": "",
         "tried": "All of it.",
     }
-    return {"machine": MACHINE, "scenes": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
+    measured = {"host": camera_host(), "guest": {}, "guest_missing": "not run: no <qemu>", "frames": 100, "doubts": []}
+    return {"machine": MACHINE, "cameras": measured,
+            "scenes": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
 
@@ -160,10 +184,12 @@ def test_a_report_holds_its_figures_and_pictures(tmp_path):
     written = report.write(document(), tmp_path)
     assert all(path.stat().st_size > 1000 for path in written if path.suffix == ".png")
     text, page = (tmp_path / "report.md").read_text(), (tmp_path / "index.html").read_text()
-    for said in ("Missed: speed. All of it.", "others were busy", "does not load it", "192 px", "quick run"):
+    for said in ("Missed: speed. All of it.", "others were busy", "does not load it", "192 px", "quick run",
+                 "closing a source whose device hangs"):  # fmt: skip
         assert said in text
         assert said in page
     assert "fp32 &lt;slow&gt;" in page
+    assert "Not measured in the virtual machine: not run: no <qemu>." in text
     assert page.count("data:image/png;base64,") == 4
     assert "| as shipped | 10.0 | 0.600 | 6.0 | 0.500 | 0.600 | ● |" in text
     assert "| fp32 <slow> | 20.0 | 0.610 | 6.1 | 0.500 | 0.600 |  |" in text

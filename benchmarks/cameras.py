@@ -1,0 +1,261 @@
+"""How frames get from a camera to the app: none lost, unplugging, age, processor time, heap.
+
+    python -m benchmarks.cameras             alone, about 3 minutes; `make build` first. Also a part of `make bench`
+    python -m benchmarks.cameras --quick     fewer frames, to see that it runs
+    python -m benchmarks.cameras --no-guest  without the virtual machine
+
+Measured by `maquette play` in two places. The guest is a real kernel with its drivers in a virtual machine
+(tests/camera_vm, guest "figures"), with the kernel's test camera and a virtual USB camera; its clock counts
+instructions, so that its times come out alike however busy this machine is. The host is this machine, with a stub and a
+recording that are played as cameras. Exit status: 0 when every gate is met, 1 when one is missed, 2 when the host could
+not be measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from tqdm import tqdm
+
+from benchmarks import gates, scenes
+
+SCHEMA = "maquette-cameras-1"
+HOST_FIGURES = ("camera_age_ms", "camera_processor_percent", "camera_close_ms", "camera_fault_noticed_ms",
+                "camera_fault_replug_ms", "camera_allocations")  # fmt: skip
+GUEST_FIGURES = ("camera_vivid_lost", "camera_vivid_fps", "camera_uvc_lost", "camera_uvc_fps",
+                 "camera_v4l2_allocations", "camera_noticed_ms", "camera_replug_ms", "camera_reopen_ms")  # fmt: skip
+FIGURES = HOST_FIGURES + GUEST_FIGURES
+COUNTER = Path("benchmarks/count_allocations.c")
+STUB = "stub:pattern?live=1&size=640x480&fps=30"
+COUNTED = "stub:pattern?live=1&size=320x240&fps=400"
+COUNT_FROM, COUNT_TO = 200, 1200
+UNPLUG_AT_S = 2.0
+ABSENCES_S = (1.0, 1.03, 1.06)  # end at other times between two looks of the source, 100 ms apart
+MOST_OTHERS = 0.05  # of all cores: more, and times are doubtful
+UNUSABLE = 77  # exit status of run.sh where there can be no virtual machine
+
+
+@dataclass(frozen=True)
+class Outage:
+    """Milliseconds from unplugging to the app's being told, from plugging in to the first frame, and from the device's
+    being there to the first frame."""
+
+    noticed_ms: float
+    replug_ms: float
+    reopen_ms: float
+
+
+def play(uri: str, *arguments: str, **environment: str) -> dict:
+    """The figures of one run of `maquette play`. Raises FileNotFoundError, CalledProcessError."""
+    if not scenes.PROGRAM.exists():
+        raise FileNotFoundError(f"{scenes.PROGRAM} is not there: make build")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "play.json"
+        command = [str(scenes.PROGRAM), "play", uri, *arguments, "--no-picture", "--json", str(path)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ | environment)
+        return json.loads(path.read_text())
+
+
+def processor_share(longer: dict, shorter: dict) -> float:
+    """Of a core, without what starting and ending take: from two runs of the same that differ in length."""
+    spent_s = [run["processor_share"] * run["wall_seconds"] for run in (longer, shorter)]
+    return (spent_s[0] - spent_s[1]) / (longer["wall_seconds"] - shorter["wall_seconds"])
+
+
+def outages(played: dict, cycles: list[dict]) -> list[Outage]:
+    """Of each time that the camera was unplugged. cycles: when that was and when it came again, on the monotonic clock.
+
+    Raises ValueError when the source did not notice, or did not come back, as often.
+    """
+    events = [(event["state"], played["begin_monotonic_s"] + event["at_s"], event) for event in played["events"]]
+    lost = [at_s for state, at_s, _ in events if state == "lost"]
+    first = [at_s + event["before_next_frame_s"] for state, at_s, event in events
+             if state == "back" and "before_next_frame_s" in event]  # fmt: skip
+    if not len(lost) == len(first) == len(cycles):
+        raise ValueError(
+            f"of {len(cycles)} times that the camera was unplugged {len(lost)} were noticed, and after {len(first)} it "
+            "gave frames again"
+        )
+    found = []
+    for lost_s, first_s, cycle in zip(lost, first, cycles, strict=True):
+        seconds = (lost_s - cycle["unplugged_s"], first_s - cycle["plugged_in_s"], first_s - cycle["appeared_s"])
+        found.append(Outage(*(1000 * x for x in seconds)))
+    return found
+
+
+def fault_outage(absence_s: float) -> Outage:
+    """Of a stub that is away for so long. Its time starts when it is opened, a little later than that of its figures:
+    both are too long by that."""
+    uri = f"{STUB}&unplug={absence_s:g}s@{UNPLUG_AT_S:g}s"
+    played = play(uri, "--seconds", str(UNPLUG_AT_S + absence_s + 1))
+    begin_s = played["begin_monotonic_s"]
+    unplugged_s, back_s = begin_s + UNPLUG_AT_S, begin_s + UNPLUG_AT_S + absence_s
+    return outages(played, [{"unplugged_s": unplugged_s, "plugged_in_s": back_s, "appeared_s": back_s}])[0]
+
+
+def count_allocations(folder: Path) -> dict:
+    """Frames and allocations of a live source in steady state. Raises CalledProcessError without a C compiler."""
+    library, count = folder / "count_allocations.so", folder / "count.json"
+    subprocess.run(["cc", "-std=c11", "-O2", "-shared", "-fPIC", "-Isdk/include", "-o", str(library), str(COUNTER)],
+                   check=True)  # fmt: skip
+    play(COUNTED, "--frames", str(COUNT_TO), LD_PRELOAD=str(library), COUNT_FILE=str(count),
+         COUNT_FROM=str(COUNT_FROM), COUNT_TO=str(COUNT_TO))  # fmt: skip
+    return json.loads(count.read_text())
+
+
+def measure_host(quick: bool) -> dict:
+    """Runs of each kind, in turns: lists by name."""
+    rounds = 1 if quick else 3
+    few, many = ("15", "60") if quick else ("30", "270")
+    measured: dict[str, list] = {"stub": [], "recording": [], "closing": [], "outages": []}
+    others = OthersShare()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        recording = folder / "pattern.maqrec"
+        subprocess.run([str(scenes.PROGRAM), "record", "stub:pattern?size=640x480", str(recording), "--frames", "30"],
+                       check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+        for k in tqdm(range(rounds), desc="cameras", unit="round", disable=None):
+            for kind, uri in (("stub", STUB), ("recording", f"rec:{recording}?live=1&loop=1")):
+                shorter, longer = play(uri, "--frames", few), play(uri, "--frames", many)
+                measured[kind].append({"age_ms": longer["age_ms"], "lost": longer["drops"],
+                                       "processor_share": processor_share(longer, shorter)})  # fmt: skip
+            measured["closing"].append(play(f"{STUB}&hang=5s@1s", "--seconds", "2")["close_ms"])
+            measured["outages"].append(vars(fault_outage(ABSENCES_S[k])))
+        measured["allocations"] = count_allocations(folder)
+    measured["others_share"] = others.now()
+    return measured
+
+
+class OthersShare:
+    """What other processes have of all cores, from now on."""
+
+    def __init__(self) -> None:
+        self.begin = self.spent_s()
+
+    @staticmethod
+    def spent_s() -> tuple[float, float]:
+        ticks = [int(x) for x in Path("/proc/stat").read_text().splitlines()[0].split()[1:9]]
+        own = os.times()
+        all_s = (sum(ticks) - ticks[3] - ticks[4]) / os.sysconf("SC_CLK_TCK")
+        return all_s - sum(own[:4]), time.monotonic()
+
+    def now(self) -> float:
+        (before_s, begin_s), (after_s, end_s) = self.begin, self.spent_s()
+        return max(0.0, after_s - before_s) / ((end_s - begin_s) * (os.cpu_count() or 1))
+
+
+def host_figures(measured: dict) -> dict[str, float]:
+    counted = measured["allocations"]
+    return {
+        "camera_age_ms": statistics.median(run["age_ms"]["median"] for run in measured["stub"]),
+        "camera_processor_percent": 100 * statistics.median(run["processor_share"] for run in measured["recording"]),
+        "camera_close_ms": statistics.median(measured["closing"]),
+        "camera_fault_noticed_ms": statistics.median(outage["noticed_ms"] for outage in measured["outages"]),
+        "camera_fault_replug_ms": statistics.median(outage["replug_ms"] for outage in measured["outages"]),
+        "camera_allocations": counted["allocations"] / counted["frames"],
+    }
+
+
+def measure_guest(frames: int) -> tuple[dict, str]:
+    """What the guest said, by name, and why something is missing ("" when nothing is)."""
+    print("Cameras in a virtual machine: about a minute")
+    run = subprocess.run(["tests/camera_vm/run.sh", "figures"], env=os.environ | {"FRAMES": str(frames)},
+                         stdout=subprocess.PIPE, text=True, check=False)  # fmt: skip
+    return read_guest(run.stdout, run.returncode)
+
+
+def read_guest(output: str, status: int) -> tuple[dict, str]:
+    """The lines `figure NAME JSON` of run.sh by name, with `outages` made of `plug`, and why something is missing.
+
+    Raises ValueError for broken JSON.
+    """
+    lines = output.splitlines()
+    figures = {}
+    for line in lines:
+        if line.startswith("figure "):
+            _, name, text = line.split(" ", 2)
+            figures[name] = json.loads(text)
+    failed = [line.removeprefix("not ok ") for line in lines if line.startswith("not ok ")]
+    if status == UNUSABLE:
+        return figures, next((line for line in reversed(lines) if line.strip()), "there is no virtual machine")
+    if status != 0 and not failed:
+        failed.append(f"tests/camera_vm/run.sh ended with status {status}")
+    if "plug" in figures:
+        try:
+            found = outages(figures["plug"]["play"], figures["plug"]["cycles"])
+            figures["outages"] = [vars(outage) for outage in found]
+        except ValueError as error:
+            failed.append(str(error))
+    return figures, "; ".join(failed)
+
+
+def guest_figures(said: dict, frames: int, why: str) -> tuple[dict[str, float], dict[str, str]]:
+    """The figures, and why others are missing."""
+    figures = {}
+    for camera in ("vivid", "uvc"):
+        played = said.get(camera)
+        if played is not None and played["frames"] == frames:
+            figures[f"camera_{camera}_lost"] = played["drops"]
+            figures[f"camera_{camera}_fps"] = played["fps"]
+    counts = [said[name] for name in ("vivid_allocations", "uvc_allocations") if name in said]
+    if len(counts) == 2:
+        figures["camera_v4l2_allocations"] = max(count["allocations"] / count["frames"] for count in counts)
+    if "outages" in said:
+        for name in ("noticed_ms", "replug_ms", "reopen_ms"):
+            figures[f"camera_{name}"] = statistics.median(outage[name] for outage in said["outages"])
+    return figures, {name: why or "the guest did not say" for name in GUEST_FIGURES if name not in figures}
+
+
+def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float], dict[str, str]]:
+    """What was measured, the figures that are gates, and why others are missing."""
+    frames = 100 if quick else 1000
+    host = measure_host(quick)
+    said, why = measure_guest(frames) if with_guest else ({}, "left out by --no-guest")
+    found, missing = guest_figures(said, frames, why)
+    figures = {name: round(value, 4) for name, value in (host_figures(host) | found).items()}
+    share = host["others_share"]
+    doubts = [f"other processes had {share:.0%} of the processor (cameras)"] if share > MOST_OTHERS else []
+    return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "doubts": doubts}, figures, missing
+
+
+def main(argv: list[str] | None = None) -> int:
+    from benchmarks import report
+
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.cameras", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("build/benchmarks"), metavar="DIR",
+        help="for cameras.json, cameras.md and cameras.html; default: build/benchmarks",
+    )  # fmt: skip
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--no-guest", action="store_true")
+    options = parser.parse_args(argv)
+    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        machine = scenes.bench([scenes.people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0")["machine"]
+        measured, figures, missing = measure(options.quick, not options.no_guest)
+    except (FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
+        print(f"The benchmark stopped: {error}", file=sys.stderr)
+        return 2
+    verdicts = gates.check(figures, machine, missing, only=FIGURES)
+    document = {"schema": SCHEMA, "quick": options.quick, "machine": machine, "cameras": measured, "figures": figures,
+                "missing": missing, "gates": [vars(verdict) for verdict in verdicts]}  # fmt: skip
+    path = options.out / "cameras.json"
+    path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    gates.print_verdicts(verdicts)
+    print("Written: " + ", ".join(str(x) for x in [path, *report.write_cameras(document, options.out)]))
+    return 1 if any(verdict.state == "missed" for verdict in verdicts) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

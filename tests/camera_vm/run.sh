@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the camera tests: boots Debian's kernel in qemu, with test cameras, and programs against them.
 #
-#   tests/camera_vm/run.sh [vivid|uvc|sdk]...      default: all; sdk needs `make build`
+#   tests/camera_vm/run.sh [vivid|uvc|sdk|libcamera]...      default: all; sdk and libcamera need `make build`
 #
 # Closes with "N passed, N failed"; results also in build/test-results/camera-vm.xml (JUnit), what the kernel said in
 # build/camera-vm. Exit status 77: it could not be run, and the last line says why.
@@ -9,7 +9,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 usage() { sed -n '2,7s/^# \{0,1\}//p' "$0"; }
 
-guests=(vivid uvc sdk)
+guests=(vivid uvc sdk libcamera)
 limit_s=180  # for one guest; each takes up to 40 s where nothing else runs
 work=build/camera-vm
 report=build/test-results/camera-vm.xml
@@ -17,7 +17,7 @@ report=build/test-results/camera-vm.xml
 for argument in "$@"; do
     case "$argument" in
         -h | --help) usage; exit 0 ;;
-        vivid | uvc | sdk) ;;
+        vivid | uvc | sdk | libcamera) ;;
         *) usage >&2; exit 2 ;;
     esac
 done
@@ -55,6 +55,12 @@ pack() {
             --file tests/media/photo.jpg=photo.jpg) ;;
         sdk) contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
             --file tests/media/photo.jpg=photo.jpg --tree build/release/stage=/opt/maquette) ;;
+        libcamera)
+            cc -std=c11 -Wall -Wextra -Werror -O2 -o "$work/source_check" tests/camera_vm/source_check.c \
+                -Isdk/include -Lbuild/release/stage/lib -lmaquette -Wl,--allow-shlib-undefined
+            contents+=(--module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
+                --program "$work/source_check" --program "$(command -v cam)" --program "$(command -v udevadm)"
+                --file tests/media/photo.jpg=photo.jpg --tree build/release/stage=/opt/maquette) ;;
     esac
     tests/camera_vm/make-initramfs.sh "$work/$1.cpio" "${contents[@]}"
 }

@@ -1,6 +1,7 @@
 #include "core/error.h"
 #include "sources/faults.h"
 #include "sources/file_sources.h"
+#include "sources/libcamera_cameras.h"
 #include "sources/live_source.h"
 #include "sources/played_camera.h"
 #include "sources/source.h"
@@ -30,6 +31,10 @@ const Entry kEntries[] = {
       "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
      nullptr,
      v4l2_camera_opener},
+    {{"libcamera", "libcamera:0?size=640x480&fps=30",
+      "a camera of libcamera, by number or id: those of the Raspberry Pi and other boards; ?format=NV12"},
+     nullptr,
+     libcamera_camera_opener},
 };
 
 // Of a source that is played as if it were a camera.
@@ -52,7 +57,7 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
     }
     return entry.open(std::move(uri));
   }
-  const std::string name = is_camera ? uri.target : uri.scheme + ":" + uri.target;
+  const std::string name = is_camera && uri.target[0] == '/' ? uri.target : uri.scheme + ":" + uri.target;
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
   CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers) : played(entry, std::move(uri), buffers);
@@ -71,7 +76,11 @@ const std::vector<SourceScheme>& source_schemes() {
   return schemes;
 }
 
-std::vector<CameraListing> list_cameras() { return list_v4l2_cameras(SystemCalls::real()); }
+std::vector<CameraListing> list_cameras() {
+  std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
+  for (CameraListing& camera : list_libcamera_cameras()) all.push_back(std::move(camera));
+  return all;
+}
 
 std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {
   SourceUri uri = parse_source_uri(text);

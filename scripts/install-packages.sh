@@ -42,6 +42,7 @@ needs_package libcli11-dev
 for module in core imgproc imgcodecs videoio; do needs_package "libopencv-$module-dev"; done
 needs_package libwebp-dev
 needs_package libturbojpeg0-dev
+needs_package libxxhash-dev
 needs_package ca-certificates
 
 if [ "$group" != demo ]; then

@@ -2,7 +2,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <maquette/maquette.hpp>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "interrupt.h"
 #include "machine.h"
 #include "model_options.h"
 #include "output_file.h"
@@ -35,8 +35,6 @@ struct Options {
   int runs = 100;
   double seconds = 3;
 };
-
-volatile std::sig_atomic_t stop_asked = 0;
 
 using Clock = std::chrono::steady_clock;
 
@@ -197,9 +195,9 @@ int run_bench(const Options& options) {
   const double first_frame_ms = scenes[0]->run(densepose, false);
   const double first_result_ms = 1e3 * seconds_since_start();
 
-  std::signal(SIGINT, [](int) { stop_asked = 1; });
+  catch_interrupts();
   for (const auto& scene : scenes) {
-    for (int i = 0; i < options.warm_up && stop_asked == 0; ++i) scene->run(densepose, false);
+    for (int i = 0; i < options.warm_up && !interrupted(); ++i) scene->run(densepose, false);
   }
   const double others_before_s = others_processor_seconds();
   const auto measured_from = Clock::now();
@@ -208,14 +206,14 @@ int run_bench(const Options& options) {
     return scene.runs() < size_t(options.runs) || scene.seconds() < options.seconds;
   };
   int64_t done = 0;
-  for (bool any = true; any && stop_asked == 0;) {
+  for (bool any = true; any && !interrupted();) {
     any = false;
     for (const auto& scene : scenes) {
       if (!unfinished(*scene)) continue;
       any = true;
       scene->pause();
       densepose.restart();
-      for (int i = 0; i < kBlock && stop_asked == 0; ++i) scene->run(densepose, true);
+      for (int i = 0; i < kBlock && !interrupted(); ++i) scene->run(densepose, true);
       done += kBlock;
       progress.advance(done, scene->uri());
     }
@@ -275,7 +273,7 @@ int run_bench(const Options& options) {
     write_whole_file(options.json, text.data(), text.size());
     std::printf("Written: %s\n", options.json.c_str());
   }
-  return stop_asked == 0 ? 0 : 1;
+  return !interrupted() ? 0 : 1;
 }
 
 }  // namespace

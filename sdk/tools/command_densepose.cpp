@@ -1,6 +1,5 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <maquette/maquette.hpp>
@@ -11,9 +10,11 @@
 #include <vector>
 
 #include "commands.h"
+#include "interrupt.h"
 #include "model_options.h"
 #include "overlay.h"
 #include "overlay_clip.h"
+#include "program.h"
 #include "progress_bar.h"
 #include "result_files.h"
 #include "source_argument.h"
@@ -33,9 +34,6 @@ struct Options {
   int64_t max_frames = 0;
   int64_t every = 1;
 };
-
-// Set by Ctrl-C: the frame at hand is finished, files are completed, and the summary is printed.
-volatile std::sig_atomic_t stop_asked = 0;
 
 // The stages of a run, in order, with their times of every frame.
 class Timings {
@@ -130,7 +128,7 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
   ProgressBar progress(argument.stem, is_clip && !options.json ? expected : 1);
   OverlayClip clip(options.out, argument.stem, info.fps / double(options.every));
   int64_t done = 0;
-  for (int64_t index = 0; stop_asked == 0 && (limit == 0 || done < limit); ++index) {
+  for (int64_t index = 0; !interrupted() && (limit == 0 || done < limit); ++index) {
     const auto frame = source.next();
     if (!frame) break;
     if (index % options.every != 0) continue;
@@ -173,14 +171,14 @@ std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts)
 int run_densepose(const Options& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
   const std::string bundle = bundle_of(options.model);
-  const maquette::Context context;
+  const maquette::Context context = open_context();
   maquette::DensePose densepose(context, config_of(options.model, bundle));
 
-  std::signal(SIGINT, [](int) { stop_asked = 1; });
+  catch_interrupts();
   Timings timings;
   int failed = 0;
   for (const SourceArgument& argument : arguments) {
-    if (stop_asked != 0) break;
+    if (interrupted()) break;
     try {
       run_source(options, argument, context, densepose, timings);
     } catch (const std::exception& error) {
@@ -191,7 +189,7 @@ int run_densepose(const Options& options) {
     }
   }
   if (timings.frames() > 0 && !options.json) timings.print();
-  return failed == 0 && stop_asked == 0 ? 0 : 1;
+  return failed == 0 && !interrupted() ? 0 : 1;
 }
 
 }  // namespace

@@ -8,5 +8,8 @@ class App;
 
 void add_info_command(CLI::App& app, int* exit_code);
 void add_sources_command(CLI::App& app, int* exit_code);
+void add_doctor_command(CLI::App& app, int* exit_code);
+void add_play_command(CLI::App& app, int* exit_code);
+void add_record_command(CLI::App& app, int* exit_code);
 void add_densepose_command(CLI::App& app, int* exit_code);
 void add_bench_command(CLI::App& app, int* exit_code);

@@ -20,6 +20,9 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   add_info_command(app, &exit_code);
   add_sources_command(app, &exit_code);
+  add_doctor_command(app, &exit_code);
+  add_play_command(app, &exit_code);
+  add_record_command(app, &exit_code);
   add_densepose_command(app, &exit_code);
   add_bench_command(app, &exit_code);
   return run_program(app, argc, argv, &exit_code);

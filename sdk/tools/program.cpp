@@ -11,6 +11,12 @@ constexpr int kWrongUsage = 2;
 
 }  // namespace
 
+maquette::Context open_context() {
+  maq_context_config config = maquette::default_context_config();
+  config.log_callback = [](void*, maq_log_level, const char* text) { std::fprintf(stderr, "maquette: %s\n", text); };
+  return maquette::Context(config);
+}
+
 int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
   try {
     app.parse(argc, argv);

@@ -1,9 +1,14 @@
 // What the programs of this folder have in common.
 #pragma once
 
+#include <maquette/maquette.hpp>
+
 namespace CLI {
 class App;
 }
+
+// A context whose warnings go to standard error.
+maquette::Context open_context();
 
 // Parses the arguments, which runs what they ask for, and returns the exit status: *exit_code, 1 after an exception,
 // which is printed, 2 for wrong usage.

@@ -92,6 +92,67 @@ TEST_F(ApiArguments, DestroyingNullIsFine) {
   maq_frame_release(nullptr);
   maq_densepose_destroy(nullptr);
   maq_densepose_result_release(nullptr);
+  maq_recorder_destroy(nullptr);
+}
+
+TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
+  maq_source* source = nullptr;
+  maq_frame* frame = nullptr;
+  ASSERT_EQ(maq_source_create(context_, "stub:pattern?size=16x16", nullptr, &source), MAQ_OK);
+  ASSERT_EQ(maq_source_acquire_frame(source, 0, &frame), MAQ_OK);
+  maq_control_info control{};
+  control.struct_size = sizeof control;
+  maq_calibration calibration{};
+  calibration.struct_size = sizeof calibration;
+  maq_frame_desc desc{};
+  desc.struct_size = sizeof desc;
+  int32_t fd = -5;
+  expect_error(maq_source_get_control(source, MAQ_CONTROL_GAIN, &control), MAQ_ERROR_UNSUPPORTED, source, "no control");
+  expect_error(maq_source_set_control(source, MAQ_CONTROL_GAIN, 1), MAQ_ERROR_UNSUPPORTED, source, "no control");
+  expect_error(maq_source_set_control(source, MAQ_CONTROL_GAIN, 0.0 / 0.0), MAQ_ERROR_INVALID_ARGUMENT, source,
+               "value");
+  expect_error(maq_source_set_control(source, maq_control(0), 1), MAQ_ERROR_INVALID_ARGUMENT, source, "control is 0");
+  expect_error(maq_source_get_control(source, MAQ_CONTROL_GAIN, nullptr), MAQ_ERROR_INVALID_ARGUMENT, source, "info");
+  expect_error(maq_source_get_calibration(source, &calibration), MAQ_ERROR_UNSUPPORTED, source, "calibration");
+  expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, source, "negative");
+  expect_error(maq_frame_get_depth(frame, &desc), MAQ_ERROR_UNSUPPORTED, frame, "without depth");
+  expect_error(maq_frame_get_dma_buf(frame, &fd), MAQ_ERROR_UNSUPPORTED, frame, "dma-buf");
+  expect_error(maq_frame_get_dma_buf(frame, nullptr), MAQ_ERROR_INVALID_ARGUMENT, frame, "fd is NULL");
+  EXPECT_EQ(fd, -5);
+  EXPECT_EQ(maq_source_seek(source, 1000000000), MAQ_OK);
+  maq_frame_release(frame);
+  ASSERT_EQ(maq_source_acquire_frame(source, 0, &frame), MAQ_OK);
+  ASSERT_EQ(maq_frame_get_desc(frame, &desc), MAQ_OK);
+  EXPECT_EQ(desc.sequence, 30u);
+  maq_frame_release(frame);
+  maq_source_destroy(source);
+  for (const maq_status status :
+       {maq_source_get_control(nullptr, MAQ_CONTROL_GAIN, &control),
+        maq_source_set_control(nullptr, MAQ_CONTROL_GAIN, 1), maq_source_get_calibration(nullptr, &calibration),
+        maq_source_seek(nullptr, 0), maq_frame_get_depth(nullptr, &desc), maq_frame_get_dma_buf(nullptr, &fd)}) {
+    EXPECT_EQ(status, MAQ_ERROR_INVALID_ARGUMENT);
+  }
+}
+
+TEST_F(ApiArguments, ARecorderSaysWhatIsWrong) {
+  maq_recorder* recorder = nullptr;
+  maq_recorder_info info{};
+  info.struct_size = sizeof info;
+  maq_recorder_config config;
+  ASSERT_EQ(maq_recorder_config_init(&config, sizeof config), MAQ_OK);
+  config.jpeg_quality = 101;
+  expect_error(maq_recorder_create(context_, "/tmp", nullptr, &config, &recorder), MAQ_ERROR_INVALID_ARGUMENT, context_,
+               "config.jpeg_quality is 101");
+  expect_error(maq_recorder_create(context_, "/tmp", nullptr, nullptr, &recorder), MAQ_ERROR_UNWRITABLE, context_,
+               "/tmp cannot be made");
+  expect_error(maq_recorder_create(context_, nullptr, nullptr, nullptr, &recorder), MAQ_ERROR_INVALID_ARGUMENT,
+               context_, "path is NULL");
+  expect_error(maq_recorder_create(nullptr, "/tmp", nullptr, nullptr, &recorder), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "context is NULL");
+  EXPECT_EQ(recorder, nullptr);
+  expect_error(maq_recorder_add(nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "recorder is NULL");
+  expect_error(maq_recorder_finish(nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "recorder is NULL");
+  expect_error(maq_recorder_get_info(nullptr, &info), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "recorder is NULL");
 }
 
 // first_size: of the struct's first release, which apps that were built then still give.
@@ -189,7 +250,7 @@ TEST_F(ApiArguments, EveryStatusHasItsName) {
   for (int status = MAQ_OK; status <= MAQ_ERROR_NO_PERMISSION; ++status) {
     EXPECT_EQ(std::string(maq_status_name(maq_status(status))).rfind("MAQ_", 0), 0u) << status;
   }
-  EXPECT_STREQ(maq_status_name(maq_status(MAQ_ERROR_NO_PERMISSION + 1)), "unknown status");
+  EXPECT_STREQ(maq_status_name(maq_status(MAQ_ERROR_UNWRITABLE + 1)), "unknown status");
 }
 
 TEST_F(ApiArguments, TheVersionOfHeadersAndLibraryAgree) {
@@ -210,7 +271,7 @@ static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 56, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 20, "");
 static_assert(sizeof(maq_densepose_stats) == 80, "");
-static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_NO_PERMISSION == 17 && MAQ_SOURCE_BACK == 5 && MAQ_PIXEL_YUYV == 6 &&
+static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_BACK == 5 && MAQ_PIXEL_DEPTH16 == 7 &&
                   MAQ_PLANE_PERSON == 4,
               "");
 

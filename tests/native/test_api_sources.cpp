@@ -22,7 +22,7 @@ TEST(ApiSources, EverySchemeOfTheListHasAnExampleThatIsKnown) {
     EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_last_error(context.get());
     maq_source_destroy(source);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"image", "libcamera", "stub", "v4l2", "video"}));
+  EXPECT_EQ(names, (std::set<std::string>{"image", "libcamera", "rec", "stub", "v4l2", "video"}));
   maq_source_scheme scheme{};
   scheme.struct_size = sizeof scheme;
   EXPECT_EQ(maq_source_get_scheme(maq_source_scheme_count(), &scheme), MAQ_ERROR_INVALID_ARGUMENT);
@@ -80,6 +80,30 @@ TEST(ApiSources, SayWhenEveryFrameIsHeldAndAFrameGivenBackIsNewToTheNext) {
   const std::optional<maquette::Frame> next = source.next();
   EXPECT_EQ(next->desc().sequence, 4u) << "a refused call takes no frame";
   EXPECT_STREQ(maq_last_error(next->get()), "");
+}
+
+TEST(ApiSources, WhatIsRecordedIsPlayedAgain) {
+  const TempFolder folder;
+  const maquette::Context context;
+  maquette::Source source(context, "stub:pattern?frames=3&size=16x12&fps=10");
+  maquette::Recorder recorder(context, folder.file("a.maqrec"), &source);
+  std::vector<uint8_t> last(16 * 12 * 3), again(last.size());
+  while (const auto frame = source.next()) {
+    recorder.add(*frame);
+    frame->copy_pixels(MAQ_PIXEL_BGR8, last.data(), 0, last.size());
+  }
+  recorder.finish();
+  EXPECT_EQ(recorder.info().frame_count, 3u);
+  EXPECT_EQ(recorder.info().size_bytes, std::filesystem::file_size(folder.file("a.maqrec")));
+  maquette::Source player(context, "rec:" + folder.file("a.maqrec"));
+  EXPECT_NEAR(player.info().fps, 10, 1e-9);
+  EXPECT_FALSE(player.calibration().has_value());
+  player.seek(200000000);
+  const auto frame = player.next();
+  EXPECT_FALSE(frame->depth().has_value());
+  frame->copy_pixels(MAQ_PIXEL_BGR8, again.data(), 0, again.size());
+  EXPECT_EQ(again, last);
+  EXPECT_FALSE(player.next().has_value());
 }
 
 // A copy of the SDK that lies alone.
@@ -145,7 +169,8 @@ TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {
   maq_source* source = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "rtsp:camera", nullptr, &source), MAQ_ERROR_UNSUPPORTED);
   EXPECT_STREQ(maq_last_error(context.get()),
-               "\"rtsp:\" is not a kind of source of this build; there are image:, video:, stub:, v4l2:, libcamera:.");
+               "\"rtsp:\" is not a kind of source of this build; there are image:, video:, rec:, stub:, v4l2:, "
+               "libcamera:.");
   EXPECT_EQ(maq_source_create(context.get(), "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND);
   EXPECT_STREQ(maq_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
   EXPECT_EQ(source, nullptr);

@@ -239,6 +239,62 @@ TEST_F(CommandLine, WhatCannotBeMeasuredIsOneSentence) {
   expect_failure("bench image:two.png --bundle nowhere --runs 1 --seconds 0 --json o/bench.json", "nowhere");
 }
 
+TEST_F(CommandLine, RecordsPlaysAndMeasures) {
+  const Outcome recorded = run("record 'stub:people?size=320x256&fps=50' take.maqrec --seconds 1");
+  EXPECT_EQ(recorded.exit_code, 0) << recorded.err;
+  EXPECT_NE(recorded.out.find("take.maqrec: 50 frames, 1.0 s"), std::string::npos) << recorded.out;
+  const Outcome played = run("play take.maqrec --speed 2 --json figures.json");
+  EXPECT_EQ(played.exit_code, 0) << played.err;
+  EXPECT_EQ(played.out.find('\x1b'), std::string::npos) << "no pictures where no terminal is";
+  const auto figures = nlohmann::json::parse(read_text(folder_.file("figures.json")));
+  EXPECT_EQ(figures["frames"].get<int>() + figures["drops"].get<int>(), 50);
+  EXPECT_NEAR(figures["promised_fps"].get<double>(), 100, 0.1);
+  EXPECT_GT(figures["age_ms"]["median"].get<double>(), 0);
+  EXPECT_EQ(figures["events"][0]["state"], "started");
+  const Outcome posed = run("densepose take.maqrec --out o --max-frames 2");
+  EXPECT_EQ(posed.exit_code, 0) << posed.err;
+  EXPECT_EQ(written_files().count("take_000001_IUV.png"), 1u);
+
+  const Outcome again = run("record 'stub:people?frames=5' take.maqrec");
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_NE(again.err.find("never written over"), std::string::npos) << again.err;
+  const Outcome endless = run("record stub:people other.maqrec");
+  EXPECT_NE(endless.err.find("--frames or --seconds"), std::string::npos) << endless.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("other.maqrec")));
+}
+
+TEST_F(CommandLine, PlayTellsOfLossAndReturnAndOfWhatStaysAway) {
+  const Outcome played = run("play 'stub:pattern?frames=60&fps=100&unplug=100ms@200ms&drop=0.2' --json figures.json");
+  EXPECT_EQ(played.exit_code, 0) << played.err;
+  const auto figures = nlohmann::json::parse(read_text(folder_.file("figures.json")));
+  std::vector<std::string> states;
+  for (const auto& event : figures["events"]) states.push_back(event["state"]);
+  EXPECT_EQ(states, (std::vector<std::string>{"started", "lost", "reconnecting", "back"}));
+  EXPECT_GT(figures["drops"].get<int>(), 0);
+  const Outcome lost = run("play v4l2:/dev/video77");
+  EXPECT_EQ(lost.exit_code, 1);
+  EXPECT_NE(lost.err.find("plugged in"), std::string::npos) << lost.err;
+}
+
+TEST_F(CommandLine, ADamagedRecordingPlaysWithoutItsDamagedFrames) {
+  run("record 'stub:pattern?frames=5&size=64x48' take.maqrec");
+  std::string bytes = read_text(folder_.file("take.maqrec"));
+  write_text(folder_.file("cut.maqrec"), bytes.substr(0, bytes.size() / 2));
+  const Outcome played = run("play cut.maqrec");
+  EXPECT_EQ(played.exit_code, 0);
+  EXPECT_NE(played.out.find("2 frames"), std::string::npos) << played.out;
+  EXPECT_NE(played.err.find("2 whole frames were found"), std::string::npos) << played.err;
+}
+
+TEST_F(CommandLine, TheDoctorSaysWhatToDo) {
+  const Outcome result = run("doctor");
+  EXPECT_TRUE(result.exit_code == 0 || result.exit_code == 1);
+  EXPECT_NE(result.out.find("cameras can be used"), std::string::npos) << result.out;
+  if (result.exit_code == 1) {
+    EXPECT_NE(result.out.find("->"), std::string::npos) << result.out;
+  }
+}
+
 TEST_F(CommandLine, WrongUsageIsExitCodeTwoAndHelpTeaches) {
   EXPECT_EQ(run("").exit_code, 2);
   EXPECT_EQ(run("densepose two.png").exit_code, 2) << "--out is required";

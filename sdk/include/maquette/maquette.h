@@ -23,6 +23,7 @@
 #include "maquette/context.h"
 #include "maquette/densepose.h"
 #include "maquette/frame.h"
+#include "maquette/recorder.h"
 #include "maquette/source.h"
 #include "maquette/types.h"
 

@@ -71,6 +71,12 @@ inline maq_densepose_config default_densepose_config() {
   return config;
 }
 
+inline maq_source_config default_source_config() {
+  maq_source_config config;
+  check(maq_source_config_init(&config, sizeof config), nullptr);
+  return config;
+}
+
 class Context {
  public:
   Context() : Context(default_context_config()) {}
@@ -176,6 +182,32 @@ class Source {
 
  private:
   Owner<maq_source, maq_source_destroy> owner_;
+};
+
+class Recorder {
+ public:
+  // `source` may be NULL, and so may `config`.
+  Recorder(const Context& context, const std::string& path, const Source* source = nullptr,
+           const maq_recorder_config* config = nullptr) {
+    maq_recorder* made = nullptr;
+    const maq_source* from = source == nullptr ? nullptr : source->get();
+    check(maq_recorder_create(context.get(), path.c_str(), from, config, &made), context.get());
+    owner_.reset(made);
+  }
+
+  maq_recorder* get() const { return owner_.get(); }
+  void add(const Frame& frame) { check(maq_recorder_add(get(), frame.get()), get()); }
+  void finish() { check(maq_recorder_finish(get()), get()); }
+
+  maq_recorder_info info() const {
+    maq_recorder_info info{};
+    info.struct_size = sizeof info;
+    check(maq_recorder_get_info(get(), &info), get());
+    return info;
+  }
+
+ private:
+  Owner<maq_recorder, maq_recorder_destroy> owner_;
 };
 
 class DensePoseResult {

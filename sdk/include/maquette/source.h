@@ -86,6 +86,7 @@ typedef struct maq_source_scheme {
   const char* name;    /* "image" */
   const char* example; /* "image:photo.jpg" */
   const char* summary; /* one line: what it delivers and its options */
+  int32_t is_camera;   /* 1: always live; 0: at the app's own pace, or live with "?live=1" */
 } maq_source_scheme;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_source_config) of the caller.

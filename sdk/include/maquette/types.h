@@ -41,12 +41,13 @@ typedef enum maq_status {
   MAQ_ERROR_POOL_EMPTY = 9,       /* every frame or result of the pool is still held: release one */
   MAQ_ERROR_INFERENCE = 10,       /* a network failed to run */
   MAQ_ERROR_OUT_OF_MEMORY = 11,
-  MAQ_ERROR_INTERNAL = 12,     /* a defect of the library; please report it */
-  MAQ_END_OF_STREAM = 13,      /* not an error: the source has no more frames */
-  MAQ_TIMEOUT = 14,            /* not an error: no frame came in the time that was given */
-  MAQ_ERROR_DEVICE_LOST = 15,  /* a camera was unplugged, or broke, and did not come back in time */
-  MAQ_ERROR_BUSY = 16,         /* another program has the camera */
-  MAQ_ERROR_NO_PERMISSION = 17 /* the user may not open the camera */
+  MAQ_ERROR_INTERNAL = 12,      /* a defect of the library; please report it */
+  MAQ_END_OF_STREAM = 13,       /* not an error: the source has no more frames */
+  MAQ_TIMEOUT = 14,             /* not an error: no frame came in the time that was given */
+  MAQ_ERROR_DEVICE_LOST = 15,   /* a camera was unplugged, or broke, and did not come back in time */
+  MAQ_ERROR_BUSY = 16,          /* another program has the camera */
+  MAQ_ERROR_NO_PERMISSION = 17, /* the user may not open the camera */
+  MAQ_ERROR_UNWRITABLE = 18     /* a file cannot be made or written: it is there already, the disk is full */
 } maq_status;
 
 /* The status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.

@@ -66,6 +66,7 @@ const char* maq_status_name(maq_status status) {
     case MAQ_ERROR_DEVICE_LOST: return "MAQ_ERROR_DEVICE_LOST";
     case MAQ_ERROR_BUSY: return "MAQ_ERROR_BUSY";
     case MAQ_ERROR_NO_PERMISSION: return "MAQ_ERROR_NO_PERMISSION";
+    case MAQ_ERROR_UNWRITABLE: return "MAQ_ERROR_UNWRITABLE";
   }
   return "unknown status";
 }

@@ -11,6 +11,7 @@ constexpr uint32_t kLargestPoolSize = 64;
 // Of the structs of version 0.1, which had no cameras.
 constexpr size_t kFirstConfigSize = offsetof(maq_source_config, queue_length);
 constexpr size_t kFirstInfoSize = offsetof(maq_source_info, drops);
+constexpr size_t kFirstSchemeSize = offsetof(maq_source_scheme, is_camera);
 
 maq_source_config default_config() {
   maq_source_config config{};
@@ -52,7 +53,7 @@ maq_status maq_source_create(maq_context* context, const char* uri, const maq_so
     settings.on_state = config.state_callback;
     settings.user_data = config.user_data;
     settings.log = context->state->log();
-    *source = new maq_source(open_source(uri, settings), config.pool_size);
+    *source = new maq_source(uri, open_source(uri, settings), config.pool_size);
     return MAQ_OK;
   });
 }
@@ -82,7 +83,6 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
     require_argument(source, "source");
     require_argument(frame, "frame");
     BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
-    handle->frame.depth.width_px = 0;  // of whoever had it before
     switch (source->source->next(timeout_ns, handle->frame)) {
       case NextFrame::kFrame: break;
       case NextFrame::kEnd: return MAQ_END_OF_STREAM;
@@ -147,8 +147,8 @@ maq_status maq_source_get_scheme(uint32_t index, maq_source_scheme* scheme) {
     const std::vector<SourceScheme>& schemes = source_schemes();
     require_range("index", index, 0u, uint32_t(schemes.size() - 1));
     const SourceScheme& from = schemes[index];
-    write_struct(scheme, "scheme", maq_source_scheme{0, from.name, from.example, from.summary},
-                 sizeof(maq_source_scheme));
+    write_struct(scheme, "scheme", maq_source_scheme{0, from.name, from.example, from.summary, from.is_camera ? 1 : 0},
+                 kFirstSchemeSize);
     return MAQ_OK;
   });
 }

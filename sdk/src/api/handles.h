@@ -74,8 +74,9 @@ struct maq_frame : maq::Handle {
 };
 
 struct maq_source : maq::Handle {
-  explicit maq_source(std::unique_ptr<maq::Source> made, size_t pool_size)
-      : source(std::move(made)), frames(pool_size, "frames") {}
+  maq_source(std::string opened, std::unique_ptr<maq::Source> made, size_t pool_size)
+      : uri(std::move(opened)), source(std::move(made)), frames(pool_size, "frames") {}
+  std::string uri;
   std::unique_ptr<maq::Source> source;
   maq::BoundedPool<maq_frame> frames;
 };
@@ -111,7 +112,7 @@ T* hand_out(typename BoundedPool<T>::Pooled handle) {
 // Takes it back; NULL is fine.
 inline void take_back(maq_frame* frame) {
   if (frame == nullptr) return;
-  frame->frame.lease.reset();
+  frame->frame.clear();
   std::exchange(frame->home, {})(frame);
 }
 inline void take_back(maq_densepose_result* result) {

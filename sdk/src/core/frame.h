@@ -71,8 +71,18 @@ struct Frame {
   // Memory of the pixels when the library owns them; kept between uses of a pooled frame.
   std::vector<uint8_t> storage;
   std::vector<uint8_t> depth_storage;
-  // Of pixels that are a camera's; empty for those in memory of the frame, or of an app.
+  // The JPEG image that `image` was decoded from, in the camera's memory; null when it came otherwise.
+  const uint8_t* jpeg = nullptr;
+  size_t jpeg_bytes = 0;
+  // Of what is a camera's; empty for pixels in memory of the frame, or of an app.
   PixelLease lease;
+
+  // Keeps the memory of the frame itself, for the next image.
+  void clear() {
+    lease.reset();
+    jpeg = nullptr;
+    depth.width_px = 0;
+  }
 
   // Makes `storage` hold one image of that size without row padding and points `image` at it.
   uint8_t* allocate(maq_pixel_format format, int width_px, int height_px);

@@ -1,8 +1,9 @@
-// JPEG images as cameras send them.
+// JPEG images, as cameras send them.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "core/frame.h"
 
@@ -20,6 +21,21 @@ class JpegDecoder {
 
  private:
   void* decoder_ = nullptr;
+};
+
+class JpegEncoder {
+ public:
+  JpegEncoder() = default;
+  ~JpegEncoder();
+  JpegEncoder(const JpegEncoder&) = delete;
+  JpegEncoder& operator=(const JpegEncoder&) = delete;
+
+  // Into `bytes`, at `quality` 1 to 100, with colour at half the resolution. Throws MAQ_ERROR_INTERNAL.
+  void encode(const ImageView& image, int quality, std::vector<uint8_t>& bytes);
+
+ private:
+  void* encoder_ = nullptr;
+  std::vector<uint8_t> bgr_;
 };
 
 }  // namespace maq

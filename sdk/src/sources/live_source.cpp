@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kReconnectPause(100);
-constexpr milliseconds kStopPatience(50);
+constexpr milliseconds kStopPatience(40);  // of the 50 ms that closing may take
 constexpr int kLongestWaitMs = 200;  // whether the camera stalls is looked at between two waits
 
 }  // namespace
@@ -282,8 +282,10 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
       state_->add_drops(1);  // cut short on its way; the next one follows soon
       continue;
     }
+    frame.jpeg = buffer.jpeg;
+    frame.jpeg_bytes = buffer.jpeg_bytes;
     frame.depth = buffer.depth;
-    if (buffer.jpeg == nullptr || buffer.depth.width_px > 0) frame.lease = std::move(entry.lease);
+    frame.lease = std::move(entry.lease);
     frame.timestamp_ns = buffer.timestamp_ns;
     frame.clock = MAQ_CLOCK_MONOTONIC;
     frame.sequence = entry.sequence;

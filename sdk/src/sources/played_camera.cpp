@@ -39,7 +39,7 @@ class Reel {
 
   // Reads the next frame; nothing at the end.
   std::optional<Next> read(Frame& frame) {
-    frame.depth.width_px = 0;
+    frame.clear();
     bool damaged = false;
     for (bool again = false;; again = true) {
       try {
@@ -153,9 +153,10 @@ class PlayedCamera : public Camera {
   int free_slot() {
     std::lock_guard<std::mutex> lock(mutex_);
     for (size_t i = 0; i < slots_.size(); ++i) {
-      if (!slots_[i].is_free) continue;
-      slots_[i].is_free = false;
-      return int(i);
+      last_slot_ = (last_slot_ + 1) % slots_.size();  // in turns, so that each has its memory soon
+      if (!slots_[last_slot_].is_free) continue;
+      slots_[last_slot_].is_free = false;
+      return int(last_slot_);
     }
     return -1;
   }
@@ -180,6 +181,7 @@ class PlayedCamera : public Camera {
   std::optional<Reel::Next> next_;
   std::mutex mutex_;  // of the rest
   std::vector<Slot> slots_;
+  size_t last_slot_ = 0;
   std::optional<int64_t> seek_to_ns_;
 };
 

@@ -13,19 +13,31 @@
 namespace maq {
 namespace {
 
+template <std::unique_ptr<Source> (*open)(SourceUri uri)>
+std::unique_ptr<Source> without_log(SourceUri uri, const Log&) {
+  return open(std::move(uri));
+}
+
 // Of one kind of sources: either opens one, or makes what opens its cameras.
 struct Entry {
   SourceScheme scheme;
-  std::unique_ptr<Source> (*open)(SourceUri uri);
+  std::unique_ptr<Source> (*open)(SourceUri uri, const Log& log);
   CameraOpener (*camera)(SourceUri uri, int buffers);
 };
 
 const Entry kEntries[] = {
-    {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"}, open_image_source, nullptr},
-    {{"video", "video:clip.mp4", "a video file, frame by frame; ?fps=10 thins it out"}, open_video_source, nullptr},
+    {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"},
+     without_log<open_image_source>,
+     nullptr},
+    {{"video", "video:clip.mp4", "a video file, frame by frame; ?fps=10 thins it out"},
+     without_log<open_video_source>,
+     nullptr},
+    {{"rec", "rec:take.maqrec?from=10&to=20", "a recording (maquette record); its frames at their times, with depth"},
+     open_recording_source,
+     nullptr},
     {{"stub", "stub:people?count=2&fps=30&seed=7",
       "frames without a camera: people (rendered people who walk; count, seed, frames) or pattern (colour bars)"},
-     open_stub_source,
+     without_log<open_stub_source>,
      nullptr},
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
       "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
@@ -38,13 +50,13 @@ const Entry kEntries[] = {
 };
 
 // Of a source that is played as if it were a camera.
-CameraOpener played(const Entry& entry, SourceUri uri, int buffers) {
+CameraOpener played(const Entry& entry, SourceUri uri, const Log& log, int buffers) {
   PlayOptions play;
   play.buffers = buffers;
   play.speed = uri.take_number("speed", 1, 0.01, 100);
   play.loop = uri.take_integer("loop", 0, 0, 1) == 1;
   std::string name = uri.scheme + ":" + uri.target;
-  return played_as_camera([&entry, uri = std::move(uri)] { return entry.open(uri); }, std::move(name), play);
+  return played_as_camera([&entry, uri = std::move(uri), log] { return entry.open(uri, log); }, std::move(name), play);
 }
 
 std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
@@ -55,12 +67,13 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
     if (!faults.is_empty()) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "live=0 in ", uri.text, " does not go with ", kFaultOptions, ".");
     }
-    return entry.open(std::move(uri));
+    return entry.open(std::move(uri), settings.log);
   }
   const std::string name = is_camera && uri.target[0] == '/' ? uri.target : uri.scheme + ":" + uri.target;
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
-  CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers) : played(entry, std::move(uri), buffers);
+  CameraOpener opener =
+      is_camera ? entry.camera(std::move(uri), buffers) : played(entry, std::move(uri), settings.log, buffers);
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
   return std::make_unique<LiveSource>(std::move(opener), name, settings);
 }
@@ -70,7 +83,10 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
 const std::vector<SourceScheme>& source_schemes() {
   static const std::vector<SourceScheme> schemes = [] {
     std::vector<SourceScheme> list;
-    for (const Entry& entry : kEntries) list.push_back(entry.scheme);
+    for (const Entry& entry : kEntries) {
+      list.push_back(entry.scheme);
+      list.back().is_camera = entry.camera != nullptr;
+    }
     return list;
   }();
   return schemes;

@@ -38,7 +38,7 @@ class Source {
   // Throws MAQ_ERROR_UNSUPPORTED where it cannot be done.
   virtual void seek(int64_t time_ns);
   // Fills `frame` (pixels, time, sequence) with the next frame, unless it says something else. Pixels may be those that
-  // the frame had before; depth and lease are empty when it is called.
+  // the frame had before; the rest is clear (Frame::clear).
   virtual NextFrame next(int64_t timeout_ns, Frame& frame) = 0;
 };
 
@@ -57,6 +57,7 @@ struct SourceScheme {
   const char* name;
   const char* example;
   const char* summary;
+  bool is_camera = false;
 };
 
 // Every scheme of this build.

@@ -1,0 +1,60 @@
+#include "api/boundary.h"
+#include "sources/recording.h"
+
+using namespace maq;
+
+struct maq_recorder : Handle {
+  maq_recorder(const char* path, const RecordingInfo& info, int jpeg_quality) : writer(path, info, jpeg_quality) {}
+  RecordingWriter writer;
+};
+
+maq_status maq_recorder_config_init(maq_recorder_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, maq_recorder_config{}, sizeof(maq_recorder_config));
+}
+
+maq_status maq_recorder_create(maq_context* context, const char* path, const maq_source* source,
+                               const maq_recorder_config* given, maq_recorder** recorder) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(path, "path");
+    require_argument(recorder, "recorder");
+    const maq_recorder_config config = read_config(given, "config", maq_recorder_config{}, sizeof(maq_recorder_config));
+    require_range("config.jpeg_quality", config.jpeg_quality, 0u, 100u);
+    RecordingInfo info;
+    if (source != nullptr) {
+      info.source = source->uri;
+      info.fps = source->source->info().fps;
+      if (source->source->calibration() != nullptr) info.calibration = *source->source->calibration();
+    }
+    *recorder = new maq_recorder(path, info, int(config.jpeg_quality));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_recorder_add(maq_recorder* recorder, const maq_frame* frame) {
+  return guarded(recorder, __func__, [&] {
+    require_argument(recorder, "recorder");
+    require_argument(frame, "frame");
+    recorder->writer.add(frame->frame);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_recorder_finish(maq_recorder* recorder) {
+  return guarded(recorder, __func__, [&] {
+    require_argument(recorder, "recorder");
+    recorder->writer.finish();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_recorder_get_info(const maq_recorder* recorder, maq_recorder_info* info) {
+  return guarded(recorder, __func__, [&] {
+    require_argument(recorder, "recorder");
+    write_struct(info, "info", maq_recorder_info{0, recorder->writer.frame_count(), recorder->writer.size_bytes()},
+                 sizeof(maq_recorder_info));
+    return MAQ_OK;
+  });
+}
+
+void maq_recorder_destroy(maq_recorder* recorder) { delete recorder; }

@@ -1,0 +1,108 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <optional>
+
+#include "commands.h"
+#include "interrupt.h"
+#include "output_file.h"
+#include "play_statistics.h"
+#include "program.h"
+#include "source_argument.h"
+#include "terminal_picture.h"
+
+namespace {
+
+struct Options {
+  std::string source;
+  double speed = 1;
+  double from_s = 0;
+  int64_t frames = 0;
+  double seconds = 0;
+  std::optional<bool> picture;
+  std::string json;
+};
+
+bool is_camera(const std::string& uri) {
+  for (uint32_t i = 0; i < maq_source_scheme_count(); ++i) {
+    maq_source_scheme scheme{};
+    scheme.struct_size = sizeof scheme;
+    maquette::check(maq_source_get_scheme(i, &scheme), nullptr);
+    if (uri.rfind(std::string(scheme.name) + ":", 0) == 0) return scheme.is_camera != 0;
+  }
+  return false;
+}
+
+std::string with_option(const std::string& uri, const std::string& key, const std::string& value) {
+  return uri + (uri.find('?') == std::string::npos ? "?" : "&") + key + "=" + value;
+}
+
+int play(const Options& options) {
+  catch_interrupts();
+  std::string uri = parse_source_argument(options.source).uri;
+  if (!is_camera(uri)) {
+    if (uri.find("live=") == std::string::npos) uri = with_option(uri, "live", "1");
+    if (options.speed != 1) uri = with_option(uri, "speed", std::to_string(options.speed));
+  }
+  PlayStatistics statistics(options.frames);
+  const maquette::Context context = open_context();
+  maq_source_config config = maquette::default_source_config();
+  config.state_callback = PlayStatistics::note_state;
+  config.user_data = &statistics;
+  maquette::Source source(context, uri, &config);
+  if (options.from_s > 0) source.seek(int64_t(options.from_s * 1e9));
+
+  const bool shows = options.picture.value_or(terminal_shows_pictures());
+  TerminalPicture picture;
+  std::string failure;
+  const int64_t end_ns = options.seconds > 0 ? monotonic_ns() + int64_t(options.seconds * 1e9) : INT64_MAX;
+  while (!interrupted() && monotonic_ns() < end_ns && (options.frames == 0 || statistics.frames() < options.frames)) {
+    constexpr int64_t kPatienceNs = 250000000;  // how soon Ctrl-C is heard while no frame comes
+    maq_frame* taken = nullptr;
+    const maq_status status = maq_source_acquire_frame(source.get(), kPatienceNs, &taken);
+    if (status == MAQ_TIMEOUT) continue;
+    if (status == MAQ_END_OF_STREAM) break;
+    if (status != MAQ_OK) {
+      failure = maq_last_error(source.get());
+      break;
+    }
+    const maquette::Frame frame(taken);
+    const maq_frame_desc desc = frame.desc();
+    statistics.add(desc);
+    if (shows) picture.show(frame, statistics.line(source.info().drops));
+  }
+  const maq_source_info info = source.info();
+  statistics.close(std::move(source));
+  statistics.print(info);
+  if (!options.json.empty()) {
+    const std::string text = statistics.report(info).dump(1) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  if (!failure.empty()) std::fprintf(stderr, "maquette: %s\n", failure.c_str());
+  return failure.empty() && statistics.frames() > 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_play_command(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("play", "Watch a camera, a recording or another source, and how it delivers");
+  command->add_option("source", options->source, "Where frames come from; see `maquette sources`")->required();
+  command->add_option("-s,--speed", options->speed, "Of a recording, clip or stub: 2 is twice as fast")
+      ->check(CLI::Range(0.01, 100.0));
+  command->add_option("--from", options->from_s, "Begin so many seconds after the start of a recording")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("-n,--frames", options->frames, "End after so many frames")->check(CLI::PositiveNumber);
+  command->add_option("-t,--seconds", options->seconds, "End after so much time")->check(CLI::PositiveNumber);
+  command->add_flag_callback(
+      "--no-picture", [=] { options->picture = false; }, "Only figures; so it is where no terminal is");
+  command->add_option("--json", options->json, "Write the figures to this file");
+  command->footer(
+      "Frames come at their times, also those of files. In a terminal the picture is shown in its colours; what does\n"
+      "not come, comes late or goes away is counted:\n\n"
+      "  maquette play v4l2:/dev/video0\n"
+      "  maquette play take.maqrec --from 5 --speed 0.5\n"
+      "  maquette play 'stub:people?drop=0.1&unplug=3s@5s'");
+  command->callback([=] { *exit_code = play(*options); });
+}

@@ -132,6 +132,12 @@ class LoneCopy {
     function<decltype(maq_source_destroy)>("maq_source_destroy")(source);
     return status;
   }
+  maq_status list_cameras() {
+    maq_camera_list* list = nullptr;
+    const maq_status status = function<decltype(maq_camera_list_create)>("maq_camera_list_create")(context_, &list);
+    function<decltype(maq_camera_list_destroy)>("maq_camera_list_destroy")(list);
+    return status;
+  }
   std::string last_error() { return function<decltype(maq_last_error)>("maq_last_error")(context_); }
 
  private:
@@ -162,6 +168,21 @@ TEST(ApiSources, FilesNeedTheirLibraryAndNothingElseDoes) {
   std::filesystem::copy_file(sdk.beside("libmaquette.so"), library);
   EXPECT_EQ(sdk.open(image.c_str()), MAQ_ERROR_RUNTIME_LIBRARY) << "the SDK itself is not the library of files";
   EXPECT_NE(sdk.last_error().find("install both from the same build"), std::string::npos) << sdk.last_error();
+}
+
+TEST(ApiSources, CamerasOfLibcameraNeedTheirLibraryAndTheListOfCamerasDoesNot) {
+  LoneCopy sdk;
+  EXPECT_EQ(sdk.open("libcamera:0"), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_NE(sdk.last_error().find("maquette/libmaquette_libcamera.so, which cannot be opened"), std::string::npos);
+  EXPECT_NE(sdk.last_error().find("libcamera-dev"), std::string::npos) << sdk.last_error();
+  EXPECT_EQ(sdk.list_cameras(), MAQ_OK) << sdk.last_error();
+
+  std::filesystem::create_directory(sdk.beside("maquette"));
+  std::filesystem::copy_file(sdk.beside("libmaquette.so"), sdk.beside("maquette/libmaquette_libcamera.so"));
+  EXPECT_EQ(sdk.open("libcamera:0"), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_NE(sdk.last_error().find("install both from the same build"), std::string::npos) << sdk.last_error();
+  EXPECT_EQ(sdk.list_cameras(), MAQ_OK) << sdk.last_error();
+  EXPECT_EQ(sdk.open("libcamera:0?colour=red"), MAQ_ERROR_INVALID_ARGUMENT) << "before anything is opened";
 }
 
 TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {

@@ -195,6 +195,7 @@ Camera::Event LibcameraCamera::wait(int wake_fd, int timeout_ms, CameraBuffer& b
   Slot& slot = slots_[size_t(item->slot)];
   if (slot.request->status() == libcamera::Request::RequestCancelled) {
     // One is cancelled when the camera refuses its setting; when all of them are, nothing will come any more.
+    if (is_unplugged()) return lost("the camera's device is gone");
     if (++cancelled_in_a_row_ > 2 * int(slots_.size())) return lost("libcamera cancels every request");
     give_back(item->slot);
     return Event::kTimeout;

@@ -1,5 +1,6 @@
 #include "sources/libcamera/camera.h"
 
+#include <libcamera/control_ids.h>
 #include <libcamera/fence.h>
 #include <linux/dma-buf.h>
 #include <poll.h>
@@ -64,11 +65,12 @@ void LibcameraCamera::start(const CameraWish& wish, int buffers) {
   for (const auto& buffer : made) make_slot(*buffer);
 
   device_entries_ = device_entries(**manager_, *camera_);
-  controls_ = LibcameraControls(*camera_, name_);
-  libcamera::ControlList at_start(camera_->controls());
-  format_.fps = set_libcamera_rate(*camera_, wish.fps, at_start);
+  controls_ = LibcameraControls(camera_->controls(), name_);
+  libcamera::ControlList at_start(libcamera::controls::controls);
+  format_.fps = set_libcamera_rate(camera_->controls(), wish.fps, at_start);
   receiver_ = new LibcameraReceiver(camera_, mailbox_);
-  if (const int error = camera_->start(&at_start); error < 0) fail_libcamera(name_, "does not start", error);
+  if (const int error = camera_->start(at_start.empty() ? nullptr : &at_start); error < 0)
+    fail_libcamera(name_, "does not start", error);
   started_ = true;
   for (size_t index = 0; index < slots_.size(); ++index) {
     Slot& slot = slots_[index];

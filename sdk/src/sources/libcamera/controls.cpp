@@ -23,6 +23,13 @@ std::optional<double> number_of(const libcamera::ControlValue& value) {
   }
 }
 
+// Null when the camera does not have it. A map that never got any controls cannot be asked for one.
+const libcamera::ControlInfo* find(const libcamera::ControlInfoMap& offered, const libcamera::ControlId& id) {
+  if (offered.empty()) return nullptr;
+  const auto found = offered.find(id.id());
+  return found == offered.end() ? nullptr : &found->second;
+}
+
 // Focus is the one automatic that is no switch, but one of several ways: we use that of always, and that of never.
 bool is_focus_mode(const libcamera::ControlId& id) { return id.id() == controls::AfMode.id(); }
 
@@ -59,28 +66,27 @@ const LibcameraControls::Known LibcameraControls::kKnown[] = {
     {MAQ_CONTROL_BRIGHTNESS, controls::Brightness, nullptr},
 };
 
-LibcameraControls::LibcameraControls(const libcamera::Camera& camera, std::string name) : name_(std::move(name)) {
+LibcameraControls::LibcameraControls(const libcamera::ControlInfoMap& offered, std::string name)
+    : name_(std::move(name)) {
   for (const Known& known : kKnown) {
-    if (const auto found = range(camera, known)) states_.push_back({&known, *found});
+    if (const auto found = range(offered, known)) states_.push_back({&known, *found});
   }
 }
 
 // What the camera says of the control; nothing when it does not have it.
-std::optional<maq_control_info> LibcameraControls::range(const libcamera::Camera& camera, const Known& known) {
-  const libcamera::ControlInfoMap& all = camera.controls();
-  const auto found = all.find(known.id.id());
-  if (found == all.end()) return {};
-  const libcamera::ControlInfo& offered = found->second;
-  const auto least = number_of(offered.min()), most = number_of(offered.max());
+std::optional<maq_control_info> LibcameraControls::range(const libcamera::ControlInfoMap& offered, const Known& known) {
+  const libcamera::ControlInfo* const control = find(offered, known.id);
+  if (control == nullptr) return {};
+  const auto least = number_of(control->min()), most = number_of(control->max());
   if (!least || !most || !(*least <= *most)) return {};
   maq_control_info info{};
   info.least = *least;
   info.most = *most;
   info.step = known.id.type() == libcamera::ControlTypeFloat ? 0 : 1;
-  info.preset = from_libcamera(known.id, number_of(offered.def()).value_or(*least));
+  info.preset = from_libcamera(known.id, number_of(control->def()).value_or(*least));
   if (is_focus_mode(known.id)) {
     const auto has = [&](int32_t way) {
-      return std::any_of(offered.values().begin(), offered.values().end(),
+      return std::any_of(control->values().begin(), control->values().end(),
                          [&](const auto& value) { return number_of(value) == double(way); });
     };
     if (!has(controls::AfModeContinuous) || !has(controls::AfModeManual)) return {};
@@ -134,12 +140,11 @@ void LibcameraControls::note(const libcamera::ControlList& reported) {
   }
 }
 
-double set_libcamera_rate(const libcamera::Camera& camera, double fps, libcamera::ControlList& at_start) {
-  const libcamera::ControlInfoMap& all = camera.controls();
-  const auto found = all.find(controls::FrameDurationLimits.id());
-  if (fps <= 0 || found == all.end()) return 0;
-  const double least_us = number_of(found->second.min()).value_or(1);
-  const double most_us = number_of(found->second.max()).value_or(1e9);
+double set_libcamera_rate(const libcamera::ControlInfoMap& offered, double fps, libcamera::ControlList& at_start) {
+  const libcamera::ControlInfo* const limits_us = find(offered, controls::FrameDurationLimits);
+  if (fps <= 0 || limits_us == nullptr) return 0;
+  const double least_us = number_of(limits_us->min()).value_or(1);
+  const double most_us = number_of(limits_us->max()).value_or(1e9);
   if (!(least_us >= 1) || !(least_us <= most_us)) return 0;
   const int64_t duration_us = std::llround(std::clamp(1e6 / fps, least_us, most_us));
   const int64_t limits[2] = {duration_us, duration_us};

@@ -2,7 +2,6 @@
 // next ones, in order.
 #pragma once
 
-#include <libcamera/camera.h>
 #include <libcamera/controls.h>
 
 #include <deque>
@@ -17,8 +16,8 @@ namespace maq {
 class LibcameraControls {
  public:
   LibcameraControls() = default;
-  // Those that the camera lists. `name` begins error texts.
-  LibcameraControls(const libcamera::Camera& camera, std::string name);
+  // Of those that the camera offers. `name` begins error texts.
+  LibcameraControls(const libcamera::ControlInfoMap& offered, std::string name);
 
   // As those of maq::Camera.
   const maq_control_info& get(maq_control which) const;
@@ -41,7 +40,7 @@ class LibcameraControls {
   };
   static const Known kKnown[];
 
-  static std::optional<maq_control_info> range(const libcamera::Camera& camera, const Known& known);
+  static std::optional<maq_control_info> range(const libcamera::ControlInfoMap& offered, const Known& known);
   void push(State& state, double value);
 
   std::string name_;
@@ -51,6 +50,6 @@ class LibcameraControls {
 
 // As near to `fps` as the camera can: put into what it is started with. Returns the rate, or 0 for a camera that keeps
 // its rate to itself.
-double set_libcamera_rate(const libcamera::Camera& camera, double fps, libcamera::ControlList& at_start);
+double set_libcamera_rate(const libcamera::ControlInfoMap& offered, double fps, libcamera::ControlList& at_start);
 
 }  // namespace maq

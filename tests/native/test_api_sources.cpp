@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <maquette/maquette.hpp>
 #include <set>
+#include <vector>
 
 #include "temp_folder.h"
 
@@ -22,7 +23,7 @@ TEST(ApiSources, EverySchemeOfTheListHasAnExampleThatIsKnown) {
     EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_last_error(context.get());
     maq_source_destroy(source);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"image", "libcamera", "rec", "stub", "v4l2", "video"}));
+  EXPECT_EQ(names, (std::set<std::string>{"depthai", "image", "libcamera", "rec", "stub", "v4l2", "video"}));
   maq_source_scheme scheme{};
   scheme.struct_size = sizeof scheme;
   EXPECT_EQ(maq_source_get_scheme(maq_source_scheme_count(), &scheme), MAQ_ERROR_INVALID_ARGUMENT);
@@ -113,7 +114,8 @@ class LoneCopy {
     Dl_info info{};
     dladdr(reinterpret_cast<const void*>(&maq_source_create), &info);
     std::filesystem::copy_file(info.dli_fname, path_);
-    library_ = dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL);
+    // Its code stays: the thread of a camera may end a little later than its source.
+    library_ = dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
     EXPECT_NE(library_, nullptr) << dlerror();
     EXPECT_EQ(function<decltype(maq_context_create)>("maq_context_create")(MAQ_HEADER_VERSION, nullptr, &context_),
               MAQ_OK);
@@ -138,14 +140,35 @@ class LoneCopy {
     function<decltype(maq_camera_list_destroy)>("maq_camera_list_destroy")(list);
     return status;
   }
+  template <class Use>
+  void use(const char* uri, Use&& body) {
+    maq_source* source = nullptr;
+    ASSERT_EQ(function<decltype(maq_source_create)>("maq_source_create")(context_, uri, nullptr, &source), MAQ_OK)
+        << last_error();
+    body(source);
+    function<decltype(maq_source_destroy)>("maq_source_destroy")(source);
+  }
+  // Of the DepthAI devices in the list of cameras.
+  std::vector<maq_status> depthai_listings() {
+    maq_camera_list* list = nullptr;
+    EXPECT_EQ(function<decltype(maq_camera_list_create)>("maq_camera_list_create")(context_, &list), MAQ_OK);
+    std::vector<maq_status> found;
+    for (uint32_t i = 0; i < function<decltype(maq_camera_list_count)>("maq_camera_list_count")(list); ++i) {
+      maq_camera_info info{};
+      info.struct_size = sizeof info;
+      EXPECT_EQ(function<decltype(maq_camera_list_get)>("maq_camera_list_get")(list, i, &info), MAQ_OK);
+      if (std::string(info.uri).rfind("depthai:", 0) == 0) found.push_back(info.status);
+    }
+    function<decltype(maq_camera_list_destroy)>("maq_camera_list_destroy")(list);
+    return found;
+  }
   std::string last_error() { return function<decltype(maq_last_error)>("maq_last_error")(context_); }
-
- private:
   template <typename Function>
   Function* function(const char* name) const {
     return reinterpret_cast<Function*>(dlsym(library_, name));
   }
 
+ private:
   TempFolder folder_;
   std::string path_;
   void* library_ = nullptr;
@@ -185,13 +208,64 @@ TEST(ApiSources, CamerasOfLibcameraNeedTheirLibraryAndTheListOfCamerasDoesNot) {
   EXPECT_EQ(sdk.open("libcamera:0?colour=red"), MAQ_ERROR_INVALID_ARGUMENT) << "before anything is opened";
 }
 
+TEST(ApiSources, DepthAiNeedsItsLibraryAndListingDoesNot) {
+  LoneCopy sdk;
+  EXPECT_EQ(sdk.open("depthai:"), MAQ_ERROR_RUNTIME_LIBRARY);
+  for (const char* part : {"maquette/libmaquette_depthai.so", "-DMAQ_WITH_DEPTHAI=ON"}) {
+    EXPECT_NE(sdk.last_error().find(part), std::string::npos) << sdk.last_error();
+  }
+  EXPECT_EQ(sdk.open("depthai:?depth=2"), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(sdk.open("depthai:?format=MJPG"), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(sdk.open("v4l2:"), MAQ_ERROR_INVALID_ARGUMENT) << "which has no first camera";
+  EXPECT_EQ(sdk.depthai_listings(), std::vector<maq_status>());
+
+  std::filesystem::create_directory(sdk.beside("maquette"));
+  const std::string library = sdk.beside("maquette/libmaquette_depthai.so");
+  std::filesystem::copy_file(sdk.beside("libmaquette.so"), library);
+  EXPECT_EQ(sdk.open("depthai:"), MAQ_ERROR_RUNTIME_LIBRARY) << "the SDK itself is not the library of DepthAI";
+  EXPECT_NE(sdk.last_error().find("install both from the same build"), std::string::npos) << sdk.last_error();
+  EXPECT_EQ(sdk.depthai_listings(), std::vector<maq_status>{MAQ_ERROR_RUNTIME_LIBRARY});
+}
+
+TEST(ApiSources, DepthAiDeliversDepthAndCalibrationAcrossItsLibrary) {
+  LoneCopy sdk;
+  std::filesystem::create_directory(sdk.beside("maquette"));
+  std::filesystem::copy_file(MAQ_TEST_FAKE_DEPTHAI, sdk.beside("maquette/libmaquette_depthai.so"));
+  EXPECT_EQ(sdk.depthai_listings(), std::vector<maq_status>{MAQ_OK});
+  EXPECT_EQ(sdk.open("depthai:no-such-device"), MAQ_ERROR_NOT_FOUND) << sdk.last_error();
+  EXPECT_EQ(sdk.open("depthai:10.0.0.1"), MAQ_ERROR_NO_PERMISSION)
+      << "an exception of the library: " << sdk.last_error();
+  sdk.use("depthai:?size=64x48&fps=100", [&](maq_source* source) {
+    maq_calibration calibration{};
+    calibration.struct_size = sizeof calibration;
+    EXPECT_EQ(sdk.function<decltype(maq_source_get_calibration)>("maq_source_get_calibration")(source, &calibration),
+              MAQ_OK);
+    EXPECT_EQ(calibration.width_px, 64);
+    EXPECT_EQ(calibration.fx_px, 500);
+    maq_frame* frame = nullptr;
+    ASSERT_EQ(sdk.function<decltype(maq_source_acquire_frame)>("maq_source_acquire_frame")(source, 5000000000, &frame),
+              MAQ_OK);
+    maq_frame_desc desc{};
+    desc.struct_size = sizeof desc;
+    EXPECT_EQ(sdk.function<decltype(maq_frame_get_desc)>("maq_frame_get_desc")(frame, &desc), MAQ_OK);
+    EXPECT_EQ(desc.format, MAQ_PIXEL_NV12);
+    EXPECT_EQ(desc.planes[0][0], 200);
+    EXPECT_EQ(desc.clock, MAQ_CLOCK_MONOTONIC);
+    EXPECT_EQ(sdk.function<decltype(maq_frame_get_depth)>("maq_frame_get_depth")(frame, &desc), MAQ_OK);
+    EXPECT_EQ(desc.format, MAQ_PIXEL_DEPTH16);
+    EXPECT_EQ(desc.width_px, 64);
+    EXPECT_EQ(*reinterpret_cast<const uint16_t*>(desc.planes[0]), 1500);
+    sdk.function<decltype(maq_frame_release)>("maq_frame_release")(frame);
+  });
+}
+
 TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {
   const maquette::Context context;
   maq_source* source = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "rtsp:camera", nullptr, &source), MAQ_ERROR_UNSUPPORTED);
   EXPECT_STREQ(maq_last_error(context.get()),
                "\"rtsp:\" is not a kind of source of this build; there are image:, video:, rec:, stub:, v4l2:, "
-               "libcamera:.");
+               "libcamera:, depthai:.");
   EXPECT_EQ(maq_source_create(context.get(), "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND);
   EXPECT_STREQ(maq_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
   EXPECT_EQ(source, nullptr);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/log.h"
 #include "sources/camera.h"
 #include "sources/uri.h"
 
@@ -26,7 +27,7 @@ constexpr char kLibcameraSymbol[] = "maquette_libcamera";
 // Opening throws MAQ_ERROR_RUNTIME_LIBRARY without libmaquette_libcamera.so, and MAQ_ERROR_NOT_FOUND, _NO_PERMISSION,
 // _BUSY, _DEVICE_LOST, _OUT_OF_MEMORY, and _UNSUPPORTED for a camera without a format that this build knows. Opened again,
 // it is the camera of the same id, whatever number it has then.
-CameraOpener libcamera_camera_opener(SourceUri uri, int buffers);
+CameraOpener libcamera_camera_opener(SourceUri uri, int buffers, const Log& log);
 
 // Those that are there; none without the library.
 std::vector<CameraListing> list_libcamera_cameras();

@@ -14,7 +14,7 @@ const LibcameraCameras& cameras() {
 
 }  // namespace
 
-CameraOpener libcamera_camera_opener(SourceUri uri, int buffers) {
+CameraOpener libcamera_camera_opener(SourceUri uri, int buffers, const Log&) {
   CameraWish wish{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
   uri.expect_no_more_options("size, fps and format");
   return [name = uri.target, wish = std::move(wish), buffers]() mutable {

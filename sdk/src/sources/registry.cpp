@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "sources/depthai_source.h"
 #include "sources/faults.h"
 #include "sources/file_sources.h"
 #include "sources/libcamera_cameras.h"
@@ -22,7 +23,8 @@ std::unique_ptr<Source> without_log(SourceUri uri, const Log&) {
 struct Entry {
   SourceScheme scheme;
   std::unique_ptr<Source> (*open)(SourceUri uri, const Log& log);
-  CameraOpener (*camera)(SourceUri uri, int buffers);
+  CameraOpener (*camera)(SourceUri uri, int buffers, const Log& log);
+  bool needs_target = true;  // otherwise nothing after the scheme means the first there is
 };
 
 const Entry kEntries[] = {
@@ -47,6 +49,11 @@ const Entry kEntries[] = {
       "a camera of libcamera, by number or id: those of the Raspberry Pi and other boards; ?format=NV12"},
      nullptr,
      libcamera_camera_opener},
+    {{"depthai", "depthai:?size=640x480&fps=30",
+      "an OAK camera with depth, the first or depthai:<id or IP>; ?depth=0 for colour alone"},
+     nullptr,
+     depthai_camera_opener,
+     false},
 };
 
 // Of a source that is played as if it were a camera.
@@ -69,11 +76,12 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
     }
     return entry.open(std::move(uri), settings.log);
   }
-  const std::string name = is_camera && uri.target[0] == '/' ? uri.target : uri.scheme + ":" + uri.target;
+  const bool is_path = is_camera && uri.target.rfind("/", 0) == 0;
+  const std::string name = is_path ? uri.target : uri.scheme + ":" + uri.target;
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
-  CameraOpener opener =
-      is_camera ? entry.camera(std::move(uri), buffers) : played(entry, std::move(uri), settings.log, buffers);
+  CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers, settings.log)
+                                  : played(entry, std::move(uri), settings.log, buffers);
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
   return std::make_unique<LiveSource>(std::move(opener), name, settings);
 }
@@ -95,6 +103,7 @@ const std::vector<SourceScheme>& source_schemes() {
 std::vector<CameraListing> list_cameras() {
   std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
   for (CameraListing& camera : list_libcamera_cameras()) all.push_back(std::move(camera));
+  for (CameraListing& listing : list_depthai_sources()) all.push_back(std::move(listing));
   return all;
 }
 
@@ -102,7 +111,7 @@ std::unique_ptr<Source> open_source(const std::string& text, const SourceSetting
   SourceUri uri = parse_source_uri(text);
   for (const Entry& entry : kEntries) {
     if (uri.scheme == entry.scheme.name) {
-      if (uri.target.empty()) {
+      if (entry.needs_target && uri.target.empty()) {
         throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
                     entry.scheme.example, ".");
       }

@@ -4,7 +4,7 @@
 
 namespace maq {
 
-CameraOpener v4l2_camera_opener(SourceUri uri, int buffers) {
+CameraOpener v4l2_camera_opener(SourceUri uri, int buffers, const Log&) {
   CameraWish wish{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
   uri.expect_no_more_options("size, fps and format");
   return v4l2_opener(SystemCalls::real(), uri.target, std::move(wish), buffers);

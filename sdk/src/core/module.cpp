@@ -11,8 +11,10 @@
 
 namespace maq {
 
-const void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy) {
-  const std::string path = own_folder() + "maquette/" + file;
+std::string module_path(const char* file) { return own_folder() + "maquette/" + file; }
+
+void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy) {
+  const std::string path = module_path(file);
   void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) {
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, needed_for, " ", path, ", which cannot be opened: ", dlerror(), ". ",

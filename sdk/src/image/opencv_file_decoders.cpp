@@ -58,8 +58,8 @@ class OpenCvFileDecoders : public FileDecoders {
 
 #ifdef MAQ_MODULE_VERSION
 extern "C" __attribute__((visibility("default"))) maq::ModuleExport maquette_file_decoders() {
-  static const maq::OpenCvFileDecoders decoders;
-  return {MAQ_MODULE_VERSION, static_cast<const maq::FileDecoders*>(&decoders)};
+  static maq::OpenCvFileDecoders decoders;
+  return {MAQ_MODULE_VERSION, static_cast<maq::FileDecoders*>(&decoders)};
 }
 #else
 namespace maq {

@@ -65,6 +65,6 @@ class Cameras : public LibcameraCameras {
 }  // namespace maq
 
 extern "C" __attribute__((visibility("default"))) maq::ModuleExport maquette_libcamera() {
-  static const maq::Cameras cameras;
-  return {MAQ_MODULE_VERSION, static_cast<const maq::LibcameraCameras*>(&cameras)};
+  static maq::Cameras cameras;
+  return {MAQ_MODULE_VERSION, static_cast<maq::LibcameraCameras*>(&cameras)};
 }

@@ -100,6 +100,7 @@ check "it is listed with its formats" lists "$id" "Virtual UVC Camera" "YUYV    
 check "the gradient at 640x480, byte for byte" source_check "libcamera:0?format=YUYV" 20 gradient
 check "the gradient at 320x240, byte for byte" source_check "libcamera:0?size=320x240" 20 gradient
 check "by its id" source_check "$id?size=330x200" 5 gradient
+check "brightness reaches the camera" brightness_reaches_the_camera
 check "another id says what there is" says "libcamera sees 1 camera." libcamera:/another
 check "a format that it has not says which it has" says "offers MJPG, YUYV, but not NV12" 'libcamera:0?format=NV12'
 check "busy while another program has it" busy_while_another_program_has_it

@@ -5,7 +5,7 @@
  *   source_check URI FRAMES back         ... FRAMES of them after it went away and came back
  *   source_check URI VALUE  brightness   the control is set, and some frames are taken for it to reach the camera
  *
- * Numbers and times of frames must rise, and times be of the monotonic clock. A frame's dma-buf must show the same bytes as
+ * While a camera streams it is listed, and nobody else can open it. Numbers and times of frames must rise, and times be of the monotonic clock. A frame's dma-buf must show the same bytes as
  * its planes, and the last frame stay readable when the source is gone.
  * Prints one line: what was taken (exit status 0), or what was wrong (1).
  */
@@ -58,6 +58,17 @@ static void check_dma_buf(const maq_frame* frame, const maq_frame_desc* desc) {
   if (memory == MAP_FAILED) fail("A frame's dma-buf cannot be mapped.");
   if (memcmp(memory, desc->planes[0], bytes) != 0) fail("A frame's dma-buf shows something else than its pixels.");
   munmap(memory, bytes);
+}
+
+/* Neither disturbs the frames that follow. */
+static void check_others(maq_context* context, const char* uri) {
+  maq_source* second = NULL;
+  maq_camera_list* list = NULL;
+  maq_status status = maq_source_create(context, uri, NULL, &second);
+  if (status != MAQ_ERROR_BUSY) fail("Opened twice, it gives status %d and not MAQ_ERROR_BUSY.", status);
+  if (maq_camera_list_create(context, &list) != MAQ_OK) fail("%s", maq_last_error(context));
+  if (maq_camera_list_count(list) == 0) fail("A camera that streams is not listed.");
+  maq_camera_list_destroy(list);
 }
 
 static atomic_int times_back;
@@ -131,6 +142,7 @@ int main(int count, char** arguments) {
     last_ns = desc.timestamp_ns;
     check_gradient(&desc);
     check_dma_buf(frame, &desc);
+    if (all == 0 && strcmp(arguments[3], "gradient") == 0) check_others(context, arguments[1]);
     if (!is_back || atomic_load(&times_back) > 0) ++got;
   }
   if (is_lost) fail("The camera was still there after %d frames.", frames);

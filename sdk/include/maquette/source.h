@@ -94,7 +94,7 @@ typedef struct maq_source_scheme {
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
 /* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "stub:people?count=2&fps=30&seed=7" "stub:pattern"
- * "v4l2:/dev/video0" or "depthai:". "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out
+ * "v4l2:/dev/video0", "libcamera:0" or "depthai:". "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out
  * to that rate; a camera takes the nearest that it offers, which maq_source_get_info tells, and "format=MJPG" names its format. A '?' that is part of a file name is written %3F, '%' is written %25. `config` may be NULL.
  * `*source` is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),

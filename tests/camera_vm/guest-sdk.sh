@@ -27,11 +27,33 @@ dense_pose() {
     [ $status -eq 0 ] && [ "$(ls /tmp/results/*_IUV.png | wc -l)" -eq "$2" ] && grep "$3" /tmp/summary
 }
 
+# controls_arrive OPTIONS CONTROL=VALUE...: opened with the options of a URI, the driver has the values.
+controls_arrive() {
+    dma_buf "v4l2:/dev/video0?$1" 1 || return 1
+    shift
+    for wanted in "$@"; do
+        v4l2-ctl -d /dev/video0 -C "${wanted%=*}" | grep -x "${wanted%=*}: ${wanted#*=}[^0-9]*" || {
+            v4l2-ctl -d /dev/video0 -C "${wanted%=*}"
+            return 1
+        }
+    done
+}
+# Refused with a sentence that has the text.
+refuses() {
+    ! dma_buf "v4l2:/dev/video0?$1" 1 >/tmp/summary && grep "$2" /tmp/summary
+}
+dma_buf_outlives_the_camera() {
+    (sleep 3; kill $camera) &
+    dma_buf v4l2:/dev/video0 unplugged && wait_until test ! -e /dev/video0
+}
+
 # The camera is away for two seconds while frames are taken.
 survives_unplugging() {
+    rm -rf /tmp/results
     $maquette densepose v4l2:/dev/video0 --out /tmp/results --max-frames 12 >/tmp/summary 2>&1 &
     program=$!
-    sleep 3
+    has_a_frame() { ls /tmp/results/*_IUV.png; }
+    wait_until has_a_frame || wait_until has_a_frame || return 1
     unplug || return 1
     sleep 2
     plug_in --jpeg /photo.jpg || return 1
@@ -46,6 +68,18 @@ check "vivid is listed" lists "v4l2:/dev/video0" "vivid"
 for size in 320x240 640x480 1280x720; do
     check "vivid $size: colour bars show nobody" dense_pose "v4l2:/dev/video0?size=$size" 3 ", 0 people"
 done
+check "vivid: controls arrive, and switch their automatic off" \
+    controls_arrive "brightness=77&gain=33" brightness=77 gain_automatic=0 gain=33
+check "vivid: a value out of range is refused with the range" refuses brightness=1000 "goes from 0 to 255, not to 1000"
+check "vivid: what it does not have is refused" refuses focus=3 "has no focus"
+check "vivid YUYV: frames are dma-bufs" dma_buf "v4l2:/dev/video0?size=640x480&format=YUYV" 5
+check "vivid NV12: frames are dma-bufs" dma_buf "v4l2:/dev/video0?size=640x480&format=NV12" 5
+rmmod vivid
+
+check "vivid of two planes loads" modprobe vivid n_devs=1 node_types=0x1 multiplanar=2
+check "vivid of two planes shows nobody" dense_pose "v4l2:/dev/video0?size=640x480&format=NM12" 1 ", 0 people"
+check "vivid NV12: frames are dma-bufs by the multi-planar interface" \
+    dma_buf "v4l2:/dev/video0?size=640x480&format=NV12" 5
 rmmod vivid
 
 check "drivers of USB cameras load" sh -c 'modprobe vhci-hcd && modprobe uvcvideo'
@@ -55,6 +89,11 @@ check "the gradient at 320x240 shows nobody" dense_pose "v4l2:/dev/video0?size=3
 unplug
 check "a camera that shows a picture appears" plug_in --jpeg /photo.jpg
 check "dense pose finds the people of the picture" dense_pose "v4l2:/dev/video0?format=MJPG" 3 ", [1-9][0-9]* p"
+check "its brightness arrives" controls_arrive brightness=77 brightness=77
+check "what it does not have is refused" refuses exposure=10000 "has no exposure"
 check "survives being unplugged and plugged in again" survives_unplugging
 unplug
+check "a camera appears for its dma-bufs" plug_in
+check "a frame's dma-buf is readable when the camera is unplugged" dma_buf_outlives_the_camera
+wait $camera 2>/dev/null
 check "without a camera it says what to do" sh -c "! $maquette densepose v4l2:/dev/video0 --out /tmp/x 2>&1 | grep 'plugged in' && exit 1; true"

@@ -53,15 +53,19 @@ pack() {
         vivid) contents+=(--module vivid) ;;
         uvc) contents+=(--module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
             --file tests/media/photo.jpg=photo.jpg) ;;
-        sdk) contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
-            --file tests/media/photo.jpg=photo.jpg --tree build/release/stage=/opt/maquette) ;;
+        sdk)
+            cc -std=c99 -Wall -Wextra -Werror -O2 -Isdk/include tests/camera_vm/dma_buf.c -o "$work/dma_buf" \
+                -Lbuild/release/stage/lib -lmaquette
+            contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
+                --program "$work/dma_buf" --file tests/media/photo.jpg=photo.jpg
+                --tree build/release/stage=/opt/maquette) ;;
         libcamera)
             [ -e build/release/stage/lib/maquette/libmaquette_libcamera.so ] || {
                 echo "This build has no libcamera: cameras: cmake --preset release && make build (libcamera-dev)." >&2
                 return 1
             }
             cc -std=c11 -Wall -Wextra -Werror -O2 -o "$work/source_check" tests/camera_vm/source_check.c \
-                -Isdk/include -Lbuild/release/stage/lib -lmaquette -Wl,--allow-shlib-undefined
+                -Isdk/include -Lbuild/release/stage/lib -lmaquette
             contents+=(--module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
                 --program "$work/source_check" --program "$(command -v cam)" --program "$(command -v udevadm)"
                 --file tests/media/photo.jpg=photo.jpg --tree build/release/stage=/opt/maquette) ;;

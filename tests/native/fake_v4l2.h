@@ -8,16 +8,19 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <ctime>
 #include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "fake_v4l2_controls.h"
 #include "sources/system_calls.h"
 
 class FakeV4l2 : public maq::SystemCalls {
@@ -37,7 +40,11 @@ class FakeV4l2 : public maq::SystemCalls {
   size_t stride_bytes = 0;       // 0: rows without padding
   uint32_t granted_buffers = 0;  // 0: as many as were asked for
   uint32_t buffer_bytes = 0;     // 0: as many as a frame has
-  uint32_t wrong_index = 0;      // added to what DQBUF says
+  uint32_t data_offset[2] = {};  // where pictures begin in each plane of memory
+  uint8_t wrong_planes = 0;      // of memory, added to what TRY_FMT and S_FMT say
+  bool endless = false;          // lists that never end
+  bool can_export = true;
+  FakeV4l2Controls controls;
 
   ~FakeV4l2() override {
     for (auto& [data, size] : memory_) std::free(data);
@@ -45,37 +52,55 @@ class FakeV4l2 : public maq::SystemCalls {
 
   // --- what a test does
 
-  // From now on `call` (a request, or one of the above) fails with `error`, after so many calls that still work.
-  void break_call(unsigned long call, int error, int after = 0) {
+  // From now on `call` (a request, or one of the above) fails `times` times with `error`, after so many calls that work.
+  void break_call(unsigned long call, int error, int after = 0, int times = INT_MAX) {
     std::lock_guard<std::mutex> lock(mutex_);
-    faults_ = {{call, {error, after}}};
+    faults_ = {{call, {error, after, times}}};
+  }
+  // The device is pulled out when `call` is made, after so many that still work.
+  void vanish_at(unsigned long call, int after = 0) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    faults_ = {{call, {0, after, 1}}};
+  }
+  // poll says that the device has an error, and nothing more.
+  void raise_poll_error(bool on) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    poll_error_ = on;
+    wake();
+  }
+  // What the driver says of frames that are delivered from now on; without a stamp they get the time of delivery.
+  void stamp_frames(std::optional<timeval> stamp) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    stamp_ = stamp;
+  }
+  // What the driver says from now on, of buffers that are as they are.
+  void set_data_offset(uint32_t offset) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    said_offset_ = offset;
+  }
+  void add_to_index(uint32_t wrong) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    wrong_index_ = wrong;
+  }
+  void number_frames_from(uint32_t sequence) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    sequence_ = sequence;
   }
   void mend() {
     std::lock_guard<std::mutex> lock(mutex_);
     faults_.clear();
   }
 
-  // Fills the next queued buffer with the byte `value`; false when none is queued: the frame is lost, as in a driver.
+  // Fills the next queued buffer with the byte `value`, of its second plane of memory with `value + 1`; false when none is
+  // queued: the frame is lost, as in a driver. `bytes`: in each plane at most.
   bool deliver(uint8_t value, uint32_t flags = 0, size_t bytes = SIZE_MAX) {
-    std::lock_guard<std::mutex> lock(mutex_);
-    const uint32_t sequence = sequence_++;
-    if (!streaming_ || queued_.empty()) return false;
-    const uint32_t index = queued_.front();
-    queued_.pop_front();
-    std::memset(buffers_[index], value, frame_bytes_);
-    finish(index, sequence, flags, std::min(bytes, frame_bytes_));
-    return true;
+    return fill(flags, bytes,
+                [value](int plane, uint8_t* data, size_t size) { std::memset(data, value + plane, size); });
   }
   // The same with these bytes: a JPEG image.
-  bool deliver(const std::vector<uint8_t>& bytes) {
-    std::lock_guard<std::mutex> lock(mutex_);
-    const uint32_t sequence = sequence_++;
-    if (!streaming_ || queued_.empty()) return false;
-    const uint32_t index = queued_.front();
-    queued_.pop_front();
-    std::memcpy(buffers_[index], bytes.data(), std::min(bytes.size(), frame_bytes_));
-    finish(index, sequence, 0, std::min(bytes.size(), frame_bytes_));
-    return true;
+  bool deliver(const std::vector<uint8_t>& jpeg) {
+    return fill(0, jpeg.size(),
+                [&](int, uint8_t* data, size_t size) { std::copy_n(jpeg.begin(), std::min(size, jpeg.size()), data); });
   }
   void unplug() {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -96,6 +121,24 @@ class FakeV4l2 : public maq::SystemCalls {
     std::lock_guard<std::mutex> lock(mutex_);
     return mappings_;
   }
+  // dma-bufs that are open.
+  size_t exported() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return exported_.size();
+  }
+  int exports() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return exports_;
+  }
+  // As the driver has it now.
+  int control(uint32_t id) const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return controls.all.at(id).value;
+  }
+  void reset_controls() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    for (auto& [id, control] : controls.all) control.value = control.preset;
+  }
   size_t queued() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return queued_.size();
@@ -114,8 +157,8 @@ class FakeV4l2 : public maq::SystemCalls {
 
   int open(const char* path, int) override {
     std::lock_guard<std::mutex> lock(mutex_);
-    if (!plugged_ || path != path_) return failed(ENOENT);
-    if (fails(kOpen)) return -1;
+    if (path != path_ || fails(kOpen)) return path != path_ ? failed(ENOENT) : -1;
+    if (!plugged_) return failed(ENOENT);
     const int fd = eventfd(0, EFD_NONBLOCK | EFD_SEMAPHORE);
     files_.insert(fd);
     fd_ = fd;
@@ -125,6 +168,7 @@ class FakeV4l2 : public maq::SystemCalls {
 
   int close(int fd) override {
     std::lock_guard<std::mutex> lock(mutex_);
+    if (exported_.erase(fd) != 0) return ::close(fd);
     if (files_.erase(fd) == 0) return failed(EBADF);
     streaming_ = false;
     queued_.clear();
@@ -159,8 +203,8 @@ class FakeV4l2 : public maq::SystemCalls {
     }
     const int ready = ::poll(fds, count, timeout_ms);
     std::lock_guard<std::mutex> lock(mutex_);
-    if (plugged_) return ready;
-    fds[0].revents = POLLERR | POLLHUP;
+    if (plugged_ && !poll_error_) return ready;
+    fds[0].revents = plugged_ ? POLLERR : POLLERR | POLLHUP;
     return std::max(ready, 1);
   }
 
@@ -182,8 +226,13 @@ class FakeV4l2 : public maq::SystemCalls {
       case VIDIOC_QUERYBUF: return describe_buffer(*static_cast<v4l2_buffer*>(argument));
       case VIDIOC_QBUF: return queue(*static_cast<v4l2_buffer*>(argument));
       case VIDIOC_DQBUF: return dequeue(*static_cast<v4l2_buffer*>(argument));
+      case VIDIOC_EXPBUF: return export_buffer(*static_cast<v4l2_exportbuffer*>(argument));
       case VIDIOC_STREAMON: streaming_ = true; return 0;
       case VIDIOC_STREAMOFF: streaming_ = false; return 0;
+      case VIDIOC_QUERYCTRL: return answered(controls.query(*static_cast<v4l2_queryctrl*>(argument)));
+      case VIDIOC_QUERYMENU: return answered(controls.query_item(*static_cast<v4l2_querymenu*>(argument)));
+      case VIDIOC_G_CTRL: return answered(controls.get(*static_cast<v4l2_control*>(argument)));
+      case VIDIOC_S_CTRL: return answered(controls.set(*static_cast<v4l2_control*>(argument)));
     }
     return failed(ENOTTY);
   }
@@ -192,10 +241,11 @@ class FakeV4l2 : public maq::SystemCalls {
   struct Fault {
     int error = 0;
     int after = 0;
+    int times = 0;
   };
   struct Filled {
     uint32_t index, sequence, flags;
-    size_t bytes;
+    size_t bytes;  // in each plane at most
     timeval time;
   };
 
@@ -206,20 +256,41 @@ class FakeV4l2 : public maq::SystemCalls {
   bool fails(unsigned long call) {
     const auto found = faults_.find(call);
     if (found == faults_.end()) return false;
-    if (found->second.after-- > 0) return false;
-    errno = found->second.error;
+    Fault& fault = found->second;
+    if (fault.after-- > 0 || fault.times <= 0) return false;
+    --fault.times;
+    if (fault.error == 0) {
+      plugged_ = false;
+      wake();
+      return false;
+    }
+    errno = fault.error;
     return true;
   }
+  static int answered(int error) { return error == 0 ? 0 : failed(error); }
   void wake() {
     const uint64_t one = 1;
     if (fd_ >= 0 && files_.count(fd_) != 0) [[maybe_unused]]
       const ssize_t written = ::write(fd_, &one, sizeof one);
   }
-  void finish(uint32_t index, uint32_t sequence, uint32_t flags, size_t bytes) {
+  template <class Fill>
+  bool fill(uint32_t flags, size_t bytes, Fill fill_plane) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const uint32_t sequence = sequence_++;
+    if (!streaming_ || queued_.empty()) return false;
+    const uint32_t index = queued_.front();
+    queued_.pop_front();
+    for (int plane = 0; plane < memory_planes_; ++plane) {
+      fill_plane(plane, buffers_[index + plane * kNextPlane] + data_offset[plane], memory_bytes_[plane]);
+    }
     timespec now{};
     clock_gettime(CLOCK_MONOTONIC, &now);
-    filled_.push_back({index, sequence, flags, bytes, {now.tv_sec, now.tv_nsec / 1000}});
+    // No two frames have the same time, however fast they come.
+    last_us_ = std::max(last_us_ + 1, int64_t(now.tv_sec) * 1000000 + now.tv_nsec / 1000);
+    const timeval time = stamp_.value_or(timeval{last_us_ / 1000000, last_us_ % 1000000});
+    filled_.push_back({index, sequence, flags, bytes, time});
     wake();
+    return true;
   }
 
   int query(v4l2_capability& found) {
@@ -235,8 +306,8 @@ class FakeV4l2 : public maq::SystemCalls {
     for (const Mode& mode : modes) {
       if (std::find(all.begin(), all.end(), mode.fourcc) == all.end()) all.push_back(mode.fourcc);
     }
-    if (found.index >= all.size()) return failed(EINVAL);
-    found.pixelformat = all[found.index];
+    if (found.index >= all.size() && !endless) return failed(EINVAL);
+    found.pixelformat = all[found.index % all.size()];
     return 0;
   }
   static size_t row_of(uint32_t fourcc, int width) {
@@ -254,23 +325,31 @@ class FakeV4l2 : public maq::SystemCalls {
     }
     if (best == nullptr) return failed(EINVAL);
     const bool jpeg = fourcc == V4L2_PIX_FMT_MJPEG;
+    const auto width_px = uint32_t(best->width), height_px = uint32_t(best->height);
     const size_t row = jpeg ? 0 : stride_bytes != 0 ? stride_bytes : row_of(fourcc, best->width);
-    size_t bytes = jpeg ? size_t(best->width) * size_t(best->height) * 2 : row * size_t(best->height);
-    if (fourcc == V4L2_PIX_FMT_NV12) bytes += row * size_t(best->height) / 2;
+    // Of NV12M the second plane has longer lines, so that nobody takes one stride for both.
+    const size_t rows[2] = {row, row + 32};
+    size_t bytes[2] = {(jpeg ? 2 * width_px : row) * height_px, rows[1] * height_px / 2};
+    if (fourcc == V4L2_PIX_FMT_NV12) bytes[0] += row * height_px / 2;
+    const int planes = fourcc == V4L2_PIX_FMT_NV12M ? 2 : 1;
     if (planar) {
-      format.fmt.pix_mp.width = uint32_t(best->width);
-      format.fmt.pix_mp.height = uint32_t(best->height);
-      format.fmt.pix_mp.num_planes = 1;
-      format.fmt.pix_mp.plane_fmt[0].bytesperline = uint32_t(row);
-      format.fmt.pix_mp.plane_fmt[0].sizeimage = uint32_t(bytes);
+      v4l2_pix_format_mplane& mp = format.fmt.pix_mp;
+      mp.width = width_px;
+      mp.height = height_px;
+      mp.num_planes = uint8_t(planes + wrong_planes);
+      for (int plane = 0; plane < planes; ++plane) {
+        mp.plane_fmt[plane].bytesperline = uint32_t(rows[plane]);
+        mp.plane_fmt[plane].sizeimage = uint32_t(bytes[plane]);
+      }
     } else {
-      format.fmt.pix.width = uint32_t(best->width);
-      format.fmt.pix.height = uint32_t(best->height);
+      format.fmt.pix.width = width_px;
+      format.fmt.pix.height = height_px;
       format.fmt.pix.bytesperline = uint32_t(row);
-      format.fmt.pix.sizeimage = uint32_t(bytes);
+      format.fmt.pix.sizeimage = uint32_t(bytes[0]);
     }
     if (keep) {
-      frame_bytes_ = bytes;
+      memory_planes_ = planes;
+      std::copy(bytes, bytes + 2, memory_bytes_);
       fps_ = best->fps;
     }
     return 0;
@@ -278,7 +357,7 @@ class FakeV4l2 : public maq::SystemCalls {
   int size(v4l2_frmsizeenum& found) {
     uint32_t index = found.index;
     for (const Mode& mode : modes) {
-      if (mode.fourcc != found.pixel_format || index-- > 0) continue;
+      if (mode.fourcc != found.pixel_format || (index-- > 0 && !endless)) continue;
       found.type = V4L2_FRMSIZE_TYPE_DISCRETE;
       found.discrete = {uint32_t(mode.width), uint32_t(mode.height)};
       return 0;
@@ -287,7 +366,7 @@ class FakeV4l2 : public maq::SystemCalls {
   }
   int interval(v4l2_frmivalenum& found) {
     for (const Mode& mode : modes) {
-      if (found.index == 0 && mode.fourcc == found.pixel_format && mode.width == int(found.width)) {
+      if ((found.index == 0 || endless) && mode.fourcc == found.pixel_format && mode.width == int(found.width)) {
         found.type = V4L2_FRMIVAL_TYPE_DISCRETE;
         found.discrete = {1, uint32_t(mode.fps)};
         return 0;
@@ -306,16 +385,27 @@ class FakeV4l2 : public maq::SystemCalls {
     count_ = request.count;
     return 0;
   }
-  uint32_t size_of_buffer() const { return buffer_bytes != 0 ? buffer_bytes : uint32_t(frame_bytes_); }
+  uint32_t size_of_buffer(int plane) const {
+    return buffer_bytes != 0 ? buffer_bytes : uint32_t(memory_bytes_[plane]) + data_offset[plane];
+  }
   int describe_buffer(v4l2_buffer& buffer) {
-    if (buffer.index >= count_) return failed(EINVAL);
-    if (planar) {
-      buffer.m.planes[0].length = size_of_buffer();
-      buffer.m.planes[0].m.mem_offset = buffer.index;
-    } else {
-      buffer.length = size_of_buffer();
+    if (buffer.index >= count_ || (planar && buffer.length < uint32_t(memory_planes_))) return failed(EINVAL);
+    for (int plane = 0; planar && plane < memory_planes_; ++plane) {
+      buffer.m.planes[plane].length = size_of_buffer(plane);
+      buffer.m.planes[plane].m.mem_offset = buffer.index + plane * kNextPlane;
+    }
+    if (!planar) {
+      buffer.length = size_of_buffer(0);
       buffer.m.offset = buffer.index;
     }
+    return 0;
+  }
+  int export_buffer(v4l2_exportbuffer& request) {
+    if (!can_export) return failed(ENOTTY);
+    if (request.index >= count_ || request.plane >= uint32_t(memory_planes_)) return failed(EINVAL);
+    request.fd = memfd_create("a dma-buf", MFD_CLOEXEC);
+    exported_.insert(request.fd);
+    ++exports_;
     return 0;
   }
   int queue(v4l2_buffer& buffer) {
@@ -329,13 +419,20 @@ class FakeV4l2 : public maq::SystemCalls {
     if (filled_.empty() || ::read(fd_, &one, sizeof one) < 0) return failed(EAGAIN);
     const Filled filled = filled_.front();
     filled_.pop_front();
-    buffer.index = filled.index + wrong_index;
+    buffer.index = filled.index + wrong_index_;
     buffer.sequence = filled.sequence;
     buffer.flags = filled.flags | timestamp_flags;
     buffer.timestamp = filled.time;
-    (planar ? buffer.m.planes[0].bytesused : buffer.bytesused) = uint32_t(filled.bytes);
+    for (int plane = 0; planar && plane < memory_planes_; ++plane) {
+      buffer.m.planes[plane].data_offset = said_offset_.value_or(data_offset[plane]);
+      buffer.m.planes[plane].bytesused =
+          uint32_t(std::min(filled.bytes, memory_bytes_[plane])) + data_offset[plane];  // which counts both
+    }
+    if (!planar) buffer.bytesused = uint32_t(std::min(filled.bytes, memory_bytes_[0]));
     return 0;
   }
+
+  static constexpr uint32_t kNextPlane = 1000;  // between the offsets of the planes of a buffer
 
   mutable std::mutex mutex_;
   std::map<unsigned long, Fault> faults_;
@@ -349,7 +446,15 @@ class FakeV4l2 : public maq::SystemCalls {
   int opened_ = 0;
   uint32_t count_ = 0;
   uint32_t sequence_ = 0;
-  size_t frame_bytes_ = 0;
+  int memory_planes_ = 1;
+  size_t memory_bytes_[2] = {};  // of a frame in each plane of memory
+  std::set<int> exported_;
+  int exports_ = 0;
+  bool poll_error_ = false;
+  std::optional<timeval> stamp_;
+  int64_t last_us_ = 0;
+  uint32_t wrong_index_ = 0;
+  std::optional<uint32_t> said_offset_;
   double fps_ = 30;
   bool plugged_ = true;
   std::string path_ = "/dev/video0";

@@ -1,6 +1,7 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <maquette/maquette.hpp>
 #include <set>
@@ -105,6 +106,24 @@ TEST(ApiSources, WhatIsRecordedIsPlayedAgain) {
   frame->copy_pixels(MAQ_PIXEL_BGR8, again.data(), 0, again.size());
   EXPECT_EQ(again, last);
   EXPECT_FALSE(player.next().has_value());
+}
+
+TEST(ApiSources, OnlyCamerasHaveControls) {
+  const maquette::Context context;
+  maquette::Source source(context, "stub:pattern?size=16x16");
+  EXPECT_FALSE(source.control(MAQ_CONTROL_GAIN).has_value());
+  for (const auto& [value, status] :
+       {std::pair(1.0, MAQ_ERROR_UNSUPPORTED), std::pair(double(NAN), MAQ_ERROR_INVALID_ARGUMENT)}) {
+    try {
+      source.set_control(MAQ_CONTROL_GAIN, value);
+      ADD_FAILURE() << value;
+    } catch (const maquette::Error& error) {
+      EXPECT_EQ(error.status(), status) << error.what();
+    }
+  }
+  maq_source* camera = nullptr;
+  EXPECT_EQ(maq_source_create(context.get(), "v4l2:/no/such?gain=loud", nullptr, &camera), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(maq_last_error(context.get()), "gain=loud in v4l2:/no/such?gain=loud must be a number or auto.");
 }
 
 // A copy of the SDK that lies alone.

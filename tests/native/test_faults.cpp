@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstring>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -93,6 +94,27 @@ TEST_F(Faults, SpeedAndLoopAreHeeded) {
     EXPECT_TRUE(i == 0 || frame.sequence > last);
     last = frame.sequence;
   }
+}
+
+TEST_F(Faults, WhatIsPlayedCanBeSoughtAlsoFromItsEnd) {
+  const auto source = open("stub:pattern?live=1&frames=20&fps=100&size=32x24", 5);
+  maq::Frame frame;
+  ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
+  int64_t last_ns = frame.timestamp_ns;
+  for (const uint64_t number : {15u, 3u, 18u}) {
+    source->seek(int64_t(number) * 10000000);
+    ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
+    const auto shown = open("stub:pattern?size=32x24");
+    shown->seek(int64_t(number) * 10000000);
+    maq::Frame expected;
+    ASSERT_EQ(shown->next(0, expected), NextFrame::kFrame);
+    EXPECT_EQ(std::memcmp(frame.image.planes[0].data, expected.storage.data(), expected.storage.size()), 0) << number;
+    EXPECT_GT(frame.timestamp_ns, last_ns) << "the clock goes on";
+    last_ns = frame.timestamp_ns;
+    while (source->next(10 * kSecond, frame) == NextFrame::kFrame) last_ns = frame.timestamp_ns;
+  }
+  const auto image = open("stub:people?drop=0.1");
+  EXPECT_NO_THROW(image->seek(0));
 }
 
 TEST_F(Faults, DroppedFramesAreCountedAndTheSameForASeed) {

@@ -166,15 +166,25 @@ TEST(LibcameraChoices, AValueSetByHandSwitchesItsAutomaticOffWithARequestBeforeI
   book.set(MAQ_CONTROL_EXPOSURE, 12345.4);
   EXPECT_EQ(book.get(MAQ_CONTROL_EXPOSURE).value, 12345);
   EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_EXPOSURE).value, 0);
-  book.set(MAQ_CONTROL_FOCUS, 2.5);
   book.set(MAQ_CONTROL_GAIN, 4);
+  book.set(MAQ_CONTROL_FOCUS, 2.5);
   book.set(MAQ_CONTROL_AUTO_FOCUS, 1);
-  EXPECT_EQ(next_setting(book), "AeEnable=false");
-  EXPECT_EQ(next_setting(book), "ExposureTime=12345");
-  EXPECT_EQ(next_setting(book), "LensPosition=2.500000");
-  EXPECT_EQ(next_setting(book), "AnalogueGain=4.000000");
-  EXPECT_EQ(next_setting(book), "AfMode=2") << "set twice, sent once: what was set last";
-  EXPECT_EQ(next_setting(book), "");
+  for (const char* setting : {"AeEnable=false", "ExposureTime=12345", "AeEnable=false", "AnalogueGain=4.000000",
+                              "AfMode=0", "LensPosition=2.500000", "AfMode=2", ""}) {
+    EXPECT_EQ(next_setting(book), setting);
+  }
+}
+
+TEST(LibcameraChoices, SettingsThatNoFrameTakesAwayDoNotPileUp) {
+  maq::LibcameraControls book(board_controls(), "0");
+  for (int value = 100; value < 10000; ++value) book.set(MAQ_CONTROL_EXPOSURE, value);
+  for (const char* setting : {"AeEnable=false", "ExposureTime=9999", ""}) EXPECT_EQ(next_setting(book), setting);
+  expect_error(MAQ_ERROR_BUSY, "settings waiting for its next frames", [&] {
+    for (int i = 0; i < 100; ++i) {
+      book.set(MAQ_CONTROL_EXPOSURE, 1000 + i);
+      book.set(MAQ_CONTROL_BRIGHTNESS, 0.5);
+    }
+  });
 }
 
 TEST(LibcameraChoices, ValuesOutOfRangeAreRefusedAndSetNothing) {

@@ -1,78 +1,15 @@
 // The V4L2 backend and the live source above it, on a driver in memory.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <atomic>
 #include <opencv2/imgcodecs.hpp>
-#include <thread>
 
-#include "expect_error.h"
-#include "fake_v4l2.h"
-#include "sources/live_source.h"
-#include "sources/v4l2_camera.h"
+#include "live_camera_test.h"
 
 namespace {
 
-using namespace std::chrono_literals;
-using maq::NextFrame;
-constexpr int64_t kSecond = 1000000000;
-
-// What was reported, in order.
-class Reports {
- public:
-  static void note(void* self, maq_source_state state, const char*) {
-    auto* reports = static_cast<Reports*>(self);
-    std::lock_guard<std::mutex> lock(reports->mutex_);
-    reports->states_.push_back(state);
-  }
-  std::vector<maq_source_state> states() const {
-    std::lock_guard<std::mutex> lock(mutex_);
-    return states_;
-  }
-  bool wait_for(maq_source_state state) const {
-    for (int i = 0; i < 500; ++i) {
-      const auto all = states();
-      if (std::find(all.begin(), all.end(), state) != all.end()) return true;
-      std::this_thread::sleep_for(10ms);
-    }
-    return false;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<maq_source_state> states_;
-};
-
-class LiveCameras : public ::testing::Test {
- protected:
-  std::shared_ptr<maq::Camera> camera(const maq::CameraWish& wish = {}) {
-    return maq::open_v4l2_camera(fake_, "/dev/video0", wish, 4);
-  }
-  maq::SourceSettings settings() {
-    maq::SourceSettings settings;
-    settings.on_state = Reports::note;
-    settings.user_data = &reports_;
-    return settings;
-  }
-  std::unique_ptr<maq::LiveSource> source(const maq::SourceSettings& settings, const maq::CameraWish& wish = {}) {
-    const auto open = [this, wish] { return maq::open_v4l2_camera(fake_, "/dev/video0", wish, 6); };
-    return std::make_unique<maq::LiveSource>(open, "/dev/video0", settings);
-  }
-  void TearDown() override { wait_until_closed(fake_); }
-
-  // On a busy machine a source's thread may need longer to end than its source waits.
-  static void wait_until_closed(const FakeV4l2& fake) {
-    for (int i = 0; i < 500 && fake.mappings() > 0; ++i) std::this_thread::sleep_for(10ms);
-    EXPECT_EQ(fake.open_files(), 0);
-    EXPECT_EQ(fake.mappings(), 0);
-  }
-  void expect_nothing_left() {
-    EXPECT_EQ(fake_.open_files(), 0);
-    EXPECT_EQ(fake_.mappings(), 0);
-  }
-
-  FakeV4l2 fake_;
-  Reports reports_;
-};
+class LiveCameras : public LiveCameraTest {};
 
 TEST_F(LiveCameras, TakeTheNearestOfWhatIsOffered) {
   fake_.modes = {{V4L2_PIX_FMT_YUYV, 1280, 720, 10},
@@ -145,6 +82,99 @@ TEST_F(LiveCameras, FramesComeWithPixelsTimeAndNumber) {
       EXPECT_NEAR(double(frame.timestamp_ns) / 1e9, double(now.tv_sec) + double(now.tv_nsec) / 1e9, 5);
     }
   }
+}
+
+TEST_F(LiveCameras, PlanesInMemoryOfTheirOwnAreShownWhereTheyBegin) {
+  fake_.planar = true;
+  fake_.modes = {{V4L2_PIX_FMT_NV12M, 64, 48, 30}};
+  fake_.data_offset[0] = 128;
+  fake_.data_offset[1] = 16;
+  const auto live = source(settings());
+  EXPECT_EQ(fake_.mappings(), 2 * 6);
+  ASSERT_TRUE(fake_.deliver(1, 0, 64 * 48 - 1));  // one byte short in the first plane
+  ASSERT_TRUE(fake_.deliver(77));
+  const maq::Frame frame = next(*live);
+  EXPECT_EQ(frame.image.format, MAQ_PIXEL_NV12);
+  EXPECT_EQ(frame.image.planes[0].stride_bytes, 64u);
+  EXPECT_EQ(frame.image.planes[1].stride_bytes, 96u);
+  for (int plane = 0; plane < 2; ++plane) {
+    const maq::PlaneView& view = frame.image.planes[plane];
+    const size_t bytes = view.stride_bytes * (plane == 0 ? 48 : 24);
+    EXPECT_EQ(std::count(view.data, view.data + bytes, 77 + plane), int64_t(bytes));
+  }
+  EXPECT_EQ(live->drops(), 1u);
+  EXPECT_EQ(frame.lease.dma_buf(), -1) << "one file cannot hold both planes";
+}
+
+TEST_F(LiveCameras, BytesOfAPlaneAreCountedWithoutWhatIsBeforeThem) {
+  fake_.planar = true;
+  const auto live = source(settings(), {"", 320, 240, 0});
+  ASSERT_TRUE(fake_.deliver(1));
+  EXPECT_EQ(next(*live).image.planes[0].data[0], 1);
+  uint64_t dropped = 0;
+  for (const uint32_t offset : {1000u, UINT32_MAX}) {  // more than its buffers have room for
+    fake_.set_data_offset(offset);
+    ASSERT_TRUE(fake_.deliver(2));
+    ++dropped;
+    for (int i = 0; i < 500 && live->drops() < dropped; ++i) std::this_thread::sleep_for(10ms);
+    EXPECT_EQ(live->drops(), dropped);
+  }
+  fake_.set_data_offset(0);
+  ASSERT_TRUE(fake_.deliver(4));
+  EXPECT_EQ(next(*live).image.planes[0].data[0], 4);
+  EXPECT_EQ(live->drops(), dropped);
+}
+
+TEST_F(LiveCameras, AFrameIsADmaBufMadeOnceForItsBuffer) {
+  auto live = source(settings());
+  int first = -1;
+  for (int i = 0; i < 30; ++i) {
+    ASSERT_TRUE(fake_.deliver(1));
+    const maq::Frame frame = next(*live);
+    const int fd = frame.lease.dma_buf();
+    EXPECT_GE(fd, 0);
+    EXPECT_EQ(frame.lease.dma_buf(), fd);
+    if (i == 0) first = fd;
+    EXPECT_EQ(fd == first, i % 6 == 0) << "six buffers, in turns";
+  }
+  EXPECT_EQ(fake_.exports(), 6);
+  ASSERT_TRUE(fake_.deliver(1));
+  maq::Frame held = next(*live);
+  const int fd = held.lease.dma_buf();
+  fake_.unplug();
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_LOST));
+  EXPECT_EQ(held.lease.dma_buf(), fd);
+  EXPECT_NE(fcntl(fd, F_GETFD), -1) << "still open";
+  EXPECT_EQ(fake_.exported(), 6u);
+  live.reset();
+  EXPECT_EQ(held.lease.dma_buf(), fd);
+  held.lease.reset();
+  wait_until_closed(fake_);
+}
+
+TEST_F(LiveCameras, AFrameIsNoDmaBufWhereNoneCanBeMade) {
+  auto live = source(settings());
+  ASSERT_TRUE(fake_.deliver(1));
+  maq::Frame frame = next(*live);
+  fake_.unplug();
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_LOST));
+  EXPECT_EQ(frame.lease.dma_buf(), -1) << "it is too late to make one";
+  frame.lease.reset();
+  live.reset();
+  wait_until_closed(fake_);
+  fake_.plug();
+  fake_.can_export = false;
+  live = source(settings());
+  ASSERT_TRUE(fake_.deliver(1));
+  EXPECT_EQ(next(*live).lease.dma_buf(), -1);
+  live.reset();
+  wait_until_closed(fake_);
+  fake_.can_export = true;
+  fake_.planar = true;
+  fake_.data_offset[0] = 128;
+  live = source(settings());
+  ASSERT_TRUE(fake_.deliver(1));
+  EXPECT_EQ(next(*live).lease.dma_buf(), -1) << "nobody could know where in it the picture begins";
 }
 
 TEST_F(LiveCameras, JpegFramesAreDecodedAndDamagedOnesSkipped) {
@@ -315,146 +345,6 @@ TEST_F(LiveCameras, ClosingDoesNotWaitForADeviceThatHangs) {
   for (int i = 0; i < 500 && device.mappings() > 0; ++i) std::this_thread::sleep_for(10ms);
   EXPECT_EQ(device.open_files(), 0) << "the thread closes the device when it answers";
   EXPECT_EQ(device.mappings(), 0);
-}
-
-struct Failing {
-  const char* name;
-  unsigned long call;
-  std::vector<int> errors;
-  // Without these a camera works all the same.
-  bool harmless = false;
-};
-
-// The errors that the kernel's documentation names for each call, and those that any call may give.
-const Failing kMatrix[] = {
-    {"open", FakeV4l2::kOpen, {ENOENT, EACCES, EPERM, EBUSY, ENXIO, ENODEV, ENOMEM, EMFILE, ENFILE, EINVAL}},
-    {"QUERYCAP", VIDIOC_QUERYCAP, {EINVAL, ENOTTY, ENODEV, EIO}},
-    {"ENUM_FMT", VIDIOC_ENUM_FMT, {EINVAL, ENODATA, ENODEV}},
-    {"TRY_FMT", VIDIOC_TRY_FMT, {EINVAL, EBADR, EBUSY, ENODEV}},
-    {"ENUM_FRAMEINTERVALS", VIDIOC_ENUM_FRAMEINTERVALS, {EINVAL, ENOTTY, ENODATA}, true},
-    {"S_FMT", VIDIOC_S_FMT, {EINVAL, EBADR, EBUSY, ENODEV, EIO}},
-    {"G_PARM", VIDIOC_G_PARM, {EINVAL, ENOTTY}, true},
-    {"REQBUFS", VIDIOC_REQBUFS, {EINVAL, EBUSY, ENOMEM, ENODEV}},
-    {"QUERYBUF", VIDIOC_QUERYBUF, {EINVAL, ENODEV}},
-    {"mmap", FakeV4l2::kMmap, {EACCES, EAGAIN, EINVAL, ENODEV, ENOMEM}},
-    {"QBUF", VIDIOC_QBUF, {EINVAL, EIO, ENODEV, ENOMEM}},
-    {"STREAMON", VIDIOC_STREAMON, {EINVAL, EPIPE, ENOLINK, ENOSPC, EIO, ENODEV}},
-};
-
-TEST_F(LiveCameras, EveryFailureOfStartingIsNamedAndLeavesNothingOpen) {
-  for (const Failing& failing : kMatrix) {
-    for (const int error : failing.errors) {
-      for (const bool planar : {false, true}) {
-        for (const int after : {0, 1, 2, 3}) {
-          fake_.planar = planar;
-          fake_.break_call(failing.call, error, after);
-          const std::string what =
-              std::string(failing.name) + " " + std::strerror(error) + " after " + std::to_string(after);
-          try {
-            const auto opened = camera();
-            EXPECT_TRUE(failing.harmless || after > 0) << what;
-          } catch (const maq::Error& failure) {
-            EXPECT_FALSE(failing.harmless) << what;
-            EXPECT_NE(failure.status(), MAQ_ERROR_INTERNAL) << what;
-            EXPECT_EQ(std::string(failure.what()).rfind("/dev/video0 ", 0), 0u) << failure.what();
-          }
-          expect_nothing_left();
-        }
-      }
-    }
-  }
-}
-
-TEST_F(LiveCameras, FailuresSayWhatToDo) {
-  const std::tuple<unsigned long, int, maq_status, const char*> expected[] = {
-      {FakeV4l2::kOpen, EACCES, MAQ_ERROR_NO_PERMISSION, "group \"video\""},
-      {FakeV4l2::kOpen, ENOENT, MAQ_ERROR_NOT_FOUND, "plugged in"},
-      {VIDIOC_S_FMT, EBUSY, MAQ_ERROR_BUSY, "Another program"},
-      {VIDIOC_STREAMON, ENOSPC, MAQ_ERROR_BUSY, "smaller size or rate"},
-      {VIDIOC_QUERYCAP, ENOTTY, MAQ_ERROR_UNSUPPORTED, "is not a video device"},
-      {VIDIOC_STREAMON, ENODEV, MAQ_ERROR_DEVICE_LOST, "plug it in again"}};
-  for (const auto& [call, error, status, text] : expected) {
-    fake_.break_call(call, error);
-    expect_error(status, text, [&] { camera(); });
-  }
-  fake_.mend();
-  fake_.capabilities = V4L2_CAP_STREAMING | V4L2_CAP_VIDEO_OUTPUT;
-  expect_error(MAQ_ERROR_UNSUPPORTED, "captures no pictures", [&] { camera(); });
-  fake_.capabilities = V4L2_CAP_VIDEO_CAPTURE;
-  expect_error(MAQ_ERROR_UNSUPPORTED, "cannot stream", [&] { camera(); });
-  fake_.capabilities |= V4L2_CAP_STREAMING;
-  fake_.modes = {{v4l2_fourcc('X', 'Y', 'Z', '1'), 640, 480, 30}};
-  expect_error(MAQ_ERROR_UNSUPPORTED, "offers XYZ1, but none of them is understood", [&] { camera(); });
-}
-
-TEST_F(LiveCameras, ADriverThatAnswersNonsenseIsRefused) {
-  const std::pair<const char*, std::function<void(FakeV4l2&)>> broken[] = {
-      {"lines of", [](FakeV4l2& fake) { fake.stride_bytes = 7; }},
-      {"lines of", [](FakeV4l2& fake) { fake.stride_bytes = 1 << 20; }},
-      {"gives 1 buffers", [](FakeV4l2& fake) { fake.granted_buffers = 1; }},
-      {"buffers of 100 bytes", [](FakeV4l2& fake) { fake.buffer_bytes = 100; }},
-      {"cannot be used (100000 x 2)", [](FakeV4l2& fake) {
-         fake.modes = {{V4L2_PIX_FMT_GREY, 100000, 2, 30}};
-       }}};
-  for (const auto& [text, harm] : broken) {
-    FakeV4l2 fake;
-    harm(fake);
-    expect_error(MAQ_ERROR_UNSUPPORTED, text, [&] { maq::open_v4l2_camera(fake, "/dev/video0", {}, 4); });
-    EXPECT_EQ(fake.open_files(), 0);
-    EXPECT_EQ(fake.mappings(), 0);
-  }
-}
-
-TEST_F(LiveCameras, EveryFailureOfStreamingLosesTheCameraAndBringsItBack) {
-  const Failing streaming[] = {{"DQBUF", VIDIOC_DQBUF, {EINVAL, EIO, EPIPE, ENODEV}},
-                               {"poll", FakeV4l2::kPoll, {ENOMEM, EINVAL, EFAULT}}};
-  for (const Failing& failing : streaming) {
-    for (const int error : failing.errors) {
-      FakeV4l2 fake;
-      Reports reports;
-      maq::SourceSettings asked;
-      asked.on_state = Reports::note;
-      asked.user_data = &reports;
-      auto live = std::make_unique<maq::LiveSource>([&] { return maq::open_v4l2_camera(fake, "/dev/video0", {}, 4); },
-                                                    "/dev/video0", asked);
-      fake.unplug();  // no call is under way while the fault is put in
-      ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_RECONNECTING)) << failing.name;
-      fake.break_call(failing.call, error);
-      fake.plug();
-      ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_BACK)) << failing.name;
-      fake.deliver(1);
-      for (int i = 0; i < 300 && fake.opened() < 3; ++i) {
-        std::this_thread::sleep_for(10ms);
-        fake.deliver(1);
-      }
-      EXPECT_GE(fake.opened(), 3) << failing.name << " " << std::strerror(error);
-      fake.mend();
-      live.reset();
-      wait_until_closed(fake);
-    }
-  }
-  // Interrupted or early calls lose nothing.
-  fake_.break_call(VIDIOC_DQBUF, EAGAIN);
-  const auto live = source(settings());
-  fake_.deliver(1);
-  std::this_thread::sleep_for(50ms);
-  EXPECT_EQ(fake_.opened(), 1);
-}
-
-TEST_F(LiveCameras, ABufferThatDoesNotExistLosesTheCameraButNoMemory) {
-  fake_.wrong_index = 1000;
-  const auto live = source(settings());
-  ASSERT_TRUE(fake_.deliver(1));
-  EXPECT_TRUE(reports_.wait_for(MAQ_SOURCE_LOST));
-}
-
-TEST_F(LiveCameras, AThousandTimesOpenedNothingIsLeft) {
-  for (int i = 0; i < 1000; ++i) camera();
-  expect_nothing_left();
-  for (int i = 0; i < 20; ++i) {
-    source(settings());
-    wait_until_closed(fake_);
-  }
 }
 
 TEST_F(LiveCameras, FramesAreTakenAndGivenBackByOtherThreadsWhileTheCameraComesAndGoes) {

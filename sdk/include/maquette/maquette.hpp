@@ -169,6 +169,17 @@ class Source {
     return calibration;
   }
 
+  // Nothing when the camera does not have it.
+  std::optional<maq_control_info> control(maq_control which) const {
+    maq_control_info info{};
+    info.struct_size = sizeof info;
+    const maq_status status = maq_source_get_control(get(), which, &info);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status, get());
+    return info;
+  }
+  void set_control(maq_control which, double value) { check(maq_source_set_control(get(), which, value), get()); }
+
   void seek(int64_t time_ns) { check(maq_source_seek(get(), time_ns), get()); }
 
   // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when none came in time.

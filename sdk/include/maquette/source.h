@@ -93,9 +93,13 @@ typedef struct maq_source_scheme {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
-/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "stub:people?count=2&fps=30&seed=7" "stub:pattern"
- * "v4l2:/dev/video0", "libcamera:0" or "depthai:". "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out
- * to that rate; a camera takes the nearest that it offers, which maq_source_get_info tells, and "format=MJPG" names its format. A '?' that is part of a file name is written %3F, '%' is written %25. `config` may be NULL.
+/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec", "stub:people?count=2&seed=7",
+ * "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:".
+ * "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out to that rate; a camera
+ * takes the nearest that it offers, which maq_source_get_info tells. Of a camera, "format=MJPG" names the format and
+ * "exposure=10000&focus=auto" sets controls. "live=1" plays what is no camera as if it were one, and faults such as
+ * "drop=0.1" or "unplug=3s@5s" are put into any source (docs/cameras/stand-ins.md).
+ * A '?' that is part of a file name is written %3F, '%' is written %25. `config` may be NULL.
  * `*source` is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),
  * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE; for cameras MAQ_ERROR_DEVICE_LOST,
@@ -113,10 +117,12 @@ MAQ_API void maq_source_destroy(maq_source* source);
 MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info* info);
 
 /* Takes the next frame: of a camera the oldest that waits. A camera's frame is in memory of the device, which has a few
- * such buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources (MAQ_WAIT_FOREVER: no bound); files and stubs
- * deliver at once and ignore it. `*frame` comes from a pool of fixed size: give it back with maq_frame_release soon.
- * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_POOL_EMPTY when all frames are held,
- * MAQ_ERROR_UNREADABLE when a file ends before its header says, after all readable frames. Blocks while decoding. */
+ * such buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources
+ * (MAQ_WAIT_FOREVER: no bound); files and stubs deliver at once and ignore it. `*frame` comes from a pool of fixed size:
+ * give it back with maq_frame_release soon.
+ * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_ERROR_DEVICE_LOST,
+ * MAQ_ERROR_POOL_EMPTY when all frames are held, MAQ_ERROR_UNREADABLE when a clip ends before its header says, after all
+ * readable frames, or for a damaged frame of a recording, which is left out. Blocks while decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
 
 /* How the camera maps the world into its picture. The caller sets calibration->struct_size.
@@ -124,14 +130,14 @@ MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_
 MAQ_API maq_status maq_source_get_calibration(const maq_source* source, maq_calibration* calibration);
 
 /* What a control of the camera is now and what it can be. The caller sets info->struct_size.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the device does not have it),
- * MAQ_ERROR_DEVICE_LOST. Blocks while the device is asked. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the device does not have it), MAQ_ERROR_BUSY
+ * (not now), MAQ_ERROR_DEVICE_LOST (also while the camera is lost). Blocks while the device is asked. */
 MAQ_API maq_status maq_source_get_control(maq_source* source, maq_control control, maq_control_info* info);
 
-/* Sets a control. A manual exposure, focus or white balance switches its automatic off. What was set is set again when a
- * lost camera comes back.
+/* Sets a control. A manual exposure, gain, focus or white balance switches its automatic off. What was set is set again
+ * when a lost camera comes back.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (out of range), MAQ_ERROR_UNSUPPORTED (the device does not have it),
- * MAQ_ERROR_BUSY (not now), MAQ_ERROR_DEVICE_LOST. Blocks while the device is asked. */
+ * MAQ_ERROR_BUSY (not now), MAQ_ERROR_DEVICE_LOST (also while the camera is lost). Blocks while the device is asked. */
 MAQ_API maq_status maq_source_set_control(maq_source* source, maq_control control, double value);
 
 /* Goes to the first frame at `time_ns` after the source's first frame, or later; it is the next that is acquired.

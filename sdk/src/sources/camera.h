@@ -31,14 +31,21 @@ struct CameraFormat {
 
 // A filled buffer of the device. It belongs to whoever got it until it is given back.
 struct CameraBuffer {
-  ImageView image;                // of pixels as they come
+  ImageView image;                // of pixels as they come; of a JPEG image the size agreed on, or none
   const uint8_t* jpeg = nullptr;  // of a JPEG image
   size_t jpeg_bytes = 0;
   ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the picture; no width when there is none
   int slot = 0;
-  int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the picture was taken
+  int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the picture was taken; no later than the one before: it is dropped
   uint32_t sequence = 0;     // counts the device's frames, those that were lost included
   bool damaged = false;      // the device says that pixels are missing
+  uint32_t seeks = 0;        // how often Camera::seek was heeded before this frame
+};
+
+// A control and what it was set to.
+struct ControlSetting {
+  maq_control which;
+  double value;
 };
 
 class Camera : public FrameOwner {

@@ -1,6 +1,7 @@
 #include "sources/depthai_source.h"
 
 #include "core/error.h"
+#include "sources/control_options.h"
 #include "sources/depthai_camera.h"
 #include "sources/depthai_library.h"
 
@@ -10,7 +11,7 @@ CameraOpener depthai_camera_opener(SourceUri uri, int buffers, const Log& log) {
   DepthAiWish wish{uri.width_px, uri.height_px, uri.fps, {}};
   const int64_t depth = uri.take_integer("depth", -1, 0, 1);
   if (depth >= 0) wish.depth = depth == 1;
-  uri.expect_no_more_options("size, fps and depth");
+  uri.expect_no_more_options(std::string("size, fps, depth, ") + kControlOptions);
   return depthai_opener(depthai_driver(), uri.target, wish, buffers, log);
 }
 

@@ -154,7 +154,7 @@ std::optional<int64_t> duration_ns(const std::string& text) {
   size_t digits = text.find_first_not_of("0123456789.");
   if (digits == 0 || digits == std::string::npos) return {};
   const std::string unit = text.substr(digits);
-  const auto number = as_number(text.substr(0, digits));
+  const auto number = read_number(text.substr(0, digits));
   if (!number || *number > 1e6 || (unit != "s" && unit != "ms")) return {};
   return int64_t(*number * (unit == "s" ? 1e9 : 1e6));
 }
@@ -168,7 +168,7 @@ std::optional<FaultEvent> take_event(SourceUri& uri, const std::string& key, boo
     const std::string lasts = text.substr(0, at), when = text.substr(at + 1);
     const auto lasts_ns = lasts.empty() && may_last_for_ever ? kForEver : duration_ns(lasts);
     const auto at_ns = duration_ns(when);
-    const auto frame = as_number(when);
+    const auto frame = read_number(when);
     if (at_ns) event.at_ns = *at_ns;
     if (frame && *frame >= 0 && *frame < 1e15) event.frame = int64_t(*frame);
     if (lasts_ns && (at_ns || event.frame >= 0)) {

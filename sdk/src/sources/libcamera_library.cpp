@@ -1,4 +1,5 @@
 #include "core/module.h"
+#include "sources/control_options.h"
 #include "sources/libcamera_cameras.h"
 
 namespace maq {
@@ -16,7 +17,7 @@ const LibcameraCameras& cameras() {
 
 CameraOpener libcamera_camera_opener(SourceUri uri, int buffers, const Log&) {
   CameraWish wish{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
-  uri.expect_no_more_options("size, fps and format");
+  uri.expect_no_more_options(std::string("size, fps, format, ") + kControlOptions);
   return [name = uri.target, wish = std::move(wish), buffers]() mutable {
     std::shared_ptr<Camera> camera = cameras().open(name, wish, buffers);
     name = camera->identity();

@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <optional>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -20,8 +21,16 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kReconnectPause(100);
-constexpr milliseconds kStopPatience(40);  // of the 50 ms that closing may take
-constexpr int kLongestWaitMs = 200;  // whether the camera stalls is looked at between two waits
+constexpr milliseconds kStopPatience(40);     // of the 50 ms that closing may take
+constexpr uint32_t kMostLostAtOnce = 100000;  // minutes of frames
+constexpr int kLongestWaitMs = 200;           // whether the camera stalls is looked at between two waits
+
+// Of a JPEG image for which a size was agreed on: cameras send smaller ones too, and ones of whole blocks.
+int64_t most_pixels(const ImageView& agreed) {
+  constexpr int64_t kBlock = 16;
+  if (agreed.width_px == 0) return MAQ_MAX_PIXELS;
+  return ((agreed.width_px + kBlock - 1) / kBlock * kBlock) * ((agreed.height_px + kBlock - 1) / kBlock * kBlock);
+}
 
 }  // namespace
 
@@ -46,10 +55,16 @@ struct LiveSource::State {
   uint64_t dropped = 0;
   std::optional<std::string> failure;
   bool at_end = false;  // after the frames that wait
+  uint32_t seeks = 0;   // asked for; frames of before are not handed out
   bool stopping = false;
   bool ended = false;  // the thread
   std::thread thread;
   JpegDecoder jpeg;  // of next() alone
+  bool told_of_bad_jpeg = false;
+
+  std::mutex control_mutex;                  // one call at a time; before `mutex`, and never taken by the thread
+  std::weak_ptr<Camera> present;             // nobody but the thread keeps the camera; none while it is lost
+  std::vector<ControlSetting> set_controls;  // the latest last
 
   ~State() {
     if (wake_fd >= 0) ::close(wake_fd);
@@ -77,6 +92,47 @@ struct LiveSource::State {
     changed.notify_all();
   }
 
+  // The camera, for as long as a call takes. Throws while it is lost.
+  std::shared_ptr<Camera> present_camera() {
+    std::lock_guard<std::mutex> lock(mutex);
+    std::shared_ptr<Camera> camera = present.lock();
+    if (camera != nullptr) return camera;
+    if (failure) throw Error(MAQ_ERROR_DEVICE_LOST, *failure, ".");
+    throw Error(MAQ_ERROR_DEVICE_LOST, name,
+                " is not there at the moment; try again when its state is MAQ_SOURCE_BACK.");
+  }
+
+  void show(const std::shared_ptr<Camera>& camera) {
+    std::lock_guard<std::mutex> lock(mutex);
+    present = camera;
+  }
+
+  // False when `camera` was lost meanwhile.
+  bool remember(const std::shared_ptr<Camera>& camera, const ControlSetting& setting) {
+    std::lock_guard<std::mutex> lock(mutex);
+    if (present.lock() != camera) return false;
+    const auto same = [&](const ControlSetting& other) { return other.which == setting.which; };
+    set_controls.erase(std::remove_if(set_controls.begin(), set_controls.end(), same), set_controls.end());
+    set_controls.push_back(setting);
+    return true;
+  }
+
+  // What was set of the camera before it was lost.
+  void restore_controls(Camera& camera) {
+    std::vector<ControlSetting> before;
+    {
+      std::lock_guard<std::mutex> lock(mutex);
+      before = set_controls;
+    }
+    for (const ControlSetting& setting : before) {
+      try {
+        camera.set_control(setting.which, setting.value);
+      } catch (const std::exception& error) {
+        settings.log.write(MAQ_LOG_WARNING, name, " is back without one of its controls: ", error.what());
+      }
+    }
+  }
+
   bool stop_asked() {
     std::lock_guard<std::mutex> lock(mutex);
     return stopping;
@@ -97,6 +153,7 @@ struct LiveSource::State {
     } catch (...) {
       fail(name + " stopped: its state callback threw an exception");
     }
+    show(nullptr);
     if (camera != nullptr) camera->close();
     camera.reset();
     std::lock_guard<std::mutex> lock(mutex);
@@ -110,17 +167,29 @@ struct LiveSource::State {
     changed.notify_all();
   }
 
-  void end_of_stream() {
-    std::lock_guard<std::mutex> lock(mutex);
+  // Cut short on its way, most often; the next one follows soon.
+  void drop_jpeg(const CameraBuffer& buffer) {
+    add_drops(1);
+    if (std::exchange(told_of_bad_jpeg, true)) return;
+    settings.log.write(MAQ_LOG_WARNING, name, ": a JPEG image is damaged, or larger than the ", buffer.image.width_px,
+                       " x ", buffer.image.height_px, " pixels agreed on; it is dropped, and so are others like it.");
+  }
+
+  // Waits at the end until somebody seeks. False when nobody will.
+  bool wait_at_end() {
+    std::unique_lock<std::mutex> lock(mutex);
     at_end = true;
     changed.notify_all();
+    changed.wait(lock, [&] { return stopping || !at_end; });
+    return !stopping;
   }
 
   // Until somebody asks to stop, or the camera stays away; `camera` is null then.
   void stream(std::shared_ptr<Camera>& camera) {
-    uint64_t base = 0, next_sequence = 0;  // sequence numbers go on where they were when the camera is opened anew
-    uint32_t first_sequence = 0;
-    bool is_first = true;  // of the camera as it was opened last
+    uint64_t next_sequence = 0;  // goes on where it was when the camera is opened anew
+    uint32_t last_number = 0;    // the device's own
+    bool is_first = true;        // of the camera as it was opened last
+    int64_t last_time_ns = INT64_MIN;
     auto last_frame = Clock::now();
     bool stalled = false;
     const int wait_ms = std::min(kLongestWaitMs, settings.stall_ms);
@@ -134,18 +203,21 @@ struct LiveSource::State {
         break;
       }
       if (event == Camera::Event::kFrame) {
-        if (is_first) first_sequence = buffer.sequence;
-        is_first = false;
-        const uint64_t sequence = base + uint32_t(buffer.sequence - first_sequence);
-        if (sequence > next_sequence) add_drops(sequence - next_sequence);
+        const uint32_t lost_before = is_first ? 0 : buffer.sequence - last_number - 1;
+        // A number that repeats, goes back or leaps says nothing of frames that were lost.
+        const uint64_t sequence = next_sequence + (lost_before < kMostLostAtOnce ? lost_before : 0);
+        add_drops(sequence - next_sequence);
         next_sequence = sequence + 1;
+        last_number = buffer.sequence;
+        is_first = false;
         last_frame = Clock::now();
         if (stalled) report(MAQ_SOURCE_BACK, "frames come again");
         stalled = false;
         PixelLease lease(camera, buffer.slot);
-        if (buffer.damaged) {
+        if (buffer.damaged || buffer.timestamp_ns <= last_time_ns) {
           add_drops(1);
         } else {
+          last_time_ns = buffer.timestamp_ns;
           push({std::move(lease), buffer, sequence});
         }
       } else if (event == Camera::Event::kTimeout) {
@@ -154,9 +226,10 @@ struct LiveSource::State {
           report(MAQ_SOURCE_STALLED, concatenate("no frame for ", settings.stall_ms, " ms"));
         }
       } else if (event == Camera::Event::kEnd) {
-        end_of_stream();
-        break;
+        if (!wait_at_end()) break;
+        last_frame = Clock::now();
       } else {
+        show(nullptr);
         camera->close();
         // As long as anything of it is mapped, the device keeps its number, and comes back under another.
         camera.reset();
@@ -164,7 +237,6 @@ struct LiveSource::State {
         report(MAQ_SOURCE_LOST, reason);
         camera = reconnect();
         if (camera == nullptr) break;
-        base = next_sequence;
         is_first = true;
         last_frame = Clock::now();
         stalled = false;
@@ -198,6 +270,8 @@ struct LiveSource::State {
       if (pause(kReconnectPause)) return nullptr;
       try {
         std::shared_ptr<Camera> camera = open();
+        restore_controls(*camera);
+        show(camera);
         report(MAQ_SOURCE_BACK, "the device is back");
         return camera;
       } catch (const std::exception& error) {
@@ -209,7 +283,8 @@ struct LiveSource::State {
   }
 };
 
-LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings& settings)
+LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings& settings,
+                       const std::vector<ControlSetting>& controls)
     : state_(std::make_shared<State>()) {
   state_->open = std::move(open);
   state_->name = std::move(name);
@@ -218,6 +293,9 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
   state_->wake_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (state_->wake_fd < 0) throw Error(MAQ_ERROR_INTERNAL, state_->name, ": no event can be made to wake its thread.");
   std::shared_ptr<Camera> camera = state_->open();
+  for (const ControlSetting& setting : controls) camera->set_control(setting.which, setting.value);
+  state_->set_controls = controls;
+  state_->present = camera;
   const CameraFormat& format = camera->format();
   info_.width_px = format.width_px;
   info_.height_px = format.height_px;
@@ -256,11 +334,35 @@ uint64_t LiveSource::drops() const {
   return state_->dropped;
 }
 
+maq_control_info LiveSource::control(maq_control which) {
+  std::lock_guard<std::mutex> lock(state_->control_mutex);
+  return state_->present_camera()->control(which);
+}
+
+void LiveSource::set_control(maq_control which, double value) {
+  std::lock_guard<std::mutex> lock(state_->control_mutex);
+  const std::shared_ptr<Camera> camera = state_->present_camera();
+  camera->set_control(which, value);
+  if (!state_->remember(camera, {which, value})) {
+    throw Error(MAQ_ERROR_DEVICE_LOST, state_->name, " was lost while a control was set; set it again.");
+  }
+}
+
+void LiveSource::seek(int64_t time_ns) {
+  std::lock_guard<std::mutex> lock(state_->control_mutex);
+  state_->present_camera()->seek(time_ns);
+  std::lock_guard<std::mutex> state_lock(state_->mutex);
+  ++state_->seeks;
+  state_->at_end = false;
+  state_->changed.notify_all();
+}
+
 NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
   const bool has_end = timeout_ns >= 0;
   const auto deadline = Clock::now() + std::chrono::nanoseconds(has_end ? timeout_ns : 0);
   for (;;) {
     State::Entry entry;
+    uint32_t seeks = 0;
     {
       std::unique_lock<std::mutex> lock(state_->mutex);
       const auto ready = [&] { return state_->count > 0 || state_->failure || state_->at_end; };
@@ -274,12 +376,14 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
       entry = std::move(state_->ring[state_->first]);
       state_->first = (state_->first + 1) % state_->ring.size();
       --state_->count;
+      seeks = state_->seeks;
     }
     const CameraBuffer& buffer = entry.buffer;
+    if (buffer.seeks != seeks) continue;
     if (buffer.jpeg == nullptr) {
       frame.image = buffer.image;
-    } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, frame)) {
-      state_->add_drops(1);  // cut short on its way; the next one follows soon
+    } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, most_pixels(buffer.image), frame)) {
+      state_->drop_jpeg(buffer);
       continue;
     }
     frame.jpeg = buffer.jpeg;

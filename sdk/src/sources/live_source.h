@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sources/camera.h"
 #include "sources/source.h"
@@ -13,14 +14,21 @@ namespace maq {
 
 class LiveSource : public Source {
  public:
-  // Opens the camera at once, and throws what `open` throws. `name` begins error texts.
-  LiveSource(CameraOpener open, std::string name, const SourceSettings& settings);
+  // Opens the camera at once and sets `controls`, and throws what they throw. `name` begins error texts.
+  LiveSource(CameraOpener open, std::string name, const SourceSettings& settings,
+             const std::vector<ControlSetting>& controls = {});
   // Returns within 50 ms, also when the device hangs in a system call: the thread then ends by itself later.
   ~LiveSource() override;
 
   const SourceInfo& info() const override { return info_; }
   uint64_t drops() const override;
   const maq_calibration* calibration() const override { return calibration_ ? &*calibration_ : nullptr; }
+  // Of the camera, from any thread. Throw MAQ_ERROR_DEVICE_LOST while it is lost. What was set is set again when it is
+  // back.
+  maq_control_info control(maq_control which) override;
+  void set_control(maq_control which, double value) override;
+  // Of what plays a camera: frames of before are not handed out any more.
+  void seek(int64_t time_ns) override;
   // Throws MAQ_ERROR_DEVICE_LOST when the camera was lost and did not come back in time.
   NextFrame next(int64_t timeout_ns, Frame& frame) override;
 

@@ -25,7 +25,7 @@ int64_t monotonic_ns(Clock::time_point time) {
 class Reel {
  public:
   Reel(std::function<std::unique_ptr<Source>()> open, PlayOptions options)
-      : open_(std::move(open)), options_(options), source_(open_()) {}
+      : open_(std::move(open)), options_(options), source_(open_()), can_seek_(source_->can_seek()) {}
 
   const SourceInfo& info() const { return source_->info(); }
   const maq_calibration* calibration() const { return source_->calibration(); }
@@ -65,18 +65,25 @@ class Reel {
     return Next{*begin_ + nanoseconds(int64_t(double(last_ns_) / options_.speed)), uint32_t(last_sequence_), damaged};
   }
 
+  bool can_seek() const { return can_seek_; }
+
   void seek(int64_t time_ns) {
     source_->seek(time_ns);
     lap_ns_ = 0;
+    lap_sequence_ = 0;
     begin_.reset();
+    ++seeks_;
   }
+  uint32_t seeks() const { return seeks_; }
 
  private:
   std::function<std::unique_ptr<Source>()> open_;
   PlayOptions options_;
   std::unique_ptr<Source> source_;
+  const bool can_seek_;
   std::optional<Clock::time_point> begin_;  // when time 0 of the source was, or would have been
   int64_t readable_ = 0;
+  uint32_t seeks_ = 0;
   int64_t last_ns_ = 0, lap_ns_ = 0;
   uint64_t last_sequence_ = 0, lap_sequence_ = 0;
 };
@@ -104,6 +111,7 @@ class PlayedCamera : public Camera {
   }
 
   void seek(int64_t time_ns) override {
+    if (!reel_->can_seek()) Camera::seek(time_ns);  // throws
     std::lock_guard<std::mutex> lock(mutex_);
     seek_to_ns_ = time_ns;
   }
@@ -132,6 +140,7 @@ class PlayedCamera : public Camera {
       buffer.timestamp_ns = monotonic_ns(now.due);
       buffer.sequence = now.sequence;
       buffer.damaged = now.damaged;
+      buffer.seeks = reel_->seeks();
       return Event::kFrame;
     }
   }

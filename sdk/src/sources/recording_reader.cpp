@@ -183,7 +183,7 @@ void RecordingReader::read(size_t index, Frame& frame) {
                head.payload_check == XXH3_64bits(payload_.data(), payload_.size());
   }
   if (is_whole && head.encoding == kJpegEncoding) {
-    is_whole = jpeg_.decode(payload_.data(), head.picture_bytes, frame);
+    is_whole = jpeg_.decode(payload_.data(), head.picture_bytes, MAQ_MAX_PIXELS, frame);
   } else if (is_whole) {
     uint8_t* pixels = frame.allocate(maq_pixel_format(head.encoding), head.width_px, head.height_px);
     std::memcpy(pixels, payload_.data(), head.picture_bytes);

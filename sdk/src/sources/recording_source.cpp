@@ -46,6 +46,7 @@ class RecordingSource : public Source {
     return reader_.info().calibration && width_px_ == 0 ? &*reader_.info().calibration : nullptr;
   }
 
+  bool can_seek() const override { return true; }
   void seek(int64_t wanted_ns) override {
     next_ = std::clamp(at_or_after(time_ns(first_) + std::min(wanted_ns, time_ns(end_ - 1) + 1)), first_, end_);
     next_due_ns_ = 0;

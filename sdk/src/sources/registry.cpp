@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "sources/control_options.h"
 #include "sources/depthai_source.h"
 #include "sources/faults.h"
 #include "sources/file_sources.h"
@@ -42,7 +43,7 @@ const Entry kEntries[] = {
      without_log<open_stub_source>,
      nullptr},
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
-      "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG"},
+      "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG&exposure=10000 (microseconds)"},
      nullptr,
      v4l2_camera_opener},
     {{"libcamera", "libcamera:0?size=640x480&fps=30",
@@ -69,6 +70,8 @@ CameraOpener played(const Entry& entry, SourceUri uri, const Log& log, int buffe
 std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
   const FaultPlan faults = take_faults(uri);
   const bool is_camera = entry.camera != nullptr;
+  std::vector<ControlSetting> controls;
+  if (is_camera) controls = take_control_options(uri);
   // Faults happen in time, so that a file or a stub with faults runs as a camera does.
   if (!is_camera && uri.take_integer("live", faults.is_empty() ? 0 : 1, 0, 1) == 0) {
     if (!faults.is_empty()) {
@@ -83,7 +86,7 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
   CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers, settings.log)
                                   : played(entry, std::move(uri), settings.log, buffers);
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
-  return std::make_unique<LiveSource>(std::move(opener), name, settings);
+  return std::make_unique<LiveSource>(std::move(opener), name, settings, controls);
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ class Source {
   virtual maq_control_info control(maq_control which);
   virtual void set_control(maq_control which, double value);
   // Throws MAQ_ERROR_UNSUPPORTED where it cannot be done.
+  virtual bool can_seek() const { return false; }
   virtual void seek(int64_t time_ns);
   // Fills `frame` (pixels, time, sequence) with the next frame, unless it says something else. Pixels may be those that
   // the frame had before; the rest is clear (Frame::clear).

@@ -52,6 +52,7 @@ class StubSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
 
+  bool can_seek() const override { return true; }
   void seek(int64_t time_ns) override {
     const double index = std::ceil(double(time_ns) / 1e9 * info_.fps - 1e-6);
     index_ = int64_t(std::min(index, double(info_.frame_count < 0 ? kMostFrames : info_.frame_count)));

@@ -76,7 +76,7 @@ void take_size(SourceUri& uri) {
 
 }  // namespace
 
-std::optional<double> as_number(const std::string& text) {
+std::optional<double> read_number(const std::string& text) {
   std::istringstream in(text);
   in.imbue(std::locale::classic());
   double value = 0;
@@ -106,7 +106,7 @@ int64_t SourceUri::take_integer(const std::string& key, int64_t otherwise, int64
 double SourceUri::take_number(const std::string& key, double otherwise, double least, double most) {
   const auto value = take(key);
   if (!value) return otherwise;
-  const auto number = as_number(*value);
+  const auto number = read_number(*value);
   if (!number || *number < least || *number > most) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a number from ", least, " to ",
                 most, ".");

@@ -32,8 +32,8 @@ struct SourceUri {
   std::optional<std::string> take(const std::string& key);
 };
 
-// Independent of the process's locale, which may want a comma. Nothing when the text is no finite number.
-std::optional<double> as_number(const std::string& text);
+// Nothing when the text is no finite number. Independent of the process's locale, which may want a comma.
+std::optional<double> read_number(const std::string& text);
 
 // Throws MAQ_ERROR_INVALID_ARGUMENT for an ill-formed text and MAQ_ERROR_IMAGE_SIZE for a size outside the limits.
 SourceUri parse_source_uri(const std::string& text);

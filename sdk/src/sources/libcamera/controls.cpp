@@ -12,6 +12,8 @@ namespace {
 
 namespace controls = libcamera::controls;
 
+constexpr size_t kMostWaiting = 64;
+
 std::optional<double> number_of(const libcamera::ControlValue& value) {
   if (value.isArray()) return {};
   switch (value.type()) {
@@ -58,7 +60,7 @@ struct LibcameraControls::Known {
 const LibcameraControls::Known LibcameraControls::kKnown[] = {
     {MAQ_CONTROL_AUTO_EXPOSURE, controls::AeEnable, nullptr},
     {MAQ_CONTROL_EXPOSURE, controls::ExposureTime, &controls::AeEnable},
-    {MAQ_CONTROL_GAIN, controls::AnalogueGain, nullptr},
+    {MAQ_CONTROL_GAIN, controls::AnalogueGain, &controls::AeEnable},
     {MAQ_CONTROL_AUTO_FOCUS, controls::AfMode, nullptr},
     {MAQ_CONTROL_FOCUS, controls::LensPosition, &controls::AfMode},
     {MAQ_CONTROL_AUTO_WHITE_BALANCE, controls::AwbEnable, nullptr},
@@ -110,17 +112,25 @@ void LibcameraControls::set(maq_control which, double value) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " of libcamera:", name_, " goes from ", info.least,
                 " to ", info.most, ", not to ", value, ".");
   }
-  const auto state =
-      std::find_if(states_.begin(), states_.end(), [&](const State& other) { return other.known->which == which; });
-  for (State& other : states_) {
-    if (&other.known->id == state->known->automatic) push(other, 0);
+  State& state =
+      *std::find_if(states_.begin(), states_.end(), [&](const State& other) { return other.known->which == which; });
+  value = info.step > 0 ? std::round(value) : value;
+  // Somebody who moves a slider sets values faster than frames come.
+  if (!settings_.empty() && settings_.back().id == state.known->id.id()) {
+    settings_.pop_back();
+    return push(state, value);
   }
-  push(*state, info.step > 0 ? std::round(value) : value);
+  if (settings_.size() >= kMostWaiting) {
+    throw Error(MAQ_ERROR_BUSY, "libcamera:", name_, " has ", settings_.size(),
+                " settings waiting for its next frames; give frames back, and set this one later.");
+  }
+  for (State& other : states_) {
+    if (&other.known->id == state.known->automatic) push(other, 0);
+  }
+  push(state, value);
 }
 
 void LibcameraControls::push(State& state, double value) {
-  const auto same = [&](const Setting& other) { return other.id == state.known->id.id(); };
-  settings_.erase(std::remove_if(settings_.begin(), settings_.end(), same), settings_.end());
   settings_.push_back({state.known->id.id(), to_libcamera(state.known->id, value)});
   state.info.value = value;
 }

@@ -17,7 +17,7 @@
 
 namespace maq {
 
-class LibcameraCamera : public Camera {
+class LibcameraCamera final : public Camera {
  public:
   explicit LibcameraCamera(std::string name) : name_(std::move(name)) {}
   ~LibcameraCamera() override;

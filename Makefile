@@ -45,7 +45,7 @@ test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2
 	@scripts/test-isa.sh $(JOBS)
 
 .PHONY: test-camera-vm
-test-camera-vm: build  ## camera tests on a real kernel in qemu, with test cameras; part of `test`
+test-camera-vm: packages-test build  ## camera tests on a real kernel in qemu, with test cameras; part of `test`
 	@tests/camera_vm/run.sh
 
 .PHONY: bench

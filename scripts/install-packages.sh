@@ -4,7 +4,7 @@
 #   scripts/install-packages.sh demo        to build the SDK and run it
 #   scripts/install-packages.sh test        + the native tests, Python and software OpenGL for rendering
 #   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (120 MB)
-#   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (20 MB)
+#   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (35 MB)
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
@@ -49,6 +49,7 @@ if [ "$group" != demo ]; then
     needs_command git git
     needs_package libgtest-dev
     needs_package libgmock-dev
+    needs_package libcamera-dev       # without it the SDK is built without libcamera: cameras
     needs_package python3-venv
     needs_package python3-dev
     needs_package libegl1             # moderngl draws without a window through EGL
@@ -66,6 +67,8 @@ if [ "$group" = camera-vm ]; then
     needs_command cpio cpio
     needs_package kmod                # its programs are not in the PATH of users
     needs_command v4l2-ctl v4l-utils
+    needs_command cam libcamera-tools
+    needs_command udevadm udev
 fi
 if [ "$group" = lint ]; then
     needs_command clang-format clang-format

@@ -126,6 +126,21 @@ void look_for_the_missing() {
   }
 }
 
+// Parts of the SDK that bring libraries of others, and so may be missing.
+void look_at_parts(const maquette::Context& context) {
+  for (const char* uri : {"libcamera:none", "depthai:none"}) {
+    const std::string scheme = std::string(uri).substr(0, std::string(uri).find(':') + 1);
+    maq_source* source = nullptr;
+    const maq_status status = maq_source_create(context.get(), uri, nullptr, &source);
+    maq_source_destroy(source);
+    if (status == MAQ_ERROR_RUNTIME_LIBRARY || status == MAQ_ERROR_UNSUPPORTED) {
+      note(scheme + " cannot be used by this build; `maquette play " + uri + "` says why");
+    } else {
+      well(scheme + " can be used by this build");
+    }
+  }
+}
+
 int look_at_cameras() {
   std::printf("maquette %s (%s)\n", maq_sdk_version(), maq_build_options());
   const maquette::Context context;
@@ -137,6 +152,7 @@ int look_at_cameras() {
   for (uint32_t i = 0; i < count; ++i) usable += look_at(list.get(), i) ? 1 : 0;
   std::printf("\nThis machine\n");
   look_for_the_missing();
+  look_at_parts(context);
   if (count == 0) {
     unwell("no camera is plugged in", "plug one in; without one try: maquette play stub:people, or play a recording");
   }

@@ -63,6 +63,45 @@ survives_unplugging() {
     [ $status -eq 0 ] && grep "12 frames" /tmp/summary
 }
 
+# doctor_says STATUS TEXT...: its exit status, and texts that it prints.
+doctor_says() {
+    expected=$1
+    shift
+    $maquette doctor >/tmp/doctor 2>&1
+    status=$?
+    cat /tmp/doctor
+    for text in "$@"; do grep -qF "$text" /tmp/doctor || { echo "without: $text"; return 1; }; done
+    [ $status -eq "$expected" ] || { echo "exit status $status"; return 1; }
+}
+# As a user who is in no group.
+doctor_says_to_nobody() {
+    chmod 0755 / /opt
+    chmod 0660 /dev/video0
+    printf 'root:x:0:0::/:/bin/sh\nnobody:x:65534:65534::/:/bin/sh\n' >/etc/passwd
+    printf 'video:x:44:\n' >/etc/group
+    chown 0:44 /dev/video0
+    su nobody -c "LD_LIBRARY_PATH=$LD_LIBRARY_PATH $maquette doctor" >/tmp/doctor 2>&1
+    status=$?
+    cat /tmp/doctor
+    grep -qF 'it belongs to the group "video", in which you are not' /tmp/doctor || return 1
+    grep -qF 'sudo usermod -aG video $USER' /tmp/doctor && [ $status -eq 1 ]
+}
+doctor_names_who_uses_it() {
+    $maquette play "v4l2:/dev/video0?size=320x240" --seconds 60 >/dev/null 2>&1 &
+    other=$!
+    sleep 2
+    doctor_says 0 "open in maquette (process $other)"
+    status=$?
+    kill $other
+    wait $other
+    return $status
+}
+# What was recorded is played again, frame by frame.
+records_and_plays() {
+    $maquette record "v4l2:/dev/video0?size=320x240&format=YUYV" /tmp/take.maqrec --frames 20 && \
+        $maquette play /tmp/take.maqrec --speed 4 && $maquette play /tmp/take.maqrec --frames 3 | grep "^3 frames of 320 x 180"
+}
+
 check "vivid loads" modprobe vivid n_devs=1 node_types=0x1
 check "vivid is listed" lists "v4l2:/dev/video0" "vivid"
 for size in 320x240 640x480 1280x720; do
@@ -72,6 +111,10 @@ check "vivid: controls arrive, and switch their automatic off" \
     controls_arrive "brightness=77&gain=33" brightness=77 gain_automatic=0 gain=33
 check "vivid: a value out of range is refused with the range" refuses brightness=1000 "goes from 0 to 255, not to 1000"
 check "vivid: what it does not have is refused" refuses focus=3 "has no focus"
+check "the doctor finds it well" doctor_says 0 "may be opened" "1 of 1 cameras can be used"
+check "the doctor says who may not open it" doctor_says_to_nobody
+check "the doctor says who uses it" doctor_names_who_uses_it
+check "vivid is recorded, and played" records_and_plays
 check "vivid YUYV: frames are dma-bufs" dma_buf "v4l2:/dev/video0?size=640x480&format=YUYV" 5
 check "vivid NV12: frames are dma-bufs" dma_buf "v4l2:/dev/video0?size=640x480&format=NV12" 5
 rmmod vivid
@@ -96,4 +139,5 @@ unplug
 check "a camera appears for its dma-bufs" plug_in
 check "a frame's dma-buf is readable when the camera is unplugged" dma_buf_outlives_the_camera
 wait $camera 2>/dev/null
+check "the doctor says that there is none" doctor_says 1 "no camera is plugged in" "0 of 0 cameras"
 check "without a camera it says what to do" sh -c "! $maquette densepose v4l2:/dev/video0 --out /tmp/x 2>&1 | grep 'plugged in' && exit 1; true"

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <thread>
 
+#include "core/module.h"
 #include "fake_depthai.h"
 
 namespace {
@@ -34,7 +35,7 @@ class SendingDepthAi : public FakeDepthAi {
 
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) maq::DepthAiExport maquette_depthai() {
+extern "C" __attribute__((visibility("default"))) maq::ModuleExport maquette_depthai() {
   static SendingDepthAi device;
-  return {MAQ_DEPTHAI_VERSION, &device};
+  return {MAQ_MODULE_VERSION, static_cast<maq::DepthAiDriver*>(&device)};
 }

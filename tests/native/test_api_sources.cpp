@@ -24,7 +24,7 @@ TEST(ApiSources, EverySchemeOfTheListHasAnExampleThatIsKnown) {
     EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_last_error(context.get());
     maq_source_destroy(source);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"depthai", "image", "rec", "stub", "v4l2", "video"}));
+  EXPECT_EQ(names, (std::set<std::string>{"depthai", "image", "libcamera", "rec", "stub", "v4l2", "video"}));
   maq_source_scheme scheme{};
   scheme.struct_size = sizeof scheme;
   EXPECT_EQ(maq_source_get_scheme(maq_source_scheme_count(), &scheme), MAQ_ERROR_INVALID_ARGUMENT);
@@ -39,7 +39,8 @@ TEST(ApiSources, CamerasAreListedAndWrongIndicesRefused) {
   const uint32_t count = maq_camera_list_count(list);  // none on most machines that run tests
   for (uint32_t i = 0; i < count; ++i) {
     ASSERT_EQ(maq_camera_list_get(list, i, &info), MAQ_OK);
-    EXPECT_EQ(std::string(info.uri).rfind("v4l2:/dev/video", 0), 0u);
+    const std::string uri = info.uri;
+    EXPECT_TRUE(uri.rfind("v4l2:/dev/video", 0) == 0 || uri.rfind("libcamera:", 0) == 0) << uri;
   }
   EXPECT_EQ(maq_camera_list_get(list, count, &info), MAQ_ERROR_INVALID_ARGUMENT);
   maq_camera_mode mode{};
@@ -152,6 +153,12 @@ class LoneCopy {
     function<decltype(maq_source_destroy)>("maq_source_destroy")(source);
     return status;
   }
+  maq_status list_cameras() {
+    maq_camera_list* list = nullptr;
+    const maq_status status = function<decltype(maq_camera_list_create)>("maq_camera_list_create")(context_, &list);
+    function<decltype(maq_camera_list_destroy)>("maq_camera_list_destroy")(list);
+    return status;
+  }
   template <class Use>
   void use(const char* uri, Use&& body) {
     maq_source* source = nullptr;
@@ -203,6 +210,21 @@ TEST(ApiSources, FilesNeedTheirLibraryAndNothingElseDoes) {
   std::filesystem::copy_file(sdk.beside("libmaquette.so"), library);
   EXPECT_EQ(sdk.open(image.c_str()), MAQ_ERROR_RUNTIME_LIBRARY) << "the SDK itself is not the library of files";
   EXPECT_NE(sdk.last_error().find("install both from the same build"), std::string::npos) << sdk.last_error();
+}
+
+TEST(ApiSources, CamerasOfLibcameraNeedTheirLibraryAndTheListOfCamerasDoesNot) {
+  LoneCopy sdk;
+  EXPECT_EQ(sdk.open("libcamera:0"), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_NE(sdk.last_error().find("maquette/libmaquette_libcamera.so, which cannot be opened"), std::string::npos);
+  EXPECT_NE(sdk.last_error().find("libcamera-dev"), std::string::npos) << sdk.last_error();
+  EXPECT_EQ(sdk.list_cameras(), MAQ_OK) << sdk.last_error();
+
+  std::filesystem::create_directory(sdk.beside("maquette"));
+  std::filesystem::copy_file(sdk.beside("libmaquette.so"), sdk.beside("maquette/libmaquette_libcamera.so"));
+  EXPECT_EQ(sdk.open("libcamera:0"), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_NE(sdk.last_error().find("install both from the same build"), std::string::npos) << sdk.last_error();
+  EXPECT_EQ(sdk.list_cameras(), MAQ_OK) << sdk.last_error();
+  EXPECT_EQ(sdk.open("libcamera:0?colour=red"), MAQ_ERROR_INVALID_ARGUMENT) << "before anything is opened";
 }
 
 TEST(ApiSources, DepthAiNeedsItsLibraryAndListingDoesNot) {
@@ -260,9 +282,9 @@ TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {
   const maquette::Context context;
   maq_source* source = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "rtsp:camera", nullptr, &source), MAQ_ERROR_UNSUPPORTED);
-  EXPECT_STREQ(
-      maq_last_error(context.get()),
-      "\"rtsp:\" is not a kind of source of this build; there are image:, video:, rec:, stub:, v4l2:, depthai:.");
+  EXPECT_STREQ(maq_last_error(context.get()),
+               "\"rtsp:\" is not a kind of source of this build; there are image:, video:, rec:, stub:, v4l2:, "
+               "libcamera:, depthai:.");
   EXPECT_EQ(maq_source_create(context.get(), "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND);
   EXPECT_STREQ(maq_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
   EXPECT_EQ(source, nullptr);

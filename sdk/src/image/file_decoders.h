@@ -40,11 +40,7 @@ class FileDecoders {
 // build. Where the decoders are linked in (tests), it is those.
 const FileDecoders& file_decoders();
 
-// What the library exports: its version, which must be that of the SDK, and its decoders.
-struct FileDecodersExport {
-  const char* version;
-  const FileDecoders* decoders;
-};
+// What the library exports, a FileDecoders (core/module.h).
 constexpr char kFileDecodersSymbol[] = "maquette_file_decoders";
 
 }  // namespace maq

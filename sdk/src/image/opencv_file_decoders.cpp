@@ -2,6 +2,7 @@
 #include <opencv2/videoio.hpp>
 #include <opencv2/videoio/registry.hpp>
 
+#include "core/module.h"
 #include "image/file_decoders.h"
 
 namespace maq {
@@ -55,10 +56,10 @@ class OpenCvFileDecoders : public FileDecoders {
 }  // namespace
 }  // namespace maq
 
-#ifdef MAQ_FILE_DECODERS_VERSION
-extern "C" __attribute__((visibility("default"))) maq::FileDecodersExport maquette_file_decoders() {
-  static const maq::OpenCvFileDecoders decoders;
-  return {MAQ_FILE_DECODERS_VERSION, &decoders};
+#ifdef MAQ_MODULE_VERSION
+extern "C" __attribute__((visibility("default"))) maq::ModuleExport maquette_file_decoders() {
+  static maq::OpenCvFileDecoders decoders;
+  return {MAQ_MODULE_VERSION, static_cast<maq::FileDecoders*>(&decoders)};
 }
 #else
 namespace maq {

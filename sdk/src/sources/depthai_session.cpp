@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/module.h"
+
 namespace maq {
 namespace {
 
@@ -276,7 +278,7 @@ class Driver : public DepthAiDriver {
 }  // namespace
 }  // namespace maq
 
-extern "C" __attribute__((visibility("default"))) maq::DepthAiExport maquette_depthai() {
+extern "C" __attribute__((visibility("default"))) maq::ModuleExport maquette_depthai() {
   static maq::Driver driver;
-  return {MAQ_DEPTHAI_VERSION, &driver};
+  return {MAQ_MODULE_VERSION, static_cast<maq::DepthAiDriver*>(&driver)};
 }

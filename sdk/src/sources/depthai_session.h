@@ -108,11 +108,7 @@ class DepthAiDriver {
   virtual std::unique_ptr<DepthAiSession> open(const std::string& device) = 0;
 };
 
-// What the library exports: its version, which must be that of the SDK, and its driver.
-struct DepthAiExport {
-  const char* version;
-  DepthAiDriver* driver;
-};
+// What the library exports, a DepthAiDriver (core/module.h).
 constexpr char kDepthAiSymbol[] = "maquette_depthai";
 
 }  // namespace maq

@@ -1,7 +1,6 @@
 #include <fcntl.h>
 #include <sys/uio.h>
 #include <unistd.h>
-#define XXH_INLINE_ALL
 #include <xxhash.h>
 
 #include <cerrno>

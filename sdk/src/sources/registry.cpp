@@ -3,6 +3,7 @@
 #include "sources/depthai_source.h"
 #include "sources/faults.h"
 #include "sources/file_sources.h"
+#include "sources/libcamera_cameras.h"
 #include "sources/live_source.h"
 #include "sources/played_camera.h"
 #include "sources/source.h"
@@ -45,6 +46,10 @@ const Entry kEntries[] = {
       "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG&exposure=10000 (microseconds)"},
      nullptr,
      v4l2_camera_opener},
+    {{"libcamera", "libcamera:0?size=640x480&fps=30",
+      "a camera of libcamera, by number or id: those of the Raspberry Pi and other boards; ?format=NV12"},
+     nullptr,
+     libcamera_camera_opener},
     {{"depthai", "depthai:?size=640x480&fps=30",
       "an OAK camera with depth, the first or depthai:<id or IP>; ?depth=0 for colour alone"},
      nullptr,
@@ -100,6 +105,7 @@ const std::vector<SourceScheme>& source_schemes() {
 
 std::vector<CameraListing> list_cameras() {
   std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
+  for (CameraListing& camera : list_libcamera_cameras()) all.push_back(std::move(camera));
   for (CameraListing& listing : list_depthai_sources()) all.push_back(std::move(listing));
   return all;
 }

@@ -1,0 +1,17 @@
+# libcamera, as maq_libcamera, where it is to be used (MAQ_WITH_LIBCAMERA) and found. Not by pkg-config, which would find
+# this machine's libcamera in a build for another one.
+if(MAQ_WITH_LIBCAMERA)
+  find_path(MAQ_LIBCAMERA_INCLUDE_DIR libcamera/libcamera.h PATH_SUFFIXES libcamera)
+  find_library(MAQ_LIBCAMERA_LIBRARY camera)
+  find_library(MAQ_LIBCAMERA_BASE_LIBRARY camera-base)
+  mark_as_advanced(MAQ_LIBCAMERA_INCLUDE_DIR MAQ_LIBCAMERA_LIBRARY MAQ_LIBCAMERA_BASE_LIBRARY)
+  if(MAQ_LIBCAMERA_INCLUDE_DIR AND MAQ_LIBCAMERA_LIBRARY AND MAQ_LIBCAMERA_BASE_LIBRARY)
+    add_library(maq_libcamera INTERFACE)
+    target_include_directories(maq_libcamera SYSTEM INTERFACE "${MAQ_LIBCAMERA_INCLUDE_DIR}")
+    target_link_libraries(maq_libcamera INTERFACE "${MAQ_LIBCAMERA_LIBRARY}" "${MAQ_LIBCAMERA_BASE_LIBRARY}")
+  elseif(MAQ_WITH_LIBCAMERA STREQUAL "AUTO")
+    message(STATUS "libcamera was not found: this build opens no libcamera: cameras (Debian: libcamera-dev).")
+  else()
+    message(FATAL_ERROR "libcamera was not found. On Debian install libcamera-dev, or set MAQ_WITH_LIBCAMERA=OFF.")
+  endif()
+endif()

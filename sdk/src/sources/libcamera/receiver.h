@@ -1,0 +1,57 @@
+// From libcamera's thread to that of a source: what happened to a camera.
+#pragma once
+
+#include <libcamera/base/object.h>
+#include <libcamera/camera.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+namespace maq {
+
+class LibcameraMailbox {
+ public:
+  struct Item {
+    int slot = -1;          // of a request that came back; -1: the camera is lost
+    const char* lost = "";  // how
+  };
+
+  LibcameraMailbox();
+  ~LibcameraMailbox();
+  LibcameraMailbox(const LibcameraMailbox&) = delete;
+  LibcameraMailbox& operator=(const LibcameraMailbox&) = delete;
+
+  // Can be read as long as there is an item.
+  int fd() const { return fd_; }
+  void post(Item item);
+  std::optional<Item> take();
+
+ private:
+  int fd_;
+  std::mutex mutex_;
+  std::vector<Item> items_;
+};
+
+// Gets what libcamera tells of a camera. It lives in libcamera's thread, the only one in which signals can be connected
+// and disconnected while they may be sent.
+class LibcameraReceiver : public libcamera::Object {
+ public:
+  LibcameraReceiver(std::shared_ptr<libcamera::Camera> camera, LibcameraMailbox& mailbox);
+
+  // After this nothing more is put into the mailbox, and libcamera's thread has done all that it was asked for before.
+  // The receiver deletes itself.
+  void retire();
+
+ private:
+  void attach();
+  void detach();
+  void completed(libcamera::Request* request) { mailbox_.post({int(request->cookie()), ""}); }
+  void disconnected() { mailbox_.post({-1, "libcamera says that the camera was unplugged"}); }
+
+  std::shared_ptr<libcamera::Camera> camera_;
+  LibcameraMailbox& mailbox_;
+};
+
+}  // namespace maq

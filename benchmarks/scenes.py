@@ -24,7 +24,9 @@ def bench(sources: list[str], *arguments: str) -> dict:
         path = Path(folder) / "bench.json"
         command = [str(PROGRAM), "bench", *sources, *arguments, "--json", str(path)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        return json.loads(path.read_text())
+        document = json.loads(path.read_text())
+    document["bundle"] = Path(document["bundle"]).name  # reports do not name folders of the machine
+    return document
 
 
 def people(count: int, size: tuple[int, int] = (640, 480)) -> str:

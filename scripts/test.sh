@@ -17,8 +17,8 @@ for preset in release asan; do
 done
 
 printf '\n== native tests of threads, tsan\n'
-ctest --test-dir build/tsan -R '^native\.(DepthaiCameras|Faults|LiveCameras|V4l2Controls|V4l2Faults)$' --output-on-failure --no-tests=error \
-    --output-junit "$PWD/$results/ctest-tsan.xml" || status=1
+ctest --test-dir build/tsan -R '^native\.(DepthaiCameras|Faults|LiveCameras|V4l2Controls|V4l2Faults)$' \
+    --output-on-failure --no-tests=error --output-junit "$PWD/$results/ctest-tsan.xml" || status=1
 
 printf '\n== Python tests\n'
 .venv/bin/python -m pytest -rs --junitxml "$results/pytest.xml" || status=1

@@ -12,6 +12,7 @@
 
 #include "expect_error.h"
 #include "fake_v4l2.h"
+#include "source_threads.h"
 #include "sources/live_source.h"
 #include "sources/v4l2_camera.h"
 

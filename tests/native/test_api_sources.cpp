@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "source_threads.h"
 #include "temp_folder.h"
 
 namespace {

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "expect_error.h"
+#include "source_threads.h"
 #include "sources/faults.h"
 #include "sources/recording.h"
 #include "sources/source.h"

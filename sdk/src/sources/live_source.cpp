@@ -1,5 +1,6 @@
 #include "sources/live_source.h"
 
+#include <pthread.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -305,6 +306,7 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
   if (camera->calibration() != nullptr) calibration_ = *camera->calibration();
   state_->thread =
       std::thread([state = state_, camera = std::move(camera)]() mutable { state->run(std::move(camera)); });
+  pthread_setname_np(state_->thread.native_handle(), "maq source");  // for debuggers and `top -H`
 }
 
 LiveSource::~LiveSource() {

@@ -9,6 +9,15 @@
 namespace maq {
 namespace {
 
+// Neighbours in the picture may lie anywhere in memory, so that each point is asked for before its turn.
+constexpr size_t kAhead = 16;
+constexpr size_t kCacheLine = 64;
+inline void fetch(const float* from, size_t bytes) {
+  for (size_t offset = 0; offset < bytes; offset += kCacheLine) {
+    __builtin_prefetch(reinterpret_cast<const char*>(from) + offset);
+  }
+}
+
 // The look of a point: mean + h slope.
 MAQ_SIMD_CLONES void look_from(const float* mean, const float* slope, const float h[kBasis], float look[kFeatures]) {
   for (int c = 0; c < kFeatures; ++c) look[c] = mean[c];
@@ -55,6 +64,11 @@ void LookRaster::shade(const VisiblePoints& visible, const PointPlaces& points, 
   std::vector<float>& finest = levels_[0];
   const size_t plane = size_t(width) * size_t(height);
   for (size_t i = 0; i < count; ++i) {
+    if (i + kAhead < count) {
+      const size_t later = winners[pixels_[i + kAhead]];
+      fetch(looks.means + later * kFeatures, kFeatures * sizeof(float));
+      if (looks.slopes != nullptr) fetch(looks.slopes + later * kBasis * kFeatures, kBasis * kFeatures * sizeof(float));
+    }
     const size_t point = winners[pixels_[i]];
     const float* mean = looks.means + point * kFeatures;
     float look[kFeatures], h[kBasis];

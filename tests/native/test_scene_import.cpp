@@ -1,5 +1,6 @@
 // Captured places from disk: COLMAP models and transforms.json, with their photos and clouds.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -359,6 +360,17 @@ TEST_F(SceneImport, FoldersWithoutACaptureAreASentence) {
   made.images.clear();
   made.write_colmap(folder_, false);
   expect_refused(MAQ_ERROR_UNREADABLE, "no photo that can be used: 1 cameras without a photo (first: 7)");
+}
+
+// A reader that opened one would wait for ever.
+TEST_F(SceneImport, PipesInPlaceOfFilesAreRefused) {
+  open_colmap(MadeCapture());
+  std::filesystem::remove(folder_.path() / "images" / "a.png");
+  ASSERT_EQ(mkfifo(folder_.file("images/a.png").c_str(), 0600), 0);
+  EXPECT_EQ(texts_of(open().dropped), "1 photos that cannot be read as images (first: a.png)\n");
+  std::filesystem::remove(folder_.path() / "sparse" / "0" / "points3D.bin");
+  ASSERT_EQ(mkfifo(folder_.file("sparse/0/points3D.bin").c_str(), 0600), 0);
+  expect_refused(MAQ_ERROR_UNREADABLE, "is not a file");
 }
 
 TEST_F(SceneImport, OtherCameraModelsAreASentence) {

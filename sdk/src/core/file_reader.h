@@ -32,6 +32,7 @@ class FileReader {
 
   // Both throw MAQ_ERROR_UNREADABLE when the file ends before.
   void read(void* bytes, size_t count) {
+    if (count == 0) return;  // `bytes` may be null
     if (count > filled_ - position_) return read_over_the_end(static_cast<uint8_t*>(bytes), count);
     std::memcpy(bytes, buffer_.get() + position_, count);
     position_ += count;

@@ -1,6 +1,7 @@
 #include "image/image_file.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
@@ -11,11 +12,13 @@
 namespace maq {
 
 void read_image_file(const std::string& path, Frame& frame, Orientation orientation) {
-  const std::vector<uint8_t> bytes = read_file(path);
-  if (bytes.empty()) throw Error(MAQ_ERROR_UNREADABLE, path, " is empty; an image file was expected.");
-  if (bytes.size() > size_t(1) << 30) {
+  std::error_code ignored;  // what is no file is for read_file() to say
+  const uintmax_t size_bytes = std::filesystem::file_size(path, ignored);
+  if (!ignored && size_bytes > uintmax_t(1) << 30) {
     throw Error(MAQ_ERROR_UNREADABLE, path, " is over 1 GiB; an image file was expected.");
   }
+  const std::vector<uint8_t> bytes = read_file(path);
+  if (bytes.empty()) throw Error(MAQ_ERROR_UNREADABLE, path, " is empty; an image file was expected.");
   if (const auto size = read_image_size(bytes)) check_image_size(size->width, size->height, path);
 
   const cv::Mat image = file_decoders().decode_image(bytes.data(), bytes.size(), orientation);

@@ -23,7 +23,8 @@ class DropCounts {
       dropped.count += count;
       return;
     }
-    list_.push_back({reason, count, name});
+    constexpr size_t kMostNameBytes = 200;
+    list_.push_back({reason, count, name.substr(0, kMostNameBytes)});
   }
 
   // In the order in which the reasons came up first.

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-// Some 40,000 frames. Parsed, a hostile file takes twenty times as much.
+// Some 25,000 frames. Parsed, a hostile file takes twenty times as much.
 constexpr uint64_t kMostBytes = 16 << 20;
 
 // What is said of a frame: by itself, or by the file for all.

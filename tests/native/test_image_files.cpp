@@ -57,6 +57,21 @@ TEST(ImageFiles, ImagesAreReadAsBgr) {
   }
 }
 
+TEST(ImageFiles, SizesComeFromTheHeaderOrByDecoding) {
+  const TempFolder folder;
+  for (const char* name : {"a.png", "a.jpg", "a.tiff"}) {  // the size of a TIFF file lies anywhere in it
+    const maq::SizePx size = maq::read_image_file_size(written_image(folder, name, 123, 45));
+    EXPECT_EQ(size.width, 123) << name;
+    EXPECT_EQ(size.height, 45) << name;
+  }
+  expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { maq::read_image_file_size(folder.file("no.jpg")); });
+  write_text(folder.file("empty.jpg"), "");
+  expect_error(MAQ_ERROR_UNREADABLE, "is empty", [&] { maq::read_image_file_size(folder.file("empty.jpg")); });
+  write_text(folder.file("long.jpg"), "");
+  std::filesystem::resize_file(folder.file("long.jpg"), (uintmax_t(1) << 30) + 1);  // a hole: it takes no disk
+  expect_error(MAQ_ERROR_UNREADABLE, "over 1 GiB", [&] { maq::read_image_file_size(folder.file("long.jpg")); });
+}
+
 TEST(ImageFiles, MissingEmptyAndDamagedFilesAreToldApart) {
   const TempFolder folder;
   maq::Frame frame;

@@ -21,6 +21,13 @@ bool is_folder(const std::string& path) {
   return stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
 }
 
+bool stays_inside(const std::string& relative_path) {
+  if (relative_path.empty() || relative_path[0] == '/') return false;
+  if (relative_path.find('\0') != std::string::npos) return false;
+  const std::string parts = "/" + relative_path + "/";
+  return parts.find("/../") == std::string::npos;
+}
+
 std::vector<uint8_t> read_file(const std::string& path) {
   if (is_folder(path)) throw Error(MAQ_ERROR_UNREADABLE, path, " is a folder, not a file.");
   const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);

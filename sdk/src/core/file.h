@@ -1,4 +1,4 @@
-// Reading whole files.
+// Paths of files, and reading whole files.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,10 @@ namespace maq {
 
 bool file_exists(const std::string& path);  // and is a regular file, not a folder
 bool is_folder(const std::string& path);
+
+// Whether a path that somebody else wrote, relative to a folder, stays in that folder: it is not empty, does not begin
+// with '/' and has no part "..". Links are not looked at.
+bool stays_inside(const std::string& relative_path);
 
 // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE when it cannot be read.
 std::vector<uint8_t> read_file(const std::string& path);

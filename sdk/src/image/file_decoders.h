@@ -10,6 +10,8 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "image/orientation.h"
+
 namespace maq {
 
 // A clip that is open. Numbers are as its file says and may be anything.
@@ -30,8 +32,8 @@ class Clip {
 class FileDecoders {
  public:
   virtual ~FileDecoders() = default;
-  // BGR, 8 bits, turned upright by EXIF; empty for what is damaged or no image.
-  virtual cv::Mat decode_image(const uint8_t* bytes, size_t size_bytes) const = 0;
+  // BGR, 8 bits; empty for what is damaged or no image.
+  virtual cv::Mat decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const = 0;
   // Nothing for what is damaged or no video.
   virtual std::unique_ptr<Clip> open_clip(const std::string& path) const = 0;
 };

@@ -34,10 +34,12 @@ class OpenCvClip : public Clip {
 class OpenCvFileDecoders : public FileDecoders {
  public:
   // OpenCV throws for some damaged files and returns an empty image for others.
-  cv::Mat decode_image(const uint8_t* bytes, size_t size_bytes) const override {
+  cv::Mat decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const override {
     try {
       const cv::Mat encoded(1, int(size_bytes), CV_8UC1, const_cast<uint8_t*>(bytes));
-      return cv::imdecode(encoded, cv::IMREAD_COLOR);
+      return cv::imdecode(encoded, orientation == Orientation::kUpright
+                                       ? cv::IMREAD_COLOR
+                                       : int(cv::IMREAD_COLOR) | int(cv::IMREAD_IGNORE_ORIENTATION));
     } catch (const std::exception&) {
       return {};
     }

@@ -1,0 +1,130 @@
+#include "core/file_reader.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+
+namespace maq {
+namespace {
+
+constexpr size_t kBufferBytes = 1 << 16;
+
+bool is_space(int character) { return character == ' ' || (character >= '\t' && character <= '\r'); }
+
+}  // namespace
+
+FileReader::FileReader(std::string path) : path_(std::move(path)) {
+  // Without O_NONBLOCK a pipe would wait for somebody who writes.
+  file_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (file_ < 0) {
+    const int reason = errno;
+    if (reason == ENOENT || reason == ENOTDIR) {
+      throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
+    }
+    fail(" cannot be opened (", std::strerror(reason), ").");
+  }
+  struct stat found {};
+  if (::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) {
+    ::close(file_);
+    fail(" is not a file.");
+  }
+  size_bytes_ = uint64_t(found.st_size);
+  buffer_ = std::make_unique<uint8_t[]>(kBufferBytes);
+}
+
+FileReader::~FileReader() { ::close(file_); }
+
+bool FileReader::fill() {
+  buffer_offset_ += position_;
+  position_ = filled_ = 0;
+  const size_t count = size_t(std::min<uint64_t>(kBufferBytes, size_bytes_ - buffer_offset_));
+  while (filled_ < count) {
+    const ssize_t got = ::pread(file_, buffer_.get() + filled_, count - filled_, off_t(buffer_offset_ + filled_));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) fail(" cannot be read to its end; did it change meanwhile?");
+    filled_ += size_t(got);
+  }
+  return filled_ > 0;
+}
+
+void FileReader::read_over_the_end(uint8_t* bytes, size_t count) {
+  if (count > remaining()) fail(" ends early: it is cut off or damaged; copy it again.");
+  while (count > 0) {
+    if (position_ == filled_) fill();
+    const size_t part = std::min(count, filled_ - position_);
+    std::memcpy(bytes, buffer_.get() + position_, part);
+    position_ += part;
+    bytes += part;
+    count -= part;
+  }
+}
+
+void FileReader::skip(uint64_t count) {
+  if (count > remaining()) fail(" ends early: it is cut off or damaged; copy it again.");
+  if (count <= filled_ - position_) {
+    position_ += size_t(count);
+    return;
+  }
+  buffer_offset_ += position_ + count;
+  position_ = filled_ = 0;
+}
+
+int FileReader::next_character() {
+  if (position_ == filled_ && !fill()) return -1;
+  return buffer_[position_++];
+}
+
+bool FileReader::next_line(std::string& line, size_t most_bytes) {
+  line.clear();
+  bool is_there = false;
+  while (position_ < filled_ || fill()) {
+    is_there = true;
+    const uint8_t* begin = buffer_.get() + position_;
+    const auto* end = static_cast<const uint8_t*>(std::memchr(begin, '\n', filled_ - position_));
+    const size_t count = end == nullptr ? filled_ - position_ : size_t(end - begin);
+    const size_t kept = std::min(count, most_bytes - std::min(most_bytes, line.size()));
+    line.append(reinterpret_cast<const char*>(begin), kept);
+    position_ += count;
+    if (end == nullptr) continue;
+    ++position_;
+    break;
+  }
+  if (!line.empty() && line.back() == '\r') line.pop_back();
+  if (is_there) ++line_;
+  return is_there;
+}
+
+std::string_view FileReader::next_word() {
+  int character;
+  do {
+    if (ended_line_) ++line_;
+    character = next_character();
+    ended_line_ = character == '\n';
+  } while (is_space(character));
+  size_t length = 0;
+  while (character >= 0 && !is_space(character)) {
+    if (length == word_.size()) fail(", line ", line_, ": there is a word of over ", word_.size(), " letters.");
+    word_[length++] = char(character);
+    character = next_character();
+  }
+  ended_line_ = character == '\n';
+  return {word_.data(), length};
+}
+
+bool parse_number(std::string_view text, double& number) {
+  if (!text.empty() && text[0] == '+') text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc::result_out_of_range) {
+    // Too small is nothing, too large is not finite; both are what strtod says.
+    const bool is_small = text.find("e-") != std::string_view::npos || text.find("E-") != std::string_view::npos;
+    number = is_small ? 0 : HUGE_VAL;
+    return end == text.data() + text.size();
+  }
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace maq

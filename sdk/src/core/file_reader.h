@@ -1,0 +1,85 @@
+// A file read from front to back: as numbers, words or lines, with memory that does not depend on what it claims.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+
+namespace maq {
+
+enum class ByteOrder { kLittle, kBig };
+
+class FileReader {
+ public:
+  // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE for what is no file or may not be read.
+  explicit FileReader(std::string path);
+  ~FileReader();
+  FileReader(const FileReader&) = delete;
+  FileReader& operator=(const FileReader&) = delete;
+
+  const std::string& path() const { return path_; }
+  // Bytes that have not been read or skipped yet.
+  uint64_t remaining() const { return size_bytes_ - buffer_offset_ - position_; }
+  // Of the line or word that was read last, from 1.
+  uint64_t line() const { return line_; }
+
+  // Both throw MAQ_ERROR_UNREADABLE when the file ends before.
+  void read(void* bytes, size_t count) {
+    if (count == 0) return;  // `bytes` may be null
+    if (count > filled_ - position_) return read_over_the_end(static_cast<uint8_t*>(bytes), count);
+    std::memcpy(bytes, buffer_.get() + position_, count);
+    position_ += count;
+  }
+  void skip(uint64_t count);
+
+  template <class Number>
+  Number number(ByteOrder order = ByteOrder::kLittle) {
+    std::array<uint8_t, sizeof(Number)> bytes;
+    read(bytes.data(), bytes.size());
+    if (order == ByteOrder::kBig) std::reverse(bytes.begin(), bytes.end());
+    Number number;
+    std::memcpy(&number, bytes.data(), sizeof number);
+    return number;
+  }
+
+  // The next line without its end ("\n" or "\r\n"); what is behind its first `most_bytes` is left out. False at the end of
+  // the file.
+  bool next_line(std::string& line, size_t most_bytes);
+
+  // What comes next between white space, until the next call; empty at the end of the file. Throws MAQ_ERROR_UNREADABLE
+  // when it is longer than any number.
+  std::string_view next_word();
+
+  // Throws MAQ_ERROR_UNREADABLE: the path, then what is wrong.
+  template <class... Parts>
+  [[noreturn]] void fail(const Parts&... parts) const {
+    throw Error(MAQ_ERROR_UNREADABLE, path_, parts...);
+  }
+
+ private:
+  void read_over_the_end(uint8_t* bytes, size_t count);
+  bool fill();           // false at the end of the file
+  int next_character();  // -1 at the end of the file
+
+  std::string path_;
+  int file_ = -1;
+  uint64_t size_bytes_ = 0;
+  uint64_t buffer_offset_ = 0;  // of the buffer's first byte in the file
+  std::unique_ptr<uint8_t[]> buffer_;
+  size_t position_ = 0, filled_ = 0;
+  uint64_t line_ = 0;
+  std::array<char, 64> word_{};
+  bool ended_line_ = true;
+};
+
+// The whole text as a number, in the way of C whatever the language of the system; false when it is none.
+bool parse_number(std::string_view text, double& number);
+
+}  // namespace maq

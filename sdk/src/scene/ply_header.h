@@ -1,0 +1,45 @@
+// The head of a PLY file: what its elements are made of.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/file_reader.h"
+
+namespace maq {
+
+enum class PlyForm { kAscii, kLittleEndian, kBigEndian };
+enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
+
+size_t size_bytes(PlyType type);
+bool is_float(PlyType type);
+
+struct PlyProperty {
+  std::string name;
+  PlyType type = PlyType::kFloat32;  // of each entry for lists
+  bool is_list = false;
+  PlyType count_type = PlyType::kUint8;  // of a list's length
+};
+
+struct PlyElement {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<PlyProperty> properties;
+  uint64_t header_line = 0;
+
+  // What one of them takes in the file at least: lists may be empty; in text, a digit and a space for each property.
+  uint64_t least_bytes(PlyForm form) const;
+  // Of the property of that name that is no list; -1 when there is none.
+  int index_of(const std::string& property) const;
+};
+
+struct PlyHeader {
+  PlyForm form = PlyForm::kAscii;
+  std::vector<PlyElement> elements;
+};
+
+// Reads up to the first byte of the data. Throws MAQ_ERROR_UNREADABLE, and MAQ_ERROR_UNSUPPORTED for versions other than 1.0.
+PlyHeader read_ply_header(FileReader& file);
+
+}  // namespace maq

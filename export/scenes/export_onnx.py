@@ -3,12 +3,13 @@
     python -m export.scenes.export_onnx --checkpoint RUN/weights.pt --out .data/bundles/scenes-fp32
     python -m export.scenes.export_onnx --random small --out .data/bundles/random-scenes-fp32
 
-All tensors have channels last, as int8 kernels want them and as the SDK, which writes and reads a whole pixel at a time,
-does. `extractor`: image [1, H, W, 3], RGB in 0..1, H and W multiples of 32 -> features [1, H, W, 8]. `refiner`:
+All tensors have channels last, as int8 kernels want them and as the SDK, which writes and reads a whole pixel at a
+time, does. `extractor`: image [1, H, W, 3], RGB in 0..1, H and W multiples of 32 -> features [1, H, W, 8]. `refiner`:
 raster0, raster1, ... [1, H/2^k, W/2^k, 9] -> rgb [1, H, W, 3], not clamped; a folded refiner (config.folded) takes
-raster0 as [1, H/2, W/2, 4 * 9] and gives rgb as [1, H/2, W/2, 4 * 3], pixels (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2.
-H and W are open: photos and windows have any size, and a runtime that knows its size fixes the axes named `height` and
-`width` when it loads a graph, which is then as fast as one exported for that size.
+raster0 as [1, H/2, W/2, 4 * 9] and gives rgb as [1, H/2, W/2, 4 * 3], pixels (0, 0), (0, 1), (1, 0), (1, 1) of each
+2x2. H and W are open: photos and windows have any size, and a runtime that knows its size fixes the axes named
+`height` and `width` when it loads a graph, which is then as fast as one exported for that size.
+The gated refiner's graph needs sides of at least 32: its borders are reflected.
 The basis network has no graph: it is 678 numbers, in `basis.bin`, little-endian float32: for each of its three layers
 the weights [outputs, inputs], then the biases.
 """
@@ -26,7 +27,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from export.densepose.export_onnx import channels_first, channels_last, doubled
+from export.densepose.export_onnx import Doubled, channels_first, channels_last
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
 from export.scenes.basis import Basis
@@ -38,6 +39,28 @@ from export.scenes.system import Networks, load_networks
 
 OPSET = 17
 TOLERANCE = 1e-5  # largest |ONNX - torch|, relative to the output's largest value
+
+
+class DoubledBeside(Doubled):
+    """As `Doubled`, for an x whose channels are not those of `like`."""
+
+    @staticmethod
+    def symbolic(g: object, x: object, like: object) -> object:
+        cells = g.op("Transpose", x, perm_i=[0, 2, 3, 1])
+        rows = g.op("Reshape", g.op("Concat", cells, cells, axis_i=3), _constant(g, 0, 0, 1, -1))
+        size = g.op("Shape", g.op("Transpose", like, perm_i=[0, 2, 3, 1]), start_i=0, end_i=3)
+        shape = g.op("Concat", size, _constant(g, -1), axis_i=0)
+        twice = g.op("Reshape", g.op("Concat", rows, rows, axis_i=2), shape)
+        return g.op("Transpose", twice, perm_i=[0, 3, 1, 2])
+
+
+def _constant(g: object, *values: int) -> object:
+    return g.op("Constant", value_t=torch.tensor(values))
+
+
+def doubled(x: Tensor, like: Tensor) -> Tensor:
+    """Nearest upsampling of x by two, to the height and width of `like`."""
+    return DoubledBeside.apply(x, like) if torch.onnx.is_in_onnx_export() else Doubled.forward(None, x, like)
 
 
 class ExtractorGraph(nn.Module):
@@ -131,7 +154,7 @@ def write_basis(basis: Basis, path: Path) -> None:
 
 @torch.no_grad()
 def parity(module: nn.Module, path: Path, given: dict[str, np.ndarray]) -> float:
-    """Largest |ONNX - torch| over the output, relative to its largest value. module: an ExtractorGraph or RefinerGraph."""
+    """Largest |ONNX - torch| over the output, relative to its largest value. module: what the graph was made of."""
     expected = module.eval()(*(torch.from_numpy(x) for x in given.values())).numpy()
     (found,) = session(path).run(None, given)
     return float(np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-9))

@@ -17,7 +17,7 @@ class LossWeights:
     """quarter: L1 of pictures a quarter as wide. perceptual: see `Perceptual`. own: L1 of the target made from its own
     features. full: L1 of all pixels, which the paper does not have; PSNR is measured here too.
 
-    The paper's 2500 and 1000 for quarter and own go with sums over VGG-19's features; ours are means. Their ratio stays.
+    The paper's 2500 and 1000 for quarter and own go with sums over VGG-19's features; ours are means. The ratio stays.
     """
 
     quarter: float = 5.0

@@ -3,9 +3,9 @@
 One pixel a point; the nearest wins, of equal depths the lowest index, by the same arithmetic as the SDK's
 `VisiblePoints` (sdk/src/scene/visible_points.h). A key is the depth's bits, then the index: the least wins.
 
-Coarser levels are the least keys of 2x2 pixels of the next finer one. That is what a camera of half the size would find,
-and not nearly: a point at (x, y) is in pixel floor(x + 1/2), and half the size moves it to ((x + 1/2) / 2 - 1/2), so to
-pixel floor((x + 1/2) / 2) = floor(floor(x + 1/2) / 2). It holds where all sides can be halved, hence sides are
+Coarser levels are the least keys of 2x2 pixels of the next finer one. That is what a camera of half the size would
+find, and exactly: a point at (x, y) is in pixel floor(x + 1/2), and half the size moves it to (x + 1/2) / 2 - 1/2, so
+to pixel floor((x + 1/2) / 2) = floor(floor(x + 1/2) / 2). It holds where all sides can be halved, hence sides are
 multiples of 16 here: the frame is wider than the picture by up to 15 pixels, with the points that are there, and cut
 afterwards. The paper truncates sizes instead and draws the points five times.
 """

@@ -35,7 +35,7 @@ class Sample:
 @dataclass(frozen=True)
 class Sampling:
     """crop_px: side of the cuts, a multiple of 32. sources: photos a cut is made from, 3 in the paper. long_side_px:
-    larger photos are made smaller. jitter: probability that colours are changed, the same for all photos of a sample."""
+    larger photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
 
     crop_px: int = 256
     sources: int = 3

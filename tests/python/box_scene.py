@@ -1,4 +1,4 @@
-"""A made-up place: a room with coloured boxes, painted by casting a ray for each pixel; exact cameras, cloud and depth."""
+"""A made-up place: a room with coloured boxes, painted by casting rays; exact cameras, cloud and depth."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from export.scenes.cameras import Camera
 
 
 class BoxScene:
-    """Boxes [B, 2, 3] (least and greatest corner) with checkered faces, inside of a room that is a box as well. Up is y."""
+    """Checkered boxes [B, 2, 3] (least and greatest corner), the first of them the room around the others. Up is y."""
 
     def __init__(self, seed: int, boxes: int = 5) -> None:
         rng = np.random.default_rng(seed)
@@ -75,16 +75,8 @@ def looking(centre, at, width: int = 96, height: int = 64, roll: float = 0.0, fo
     down = np.cross(forward, right)
     cosine, sine = np.cos(roll), np.sin(roll)
     rotation = np.stack([cosine * right + sine * down, cosine * down - sine * right, forward])
-    return Camera(
-        width,
-        height,
-        focal * width,
-        focal * width,
-        width / 2 - 0.5,
-        height / 2 - 0.5,
-        rotation,
-        np.array(centre, float),
-    )
+    middle = width / 2 - 0.5, height / 2 - 0.5
+    return Camera(width, height, focal * width, focal * width, *middle, rotation, np.asarray(centre, float))
 
 
 def ring(count: int, width: int = 96, height: int = 64, seed: int = 0) -> list[Camera]:

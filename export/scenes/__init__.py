@@ -1,0 +1,1 @@
+"""Scenes from posed photos and a point cloud: the networks of NPBG++, their training and export."""

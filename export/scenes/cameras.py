@@ -1,0 +1,96 @@
+"""Cameras without lens distortion, in the convention of OpenCV and of the SDK (sdk/src/scene/pinhole_camera.h): x to
+the right, y down, z forward; the centre of the top left pixel is (0, 0)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+FAINTEST = 0.05  # where the world's up is nearly along the axis, the turn fades out (pinhole_camera.cpp)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """rotation: float64 [3, 3], world to camera. centre: float64 [3], in the world."""
+
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    rotation: np.ndarray
+    centre: np.ndarray
+
+    def intrinsics(self) -> np.ndarray:
+        """[3, 3]: from the camera's coordinates to pixels times depth."""
+        return np.array([[self.fx_px, 0, self.cx_px], [0, self.fy_px, self.cy_px], [0, 0, 1]])
+
+
+def resized(camera: Camera, width_px: int, height_px: int) -> Camera:
+    """A smaller or larger picture of the same field of view."""
+    across, down = width_px / camera.width_px, height_px / camera.height_px
+    return replace(
+        camera,
+        width_px=width_px,
+        height_px=height_px,
+        fx_px=camera.fx_px * across,
+        fy_px=camera.fy_px * down,
+        cx_px=(camera.cx_px + 0.5) * across - 0.5,
+        cy_px=(camera.cy_px + 0.5) * down - 0.5,
+    )
+
+
+def reframed(camera: Camera, left_px: int, top_px: int, width_px: int, height_px: int) -> Camera:
+    """The same camera with another frame, whose first pixel was (left, top): a cut, or more than there was."""
+    return replace(
+        camera, width_px=width_px, height_px=height_px, cx_px=camera.cx_px - left_px, cy_px=camera.cy_px - top_px
+    )
+
+
+def turned_upright(camera: Camera, up: np.ndarray) -> Camera:
+    """The camera turned about its optical axis so that `up` [3] of the world points up in the picture.
+
+    Section 3.2 of NPBG++ (arXiv 2203.13318), as the SDK's `turned_upright`: as it is where up is along the axis, and
+    continuous near that.
+    """
+    length = float(np.linalg.norm(up))
+    if not (length > 0 and math.isfinite(length)):
+        return camera
+    across, down, _ = camera.rotation @ (np.asarray(up, np.float64) / length)
+    angle = math.atan2(across, -down) * min(1.0, math.hypot(across, down) / FAINTEST)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    return replace(camera, rotation=turn @ camera.rotation)
+
+
+def upright(camera: Camera, up: np.ndarray, multiple: int) -> Camera:
+    """The camera turned upright, with the smallest frame that holds its whole picture and has sides that are multiples
+    of `multiple`. The paper turns inside of a square as wide as the diagonal: up to twice the pixels."""
+    turned = turned_upright(camera, up)
+    right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
+    corners = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [-0.5, bottom, 1], [right, bottom, 1]])
+    seen = corners @ between(camera, turned).T
+    # A turn by an angle of rounding size must not widen the frame by a pixel.
+    first = np.floor(seen.min(0) + 0.5 + 1e-6).astype(int)
+    size = np.ceil(seen.max(0) + 0.5 - 1e-6).astype(int) - first
+    width, height = (-(-int(side) // multiple) * multiple for side in size)
+    return reframed(turned, int(first[0]), int(first[1]), width, height)
+
+
+def between(source: Camera, target: Camera) -> np.ndarray:
+    """[2, 3]: pixels of `source` to pixels of `target`, two cameras that differ by frame and turn about the axis."""
+    whole = target.intrinsics() @ target.rotation @ source.rotation.T @ np.linalg.inv(source.intrinsics())
+    return (whole / whole[2, 2])[:2]
+
+
+def warped(image: np.ndarray, source: Camera, target: Camera, outside: int = cv2.BORDER_REPLICATE) -> np.ndarray:
+    """The picture that `source` took, as `target` would have (see `between`); bilinear. image: [H, W] or [H, W, C].
+
+    Beyond the border the last pixels are repeated: an edge between picture and black would be a feature.
+    """
+    size = target.width_px, target.height_px
+    return cv2.warpAffine(image, between(source, target), size, flags=cv2.INTER_LINEAR, borderMode=outside)

@@ -1,0 +1,71 @@
+"""The sizes of the networks of NPBG++ (arXiv 2203.13318) in one place, as published and as the SDK uses them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+FEATURES = 8  # values of a point's look
+BASIS = 6  # functions of the direction that the look is a combination of
+RASTER = FEATURES + 1  # with the occupancy
+LEVELS = 5  # rasters at 1, 1/2, 1/4, 1/8, 1/16
+MULTIPLE = 2 ** (LEVELS - 1)  # sides of rendered pictures, pixels
+ALPHA = 1.0  # of the ridge regression, as in the paper
+
+
+@dataclass(frozen=True)
+class ExtractorConfig:
+    """Channels of the decoder's outputs, from stride 16 to 1.
+
+    The paper's are (256, 128, 64, 32, 16). These have a third of the multiply-adds: at full resolution, where most of
+    them are, the width is the paper's.
+    """
+
+    widths: tuple[int, ...] = (96, 64, 32, 24, 16)
+
+
+@dataclass(frozen=True)
+class RefinerConfig:
+    """kind: `gated`, as in the paper (the rest is not used then), or `light`.
+
+    block: of the light one, `conv` (3x3) or `separable` (depthwise 3x3, then 1x1). join: how a skip meets what comes
+    from below, `add` or `concat`. folded: whether it begins and ends at half resolution, 2x2 pixels as channels.
+    widths: channels at 1/2, 1/4, ... of the picture where it is folded, else at 1, 1/2, ...; rasters coarser than the
+    last are not read.
+    """
+
+    kind: str = "light"
+    block: str = "conv"
+    join: str = "concat"
+    folded: bool = True
+    widths: tuple[int, ...] = (24, 32, 48, 64)
+
+    def __post_init__(self) -> None:
+        for name, known in (
+            ("kind", ("gated", "light")),
+            ("block", ("conv", "separable")),
+            ("join", ("add", "concat")),
+        ):
+            if getattr(self, name) not in known:
+                raise ValueError(f"A refiner's {name} is {' or '.join(known)}, not {getattr(self, name)!r}.")
+        if not self.widths or min(self.widths) < 1 or self.levels > LEVELS:
+            raise ValueError(f"A light refiner reads at most {LEVELS} rasters with positive widths, not {self.widths}.")
+
+    @property
+    def levels(self) -> int:
+        """How many rasters it reads, the finest first."""
+        return LEVELS if self.kind == "gated" else len(self.widths) + self.folded
+
+
+@dataclass(frozen=True)
+class SceneConfig:
+    """All networks of a system."""
+
+    extractor: ExtractorConfig = field(default_factory=ExtractorConfig)
+    refiner: RefinerConfig = field(default_factory=RefinerConfig)
+
+
+SIZES = {
+    "tiny": SceneConfig(ExtractorConfig((32, 24, 16, 16, 16)), RefinerConfig(widths=(16, 16, 24, 24))),
+    "small": SceneConfig(),
+    "full": SceneConfig(ExtractorConfig((256, 128, 64, 32, 16)), RefinerConfig("gated")),
+}

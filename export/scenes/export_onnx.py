@@ -1,0 +1,199 @@
+"""Exports extractor and refiner as fp32 ONNX graphs, and compares them with torch.
+
+    python -m export.scenes.export_onnx --checkpoint RUN/weights.pt --out .data/bundles/scenes-fp32
+    python -m export.scenes.export_onnx --random small --out .data/bundles/random-scenes-fp32
+
+All tensors have channels last, as int8 kernels want them and as the SDK, which writes and reads a whole pixel at a
+time, does. `extractor`: image [1, H, W, 3], RGB in 0..1, H and W multiples of 32 -> features [1, H, W, 8]. `refiner`:
+raster0, raster1, ... [1, H/2^k, W/2^k, 9] -> rgb [1, H, W, 3], not clamped; a folded refiner (config.folded) takes
+raster0 as [1, H/2, W/2, 4 * 9] and gives rgb as [1, H/2, W/2, 4 * 3], pixels (0, 0), (0, 1), (1, 0), (1, 1) of each
+2x2. H and W are open: photos and windows have any size, and a runtime that knows its size fixes the axes named
+`height` and `width` when it loads a graph, which is then as fast as one exported for that size.
+The gated refiner's graph needs sides of at least 32: its borders are reflected.
+The basis network has no graph: it is 678 numbers, in `basis.bin`, little-endian float32: for each of its three layers
+the weights [outputs, inputs], then the biases.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import warnings
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from torch import Tensor, nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from export.densepose.export_onnx import Doubled, channels_first, channels_last
+from export.densepose.graphs import session
+from export.densepose.network import ConvBn
+from export.scenes.basis import Basis
+from export.scenes.config import FEATURES, RASTER, SIZES
+from export.scenes.extractor import STRIDE, Extractor
+from export.scenes.light_refiner import LightRefiner
+from export.scenes.refiner import Refiner
+from export.scenes.system import Networks, load_networks
+
+OPSET = 17
+TOLERANCE = 1e-5  # largest |ONNX - torch|, relative to the output's largest value
+
+
+class DoubledBeside(Doubled):
+    """As `Doubled`, for an x whose channels are not those of `like`."""
+
+    @staticmethod
+    def symbolic(g: object, x: object, like: object) -> object:
+        cells = g.op("Transpose", x, perm_i=[0, 2, 3, 1])
+        rows = g.op("Reshape", g.op("Concat", cells, cells, axis_i=3), _constant(g, 0, 0, 1, -1))
+        size = g.op("Shape", g.op("Transpose", like, perm_i=[0, 2, 3, 1]), start_i=0, end_i=3)
+        shape = g.op("Concat", size, _constant(g, -1), axis_i=0)
+        twice = g.op("Reshape", g.op("Concat", rows, rows, axis_i=2), shape)
+        return g.op("Transpose", twice, perm_i=[0, 3, 1, 2])
+
+
+def _constant(g: object, *values: int) -> object:
+    return g.op("Constant", value_t=torch.tensor(values))
+
+
+def doubled(x: Tensor, like: Tensor) -> Tensor:
+    """Nearest upsampling of x by two, to the height and width of `like`."""
+    return DoubledBeside.apply(x, like) if torch.onnx.is_in_onnx_export() else Doubled.forward(None, x, like)
+
+
+class ExtractorGraph(nn.Module):
+    """Channels last at both ends, batch normalisation folded."""
+
+    def __init__(self, extractor: Extractor) -> None:
+        super().__init__()
+        self.extractor = copy.deepcopy(extractor).eval().requires_grad_(False)
+        for module in self.extractor.modules():
+            if isinstance(module, ConvBn):
+                module.conv, module.bn = fuse_conv_bn_eval(module.conv, module.bn), nn.Identity()
+        self.extractor.double = doubled
+
+    def forward(self, image: Tensor) -> Tensor:
+        return channels_last(self.extractor(channels_first(image)))
+
+
+class RefinerGraph(nn.Module):
+    """Channels last at both ends, folded where the refiner is."""
+
+    def __init__(self, refiner: Refiner) -> None:
+        super().__init__()
+        self.refiner = copy.deepcopy(refiner).eval().requires_grad_(False)
+        self.light = isinstance(refiner, LightRefiner)
+        if self.light:
+            self.refiner.double = doubled
+
+    def forward(self, *rasters: Tensor) -> Tensor:
+        given = [channels_first(raster) for raster in rasters]
+        return channels_last(self.refiner.of_folded(given) if self.light else self.refiner(given))
+
+
+def raster_shapes(refiner: Refiner, height: int, width: int) -> dict[str, list[int]]:
+    """What a refiner's graph is given for a picture of that size."""
+    is_folded, levels = (refiner.config.folded, refiner.config.levels) if isinstance(refiner, LightRefiner) else (0, 5)
+    shapes = {f"raster{k}": [1, height >> k, width >> k, RASTER] for k in range(levels)}
+    if is_folded:
+        shapes["raster0"] = [1, height // 2, width // 2, 4 * RASTER]
+    return shapes
+
+
+def export_extractor(extractor: Extractor, path: Path) -> None:
+    """Writes the graph of the extractor."""
+    axes = {name: {1: "height", 2: "width"} for name in ("image", "features")}
+    given = torch.rand(1, 2 * STRIDE, 3 * STRIDE, 3)
+    _export(ExtractorGraph(extractor), (given,), path, ["image"], ["features"], axes)
+
+
+def export_refiner(refiner: Refiner, path: Path) -> None:
+    """Writes the graph of a refiner."""
+    height, width = 96, 160
+    shapes = raster_shapes(refiner, height, width)
+    names = {height >> k: f"height/{1 << k}" for k in range(5)} | {width >> k: f"width/{1 << k}" for k in range(5)}
+    names[height], names[width] = "height", "width"
+    axes = {name: {axis: names[shape[axis]] for axis in (1, 2)} for name, shape in shapes.items()}
+    axes["rgb"] = axes["raster0"]
+    _export(RefinerGraph(refiner), tuple(torch.rand(s) for s in shapes.values()), path, list(shapes), ["rgb"], axes)
+
+
+def _export(
+    module: nn.Module,
+    given: tuple[Tensor, ...],
+    path: Path,
+    inputs: list[str],
+    outputs: list[str],
+    axes: dict[str, dict[int, str]],
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the exporter that knows our own operations is called deprecated
+        torch.onnx.export(
+            module.eval(),
+            given,
+            path,
+            input_names=inputs,
+            output_names=outputs,
+            dynamic_axes=axes,
+            opset_version=OPSET,
+            dynamo=False,
+        )
+    model = onnx.load(path)
+    model.graph.name = path.stem
+    onnx.checker.check_model(model, full_check=True)
+    onnx.save(model, path)
+
+
+def write_basis(basis: Basis, path: Path) -> None:
+    """The 678 numbers of the basis network, as the head of this file says."""
+    values = [p.detach().float().flatten() for p in basis.parameters()]
+    torch.cat(values).numpy().astype("<f4").tofile(path)
+
+
+@torch.no_grad()
+def parity(module: nn.Module, path: Path, given: dict[str, np.ndarray]) -> float:
+    """Largest |ONNX - torch| over the output, relative to its largest value. module: what the graph was made of."""
+    expected = module.eval()(*(torch.from_numpy(x) for x in given.values())).numpy()
+    (found,) = session(path).run(None, given)
+    return float(np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-9))
+
+
+def export(networks: Networks, folder: Path) -> dict[str, float]:
+    """Writes `extractor.onnx`, `refiner.onnx` and `basis.bin`; returns each graph's parity. Raises ValueError where one
+    is not what torch computes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    export_extractor(networks.extractor, folder / "extractor.onnx")
+    export_refiner(networks.refiner, folder / "refiner.onnx")
+    write_basis(networks.basis, folder / "basis.bin")
+    random = np.random.default_rng(0)
+    image = {"image": random.random((1, 5 * STRIDE, 4 * STRIDE, 3), np.float32)}
+    shapes = raster_shapes(networks.refiner, 112, 80)
+    rasters = {name: random.standard_normal(shape, np.float32) for name, shape in shapes.items()}
+    worst = {
+        "extractor": parity(ExtractorGraph(networks.extractor), folder / "extractor.onnx", image),
+        "refiner": parity(RefinerGraph(networks.refiner), folder / "refiner.onnx", rasters),
+    }
+    for name, error in worst.items():
+        if not error <= TOLERANCE:
+            raise ValueError(f"the graph {name} differs from torch by {error:.1e} of its largest value")
+    return worst
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--checkpoint", type=Path, help="weights.pt of export.scenes.train")
+    source.add_argument("--random", choices=SIZES, help="random weights of this size, for measuring time")
+    parser.add_argument("--out", type=Path, default=Path(".data/bundles/scenes-fp32"))
+    options = parser.parse_args()
+    torch.manual_seed(0)
+    networks = Networks(SIZES[options.random]) if options.random else load_networks(options.checkpoint)
+    for name, error in export(networks.eval(), options.out).items():
+        size = (options.out / f"{name}.onnx").stat().st_size / 1e6
+        print(f"{name}: {size:.2f} MB, {error:.1e} from torch; {FEATURES} features")
+
+
+if __name__ == "__main__":
+    main()

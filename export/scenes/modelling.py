@@ -1,0 +1,138 @@
+"""From photos and a cloud to looks, and from looks to a picture: all of NPBG++ (arXiv 2203.13318) in torch.
+
+The reference for the SDK and what training differentiates through. Points are float64 [P, 3], photos RGB in 0..1
+[H, W, 3] (numpy float32), features and rasters float32.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from export.scenes.basis import directions
+from export.scenes.cameras import Camera, resized, upright, warped
+from export.scenes.config import ALPHA, LEVELS, MULTIPLE
+from export.scenes.extractor import STRIDE
+from export.scenes.looks import Looks, Moments
+from export.scenes.raster import projected, pyramid, visible
+from export.scenes.system import Networks
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A photo and its camera. image: RGB float32 [H, W, 3] in 0..1."""
+
+    image: np.ndarray
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Options:
+    """up: of the world. visibility_scale: of the photos' sides, for finding who is seen (1/2 in the paper where points
+    are sparse, so that what is behind does not shine through). near: depth of the nearest visible point, in the scene's
+    units. alpha: of the ridge regression. precision: of the moments."""
+
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    visibility_scale: float = 1.0
+    near: float = 0.0
+    alpha: float = ALPHA
+    precision: torch.dtype = torch.float32
+
+
+def features_of(view: View, networks: Networks, options: Options) -> tuple[Tensor, Camera]:
+    """Features [8, h, w] of the photo turned upright, and the camera that took it so.
+
+    A photo is turned by bilinear interpolation before the extractor sees it, in the smallest frame that holds it.
+    """
+    camera = upright(view.camera, np.asarray(options.up), STRIDE)
+    image = torch.from_numpy(warped(view.image, view.camera, camera))
+    device = next(networks.parameters()).device
+    return networks.extractor(image.permute(2, 0, 1)[None].to(device))[0], camera
+
+
+def sampled(features: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
+    """Bilinear [P, C] of a map [C, H, W] at pixels [P], the border repeated outside."""
+    height, width = features.shape[1:]
+    grid = torch.stack([(2 * columns + 1) / width - 1, (2 * rows + 1) / height - 1], -1)
+    found = F.grid_sample(features[None], grid[None, None], mode="bilinear", padding_mode="border", align_corners=False)
+    return found[0, :, 0].T
+
+
+def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
+    """Which points win a pixel of the photo, bool [P]. Asked of the camera as it is: its pixels are the photo's."""
+    scale = options.visibility_scale
+    small = resized(camera, max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
+    keys = visible(points, small, options.near)
+    seen = torch.zeros(len(points), dtype=torch.bool, device=points.device)
+    seen[pyramid(keys, 1).points] = True
+    return seen
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is left of a cloud: the points that some photo sees, float64 [P, 3], and how they look."""
+
+    places: Tensor
+    looks: Looks
+
+    def descriptors(self, chosen: Tensor, centre: np.ndarray, networks: Networks) -> Tensor:
+        """How the points with indices `chosen` [V] look from a camera's centre [3]: float32 [V, 8].
+
+        As in the paper the target's basis values have no gradient; the basis learns from the sources'.
+        """
+        places, looks = self.places[chosen], self.looks
+        with torch.no_grad():
+            basis = networks.basis(directions(places, torch.from_numpy(centre).to(places)).float())
+        mean, slope = looks.mean[chosen], looks.slope[chosen]
+        return Looks(mean, slope, looks.views[chosen], looks.singular[chosen]).seen_from(basis.to(mean)).float()
+
+    def rasters(self, camera: Camera, networks: Networks, options: Options) -> list[Tensor]:
+        """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16."""
+        shown = pyramid(visible(self.places, camera, options.near), LEVELS)
+        return shown.rasters(self.descriptors(shown.points, camera.centre, networks))
+
+
+def modelled(
+    points: Tensor, views: Sequence[View], networks: Networks, options: Options, target: Camera | None = None
+) -> Model:
+    """The cloud after all views; with a `target`, only what wins a pixel of that camera: enough to render it."""
+    seen = torch.stack([seen_in(points, view.camera, options) for view in views])
+    (chosen,) = torch.where(seen.any(0))
+    if target is not None:
+        chosen = chosen[pyramid(visible(points[chosen], target, options.near), 1).points]
+    places, seen = points[chosen], seen[:, chosen]
+    moments = Moments.zeros(len(places), torch.zeros((), dtype=options.precision, device=points.device))
+    for view, sees in zip(views, seen, strict=True):
+        features, camera = features_of(view, networks, options)
+        columns, rows, _ = projected(places, camera)
+        # What is not seen may have no pixel at all; it counts for nothing, but must be a number.
+        columns, rows = (torch.where(sees, at, 0) for at in (columns, rows))
+        centre = torch.from_numpy(view.camera.centre).to(places)
+        basis = networks.basis(directions(places, centre).float())
+        moments = moments.with_view(sampled(features, columns, rows), basis, sees)
+    return Model(places, moments.looks(options.alpha))
+
+
+@torch.no_grad()
+def render(model: Model, camera: Camera, networks: Networks, options: Options) -> np.ndarray:
+    """The picture of a camera of any size and turn: RGB float32 [H, W, 3] in 0..1.
+
+    Rendered upright in the smallest frame that holds it, turned back, cut.
+    """
+    turned = upright(camera, np.asarray(options.up), MULTIPLE)
+    rasters = model.rasters(turned, networks, options)
+    picture = networks.refiner([raster[None] for raster in rasters])[0]
+    picture = np.ascontiguousarray(picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy())
+    return warped(picture, turned, camera)
+
+
+def painted(points: Tensor, colours: Tensor, camera: Camera, near: float = 0.0) -> np.ndarray:
+    """The cloud with its own colours [P, 3] in 0..1, nothing between the points: RGB float32 [H, W, 3]; what every
+    method is compared with."""
+    shown = pyramid(visible(points, camera, near), 1)
+    return shown.rasters(colours[shown.points])[0][:3].permute(1, 2, 0).cpu().numpy()

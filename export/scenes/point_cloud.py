@@ -1,0 +1,91 @@
+"""Point clouds in PLY files: ASCII and binary little-endian, positions and colours of the element `vertex`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "<i2", "int16": "<i2", "ushort": "<u2",
+    "uint16": "<u2", "int": "<i4", "int32": "<i4", "uint": "<u4", "uint32": "<u4", "float": "<f4", "float32": "<f4",
+    "double": "<f8", "float64": "<f8",
+}  # fmt: skip
+_FORMATS = ("ascii", "binary_little_endian")
+MOST_HEADER_BYTES = 65536
+MOST_POINTS = 50_000_000
+
+
+class PointCloudError(ValueError):
+    """A file is not a cloud that can be read; the sentence says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """places: float64 [P, 3]. colours: float32 [P, 3] in 0..1, grey where the file has none. dropped: how many points
+    of the file were not finite."""
+
+    places: np.ndarray
+    colours: np.ndarray
+    dropped: int = 0
+
+
+def read_ply(path: Path) -> PointCloud:
+    """Raises PointCloudError."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise PointCloudError(f"{path} cannot be read: {error}.") from None
+    end = data.find(b"end_header", 0, MOST_HEADER_BYTES)
+    start = data.find(b"\n", end) + 1
+    if not data.startswith(b"ply") or end < 0 or not start:
+        raise PointCloudError(f"{path} is not a PLY file: it has no header.")
+    kind, count, fields = _header(data[:end].decode("ascii", "replace"), path)
+    row = np.dtype(fields)
+    try:
+        if kind == "ascii":
+            text = data[start:].split(b"\n", count)[:count]
+            table = np.loadtxt(text, dtype=row, ndmin=1) if count else np.empty(0, row)
+        else:
+            table = np.frombuffer(data, row, count, start)
+    except ValueError as error:
+        raise PointCloudError(f"{path} does not hold the {count} points its header promises: {error}.") from None
+    if len(table) != count:
+        raise PointCloudError(f"{path} has {len(table)} points, but its header promises {count}.")
+    places = np.stack([table[axis].astype(np.float64) for axis in "xyz"], 1)
+    colours = np.full((count, 3), 0.5, np.float32)
+    if {"red", "green", "blue"} <= set(row.names):
+        whole = 1.0 if row["red"].kind == "f" else float(np.iinfo(row["red"]).max)
+        colours = np.stack([table[name].astype(np.float32) / whole for name in ("red", "green", "blue")], 1)
+    finite = np.isfinite(places).all(1) & np.isfinite(colours).all(1)
+    return PointCloud(places[finite], colours[finite], int((~finite).sum()))
+
+
+def _header(text: str, path: Path) -> tuple[str, int, list[tuple[str, str]]]:
+    """Format, number of points, and their properties."""
+    kind, count, fields, element = "", -1, [], ""
+    for line in text.splitlines()[1:]:
+        words = line.split()
+        match words:
+            case ["format", name, "1.0"]:
+                kind = name
+            case ["element", name, number]:
+                if not fields and name != "vertex" and element == "":
+                    raise PointCloudError(f"{path} begins with the element {name}; only clouds are read.")
+                element = name
+                if name == "vertex":
+                    count = int(number) if number.isdigit() else -1
+            case ["property", name, title] if element == "vertex":
+                if name not in _TYPES or title in dict(fields):
+                    raise PointCloudError(f"{path}: a point's property {name} {title} is unknown or there twice.")
+                fields.append((title, _TYPES[name]))
+            case ["property", "list", *_] if element == "vertex":
+                raise PointCloudError(f"{path}: points have a property that is a list.")
+    if kind not in _FORMATS:
+        raise PointCloudError(f"{path} has the format {kind!r}; {' and '.join(_FORMATS)} are read.")
+    if not 0 <= count <= MOST_POINTS:
+        raise PointCloudError(f"{path} has no number of points that can be read; at most {MOST_POINTS} are.")
+    if not {"x", "y", "z"} <= set(dict(fields)):
+        raise PointCloudError(f"{path}: points have no x, y and z.")
+    return kind, count, fields

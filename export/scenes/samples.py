@@ -1,0 +1,84 @@
+"""What one step of training looks at: a cut of a photo, the photos it is to be made from, and their cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+from torchvision.transforms import functional as colour
+
+from export.scenes.cameras import Camera, reframed, upright, warped
+from export.scenes.captures import Capture
+from export.scenes.modelling import View
+from export.scenes.source_views import drawn
+
+SCORED_POINTS = 512  # of the cloud, enough to tell which photos see the same
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """camera: of the cut, upright. target: RGB float32 [3, S, S]; mask [1, S, S] is 1 where the photo is. sources: the
+    photos. points: float64 [P, 3]."""
+
+    camera: Camera
+    target: Tensor
+    mask: Tensor
+    sources: list[View]
+    points: Tensor
+    up: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """crop_px: side of the cuts, a multiple of 32. sources: photos a cut is made from, 3 in the paper. long_side_px:
+    larger photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
+
+    crop_px: int = 256
+    sources: int = 3
+    long_side_px: int = 640
+    jitter: float = 0.8
+
+
+def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.Generator) -> Sample:
+    """Depends on the generator alone. Raises CaptureError where a photo cannot be decoded."""
+    capture = captures[rng.integers(len(captures))]
+    places = capture.cloud.places
+    target = int(rng.integers(len(capture.cameras)))
+    scored = places[rng.integers(len(places), size=min(SCORED_POINTS, len(places)))]
+    chosen = drawn(target, capture.cameras, scored, sampling.sources, rng)
+    change = _jitter(rng) if rng.random() < sampling.jitter else lambda image: image
+    views = [capture.view(k, sampling.long_side_px) for k in (target, *chosen)]
+    views = [replace(view, image=change(view.image)) for view in views]
+    photo = views[0]
+    turned = upright(photo.camera, np.asarray(capture.up), 1)
+    # Anywhere inside, or in the middle where the photo is smaller than a cut.
+    free = np.array([turned.width_px, turned.height_px]) - sampling.crop_px
+    left, top = (int(rng.integers(room + 1)) if room > 0 else room // 2 for room in free)
+    camera = reframed(turned, left, top, sampling.crop_px, sampling.crop_px)
+    there = np.ones(photo.image.shape[:2], np.float32)
+    mask = warped(there, photo.camera, camera, cv2.BORDER_CONSTANT) > 0.999
+    cut = warped(photo.image, photo.camera, camera)
+    return Sample(
+        camera,
+        torch.from_numpy(cut).permute(2, 0, 1),
+        torch.from_numpy(mask)[None].float(),
+        views[1:],
+        torch.from_numpy(places),
+        capture.up,
+    )
+
+
+def _jitter(rng: np.random.Generator):
+    """A change of brightness, saturation and hue by the paper's amounts."""
+    brightness, saturation, hue = 1 + 0.1 * rng.uniform(-1, 1), 1 + 0.5 * rng.uniform(-1, 1), 0.5 * rng.uniform(-1, 1)
+
+    def change(image: np.ndarray) -> np.ndarray:
+        picture = torch.from_numpy(image).permute(2, 0, 1)
+        picture = colour.adjust_saturation(colour.adjust_brightness(picture, brightness), saturation)
+        return np.ascontiguousarray(colour.adjust_hue(picture, hue).permute(1, 2, 0).numpy())
+
+    return change

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <cstdio>
 #include <maquette/maquette.hpp>
 #include <memory>
@@ -8,7 +9,6 @@
 #include "interrupt.h"
 #include "output_file.h"
 #include "play_statistics.h"
-#include "program.h"
 #include "source_argument.h"
 #include "terminal_picture.h"
 
@@ -46,11 +46,19 @@ int play(const Options& options) {
     if (options.speed != 1) uri = with_option(uri, "speed", std::to_string(options.speed));
   }
   PlayStatistics statistics(options.frames);
-  const maquette::Context context = open_context();
+  // What happens later is among the figures, and would come between the lines of a picture.
+  std::atomic<bool> is_opening{true};
+  maq_context_config log = maquette::default_context_config();
+  log.log_user_data = &is_opening;
+  log.log_callback = [](void* opening, maq_log_level, const char* text) {
+    if (*static_cast<const std::atomic<bool>*>(opening)) std::fprintf(stderr, "maquette: %s\n", text);
+  };
+  const maquette::Context context(log);
   maq_source_config config = maquette::default_source_config();
   config.state_callback = PlayStatistics::note_state;
   config.user_data = &statistics;
   maquette::Source source(context, uri, &config);
+  is_opening = false;
   if (options.from_s > 0) source.seek(int64_t(options.from_s * 1e9));
 
   const bool shows = options.picture.value_or(terminal_shows_pictures());

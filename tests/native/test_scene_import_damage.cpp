@@ -128,6 +128,17 @@ TEST_F(SceneImportDamage, CountsThatNoFileHoldsTakeNoMemory) {
   expect_error(MAQ_ERROR_UNREADABLE, "images of a point", [&] { maq::open_capture(folder_.path().string()); });
 }
 
+// As when a count was changed to a smaller one.
+TEST_F(SceneImportDamage, BytesBehindTheLastRecordAreRefused) {
+  made_.write_colmap(folder_, false);
+  for (const char* name : {"cameras", "images", "points3D"}) {
+    const std::string path = folder_.file(std::string("sparse/0/") + name + ".bin"), whole = read_text(path);
+    write_text(path, whole + "x");
+    expect_error(MAQ_ERROR_UNREADABLE, "1 bytes behind the last", [&] { maq::open_capture(folder_.path().string()); });
+    write_text(path, whole);
+  }
+}
+
 TEST_F(SceneImportDamage, LinesWithoutEndTakeNoMemory) {
   made_.write_colmap(folder_, true);
   const std::string path = folder_.file("sparse/0/images.txt");

@@ -1,0 +1,1 @@
+"""Rendered places: multi-view scenes with exact cameras, images, depth and point clouds."""

@@ -1,0 +1,83 @@
+"""From (split, seed) to a place with its cameras, and from there to pictures, depth and exposure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from export.places.assets import SPLITS
+from export.places.cameras import Camera, Lens, draw_lens
+from export.places.render import Renderer
+from export.places.rooms import Staged, draw_room
+from export.places.subjects import draw_still_life, draw_subject
+
+LAYOUTS = {"room": (0.6, draw_room), "subject": (0.22, draw_subject), "still life": (0.18, draw_still_life)}
+FRAMES = 40
+_TRIES = 12
+_TOO_NEAR = 0.25  # metres, in rooms: a camera of which much is nearer stands in something
+
+
+def generator(split: str, seed: int, what: int) -> np.random.Generator:
+    """Random numbers of one place; `what` keeps cameras, cloud and furniture from disturbing each other."""
+    return np.random.default_rng([SPLITS[split], 11, seed, what])
+
+
+def draw_place(stock, split: str, seed: int, small: bool = False, frames: int = FRAMES) -> tuple[Staged, Lens]:
+    """The place of a seed. The same seed drawn `small` is the same place with a quarter of the pixels."""
+    lens = draw_lens(generator(split, seed, 0), small)
+    rng = generator(split, seed, 1)
+    shares = np.array([share for share, _ in LAYOUTS.values()])
+    draw = [make for _, make in LAYOUTS.values()][rng.choice(len(LAYOUTS), p=shares / shares.sum())]
+    return draw(stock, rng, lens, frames), lens
+
+
+def sound(depth: np.ndarray, near: float) -> bool:
+    """Whether a view shows something, and is not taken from within a thing."""
+    seen = depth > 0
+    too_near = (depth < near * _TOO_NEAR / 0.03) & seen
+    return bool(seen.mean() > 0.1 and too_near.mean() < 0.25)
+
+
+def choose_views(renderer: Renderer, staged: Staged, rng: np.random.Generator) -> list[Camera]:
+    """The place's cameras without those that stand in a thing: each of these takes over a neighbour's view, moved a little."""
+    small = [c.resized(max(c.width // 8, 8), max(c.height // 8, 8)) for c in staged.cameras]
+    good = [sound(renderer.depth(c), staged.near) for c in small]
+    kept = [k for k, ok in enumerate(good) if ok]
+    if not kept:
+        raise ValueError(f"no camera of this {staged.kind} sees anything")
+    chosen = []
+    for k, camera in enumerate(staged.cameras):
+        if not good[k]:
+            camera = _moved_until_sound(renderer, staged, rng, min(kept, key=lambda j: abs(j - k)))
+        chosen.append(camera)
+    return chosen
+
+
+def _moved_until_sound(renderer: Renderer, staged: Staged, rng: np.random.Generator, source: int) -> Camera:
+    start = staged.cameras[source]
+    for attempt in range(_TRIES):
+        size = 3 * staged.near / (1 + 0.3 * attempt)
+        centre = start.centre + rng.normal(0, size, 3)
+        rotation = start.world_to_camera[:, :3]
+        moved = Camera(start.width, start.height, start.intrinsics, np.c_[rotation, -rotation @ centre])
+        if sound(renderer.depth(moved.resized(max(start.width // 8, 8), max(start.height // 8, 8))), staged.near):
+            return moved
+    return start
+
+
+def choose_exposure(renderer: Renderer, cameras: list[Camera], rng: np.random.Generator) -> float:
+    """One exposure for all views, with which their middle grey is about that of a photograph."""
+    wanted = rng.uniform(0.36, 0.56)
+    views = [c.resized(max(c.width // 8, 8), max(c.height // 8, 8)) for c in cameras[:: max(len(cameras) // 6, 1)]]
+    low, high = 0.05, 60.0
+    for _ in range(9):
+        middle = float(np.sqrt(low * high))
+        mean = np.mean([_surface_mean(renderer, c, middle) for c in views])
+        low, high = (middle, high) if mean < wanted else (low, middle)
+    return float(np.sqrt(low * high))
+
+
+def _surface_mean(renderer: Renderer, camera: Camera, exposure: float) -> float:
+    """Mean display value, 0..1, of what is there; a plain background has no say."""
+    image = renderer.colour(camera, exposure).mean(2) / 255
+    seen = renderer.depth(camera) > 0
+    return float(image[seen].mean()) if seen.any() else 0.5

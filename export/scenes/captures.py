@@ -55,7 +55,7 @@ class Capture:
 
 
 def read_capture(folder: Path) -> Capture:
-    """Raises CaptureError."""
+    """Raises CaptureError, and PointCloudError for its cloud."""
     path = folder / "transforms.json"
     try:
         table = json.loads(path.read_text())
@@ -100,8 +100,13 @@ def _camera(frame: dict[str, Any], path: Path) -> Camera:
 
 
 def read_captures(folder: Path) -> list[Capture]:
-    """All captures directly in a folder, by name. Raises CaptureError where there is none."""
+    """All captures directly in a folder, by name, to learn from. Raises CaptureError where there is none, and where one
+    has a single photo or no points; PointCloudError."""
     found = [read_capture(path.parent) for path in sorted(folder.glob("*/transforms.json"))]
     if not found:
         raise CaptureError(f"{folder} has no folders with a transforms.json in them.")
+    for capture in found:
+        photos, points = len(capture.photos), len(capture.cloud.places)
+        if photos < 2 or not points:
+            raise CaptureError(f"{folder / capture.name} has {photos} photos and {points} points; it needs 2 and 1.")
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -72,7 +72,7 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     )
 
 
-def _jitter(rng: np.random.Generator):
+def _jitter(rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
     """A change of brightness, saturation and hue by the paper's amounts."""
     brightness, saturation, hue = 1 + 0.1 * rng.uniform(-1, 1), 1 + 0.5 * rng.uniform(-1, 1), 0.5 * rng.uniform(-1, 1)
 

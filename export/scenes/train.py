@@ -30,12 +30,13 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from export.scenes.captures import Capture, read_captures
+from export.scenes.captures import Capture, CaptureError, read_captures
 from export.scenes.config import SIZES
 from export.scenes.extractor import STRIDE
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
 from export.scenes.modelling import Options, modelled, painted, render
 from export.scenes.perceptual import Perceptual, load_perceptual
+from export.scenes.point_cloud import PointCloudError
 from export.scenes.samples import Sample, Sampling, draw_sample
 from export.scenes.source_views import scores
 from export.scenes.system import Networks, save_networks
@@ -205,7 +206,10 @@ def main() -> None:
     if options.threads:
         torch.set_num_threads(options.threads)
     run = Run(options, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
-    captures, held_out = (read_captures(options.data / split) for split in ("train", "val"))
+    try:
+        captures, held_out = (read_captures(options.data / split) for split in ("train", "val"))
+    except (CaptureError, PointCloudError) as error:
+        raise SystemExit(str(error)) from None
     sampling = Sampling(options.crop, options.sources, options.long_side)
     stopped = False
 

@@ -74,6 +74,17 @@ def test_what_is_no_json_or_no_folder_is_refused(folder):
         read_captures(folder / "nothing")
 
 
+def test_a_single_photo_or_no_points_are_nothing_to_learn_from(folder):
+    frames = json.loads((folder / "transforms.json").read_text())["frames"]
+    changed(folder, frames=frames[:1])
+    with pytest.raises(CaptureError, match="1 photos and 1152 points"):
+        read_captures(folder.parent)
+    changed(folder, frames=frames)
+    write_ply(folder / "cloud.ply", np.zeros((0, 3)), np.zeros((0, 3)))
+    with pytest.raises(CaptureError, match="3 photos and 0 points"):
+        read_captures(folder.parent)
+
+
 def test_photos_that_are_none_or_of_another_size_are_refused(folder):
     capture_of = read_capture
     (folder / "0.png").write_bytes(b"no picture")

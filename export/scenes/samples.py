@@ -49,7 +49,7 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     places = capture.cloud.places
     target = int(rng.integers(len(capture.cameras)))
     scored = places[rng.integers(len(places), size=min(SCORED_POINTS, len(places)))]
-    chosen = drawn(target, capture.cameras, scored, sampling.sources, rng)
+    chosen = drawn(target, capture.cameras, capture.sources(), scored, sampling.sources, rng)
     change = _jitter(rng) if rng.random() < sampling.jitter else lambda image: image
     views = [capture.view(k, sampling.long_side_px) for k in (target, *chosen)]
     views = [replace(view, image=change(view.image)) for view in views]

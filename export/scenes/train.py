@@ -84,10 +84,12 @@ def validate(
         points = torch.from_numpy(capture.cloud.places).to(device)
         colours = torch.from_numpy(capture.cloud.colours).to(device)
         options = Options(up=capture.up)
-        for target in np.linspace(0, len(capture.cameras) - 1, targets + 2).astype(int)[1:-1]:
-            score = scores(capture.cameras[target], capture.cameras, capture.cloud.places[::37])
-            score[target] = -1
-            best = [int(k) for k in np.argsort(-score, kind="stable")[:sources] if k != target]
+        candidates = sorted(capture.held_out) or range(len(capture.cameras))
+        for at in np.linspace(0, len(candidates) - 1, targets + 2).round().astype(int)[1:-1]:
+            target = candidates[at]
+            others = [k for k in capture.sources() if k != target]
+            score = scores(capture.cameras[target], [capture.cameras[k] for k in others], capture.cloud.places[::37])
+            best = [others[k] for k in np.argsort(-score, kind="stable")[:sources]]
             photo = capture.view(target, long_side_px)
             model = modelled(points, [capture.view(k, long_side_px) for k in best], networks, options)
             made = render(model, photo.camera, networks, options)

@@ -3,7 +3,8 @@
 transforms.json is the file of nerfstudio and Instant-NGP: `w`, `h`, `fl_x`, `fl_y`, `cx`, `cy` for all frames or for
 each, and `frames`, each with `file_path` and `transform_matrix`, camera to world with x to the right, y up and z
 backwards. A principal point counts from the corner of the first pixel, so ours is half a pixel less. The cloud is the
-file named by `ply_file_path`, or cloud.ply.
+file named by `ply_file_path`, or cloud.ply. Frames in `test_filenames` are held out: pictures are made of the others.
+Up is `up`, or `up_axis` in the table `maquette` of rendered places (export/places), or y.
 """
 
 from __future__ import annotations
@@ -31,13 +32,19 @@ class CaptureError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Capture:
-    """One place. photos: encoded, so that many fit into memory. up: of the world."""
+    """One place. photos: encoded, so that many fit into memory. up: of the world. held_out: indices of photos that
+    pictures are never made of."""
 
     name: str
     cameras: list[Camera]
     photos: list[bytes]
     cloud: PointCloud
     up: tuple[float, float, float] = field(default=(0.0, 1.0, 0.0))
+    held_out: frozenset[int] = frozenset()
+
+    def sources(self) -> list[int]:
+        """Indices of the photos that pictures are made of."""
+        return [k for k in range(len(self.cameras)) if k not in self.held_out]
 
     def view(self, k: int, long_side_px: int | None = None) -> View:
         """Photo k, at most `long_side_px` wide or high. Raises CaptureError where it cannot be decoded."""
@@ -55,13 +62,15 @@ class Capture:
 
 
 def read_capture(folder: Path) -> Capture:
-    """Raises CaptureError."""
+    """Raises CaptureError, and PointCloudError for its cloud."""
     path = folder / "transforms.json"
     try:
         table = json.loads(path.read_text())
         frames = table["frames"]
         cloud_name = str(table.get("ply_file_path", "cloud.ply"))
-        up = tuple(float(x) for x in table.get("up", (0, 1, 0)))
+        up = tuple(float(x) for x in table.get("up", table.get("maquette", {}).get("up_axis", (0, 1, 0))))
+        tests = set(map(str, table.get("test_filenames", [])))
+        held_out = frozenset(k for k, frame in enumerate(frames) if frame["file_path"] in tests)
         named = [(_camera(table | frame, path), folder / str(frame["file_path"])) for frame in frames]
     except (OSError, json.JSONDecodeError, UnicodeDecodeError) as error:
         raise CaptureError(f"{path} cannot be read as JSON: {error}.") from None
@@ -79,7 +88,8 @@ def read_capture(folder: Path) -> Capture:
         photos = [file.read_bytes() for _, file in named]
     except OSError as error:
         raise CaptureError(f"A photo of {path} cannot be read: {error}.") from None
-    return Capture(folder.name, [camera for camera, _ in named], photos, read_ply(folder / cloud_name), up)
+    cloud = read_ply(folder / cloud_name)
+    return Capture(folder.name, [camera for camera, _ in named], photos, cloud, up, held_out)
 
 
 def _camera(frame: dict[str, Any], path: Path) -> Camera:
@@ -100,8 +110,15 @@ def _camera(frame: dict[str, Any], path: Path) -> Camera:
 
 
 def read_captures(folder: Path) -> list[Capture]:
-    """All captures directly in a folder, by name. Raises CaptureError where there is none."""
+    """All captures directly in a folder, by name, to learn from. Raises CaptureError where there is none, and where one
+    has a single photo or no points; PointCloudError."""
     found = [read_capture(path.parent) for path in sorted(folder.glob("*/transforms.json"))]
     if not found:
         raise CaptureError(f"{folder} has no folders with a transforms.json in them.")
+    for capture in found:
+        photos, points = len(capture.sources()), len(capture.cloud.places)
+        if photos < 2 or not points:
+            raise CaptureError(
+                f"{folder / capture.name} has {photos} photos to learn from and {points} points; it needs 2 and 1."
+            )
     return found

@@ -100,7 +100,12 @@ class Model:
 def modelled(
     points: Tensor, views: Sequence[View], networks: Networks, options: Options, target: Camera | None = None
 ) -> Model:
-    """The cloud after all views; with a `target`, only what wins a pixel of that camera: enough to render it."""
+    """The cloud after all views; with a `target`, only what wins a pixel of that camera: enough to render it.
+
+    Raises ValueError without views.
+    """
+    if not views:
+        raise ValueError("a model needs at least one view, and none is given")
     seen = torch.stack([seen_in(points, view.camera, options) for view in views])
     (chosen,) = torch.where(seen.any(0))
     if target is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -49,7 +49,7 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     places = capture.cloud.places
     target = int(rng.integers(len(capture.cameras)))
     scored = places[rng.integers(len(places), size=min(SCORED_POINTS, len(places)))]
-    chosen = drawn(target, capture.cameras, scored, sampling.sources, rng)
+    chosen = drawn(target, capture.cameras, capture.sources(), scored, sampling.sources, rng)
     change = _jitter(rng) if rng.random() < sampling.jitter else lambda image: image
     views = [capture.view(k, sampling.long_side_px) for k in (target, *chosen)]
     views = [replace(view, image=change(view.image)) for view in views]
@@ -72,7 +72,7 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     )
 
 
-def _jitter(rng: np.random.Generator):
+def _jitter(rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
     """A change of brightness, saturation and hue by the paper's amounts."""
     brightness, saturation, hue = 1 + 0.1 * rng.uniform(-1, 1), 1 + 0.5 * rng.uniform(-1, 1), 0.5 * rng.uniform(-1, 1)
 

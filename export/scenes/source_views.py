@@ -40,10 +40,15 @@ def scores(target: Camera, others: Sequence[Camera], places: np.ndarray) -> np.n
 
 
 def drawn(
-    target: int, cameras: Sequence[Camera], places: np.ndarray, count: int, rng: np.random.Generator
+    target: int,
+    cameras: Sequence[Camera],
+    allowed: Sequence[int],
+    places: np.ndarray,
+    count: int,
+    rng: np.random.Generator,
 ) -> list[int]:
-    """Indices of `count` other cameras (fewer where there are fewer), drawn by their scores, without repetition."""
-    others = [k for k in range(len(cameras)) if k != target]
+    """`count` of the allowed indices but the target's (fewer where there are fewer), drawn by scores, no repetition."""
+    others = [k for k in allowed if k != target]
     weight = scores(cameras[target], [cameras[k] for k in others], places) + 1e-9
     picked = rng.choice(len(others), min(count, len(others)), replace=False, p=weight / weight.sum())
     return [others[k] for k in picked]

@@ -30,12 +30,13 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from export.scenes.captures import Capture, read_captures
+from export.scenes.captures import Capture, CaptureError, read_captures
 from export.scenes.config import SIZES
 from export.scenes.extractor import STRIDE
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
 from export.scenes.modelling import Options, modelled, painted, render
 from export.scenes.perceptual import Perceptual, load_perceptual
+from export.scenes.point_cloud import PointCloudError
 from export.scenes.samples import Sample, Sampling, draw_sample
 from export.scenes.source_views import scores
 from export.scenes.system import Networks, save_networks
@@ -83,10 +84,12 @@ def validate(
         points = torch.from_numpy(capture.cloud.places).to(device)
         colours = torch.from_numpy(capture.cloud.colours).to(device)
         options = Options(up=capture.up)
-        for target in np.linspace(0, len(capture.cameras) - 1, targets + 2).astype(int)[1:-1]:
-            score = scores(capture.cameras[target], capture.cameras, capture.cloud.places[::37])
-            score[target] = -1
-            best = [int(k) for k in np.argsort(-score, kind="stable")[:sources] if k != target]
+        candidates = sorted(capture.held_out) or range(len(capture.cameras))
+        for at in np.linspace(0, len(candidates) - 1, targets + 2).round().astype(int)[1:-1]:
+            target = candidates[at]
+            others = [k for k in capture.sources() if k != target]
+            score = scores(capture.cameras[target], [capture.cameras[k] for k in others], capture.cloud.places[::37])
+            best = [others[k] for k in np.argsort(-score, kind="stable")[:sources]]
             photo = capture.view(target, long_side_px)
             model = modelled(points, [capture.view(k, long_side_px) for k in best], networks, options)
             made = render(model, photo.camera, networks, options)
@@ -205,7 +208,10 @@ def main() -> None:
     if options.threads:
         torch.set_num_threads(options.threads)
     run = Run(options, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
-    captures, held_out = (read_captures(options.data / split) for split in ("train", "val"))
+    try:
+        captures, held_out = (read_captures(options.data / split) for split in ("train", "val"))
+    except (CaptureError, PointCloudError) as error:
+        raise SystemExit(str(error)) from None
     sampling = Sampling(options.crop, options.sources, options.long_side)
     stopped = False
 

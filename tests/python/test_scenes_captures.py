@@ -36,6 +36,14 @@ def test_a_capture_is_read_as_it_was_written(folder):
     assert len(capture.cloud.places) == 3 * 24 * 16
 
 
+def test_held_out_photos_and_the_worlds_up_are_found(folder):
+    capture = read_capture(folder)
+    assert (capture.up, capture.sources()) == ((0, 1, 0), [0, 1, 2])
+    changed(folder, test_filenames=["1.png"], maquette={"up_axis": [0, 0, 1]})
+    capture = read_capture(folder)
+    assert (capture.up, capture.sources(), capture.held_out) == ((0, 0, 1), [0, 2], {1})
+
+
 def test_a_smaller_photo_has_the_same_field_of_view(folder):
     view = read_capture(folder).view(0, long_side_px=24)
     assert view.image.shape == (16, 24, 3)
@@ -54,6 +62,9 @@ def test_a_smaller_photo_has_the_same_field_of_view(folder):
         ({"w": 10**9}, "pixels"),
         ({"k1": 0.1}, "undistort"),
         ({"up": [0, 0, 0]}, "direction"),
+        ({"maquette": {"up_axis": [0, 1]}}, "direction"),
+        ({"maquette": 3}, "another kind"),
+        ({"test_filenames": 3}, "another kind"),
         ({"frames": [{"file_path": "0.png", "transform_matrix": np.zeros((4, 4)).tolist()}]}, "rotation"),
         ({"frames": [{"file_path": "0.png", "transform_matrix": [[1]]}]}, "4 x 4"),
         ({"frames": [{"file_path": "../../secret", "transform_matrix": np.eye(4).tolist()}]}, "outside"),
@@ -72,6 +83,17 @@ def test_what_is_no_json_or_no_folder_is_refused(folder):
         read_capture(folder)
     with pytest.raises(CaptureError, match="no folders"):
         read_captures(folder / "nothing")
+
+
+def test_a_single_photo_or_no_points_are_nothing_to_learn_from(folder):
+    frames = json.loads((folder / "transforms.json").read_text())["frames"]
+    changed(folder, frames=frames[:1])
+    with pytest.raises(CaptureError, match="1 photos to learn from and 1152 points"):
+        read_captures(folder.parent)
+    changed(folder, frames=frames)
+    write_ply(folder / "cloud.ply", np.zeros((0, 3)), np.zeros((0, 3)))
+    with pytest.raises(CaptureError, match="3 photos to learn from and 0 points"):
+        read_captures(folder.parent)
 
 
 def test_photos_that_are_none_or_of_another_size_are_refused(folder):

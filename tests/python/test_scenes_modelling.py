@@ -363,7 +363,8 @@ def test_sources_are_drawn_from_aside_and_from_those_that_see_the_same():
     assert score.argmax() == 1
     assert score[3] == 0
     rng = np.random.default_rng(0)
-    counts = np.bincount([k for _ in range(200) for k in drawn(0, cameras, places, 1, rng)], minlength=5)
+    counts = np.bincount([k for _ in range(200) for k in drawn(0, cameras, range(5), places, 1, rng)], minlength=5)
     assert counts[0] == 0
     assert counts[2] > 120
-    assert sorted(drawn(0, cameras, places, 9, rng)) == [1, 2, 3, 4]
+    assert sorted(drawn(0, cameras, range(5), places, 9, rng)) == [1, 2, 3, 4]
+    assert sorted(drawn(0, cameras, [0, 3, 4], places, 9, rng)) == [3, 4]

@@ -1,6 +1,6 @@
 """Models and tiles that places are made of, and how they get here.
 
-    python -m export.places.assets            furniture (120 MB) and the ground tiles of 0 A.D. (1.4 GB, shared with people)
+    python -m export.places.assets            furniture (120 MB) and ground tiles of 0 A.D. (1.4 GB, shared with people)
     python -m export.places.assets furniture  only the furniture
 
 Packages are fetched and checked as those of `export.people.assets`. Unpacked: `.data/assets/furniture` (OBJ models with

@@ -78,7 +78,7 @@ class CloudMaker:
         weight = (z**2 / np.maximum(slant[y, x], 0.1)) ** faults.spread
         count = min(-(-self.faults.points * 3 // (2 * self.views)), len(x))
         if count < len(x):
-            # The smallest of exponential times: a draw without replacement, likely by weight (Efraimidis, Spirakis 2006).
+            # The smallest of exponential times: a weighted draw without replacement (Efraimidis, Spirakis 2006).
             time = rng.exponential(size=len(x)) / weight
             chosen = np.sort(np.argpartition(time, count)[:count])
             x, y, z = x[chosen], y[chosen], z[chosen]
@@ -103,7 +103,7 @@ class CloudMaker:
             left = np.arange(len(xyz))
         left = rng.permutation(left)[: faults.points]
         xyz, rgb = xyz[left], rgb[left]
-        count = int(round(faults.outliers * len(xyz)))
+        count = round(faults.outliers * len(xyz))
         if count:
             low, high = xyz.min(0), xyz.max(0)
             xyz[:count] = rng.uniform(low - 0.1 * (high - low), high + 0.1 * (high - low), (count, 3))
@@ -113,7 +113,7 @@ class CloudMaker:
 
 
 def grazing_cosine(depth: np.ndarray, camera: Camera) -> np.ndarray:
-    """Cosine between each pixel's ray and the surface's normal, float32 [H, W]; 0 at steps in depth and where nothing is."""
+    """Cosine between each pixel's ray and the surface's normal, float32 [H, W]; about 0 at steps in depth."""
     height, width = depth.shape
     x, y = np.meshgrid(np.arange(width), np.arange(height))
     k = camera.intrinsics

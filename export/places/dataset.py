@@ -67,7 +67,7 @@ def render_place(stock, split: str, seed: int, folder: Path, small=False, exact=
         held_out = held_out_views(len(cameras), rng)
         faults = CloudFaults(points=200_000) if exact else draw_faults(generator(split, seed, 3), small)
         cloud = CloudMaker(faults, len(cameras) - len(held_out), generator(split, seed, 4))
-        partial = folder.with_name(f".{folder.name}.{os.getpid()}.partial")
+        partial = folder.with_name(f".{folder.name}.partial")
         shutil.rmtree(partial, ignore_errors=True)
         for name in ("images", "depth"):
             (partial / name).mkdir(parents=True)

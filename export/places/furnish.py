@@ -65,7 +65,7 @@ def surface_points(parts: list[Part], spacing: float, rng: np.random.Generator) 
 
 @dataclass
 class Heights:
-    """The highest surface over each cell of the ground: metres, -inf where nothing is; x0, y0: the first cell's corner."""
+    """The highest surface over each cell of the ground: metres, -inf where nothing is; x0, y0: corner of the first."""
 
     x0: float
     y0: float

@@ -177,7 +177,7 @@ def _cut(polygons: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def _indices(corner: str, vertices: int, coordinates: int) -> tuple[int, int]:
-    """Vertex and texture coordinate (-1: none) of "7/3/2", from 0; the file counts from 1, or from the end backwards."""
+    """Vertex and texture coordinate (-1: none) of "7/3/2", from 0; the file counts from 1, or back from the end."""
     fields = corner.split("/")
     v = int(fields[0])
     t = int(fields[1]) if len(fields) > 1 and fields[1] else 0

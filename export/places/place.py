@@ -24,7 +24,7 @@ class PlaceError(ValueError):
 
 
 class Pictures(Sequence):
-    """Pictures that are read when asked for: `p[3]` is one [H, W, ...], `p[2:5]` or `p[[7, 1]]` several [n, H, W, ...]."""
+    """Read when asked for: `p[3]` is one picture [H, W, ...], `p[2:5]` or `p[[7, 1]]` are several [n, H, W, ...]."""
 
     def __init__(self, files: list[Path], height: int, width: int, read) -> None:
         self.files, self.height, self.width, self._read = files, height, width, read
@@ -42,11 +42,14 @@ class Pictures(Sequence):
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """V views of H x W pixels. images: uint8 [V, H, W, 3] RGB and depth: float32 [V, H, W] metres along the optical axis
-    (0: nothing there), both read when asked for; intrinsics float64 [V, 3, 3], pixels, centre of the top left one (0, 0);
-    world_to_camera float64 [V, 3, 4], x right, y down, z forward, metres; xyz float32 [N, 3], rgb uint8 [N, 3]: the cloud;
-    source, held_out: numbers of the views to build from and of those to compare with; up [3]; about: the file's own part
-    `maquette` (kind, seed, assets with licences, cloud)."""
+    """V views of H x W pixels of one place.
+
+    images: uint8 [V, H, W, 3] RGB and depth: float32 [V, H, W] metres along the optical axis (0: nothing there), both
+    read when asked for. intrinsics: float64 [V, 3, 3] pixels, the centre of the top left one is (0, 0). world_to_camera:
+    float64 [V, 3, 4], x right, y down, z forward, metres. xyz float32 [N, 3] and rgb uint8 [N, 3]: the cloud. source,
+    held_out: numbers of the views to build from and of those to compare with. up: [3]. about: the file's own part
+    `maquette` (kind, seed, assets with licences, cloud).
+    """
 
     folder: Path
     images: Pictures

@@ -38,7 +38,7 @@ def sound(depth: np.ndarray, near: float) -> bool:
 
 
 def choose_views(renderer: Renderer, staged: Staged, rng: np.random.Generator) -> list[Camera]:
-    """The place's cameras without those that stand in a thing: each of these takes over a neighbour's view, moved a little."""
+    """The place's cameras; each that stands in a thing is replaced by its neighbour, moved a little."""
     small = [c.resized(max(c.width // 8, 8), max(c.height // 8, 8)) for c in staged.cameras]
     good = [sound(renderer.depth(c), staged.near) for c in small]
     kept = [k for k, ok in enumerate(good) if ok]
@@ -65,19 +65,18 @@ def _moved_until_sound(renderer: Renderer, staged: Staged, rng: np.random.Genera
 
 
 def choose_exposure(renderer: Renderer, cameras: list[Camera], rng: np.random.Generator) -> float:
-    """One exposure for all views, with which their middle grey is about that of a photograph."""
+    """One exposure for all views: their mean is about that of a photograph. A plain background has no say."""
     wanted = rng.uniform(0.36, 0.56)
     views = [c.resized(max(c.width // 8, 8), max(c.height // 8, 8)) for c in cameras[:: max(len(cameras) // 6, 1)]]
-    low, high = 0.05, 60.0
-    for _ in range(9):
+    first = 0.7
+    light = []
+    for view in views:
+        shown = renderer.colour(view, first)[renderer.depth(view) > 0].astype(np.float64)
+        light.append(-np.log(1 - (np.minimum(shown, 253) / 255) ** 2.2) / first)  # the shader's curve, backwards
+    light = np.concatenate(light)
+    low, high = 0.02, 100.0
+    for _ in range(24):
         middle = float(np.sqrt(low * high))
-        mean = np.mean([_surface_mean(renderer, c, middle) for c in views])
+        mean = ((1 - np.exp(-middle * light)) ** (1 / 2.2)).mean() if len(light) else wanted
         low, high = (middle, high) if mean < wanted else (low, middle)
     return float(np.sqrt(low * high))
-
-
-def _surface_mean(renderer: Renderer, camera: Camera, exposure: float) -> float:
-    """Mean display value, 0..1, of what is there; a plain background has no say."""
-    image = renderer.colour(camera, exposure).mean(2) / 255
-    seen = renderer.depth(camera) > 0
-    return float(image[seen].mean()) if seen.any() else 0.5

@@ -43,17 +43,11 @@ void main() {CUTTING
   found = depth;
 }"""
 
-_COLOUR = (
-    """#version 330
-#define SKY %d
-#define LIGHTS %d
-#define ATLAS %d.
-"""
-    % (_SKY, _LIGHTS, _ATLAS)
-    + """
+_COLOUR = """#version 330
 in vec3 at; in vec3 v_normal; in vec2 v_uv; in float v_cut;
 uniform sampler2D albedo, surroundings; uniform sampler2DShadow key_map, sky_map;
-uniform mat4 key_matrix, sky_matrix[SKY]; uniform vec3 sky_towards[SKY], sky_colour[SKY], bounce, eye;
+uniform mat4 key_matrix, sky_matrix[SKY_LIGHTS];
+uniform vec3 sky_towards[SKY_LIGHTS], sky_colour[SKY_LIGHTS], bounce, eye;
 uniform vec4 light_at[LIGHTS]; uniform vec3 light_colour[LIGHTS];
 uniform vec3 tint; uniform float specular, shininess, mirror, opacity, emission, exposure, reflection;
 out vec4 colour;
@@ -76,14 +70,14 @@ void main() {CUTTING
   vec3 origin = at + .012 * flat_normal;
   vec3 light = bounce * (.75 - .25 * n.z), shine = vec3(0);
   float open = 0.;
-  for (int k = 0; k < SKY; ++k) {
+  for (int k = 0; k < SKY_LIGHTS; ++k) {
     float facing = dot(n, sky_towards[k]);
     if (facing <= 0.) continue;
     vec3 s = (sky_matrix[k] * vec4(origin, 1)).xyz * .5 + .5;
     float lit = 1.;
     if (all(greaterThan(s, vec3(0))) && all(lessThan(s, vec3(1)))) {
-      vec2 cell = vec2(mod(float(k), ATLAS), floor(float(k) / ATLAS));
-      lit = texture(sky_map, vec3((cell + clamp(s.xy, .002, .998)) / ATLAS, s.z));
+      vec2 cell = vec2(mod(float(k), ATLAS.), floor(float(k) / ATLAS.));
+      lit = texture(sky_map, vec3((cell + clamp(s.xy, .002, .998)) / ATLAS., s.z));
     }
     light += facing * lit * sky_colour[k];
     open += facing * lit;
@@ -111,7 +105,6 @@ void main() {CUTTING
   shown = pow(1. - exp(-exposure * shown), vec3(1. / 2.2));
   colour = vec4(shown, clamp(opacity + dot(shine, vec3(.3)), 0., 1.));
 }"""
-)
 
 _BEHIND_VERTEX = """#version 330
 in vec2 corner; out vec2 ndc;
@@ -213,7 +206,14 @@ class Renderer:
             for kind, vertex, fragment in (
                 ("colour", _VERTEX, _COLOUR), ("depth", _VERTEX, _DEPTH), ("shadow", _SHADOW_VERTEX, _SHADOW),
             ):  # fmt: skip
-                fragment = fragment.replace("CUTTING", cutting).replace("KEY_MAP", str(_KEY_MAP))
+                fragment = fragment.replace("CUTTING", cutting)
+                for figure, value in (
+                    ("KEY_MAP", _KEY_MAP),
+                    ("SKY_LIGHTS", _SKY),
+                    ("LIGHTS", _LIGHTS),
+                    ("ATLAS", _ATLAS),
+                ):
+                    fragment = fragment.replace(figure, str(value))
                 self.programs[kind, name] = self.context.program(vertex_shader=vertex, fragment_shader=fragment)
         self.behind = self.context.program(vertex_shader=_BEHIND_VERTEX, fragment_shader=_BEHIND)
         corners = np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from export.people.props import Solid, box, cylinder, joined
+from export.people.props import PropMaker, Solid, box, cylinder, joined
 from export.places.cameras import Camera, Lens, looking
 from export.places.catalogue import Asset, people_assets
 from export.places.furnish import Heights, finished, placed, quad
-from export.places.mesh import Material, Part, part_of
+from export.places.mesh import Material, Part, part_of, part_of_prop
 from export.places.render import Lighting
 
 _GROUND = "paving|tile|road|city|stone|wood|brick|pavement"
@@ -21,7 +21,7 @@ _MARGIN = 0.3  # metres between cameras and walls
 
 @dataclass
 class Staged:
-    """What a recipe makes. near: metres before which cameras see nothing; subject: what the place is about, for people."""
+    """What a recipe makes. near: metres before which cameras see nothing."""
 
     kind: str
     parts: list[Part]
@@ -80,6 +80,7 @@ class RoomMaker:
         self.ground.top[:] = 0.0
         self.supports: list[Heights] = []
         self.count = 0
+        self.middles: list[np.ndarray] = []  # of what stands on the floor
 
     # -- the shell ---------------------------------------------------------------------------------------------
 
@@ -203,6 +204,7 @@ class RoomMaker:
         if solid:
             self.ground.add(solid, self.rng)
         self.count += 1
+        self.middles.append(np.array([at[0], at[1], np.clip(0.6 * size[2], 0.3, 1.3)]))
         return own
 
     def stand(self, parts, size, at_wall: bool, gap: float = 0.06) -> list[Part] | None:
@@ -223,6 +225,17 @@ class RoomMaker:
             if mask is not None and mask.any() and not self.ground.taken[mask].any():
                 return self.put(parts, size, yaw, (x, y))
         return None
+
+    def own_texture(self) -> np.ndarray:
+        """Wood, paint, or a tile, for things that are made here."""
+        kind = self.rng.random()
+        if kind < 0.35:
+            return planks(self.rng, 256)
+        if kind < 0.6:
+            return noise(self.rng, 6)
+        texture, asset = self.stock.tile(self.rng, "")
+        self.assets.append(asset)
+        return texture
 
     def support(self, own: list[Part]) -> None:
         """Things may be put on what has just been placed."""
@@ -250,6 +263,14 @@ class RoomMaker:
         if not self.supports or u() < 0.5:
             parts, size = own_table(self.stock, rng, self.assets)
             own = self.stand(parts, size, at_wall=u() < 0.4)
+            if own is not None:
+                self.support(own)
+        maker = PropMaker(lambda rng: self.own_texture())
+        for _ in range(max(int(rng.integers(-2, 3)), wanted - self.count - 2)):
+            part = part_of_prop(maker.standing(rng))
+            low, high = part.corners.reshape(-1, 3).min(0), part.corners.reshape(-1, 3).max(0)
+            part = part.moved(np.eye(3), [*(-(low + high)[:2] / 2), -low[2]])
+            own = self.stand(finished([part], rng), tuple(map(float, high - low)), at_wall=u() < 0.5)
             if own is not None:
                 self.support(own)
         if self.stock.people is not None and u() < 0.3:
@@ -326,8 +347,13 @@ class RoomMaker:
         rng, u = self.rng, self.rng.uniform
         panorama, asset = self.stock.panorama(rng)
         self.assets.append(asset)
-        warm = lambda: 1 + np.array([1, 0.2, -1]) * rng.normal(0.06, 0.1)  # noqa: E731
-        lamp = lambda: np.array([*(u(-0.35, 0.35, 2) * self.size[:2]), self.size[2] - u(0.1, 0.5), 1.0])  # noqa: E731
+
+        def warm() -> np.ndarray:
+            return 1 + np.array([1, 0.2, -1]) * rng.normal(0.06, 0.1)
+
+        def lamp() -> np.ndarray:
+            return np.array([*(u(-0.35, 0.35, 2) * self.size[:2]), self.size[2] - u(0.1, 0.5), 1.0])
+
         if u() < 0.65:
             first = (lamp(), u(1.5, 4) * warm())
         else:
@@ -335,8 +361,9 @@ class RoomMaker:
             first = (sun, u(0.5, 1.4) * warm())
         more = [(lamp(), u(0.3, 1.5) * warm()) for _ in range(rng.integers(0, 3))]
         mean = max(float(panorama.mean()), 1e-4)
-        return Lighting((first, *more), u(0.2, 0.6) * warm(), u(0.1, 0.35) * warm(), panorama * (0.5 / mean), u(0.3, 1.0),
-                        plain=(0.0, 0.0, 0.0))  # fmt: skip
+        sky, bounce = u(0.2, 0.6) * warm(), u(0.1, 0.35) * warm()
+        around = panorama * (0.5 / mean)
+        return Lighting((first, *more), sky, bounce, around, u(0.3, 1.0), plain=(0.0, 0.0, 0.0))
 
     def cameras(self, lens: Lens, count: int) -> list[Camera]:
         rng, u = self.rng, self.rng.uniform
@@ -344,9 +371,11 @@ class RoomMaker:
         half = self.size[:2] / 2 - _MARGIN - 0.1
         low, high = np.sort(u(0.8, min(2.1, self.size[2] - 0.3), 2))
         target = np.array([*(u(-0.2, 0.2, 2) * self.size[:2]), u(0.5, 1.1)])
+        if kind == "orbit":
+            target = self._worth_a_look(target + 10)
         start, span, rounds = u(0, 2 * np.pi), np.radians(u(110, 360)), int(rng.integers(1, 3))
         legs = np.stack([u(-0.85, 0.85, 5) * half[0], u(-0.85, 0.85, 5) * half[1], u(low, high, 5)], 1)
-        looks = np.stack([*(u(-0.45, 0.45, 5) * n for n in self.size[:2]), u(0.3, 1.4, 5)], 1)
+        looks = np.array([self._worth_a_look(leg) for leg in legs])
         radius = u(0.9, 1.6)
         zoomed = rng.random() < 0.25
         cameras = []
@@ -370,8 +399,10 @@ class RoomMaker:
                 eye[:2] = np.clip(eye[:2], -half - 0.1, half + 0.1)
                 eye[2] = np.clip(eye[2], 0.3, self.size[2] - 0.25)
                 to = to + rng.normal(0, 0.1, 3)
-                if np.linalg.norm(to - eye) < 0.7:
+                reach = float(np.linalg.norm((to - eye)[:2]))
+                if reach < 0.4:
                     continue
+                to[2] = max(to[2], eye[2] - np.tan(np.radians(38)) * reach)  # else there is only floor to see
                 missing = 0.2 - self.ground.clear(eye)
                 if missing > 0 and eye[2] + missing < self.size[2] - 0.25:
                     eye[2] += missing
@@ -381,6 +412,11 @@ class RoomMaker:
             zoom = float(np.exp(rng.normal(0, 0.1))) if zoomed else 1.0
             cameras.append(looking(lens, eye, to, float(rng.normal(0, 2)), zoom))
         return cameras
+
+    def _worth_a_look(self, eye: np.ndarray) -> np.ndarray:
+        """The middle of something that is not too near, or of the room."""
+        far = [m for m in self.middles if np.linalg.norm((m - eye)[:2]) > 1.2]
+        return far[self.rng.integers(len(far))] if far else np.array([0, 0, 0.8])
 
 
 def own_table(stock, rng: np.random.Generator, assets: list[Asset]) -> tuple[list[Part], tuple[float, float, float]]:

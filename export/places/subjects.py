@@ -34,8 +34,8 @@ def _outdoors(stock, rng: np.random.Generator, assets: list[Asset]) -> Lighting:
     if u() < 0.4:
         grey = u(0, 1) if u() < 0.5 else float(rng.integers(2))
         plain = tuple(map(float, np.clip(grey + rng.normal(0, 0.05, 3), 0, 1)))
-    return Lighting(tuple(lamps), panorama.sky * scale, 0.6 * panorama.ground * scale, panorama.radiance * scale, u(0.5, 1),
-                    plain=plain)  # fmt: skip
+    sky, bounce, around = (scale * a for a in (panorama.sky, 0.6 * panorama.ground, panorama.radiance))
+    return Lighting(tuple(lamps), sky, bounce, around, u(0.5, 1), plain)
 
 
 def _ground(stock, rng: np.random.Generator, assets: list[Asset], radius: float) -> Part:

@@ -44,11 +44,11 @@ class Pictures(Sequence):
 class Place:
     """V views of H x W pixels of one place.
 
-    images: uint8 [V, H, W, 3] RGB and depth: float32 [V, H, W] metres along the optical axis (0: nothing there), both
-    read when asked for. intrinsics: float64 [V, 3, 3] pixels, the centre of the top left one is (0, 0).
-    world_to_camera: float64 [V, 3, 4], x right, y down, z forward, metres. xyz float32 [N, 3] and rgb uint8 [N, 3]:
-    the cloud. source, held_out: numbers of the views to build from and of those to compare with. up: [3]. about: the
-    file's own part `maquette` (kind, seed, assets with licences, cloud).
+    images: uint8 [V, H, W, 3] RGB and depth: float32 [V, H, W] metres along the optical axis (0: nothing), both read
+    when asked for. intrinsics: float64 [V, 3, 3] pixels, the centre of the top left one is (0, 0). world_to_camera:
+    float64 [V, 3, 4], x right, y down, z forward, metres. xyz float32 [N, 3] and rgb uint8 [N, 3]: the cloud. source,
+    held_out: numbers of the views to build from and of those to compare with. up: [3]. about: the file's own part
+    `maquette` (kind, seed, assets with licences, cloud).
     """
 
     folder: Path

@@ -22,6 +22,7 @@ _SAMPLES = 4  # of colour, a pixel; depth is that of the pixel's centre
 _KEY_MAP, _SKY_MAP, _SKY = 2048, 512, 8  # texels a side, texels a side, directions that light comes from
 _ATLAS = 3  # sky maps in a row of their common texture
 _LIGHTS = 4
+_OFFSET = 2.0  # texels before a surface, where its own roughness in a depth map does not shade it
 
 _VERTEX = """#version 330
 in vec3 position; in vec3 normal; in vec2 uv; in float cut;
@@ -50,6 +51,7 @@ uniform mat4 key_matrix, sky_matrix[SKY_LIGHTS];
 uniform vec3 sky_towards[SKY_LIGHTS], sky_colour[SKY_LIGHTS], bounce, eye;
 uniform vec4 light_at[LIGHTS]; uniform vec3 light_colour[LIGHTS];
 uniform vec3 tint; uniform float specular, shininess, mirror, opacity, emission, exposure, reflection;
+uniform float key_offset, sky_offset;
 out vec4 colour;
 float key_light(vec3 p) {
   vec4 q = key_matrix * vec4(p, 1);
@@ -67,7 +69,7 @@ void main() {CUTTING
   vec3 n = dot(v_normal, v_normal) > 0. ? normalize(v_normal) : flat_normal;
   if (dot(n, flat_normal) < 0.) n = -n;
   vec3 base = pow(clamp(texture(albedo, v_uv).rgb * tint, 0., 1.), vec3(2.2));
-  vec3 origin = at + .012 * flat_normal;
+  vec3 origin = at + sky_offset * flat_normal;
   vec3 light = bounce * (.75 - .25 * n.z), shine = vec3(0);
   float open = 0.;
   for (int k = 0; k < SKY_LIGHTS; ++k) {
@@ -89,7 +91,7 @@ void main() {CUTTING
     float facing = dot(n, to);
     if (facing <= 0. || light_colour[k] == vec3(0)) continue;
     vec3 arrives = light_colour[k] / (far2 + .1 * light_at[k].w);
-    if (k == 0) arrives *= key_light(origin);
+    if (k == 0) arrives *= key_light(at + key_offset * flat_normal);
     light += facing * arrives;
     // The factor keeps the highlight's whole energy about the same for every exponent.
     shine += arrives * specular * (shininess + 8.) / 32. * pow(max(0., dot(n, normalize(to + ray))), shininess);
@@ -159,7 +161,7 @@ def _sky_directions() -> np.ndarray:
 
 def _from_far(towards: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """World -> [-1, 1] cube of a light far away in direction `towards`, around the box low..high: [4, 4]."""
-    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 + 0.05
+    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 + 1e-3
     side = np.cross(towards, [0.31, 0.17, 0.93])
     side /= np.linalg.norm(side)
     axes = np.stack([side, np.cross(towards, side), -towards]) / radius
@@ -277,13 +279,15 @@ class Renderer:
         """Depth maps of the key light and of light from all over the sky."""
         casting = [d for d in self.drawn if d.part.shades and d.part.material.opacity >= 1]
         points = np.concatenate([d.part.corners.reshape(-1, 3) for d in casting] or [np.zeros((1, 3))])
-        low, high = points.min(0).astype(np.float64) - 0.05, points.max(0).astype(np.float64) + 0.05
+        low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
+        self.reach = float(np.linalg.norm(high - low)) + 2e-3
         at = self.lighting.lights[0][0]
-        self.key_matrix = (
-            _from_lamp(at[:3], self.lighting.towards_key)
-            if at[3]
-            else _from_far(at[:3] / np.linalg.norm(at[:3]), low, high)
-        )
+        if at[3]:
+            self.key_matrix = _from_lamp(at[:3], self.lighting.towards_key)
+            self.key_offset = 0.01  # metres: a lamp's texels, a few metres off
+        else:
+            self.key_matrix = _from_far(at[:3] / np.linalg.norm(at[:3]), low, high)
+            self.key_offset = _OFFSET * self.reach / _KEY_MAP
         self.sky = _sky_directions()
         self.sky_matrices = [_from_far(towards, low, high) for towards in self.sky]
         self.key_map = self._depth_map((_KEY_MAP, _KEY_MAP))
@@ -322,6 +326,8 @@ class Renderer:
             for unit, sampler in enumerate(("albedo", "surroundings", "key_map", "sky_map")):
                 self._set(program, sampler, unit)
             self._set(program, "key_matrix", self.key_matrix.T)
+            self._set(program, "key_offset", self.key_offset)
+            self._set(program, "sky_offset", _OFFSET * self.reach / _SKY_MAP)
             self._set(program, "sky_matrix", np.stack([m.T for m in self.sky_matrices]))
             self._set(program, "sky_towards", self.sky)
             self._set(program, "sky_colour", np.repeat(self.lighting.sky[None] * share, _SKY, 0))

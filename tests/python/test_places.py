@@ -12,11 +12,12 @@ from export.places import assets
 from export.places.cameras import Lens, looking
 from export.places.clouds import CloudFaults, CloudMaker
 from export.places.dataset import frame_entry, held_out_views, render_place
-from export.places.mesh import ModelError, read_obj
+from export.places.mesh import Material, ModelError, Part, flat_normals, read_obj
 from export.places.place import PlaceError, load_place
 from export.places.plain import PlainStock
 from export.places.ply import PlyError, read_ply, write_ply
 from export.places.polygons import triangles_of
+from export.places.render import Lighting, Renderer
 
 SEEDS = {"room": 3, "still life": 0, "object": 2}  # of the split to train on
 FRAMES = 10
@@ -149,6 +150,72 @@ def test_files_hold_the_axes_and_pixels_of_nerfstudio():
     assert pixel[1, 0] > 31.5
     assert pixel[1, 1] < 23.5
     assert np.allclose(depth, 2)
+
+
+def _quad(corners, colour, **more):
+    a, b, c, d = np.array(corners, np.float32)
+    triangles = np.array([[a, b, c], [a, c, d]])
+    return Part(triangles, flat_normals(triangles), np.zeros((2, 3, 2), np.float32), Material(colour=colour, **more))
+
+
+def _lighting(**more):
+    lamp = (np.array([0, -1.0, 1, 0]), np.ones(3))
+    return Lighting((lamp,), np.ones(3), np.ones(3), np.ones((4, 8, 3), np.float32), plain=(0, 0, 0), **more)
+
+
+def test_depth_is_that_of_the_centre_of_each_pixel():
+    # The plane z = 1 + 0.8 x + 0.3 y, from above; rays of float64 are the reference.
+    normal = np.array([-0.8, -0.3, 1])
+    corners = [(x, y, 1 + 0.8 * x + 0.3 * y) for x, y in ((-60, -60), (60, -60), (60, 60), (-60, 60))]
+    camera = looking(Lens(120, 90, 70.0, (5.0, -3.0)), np.array([0.3, -1.0, 4]), np.array([0, 0.5, 1.0]), 7.0)
+    with Renderer([_quad(corners, (1, 1, 1))], _lighting()) as renderer:
+        depth = renderer.depth(camera)
+    x, y = np.meshgrid(np.arange(120), np.arange(90))
+    away = camera.lifted(np.stack([x.ravel(), y.ravel()], 1), np.ones(x.size)) - camera.centre
+    expected = ((1 - normal @ camera.centre) / (away @ normal)).reshape(90, 120)
+    assert np.abs(depth / expected - 1).max() < 5e-6
+
+
+def test_pictures_lie_over_their_depth():
+    # A white wall from x = 0.1 to the right: its edge is seen in a column that a camera tells exactly.
+    camera = looking(Lens(101, 40, 60.0, (3.3, 0.0)), np.array([0, -2.0, 0]), np.zeros(3))
+    wall = _quad([(0.1, 0, -5), (9, 0, -5), (9, 0, 5), (0.1, 0, 5)], (1, 1, 1), emission=50.0)
+    with Renderer([wall], _lighting()) as renderer:
+        row, found = renderer.colour(camera, 1.0)[20, :, 0] / 255, renderer.depth(camera)[20] > 0
+    edge = camera.projected(np.array([[0.1, 0, 0]]))[0][0, 0]
+    assert 101 - row.sum() - 0.5 == pytest.approx(edge, abs=0.15)  # to the four samples of a pixel
+    assert found.argmax() == np.ceil(edge)
+
+
+_WALL = [(-9, 0, -9), (9, 0, -9), (9, 0, 9), (-9, 0, 9)]
+
+
+def _seen(part, *eyes):
+    """Pictures of a part by cameras at `eyes` that look at the origin."""
+    with Renderer([part], _lighting()) as renderer:
+        cameras = [looking(Lens(64, 64, 50.0), np.array(eye, float), np.zeros(3)) for eye in eyes]
+        return [renderer.colour(c, 0.5).astype(int) for c in cameras]
+
+
+def test_glass_is_seen_but_depth_looks_through_it():
+    wall, glass = _quad(_WALL, (0.5, 0.2, 0.2)), _quad(np.array(_WALL) - [0, 1, 0], (0, 1, 0), opacity=0.5)
+    camera = looking(Lens(64, 64, 50.0), np.array([0, -3.0, 0]), np.zeros(3))
+    with Renderer([wall], _lighting()) as renderer:
+        bare, depth = renderer.colour(camera, 0.5).astype(int), renderer.depth(camera)
+    with Renderer([wall, glass], _lighting()) as renderer:
+        assert np.array_equal(renderer.depth(camera), depth)
+        assert (renderer.colour(camera, 0.5)[..., 1] - bare[..., 1] > 20).all()
+
+
+def test_dull_things_look_the_same_from_everywhere_and_shiny_ones_do_not():
+    # Light comes from (0, -1, 1): the wall y = 0 throws it back to (0, -1, -1).
+    eyes = (0, -2, 2), (0, -2, -2)
+    dull = _seen(_quad(_WALL, (0.5, 0.2, 0.2)), *eyes)
+    assert np.ptp(dull[0], axis=(0, 1)).max() <= 1
+    assert np.abs(dull[0] - dull[1]).max() <= 1
+    away, into = _seen(_quad(_WALL, (0.5, 0.2, 0.2), specular=0.5, shininess=40.0), *eyes)
+    assert np.abs(away - dull[0]).max() <= 1
+    assert (into - away)[28:36, 28:36].min() > 20
 
 
 def test_resized_cameras_see_the_same():

@@ -15,7 +15,7 @@ from export.photos.backgrounds import load_backgrounds
 from export.photos.packages import load_packages
 from export.photos.panoramas import PACKAGE as PANORAMAS
 from export.places.assets import FURNITURE, TILES, family_of, furniture_folder, split_of, tiles_folder
-from export.places.mesh import Material, Part, read_obj, smooth_normals
+from export.places.mesh import Part, read_obj, smooth_normals
 
 _CM = 0.01
 # The front of a model looks to +z, its up is +y; in the world the front looks to -y, up is +z.
@@ -195,7 +195,3 @@ def _photo(file: Path) -> np.ndarray:
 def people_assets() -> list[Asset]:
     """What dressed people come from."""
     return [Asset(f"people: {p.used_for}", p.name, p.version, p.licence) for p in assets.PACKAGES]
-
-
-def plain_material(colour: tuple[float, float, float]) -> Material:
-    return Material(colour=colour)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from export.people.props import Solid
-from export.places.mesh import Material, Part, flat_normals
+from export.places.mesh import Material, Part
 
 _CELL = 0.04  # metres
 _FLAT = 0.012  # metres that a top may be uneven under what stands on it
@@ -113,7 +113,3 @@ class Heights:
 def placed(parts: tuple[Part, ...] | list[Part], at, yaw: float) -> list[Part]:
     """Turned about the vertical, then with its foot at `at` [3]."""
     return [p.moved(about_z(yaw), at) for p in parts]
-
-
-def with_normals(corners: np.ndarray, uv: np.ndarray, material: Material, shades: bool = True) -> Part:
-    return Part(corners.astype(np.float32), flat_normals(corners), uv.astype(np.float32), material, shades=shades)

@@ -13,7 +13,7 @@ from export.places.subjects import draw_still_life, draw_subject
 LAYOUTS = {"room": (0.6, draw_room), "subject": (0.22, draw_subject), "still life": (0.18, draw_still_life)}
 FRAMES = 40
 _TRIES = 12
-_TOO_NEAR = 0.25  # metres, in rooms: a camera of which much is nearer stands in something
+_TOO_NEAR = 0.35  # metres, in rooms: a camera of which much is nearer stands in something
 
 
 def generator(split: str, seed: int, what: int) -> np.random.Generator:
@@ -34,7 +34,7 @@ def sound(depth: np.ndarray, near: float) -> bool:
     """Whether a view shows something, and is not taken from within a thing."""
     seen = depth > 0
     too_near = (depth < near * _TOO_NEAR / 0.03) & seen
-    return bool(seen.mean() > 0.1 and too_near.mean() < 0.25)
+    return bool(seen.mean() > 0.1 and too_near.mean() < 0.12)
 
 
 def choose_views(renderer: Renderer, staged: Staged, rng: np.random.Generator) -> list[Camera]:

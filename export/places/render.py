@@ -22,6 +22,7 @@ _SAMPLES = 4  # of colour, a pixel; depth is that of the pixel's centre
 _KEY_MAP, _SKY_MAP, _SKY = 2048, 512, 8  # texels a side, texels a side, directions that light comes from
 _ATLAS = 3  # sky maps in a row of their common texture
 _LIGHTS = 4
+_BRIGHTEST = 15.0  # of the surroundings: mirrored lamps would be white patches else
 _OFFSET = 2.0  # texels before a surface, where its own roughness in a depth map does not shade it
 
 _VERTEX = """#version 330
@@ -226,7 +227,7 @@ class Renderer:
         self.white = self._texture(np.full((1, 1, 4), 255, np.uint8))
         self.drawn = [self._upload(p) for p in parts if len(p.corners)]
         self.targets: dict[tuple[int, int], tuple] = {}
-        around = np.ascontiguousarray(np.minimum(lighting.surroundings, 60.0).astype(np.float16))
+        around = np.ascontiguousarray(np.minimum(lighting.surroundings, _BRIGHTEST).astype(np.float16))
         self.surroundings = self.context.texture(around.shape[1::-1], 3, around.tobytes(), dtype="f2", alignment=1)
         self.surroundings.repeat_y = False
         self.surroundings.build_mipmaps()

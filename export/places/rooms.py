@@ -58,7 +58,7 @@ def planks(rng: np.random.Generator, side: int = 512) -> np.ndarray:
 
 def checks(rng: np.random.Generator, side: int = 256) -> np.ndarray:
     """Square tiles of two colours with joints."""
-    one, two = rng.uniform(30, 250, (2, 1, 1, 3))
+    one, two = rng.uniform(40, 240, (2, 1, 1, 1)) * (1 + rng.normal(0, 0.15, (2, 1, 1, 3)))
     at = np.arange(side) * 4 // side
     image = np.where(((at[:, None] + at[None]) % 2)[..., None] > 0, one, two * np.ones((side, side, 1)))
     joint = (np.arange(side) % (side // 4)) < 3
@@ -131,7 +131,7 @@ class RoomMaker:
             at = [0.0, 0.0, 0.04]
             at[axis] = side * (self.size[axis] / 2 - 0.0075)
             self.parts.append(part_of(box(board, at), white, shades=False))
-        self.ceiling = u() < 0.7
+        self.ceiling = u() < 0.85
         if self.ceiling:
             paint = Material(noise(rng, 2), (u(0.85, 1.05),) * 3)
             lid = box((w + 2 * thick, d + 2 * thick, thick), (0, 0, h + thick / 2))

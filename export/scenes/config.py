@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 FEATURES = 8  # values of a point's look
+COLOURS = 3  # of them that are the photo's red, green, blue
 BASIS = 6  # functions of the direction that the look is a combination of
 RASTER = FEATURES + 1  # with the occupancy
 LEVELS = 5  # rasters at 1, 1/2, 1/4, 1/8, 1/16

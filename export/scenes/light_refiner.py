@@ -5,6 +5,9 @@ nothing but copying is done at full resolution, where the gated one spends a thi
 two convolutions, ELU and a sigmoid, so that convolution and activation are one int8 operation; zeros around the
 borders, which convolutions bring along, where reflecting is an operation of its own; maps from below pass a 1x1
 convolution before they are doubled, not a 3x3 one after it; and pooling and doubling keep the values of int8 maps.
+
+What the network computes is added to a picture that needs none: each pixel has the colour of its point, and where it
+has none, of the next coarser raster's. Training starts there, and what is rounded to 8 bits is the difference alone.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from export.scenes.config import RASTER, RefinerConfig
+from export.scenes.config import COLOURS, RASTER, RefinerConfig
 
 
 def folded(x: Tensor) -> Tensor:
@@ -68,7 +71,8 @@ class LightRefiner(nn.Module):
         joined = 2 if config.join == "concat" else 1
         self.up = nn.ModuleList(_block(joined * w[k], w[k], block) for k in range(len(w) - 1))
         self.final = nn.Conv2d(w[0], outputs, 3, padding=1)
-        nn.init.constant_(self.final.bias, 0.5)
+        nn.init.normal_(self.final.weight, std=0.01)
+        nn.init.zeros_(self.final.bias)
 
     def forward(self, rasters: list[Tensor]) -> Tensor:
         if self.config.folded:
@@ -86,4 +90,17 @@ class LightRefiner(nn.Module):
             skip = skips.pop()
             x = self.double(lateral(x), skip)
             x = block(torch.cat([x, skip], 1) if self.config.join == "concat" else x + skip)
-        return self.final(x)
+        return self.filled(rasters) + self.final(x)
+
+    def filled(self, rasters: list[Tensor]) -> Tensor:
+        """The colours of the points, of coarser rasters where there is none: [N, 3, H, W], or [N, 12, H/2, W/2] as
+        `folded`. Black where no raster has a point."""
+        used = rasters[: self.config.levels]
+        colours = used[-1][:, :COLOURS]
+        for raster in reversed(used[1:-1]):
+            below = self.double(colours, raster[:, :COLOURS])
+            colours = raster[:, :COLOURS] + (1 - raster[:, RASTER - 1 :]) * below
+        if not self.config.folded:
+            colours = self.double(colours, used[0][:, :COLOURS])
+        pixels = used[0].split(RASTER, 1)
+        return torch.cat([pixel[:, :COLOURS] + (1 - pixel[:, RASTER - 1 :]) * colours for pixel in pixels], 1)

@@ -6,7 +6,7 @@ The reference for the SDK and what training differentiates through. Points are f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.scenes.basis import directions
-from export.scenes.cameras import Camera, resized, upright, warped
+from export.scenes.cameras import Camera, reframed, resized, upright, warped
 from export.scenes.config import ALPHA, LEVELS, MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
@@ -42,17 +42,6 @@ class Options:
     near: float = 0.0
     alpha: float = ALPHA
     precision: torch.dtype = torch.float32
-
-
-def features_of(view: View, networks: Networks, options: Options) -> tuple[Tensor, Camera]:
-    """Features [8, h, w] of the photo turned upright, and the camera that took it so.
-
-    A photo is turned by bilinear interpolation before the extractor sees it, in the smallest frame that holds it.
-    """
-    camera = upright(view.camera, np.asarray(options.up), STRIDE)
-    image = torch.from_numpy(warped(view.image, view.camera, camera))
-    device = next(networks.parameters()).device
-    return networks.extractor(image.permute(2, 0, 1)[None].to(device))[0], camera
 
 
 def sampled(features: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
@@ -97,30 +86,80 @@ class Model:
         return shown.rasters(self.descriptors(shown.points, camera.centre, networks))
 
 
-def modelled(
-    points: Tensor, views: Sequence[View], networks: Networks, options: Options, target: Camera | None = None
-) -> Model:
-    """The cloud after all views; with a `target`, only what wins a pixel of that camera: enough to render it.
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """What some photos see of a cloud, before any network. places: float64 [P, 3], points that at least one sees.
+    images: for each photo RGB float32 [3, h, w], turned upright. columns, rows: where the points are in it, [P].
+    seen: bool [P]. centres: of the cameras, [3]."""
 
-    Raises ValueError without views.
+    places: Tensor
+    images: list[Tensor]
+    columns: list[Tensor]
+    rows: list[Tensor]
+    seen: list[Tensor]
+    centres: list[np.ndarray]
+
+
+def gathered(
+    points: Tensor,
+    views: Sequence[View],
+    options: Options,
+    target: Camera | None = None,
+    window_px: int | None = None,
+    seen: Sequence[Tensor] | None = None,
+) -> Sources:
+    """The cloud [P, 3] after all views; with a `target`, only what wins a pixel of that camera: enough to render it.
+
+    A photo is turned by bilinear interpolation before the extractor sees it, in the smallest frame that holds it, or,
+    with `window_px`, in a square of that side about the points; what is outside of it is then not seen. seen: of all
+    points, if it is known (`seen_in`). Raises ValueError without views.
     """
     if not views:
         raise ValueError("a model needs at least one view, and none is given")
-    seen = torch.stack([seen_in(points, view.camera, options) for view in views])
-    (chosen,) = torch.where(seen.any(0))
+    found = torch.stack(list(seen) if seen else [seen_in(points, view.camera, options) for view in views])
+    (chosen,) = torch.where(found.any(0))
     if target is not None:
         chosen = chosen[pyramid(visible(points[chosen], target, options.near), 1).points]
-    places, seen = points[chosen], seen[:, chosen]
-    moments = Moments.zeros(len(places), torch.zeros((), dtype=options.precision, device=points.device))
-    for view, sees in zip(views, seen, strict=True):
-        features, camera = features_of(view, networks, options)
+    places, found = points[chosen], found[:, chosen]
+    sources = Sources(places, [], [], [], [], [view.camera.centre for view in views])
+    for view, sees in zip(views, found, strict=True):
+        camera = upright(view.camera, np.asarray(options.up), STRIDE)
         columns, rows, _ = projected(places, camera)
+        if window_px is not None:
+            middle = [float(at[sees].median()) if sees.any() else 0.0 for at in (columns, rows)]
+            left, top = (round(at - window_px / 2) for at in middle)
+            camera = reframed(camera, left, top, window_px, window_px)
+            columns, rows = columns - left, rows - top
+            for at in (columns, rows):
+                sees = sees & (at >= 0) & (at <= window_px - 1)
+        image = warped(view.image, view.camera, camera)
+        sources.images.append(torch.from_numpy(image).permute(2, 0, 1))
         # What is not seen may have no pixel at all; it counts for nothing, but must be a number.
-        columns, rows = (torch.where(sees, at, 0) for at in (columns, rows))
-        centre = torch.from_numpy(view.camera.centre).to(places)
-        basis = networks.basis(directions(places, centre).float())
-        moments = moments.with_view(sampled(features, columns, rows), basis, sees)
+        sources.columns.append(torch.where(sees, columns, 0))
+        sources.rows.append(torch.where(sees, rows, 0))
+        sources.seen.append(sees)
+    return sources
+
+
+def fitted(sources: Sources, features: Iterable[Tensor], networks: Networks, options: Options) -> Model:
+    """How the points look, from the features [8, h, w] of each photo's image."""
+    places = sources.places
+    moments = Moments.zeros(len(places), torch.zeros((), dtype=options.precision, device=places.device))
+    each = zip(features, sources.columns, sources.rows, sources.seen, sources.centres, strict=True)
+    for maps, columns, rows, sees, centre in each:
+        basis = networks.basis(directions(places, torch.from_numpy(centre).to(places)).float())
+        moments = moments.with_view(sampled(maps, columns, rows), basis, sees)
     return Model(places, moments.looks(options.alpha))
+
+
+def modelled(
+    points: Tensor, views: Sequence[View], networks: Networks, options: Options, target: Camera | None = None
+) -> Model:
+    """The cloud after all views (see `gathered`)."""
+    sources = gathered(points, views, options, target)
+    return fitted(
+        sources, (networks.extractor(x[None].to(points.device))[0] for x in sources.images), networks, options
+    )
 
 
 @torch.no_grad()

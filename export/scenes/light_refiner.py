@@ -6,8 +6,8 @@ two convolutions, ELU and a sigmoid, so that convolution and activation are one 
 borders, which convolutions bring along, where reflecting is an operation of its own; maps from below pass a 1x1
 convolution before they are doubled, not a 3x3 one after it; and pooling and doubling keep the values of int8 maps.
 
-What the network computes is added to a picture that needs none: each pixel has the colour of its point, and where it
-has none, of the next coarser raster's. Training starts there, and what is rounded to 8 bits is the difference alone.
+What the network computes is added to the colours of the finest raster (`export.scenes.raster.filled`): training starts
+from a picture, and what is rounded to 8 bits is the difference alone.
 """
 
 from __future__ import annotations
@@ -90,17 +90,5 @@ class LightRefiner(nn.Module):
             skip = skips.pop()
             x = self.double(lateral(x), skip)
             x = block(torch.cat([x, skip], 1) if self.config.join == "concat" else x + skip)
-        return self.filled(rasters) + self.final(x)
-
-    def filled(self, rasters: list[Tensor]) -> Tensor:
-        """The colours of the points, of coarser rasters where there is none: [N, 3, H, W], or [N, 12, H/2, W/2] as
-        `folded`. Black where no raster has a point."""
-        used = rasters[: self.config.levels]
-        colours = used[-1][:, :COLOURS]
-        for raster in reversed(used[1:-1]):
-            below = self.double(colours, raster[:, :COLOURS])
-            colours = raster[:, :COLOURS] + (1 - raster[:, RASTER - 1 :]) * below
-        if not self.config.folded:
-            colours = self.double(colours, used[0][:, :COLOURS])
-        pixels = used[0].split(RASTER, 1)
-        return torch.cat([pixel[:, :COLOURS] + (1 - pixel[:, RASTER - 1 :]) * colours for pixel in pixels], 1)
+        firsts = range(0, rasters[0].shape[1], RASTER)
+        return torch.cat([rasters[0][:, first : first + COLOURS] for first in firsts], 1) + self.final(x)

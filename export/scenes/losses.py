@@ -10,6 +10,7 @@ from torch.nn import functional as F
 
 from export.scenes.config import LEVELS
 from export.scenes.perceptual import Perceptual
+from export.scenes.raster import filled
 
 
 @dataclass(frozen=True)
@@ -53,4 +54,4 @@ def own_rasters(features: Tensor) -> list[Tensor]:
         small = features[:, :, ::step, ::step]
         there = (torch.rand_like(small[:, :1]) < 1 - 0.5 / step).to(small)
         rasters.append(torch.cat([small, torch.ones_like(there)], 1) * there)
-    return rasters
+    return filled(rasters)

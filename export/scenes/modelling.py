@@ -19,7 +19,7 @@ from export.scenes.cameras import Camera, reframed, resized, upright, warped
 from export.scenes.config import ALPHA, LEVELS, MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
-from export.scenes.raster import projected, pyramid, visible
+from export.scenes.raster import filled, projected, pyramid, visible
 from export.scenes.system import Networks
 
 
@@ -81,9 +81,9 @@ class Model:
         return Looks(mean, slope, looks.views[chosen], looks.singular[chosen]).seen_from(basis.to(mean)).float()
 
     def rasters(self, camera: Camera, networks: Networks, options: Options) -> list[Tensor]:
-        """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16."""
+        """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16; `filled`."""
         shown = pyramid(visible(self.places, camera, options.near), LEVELS)
-        return shown.rasters(self.descriptors(shown.points, camera.centre, networks))
+        return filled(shown.rasters(self.descriptors(shown.points, camera.centre, networks)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ import torch
 from torch import Tensor
 
 from export.scenes.cameras import Camera
+from export.scenes.config import COLOURS
 
 NOTHING = torch.iinfo(torch.int64).max
 _INDEX = (1 << 32) - 1
@@ -92,3 +93,14 @@ def pyramid(keys: Tensor, levels: int) -> Pyramid:
         found = torch.searchsorted(points, keys & _INDEX)
         slots.append(torch.where(keys == NOTHING, len(points), found))
     return Pyramid(points, slots)
+
+
+def filled(rasters: list[Tensor]) -> list[Tensor]:
+    """Rasters [..., 9, H/2^k, W/2^k], finest first, as a refiner wants them: where a pixel has no point its colours are
+    those of the next coarser raster, so that the finest holds a picture. Occupancy and learnt features stay 0 there."""
+    found = [rasters[-1]]
+    for raster in reversed(rasters[:-1]):
+        below = found[-1][..., :COLOURS, :, :].repeat_interleave(2, -2).repeat_interleave(2, -1)
+        colours = raster[..., :COLOURS, :, :] + (1 - raster[..., -1:, :, :]) * below
+        found.append(torch.cat([colours, raster[..., COLOURS:, :, :]], -3))
+    return found[::-1]

@@ -12,7 +12,7 @@ from export.scenes.cameras import Camera, between, reframed, resized, turned_upr
 from export.scenes.config import SIZES
 from export.scenes.looks import Moments
 from export.scenes.modelling import Options, View, modelled, painted, render, sampled, seen_in
-from export.scenes.raster import NOTHING, depths_of, halved, projected, pyramid, visible
+from export.scenes.raster import NOTHING, depths_of, filled, halved, projected, pyramid, visible
 from export.scenes.source_views import drawn, scores
 from export.scenes.system import Networks
 
@@ -368,3 +368,20 @@ def test_sources_are_drawn_from_aside_and_from_those_that_see_the_same():
     assert counts[2] > 120
     assert sorted(drawn(0, cameras, range(5), places, 9, rng)) == [1, 2, 3, 4]
     assert sorted(drawn(0, cameras, [0, 3, 4], places, 9, rng)) == [3, 4]
+
+
+def test_pixels_without_a_point_have_the_colours_of_the_next_coarser_raster():
+    rasters = [torch.rand(9, 32 >> k, 48 >> k) for k in range(3)]
+    for raster, share in zip(rasters, (0.3, 0.6, 0.9), strict=True):
+        raster[8] = (torch.rand_like(raster[8]) < share).float()
+        raster *= raster[8].clone()
+    full = filled(rasters)
+    for level in range(3):
+        there = rasters[level][8] > 0
+        assert torch.equal(full[level][:, there], rasters[level][:, there])
+        assert torch.equal(full[level][3:], rasters[level][3:])
+        if level < 2:
+            below = full[level + 1][:3].repeat_interleave(2, 1).repeat_interleave(2, 2)
+            assert torch.equal(full[level][:3, ~there], below[:, ~there])
+        else:
+            assert full[level][:3, ~there].abs().max() == 0

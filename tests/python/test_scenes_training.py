@@ -153,4 +153,4 @@ def test_a_pictures_own_rasters_lose_most_where_they_are_finest():
     shares = [float(raster[:, 8].mean()) for raster in rasters]
     assert shares == pytest.approx([0.5, 0.75, 0.875, 0.9375, 0.96875], abs=0.02)
     for raster in rasters:
-        assert torch.equal(raster[:, 0], raster[:, 8])
+        assert torch.equal(raster[:, 3], raster[:, 8])

@@ -10,6 +10,7 @@ BASIS = 6  # functions of the direction that the look is a combination of
 RASTER = FEATURES + 1  # with the occupancy
 LEVELS = 5  # rasters at 1, 1/2, 1/4, 1/8, 1/16
 MULTIPLE = 2 ** (LEVELS - 1)  # sides of rendered pictures, pixels
+HIDING = 0.1  # a point so much farther than one beside it is behind it (export.scenes.raster.unhidden)
 ALPHA = 1.0  # of the ridge regression, as in the paper
 
 

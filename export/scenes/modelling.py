@@ -16,10 +16,10 @@ from torch.nn import functional as F
 
 from export.scenes.basis import directions
 from export.scenes.cameras import Camera, reframed, resized, upright, warped
-from export.scenes.config import ALPHA, LEVELS, MULTIPLE
+from export.scenes.config import ALPHA, HIDING, LEVELS, MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
-from export.scenes.raster import filled, projected, pyramid, visible
+from export.scenes.raster import filled, projected, pyramid, unhidden, visible
 from export.scenes.system import Networks
 
 
@@ -34,11 +34,13 @@ class View:
 @dataclass(frozen=True)
 class Options:
     """up: of the world. visibility_scale: of the photos' sides, for finding who is seen (1/2 in the paper where points
-    are sparse, so that what is behind does not shine through). near: depth of the nearest visible point, in the scene's
-    units. alpha: of the ridge regression. precision: of the moments."""
+    are sparse, so that what is behind does not shine through). hiding: how much farther than the nearest point of its
+    block of pixels a point may be, as a share of that depth (see `unhidden`; infinite in the paper). near: depth of the
+    nearest visible point, in the scene's units. alpha: of the ridge regression. precision: of the moments."""
 
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     visibility_scale: float = 1.0
+    hiding: float = HIDING
     near: float = 0.0
     alpha: float = ALPHA
     precision: torch.dtype = torch.float32
@@ -52,11 +54,16 @@ def sampled(features: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
     return found[0, :, 0].T
 
 
+def shown_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
+    """Keys, int64 [H, W], of the points [P, 3] that a camera sees."""
+    return unhidden(visible(points, camera, options.near), options.hiding)
+
+
 def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
     """Which points win a pixel of the photo, bool [P]. Asked of the camera as it is: its pixels are the photo's."""
     scale = options.visibility_scale
     small = resized(camera, max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
-    keys = visible(points, small, options.near)
+    keys = shown_in(points, small, options)
     seen = torch.zeros(len(points), dtype=torch.bool, device=points.device)
     seen[pyramid(keys, 1).points] = True
     return seen
@@ -82,7 +89,7 @@ class Model:
 
     def rasters(self, camera: Camera, networks: Networks, options: Options) -> list[Tensor]:
         """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16; `filled`."""
-        shown = pyramid(visible(self.places, camera, options.near), LEVELS)
+        shown = pyramid(shown_in(self.places, camera, options), LEVELS)
         return filled(shown.rasters(self.descriptors(shown.points, camera.centre, networks)))
 
 
@@ -119,7 +126,7 @@ def gathered(
     found = torch.stack(list(seen) if seen else [seen_in(points, view.camera, options) for view in views])
     (chosen,) = torch.where(found.any(0))
     if target is not None:
-        chosen = chosen[pyramid(visible(points[chosen], target, options.near), 1).points]
+        chosen = chosen[pyramid(shown_in(points[chosen], target, options), 1).points]
     places, found = points[chosen], found[:, chosen]
     sources = Sources(places, [], [], [], [], [view.camera.centre for view in views])
     for view, sees in zip(views, found, strict=True):

@@ -1,15 +1,13 @@
 /* Scenes: a place captured as posed photos and a point cloud, made into something that is rendered from new viewpoints,
  * without training for it (NPBG++, arXiv 2203.13318).
  *
- *   maq_capture* capture;             maq_capture_open(context, "folder", &capture);
- *   maq_scene_builder* builder;       maq_scene_builder_create(context, &build, capture, NULL, &builder);
- *   for each view                     maq_scene_builder_add_capture_view(builder, k, NULL);
- *   maq_scene* scene;                 maq_scene_builder_finish(builder, &scene);  maq_scene_save(scene, "place.maqs");
- *   maq_scene_renderer* renderer;     maq_scene_renderer_create(context, &how, scene, &renderer);
- *   maq_scene_image* image;           maq_scene_renderer_run(renderer, &camera, &image);
+ *   maq_capture* capture;          maq_capture_open(context, "folder", &capture);
+ *   maq_scene* scene;              maq_scene_build(context, &config, capture, NULL, &scene);
+ *                                  maq_scene_save(scene, "place.maqs");
+ *   maq_scene_renderer* renderer;  maq_scene_renderer_create(context, &how, scene, &renderer);
+ *   maq_scene_image* image;        maq_scene_renderer_run(renderer, &camera, &image);
  *
- * An app that has cameras and a cloud of its own gives a maq_point_cloud instead of a capture, and its photos by
- * maq_scene_builder_add_view. */
+ * An app that has a cloud and cameras of its own uses a maq_scene_builder and gives it photo after photo. */
 #ifndef MAQUETTE_SCENE_H_
 #define MAQUETTE_SCENE_H_
 
@@ -88,6 +86,52 @@ MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t in
 
 /* ---- Building ------------------------------------------------------------------------------------------------------ */
 
+/* Called on the thread that builds: how much of the call is done, 0 to 1, and what is being done. 0 cancels. */
+typedef int32_t (*maq_scene_progress_callback)(void* user_data, double done, const char* what);
+
+typedef struct maq_scene_build_config {
+  uint32_t struct_size;
+  int32_t threads;          /* 0 (default): the machine's cores, at most 4 */
+  const char* bundle_path;  /* folder of the scene networks; required. Copied. */
+  int32_t long_side_px;     /* larger photos are made smaller before they are looked at; default 640; 0: never */
+  int32_t coefficient_bits; /* of the scene's looks: 8 (default), 16, or 32 for floats, places then too */
+  double least_variation;   /* points whose look varies less keep their mean alone, in units of colours of 0 to 1; 0 keeps
+                               all; negative (default): the library's choice */
+  double visibility_scale;  /* of a photo's sides, for finding which points it sees: below 1 a point hides more of what is
+                               behind it, for sparse clouds; 1/16 to 4, default 1 */
+  double near_depth;        /* points nearer to a camera are not seen by it; units of the scene, default 0 */
+  uint64_t most_points;     /* of larger clouds points are taken evenly; 0 (default): all */
+  uint64_t most_bytes;      /* for what is known of points while building; 0 (default): 2 GiB */
+  maq_scene_progress_callback progress; /* may be NULL */
+  void* progress_user_data;
+  /* Of maq_scene_build: */
+  uint32_t most_views;   /* of more photos some are taken evenly; 0 (default): all */
+  int32_t uses_held_out; /* 1: photos that the capture keeps for comparisons too; default 0 */
+} maq_scene_build_config;
+
+typedef struct maq_scene_build_stats {
+  uint32_t struct_size;
+  uint32_t view_count;   /* photos that were looked at */
+  uint32_t unused_views; /* of maq_scene_build: photos that could not be used, or see nothing */
+  uint64_t cloud_points; /* after most_points */
+  uint64_t seen_points;  /* that a photo has seen */
+  /* Milliseconds so far, over all photos: reading them, finding whom they see, turning them upright, the network, what is
+   * done point by point; then solving for the looks, and packing the scene. */
+  double load_ms, visibility_ms, turning_ms, extractor_ms, moments_ms, solving_ms, packing_ms;
+} maq_scene_build_stats;
+
+/* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_scene_build_config) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size);
+
+/* Makes a scene of a capture. Photos that cannot be read are left out and counted, points that no photo saw too. `stats`
+ * may be NULL; else the caller sets stats->struct_size. `*scene` is the caller's, to be given to maq_scene_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (the networks),
+ * MAQ_ERROR_RUNTIME_LIBRARY, MAQ_ERROR_UNREADABLE (no photo can be used or sees a point), MAQ_ERROR_OUT_OF_MEMORY,
+ * MAQ_ERROR_INFERENCE, MAQ_CANCELLED (by the progress callback). Blocks until it is done. */
+MAQ_API maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* config,
+                                   const maq_capture* capture, maq_scene_build_stats* stats, maq_scene** scene);
+
 /* A cloud of the app. The arrays stay the app's and are copied. */
 typedef struct maq_point_cloud {
   uint32_t struct_size;
@@ -97,48 +141,12 @@ typedef struct maq_point_cloud {
   double up[3];     /* the world's up; any length but 0 */
 } maq_point_cloud;
 
-/* Called on the thread that builds: how much of the call is done, 0 to 1, and what is being done. 0 cancels. */
-typedef int32_t (*maq_scene_progress_callback)(void* user_data, double done, const char* what);
-
-typedef struct maq_scene_builder_config {
-  uint32_t struct_size;
-  int32_t threads;         /* 0 (default): the machine's cores, at most 4 */
-  const char* bundle_path; /* folder of the scene networks; required. Copied. */
-  int32_t long_side_px;    /* larger photos are made smaller before they are looked at; default 640; 0: never */
-  int32_t coefficient_bits; /* of the scene's looks: 8 (default), 16, or 32 for floats; places have 16 (or float) */
-  double visibility_scale; /* of a photo's sides, for finding which points it sees: below 1 a point hides more of what is
-                              behind it, for sparse clouds; 1/16 to 4, default 1 */
-  double near_depth;       /* points nearer to a camera are not seen by it; units of the scene, default 0 */
-  double least_variation;  /* points whose look varies less keep their mean alone: 0 keeps all; negative (default): the
-                              library's choice */
-  uint64_t most_points;    /* of larger clouds every so-manieth point is taken; 0 (default): all */
-  uint64_t most_bytes;     /* for what is known of points while building; 0 (default): 2 GiB */
-  maq_scene_progress_callback progress; /* may be NULL */
-  void* progress_user_data;
-} maq_scene_builder_config;
-
-typedef struct maq_scene_builder_stats {
-  uint32_t struct_size;
-  uint32_t view_count;    /* added so far */
-  uint64_t cloud_points;  /* after most_points */
-  uint64_t seen_points;   /* that a photo has seen */
-  /* Milliseconds so far, in all views: reading and undistorting photos of a capture, finding who is seen, turning photos
-   * upright, the network, what is done point by point, solving for the looks, packing. */
-  double load_ms, visibility_ms, turning_ms, extractor_ms, moments_ms, solving_ms, packing_ms;
-} maq_scene_builder_stats;
-
-/* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_scene_builder_config) of the caller.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_scene_builder_config_init(maq_scene_builder_config* config, uint32_t struct_size);
-
-/* Begins a scene with the cloud of a capture, or one of the app: one of `capture` and `cloud` is NULL.
- * `*builder` is the caller's, to be given to maq_scene_builder_destroy.
+/* Begins a scene with a cloud of the app. `*builder` is the caller's, to be given to maq_scene_builder_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (no points, a point that is not finite, an up that is none),
  * MAQ_ERROR_UNSUPPORTED (over 30 million points), MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_RUNTIME_LIBRARY,
  * MAQ_ERROR_OUT_OF_MEMORY (most_bytes). Blocks while networks and cloud are prepared. */
-MAQ_API maq_status maq_scene_builder_create(maq_context* context, const maq_scene_builder_config* config,
-                                            const maq_capture* capture, const maq_point_cloud* cloud,
-                                            maq_scene_builder** builder);
+MAQ_API maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_config* config,
+                                            const maq_point_cloud* cloud, maq_scene_builder** builder);
 
 /* Frees what was known of the points (NULL is fine). Scenes made by it stay.
  * Once for each handle, from any thread. Does not block. */
@@ -152,19 +160,13 @@ MAQ_API void maq_scene_builder_destroy(maq_scene_builder* builder);
 MAQ_API maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
                                               const maq_camera* camera, uint64_t* seen_points);
 
-/* The same for the view at `index` of the capture that the builder was made for. Held-out views are taken too: who
- * compares leaves them out (maq_capture_get_view).
- * One at a time. Errors: as maq_scene_builder_add_view and maq_capture_load_view. Blocks. */
-MAQ_API maq_status maq_scene_builder_add_capture_view(maq_scene_builder* builder, uint32_t index,
-                                                      uint64_t* seen_points);
-
-/* The maq_scene_builder_add_… that runs, or else the next, ends with MAQ_CANCELLED.
+/* The maq_scene_builder_add_view that runs, or else the next, ends with MAQ_CANCELLED.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_builder_cancel(maq_scene_builder* builder);
 
 /* What was added and how long it took. The caller sets stats->struct_size.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_scene_builder_stats* stats);
+MAQ_API maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_scene_build_stats* stats);
 
 /* Makes a scene of what is known by now; views can be added afterwards, for another scene. Points that no photo saw are
  * left out. `*scene` is the caller's, to be given to maq_scene_destroy.
@@ -179,7 +181,6 @@ typedef struct maq_scene_info {
   uint64_t point_count;
   uint64_t varying_count;  /* of them, whose look depends on the side */
   uint64_t block_count;    /* boxes of neighbouring points, which are left out whole where they are not seen */
-  uint64_t size_bytes;     /* of the file that maq_scene_save writes */
   double up[3];
   double low[3], high[3];  /* the box of all points, in the world */
   uint8_t networks_sha256[32]; /* of the networks that it was made with: the renderer wants the same */
@@ -213,17 +214,20 @@ typedef struct maq_scene_renderer_config {
   int32_t threads;          /* 0 (default): the machine's cores, at most 4 */
   const char* bundle_path;  /* folder of the scene networks; required. Copied. */
   double near_depth;        /* points nearer to the camera are not drawn; units of the scene, default 0 */
-  uint8_t background[3];    /* red, green, blue where there is nothing; default black */
-  uint8_t mean_looks;       /* 1: every point keeps its mean look from all sides; default 0 */
+  uint8_t background[3];    /* red, green, blue; default black */
+  uint8_t is_drawn_over;    /* 1: the picture is mixed with the background by its alpha; default 0: it is what the
+                               network made, the background only where nothing is near */
   uint32_t image_pool_size; /* images the app may hold at once, 1 to 64; default 4 */
+  int32_t spin;             /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
+  /* For measuring what is saved: 1 does it all the same. Pictures stay the same where alpha is above 0. */
+  uint8_t draws_unseen_blocks, refines_empty_parts;
 } maq_scene_renderer_config;
 
 /* The planes of an image, each of the camera's size. */
 typedef enum maq_scene_plane {
-  MAQ_SCENE_RGB = 1,   /* three bytes a pixel, over the background */
-  MAQ_SCENE_ALPHA = 2, /* one byte a pixel: 255 where there are points, 0 where there is nothing near */
-  MAQ_SCENE_DEPTH = 3  /* a float a pixel, along the optical axis, in units of the scene: of the point that the pixel, or
-                          the smallest block of pixels about it that has one, shows; 0 where there is nothing */
+  MAQ_SCENE_BGR = 1,   /* three bytes a pixel: blue, green, red */
+  MAQ_SCENE_ALPHA = 2, /* one byte a pixel: 255 surely covered by points, 0 nothing near */
+  MAQ_SCENE_DEPTH = 3  /* a float a pixel, along the optical axis, in units of the scene; 0 where nothing is near */
 } maq_scene_plane;
 
 /* Times are wall-clock milliseconds. */
@@ -235,7 +239,7 @@ typedef struct maq_scene_image_stats {
   float turn_ms;    /* back to the camera, colours to bytes */
   float total_ms;
   uint32_t blocks_drawn;   /* the others are outside of the picture */
-  uint64_t points_drawn;   /* of these blocks */
+  uint64_t points_drawn;   /* in these blocks */
   uint64_t points_shaded;  /* that win a pixel */
   int64_t refined_pixels;  /* that the network saw */
 } maq_scene_image_stats;

@@ -42,8 +42,10 @@ void encode_places(const ModelledPoints& points, const uint32_t* indices, SceneB
       for (uint32_t k = 0; k < block.count; ++k) {
         places[k] = nearest<Stored>((double(at[indices[k]]) - low) * steps_a_unit, 0, kMost);
       }
-      const float reached = float(double(low) + kMost * step);
-      block.high[axis] = std::nextafter(std::max(high, reached), std::numeric_limits<float>::infinity());
+      // A decoder rounds q * step, then the sum.
+      const double reached = double(low) + kMost * step;
+      const double rounding = std::numeric_limits<float>::epsilon() * (std::abs(double(low)) + kMost * step);
+      block.high[axis] = float(std::max(double(high), reached) + rounding);
     }
   }
 }

@@ -12,7 +12,8 @@ namespace {
 
 template <class Stored>
 inline Stored nearest(double steps, double least, double most) {
-  return Stored(std::nearbyint(std::min(std::max(steps, least), most)));
+  const double within = std::min(std::max(steps, least), most);
+  return Stored(int32_t(within + (within < 0 ? -0.5 : 0.5)));  // no call, as of nearbyint: it becomes vectors
 }
 
 template <class Stored>
@@ -98,7 +99,8 @@ void encode_looks(const ModelledPoints& points, const uint32_t* indices, SceneBl
 
 }  // namespace
 
-void encode_block(const ModelledPoints& points, const uint32_t* indices, SceneBlock& block, const SceneArrays& arrays) {
+void encode_block(const ModelledPoints& points, const uint32_t* indices, SceneBlock& block,
+                                  const SceneArrays& arrays) {
   const size_t place = size_t(block.first) * 3;
   switch (arrays.place_kind) {
     case Places::kFloat32: encode_places(points, indices, block, from<float>(arrays.places, place)); break;

@@ -28,7 +28,8 @@ class WorkerThreads {
   // Not for two threads at once.
   template <class Work>
   void run(size_t tasks, Work&& work) {
-    run_with(tasks, [](void* of, size_t task, int worker) { (*static_cast<Work*>(of))(task, worker); }, &work);
+    run_with(
+        tasks, [](void* of, size_t task, int worker) { (*static_cast<Work*>(of))(task, worker); }, &work);
   }
 
  private:

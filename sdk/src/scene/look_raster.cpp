@@ -84,8 +84,7 @@ void LookRaster::shade_strip(const Task& task, int top, Scratch& scratch) {
   scratch.constant.clear();
   scratch.varying.clear();
   for (int y = top; y < top + kStripRows; ++y) {
-    const DepthKey* from = task.buffer.keys() +
-                           size_t(task.window.top_px + y) * size_t(task.buffer.width_px()) +
+    const DepthKey* from = task.buffer.keys() + size_t(task.window.top_px + y) * size_t(task.buffer.width_px()) +
                            size_t(task.window.left_px);
     DepthKey* const keys = keys_[0].data() + size_t(y) * width;
     std::copy_n(from, width, keys);

@@ -70,7 +70,10 @@ TEST(PictureCover, IsWholeWhereThereIsAPointAndNothingFarFromAll) {
   cover.find(raster, int(kWidth), int(kHeight), false, threads);
   size_t covered = 0, nothing = 0;
   for (size_t i = 0; i < kWidth * kHeight; ++i) {
-    if (raster.keys(0)[i] != kNoPointKey) EXPECT_EQ(cover.alphas()[i], 255), ++covered;
+    if (raster.keys(0)[i] != kNoPointKey) {
+      EXPECT_EQ(cover.alphas()[i], 255);
+      ++covered;
+    }
     nothing += cover.alphas()[i] == 0 ? 1 : 0;
   }
   EXPECT_EQ(covered, 1u);

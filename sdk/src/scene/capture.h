@@ -19,6 +19,7 @@ struct CaptureView {
   std::string image_path;  // on this machine
   Lens lens;               // of the photo as it lies there, with its distortion
   PinholeCamera camera;    // of the photo after undistortion
+  bool is_held_out;        // kept to compare with: no scene is made of it
 };
 
 struct Capture {

@@ -11,6 +11,8 @@ namespace {
 
 // A hand-held camera's photos, turned upright, are of a few sizes; a session has the memory of all of its maps.
 constexpr size_t kExtractorsKept = 2, kRefinersKept = 3;
+// Of the basis: what comes out stays a float when it is squared.
+constexpr float kLargestWeight = 1000;
 constexpr int kMostLevels = 5, kFoldedPixels = 4, kColours = 3;
 
 template <class... Parts>
@@ -71,8 +73,10 @@ std::vector<float> basis_weights(const Bundle& bundle) {
   }
   std::memcpy(weights.data(), bytes.data(), bytes.size());
   for (const float weight : weights) {
-    if (!std::isfinite(weight))
-      fail(bundle.manifest.name, bundle.manifest.basis_file, " has numbers that are not finite");
+    if (!(std::abs(weight) <= kLargestWeight)) {
+      fail(bundle.manifest.name, bundle.manifest.basis_file, " has the weight ", weight, ", but none may be over ",
+           kLargestWeight);
+    }
   }
   return weights;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
+
 namespace maq {
 
 PixelMap pixels_between(const PinholeCamera& source, const PinholeCamera& target) {
@@ -36,6 +38,12 @@ PinholeCamera upright_frame(const PinholeCamera& camera, const std::array<double
         low = std::min(low, at);
         high = std::max(high, at);
       }
+    }
+    constexpr double kFarthest = 1 << 20;
+    if (!(std::abs(low) <= kFarthest && std::abs(high) <= kFarthest)) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A picture turned upright would reach from pixel ", low, " to ", high,
+                  ": the camera's focal lengths (", camera.fx_px, " and ", camera.fy_px, ") or its principal point (",
+                  camera.cx_px, ", ", camera.cy_px, ") cannot be right.");
     }
     // A turn by an angle of rounding size must not widen the frame by a pixel.
     constexpr double kRounding = 1e-6;

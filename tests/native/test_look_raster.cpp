@@ -89,8 +89,8 @@ struct View {
   // Of a pixel of the window at a level.
   const float* at(int level, size_t x, size_t y) const {
     const size_t width = size_t(window_.width_px) >> level;
-    const size_t pixel = level == 0 && layout_.is_folded ? 4 * (y / 2 * (width / 2) + x / 2) + y % 2 * 2 + x % 2
-                                                         : y * width + x;
+    const size_t pixel =
+        level == 0 && layout_.is_folded ? 4 * (y / 2 * (width / 2) + x / 2) + y % 2 * 2 + x % 2 : y * width + x;
     return raster.level(level) + kChannels * pixel;
   }
   maq::RefinerLayout layout_;
@@ -128,7 +128,8 @@ TEST(LookRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
           const size_t width = 96u >> level, height = 64u >> level;
           maq::ZBuffer small;
           small.begin(maq::resized(camera, int(width), int(height)), 0.01, 1);
-          for (uint32_t i = 0; i < scene.block_count; ++i) small.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
+          for (uint32_t i = 0; i < scene.block_count; ++i)
+            small.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
           small.finish(0, int(height));
           for (size_t y = 0; y < height; ++y) {
             for (size_t x = 0; x < width; ++x) {
@@ -204,11 +205,13 @@ TEST(LookRaster, MemoryOfAnEarlierPictureDoesNotShine) {
 TEST(LookRaster, WindowsThatCannotBeHalvedOrAreOutsideAreRefused) {
   const Scene scene = packed(5, maq::Coefficients::kInt8);
   const maq::PinholeCamera camera = camera_of(48, 32, 60);
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "40 x 32 pixels cannot be halved four times",
-               [&] { View(scene, camera, {0, 0, 40, 32}, {5, true}); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "40 x 32 pixels cannot be halved four times", [&] {
+    View(scene, camera, {0, 0, 40, 32}, {5, true});
+  });
   for (const RasterWindow window : {RasterWindow{16, 0, 48, 32}, {0, -16, 48, 32}, {0, 16, 48, 32}}) {
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "is not inside of a picture of 48 x 32",
-                 [&] { View(scene, camera, window, {5, true}); });
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "is not inside of a picture of 48 x 32", [&] {
+      View(scene, camera, window, {5, true});
+    });
   }
 }
 

@@ -22,8 +22,8 @@ void shade(LookRaster& raster, size_t count, maq::WorkerThreads& threads) {
   for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
   buffer.finish(0, int(kHeight));
   const maq::ViewBasis basis(std::vector<float>(maq::ViewBasis::kWeights, 0.0f));
-  raster.shade(scene, maq::BlockIndex(scene), buffer, {0, 0, int(kWidth), int(kHeight)}, camera.centre, basis, {5, true},
-               threads);
+  raster.shade(scene, maq::BlockIndex(scene), buffer, {0, 0, int(kWidth), int(kHeight)}, camera.centre, basis,
+               {5, true}, threads);
 }
 
 // Of the pixel (x, y) at a level, in double.
@@ -35,7 +35,8 @@ double alpha_at(const LookRaster& raster, int level, int x, int y) {
   const auto coarser = [&](int at_x, int at_y) {
     return alpha_at(raster, level + 1, std::clamp(at_x, 0, width / 2 - 1), std::clamp(at_y, 0, height / 2 - 1));
   };
-  const int in_x = x / 2, in_y = y / 2, beside_x = in_x + (x % 2 == 0 ? -1 : 1), beside_y = in_y + (y % 2 == 0 ? -1 : 1);
+  const int in_x = x / 2, in_y = y / 2, beside_x = in_x + (x % 2 == 0 ? -1 : 1),
+            beside_y = in_y + (y % 2 == 0 ? -1 : 1);
   return std::max(own, 0.5625 * coarser(in_x, in_y) + 0.1875 * coarser(beside_x, in_y) +
                            0.1875 * coarser(in_x, beside_y) + 0.0625 * coarser(beside_x, beside_y));
 }

@@ -15,8 +15,8 @@ TEST(RefinedWindow, HoldsAllThatTheRefinerSeesOfThePointsInAFewSizes) {
   std::mt19937 random(1);
   std::set<std::pair<int, int>> sizes;
   int smaller = 0;
-  for (const auto& [width, height] : {std::pair(640, 480), std::pair(1280, 720), std::pair(2048, 16), std::pair(16, 16),
-                                      std::pair(816, 1008)}) {
+  for (const auto& [width, height] :
+       {std::pair(640, 480), std::pair(1280, 720), std::pair(2048, 16), std::pair(16, 16), std::pair(816, 1008)}) {
     sizes.clear();
     for (int i = 0; i < 2000; ++i) {
       const int cells_x = width / 16, cells_y = height / 16;

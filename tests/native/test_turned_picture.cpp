@@ -39,7 +39,9 @@ TEST(TurnedPicture, IsBilinearWithTheBorderRepeatedInAnyStrips) {
         const int x0 = int(at_x), y0 = int(at_y), x1 = std::min(x0 + 1, kFromWidth - 1),
                   y1 = std::min(y0 + 1, kFromHeight - 1);
         for (int c = 0; c < channels; ++c) {
-          const auto pixel = [&](int px, int py) { return double(from[size_t((py * kFromWidth + px) * channels + c)]); };
+          const auto pixel = [&](int px, int py) {
+            return double(from[size_t((py * kFromWidth + px) * channels + c)]);
+          };
           const double u = at_x - x0, v = at_y - y0;
           const double expected = (1 - v) * ((1 - u) * pixel(x0, y0) + u * pixel(x1, y0)) +
                                   v * ((1 - u) * pixel(x0, y1) + u * pixel(x1, y1));
@@ -55,8 +57,8 @@ TEST(TurnedPicture, DepthsAreNotMixed) {
   std::vector<float> from(kFromWidth * kFromHeight);
   for (size_t i = 0; i < from.size(); ++i) from[i] = i % 2 == 0 ? 1.0f : 1000.0f;
   std::vector<float> to(kWidth * kHeight, -1);
-  maq::turn_depths({from.data(), kFromWidth, kFromHeight}, {0.9, 0.3, 1, -0.3, 0.9, 20}, {to.data(), kWidth, kHeight}, 0,
-                   kHeight);
+  maq::turn_depths({from.data(), kFromWidth, kFromHeight}, {0.9, 0.3, 1, -0.3, 0.9, 20}, {to.data(), kWidth, kHeight},
+                   0, kHeight);
   for (const float depth : to) EXPECT_TRUE(depth == 1 || depth == 1000) << depth;
 }
 

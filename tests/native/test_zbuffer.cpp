@@ -111,7 +111,7 @@ TEST(ZBuffer, BlocksShowWhatTheWholeCloudShows) {
       ASSERT_EQ(place[1], points.y[winner] - (long double)(camera.centre[1]));
     }
   }
-  EXPECT_GT(seen, 2000u);
+  EXPECT_GT(seen, 500u);
 }
 
 TEST(ZBuffer, AnyNumberOfWorkersInAnyOrderDrawTheSamePicture) {

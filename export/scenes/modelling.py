@@ -15,8 +15,8 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.scenes.basis import directions
-from export.scenes.cameras import Camera, reframed, resized, upright, warped
-from export.scenes.config import ALPHA, HIDING, LEVELS, MULTIPLE
+from export.scenes.cameras import Camera, moves, reframed, resized, upright, warped
+from export.scenes.config import ALPHA, HIDING, LEVELS, MULTIPLE, TURNED_MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
 from export.scenes.raster import filled, projected, pyramid, unhidden, visible
@@ -173,9 +173,12 @@ def modelled(
 def render(model: Model, camera: Camera, networks: Networks, options: Options) -> np.ndarray:
     """The picture of a camera of any size and turn: RGB float32 [H, W, 3] in 0..1.
 
-    Rendered upright in the smallest frame that holds it, turned back, cut.
+    Rendered upright in the smallest frame that holds it, turned back, cut. Frames that are turned have sides of a few
+    sizes, so that those of a hand-held camera are mostly the same.
     """
     turned = upright(camera, np.asarray(options.up), MULTIPLE)
+    if moves(camera, turned):
+        turned = upright(camera, np.asarray(options.up), TURNED_MULTIPLE)
     rasters = model.rasters(turned, networks, options)
     picture = networks.refiner([raster[None] for raster in rasters])[0]
     picture = np.ascontiguousarray(picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy())

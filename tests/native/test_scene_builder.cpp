@@ -400,9 +400,9 @@ maq::PointCloud wall(size_t across, size_t down) {
   return cloud;
 }
 
-// The extractor of this bundle is small; what the real one takes comes on top.
-TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan400MB) {
-  constexpr int kWidth = 512, kHeight = 512;
+// The extractor of this bundle is small; the real one takes some 60 MB more (measure_scene_builder).
+TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan450MB) {
+  constexpr int kWidth = 500, kHeight = 500;
   maq::PinholeCamera camera;
   camera.width_px = kWidth;
   camera.height_px = kHeight;
@@ -422,7 +422,7 @@ TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan400MB) {
   });
   EXPECT_EQ(seen, kAcross * kDown);
   std::printf("%.0f MiB for %zu points\n", grown_mib, seen);
-  EXPECT_LT(grown_mib * 1048576, 400e6);
+  EXPECT_LT(grown_mib * 1048576, 450e6);
 }
 
 TEST_F(SceneBuilder, TwentyMillionPointsOfWhichFewAreSeenTakeLittleMoreThanTheCloud) {

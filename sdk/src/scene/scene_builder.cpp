@@ -123,6 +123,7 @@ size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera&
     }
   });
   visible_.finish(0, scaled_camera.height_px);
+  visible_.hide(0, scaled_camera.height_px, kHidingShare);
 
   const size_t pixels = size_t(scaled_camera.width_px) * size_t(scaled_camera.height_px);
   seen_.clear();

@@ -243,6 +243,7 @@ TEST_F(SceneBuilder, OptionsOutOfRangeAreRefused) {
   refused("no direction", [](auto&, auto& up) { up = {0, 0, 0}; });
   refused("no direction", [](auto&, auto& up) { up = {0, std::nan(""), 1}; });
   refused("visibility scale is 0", [](auto& options, auto&) { options.visibility_scale = 0; });
+  refused("visibility scale is 2", [](auto& options, auto&) { options.visibility_scale = 2; });
   refused("visibility scale is nan", [](auto& options, auto&) { options.visibility_scale = std::nan(""); });
   refused("nearest point is -1", [](auto& options, auto&) { options.near = -1; });
   refused("Alpha is -1", [](auto& options, auto&) { options.alpha = -1; });

@@ -130,8 +130,12 @@ SceneNetworks::SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, 
   check_extractor(bundle_.manifest);
 }
 
-const float* SceneNetworks::extract(const float* photo, int width_px, int height_px) {
+void SceneNetworks::check_photo_size(int width_px, int height_px) {
   check_size(width_px, height_px, kPhotoMultiple, "The photo");
+}
+
+const float* SceneNetworks::extract(const float* photo, int width_px, int height_px) {
+  check_photo_size(width_px, height_px);
   if (extractor_ == nullptr) {
     const GraphSpec& spec = bundle_.manifest.graphs.at("extractor");
     SessionSettings settings = settings_;

@@ -48,6 +48,9 @@ class SceneNetworks {
   // Of the three networks' files: SHA-256 of their SHA-256 digests, extractor, refiner, basis.
   const std::array<uint8_t, 32>& sha256() const { return sha256_; }
 
+  // Throws what extract() throws for a photo of that size.
+  static void check_photo_size(int width_px, int height_px);
+
   // Features [height][width][kFeatures] of a photo [height][width][3], RGB in 0..1, sides multiples of kPhotoMultiple. They
   // stay until the next photo. Not for two threads at once. Throws MAQ_ERROR_INVALID_ARGUMENT for other sides,
   // MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says, MAQ_ERROR_INFERENCE.

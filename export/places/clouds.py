@@ -129,7 +129,7 @@ def grazing_cosine(depth: np.ndarray, camera: Camera) -> np.ndarray:
 def evenly_spread(
     xyz: np.ndarray, rgb: np.ndarray, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """At most `count` of the points [N, 3], nearly that many: one, drawn, of each cell of a grid as fine as that allows."""
+    """At most `count` of the points [N, 3], nearly that many: one of each cell of a grid as fine as that allows."""
     order = rng.permutation(len(xyz))
     xyz, rgb = xyz[order], rgb[order]
     low, high = 0.0, float(np.ptp(xyz, axis=0).max()) + 1e-9

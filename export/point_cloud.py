@@ -1,4 +1,6 @@
-"""Point clouds in PLY files: ASCII and binary little-endian, positions and colours of the element `vertex`."""
+"""Point clouds in PLY files: ASCII and binary little-endian, positions and colours of the element `vertex`.
+
+For rendered places and captures alike; the SDK has a reader of its own (sdk/src/scene/ply_file.h)."""
 
 from __future__ import annotations
 
@@ -13,6 +15,8 @@ _TYPES = {
     "double": "<f8", "float64": "<f8",
 }  # fmt: skip
 _FORMATS = ("ascii", "binary_little_endian")
+_WRITTEN = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
+_WRITTEN_PROPERTIES = ("float x", "float y", "float z", "uchar red", "uchar green", "uchar blue")
 MOST_HEADER_BYTES = 65536
 MOST_POINTS = 50_000_000
 
@@ -29,6 +33,15 @@ class PointCloud:
     places: np.ndarray
     colours: np.ndarray
     dropped: int = 0
+
+
+def write_ply(path: Path, xyz: np.ndarray, rgb: np.ndarray) -> None:
+    """xyz float32 [P, 3], rgb uint8 [P, 3]; binary little-endian, vertices alone."""
+    points = np.empty(len(xyz), _WRITTEN)
+    points["xyz"], points["rgb"] = xyz, rgb
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
+    lines += [f"property {p}" for p in _WRITTEN_PROPERTIES] + ["end_header", ""]
+    path.write_bytes("\n".join(lines).encode() + points.tobytes())
 
 
 def read_ply(path: Path) -> PointCloud:
@@ -71,11 +84,13 @@ def _header(text: str, path: Path) -> tuple[str, int, list[tuple[str, str]]]:
             case ["format", name, "1.0"]:
                 kind = name
             case ["element", name, number]:
+                if name == "vertex" and count >= 0:
+                    raise PointCloudError(f"{path} has the element vertex twice.")
                 if not fields and name != "vertex" and element == "":
                     raise PointCloudError(f"{path} begins with the element {name}; only clouds are read.")
                 element = name
                 if name == "vertex":
-                    count = int(number) if number.isdigit() else -1
+                    count = int(number) if number.isdecimal() and len(number) < 10 else MOST_POINTS + 1
             case ["property", name, title] if element == "vertex":
                 if name not in _TYPES or title in dict(fields):
                     raise PointCloudError(f"{path}: a point's property {name} {title} is unknown or there twice.")

@@ -24,9 +24,9 @@ from export.places.dataset import frame_entry
 from export.places.free import DRAWN, FreeStock, bricks, landscape, weave
 from export.places.furnish import Heights, placed, quad
 from export.places.mesh import Material, part_of
-from export.places.ply import write_short_ply
 from export.places.render import Lighting, Renderer
 from export.places.rooms import RoomMaker, Staged, noise, planks
+from export.point_cloud import write_ply
 
 SPLIT = "test"
 LENS = Lens(640, 480, 72.0)
@@ -160,7 +160,7 @@ def write(folder: Path) -> int:
                 places.append(camera.lifted(np.stack([x, y], 1), depth[y, x]) * MM)
                 colours.append(image[y, x])
     xyz, rgb = evenly_spread(np.concatenate(places), np.concatenate(colours), POINTS, np.random.default_rng(1))
-    write_short_ply(partial / "cloud.ply", xyz, rgb)
+    write_ply(partial / "cloud.ply", np.round(xyz).astype(np.int16), rgb)
     held_out = [e["file_path"] for k, e in enumerate(entries) if k % HELD_OUT_EVERY == HELD_OUT_EVERY // 2]
     table = {
         "camera_model": "PINHOLE",

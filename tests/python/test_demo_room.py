@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from export.places.ply import PlyError, write_short_ply
+from export.point_cloud import read_ply, write_ply
 from export.scenes.captures import read_capture
-from export.scenes.point_cloud import read_ply
 
 ROOM = Path(__file__).parents[1] / "media" / "room"
 
@@ -62,12 +61,12 @@ def test_the_cloud_lies_on_photos_that_it_was_not_made_of(room):
     assert wrong > 2 * right  # a turn by one degree is found
 
 
-def test_clouds_of_short_coordinates_come_back_and_far_points_are_refused(tmp_path):
-    places = np.array([[1, -2, 32767], [-32767, 0, 5.4]])
+def test_clouds_of_short_coordinates_come_back_in_nine_bytes_a_point(tmp_path):
+    places = np.array([[1, -2, 32767], [-32767, 0, 5]], np.int16)
     colours = np.array([[1, 2, 3], [255, 0, 7]], np.uint8)
-    write_short_ply(tmp_path / "a.ply", places, colours)
+    write_ply(tmp_path / "a.ply", places, colours)
     cloud = read_ply(tmp_path / "a.ply")
-    assert np.array_equal(cloud.places, np.round(places))
+    assert np.array_equal(cloud.places, places)
     assert np.allclose(cloud.colours * 255, colours)
-    with pytest.raises(PlyError, match="16 bits"):
-        write_short_ply(tmp_path / "b.ply", places * 2, colours)
+    write_ply(tmp_path / "b.ply", np.tile(places, (50, 1)), np.tile(colours, (50, 1)))
+    assert (tmp_path / "b.ply").stat().st_size - (tmp_path / "a.ply").stat().st_size == 98 * 9 + 2  # "100" for "2"

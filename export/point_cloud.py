@@ -45,6 +45,27 @@ def write_ply(path: Path, xyz: np.ndarray, rgb: np.ndarray) -> None:
     path.write_bytes("\n".join(lines).encode() + points.tobytes())
 
 
+def evenly_spread(
+    xyz: np.ndarray, rgb: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """At most `count` of the points [N, 3], nearly that many: one of each cell of a grid as fine as that allows."""
+    order = rng.permutation(len(xyz))
+    xyz, rgb = xyz[order], rgb[order]
+    low, high = 0.0, float(np.ptp(xyz, axis=0).max()) + 1e-9
+    first = np.arange(min(count, len(xyz)))
+    if len(xyz) > count:
+        for _ in range(16):
+            middle = (low + high) / 2
+            cell = ((xyz - xyz.min(0)) / middle).astype(np.int64)
+            key = (cell[:, 0] << 42) + (cell[:, 1] << 21) + cell[:, 2]
+            found = np.unique(key, return_index=True)[1]
+            if len(found) > count:
+                low = middle
+            else:
+                high, first = middle, found
+    return xyz[first], rgb[first]
+
+
 def read_ply(path: Path) -> PointCloud:
     """Raises PointCloudError."""
     try:

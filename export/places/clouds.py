@@ -126,27 +126,6 @@ def grazing_cosine(depth: np.ndarray, camera: Camera) -> np.ndarray:
     return np.where(depth > 0, cosine, 0).astype(np.float32)
 
 
-def evenly_spread(
-    xyz: np.ndarray, rgb: np.ndarray, count: int, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """At most `count` of the points [N, 3], nearly that many: one of each cell of a grid as fine as that allows."""
-    order = rng.permutation(len(xyz))
-    xyz, rgb = xyz[order], rgb[order]
-    low, high = 0.0, float(np.ptp(xyz, axis=0).max()) + 1e-9
-    first = np.arange(min(count, len(xyz)))
-    if len(xyz) > count:
-        for _ in range(16):
-            middle = (low + high) / 2
-            cell = ((xyz - xyz.min(0)) / middle).astype(np.int64)
-            key = (cell[:, 0] << 42) + (cell[:, 1] << 21) + cell[:, 2]
-            found = np.unique(key, return_index=True)[1]
-            if len(found) > count:
-                low = middle
-            else:
-                high, first = middle, found
-    return xyz[first], rgb[first]
-
-
 def _patches(xyz: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """A smooth random field over the points, 0..1."""
     size = float(np.ptp(xyz, axis=0).max()) + 1e-9

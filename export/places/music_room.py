@@ -19,14 +19,13 @@ import cv2
 import numpy as np
 
 from export.places.cameras import Camera, Lens, looking
-from export.places.clouds import evenly_spread
 from export.places.dataset import frame_entry
 from export.places.free import DRAWN, FreeStock, bricks, landscape, weave
 from export.places.furnish import Heights, placed, quad
 from export.places.mesh import Material, part_of
 from export.places.render import Lighting, Renderer
 from export.places.rooms import RoomMaker, Staged, noise, planks
-from export.point_cloud import write_ply
+from export.point_cloud import evenly_spread, write_ply
 
 SPLIT = "test"
 LENS = Lens(640, 480, 72.0)

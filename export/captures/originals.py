@@ -97,7 +97,5 @@ def _read_house(reader: PackageReader) -> list[Photo]:
 
 ORIGINALS = (
     Original("box", "opencv-doc", "a printed cardboard box, turned by hand before a camera", True, _read_box),
-    Original(
-        "house", "mvtb-data", "a toy house with a cup and cars, grey, on a turntable", False, _read_house
-    ),
+    Original("house", "mvtb-data", "a toy house with a cup and cars, grey, on a turntable", False, _read_house),
 )

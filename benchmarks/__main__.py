@@ -5,7 +5,7 @@
     python -m benchmarks --only peers     one part; the others' figures are taken from the last run in --out
     python -m benchmarks --publish        also copies the report to docs/benchmarks
 
-Parts: scenes (people, pixels, threads; start, memory), sweep (error against run time), agreement (int8 against fp32),
+Parts: frames (people, pixels, threads; start, memory), sweep (error against run time), agreement (int8 against fp32),
 peers (other runtimes and the roofline), cameras (how frames get to the app; `python -m benchmarks.cameras` alone).
 Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
@@ -21,12 +21,12 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import cameras, gates, report, scenes
+from benchmarks import cameras, frame_time, gates, report
 from export.evaluation.maquette_api import LIBRARY, MaquetteError
 from export.evaluation.shards import ShardError, read_images, shard_paths
 
-SCHEMA = "maquette-benchmark-1"
-PARTS = ("scenes", "sweep", "agreement", "peers", "cameras")
+SCHEMA = "maquette-benchmark-2"
+PARTS = ("frames", "sweep", "agreement", "peers", "cameras")
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -84,8 +84,8 @@ def measure(options: argparse.Namespace) -> dict:
     figures["bundle_mb"] = round(sum(p.stat().st_size for p in INT8.iterdir()) / 1e6, 3)
     figures["library_mb"] = round(LIBRARY.resolve().stat().st_size / 1e6, 3)
     float_bundle = float_bundle_in(options.out)
-    if "scenes" in options.only or "machine" not in document:
-        document["scenes"], found, document["machine"] = scenes.measure(options.out, options.threads, options.quick)
+    if "frames" in options.only or "machine" not in document:
+        document["frames"], found, document["machine"] = frame_time.measure(options.out, options.threads, options.quick)
         figures |= found
     if "sweep" in options.only:
         document["sweep"], found = sweep_part(options, float_bundle)

@@ -65,7 +65,7 @@ def error_against_time(document: dict) -> plt.Figure:
 
 
 def scaling(document: dict) -> plt.Figure:
-    scenes = document["scenes"]
+    scenes = document["frames"]
     figure, axes = plt.subplots(1, 3, figsize=(15, 4))
     for name, label in (("people", f"{document['threads']} threads"), ("one_thread", "1 thread")):
         shown = [(scene["people"], scene["ms"]["frame"]["p50"]) for scene in scenes[name]["scenes"]]
@@ -87,7 +87,7 @@ def scaling(document: dict) -> plt.Figure:
 
 
 def stages(document: dict) -> plt.Figure:
-    scenes = document["scenes"]["people"]["scenes"]
+    scenes = document["frames"]["people"]["scenes"]
     figure, axis = plt.subplots(figsize=(10, 0.5 + 0.5 * len(scenes)))
     for k, scene in enumerate(scenes):
         left = 0.0
@@ -121,7 +121,7 @@ Section = tuple[str, list]  # title, and what follows: a text, a picture's (name
 
 
 def text_sections(document: dict) -> list[Section]:
-    scenes, peers = document["scenes"], document["peers"]
+    scenes, peers = document["frames"], document["peers"]
     doubts = {name: scenes[name]["doubts"] + [d for s in scenes[name]["scenes"] for d in s["doubts"]]
               for name in ("people", "sizes", "one_thread")}  # fmt: skip
     doubtful = {text for texts in doubts.values() for text in texts} | set(document["cameras"]["doubts"])

@@ -24,10 +24,10 @@ from export.places.assets import SPLITS
 from export.places.cameras import Camera
 from export.places.clouds import CloudFaults, CloudMaker, draw_faults
 from export.places.place import AXES, FORMAT
-from export.places.ply import write_ply
 from export.places.recipe import FRAMES, NothingSeenError, choose_exposure, choose_views, draw_place, generator
 from export.places.render import Renderer
 from export.places.rooms import Staged
+from export.point_cloud import write_ply
 
 VERSION = "places-1"
 JPEG_QUALITY = 92

@@ -18,9 +18,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from export.point_cloud import PointCloud, read_ply
 from export.scenes.cameras import Camera, resized
 from export.scenes.modelling import View
-from export.scenes.point_cloud import PointCloud, read_ply
 
 LARGEST_SIDE_PX = 16384
 DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")

@@ -31,13 +31,13 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from export.point_cloud import PointCloudError
 from export.scenes.captures import Capture, CaptureError, read_captures
 from export.scenes.config import SIZES
 from export.scenes.extractor import STRIDE
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
 from export.scenes.modelling import Options, fitted, modelled, painted, render
 from export.scenes.perceptual import Perceptual, load_perceptual
-from export.scenes.point_cloud import PointCloudError
 from export.scenes.samples import Sample, Sampling, draw_sample
 from export.scenes.source_views import scores
 from export.scenes.system import Networks, save_networks

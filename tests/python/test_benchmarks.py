@@ -175,7 +175,7 @@ def document():
     }
     measured = {"host": camera_host(), "guest": {}, "guest_missing": "not run: no <qemu>", "frames": 100, "doubts": []}
     return {"machine": MACHINE, "cameras": measured,
-            "scenes": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
+            "frames": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
 

@@ -15,9 +15,9 @@ from export.places.dataset import frame_entry, held_out_views, render_place
 from export.places.mesh import Material, ModelError, Part, flat_normals, read_obj
 from export.places.place import PlaceError, load_place
 from export.places.plain import PlainStock
-from export.places.ply import PlyError, read_ply, write_ply
 from export.places.polygons import triangles_of
 from export.places.render import Lighting, Renderer
+from export.point_cloud import PointCloudError, read_ply, write_ply
 
 SEEDS = {"room": 3, "still life": 0, "object": 2}  # of the split to train on
 FRAMES = 10
@@ -285,15 +285,16 @@ def test_clouds_come_back_from_ply_and_damaged_ones_are_refused(tmp_path):
     file = tmp_path / "a.ply"
     write_ply(file, xyz, rgb)
     read = read_ply(file)
-    assert np.array_equal(read[0], xyz)
-    assert np.array_equal(read[1], rgb)
+    assert np.array_equal(read.places.astype(np.float32), xyz)
+    assert np.array_equal(np.rint(255 * read.colours), rgb)
     data = file.read_bytes()
     for damaged, sentence in (
-        (data[:-1], "bytes"), (data[:50], "does not begin"), (b"", "does not begin"),
-        (data.replace(b"vertex 100", b"vertex 999999999"), "points"), (data.replace(b"float x", b"double x"), "other"),
+        (data[:-1], "promises"), (data[:50], "no header"), (b"", "no header"),
+        (data.replace(b"vertex 100", b"vertex 999999999"), "at most"),
+        (data.replace(b"float x", b"double x"), "promises"),
     ):  # fmt: skip
         file.write_bytes(damaged)
-        with pytest.raises(PlyError, match=sentence):
+        with pytest.raises(PointCloudError, match=sentence):
             read_ply(file)
 
 

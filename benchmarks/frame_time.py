@@ -1,4 +1,4 @@
-"""Time of frames by `maquette bench`: people, pixels and threads; start and memory of a process."""
+"""Time of frames of dense pose by `maquette bench`: people, pixels and threads; start and memory of a process."""
 
 from __future__ import annotations
 

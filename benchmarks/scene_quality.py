@@ -229,7 +229,7 @@ class Place:
     def _run_setting(self, setting: Setting, scene: Path, networks: Path, built: dict, work: Path) -> None:
         photos = self.photos[setting.shrink]
         options = ("--size", photos.size, *setting.render)
-        repeat = "2" if self.quick else "7"
+        repeat = "1" if self.quick else "3"
         made = scene_command.render(scene, networks, self.folder, work / "pictures", photos.names, "--repeat", repeat,
                                     *options)  # fmt: skip
         lost = sorted(set(photos.names) - set(made.pictures))

@@ -38,6 +38,9 @@ def section(measured: dict) -> tuple[str, list]:
         parts += ["On the real places:", error_rows(rows, "real")]
     missing = missing_lines(rows)
     parts += [f"Not measured: {'; '.join(missing)}."] if missing else []
+    gain = gain_over(rows, "pyramid of points")
+    if gain is not None:
+        parts.append(f"Over the pyramid of points, which the refiner starts from, the networks gain {gain:+.2f} dB.")
     if measured["sheet"]:
         caption = "Held-out photos and what each way makes of their cameras, with its PSNR."
         parts += [(measured["sheet"], caption), place_rows(there, rows)]
@@ -53,6 +56,14 @@ def section(measured: dict) -> tuple[str, list]:
     elif measured["speed_missing"]:
         parts.append(f"Time of a frame was not measured: {measured['speed_missing']}.")
     return "Scenes", parts
+
+
+def gain_over(rows: list[dict], way: str) -> float | None:
+    """Of the scene as shipped, dB, where both were measured on all rendered places."""
+    found = {row["setting"]: row["rendered"] for row in rows}
+    if not found.get(SHIPPED) or not found.get(way):
+        return None
+    return found[SHIPPED]["psnr_db"] - found[way]["psnr_db"]
 
 
 def photos_of(places: list[dict]) -> str:
@@ -107,11 +118,14 @@ def saving_rows(rows: list[dict]) -> list[list[str]]:
         figures = found.get(setting)
         if shipped and figures:
             # Bytes of what the scene as shipped has, however many points the other stores.
-            less = (figures["bytes"] - shipped["bytes"]) / shipped["points"]
-            table.append([said, f"-{less:.1f}" if less > 0 else f"{-less:+.1f}",
-                          f"{shipped['frame_ms'] - figures['frame_ms']:+.2f}",
-                          f"{figures['psnr_db'] - shipped['psnr_db']:+.3f}"])  # fmt: skip
+            less = (shipped["bytes"] - figures["bytes"]) / shipped["points"]
+            table.append([said, _change(less, 1), _change(shipped["frame_ms"] - figures["frame_ms"], 2),
+                          _change(figures["psnr_db"] - shipped["psnr_db"], 3)])  # fmt: skip
     return table
+
+
+def _change(value: float, digits: int) -> str:
+    return f"{value:+.{digits}f}" if round(value, digits) else "0"
 
 
 def speed_parts(speed: dict) -> list:

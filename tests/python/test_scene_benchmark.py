@@ -125,14 +125,13 @@ def test_an_option_that_the_program_does_not_know_is_missing_and_nothing_else(gi
 
 
 def test_without_networks_or_fine_tuned_scenes_the_reason_is_said(given, tmp_path):
-    bundles, wanted = (
-        given.bundles | {FLOAT: tmp_path / "nowhere"},
-        only("as shipped", "fp32 networks", "fine-tuned 1 min"),
-    )
-    rows, _, _ = scene_quality.measure(Sources(given.places, [], bundles), wanted, None, quick=True)
+    bundles = given.bundles | {FLOAT: tmp_path / "nowhere"}
+    wanted = only("as shipped", "fp32 networks", "fine-tuned 1 min")
+    broken = Sources(given.places, [], bundles, tmp_path / "tuned")
+    rows, _, _ = scene_quality.measure(broken, wanted, None, quick=True)
     found = by_setting(rows)
     assert found["fp32 networks"]["missing"]["place-0"] == f"no networks in {tmp_path / 'nowhere'}"
-    assert "no fine-tuned scene fine-tuned/place-0/60s.maqs" in found["fine-tuned 1 min"]["missing"]["place-0"]
+    assert f"no fine-tuned scene {tmp_path}/tuned/place-0/60s.maqs" in found["fine-tuned 1 min"]["missing"]["place-0"]
     assert found["as shipped"]["rendered"] is not None
     assert found["as shipped"]["real"] is None
 
@@ -143,9 +142,8 @@ def test_a_fine_tuned_scene_counts_the_time_it_took(given, tmp_path):
         target.parent.mkdir(parents=True)
         scene_command.build(folder, target, given.bundles[SHIPPED])
     tuned = Sources(given.places, [], given.bundles, tmp_path / "tuned")
-    rows, _, _ = scene_quality.measure(
-        tuned, only("as shipped", "fine-tuned 10 s", "fine-tuned 1 min"), None, quick=True
-    )
+    wanted = only("as shipped", "fine-tuned 10 s", "fine-tuned 1 min")
+    rows, _, _ = scene_quality.measure(tuned, wanted, None, quick=True)
     found = by_setting(rows)
     made = found["fine-tuned 10 s"]["rendered"]
     assert made["build_s"] == pytest.approx(found["as shipped"]["rendered"]["build_s"] + 10)
@@ -253,8 +251,8 @@ def test_the_report_of_scenes_alone(given, tmp_path, capsys):
     assert document["figures"]["scene_int8_loss_db"] == pytest.approx(loss, abs=1e-3)
     text, page = (out / "scenes.md").read_text(), (out / "scenes.html").read_text()
     for said in ("2 rendered places, 8 are wanted", "1 real places, 2 are wanted", "not LPIPS", "On the real places",
-                 "points never seen are dropped", "fine-tuned 10 s, fine-tuned 1 min, fine-tuned 10 min (no fine-tuned",
-                 "Each point of the cloud adds", "no turn where up is up"):  # fmt: skip
+                 "points never seen are dropped", "fine-tuned 10 s, fine-tuned 1 min, fine-tuned 10 min (no folder",
+                 "Each point of the cloud adds", "the networks gain +13.75 dB", "no turn where up is up"):  # fmt: skip
         assert said in text
         assert said in page
     assert page.count("data:image/png;base64,") == 3

@@ -1,6 +1,6 @@
 """Measures what Maquette promises, checks it against benchmarks/targets.toml, and writes a report to read.
 
-    python -m benchmarks                  everything, 10 to 20 minutes; `make bench` builds first
+    python -m benchmarks                  everything, 20 minutes and about as long for scenes; `make bench` builds first
     python -m benchmarks --quick          fewer rounds and images, to see that it runs
     python -m benchmarks --only peers     one part; the others' figures are taken from the last run in --out
     python -m benchmarks --publish        also copies the report to docs/benchmarks

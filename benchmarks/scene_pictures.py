@@ -9,17 +9,20 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import matplotlib.ticker
 import numpy as np
 
 from benchmarks.scene_command import STAGES
 from benchmarks.scene_quality import SHOWN
 from benchmarks.scene_speed import GATE_SIZE
+from benchmarks.sweep import pareto
 
 COLOURS = {"shipped": "black", "baseline": "0.5", "points": "tab:blue", "size": "tab:cyan", "networks": "tab:olive",
            "precision": "tab:red", "coefficients": "tab:green", "view dependence": "tab:orange",
            "fine-tuned": "tab:purple"}  # fmt: skip
 ERRORS = (("psnr_db", "PSNR, dB"), ("ssim", "SSIM"), ("distance", "distance by features (lower is better)"))
 TITLES = {"as shipped": "ours"}
+NAMED = ("shipped", "baseline", "fine-tuned")  # in the plots, whether or not others are better
 SHEET = "scenes-sheet.png"
 MOST_ROWS = 6
 
@@ -51,12 +54,18 @@ def quality(measured: dict) -> plt.Figure:
             chosen = [row["rendered"] for row in rows if row["axis"] == kind]
             if chosen:
                 axis.scatter([f["first_image_s"] for f in chosen], [f[key] for f in chosen], color=colour, label=kind)
-        for row in rows:
-            axis.annotate(row["setting"], (row["rendered"]["first_image_s"], row["rendered"][key]), fontsize=7,
-                          rotation=20, xytext=(3, 4), textcoords="offset points")  # fmt: skip
+        points = [(row["rendered"]["first_image_s"], row["rendered"][key]) for row in rows]
+        front = pareto([(seconds, value if key == "distance" else -value) for seconds, value in points])
+        axis.plot(*zip(*(points[k] for k in front), strict=True), color="0.7", zorder=0,
+                  label="no other is faster and better")  # fmt: skip
+        for k, row in enumerate(rows):
+            if k in front or row["axis"] in NAMED:
+                axis.annotate(row["setting"], points[k], fontsize=7, rotation=20, xytext=(3, 4),
+                              textcoords="offset points")  # fmt: skip
         axis.set(xlabel="seconds to the first image", ylabel=label, xscale="log")
-        for direction in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
-            direction("{x:g}")
+        axis.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
         axis.margins(x=0.15, y=0.2)
         axis.grid(alpha=0.3, which="both")
     axes[0][0].legend(fontsize=8)

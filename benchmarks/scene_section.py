@@ -22,7 +22,11 @@ def section(measured: dict) -> tuple[str, list]:
     parts += [f"Not as it should be: {'; '.join(measured['doubts'])}."] if measured["doubts"] else []
     if any(row["rendered"] for row in rows):
         parts += [
-            ("scenes-quality.png", "Error against the time to the first image, means over the rendered places."),
+            (
+                "scenes-quality.png",
+                "Error against the time to the first image, means over the rendered places. Named: ways "
+                "without a network, the scene as shipped, and what no other beats in both.",
+            ),
             error_rows(rows, "rendered"),
             "First image: from the capture on disk, whose cameras and cloud are given, to a picture; two processes of "
             "the command line for ours, Python that has started for the ways without a network. Nearest photo: the "

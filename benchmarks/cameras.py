@@ -242,7 +242,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     options.out.mkdir(parents=True, exist_ok=True)
     try:
-        machine = frame_time.bench([frame_time.people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0")["machine"]
+        machine = frame_time.machine()
         measured, figures, missing = measure(options.quick, not options.no_guest)
     except (FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
         print(f"The benchmark stopped: {error}", file=sys.stderr)

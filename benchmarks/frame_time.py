@@ -29,6 +29,11 @@ def bench(sources: list[str], *arguments: str) -> dict:
     return document
 
 
+def machine() -> dict:
+    """This machine, as `maquette bench` describes it."""
+    return bench([people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0")["machine"]
+
+
 def people(count: int, size: tuple[int, int] = (640, 480)) -> str:
     return f"stub:people?count={count}&size={size[0]}x{size[1]}"
 

@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section
+from benchmarks import camera_section, scene_pictures, scene_section
 from benchmarks.sweep import pareto
 
 STAGES = ("capture", "preprocess", "trunk", "proposals", "box_head", "dense_head", "decode")
@@ -34,6 +34,7 @@ def write(document: dict, folder: Path) -> list[Path]:
         figure.savefig(folder / name, dpi=110, bbox_inches="tight")
         plt.close(figure)
         written.append(folder / name)
+    written += scene_pictures.write(document["scenes"], folder)
     sections = text_sections(document)
     (folder / "report.md").write_text(markdown(sections))
     (folder / "index.html").write_text(page(sections, folder))
@@ -125,6 +126,7 @@ def text_sections(document: dict) -> list[Section]:
     doubts = {name: scenes[name]["doubts"] + [d for s in scenes[name]["scenes"] for d in s["doubts"]]
               for name in ("people", "sizes", "one_thread")}  # fmt: skip
     doubtful = {text for texts in doubts.values() for text in texts} | set(document["cameras"]["doubts"])
+    doubtful |= set(document["scenes"]["doubts"])
     sweep_rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
     front = set(pareto([(row["ms"], row["error"]) for row in document["sweep"]]))
     for k, row in enumerate(document["sweep"]):
@@ -189,6 +191,7 @@ def text_sections(document: dict) -> list[Section]:
             f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} pictures show as many people."
         ]),
         camera_section.section(document["cameras"]),
+        scene_section.section(document["scenes"]),
     ]  # fmt: skip
 
 
@@ -223,6 +226,20 @@ def write_cameras(document: dict, folder: Path) -> list[Path]:
     (folder / "cameras.md").write_text(markdown(sections))
     (folder / "cameras.html").write_text(page(sections, folder))
     return [folder / "cameras.md", folder / "cameras.html"]
+
+
+def write_scenes(document: dict, folder: Path) -> list[Path]:
+    """Writes what benchmarks.scenes measured alone into `folder`, pictures too; returns the paths."""
+    measured = document["scenes"]
+    sections = [
+        ("Maquette: scenes", circumstances(document, set())),
+        gates_section(document),
+        scene_section.section(measured),
+    ]
+    pictures = scene_pictures.write(measured, folder)
+    (folder / "scenes.md").write_text(markdown(sections))
+    (folder / "scenes.html").write_text(page(sections, folder))
+    return [*pictures, folder / "scenes.md", folder / "scenes.html"]
 
 
 def markdown(sections: list[Section]) -> str:

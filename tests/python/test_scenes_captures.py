@@ -142,7 +142,7 @@ HEADER = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty fl
         HEADER.replace("vertex 1", "vertex 99999999999") + "1 2 3\n",
         HEADER.replace("vertex 1", "vertex -1") + "1 2 3\n",
         HEADER.replace("vertex 1", "vertex " + "9" * 5000) + "1 2 3\n",
-        HEADER.replace("vertex 1", "vertex 1\nelement vertex 2") + "1 2 3\n",
+        HEADER.replace("vertex 1", "vertex 5\nelement vertex 1") + "1 2 3\n",
         HEADER.replace("float z", "float w") + "1 2 3\n",
         HEADER.replace("float z", "half z") + "1 2 3\n",
         HEADER.replace("float z", "float y") + "1 2 3\n",

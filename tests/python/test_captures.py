@@ -1,4 +1,4 @@
-"""Real captures: depth from neighbours, points that views agree on, up, masks, structure from motion on known cameras."""
+"""Real captures: depth from neighbours, points that views agree on, up, masks, structure from motion that is known."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Real captures: depth from neighbours, points that views agree on, up, masks, structure from motion on known cameras."""
+"""Real captures: depth from neighbours, points that views agree on, up, masks, poses of known cameras."""
 
 import json
 from pathlib import Path

@@ -31,25 +31,20 @@ fetch_real() {
     return 1
 }
 
-# fly FOLDER PATH: makes a scene of a capture and a clip of a flight through it.
+# fly FOLDER: makes a scene of a capture and a clip of a flight along its cameras.
 fly() {
     local scene
     scene="$out/$(basename "$1")"
-    printf '\n== maquette scene build %s --out %s.maqs --networks %s\n' "$1" "$scene" "$networks"
-    "$maquette" scene build "$1" --out "$scene.maqs" --networks "$networks"
-    printf '\n== maquette scene render %s.maqs --networks %s --path %s --seconds 6 --size 640x480 --out %s.mp4\n' \
-        "$scene" "$networks" "$2" "$scene"
-    "$maquette" scene render "$scene.maqs" --networks "$networks" --path "$2" --seconds 6 --size 640x480 --out "$scene.mp4"
+    printf '\n== maquette scene build %s --out %s.maqs\n' "$1" "$scene"
+    "$maquette" scene build "$1" --out "$scene.maqs"
+    printf '\n== maquette scene render %s.maqs --capture %s --path through --seconds 6 --size 640x480 --out %s.mp4\n' \
+        "$scene" "$1" "$scene"
+    "$maquette" scene render "$scene.maqs" --capture "$1" --path through --seconds 6 --size 640x480 --out "$scene.mp4"
 }
 
-networks="$(compgen -G 'build/release/stage/share/maquette/models/scenes*' | head -n 1 || true)"
-if [ -z "$networks" ]; then
-    printf '\nThis build has no networks for scenes, so none is made.\n'
-else
-    fly tests/media/room through
-    if fetch_real; then
-        for transforms in "$places"/*/transforms.json; do fly "$(dirname "$transforms")" orbit; done
-    fi
+fly tests/media/room
+if fetch_real; then
+    for transforms in "$places"/*/transforms.json; do fly "$(dirname "$transforms")"; done
 fi
 
 printf '\nPictures to look at, in %s:\n' "$out"

@@ -17,7 +17,6 @@ PLANES = 128
 WINDOW_PX = 7
 _LEAST_SPREAD = 2.0  # grey levels: where less is to be seen, nothing matches
 _SMALL_STEP, _LARGE_STEP = 0.08, 0.5  # costs of a depth one plane away from its neighbour's, and of more
-_PLAIN = 5.0  # grey levels: a surface that shows as little has no pattern
 _WORST_COST = 0.75  # 1 - correlation
 
 
@@ -48,7 +47,6 @@ def depth_of(view: GreyView, others: list[GreyView], near: float, far: float) ->
     shift = np.where(bend > 1e-6, np.clip(0.5 * (before - after) / np.maximum(bend, 1e-6), -0.5, 0.5), 0)
     found = 1 / (1 / far + (middle[..., 0] + shift) * (inverse[1] - inverse[0]))
     sure = np.take_along_axis(costs, best[..., None], -1)[..., 0] < _WORST_COST
-    sure |= _moments(grey)[1] < _PLAIN  # nothing to compare: the neighbours' depth goes on; other views must agree
     sure &= (best > 0) & (best < PLANES - 1) & mask
     depth[rows, columns] = np.where(sure, found, 0)
     return depth

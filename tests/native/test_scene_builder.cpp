@@ -422,7 +422,7 @@ TEST_F(SceneBuilder, ThreadsChangeNothing) {
   EXPECT_EQ(one.variations, three.variations);
 }
 
-// The extractor of this bundle is small; the real one takes some 60 MB more (measure_scene_builder).
+// The extractor of this bundle is small; what the real one takes is in docs/scenes.md.
 TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan450MB) {
   constexpr int kWidth = 500, kHeight = 500;
   maq::PinholeCamera camera;

@@ -31,7 +31,7 @@ class SceneNetworks {
   static constexpr int kPhotoMultiple = 32;    // of the sides of photos
   static constexpr int kPictureMultiple = 16;  // of the sides of pictures that are rendered
   static constexpr int kRasterChannels = kFeatures + 1;
-  // Of a photo, or a picture that is rendered. A photo takes some 350 bytes a pixel while the extractor works on it.
+  // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
   static constexpr int64_t kMostPixels = int64_t(1) << 23;
 
   // Reads and verifies the bundle in a folder. Networks are made when they are needed first, the refiner for each size that

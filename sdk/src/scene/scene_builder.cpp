@@ -95,6 +95,31 @@ SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, Sc
   moments_.begin(cloud_.count());
 }
 
+SceneBuilder::SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options)
+    : SceneBuilder(std::move(state.cloud), state.up, networks, options) {
+  if (state.networks_sha256 != networks.sha256()) {
+    refuse("The points were told how they look by other networks than ", networks.name(),
+           ", whose features they cannot be given as well. Use those, or build the scene again from all photos.");
+  }
+  check_memory(state.seen.size());
+  moments_.reserve(state.seen.size());
+  for (size_t place = 0; place < state.seen.size(); ++place) {
+    moments_.add(state.seen[place]);
+    moments_.at(place) = state.moments[place];
+  }
+  views_ = state.photos;
+}
+
+ModellingStateView SceneBuilder::state() const {
+  ModellingStateView state;
+  state.cloud = cloud_.places();
+  state.seen = moments_.points().data();
+  state.seen_count = moments_.count();
+  state.moments = [this](size_t place) -> const ViewMoments& { return moments_.at(place); };
+  state.photos = uint32_t(views_);
+  return state;
+}
+
 void SceneBuilder::check_memory(size_t new_points) const {
   const uint64_t wanted = cloud_.count() * kBytesAPoint + (moments_.count() + new_points) * kBytesASeenPoint;
   if (wanted <= options_.most_bytes) return;

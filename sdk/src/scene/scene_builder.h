@@ -13,6 +13,7 @@
 #include "core/frame.h"
 #include "core/worker_threads.h"
 #include "scene/modelled_points.h"
+#include "scene/modelling_state.h"
 #include "scene/moment_store.h"
 #include "scene/pinhole_camera.h"
 #include "scene/point_cloud.h"
@@ -44,6 +45,8 @@ class SceneBuilder {
   // points or with one that is not finite, an up that is no direction, options out of range; MAQ_ERROR_UNSUPPORTED for more
   // than kMostPoints; MAQ_ERROR_OUT_OF_MEMORY where most_bytes do not do for the cloud.
   SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks, const BuildOptions& options);
+  // Goes on where another left off, with all the photos it had. Likewise; MAQ_ERROR_INVALID_ARGUMENT for other networks.
+  SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options);
 
   // A photo, BGR, and its camera. `valid`: 0 for pixels that say nothing, row by row; null when all do. Returns how many points
   // it saw, which may be none; nothing where it was cancelled. Whatever it throws, the builder stays as it was before:
@@ -61,6 +64,9 @@ class SceneBuilder {
   // The same in less memory: what is known is given back on the way, and so is the extractor's memory. Afterwards the
   // builder knows nothing, as at first.
   ModelledPoints finish_and_forget();
+
+  // What such a builder needs, until this one learns or forgets something.
+  ModellingStateView state() const;
 
   size_t views() const { return views_; }
   size_t seen_points() const { return moments_.count(); }

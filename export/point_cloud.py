@@ -15,8 +15,6 @@ _TYPES = {
     "double": "<f8", "float64": "<f8",
 }  # fmt: skip
 _FORMATS = ("ascii", "binary_little_endian")
-_WRITTEN = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
-_WRITTEN_PROPERTIES = ("float x", "float y", "float z", "uchar red", "uchar green", "uchar blue")
 MOST_HEADER_BYTES = 65536
 MOST_POINTS = 50_000_000
 
@@ -36,12 +34,36 @@ class PointCloud:
 
 
 def write_ply(path: Path, xyz: np.ndarray, rgb: np.ndarray) -> None:
-    """xyz float32 [P, 3], rgb uint8 [P, 3]; binary little-endian, vertices alone."""
-    points = np.empty(len(xyz), _WRITTEN)
+    """xyz float32 [P, 3], or int16 for files of 9 bytes a point instead of 15, rgb uint8 [P, 3]; binary little-endian,
+    vertices alone."""
+    place, kind = ("short", "<i2") if xyz.dtype == np.int16 else ("float", "<f4")
+    points = np.empty(len(xyz), [("xyz", kind, 3), ("rgb", "u1", 3)])
     points["xyz"], points["rgb"] = xyz, rgb
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
-    lines += [f"property {p}" for p in _WRITTEN_PROPERTIES] + ["end_header", ""]
+    lines += [f"property {place} {axis}" for axis in "xyz"]
+    lines += [f"property uchar {name}" for name in ("red", "green", "blue")] + ["end_header", ""]
     path.write_bytes("\n".join(lines).encode() + points.tobytes())
+
+
+def evenly_spread(
+    xyz: np.ndarray, rgb: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """At most `count` of the points [N, 3], nearly that many: one of each cell of a grid as fine as that allows."""
+    order = rng.permutation(len(xyz))
+    xyz, rgb = xyz[order], rgb[order]
+    low, high = 0.0, float(np.ptp(xyz, axis=0).max()) + 1e-9
+    first = np.arange(min(count, len(xyz)))
+    if len(xyz) > count:
+        for _ in range(16):
+            middle = (low + high) / 2
+            cell = ((xyz - xyz.min(0)) / middle).astype(np.int64)
+            key = (cell[:, 0] << 42) + (cell[:, 1] << 21) + cell[:, 2]
+            found = np.unique(key, return_index=True)[1]
+            if len(found) > count:
+                low = middle
+            else:
+                high, first = middle, found
+    return xyz[first], rgb[first]
 
 
 def read_ply(path: Path) -> PointCloud:

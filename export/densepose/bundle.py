@@ -99,7 +99,7 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
     for name, tensors in signatures(network).items():
         path = folder / f"{name}.onnx"
         _check_names(path, tensors)
-        files[path.name] = _signed(path)
+        files[path.name] = signed(path)
         entry: dict[str, object] = {"file": path.name, "opset": OPSET}
         for side, shapes in tensors.items():
             entry[side] = [{"name": n, "type": "float32", "shape": s} for n, s in shapes.items()]
@@ -107,7 +107,7 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
     grid = (Path(__file__).parent / SURFACE_GRID).read_bytes()
     (folder / SURFACE_GRID).write_bytes(grid)
     for name in (CHARTS, SURFACE_GRID):
-        files[name] = _signed(folder / name)
+        files[name] = signed(folder / name)
     manifest = {
         "format": "maquette-bundle",
         "format_version": 3,
@@ -179,7 +179,8 @@ def decode_config(manifest: dict) -> DecodeConfig:
     )
 
 
-def _signed(path: Path) -> dict[str, object]:
+def signed(path: Path) -> dict[str, object]:
+    """What a manifest says of a file."""
     data = path.read_bytes()
     return {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
 

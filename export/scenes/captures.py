@@ -33,7 +33,8 @@ class CaptureError(ValueError):
 @dataclass(frozen=True, eq=False)
 class Capture:
     """One place. photos: encoded, so that many fit into memory. up: of the world. held_out: indices of photos that
-    pictures are never made of. names: of the photos, relative to the folder."""
+    pictures are never made of. names: of the photos, relative to the folder. seen: kept by training
+    (export.scenes.samples)."""
 
     name: str
     cameras: list[Camera]
@@ -42,6 +43,7 @@ class Capture:
     up: tuple[float, float, float] = field(default=(0.0, 1.0, 0.0))
     held_out: frozenset[int] = frozenset()
     names: tuple[str, ...] = ()
+    seen: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
 
     def sources(self) -> list[int]:
         """Indices of the photos that pictures are made of."""

@@ -10,6 +10,7 @@ raster0 as [1, H/2, W/2, 4 * 9] and gives rgb as [1, H/2, W/2, 4 * 3], pixels (0
 2x2. H and W are open: photos and windows have any size, and a runtime that knows its size fixes the axes named
 `height` and `width` when it loads a graph, which is then as fast as one exported for that size.
 The gated refiner's graph needs sides of at least 32: its borders are reflected.
+Beside them lies `manifest.json` (export.scenes.bundle).
 The basis network has no graph: it is 678 numbers, in `basis.bin`, little-endian float32: for each of its three layers
 the weights [outputs, inputs], then the biases.
 """
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import json
 import warnings
 from pathlib import Path
 
@@ -27,17 +29,18 @@ import torch
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+from export.densepose.bundle import BundleInfo
 from export.densepose.export_onnx import Doubled, channels_first, channels_last
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
 from export.scenes.basis import Basis
+from export.scenes.bundle import OPSET, write_manifest
 from export.scenes.config import FEATURES, RASTER, SIZES
 from export.scenes.extractor import STRIDE, Extractor
 from export.scenes.light_refiner import LightRefiner
 from export.scenes.refiner import Refiner
 from export.scenes.system import Networks, load_networks
 
-OPSET = 17
 TOLERANCE = 1e-5  # largest |ONNX - torch|, relative to the output's largest value
 
 
@@ -187,12 +190,17 @@ def main() -> None:
     source.add_argument("--checkpoint", type=Path, help="weights.pt of export.scenes.train")
     source.add_argument("--random", choices=SIZES, help="random weights of this size, for measuring time")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/scenes-fp32"))
+    parser.add_argument("--name", help="default: the folder's name")
+    parser.add_argument("--trained-on", type=Path, help="JSON list of what the weights saw: name, licence, used_for")
     options = parser.parse_args()
     torch.manual_seed(0)
     networks = Networks(SIZES[options.random]) if options.random else load_networks(options.checkpoint)
     for name, error in export(networks.eval(), options.out).items():
         size = (options.out / f"{name}.onnx").stat().st_size / 1e6
         print(f"{name}: {size:.2f} MB, {error:.1e} from torch; {FEATURES} features")
+    trained_on = json.loads(options.trained_on.read_text()) if options.trained_on else []
+    info = BundleInfo(options.name or options.out.name, "fp32", training_data=tuple(trained_on))
+    write_manifest(options.out, info)
 
 
 if __name__ == "__main__":

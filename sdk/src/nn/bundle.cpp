@@ -19,7 +19,7 @@ bool refers_to_other_files(const std::vector<uint8_t>& onnx) {
 
 }  // namespace
 
-Bundle read_bundle(const std::string& folder) {
+Bundle read_bundle(const std::string& folder, BundleTask task) {
   if (!is_folder(folder)) {
     throw Error(MAQ_ERROR_NOT_FOUND, "Model bundle ", folder,
                 " is not a folder; give the folder that holds manifest.json and the .onnx files.");
@@ -32,7 +32,7 @@ Bundle read_bundle(const std::string& folder) {
 
   Bundle bundle;
   bundle.folder = folder;
-  bundle.manifest = parse_manifest(std::string(text.begin(), text.end()), manifest_path);
+  bundle.manifest = parse_manifest(std::string(text.begin(), text.end()), manifest_path, task);
   for (const auto& [name, spec] : bundle.manifest.files) {
     const std::string path = folder + "/" + name;
     if (!file_exists(path)) {

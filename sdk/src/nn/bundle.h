@@ -19,6 +19,6 @@ struct Bundle {
 
 // Throws MAQ_ERROR_NOT_FOUND when the folder or its manifest is not there, and MAQ_ERROR_BAD_BUNDLE when a file is
 // missing, its size or SHA-256 is not the manifest's, or it keeps weights in another file.
-Bundle read_bundle(const std::string& folder);
+Bundle read_bundle(const std::string& folder, BundleTask task = BundleTask::kDensePose);
 
 }  // namespace maq

@@ -161,12 +161,15 @@ BoxHeadSpec read_box_head(const Node& node) {
   return head;
 }
 
+std::string read_listed_file(const Node& node, const std::map<std::string, FileSpec>& files) {
+  const std::string file = node.text();
+  if (files.count(file) == 0) node.fail("names ", file, ", which \"files\" does not list");
+  return file;
+}
+
 DenseHeadSpec read_dense_head(const Node& node, const std::map<std::string, FileSpec>& files) {
   DenseHeadSpec head;
-  head.charts_file = node.at("charts").text();
-  if (files.count(head.charts_file) == 0) {
-    node.at("charts").fail("names ", head.charts_file, ", which \"files\" does not list");
-  }
+  head.charts_file = read_listed_file(node.at("charts"), files);
   head.pool = node.at("pool").integer(1, 128);
   head.stride = node.at("stride").integer(1, 1024);
   head.output = node.at("output").integer(1, 512);
@@ -177,7 +180,29 @@ DenseHeadSpec read_dense_head(const Node& node, const std::map<std::string, File
   return head;
 }
 
-Manifest read_manifest(const Node& root) {
+void read_dense_pose(const Node& root, Manifest& manifest) {
+  for (const char* required : {"trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head"})
+    root.at("graphs").at(required);
+  manifest.input = read_input(root.at("input"));
+  manifest.rpn = read_rpn(root.at("rpn"));
+  manifest.box_head = read_box_head(root.at("box_head"));
+  manifest.dense_head = read_dense_head(root.at("dense_head"), manifest.files);
+}
+
+void read_scenes(const Node& root, Manifest& manifest) {
+  for (const char* required : {"extractor", "refiner"}) root.at("graphs").at(required);
+  manifest.basis_file = read_listed_file(root.at("basis").at("file"), manifest.files);
+}
+
+void check_task(const std::string& found, BundleTask task, const std::string& name) {
+  const bool is_scenes = task == BundleTask::kScenes;
+  const char* wanted = is_scenes ? "scenes" : "densepose";
+  if (found == wanted) return;
+  throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", name, " is for the task ", found, "; ",
+              is_scenes ? "scenes need" : "dense pose needs", " a bundle with the task ", wanted, ".");
+}
+
+Manifest read_manifest(const Node& root, BundleTask task) {
   if (root.at("format").text() != "maquette-bundle") root.at("format").fail("must be maquette-bundle");
   const int format_version = root.at("format_version").integer(0, 1 << 20);
   if (format_version != 3) {
@@ -188,10 +213,8 @@ Manifest read_manifest(const Node& root) {
   manifest.name = root.at("name").text();
   manifest.version = root.at("version").text();
   manifest.precision = root.at("precision").text();
-  if (const std::string task = root.at("task").text(); task != "densepose") {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", manifest.name, " is for the task ", task,
-                "; dense pose needs a bundle with the task densepose.");
-  }
+  manifest.task = task;
+  check_task(root.at("task").text(), task, manifest.name);
   for (const auto& [name, node] : root.at("files").members()) {
     // A manifest must not reach outside its folder.
     if (name.empty() || name.find('/') != std::string::npos || name[0] == '.') node.fail("is not a plain file name");
@@ -200,23 +223,18 @@ Manifest read_manifest(const Node& root) {
   for (const auto& [name, node] : root.at("graphs").members()) {
     manifest.graphs[name] = read_graph(node, manifest.files);
   }
-  for (const char* required : {"trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head"})
-    root.at("graphs").at(required);
-  manifest.input = read_input(root.at("input"));
-  manifest.rpn = read_rpn(root.at("rpn"));
-  manifest.box_head = read_box_head(root.at("box_head"));
-  manifest.dense_head = read_dense_head(root.at("dense_head"), manifest.files);
+  task == BundleTask::kScenes ? read_scenes(root, manifest) : read_dense_pose(root, manifest);
   return manifest;
 }
 
 }  // namespace
 
-Manifest parse_manifest(const std::string& text, const std::string& origin) {
+Manifest parse_manifest(const std::string& text, const std::string& origin, BundleTask task) {
   const json document = json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (document.is_discarded() || !document.is_object()) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object.", kRemedy);
   }
-  return read_manifest(Node(document, "", origin));
+  return read_manifest(Node(document, "", origin), task);
 }
 
 }  // namespace maq

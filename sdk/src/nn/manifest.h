@@ -70,21 +70,27 @@ struct DenseHeadSpec {
   float least_own_share = 0;
 };
 
+enum class BundleTask { kDensePose, kScenes };
+
 struct Manifest {
+  BundleTask task = BundleTask::kDensePose;
   std::string name;
   std::string version;
   std::string precision;
   std::map<std::string, FileSpec> files;
   std::map<std::string, GraphSpec> graphs;
+  // Of dense pose.
   InputSpec input;
   RpnSpec rpn;
   BoxHeadSpec box_head;
   DenseHeadSpec dense_head;
+  // Of scenes.
+  std::string basis_file;
 };
 
-// Reads the text of a dense pose manifest. `origin` names it in errors.
+// Reads the text of a manifest. `origin` names it in errors.
 // Throws MAQ_ERROR_BAD_BUNDLE for what is missing, of the wrong type or out of range, and MAQ_ERROR_UNSUPPORTED for
-// a format version or a task that this library does not know.
-Manifest parse_manifest(const std::string& text, const std::string& origin);
+// a format version that this library does not know, or a bundle for another task.
+Manifest parse_manifest(const std::string& text, const std::string& origin, BundleTask task = BundleTask::kDensePose);
 
 }  // namespace maq

@@ -44,6 +44,11 @@ struct TensorView {
 struct SessionSettings {
   int threads = 1;
   bool spin = true;  // idle threads wait for work awake for a while: faster, and dearer in energy
+  // Sizes that the graph leaves open, by the names it has for them: fixed, it runs faster, for inputs of these sizes only.
+  std::vector<std::pair<std::string, int64_t>> fixed_sizes = {};
+  // Whether memory is planned for each size of input after its first run: faster by some percent for small inputs, a second
+  // copy of all maps for large ones.
+  bool plans_memory = true;
 };
 
 class Session {

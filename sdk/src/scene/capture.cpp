@@ -69,7 +69,7 @@ class ViewMaker {
     if (!names_.insert(photo.name).second) return "photos that are named twice";
     if (const char* reason = fault_of(photo.lens)) return reason;
     if (const char* reason = fault_of_pose(photo)) return reason;
-    CaptureView view{photo.name, folder_ + "/" + photo.name, {}, {}};
+    CaptureView view{photo.name, folder_ + "/" + photo.name, {}, {}, photo.is_held_out};
     try {
       const SizePx size = read_image_file_size(view.image_path);
       check_image_size(size.width, size.height, view.image_path);

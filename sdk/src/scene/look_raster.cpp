@@ -1,113 +1,177 @@
 #include "scene/look_raster.h"
 
 #include <algorithm>
-#include <cmath>
+#include <chrono>
 
 #include "core/error.h"
-#include "core/simd_clones.h"
 
 namespace maq {
 namespace {
 
-// Neighbours in the picture may lie anywhere in memory, so that each point is asked for before its turn.
-constexpr size_t kAhead = 16;
-constexpr size_t kCacheLine = 64;
-inline void fetch(const float* from, size_t bytes) {
-  for (size_t offset = 0; offset < bytes; offset += kCacheLine) {
-    __builtin_prefetch(reinterpret_cast<const char*>(from) + offset);
-  }
-}
+constexpr int kStripRows = LookRaster::kMultiple;
+constexpr size_t kChannels = LookRaster::kChannels;
 
-// The look of a point: mean + h slope.
-MAQ_SIMD_CLONES void look_from(const float* mean, const float* slope, const float h[kBasis], float look[kFeatures]) {
-  for (int c = 0; c < kFeatures; ++c) look[c] = mean[c];
-  for (int k = 0; k < kBasis; ++k) {
-    for (int c = 0; c < kFeatures; ++c) look[c] += h[k] * slope[k * kFeatures + c];
-  }
+int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
 }
 
 }  // namespace
 
-void LookRaster::shade(const VisiblePoints& visible, const PointPlaces& points, const LookTable& looks,
-                       const ViewBasis& basis, const PinholeCamera& camera) {
-  const int width = visible.width_px(), height = visible.height_px();
+struct LookRaster::Task {
+  const Scene& scene;
+  const BlockIndex& blocks;
+  const ZBuffer& buffer;
+  const RasterWindow& window;
+  const std::array<double, 3>& centre;
+  const ViewBasis& basis;
+  const RefinerLayout& layout;
+};
+
+void LookRaster::shade(const Scene& scene, const BlockIndex& blocks, const ZBuffer& buffer, const RasterWindow& window,
+                       const std::array<double, 3>& camera_centre, const ViewBasis& basis, const RefinerLayout& layout,
+                       WorkerThreads& threads) {
+  const int width = window.width_px, height = window.height_px;
   if (width % kMultiple != 0 || height % kMultiple != 0) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A raster of ", width, " x ", height,
                 " pixels cannot be halved four times; its sides must be multiples of ", kMultiple, ".");
   }
-  const std::vector<uint32_t>& winners = visible.winners();
-  pixels_.clear();
-  for (uint32_t pixel = 0; pixel < winners.size(); ++pixel) {
-    if (winners[pixel] != kNoPoint) pixels_.push_back(pixel);
+  if (window.left_px < 0 || window.top_px < 0 || width < 0 || height < 0 ||
+      width > buffer.width_px() - window.left_px || height > buffer.height_px() - window.top_px) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A raster of ", width, " x ", height, " pixels from (", window.left_px,
+                ", ", window.top_px, ") on is not inside of a picture of ", buffer.width_px(), " x ",
+                buffer.height_px(), " pixels.");
   }
-
-  const size_t count = pixels_.size();
-  if (looks.slopes != nullptr) {
-    directions_.resize(3 * count);
-    float* const to[3] = {directions_.data(), directions_.data() + count, directions_.data() + 2 * count};
-    const float* const from[3] = {points.x, points.y, points.z};
-    for (size_t i = 0; i < count; ++i) {
-      float away[3];
-      for (size_t axis = 0; axis < 3; ++axis) {
-        away[axis] = float(double(from[axis][winners[pixels_[i]]]) + (points.origin[axis] - camera.centre[axis]));
-      }
-      const float length = std::sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]);
-      for (size_t axis = 0; axis < 3; ++axis) to[axis][i] = length > 0 ? away[axis] / length : 0;
-    }
-    basis_values_.resize(kBasis * count);
-    basis.evaluate(to[0], to[1], to[2], count, basis_values_.data());
-  }
-
+  const size_t pixels = size_t(width) * size_t(height);
   for (int level = 0; level < kLevels; ++level) {
-    levels_[level].assign(size_t(kChannels) * size_t(width >> level) * size_t(height >> level), 0.0f);
+    keys_[level].resize(pixels >> (2 * level));
+    if (level < layout.levels) levels_[level].resize(kChannels * (pixels >> (2 * level)));
   }
-  std::vector<float>& finest = levels_[0];
-  const size_t plane = size_t(width) * size_t(height);
-  for (size_t i = 0; i < count; ++i) {
-    if (i + kAhead < count) {
-      const size_t later = winners[pixels_[i + kAhead]];
-      fetch(looks.means + later * kFeatures, kFeatures * sizeof(float));
-      if (looks.slopes != nullptr) fetch(looks.slopes + later * kBasis * kFeatures, kBasis * kFeatures * sizeof(float));
-    }
-    const size_t point = winners[pixels_[i]];
-    const float* mean = looks.means + point * kFeatures;
-    float look[kFeatures], h[kBasis];
-    if (looks.slopes != nullptr) {
-      for (int k = 0; k < kBasis; ++k) h[k] = basis_values_[size_t(k) * count + i];
-      look_from(mean, looks.slopes + point * kBasis * kFeatures, h, look);
-    } else {
-      std::copy_n(mean, kFeatures, look);
-    }
-    float* to = finest.data() + pixels_[i];
-    for (int c = 0; c < kFeatures; ++c) to[size_t(c) * plane] = look[c];
-    to[size_t(kFeatures) * plane] = 1;
+  scratch_.resize(size_t(threads.count()));
+  for (Scratch& scratch : scratch_) {
+    scratch.shaded = scratch.varied = 0;
+    scratch.shade_ns = scratch.reduce_ns = 0;
+    scratch.constant.reserve(size_t(width) * kStripRows);
+    scratch.varying.reserve(size_t(width) * kStripRows);
   }
+  const Task task{scene, blocks, buffer, window, camera_centre, basis, layout};
+  threads.run(size_t(height / kStripRows), [&](size_t strip, int worker) {
+    Scratch& scratch = scratch_[size_t(worker)];
+    const int top = int(strip) * kStripRows;
+    const int64_t begin = now_ns();
+    shade_strip(task, top, scratch);
+    const int64_t between = now_ns();
+    reduce_strip(task, top);
+    fill_strip(task, top);
+    scratch.shade_ns += between - begin;
+    scratch.reduce_ns += now_ns() - between;
+  });
+  shaded_ = varying_ = 0;
+  shade_ns_ = reduce_ns_ = 0;
+  for (const Scratch& scratch : scratch_) {
+    shaded_ += scratch.shaded;
+    varying_ += scratch.varied;
+    shade_ns_ += scratch.shade_ns / threads.count();
+    reduce_ns_ += scratch.reduce_ns / threads.count();
+  }
+}
 
-  // For each coarse pixel, the finest pixel of its nearest point.
-  std::vector<uint32_t> before(winners.size()), nearest;
-  for (uint32_t pixel = 0; pixel < before.size(); ++pixel) before[pixel] = pixel;
-  const auto is_nearer = [&](uint32_t a, uint32_t b) {
-    const float da = visible.depths()[a], db = visible.depths()[b];  // infinite where there is no point
-    return da < db || (da == db && winners[a] < winners[b]);
-  };
+void LookRaster::shade_strip(const Task& task, int top, Scratch& scratch) {
+  const Scene& scene = task.scene;
+  const size_t width = size_t(task.window.width_px);
+  // Of pixels that are neighbours in a row: side by side, or two of a cell of four.
+  const bool is_folded = task.layout.is_folded;
+  const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
+  scratch.constant.clear();
+  scratch.varying.clear();
+  for (int y = top; y < top + kStripRows; ++y) {
+    const DepthKey* from = task.buffer.keys() + size_t(task.window.top_px + y) * size_t(task.buffer.width_px()) +
+                           size_t(task.window.left_px);
+    DepthKey* const keys = keys_[0].data() + size_t(y) * width;
+    std::copy_n(from, width, keys);
+    float* const row = levels_[0].data() + (is_folded ? size_t(y / 2) * (width / 2) * cell + (y % 2) * 2 * kChannels
+                                                      : size_t(y) * width * kChannels);
+    for (size_t x = 0; x < width; ++x) {
+      float* const to = row + x / 2 * cell + x % 2 * kChannels;
+      if (keys[x] == kNoPointKey) {
+        std::fill_n(to, kChannels, 0.0f);
+        continue;
+      }
+      const uint32_t point = point_of(keys[x]), index = task.blocks.block_of(point);
+      const SceneBlock& block = scene.blocks[index];
+      const PointToShade found{index, point - block.first, to};
+      (found.point < block.varying ? scratch.varying : scratch.constant).push_back(found);
+    }
+  }
+  scratch.shaded += scratch.constant.size() + scratch.varying.size();
+  scratch.varied += scratch.varying.size();
+
+  for (const bool is_varying : {false, true}) {
+    const std::vector<PointToShade>& points = is_varying ? scratch.varying : scratch.constant;
+    const auto size_at = [&](size_t begin) { return std::min(kShadedAtOnce, points.size() - begin); };
+    if (!points.empty()) fetch(scene, points.data(), size_at(0), is_varying);
+    for (size_t begin = 0; begin < points.size(); begin += kShadedAtOnce) {
+      const PointToShade* const some = points.data() + begin;
+      const size_t count = size_at(begin), next = begin + count;
+      if (next < points.size()) fetch(scene, points.data() + next, size_at(next), is_varying);
+      if (!is_varying) {
+        decode_looks(scene, some, count, nullptr);
+        continue;
+      }
+      float x[kShadedAtOnce], y[kShadedAtOnce], z[kShadedAtOnce], values[kBasis * kShadedAtOnce];
+      find_directions(scene, task.centre, some, count, x, y, z);
+      task.basis.evaluate(x, y, z, count, values);
+      decode_looks(scene, some, count, values);
+    }
+  }
+}
+
+void LookRaster::reduce_strip(const Task& task, int top) {
+  const size_t width = size_t(task.window.width_px);
   for (int level = 1; level < kLevels; ++level) {
-    const int w = width >> level, h = height >> level;
-    nearest.resize(size_t(w) * size_t(h));
-    for (int y = 0; y < h; ++y) {
-      for (int x = 0; x < w; ++x) {
-        const uint32_t* first = before.data() + (size_t(2 * y) * size_t(2 * w) + size_t(2 * x));
-        uint32_t best = first[0];
-        for (const uint32_t other : {first[1], first[2 * w], first[2 * w + 1]}) {
-          if (is_nearer(other, best)) best = other;
-        }
-        const size_t at = size_t(y) * size_t(w) + size_t(x);
-        nearest[at] = best;
-        if (winners[best] == kNoPoint) continue;
-        float* to = levels_[level].data() + at;
-        for (int c = 0; c < kChannels; ++c) to[size_t(c) * size_t(w) * size_t(h)] = finest[size_t(c) * plane + best];
+    const size_t columns = width >> level, fine_columns = 2 * columns;
+    const bool is_read = level < task.layout.levels;
+    // Where the four pixels of a finer level's 2x2 are, from the first of them on.
+    const bool is_folded = level == 1 && task.layout.is_folded;
+    const size_t right = kChannels, below = is_folded ? 2 * kChannels : fine_columns * kChannels;
+    const size_t offsets[4] = {0, right, below, below + right};
+    const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
+    for (int y = top >> level; y < (top + kStripRows) >> level; ++y) {
+      const DepthKey* const above = keys_[level - 1].data() + 2 * size_t(y) * fine_columns;
+      const DepthKey* const under = above + fine_columns;
+      DepthKey* const keys = keys_[level].data() + size_t(y) * columns;
+      const float* const from =
+          is_read ? levels_[level - 1].data() + 2 * size_t(y) * fine_columns * kChannels : nullptr;
+      float* const to = is_read ? levels_[level].data() + size_t(y) * columns * kChannels : nullptr;
+      for (size_t x = 0; x < columns; ++x) {
+        const DepthKey four[4] = {above[2 * x], above[2 * x + 1], under[2 * x], under[2 * x + 1]};
+        const size_t of_first = four[1] < four[0] ? 1 : 0, of_last = four[3] < four[2] ? 3 : 2;
+        const size_t best = four[of_last] < four[of_first] ? of_last : of_first;
+        keys[x] = four[best];
+        // Of four without a point the first is all 0.
+        if (is_read) std::memcpy(to + x * kChannels, from + x * cell + offsets[best], kChannels * sizeof(float));
       }
     }
-    before.swap(nearest);
+  }
+}
+
+void LookRaster::fill_strip(const Task& task, int top) {
+  const size_t width = size_t(task.window.width_px);
+  for (int level = task.layout.levels - 2; level >= 0; --level) {
+    const size_t columns = width >> level;
+    const bool is_folded = level == 0 && task.layout.is_folded;
+    const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
+    for (int y = top >> level; y < (top + kStripRows) >> level; ++y) {
+      const DepthKey* const keys = keys_[level].data() + size_t(y) * columns;
+      float* const row =
+          levels_[level].data() + (is_folded ? size_t(y / 2) * (columns / 2) * cell + (y % 2) * 2 * kChannels
+                                             : size_t(y) * columns * kChannels);
+      const float* const coarser = levels_[level + 1].data() + size_t(y / 2) * (columns / 2) * kChannels;
+      for (size_t x = 0; x < columns; ++x) {
+        if (keys[x] == kNoPointKey)
+          std::copy_n(coarser + x / 2 * kChannels, kColours, row + x / 2 * cell + x % 2 * kChannels);
+      }
+    }
   }
 }
 

@@ -13,6 +13,7 @@ struct PosedPhoto {
   Lens lens;
   std::array<double, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row by row: world to camera, in axes of OpenCV
   std::array<double, 3> centre = {0, 0, 0};
+  bool is_held_out = false;  // kept to compare with: no scene is made of it
 };
 
 // Reasons why photos are dropped (drop_counts.h).

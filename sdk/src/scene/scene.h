@@ -1,8 +1,8 @@
 // A scene as it is rendered and stored: points in blocks of neighbours, with their looks.
 //
-// Points are sorted along a Morton curve and cut into blocks, so that a block is a small box: it can be left out whole
-// where a camera does not see it, and places need 16 bits a coordinate. In each block the points whose look depends on the
-// side come first; the rest have no slopes. Arrays are owned or lie in a mapped file; the renderer does not know which.
+// Points are cut into blocks of neighbours (scene_blocks.h), so that a block is a small box: it can be left out whole where
+// a camera does not see it, and places need 16 bits a coordinate. In each block the points whose look depends on the side
+// come first; the rest have no slopes. Arrays are owned or lie in a mapped file; the renderer does not know which.
 #pragma once
 
 #include <array>

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -155,6 +156,20 @@ std::string with_ending(const std::string& folder, const std::string& name) {
   return name;
 }
 
+std::set<std::string> held_out_names(const json& document, const std::string& path) {
+  std::set<std::string> names;
+  const auto list = document.find("test_filenames");
+  if (list == document.end()) return names;
+  if (!list->is_array()) throw Error(MAQ_ERROR_UNREADABLE, path, ": \"test_filenames\" is not a list.");
+  for (const json& name : *list) {
+    if (!name.is_string()) {
+      throw Error(MAQ_ERROR_UNREADABLE, path, ": \"test_filenames\" has an entry that is not a text.");
+    }
+    names.insert(name.get<std::string>());
+  }
+  return names;
+}
+
 }  // namespace
 
 TransformsFile read_transforms_file(const std::string& folder, const std::string& file_name, DropCounts& drops) {
@@ -167,6 +182,7 @@ TransformsFile read_transforms_file(const std::string& folder, const std::string
   if (frames == document.end() || !frames->is_array()) {
     throw Error(MAQ_ERROR_UNREADABLE, path, " has no list \"frames\".");
   }
+  const std::set<std::string> held_out = held_out_names(document, path);
   for (size_t i = 0; i < frames->size(); ++i) {
     const std::string where = path + ", frame " + std::to_string(i);
     const json& frame = (*frames)[i];
@@ -175,6 +191,7 @@ TransformsFile read_transforms_file(const std::string& folder, const std::string
     PosedPhoto photo;
     photo.name = facts.text("file_path");
     if (photo.name.empty()) facts.fail("\"file_path\" is missing");
+    photo.is_held_out = held_out.count(photo.name) != 0;
     read_pose(facts, photo);
     if (!stays_inside(photo.name)) {
       drops.add(kPhotosOutside, photo.name);

@@ -1,11 +1,11 @@
-// Which point of a cloud each pixel of a picture shows: one pixel a point, the nearest wins (NPBG++, section 3.4).
+// Which point of a cloud each pixel of a picture shows (z_buffer.h).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "scene/pinhole_camera.h"
+#include "scene/z_buffer.h"
 
 namespace maq {
 
@@ -26,16 +26,15 @@ class VisiblePoints {
   // depth the lowest index wins. Points that are not finite are never seen.
   void find(const PointPlaces& points, const PinholeCamera& camera, double near);
 
-  int width_px() const { return width_px_; }
-  int height_px() const { return height_px_; }
+  int width_px() const { return buffer_.width_px(); }
+  int height_px() const { return buffer_.height_px(); }
   // Row by row: the index of the point, kNoPoint where there is none.
   const std::vector<uint32_t>& winners() const { return winners_; }
   // Its depth along the optical axis; infinite where there is none.
   const std::vector<float>& depths() const { return depths_; }
 
  private:
-  int width_px_ = 0, height_px_ = 0;
-  std::vector<uint64_t> keys_;  // depth as bits, then index: the least wins
+  ZBuffer buffer_;
   std::vector<uint32_t> winners_;
   std::vector<float> depths_;
 };

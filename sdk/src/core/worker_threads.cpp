@@ -1,0 +1,71 @@
+#include "core/worker_threads.h"
+
+namespace maq {
+
+WorkerThreads::WorkerThreads(int count) {
+  try {
+    for (int worker = 1; worker < count; ++worker) threads_.emplace_back([this, worker] { stay(worker); });
+  } catch (...) {
+    stop();
+    throw;
+  }
+}
+
+WorkerThreads::~WorkerThreads() { stop(); }
+
+void WorkerThreads::stop() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    stops_ = true;
+  }
+  begins_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void WorkerThreads::run_with(size_t tasks, Call call, void* work) {
+  if (tasks == 0) return;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    tasks_ = tasks;
+    call_ = call;
+    work_ = work;
+    failure_ = nullptr;
+    next_ = 0;
+    ++round_;
+    is_open_ = tasks > 1;
+  }
+  if (tasks > 1) begins_.notify_all();
+  take_tasks(0);
+  std::unique_lock<std::mutex> lock(mutex_);
+  // Who has not woken up by now is not waited for.
+  is_open_ = false;
+  ends_.wait(lock, [this] { return working_ == 0; });
+  if (failure_ != nullptr) std::rethrow_exception(failure_);
+}
+
+void WorkerThreads::take_tasks(int worker) {
+  try {
+    for (size_t task = next_++; task < tasks_; task = next_++) call_(work_, task, worker);
+  } catch (...) {
+    next_ = tasks_;
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (failure_ == nullptr) failure_ = std::current_exception();
+  }
+}
+
+void WorkerThreads::stay(int worker) {
+  unsigned seen = 0;
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (true) {
+    begins_.wait(lock, [&] { return stops_ || (is_open_ && round_ != seen); });
+    if (stops_) return;
+    seen = round_;
+    ++working_;
+    lock.unlock();
+    take_tasks(worker);
+    lock.lock();
+    if (--working_ == 0) ends_.notify_one();
+  }
+}
+
+}  // namespace maq

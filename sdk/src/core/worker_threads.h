@@ -1,0 +1,56 @@
+// A few threads that stay and share out the tasks of one piece of work after another: starting threads takes longer than
+// many of those take.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace maq {
+
+class WorkerThreads {
+ public:
+  // `count` includes the thread that calls run(), so that of 1 none is started. Throws std::system_error where the system
+  // has no more threads.
+  explicit WorkerThreads(int count);
+  ~WorkerThreads();
+  WorkerThreads(const WorkerThreads&) = delete;
+  WorkerThreads& operator=(const WorkerThreads&) = delete;
+
+  int count() const { return int(threads_.size()) + 1; }
+
+  // Calls work(task, worker) once for each task below `tasks`, in no order, with worker below count() and never twice at
+  // once for the same worker. Returns when all are done; throws what one of them threw, after which the rest is left out.
+  // Not for two threads at once.
+  template <class Work>
+  void run(size_t tasks, Work&& work) {
+    run_with(
+        tasks, [](void* of, size_t task, int worker) { (*static_cast<Work*>(of))(task, worker); }, &work);
+  }
+
+ private:
+  using Call = void (*)(void* work, size_t task, int worker);
+  void run_with(size_t tasks, Call call, void* work);
+  void take_tasks(int worker);
+  void stay(int worker);
+  void stop();
+
+  std::vector<std::thread> threads_;
+  std::mutex mutex_;
+  std::condition_variable begins_, ends_;
+  // Guarded by the mutex, or of the round that all agree on.
+  unsigned round_ = 0;
+  int working_ = 0;
+  bool is_open_ = false, stops_ = false;
+  std::exception_ptr failure_;
+  size_t tasks_ = 0;
+  Call call_ = nullptr;
+  void* work_ = nullptr;
+  std::atomic<size_t> next_{0};
+};
+
+}  // namespace maq

@@ -193,7 +193,8 @@ class Place:
                 raise SceneCommandError(f"no networks in {networks}")
             else:
                 said = scene_command.build(self.folder, scene, networks, *first.build)
-                built = {"build_s": said.wall_s, "points": said.points, "varying": said.varying, "bytes": said.bytes,
+                built = {"build_s": said.wall_s, "cloud_points": said.cloud_points, "points": said.points,
+                         "varying": said.varying, "bytes": said.bytes,
                          "bytes_a_point": said.bytes / said.points, "modelling_mb": said.peak_memory_mb}  # fmt: skip
         except SceneCommandError as error:
             why = str(error)

@@ -81,11 +81,8 @@ def settings(bundles: Sequence[str]) -> list[Setting]:
 def savings() -> list[tuple[Setting, str]]:
     """Work that a scene does not need, each done all the same; and what it is when it is not done. Two more are among
     `settings`: "every look varies" and "coefficients of 32 bits"."""
-    build = ("--points", str(POINTS), "--without", "unseen")
     axis = "not needed"
     return [
-        (Setting("points never seen are stored", axis, build=build), "points never seen are dropped"),
         (Setting("no block is culled", axis, render=("--without", "culling")), "blocks out of sight are left out"),
         (Setting("all tiles are refined", axis, render=("--without", "tiles")), "tiles without points are not refined"),
-        (Setting("always turned", axis, render=("--without", "turn")), "no turn where up is up"),
     ]

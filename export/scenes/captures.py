@@ -93,7 +93,7 @@ def read_capture(folder: Path) -> Capture:
         raise CaptureError(f"A photo of {path} cannot be read: {error}.") from None
     cloud = read_ply(folder / cloud_name)
     names = tuple(str(frame["file_path"]) for frame in frames)
-    return Capture(folder.name, [camera for camera, _ in named], photos, cloud, up, held_out, names)
+    return Capture(folder.name, [camera for camera, _ in named], photos, cloud, up, held_out, names=names)
 
 
 def _camera(frame: dict[str, Any], path: Path) -> Camera:

@@ -1,6 +1,6 @@
 """Exports extractor and refiner as fp32 ONNX graphs, and compares them with torch.
 
-    python -m export.scenes.export_onnx --checkpoint RUN/weights.pt --scale-on .data/places/train \\
+    python -m export.scenes.export_onnx --checkpoint RUN/weights.pt --places .data/places/train \\
         --out .data/bundles/scenes-fp32
     python -m export.scenes.export_onnx --random small --out .data/bundles/random-scenes-fp32
 
@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import argparse
 import copy
-import json
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,7 +35,7 @@ from export.densepose.export_onnx import Doubled, channels_first, channels_last
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
 from export.scenes.basis import Basis
-from export.scenes.bundle import OPSET, write_manifest
+from export.scenes.bundle import OPSET, training_data, write_manifest
 from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture, read_captures
 from export.scenes.config import FEATURES, RASTER, SIZES
@@ -205,21 +204,23 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/scenes-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument(
-        "--scale-on", type=Path, help="captures: features get the range of colours on their photos, for int8"
+        "--places",
+        type=Path,
+        help="the rendered places it was trained on: named in the manifest, and features get the range of colours on "
+        "their photos, for int8",
     )
-    parser.add_argument("--trained-on", type=Path, help="JSON list of what the weights saw: name, licence, used_for")
     options = parser.parse_args()
     torch.manual_seed(0)
     networks = Networks(SIZES[options.random]) if options.random else load_networks(options.checkpoint)
     networks.eval()
-    if options.scale_on:
-        factors = measured(networks, _photos(read_captures(options.scale_on)))
+    if options.places:
+        factors = measured(networks, _photos(read_captures(options.places)))
         print("features scaled by " + ", ".join(f"{factor:.3f}" for factor in factors))
         networks = scaled(networks, factors)
     for name, error in export(networks, options.out).items():
         size = (options.out / f"{name}.onnx").stat().st_size / 1e6
         print(f"{name}: {size:.2f} MB, {error:.1e} from torch; {FEATURES} features")
-    trained_on = json.loads(options.trained_on.read_text()) if options.trained_on else []
+    trained_on = training_data(options.places) if options.places else []
     info = BundleInfo(options.name or options.out.name, "fp32", training_data=tuple(trained_on))
     write_manifest(options.out, info)
 

@@ -16,11 +16,13 @@ from torch.nn import functional as F
 
 from export.scenes.basis import directions
 from export.scenes.cameras import Camera, moves, reframed, resized, upright, warped
-from export.scenes.config import ALPHA, BACKGROUND_PX, HIDING, LEVELS, MULTIPLE, TURNED_MULTIPLE
+from export.scenes.config import ALPHA, BACKGROUND_PX, HIDING, LEVELS, MULTIPLE, RASTER, TURNED_MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
 from export.scenes.raster import filled, projected, pyramid, unhidden, visible
 from export.scenes.system import Networks
+
+_SURENESS = (1.0, 1.0, 1.0, 0.5, 0.25)  # that a pixel is covered by points, by the scale that has one there
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +201,16 @@ def modelled(
     )
 
 
+def cover(rasters: list[Tensor]) -> Tensor:
+    """How much of a picture is the refiner's, the rest is background: [1, H, W], 1 where there is a point in the 16 x
+    16 pixels that a pixel is in, fading to 0 beyond (PictureCover and kOwnBackgroundGain in the SDK)."""
+    sure = rasters[-1][None, RASTER - 1 :] * _SURENESS[-1]
+    for raster, most in zip(reversed(rasters[:-1]), reversed(_SURENESS[:-1]), strict=True):
+        wider = F.interpolate(sure, scale_factor=2, mode="bilinear", align_corners=False)
+        sure = torch.maximum(wider, raster[None, RASTER - 1 :] * most)
+    return (sure[0] / _SURENESS[-1]).clamp_max(1)
+
+
 @torch.no_grad()
 def render(model: Model, camera: Camera, networks: Networks, options: Options) -> np.ndarray:
     """The picture of a camera of any size and turn: RGB float32 [H, W, 3] in 0..1.
@@ -210,7 +222,9 @@ def render(model: Model, camera: Camera, networks: Networks, options: Options) -
     if moves(camera, turned):
         turned = upright(camera, np.asarray(options.up), TURNED_MULTIPLE)
     rasters = model.rasters(turned, networks, options)
-    picture = networks.refiner([raster[None] for raster in rasters])[0]
+    picture = networks.refiner([raster[None] for raster in rasters])[0].clamp(0, 1)
+    background = model.background[:, None, None].to(picture)
+    picture = background + cover(rasters) * (picture - background)
     picture = np.ascontiguousarray(picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy())
     return warped(picture, turned, camera)
 

@@ -43,6 +43,11 @@ void check(const ModelledPoints& points) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The scene's origin and direction of up must be finite numbers.");
     }
   }
+  for (const float part : points.background) {
+    if (!(part >= 0 && part <= 1)) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The background's colour has a part ", part, ", which is not 0 to 1.");
+    }
+  }
   for (size_t i = 0; i < count; ++i) {
     if (!is_sound(points.x[i]) || !is_sound(points.y[i]) || !is_sound(points.z[i])) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Point ", i, " is at (", points.x[i], ", ", points.y[i], ", ",
@@ -79,6 +84,7 @@ Scene make_scene(const ModelledPoints& points, const ScenePacking& packing, std:
   Scene scene;
   scene.origin = points.origin;
   scene.up = points.up;
+  scene.background = points.background;
   scene.place_kind = packing.places;
   scene.coefficient_kind = packing.coefficients;
   owned->blocks.resize(cut.ends.size());

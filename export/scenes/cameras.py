@@ -87,6 +87,13 @@ def between(source: Camera, target: Camera) -> np.ndarray:
     return (whole / whole[2, 2])[:2]
 
 
+def moves(source: Camera, target: Camera) -> bool:
+    """Whether a corner of the picture is elsewhere in the other one, by more than interpolation shows (1/64 pixel)."""
+    right, bottom = source.width_px, source.height_px
+    corners = np.array([[0, 0, 1], [right, 0, 1], [0, bottom, 1], [right, bottom, 1]], np.float64)
+    return bool(np.abs(corners @ between(source, target).T - corners[:, :2]).max() > 1 / 64)
+
+
 def warped(image: np.ndarray, source: Camera, target: Camera, outside: int = cv2.BORDER_REPLICATE) -> np.ndarray:
     """The picture that `source` took, as `target` would have (see `between`); bilinear. image: [H, W] or [H, W, C].
 

@@ -1,89 +1,152 @@
 // The refiner's input against drawing every scale by itself.
+#include "scene/look_raster.h"
+
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
-
 #include "expect_error.h"
-#include "scene/look_raster.h"
+#include "made_up_scene.h"
+#include "scene/scene_packing.h"
 
 namespace {
 
+using maq::DepthKey;
 using maq::kBasis;
 using maq::kFeatures;
+using maq::kNoPointKey;
 using maq::LookRaster;
+using maq::RasterWindow;
+using maq::Scene;
 
-struct Scene {
-  explicit Scene(size_t count, unsigned seed = 1) : random(seed) {
-    std::uniform_real_distribution<float> across(-1.5f, 1.5f), depth(1.5f, 5.0f);
-    for (size_t i = 0; i < count; ++i) {
-      x.push_back(across(random));
-      y.push_back(across(random));
-      z.push_back(std::round(depth(random) * 8) / 8);  // many are equally deep
-    }
-    for (size_t i = 0; i < count * kFeatures; ++i) means.push_back(across(random));
-    for (size_t i = 0; i < count * kFeatures * kBasis; ++i) slopes.push_back(across(random));
-    weights.resize(maq::ViewBasis::kWeights);
-    for (float& weight : weights) weight = across(random) * 0.3f;
+constexpr size_t kChannels = LookRaster::kChannels;
+
+const maq::ViewBasis& basis() {
+  static const maq::ViewBasis made([] {
+    std::mt19937 random(2);
+    std::normal_distribution<float> normal;
+    std::vector<float> weights(maq::ViewBasis::kWeights);
+    for (float& weight : weights) weight = 0.4f * normal(random);
+    return weights;
+  }());
+  return made;
+}
+
+template <class Stored>
+double stored(const void* values, size_t at) {
+  return double(static_cast<const Stored*>(values)[at]);
+}
+double coefficient(const Scene& scene, const void* values, size_t at) {
+  switch (scene.coefficient_kind) {
+    case maq::Coefficients::kFloat32: return stored<float>(values, at);
+    case maq::Coefficients::kInt16: return stored<int16_t>(values, at);
+    default: return stored<int8_t>(values, at);
   }
-  maq::PointPlaces places() const { return {x.data(), y.data(), z.data(), x.size(), {0, 0, 0}}; }
-  // The look of a point, by its formula.
-  std::vector<double> look(size_t point, const maq::PinholeCamera& camera) const {
-    const double d[3] = {x[point] - camera.centre[0], y[point] - camera.centre[1], z[point] - camera.centre[2]};
-    const double length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    const float unit[3] = {float(d[0] / length), float(d[1] / length), float(d[2] / length)};
-    float h[kBasis];
-    maq::ViewBasis(weights).evaluate(&unit[0], &unit[1], &unit[2], 1, h);
-    std::vector<double> look;
-    for (int c = 0; c < kFeatures; ++c) {
-      double value = means[point * kFeatures + size_t(c)];
-      for (int k = 0; k < kBasis; ++k) {
-        value += double(h[k]) * slopes[(point * kBasis + size_t(k)) * kFeatures + size_t(c)];
-      }
-      look.push_back(value);
-    }
-    return look;
+}
+double place(const Scene& scene, size_t at) {
+  return scene.place_kind == maq::Places::kFloat32 ? stored<float>(scene.places, at)
+                                                   : stored<uint16_t>(scene.places, at);
+}
+
+// The look of a point from a camera's centre, by its formula, from what the scene's header says of stored numbers.
+std::array<double, kFeatures> look_of(const Scene& scene, uint32_t point, const maq::PinholeCamera& camera) {
+  const maq::SceneBlock* block = scene.blocks;
+  while (point >= block->first + block->count) ++block;
+  const size_t in_block = point - block->first;
+  const bool is_float = scene.coefficient_kind == maq::Coefficients::kFloat32;
+  double d[3], length = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    d[axis] = place(scene, 3 * size_t(block->first) + axis * block->count + in_block);
+    if (scene.place_kind == maq::Places::kUint16) d[axis] = block->low[axis] + d[axis] * block->place_step[axis];
+    d[axis] += scene.origin[axis] - camera.centre[axis];
+    length += d[axis] * d[axis];
   }
-  std::mt19937 random;
-  std::vector<float> x, y, z, means, slopes, weights;
+  float unit[3], h[kBasis];
+  for (size_t axis = 0; axis < 3; ++axis) unit[axis] = float(d[axis] / std::sqrt(length));
+  basis().evaluate(&unit[0], &unit[1], &unit[2], 1, h);
+  std::array<double, kFeatures> look;
+  for (size_t c = 0; c < size_t(kFeatures); ++c) {
+    look[c] = coefficient(scene, scene.means, point * size_t(kFeatures) + c);
+    if (!is_float) look[c] = block->mean_middle[c] + look[c] * block->mean_step[c];
+    if (in_block >= block->varying) continue;
+    for (size_t k = 0; k < size_t(kBasis); ++k) {
+      const size_t at = k * kFeatures + c;
+      const double slope =
+          coefficient(scene, scene.slopes, (block->first_varying + in_block) * kBasis * kFeatures + at);
+      look[c] += h[k] * slope * (is_float ? 1 : double(block->slope_step[at]));
+    }
+  }
+  return look;
+}
+
+struct View {
+  View(const Scene& scene, const maq::PinholeCamera& camera, const RasterWindow& window, maq::RefinerLayout layout,
+       int threads = 2)
+      : layout_(layout), window_(window), workers(threads) {
+    buffer.begin(camera, 0.01, 1);
+    for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
+    buffer.finish(0, camera.height_px);
+    raster.shade(scene, maq::BlockIndex(scene), buffer, window, camera.centre, basis(), layout, workers);
+  }
+  // Of a pixel of the window at a level.
+  const float* at(int level, size_t x, size_t y) const {
+    const size_t width = size_t(window_.width_px) >> level;
+    const size_t pixel =
+        level == 0 && layout_.is_folded ? 4 * (y / 2 * (width / 2) + x / 2) + y % 2 * 2 + x % 2 : y * width + x;
+    return raster.level(level) + kChannels * pixel;
+  }
+  maq::RefinerLayout layout_;
+  RasterWindow window_;
+  maq::WorkerThreads workers;
+  maq::ZBuffer buffer;
+  LookRaster raster;
 };
 
-maq::PinholeCamera camera_of(int width, int height) {
-  maq::PinholeCamera camera;
-  camera.width_px = width;
-  camera.height_px = height;
-  camera.fx_px = camera.fy_px = width;
-  camera.cx_px = (width - 1) / 2.0;
-  camera.cy_px = (height - 1) / 2.0;
-  camera.centre = {0.1, -0.05, 0.2};
+Scene packed(size_t count, maq::Coefficients coefficients, size_t copies = 1) {
+  maq::ScenePacking packing;
+  packing.coefficients = coefficients;
+  packing.places = coefficients == maq::Coefficients::kFloat32 ? maq::Places::kFloat32 : maq::Places::kUint16;
+  return make_scene(made_up_points(count, 1, 1, {1, 2, 3}, copies), packing);
+}
+
+maq::PinholeCamera camera_near(int width, int height) {
+  maq::PinholeCamera camera = camera_of(width, height, 55);
+  camera.centre = {1.1, 1.95, 3.2};
   return camera;
 }
 
 TEST(LookRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
-  for (const size_t count : {0u, 1u, 300u, 20000u}) {
-    const Scene scene(count);
-    const maq::PinholeCamera camera = camera_of(96, 64);
-    maq::VisiblePoints visible;
-    visible.find(scene.places(), camera, 0.01);
-    LookRaster raster;
-    raster.shade(visible, scene.places(), {scene.means.data(), scene.slopes.data()}, maq::ViewBasis(scene.weights),
-                 camera);
-    EXPECT_EQ(raster.shaded(), size_t(std::count_if(visible.winners().begin(), visible.winners().end(),
-                                                    [](uint32_t winner) { return winner != maq::kNoPoint; })));
-    for (int level = 0; level < LookRaster::kLevels; ++level) {
-      const int width = 96 >> level, height = 64 >> level;
-      maq::VisiblePoints small;
-      small.find(scene.places(), maq::resized(camera, width, height), 0.01);
-      const std::vector<float>& found = raster.level(level);
-      const size_t plane = size_t(width) * size_t(height);
-      ASSERT_EQ(found.size(), plane * LookRaster::kChannels);
-      for (size_t pixel = 0; pixel < plane; ++pixel) {
-        const uint32_t winner = small.winners()[pixel];
-        ASSERT_EQ(found[kFeatures * plane + pixel], winner == maq::kNoPoint ? 0 : 1) << level;
-        const std::vector<double> expected =
-            winner == maq::kNoPoint ? std::vector<double>(kFeatures, 0.0) : scene.look(winner, camera);
-        for (size_t c = 0; c < size_t(kFeatures); ++c) {
-          ASSERT_NEAR(found[c * plane + pixel], expected[c], 1e-4) << level << " " << pixel;
+  for (const auto kind : {maq::Coefficients::kFloat32, maq::Coefficients::kInt16, maq::Coefficients::kInt8}) {
+    for (const size_t count : {1u, 300u, 20000u}) {
+      const Scene scene = packed(count, kind, count > 1 ? 3 : 1);
+      const maq::PinholeCamera camera = camera_near(96, 64);
+      for (const maq::RefinerLayout layout : {maq::RefinerLayout{5, true}, maq::RefinerLayout{3, false}}) {
+        const View view(scene, camera, {0, 0, 96, 64}, layout);
+        const auto seen = std::count_if(view.buffer.keys(), view.buffer.keys() + 96 * 64,
+                                        [](DepthKey key) { return key != kNoPointKey; });
+        EXPECT_EQ(view.raster.shaded(), size_t(seen));
+        EXPECT_LE(view.raster.varying(), view.raster.shaded());
+        for (int level = 0; level < LookRaster::kLevels; ++level) {
+          const size_t width = 96u >> level, height = 64u >> level;
+          maq::ZBuffer small;
+          small.begin(maq::resized(camera, int(width), int(height)), 0.01, 1);
+          for (uint32_t i = 0; i < scene.block_count; ++i)
+            small.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
+          small.finish(0, int(height));
+          for (size_t y = 0; y < height; ++y) {
+            for (size_t x = 0; x < width; ++x) {
+              const DepthKey key = small.keys()[y * width + x];
+              ASSERT_EQ(view.raster.keys(level)[y * width + x], key) << level;
+              if (level >= layout.levels) continue;
+              const float* found = view.at(level, x, y);
+              ASSERT_EQ(found[kFeatures], key == kNoPointKey ? 0 : 1) << level;
+              std::array<double, kFeatures> expected{};
+              if (key != kNoPointKey) {
+                expected = look_of(scene, maq::point_of(key), camera);
+              } else if (level + 1 < layout.levels) {
+                std::copy_n(view.at(level + 1, x / 2, y / 2), LookRaster::kColours, expected.begin());
+              }
+              for (size_t c = 0; c < size_t(kFeatures); ++c) ASSERT_NEAR(found[c], expected[c], 1e-4) << level;
+            }
+          }
         }
       }
     }
@@ -91,28 +154,69 @@ TEST(LookRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
 }
 
 TEST(LookRaster, WithoutSlopesALookIsItsMean) {
-  const Scene scene(500);
-  const maq::PinholeCamera camera = camera_of(32, 32);
-  maq::VisiblePoints visible;
-  visible.find(scene.places(), camera, 0.01);
-  LookRaster raster;
-  raster.shade(visible, scene.places(), {scene.means.data(), nullptr}, maq::ViewBasis(scene.weights), camera);
+  maq::ModelledPoints points = made_up_points(500);
+  std::fill(points.slopes.begin(), points.slopes.end(), 0.0f);
+  maq::ScenePacking packing;
+  packing.coefficients = maq::Coefficients::kFloat32;
+  const Scene scene = make_scene(points, packing);
+  const View view(scene, camera_of(32, 32, 60), {0, 0, 32, 32}, {5, false});
+  EXPECT_GT(view.raster.shaded(), 100u);
+  EXPECT_EQ(view.raster.varying(), 0u);
   for (size_t pixel = 0; pixel < 32 * 32; ++pixel) {
-    const uint32_t winner = visible.winners()[pixel];
-    if (winner == maq::kNoPoint) continue;
-    EXPECT_EQ(raster.level(0)[pixel], scene.means[winner * kFeatures]);
+    const DepthKey key = view.raster.keys(0)[pixel];
+    if (key == kNoPointKey) continue;
+    EXPECT_EQ(view.at(0, pixel % 32, pixel / 32)[0],
+              static_cast<const float*>(scene.means)[maq::point_of(key) * kFeatures]);
   }
 }
 
-TEST(LookRaster, SidesThatCannotBeHalvedAreRefused) {
-  const Scene scene(5);
-  const maq::PinholeCamera camera = camera_of(40, 32);
-  maq::VisiblePoints visible;
-  visible.find(scene.places(), camera, 0.01);
-  LookRaster raster;
+TEST(LookRaster, AWindowHasThatPartOfThePictureWithAnyNumberOfThreads) {
+  const Scene scene = packed(20000, maq::Coefficients::kInt8);
+  const maq::PinholeCamera camera = camera_near(160, 128);
+  for (const bool is_folded : {true, false}) {
+    const View whole(scene, camera, {0, 0, 160, 128}, {5, is_folded}, 1);
+    for (const int threads : {1, 2, 3}) {
+      const View part(scene, camera, {48, 16, 96, 64}, {5, is_folded}, threads);
+      for (int level = 0; level < LookRaster::kLevels; ++level) {
+        for (size_t y = 0; y < 64u >> level; ++y) {
+          for (size_t x = 0; x < 96u >> level; ++x) {
+            const float* expected = whole.at(level, x + (48u >> level), y + (16u >> level));
+            ASSERT_TRUE(std::equal(expected, expected + kChannels, part.at(level, x, y))) << level;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(LookRaster, MemoryOfAnEarlierPictureDoesNotShine) {
+  const Scene scene = packed(5000, maq::Coefficients::kInt8);
+  View view(scene, camera_near(96, 64), {0, 0, 96, 64}, {5, true});
+  ASSERT_GT(view.raster.shaded(), 0u);
+  maq::PinholeCamera away = camera_near(96, 64);
+  away.rotation = {-1, 0, 0, 0, 1, 0, 0, 0, -1};
+  view.buffer.begin(away, 0.01, 1);
+  view.buffer.finish(0, 64);
+  view.raster.shade(scene, maq::BlockIndex(scene), view.buffer, {0, 0, 96, 64}, away.centre, basis(), {5, true},
+                    view.workers);
+  EXPECT_EQ(view.raster.shaded(), 0u);
+  for (int level = 0; level < LookRaster::kLevels; ++level) {
+    const float* values = view.raster.level(level);
+    EXPECT_TRUE(std::all_of(values, values + ((96 * 64) >> (2 * level)) * kChannels, [](float v) { return v == 0; }));
+  }
+}
+
+TEST(LookRaster, WindowsThatCannotBeHalvedOrAreOutsideAreRefused) {
+  const Scene scene = packed(5, maq::Coefficients::kInt8);
+  const maq::PinholeCamera camera = camera_of(48, 32, 60);
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "40 x 32 pixels cannot be halved four times", [&] {
-    raster.shade(visible, scene.places(), {scene.means.data(), nullptr}, maq::ViewBasis(scene.weights), camera);
+    View(scene, camera, {0, 0, 40, 32}, {5, true});
   });
+  for (const RasterWindow window : {RasterWindow{16, 0, 48, 32}, {0, -16, 48, 32}, {0, 16, 48, 32}}) {
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "is not inside of a picture of 48 x 32", [&] {
+      View(scene, camera, window, {5, true});
+    });
+  }
 }
 
 }  // namespace

@@ -62,6 +62,7 @@ void LookRaster::shade(const Scene& scene, const BlockIndex& blocks, const ZBuff
     shade_strip(task, top, scratch);
     const int64_t between = now_ns();
     reduce_strip(task, top);
+    fill_strip(task, top);
     scratch.shade_ns += between - begin;
     scratch.reduce_ns += now_ns() - between;
   });
@@ -149,6 +150,26 @@ void LookRaster::reduce_strip(const Task& task, int top) {
         keys[x] = four[best];
         // Of four without a point the first is all 0.
         if (is_read) std::memcpy(to + x * kChannels, from + x * cell + offsets[best], kChannels * sizeof(float));
+      }
+    }
+  }
+}
+
+void LookRaster::fill_strip(const Task& task, int top) {
+  const size_t width = size_t(task.window.width_px);
+  for (int level = task.layout.levels - 2; level >= 0; --level) {
+    const size_t columns = width >> level;
+    const bool is_folded = level == 0 && task.layout.is_folded;
+    const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
+    for (int y = top >> level; y < (top + kStripRows) >> level; ++y) {
+      const DepthKey* const keys = keys_[level].data() + size_t(y) * columns;
+      float* const row =
+          levels_[level].data() + (is_folded ? size_t(y / 2) * (columns / 2) * cell + (y % 2) * 2 * kChannels
+                                             : size_t(y) * columns * kChannels);
+      const float* const coarser = levels_[level + 1].data() + size_t(y / 2) * (columns / 2) * kChannels;
+      for (size_t x = 0; x < columns; ++x) {
+        if (keys[x] == kNoPointKey)
+          std::copy_n(coarser + x / 2 * kChannels, kColours, row + x / 2 * cell + x % 2 * kChannels);
       }
     }
   }

@@ -37,8 +37,10 @@ class LookRaster {
              const std::array<double, 3>& camera_centre, const ViewBasis& basis, const RefinerLayout& layout,
              WorkerThreads& threads);
 
-  // As the layout says (the refiner's input of that number), with features and the 1 of a pixel side by side; all 0 where
-  // there is no point. Only as many as the layout has.
+  static constexpr size_t kColours = 3;  // features that are red, green and blue
+
+  // As the layout says (the refiner's input of that number), with features and the 1 of a pixel side by side. Where there is
+  // no point the colours are those of the next coarser level, all else is 0. Only as many as the layout has.
   const float* level(int level) const { return levels_[level].data(); }
   // Who is nearest, row by row, at each of the kLevels scales.
   const DepthKey* keys(int level) const { return keys_[level].data(); }
@@ -59,6 +61,7 @@ class LookRaster {
 
   void shade_strip(const Task& task, int top, Scratch& scratch);
   void reduce_strip(const Task& task, int top);
+  void fill_strip(const Task& task, int top);
 
   std::vector<float> levels_[kLevels];
   std::vector<DepthKey> keys_[kLevels];

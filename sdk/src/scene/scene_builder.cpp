@@ -65,8 +65,8 @@ const BuildOptions& checked(const std::array<double, 3>& up, const BuildOptions&
   if (!(length > 0) || !std::isfinite(length)) {
     refuse("Up is (", up[0], ", ", up[1], ", ", up[2], "), which is no direction.");
   }
-  if (!(options.visibility_scale >= 1.0 / 16 && options.visibility_scale <= 4)) {
-    refuse("The visibility scale is ", options.visibility_scale, ", but must be 1/16 to 4.");
+  if (!(options.visibility_scale >= 1.0 / 16 && options.visibility_scale <= 1)) {
+    refuse("The visibility scale is ", options.visibility_scale, ", but must be 1/16 to 1.");
   }
   if (!(options.near >= 0) || !std::isfinite(options.near)) {
     refuse("The depth of the nearest point is ", options.near, ", but must be finite and not negative.");
@@ -148,6 +148,7 @@ size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera&
     }
   });
   visible_.finish(0, scaled_camera.height_px);
+  visible_.hide(0, scaled_camera.height_px, kHidingShare);
 
   const size_t pixels = size_t(scaled_camera.width_px) * size_t(scaled_camera.height_px);
   seen_.clear();
@@ -187,6 +188,7 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
            " x ", camera.height_px, ".");
   }
   const PinholeCamera upright = upright_frame(camera, up_, SceneNetworks::kPhotoMultiple);
+  SceneNetworks::check_photo_size(upright.width_px, upright.height_px);
   const auto goes_on = [&](double done, const char* what) {
     const bool wanted = !progress || progress(done, what);
     return wanted && !is_cancelled_;

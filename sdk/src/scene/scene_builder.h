@@ -23,7 +23,7 @@
 namespace maq {
 
 struct BuildOptions {
-  // Of a photo's sides, for finding which points it sees: below 1 a point hides more of what is behind it. 1/16 to 4.
+  // Of a photo's sides, for finding which points it sees: below 1 a point hides more of what is behind it. 1/16 to 1.
   double visibility_scale = 1;
   double near = 0;   // depth of the nearest point that is seen, in units of the scene
   double alpha = 1;  // of the ridge regression; 0 or more

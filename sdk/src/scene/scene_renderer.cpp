@@ -16,6 +16,9 @@ namespace maq {
 namespace {
 
 constexpr int kMultiple = LookRaster::kMultiple;
+// The frames of a camera that is turned a little otherwise every time have a few sizes: of every size is a network prepared
+// anew (export/scenes/config.py has the same).
+constexpr int kTurnedMultiple = 64;
 constexpr int kMostThreads = 64;
 
 class StopWatch {
@@ -116,6 +119,7 @@ RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
   threads_.run(occupied_.size(), [&](size_t strip, int) {
     const int top = int(strip) * kMultiple;
     buffer_.finish(top, top + kMultiple);
+    buffer_.hide(top, top + kMultiple, kHidingShare);
     int first = cells, last = -1;
     for (int y = top; y < top + kMultiple; ++y) {
       const DepthKey* const row = buffer_.keys() + size_t(y) * size_t(frame.width_px);
@@ -155,7 +159,9 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
   PinholeCamera frame = upright_frame(camera, scene_.up, kMultiple);
   const PixelMap back = pixels_between(camera, frame);
   counts.is_turned = is_turn(back, camera);
-  if (!counts.is_turned) {
+  if (counts.is_turned) {
+    frame = upright_frame(camera, scene_.up, kTurnedMultiple);
+  } else {
     frame = camera;
     frame.width_px = rounded_up(camera.width_px);
     frame.height_px = rounded_up(camera.height_px);

@@ -12,6 +12,15 @@ MAQ_SIMD_CLONES void take_least(DepthKey* __restrict into, const DepthKey* __res
   for (size_t i = 0; i < count; ++i) into[i] = from[i] < into[i] ? from[i] : into[i];
 }
 
+// The largest key of a point that is as deep as `nearest` or farther by at most that share.
+DepthKey last_unhidden(DepthKey nearest, float factor) {
+  if (nearest == kNoPointKey) return kNoPointKey;
+  const float depth = depth_of(nearest) * factor;
+  uint32_t bits;
+  std::memcpy(&bits, &depth, sizeof bits);
+  return DepthKey((uint64_t(bits) << 32) | std::numeric_limits<uint32_t>::max());
+}
+
 }  // namespace
 
 void ZBuffer::begin(const PinholeCamera& camera, double near, int workers) {
@@ -51,6 +60,28 @@ void ZBuffer::finish(int top, int bottom) {
   if (!sheets_[0].is_drawn) std::fill_n(into, count, kNoPointKey);
   for (size_t i = 1; i < sheets_.size(); ++i) {
     if (sheets_[i].is_drawn) take_least(into, sheets_[i].keys.data() + begin, count);
+  }
+}
+
+void ZBuffer::hide(int top, int bottom, double share) {
+  const float factor = float(1 + share);
+  const size_t width = size_t(width_px_);
+  for (int y = top; y < bottom; y += kHidingPx) {
+    const int rows = std::min(kHidingPx, bottom - y);
+    DepthKey* const first = sheets_[0].keys.data() + size_t(y) * width;
+    for (size_t x = 0; x < width; x += kHidingPx) {
+      const size_t columns = std::min<size_t>(kHidingPx, width - x);
+      DepthKey nearest = kNoPointKey;
+      for (int row = 0; row < rows; ++row) {
+        const DepthKey* const keys = first + size_t(row) * width + x;
+        for (size_t i = 0; i < columns; ++i) nearest = std::min(nearest, keys[i]);
+      }
+      const DepthKey last = last_unhidden(nearest, factor);
+      for (int row = 0; row < rows; ++row) {
+        DepthKey* const keys = first + size_t(row) * width + x;
+        for (size_t i = 0; i < columns; ++i) keys[i] = keys[i] > last ? kNoPointKey : keys[i];
+      }
+    }
   }
 }
 

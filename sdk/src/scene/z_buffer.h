@@ -14,6 +14,8 @@
 namespace maq {
 
 using DepthKey = int64_t;
+// A point so much farther than one beside it is behind it (export/scenes/config.py has the same).
+inline constexpr double kHidingShare = 0.1;
 inline constexpr DepthKey kNoPointKey = std::numeric_limits<int64_t>::max();
 
 inline uint32_t point_of(DepthKey key) { return uint32_t(key); }
@@ -36,6 +38,13 @@ class ZBuffer {
   // Brings the workers' sheets together in rows [top, bottom), after all is drawn and before keys() is read there.
   // Different rows may be finished at once.
   void finish(int top, int bottom);
+
+  // A side of the blocks that hide() looks at, pixels.
+  static constexpr int kHidingPx = 4;
+  // Of what is finished in rows [top, bottom), takes out the points that shine through holes of what is before them: those
+  // farther than the nearest of their block, counted from the first pixel, by more than that share of its depth. `top` is
+  // a multiple of kHidingPx, `bottom` too or the height. Different rows may be worked on at once.
+  void hide(int top, int bottom, double share);
 
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }

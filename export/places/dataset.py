@@ -25,12 +25,14 @@ from export.places.cameras import Camera
 from export.places.clouds import CloudFaults, CloudMaker, draw_faults
 from export.places.place import AXES, FORMAT
 from export.places.ply import write_ply
-from export.places.recipe import FRAMES, choose_exposure, choose_views, draw_place, generator
+from export.places.recipe import FRAMES, NothingSeenError, choose_exposure, choose_views, draw_place, generator
 from export.places.render import Renderer
+from export.places.rooms import Staged
 
 VERSION = "places-1"
 JPEG_QUALITY = 92
 DEPTH_UNIT_M = 0.001
+_ATTEMPTS = 5
 _BLOCK = 5  # of so many neighbours on the cameras' way, one is held out
 
 
@@ -59,7 +61,17 @@ def frame_entry(k: int, camera: Camera) -> dict:
 
 def render_place(stock, split: str, seed: int, folder: Path, small=False, exact=False, frames: int = FRAMES) -> None:
     """Draws one place and writes its folder whole (temporary name, then rename). exact: a cloud without faults."""
-    staged, _ = draw_place(stock, split, seed, small, frames)
+    for attempt in range(_ATTEMPTS):
+        staged, _ = draw_place(stock, split, seed, small, frames, attempt)
+        try:
+            _render(staged, split, seed, folder, small, exact)
+            return
+        except NothingSeenError:
+            if attempt + 1 == _ATTEMPTS:
+                raise
+
+
+def _render(staged: Staged, split: str, seed: int, folder: Path, small: bool, exact: bool) -> None:
     rng = generator(split, seed, 2)
     with Renderer(staged.parts, staged.lighting, staged.near) as renderer:
         cameras = choose_views(renderer, staged, rng)

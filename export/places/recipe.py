@@ -13,6 +13,7 @@ from export.places.subjects import draw_still_life, draw_subject
 LAYOUTS = {"room": (0.6, draw_room), "subject": (0.22, draw_subject), "still life": (0.18, draw_still_life)}
 FRAMES = 40
 _TRIES = 12
+_NUMBERS = 8  # generators of an attempt
 _TOO_NEAR = 0.35  # metres, in rooms: a camera of which much is nearer stands in something
 
 
@@ -21,10 +22,17 @@ def generator(split: str, seed: int, what: int) -> np.random.Generator:
     return np.random.default_rng([SPLITS[split], 11, seed, what])
 
 
-def draw_place(stock, split: str, seed: int, small: bool = False, frames: int = FRAMES) -> tuple[Staged, Lens]:
-    """The place of a seed. The same seed drawn `small` is the same place with a quarter of the pixels."""
+class NothingSeenError(ValueError):
+    """A place was drawn that no camera of it sees."""
+
+
+def draw_place(
+    stock, split: str, seed: int, small: bool = False, frames: int = FRAMES, attempt: int = 0
+) -> tuple[Staged, Lens]:
+    """The place of a seed. The same seed drawn `small` is the same place with a quarter of the pixels. attempt: another
+    place, for a seed whose first cannot be seen (NothingSeenError)."""
     lens = draw_lens(generator(split, seed, 0), small)
-    rng = generator(split, seed, 1)
+    rng = generator(split, seed, 1 + _NUMBERS * attempt)
     shares = np.array([share for share, _ in LAYOUTS.values()])
     draw = [make for _, make in LAYOUTS.values()][rng.choice(len(LAYOUTS), p=shares / shares.sum())]
     return draw(stock, rng, lens, frames), lens
@@ -43,7 +51,7 @@ def choose_views(renderer: Renderer, staged: Staged, rng: np.random.Generator) -
     good = [sound(renderer.depth(c), staged.near) for c in small]
     kept = [k for k, ok in enumerate(good) if ok]
     if not kept:
-        raise ValueError(f"no camera of this {staged.kind} sees anything")
+        raise NothingSeenError(f"no camera of this {staged.kind} sees anything")
     chosen = []
     for k, camera in enumerate(staged.cameras):
         if not good[k]:

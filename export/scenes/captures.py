@@ -33,7 +33,7 @@ class CaptureError(ValueError):
 @dataclass(frozen=True, eq=False)
 class Capture:
     """One place. photos: encoded, so that many fit into memory. up: of the world. held_out: indices of photos that
-    pictures are never made of."""
+    pictures are never made of. seen: kept by training (export.scenes.samples)."""
 
     name: str
     cameras: list[Camera]
@@ -41,6 +41,7 @@ class Capture:
     cloud: PointCloud
     up: tuple[float, float, float] = field(default=(0.0, 1.0, 0.0))
     held_out: frozenset[int] = frozenset()
+    seen: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
 
     def sources(self) -> list[int]:
         """Indices of the photos that pictures are made of."""

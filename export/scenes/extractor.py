@@ -1,5 +1,7 @@
 """The feature extractor of NPBG++ (arXiv 2203.13318): a U-Net from a photo to 8 features a pixel.
 
+The first three are the photo's own red, green and blue, as they are: so a scene has colours without a network, the
+refiner starts from a picture instead of from nothing, and no bit of 8 is lost on what is known. Five are learnt.
 The trunk is the MobileNetV2 that the dense pose network has too, since there are weights for it that may be shipped
 (export.teachers.backbone); the paper's has a similar size.
 """
@@ -14,7 +16,7 @@ from torch.nn import functional as F
 
 from export.densepose.data import MEAN, STD
 from export.densepose.network import MobileNetV2
-from export.scenes.config import FEATURES, ExtractorConfig
+from export.scenes.config import COLOURS, FEATURES, ExtractorConfig
 
 STRIDE = 32  # sides of the photo are multiples of it
 
@@ -45,7 +47,7 @@ class Extractor(nn.Module):
         self.blocks = nn.ModuleList(
             nn.Conv2d(w + s, w, 3, padding=1) for w, s in zip(config.widths, skips, strict=True)
         )
-        self.final = nn.Conv2d(config.widths[-1], FEATURES, 1, bias=False)
+        self.final = nn.Conv2d(config.widths[-1], FEATURES - COLOURS, 1, bias=False)
         self.register_buffer("mean", torch.from_numpy(MEAN / 255)[:, None, None])
         self.register_buffer("std", torch.from_numpy(STD / 255)[:, None, None])
 
@@ -67,4 +69,4 @@ class Extractor(nn.Module):
         for lateral, block in zip(self.lateral, self.blocks, strict=True):
             skip = skips.pop()
             x = F.relu(block(torch.cat([self.double(lateral(x), skip), skip], 1)))
-        return self.final(x)
+        return torch.cat([image, self.final(x)], 1)

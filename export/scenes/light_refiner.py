@@ -5,6 +5,9 @@ nothing but copying is done at full resolution, where the gated one spends a thi
 two convolutions, ELU and a sigmoid, so that convolution and activation are one int8 operation; zeros around the
 borders, which convolutions bring along, where reflecting is an operation of its own; maps from below pass a 1x1
 convolution before they are doubled, not a 3x3 one after it; and pooling and doubling keep the values of int8 maps.
+
+What the network computes is added to the colours of the finest raster (`export.scenes.raster.filled`): training starts
+from a picture, and what is rounded to 8 bits is the difference alone.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from export.scenes.config import RASTER, RefinerConfig
+from export.scenes.config import COLOURS, RASTER, RefinerConfig
 
 
 def folded(x: Tensor) -> Tensor:
@@ -68,7 +71,8 @@ class LightRefiner(nn.Module):
         joined = 2 if config.join == "concat" else 1
         self.up = nn.ModuleList(_block(joined * w[k], w[k], block) for k in range(len(w) - 1))
         self.final = nn.Conv2d(w[0], outputs, 3, padding=1)
-        nn.init.constant_(self.final.bias, 0.5)
+        nn.init.normal_(self.final.weight, std=0.01)
+        nn.init.zeros_(self.final.bias)
 
     def forward(self, rasters: list[Tensor]) -> Tensor:
         if self.config.folded:
@@ -86,4 +90,5 @@ class LightRefiner(nn.Module):
             skip = skips.pop()
             x = self.double(lateral(x), skip)
             x = block(torch.cat([x, skip], 1) if self.config.join == "concat" else x + skip)
-        return self.final(x)
+        firsts = range(0, rasters[0].shape[1], RASTER)
+        return torch.cat([rasters[0][:, first : first + COLOURS] for first in firsts], 1) + self.final(x)

@@ -6,7 +6,7 @@ The reference for the SDK and what training differentiates through. Points are f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +15,11 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.scenes.basis import directions
-from export.scenes.cameras import Camera, moves, resized, upright, warped
-from export.scenes.config import ALPHA, LEVELS, MULTIPLE, TURNED_MULTIPLE
+from export.scenes.cameras import Camera, moves, reframed, resized, upright, warped
+from export.scenes.config import ALPHA, HIDING, LEVELS, MULTIPLE, TURNED_MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
-from export.scenes.raster import projected, pyramid, visible
+from export.scenes.raster import filled, projected, pyramid, unhidden, visible
 from export.scenes.system import Networks
 
 
@@ -34,25 +34,16 @@ class View:
 @dataclass(frozen=True)
 class Options:
     """up: of the world. visibility_scale: of the photos' sides, for finding who is seen (1/2 in the paper where points
-    are sparse, so that what is behind does not shine through). near: depth of the nearest visible point, in the scene's
-    units. alpha: of the ridge regression. precision: of the moments."""
+    are sparse, so that what is behind does not shine through). hiding: how much farther than the nearest point of its
+    block of pixels a point may be, as a share of that depth (see `unhidden`; infinite in the paper). near: depth of the
+    nearest visible point, in the scene's units. alpha: of the ridge regression. precision: of the moments."""
 
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     visibility_scale: float = 1.0
+    hiding: float = HIDING
     near: float = 0.0
     alpha: float = ALPHA
     precision: torch.dtype = torch.float32
-
-
-def features_of(view: View, networks: Networks, options: Options) -> tuple[Tensor, Camera]:
-    """Features [8, h, w] of the photo turned upright, and the camera that took it so.
-
-    A photo is turned by bilinear interpolation before the extractor sees it, in the smallest frame that holds it.
-    """
-    camera = upright(view.camera, np.asarray(options.up), STRIDE)
-    image = torch.from_numpy(warped(view.image, view.camera, camera))
-    device = next(networks.parameters()).device
-    return networks.extractor(image.permute(2, 0, 1)[None].to(device))[0], camera
 
 
 def sampled(features: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
@@ -63,11 +54,16 @@ def sampled(features: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
     return found[0, :, 0].T
 
 
+def shown_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
+    """Keys, int64 [H, W], of the points [P, 3] that a camera sees."""
+    return unhidden(visible(points, camera, options.near), options.hiding)
+
+
 def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
     """Which points win a pixel of the photo, bool [P]. Asked of the camera as it is: its pixels are the photo's."""
     scale = options.visibility_scale
     small = resized(camera, max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
-    keys = visible(points, small, options.near)
+    keys = shown_in(points, small, options)
     seen = torch.zeros(len(points), dtype=torch.bool, device=points.device)
     seen[pyramid(keys, 1).points] = True
     return seen
@@ -92,35 +88,85 @@ class Model:
         return Looks(mean, slope, looks.views[chosen], looks.singular[chosen]).seen_from(basis.to(mean)).float()
 
     def rasters(self, camera: Camera, networks: Networks, options: Options) -> list[Tensor]:
-        """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16."""
-        shown = pyramid(visible(self.places, camera, options.near), LEVELS)
-        return shown.rasters(self.descriptors(shown.points, camera.centre, networks))
+        """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16; `filled`."""
+        shown = pyramid(shown_in(self.places, camera, options), LEVELS)
+        return filled(shown.rasters(self.descriptors(shown.points, camera.centre, networks)))
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """What some photos see of a cloud, before any network. places: float64 [P, 3], points that at least one sees.
+    images: for each photo RGB float32 [3, h, w], turned upright. columns, rows: where the points are in it, [P].
+    seen: bool [P]. centres: of the cameras, [3]."""
+
+    places: Tensor
+    images: list[Tensor]
+    columns: list[Tensor]
+    rows: list[Tensor]
+    seen: list[Tensor]
+    centres: list[np.ndarray]
+
+
+def gathered(
+    points: Tensor,
+    views: Sequence[View],
+    options: Options,
+    target: Camera | None = None,
+    window_px: int | None = None,
+    seen: Sequence[Tensor] | None = None,
+) -> Sources:
+    """The cloud [P, 3] after all views; with a `target`, only what wins a pixel of that camera: enough to render it.
+
+    A photo is turned by bilinear interpolation before the extractor sees it, in the smallest frame that holds it, or,
+    with `window_px`, in a square of that side about the points; what is outside of it is then not seen. seen: of all
+    points, if it is known (`seen_in`). Raises ValueError without views.
+    """
+    if not views:
+        raise ValueError("a model needs at least one view, and none is given")
+    found = torch.stack(list(seen) if seen else [seen_in(points, view.camera, options) for view in views])
+    (chosen,) = torch.where(found.any(0))
+    if target is not None:
+        chosen = chosen[pyramid(shown_in(points[chosen], target, options), 1).points]
+    places, found = points[chosen], found[:, chosen]
+    sources = Sources(places, [], [], [], [], [view.camera.centre for view in views])
+    for view, sees in zip(views, found, strict=True):
+        camera = upright(view.camera, np.asarray(options.up), STRIDE)
+        columns, rows, _ = projected(places, camera)
+        if window_px is not None:
+            middle = [float(at[sees].median()) if sees.any() else 0.0 for at in (columns, rows)]
+            left, top = (round(at - window_px / 2) for at in middle)
+            camera = reframed(camera, left, top, window_px, window_px)
+            columns, rows = columns - left, rows - top
+            for at in (columns, rows):
+                sees = sees & (at >= 0) & (at <= window_px - 1)
+        image = warped(view.image, view.camera, camera)
+        sources.images.append(torch.from_numpy(image).permute(2, 0, 1))
+        # What is not seen may have no pixel at all; it counts for nothing, but must be a number.
+        sources.columns.append(torch.where(sees, columns, 0))
+        sources.rows.append(torch.where(sees, rows, 0))
+        sources.seen.append(sees)
+    return sources
+
+
+def fitted(sources: Sources, features: Iterable[Tensor], networks: Networks, options: Options) -> Model:
+    """How the points look, from the features [8, h, w] of each photo's image."""
+    places = sources.places
+    moments = Moments.zeros(len(places), torch.zeros((), dtype=options.precision, device=places.device))
+    each = zip(features, sources.columns, sources.rows, sources.seen, sources.centres, strict=True)
+    for maps, columns, rows, sees, centre in each:
+        basis = networks.basis(directions(places, torch.from_numpy(centre).to(places)).float())
+        moments = moments.with_view(sampled(maps, columns, rows), basis, sees)
+    return Model(places, moments.looks(options.alpha))
 
 
 def modelled(
     points: Tensor, views: Sequence[View], networks: Networks, options: Options, target: Camera | None = None
 ) -> Model:
-    """The cloud after all views; with a `target`, only what wins a pixel of that camera: enough to render it.
-
-    Raises ValueError without views.
-    """
-    if not views:
-        raise ValueError("a model needs at least one view, and none is given")
-    seen = torch.stack([seen_in(points, view.camera, options) for view in views])
-    (chosen,) = torch.where(seen.any(0))
-    if target is not None:
-        chosen = chosen[pyramid(visible(points[chosen], target, options.near), 1).points]
-    places, seen = points[chosen], seen[:, chosen]
-    moments = Moments.zeros(len(places), torch.zeros((), dtype=options.precision, device=points.device))
-    for view, sees in zip(views, seen, strict=True):
-        features, camera = features_of(view, networks, options)
-        columns, rows, _ = projected(places, camera)
-        # What is not seen may have no pixel at all; it counts for nothing, but must be a number.
-        columns, rows = (torch.where(sees, at, 0) for at in (columns, rows))
-        centre = torch.from_numpy(view.camera.centre).to(places)
-        basis = networks.basis(directions(places, centre).float())
-        moments = moments.with_view(sampled(features, columns, rows), basis, sees)
-    return Model(places, moments.looks(options.alpha))
+    """The cloud after all views (see `gathered`)."""
+    sources = gathered(points, views, options, target)
+    return fitted(
+        sources, (networks.extractor(x[None].to(points.device))[0] for x in sources.images), networks, options
+    )
 
 
 @torch.no_grad()

@@ -7,7 +7,8 @@ Coarser levels are the least keys of 2x2 pixels of the next finer one. That is w
 find, and exactly: a point at (x, y) is in pixel floor(x + 1/2), and half the size moves it to (x + 1/2) / 2 - 1/2, so
 to pixel floor((x + 1/2) / 2) = floor(floor(x + 1/2) / 2). It holds where all sides can be halved, hence sides are
 multiples of 16 here: the frame is wider than the picture by up to 15 pixels, with the points that are there, and cut
-afterwards. The paper truncates sizes instead and draws the points five times.
+afterwards. The paper truncates sizes instead and draws the points five times. A winner that is hidden (`unhidden`) is
+never the winner of a coarser pixel that has another point of its block.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ import torch
 from torch import Tensor
 
 from export.scenes.cameras import Camera
+from export.scenes.config import COLOURS
 
 NOTHING = torch.iinfo(torch.int64).max
+HIDING_PX = 4
 _INDEX = (1 << 32) - 1
 
 
@@ -50,6 +53,20 @@ def visible(points: Tensor, camera: Camera, near: float = 0.0) -> Tensor:
     keys = torch.full((h * w,), NOTHING, dtype=torch.int64, device=points.device)
     key = depths[index].view(torch.int32).long() << 32 | index
     return keys.scatter_reduce(0, at, key, "amin").view(h, w)
+
+
+def unhidden(keys: Tensor, share: float) -> Tensor:
+    """Keys [H, W] without the points that shine through holes of what is before them: those of a block of
+    HIDING_PX x HIDING_PX pixels, counted from the first one, that are farther than its nearest by more than `share` of
+    that depth. Infinite: all stay."""
+    h, w = keys.shape
+    rows, columns = -(-h // HIDING_PX), -(-w // HIDING_PX)
+    whole = torch.full((rows * HIDING_PX, columns * HIDING_PX), NOTHING, dtype=keys.dtype, device=keys.device)
+    whole[:h, :w] = keys
+    blocks = whole.view(rows, HIDING_PX, columns, HIDING_PX)
+    nearest = depths_of(blocks.amin((1, 3)))
+    limit = (nearest * (1 + share)).repeat_interleave(HIDING_PX, 0).repeat_interleave(HIDING_PX, 1)
+    return torch.where(depths_of(keys) > limit[:h, :w], NOTHING, keys)
 
 
 def halved(keys: Tensor) -> Tensor:
@@ -92,3 +109,14 @@ def pyramid(keys: Tensor, levels: int) -> Pyramid:
         found = torch.searchsorted(points, keys & _INDEX)
         slots.append(torch.where(keys == NOTHING, len(points), found))
     return Pyramid(points, slots)
+
+
+def filled(rasters: list[Tensor]) -> list[Tensor]:
+    """Rasters [..., 9, H/2^k, W/2^k], finest first, as a refiner wants them: where a pixel has no point its colours are
+    those of the next coarser raster, so that the finest holds a picture. Occupancy and learnt features stay 0 there."""
+    found = [rasters[-1]]
+    for raster in reversed(rasters[:-1]):
+        below = found[-1][..., :COLOURS, :, :].repeat_interleave(2, -2).repeat_interleave(2, -1)
+        colours = raster[..., :COLOURS, :, :] + (1 - raster[..., -1:, :, :]) * below
+        found.append(torch.cat([colours, raster[..., COLOURS:, :, :]], -3))
+    return found[::-1]

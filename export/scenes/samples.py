@@ -13,7 +13,7 @@ from torchvision.transforms import functional as colour
 
 from export.scenes.cameras import Camera, reframed, upright, warped
 from export.scenes.captures import Capture
-from export.scenes.modelling import View
+from export.scenes.modelling import Options, Sources, gathered, seen_in
 from export.scenes.source_views import drawn
 
 SCORED_POINTS = 512  # of the cloud, enough to tell which photos see the same
@@ -22,23 +22,24 @@ SCORED_POINTS = 512  # of the cloud, enough to tell which photos see the same
 @dataclass(frozen=True, eq=False)
 class Sample:
     """camera: of the cut, upright. target: RGB float32 [3, S, S]; mask [1, S, S] is 1 where the photo is. sources: the
-    photos. points: float64 [P, 3]."""
+    photos, and what they see of the cut."""
 
     camera: Camera
     target: Tensor
     mask: Tensor
-    sources: list[View]
-    points: Tensor
-    up: tuple[float, float, float]
+    sources: Sources
+    options: Options
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """crop_px: side of the cuts, a multiple of 32. sources: photos a cut is made from, 3 in the paper. long_side_px:
-    larger photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
+    """crop_px: side of the cuts, a multiple of 32. sources: photos a cut is made from, at least and at most; the paper
+    has 3. margin_px: the extractor sees of a photo a square so much wider than the cut. long_side_px: larger photos are
+    made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
 
     crop_px: int = 256
-    sources: int = 3
+    sources: tuple[int, int] = (3, 3)
+    margin_px: int = 64
     long_side_px: int = 640
     jitter: float = 0.8
 
@@ -49,7 +50,8 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     places = capture.cloud.places
     target = int(rng.integers(len(capture.cameras)))
     scored = places[rng.integers(len(places), size=min(SCORED_POINTS, len(places)))]
-    chosen = drawn(target, capture.cameras, capture.sources(), scored, sampling.sources, rng)
+    count = int(rng.integers(sampling.sources[0], sampling.sources[1] + 1))
+    chosen = drawn(target, capture.cameras, capture.sources(), scored, count, rng)
     change = _jitter(rng) if rng.random() < sampling.jitter else lambda image: image
     views = [capture.view(k, sampling.long_side_px) for k in (target, *chosen)]
     views = [replace(view, image=change(view.image)) for view in views]
@@ -62,14 +64,20 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     there = np.ones(photo.image.shape[:2], np.float32)
     mask = warped(there, photo.camera, camera, cv2.BORDER_CONSTANT) > 0.999
     cut = warped(photo.image, photo.camera, camera)
+    points, options = torch.from_numpy(places), Options(up=capture.up)
+    seen = [_seen(capture, k, points, view.camera, options) for k, view in zip(chosen, views[1:], strict=True)]
+    sources = gathered(points, views[1:], options, camera, sampling.crop_px + sampling.margin_px, seen)
     return Sample(
-        camera,
-        torch.from_numpy(cut).permute(2, 0, 1),
-        torch.from_numpy(mask)[None].float(),
-        views[1:],
-        torch.from_numpy(places),
-        capture.up,
+        camera, torch.from_numpy(cut).permute(2, 0, 1), torch.from_numpy(mask)[None].float(), sources, options
     )
+
+
+def _seen(capture: Capture, k: int, points: Tensor, camera: Camera, options: Options) -> Tensor:
+    """Which points photo k sees. It is the same each time the photo is drawn, so it is kept, a bit a point."""
+    key = (k, camera.width_px)
+    if key not in capture.seen:
+        capture.seen[key] = np.packbits(seen_in(points, camera, options).numpy())
+    return torch.from_numpy(np.unpackbits(capture.seen[key], count=len(points)).astype(bool))
 
 
 def _jitter(rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:

@@ -18,6 +18,7 @@ import math
 import signal
 import time
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -34,7 +35,7 @@ from export.scenes.captures import Capture, CaptureError, read_captures
 from export.scenes.config import SIZES
 from export.scenes.extractor import STRIDE
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
-from export.scenes.modelling import Options, modelled, painted, render
+from export.scenes.modelling import Options, fitted, modelled, painted, render
 from export.scenes.perceptual import Perceptual, load_perceptual
 from export.scenes.point_cloud import PointCloudError
 from export.scenes.samples import Sample, Sampling, draw_sample
@@ -43,27 +44,39 @@ from export.scenes.system import Networks, save_networks
 
 WARM_UP_STEPS = 100
 LARGEST_GRADIENT = 1.0
+STANDING_BLOCKS = 3  # of a pretrained trunk, to stride 4, that are not trained
+PRECISIONS = {"float32": torch.float32, "bfloat16": torch.bfloat16}
 
 
 def batch_terms(
-    networks: Networks, samples: Sequence[Sample], weights: LossWeights, perceptual: Perceptual | None
+    networks: Networks,
+    samples: Sequence[Sample],
+    weights: LossWeights,
+    perceptual: Perceptual | None,
+    precision: torch.dtype = torch.float32,
 ) -> dict[str, Tensor]:
-    """The loss's terms over a batch of cuts of one size. Extractor, basis and refiner get gradients."""
+    """The loss's terms over a batch of cuts of one size. Extractor, basis and refiner get gradients. precision: of
+    convolutions; the regression is always float64."""
     device = next(networks.parameters()).device
+    images = torch.cat([torch.stack(sample.sources.images) for sample in samples]).to(device)
+    half = torch.autocast(device.type, precision, enabled=precision != torch.float32)
+    with half:
+        features = iter(networks.extractor(images.contiguous(memory_format=torch.channels_last)).float())
     rasters: list[list[Tensor]] = []
     for sample in samples:
-        options = Options(up=sample.up)
-        model = modelled(sample.points.to(device), sample.sources, networks, options, sample.camera)
-        rasters.append(model.rasters(sample.camera, networks, options))
+        model = fitted(sample.sources, islice(features, len(sample.sources.images)), networks, sample.options)
+        rasters.append(model.rasters(sample.camera, networks, sample.options))
     target = torch.stack([sample.target for sample in samples]).to(device)
     mask = torch.stack([sample.mask for sample in samples]).to(device)
-    picture = networks.refiner([torch.stack(level) for level in zip(*rasters, strict=True)])
-    terms = picture_terms(picture, target, mask, weights, perceptual)
-    # The refiner alone: what it makes of a picture's own features should be the picture.
-    with torch.no_grad():
-        features = networks.extractor(target)
-    own = networks.refiner(own_rasters(features))
-    terms["own"] = weights.own * ((own - target) * mask).abs().mean() / mask.mean().clamp_min(1e-6)
+    with half:
+        picture = networks.refiner([torch.stack(level) for level in zip(*rasters, strict=True)])
+        terms = picture_terms(picture.float(), target, mask, weights, perceptual)
+    if weights.own:
+        # The refiner alone: what it makes of a picture's own features should be the picture.
+        with torch.no_grad():
+            features = networks.extractor(target)
+        own = networks.refiner(own_rasters(features))
+        terms["own"] = weights.own * ((own - target) * mask).abs().mean() / mask.mean().clamp_min(1e-6)
     return terms
 
 
@@ -149,7 +162,14 @@ class Run:
         self.size = options.size
         if self.perceptual and not saved:
             self.networks.extractor.trunk.load_state_dict(self.perceptual.trunk.state_dict())
-        self.optimiser = torch.optim.Adam(self.networks.parameters(), lr=options.lr)
+        if self.perceptual:
+            # What has learnt edges from photographs needs no lesson, and would be the dearest to teach: half of the
+            # way back through the extractor is at the largest sizes.
+            trunk = self.networks.extractor.trunk
+            for module in (trunk.stem, *trunk.blocks[:STANDING_BLOCKS]):
+                module.requires_grad_(False)
+        learning = [p for p in self.networks.parameters() if p.requires_grad]
+        self.optimiser = torch.optim.Adam(learning, lr=options.lr)
         if saved:
             self.networks.load_state_dict(saved["networks"])
             self.optimiser.load_state_dict(saved["optimiser"])
@@ -188,18 +208,28 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
     parser.add_argument("--batch", type=int, default=4, help="cuts a step")
     parser.add_argument("--crop", type=int, default=256, help="side of the cuts, pixels; a multiple of 32")
-    parser.add_argument("--sources", type=int, default=3, help="photos that a cut is made from")
+    parser.add_argument(
+        "--sources", type=int, nargs=2, default=(2, 5), help="photos that a cut is made from, from .. to"
+    )
+    parser.add_argument("--margin", type=int, default=64, help="the extractor sees so much more than a cut, pixels")
     parser.add_argument("--long-side", type=int, default=640, help="larger photos are made smaller, pixels")
     parser.add_argument("--lr", type=float, default=5e-4)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, help="default: one a core")
+    parser.add_argument(
+        "--precision",
+        choices=PRECISIONS,
+        default="float32",
+        help="of convolutions; processors with AVX512_BF16 or AMX train about twice as fast with bfloat16",
+    )
     parser.add_argument("--pretrained", type=Path, help="weights of the trunk (export.teachers.backbone)")
     parser.add_argument("--validate-minutes", type=float, default=10)
     options = parser.parse_args()
-    if options.crop < STRIDE or options.crop % STRIDE:
-        parser.error(f"--crop {options.crop}: must be a multiple of {STRIDE}")
-    if min(options.batch, options.sources) < 1:
-        parser.error("--batch and --sources must be at least 1")
+    for name, value, least in (("crop", options.crop, STRIDE), ("margin", options.margin, 0)):
+        if value < least or value % STRIDE:
+            parser.error(f"--{name} {value}: must be a multiple of {STRIDE}")
+    if min(options.batch, options.sources[0]) < 1 or options.sources[1] < options.sources[0]:
+        parser.error("--batch and --sources must be at least 1, and --sources rise")
     return options
 
 
@@ -212,7 +242,7 @@ def main() -> None:
         captures, held_out = (read_captures(options.data / split) for split in ("train", "val"))
     except (CaptureError, PointCloudError) as error:
         raise SystemExit(str(error)) from None
-    sampling = Sampling(options.crop, options.sources, options.long_side)
+    sampling = Sampling(options.crop, tuple(options.sources), options.margin, options.long_side)
     stopped = False
 
     def stop(*_: object) -> None:
@@ -238,7 +268,7 @@ def main() -> None:
             group["lr"] = rate
         rng = np.random.default_rng([options.seed, run.step])
         samples = [draw_sample(captures, sampling, rng) for _ in range(options.batch)]
-        terms = batch_terms(run.networks, samples, LossWeights(), run.perceptual)
+        terms = batch_terms(run.networks, samples, LossWeights(), run.perceptual, PRECISIONS[options.precision])
         run.optimiser.zero_grad(set_to_none=True)
         sum(terms.values()).backward()
         if torch.isfinite(nn.utils.clip_grad_norm_(run.networks.parameters(), LARGEST_GRADIENT)):

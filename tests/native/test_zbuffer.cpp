@@ -23,7 +23,8 @@ Scene packed(const ModelledPoints& points, maq::Places places) {
 
 // Keys of a scene, its blocks dealt to `workers` in turn, from the last to the first where `is_reversed`.
 std::vector<DepthKey> keys_of(const Scene& scene, const PinholeCamera& camera, double near, int workers = 1,
-                              bool is_reversed = false, bool skips = false, uint32_t* drawn = nullptr) {
+                              bool is_reversed = false, bool skips = false, uint32_t* drawn = nullptr,
+                              double hiding = INFINITY) {
   static maq::ZBuffer buffer;  // with what an earlier picture left
   buffer.begin(camera, near, workers);
   const maq::ViewFrustum frustum(camera, near);
@@ -33,7 +34,10 @@ std::vector<DepthKey> keys_of(const Scene& scene, const PinholeCamera& camera, d
     if (drawn != nullptr) ++*drawn;
     buffer.draw(span_of(scene, block, camera.centre), int(i) % workers);
   }
-  for (int row = 0; row < camera.height_px; ++row) buffer.finish(row, row + 1);
+  constexpr int kRows = 2 * maq::ZBuffer::kHidingBlock;
+  for (int row = 0; row < camera.height_px; row += kRows) {
+    buffer.finish(row, std::min(camera.height_px, row + kRows), hiding);
+  }
   return {buffer.keys(), buffer.keys() + size_t(camera.width_px) * size_t(camera.height_px)};
 }
 
@@ -171,6 +175,37 @@ TEST(ZBuffer, StoredPlacesByCamerasOfEveryKind) {
         camera.fy_px *= 1.7;
         camera.cx_px += width;
         expect_as_reference(scene, camera, 0.01);
+      }
+    }
+  }
+}
+
+TEST(ZBuffer, PointsFarBehindTheNearestOfTheirBlockOfPixelsAreHidden) {
+  const Scene scene = packed(made_up_points(6000), maq::Places::kFloat32);
+  for (const auto& [width, height] : {std::pair(66, 45), std::pair(3, 2), std::pair(64, 48)}) {
+    const PinholeCamera camera = camera_of(width, height, 60);
+    const std::vector<DepthKey> all = keys_of(scene, camera, 0, 2);
+    EXPECT_EQ(keys_of(scene, camera, 0, 2, false, false, nullptr, 1e30), all);
+    for (const double share : {0.0, 0.1, 0.5}) {
+      const std::vector<DepthKey> left = keys_of(scene, camera, 0, 2, false, false, nullptr, share);
+      size_t hidden = 0;
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+          float nearest = INFINITY;
+          for (int by = y / 4 * 4; by < std::min(height, y / 4 * 4 + 4); ++by) {
+            for (int bx = x / 4 * 4; bx < std::min(width, x / 4 * 4 + 4); ++bx) {
+              const DepthKey key = all[size_t(by * width + bx)];
+              if (key != kNoPointKey) nearest = std::min(nearest, maq::depth_of(key));
+            }
+          }
+          const DepthKey key = all[size_t(y * width + x)];
+          const bool is_hidden = key != kNoPointKey && maq::depth_of(key) > nearest * float(1 + share);
+          hidden += is_hidden ? 1 : 0;
+          ASSERT_EQ(left[size_t(y * width + x)], is_hidden ? kNoPointKey : key);
+        }
+      }
+      if (width > 3) {
+        EXPECT_GT(hidden, 100u);
       }
     }
   }

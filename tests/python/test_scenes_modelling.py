@@ -12,7 +12,7 @@ from export.scenes.cameras import Camera, between, reframed, resized, turned_upr
 from export.scenes.config import SIZES
 from export.scenes.looks import Moments
 from export.scenes.modelling import Options, View, modelled, painted, render, sampled, seen_in
-from export.scenes.raster import NOTHING, depths_of, halved, projected, pyramid, visible
+from export.scenes.raster import HIDING_PX, NOTHING, depths_of, filled, halved, projected, pyramid, unhidden, visible
 from export.scenes.source_views import drawn, scores
 from export.scenes.system import Networks
 
@@ -185,9 +185,10 @@ def test_only_the_front_is_seen_and_coarser_photos_see_through_less():
     points, front = torch.from_numpy(wall), torch.from_numpy(wall[:, 2] == 0)
     through = []
     for scale in (1.0, 0.4):
-        seen = seen_in(points, camera, Options(visibility_scale=scale))
+        seen = seen_in(points, camera, Options(visibility_scale=scale, hiding=np.inf))
         through.append(int(seen[~front].sum()))
     assert through[1] < through[0]
+    assert not seen_in(points, camera, Options())[~front].any()
 
 
 def test_bilinear_samples_are_those_between_pixel_centres():
@@ -324,7 +325,7 @@ def test_a_picture_of_any_size_and_turn_is_what_the_camera_sees(room, roll):
     networks, options = Networks(SIZES["tiny"]).eval(), Options()
     camera = looking((0.2, 0.3, 2.4), (0, -0.5, 0), 61, 45, roll)
     networks.extractor.forward = lambda image: torch.cat([image, image, image[:, :2]], 1)
-    networks.refiner.forward = lambda rasters: rasters[0][:, :3] + (1 - rasters[0][:, 8:]) * 0.5
+    networks.refiner.forward = lambda rasters: rasters[0][:, :3]
     with torch.no_grad():
         picture = render(modelled(points, views, networks, options), camera, networks, options)
     assert picture.shape == (45, 61, 3)
@@ -368,3 +369,44 @@ def test_sources_are_drawn_from_aside_and_from_those_that_see_the_same():
     assert counts[2] > 120
     assert sorted(drawn(0, cameras, range(5), places, 9, rng)) == [1, 2, 3, 4]
     assert sorted(drawn(0, cameras, [0, 3, 4], places, 9, rng)) == [3, 4]
+
+
+def test_pixels_without_a_point_have_the_colours_of_the_next_coarser_raster():
+    rasters = [torch.rand(9, 32 >> k, 48 >> k) for k in range(3)]
+    for raster, share in zip(rasters, (0.3, 0.6, 0.9), strict=True):
+        raster[8] = (torch.rand_like(raster[8]) < share).float()
+        raster *= raster[8].clone()
+    full = filled(rasters)
+    for level in range(3):
+        there = rasters[level][8] > 0
+        assert torch.equal(full[level][:, there], rasters[level][:, there])
+        assert torch.equal(full[level][3:], rasters[level][3:])
+        if level < 2:
+            below = full[level + 1][:3].repeat_interleave(2, 1).repeat_interleave(2, 2)
+            assert torch.equal(full[level][:3, ~there], below[:, ~there])
+        else:
+            assert full[level][:3, ~there].abs().max() == 0
+
+
+def test_points_behind_a_sparse_surface_are_hidden_and_a_slope_is_not():
+    rng = np.random.default_rng(5)
+    wall = np.c_[rng.uniform(-1, 1, (400, 2)), np.full(400, 2.0)]
+    behind = np.c_[rng.uniform(-2, 2, (4000, 2)), np.full(4000, 4.0)]
+    points = torch.from_numpy(np.concatenate([behind, wall]))
+    camera = Camera(66, 46, 60.0, 60.0, 33.0, 23.0, np.eye(3), np.zeros(3))
+    keys = visible(points, camera)
+    left = unhidden(keys, 0.1)
+    behind_before, behind_after = (((k != NOTHING) & (depths_of(k) > 3))[8:36, 8:56].sum() for k in (keys, left))
+    assert behind_before > 300
+    assert behind_after < behind_before / 4
+    assert torch.equal(left[depths_of(keys) < 3], keys[depths_of(keys) < 3])
+    assert torch.equal(unhidden(keys, torch.inf), keys)
+    # What remains is the nearest of its block, or near it: by hand.
+    depth = depths_of(keys).numpy()
+    for row, column in np.argwhere(left.numpy() != NOTHING)[::17]:
+        top, first = row - row % HIDING_PX, column - column % HIDING_PX
+        assert depth[row, column] <= depth[top : top + HIDING_PX, first : first + HIDING_PX].min() * 1.1001
+    columns, rows = (x.ravel() for x in np.meshgrid(np.linspace(-3, 3, 200), np.linspace(-2, 2, 200)))
+    slope = torch.from_numpy(np.c_[columns, rows, 4 + columns])
+    keys = visible(slope, camera)
+    assert torch.equal(unhidden(keys, 0.2), keys)

@@ -19,7 +19,7 @@ from export.scenes.perceptual import Perceptual
 from export.scenes.samples import Sampling, draw_sample
 from export.scenes.system import Networks, load_networks
 
-SAMPLING = Sampling(crop_px=64, sources=2, long_side_px=96)
+SAMPLING = Sampling(crop_px=64, sources=(2, 2), margin_px=32, long_side_px=96)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def run(monkeypatch, places, out, *options, stop_after=None) -> list[float]:
     with monkeypatch.context() as patch:
         patch.setattr(train, "batch_terms", recorded)
         given = ["train", "--data", str(places), "--out", str(out), "--size", "tiny", "--batch", "1", "--threads", "1"]
-        patch.setattr("sys.argv", [*given, "--crop", "64", "--sources", "2", *options])
+        patch.setattr("sys.argv", [*given, "--crop", "64", "--sources", "2", "2", "--margin", "32", *options])
         train.main()
     return losses
 
@@ -76,7 +76,7 @@ def test_a_run_leaves_checkpoint_weights_log_curves_and_sample(monkeypatch, plac
     names = {path.name for path in (tmp_path / "run").iterdir()}
     assert names == {"checkpoint.pt", "weights.pt", "log.json", "curves.png", "sample.png"}
     log = json.loads((tmp_path / "run" / "log.json").read_text())
-    assert {"quarter", "full", "own", "perceptual"} == set(log[0]["terms"])
+    assert {"quarter", "full", "perceptual"} == set(log[0]["terms"])
     assert {"psnr_db", "plain_psnr_db"} <= set(log[-1])
     assert cv2.imread(str(tmp_path / "run" / "sample.png")).shape == (64, 3 * 96, 3)
     assert load_networks(tmp_path / "run" / "weights.pt").config == SIZES["tiny"]
@@ -95,15 +95,15 @@ def test_a_few_steps_lower_the_loss_on_the_made_up_room(places):
     networks = Networks(SIZES["tiny"]).train()
     optimiser = torch.optim.Adam(networks.parameters(), lr=2e-3)
     history = []
-    for _ in range(30):
+    for _ in range(70):
         torch.manual_seed(0)
         terms = train.batch_terms(networks, samples, LossWeights(), None)
         optimiser.zero_grad()
         sum(terms.values()).backward()
         optimiser.step()
         history.append({name: value.item() for name, value in terms.items()})
-    for name in ("quarter", "full", "own"):
-        assert history[-1][name] < 0.85 * history[0][name], (name, history[0], history[-1])
+    for name in ("quarter", "full"):
+        assert history[-1][name] < 0.93 * history[0][name], (name, history[0], history[-1])
 
 
 def test_samples_depend_on_their_generator_alone_and_show_the_photo(places):
@@ -111,7 +111,7 @@ def test_samples_depend_on_their_generator_alone_and_show_the_photo(places):
     first, again = (draw_sample(captures, SAMPLING, np.random.default_rng(3)) for _ in range(2))
     assert torch.equal(first.target, again.target)
     assert first.target.shape == (3, 64, 64)
-    assert len(first.sources) == 2
+    assert len(first.sources.images) == 2
     assert 0.5 < first.mask.mean() <= 1
     other = draw_sample(captures, SAMPLING, np.random.default_rng(4))
     assert not torch.equal(first.target, other.target)
@@ -119,10 +119,12 @@ def test_samples_depend_on_their_generator_alone_and_show_the_photo(places):
 
 def test_colours_change_alike_in_target_and_sources(places):
     captures = read_captures(places / "train")
-    plain = [draw_sample(captures, Sampling(64, 2, 96, jitter=0.0), np.random.default_rng(s)) for s in range(4)]
+    plain = [
+        draw_sample(captures, Sampling(64, (2, 2), 32, 96, jitter=0.0), np.random.default_rng(s)) for s in range(4)
+    ]
     assert all(sample.target.min() >= 0 and sample.target.max() <= 1 for sample in plain)
-    changed = draw_sample(captures, Sampling(64, 2, 96, jitter=1.0), np.random.default_rng(0))
-    hue = [np.sort(image.reshape(-1, 3).mean(0)) for image in (view.image for view in changed.sources)]
+    changed = draw_sample(captures, Sampling(64, (2, 2), 32, 96, jitter=1.0), np.random.default_rng(0))
+    hue = [np.sort(image.numpy().reshape(3, -1).mean(1)) for image in changed.sources.images]
     np.testing.assert_allclose(hue[0], hue[1], atol=0.15)
 
 
@@ -151,4 +153,4 @@ def test_a_pictures_own_rasters_lose_most_where_they_are_finest():
     shares = [float(raster[:, 8].mean()) for raster in rasters]
     assert shares == pytest.approx([0.5, 0.75, 0.875, 0.9375, 0.96875], abs=0.02)
     for raster in rasters:
-        assert torch.equal(raster[:, 0], raster[:, 8])
+        assert torch.equal(raster[:, 3], raster[:, 8])

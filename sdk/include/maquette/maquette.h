@@ -24,6 +24,7 @@
 #include "maquette/densepose.h"
 #include "maquette/frame.h"
 #include "maquette/recorder.h"
+#include "maquette/scene.h"
 #include "maquette/source.h"
 #include "maquette/types.h"
 

@@ -47,7 +47,8 @@ typedef enum maq_status {
   MAQ_ERROR_DEVICE_LOST = 15,   /* a camera was unplugged, or broke, and did not come back in time */
   MAQ_ERROR_BUSY = 16,          /* another program has the camera */
   MAQ_ERROR_NO_PERMISSION = 17, /* the user may not open the camera */
-  MAQ_ERROR_UNWRITABLE = 18     /* a file cannot be made or written: it is there already, the disk is full */
+  MAQ_ERROR_UNWRITABLE = 18,    /* a file cannot be made or written: it is there already, the disk is full */
+  MAQ_CANCELLED = 19            /* not an error: the app ended the call before its time */
 } maq_status;
 
 /* The status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.

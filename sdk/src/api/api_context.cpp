@@ -67,6 +67,7 @@ const char* maq_status_name(maq_status status) {
     case MAQ_ERROR_BUSY: return "MAQ_ERROR_BUSY";
     case MAQ_ERROR_NO_PERMISSION: return "MAQ_ERROR_NO_PERMISSION";
     case MAQ_ERROR_UNWRITABLE: return "MAQ_ERROR_UNWRITABLE";
+    case MAQ_CANCELLED: return "MAQ_CANCELLED";
   }
   return "unknown status";
 }

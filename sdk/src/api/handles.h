@@ -13,6 +13,9 @@
 #include "densepose/densepose.h"
 #include "maquette/maquette.h"
 #include "nn/onnxruntime_library.h"
+#include "scene/capture.h"
+#include "scene/scene.h"
+#include "scene/scene_renderer.h"
 #include "sources/source.h"
 
 namespace maq {
@@ -99,6 +102,22 @@ struct maq_densepose : maq::Handle {
   maq::BoundedPool<maq_densepose_result> results;
 };
 
+struct maq_capture : maq::Handle {
+  explicit maq_capture(maq::Capture opened) : capture(std::move(opened)) {}
+  maq::Capture capture;
+  std::vector<std::string> dropped;  // as sentences
+};
+
+struct maq_scene : maq::Handle {
+  explicit maq_scene(maq::Scene made) : scene(std::move(made)) {}
+  maq::Scene scene;
+};
+
+struct maq_scene_image : maq::Handle {
+  maq::RenderedPicture picture;
+  maq::BoundedPool<maq_scene_image>::Home home;
+};
+
 namespace maq {
 
 // Gives a handle to the caller.
@@ -117,6 +136,9 @@ inline void take_back(maq_frame* frame) {
 }
 inline void take_back(maq_densepose_result* result) {
   if (result != nullptr) std::exchange(result->home, {})(result);
+}
+inline void take_back(maq_scene_image* image) {
+  if (image != nullptr) std::exchange(image->home, {})(image);
 }
 
 }  // namespace maq

@@ -17,7 +17,7 @@ constexpr int kMostGapCuts = 2;  // one after the other: four blocks of one
 
 class Cutter {
  public:
-  Cutter(uint32_t most_points, BlockOrder& result) : most_points_(most_points), result_(result) {}
+  Cutter(uint32_t most_points, BlockOrder& blocks) : most_points_(most_points), blocks_(blocks) {}
 
   void cut(Entry* begin, Entry* end) {
     const size_t count = size_t(end - begin);
@@ -74,26 +74,25 @@ class Cutter {
         return cut_gaps(behind, end, cuts_left - 1);
       }
     }
-    const size_t first = result_.order.size();
-    for (const Entry* entry = begin; entry < end; ++entry) result_.order.push_back(entry->index);
-    std::sort(result_.order.begin() + std::ptrdiff_t(first), result_.order.end());
-    result_.ends.push_back(uint32_t(result_.order.size()));
+    const size_t first = blocks_.order.size();
+    for (const Entry* entry = begin; entry < end; ++entry) blocks_.order.push_back(entry->index);
+    std::sort(blocks_.order.begin() + std::ptrdiff_t(first), blocks_.order.end());
+    blocks_.ends.push_back(uint32_t(blocks_.order.size()));
   }
 
   const uint32_t most_points_;
-  BlockOrder& result_;
+  BlockOrder& blocks_;
 };
 
 }  // namespace
 
-BlockOrder cut_into_blocks(const PointPlaces& places, const std::vector<uint32_t>& chosen, uint32_t most_points) {
+void cut_into_blocks(const PointPlaces& places, const std::vector<uint32_t>& chosen, uint32_t most_points,
+                     BlockOrder& blocks) {
+  if (chosen.empty()) return;
   std::vector<Entry> entries;
   entries.reserve(chosen.size());
   for (const uint32_t i : chosen) entries.push_back({{places.x[i], places.y[i], places.z[i]}, i});
-  BlockOrder result;
-  result.order.reserve(chosen.size());
-  if (!entries.empty()) Cutter(most_points, result).cut(entries.data(), entries.data() + entries.size());
-  return result;
+  Cutter(most_points, blocks).cut(entries.data(), entries.data() + entries.size());
 }
 
 }  // namespace maq

@@ -14,9 +14,10 @@ struct BlockOrder {
   std::vector<uint32_t> ends;
 };
 
-// The points with indices `chosen`, halved across their longest side until no block has over `most_points`; all but one
+// Adds blocks of the points with indices `chosen`, halved across their longest side until no block has over `most_points`; all but one
 // block are full. Then a block is cut where there is a gap of most of its length, so that a point far from all others
 // does not make a large box of its neighbours' (at most four blocks are made of one). Places must be finite.
-BlockOrder cut_into_blocks(const PointPlaces& places, const std::vector<uint32_t>& chosen, uint32_t most_points);
+void cut_into_blocks(const PointPlaces& places, const std::vector<uint32_t>& chosen, uint32_t most_points,
+                     BlockOrder& blocks);
 
 }  // namespace maq

@@ -122,7 +122,7 @@ size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera&
       visible_.draw(span, worker);
     }
   });
-  visible_.finish(0, scaled_camera.height_px);
+  visible_.finish(0, scaled_camera.height_px, options_.hiding);
 
   const size_t pixels = size_t(scaled_camera.width_px) * size_t(scaled_camera.height_px);
   seen_.clear();

@@ -25,6 +25,7 @@ struct BuildOptions {
   // Of a photo's sides, for finding which points it sees: below 1 a point hides more of what is behind it. 1/16 to 4.
   double visibility_scale = 1;
   double near = 0;   // depth of the nearest point that is seen, in units of the scene
+  double hiding = kHiding;
   double alpha = 1;  // of the ridge regression; 0 or more
   int threads = 2;   // for what is done point by point; the networks have theirs
   // What the builder may take in all for what it knows of points: 336 bytes each that was seen, 4 for others.

@@ -1,6 +1,9 @@
 // From modelled points to a scene that can be rendered and stored.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "scene/modelled_points.h"
 #include "scene/scene.h"
 
@@ -10,16 +13,17 @@ struct ScenePacking {
   Places places = Places::kUint16;
   Coefficients coefficients = Coefficients::kInt8;
   // Points whose look moves by less than that from its mean over the photos (ModelledPoints::variations) keep the mean
-  // alone. 0 keeps the slopes of all but those that have none.
-  float least_variation = 0;
+  // alone; the default is a step of an 8-bit picture. 0 keeps the slopes of all but those that have none.
+  float least_variation = 1 / 255.0f;
 };
 
 // Beyond that numbers stand for something broken, and sums of them would not be finite.
 inline constexpr float kLargestInScene = 1e30f;
 
-// The scene owns its arrays. With kFloat32 places and looks are exactly those given.
+// The scene owns its arrays. With kFloat32 places and looks are exactly those given. `order`, if it is not null, gets the
+// index among the given points of each of the scene's.
 // Throws MAQ_ERROR_INVALID_ARGUMENT without points, where lists differ in length, and for places and looks that are
-// not finite or over kLargestInScene.
-Scene make_scene(const ModelledPoints& points, const ScenePacking& packing);
+// not finite or over kLargestInScene; MAQ_ERROR_UNSUPPORTED for more than kMostPoints.
+Scene make_scene(const ModelledPoints& points, const ScenePacking& packing, std::vector<uint32_t>* order = nullptr);
 
 }  // namespace maq

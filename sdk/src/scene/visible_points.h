@@ -23,7 +23,8 @@ struct PointPlaces {
 class VisiblePoints {
  public:
   // Points nearer than `near` (in units of the scene, along the optical axis) are not seen. Where several have the same
-  // depth the lowest index wins. Points that are not finite are never seen.
+  // depth the lowest index wins. Points that are not finite are never seen. Nothing is hidden
+  // as of ZBuffer::finish().
   void find(const PointPlaces& points, const PinholeCamera& camera, double near);
 
   int width_px() const { return buffer_.width_px(); }

@@ -1,0 +1,284 @@
+/* Scenes: a place captured as posed photos and a point cloud, made into something that is rendered from new viewpoints,
+ * without training for it (NPBG++, arXiv 2203.13318).
+ *
+ *   maq_capture* capture;          maq_capture_open(context, "folder", &capture);
+ *   maq_scene* scene;              maq_scene_build(context, &config, capture, NULL, &scene);
+ *                                  maq_scene_save(scene, "place.maqs");
+ *   maq_scene_renderer* renderer;  maq_scene_renderer_create(context, &how, scene, &renderer);
+ *   maq_scene_image* image;        maq_scene_renderer_run(renderer, &camera, &image);
+ *
+ * An app that has a cloud and cameras of its own uses a maq_scene_builder and gives it photo after photo. */
+#ifndef MAQUETTE_SCENE_H_
+#define MAQUETTE_SCENE_H_
+
+#include "maquette/frame.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct maq_capture maq_capture;
+typedef struct maq_scene maq_scene;
+typedef struct maq_scene_builder maq_scene_builder;
+typedef struct maq_scene_renderer maq_scene_renderer;
+typedef struct maq_scene_image maq_scene_image;
+
+/* A camera, in the convention of OpenCV: x to the right, y down, z forward; the centre of the top left pixel is (0, 0).
+ * A point at X of the world is seen at rotation * (X - centre). */
+typedef struct maq_camera {
+  uint32_t struct_size;
+  int32_t width_px;
+  int32_t height_px;
+  double fx_px, fy_px, cx_px, cy_px;
+  double rotation[9]; /* row by row: world to camera */
+  double centre[3];   /* in the world */
+  /* Of a photo: k1, k2, p1, p2, k3, k4, k5, k6 as in OpenCV; the library undistorts it. Pictures are rendered without. */
+  double distortion[8];
+} maq_camera;
+
+/* ---- Captures: a folder with photos, their cameras and a cloud ---------------------------------------------------- */
+
+typedef struct maq_capture_info {
+  uint32_t struct_size;
+  uint32_t view_count;
+  uint64_t point_count;
+  uint32_t dropped_count; /* reasons for which something was dropped, see maq_capture_get_dropped */
+  double up[3];           /* unit vector */
+} maq_capture_info;
+
+/* The texts are the capture's. */
+typedef struct maq_capture_view {
+  uint32_t struct_size;
+  int32_t held_out;   /* 1: the capture keeps this photo for comparisons; do not build from it */
+  const char* name;   /* as the capture names the photo */
+  maq_camera camera;  /* of the photo after undistortion */
+} maq_capture_view;
+
+/* Opens a folder: a COLMAP model (text or binary, in sparse/0, sparse, colmap/sparse/0 or the folder itself) with its
+ * photos, or transforms.json as nerfstudio and Instant-NGP write it, with a PLY cloud. Photos are looked at when they are
+ * needed. `*capture` is the caller's, to be given to maq_capture_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (no such folder, no capture or cloud in it),
+ * MAQ_ERROR_UNREADABLE (damaged; no photo or point that can be used), MAQ_ERROR_UNSUPPORTED (camera models, sizes).
+ * Blocks while cameras and cloud are read. */
+MAQ_API maq_status maq_capture_open(maq_context* context, const char* folder, maq_capture** capture);
+
+/* Once, from any thread (NULL is fine). Builders made from it stay usable. Does not block. */
+MAQ_API void maq_capture_destroy(maq_capture* capture);
+
+/* Size of the capture. The caller sets info->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_info* info);
+
+/* The view at `index`. The caller sets view->struct_size and view->camera.struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
+MAQ_API maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_capture_view* view);
+
+/* Why something of the capture was dropped ("photos without a camera"), and how often. The text is the capture's.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
+MAQ_API maq_status maq_capture_get_dropped(const maq_capture* capture, uint32_t index, const char** reason,
+                                           uint64_t* count);
+
+/* Reads the photo of a view and undistorts it: BGR of the size of the view's camera. `*frame` is the caller's, to be given
+ * to maq_frame_release.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE.
+ * Blocks while the photo is read. */
+MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq_frame** frame);
+
+/* ---- Building ------------------------------------------------------------------------------------------------------ */
+
+/* Called on the thread that builds: how much of the call is done, 0 to 1, and what is being done. 0 cancels. */
+typedef int32_t (*maq_scene_progress_callback)(void* user_data, double done, const char* what);
+
+typedef struct maq_scene_build_config {
+  uint32_t struct_size;
+  int32_t threads;          /* 0 (default): the machine's cores, at most 4 */
+  const char* bundle_path;  /* folder of the scene networks; required. Copied. */
+  int32_t long_side_px;     /* larger photos are made smaller before they are looked at; default 640; 0: never */
+  int32_t coefficient_bits; /* of the scene's looks: 8 (default), 16, or 32 for floats, places then too */
+  double least_variation;   /* points whose look varies less keep their mean alone, in units of colours of 0 to 1; 0 keeps
+                               all; negative (default): the library's choice */
+  double visibility_scale;  /* of a photo's sides, for finding which points it sees: below 1 a point hides more of what is
+                               behind it, for sparse clouds; 1/16 to 4, default 1 */
+  double near_depth;        /* points nearer to a camera are not seen by it; units of the scene, default 0 */
+  uint64_t most_points;     /* of larger clouds points are taken evenly; 0 (default): all */
+  uint64_t most_bytes;      /* for what is known of points while building; 0 (default): 2 GiB */
+  maq_scene_progress_callback progress; /* may be NULL */
+  void* progress_user_data;
+  /* Of maq_scene_build: */
+  uint32_t most_views;   /* of more photos some are taken evenly; 0 (default): all */
+  int32_t uses_held_out; /* 1: photos that the capture keeps for comparisons too; default 0 */
+} maq_scene_build_config;
+
+typedef struct maq_scene_build_stats {
+  uint32_t struct_size;
+  uint32_t view_count;   /* photos that were looked at */
+  uint32_t unused_views; /* of maq_scene_build: photos that could not be used, or see nothing */
+  uint64_t cloud_points; /* after most_points */
+  uint64_t seen_points;  /* that a photo has seen */
+  /* Milliseconds so far, over all photos: reading them, finding whom they see, turning them upright, the network, what is
+   * done point by point; then solving for the looks, and packing the scene. */
+  double load_ms, visibility_ms, turning_ms, extractor_ms, moments_ms, solving_ms, packing_ms;
+} maq_scene_build_stats;
+
+/* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_scene_build_config) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size);
+
+/* Makes a scene of a capture. Photos that cannot be read are left out and counted, points that no photo saw too. `stats`
+ * may be NULL; else the caller sets stats->struct_size. `*scene` is the caller's, to be given to maq_scene_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (the networks),
+ * MAQ_ERROR_RUNTIME_LIBRARY, MAQ_ERROR_UNREADABLE (no photo can be used or sees a point), MAQ_ERROR_OUT_OF_MEMORY,
+ * MAQ_ERROR_INFERENCE, MAQ_CANCELLED (by the progress callback). Blocks until it is done. */
+MAQ_API maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* config,
+                                   const maq_capture* capture, maq_scene_build_stats* stats, maq_scene** scene);
+
+/* A cloud of the app. The arrays stay the app's and are copied. */
+typedef struct maq_point_cloud {
+  uint32_t struct_size;
+  uint64_t count;   /* 1 to 30 million */
+  const float* xyz; /* three a point, relative to origin */
+  double origin[3]; /* in the world */
+  double up[3];     /* the world's up; any length but 0 */
+} maq_point_cloud;
+
+/* Begins a scene with a cloud of the app. `*builder` is the caller's, to be given to maq_scene_builder_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (no points, a point that is not finite, an up that is none),
+ * MAQ_ERROR_UNSUPPORTED (over 30 million points), MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_RUNTIME_LIBRARY,
+ * MAQ_ERROR_OUT_OF_MEMORY (most_bytes). Blocks while networks and cloud are prepared. */
+MAQ_API maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_config* config,
+                                            const maq_point_cloud* cloud, maq_scene_builder** builder);
+
+/* Frees what was known of the points (NULL is fine). Scenes made by it stay.
+ * Once for each handle, from any thread. Does not block. */
+MAQ_API void maq_scene_builder_destroy(maq_scene_builder* builder);
+
+/* Looks at a photo: which points it sees, and how they look in it. Memory does not grow with the number of photos. On
+ * failure and when cancelled the builder is as before. `*seen_points`, unless NULL: how many points this photo saw, which
+ * may be none.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (a camera that is none or of another size than the photo),
+ * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_OUT_OF_MEMORY, MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks while it looks. */
+MAQ_API maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
+                                              const maq_camera* camera, uint64_t* seen_points);
+
+/* The maq_scene_builder_add_view that runs, or else the next, ends with MAQ_CANCELLED.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_builder_cancel(maq_scene_builder* builder);
+
+/* What was added and how long it took. The caller sets stats->struct_size.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_scene_build_stats* stats);
+
+/* Makes a scene of what is known by now; views can be added afterwards, for another scene. Points that no photo saw are
+ * left out. `*scene` is the caller's, to be given to maq_scene_destroy.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (no photo saw a point), MAQ_ERROR_OUT_OF_MEMORY. Blocks. */
+MAQ_API maq_status maq_scene_builder_finish(maq_scene_builder* builder, maq_scene** scene);
+
+/* ---- Scenes -------------------------------------------------------------------------------------------------------- */
+
+typedef struct maq_scene_info {
+  uint32_t struct_size;
+  int32_t coefficient_bits; /* 8, 16 or 32 */
+  uint64_t point_count;
+  uint64_t varying_count;  /* of them, whose look depends on the side */
+  uint64_t block_count;    /* boxes of neighbouring points, which are left out whole where they are not seen */
+  double up[3];
+  double low[3], high[3];  /* the box of all points, in the world */
+  uint8_t networks_sha256[32]; /* of the networks that it was made with: the renderer wants the same */
+} maq_scene_info;
+
+/* Opens a scene file (.maqs): it is checked whole and mapped, not read into memory. The file must stay as it is while the
+ * scene is open; maq_scene_save to its name is fine.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (damaged, or none),
+ * MAQ_ERROR_UNSUPPORTED (a later version). Blocks while it is checked. */
+MAQ_API maq_status maq_scene_open(maq_context* context, const char* path, maq_scene** scene);
+
+/* Writes the scene to a file, whole or not at all: what was there stays until the new one is complete.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks until the disk has it. */
+MAQ_API maq_status maq_scene_save(const maq_scene* scene, const char* path);
+
+/* Writes places and mean colours as binary PLY, for other programs; whole or not at all.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks. */
+MAQ_API maq_status maq_scene_save_ply(const maq_scene* scene, const char* path);
+
+/* The caller sets info->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info);
+
+/* Once, from any thread (NULL is fine). Renderers of it stay usable. Does not block. */
+MAQ_API void maq_scene_destroy(maq_scene* scene);
+
+/* ---- Rendering ----------------------------------------------------------------------------------------------------- */
+
+typedef struct maq_scene_renderer_config {
+  uint32_t struct_size;
+  int32_t threads;          /* 0 (default): the machine's cores, at most 4 */
+  const char* bundle_path;  /* folder of the scene networks; required. Copied. */
+  double near_depth;        /* points nearer to the camera are not drawn; units of the scene, default 0 */
+  uint8_t background[3];    /* red, green, blue; default black */
+  uint8_t is_drawn_over;    /* 1: the picture is mixed with the background by its alpha; default 0: it is what the
+                               network made, the background only where nothing is near */
+  uint32_t image_pool_size; /* images the app may hold at once, 1 to 64; default 4 */
+  int32_t spin;             /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
+  /* For measuring what is saved: 1 does it all the same. Pictures stay the same where alpha is above 0. */
+  uint8_t draws_unseen_blocks, refines_empty_parts;
+} maq_scene_renderer_config;
+
+/* The planes of an image, each of the camera's size. */
+typedef enum maq_scene_plane {
+  MAQ_SCENE_BGR = 1,   /* three bytes a pixel: blue, green, red */
+  MAQ_SCENE_ALPHA = 2, /* one byte a pixel: 255 surely covered by points, 0 nothing near */
+  MAQ_SCENE_DEPTH = 3  /* a float a pixel, along the optical axis, in units of the scene; 0 where nothing is near */
+} maq_scene_plane;
+
+/* Times are wall-clock milliseconds. */
+typedef struct maq_scene_image_stats {
+  uint32_t struct_size;
+  float project_ms; /* points to pixels */
+  float shade_ms;   /* looks of what is seen, and coarser rasters */
+  float refine_ms;  /* the network */
+  float turn_ms;    /* back to the camera, colours to bytes */
+  float total_ms;
+  uint32_t blocks_drawn;   /* the others are outside of the picture */
+  uint64_t points_drawn;   /* in these blocks */
+  uint64_t points_shaded;  /* that win a pixel */
+  int64_t refined_pixels;  /* that the network saw */
+} maq_scene_image_stats;
+
+/* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_scene_renderer_config) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_renderer_config_init(maq_scene_renderer_config* config, uint32_t struct_size);
+
+/* Makes a renderer of a scene. `*renderer` is the caller's, to be given to maq_scene_renderer_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE (also: not the networks that
+ * the scene was made with), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while networks are read. */
+MAQ_API maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_renderer_config* config,
+                                             const maq_scene* scene, maq_scene_renderer** renderer);
+
+/* Once, from any thread (NULL is fine). Images still held stay valid until they are released. */
+MAQ_API void maq_scene_renderer_destroy(maq_scene_renderer* renderer);
+
+/* Renders what a camera sees. The first picture of a size takes longer: networks are prepared for it. `*image` comes from
+ * a pool of fixed size: give it back with maq_scene_image_release. Where nothing is seen no network runs.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (a camera that is none, or with distortion), MAQ_ERROR_IMAGE_SIZE,
+ * MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while it renders. */
+MAQ_API maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_camera* camera,
+                                          maq_scene_image** image);
+
+/* Gives the image back (NULL is fine). Pointers into it are invalid afterwards.
+ * Once for each image, from any thread. Does not block. */
+MAQ_API void maq_scene_image_release(maq_scene_image* image);
+
+/* A plane of the image: rows of `*stride_bytes` bytes, inside the image.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_image_plane(const maq_scene_image* image, maq_scene_plane plane, const void** pixels,
+                                         size_t* stride_bytes);
+
+/* Times and counts. The caller sets stats->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_image_stats* stats);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* MAQUETTE_SCENE_H_ */

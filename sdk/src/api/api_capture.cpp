@@ -1,0 +1,80 @@
+#include <memory>
+
+#include "api/boundary.h"
+#include "api/scene_arguments.h"
+
+using namespace maq;
+
+maq_status maq_capture_open(maq_context* context, const char* folder, maq_capture** capture) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(folder, "folder");
+    require_argument(capture, "capture");
+    auto opened = std::make_unique<maq_capture>(open_capture(folder));
+    for (const Dropped& dropped : opened->capture.dropped) {
+      opened->dropped.push_back(dropped.first.empty() ? dropped.reason
+                                                      : dropped.reason + " (first: " + dropped.first + ")");
+    }
+    *capture = opened.release();
+    return MAQ_OK;
+  });
+}
+
+void maq_capture_destroy(maq_capture* capture) { delete capture; }
+
+maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_info* info) {
+  return guarded(capture, __func__, [&] {
+    require_argument(capture, "capture");
+    maq_capture_info filled{};
+    filled.view_count = uint32_t(capture->capture.views.size());
+    filled.point_count = capture->capture.cloud.count();
+    filled.dropped_count = uint32_t(capture->dropped.size());
+    std::copy_n(capture->capture.up.begin(), 3, filled.up);
+    write_struct(info, "info", filled, sizeof(maq_capture_info));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_capture_view* view) {
+  return guarded(capture, __func__, [&] {
+    require_argument(capture, "capture");
+    require_argument(view, "view");
+    require_range("index", index, 0u, uint32_t(capture->capture.views.size() - 1));
+    const CaptureView& from = capture->capture.views[index];
+    require_struct_size("view->camera", view->camera.struct_size, sizeof(maq_camera), sizeof(maq_camera));
+    maq_capture_view filled{};
+    filled.held_out = from.is_held_out ? 1 : 0;
+    filled.name = from.name.c_str();
+    filled.camera = camera_of(from.camera);
+    write_struct(view, "view", filled, sizeof(maq_capture_view));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_capture_get_dropped(const maq_capture* capture, uint32_t index, const char** reason, uint64_t* count) {
+  return guarded(capture, __func__, [&] {
+    require_argument(capture, "capture");
+    require_argument(reason, "reason");
+    require_argument(count, "count");
+    if (index >= capture->dropped.size()) {
+      throw ArgumentError("index is ", index, ", but ", capture->dropped.size(), " things were dropped.");
+    }
+    *reason = capture->dropped[index].c_str();
+    *count = capture->capture.dropped[index].count;
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq_frame** frame) {
+  return guarded(capture, __func__, [&] {
+    require_argument(capture, "capture");
+    require_argument(frame, "frame");
+    require_range("index", index, 0u, uint32_t(capture->capture.views.size() - 1));
+    auto made = std::make_unique<maq_frame>();
+    std::vector<uint8_t> valid;
+    load_view(capture->capture.views[index], made->frame, valid);
+    made->frame.sequence = index;
+    *frame = made.release();
+    return MAQ_OK;
+  });
+}

@@ -1,0 +1,66 @@
+#include <algorithm>
+#include <limits>
+
+#include "api/boundary.h"
+#include "scene/ply_writer.h"
+#include "scene/scene_file.h"
+
+using namespace maq;
+
+maq_status maq_scene_open(maq_context* context, const char* path, maq_scene** scene) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(path, "path");
+    require_argument(scene, "scene");
+    *scene = new maq_scene(open_scene_file(path));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_scene_save(const maq_scene* scene, const char* path) {
+  return guarded(scene, __func__, [&] {
+    require_argument(scene, "scene");
+    require_argument(path, "path");
+    write_scene_file(scene->scene, path);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_scene_save_ply(const maq_scene* scene, const char* path) {
+  return guarded(scene, __func__, [&] {
+    require_argument(scene, "scene");
+    require_argument(path, "path");
+    write_scene_ply(scene->scene, path);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
+  return guarded(scene, __func__, [&] {
+    require_argument(scene, "scene");
+    const Scene& from = scene->scene;
+    maq_scene_info filled{};
+    switch (from.coefficient_kind) {
+      case Coefficients::kInt8: filled.coefficient_bits = 8; break;
+      case Coefficients::kInt16: filled.coefficient_bits = 16; break;
+      case Coefficients::kFloat32: filled.coefficient_bits = 32; break;
+    }
+    filled.point_count = from.points;
+    filled.varying_count = from.varying;
+    filled.block_count = from.block_count;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      filled.up[axis] = from.up[axis];
+      filled.low[axis] = std::numeric_limits<double>::infinity();
+      filled.high[axis] = -filled.low[axis];
+      for (uint32_t block = 0; block < from.block_count; ++block) {
+        filled.low[axis] = std::min(filled.low[axis], from.origin[axis] + double(from.blocks[block].low[axis]));
+        filled.high[axis] = std::max(filled.high[axis], from.origin[axis] + double(from.blocks[block].high[axis]));
+      }
+    }
+    std::copy(from.networks_sha256.begin(), from.networks_sha256.end(), filled.networks_sha256);
+    write_struct(info, "info", filled, sizeof filled);
+    return MAQ_OK;
+  });
+}
+
+void maq_scene_destroy(maq_scene* scene) { delete scene; }

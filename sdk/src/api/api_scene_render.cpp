@@ -1,0 +1,126 @@
+#include <memory>
+
+#include "api/boundary.h"
+#include "api/scene_arguments.h"
+#include "scene/scene_renderer.h"
+
+using namespace maq;
+
+namespace {
+
+maq_scene_renderer_config default_config() {
+  maq_scene_renderer_config config{};
+  config.struct_size = sizeof config;
+  config.image_pool_size = 4;
+  config.spin = 1;
+  return config;
+}
+
+}  // namespace
+
+struct maq_scene_renderer : Handle {
+  maq_scene_renderer(const Scene& scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options,
+                     size_t pool_size)
+      : renderer(scene, std::move(networks), options), images(pool_size, "images") {}
+  SceneRenderer renderer;
+  BoundedPool<maq_scene_image> images;
+};
+
+maq_status maq_scene_renderer_config_init(maq_scene_renderer_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_scene_renderer_config));
+}
+
+maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_renderer_config* given,
+                                     const maq_scene* scene, maq_scene_renderer** renderer) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(given, "config");
+    require_argument(scene, "scene");
+    require_argument(renderer, "renderer");
+    const maq_scene_renderer_config config =
+        read_config(given, "config", default_config(), sizeof(maq_scene_renderer_config));
+    require_argument(config.bundle_path, "config.bundle_path");
+    require_range("config.image_pool_size", config.image_pool_size, 1u, 64u);
+    require_range("config.spin", config.spin, 0, 1);
+    RenderOptions options;
+    options.threads = scene_threads(config.threads);
+    options.near = config.near_depth;
+    options.background = {config.background[2], config.background[1], config.background[0]};
+    options.is_over_background = config.is_drawn_over != 0;
+    options.skips_unseen_blocks = config.draws_unseen_blocks == 0;
+    options.skips_empty_parts = config.refines_empty_parts == 0;
+    auto networks = open_scene_networks(context, config.bundle_path, options.threads, config.spin == 1);
+    if (scene->scene.networks_sha256 != networks->sha256()) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, "The scene was made with other networks than those in ", config.bundle_path,
+                  "; give the bundle that it was built with, or build it anew.");
+    }
+    *renderer = new maq_scene_renderer(scene->scene, std::move(networks), options, config.image_pool_size);
+    return MAQ_OK;
+  });
+}
+
+void maq_scene_renderer_destroy(maq_scene_renderer* renderer) { delete renderer; }
+
+maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_camera* camera, maq_scene_image** image) {
+  return guarded(renderer, __func__, [&] {
+    require_argument(renderer, "renderer");
+    require_argument(camera, "camera");
+    require_argument(image, "image");
+    require_struct_size("camera", camera->struct_size, sizeof(maq_camera), sizeof(maq_camera));
+    if (is_distorted(*camera)) {
+      throw ArgumentError("camera.distortion is not 0; pictures are rendered without distortion.");
+    }
+    BoundedPool<maq_scene_image>::Pooled handle = renderer->images.acquire();
+    renderer->renderer.render(pinhole_of(*camera), handle->picture);
+    *image = hand_out<maq_scene_image>(std::move(handle));
+    return MAQ_OK;
+  });
+}
+
+void maq_scene_image_release(maq_scene_image* image) { take_back(image); }
+
+maq_status maq_scene_image_plane(const maq_scene_image* image, maq_scene_plane plane, const void** pixels,
+                                 size_t* stride_bytes) {
+  return guarded(image, __func__, [&] {
+    require_argument(image, "image");
+    require_argument(pixels, "pixels");
+    require_argument(stride_bytes, "stride_bytes");
+    require_range("plane", int(plane), int(MAQ_SCENE_BGR), int(MAQ_SCENE_DEPTH));
+    const RenderedPicture& picture = image->picture;
+    const size_t width = size_t(picture.width_px);
+    switch (plane) {
+      case MAQ_SCENE_BGR:
+        *pixels = picture.bgr.data();
+        *stride_bytes = 3 * width;
+        break;
+      case MAQ_SCENE_ALPHA:
+        *pixels = picture.alpha.data();
+        *stride_bytes = width;
+        break;
+      case MAQ_SCENE_DEPTH:
+        *pixels = picture.depth.data();
+        *stride_bytes = sizeof(float) * width;
+        break;
+    }
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_image_stats* stats) {
+  return guarded(image, __func__, [&] {
+    require_argument(image, "image");
+    const RenderCounts& from = image->picture.counts;
+    maq_scene_image_stats filled{};
+    filled.project_ms = float(from.project_ms);
+    filled.shade_ms = float(from.shade_ms + from.reduce_ms);
+    filled.refine_ms = float(from.refine_ms);
+    filled.turn_ms = float(from.cover_ms + from.turn_ms);
+    filled.total_ms = float(from.all_ms);
+    filled.blocks_drawn = from.projected_blocks;
+    filled.points_drawn = from.projected_points;
+    filled.points_shaded = from.shaded_points;
+    filled.refined_pixels = int64_t(from.refined_pixels);
+    write_struct(stats, "stats", filled, sizeof filled);
+    return MAQ_OK;
+  });
+}

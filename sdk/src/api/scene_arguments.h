@@ -1,0 +1,64 @@
+// What the functions of the C API for scenes have in common.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "api/boundary.h"
+#include "scene/pinhole_camera.h"
+#include "scene/scene_networks.h"
+
+namespace maq {
+
+inline constexpr int kMostSceneThreads = 64;
+
+inline int scene_threads(int32_t wanted) {
+  require_range("config.threads", wanted, 0, kMostSceneThreads);
+  // More threads than this do not pay for networks of this size.
+  constexpr unsigned kMostDefaultThreads = 4;
+  return wanted > 0 ? wanted : int(std::clamp(std::thread::hardware_concurrency(), 1u, kMostDefaultThreads));
+}
+
+inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, const char* folder, int threads,
+                                                          bool spin) {
+  SessionSettings settings;
+  settings.threads = threads;
+  settings.spin = spin;
+  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), folder, settings);
+}
+
+// The camera without its distortion.
+inline PinholeCamera pinhole_of(const maq_camera& given) {
+  PinholeCamera camera;
+  camera.width_px = given.width_px;
+  camera.height_px = given.height_px;
+  camera.fx_px = given.fx_px;
+  camera.fy_px = given.fy_px;
+  camera.cx_px = given.cx_px;
+  camera.cy_px = given.cy_px;
+  std::copy_n(given.rotation, 9, camera.rotation.begin());
+  std::copy_n(given.centre, 3, camera.centre.begin());
+  return camera;
+}
+
+inline maq_camera camera_of(const PinholeCamera& camera) {
+  maq_camera filled{};
+  filled.struct_size = sizeof filled;
+  filled.width_px = camera.width_px;
+  filled.height_px = camera.height_px;
+  filled.fx_px = camera.fx_px;
+  filled.fy_px = camera.fy_px;
+  filled.cx_px = camera.cx_px;
+  filled.cy_px = camera.cy_px;
+  std::copy_n(camera.rotation.begin(), 9, filled.rotation);
+  std::copy_n(camera.centre.begin(), 3, filled.centre);
+  return filled;
+}
+
+inline bool is_distorted(const maq_camera& camera) {
+  return std::any_of(std::begin(camera.distortion), std::end(camera.distortion), [](double k) { return k != 0; });
+}
+
+}  // namespace maq

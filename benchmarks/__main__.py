@@ -1,12 +1,13 @@
 """Measures what Maquette promises, checks it against benchmarks/targets.toml, and writes a report to read.
 
-    python -m benchmarks                  everything, 10 to 20 minutes; `make bench` builds first
+    python -m benchmarks                  everything, 20 minutes and about as long for scenes; `make bench` builds first
     python -m benchmarks --quick          fewer rounds and images, to see that it runs
     python -m benchmarks --only peers     one part; the others' figures are taken from the last run in --out
     python -m benchmarks --publish        also copies the report to docs/benchmarks
 
-Parts: scenes (people, pixels, threads; start, memory), sweep (error against run time), agreement (int8 against fp32),
-peers (other runtimes and the roofline), cameras (how frames get to the app; `python -m benchmarks.cameras` alone).
+Parts: frames (people, pixels, threads; start, memory), sweep (error against run time), agreement (int8 against fp32),
+peers (other runtimes and the roofline), cameras (how frames get to the app; `python -m benchmarks.cameras` alone),
+scenes (new views of captured places; `python -m benchmarks.scenes` alone).
 Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
 
@@ -21,12 +22,12 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import cameras, gates, report, scenes
+from benchmarks import cameras, frame_time, gates, report, scenes
 from export.evaluation.maquette_api import LIBRARY, MaquetteError
 from export.evaluation.shards import ShardError, read_images, shard_paths
 
-SCHEMA = "maquette-benchmark-1"
-PARTS = ("scenes", "sweep", "agreement", "peers", "cameras")
+SCHEMA = "maquette-benchmark-2"
+PARTS = ("frames", "sweep", "agreement", "peers", "cameras", "scenes")
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -47,6 +48,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
     parser.add_argument("--publish", action="store_true")
+    scenes.add_arguments(parser)
     options = parser.parse_args(argv)
     options.out.mkdir(parents=True, exist_ok=True)
     try:
@@ -84,8 +86,8 @@ def measure(options: argparse.Namespace) -> dict:
     figures["bundle_mb"] = round(sum(p.stat().st_size for p in INT8.iterdir()) / 1e6, 3)
     figures["library_mb"] = round(LIBRARY.resolve().stat().st_size / 1e6, 3)
     float_bundle = float_bundle_in(options.out)
-    if "scenes" in options.only or "machine" not in document:
-        document["scenes"], found, document["machine"] = scenes.measure(options.out, options.threads, options.quick)
+    if "frames" in options.only or "machine" not in document:
+        document["frames"], found, document["machine"] = frame_time.measure(options.out, options.threads, options.quick)
         figures |= found
     if "sweep" in options.only:
         document["sweep"], found = sweep_part(options, float_bundle)
@@ -99,6 +101,10 @@ def measure(options: argparse.Namespace) -> dict:
     if "cameras" in options.only:
         document["cameras"], found, why = cameras.measure(options.quick)
         replace(figures, missing, cameras.FIGURES, found, why)
+    if "scenes" in options.only:
+        given = scenes.sources_of(options)
+        document["scenes"], found, why = scenes.measure(given, options.out, options.threads, options.quick)
+        replace(figures, missing, scenes.FIGURES, found, why)
     for name in PARTS:
         if name not in document:
             raise ValueError(f"{name} was never measured in {options.out}; run it too")

@@ -26,7 +26,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from benchmarks import gates, scenes
+from benchmarks import frame_time, gates
 
 SCHEMA = "maquette-cameras-1"
 HOST_FIGURES = ("camera_age_ms", "camera_processor_percent", "camera_close_ms", "camera_fault_noticed_ms",
@@ -56,11 +56,11 @@ class Outage:
 
 def play(uri: str, *arguments: str, **environment: str) -> dict:
     """The figures of one run of `maquette play`. Raises FileNotFoundError, CalledProcessError."""
-    if not scenes.PROGRAM.exists():
-        raise FileNotFoundError(f"{scenes.PROGRAM} is not there: make build")
+    if not frame_time.PROGRAM.exists():
+        raise FileNotFoundError(f"{frame_time.PROGRAM} is not there: make build")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "play.json"
-        command = [str(scenes.PROGRAM), "play", uri, *arguments, "--no-picture", "--json", str(path)]
+        command = [str(frame_time.PROGRAM), "play", uri, *arguments, "--no-picture", "--json", str(path)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ | environment)
         return json.loads(path.read_text())
 
@@ -121,8 +121,8 @@ def measure_host(quick: bool) -> dict:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         recording = folder / "pattern.maqrec"
-        subprocess.run([str(scenes.PROGRAM), "record", "stub:pattern?size=640x480", str(recording), "--frames", "30"],
-                       check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+        command = [str(frame_time.PROGRAM), "record", "stub:pattern?size=640x480", str(recording), "--frames", "30"]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         for k in tqdm(range(rounds), desc="cameras", unit="round", disable=None):
             for kind, uri in (("stub", STUB), ("recording", f"rec:{recording}?live=1&loop=1")):
                 shorter, longer = play(uri, "--frames", few), play(uri, "--frames", many)
@@ -242,7 +242,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     options.out.mkdir(parents=True, exist_ok=True)
     try:
-        machine = scenes.bench([scenes.people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0")["machine"]
+        machine = frame_time.machine()
         measured, figures, missing = measure(options.quick, not options.no_guest)
     except (FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
         print(f"The benchmark stopped: {error}", file=sys.stderr)

@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section
+from benchmarks import camera_section, scene_pictures, scene_section
 from benchmarks.sweep import pareto
 
 STAGES = ("capture", "preprocess", "trunk", "proposals", "box_head", "dense_head", "decode")
@@ -34,6 +34,7 @@ def write(document: dict, folder: Path) -> list[Path]:
         figure.savefig(folder / name, dpi=110, bbox_inches="tight")
         plt.close(figure)
         written.append(folder / name)
+    written += scene_pictures.write(document["scenes"], folder)
     sections = text_sections(document)
     (folder / "report.md").write_text(markdown(sections))
     (folder / "index.html").write_text(page(sections, folder))
@@ -65,7 +66,7 @@ def error_against_time(document: dict) -> plt.Figure:
 
 
 def scaling(document: dict) -> plt.Figure:
-    scenes = document["scenes"]
+    scenes = document["frames"]
     figure, axes = plt.subplots(1, 3, figsize=(15, 4))
     for name, label in (("people", f"{document['threads']} threads"), ("one_thread", "1 thread")):
         shown = [(scene["people"], scene["ms"]["frame"]["p50"]) for scene in scenes[name]["scenes"]]
@@ -87,7 +88,7 @@ def scaling(document: dict) -> plt.Figure:
 
 
 def stages(document: dict) -> plt.Figure:
-    scenes = document["scenes"]["people"]["scenes"]
+    scenes = document["frames"]["people"]["scenes"]
     figure, axis = plt.subplots(figsize=(10, 0.5 + 0.5 * len(scenes)))
     for k, scene in enumerate(scenes):
         left = 0.0
@@ -121,10 +122,11 @@ Section = tuple[str, list]  # title, and what follows: a text, a picture's (name
 
 
 def text_sections(document: dict) -> list[Section]:
-    scenes, peers = document["scenes"], document["peers"]
+    scenes, peers = document["frames"], document["peers"]
     doubts = {name: scenes[name]["doubts"] + [d for s in scenes[name]["scenes"] for d in s["doubts"]]
               for name in ("people", "sizes", "one_thread")}  # fmt: skip
     doubtful = {text for texts in doubts.values() for text in texts} | set(document["cameras"]["doubts"])
+    doubtful |= set(document["scenes"]["doubts"])
     sweep_rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
     front = set(pareto([(row["ms"], row["error"]) for row in document["sweep"]]))
     for k, row in enumerate(document["sweep"]):
@@ -189,6 +191,7 @@ def text_sections(document: dict) -> list[Section]:
             f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} pictures show as many people."
         ]),
         camera_section.section(document["cameras"]),
+        scene_section.section(document["scenes"]),
     ]  # fmt: skip
 
 
@@ -223,6 +226,20 @@ def write_cameras(document: dict, folder: Path) -> list[Path]:
     (folder / "cameras.md").write_text(markdown(sections))
     (folder / "cameras.html").write_text(page(sections, folder))
     return [folder / "cameras.md", folder / "cameras.html"]
+
+
+def write_scenes(document: dict, folder: Path) -> list[Path]:
+    """Writes what benchmarks.scenes measured alone into `folder`, pictures too; returns the paths."""
+    measured = document["scenes"]
+    sections = [
+        ("Maquette: scenes", circumstances(document, set())),
+        gates_section(document),
+        scene_section.section(measured),
+    ]
+    pictures = scene_pictures.write(measured, folder)
+    (folder / "scenes.md").write_text(markdown(sections))
+    (folder / "scenes.html").write_text(page(sections, folder))
+    return [*pictures, folder / "scenes.md", folder / "scenes.html"]
 
 
 def markdown(sections: list[Section]) -> str:

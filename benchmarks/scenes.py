@@ -1,60 +1,149 @@
-"""Time of frames by `maquette bench`: people, pixels and threads; start and memory of a process."""
+"""Scenes: how near pictures from new sides are to photos, against the time to the first; time of frames; memory; bytes.
+
+    python -m benchmarks.scenes             alone; `make build` first. Also a part of `make bench`
+    python -m benchmarks.scenes --quick     two places, two photos of each, to see that it runs
+
+Measured by `maquette scene` on rendered places that no training saw and on real ones, beside ways that need no network.
+Exit status: 0 when every gate is met, 1 when one is missed, 2 when the measurement stopped. A gate that could not be
+measured is said to be so, with the reason.
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
-import statistics
 import subprocess
-import tempfile
+import sys
 from pathlib import Path
 
-from tqdm import tqdm
+from benchmarks import frame_time, gates, scene_pictures, scene_quality, scene_speed
+from benchmarks.cameras import MOST_OTHERS, OthersShare
+from benchmarks.scene_settings import SHIPPED, Sources, settings, sources
+from export.scenes.perceptual import load_perceptual
 
-PROGRAM = Path("build/release/stage/bin/maquette")
-PEOPLE = (0, 1, 2, 3, 4, 6, 8)
-SIZES = ((320, 240), (640, 480), (1280, 720), (1920, 1080))
-STARTS = 9
-
-
-def bench(sources: list[str], *arguments: str) -> dict:
-    """One run of `maquette bench`. Raises FileNotFoundError without the program, CalledProcessError when it fails."""
-    if not PROGRAM.exists():
-        raise FileNotFoundError(f"{PROGRAM} is not there: make build")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bench.json"
-        command = [str(PROGRAM), "bench", *sources, *arguments, "--json", str(path)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        document = json.loads(path.read_text())
-    document["bundle"] = Path(document["bundle"]).name  # reports do not name folders of the machine
-    return document
+SCHEMA = "maquette-scenes-1"
+FIGURES = ("scene_fps_500k", "scene_fps_200k_small", "scene_build_s", "scene_bytes_a_point", "scene_gain_db",
+           "scene_int8_loss_db", "scene_peak_memory_mb", "scene_bundle_mb")  # fmt: skip
+LEAST_PLACES, LEAST_REAL = 8, 2
+PERCEPTUAL = Path(".data/teachers/backbone.pt")
+PLACES, REAL = Path(".data/places/test"), Path(".data/places/real")
+NETWORKS, FP32 = Path("sdk/models/scenes-int8"), Path(".data/bundles/scenes-fp32")
 
 
-def people(count: int, size: tuple[int, int] = (640, 480)) -> str:
-    return f"stub:people?count={count}&size={size[0]}x{size[1]}"
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where places and networks are."""
+    parser.add_argument("--places", type=Path, default=PLACES, metavar="DIR",
+                        help=f"rendered places, made if not there; default: {PLACES}")  # fmt: skip
+    parser.add_argument("--real", type=Path, nargs="+", metavar="DIR",
+                        help=f"real places, folders with transforms.json each; default: all in {REAL}")  # fmt: skip
+    parser.add_argument("--networks", type=Path, default=NETWORKS, metavar="BUNDLE", help=f"default: {NETWORKS}")
+    parser.add_argument("--fp32", type=Path, default=FP32, metavar="BUNDLE", help=f"the same in fp32; default: {FP32}")
+    parser.add_argument("--other-networks", type=Path, nargs="+", default=[], metavar="BUNDLE",
+                        help="to compare with: other widths")  # fmt: skip
+    parser.add_argument("--fine-tuned", type=Path, metavar="DIR", help="scenes DIR/PLACE/{10s,60s,600s}.maqs")
 
 
-def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict]:
-    """The scaling curves, the figures that are gates, and the machine."""
-    runs = ["--runs", "20", "--seconds", "0"] if quick else ["--runs", "150", "--seconds", "3"]
-    main = bench([people(k) for k in PEOPLE], *runs, "--threads", str(threads))
-    sizes = bench([people(1, size) for size in SIZES], *runs, "--threads", str(threads))
-    single = bench([people(k) for k in (0, 1, 4)], *runs, "--threads", "1")
-    asleep = bench([people(1)], *runs, "--threads", str(threads), "--no-spin")
-    starts = [
-        bench([people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0", "--threads", str(threads))
-        for _ in tqdm(range(3 if quick else STARTS), desc="starts", unit="start", disable=None)
-    ]
-    fps = {scene["source"]: scene["fps"] for scene in main["scenes"]}
-    memory = bench([people(1)], *runs, "--threads", str(threads))["peak_memory_mib"] * 1.048576
-    figures = {
-        "fps_one_person": fps[people(1)],
-        "fps_four_people": fps[people(4)],
-        "fps_empty": fps[people(0)],
-        "peak_memory_mb": memory,
-        "first_result_ms": statistics.median(start["start_to_first_result_ms"] for start in starts),
-    }
-    figures = {name: round(value, 2) for name, value in figures.items()}
-    document = {"people": main, "sizes": sizes, "one_thread": single, "no_spin": asleep,
-                "starts_ms": [start["start_to_first_result_ms"] for start in starts],
-                "create_ms": statistics.median(start["create_ms"] for start in starts)}  # fmt: skip
-    return document, figures, main["machine"]
+def sources_of(options: argparse.Namespace) -> Sources:
+    """What the arguments say. Renders places where there are none."""
+    if not list(options.places.glob("*/transforms.json")):
+        print(f"Rendering {LEAST_PLACES} places into {options.places}: a quarter of an hour")
+        for module in (["export.places.assets"], ["export.photos", "fetch"], ["export.people.assets"],
+                       ["export.places.dataset", "--split", "test", "--scenes", str(LEAST_PLACES), "--out",
+                        str(options.places.parent)]):  # fmt: skip
+            subprocess.run([sys.executable, "-m", *module], check=True)
+    real = options.real if options.real is not None else [p.parent for p in sorted(REAL.glob("*/transforms.json"))]
+    return sources(options.places, real, options.networks, options.fp32, options.other_networks, options.fine_tuned)
+
+
+def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict[str, str]]:
+    """What was measured, the figures that are gates, and why others are missing. The sheet of pictures is written into
+    `folder`: pictures are in no JSON."""
+    few = Sources(given.places[:2], given.real[:1], given.bundles, given.tuned) if quick else given
+    others = OthersShare()
+    perceptual = load_perceptual(PERCEPTUAL) if PERCEPTUAL.exists() else None
+    wanted = settings(list(given.bundles))
+    rows, places, shown = scene_quality.measure(few, wanted, perceptual, quick)
+    speed, why = scene_speed.measure(given.places, given.bundles[SHIPPED], threads, quick)
+    share = others.now()
+    doubts = doubts_of(places, perceptual is not None)
+    if share > MOST_OTHERS:
+        doubts.append(f"other processes had {share:.0%} of the processor (scenes)")
+    sheet = scene_pictures.write_sheet(shown, rows, folder)
+    document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "doubts": doubts,
+                "sheet": sheet.name if sheet else ""}  # fmt: skip
+    figures, missing = quality_figures(rows, given)
+    found, lost = scene_speed.figures_of(speed) if speed else ({}, {})
+    missing = dict.fromkeys(FIGURES, why) | missing | lost
+    figures = {name: round(value, 4) for name, value in (figures | found).items()}
+    return document, figures, {name: reason for name, reason in missing.items() if name not in figures}
+
+
+def doubts_of(places: list[dict], has_distance: bool) -> list[str]:
+    """What this run should have had and has not."""
+    doubts = [f"{place['name']} was left out: {place['missing']}" for place in places if "missing" in place]
+    for real, least, kind in ((False, LEAST_PLACES, "rendered"), (True, LEAST_REAL, "real")):
+        count = sum(place["real"] == real and "missing" not in place for place in places)
+        if count < least:
+            doubts.append(f"{count} {kind} places, {least} are wanted")
+    if not has_distance:
+        doubts.append(f"no distance by features: {PERCEPTUAL} is not there (python -m export.teachers.backbone)")
+    return doubts
+
+
+def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float], dict[str, str]]:
+    """Those that the rows of rendered places tell, and why others are missing."""
+    found = {row["setting"]: row["rendered"] for row in rows}
+    said = {row["setting"]: next(iter(row["missing"].values()), "there is no rendered place") for row in rows}
+    figures, missing = {}, {}
+    shipped, plain, exact = "as shipped", "plain points", "fp32 networks and looks, all varying"
+    if found[shipped]:
+        figures["scene_bytes_a_point"] = found[shipped]["bytes_a_point"]
+    else:
+        missing["scene_bytes_a_point"] = said[shipped]
+    for name, better, worse in (("scene_gain_db", shipped, plain), ("scene_int8_loss_db", exact, shipped)):
+        lost = [setting for setting in (better, worse) if not found[setting]]
+        if lost:
+            missing[name] = said[lost[0]]
+        else:
+            figures[name] = found[better]["psnr_db"] - found[worse]["psnr_db"]
+    bundle = given.bundles[SHIPPED]
+    if bundle.is_dir():
+        figures["scene_bundle_mb"] = sum(path.stat().st_size for path in bundle.iterdir() if path.is_file()) / 1e6
+    else:
+        missing["scene_bundle_mb"] = f"no networks in {bundle}"
+    return figures, missing
+
+
+def main(argv: list[str] | None = None) -> int:
+    from benchmarks import report
+
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.scenes", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("build/benchmarks"), metavar="DIR",
+        help="for scenes.json, scenes.md, scenes.html and pictures; default: build/benchmarks",
+    )  # fmt: skip
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--quick", action="store_true")
+    add_arguments(parser)
+    options = parser.parse_args(argv)
+    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        machine = frame_time.machine()
+        measured, figures, missing = measure(sources_of(options), options.out, options.threads, options.quick)
+    except (FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
+        print(f"The benchmark stopped: {error}", file=sys.stderr)
+        return 2
+    verdicts = gates.check(figures, machine, missing, only=FIGURES)
+    document = {"schema": SCHEMA, "quick": options.quick, "machine": machine, "scenes": measured, "figures": figures,
+                "missing": missing, "gates": [vars(verdict) for verdict in verdicts]}  # fmt: skip
+    path = options.out / "scenes.json"
+    path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    gates.print_verdicts(verdicts)
+    print("Written: " + ", ".join(str(x) for x in [path, *report.write_scenes(document, options.out)]))
+    return 1 if any(verdict.state == "missed" for verdict in verdicts) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -50,17 +50,19 @@ class Settings:
 def read_settings(path: Path) -> Settings:
     """Raises ValueError for unknown keys or methods."""
     values = tomllib.loads(path.read_text())
-    graphs = {}
-    for name in GRAPHS:
-        given = dict(values.pop(name, {}))
-        given["float_nodes"] = tuple(given.get("float_nodes", ()))
-        try:
-            graphs[name] = GraphSettings(**given)
-        except TypeError as error:
-            raise ValueError(f"{path}, [{name}]: {error}") from error
-        if graphs[name].method not in METHODS:
-            raise ValueError(f"{path}, [{name}]: method {graphs[name].method!r} is none of {', '.join(METHODS)}")
+    graphs = {name: graph_settings(values.pop(name, {}), f"{path}, [{name}]") for name in GRAPHS}
     try:
         return Settings(graphs, **values)
     except TypeError as error:
         raise ValueError(f"{path}: {error}") from error
+
+
+def graph_settings(table: dict[str, object], where: str) -> GraphSettings:
+    """Of a table of such a file; `where` begins the sentence of a ValueError."""
+    try:
+        settings = GraphSettings(**{**table, "float_nodes": tuple(table.get("float_nodes", ()))})
+    except TypeError as error:
+        raise ValueError(f"{where}: {error}") from error
+    if settings.method not in METHODS:
+        raise ValueError(f"{where}: method {settings.method!r} is none of {', '.join(METHODS)}")
+    return settings

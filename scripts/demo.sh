@@ -1,9 +1,13 @@
 #!/usr/bin/env bash
-# Runs the built SDK on the bundled photo and clip: scripts/demo.sh [OUTPUT_FOLDER]
+# Runs the built SDK on the bundled photo, clip and room, and on a real place: scripts/demo.sh [OUTPUT_FOLDER]
+#
+# The real place is fetched once (box, or what is in .data/places/real), which needs Python 3.11 and some minutes; without a
+# network the demo says so and goes on. REAL=no leaves it out.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out="${1:-demo-output}"
 maquette=build/release/stage/bin/maquette
+places=.data/places/real
 if [ ! -x "$maquette" ]; then
     echo "The maquette program is not built. Run: make build" >&2
     exit 1
@@ -16,6 +20,33 @@ for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
     "$maquette" densepose "$source" --out "$out" --overlay
 done
 
+# A real place takes a while to come, so the bundled one is shown first.
+fetch_real() {
+    [ "${REAL:-yes}" != no ] || { echo "REAL=no: no real place"; return 1; }
+    compgen -G "$places/*/transforms.json" >/dev/null && return 0
+    printf '\n== python -m export.captures fetch box\n'
+    scripts/make-venv.sh captures && .venv/bin/python -m export.captures fetch box && return 0
+    echo "No real place could be fetched, so only the rendered room is shown. Later, with a network:"
+    echo "  scripts/make-venv.sh captures && .venv/bin/python -m export.captures fetch box && make demo"
+    return 1
+}
+
+# fly FOLDER: makes a scene of a capture and a clip of a flight along its cameras.
+fly() {
+    local scene
+    scene="$out/$(basename "$1")"
+    printf '\n== maquette scene build %s --out %s.maqs\n' "$1" "$scene"
+    "$maquette" scene build "$1" --out "$scene.maqs"
+    printf '\n== maquette scene render %s.maqs --capture %s --path through --seconds 6 --size 640x480 --out %s.mp4\n' \
+        "$scene" "$1" "$scene"
+    "$maquette" scene render "$scene.maqs" --capture "$1" --path through --seconds 6 --size 640x480 --out "$scene.mp4"
+}
+
+fly tests/media/room
+if fetch_real; then
+    for transforms in "$places"/*/transforms.json; do fly "$(dirname "$transforms")"; done
+fi
+
 printf '\nPictures to look at, in %s:\n' "$out"
-find "$out" -name '*_overlay.*' | sort | sed 's/^/  /'
-printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/formats.md).\n'
+find "$out" -name '*_overlay.*' -o -name '*.mp4' | sort | sed 's/^/  /'
+printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/formats.md); <place>.maqs, scenes.\n'

@@ -3,14 +3,14 @@
     python -m export.places.dataset --split train --scenes 100 --processes 2 --out .data/places
 
 Each place is a function of (split, seed) alone, and its folder (docs/formats.md) appears whole or not at all: what is
-there already is kept, so a stopped run goes on where it was. Splits share no model, texture, photo, panorama or person.
+there already is kept, so a stopped run goes on where it was. A place that fails, or never ends, is said and left out.
+Splits share no model, texture, photo, panorama or person.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import shutil
 from dataclasses import asdict
@@ -24,10 +24,11 @@ from export.places.assets import SPLITS
 from export.places.cameras import Camera
 from export.places.clouds import CloudFaults, CloudMaker, draw_faults
 from export.places.place import AXES, FORMAT
-from export.places.ply import write_ply
 from export.places.recipe import FRAMES, NothingSeenError, choose_exposure, choose_views, draw_place, generator
 from export.places.render import Renderer
 from export.places.rooms import Staged
+from export.places.workers import done
+from export.point_cloud import write_ply
 
 VERSION = "places-1"
 JPEG_QUALITY = 92
@@ -130,6 +131,7 @@ _stocks: dict[tuple[str, Path, bool], object] = {}
 
 def _work(job: tuple) -> str:
     split, seed, folder, data, options = job
+    cv2.setNumThreads(1)
     plain = options.pop("plain")
     if (split, data, plain) not in _stocks:
         if plain:
@@ -154,6 +156,9 @@ def main() -> None:
     parser.add_argument("--exact", action="store_true", help="clouds without noise, holes or outliers")
     parser.add_argument("--plain", action="store_true", help="boxes instead of furniture: needs no package")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument(
+        "--most-seconds", type=float, default=600, help="a place that takes longer is left out (default %(default)s)"
+    )
     parser.add_argument("--out", type=Path, default=Path(".data/places"))
     parser.add_argument("--data", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
     options = parser.parse_args()
@@ -165,16 +170,15 @@ def main() -> None:
     seeds = range(options.first_seed, options.first_seed + options.scenes)
     jobs = [(options.split, seed, out / f"place-{seed:05d}", options.data, dict(how)) for seed in seeds]
     missing = [job for job in jobs if not job[2].exists()]
-    cv2.setNumThreads(1)
+    lost = 0
     with tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit="place") as bar:
-        if options.processes == 1:
-            for job in missing:
-                _work(job)
-                bar.update()
-            return
-        with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
-            for _ in pool.imap_unordered(_work, missing):
-                bar.update()
+        for job, error in done(_work, missing, options.processes, options.most_seconds):
+            bar.update()
+            if error is not None:
+                lost += 1
+                tqdm.write(f"{job[2].name} is left out: {error}")
+    if lost == len(missing) > 0:
+        raise SystemExit(f"None of {lost} places could be rendered; the lines above say why.")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from export.places.cameras import Camera
-from export.places.ply import PlyError, read_ply
+from export.point_cloud import PointCloudError, read_ply
 
 FORMAT = "maquette-place-1"
 # Cameras of files look to -z with y up (OpenGL); ours look to z with y down (OpenCV).
@@ -132,19 +132,21 @@ def load_place(folder: Path | str) -> Place:
             f"{file}: `depth_unit_m` is {unit} and `up_axis` {up.tolist()}; a length and a unit vector belong there."
         )
     try:
-        xyz, rgb = read_ply(folder / _inside(file, table, "ply_file_path"))
-    except (PlyError, OSError) as error:
+        cloud = read_ply(folder / _inside(file, table, "ply_file_path"))
+    except PointCloudError as error:
         raise PlaceError(f"The cloud of {folder} cannot be read: {error}") from None
-    if not np.isfinite(xyz).all():
-        raise PlaceError(f"The cloud of {folder} has points that are not finite.")
+    if cloud.dropped or not len(cloud.places):
+        raise PlaceError(
+            f"The cloud of {folder} has {len(cloud.places)} points, and {cloud.dropped} that are not finite."
+        )
     return Place(
         folder,
         Pictures([folder / n for n in names], height, width, _image),
         Pictures([folder / n for n in depths], height, width, _depth_reader(unit)),
         np.stack([c.intrinsics for c in cameras]),
         np.stack([c.world_to_camera for c in cameras]),
-        xyz,
-        rgb,
+        cloud.places.astype(np.float32),
+        np.rint(255 * cloud.colours).astype(np.uint8),
         np.array(source, np.int64),
         np.array(held_out, np.int64),
         up,

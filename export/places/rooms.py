@@ -172,9 +172,14 @@ class RoomMaker:
         if place is None:
             return
         z = min(u(1.3, 1.7), self.size[2] - height / 2 - 0.15)
-        at, inward = self.on_wall(*place, max(z, height / 2 + 0.3), 0.02)
-        right, up = np.cross([0, 0, 1.0], inward), np.array([0, 0, 1.0])
         self.assets.append(asset)
+        self.frame(photo, place[0], (place[1], max(z, height / 2 + 0.3)), (width, height), window)
+
+    def frame(self, photo: np.ndarray, spot: tuple[int, int], middle, size, window: bool) -> None:
+        """A picture or a window of `size` (width, height) on a wall, its `middle` so far along the wall and so high."""
+        u, (along, z), (width, height) = self.rng.uniform, middle, size
+        at, inward = self.on_wall(spot, along, z, 0.02)
+        right, up = np.cross([0, 0, 1.0], inward), np.array([0, 0, 1.0])
         if window:
             pane = Material(photo, specular=0.4, shininess=200.0, mirror=0.08, emission=u(0.8, 2.5))
         else:

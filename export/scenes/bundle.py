@@ -14,6 +14,36 @@ GRAPHS = ("extractor", "refiner")
 BASIS = "basis.bin"
 
 
+TRUNK = {
+    "name": "MobileNetV2 in ssd_mobilenet_v2_coco_2018_03_29 (TensorFlow detection model zoo, trained on COCO)",
+    "licence": "Apache-2.0",
+    "used_for": "first weights of the extractor's trunk; comparing pictures",
+}
+
+
+def training_data(places: Path) -> list[dict[str, str]]:
+    """What a manifest says of networks that were trained on the rendered places in a folder: everything that is in one
+    of them, by package, and where the trunk comes from. Raises ValueError for places that do not name their assets."""
+    packages: dict[tuple[str, str], set[str]] = {}
+    count = 0
+    for path in sorted(places.glob("*/transforms.json")):
+        count += 1
+        try:
+            for asset in json.loads(path.read_text())["maquette"]["assets"]:
+                key = f"{asset['package']} {asset['version']}", asset["licence"]
+                packages.setdefault(key, set()).add(asset["name"].split()[0].rstrip(":"))
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} does not name its assets: {error!r}") from None
+    if not count:
+        raise ValueError(f"{places} has no places in it")
+    rendered = {"name": f"Maquette rendered places ({count})", "licence": LICENCE, "used_for": "training, calibration"}
+    used = [
+        {"name": f"{package}: {', '.join(sorted(kinds))}", "licence": licence, "used_for": "rendering"}
+        for (package, licence), kinds in sorted(packages.items())
+    ]
+    return [rendered, *used, TRUNK]
+
+
 def _tensor(value: onnx.ValueInfoProto) -> dict[str, object]:
     sizes = [dimension.dim_param or dimension.dim_value for dimension in value.type.tensor_type.shape.dim]
     return {"name": value.name, "type": "float32", "shape": sizes}

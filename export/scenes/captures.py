@@ -18,9 +18,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from export.point_cloud import PointCloud, read_ply
 from export.scenes.cameras import Camera, resized
 from export.scenes.modelling import View
-from export.scenes.point_cloud import PointCloud, read_ply
 
 LARGEST_SIDE_PX = 16384
 DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
@@ -33,7 +33,8 @@ class CaptureError(ValueError):
 @dataclass(frozen=True, eq=False)
 class Capture:
     """One place. photos: encoded, so that many fit into memory. up: of the world. held_out: indices of photos that
-    pictures are never made of. seen: kept by training (export.scenes.samples)."""
+    pictures are never made of. names: of the photos, relative to the folder. seen: kept by training
+    (export.scenes.samples)."""
 
     name: str
     cameras: list[Camera]
@@ -41,6 +42,7 @@ class Capture:
     cloud: PointCloud
     up: tuple[float, float, float] = field(default=(0.0, 1.0, 0.0))
     held_out: frozenset[int] = frozenset()
+    names: tuple[str, ...] = ()
     seen: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
 
     def sources(self) -> list[int]:
@@ -90,7 +92,8 @@ def read_capture(folder: Path) -> Capture:
     except OSError as error:
         raise CaptureError(f"A photo of {path} cannot be read: {error}.") from None
     cloud = read_ply(folder / cloud_name)
-    return Capture(folder.name, [camera for camera, _ in named], photos, cloud, up, held_out)
+    names = tuple(str(frame["file_path"]) for frame in frames)
+    return Capture(folder.name, [camera for camera, _ in named], photos, cloud, up, held_out, names=names)
 
 
 def _camera(frame: dict[str, Any], path: Path) -> Camera:

@@ -10,8 +10,8 @@ BASIS = 6  # functions of the direction that the look is a combination of
 RASTER = FEATURES + 1  # with the occupancy
 LEVELS = 5  # rasters at 1, 1/2, 1/4, 1/8, 1/16
 MULTIPLE = 2 ** (LEVELS - 1)  # sides of rendered pictures, pixels
-TURNED_MULTIPLE = 64  # sides of those that are turned afterwards: of every size is a network prepared anew (SDK)
 HIDING = 0.1  # a point so much farther than one beside it is behind it (export.scenes.raster.unhidden)
+TURNED_MULTIPLE = 64  # sides of those that are turned afterwards: of every size is a network prepared anew (SDK)
 ALPHA = 1.0  # of the ridge regression, as in the paper
 
 

@@ -1,6 +1,7 @@
 """Exports extractor and refiner as fp32 ONNX graphs, and compares them with torch.
 
-    python -m export.scenes.export_onnx --checkpoint RUN/weights.pt --out .data/bundles/scenes-fp32
+    python -m export.scenes.export_onnx --checkpoint RUN/weights.pt --places .data/places/train \\
+        --out .data/bundles/scenes-fp32
     python -m export.scenes.export_onnx --random small --out .data/bundles/random-scenes-fp32
 
 All tensors have channels last, as int8 kernels want them and as the SDK, which writes and reads a whole pixel at a
@@ -19,8 +20,8 @@ from __future__ import annotations
 
 import argparse
 import copy
-import json
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -34,9 +35,12 @@ from export.densepose.export_onnx import Doubled, channels_first, channels_last
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
 from export.scenes.basis import Basis
-from export.scenes.bundle import OPSET, write_manifest
+from export.scenes.bundle import OPSET, training_data, write_manifest
+from export.scenes.cameras import upright, warped
+from export.scenes.captures import Capture, read_captures
 from export.scenes.config import FEATURES, RASTER, SIZES
 from export.scenes.extractor import STRIDE, Extractor
+from export.scenes.feature_scale import measured, scaled
 from export.scenes.light_refiner import LightRefiner
 from export.scenes.refiner import Refiner
 from export.scenes.system import Networks, load_networks
@@ -184,6 +188,14 @@ def export(networks: Networks, folder: Path) -> dict[str, float]:
     return worst
 
 
+def _photos(captures: list[Capture]) -> Iterator[Tensor]:
+    """One of each capture, turned upright."""
+    for capture in captures:
+        view = capture.view(capture.sources()[0])
+        camera = upright(view.camera, np.asarray(capture.up), STRIDE)
+        yield torch.from_numpy(warped(view.image, view.camera, camera)).permute(2, 0, 1)[None]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     source = parser.add_mutually_exclusive_group(required=True)
@@ -191,14 +203,24 @@ def main() -> None:
     source.add_argument("--random", choices=SIZES, help="random weights of this size, for measuring time")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/scenes-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
-    parser.add_argument("--trained-on", type=Path, help="JSON list of what the weights saw: name, licence, used_for")
+    parser.add_argument(
+        "--places",
+        type=Path,
+        help="the rendered places it was trained on: named in the manifest, and features get the range of colours on "
+        "their photos, for int8",
+    )
     options = parser.parse_args()
     torch.manual_seed(0)
     networks = Networks(SIZES[options.random]) if options.random else load_networks(options.checkpoint)
-    for name, error in export(networks.eval(), options.out).items():
+    networks.eval()
+    if options.places:
+        factors = measured(networks, _photos(read_captures(options.places)))
+        print("features scaled by " + ", ".join(f"{factor:.3f}" for factor in factors))
+        networks = scaled(networks, factors)
+    for name, error in export(networks, options.out).items():
         size = (options.out / f"{name}.onnx").stat().st_size / 1e6
         print(f"{name}: {size:.2f} MB, {error:.1e} from torch; {FEATURES} features")
-    trained_on = json.loads(options.trained_on.read_text()) if options.trained_on else []
+    trained_on = training_data(options.places) if options.places else []
     info = BundleInfo(options.name or options.out.name, "fp32", training_data=tuple(trained_on))
     write_manifest(options.out, info)
 

@@ -31,13 +31,14 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from export.point_cloud import PointCloudError
 from export.scenes.captures import Capture, CaptureError, read_captures
 from export.scenes.config import SIZES
 from export.scenes.extractor import STRIDE
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
 from export.scenes.modelling import Options, fitted, modelled, painted, render
 from export.scenes.perceptual import Perceptual, load_perceptual
-from export.scenes.point_cloud import PointCloudError
+from export.scenes.picture_quality import psnr_db
 from export.scenes.samples import Sample, Sampling, draw_sample
 from export.scenes.source_views import scores
 from export.scenes.system import Networks, save_networks
@@ -78,11 +79,6 @@ def batch_terms(
         own = networks.refiner(own_rasters(features))
         terms["own"] = weights.own * ((own - target) * mask).abs().mean() / mask.mean().clamp_min(1e-6)
     return terms
-
-
-def psnr_db(picture: np.ndarray, target: np.ndarray) -> float:
-    """Of RGB in 0..1."""
-    return float(-10 * np.log10(max(np.square(picture.astype(np.float64) - target).mean(), 1e-10)))
 
 
 @torch.no_grad()

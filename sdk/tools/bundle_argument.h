@@ -5,3 +5,5 @@
 
 // The environment variable MAQ_BUNDLE, else the bundle installed (or staged) with this program; "" without either.
 std::string default_bundle();
+// Likewise the networks of scenes: MAQ_SCENE_BUNDLE.
+std::string default_scene_bundle();

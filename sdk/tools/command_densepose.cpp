@@ -9,11 +9,11 @@
 #include <stdexcept>
 #include <vector>
 
+#include "clip_file.h"
 #include "commands.h"
 #include "interrupt.h"
 #include "model_options.h"
 #include "overlay.h"
-#include "overlay_clip.h"
 #include "program.h"
 #include "progress_bar.h"
 #include "result_files.h"
@@ -126,7 +126,7 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
   int64_t expected = info.frame_count < 0 ? limit : (info.frame_count + options.every - 1) / options.every;
   if (limit > 0) expected = expected > 0 ? std::min(expected, limit) : limit;
   ProgressBar progress(argument.stem, is_clip && !options.json ? expected : 1);
-  OverlayClip clip(options.out, argument.stem, info.fps / double(options.every));
+  ClipFile clip(fs::path(options.out) / (argument.stem + "_overlay.mp4"), info.fps / double(options.every));
   int64_t done = 0;
   for (int64_t index = 0; !interrupted() && (limit == 0 || done < limit); ++index) {
     const auto frame = source.next();

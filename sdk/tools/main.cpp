@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
   setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
 
-  CLI::App app("Maquette: dense pose of people in images, clips and camera pictures, on the CPU.");
+  CLI::App app("Maquette: dense pose of people in images, clips and camera pictures, and scenes from photos, on the CPU.");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("maquette ") + maq_sdk_version());
   app.footer(
@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   add_play_command(app, &exit_code);
   add_record_command(app, &exit_code);
   add_densepose_command(app, &exit_code);
+  add_scene_command(app, &exit_code);
   add_bench_command(app, &exit_code);
   return run_program(app, argc, argv, &exit_code);
 }

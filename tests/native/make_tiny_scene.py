@@ -57,7 +57,7 @@ def write_bundle(folder: Path) -> Networks:
         parameter.data *= 2  # so that looks depend on the side more than by rounding
     for name, parameter in networks.refiner.named_parameters():
         if name.endswith("weight"):  # so that pictures have more than one colour
-            parameter.data *= 20 if name.startswith("final") else 1.4
+            parameter.data *= 6 if name.startswith("final") else 1.4
     export(networks.eval(), folder)
     write_manifest(folder, BundleInfo("tiny-scenes", "fp32", training_data=()))
     return networks

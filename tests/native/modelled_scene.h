@@ -30,7 +30,7 @@ inline maq::ModelledPoints made_up_points(size_t count, uint32_t seed = 1) {
     }
     const float strength = 0.02f * std::abs(normal(random));
     for (size_t k = 0; k < maq::kSlopes; ++k) points.slopes.push_back(strength * normal(random));
-    points.variations.push_back(strength);
+    points.variations.push_back(7 * strength);  // about as long as all its slopes together
     points.views.push_back(uint32_t(1 + i % 9));
   }
   return points;

@@ -83,9 +83,8 @@ struct View {
       : layout_(layout), window_(window), workers(threads) {
     buffer.begin(camera, 0.01, 1);
     for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
-    buffer.finish(0, camera.height_px, INFINITY);
-    const maq::BlockIndex blocks(scene);
-    raster.shade({scene, blocks, buffer, window, camera.centre, basis(), layout}, workers);
+    buffer.finish(0, camera.height_px);
+    raster.shade(scene, maq::BlockIndex(scene), buffer, window, camera.centre, basis(), layout, workers);
   }
   // Of a pixel of the window at a level.
   const float* at(int level, size_t x, size_t y) const {
@@ -131,17 +130,18 @@ TEST(LookRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
           small.begin(maq::resized(camera, int(width), int(height)), 0.01, 1);
           for (uint32_t i = 0; i < scene.block_count; ++i)
             small.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
-          small.finish(0, int(height), INFINITY);
+          small.finish(0, int(height));
           for (size_t y = 0; y < height; ++y) {
             for (size_t x = 0; x < width; ++x) {
               const DepthKey key = small.keys()[y * width + x];
               ASSERT_EQ(view.raster.keys(level)[y * width + x], key) << level;
+              if (level >= layout.levels) continue;
               const float* found = view.at(level, x, y);
               ASSERT_EQ(found[kFeatures], key == kNoPointKey ? 0 : 1) << level;
               std::array<double, kFeatures> expected{};
               if (key != kNoPointKey) {
                 expected = look_of(scene, maq::point_of(key), camera);
-              } else if (level + 1 < LookRaster::kLevels) {
+              } else if (level + 1 < layout.levels) {
                 std::copy_n(view.at(level + 1, x / 2, y / 2), LookRaster::kColours, expected.begin());
               }
               for (size_t c = 0; c < size_t(kFeatures); ++c) ASSERT_NEAR(found[c], expected[c], 1e-4) << level;
@@ -196,9 +196,9 @@ TEST(LookRaster, MemoryOfAnEarlierPictureDoesNotShine) {
   maq::PinholeCamera away = camera_near(96, 64);
   away.rotation = {-1, 0, 0, 0, 1, 0, 0, 0, -1};
   view.buffer.begin(away, 0.01, 1);
-  view.buffer.finish(0, 64, INFINITY);
-  const maq::BlockIndex blocks(scene);
-  view.raster.shade({scene, blocks, view.buffer, {0, 0, 96, 64}, away.centre, basis(), {5, true}}, view.workers);
+  view.buffer.finish(0, 64);
+  view.raster.shade(scene, maq::BlockIndex(scene), view.buffer, {0, 0, 96, 64}, away.centre, basis(), {5, true},
+                    view.workers);
   EXPECT_EQ(view.raster.shaded(), 0u);
   for (int level = 0; level < LookRaster::kLevels; ++level) {
     const float* values = view.raster.level(level);

@@ -20,10 +20,10 @@ void shade(LookRaster& raster, size_t count, maq::WorkerThreads& threads) {
   maq::ZBuffer buffer;
   buffer.begin(camera, 0.01, 1);
   for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
-  buffer.finish(0, int(kHeight), INFINITY);
+  buffer.finish(0, int(kHeight));
   const maq::ViewBasis basis(std::vector<float>(maq::ViewBasis::kWeights, 0.0f));
-  const maq::BlockIndex blocks(scene);
-  raster.shade({scene, blocks, buffer, {0, 0, int(kWidth), int(kHeight)}, camera.centre, basis, {5, true}}, threads);
+  raster.shade(scene, maq::BlockIndex(scene), buffer, {0, 0, int(kWidth), int(kHeight)}, camera.centre, basis,
+               {5, true}, threads);
 }
 
 // Of the pixel (x, y) at a level, in double.

@@ -14,10 +14,12 @@
 #include "peak_memory.h"
 #include "scene/ply_file.h"
 #include "scene/ply_writer.h"
+#include "scene/scene_builder.h"
 #include "scene/scene_file.h"
 #include "scene/scene_packing.h"
 #include "scene/scene_unpacking.h"
 #include "temp_folder.h"
+#include "tiny_scene.h"
 
 namespace {
 
@@ -64,7 +66,7 @@ TEST(SceneFiles, KeepScenesOfEveryKind) {
   const maq::ModelledPoints points = made_up_points(3'000);
   for (const Places places : {Places::kFloat32, Places::kUint16}) {
     for (const Coefficients kind : {Coefficients::kFloat32, Coefficients::kInt16, Coefficients::kInt8}) {
-      for (const float least : {0.0f, 0.015f, 100.0f}) {
+      for (const float least : {0.0f, 0.1f, 100.0f}) {
         Scene scene = make_scene(points, {places, kind, least});
         for (size_t i = 0; i < 32; ++i) scene.networks_sha256[i] = uint8_t(200 + i);
         write_scene_file(scene, folder.file("a.maqs"));
@@ -235,6 +237,44 @@ TEST(SceneFiles, KeepTheStateOfModelling) {
   write_scene_file(scene, folder.file("a.maqs"));
   expect_error(MAQ_ERROR_UNSUPPORTED, "state of its modelling",
                [&] { maq::read_modelling_state(folder.file("a.maqs")); });
+}
+
+TEST(SceneFiles, APhotoCanBeAddedToASceneOfWhichOnlyTheFileIsLeft) {
+  TempFolder folder;
+  const maq::Capture capture = tiny_scene::capture();
+  const auto networks = tiny_scene::networks();
+  const auto add = [&](maq::SceneBuilder& builder, size_t view) {
+    maq::Frame photo;
+    std::vector<uint8_t> valid;
+    maq::load_view(capture.views[view], photo, valid);
+    EXPECT_GT(builder.add_view(photo.image, valid.data(), capture.views[view].camera).value(), 0u);
+  };
+  maq::SceneBuilder all(capture.cloud, capture.up, *networks, {}), first(capture.cloud, capture.up, *networks, {});
+  for (const size_t view : {0, 1, 2}) add(all, view);
+  for (const size_t view : {0, 1}) add(first, view);
+  const auto write = [&] {
+    Scene scene = make_scene(first.finish(), {});
+    scene.networks_sha256 = networks->sha256();
+    const maq::ModellingStateView state = first.state();
+    write_scene_file(scene, folder.file("a.maqs"), &state);
+  };
+  write();
+  maq::SceneBuilder second(maq::read_modelling_state(folder.file("a.maqs")), *networks, {});
+  EXPECT_EQ(second.views(), 2u);
+  EXPECT_EQ(second.finish().slopes, first.finish().slopes);
+  add(second, 2);
+  const maq::ModelledPoints a = all.finish(), b = second.finish();
+  EXPECT_EQ(a.x, b.x);
+  EXPECT_EQ(a.up, b.up);
+  EXPECT_EQ(a.means, b.means);
+  EXPECT_EQ(a.slopes, b.slopes);
+  EXPECT_EQ(a.views, b.views);
+  EXPECT_EQ(a.variations, b.variations);
+
+  maq::ModellingState other = maq::read_modelling_state(folder.file("a.maqs"));
+  other.networks_sha256[0] ^= 1;
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "other networks",
+               [&] { maq::SceneBuilder(std::move(other), *networks, {}); });
 }
 
 TEST(SceneFiles, ThePlyHasTheScenesPointsAndColours) {

@@ -323,6 +323,15 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
   std::filesystem::remove(folder_.path().parent_path() / "up.png");
 }
 
+TEST_F(SceneImport, PhotosToCompareWithAreHeldOut) {
+  json document = transforms();
+  document["test_filenames"] = {document["frames"][1]["file_path"], "images/of_nobody.png"};
+  write_transforms(document);
+  const Capture capture = open();
+  ASSERT_GE(capture.views.size(), 2u);
+  for (size_t i = 0; i < capture.views.size(); ++i) EXPECT_EQ(capture.views[i].is_held_out, i == 1) << i;
+}
+
 TEST_F(SceneImport, FramesThatCannotBeUsedAreDroppedAndCounted) {
   json document = transforms();
   json mirrored = frame("images/b.png"), scaled = frame("images/b.png"), zero = frame("images/c.png");

@@ -158,7 +158,7 @@ TEST(ScenePacking, ItsErrorIsSmallForDescriptorsOfAnySize) {
 
 TEST(ScenePacking, PointsThatVaryLessKeepTheMeanAlone) {
   const ModelledPoints points = made_up_points(10'000);
-  const float least = 0.015f;
+  const float least = 0.1f;
   std::vector<uint32_t> order;
   const Scene scene = make_scene(points, {Places::kFloat32, Coefficients::kFloat32, least}, &order);
   EXPECT_EQ(scene.varying, std::count_if(points.variations.begin(), points.variations.end(),

@@ -137,8 +137,8 @@ TEST(SceneRenderer, StoredIn8BitsItShowsNearlyTheSame) {
     squares_16 += std::pow(10, -found_16 / 10) / double(views.size());
     squares_8 += std::pow(10, -found_8 / 10) / double(views.size());
   }
-  EXPECT_GE(-10 * std::log10(squares_16), 60);
-  EXPECT_GE(-10 * std::log10(squares_8), 50);
+  EXPECT_GE(-10 * std::log10(squares_16), 50);
+  EXPECT_GE(-10 * std::log10(squares_8), 48);
 }
 
 TEST(SceneRenderer, AnyNumberOfThreadsRendersTheSamePicture) {
@@ -149,7 +149,7 @@ TEST(SceneRenderer, AnyNumberOfThreadsRendersTheSamePicture) {
     camera.rotation = rotation_of(1, 0, 0, roll);
     const RenderedPicture expected = render(scene, camera);
     EXPECT_EQ(expected.counts.is_turned, roll != 0);
-    EXPECT_GT(expected.counts.shaded_points, 1500u);
+    EXPECT_GT(expected.counts.shaded_points, 2000u);
     for (const int threads : {2, 3}) {
       RenderOptions options;
       options.threads = threads;
@@ -333,21 +333,6 @@ TEST(SceneRenderer, CamerasOfEveryKind) {
   EXPECT_GT(shaded, 1000u);
 }
 
-TEST(SceneRenderer, WithMeanLooksNoLookDependsOnTheSide) {
-  maq::ModelledPoints points = made_up_points(5000);
-  RenderOptions means;
-  means.has_mean_looks = true;
-  const PinholeCamera camera = camera_of(100, 80, 60);
-  const RenderedPicture found = render(packed(points, maq::Coefficients::kFloat32), camera, means);
-  const RenderedPicture plain = render(packed(points, maq::Coefficients::kFloat32), camera);
-  std::fill(points.slopes.begin(), points.slopes.end(), 0.0f);
-  const RenderedPicture expected = render(packed(points, maq::Coefficients::kFloat32), camera);
-  EXPECT_EQ(found.counts.varying_points, 0u);
-  EXPECT_EQ(found.counts.shaded_points, plain.counts.shaded_points);
-  EXPECT_GE(psnr(found.bgr, expected.bgr), 60);
-  EXPECT_LE(psnr(found.bgr, plain.bgr), 50);
-}
-
 TEST(SceneRenderer, OnePointIsOnePoint) {
   maq::ModelledPoints points = made_up_points(1);
   points.x[0] = points.y[0] = 0;
@@ -402,9 +387,6 @@ TEST(SceneRenderer, WhatCannotBeRenderedIsASentence) {
   options.threads = 1;
   options.near = INFINITY;
   expect_error(wrong, "must be a finite number", [&] { SceneRenderer(scene, networks(), options); });
-  options.near = 0;
-  options.hiding = NAN;
-  expect_error(wrong, "must be a share of at least 0", [&] { SceneRenderer(scene, networks(), options); });
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from benchmarks import __main__ as benchmark
-from benchmarks import cameras, compare, gates, graphs, report, roofline, sweep
+from benchmarks import cameras, compare, gates, graphs, report, roofline, scenes, sweep
 
 MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2", "fma"], "processor": "P",
            "memory_mib": 2048, "system": "S"}  # fmt: skip
@@ -82,7 +82,7 @@ def test_a_part_that_is_measured_again_leaves_nothing_of_before():
 def test_the_shipped_targets_can_be_read():
     names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "library_mb", "peak_memory_mb",
              "first_result_ms", "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8",
-             "time_by_pytorch_fp32", "roofline_share", *cameras.FIGURES}  # fmt: skip
+             "time_by_pytorch_fp32", "roofline_share", *cameras.FIGURES, *scenes.FIGURES}  # fmt: skip
     assert {v.figure for v in gates.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
 
 
@@ -174,8 +174,10 @@ def document():
         "tried": "All of it.",
     }
     measured = {"host": camera_host(), "guest": {}, "guest_missing": "not run: no <qemu>", "frames": 100, "doubts": []}
-    return {"machine": MACHINE, "cameras": measured,
-            "scenes": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
+    unseen = {"rows": [], "places": [], "speed": {}, "speed_missing": "no <networks>", "doubts": ["0 real places"],
+              "sheet": ""}  # fmt: skip
+    return {"machine": MACHINE, "cameras": measured, "scenes": unseen,
+            "frames": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
 
@@ -190,6 +192,7 @@ def test_a_report_holds_its_figures_and_pictures(tmp_path):
         assert said in page
     assert "fp32 &lt;slow&gt;" in page
     assert "Not measured in the virtual machine: not run: no <qemu>." in text
+    assert "Time of a frame was not measured: no <networks>." in text
     assert page.count("data:image/png;base64,") == 4
     assert "| as shipped | 10.0 | 0.600 | 6.0 | 0.500 | 0.600 | ● |" in text
     assert "| fp32 <slow> | 20.0 | 0.610 | 6.1 | 0.500 | 0.600 |  |" in text

@@ -3,6 +3,7 @@
 import json
 import shutil
 import struct
+import time
 
 import cv2
 import numpy as np
@@ -15,9 +16,10 @@ from export.places.dataset import frame_entry, held_out_views, render_place
 from export.places.mesh import Material, ModelError, Part, flat_normals, read_obj
 from export.places.place import PlaceError, load_place
 from export.places.plain import PlainStock
-from export.places.ply import PlyError, read_ply, write_ply
 from export.places.polygons import triangles_of
 from export.places.render import Lighting, Renderer
+from export.places.workers import done
+from export.point_cloud import PointCloudError, read_ply, write_ply
 
 SEEDS = {"room": 3, "still life": 0, "object": 2}  # of the split to train on
 FRAMES = 10
@@ -285,15 +287,16 @@ def test_clouds_come_back_from_ply_and_damaged_ones_are_refused(tmp_path):
     file = tmp_path / "a.ply"
     write_ply(file, xyz, rgb)
     read = read_ply(file)
-    assert np.array_equal(read[0], xyz)
-    assert np.array_equal(read[1], rgb)
+    assert np.array_equal(read.places.astype(np.float32), xyz)
+    assert np.array_equal(np.rint(255 * read.colours), rgb)
     data = file.read_bytes()
     for damaged, sentence in (
-        (data[:-1], "bytes"), (data[:50], "does not begin"), (b"", "does not begin"),
-        (data.replace(b"vertex 100", b"vertex 999999999"), "points"), (data.replace(b"float x", b"double x"), "other"),
+        (data[:-1], "promises"), (data[:50], "no header"), (b"", "no header"),
+        (data.replace(b"vertex 100", b"vertex 999999999"), "at most"),
+        (data.replace(b"float x", b"double x"), "promises"),
     ):  # fmt: skip
         file.write_bytes(damaged)
-        with pytest.raises(PlyError, match=sentence):
+        with pytest.raises(PointCloudError, match=sentence):
             read_ply(file)
 
 
@@ -410,3 +413,19 @@ def test_families_hold_variants_together():
     assert assets.family_of("grass_01.jpg") == assets.family_of("Grass_02b.jpg") == "grass"
     assert assets.family_of("rock2") == assets.family_of("rock1")
     assert assets.family_of("aegean_anatolia-cliff_01") == "aegean_anatolia-cliff"
+
+
+def _sleepy(job: tuple) -> None:
+    (what,) = job
+    if what == "for ever":
+        time.sleep(3600)
+    if what == "wrong":
+        raise ValueError("no such thing")
+
+
+def test_jobs_that_never_end_or_fail_are_given_up_and_others_done():
+    jobs = [("a",), ("for ever",), ("wrong",), ("b",), ("c",)]
+    found = {job[0]: error for job, error in done(_sleepy, jobs, 2, 5)}
+    assert found["a"] is found["b"] is found["c"] is None
+    assert isinstance(found["for ever"], TimeoutError)
+    assert isinstance(found["wrong"], ValueError)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from box_scene import ring, write_capture, write_ply
 
+from export.point_cloud import PointCloudError, read_ply
 from export.scenes.captures import CaptureError, read_capture, read_captures
-from export.scenes.point_cloud import PointCloudError, read_ply
 
 
 @pytest.fixture
@@ -141,6 +141,8 @@ HEADER = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty fl
         HEADER.replace("vertex 1", "vertex 2") + "1 2 3\n",
         HEADER.replace("vertex 1", "vertex 99999999999") + "1 2 3\n",
         HEADER.replace("vertex 1", "vertex -1") + "1 2 3\n",
+        HEADER.replace("vertex 1", "vertex " + "9" * 5000) + "1 2 3\n",
+        HEADER.replace("vertex 1", "vertex 5\nelement vertex 1") + "1 2 3\n",
         HEADER.replace("float z", "float w") + "1 2 3\n",
         HEADER.replace("float z", "half z") + "1 2 3\n",
         HEADER.replace("float z", "float y") + "1 2 3\n",

@@ -10,6 +10,7 @@ from export.scenes.basis import Basis, directions, encoded
 from export.scenes.config import SIZES, ExtractorConfig, RefinerConfig, SceneConfig
 from export.scenes.export_onnx import ExtractorGraph, RefinerGraph, export, export_extractor, export_refiner, parity
 from export.scenes.extractor import Extractor
+from export.scenes.feature_scale import measured, scaled
 from export.scenes.gated_refiner import GatedRefiner
 from export.scenes.light_refiner import LightRefiner, folded, unfolded
 from export.scenes.refiner import make_refiner
@@ -176,3 +177,25 @@ def test_another_file_is_not_taken_for_weights(tmp_path):
     torch.save({"ema": {}}, tmp_path / "weights.pt")
     with pytest.raises(ValueError, match="holds no networks"):
         load_networks(tmp_path / "weights.pt")
+
+
+@pytest.mark.parametrize("refiner", [LIGHT, RefinerConfig(block="separable", folded=False, widths=(8, 8, 12))])
+def test_features_of_another_scale_make_the_same_picture(refiner):
+    networks = Networks(SceneConfig(SIZES["tiny"].extractor, refiner)).eval()
+    torch.nn.init.normal_(networks.refiner.final.weight)
+    photo = torch.rand(1, 3, 64, 96)
+    factors = measured(networks, [photo])
+    other = scaled(networks, factors)
+    with torch.no_grad():
+        features, changed = networks.extractor(photo), other.extractor(photo)
+        torch.testing.assert_close(changed[:, :3], features[:, :3])
+        torch.testing.assert_close(changed[:, 3:], features[:, 3:] * factors[:, None, None], rtol=1e-4, atol=1e-6)
+        assert changed[:, 3:].abs().flatten(2).quantile(0.999, dim=2).allclose(torch.tensor(0.5), rtol=1e-3)
+        there = [raster[:, 8:] > 0 for raster in rasters(64, 96)]
+        made = []
+        for net, maps in ((networks, features), (other, changed)):
+            given = [torch.cat([F.avg_pool2d(maps, 2**k), there[k].float()], 1) * there[k] for k in range(5)]
+            made.append(net.refiner(given))
+    torch.testing.assert_close(made[1], made[0], rtol=1e-4, atol=1e-4)
+    with pytest.raises(ValueError, match="gated"):
+        scaled(Networks(SceneConfig(SIZES["tiny"].extractor, RefinerConfig("gated"))), factors)

@@ -49,9 +49,9 @@ typedef struct maq_capture_info {
 /* The texts are the capture's. */
 typedef struct maq_capture_view {
   uint32_t struct_size;
-  int32_t held_out;   /* 1: the capture keeps this photo for comparisons; do not build from it */
-  const char* name;   /* as the capture names the photo */
-  maq_camera camera;  /* of the photo after undistortion */
+  int32_t held_out;  /* 1: the capture keeps this photo for comparisons; do not build from it */
+  const char* name;  /* as the capture names the photo */
+  maq_camera camera; /* of the photo after undistortion */
 } maq_capture_view;
 
 /* Opens a folder: a COLMAP model (text or binary, in sparse/0, sparse, colmap/sparse/0 or the folder itself) with its
@@ -95,13 +95,14 @@ typedef struct maq_scene_build_config {
   const char* bundle_path;  /* folder of the scene networks; required. Copied. */
   int32_t long_side_px;     /* larger photos are made smaller before they are looked at; default 640; 0: never */
   int32_t coefficient_bits; /* of the scene's looks: 8 (default), 16, or 32 for floats, places then too */
-  double least_variation;   /* points whose look varies less keep their mean alone, in units of colours of 0 to 1; 0 keeps
+  double least_variation; /* points whose look varies less keep their mean alone, in units of colours of 0 to 1; 0 keeps
                                all; negative (default): the library's choice */
-  double visibility_scale;  /* of a photo's sides, for finding which points it sees: below 1 a point hides more of what is
+  double
+      visibility_scale; /* of a photo's sides, for finding which points it sees: below 1 a point hides more of what is
                                behind it, for sparse clouds; 1/16 to 4, default 1 */
-  double near_depth;        /* points nearer to a camera are not seen by it; units of the scene, default 0 */
-  uint64_t most_points;     /* of larger clouds points are taken evenly; 0 (default): all */
-  uint64_t most_bytes;      /* for what is known of points while building; 0 (default): 2 GiB */
+  double near_depth;    /* points nearer to a camera are not seen by it; units of the scene, default 0 */
+  uint64_t most_points; /* of larger clouds points are taken evenly; 0 (default): all */
+  uint64_t most_bytes;  /* for what is known of points while building; 0 (default): 2 GiB */
   maq_scene_progress_callback progress; /* may be NULL */
   void* progress_user_data;
   /* Of maq_scene_build: */
@@ -179,10 +180,10 @@ typedef struct maq_scene_info {
   uint32_t struct_size;
   int32_t coefficient_bits; /* 8, 16 or 32 */
   uint64_t point_count;
-  uint64_t varying_count;  /* of them, whose look depends on the side */
-  uint64_t block_count;    /* boxes of neighbouring points, which are left out whole where they are not seen */
+  uint64_t varying_count; /* of them, whose look depends on the side */
+  uint64_t block_count;   /* boxes of neighbouring points, which are left out whole where they are not seen */
   double up[3];
-  double low[3], high[3];  /* the box of all points, in the world */
+  double low[3], high[3];      /* the box of all points, in the world */
   uint8_t networks_sha256[32]; /* of the networks that it was made with: the renderer wants the same */
 } maq_scene_info;
 
@@ -238,10 +239,10 @@ typedef struct maq_scene_image_stats {
   float refine_ms;  /* the network */
   float turn_ms;    /* back to the camera, colours to bytes */
   float total_ms;
-  uint32_t blocks_drawn;   /* the others are outside of the picture */
-  uint64_t points_drawn;   /* in these blocks */
-  uint64_t points_shaded;  /* that win a pixel */
-  int64_t refined_pixels;  /* that the network saw */
+  uint32_t blocks_drawn;  /* the others are outside of the picture */
+  uint64_t points_drawn;  /* in these blocks */
+  uint64_t points_shaded; /* that win a pixel */
+  int64_t refined_pixels; /* that the network saw */
 } maq_scene_image_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_scene_renderer_config) of the caller.

@@ -1,12 +1,12 @@
+#include <chrono>
+#include <cmath>
 #include <memory>
 #include <optional>
 
 #include "api/boundary.h"
 #include "api/scene_arguments.h"
-#include "image/convert.h"
-#include "image/lens.h"
-#include "image/undistort.h"
 #include "scene/capture_build.h"
+#include "scene/posed_view.h"
 #include "scene/scene_packing.h"
 
 using namespace maq;
@@ -59,8 +59,10 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
   settings.most_points = config.most_points;
   require_range("config.uses_held_out", config.uses_held_out, 0, 1);
   if (config.progress != nullptr) {
-    settings.progress = [callback = config.progress, user_data = config.progress_user_data](
-                            double done, const std::string& what) { return callback(user_data, done, what.c_str()) != 0; };
+    settings.progress = [callback = config.progress, user_data = config.progress_user_data](double done,
+                                                                                            const std::string& what) {
+      return callback(user_data, done, what.c_str()) != 0;
+    };
   }
   return settings;
 }
@@ -184,7 +186,7 @@ maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_fram
     require_argument(camera, "camera");
     require_struct_size("camera", camera->struct_size, sizeof(maq_camera), sizeof(maq_camera));
     PosedView view;
-    view.load(photo->frame.image, *camera, builder->settings.long_side_px);
+    view.load(photo->frame.image, lens_of(*camera), pinhole_of(*camera), builder->settings.long_side_px);
     const std::optional<size_t> seen =
         builder->builder.add_view(view.image(), view.valid(), view.camera(), builder->settings.progress);
     if (!seen) return keep_error(builder, MAQ_CANCELLED, nullptr, "The photo was not added: the app cancelled it.");

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "api/boundary.h"
+#include "image/lens.h"
 #include "scene/pinhole_camera.h"
 #include "scene/scene_networks.h"
 
@@ -59,6 +60,22 @@ inline maq_camera camera_of(const PinholeCamera& camera) {
 
 inline bool is_distorted(const maq_camera& camera) {
   return std::any_of(std::begin(camera.distortion), std::end(camera.distortion), [](double k) { return k != 0; });
+}
+
+// How it maps directions into its picture.
+inline Lens lens_of(const maq_camera& camera) {
+  Lens lens;
+  lens.width_px = camera.width_px;
+  lens.height_px = camera.height_px;
+  lens.fx_px = camera.fx_px;
+  lens.fy_px = camera.fy_px;
+  lens.cx_px = camera.cx_px;
+  lens.cy_px = camera.cy_px;
+  if (is_distorted(camera)) {
+    lens.distortion = Distortion::kRational;
+    std::copy_n(camera.distortion, lens.coefficients.size(), lens.coefficients.begin());
+  }
+  return lens;
 }
 
 }  // namespace maq

@@ -67,6 +67,7 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
   // The networks run one after another: the threads of one must not keep spinning while the next one works.
   check(api.AddSessionConfigEntry(options.get(), "session.force_spinning_stop", "1"));
   check(api.AddSessionConfigEntry(options.get(), "session.intra_op.allow_spinning", settings.spin ? "1" : "0"));
+  if (!settings.plans_memory) check(api.DisableMemPattern(options.get()));
   for (const auto& [size_name, size] : settings.fixed_sizes) {
     check(api.AddFreeDimensionOverrideByName(options.get(), size_name.c_str(), size));
   }

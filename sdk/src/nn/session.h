@@ -46,6 +46,9 @@ struct SessionSettings {
   bool spin = true;  // idle threads wait for work awake for a while: faster, and dearer in energy
   // Sizes that the graph leaves open, by the names it has for them: fixed, it runs faster, for inputs of these sizes only.
   std::vector<std::pair<std::string, int64_t>> fixed_sizes = {};
+  // Whether memory is planned for each size of input after its first run. With inputs of many sizes, or large ones, that takes
+  // more than it saves.
+  bool plans_memory = true;
 };
 
 class Session {

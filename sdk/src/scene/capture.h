@@ -36,7 +36,7 @@ struct Capture {
 //
 // A photo of another size than its camera stands for it when both have the same shape to within 1 %. Photos are looked at as
 // they are stored, not turned by EXIF, as the programs do that find the cameras. What cannot be used of the rest is
-// dropped and counted. Up is the mean of the cameras' for COLMAP; +z for transforms.json, unless the cameras say otherwise
+// dropped and counted. Up is the cameras' for COLMAP (up_axis.h); +z for transforms.json, unless the cameras say otherwise
 // by over 45 degrees.
 //
 // Throws MAQ_ERROR_NOT_FOUND when there is no such folder, no capture in it or no cloud, MAQ_ERROR_UNREADABLE for damaged

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "image/shrink.h"
 #include "scene/posed_photo.h"
+#include "scene/posed_view.h"
 
 namespace maq {
 namespace {
@@ -39,26 +39,6 @@ std::vector<const CaptureView*> chosen_views(const Capture& capture, const Captu
   return even;
 }
 
-// A photo with what is valid in it and its camera, no larger than asked for.
-struct LoadedPhoto {
-  Frame whole, smaller;
-  std::vector<uint8_t> valid;
-  PinholeCamera camera;
-
-  const ImageView& load(const CaptureView& view, int long_side_px) {
-    load_view(view, whole, valid);
-    camera = view.camera;
-    const int long_side = std::max(camera.width_px, camera.height_px);
-    if (long_side_px == 0 || long_side <= long_side_px) return whole.image;
-    const auto side = [&](int px) { return std::max(1, int(std::nearbyint(double(px) * long_side_px / long_side))); };
-    const int width = side(camera.width_px), height = side(camera.height_px);
-    shrink(whole.image, width, height, smaller);
-    shrink_valid(valid, camera.width_px, camera.height_px, width, height);
-    camera = resized(camera, width, height);
-    return smaller.image;
-  }
-};
-
 // Why a photo cannot be used; null for errors that are not the photo's.
 const char* fault_of_photo(maq_status status) {
   switch (status) {
@@ -81,7 +61,7 @@ std::optional<BuiltCapture> build_from_capture(Capture capture, SceneNetworks& n
   SceneBuilder builder(std::move(capture.cloud), capture.up, networks, options.points);
   BuiltCapture built;
   DropCounts drops;
-  LoadedPhoto photo;
+  PosedView photo;
   for (size_t i = 0; i < views.size(); ++i) {
     const CaptureView& view = *views[i];
     const auto in_all = [&](double done, const std::string& what) {
@@ -91,9 +71,9 @@ std::optional<BuiltCapture> build_from_capture(Capture capture, SceneNetworks& n
     };
     try {
       const auto start = std::chrono::steady_clock::now();
-      const ImageView& image = photo.load(view, options.long_side_px);
+      photo.load(view, options.long_side_px);
       built.loading_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-      const auto seen = builder.add_view(image, photo.valid.data(), photo.camera, in_all);
+      const auto seen = builder.add_view(photo.image(), photo.valid(), photo.camera(), in_all);
       if (!seen) return {};
       if (*seen == 0) drops.add("photos that see no point of the cloud", view.name);
     } catch (const Error& error) {

@@ -16,26 +16,21 @@ int64_t now_ns() {
       .count();
 }
 
-// Where the pixels of a level are.
-struct LevelLayout {
-  LevelLayout(const ViewToShade& view, int level)
-      : width(size_t(view.window.width_px) >> level), is_folded(level == 0 && view.layout.is_folded) {}
-
-  // From one 2x2 to the next, and of its pixels (0, 0), (0, 1), (1, 0), (1, 1) from the first.
-  size_t cell() const { return is_folded ? 4 * kChannels : 2 * kChannels; }
-  size_t below() const { return is_folded ? 2 * kChannels : width * kChannels; }
-  // Of the first 2x2 in a row of them.
-  size_t row_of_cells(size_t row) const { return 2 * row * width * kChannels; }
-
-  size_t width;
-  bool is_folded;
-};
-
 }  // namespace
 
-void LookRaster::shade(const ViewToShade& view, WorkerThreads& threads) {
-  const RasterWindow& window = view.window;
-  const ZBuffer& buffer = view.buffer;
+struct LookRaster::Task {
+  const Scene& scene;
+  const BlockIndex& blocks;
+  const ZBuffer& buffer;
+  const RasterWindow& window;
+  const std::array<double, 3>& centre;
+  const ViewBasis& basis;
+  const RefinerLayout& layout;
+};
+
+void LookRaster::shade(const Scene& scene, const BlockIndex& blocks, const ZBuffer& buffer, const RasterWindow& window,
+                       const std::array<double, 3>& camera_centre, const ViewBasis& basis, const RefinerLayout& layout,
+                       WorkerThreads& threads) {
   const int width = window.width_px, height = window.height_px;
   if (width % kMultiple != 0 || height % kMultiple != 0) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A raster of ", width, " x ", height,
@@ -50,7 +45,7 @@ void LookRaster::shade(const ViewToShade& view, WorkerThreads& threads) {
   const size_t pixels = size_t(width) * size_t(height);
   for (int level = 0; level < kLevels; ++level) {
     keys_[level].resize(pixels >> (2 * level));
-    levels_[level].resize(kChannels * (pixels >> (2 * level)));
+    if (level < layout.levels) levels_[level].resize(kChannels * (pixels >> (2 * level)));
   }
   scratch_.resize(size_t(threads.count()));
   for (Scratch& scratch : scratch_) {
@@ -59,14 +54,15 @@ void LookRaster::shade(const ViewToShade& view, WorkerThreads& threads) {
     scratch.constant.reserve(size_t(width) * kStripRows);
     scratch.varying.reserve(size_t(width) * kStripRows);
   }
+  const Task task{scene, blocks, buffer, window, camera_centre, basis, layout};
   threads.run(size_t(height / kStripRows), [&](size_t strip, int worker) {
     Scratch& scratch = scratch_[size_t(worker)];
     const int top = int(strip) * kStripRows;
     const int64_t begin = now_ns();
-    shade_strip(view, top, scratch);
+    shade_strip(task, top, scratch);
     const int64_t between = now_ns();
-    reduce_strip(view, top);
-    fill_strip(view, top);
+    reduce_strip(task, top);
+    fill_strip(task, top);
     scratch.shade_ns += between - begin;
     scratch.reduce_ns += now_ns() - between;
   });
@@ -80,28 +76,31 @@ void LookRaster::shade(const ViewToShade& view, WorkerThreads& threads) {
   }
 }
 
-void LookRaster::shade_strip(const ViewToShade& view, int top, Scratch& scratch) {
-  const Scene& scene = view.scene;
-  const LevelLayout layout(view, 0);
-  const size_t width = layout.width;
+void LookRaster::shade_strip(const Task& task, int top, Scratch& scratch) {
+  const Scene& scene = task.scene;
+  const size_t width = size_t(task.window.width_px);
+  // Of pixels that are neighbours in a row: side by side, or two of a cell of four.
+  const bool is_folded = task.layout.is_folded;
+  const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
   scratch.constant.clear();
   scratch.varying.clear();
-  for (size_t y = size_t(top); y < size_t(top + kStripRows); ++y) {
-    const DepthKey* const from =
-        view.buffer.keys() + (size_t(view.window.top_px) + y) * size_t(view.buffer.width_px()) + view.window.left_px;
-    DepthKey* const keys = keys_[0].data() + y * width;
+  for (int y = top; y < top + kStripRows; ++y) {
+    const DepthKey* from = task.buffer.keys() + size_t(task.window.top_px + y) * size_t(task.buffer.width_px()) +
+                           size_t(task.window.left_px);
+    DepthKey* const keys = keys_[0].data() + size_t(y) * width;
     std::copy_n(from, width, keys);
-    float* const row = levels_[0].data() + layout.row_of_cells(y / 2) + y % 2 * layout.below();
+    float* const row = levels_[0].data() + (is_folded ? size_t(y / 2) * (width / 2) * cell + (y % 2) * 2 * kChannels
+                                                      : size_t(y) * width * kChannels);
     for (size_t x = 0; x < width; ++x) {
-      float* const to = row + x / 2 * layout.cell() + x % 2 * kChannels;
+      float* const to = row + x / 2 * cell + x % 2 * kChannels;
       if (keys[x] == kNoPointKey) {
         std::fill_n(to, kChannels, 0.0f);
         continue;
       }
-      const uint32_t point = point_of(keys[x]), index = view.blocks.block_of(point);
+      const uint32_t point = point_of(keys[x]), index = task.blocks.block_of(point);
       const SceneBlock& block = scene.blocks[index];
       const PointToShade found{index, point - block.first, to};
-      (found.point < block.varying && !view.has_mean_looks ? scratch.varying : scratch.constant).push_back(found);
+      (found.point < block.varying ? scratch.varying : scratch.constant).push_back(found);
     }
   }
   scratch.shaded += scratch.constant.size() + scratch.varying.size();
@@ -120,45 +119,57 @@ void LookRaster::shade_strip(const ViewToShade& view, int top, Scratch& scratch)
         continue;
       }
       float x[kShadedAtOnce], y[kShadedAtOnce], z[kShadedAtOnce], values[kBasis * kShadedAtOnce];
-      find_directions(scene, view.camera_centre, some, count, x, y, z);
-      view.basis.evaluate(x, y, z, count, values);
+      find_directions(scene, task.centre, some, count, x, y, z);
+      task.basis.evaluate(x, y, z, count, values);
       decode_looks(scene, some, count, values);
     }
   }
 }
 
-void LookRaster::reduce_strip(const ViewToShade& view, int top) {
+void LookRaster::reduce_strip(const Task& task, int top) {
+  const size_t width = size_t(task.window.width_px);
   for (int level = 1; level < kLevels; ++level) {
-    const LevelLayout fine(view, level - 1), coarse(view, level);
-    const size_t offsets[4] = {0, kChannels, fine.below(), fine.below() + kChannels};
-    for (size_t y = size_t(top) >> level; y < size_t(top + kStripRows) >> level; ++y) {
-      const DepthKey* const above = keys_[level - 1].data() + 2 * y * fine.width;
-      const DepthKey* const under = above + fine.width;
-      DepthKey* const keys = keys_[level].data() + y * coarse.width;
-      const float* const from = levels_[level - 1].data() + fine.row_of_cells(y);
-      float* const to = levels_[level].data() + y * coarse.width * kChannels;
-      for (size_t x = 0; x < coarse.width; ++x) {
+    const size_t columns = width >> level, fine_columns = 2 * columns;
+    const bool is_read = level < task.layout.levels;
+    // Where the four pixels of a finer level's 2x2 are, from the first of them on.
+    const bool is_folded = level == 1 && task.layout.is_folded;
+    const size_t right = kChannels, below = is_folded ? 2 * kChannels : fine_columns * kChannels;
+    const size_t offsets[4] = {0, right, below, below + right};
+    const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
+    for (int y = top >> level; y < (top + kStripRows) >> level; ++y) {
+      const DepthKey* const above = keys_[level - 1].data() + 2 * size_t(y) * fine_columns;
+      const DepthKey* const under = above + fine_columns;
+      DepthKey* const keys = keys_[level].data() + size_t(y) * columns;
+      const float* const from =
+          is_read ? levels_[level - 1].data() + 2 * size_t(y) * fine_columns * kChannels : nullptr;
+      float* const to = is_read ? levels_[level].data() + size_t(y) * columns * kChannels : nullptr;
+      for (size_t x = 0; x < columns; ++x) {
         const DepthKey four[4] = {above[2 * x], above[2 * x + 1], under[2 * x], under[2 * x + 1]};
         const size_t of_first = four[1] < four[0] ? 1 : 0, of_last = four[3] < four[2] ? 3 : 2;
         const size_t best = four[of_last] < four[of_first] ? of_last : of_first;
         keys[x] = four[best];
         // Of four without a point the first is all 0.
-        std::memcpy(to + x * kChannels, from + x * fine.cell() + offsets[best], kChannels * sizeof(float));
+        if (is_read) std::memcpy(to + x * kChannels, from + x * cell + offsets[best], kChannels * sizeof(float));
       }
     }
   }
 }
 
-void LookRaster::fill_strip(const ViewToShade& view, int top) {
-  for (int level = kLevels - 2; level >= 0; --level) {
-    const LevelLayout fine(view, level), coarse(view, level + 1);
-    for (size_t y = size_t(top) >> level; y < size_t(top + kStripRows) >> level; ++y) {
-      const DepthKey* const keys = keys_[level].data() + y * fine.width;
-      const float* const from = levels_[level + 1].data() + y / 2 * coarse.width * kChannels;
-      float* const to = levels_[level].data() + fine.row_of_cells(y / 2) + y % 2 * fine.below();
-      for (size_t x = 0; x < fine.width; ++x) {
-        if (keys[x] != kNoPointKey) continue;
-        std::copy_n(from + x / 2 * kChannels, kColours, to + x / 2 * fine.cell() + x % 2 * kChannels);
+void LookRaster::fill_strip(const Task& task, int top) {
+  const size_t width = size_t(task.window.width_px);
+  for (int level = task.layout.levels - 2; level >= 0; --level) {
+    const size_t columns = width >> level;
+    const bool is_folded = level == 0 && task.layout.is_folded;
+    const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
+    for (int y = top >> level; y < (top + kStripRows) >> level; ++y) {
+      const DepthKey* const keys = keys_[level].data() + size_t(y) * columns;
+      float* const row =
+          levels_[level].data() + (is_folded ? size_t(y / 2) * (columns / 2) * cell + (y % 2) * 2 * kChannels
+                                             : size_t(y) * columns * kChannels);
+      const float* const coarser = levels_[level + 1].data() + size_t(y / 2) * (columns / 2) * kChannels;
+      for (size_t x = 0; x < columns; ++x) {
+        if (keys[x] == kNoPointKey)
+          std::copy_n(coarser + x / 2 * kChannels, kColours, row + x / 2 * cell + x % 2 * kChannels);
       }
     }
   }

@@ -5,7 +5,7 @@
 // pixel floor(x / 2), so whoever is nearest of the points of a coarse pixel is nearest in one of its four fine ones.
 // Sides must be multiples of 16 for that. Who wins no pixel is not shaded.
 //
-// The picture is worked on in strips of 16 rows, from keys to all five scales and back, so that a strip stays in a core's cache.
+// The picture is worked on in strips of 16 rows, from keys to all five scales, so that a strip stays in a core's cache.
 #pragma once
 
 #include <array>
@@ -25,30 +25,22 @@ struct RasterWindow {
   int left_px = 0, top_px = 0, width_px = 0, height_px = 0;
 };
 
-// What is to be shaded: the points of a scene that a camera with that centre drew into a finished buffer.
-struct ViewToShade {
-  const Scene& scene;
-  const BlockIndex& blocks;  // the scene's
-  const ZBuffer& buffer;
-  RasterWindow window;
-  std::array<double, 3> camera_centre;
-  const ViewBasis& basis;
-  RefinerLayout layout;
-  bool has_mean_looks = false;  // all points look the same from all sides
-};
-
 class LookRaster {
  public:
   static constexpr int kLevels = 5;
   static constexpr int kMultiple = 1 << (kLevels - 1);
-  static constexpr size_t kColours = 3;                             // the first features
   static constexpr int kChannels = SceneNetworks::kRasterChannels;  // the last is 1 where there is a point
 
-  // Throws MAQ_ERROR_INVALID_ARGUMENT where the window is not of multiples of 16, or not in the picture.
-  void shade(const ViewToShade& view, WorkerThreads& threads);
+  // Of a window of the finished `buffer`, in which a camera with that centre drew the points of `scene`; `blocks` are the
+  // scene's. Throws MAQ_ERROR_INVALID_ARGUMENT where the window is not of multiples of 16, or not in the picture.
+  void shade(const Scene& scene, const BlockIndex& blocks, const ZBuffer& buffer, const RasterWindow& window,
+             const std::array<double, 3>& camera_centre, const ViewBasis& basis, const RefinerLayout& layout,
+             WorkerThreads& threads);
+
+  static constexpr size_t kColours = 3;  // features that are red, green and blue
 
   // As the layout says (the refiner's input of that number), with features and the 1 of a pixel side by side. Where there is
-  // no point, colours (the first three) are those of the next coarser scale, 0 at the coarsest; the rest is 0.
+  // no point the colours are those of the next coarser level, all else is 0. Only as many as the layout has.
   const float* level(int level) const { return levels_[level].data(); }
   // Who is nearest, row by row, at each of the kLevels scales.
   const DepthKey* keys(int level) const { return keys_[level].data(); }
@@ -65,10 +57,11 @@ class LookRaster {
     size_t shaded = 0, varied = 0;
     int64_t shade_ns = 0, reduce_ns = 0;
   };
+  struct Task;
 
-  void shade_strip(const ViewToShade& view, int top, Scratch& scratch);
-  void reduce_strip(const ViewToShade& view, int top);
-  void fill_strip(const ViewToShade& view, int top);
+  void shade_strip(const Task& task, int top, Scratch& scratch);
+  void reduce_strip(const Task& task, int top);
+  void fill_strip(const Task& task, int top);
 
   std::vector<float> levels_[kLevels];
   std::vector<DepthKey> keys_[kLevels];

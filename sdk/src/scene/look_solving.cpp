@@ -45,10 +45,11 @@ void solve_looks(MomentStore& moments, const PointPlaces& places, double alpha, 
   made.means.reserve(count * kFeatures);
   made.slopes.reserve(count * kBasis * kFeatures);
 
-  std::vector<Solved> solved(std::min(count, MomentStore::kChunk));
-  for (size_t chunk = 0; chunk < moments.chunk_count(); ++chunk) {
-    const size_t first = chunk * MomentStore::kChunk, size = std::min(MomentStore::kChunk, count - first);
-    constexpr size_t kTask = 1024;
+  constexpr size_t kBatch = 10'000, kTask = 1'000;
+  static_assert(MomentStore::kChunk % kBatch == 0);
+  std::vector<Solved> solved(std::min(count, kBatch));
+  for (size_t first = 0; first < count; first += kBatch) {
+    const size_t size = std::min(kBatch, count - first), end = first + size;
     threads.run((size + kTask - 1) / kTask, [&](size_t task, int) {
       for (size_t i = task * kTask; i < std::min(size, (task + 1) * kTask); ++i) {
         const ViewMoments& known = moments.at(first + i);
@@ -69,7 +70,8 @@ void solve_looks(MomentStore& moments, const PointPlaces& places, double alpha, 
       made.views.push_back(known.views);
       made.singular += solved[i].is_singular ? 1 : 0;
     }
-    if (forgets) moments.forget_chunk(chunk);
+    if (forgets && (end == count || end % MomentStore::kChunk == 0))
+      moments.forget_chunk((end - 1) / MomentStore::kChunk);
   }
 }
 

@@ -1,6 +1,7 @@
 #include "scene/moment_store.h"
 
 #include <algorithm>
+#include <new>
 
 namespace maq {
 
@@ -8,7 +9,11 @@ void MomentStore::reserve(size_t more) {
   const size_t wanted = points_.size() + more;
   // Half again as many, or each photo would move all; but no more than there are.
   if (points_.capacity() < wanted) points_.reserve(std::min(places_.size(), wanted + wanted / 2));
-  while (chunks_.size() * kChunk < wanted) chunks_.push_back(std::make_unique<ViewMoments[]>(kChunk));
+  while (chunks_.size() * kChunk < wanted) {
+    auto* made = static_cast<ViewMoments*>(std::calloc(kChunk, sizeof(ViewMoments)));
+    if (made == nullptr) throw std::bad_alloc();
+    chunks_.emplace_back(made);
+  }
 }
 
 }  // namespace maq

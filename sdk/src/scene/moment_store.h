@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <vector>
 
@@ -33,8 +34,9 @@ class MomentStore {
   const ViewMoments& at(size_t place) const { return chunks_[place / kChunk][place % kChunk]; }
   const std::vector<uint32_t>& points() const { return points_; }
 
-  static constexpr size_t kChunk = 1 << 14;  // points that memory is taken and given back for, 5.5 MB
-  size_t chunk_count() const { return (count() + kChunk - 1) / kChunk; }
+  // Points that memory is taken and given back for: 33.6 MB, enough for allocators to hand it to the system and back at once.
+  // What is not used of it yet is not there: the system gives zeros page by page.
+  static constexpr size_t kChunk = 100'000;
   // Gives the memory of a chunk back; nothing of its points may be asked for then.
   void forget_chunk(size_t chunk) { chunks_[chunk].reset(); }
 
@@ -43,7 +45,10 @@ class MomentStore {
 
   std::vector<uint32_t> places_;  // of each point of the cloud
   std::vector<uint32_t> points_;  // of each place
-  std::vector<std::unique_ptr<ViewMoments[]>> chunks_;
+  struct Free {
+    void operator()(ViewMoments* moments) const { std::free(moments); }
+  };
+  std::vector<std::unique_ptr<ViewMoments[], Free>> chunks_;
 };
 
 }  // namespace maq

@@ -1,8 +1,10 @@
 // A point cloud in memory, 15 bytes a point.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -42,5 +44,21 @@ struct PointCloud {
     return true;
   }
 };
+
+// Takes points evenly from a cloud of more than `most`; 0: all stay.
+inline void thin_out(PointCloud& cloud, uint64_t most) {
+  const uint64_t count = cloud.count();
+  if (most == 0 || count <= most) return;
+  for (uint64_t i = 0; i < most; ++i) {
+    const size_t from = size_t(i * count / most);
+    cloud.x[i] = cloud.x[from];
+    cloud.y[i] = cloud.y[from];
+    cloud.z[i] = cloud.z[from];
+    if (!cloud.rgb.empty())
+      std::copy_n(cloud.rgb.begin() + std::ptrdiff_t(3 * from), 3, cloud.rgb.begin() + std::ptrdiff_t(3 * i));
+  }
+  for (std::vector<float>* axis : {&cloud.x, &cloud.y, &cloud.z}) axis->resize(most);
+  if (!cloud.rgb.empty()) cloud.rgb.resize(3 * most);
+}
 
 }  // namespace maq

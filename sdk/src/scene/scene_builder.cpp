@@ -65,8 +65,8 @@ const BuildOptions& checked(const std::array<double, 3>& up, const BuildOptions&
   if (!(length > 0) || !std::isfinite(length)) {
     refuse("Up is (", up[0], ", ", up[1], ", ", up[2], "), which is no direction.");
   }
-  if (!(options.visibility_scale >= 1.0 / 16 && options.visibility_scale <= 4)) {
-    refuse("The visibility scale is ", options.visibility_scale, ", but must be 1/16 to 4.");
+  if (!(options.visibility_scale >= 1.0 / 16 && options.visibility_scale <= 1)) {
+    refuse("The visibility scale is ", options.visibility_scale, ", but must be 1/16 to 1.");
   }
   if (!(options.near >= 0) || !std::isfinite(options.near)) {
     refuse("The depth of the nearest point is ", options.near, ", but must be finite and not negative.");
@@ -93,6 +93,31 @@ SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, Sc
   cloud_.rgb = {};
   check_memory(0);
   moments_.begin(cloud_.count());
+}
+
+SceneBuilder::SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options)
+    : SceneBuilder(std::move(state.cloud), state.up, networks, options) {
+  if (state.networks_sha256 != networks.sha256()) {
+    refuse("The points were told how they look by other networks than ", networks.name(),
+           ", whose features they cannot be given as well. Use those, or build the scene again from all photos.");
+  }
+  check_memory(state.seen.size());
+  moments_.reserve(state.seen.size());
+  for (size_t place = 0; place < state.seen.size(); ++place) {
+    moments_.add(state.seen[place]);
+    moments_.at(place) = state.moments[place];
+  }
+  views_ = state.photos;
+}
+
+ModellingStateView SceneBuilder::state() const {
+  ModellingStateView state;
+  state.cloud = cloud_.places();
+  state.seen = moments_.points().data();
+  state.seen_count = moments_.count();
+  state.moments = [this](size_t place) -> const ViewMoments& { return moments_.at(place); };
+  state.photos = uint32_t(views_);
+  return state;
 }
 
 void SceneBuilder::check_memory(size_t new_points) const {
@@ -122,7 +147,8 @@ size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera&
       visible_.draw(span, worker);
     }
   });
-  visible_.finish(0, scaled_camera.height_px, options_.hiding);
+  visible_.finish(0, scaled_camera.height_px);
+  visible_.hide(0, scaled_camera.height_px, kHidingShare);
 
   const size_t pixels = size_t(scaled_camera.width_px) * size_t(scaled_camera.height_px);
   seen_.clear();
@@ -162,6 +188,7 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
            " x ", camera.height_px, ".");
   }
   const PinholeCamera upright = upright_frame(camera, up_, SceneNetworks::kPhotoMultiple);
+  SceneNetworks::check_photo_size(upright.width_px, upright.height_px);
   const auto goes_on = [&](double done, const char* what) {
     const bool wanted = !progress || progress(done, what);
     return wanted && !is_cancelled_;

@@ -13,6 +13,7 @@
 #include "core/frame.h"
 #include "core/worker_threads.h"
 #include "scene/modelled_points.h"
+#include "scene/modelling_state.h"
 #include "scene/moment_store.h"
 #include "scene/pinhole_camera.h"
 #include "scene/point_cloud.h"
@@ -22,10 +23,9 @@
 namespace maq {
 
 struct BuildOptions {
-  // Of a photo's sides, for finding which points it sees: below 1 a point hides more of what is behind it. 1/16 to 4.
+  // Of a photo's sides, for finding which points it sees: below 1 a point hides more of what is behind it. 1/16 to 1.
   double visibility_scale = 1;
   double near = 0;   // depth of the nearest point that is seen, in units of the scene
-  double hiding = kHiding;
   double alpha = 1;  // of the ridge regression; 0 or more
   int threads = 2;   // for what is done point by point; the networks have theirs
   // What the builder may take in all for what it knows of points: 336 bytes each that was seen, 4 for others.
@@ -45,6 +45,8 @@ class SceneBuilder {
   // points or with one that is not finite, an up that is no direction, options out of range; MAQ_ERROR_UNSUPPORTED for more
   // than kMostPoints; MAQ_ERROR_OUT_OF_MEMORY where most_bytes do not do for the cloud.
   SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks, const BuildOptions& options);
+  // Goes on where another left off, with all the photos it had. Likewise; MAQ_ERROR_INVALID_ARGUMENT for other networks.
+  SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options);
 
   // A photo, BGR, and its camera. `valid`: 0 for pixels that say nothing, row by row; null when all do. Returns how many points
   // it saw, which may be none; nothing where it was cancelled. Whatever it throws, the builder stays as it was before:
@@ -62,6 +64,9 @@ class SceneBuilder {
   // The same in less memory: what is known is given back on the way, and so is the extractor's memory. Afterwards the
   // builder knows nothing, as at first.
   ModelledPoints finish_and_forget();
+
+  // What such a builder needs, until this one learns or forgets something.
+  ModellingStateView state() const;
 
   size_t views() const { return views_; }
   size_t seen_points() const { return moments_.count(); }

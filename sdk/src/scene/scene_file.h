@@ -1,33 +1,12 @@
 // Scenes on disk: .maqs, mapped into memory when it is opened (docs/formats.md).
 #pragma once
 
-#include <cstdint>
-#include <functional>
 #include <string>
-#include <vector>
 
-#include "scene/point_cloud.h"
+#include "scene/modelling_state.h"
 #include "scene/scene.h"
-#include "scene/view_moments.h"
 
 namespace maq {
-
-// What a modeller knows besides the scene: with it photos can be added to a scene of which only the file is left.
-struct ModellingState {
-  PointCloud cloud;                  // without colours: all points, those that no photo saw too
-  std::vector<uint32_t> seen;        // points that some photo saw
-  std::vector<ViewMoments> moments;  // of those
-  uint32_t photos = 0;
-};
-
-// The same where it lies; 12 bytes of file for each point of the cloud, and 340 for each that was seen.
-struct ModellingStateView {
-  PointPlaces cloud;
-  const uint32_t* seen = nullptr;
-  size_t seen_count = 0;
-  std::function<const ViewMoments&(size_t place)> moments;  // of seen[place]
-  uint32_t photos = 0;
-};
 
 // Takes the place of a file that is there, when it is complete and on the disk: a process that dies, or a disk that is full,
 // leaves the old one. `state` may be null. Throws MAQ_ERROR_UNWRITABLE, and MAQ_ERROR_INVALID_ARGUMENT for a scene without

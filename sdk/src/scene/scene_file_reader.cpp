@@ -275,6 +275,8 @@ ModellingState read_modelling_state(const std::string& path) {
   ModellingState state;
   std::copy_n(head.state_origin, 3, state.cloud.origin.begin());
   state.photos = head.state_photos;
+  std::copy_n(head.up, 3, state.up.begin());
+  std::copy_n(head.networks_sha256, state.networks_sha256.size(), state.networks_sha256.begin());
   std::vector<float> places(size_t(head.state_points) * 3);
   file.read_to(kStatePlacesSection, places.data());
   if (!are_sound(places.data(), places.size())) file.fail(" keeps points whose place is not finite.");

@@ -9,8 +9,7 @@
 namespace maq {
 namespace {
 
-// A hand-held camera's photos, turned upright, are of a few sizes; a session has the memory of all of its maps.
-constexpr size_t kExtractorsKept = 2, kRefinersKept = 3;
+constexpr size_t kRefinersKept = 3;
 // Of the basis: what comes out stays a float when it is squared.
 constexpr float kLargestWeight = 1000;
 constexpr int kMostLevels = 5, kFoldedPixels = 4, kColours = 3;
@@ -26,7 +25,7 @@ int64_t channels_of(const TensorSpec& tensor) {
   return channels == nullptr ? 0 : *channels;
 }
 
-GraphSpec extractor_spec(const Manifest& manifest) {
+void check_extractor(const Manifest& manifest) {
   const GraphSpec& spec = manifest.graphs.at("extractor");
   const bool is_right = spec.inputs.size() == 1 && spec.outputs.size() == 1 && spec.inputs[0].name == "image" &&
                         spec.outputs[0].name == "features" && channels_of(spec.inputs[0]) == kColours &&
@@ -35,7 +34,6 @@ GraphSpec extractor_spec(const Manifest& manifest) {
     fail(manifest.name, "graph extractor must have the input image [1, height, width, 3] and the output features ",
          "[1, height, width, ", kFeatures, "]");
   }
-  return spec;
 }
 
 RefinerLayout layout_of(const Manifest& manifest) {
@@ -124,17 +122,28 @@ SceneNetworks::SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, 
       basis_(basis_weights(bundle_)),
       layout_(layout_of(bundle_.manifest)),
       sha256_(identity_of(bundle_.manifest)),
-      extractor_(runtime, bundle_.files.at(bundle_.manifest.graphs.at("extractor").file),
-                 extractor_spec(bundle_.manifest), folder + "/" + bundle_.manifest.graphs.at("extractor").file,
-                 settings, kExtractorsKept),
+      runtime_(runtime),
+      settings_(settings),
       refiner_(runtime, bundle_.files.at(bundle_.manifest.graphs.at("refiner").file),
                bundle_.manifest.graphs.at("refiner"), folder + "/" + bundle_.manifest.graphs.at("refiner").file,
-               settings, kRefinersKept) {}
+               settings, kRefinersKept) {
+  check_extractor(bundle_.manifest);
+}
+
+void SceneNetworks::check_photo_size(int width_px, int height_px) {
+  check_size(width_px, height_px, kPhotoMultiple, "The photo");
+}
 
 const float* SceneNetworks::extract(const float* photo, int width_px, int height_px) {
-  check_size(width_px, height_px, kPhotoMultiple, "The photo");
-  Session& session = extractor_.at(width_px, height_px);
-  return session.run({{photo, {1, height_px, width_px, kColours}}}, {{1, height_px, width_px, kFeatures}})[0].data;
+  check_photo_size(width_px, height_px);
+  if (extractor_ == nullptr) {
+    const GraphSpec& spec = bundle_.manifest.graphs.at("extractor");
+    SessionSettings settings = settings_;
+    settings.plans_memory = false;
+    extractor_ = std::make_unique<Session>(runtime_, bundle_.files.at(spec.file), spec,
+                                           bundle_.folder + "/" + spec.file, settings);
+  }
+  return extractor_->run({{photo, {1, height_px, width_px, kColours}}}, {{1, height_px, width_px, kFeatures}})[0].data;
 }
 
 const float* SceneNetworks::refine(const std::vector<const float*>& rasters, int width_px, int height_px) {

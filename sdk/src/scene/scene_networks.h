@@ -31,11 +31,11 @@ class SceneNetworks {
   static constexpr int kPhotoMultiple = 32;    // of the sides of photos
   static constexpr int kPictureMultiple = 16;  // of the sides of pictures that are rendered
   static constexpr int kRasterChannels = kFeatures + 1;
-  // Of a photo, or a picture that is rendered. A photo takes some 600 bytes a pixel while the extractor works on it.
+  // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
   static constexpr int64_t kMostPixels = int64_t(1) << 23;
 
-  // Reads and verifies the bundle in a folder. Networks are made when they are needed first, for the size that they are
-  // needed for. Throws what read_bundle() throws, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the manifest
+  // Reads and verifies the bundle in a folder. Networks are made when they are needed first, the refiner for each size that
+  // it is needed for. Throws what read_bundle() throws, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the manifest
   // are not those of the format.
   SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::string& folder,
                 const SessionSettings& settings);
@@ -48,6 +48,9 @@ class SceneNetworks {
   // Of the three networks' files: SHA-256 of their SHA-256 digests, extractor, refiner, basis.
   const std::array<uint8_t, 32>& sha256() const { return sha256_; }
 
+  // Throws what extract() throws for a photo of that size.
+  static void check_photo_size(int width_px, int height_px);
+
   // Features [height][width][kFeatures] of a photo [height][width][3], RGB in 0..1, sides multiples of kPhotoMultiple. They
   // stay until the next photo. Not for two threads at once. Throws MAQ_ERROR_INVALID_ARGUMENT for other sides,
   // MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says, MAQ_ERROR_INFERENCE.
@@ -59,7 +62,7 @@ class SceneNetworks {
   const float* refine(const std::vector<const float*>& rasters, int width_px, int height_px);
 
   // Gives memory of the networks back; they are made again when they are needed.
-  void forget_extractor() { extractor_.forget(); }
+  void forget_extractor() { extractor_.reset(); }
   void forget_refiner() { refiner_.forget(); }
 
  private:
@@ -67,7 +70,11 @@ class SceneNetworks {
   ViewBasis basis_;
   RefinerLayout layout_;
   std::array<uint8_t, 32> sha256_{};
-  SizedSessions extractor_, refiner_;
+  std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
+  SessionSettings settings_;
+  // With open sizes: photos turned upright are of many, and a session for each takes longer to make than it saves.
+  std::unique_ptr<Session> extractor_;
+  SizedSessions refiner_;
   std::vector<TensorView> inputs_;
 };
 

@@ -12,9 +12,9 @@ namespace maq {
 struct ScenePacking {
   Places places = Places::kUint16;
   Coefficients coefficients = Coefficients::kInt8;
-  // Points whose look moves by less than that from its mean over the photos (ModelledPoints::variations) keep the mean
-  // alone; the default is a step of an 8-bit picture. 0 keeps the slopes of all but those that have none.
-  float least_variation = 1 / 255.0f;
+  // Points whose look moves by less than that from its mean over the photos (ModelledPoints::variations, in the features'
+  // own units) keep the mean alone. 0 keeps the slopes of all but those that have none.
+  float least_variation = 0.1f;
 };
 
 // Beyond that numbers stand for something broken, and sums of them would not be finite.

@@ -91,10 +91,6 @@ SceneRenderer::SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> network
   if (!std::isfinite(options.near)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The depth of the nearest point that is seen must be a finite number.");
   }
-  if (!(options.hiding >= 0)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT,
-                "How much farther away a hidden point is must be a share of at least 0, not ", options.hiding, ".");
-  }
 }
 
 void SceneRenderer::project(const PinholeCamera& frame, RenderCounts& counts) {
@@ -122,7 +118,8 @@ RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
   occupied_.assign(size_t(frame.height_px / kMultiple), {});
   threads_.run(occupied_.size(), [&](size_t strip, int) {
     const int top = int(strip) * kMultiple;
-    buffer_.finish(top, top + kMultiple, options_.hiding);
+    buffer_.finish(top, top + kMultiple);
+    buffer_.hide(top, top + kMultiple, kHidingShare);
     int first = cells, last = -1;
     for (int y = top; y < top + kMultiple; ++y) {
       const DepthKey* const row = buffer_.keys() + size_t(y) * size_t(frame.width_px);
@@ -189,8 +186,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
     const RasterWindow window = options_.skips_empty_parts ? window_to_refine(occupied, frame.width_px, frame.height_px)
                                                            : RasterWindow{0, 0, frame.width_px, frame.height_px};
     const RefinerLayout& layout = networks_->refiner_layout();
-    raster_.shade({scene_, blocks_, buffer_, window, frame.centre, networks_->basis(), layout, options_.has_mean_looks},
-                  threads_);
+    raster_.shade(scene_, blocks_, buffer_, window, frame.centre, networks_->basis(), layout, threads_);
     counts.shaded_points = raster_.shaded();
     counts.varying_points = raster_.varying();
     counts.refined_pixels = uint64_t(window.width_px) * uint64_t(window.height_px);

@@ -16,8 +16,6 @@ namespace maq {
 struct RenderOptions {
   int threads = 1;  // of everything but the refiner, whose threads are its networks'
   double near = 0;  // depth of the nearest point that is seen, in units of the scene
-  double hiding = kHiding;
-  bool has_mean_looks = false;  // all points look the same from all sides
   // BGR. What is farther from all points than the refiner sees is of this colour; with `is_over_background` the picture
   // is drawn over it by alpha, else the refiner's picture is left as it is.
   std::array<uint8_t, 3> background = {0, 0, 0};

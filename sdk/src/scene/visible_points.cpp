@@ -17,7 +17,7 @@ void VisiblePoints::find(const PointPlaces& points, const PinholeCamera& camera,
     span.first = uint32_t(begin);
     buffer_.draw(span, 0);
   }
-  buffer_.finish(0, camera.height_px, std::numeric_limits<double>::infinity());
+  buffer_.finish(0, camera.height_px);
   const size_t pixels = size_t(camera.width_px) * size_t(camera.height_px);
   winners_.resize(pixels);
   depths_.resize(pixels);

@@ -23,8 +23,7 @@ struct PointPlaces {
 class VisiblePoints {
  public:
   // Points nearer than `near` (in units of the scene, along the optical axis) are not seen. Where several have the same
-  // depth the lowest index wins. Points that are not finite are never seen. Nothing is hidden
-  // as of ZBuffer::finish().
+  // depth the lowest index wins. Points that are not finite are never seen.
   void find(const PointPlaces& points, const PinholeCamera& camera, double near);
 
   int width_px() const { return buffer_.width_px(); }

@@ -12,27 +12,13 @@ MAQ_SIMD_CLONES void take_least(DepthKey* __restrict into, const DepthKey* __res
   for (size_t i = 0; i < count; ++i) into[i] = from[i] < into[i] ? from[i] : into[i];
 }
 
-// In one row of blocks, of `height` rows of `width` pixels. What is deeper than the nearest times `factor` goes.
-void hide_in_blocks(DepthKey* keys, size_t width, int height, float factor) {
-  constexpr size_t kSide = ZBuffer::kHidingBlock;
-  for (size_t left = 0; left < width; left += kSide) {
-    const size_t right = std::min(width, left + kSide);
-    DepthKey nearest = kNoPointKey;
-    for (int y = 0; y < height; ++y) {
-      for (size_t x = left; x < right; ++x) nearest = std::min(nearest, keys[size_t(y) * width + x]);
-    }
-    if (nearest == kNoPointKey) continue;
-    const float limit = depth_of(nearest) * factor;
-    uint32_t bits;
-    std::memcpy(&bits, &limit, sizeof bits);
-    const DepthKey last = DepthKey((uint64_t(bits) << 32) | UINT32_MAX);
-    for (int y = 0; y < height; ++y) {
-      for (size_t x = left; x < right; ++x) {
-        DepthKey& key = keys[size_t(y) * width + x];
-        if (key > last) key = kNoPointKey;
-      }
-    }
-  }
+// The largest key of a point that is as deep as `nearest` or farther by at most that share.
+DepthKey last_unhidden(DepthKey nearest, float factor) {
+  if (nearest == kNoPointKey) return kNoPointKey;
+  const float depth = depth_of(nearest) * factor;
+  uint32_t bits;
+  std::memcpy(&bits, &depth, sizeof bits);
+  return DepthKey((uint64_t(bits) << 32) | std::numeric_limits<uint32_t>::max());
 }
 
 }  // namespace
@@ -68,17 +54,33 @@ void ZBuffer::draw(const PointSpan& span, int worker) {
   }
 }
 
-void ZBuffer::finish(int top, int bottom, double hiding) {
+void ZBuffer::finish(int top, int bottom) {
   const size_t begin = size_t(top) * size_t(width_px_), count = size_t(bottom - top) * size_t(width_px_);
   DepthKey* const into = sheets_[0].keys.data() + begin;
   if (!sheets_[0].is_drawn) std::fill_n(into, count, kNoPointKey);
   for (size_t i = 1; i < sheets_.size(); ++i) {
     if (sheets_[i].is_drawn) take_least(into, sheets_[i].keys.data() + begin, count);
   }
-  if (hiding < std::numeric_limits<float>::max()) {
-    for (int row = top; row < bottom; row += kHidingBlock) {
-      hide_in_blocks(sheets_[0].keys.data() + size_t(row) * size_t(width_px_), size_t(width_px_),
-                     std::min(kHidingBlock, bottom - row), float(1 + hiding));
+}
+
+void ZBuffer::hide(int top, int bottom, double share) {
+  const float factor = float(1 + share);
+  const size_t width = size_t(width_px_);
+  for (int y = top; y < bottom; y += kHidingPx) {
+    const int rows = std::min(kHidingPx, bottom - y);
+    DepthKey* const first = sheets_[0].keys.data() + size_t(y) * width;
+    for (size_t x = 0; x < width; x += kHidingPx) {
+      const size_t columns = std::min<size_t>(kHidingPx, width - x);
+      DepthKey nearest = kNoPointKey;
+      for (int row = 0; row < rows; ++row) {
+        const DepthKey* const keys = first + size_t(row) * width + x;
+        for (size_t i = 0; i < columns; ++i) nearest = std::min(nearest, keys[i]);
+      }
+      const DepthKey last = last_unhidden(nearest, factor);
+      for (int row = 0; row < rows; ++row) {
+        DepthKey* const keys = first + size_t(row) * width + x;
+        for (size_t i = 0; i < columns; ++i) keys[i] = keys[i] > last ? kNoPointKey : keys[i];
+      }
     }
   }
 }

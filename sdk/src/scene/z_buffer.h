@@ -14,11 +14,9 @@
 namespace maq {
 
 using DepthKey = int64_t;
+// A point so much farther than one beside it is behind it (export/scenes/config.py has the same).
+inline constexpr double kHidingShare = 0.1;
 inline constexpr DepthKey kNoPointKey = std::numeric_limits<int64_t>::max();
-
-// A point so much farther away than one beside it, as a share of the depth, is behind it (ZBuffer::finish). Networks learnt
-// with this one (export/scenes/config.py).
-inline constexpr double kHiding = 0.1;
 
 inline uint32_t point_of(DepthKey key) { return uint32_t(key); }
 // Along the optical axis; not a number for kNoPointKey.
@@ -31,20 +29,22 @@ inline float depth_of(DepthKey key) {
 
 class ZBuffer {
  public:
-  static constexpr int kHidingBlock = 4;
-
   // An empty picture, drawn by so many workers. Throws MAQ_ERROR_IMAGE_SIZE and what is of no memory.
   void begin(const PinholeCamera& camera, double near, int workers);
 
   // Draws points. Different workers may draw at once.
   void draw(const PointSpan& span, int worker);
 
-  // Brings the workers' sheets together in rows [top, bottom), after all is drawn and before keys() is read there, and takes
-  // points out that shine through holes of what is before them: those of a block of kHidingBlock x kHidingBlock pixels,
-  // counted from the first one, that are farther away than its nearest by more than `hiding` of that depth. Infinite: all
-  // stay. `top` is a multiple of kHidingBlock, and so is `bottom` but for the last row. Different rows may be finished at
-  // once.
-  void finish(int top, int bottom, double hiding);
+  // Brings the workers' sheets together in rows [top, bottom), after all is drawn and before keys() is read there.
+  // Different rows may be finished at once.
+  void finish(int top, int bottom);
+
+  // A side of the blocks that hide() looks at, pixels.
+  static constexpr int kHidingPx = 4;
+  // Of what is finished in rows [top, bottom), takes out the points that shine through holes of what is before them: those
+  // farther than the nearest of their block, counted from the first pixel, by more than that share of its depth. `top` is
+  // a multiple of kHidingPx, `bottom` too or the height. Different rows may be worked on at once.
+  void hide(int top, int bottom, double share);
 
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }

@@ -1,4 +1,6 @@
-"""Point clouds in PLY files: ASCII and binary little-endian, positions and colours of the element `vertex`."""
+"""Point clouds in PLY files: ASCII and binary little-endian, positions and colours of the element `vertex`.
+
+For rendered places and captures alike; the SDK has a reader of its own (sdk/src/scene/ply_file.h)."""
 
 from __future__ import annotations
 
@@ -29,6 +31,39 @@ class PointCloud:
     places: np.ndarray
     colours: np.ndarray
     dropped: int = 0
+
+
+def write_ply(path: Path, xyz: np.ndarray, rgb: np.ndarray) -> None:
+    """xyz float32 [P, 3], or int16 for files of 9 bytes a point instead of 15, rgb uint8 [P, 3]; binary little-endian,
+    vertices alone."""
+    place, kind = ("short", "<i2") if xyz.dtype == np.int16 else ("float", "<f4")
+    points = np.empty(len(xyz), [("xyz", kind, 3), ("rgb", "u1", 3)])
+    points["xyz"], points["rgb"] = xyz, rgb
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
+    lines += [f"property {place} {axis}" for axis in "xyz"]
+    lines += [f"property uchar {name}" for name in ("red", "green", "blue")] + ["end_header", ""]
+    path.write_bytes("\n".join(lines).encode() + points.tobytes())
+
+
+def evenly_spread(
+    xyz: np.ndarray, rgb: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """At most `count` of the points [N, 3], nearly that many: one of each cell of a grid as fine as that allows."""
+    order = rng.permutation(len(xyz))
+    xyz, rgb = xyz[order], rgb[order]
+    low, high = 0.0, float(np.ptp(xyz, axis=0).max()) + 1e-9
+    first = np.arange(min(count, len(xyz)))
+    if len(xyz) > count:
+        for _ in range(16):
+            middle = (low + high) / 2
+            cell = ((xyz - xyz.min(0)) / middle).astype(np.int64)
+            key = (cell[:, 0] << 42) + (cell[:, 1] << 21) + cell[:, 2]
+            found = np.unique(key, return_index=True)[1]
+            if len(found) > count:
+                low = middle
+            else:
+                high, first = middle, found
+    return xyz[first], rgb[first]
 
 
 def read_ply(path: Path) -> PointCloud:
@@ -71,11 +106,13 @@ def _header(text: str, path: Path) -> tuple[str, int, list[tuple[str, str]]]:
             case ["format", name, "1.0"]:
                 kind = name
             case ["element", name, number]:
+                if name == "vertex" and count >= 0:
+                    raise PointCloudError(f"{path} has the element vertex twice.")
                 if not fields and name != "vertex" and element == "":
                     raise PointCloudError(f"{path} begins with the element {name}; only clouds are read.")
                 element = name
                 if name == "vertex":
-                    count = int(number) if number.isdigit() else -1
+                    count = int(number) if number.isdecimal() and len(number) < 10 else MOST_POINTS + 1
             case ["property", name, title] if element == "vertex":
                 if name not in _TYPES or title in dict(fields):
                     raise PointCloudError(f"{path}: a point's property {name} {title} is unknown or there twice.")

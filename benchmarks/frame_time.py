@@ -1,0 +1,65 @@
+"""Time of frames of dense pose by `maquette bench`: people, pixels and threads; start and memory of a process."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import tempfile
+from pathlib import Path
+
+from tqdm import tqdm
+
+PROGRAM = Path("build/release/stage/bin/maquette")
+PEOPLE = (0, 1, 2, 3, 4, 6, 8)
+SIZES = ((320, 240), (640, 480), (1280, 720), (1920, 1080))
+STARTS = 9
+
+
+def bench(sources: list[str], *arguments: str) -> dict:
+    """One run of `maquette bench`. Raises FileNotFoundError without the program, CalledProcessError when it fails."""
+    if not PROGRAM.exists():
+        raise FileNotFoundError(f"{PROGRAM} is not there: make build")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.json"
+        command = [str(PROGRAM), "bench", *sources, *arguments, "--json", str(path)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        document = json.loads(path.read_text())
+    document["bundle"] = Path(document["bundle"]).name  # reports do not name folders of the machine
+    return document
+
+
+def machine() -> dict:
+    """This machine, as `maquette bench` describes it."""
+    return bench([people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0")["machine"]
+
+
+def people(count: int, size: tuple[int, int] = (640, 480)) -> str:
+    return f"stub:people?count={count}&size={size[0]}x{size[1]}"
+
+
+def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict]:
+    """The scaling curves, the figures that are gates, and the machine."""
+    runs = ["--runs", "20", "--seconds", "0"] if quick else ["--runs", "150", "--seconds", "3"]
+    main = bench([people(k) for k in PEOPLE], *runs, "--threads", str(threads))
+    sizes = bench([people(1, size) for size in SIZES], *runs, "--threads", str(threads))
+    single = bench([people(k) for k in (0, 1, 4)], *runs, "--threads", "1")
+    asleep = bench([people(1)], *runs, "--threads", str(threads), "--no-spin")
+    starts = [
+        bench([people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0", "--threads", str(threads))
+        for _ in tqdm(range(3 if quick else STARTS), desc="starts", unit="start", disable=None)
+    ]
+    fps = {scene["source"]: scene["fps"] for scene in main["scenes"]}
+    memory = bench([people(1)], *runs, "--threads", str(threads))["peak_memory_mib"] * 1.048576
+    figures = {
+        "fps_one_person": fps[people(1)],
+        "fps_four_people": fps[people(4)],
+        "fps_empty": fps[people(0)],
+        "peak_memory_mb": memory,
+        "first_result_ms": statistics.median(start["start_to_first_result_ms"] for start in starts),
+    }
+    figures = {name: round(value, 2) for name, value in figures.items()}
+    document = {"people": main, "sizes": sizes, "one_thread": single, "no_spin": asleep,
+                "starts_ms": [start["start_to_first_result_ms"] for start in starts],
+                "create_ms": statistics.median(start["create_ms"] for start in starts)}  # fmt: skip
+    return document, figures, main["machine"]

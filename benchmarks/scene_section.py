@@ -1,0 +1,164 @@
+"""The part of the report that tells of scenes."""
+
+from __future__ import annotations
+
+from benchmarks.scene_command import STAGES
+from benchmarks.scene_settings import savings
+from benchmarks.scene_speed import memory_a_point
+
+SHIPPED = "as shipped"
+
+
+def section(measured: dict) -> tuple[str, list]:
+    """Title and parts, as benchmarks.report has them, of what scenes.measure returned."""
+    rows, speed = measured["rows"], measured["speed"]
+    there = [place for place in measured["places"] if "missing" not in place]
+    rendered, real = ([place for place in there if place["real"] == is_real] for is_real in (False, True))
+    parts: list = [
+        "Pictures of a place from new sides, made of its posed photos and point cloud, beside photos that were held "
+        f"out: {photos_of(rendered)} of {len(rendered)} rendered places that no training saw, {photos_of(real)} of "
+        f"{len(real)} real ones."
+    ]
+    parts += [f"Not as it should be: {'; '.join(measured['doubts'])}."] if measured["doubts"] else []
+    if any(row["rendered"] for row in rows):
+        parts += [
+            (
+                "scenes-quality.png",
+                "Error against the time to the first image, means over the rendered places. Named: ways "
+                "without a network, the scene as shipped, and what no other beats in both.",
+            ),
+            error_rows(rows, "rendered"),
+            "First image: from the capture on disk, whose cameras and cloud are given, to a picture; two processes of "
+            "the command line for ours, Python that has started for the ways without a network. Nearest photo: the "
+            "source photo whose camera is nearest, by how far the cloud's points move in the picture. Plain points: "
+            "one pixel a point, the nearest in front; pyramid: where a finer raster has no point, the next coarser "
+            "shows. Behind both is the mean colour of what photos show where no point is. PSNR and SSIM (11 x 11 "
+            "Gaussian window, sigma 1.5, mean of the three channels) of RGB; every pixel counts, borders and "
+            "background too. Distance: relative difference of features of the person detector's MobileNetV2, "
+            "averaged over four layers; in the manner of LPIPS, but not LPIPS: nobody's judgement is in it, and its "
+            "figures compare with none elsewhere. What is half the size is compared with photos of half the size.",
+        ]
+    if any(row["real"] for row in rows):
+        parts += ["On the real places:", error_rows(rows, "real")]
+    missing = missing_lines(rows)
+    parts += [f"Not measured: {'; '.join(missing)}."] if missing else []
+    gain = gain_over(rows, "pyramid of points")
+    if gain is not None:
+        parts.append(f"Over the pyramid of points, which the refiner starts from, the networks gain {gain:+.2f} dB.")
+    if measured["sheet"]:
+        caption = "Held-out photos and what each way makes of their cameras, with its PSNR."
+        parts += [(measured["sheet"], caption), place_rows(there, rows)]
+    saved = saving_rows(rows)
+    if len(saved) > 1:
+        parts += [
+            saved,
+            "Work that a scene does not need, and what it costs to do it all the same: differences to the scene as "
+            "shipped, means over the rendered places. Error: the PSNR that leaving it out costs.",
+            f"Points that no photo sees have no look and are never stored: {unseen_share(rows):.0%} of the clouds'.",
+        ]
+    if speed:
+        parts += speed_parts(speed)
+    elif measured["speed_missing"]:
+        parts.append(f"Time of a frame was not measured: {measured['speed_missing']}.")
+    return "Scenes", parts
+
+
+def gain_over(rows: list[dict], way: str) -> float | None:
+    """Of the scene as shipped, dB, where both were measured on all rendered places."""
+    found = {row["setting"]: row["rendered"] for row in rows}
+    if not found.get(SHIPPED) or not found.get(way):
+        return None
+    return found[SHIPPED]["psnr_db"] - found[way]["psnr_db"]
+
+
+def photos_of(places: list[dict]) -> str:
+    return f"{sum(place['held_out'] for place in places)} photos"
+
+
+def _shown(figures: dict, key: str, form: str, scale: float = 1) -> str:
+    return format(scale * figures[key], form) if key in figures else ""
+
+
+def error_rows(rows: list[dict], kind: str) -> list[list[str]]:
+    """kind: "rendered" or "real"."""
+    table = [["way", "first image, s", "a frame, ms", "PSNR, dB", "SSIM", "distance", "points", "bytes a point"]]
+    for row in rows:
+        figures = row[kind]
+        if figures and row["axis"] != "not needed":
+            table.append([row["setting"], _shown(figures, "first_image_s", ".2f"), _shown(figures, "frame_ms", ".1f"),
+                          _shown(figures, "psnr_db", ".2f"), _shown(figures, "ssim", ".3f"),
+                          _shown(figures, "distance", ".3f"), _shown(figures, "points", ",.0f"),
+                          _shown(figures, "bytes_a_point", ".1f")])  # fmt: skip
+    return table
+
+
+def missing_lines(rows: list[dict]) -> list[str]:
+    """Reasons, with the settings that have each, one place standing for all."""
+    by_reason: dict[str, list[str]] = {}
+    for row in rows:
+        for reason in list(row["missing"].values())[:1]:
+            by_reason.setdefault(reason, []).append(row["setting"])
+    return [f"{', '.join(names)} ({reason})" for reason, names in by_reason.items()]
+
+
+def unseen_share(rows: list[dict]) -> float:
+    """Of the points of the clouds of the rendered places, as shipped."""
+    figures = next(row["rendered"] for row in rows if row["setting"] == SHIPPED)
+    return 1 - figures["points"] / figures["cloud_points"]
+
+
+def place_rows(places: list[dict], rows: list[dict]) -> list[list[str]]:
+    """PSNR place by place, of the ways that are shown."""
+    ways = [row for row in rows if row["axis"] in ("shipped", "baseline") and row["places"]]
+    table = [["place", "photos", "points of its cloud", *(f"{row['setting']}, dB" for row in ways)]]
+    for place in places:
+        found = [row["places"].get(place["name"], {}) for row in ways]
+        table.append([place["name"] + (", real" if place["real"] else ""), str(place["photos"]),
+                      f"{place['points']:,}", *(_shown(figures, "psnr_db", ".2f") for figures in found)])  # fmt: skip
+    return table
+
+
+def saving_rows(rows: list[dict]) -> list[list[str]]:
+    found = {row["setting"]: row["rendered"] for row in rows}
+    table = [["saving", "bytes a point", "a frame, ms", "error, dB"]]
+    shipped = found.get(SHIPPED)
+    named = [(setting.name, said) for setting, said in savings()]
+    named[0:0] = [("every look varies", "looks that do not vary keep their mean"),
+                  ("coefficients of 32 bits", "coefficients of few bits")]  # fmt: skip
+    for setting, said in named:
+        figures = found.get(setting)
+        if shipped and figures:
+            # Bytes of what the scene as shipped has, however many points the other stores.
+            less = (shipped["bytes"] - figures["bytes"]) / shipped["points"]
+            table.append([said, _change(less, 1), _change(shipped["frame_ms"] - figures["frame_ms"], 2),
+                          _change(figures["psnr_db"] - shipped["psnr_db"], 3)])  # fmt: skip
+    return table
+
+
+def _change(value: float, digits: int) -> str:
+    return f"{value:+.{digits}f}" if round(value, digits) else "0"
+
+
+def speed_parts(speed: dict) -> list:
+    frames = [["points", "size", "threads", *STAGES, "all, ms", "frames a second"]]
+    for row in sorted(speed["frames"], key=lambda r: (r["threads"] != speed["threads"], r["size_px"], r["points"])):
+        frames.append([f"{row['points']:,}", f"{row['size_px'][0]} x {row['size_px'][1]}", str(row["threads"]),
+                       *(f"{row['ms'][stage]:.1f}" for stage in STAGES), f"{row['ms']['total']:.1f}",
+                       f"{1000 / row['ms']['total']:.0f}"])  # fmt: skip
+    built = [["points of the cloud", "left in the scene", "modelling, s", "peak memory, MB", "bytes a point"]]
+    for row in speed["built"]:
+        built.append([f"{row['cloud']:,}", f"{row['points']:,}", f"{row['build_s']:.2f}",
+                      f"{row['peak_memory_mb']:.0f}", f"{row['bytes_a_point']:.1f}"])  # fmt: skip
+    more = memory_a_point(speed)
+    parts = [
+        ("scenes-frame-time.png", "Time of a frame against points and pixels, and where it goes."),
+        frames,
+        f"A view of {speed['place']}, with clouds of its exact depth; medians.",
+        built,
+        "Modelled from 24 photos of 640 x 480. A point of a cloud that wins no pixel of any photo is dropped."
+        + (f" Each point of the cloud adds {more:.0f} bytes to the peak of memory." if more is not None else ""),
+    ]
+    if speed["missing"]:
+        said = "; ".join(f"{what} ({why})" for what, why in speed["missing"].items())
+        parts.append(f"Not measured: {said}.")
+    return parts

@@ -1,0 +1,157 @@
+"""Time of a frame of a scene against points, pixels and threads; time and memory of modelling it.
+
+Measured on a rendered place, with a cloud of exactly as many points as wanted: random pixels of its source photos, at
+their depth. Points that win no pixel of any photo while modelling are dropped, so a scene has fewer than its cloud.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from benchmarks import scene_command
+from benchmarks.scene_command import Built, SceneCommandError
+from export.places.place import Place, PlaceError, load_place
+from export.point_cloud import write_ply
+
+VIEWS, LONG_SIDE_PX = 24, 640
+CLOUDS = (50_000, 100_000, 200_000, 250_000, 500_000, 700_000, 1_000_000)
+QUICK_CLOUDS = (50_000, 200_000)
+SIZES = ((160, 120), (320, 240), (640, 480), (1280, 960))
+GATE_SIZE, GATE_POINTS = (640, 480), 500_000
+SMALL_SIZE, SMALL_POINTS = (320, 240), 200_000
+
+
+def dense_cloud(place: Place, points: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """`points` random pixels of the source photos, where there is depth: float32 [P, 3] in the world, uint8 [P, 3].
+
+    No pixel comes twice. Raises ValueError where there are fewer.
+    """
+    rng = np.random.default_rng(seed)
+    places, colours, share = [], [], points // len(place.source) + 1
+    for view in place.source:
+        depth = place.depth[int(view)]
+        rows, columns = np.nonzero(depth)
+        if len(rows) < share:
+            continue
+        chosen = rng.choice(len(rows), share, replace=False)
+        rows, columns = rows[chosen], columns[chosen]
+        rays = np.linalg.inv(place.intrinsics[view]) @ np.stack([columns, rows, np.ones(len(rows))])
+        pose = place.world_to_camera[view]
+        places.append(((rays * depth[rows, columns]).T - pose[:, 3]) @ pose[:, :3])
+        colours.append(place.images[int(view)][rows, columns])
+    if len(places) * share < points:
+        raise ValueError(f"{place.folder} has too few pixels with depth for {points} points")
+    keep = rng.permutation(len(places) * share)[:points]
+    return np.concatenate(places)[keep].astype(np.float32), np.concatenate(colours)[keep]
+
+
+def chosen_place(folders: list[Path]) -> Place | None:
+    """The first with photos of 640 x 480, lying or upright, and as many source photos as the gate asks for; a room if
+    there is one."""
+    found = []
+    for folder in folders:
+        try:
+            place = load_place(folder)
+        except PlaceError:
+            continue  # scene_quality says what is wrong with it
+        if is_size((place.images.width, place.images.height), GATE_SIZE) and len(place.source) >= VIEWS:
+            found.append(place)
+    return min(found, key=lambda place: place.about.get("kind") != "room") if found else None
+
+
+def is_size(size: Sequence[int], wanted: tuple[int, int]) -> bool:
+    """Lying or upright."""
+    return tuple(sorted(size, reverse=True)) == wanted
+
+
+def measure(folders: list[Path], networks: Path, threads: int, quick: bool) -> tuple[dict, str]:
+    """`built` and `frames`, rows each, `missing`, and `place`; and why there is nothing ("" where there is)."""
+    place = chosen_place(folders)
+    if place is None:
+        return {}, f"no rendered place has photos of 640 x 480 and {VIEWS} of them to build from"
+    if not networks.is_dir():
+        return {}, f"no networks in {networks}"
+    clouds = QUICK_CLOUDS if quick else CLOUDS
+    upright = place.images.height > place.images.width
+    view = [Path(place.images.files[int(place.held_out[0])]).relative_to(place.folder).as_posix()]
+    result: dict = {"place": place.folder.name, "threads": threads, "built": [], "frames": [], "missing": {}}
+    with tempfile.TemporaryDirectory() as name:
+        work, scene = Path(name), Path(name) / "scene.maqs"
+        shutil.copytree(place.folder / "images", work / "dense" / "images")
+        shutil.copy(place.folder / "transforms.json", work / "dense")
+        for points in tqdm(clouds, desc="scenes, time", unit="scene", disable=None):
+            try:
+                write_ply(work / "dense" / place_cloud(place), *dense_cloud(place, points))
+                options = ("--views", str(VIEWS), "--points", str(points), "--long-side", str(LONG_SIDE_PX))
+                built = scene_command.build(work / "dense", scene, networks, *options)
+            except (SceneCommandError, ValueError) as error:
+                result["missing"][f"{points:,} points"] = str(error)
+                continue
+            result["built"].append(built_row(points, built))
+            for size, count in wanted_frames(points in clouds[-3:], threads):
+                # The command's own choice is all cores: what is usual is not asked for.
+                options = () if count == threads else ("--threads", str(count))
+                options += ("--size", "{}x{}".format(*(reversed(size) if upright else size)))
+                options += ("--repeat", "5" if quick else "31")
+                try:
+                    made = scene_command.render(scene, networks, work / "dense", work / "pictures", view, *options)
+                except SceneCommandError as error:
+                    result["missing"]["{} x {}, threads: {}".format(*size, count)] = str(error)
+                else:
+                    row = {"points": built.points, "size_px": list(size), "threads": count, "ms": made.ms}
+                    result["frames"].append(row)
+    return (result, "") if result["frames"] else ({}, next(iter(result["missing"].values())))
+
+
+def wanted_frames(all_sizes: bool, threads: int) -> list[tuple[tuple[int, int], int]]:
+    """Size and threads of the frames that are timed."""
+    wanted = [(size, threads) for size in (SIZES if all_sizes else (SMALL_SIZE, GATE_SIZE))]
+    return wanted + [(GATE_SIZE, 1)] if threads != 1 else wanted
+
+
+def place_cloud(place: Place) -> str:
+    return json.loads((place.folder / "transforms.json").read_text())["ply_file_path"]
+
+
+def built_row(asked: int, built: Built) -> dict:
+    return {"cloud": asked, "points": built.points, "varying": built.varying, "build_s": built.wall_s,
+            "stages_s": built.seconds, "peak_memory_mb": built.peak_memory_mb,
+            "bytes_a_point": built.bytes / built.points}  # fmt: skip
+
+
+def figures_of(measured: dict) -> tuple[dict[str, float], dict[str, str]]:
+    """The figures that are gates, and why others are missing. A frame's is that of the smallest scene with at least the
+    points the gate asks for."""
+    figures, missing = {}, {}
+    for name, size, least in (("scene_fps_500k", GATE_SIZE, GATE_POINTS), ("scene_fps_200k_small", SMALL_SIZE,
+                                                                            SMALL_POINTS)):  # fmt: skip
+        rows = [row for row in measured["frames"] if tuple(row["size_px"]) == size and row["points"] >= least
+                and row["threads"] == measured["threads"]]  # fmt: skip
+        if rows:
+            figures[name] = 1000 / min(rows, key=lambda row: row["points"])["ms"]["total"]
+        else:
+            missing[name] = f"no scene kept {least:,} points and was rendered at {size[0]} x {size[1]}"
+    by_cloud = {row["cloud"]: row for row in measured["built"]}
+    for name, cloud, key in (("scene_build_s", GATE_POINTS, "build_s"), ("scene_peak_memory_mb", 1_000_000,
+                                                                         "peak_memory_mb")):  # fmt: skip
+        if cloud in by_cloud:
+            figures[name] = by_cloud[cloud][key]
+        else:
+            missing[name] = measured["missing"].get(f"{cloud:,} points", f"no cloud of {cloud:,} points was modelled")
+    return figures, missing
+
+
+def memory_a_point(measured: dict) -> float | None:
+    """Bytes that each point of the cloud adds to the peak while modelling: from the smallest to the largest cloud."""
+    rows = sorted(measured.get("built", []), key=lambda row: row["cloud"])
+    if len(rows) < 2:
+        return None
+    first, last = rows[0], rows[-1]
+    return 1e6 * (last["peak_memory_mb"] - first["peak_memory_mb"]) / (last["cloud"] - first["cloud"])

@@ -1,0 +1,1 @@
+"""Real places: photographs fetched, posed and made dense."""

@@ -1,0 +1,135 @@
+"""Makes the folder of a capture: photos without distortion, cameras, a dense cloud, and COLMAP's own model."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from export.captures.dense import dense_cloud
+from export.captures.originals import Original
+from export.captures.structure import pose, up_of_cameras, write_photos
+from export.photos.packages import load_packages
+from export.point_cloud import write_ply
+from export.scenes.cameras import Camera
+
+HELD_OUT_EVERY = 8
+_TO_OPENGL = np.diag([1.0, -1.0, -1.0])
+
+
+def make(original: Original, folder: Path) -> tuple[int, int, int]:
+    """Writes the folder whole or not at all; gives the numbers of photos, of those posed, and of points.
+
+    Raises PackageError and CaptureError.
+    """
+    import pycolmap  # of the extra `captures`
+
+    photos = original.photos()
+    partial = folder.with_name(f".{folder.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    colmap = partial / "model"
+    write_photos(photos, colmap, original.alone)
+    model = pose(colmap, os.cpu_count() or 1)
+    flat = partial / "flat"
+    pycolmap.undistort_images(flat, colmap / "sparse" / "0", colmap / "images", jpeg_quality=95)
+    straight = pycolmap.Reconstruction(flat / "sparse")
+    views = sorted(straight.images.values(), key=lambda view: view.name)
+    cameras = [_camera(view) for view in views]
+    turn, scale, middle = _placed_upright(cameras)
+    cameras = [_moved(camera, turn, scale, middle) for camera in cameras]
+    places = {k: scale * turn @ (point.xyz - middle) for k, point in straight.points3D.items()}
+    seen = [{p.point3D_id for p in view.points2D if p.has_point3D()} for view in views]
+    images = [cv2.imread(str(flat / "images" / view.name)) for view in views]
+    masks = [_flat_mask(colmap, model, view.name, camera) for view, camera in zip(views, cameras, strict=True)]
+    held_out = [k for k in range(len(views)) if k % HELD_OUT_EVERY == HELD_OUT_EVERY // 2]
+    sources = [k for k in range(len(views)) if k not in held_out]
+    xyz, rgb = dense_cloud(*([part[k] for k in sources] for part in (cameras, images, masks, seen)), places)
+    write_ply(partial / "cloud.ply", xyz, rgb)
+    write_ply(colmap / "fused.ply", ((xyz @ turn) / scale + middle).astype(np.float32), rgb)
+    (flat / "images").rename(partial / "images")
+    shutil.rmtree(flat)
+    shutil.rmtree(colmap / "masks")
+    names = [f"images/{view.name}" for view in views]
+    package = load_packages()[original.package]
+    table = {
+        "camera_model": "PINHOLE",
+        "ply_file_path": "cloud.ply",
+        "up": [0, 0, 1],
+        "frames": [_entry(name, camera) for name, camera in zip(names, cameras, strict=True)],
+        "train_filenames": [names[k] for k in sources],
+        "test_filenames": [names[k] for k in held_out],
+        "shows": original.shows,
+        "package": f"{package.package} {package.version}",
+        "licence": package.licence,
+        "reprojection_error_px": float(model.compute_mean_reprojection_error()),
+    }
+    (partial / "transforms.json").write_text(json.dumps(table, indent=1) + "\n")
+    shutil.rmtree(folder, ignore_errors=True)
+    partial.rename(folder)
+    return len(photos), len(views), len(xyz)
+
+
+def _camera(view) -> Camera:
+    """Of an image of a pycolmap.Reconstruction; pixels count from the first one's corner there."""
+    fx, fy, cx, cy = view.camera.params
+    pose = view.cam_from_world()
+    rotation = pose.rotation.matrix()
+    centre = -rotation.T @ pose.translation
+    return Camera(view.camera.width, view.camera.height, fx, fy, cx - 0.5, cy - 0.5, rotation, centre)
+
+
+def _placed_upright(cameras: list[Camera]) -> tuple[np.ndarray, float, np.ndarray]:
+    """Rotation, scale and middle, so that p -> scale * rotation @ (p - middle) has up at +z, the cameras around the
+    origin, and them a unit away from it on average."""
+    up = up_of_cameras(np.stack([camera.rotation for camera in cameras]))
+    side = np.cross(up, np.eye(3)[np.abs(up).argmin()])
+    side /= np.linalg.norm(side)
+    centres = np.stack([camera.centre for camera in cameras])
+    middle = np.median(centres, 0)
+    size = float(np.linalg.norm(centres - middle, axis=1).mean())
+    return np.stack([side, np.cross(up, side), up]), 1 / max(size, 1e-9), middle
+
+
+def _moved(camera: Camera, turn: np.ndarray, scale: float, middle: np.ndarray) -> Camera:
+    return Camera(
+        camera.width_px,
+        camera.height_px,
+        camera.fx_px,
+        camera.fy_px,
+        camera.cx_px,
+        camera.cy_px,
+        camera.rotation @ turn.T,
+        scale * turn @ (camera.centre - middle),
+    )
+
+
+def _flat_mask(colmap: Path, model, name: str, camera: Camera) -> np.ndarray:
+    """The mask of a photo without distortion, two pixels smaller: bool [H, W]."""
+    mask = cv2.imread(str(colmap / "masks" / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
+    lens = next(image.camera for image in model.images.values() if image.name == name)
+    focal, cx, cy, bend = lens.params  # SIMPLE_RADIAL
+    old = np.array([[focal, 0, cx - 0.5], [0, focal, cy - 0.5], [0, 0, 1]])
+    size = camera.width_px, camera.height_px
+    to_old = cv2.initUndistortRectifyMap(old, np.array([bend, 0, 0, 0]), None, camera.intrinsics(), size, cv2.CV_32FC1)
+    return cv2.erode(cv2.remap(mask, *to_old, cv2.INTER_NEAREST), np.ones((5, 5))) > 0
+
+
+def _entry(name: str, camera: Camera) -> dict:
+    """As nerfstudio writes it: OpenGL axes, pixels counted from the first one's corner."""
+    to_world = np.eye(4)
+    to_world[:3, :3] = camera.rotation.T @ _TO_OPENGL
+    to_world[:3, 3] = camera.centre
+    return {
+        "file_path": name,
+        "w": camera.width_px,
+        "h": camera.height_px,
+        "fl_x": camera.fx_px,
+        "fl_y": camera.fy_px,
+        "cx": camera.cx_px + 0.5,
+        "cy": camera.cy_px + 0.5,
+        "transform_matrix": to_world.tolist(),
+    }

@@ -1,0 +1,83 @@
+"""Jobs in processes of their own that are given up when they take too long.
+
+Software renderers now and then never come back from a picture (Mesa's llvmpipe draws some views for ever); a place lost
+is better than a set that never ends.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import queue
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from multiprocessing.connection import Connection
+
+
+def _serve(connection: Connection, work: Callable[[tuple], object]) -> None:
+    while True:
+        try:
+            job = connection.recv()
+        except EOFError:
+            return
+        try:
+            work(job)
+            connection.send(None)
+        except Exception as error:  # the one who waits says it
+            connection.send(error)
+
+
+class _Worker:
+    def __init__(self, work: Callable[[tuple], object]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs, work), daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def run(self, job: tuple, most_s: float) -> Exception | None:
+        self._connection.send(job)
+        if not self._connection.poll(most_s):
+            return TimeoutError(f"given up after {most_s:g} s")
+        try:
+            return self._connection.recv()
+        except EOFError:
+            return RuntimeError(f"its process ended with status {self._process.exitcode}")
+
+    def end(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self._connection.close()
+
+
+def done(
+    work: Callable[[tuple], object], jobs: Sequence[tuple], processes: int, most_s: float
+) -> Iterator[tuple[tuple, Exception | None]]:
+    """Each job when it is done, and what went wrong with it, if something did. work: a function of a module."""
+    waiting: queue.SimpleQueue[tuple] = queue.SimpleQueue()
+    for job in jobs:
+        waiting.put(job)
+    found: queue.SimpleQueue[tuple[tuple, Exception | None]] = queue.SimpleQueue()
+
+    def serve() -> None:
+        worker = None
+        while True:
+            try:
+                job = waiting.get_nowait()
+            except queue.Empty:
+                break
+            worker = worker or _Worker(work)
+            error = worker.run(job, most_s)
+            if error is not None:
+                worker.end()
+                worker = None
+            found.put((job, error))
+        if worker:
+            worker.end()
+
+    threads = [threading.Thread(target=serve, daemon=True) for _ in range(min(processes, len(jobs)))]
+    for thread in threads:
+        thread.start()
+    for _ in jobs:
+        yield found.get()
+    for thread in threads:
+        thread.join()

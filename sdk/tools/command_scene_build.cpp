@@ -1,0 +1,140 @@
+#include <CLI/CLI.hpp>
+#include <cinttypes>
+#include <cstdio>
+#include <filesystem>
+#include <maquette/maquette.hpp>
+#include <memory>
+
+#include "interrupt.h"
+#include "machine.h"
+#include "output_file.h"
+#include "program.h"
+#include "progress_bar.h"
+#include "scene_commands.h"
+
+namespace {
+
+struct Options {
+  std::string capture;
+  std::string out;
+  std::string networks;
+  std::string ply;
+  std::string json;
+  int threads = 0;
+  int long_side = 640;
+  int coefficients = 8;
+  double least_variation = -1;
+  double visibility_scale = 1;
+  double near_depth = 0;
+  uint64_t points = 0;
+  uint32_t views = 0;
+  bool all_photos = false;
+};
+
+constexpr int kPermille = 1000;
+
+int32_t show_progress(void* bar, double done, const char* what) {
+  static_cast<ProgressBar*>(bar)->advance(int64_t(done * kPermille), what);
+  return interrupted() ? 0 : 1;
+}
+
+int build(const Options& options) {
+  catch_interrupts();
+  const maquette::Context context = open_context();
+  const maquette::Capture capture(context, options.capture);
+  const maq_capture_info info = capture.info();
+  std::fprintf(stderr, "%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count,
+               info.point_count);
+  for (uint32_t i = 0; i < info.dropped_count; ++i) {
+    const char* reason = "";
+    uint64_t count = 0;
+    maquette::check(maq_capture_get_dropped(capture.get(), i, &reason, &count), capture.get());
+    std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", count, reason);
+  }
+  const std::string networks = scene_bundle_or_default(options.networks);
+  ProgressBar progress("building", kPermille);
+  maq_scene_build_config config = maquette::default_scene_build_config();
+  config.bundle_path = networks.c_str();
+  config.threads = options.threads;
+  config.long_side_px = options.long_side;
+  config.coefficient_bits = options.coefficients;
+  config.least_variation = options.least_variation;
+  config.visibility_scale = options.visibility_scale;
+  config.near_depth = options.near_depth;
+  config.most_points = options.points;
+  config.most_views = options.views;
+  config.uses_held_out = options.all_photos ? 1 : 0;
+  config.progress = show_progress;
+  config.progress_user_data = &progress;
+  maq_scene_build_stats stats{};
+  const maquette::Scene scene(context, config, capture, &stats);
+  progress.finish();
+  const double before_saving_s = seconds_since_start();
+  scene.save(options.out);
+  if (!options.ply.empty()) scene.save_ply(options.ply);
+  const double total_s = seconds_since_start();
+
+  const maq_scene_info made = scene.info();
+  const uint64_t bytes = std::filesystem::file_size(options.out);
+  std::printf("%s: %" PRIu64 " of %" PRIu64 " points were seen by %u photos; %.1f MB, %.1f bytes a point; %.1f s\n",
+              options.out.c_str(), made.point_count, stats.cloud_points, stats.view_count, double(bytes) / 1e6,
+              double(bytes) / double(made.point_count), total_s);
+  if (stats.unused_views > 0) {
+    std::printf("  %u photos could not be used: unreadable, missing, or they see no point\n", stats.unused_views);
+  }
+  if (!options.json.empty()) {
+    nlohmann::ordered_json document = describe_scene(made, bytes);
+    document["cloud_points"] = stats.cloud_points;
+    document["views"] = stats.view_count;
+    document["unused_views"] = stats.unused_views;
+    document["seconds"] = {{"total", total_s},
+                           {"load", stats.load_ms / 1e3},
+                           {"visibility", stats.visibility_ms / 1e3},
+                           {"turning", stats.turning_ms / 1e3},
+                           {"extractor", stats.extractor_ms / 1e3},
+                           {"moments", stats.moments_ms / 1e3},
+                           {"solving", stats.solving_ms / 1e3},
+                           {"packing", stats.packing_ms / 1e3},
+                           {"saving", total_s - before_saving_s}};
+    document["peak_memory_mib"] = double(peak_memory_bytes()) / double(1 << 20);
+    const std::string text = document.dump(2) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_scene_build_command(CLI::App& scene, int* exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = scene.add_subcommand("build", "Make a scene of a folder with photos, cameras and a cloud");
+  command->add_option("capture", options->capture, "COLMAP model or transforms.json with its photos and cloud")
+      ->required();
+  command->add_option("-o,--out", options->out, "The scene: place.maqs; replaces one that is there")->required();
+  command->add_option("--networks", options->networks,
+                      "Bundle of scene networks; else MAQ_SCENE_BUNDLE, else the one that came with this program");
+  command->add_option("--points", options->points, "Take so many points of the cloud at most")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--views", options->views, "Take so many photos at most, evenly")->check(CLI::PositiveNumber);
+  command->add_option("--long-side", options->long_side, "Photos are made smaller to this long side, pixels; 0: never")
+      ->check(CLI::Range(0, 16384));
+  command->add_option("--coefficients", options->coefficients, "Bits of the numbers in the file: 8, 16 or 32")
+      ->check(CLI::IsMember({8, 16, 32}));
+  command
+      ->add_option(
+          "--least-variation", options->least_variation,
+          "Points whose look varies less keep one colour from all sides, for a smaller file; colours are 0 to 1")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--visibility-scale", options->visibility_scale,
+                   "For sparse clouds: below 1, points hide more of what is behind them")
+      ->check(CLI::Range(1.0 / 16, 4.0));
+  command->add_option("--near", options->near_depth, "Cameras do not see points nearer than this, in scene units")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--threads", options->threads, "Default: the cores, at most 4")->check(CLI::Range(1, 64));
+  command->add_flag("--all-photos", options->all_photos,
+                    "Use the photos that the capture holds out for comparisons too");
+  command->add_option("--ply", options->ply, "Write the points with their colours as PLY too, for other programs");
+  command->add_option("--json", options->json, "Write figures and times to this file");
+  command->callback([=] { *exit_code = build(*options); });
+}

@@ -1,0 +1,18 @@
+// The commands of `maquette scene`.
+#pragma once
+
+#include <maquette/scene.h>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+void add_scene_build_command(CLI::App& scene, int* exit_code);
+void add_scene_render_command(CLI::App& scene, int* exit_code);
+
+// `given`, or the bundle of scene networks that is used without. Throws std::runtime_error where there is none.
+std::string scene_bundle_or_default(const std::string& given);
+// What a scene file holds.
+nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_bytes);

@@ -45,6 +45,7 @@ maq::ModelledPoints tiny_points() {
 Scene packed(const maq::ModelledPoints& points, maq::Coefficients coefficients) {
   maq::ScenePacking packing;
   packing.coefficients = coefficients;
+  packing.least_variation = 0;
   packing.places = coefficients == maq::Coefficients::kFloat32 ? maq::Places::kFloat32 : maq::Places::kUint16;
   return make_scene(points, packing);
 }

@@ -45,7 +45,7 @@ void LookRaster::shade(const Scene& scene, const BlockIndex& blocks, const ZBuff
   const size_t pixels = size_t(width) * size_t(height);
   for (int level = 0; level < kLevels; ++level) {
     keys_[level].resize(pixels >> (2 * level));
-    if (level < layout.levels) levels_[level].resize(kChannels * (pixels >> (2 * level)));
+    levels_[level].resize(kChannels * (pixels >> (2 * level)));
   }
   scratch_.resize(size_t(threads.count()));
   for (Scratch& scratch : scratch_) {
@@ -130,7 +130,6 @@ void LookRaster::reduce_strip(const Task& task, int top) {
   const size_t width = size_t(task.window.width_px);
   for (int level = 1; level < kLevels; ++level) {
     const size_t columns = width >> level, fine_columns = 2 * columns;
-    const bool is_read = level < task.layout.levels;
     // Where the four pixels of a finer level's 2x2 are, from the first of them on.
     const bool is_folded = level == 1 && task.layout.is_folded;
     const size_t right = kChannels, below = is_folded ? 2 * kChannels : fine_columns * kChannels;
@@ -140,16 +139,15 @@ void LookRaster::reduce_strip(const Task& task, int top) {
       const DepthKey* const above = keys_[level - 1].data() + 2 * size_t(y) * fine_columns;
       const DepthKey* const under = above + fine_columns;
       DepthKey* const keys = keys_[level].data() + size_t(y) * columns;
-      const float* const from =
-          is_read ? levels_[level - 1].data() + 2 * size_t(y) * fine_columns * kChannels : nullptr;
-      float* const to = is_read ? levels_[level].data() + size_t(y) * columns * kChannels : nullptr;
+      const float* const from = levels_[level - 1].data() + 2 * size_t(y) * fine_columns * kChannels;
+      float* const to = levels_[level].data() + size_t(y) * columns * kChannels;
       for (size_t x = 0; x < columns; ++x) {
         const DepthKey four[4] = {above[2 * x], above[2 * x + 1], under[2 * x], under[2 * x + 1]};
         const size_t of_first = four[1] < four[0] ? 1 : 0, of_last = four[3] < four[2] ? 3 : 2;
         const size_t best = four[of_last] < four[of_first] ? of_last : of_first;
         keys[x] = four[best];
         // Of four without a point the first is all 0.
-        if (is_read) std::memcpy(to + x * kChannels, from + x * cell + offsets[best], kChannels * sizeof(float));
+        std::memcpy(to + x * kChannels, from + x * cell + offsets[best], kChannels * sizeof(float));
       }
     }
   }
@@ -157,7 +155,7 @@ void LookRaster::reduce_strip(const Task& task, int top) {
 
 void LookRaster::fill_strip(const Task& task, int top) {
   const size_t width = size_t(task.window.width_px);
-  for (int level = task.layout.levels - 2; level >= 0; --level) {
+  for (int level = kLevels - 2; level >= 0; --level) {
     const size_t columns = width >> level;
     const bool is_folded = level == 0 && task.layout.is_folded;
     const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;

@@ -45,8 +45,7 @@ TEST(TurnedPicture, IsBilinearWithTheBorderRepeatedInAnyStrips) {
           const double u = at_x - x0, v = at_y - y0;
           const double expected = (1 - v) * ((1 - u) * pixel(x0, y0) + u * pixel(x1, y0)) +
                                   v * ((1 - u) * pixel(x0, y1) + u * pixel(x1, y1));
-          // A place is rounded by up to 1/64 pixel, and the slope is up to 25 a pixel.
-          ASSERT_NEAR(to[size_t((y * kWidth + x) * channels + c)], expected, 1.5) << x << " " << y;
+          ASSERT_NEAR(to[size_t((y * kWidth + x) * channels + c)], expected, 0.6) << x << " " << y;
         }
       }
     }

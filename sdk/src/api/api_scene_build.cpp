@@ -51,7 +51,13 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
     default: throw ArgumentError("config.coefficient_bits is ", config.coefficient_bits, ", but must be 8, 16 or 32.");
   }
   if (std::isnan(config.least_variation)) throw ArgumentError("config.least_variation is not a number.");
-  if (config.least_variation >= 0) settings.packing.least_variation = float(config.least_variation);
+  if (config.least_variation >= 0) {
+    settings.packing.least_variation = float(config.least_variation);
+  } else if (config.coefficient_bits == 8) {
+    // At most 40 bytes a point, also where every look varies: the other half varies less.
+    constexpr float kMostVarying = 0.5f;
+    settings.packing.most_varying = kMostVarying;
+  }
   settings.points.visibility_scale = config.visibility_scale;
   settings.points.near = config.near_depth;
   settings.points.threads = settings.threads;

@@ -1,8 +1,9 @@
 """Scene files (.maqs) in numpy: read, checked, and written again with other looks.
 
-The layout is that of sdk/src/scene/scene_file_format.h and scene.h, version 1. Points, blocks and kinds of numbers stay as
-`maquette scene build` chose them: what is written differs in coefficients, their steps, and the networks' identity. Checks
-are 64-bit XXH3 hashes by libxxhash, which comes with the header that the SDK is built with (scripts/install-packages.sh).
+The layout is that of sdk/src/scene/scene_file_format.h and scene.h, version 1. Points, blocks and kinds of numbers
+stay as `maquette scene build` chose them: what is written differs in coefficients, their steps, and the networks'
+identity. Checks are 64-bit XXH3 hashes by libxxhash, which comes with the header that the SDK is built with
+(scripts/install-packages.sh).
 """
 
 from __future__ import annotations
@@ -73,8 +74,9 @@ class SceneFileError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class SceneFile:
-    """head: one HEAD. blocks: BLOCK [B]. places: [3 P] as stored, block by block x of all, then y, then z. means: [P, 8]
-    and slopes: [V, 48] as stored. state: bytes of three sections, empty where the file keeps no state of modelling."""
+    """head: one HEAD. blocks: BLOCK [B]. places: [3 P] as stored, block by block x of all, then y, then z. means: [P,
+    8] and slopes: [V, 48] as stored. state: bytes of three sections, empty where the file keeps no state of
+    modelling."""
 
     head: np.ndarray
     blocks: np.ndarray
@@ -104,7 +106,8 @@ class SceneFile:
         return found + self.head["origin"]
 
     def slope_rows(self) -> np.ndarray:
-        """For each point, int64 [P], which row of the slopes is its own; -1 for those that look the same from all sides."""
+        """For each point, int64 [P], which row of the slopes is its own; -1 for those that look the same from all
+        sides."""
         block = np.repeat(np.arange(len(self.blocks)), self.blocks["count"])
         own = np.arange(len(self.means)) - self.blocks["first"][block]
         return np.where(own < self.blocks["varying"][block], self.blocks["first_varying"][block] + own, -1)

@@ -1,8 +1,8 @@
 """How the points of one scene look, learnt from its photos: what is left of NPBG++ (arXiv 2203.13318) after modelling.
 
-Which point a pixel of a photo shows never changes, so it is found once. A step then renders one whole photo: each of its
-points has one pixel there, and a cut would show some of them and save nothing a pixel. Optimisers are lazy, since a step
-touches the points of one photo.
+Which point a pixel of a photo shows never changes, so it is found once. A step then renders one whole photo: each of
+its points has one pixel there, and a cut would show some of them and save nothing a pixel. Optimisers are lazy, since
+a step touches the points of one photo.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a camera shows of a scene, whatever its points look like. frame: the upright picture that is rendered, turned:
-    whether the camera's own differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis: [V, 6]."""
+    """What a camera shows of a scene, whatever its points look like. frame: the upright picture that is rendered,
+    turned: whether the camera's own differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis: [V,
+    6]."""
 
     camera: Camera
     frame: Camera
@@ -136,7 +137,7 @@ class Tuning:
         self._rates, self._random = rates, np.random.default_rng(seed)
         self._queue: list[int] = []
         device = scene.places.device
-        self._shown = [scene.shown(view.camera) for view in views]
+        self.shown = [scene.shown(view.camera) for view in views]
         self._photos = [torch.from_numpy(view.image).permute(2, 0, 1)[None].to(device) for view in views]
         groups = [{"params": [scene.mean], "whole": rates.mean}, {"params": [scene.slope], "whole": rates.slope}]
         self._optimisers = [torch.optim.SparseAdam([g for g in groups if g["params"][0].numel()], 1e-3, BETAS)]
@@ -151,7 +152,7 @@ class Tuning:
         k = self._queue.pop()
         photo = self._photos[k]
         terms = picture_terms(
-            self.scene.picture(self._shown[k]), photo, torch.ones_like(photo[:, :1]), self.weights, self.perceptual
+            self.scene.picture(self.shown[k]), photo, torch.ones_like(photo[:, :1]), self.weights, self.perceptual
         )
         loss = sum(terms.values())
         for optimiser in self._optimisers:
@@ -162,4 +163,4 @@ class Tuning:
         if torch.isfinite(loss):
             for optimiser in self._optimisers:
                 optimiser.step()
-        return float(loss)
+        return loss.item()

@@ -119,9 +119,9 @@ def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argpar
     print(f"getting ready took {time.monotonic() - begin_s:.1f} s")
 
     def say(when: str) -> None:
-        held_out = [capture.view(k, options.long_side) for k in sorted(capture.held_out)]
-        if held_out and not options.unmeasured:
-            print(f"{when}: {measured(model, held_out):.2f} dB, mean PSNR of {len(held_out)} held-out photos")
+        if capture.held_out and not options.unmeasured:
+            found = measured(model, (capture.view(k, options.long_side) for k in sorted(capture.held_out)))
+            print(f"{when}: {found:.2f} dB, mean PSNR of {len(capture.held_out)} held-out photos")
 
     say("before")
     spent_s, steps = 0.0, 0

@@ -34,7 +34,7 @@ class Rates:
     weights, 1e-4 in the paper; 0: they stay."""
 
     mean: float = 1e-2
-    slope: float = 3e-3
+    slope: float = 3e-4
     refiner: float = 0.0
 
 

@@ -165,7 +165,7 @@ def test_the_loss_falls(place):
         tuning.step()
     last = np.mean([tuning.step(0.1) for _ in range(len(views))])
     assert last < 0.8 * first
-    assert finetune.measured(model, views) > before + 1
+    assert finetune.measured(model, views) > before + 0.5
     assert all(torch.equal(a, b) for a, b in zip(refiner, model.networks.refiner.parameters(), strict=True))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -47,6 +48,13 @@ def training_data(places: Path) -> list[dict[str, str]]:
 def _tensor(value: onnx.ValueInfoProto) -> dict[str, object]:
     sizes = [dimension.dim_param or dimension.dim_value for dimension in value.type.tensor_type.shape.dim]
     return {"name": value.name, "type": "float32", "shape": sizes}
+
+
+def identity(manifest: dict) -> str:
+    """Of the networks in a bundle, in hexadecimal: what scenes made with them keep (docs/formats.md)."""
+    names = (*(manifest["graphs"][graph]["file"] for graph in GRAPHS), manifest["basis"]["file"])
+    digests = "".join(manifest["files"][name]["sha256"] for name in names)
+    return hashlib.sha256(digests.encode()).hexdigest()
 
 
 def write_manifest(folder: Path, info: BundleInfo) -> dict:

@@ -18,6 +18,7 @@ from export.scenes.light_refiner import LightRefiner
 from export.scenes.system import Networks
 
 SHARE = 0.999  # of a feature's values are within -0.5 .. 0.5 afterwards
+MOST_APART = 0.1  # of a feature's variance may differ between a bundle and its weights; 8 bits are about 0.001
 
 
 @torch.no_grad()
@@ -31,6 +32,20 @@ def measured(networks: Networks, images: Iterable[Tensor]) -> Tensor:
     if not reaches:
         raise ValueError("there is no photo to measure features on")
     return 0.5 / torch.stack(reaches).mean(0).clamp_min(1e-6)
+
+
+@torch.no_grad()
+def factors_between(networks: Networks, image: Tensor, features: Tensor) -> Tensor:
+    """Factors [5] that a bundle's features [1, 8, H, W] of a photo [1, 3, H, W] are larger by than those of the weights
+    that it was made of: a bundle need not say how it was scaled. Raises ValueError where they are of other weights."""
+    own, theirs = (x[0, COLOURS:].flatten(1).double() for x in (networks.extractor(image), features))
+    factors = (own * theirs).sum(1) / own.square().sum(1).clamp_min(1e-12)
+    apart = (theirs - factors[:, None] * own).square().sum(1) / theirs.square().sum(1).clamp_min(1e-12)
+    if not (factors > 0).all() or not float(apart.max()) <= MOST_APART:
+        raise ValueError(
+            f"the bundle's extractor is not made of these weights: {float(apart.max()):.0%} of a feature differ"
+        )
+    return factors.float()
 
 
 @torch.no_grad()

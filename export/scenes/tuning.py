@@ -1,0 +1,166 @@
+"""How the points of one scene look, learnt from its photos: what is left of NPBG++ (arXiv 2203.13318) after modelling.
+
+Which point a pixel of a photo shows never changes, so it is found once. A step then renders one whole photo: each of
+its points has one pixel there, and a cut would show some of them and save nothing a pixel. Optimisers are lazy, since
+a step touches the points of one photo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from export.scenes.basis import directions
+from export.scenes.cameras import Camera, between, moves, upright
+from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, TURNED_MULTIPLE
+from export.scenes.losses import LossWeights, picture_terms
+from export.scenes.modelling import Options, View, shown_in
+from export.scenes.perceptual import Perceptual
+from export.scenes.raster import Pyramid, filled, pyramid
+from export.scenes.scene_file import SceneFile
+from export.scenes.system import Networks
+
+BETAS = 0.9, 0.99  # a point that is met for the first time then moves by the rate, not by a multiple of it
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Learning rates of Adam. mean, slope: of looks, whose features have the range of colours, 0..1. refiner: of its
+    weights, 1e-4 in the paper; 0: they stay."""
+
+    mean: float = 1e-2
+    slope: float = 3e-4
+    refiner: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a camera shows of a scene, whatever its points look like. frame: the upright picture that is rendered,
+    turned: whether the camera's own differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis: [V,
+    6]."""
+
+    camera: Camera
+    frame: Camera
+    turned: bool
+    points: Tensor
+    slots: list[Tensor]
+    basis: Tensor
+
+
+class TunedScene(nn.Module):
+    """The looks of a scene's points as parameters, and the networks that draw them."""
+
+    def __init__(self, scene: SceneFile, networks: Networks, device: torch.device) -> None:
+        super().__init__()
+        self.networks = networks.to(device).eval().requires_grad_(False)
+        self.options = Options(up=scene.up)
+        self.places = torch.from_numpy(scene.positions()).to(device)
+        self.rows = torch.from_numpy(scene.slope_rows()).to(device)
+        means, slopes = (torch.from_numpy(values).to(device) for values in scene.looks())
+        self.mean, self.slope = nn.Parameter(means), nn.Parameter(slopes)
+
+    @torch.no_grad()
+    def shown(self, camera: Camera) -> Shown:
+        """What a camera of any size and turn shows."""
+        up = np.asarray(self.options.up)
+        frame = upright(camera, up, MULTIPLE)
+        turned = moves(camera, frame)
+        if turned:
+            frame = upright(camera, up, TURNED_MULTIPLE)
+        found = pyramid(shown_in(self.places, frame, self.options), LEVELS)
+        centre = torch.from_numpy(frame.centre).to(self.places)
+        basis = self.networks.basis(directions(self.places[found.points], centre).float())
+        slots = [slot.int() for slot in found.slots]
+        return Shown(camera, frame, turned, found.points, slots, basis)
+
+    def rasters(self, shown: Shown) -> list[Tensor]:
+        """[1, 9, H/2^k, W/2^k] for each level, of the frame."""
+        looks = F.embedding(shown.points, self.mean, sparse=True)
+        rows = self.rows[shown.points]
+        (varying,) = torch.where(rows >= 0)
+        if len(varying):
+            slopes = F.embedding(rows[varying], self.slope, sparse=True).view(-1, BASIS, FEATURES)
+            looks = looks.index_add(0, varying, torch.einsum("pb,pbf->pf", shown.basis[varying], slopes))
+        levels = Pyramid(shown.points, [slot.long() for slot in shown.slots]).rasters(looks)
+        return filled([level[None] for level in levels])
+
+    def picture(self, shown: Shown) -> Tensor:
+        """RGB [1, 3, H, W] of the camera, not clamped."""
+        picture = self.networks.refiner(self.rasters(shown))
+        camera, frame = shown.camera, shown.frame
+        if not shown.turned:
+            left, top = np.rint(between(camera, frame)[:, 2]).astype(int)
+            return picture[..., top : top + camera.height_px, left : left + camera.width_px]
+        return _turned(picture, camera, frame)
+
+    @torch.no_grad()
+    def rendered(self, camera: Camera) -> np.ndarray:
+        """RGB float32 [H, W, 3] in 0..1."""
+        picture = self.picture(self.shown(camera))[0].clamp(0, 1)
+        return np.ascontiguousarray(picture.permute(1, 2, 0).cpu().numpy())
+
+    def looks(self) -> tuple[np.ndarray, np.ndarray]:
+        """Means [P, 8] and slopes [V, 48], float32, as they are now."""
+        return tuple(values.detach().cpu().numpy().copy() for values in (self.mean, self.slope))
+
+
+def _turned(picture: Tensor, camera: Camera, frame: Camera) -> Tensor:
+    """The frame's picture [1, 3, h, w] as the camera has it [1, 3, H, W]; bilinear, borders repeated."""
+    rows, columns = torch.meshgrid(torch.arange(camera.height_px), torch.arange(camera.width_px), indexing="ij")
+    pixels = torch.stack([columns, rows, torch.ones_like(rows)], -1).double()
+    at = pixels @ torch.from_numpy(between(camera, frame)).T
+    size = torch.tensor([frame.width_px, frame.height_px])
+    grid = ((2 * at + 1) / size - 1).to(picture)
+    return F.grid_sample(picture, grid[None], mode="bilinear", padding_mode="border", align_corners=False)
+
+
+class Tuning:
+    """Goes on with the looks of a scene, photo after photo, in an order drawn anew every round."""
+
+    def __init__(
+        self,
+        scene: TunedScene,
+        views: Sequence[View],
+        rates: Rates,
+        weights: LossWeights,
+        perceptual: Perceptual | None = None,
+        seed: int = 0,
+    ) -> None:
+        if not views:
+            raise ValueError("there is no photo to learn from")
+        self.scene, self.weights, self.perceptual = scene, weights, perceptual
+        self._rates, self._random = rates, np.random.default_rng(seed)
+        self._queue: list[int] = []
+        device = scene.places.device
+        self.shown = [scene.shown(view.camera) for view in views]
+        self._photos = [torch.from_numpy(view.image).permute(2, 0, 1)[None].to(device) for view in views]
+        groups = [{"params": [scene.mean], "whole": rates.mean}, {"params": [scene.slope], "whole": rates.slope}]
+        self._optimisers = [torch.optim.SparseAdam([g for g in groups if g["params"][0].numel()], 1e-3, BETAS)]
+        if rates.refiner:
+            refiner = scene.networks.refiner.requires_grad_(True)
+            self._optimisers.append(torch.optim.Adam([{"params": list(refiner.parameters()), "whole": rates.refiner}]))
+
+    def step(self, share_of_rate: float = 1.0) -> float:
+        """Renders one photo and goes a step; the loss before it. share_of_rate: of the learning rates."""
+        if not self._queue:
+            self._queue = self._random.permutation(len(self._photos)).tolist()
+        k = self._queue.pop()
+        photo = self._photos[k]
+        terms = picture_terms(
+            self.scene.picture(self.shown[k]), photo, torch.ones_like(photo[:, :1]), self.weights, self.perceptual
+        )
+        loss = sum(terms.values())
+        for optimiser in self._optimisers:
+            optimiser.zero_grad(set_to_none=True)
+            for group in optimiser.param_groups:
+                group["lr"] = group["whole"] * share_of_rate
+        loss.backward()
+        if torch.isfinite(loss):
+            for optimiser in self._optimisers:
+                optimiser.step()
+        return loss.item()

@@ -99,7 +99,7 @@ TEST_F(ApiCaptures, WhatCannotBeUsedIsToldWithItsReason) {
   std::filesystem::remove(copy() + "/images/4.png");
   const maquette::Capture capture(context_, copy());
   EXPECT_EQ(capture.info().view_count, 4u);
-  expect_dropped(capture, "photos that are missing", 1);
+  expect_dropped(capture, "photos that are not in their folder", 1);
   uint64_t count = 0;
   EXPECT_NE(std::string(capture.dropped(0, &count)).find("(first: images/4.png)"), std::string::npos);
 }
@@ -123,11 +123,11 @@ TEST_F(ApiCaptures, PointsThatAreNotFiniteAreDroppedAndACloudOfThemIsRefused) {
 
 TEST_F(ApiCaptures, CamerasWithoutImagesAndImagesWithoutCameras) {
   std::filesystem::remove_all(copy() + "/images");
-  expect_refused(MAQ_ERROR_UNREADABLE, "photos that are missing");
+  expect_refused(MAQ_ERROR_UNREADABLE, "5 photos that are not in their folder");
   nlohmann::json document = transforms();
   document["frames"] = nlohmann::json::array();
   write(document);
-  expect_refused(MAQ_ERROR_UNREADABLE, "frames");
+  expect_refused(MAQ_ERROR_UNREADABLE, "no photo that can be used");
 }
 
 TEST_F(ApiCaptures, PhotosOfAnotherShapeThanTheirCameraAreDropped) {

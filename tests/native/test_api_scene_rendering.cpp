@@ -55,8 +55,6 @@ TEST_F(ApiSceneRendering, GivesPlanesAndStats) {
   EXPECT_NEAR(depth[middle], 2, 0.1) << "a ball of radius 1, seen from 3 away";
   EXPECT_EQ(alpha[0], 0);
   EXPECT_EQ(depth[0], 0);
-  const std::vector<uint8_t> bgr = bgr_of(image, camera);
-  EXPECT_EQ(bgr[0] + bgr[1] + bgr[2], 0) << "the background is black";
   const maq_scene_image_stats stats = image.stats();
   EXPECT_GT(stats.points_drawn, 1000u);
   EXPECT_GT(stats.points_shaded, 300u);
@@ -245,7 +243,7 @@ TEST_F(ApiSceneRendering, OtherNetworksThanTheScenesAreRefused) {
   config.bundle_path = "/no/such/bundle";
   expect_refused(config, MAQ_ERROR_NOT_FOUND, "/no/such/bundle");
   config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-  expect_refused(config, MAQ_ERROR_BAD_BUNDLE, "scenes");
+  expect_refused(config, MAQ_ERROR_UNSUPPORTED, "the task scenes");
   const TempFolder folder;
   std::filesystem::copy(api_tiny_scene::kBundle, folder.file("bundle"));
   const std::string bundle = folder.file("bundle"), basis = bundle + "/basis.bin";

@@ -18,7 +18,7 @@ class ApiScenes : public ::testing::Test {
   maq_status open(const std::string& path) const {
     maq_scene* scene = nullptr;
     const maq_status status = maq_scene_open(context_.get(), path.c_str(), &scene);
-    if (status != MAQ_OK) EXPECT_EQ(scene, nullptr);
+    EXPECT_EQ(scene != nullptr, status == MAQ_OK);
     maq_scene_destroy(scene);
     return status;
   }
@@ -36,8 +36,8 @@ TEST_F(ApiScenes, AFileIsTheSceneThatWasSaved) {
   EXPECT_GE(found.block_count, 1u);
   EXPECT_EQ(std::memcmp(&expected, &found, sizeof found), 0);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(found.low[axis], -1, 0.1);
-    EXPECT_NEAR(found.high[axis], 1, 0.1);
+    EXPECT_NEAR(found.low[axis], -1, 0.2);
+    EXPECT_NEAR(found.high[axis], 1, 0.2);
   }
   opened.save(folder_.file("again.maqs"));
   EXPECT_EQ(read_text(folder_.file("again.maqs")), read_text(path()));
@@ -97,11 +97,11 @@ TEST_F(ApiScenes, FilesThatAreNoneAreAStatus) {
   EXPECT_EQ(open(folder_.file("empty.maqs")), MAQ_ERROR_UNREADABLE);
 }
 
-// Sanitized, each of the thousands takes a millisecond.
+// Every byte would take minutes on a busy machine; SceneFileDamage takes them all, below the C API.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr size_t kEvery = 61;
 #else
-constexpr size_t kEvery = 1;
+constexpr size_t kEvery = 7;
 #endif
 
 TEST_F(ApiScenes, CutAtAnyByteItIsRefused) {

@@ -237,7 +237,7 @@ typedef struct maq_scene_renderer_config {
   double near_depth;     /* points nearer to the camera, along its axis, are not drawn; units of the scene, default 0 */
   uint8_t background[3]; /* red, green, blue; default black */
   uint8_t is_drawn_over; /* 1: the picture is mixed with the background by its alpha; default 0: it is what the
-                               network made, the background only where alpha is 0 */
+                               network made, the background only farther from all points than it sees */
   uint32_t image_pool_size; /* images the app may hold at once, 1 to 64; default 4 */
   int32_t spin; /* 1 (default): idle threads stay awake between two steps; 0: they sleep, slower but frugal */
   /* For measuring what is saved: 1 does it all the same. Pictures stay the same where alpha is above 0. */

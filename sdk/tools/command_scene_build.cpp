@@ -1,9 +1,13 @@
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cinttypes>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <maquette/maquette.hpp>
 #include <memory>
+#include <stdexcept>
 
 #include "interrupt.h"
 #include "machine.h"
@@ -38,6 +42,26 @@ int32_t show_progress(void* bar, double done, const char* what) {
   return interrupted() ? 0 : 1;
 }
 
+// Before the work: that its result has a place. Makes the folder.
+void require_writable(const std::string& path) {
+  if (path.empty()) return;
+  if (std::filesystem::is_directory(path)) throw std::runtime_error(path + " is a folder; name a file in it.");
+  const OutputFile probe(path);
+  if (!std::ofstream(probe.temporary_path())) {
+    throw std::runtime_error(path + " cannot be written: " + std::strerror(errno) + ".");
+  }
+}
+
+maquette::Scene build_or_tell(const maquette::Context& context, const maq_scene_build_config& config,
+                              const maquette::Capture& capture, maq_scene_build_stats* stats, const std::string& out) {
+  try {
+    return maquette::Scene(context, config, capture, stats);
+  } catch (const maquette::Error&) {
+    if (!interrupted()) throw;
+    throw std::runtime_error("Interrupted; " + out + " is as it was before.");
+  }
+}
+
 int build(const Options& options) {
   catch_interrupts();
   const maquette::Context context = open_context();
@@ -46,12 +70,12 @@ int build(const Options& options) {
   std::fprintf(stderr, "%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count,
                info.point_count);
   for (uint32_t i = 0; i < info.dropped_count; ++i) {
-    const char* reason = "";
     uint64_t count = 0;
-    maquette::check(maq_capture_get_dropped(capture.get(), i, &reason, &count), capture.get());
+    const char* const reason = capture.dropped(i, &count);
     std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", count, reason);
   }
   const std::string networks = scene_bundle_or_default(options.networks);
+  for (const std::string* path : {&options.out, &options.ply}) require_writable(*path);
   ProgressBar progress("building", kPermille);
   maq_scene_build_config config = maquette::default_scene_build_config();
   config.bundle_path = networks.c_str();
@@ -67,7 +91,7 @@ int build(const Options& options) {
   config.progress = show_progress;
   config.progress_user_data = &progress;
   maq_scene_build_stats stats{};
-  const maquette::Scene scene(context, config, capture, &stats);
+  const maquette::Scene scene = build_or_tell(context, config, capture, &stats, options.out);
   progress.finish();
   const double before_saving_s = seconds_since_start();
   scene.save(options.out);
@@ -128,7 +152,7 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
   command
       ->add_option("--visibility-scale", options->visibility_scale,
                    "For sparse clouds: below 1, points hide more of what is behind them")
-      ->check(CLI::Range(1.0 / 16, 4.0));
+      ->check(CLI::Range(1.0 / 16, 1.0));
   command->add_option("--near", options->near_depth, "Cameras do not see points nearer than this, in scene units")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--threads", options->threads, "Default: the cores, at most 4")->check(CLI::Range(1, 64));

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -39,6 +40,7 @@ struct Options {
   int threads = 0;
   int repeat = 1;
   bool no_alpha = false;
+  bool is_timed_clip = false;  // --seconds or --fps were given
   std::vector<std::string> without;
 };
 
@@ -49,9 +51,11 @@ struct Size {
 std::optional<Size> size_of(const std::string& text) {
   if (text.empty()) return {};
   Size size;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%c", &size.width_px, &size.height_px, &rest) != 2 || size.width_px < 1 ||
-      size.height_px < 1) {
+  const char* const end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width_px);
+  const bool goes_on = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+  const auto height = goes_on ? std::from_chars(width.ptr + 1, end, size.height_px) : width;
+  if (!goes_on || height.ec != std::errc() || height.ptr != end || size.width_px < 1 || size.height_px < 1) {
     throw std::runtime_error("--size " + text + " is none; write it as 640x480.");
   }
   return size;
@@ -145,10 +149,22 @@ std::vector<uint32_t> chosen_views(const maquette::Capture& capture, const std::
   return chosen;
 }
 
+std::string picture_name(const maq_capture_view& view) { return fs::path(view.name).stem().string() + ".png"; }
+
 int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& capture, const Options& options) {
   const std::vector<uint32_t> views = chosen_views(capture, options.views);
   const std::optional<Size> size = size_of(options.size);
-  fs::create_directories(options.out);
+  std::set<std::string> names;
+  for (const uint32_t index : views) {
+    const std::string name = picture_name(capture.view(index));
+    if (!names.insert(name).second) {
+      throw std::runtime_error("Two photos of the capture would both be " + name +
+                               "; name the one you mean in --views.");
+    }
+  }
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error) throw std::runtime_error(options.out + " cannot be made: " + error.message() + ".");
   nlohmann::ordered_json document;
   document["views"] = nlohmann::json::array();
   ProgressBar progress("rendering", int64_t(views.size()));
@@ -158,8 +174,7 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     nlohmann::ordered_json ms;
     const maquette::SceneImage image = timed(renderer, camera, options.repeat, ms);
     const maq_scene_image_stats stats = image.stats();
-    write_picture(image, camera, !options.no_alpha,
-                  fs::path(options.out) / (fs::path(view.name).stem().string() + ".png"));
+    write_picture(image, camera, !options.no_alpha, fs::path(options.out) / picture_name(view));
     document["views"].push_back({{"name", view.name},
                                  {"ms", ms},
                                  {"blocks_drawn", stats.blocks_drawn},
@@ -214,16 +229,29 @@ int render_clip(maquette::SceneRenderer& renderer, const maquette::Scene& scene,
     progress.advance(int64_t(i + 1), note);
   }
   progress.finish();
-  if (times_ms.empty()) return 1;
+  if (interrupted()) {
+    // Half of a clip takes no whole one's place.
+    throw std::runtime_error("Interrupted; " + options.out + " is as it was before.");
+  }
   const fs::path path = clip.finish();
-  std::printf("%s: %zu frames, %.1f ms each (median)\n", path.string().c_str(), times_ms.size(),
-              double(median(times_ms)));
-  return interrupted() ? 1 : 0;
+  const float median_ms = median(times_ms);
+  std::printf("%s: %zu frames, %.1f ms each (median)\n", path.string().c_str(), times_ms.size(), double(median_ms));
+  if (!options.json.empty()) {
+    const nlohmann::ordered_json document = {
+        {"clip", path.string()}, {"frames", times_ms.size()}, {"ms", {{"total", median_ms}}}};
+    const std::string text = document.dump(2) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  return 0;
 }
 
 int render(const Options& options) {
   if (options.views.empty() == options.path.empty()) {
     throw std::runtime_error("Say what to render: --views with --capture for pictures, or --path for a clip.");
+  }
+  if (options.path.empty() ? options.is_timed_clip : options.repeat != 1 || options.no_alpha) {
+    throw std::runtime_error(options.path.empty() ? "--seconds and --fps are those of a clip: use them with --path."
+                                                  : "--repeat and --no-alpha are for pictures: use them with --views.");
   }
   if (!options.views.empty() && options.capture.empty()) {
     throw std::runtime_error("--views are those of a capture: name its folder with --capture.");
@@ -266,5 +294,8 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
       ->delimiter(',')
       ->check(CLI::IsMember({"culling", "tiles"}));
   command->add_option("--json", options->json, "Write times and counts to this file");
-  command->callback([=] { *exit_code = render(*options); });
+  command->callback([=] {
+    options->is_timed_clip = command->count("--seconds") + command->count("--fps") > 0;
+    *exit_code = render(*options);
+  });
 }

@@ -1,6 +1,4 @@
 // The `maquette` program as a person meets it: output, exit codes, and files that are whole or not there.
-#include <sys/wait.h>
-
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -9,15 +7,9 @@
 #include <set>
 
 #include "bundle_copy.h"
-#include "temp_folder.h"
+#include "program_run.h"
 
 namespace {
-
-struct Outcome {
-  int exit_code = -1;
-  std::string out;
-  std::string err;
-};
 
 class CommandLine : public ::testing::Test {
  protected:
@@ -29,12 +21,7 @@ class CommandLine : public ::testing::Test {
   }
 
   Outcome run(const std::string& arguments) {
-    const std::string command = std::string("cd '") + folder_.path().string() + "' && MAQ_BUNDLE=" + bundle_ + " " +
-                                environment_ + " " MAQ_TEST_EMULATOR " '" MAQ_TEST_CLI "' " + arguments +
-                                " >out.txt 2>err.txt";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(folder_.file("out.txt")),
-            read_text(folder_.file("err.txt"))};
+    return run_program(folder_, "MAQ_BUNDLE=" + bundle_ + " " + environment_, arguments);
   }
 
   // The failure is one sentence on standard error that contains `text`, the exit code is 1 and nothing is written.

@@ -326,6 +326,14 @@ class Capture {
     return view;
   }
 
+  // Why something was dropped; the text is the capture's. `*count`: how many were.
+  const char* dropped(uint32_t index, uint64_t* count) const {
+    const char* reason = nullptr;
+    check(maq_capture_get_dropped(get(), index, &reason, count), get());
+    return reason;
+  }
+
+  // BGR, undistorted.
   Frame load_view(uint32_t index) const {
     maq_frame* frame = nullptr;
     check(maq_capture_load_view(get(), index, &frame), get());

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -51,8 +53,10 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
     default: throw ArgumentError("config.coefficient_bits is ", config.coefficient_bits, ", but must be 8, 16 or 32.");
   }
   if (std::isnan(config.least_variation)) throw ArgumentError("config.least_variation is not a number.");
+  // Colours are 0 to 1, and what is over this would not fit into a float.
+  constexpr double kMostVariation = 1e30;
   if (config.least_variation >= 0) {
-    settings.packing.least_variation = float(config.least_variation);
+    settings.packing.least_variation = float(std::min(config.least_variation, kMostVariation));
   } else if (config.coefficient_bits == 8) {
     // At most 40 bytes a point, also where every look varies: the other half varies less.
     constexpr float kMostVarying = 0.5f;
@@ -85,6 +89,16 @@ void fill(maq_scene_build_stats& stats, const BuildTimes& times) {
   stats.solving_ms = times.solving_ms;
 }
 
+// As it is where it has no length; the builder refuses that.
+std::array<double, 3> unit_vector(const double (&vector)[3]) {
+  const double length = std::hypot(vector[0], vector[1], vector[2]);
+  std::array<double, 3> unit = {vector[0], vector[1], vector[2]};
+  if (length > 0 && std::isfinite(length)) {
+    for (double& value : unit) value /= length;
+  }
+  return unit;
+}
+
 Scene packed(const ModelledPoints& points, const ScenePacking& packing, const SceneNetworks& networks) {
   Scene scene = make_scene(points, packing);
   scene.networks_sha256 = networks.sha256();
@@ -104,8 +118,8 @@ struct maq_scene_builder : Handle {
   std::shared_ptr<SceneNetworks> networks;
   uint64_t cloud_points;
   SceneBuilder builder;
-  uint32_t views = 0;
-  double packing_ms = 0;
+  uint32_t unused_views = 0;
+  double load_ms = 0, packing_ms = 0;
 };
 
 maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size) {
@@ -161,8 +175,11 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     require_argument(cloud, "cloud");
     require_argument(builder, "builder");
     require_struct_size("cloud", cloud->struct_size, sizeof(maq_point_cloud), sizeof(maq_point_cloud));
-    require_argument(cloud->xyz, "cloud.xyz");
-    require_range("cloud.count", cloud->count, uint64_t(1), kMostPoints);
+    if (cloud->count > 0) require_argument(cloud->xyz, "cloud.xyz");
+    if (cloud->count > kMostPoints) {
+      throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", cloud->count, " points, over the limit of ", kMostPoints,
+                  "; make it thinner.");
+    }
     const maq_scene_build_config config =
         read_config(given, "config", default_config(), sizeof(maq_scene_build_config));
     BuildSettings settings = checked_settings(config);
@@ -176,8 +193,8 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
       points.z.push_back(cloud->xyz[3 * i + 2]);
     }
     thin_out(points, settings.most_points);
-    *builder = new maq_scene_builder(std::move(settings), std::move(networks), std::move(points),
-                                     {cloud->up[0], cloud->up[1], cloud->up[2]});
+    *builder =
+        new maq_scene_builder(std::move(settings), std::move(networks), std::move(points), unit_vector(cloud->up));
     return MAQ_OK;
   });
 }
@@ -191,12 +208,16 @@ maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_fram
     require_argument(photo, "photo");
     require_argument(camera, "camera");
     require_struct_size("camera", camera->struct_size, sizeof(maq_camera), sizeof(maq_camera));
+    check_camera(pinhole_of(*camera), "The photo's camera");
+    check_distortion(*camera);
+    const auto start = std::chrono::steady_clock::now();
     PosedView view;
     view.load(photo->frame.image, lens_of(*camera), pinhole_of(*camera), builder->settings.long_side_px);
+    builder->load_ms += milliseconds_since(start);
     const std::optional<size_t> seen =
         builder->builder.add_view(view.image(), view.valid(), view.camera(), builder->settings.progress);
     if (!seen) return keep_error(builder, MAQ_CANCELLED, nullptr, "The photo was not added: the app cancelled it.");
-    builder->views += 1;
+    if (*seen == 0) builder->unused_views += 1;
     if (seen_points != nullptr) *seen_points = *seen;
     return MAQ_OK;
   });
@@ -214,10 +235,12 @@ maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_sce
   return guarded(builder, __func__, [&] {
     require_argument(builder, "builder");
     maq_scene_build_stats filled{};
-    filled.view_count = builder->views;
+    filled.view_count = uint32_t(builder->builder.views());
+    filled.unused_views = builder->unused_views;
     filled.cloud_points = builder->cloud_points;
     filled.seen_points = builder->builder.seen_points();
     fill(filled, builder->builder.times());
+    filled.load_ms = builder->load_ms;
     filled.packing_ms = builder->packing_ms;
     write_struct(stats, "stats", filled, sizeof filled);
     return MAQ_OK;

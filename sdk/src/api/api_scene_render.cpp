@@ -1,3 +1,4 @@
+#include <limits>
 #include <memory>
 
 #include "api/boundary.h"
@@ -42,6 +43,10 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     require_argument(config.bundle_path, "config.bundle_path");
     require_range("config.image_pool_size", config.image_pool_size, 1u, 64u);
     require_range("config.spin", config.spin, 0, 1);
+    require_range("config.near_depth", config.near_depth, 0.0, std::numeric_limits<double>::max());
+    require_range("config.has_background", int(config.has_background), 0, 1);
+    require_range("config.draws_unseen_blocks", int(config.draws_unseen_blocks), 0, 1);
+    require_range("config.refines_empty_parts", int(config.refines_empty_parts), 0, 1);
     RenderOptions options;
     options.threads = scene_threads(config.threads);
     options.near = config.near_depth;

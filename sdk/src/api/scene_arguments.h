@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -60,6 +62,14 @@ inline maq_camera camera_of(const PinholeCamera& camera) {
 
 inline bool is_distorted(const maq_camera& camera) {
   return std::any_of(std::begin(camera.distortion), std::end(camera.distortion), [](double k) { return k != 0; });
+}
+
+inline void check_distortion(const maq_camera& camera) {
+  for (size_t i = 0; i < std::size(camera.distortion); ++i) {
+    if (!std::isfinite(camera.distortion[i])) {
+      throw ArgumentError("camera.distortion[", i, "] is ", camera.distortion[i], ", but must be finite.");
+    }
+  }
 }
 
 // How it maps directions into its picture.

@@ -47,7 +47,8 @@ HEAD = np.dtype(
         ("state_seen", "<u4"),
         ("state_origin", "<f8", 3),
         ("state_photos", "<u4"),
-        ("more_zeros", "u1", 52),
+        ("background", "<f4", 3),
+        ("more_zeros", "u1", 40),
         ("sections", SPAN, 7),
     ]
 )
@@ -104,6 +105,10 @@ class SceneFile:
             stored = self.places[3 * first : 3 * (first + count)].reshape(3, count).T.astype(np.float32)
             found[first : first + count] = block["low"] + stored * block["place_step"] if quantised else stored
         return found + self.head["origin"]
+
+    def background(self) -> np.ndarray:
+        """Red, green, blue of what has no points, float32 [3] in 0..1."""
+        return self.head["background"].copy()
 
     def slope_rows(self) -> np.ndarray:
         """For each point, int64 [P], which row of the slopes is its own; -1 for those that look the same from all
@@ -248,6 +253,8 @@ def _checked_head(raw: bytes, size: int, path: Path) -> np.ndarray:
     )
     if not (0 < blocks <= points <= MOST_POINTS and varying <= points and seen <= kept <= MOST_POINTS):
         raise SceneFileError(f"{path} claims {points} points, {varying} that vary, in {blocks} blocks: that cannot be.")
+    if not ((head["background"] >= 0) & (head["background"] <= 1)).all():
+        raise SceneFileError(f"{path} has a background colour of {head['background']}, which is not 0 to 1.")
     if not all(np.isfinite(head[name]).all() for name in ("origin", "up")):
         raise SceneFileError(f"{path} has an origin or a direction of up that is not finite.")
     coefficient = COEFFICIENTS[kinds[1]].itemsize

@@ -19,7 +19,7 @@ from export.scenes.basis import directions
 from export.scenes.cameras import Camera, between, moves, upright
 from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, TURNED_MULTIPLE
 from export.scenes.losses import LossWeights, picture_terms
-from export.scenes.modelling import Options, View, shown_in
+from export.scenes.modelling import Options, View, cover, shown_in
 from export.scenes.perceptual import Perceptual
 from export.scenes.raster import Pyramid, filled, pyramid
 from export.scenes.scene_file import SceneFile
@@ -61,6 +61,7 @@ class TunedScene(nn.Module):
         self.options = Options(up=scene.up)
         self.places = torch.from_numpy(scene.positions()).to(device)
         self.rows = torch.from_numpy(scene.slope_rows()).to(device)
+        self.background = torch.from_numpy(scene.background()).to(device)
         means, slopes = (torch.from_numpy(values).to(device) for values in scene.looks())
         self.mean, self.slope = nn.Parameter(means), nn.Parameter(slopes)
 
@@ -87,11 +88,14 @@ class TunedScene(nn.Module):
             slopes = F.embedding(rows[varying], self.slope, sparse=True).view(-1, BASIS, FEATURES)
             looks = looks.index_add(0, varying, torch.einsum("pb,pbf->pf", shown.basis[varying], slopes))
         levels = Pyramid(shown.points, [slot.long() for slot in shown.slots]).rasters(looks)
-        return filled([level[None] for level in levels])
+        return filled([level[None] for level in levels], self.background)
 
     def picture(self, shown: Shown) -> Tensor:
         """RGB [1, 3, H, W] of the camera, not clamped."""
-        picture = self.networks.refiner(self.rasters(shown))
+        rasters = self.rasters(shown)
+        background = self.background[:, None, None]
+        # Not clamped, so that what is too bright can be learnt to be darker; the SDK clamps before it blends.
+        picture = background + cover([level[0] for level in rasters]) * (self.networks.refiner(rasters) - background)
         camera, frame = shown.camera, shown.frame
         if not shown.turned:
             left, top = np.rint(between(camera, frame)[:, 2]).astype(int)

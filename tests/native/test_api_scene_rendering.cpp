@@ -97,6 +97,7 @@ TEST_F(ApiSceneRendering, WhereNothingIsSeenThereIsTheBackgroundAndNoNetworkRuns
   config.background[0] = 200;
   config.background[1] = 100;
   config.background[2] = 50;
+  config.has_background = 1;
   maquette::SceneRenderer renderer(context_, config, scene_);
   maq_camera camera = camera_at(0);
   camera.centre[0] = -3;

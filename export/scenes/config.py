@@ -12,6 +12,7 @@ LEVELS = 5  # rasters at 1, 1/2, 1/4, 1/8, 1/16
 MULTIPLE = 2 ** (LEVELS - 1)  # sides of rendered pictures, pixels
 HIDING = 0.1  # a point so much farther than one beside it is behind it (export.scenes.raster.unhidden)
 TURNED_MULTIPLE = 64  # sides of those that are turned afterwards: of every size is a network prepared anew (SDK)
+BACKGROUND_PX = 16  # side of blocks of a photo that without a point in them are background
 ALPHA = 1.0  # of the ridge regression, as in the paper
 
 

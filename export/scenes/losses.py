@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from export.scenes.config import LEVELS
+from export.scenes.config import COLOURS, LEVELS
 from export.scenes.perceptual import Perceptual
 from export.scenes.raster import filled
 
@@ -54,4 +54,4 @@ def own_rasters(features: Tensor) -> list[Tensor]:
         small = features[:, :, ::step, ::step]
         there = (torch.rand_like(small[:, :1]) < 1 - 0.5 / step).to(small)
         rasters.append(torch.cat([small, torch.ones_like(there)], 1) * there)
-    return filled(rasters)
+    return filled(rasters, features[:, :COLOURS].mean((0, 2, 3)))

@@ -16,11 +16,13 @@ from torch.nn import functional as F
 
 from export.scenes.basis import directions
 from export.scenes.cameras import Camera, moves, reframed, resized, upright, warped
-from export.scenes.config import ALPHA, HIDING, LEVELS, MULTIPLE, TURNED_MULTIPLE
+from export.scenes.config import ALPHA, BACKGROUND_PX, HIDING, LEVELS, MULTIPLE, RASTER, TURNED_MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
 from export.scenes.raster import filled, projected, pyramid, unhidden, visible
 from export.scenes.system import Networks
+
+_SURENESS = (1.0, 1.0, 1.0, 0.5, 0.25)  # that a pixel is covered by points, by the scale that has one there
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +61,15 @@ def shown_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
     return unhidden(visible(points, camera, options.near), options.hiding)
 
 
+def visibility_camera(camera: Camera, options: Options) -> Camera:
+    """The camera in whose picture it is found who is seen."""
+    scale = options.visibility_scale
+    return resized(camera, max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
+
+
 def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
     """Which points win a pixel of the photo, bool [P]. Asked of the camera as it is: its pixels are the photo's."""
-    scale = options.visibility_scale
-    small = resized(camera, max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
-    keys = shown_in(points, small, options)
+    keys = shown_in(points, visibility_camera(camera, options), options)
     seen = torch.zeros(len(points), dtype=torch.bool, device=points.device)
     seen[pyramid(keys, 1).points] = True
     return seen
@@ -71,10 +77,12 @@ def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
 
 @dataclass(frozen=True)
 class Model:
-    """What is left of a cloud: the points that some photo sees, float64 [P, 3], and how they look."""
+    """What is left of a cloud: the points that some photo sees, float64 [P, 3], how they look, and the colour of what
+    has no points, [3] in 0..1."""
 
     places: Tensor
     looks: Looks
+    background: Tensor
 
     def descriptors(self, chosen: Tensor, centre: np.ndarray, networks: Networks) -> Tensor:
         """How the points with indices `chosen` [V] look from a camera's centre [3]: float32 [V, 8].
@@ -90,14 +98,14 @@ class Model:
     def rasters(self, camera: Camera, networks: Networks, options: Options) -> list[Tensor]:
         """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16; `filled`."""
         shown = pyramid(shown_in(self.places, camera, options), LEVELS)
-        return filled(shown.rasters(self.descriptors(shown.points, camera.centre, networks)))
+        return filled(shown.rasters(self.descriptors(shown.points, camera.centre, networks)), self.background)
 
 
 @dataclass(frozen=True, eq=False)
 class Sources:
     """What some photos see of a cloud, before any network. places: float64 [P, 3], points that at least one sees.
     images: for each photo RGB float32 [3, h, w], turned upright. columns, rows: where the points are in it, [P].
-    seen: bool [P]. centres: of the cameras, [3]."""
+    seen: bool [P]. centres: of the cameras, [3]. background: the colour of what has no points, [3]."""
 
     places: Tensor
     images: list[Tensor]
@@ -105,6 +113,29 @@ class Sources:
     rows: list[Tensor]
     seen: list[Tensor]
     centres: list[np.ndarray]
+    background: Tensor
+
+
+def background_of(points: Tensor, seen: Sequence[Tensor], views: Sequence[View], options: Options) -> Tensor:
+    """What photos show where there is no point: the mean colour [3] of the blocks of BACKGROUND_PX x BACKGROUND_PX
+    pixels, counted from the first one, without a seen point; of all pixels where every block has one."""
+    sums, counts = torch.zeros(2, 3, dtype=torch.float64), torch.zeros(2)
+    for sees, view in zip(seen, views, strict=True):
+        small = visibility_camera(view.camera, options)
+        columns, rows, _ = projected(points[sees], small)
+        cells = torch.ones(-(-small.height_px // BACKGROUND_PX), -(-small.width_px // BACKGROUND_PX))
+        at = [((x + 0.5).long().clamp(0, side - 1) // BACKGROUND_PX).cpu()
+              for x, side in ((rows, small.height_px), (columns, small.width_px))]  # fmt: skip
+        cells[at[0], at[1]] = 0
+        height, width = view.image.shape[:2]
+        lines = torch.arange(height) * small.height_px // height // BACKGROUND_PX
+        across = torch.arange(width) * small.width_px // width // BACKGROUND_PX
+        empty = cells[lines][:, across]
+        image = torch.from_numpy(view.image)
+        for k, weight in enumerate((empty, torch.ones_like(empty))):
+            sums[k] += (image * weight[..., None]).sum((0, 1), dtype=torch.float64)
+            counts[k] += weight.sum()
+    return (sums[0] / counts[0] if counts[0] > 0 else sums[1] / counts[1].clamp_min(1)).float()
 
 
 def gathered(
@@ -124,11 +155,12 @@ def gathered(
     if not views:
         raise ValueError("a model needs at least one view, and none is given")
     found = torch.stack(list(seen) if seen else [seen_in(points, view.camera, options) for view in views])
+    background = background_of(points, found, views, options)
     (chosen,) = torch.where(found.any(0))
     if target is not None:
         chosen = chosen[pyramid(shown_in(points[chosen], target, options), 1).points]
     places, found = points[chosen], found[:, chosen]
-    sources = Sources(places, [], [], [], [], [view.camera.centre for view in views])
+    sources = Sources(places, [], [], [], [], [view.camera.centre for view in views], background)
     for view, sees in zip(views, found, strict=True):
         camera = upright(view.camera, np.asarray(options.up), STRIDE)
         columns, rows, _ = projected(places, camera)
@@ -156,7 +188,7 @@ def fitted(sources: Sources, features: Iterable[Tensor], networks: Networks, opt
     for maps, columns, rows, sees, centre in each:
         basis = networks.basis(directions(places, torch.from_numpy(centre).to(places)).float())
         moments = moments.with_view(sampled(maps, columns, rows), basis, sees)
-    return Model(places, moments.looks(options.alpha))
+    return Model(places, moments.looks(options.alpha), sources.background.to(places.device))
 
 
 def modelled(
@@ -167,6 +199,16 @@ def modelled(
     return fitted(
         sources, (networks.extractor(x[None].to(points.device))[0] for x in sources.images), networks, options
     )
+
+
+def cover(rasters: list[Tensor]) -> Tensor:
+    """How much of a picture is the refiner's, the rest is background: [1, H, W], 1 where there is a point in the 16 x
+    16 pixels that a pixel is in, fading to 0 beyond (PictureCover and kOwnBackgroundGain in the SDK)."""
+    sure = rasters[-1][None, RASTER - 1 :] * _SURENESS[-1]
+    for raster, most in zip(reversed(rasters[:-1]), reversed(_SURENESS[:-1]), strict=True):
+        wider = F.interpolate(sure, scale_factor=2, mode="bilinear", align_corners=False)
+        sure = torch.maximum(wider, raster[None, RASTER - 1 :] * most)
+    return (sure[0] / _SURENESS[-1]).clamp_max(1)
 
 
 @torch.no_grad()
@@ -180,7 +222,9 @@ def render(model: Model, camera: Camera, networks: Networks, options: Options) -
     if moves(camera, turned):
         turned = upright(camera, np.asarray(options.up), TURNED_MULTIPLE)
     rasters = model.rasters(turned, networks, options)
-    picture = networks.refiner([raster[None] for raster in rasters])[0]
+    picture = networks.refiner([raster[None] for raster in rasters])[0].clamp(0, 1)
+    background = model.background[:, None, None].to(picture)
+    picture = background + cover(rasters) * (picture - background)
     picture = np.ascontiguousarray(picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy())
     return warped(picture, turned, camera)
 

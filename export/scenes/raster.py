@@ -111,12 +111,13 @@ def pyramid(keys: Tensor, levels: int) -> Pyramid:
     return Pyramid(points, slots)
 
 
-def filled(rasters: list[Tensor]) -> list[Tensor]:
+def filled(rasters: list[Tensor], background: Tensor) -> list[Tensor]:
     """Rasters [..., 9, H/2^k, W/2^k], finest first, as a refiner wants them: where a pixel has no point its colours are
-    those of the next coarser raster, so that the finest holds a picture. Occupancy and learnt features stay 0 there."""
-    found = [rasters[-1]]
-    for raster in reversed(rasters[:-1]):
-        below = found[-1][..., :COLOURS, :, :].repeat_interleave(2, -2).repeat_interleave(2, -1)
-        colours = raster[..., :COLOURS, :, :] + (1 - raster[..., -1:, :, :]) * below
-        found.append(torch.cat([colours, raster[..., COLOURS:, :, :]], -3))
+    those of the next coarser raster, in the coarsest `background` [3], so that the finest holds a picture. Occupancy
+    and learnt features stay 0 there."""
+    below, found = background[:, None, None].to(rasters[-1]), []
+    for raster in reversed(rasters):
+        below = raster[..., :COLOURS, :, :] + (1 - raster[..., -1:, :, :]) * below
+        found.append(torch.cat([below, raster[..., COLOURS:, :, :]], -3))
+        below = below.repeat_interleave(2, -2).repeat_interleave(2, -1)
     return found[::-1]

@@ -16,6 +16,7 @@ inline maq::ModelledPoints made_up_points(size_t count, unsigned seed = 1, doubl
   maq::ModelledPoints points;
   points.origin = origin;
   points.up = {0, -1, 0};
+  points.background = {0.25f, 0.5f, 0.75f};
   for (size_t i = 0; i < count; ++i) {
     if (i % copies == 0) {
       points.x.push_back(float(unit * across(random)));

@@ -51,7 +51,8 @@ def model() -> Model:
     places = torch.from_numpy(read_capture(SCENE / "capture").cloud.places[table["index"]])
     slope = look[:, FEATURES:-1].reshape(-1, BASIS, FEATURES)
     views, singular = torch.from_numpy(table["views"].astype(np.float32)), torch.zeros(len(look), dtype=torch.bool)
-    return Model(places, Looks(look[:, :FEATURES], slope, views, singular))
+    background = torch.from_numpy(np.fromfile(SCENE / "background.bin", "<f4"))
+    return Model(places, Looks(look[:, :FEATURES], slope, views, singular), background)
 
 
 def camera(

@@ -5,6 +5,7 @@
 layers, so that points hide each other. Places and cameras' centres are multiples of 1/256, which floats hold exactly.
 `looks.bin`: for each point that a photo sees, in the cloud's order, little-endian: uint32 index and views, then float32
 mean [8], slope [6][8], variation; computed by export/scenes, moments in float64, visibility at half of the size.
+`background.bin`: float32 red, green, blue of what the photos show where no point is.
 
     python -m tests.native.make_tiny_scene
 """
@@ -107,7 +108,9 @@ def write_looks(folder: Path, networks: Networks) -> None:
     options = Options(up=capture.up, visibility_scale=0.5, precision=torch.float64)
     points = torch.from_numpy(capture.cloud.places)
     views = [capture.view(k) for k in capture.sources()]
-    looks = modelled(points, views, networks, options).looks
+    model = modelled(points, views, networks, options)
+    looks = model.looks
+    model.background.numpy().astype("<f4").tofile(folder / "background.bin")
     sees = torch.stack([seen_in(points, view.camera, options) for view in views])
     (chosen,) = torch.where(sees.any(0))
     with (folder / "looks.bin").open("wb") as file:

@@ -142,6 +142,8 @@ TEST(LookRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
                 expected = look_of(scene, maq::point_of(key), camera);
               } else if (level + 1 < LookRaster::kLevels) {
                 std::copy_n(view.at(level + 1, x / 2, y / 2), LookRaster::kColours, expected.begin());
+              } else {
+                std::copy_n(scene.background.begin(), LookRaster::kColours, expected.begin());
               }
               for (size_t c = 0; c < size_t(kFeatures); ++c) ASSERT_NEAR(found[c], expected[c], 1e-4) << level;
             }
@@ -201,7 +203,12 @@ TEST(LookRaster, MemoryOfAnEarlierPictureDoesNotShine) {
   EXPECT_EQ(view.raster.shaded(), 0u);
   for (int level = 0; level < LookRaster::kLevels; ++level) {
     const float* values = view.raster.level(level);
-    EXPECT_TRUE(std::all_of(values, values + ((96 * 64) >> (2 * level)) * kChannels, [](float v) { return v == 0; }));
+    for (size_t pixel = 0; pixel < size_t((96 * 64) >> (2 * level)); ++pixel) {
+      for (size_t c = 0; c < kChannels; ++c) {
+        const float expected = c < LookRaster::kColours ? scene.background[c] : 0;
+        ASSERT_EQ(values[pixel * kChannels + c], expected) << level << " " << pixel;
+      }
+    }
   }
 }
 

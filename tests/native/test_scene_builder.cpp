@@ -112,6 +112,8 @@ TEST_F(SceneBuilder, AgreesWithTorch) {
     varying += look.variation > 0.01f ? 1 : 0;
   }
   EXPECT_GT(varying, expected.size() / 4) << "the reference must be one whose looks depend on the side";
+  const std::array<float, 3> background = tiny_scene::expected_background();
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(points.background[c], background[c], kTolerance);
 }
 
 TEST_F(SceneBuilder, TheOrderOfPhotosChangesRoundingAlone) {

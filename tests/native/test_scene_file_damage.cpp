@@ -173,7 +173,7 @@ TEST(SceneFileDamage, HeadsThatLieAreRefusedThoughTheirChecksAreRight) {
       {"in a way", [](auto& head, auto*) { head.coefficient_kind = 255; }},
       {"section 2", [](auto& head, auto*) { head.coefficient_kind = 1; }},
       {"in a way", [](auto& head, auto*) { head.zero[1] = 1; }},
-      {"in a way", [](auto& head, auto*) { head.more_zeros[51] = 1; }},
+      {"in a way", [](auto& head, auto*) { head.more_zeros[39] = 1; }},
       {"not finite", [](auto& head, auto*) { head.origin[1] = NAN; }},
       {"not finite", [](auto& head, auto*) { head.up[2] = -INFINITY; }},
       {"not finite", [](auto& head, auto*) { head.state_origin[0] = NAN; }},

@@ -26,7 +26,7 @@ using maq::Places;
 using maq::Scene;
 using maq::SceneBlock;
 
-constexpr maq::ScenePacking kExact = {Places::kFloat32, Coefficients::kFloat32, 0};
+constexpr maq::ScenePacking kExact = {Places::kFloat32, Coefficients::kFloat32, 0};  // all points may vary
 
 // All points of a scene in the order in which they were given.
 ModelledPoints unpack(const Scene& scene, const std::vector<uint32_t>& order) {
@@ -126,6 +126,13 @@ TEST(ScenePacking, PlacesOf16BitsAreWithinHalfAStepAndInTheirBox) {
     const ModelledPoints part = unpack_block(scene, block);
     const std::vector<float>* given[3] = {&points.x, &points.y, &points.z};
     const std::vector<float>* stored[3] = {&part.x, &part.y, &part.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      float largest = -INFINITY;
+      for (uint32_t k = 0; k < block.count; ++k) {
+        largest = std::max(largest, (*given[axis])[order[block.first + k]]);
+      }
+      EXPECT_NEAR(block.high[axis], largest, 1e-5);  // all steps are used
+    }
     for (uint32_t k = 0; k < block.count; ++k) {
       for (int axis = 0; axis < 3; ++axis) {
         const float at = (*stored[axis])[k];
@@ -171,6 +178,42 @@ TEST(ScenePacking, PointsThatVaryLessKeepTheMeanAlone) {
       ASSERT_EQ(stored.slopes[i * kSlopes + k], wanted);
     }
   }
+}
+
+TEST(ScenePacking, NoMorePointsVaryThanTheShareAllowsAndTheseAreTheMostVarying) {
+  ModelledPoints points = made_up_points(10'000);
+  maq::ScenePacking packing = kExact;
+  for (const float share : {0.0f, 0.3f, 0.9999f, 1.0f}) {
+    packing.most_varying = share;
+    std::vector<uint32_t> order;
+    const Scene scene = make_scene(points, packing, &order);
+    EXPECT_NEAR(scene.varying, share * 10'000, 1);
+    float least_kept = 1e9f, most_dropped = 0;
+    for (uint32_t b = 0; b < scene.block_count; ++b) {
+      const SceneBlock& block = scene.blocks[b];
+      for (uint32_t k = 0; k < block.count; ++k) {
+        const float variation = points.variations[order[block.first + k]];
+        if (k < block.varying) least_kept = std::min(least_kept, variation);
+        if (k >= block.varying) most_dropped = std::max(most_dropped, variation);
+      }
+    }
+    EXPECT_GE(least_kept, most_dropped);
+  }
+  std::fill(points.variations.begin(), points.variations.end(), 1.0f);
+  packing.most_varying = 0.5f;
+  EXPECT_LE(make_scene(points, packing).varying, 5'000u);
+  for (const float share : {-0.1f, 1.5f, float(NAN)}) {
+    packing.most_varying = share;
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "share of points", [&] { make_scene(points, packing); });
+  }
+}
+
+TEST(ScenePacking, AScenesBytesAPointAreAtMost39WhereHalfOfThemMayVary) {
+  const ModelledPoints points = made_up_points(20'000);
+  const Scene scene = make_scene(points, {Places::kUint16, Coefficients::kInt8, 0, 0.5f});
+  const size_t bytes = blocks_bytes(scene) + places_bytes(scene) + means_bytes(scene) + slopes_bytes(scene);
+  EXPECT_EQ(scene.varying, 10'000u);
+  EXPECT_LT(double(bytes) / scene.points, 39);
 }
 
 TEST(ScenePacking, SlopesThatAreZeroAreNotStored) {
@@ -219,7 +262,7 @@ TEST(ScenePacking, APointFarAwayDoesNotSpoilItsNeighbours) {
 TEST(ScenePacking, BlocksStayFewHoweverPointsAreSpread) {
   ModelledPoints points = made_up_points(4'096);
   for (size_t i = 0; i < points.count(); ++i) {
-    points.x[i] = std::ldexp(1.0f, -int(i % 140));  // a gap of half of what is left, again and again
+    points.x[i] = std::ldexp(1.0f, -3 * int(i % 40));  // a gap of 7/8 of what is left, again and again
     points.y[i] = points.z[i] = 0;
   }
   EXPECT_LE(make_scene(points, kExact).block_count, 4u * 4);

@@ -1,6 +1,8 @@
 // The scene networks, capture and looks of data/tiny_scene (make_tiny_scene.py).
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -38,6 +40,13 @@ inline std::vector<Look> expected_looks() {
   std::vector<Look> looks(bytes.size() / sizeof(Look));
   std::memcpy(looks.data(), bytes.data(), looks.size() * sizeof(Look));
   return looks;
+}
+
+inline std::array<float, 3> expected_background() {
+  const std::string bytes = read_text(kFolder + "/background.bin");
+  std::array<float, 3> colour{};
+  std::memcpy(colour.data(), bytes.data(), std::min(bytes.size(), sizeof colour));
+  return colour;
 }
 
 }  // namespace tiny_scene

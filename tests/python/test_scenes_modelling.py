@@ -11,7 +11,7 @@ from box_scene import BoxScene, looking, ring
 from export.scenes.cameras import Camera, between, reframed, resized, turned_upright, upright, warped
 from export.scenes.config import SIZES
 from export.scenes.looks import Moments
-from export.scenes.modelling import Options, View, modelled, painted, render, sampled, seen_in
+from export.scenes.modelling import Options, View, background_of, modelled, painted, render, sampled, seen_in
 from export.scenes.raster import HIDING_PX, NOTHING, depths_of, filled, halved, projected, pyramid, unhidden, visible
 from export.scenes.source_views import drawn, scores
 from export.scenes.system import Networks
@@ -376,7 +376,8 @@ def test_pixels_without_a_point_have_the_colours_of_the_next_coarser_raster():
     for raster, share in zip(rasters, (0.3, 0.6, 0.9), strict=True):
         raster[8] = (torch.rand_like(raster[8]) < share).float()
         raster *= raster[8].clone()
-    full = filled(rasters)
+    background = torch.tensor([0.1, 0.5, 0.7])
+    full = filled(rasters, background)
     for level in range(3):
         there = rasters[level][8] > 0
         assert torch.equal(full[level][:, there], rasters[level][:, there])
@@ -385,7 +386,7 @@ def test_pixels_without_a_point_have_the_colours_of_the_next_coarser_raster():
             below = full[level + 1][:3].repeat_interleave(2, 1).repeat_interleave(2, 2)
             assert torch.equal(full[level][:3, ~there], below[:, ~there])
         else:
-            assert full[level][:3, ~there].abs().max() == 0
+            assert torch.equal(full[level][:3, ~there], background[:, None].expand(3, int((~there).sum())))
 
 
 def test_points_behind_a_sparse_surface_are_hidden_and_a_slope_is_not():
@@ -410,3 +411,21 @@ def test_points_behind_a_sparse_surface_are_hidden_and_a_slope_is_not():
     slope = torch.from_numpy(np.c_[columns, rows, 4 + columns])
     keys = visible(slope, camera)
     assert torch.equal(unhidden(keys, 0.2), keys)
+
+
+def test_the_background_is_what_photos_show_where_no_point_is():
+    # Points in the left half of a photo whose right half is red; blocks that the border cuts belong to their side.
+    image = np.zeros((48, 64, 3), np.float32)
+    image[:, :32] = (0.2, 0.4, 0.6)
+    image[:, 32:] = (0.9, 0.1, 0.0)
+    camera = Camera(64, 48, 50.0, 50.0, 31.5, 23.5, np.eye(3), np.zeros(3))
+    columns, rows = (x.ravel() for x in np.meshgrid(np.arange(0, 32, 4), np.arange(0, 48, 4)))
+    left = torch.from_numpy(np.c_[(columns - 31.5) / 50, (rows - 23.5) / 50, np.ones(len(rows))] * 2)
+    views = [View(image, camera)]
+    for scale in (1.0, 0.5):
+        options = Options(visibility_scale=scale)
+        found = background_of(left, [seen_in(left, camera, options)], views, options)
+        torch.testing.assert_close(found, torch.tensor([0.9, 0.1, 0.0]))
+    everywhere = torch.cat([left, left * torch.tensor([-1, 1, 1])])
+    found = background_of(everywhere, [seen_in(everywhere, camera, Options())], views, Options())
+    torch.testing.assert_close(found, torch.tensor([0.55, 0.25, 0.3]))

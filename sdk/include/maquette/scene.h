@@ -215,9 +215,9 @@ typedef struct maq_scene_renderer_config {
   int32_t threads;          /* 0 (default): the machine's cores, at most 4 */
   const char* bundle_path;  /* folder of the scene networks; required. Copied. */
   double near_depth;        /* points nearer to the camera are not drawn; units of the scene, default 0 */
-  uint8_t background[3];    /* red, green, blue; default black */
-  uint8_t is_drawn_over;    /* 1: the picture is mixed with the background by its alpha; default 0: it is what the
-                               network made, the background only where nothing is near */
+  uint8_t background[3];    /* red, green, blue; only with has_background */
+  uint8_t has_background;   /* 1: pictures are drawn over `background` by their alpha; 0 (default): where no points are
+                               near they have the mean colour that the photos show there */
   uint32_t image_pool_size; /* images the app may hold at once, 1 to 64; default 4 */
   int32_t spin;             /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
   /* For measuring what is saved: 1 does it all the same. Pictures stay the same where alpha is above 0. */

@@ -45,8 +45,10 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     RenderOptions options;
     options.threads = scene_threads(config.threads);
     options.near = config.near_depth;
-    options.background = {config.background[2], config.background[1], config.background[0]};
-    options.is_over_background = config.is_drawn_over != 0;
+    require_range("config.has_background", int(config.has_background), 0, 1);
+    if (config.has_background == 1) {
+      options.background = {config.background[2], config.background[1], config.background[0]};
+    }
     options.skips_unseen_blocks = config.draws_unseen_blocks == 0;
     options.skips_empty_parts = config.refines_empty_parts == 0;
     auto networks = open_scene_networks(context, config.bundle_path, options.threads, config.spin == 1);

@@ -155,7 +155,9 @@ void LookRaster::reduce_strip(const Task& task, int top) {
 
 void LookRaster::fill_strip(const Task& task, int top) {
   const size_t width = size_t(task.window.width_px);
-  for (int level = kLevels - 2; level >= 0; --level) {
+  // Of all scales, whichever the refiner reads: a hole has the colour of the finest that has a point there.
+  constexpr int last = kLevels - 1;
+  for (int level = last; level >= 0; --level) {
     const size_t columns = width >> level;
     const bool is_folded = level == 0 && task.layout.is_folded;
     const size_t cell = is_folded ? 4 * kChannels : 2 * kChannels;
@@ -164,10 +166,12 @@ void LookRaster::fill_strip(const Task& task, int top) {
       float* const row =
           levels_[level].data() + (is_folded ? size_t(y / 2) * (columns / 2) * cell + (y % 2) * 2 * kChannels
                                              : size_t(y) * columns * kChannels);
-      const float* const coarser = levels_[level + 1].data() + size_t(y / 2) * (columns / 2) * kChannels;
+      const float* const coarser =
+          level < last ? levels_[level + 1].data() + size_t(y / 2) * (columns / 2) * kChannels : nullptr;
       for (size_t x = 0; x < columns; ++x) {
-        if (keys[x] == kNoPointKey)
-          std::copy_n(coarser + x / 2 * kChannels, kColours, row + x / 2 * cell + x % 2 * kChannels);
+        if (keys[x] != kNoPointKey) continue;
+        const float* const from = coarser != nullptr ? coarser + x / 2 * kChannels : task.scene.background.data();
+        std::copy_n(from, kColours, row + x / 2 * cell + x % 2 * kChannels);
       }
     }
   }

@@ -40,8 +40,8 @@ class LookRaster {
   static constexpr size_t kColours = 3;  // features that are red, green and blue
 
   // As the layout says (the refiner's input of that number), with features and the 1 of a pixel side by side. Where there is
-  // no point the colours are those of the next coarser level, all else is 0. All kLevels, also where the refiner reads fewer:
-  // colours come from the coarsest.
+  // no point the colours are those of the next coarser level, in the coarsest the scene's background, all else is 0. All
+  // kLevels, also where the refiner reads fewer: colours come from the coarsest.
   const float* level(int level) const { return levels_[level].data(); }
   // Who is nearest, row by row, at each of the kLevels scales.
   const DepthKey* keys(int level) const { return keys_[level].data(); }

@@ -13,6 +13,7 @@ namespace maq {
 struct ModelledPoints {
   std::array<double, 3> origin = {0, 0, 0};  // of the places, in the world
   std::array<double, 3> up = {0, 0, 1};
+  std::array<float, 3> background = {0, 0, 0};  // red, green, blue of what has no points, 0..1
   std::vector<float> x, y, z;
   std::vector<float> means;       // [count][kFeatures]: beta0; the first three are red, green, blue in 0..1
   std::vector<float> slopes;      // [count][kBasis][kFeatures]: beta

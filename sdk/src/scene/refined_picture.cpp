@@ -23,8 +23,8 @@ inline uint8_t over(uint8_t colour, uint8_t background, uint8_t alpha) {
 }  // namespace
 
 void RefinedPicture::write(const float* refined, const RefinerLayout& layout, const RasterWindow& window,
-                           const uint8_t* alphas, const float* depths, const std::array<uint8_t, 3>* background,
-                           const PictureRows& to, WorkerThreads& threads) {
+                           const uint8_t* alphas, const float* depths, const std::array<uint8_t, 3>& background,
+                           int sureness_gain, const PictureRows& to, WorkerThreads& threads) {
   const size_t width = size_t(window.width_px);
   bytes_.resize(size_t(threads.count()));
   for (std::vector<uint8_t>& bytes : bytes_) bytes.resize(2 * width * kColours);
@@ -45,9 +45,8 @@ void RefinedPicture::write(const float* refined, const RefinerLayout& layout, co
       const uint8_t* const alpha = alphas + size_t(y) * width;
       for (size_t x = 0; x < columns; ++x) {
         const uint8_t* const rgb = from + x / 2 * pair + x % 2 * beside;
-        for (size_t c = 0; c < kColours; ++c) {
-          bgr[x * kColours + c] = background == nullptr ? rgb[2 - c] : over(rgb[2 - c], (*background)[c], alpha[x]);
-        }
+        const auto share = uint8_t(std::min(255, sureness_gain * alpha[x]));
+        for (size_t c = 0; c < kColours; ++c) bgr[x * kColours + c] = over(rgb[2 - c], background[c], share);
       }
       std::copy_n(alpha, columns, to.alpha + first);
       if (to.depth != nullptr) std::copy_n(depths + size_t(y) * width, columns, to.depth + first);

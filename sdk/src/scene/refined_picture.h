@@ -22,9 +22,10 @@ struct PictureRows {
 class RefinedPicture {
  public:
   // `refined` is what SceneNetworks::refine() gave for the window (RGB, 0..1, clamped here; what is no number is 0).
-  // `alphas` and `depths`, of the window too, are copied. With `background` (BGR) the picture is drawn over it by alpha.
+  // `alphas` and `depths`, of the window too, are copied. The picture is drawn over `background` (BGR) by `alphas` times
+  // `sureness_gain`, at most wholly.
   void write(const float* refined, const RefinerLayout& layout, const RasterWindow& window, const uint8_t* alphas,
-             const float* depths, const std::array<uint8_t, 3>* background, const PictureRows& to,
+             const float* depths, const std::array<uint8_t, 3>& background, int sureness_gain, const PictureRows& to,
              WorkerThreads& threads);
 
  private:

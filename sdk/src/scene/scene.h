@@ -34,6 +34,7 @@ struct SceneBlock {
 struct Scene {
   std::array<double, 3> origin = {0, 0, 0};
   std::array<double, 3> up = {0, 0, 1};
+  std::array<float, 3> background = {0, 0, 0};  // red, green, blue of what has no points, 0..1
   Places place_kind = Places::kFloat32;
   Coefficients coefficient_kind = Coefficients::kFloat32;
   uint32_t points = 0, varying = 0;

@@ -207,11 +207,14 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
     moments_.reserve(new_points);
   }
   if (seen_.empty()) return 0;
+  BackgroundColour background;
+  background.add(photo, valid, visible_);
   if (!goes_on(0.1, "Turning the photo into features.")) return {};
   const float* features = find_features(photo, camera, upright);
   if (!goes_on(0.9, "Telling the points how they look.")) return {};
 
   // From here on nothing fails, and nothing is asked.
+  background_.add(background);
   const Stopwatch stopwatch(times_.moments_ms);
   for (const uint32_t point : seen_) {
     if (!moments_.has(point)) moments_.add(point);
@@ -237,6 +240,7 @@ ModelledPoints SceneBuilder::solve(bool forgets) {
   ModelledPoints made;
   made.origin = cloud_.origin;
   made.up = up_;
+  made.background = background_.mean();
   made.never_seen = cloud_.count() - moments_.count();
   solve_looks(moments_, cloud_.places(), options_.alpha, threads_, forgets, made);
   return made;
@@ -247,6 +251,7 @@ ModelledPoints SceneBuilder::finish_and_forget() {
   ModelledPoints made = solve(true);
   moments_ = MomentStore();
   moments_.begin(cloud_.count());
+  background_ = {};
   views_ = 0;
   return made;
 }

@@ -12,6 +12,7 @@
 
 #include "core/frame.h"
 #include "core/worker_threads.h"
+#include "scene/background_colour.h"
 #include "scene/modelled_points.h"
 #include "scene/modelling_state.h"
 #include "scene/moment_store.h"
@@ -85,6 +86,7 @@ class SceneBuilder {
   BuildOptions options_;
   WorkerThreads threads_;
   MomentStore moments_;
+  BackgroundColour background_;
   size_t views_ = 0;
   std::atomic<bool> is_cancelled_{false};
   BuildTimes times_;

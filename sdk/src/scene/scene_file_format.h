@@ -44,7 +44,8 @@ struct SceneFileHead {
   uint32_t state_points, state_seen;  // 0: no state of modelling
   double state_origin[3];
   uint32_t state_photos;  // how many were added
-  uint8_t more_zeros[52];
+  float background[3];
+  uint8_t more_zeros[40];
   SceneFileSpan sections[kSceneFileSections];
 };
 static_assert(sizeof(SceneFileHead) == 384 && offsetof(SceneFileHead, file_bytes) == 24);

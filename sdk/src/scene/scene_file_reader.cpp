@@ -147,6 +147,9 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
       fail(" has an origin or a direction of up that is not finite.");
     }
   }
+  for (const float part : head_.background) {
+    if (!(part >= 0 && part <= 1)) fail(" has a background colour of ", part, ", which is not 0 to 1.");
+  }
   const uint64_t place = size_bytes_of(Places(head_.place_kind));
   const uint64_t coefficient = size_bytes_of(Coefficients(head_.coefficient_kind));
   const uint64_t bytes[kSceneFileSections] = {
@@ -251,6 +254,7 @@ Scene open_scene_file(const std::string& path, SceneStorage storage) {
   Scene scene;
   std::copy_n(head.origin, 3, scene.origin.begin());
   std::copy_n(head.up, 3, scene.up.begin());
+  std::copy_n(head.background, 3, scene.background.begin());
   scene.place_kind = Places(head.place_kind);
   scene.coefficient_kind = Coefficients(head.coefficient_kind);
   scene.points = head.points;

@@ -82,6 +82,7 @@ void write_scene_file(const Scene& scene, const std::string& path, const Modelli
   head.head_bytes = sizeof head;
   std::copy_n(scene.origin.begin(), 3, head.origin);
   std::copy_n(scene.up.begin(), 3, head.up);
+  std::copy_n(scene.background.begin(), 3, head.background);
   head.points = scene.points;
   head.varying = scene.varying;
   head.blocks = scene.block_count;

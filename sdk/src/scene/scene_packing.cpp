@@ -43,6 +43,11 @@ void check(const ModelledPoints& points) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The scene's origin and direction of up must be finite numbers.");
     }
   }
+  for (const float part : points.background) {
+    if (!(part >= 0 && part <= 1)) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The background's colour has a part ", part, ", which is not 0 to 1.");
+    }
+  }
   for (size_t i = 0; i < count; ++i) {
     if (!is_sound(points.x[i]) || !is_sound(points.y[i]) || !is_sound(points.z[i])) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Point ", i, " is at (", points.x[i], ", ", points.y[i], ", ",
@@ -58,12 +63,26 @@ void check(const ModelledPoints& points) {
   }
 }
 
+// Of the variation, where both limits are kept.
+float least_variation(const ModelledPoints& points, const ScenePacking& packing) {
+  if (!(packing.most_varying >= 0 && packing.most_varying <= 1)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The share of points that may vary is ", packing.most_varying,
+                ", but must be 0 to 1.");
+  }
+  const auto kept = size_t(double(packing.most_varying) * double(points.count()));
+  if (kept == points.count()) return packing.least_variation;
+  std::vector<float> variations = points.variations;
+  const auto last_left_out = variations.end() - std::ptrdiff_t(kept) - 1;
+  std::nth_element(variations.begin(), last_left_out, variations.end());
+  return std::max(packing.least_variation, std::nextafter(*last_left_out, HUGE_VALF));
+}
+
 // What has no steps needs no groups.
-BlockOrder cut_all(const ModelledPoints& points, const ScenePacking& packing) {
+BlockOrder cut_all(const ModelledPoints& points, const ScenePacking& packing, float least) {
   const PointPlaces places = {points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin};
   const bool has_steps = packing.coefficients != Coefficients::kFloat32;
   BlockOrder cut;
-  for (const auto& group : set_wild_apart(points, packing.least_variation, has_steps)) {
+  for (const auto& group : set_wild_apart(points, least, has_steps)) {
     cut_into_blocks(places, group, SceneBlock::kMostPoints, cut);
   }
   return cut;
@@ -73,19 +92,20 @@ BlockOrder cut_all(const ModelledPoints& points, const ScenePacking& packing) {
 
 Scene make_scene(const ModelledPoints& points, const ScenePacking& packing, std::vector<uint32_t>* order) {
   check(points);
-  BlockOrder cut = cut_all(points, packing);
+  const float least = least_variation(points, packing);
+  BlockOrder cut = cut_all(points, packing, least);
 
   const auto owned = std::make_shared<OwnedArrays>();
   Scene scene;
   scene.origin = points.origin;
   scene.up = points.up;
+  scene.background = points.background;
   scene.place_kind = packing.places;
   scene.coefficient_kind = packing.coefficients;
   owned->blocks.resize(cut.ends.size());
   for (size_t b = 0; b < cut.ends.size(); ++b) {
     const auto begin = cut.order.begin() + scene.points, end = cut.order.begin() + cut.ends[b];
-    const auto constant =
-        std::stable_partition(begin, end, [&](uint32_t i) { return look_varies(points, i, packing.least_variation); });
+    const auto constant = std::stable_partition(begin, end, [&](uint32_t i) { return look_varies(points, i, least); });
     SceneBlock& block = owned->blocks[b];
     block.first = scene.points;
     block.count = uint32_t(end - begin);

@@ -20,6 +20,9 @@ constexpr int kMultiple = LookRaster::kMultiple;
 // anew (export/scenes/config.py has the same).
 constexpr int kTurnedMultiple = 64;
 constexpr int kMostThreads = 64;
+// The scene's background shows where no point is within 16 x 16 pixels, and fades towards there: within them the picture is
+// the refiner's (export/scenes/modelling.py has the same). An app's own shows by alpha.
+constexpr int kOwnBackgroundGain = 4;
 
 class StopWatch {
  public:
@@ -68,6 +71,12 @@ void set_size(RenderedPicture& picture, int width_px, int height_px) {
   picture.bgr.resize(3 * pixels);
   picture.alpha.resize(pixels);
   picture.depth.resize(pixels);
+}
+
+// BGR of red, green, blue in 0..1.
+std::array<uint8_t, 3> bytes_of(const std::array<float, 3>& colour) {
+  const auto byte = [](float value) { return uint8_t(std::lround(255 * std::clamp(value, 0.0f, 1.0f))); };
+  return {byte(colour[2]), byte(colour[1]), byte(colour[0])};
 }
 
 void clear(RenderedPicture& picture, const std::array<uint8_t, 3>& background) {
@@ -173,6 +182,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
                 SceneNetworks::kMostPixels, " pixels; use a smaller one.");
   }
 
+  const std::array<uint8_t, 3> background = options_.background.value_or(bytes_of(scene_.background));
   project(frame, counts);
   const RasterWindow occupied = finish(frame);
   counts.project_ms = watch.lap();
@@ -181,7 +191,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
   const PinholeCamera& shown = counts.is_turned ? frame : camera;
   set_size(upright, shown.width_px, shown.height_px);
   if (occupied.width_px == 0) {
-    clear(upright, options_.background);
+    clear(upright, background);
   } else {
     const RasterWindow window = options_.skips_empty_parts ? window_to_refine(occupied, frame.width_px, frame.height_px)
                                                            : RasterWindow{0, 0, frame.width_px, frame.height_px};
@@ -190,7 +200,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
     counts.shaded_points = raster_.shaded();
     counts.varying_points = raster_.varying();
     counts.refined_pixels = uint64_t(window.width_px) * uint64_t(window.height_px);
-    if (counts.refined_pixels < counts.frame_pixels) clear(upright, options_.background);
+    if (counts.refined_pixels < counts.frame_pixels) clear(upright, background);
     if (!options_.with_depths) std::fill(upright.depth.begin(), upright.depth.end(), 0.0f);
     counts.reduce_ms = double(raster_.reduce_ns()) * 1e-6;
     counts.shade_ms = watch.lap() - counts.reduce_ms;
@@ -201,8 +211,8 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
     counts.refine_ms = watch.lap();
 
     cover_.find(raster_, window.width_px, window.height_px, options_.with_depths, threads_);
-    refined_.write(refined, layout, window, cover_.alphas(), cover_.depths(),
-                   options_.is_over_background ? &options_.background : nullptr,
+    refined_.write(refined, layout, window, cover_.alphas(), cover_.depths(), background,
+                   options_.background ? 1 : kOwnBackgroundGain,
                    {upright.bgr.data(), upright.alpha.data(), options_.with_depths ? upright.depth.data() : nullptr,
                     upright.width_px, upright.height_px},
                    threads_);
@@ -211,7 +221,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
 
   if (counts.is_turned) {
     set_size(picture, camera.width_px, camera.height_px);
-    if (occupied.width_px == 0 || !options_.with_depths) clear(picture, options_.background);
+    if (occupied.width_px == 0 || !options_.with_depths) clear(picture, background);
     if (occupied.width_px > 0) {
       constexpr int kRowsAtOnce = 64;
       threads_.run(size_t((camera.height_px + kRowsAtOnce - 1) / kRowsAtOnce), [&](size_t strip, int) {

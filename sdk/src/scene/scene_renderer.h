@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/worker_threads.h"
@@ -16,10 +17,9 @@ namespace maq {
 struct RenderOptions {
   int threads = 1;  // of everything but the refiner, whose threads are its networks'
   double near = 0;  // depth of the nearest point that is seen, in units of the scene
-  // BGR. What is farther from all points than the refiner sees is of this colour; with `is_over_background` the picture
-  // is drawn over it by alpha, else the refiner's picture is left as it is.
-  std::array<uint8_t, 3> background = {0, 0, 0};
-  bool is_over_background = false;
+  // BGR, which the picture is drawn over by its alpha. Without, what has no point near is of the scene's background
+  // colour, and the refiner's picture is left as it is elsewhere.
+  std::optional<std::array<uint8_t, 3>> background;
   bool with_depths = true;
   // Work that is left out. Neither changes a pixel with an alpha above 0.
   bool skips_unseen_blocks = true;

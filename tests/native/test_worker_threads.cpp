@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include "core/worker_threads.h"
@@ -27,6 +29,19 @@ TEST(WorkerThreads, EachTaskIsDoneOnceRoundAfterRound) {
         for (const int times : done) ASSERT_EQ(times, 1);
       }
     }
+  }
+}
+
+TEST(WorkerThreads, RunReturnsWhenTheSlowestIsDone) {
+  WorkerThreads threads(2);
+  for (int round = 0; round < 5; ++round) {
+    std::atomic<int> done{0};
+    // Whoever has the other task is done long before.
+    threads.run(2, [&](size_t task, int) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(int(task) == round % 2 ? 40 : 5));
+      ++done;
+    });
+    ASSERT_EQ(done, 2);
   }
 }
 

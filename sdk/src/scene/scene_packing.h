@@ -14,7 +14,7 @@ struct ScenePacking {
   Coefficients coefficients = Coefficients::kInt8;
   // Points whose look moves by less than that from its mean over the photos (ModelledPoints::variations, in the features'
   // own units) keep the mean alone. 0 keeps the slopes of all but those that have none.
-  float least_variation = 0.1f;
+  float least_variation = 0.05f;
   // At most that share of the points keep their slopes: those whose looks move most. With 0.5 a scene of int8 and uint16
   // takes 39 bytes a point at most.
   float most_varying = 1;

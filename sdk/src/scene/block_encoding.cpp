@@ -99,8 +99,7 @@ void encode_looks(const ModelledPoints& points, const uint32_t* indices, SceneBl
 
 }  // namespace
 
-void encode_block(const ModelledPoints& points, const uint32_t* indices, SceneBlock& block,
-                                  const SceneArrays& arrays) {
+void encode_block(const ModelledPoints& points, const uint32_t* indices, SceneBlock& block, const SceneArrays& arrays) {
   const size_t place = size_t(block.first) * 3;
   switch (arrays.place_kind) {
     case Places::kFloat32: encode_places(points, indices, block, from<float>(arrays.places, place)); break;

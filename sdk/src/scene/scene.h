@@ -19,10 +19,10 @@ enum class Coefficients : uint8_t { kFloat32, kInt16, kInt8 };
 
 struct SceneBlock {
   static constexpr uint32_t kMostPoints = 1024;
-  uint32_t first = 0;          // of its points, counted over the scene
-  uint32_t count = 0;          // 1 .. kMostPoints
-  uint32_t varying = 0;        // the first so many have slopes
-  uint32_t first_varying = 0;  // of those, counted over the scene
+  uint32_t first = 0;                             // of its points, counted over the scene
+  uint32_t count = 0;                             // 1 .. kMostPoints
+  uint32_t varying = 0;                           // the first so many have slopes
+  uint32_t first_varying = 0;                     // of those, counted over the scene
   float low[3] = {0, 0, 0}, high[3] = {0, 0, 0};  // bounds, relative to the scene's origin
   // A stored place q is low + q * place_step (kUint16); a float is relative to the scene's origin, and step unused.
   float place_step[3] = {0, 0, 0};
@@ -42,10 +42,10 @@ struct Scene {
   const SceneBlock* blocks = nullptr;
   // For a block at points [first, first + count): x of all, then y, then z, from places + 3 * first elements on.
   const void* places = nullptr;
-  const void* means = nullptr;   // [points][kFeatures]
-  const void* slopes = nullptr;  // [varying][kBasis][kFeatures]
+  const void* means = nullptr;                   // [points][kFeatures]
+  const void* slopes = nullptr;                  // [varying][kBasis][kFeatures]
   std::array<uint8_t, 32> networks_sha256 = {};  // of the networks that the looks were made with (see scene_networks.h)
-  std::shared_ptr<const void> owner;  // of the arrays: vectors or a mapping
+  std::shared_ptr<const void> owner;             // of the arrays: vectors or a mapping
 };
 
 }  // namespace maq

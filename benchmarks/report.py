@@ -275,7 +275,8 @@ def page(sections: list[Section], folder: Path) -> str:
                 body.append(f"<p>{html.escape(part)}</p>")
             elif isinstance(part, tuple):
                 data = base64.b64encode((folder / part[0]).read_bytes()).decode()
-                body.append(f'<figure><img alt="{html.escape(part[1])}" src="data:image/png;base64,{data}">'
+                kind = "jpeg" if part[0].endswith(".jpg") else "png"
+                body.append(f'<figure><img alt="{html.escape(part[1])}" src="data:image/{kind};base64,{data}">'
                             f"<figcaption>{html.escape(part[1])}</figcaption></figure>")  # fmt: skip
             else:
                 body.append(table(part))

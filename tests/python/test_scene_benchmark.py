@@ -258,7 +258,7 @@ def test_the_report_of_scenes_alone(given, tmp_path, capsys):
         assert said in text
     assert "tiles without points are not refined" in page
     assert page.count("data:image/png;base64,") == 3
-    for name in ("scenes-quality.png", "scenes-frame-time.png", "scenes-sheet.png"):
+    for name in ("scenes-quality.png", "scenes-frame-time.png", "scenes-sheet.jpg"):
         assert (out / name).stat().st_size > 5000
 
 

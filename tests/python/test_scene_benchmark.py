@@ -257,7 +257,8 @@ def test_the_report_of_scenes_alone(given, tmp_path, capsys):
                  "| tiles without points are not refined | 0 | -0.25 | 0 |"):  # fmt: skip
         assert said in text
     assert "tiles without points are not refined" in page
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count("data:image/png;base64,") == 2
+    assert page.count("data:image/jpeg;base64,") == 1
     for name in ("scenes-quality.png", "scenes-frame-time.png", "scenes-sheet.jpg"):
         assert (out / name).stat().st_size > 5000
 

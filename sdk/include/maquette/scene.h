@@ -104,7 +104,8 @@ typedef struct maq_scene_build_config {
   int32_t long_side_px;     /* larger photos are made smaller before they are looked at; default 640; 0: never */
   int32_t coefficient_bits; /* of the scene's looks: 8 (default), 16, or 32 for floats, places then too */
   /* Points whose look varies less between the photos keep their mean alone, which makes the file smaller; in units of
-   * colours of 0 to 1. 0 keeps all; negative (default): the library's choice, 1/255. */
+   * colours of 0 to 1. 0 keeps all; negative (default): the library's choice, 0.05, and where numbers have 8 bits so much
+   * more that half of the points vary at most. */
   double least_variation;
   /* Of a photo's sides, for finding which points it sees: below 1 a point hides more of what is behind it, for sparse
    * clouds. 1/16 to 1 (default). */
@@ -141,7 +142,8 @@ MAQ_API maq_status maq_scene_build_config_init(maq_scene_build_config* config, u
  * may be NULL; else the caller sets stats->struct_size. `*scene` is the caller's, to be given to maq_scene_destroy; it needs
  * neither the capture nor its folder any more. On failure and when cancelled `*scene` and `*stats` are as before.
  * Any thread; several scenes may be built at once. Errors: MAQ_ERROR_INVALID_ARGUMENT (also: every photo is held out),
- * MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (the networks), MAQ_ERROR_RUNTIME_LIBRARY,
+ * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE and MAQ_ERROR_UNSUPPORTED (the networks; these are none of scenes),
+ * MAQ_ERROR_RUNTIME_LIBRARY,
  * MAQ_ERROR_UNREADABLE (no photo can be used or sees a point), MAQ_ERROR_OUT_OF_MEMORY (most_bytes, or the machine's),
  * MAQ_ERROR_INFERENCE, MAQ_CANCELLED (by the progress callback). Blocks until it is done. */
 MAQ_API maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* config,
@@ -158,7 +160,7 @@ typedef struct maq_point_cloud {
 
 /* Begins a scene with a cloud of the app. `*builder` is the caller's, to be given to maq_scene_builder_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (no points, a point that is not finite, an up that is none),
- * MAQ_ERROR_UNSUPPORTED (over 30 million points), MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_RUNTIME_LIBRARY,
+ * MAQ_ERROR_UNSUPPORTED (over 30 million points; networks that are none of scenes), MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_RUNTIME_LIBRARY,
  * MAQ_ERROR_OUT_OF_MEMORY (most_bytes). Blocks while networks are read and the cloud is copied. */
 MAQ_API maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_config* config,
                                             const maq_point_cloud* cloud, maq_scene_builder** builder);

@@ -1,3 +1,4 @@
+#include <cstring>
 #include <limits>
 #include <memory>
 
@@ -92,10 +93,14 @@ maq_status maq_scene_image_plane(const maq_scene_image* image, maq_scene_plane p
     require_argument(image, "image");
     require_argument(pixels, "pixels");
     require_argument(stride_bytes, "stride_bytes");
-    require_range("plane", int(plane), int(MAQ_SCENE_BGR), int(MAQ_SCENE_DEPTH));
+    // Any number may come from C, also one that is no value of the enum in C++.
+    int32_t wanted;
+    static_assert(sizeof wanted == sizeof plane);
+    std::memcpy(&wanted, &plane, sizeof wanted);
+    require_range("plane", wanted, int32_t(MAQ_SCENE_BGR), int32_t(MAQ_SCENE_DEPTH));
     const RenderedPicture& picture = image->picture;
     const size_t width = size_t(picture.width_px);
-    switch (plane) {
+    switch (wanted) {
       case MAQ_SCENE_BGR:
         *pixels = picture.bgr.data();
         *stride_bytes = 3 * width;

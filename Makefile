@@ -28,6 +28,12 @@ build: packages-demo  ## configure and build the SDK and its command line (relea
 	@[ -f build/release/CMakeCache.txt ] || cmake --preset release -DMAQ_BUILD_TESTS=OFF
 	@cmake --build --preset release -j $(JOBS)
 
+.PHONY: desktop-demo
+desktop-demo: packages-desktop build  ## the webcam demo with a window: builds it and starts it
+	@cmake --preset release -DMAQ_BUILD_DESKTOP_DEMO=ON >/dev/null
+	@cmake --build --preset release -j $(JOBS) --target maquette_demo
+	@build/release/stage/bin/maquette-demo
+
 .PHONY: test
 test: packages-test  ## all native and Python tests, cameras in a virtual machine; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev
@@ -71,6 +77,6 @@ lint: packages-lint  ## check layout and lint rules without changing anything
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)
 	@rm -rf build demo-output
 
-.PHONY: packages-demo packages-test packages-lint
-packages-demo packages-test packages-lint: packages-%:
+.PHONY: packages-demo packages-desktop packages-test packages-lint
+packages-demo packages-desktop packages-test packages-lint: packages-%:
 	@scripts/install-packages.sh $*

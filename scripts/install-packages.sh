@@ -2,7 +2,8 @@
 # Installs the Debian packages that a group of make targets needs, and only those that are missing.
 #
 #   scripts/install-packages.sh demo        to build the SDK and run it
-#   scripts/install-packages.sh test        + the native tests, Python and software OpenGL for rendering
+#   scripts/install-packages.sh desktop     + the desktop demo
+#   scripts/install-packages.sh test        + the native tests, Python, a display and OpenGL in software
 #   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (120 MB)
 #   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (35 MB)
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
@@ -10,11 +11,11 @@
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,10s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,11s/^# \{0,1\}//p' "$0"; }
 
 group="${1:-}"
 case "$group" in
-    demo | test | isa | camera-vm | lint) ;;
+    demo | desktop | test | isa | camera-vm | lint) ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
 esac
@@ -46,6 +47,11 @@ needs_package libxxhash-dev
 needs_package ca-certificates
 
 if [ "$group" != demo ]; then
+    needs_package libglfw3-dev
+    needs_package libepoxy-dev
+    needs_package libimgui-dev
+fi
+if [ "$group" != demo ] && [ "$group" != desktop ]; then
     needs_command git git
     needs_package libgtest-dev
     needs_package libgmock-dev
@@ -55,6 +61,8 @@ if [ "$group" != demo ]; then
     needs_package libegl1             # moderngl draws without a window through EGL
     needs_package libgl1
     needs_package libgl1-mesa-dri     # ... on the processor (llvmpipe)
+    needs_command Xvfb xvfb           # a display for the desktop demo
+    needs_command xauth xauth         # ... which xvfb-run needs to start it
 fi
 if [ "$group" = isa ]; then
     needs_command qemu-aarch64-static qemu-user-static

@@ -70,8 +70,8 @@ def test_seen_from_behind_the_number_reads_24(grid, shipped):
     foot = rows.max() - 3
     assert red[foot, :middle].sum() > 2 * red[foot, middle:].sum()  # a 2 stands on a bar, a 4 on its stem
     two = red[rows.min() : rows.max() + 1, columns.min() : middle - 2]
-    above_the_bar = two[round(0.6 * len(two)) : round(0.75 * len(two))]
-    assert np.nonzero(above_the_bar)[1].mean() < 0.5 * two.shape[1]  # its slope comes down to the left
+    at = [np.nonzero(two[round(share * len(two))])[0].mean() for share in (0.45, 0.7)]
+    assert at[0] > at[1] + 0.1 * two.shape[1]  # its slope comes down to the left
 
 
 def test_each_piece_has_its_colour(grid, shipped):

@@ -120,7 +120,7 @@ def torso(points: np.ndarray, is_front: bool) -> np.ndarray:
     else:
         for digit, centre_x in ((DIGIT_2, 0.062), (DIGIT_4, -0.062)):
             # Seen from behind the body's left is on the left.
-            distance = stroke_distance(in_square(x, z, (centre_x, 1.325), 0.1) * (1, 0.62) + (0, 0.19), digit)
+            distance = stroke_distance(in_square(-x, z, (-centre_x, 1.325), 0.1) * (1, 0.62) + (0, 0.19), digit)
             canvas.paint(distance < 0.25, CREAM)
             canvas.paint(distance < 0.15, RED)
     below = Painter(len(x), DENIM)

@@ -50,6 +50,11 @@ typedef enum maq_densepose_plane {
   MAQ_PLANE_PERSON = 4 /* k for the k-th person of the result, counted from 1; 0 for nobody */
 } maq_densepose_plane;
 
+/* A part's name ("left upper arm, outside") and a colour to paint it with: red, green, blue. 0 is "background", black; a
+ * number that is no part is "unknown part", black. The text is static; `rgb` has room for three bytes, or is NULL.
+ * Any thread. Does not fail or block. */
+MAQ_API const char* maq_part_name(int32_t part, uint8_t* rgb);
+
 /* What a run did and how long its stages took. Times are wall-clock milliseconds. */
 typedef struct maq_densepose_stats {
   uint32_t struct_size;

@@ -2,6 +2,7 @@
 #include <thread>
 
 #include "api/boundary.h"
+#include "densepose/body_parts.h"
 
 using namespace maq;
 
@@ -49,6 +50,13 @@ DensePoseSettings checked_settings(const maq_densepose_config& config) {
 }
 
 }  // namespace
+
+const char* maq_part_name(int32_t part, uint8_t* rgb) {
+  const bool known = part >= 0 && size_t(part) < kBodyParts.size();
+  const BodyPart& found = known ? kBodyParts[size_t(part)] : BodyPart{"unknown part", {0, 0, 0}};
+  if (rgb != nullptr) std::copy(found.rgb.begin(), found.rgb.end(), rgb);
+  return found.name;
+}
 
 maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
   return init_config(__func__, config, struct_size, default_config(), sizeof(maq_densepose_config));

@@ -7,8 +7,6 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "result_files.h"
-
 namespace {
 
 constexpr int kReadableSidePx = 900;
@@ -16,6 +14,13 @@ constexpr int kLargestEnlargement = 4;
 constexpr int kParts = 24;
 constexpr float kContoursPerPart = 8;  // iso-lines of U, and as many of V
 constexpr float kPaint = 0.70f;        // opacity of the parts' colours
+
+// A plane of the result as an image of the result's memory.
+cv::Mat plane_of(const maquette::DensePoseResult& result, maq_densepose_plane plane) {
+  size_t stride_bytes = 0;
+  const uint8_t* pixels = result.plane(plane, &stride_bytes);
+  return cv::Mat(result.height_px(), result.width_px(), CV_8UC1, const_cast<uint8_t*>(pixels), stride_bytes);
+}
 
 float smooth_step(float low, float high, float value) {
   const float t = std::clamp((value - low) / (high - low), 0.0f, 1.0f);

@@ -1,38 +1,45 @@
 #include "clip_file.h"
 
-#include <stdexcept>
+#include <algorithm>
+
+#include "frame_image.h"
+#include "output_file.h"
 
 namespace fs = std::filesystem;
 
-ClipFile::ClipFile(fs::path path, double fps) : path_(std::move(path)), fps_(fps > 0 ? fps : 25) {}
+namespace {
 
-void ClipFile::open(cv::Size size) {
-  struct Format {
-    const char* extension;
-    int fourcc;
-  };
-  const Format formats[] = {{".mp4", cv::VideoWriter::fourcc('m', 'p', '4', 'v')},
-                            {".avi", cv::VideoWriter::fourcc('M', 'J', 'P', 'G')}};
-  for (const Format& format : formats) {
-    path_.replace_extension(format.extension);
-    file_ = std::make_unique<OutputFile>(path_);
-    if (writer_.open(file_->temporary_path().string(), format.fourcc, fps_, size)) return;
-  }
-  throw std::runtime_error(path_.string() + " cannot be written: this OpenCV writes neither MP4 nor Motion JPEG. " +
-                           "Do without the clip, or use an OpenCV with video support.");
+// Of a clip in the SDK.
+constexpr double kLeastFps = 0.01;
+constexpr double kMostFps = 1000;
+
+}  // namespace
+
+ClipFile::ClipFile(const maquette::Context& context, fs::path path, double fps)
+    : context_(context), path_(std::move(path)), fps_(fps > 0 ? std::clamp(fps, kLeastFps, kMostFps) : 25) {}
+
+void ClipFile::begin(const maquette::Frame& first, const char* extension) {
+  path_.replace_extension(extension);
+  make_folder_of(path_);
+  clip_.emplace(context_, path_.string(), fps_);
+  clip_->add(first);
 }
 
 void ClipFile::add(const cv::Mat& picture) {
-  // MPEG-4 wants even sides.
-  const cv::Size size(picture.cols / 2 * 2, picture.rows / 2 * 2);
-  if (size.area() == 0) return;
-  if (!writer_.isOpened()) open(size);
-  writer_.write(picture(cv::Rect(cv::Point(), size)));
+  if (picture.cols < 2 || picture.rows < 2) return;  // too small for a clip
+  const maquette::Frame frame = frame_of(context_, picture);
+  if (clip_) return clip_->add(frame);
+  try {
+    begin(frame, ".mp4");
+  } catch (const maquette::Error& error) {
+    clip_.reset();
+    if (error.status() != MAQ_ERROR_UNSUPPORTED) throw;
+    begin(frame, ".avi");
+  }
 }
 
 fs::path ClipFile::finish() {
-  if (!writer_.isOpened()) return {};
-  writer_.release();
-  file_->commit();
+  if (!clip_) return {};
+  clip_->finish();
   return path_;
 }

@@ -1,16 +1,16 @@
-// Pictures as a video file that appears when it is complete.
+// Drawn pictures as a clip, of the kind that this build can write.
 #pragma once
 
 #include <filesystem>
-#include <memory>
-#include <opencv2/videoio.hpp>
-
-#include "output_file.h"
+#include <maquette/maquette.hpp>
+#include <opencv2/core.hpp>
+#include <optional>
 
 class ClipFile {
  public:
-  // `path` ends in .mp4; where this OpenCV cannot write that, the file is .avi (Motion JPEG) instead.
-  ClipFile(std::filesystem::path path, double fps);
+  // `path` ends in .mp4; where this build cannot write that, the file is .avi (Motion JPEG) instead. Its folder is made when
+  // it is not there. An `fps` of 0 or less is not known.
+  ClipFile(const maquette::Context& context, std::filesystem::path path, double fps);
 
   // BGR, all of the size of the first.
   void add(const cv::Mat& picture);
@@ -18,10 +18,10 @@ class ClipFile {
   std::filesystem::path finish();
 
  private:
-  void open(cv::Size size);
+  void begin(const maquette::Frame& first, const char* extension);
 
+  const maquette::Context& context_;
   std::filesystem::path path_;
   double fps_;
-  cv::VideoWriter writer_;
-  std::unique_ptr<OutputFile> file_;
+  std::optional<maquette::Clip> clip_;
 };

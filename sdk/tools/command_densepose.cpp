@@ -11,12 +11,13 @@
 
 #include "clip_file.h"
 #include "commands.h"
+#include "frame_image.h"
 #include "interrupt.h"
 #include "model_options.h"
+#include "output_file.h"
 #include "overlay.h"
 #include "program.h"
 #include "progress_bar.h"
-#include "result_files.h"
 #include "source_argument.h"
 
 namespace fs = std::filesystem;
@@ -81,13 +82,6 @@ std::string frame_stem(const std::string& stem, bool is_clip, uint64_t sequence)
   return stem + number;
 }
 
-cv::Mat pixels_of(const maquette::Frame& frame) {
-  const maq_frame_desc desc = frame.desc();
-  cv::Mat pixels(desc.height_px, desc.width_px, CV_8UC3);
-  frame.copy_pixels(MAQ_PIXEL_BGR8, pixels.data, pixels.step, pixels.total() * 3);
-  return pixels;
-}
-
 void print_frame(const Options& options, const std::string& stem, const maq_frame_desc& desc,
                  const maq_densepose_stats& stats) {
   if (options.json) {
@@ -126,7 +120,7 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
   int64_t expected = info.frame_count < 0 ? limit : (info.frame_count + options.every - 1) / options.every;
   if (limit > 0) expected = expected > 0 ? std::min(expected, limit) : limit;
   ProgressBar progress(argument.stem, is_clip && !options.json ? expected : 1);
-  ClipFile clip(fs::path(options.out) / (argument.stem + "_overlay.mp4"), info.fps / double(options.every));
+  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay.mp4"), info.fps / double(options.every));
   int64_t done = 0;
   for (int64_t index = 0; !interrupted() && (limit == 0 || done < limit); ++index) {
     const auto frame = source.next();
@@ -137,10 +131,13 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
     const maq_densepose_stats stats = result.stats();
     const std::string stem = frame_stem(argument.stem, is_clip, desc.sequence);
     // Drawn before the first file is written, so that a frame has all its files or none.
-    const cv::Mat overlay = options.overlay ? draw_overlay(pixels_of(*frame), result) : cv::Mat();
-    write_result_files(result, options.out, stem);
+    const cv::Mat overlay = options.overlay ? draw_overlay(image_of(*frame), result) : cv::Mat();
+    make_folder_of(fs::path(options.out) / (stem + "_IUV.png"));
+    result.save(options.out, stem);
     if (options.overlay && is_clip) clip.add(overlay);
-    if (options.overlay && !is_clip) write_image(fs::path(options.out) / (stem + "_overlay.png"), overlay);
+    if (options.overlay && !is_clip) {
+      frame_of(context, overlay).save((fs::path(options.out) / (stem + "_overlay.png")).string());
+    }
     timings.add(stats);
     ++done;
     if (!is_clip || options.json) print_frame(options, stem, desc, stats);

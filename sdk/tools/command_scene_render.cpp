@@ -214,10 +214,10 @@ std::vector<maq_camera> flight(const maquette::Scene& scene, const maquette::Cap
   return flight_through(stops, frames);
 }
 
-int render_clip(maquette::SceneRenderer& renderer, const maquette::Scene& scene, const maquette::Capture* capture,
-                const Options& options) {
+int render_clip(const maquette::Context& context, maquette::SceneRenderer& renderer, const maquette::Scene& scene,
+                const maquette::Capture* capture, const Options& options) {
   const std::vector<maq_camera> cameras = flight(scene, capture, options);
-  ClipFile clip(options.out, options.fps);
+  ClipFile clip(context, options.out, options.fps);
   ProgressBar progress("rendering", int64_t(cameras.size()));
   std::vector<float> times_ms;
   for (size_t i = 0; i < cameras.size() && !interrupted(); ++i) {
@@ -263,7 +263,7 @@ int render(const Options& options) {
   if (!options.capture.empty()) capture.emplace(context, options.capture);
   maquette::SceneRenderer renderer = make_renderer(context, scene, options);
   return options.path.empty() ? render_views(renderer, *capture, options)
-                              : render_clip(renderer, scene, capture ? &*capture : nullptr, options);
+                              : render_clip(context, renderer, scene, capture ? &*capture : nullptr, options);
 }
 
 }  // namespace

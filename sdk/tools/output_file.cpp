@@ -18,12 +18,15 @@ namespace {
 
 }  // namespace
 
-OutputFile::OutputFile(fs::path path) : path_(std::move(path)) {
+void make_folder_of(const fs::path& path) {
   std::error_code error;
-  if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), error);
-  if (error) fail(path_, error.message());
-  temporary_path_ = path_.parent_path() /
-                    ("." + path_.stem().string() + ".part" + std::to_string(getpid()) + path_.extension().string());
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
+  if (error) fail(path, error.message());
+}
+
+OutputFile::OutputFile(fs::path path) : path_(std::move(path)) {
+  make_folder_of(path_);
+  temporary_path_ = path_.parent_path() / ("." + path_.filename().string() + ".part" + std::to_string(getpid()));
 }
 
 OutputFile::~OutputFile() {

@@ -1,9 +1,11 @@
 // Files that appear whole or not at all: written under another name and renamed when complete.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
-#include <string>
-#include <vector>
+
+// Makes the folder of `path` when it is not there. Throws std::runtime_error.
+void make_folder_of(const std::filesystem::path& path);
 
 class OutputFile {
  public:
@@ -14,7 +16,7 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  // Where to write; has the extension of the final name, by which encoders choose the format.
+  // Where to write.
   const std::filesystem::path& temporary_path() const { return temporary_path_; }
   // Gives the file its final name, replacing one that was there. Throws std::runtime_error.
   void commit();

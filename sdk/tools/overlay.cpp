@@ -7,8 +7,6 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "result_files.h"
-
 namespace {
 
 constexpr int kReadableSidePx = 900;
@@ -17,19 +15,12 @@ constexpr int kParts = 24;
 constexpr float kContoursPerPart = 8;  // iso-lines of U, and as many of V
 constexpr float kPaint = 0.70f;        // opacity of the parts' colours
 
-// Colours by limb, so that a body can be read at a glance: torso gold, head rose, right limbs warm, left limbs cool;
-// the front and the outer side of a limb are lighter than its back. In DensePose's order; RGB.
-constexpr std::array<std::array<uint8_t, 3>, kParts + 1> kPartColours = {{
-    {0, 0, 0},       {214, 158, 46},  {246, 198, 82},   // -, torso back, front
-    {255, 112, 67},  {64, 156, 255},  {46, 204, 187},   // right hand, left hand, left foot
-    {232, 84, 128},  {196, 76, 60},   {44, 122, 160},   // right foot, upper legs: right back, left back
-    {236, 112, 88},  {72, 160, 200},  {170, 58, 84},    // right front, left front, lower legs: right back
-    {28, 142, 132},  {216, 86, 112},  {60, 184, 168},   // left back, right front, left front
-    {78, 110, 214},  {216, 104, 40},  {112, 146, 244},  // upper arms: left inside, right inside, left outside
-    {246, 144, 70},  {92, 84, 200},   {228, 128, 28},   // right outside, lower arms: left inside, right inside
-    {132, 120, 236}, {252, 170, 60},                    // left outside, right outside
-    {236, 100, 150}, {250, 140, 178},                   // head right, head left
-}};
+// A plane of the result as an image of the result's memory.
+cv::Mat plane_of(const maquette::DensePoseResult& result, maq_densepose_plane plane) {
+  size_t stride_bytes = 0;
+  const uint8_t* pixels = result.plane(plane, &stride_bytes);
+  return cv::Mat(result.height_px(), result.width_px(), CV_8UC1, const_cast<uint8_t*>(pixels), stride_bytes);
+}
 
 float smooth_step(float low, float high, float value) {
   const float t = std::clamp((value - low) / (high - low), 0.0f, 1.0f);
@@ -119,6 +110,8 @@ void mix(cv::Vec3b& pixel, const std::array<uint8_t, 3>& rgb, float amount) {
 }
 
 void paint(const Surface& surface, float line_px, cv::Mat& canvas) {
+  std::array<std::array<uint8_t, 3>, kParts + 1> colours;
+  for (int p = 0; p <= kParts; ++p) maq_part_name(p, colours[size_t(p)].data());
   constexpr std::array<uint8_t, 3> kWhite = {255, 255, 255};
   constexpr std::array<uint8_t, 3> kInk = {24, 26, 48};
   cv::Mat target = canvas(surface.area);
@@ -129,7 +122,7 @@ void paint(const Surface& surface, float line_px, cv::Mat& canvas) {
       const uint8_t part = surface.part.at<uint8_t>(y, x);
       if (part == 0 || inside <= 0) continue;
       cv::Vec3b& pixel = target.at<cv::Vec3b>(y, x);
-      mix(pixel, kPartColours[part], kPaint * inside);
+      mix(pixel, colours[part], kPaint * inside);
       mix(pixel, kWhite, 0.75f * inside * contour(surface, surface.u, x, y, 0.5f * line_px));
       mix(pixel, kInk, 0.65f * inside * contour(surface, surface.v, x, y, 0.5f * line_px));
       if (is_part_border(surface, x, y)) mix(pixel, kInk, 0.35f * inside);

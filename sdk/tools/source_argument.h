@@ -8,6 +8,6 @@ struct SourceArgument {
   std::string stem;  // of output files: "photo" for image:dir/photo.jpg, "stub_people" for stub:people?count=2
 };
 
-// Takes a URI as it is, and a bare path as rec:, video: or image:, by its content or its extension.
+// Takes a URI as it is, and a bare path as file:.
 // Throws std::runtime_error when a bare path does not exist.
 SourceArgument parse_source_argument(const std::string& text);

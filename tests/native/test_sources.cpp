@@ -4,6 +4,7 @@
 
 #include "core/bounded_pool.h"
 #include "expect_error.h"
+#include "sources/recording.h"
 #include "sources/source.h"
 #include "temp_folder.h"
 
@@ -78,6 +79,34 @@ TEST(Sources, AnImageIsOneFrameAtTheSizeAskedFor) {
   EXPECT_EQ(frame.image.height_px, 20);
   EXPECT_EQ(frame.storage[2], 3);
   EXPECT_EQ(scaled->next(0, frame), maq::NextFrame::kEnd);
+}
+
+TEST(Sources, AFileIsOpenedAsWhatItsContentSays) {
+  const TempFolder folder;
+  const cv::Mat picture(30, 40, CV_8UC3, cv::Scalar(1, 2, 3));
+  cv::imwrite(folder.file("a.png"), picture);
+  std::filesystem::rename(folder.file("a.png"), folder.file("a.mp4.x"));
+  maq::Frame frame;
+  frame_of("file:" + folder.file("a.mp4.x") + "?size=20x15", 0, &frame);
+  EXPECT_EQ(frame.image.width_px, 20);
+
+  const std::string clip = std::string(MAQ_TEST_MEDIA) + "/clip.mp4";
+  std::filesystem::copy_file(clip, folder.file("50% of a clip?"));
+  frame_of("file:" + folder.file("50%25 of a clip%3F"), 3, &frame);
+  EXPECT_EQ(frame.sequence, 3u);
+
+  { maq::RecordingWriter(folder.file("take"), {}, 0).add(frame); }
+  EXPECT_EQ(frame_of("file:" + folder.file("take"), 0), frame_of("video:" + clip, 3));
+
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "is a folder", [&] { maq::open_source("file:" + folder.path().string()); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { maq::open_source("file:" + folder.file("none.mp4")); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "Option colour", [&] { maq::open_source("file:" + clip + "?colour=red"); });
+}
+
+TEST(Sources, WithoutACameraTheFirstOneIsNotFound) {
+  if (!maq::list_cameras().empty()) GTEST_SKIP() << "this machine has a camera";
+  expect_error(MAQ_ERROR_NOT_FOUND, "No camera was found", [] { maq::open_source("camera:"); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "No camera was found", [] { maq::open_source("camera:?size=640x480"); });
 }
 
 TEST(Sources, UnknownThingsAreNamedWithWhatThereIs) {

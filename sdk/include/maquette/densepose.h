@@ -50,6 +50,11 @@ typedef enum maq_densepose_plane {
   MAQ_PLANE_PERSON = 4 /* k for the k-th person of the result, counted from 1; 0 for nobody */
 } maq_densepose_plane;
 
+/* A part's name ("left upper arm, outside") and a colour to paint it with: red, green, blue. 0 is "background", black; a
+ * number that is no part is "unknown part", black. The text is static; `rgb` has room for three bytes, or is NULL.
+ * Any thread. Does not fail or block. */
+MAQ_API const char* maq_part_name(int32_t part, uint8_t* rgb);
+
 /* What a run did and how long its stages took. Times are wall-clock milliseconds. */
 typedef struct maq_densepose_stats {
   uint32_t struct_size;
@@ -118,8 +123,10 @@ MAQ_API maq_status maq_densepose_result_plane(const maq_densepose_result* result
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
-/* Writes <stem>_IUV.png, <stem>_INDS.png and <stem>.json into a folder that is there, in the DensePose convention
- * (docs/formats.md): each whole or not at all, in place of files that are there.
+/* Writes three files into a folder that is there ("": the current one), in the DensePose convention (docs/formats.md):
+ * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png (MAQ_PLANE_PERSON) and
+ * <stem>.json (size, boxes, scores). Each appears whole or not at all, in place of one that is there, and none before all
+ * are written. `stem` begins their names and names no folder.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
  * (libmaquette_files.so is missing). Blocks while they are written. */
 MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* folder, const char* stem);
@@ -128,15 +135,15 @@ MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result,
  * back, z up. */
 typedef struct maq_surface {
   uint32_t struct_size;
-  int32_t nodes;         /* along U, and along V */
+  int32_t nodes;         /* along U, and along V; 2 at least */
   const float* points_m; /* [24][nodes][nodes][3]: part - 1, U * (nodes - 1), V * (nodes - 1); x, y, z. Between nodes,
-                            bilinear. NaN where the chart does not reach. */
+                            bilinear. x, y and z are NaN where the chart does not reach. */
 } maq_surface;
 
 /* The surface that the bundle's labels mean. The caller sets surface->struct_size; the points are the handle's and live as
  * long as it does.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has none), MAQ_ERROR_BAD_BUNDLE (it is
- * damaged). May block the first time, while it is read. */
+ * damaged). Blocks shortly the first time, while it is decoded. */
 MAQ_API maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_surface* surface);
 
 #ifdef __cplusplus

@@ -86,8 +86,9 @@ MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
                                          size_t stride_bytes, size_t size_bytes);
 
-/* Writes the frame's picture to a file, PNG or JPEG by the path's ending (.png, .jpg, .jpeg): whole or not at all, in place
- * of a file that is there.
+/* Writes the frame's picture to a file, by the path's ending: PNG (.png), without loss, or JPEG (.jpg, .jpeg) at quality 95.
+ * Grey pictures stay grey, others are written as RGB, without alpha. The file appears whole or not at all, in place of one
+ * that is there; its folder must be there.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another ending), MAQ_ERROR_UNSUPPORTED (a depth image),
  * MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is written. */
 MAQ_API maq_status maq_frame_save(const maq_frame* frame, const char* path);

@@ -20,6 +20,7 @@
 #ifndef MAQUETTE_MAQUETTE_H_
 #define MAQUETTE_MAQUETTE_H_
 
+#include "maquette/clip.h"
 #include "maquette/context.h"
 #include "maquette/densepose.h"
 #include "maquette/frame.h"

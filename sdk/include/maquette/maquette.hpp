@@ -138,6 +138,8 @@ class Frame {
     check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes), get());
   }
 
+  void save(const std::string& path) const { check(maq_frame_save(get(), path.c_str()), get()); }
+
  private:
   Owner<maq_frame, maq_frame_release> owner_;
 };
@@ -221,6 +223,22 @@ class Recorder {
   Owner<maq_recorder, maq_recorder_destroy> owner_;
 };
 
+class Clip {
+ public:
+  Clip(const Context& context, const std::string& path, double fps) {
+    maq_clip* made = nullptr;
+    check(maq_clip_create(context.get(), path.c_str(), fps, &made), context.get());
+    owner_.reset(made);
+  }
+
+  maq_clip* get() const { return owner_.get(); }
+  void add(const Frame& frame) { check(maq_clip_add(get(), frame.get()), get()); }
+  void finish() { check(maq_clip_finish(get()), get()); }
+
+ private:
+  Owner<maq_clip, maq_clip_destroy> owner_;
+};
+
 class DensePoseResult {
  public:
   // Takes over a result of the C API.
@@ -253,6 +271,10 @@ class DensePoseResult {
     return stats;
   }
 
+  void save(const std::string& folder, const std::string& stem) const {
+    check(maq_densepose_result_save(get(), folder.c_str(), stem.c_str()), get());
+  }
+
  private:
   Owner<maq_densepose_result, maq_densepose_result_release> owner_;
   int32_t width_px_ = 0;
@@ -277,6 +299,16 @@ class DensePose {
   }
 
   void restart() { check(maq_densepose_restart(get()), get()); }
+
+  // Nothing when the bundle has none. The points are this object's.
+  std::optional<maq_surface> surface() const {
+    maq_surface surface{};
+    surface.struct_size = sizeof surface;
+    const maq_status status = maq_densepose_get_surface(get(), &surface);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status, get());
+    return surface;
+  }
 
  private:
   void create(const Context& context, const maq_densepose_config& config) {

@@ -94,7 +94,8 @@ typedef struct maq_source_scheme {
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
 /* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec", "stub:people?count=2&seed=7",
- * "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:".
+ * "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:". "file:clip.mp4" is whichever of the first three the file's
+ * content says, "camera:" the first camera that can be opened.
  * "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out to that rate; a camera
  * takes the nearest that it offers, which maq_source_get_info tells. Of a camera, "format=MJPG" names the format and
  * "exposure=10000&focus=auto" sets controls. "live=1" plays what is no camera as if it were one, and faults such as

@@ -2,6 +2,8 @@
 #include <thread>
 
 #include "api/boundary.h"
+#include "densepose/body_parts.h"
+#include "densepose/result_files.h"
 
 using namespace maq;
 
@@ -50,6 +52,13 @@ DensePoseSettings checked_settings(const maq_densepose_config& config) {
 
 }  // namespace
 
+const char* maq_part_name(int32_t part, uint8_t* rgb) {
+  const bool known = part >= 0 && size_t(part) < kBodyParts.size();
+  const BodyPart& found = known ? kBodyParts[size_t(part)] : BodyPart{"unknown part", {0, 0, 0}};
+  if (rgb != nullptr) std::copy(found.rgb.begin(), found.rgb.end(), rgb);
+  return found.name;
+}
+
 maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
   return init_config(__func__, config, struct_size, default_config(), sizeof(maq_densepose_config));
 }
@@ -61,11 +70,13 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     require_argument(densepose, "densepose");
     const maq_densepose_config config = read_config(given, "config", default_config(), sizeof(maq_densepose_config));
     const DensePoseSettings settings = checked_settings(config);
-    const Bundle bundle = read_bundle(config.bundle_path);
+    Bundle bundle = read_bundle(config.bundle_path);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                                 bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");
-    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size);
+    const std::string& surface = bundle.manifest.surface_file;
+    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size,
+                                   std::move(bundle.files[surface]), bundle.folder + "/" + surface);
     return MAQ_OK;
   });
 }
@@ -154,6 +165,29 @@ maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_de
     filled.clamped_uv = from.decoded.clamped_uv;
     filled.key_frame = from.key_frame ? 1 : 0;
     write_struct(stats, "stats", filled, sizeof(maq_densepose_stats));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* folder, const char* stem) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(folder, "folder");
+    require_argument(stem, "stem");
+    if (*stem == '\0' || std::strchr(stem, '/') != nullptr) {
+      throw ArgumentError("stem is \"", stem, "\", but must be the beginning of a file name, without a folder.");
+    }
+    write_result_files(result->result, folder, stem);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_surface* surface) {
+  return guarded(densepose, __func__, [&] {
+    require_argument(densepose, "densepose");
+    require_argument(surface, "surface");
+    const SurfaceGrid& grid = densepose->surface.grid();
+    write_struct(surface, "surface", maq_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_surface));
     return MAQ_OK;
   });
 }

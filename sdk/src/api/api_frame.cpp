@@ -1,5 +1,6 @@
 #include "api/boundary.h"
 #include "image/convert.h"
+#include "image/image_file.h"
 
 using namespace maq;
 
@@ -84,6 +85,15 @@ maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format
     require_argument(frame, "frame");
     require_argument(pixels, "pixels");
     copy_pixels(frame->frame.image, format, pixels, stride_bytes, size_bytes);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_frame_save(const maq_frame* frame, const char* path) {
+  return guarded(frame, __func__, [&] {
+    require_argument(frame, "frame");
+    require_argument(path, "path");
+    write_image_file(frame->frame.image, path);
     return MAQ_OK;
   });
 }

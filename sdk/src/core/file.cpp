@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 
 #include "core/error.h"
@@ -26,6 +27,15 @@ bool stays_inside(const std::string& relative_path) {
   if (relative_path.find('\0') != std::string::npos) return false;
   const std::string parts = "/" + relative_path + "/";
   return parts.find("/../") == std::string::npos;
+}
+
+std::string lower_case_ending(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  // Whatever the language of the system: these are ASCII.
+  for (char& letter : ending) {
+    if (letter >= 'A' && letter <= 'Z') letter = char(letter - 'A' + 'a');
+  }
+  return ending;
 }
 
 std::vector<uint8_t> read_file(const std::string& path) {

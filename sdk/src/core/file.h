@@ -14,6 +14,9 @@ bool is_folder(const std::string& path);
 // with '/' and has no part "..". Links are not looked at.
 bool stays_inside(const std::string& relative_path);
 
+// Of a file's name, from its last dot on: ".png" of "a.b/C.PNG"; "" when it has none.
+std::string lower_case_ending(const std::string& path);
+
 // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE when it cannot be read.
 std::vector<uint8_t> read_file(const std::string& path);
 

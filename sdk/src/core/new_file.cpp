@@ -25,14 +25,14 @@ bool synchronise(int file) { return ::fsync(file) == 0 || errno == EINVAL || err
 
 }  // namespace
 
-NewFile::NewFile(std::string path) : path_(std::move(path)) {
+NewFile::NewFile(std::string path, const char* temporary_ending) : path_(std::move(path)) {
   struct stat found {};
   if (::stat(path_.c_str(), &found) == 0 && !S_ISREG(found.st_mode)) {
     throw Error(MAQ_ERROR_UNWRITABLE, path_, " is there and is not a file; give another name.");
   }
   static std::atomic<unsigned> count{0};
   do {
-    temporary_path_ = path_ + ".part" + std::to_string(::getpid()) + "-" + std::to_string(++count);
+    temporary_path_ = path_ + ".part" + std::to_string(::getpid()) + "-" + std::to_string(++count) + temporary_ending;
     file_ = ::open(temporary_path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   } while (file_ < 0 && errno == EEXIST);
   if (file_ < 0) fail(" cannot be made: ", errno);

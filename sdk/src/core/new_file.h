@@ -10,8 +10,8 @@ namespace maq {
 class NewFile {
  public:
   // Throws MAQ_ERROR_UNWRITABLE where the folder is not there or may not be written to, and where `path` is something other
-  // than a file.
-  explicit NewFile(std::string path);
+  // than a file. `temporary_ending` is that of the temporary name, for those who go by it.
+  explicit NewFile(std::string path, const char* temporary_ending = "");
   // Removes what was written, unless commit() was called. What a process leaves behind that dies before is named like the
   // file, with ".part" and a number at the end.
   ~NewFile();
@@ -19,6 +19,8 @@ class NewFile {
   NewFile& operator=(const NewFile&) = delete;
 
   const std::string& path() const { return path_; }
+  // For a library that opens files by name: it writes here instead of append(), and is done before commit().
+  const std::string& temporary_path() const { return temporary_path_; }
   uint64_t size_bytes() const { return size_bytes_; }
 
   // At the end. Throws MAQ_ERROR_UNWRITABLE: the disk is full.

@@ -187,6 +187,9 @@ void read_dense_pose(const Node& root, Manifest& manifest) {
   manifest.rpn = read_rpn(root.at("rpn"));
   manifest.box_head = read_box_head(root.at("box_head"));
   manifest.dense_head = read_dense_head(root.at("dense_head"), manifest.files);
+  if (const auto surface = root.find("surface")) {
+    manifest.surface_file = read_listed_file(surface->at("file"), manifest.files);
+  }
 }
 
 void read_scenes(const Node& root, Manifest& manifest) {

@@ -84,6 +84,7 @@ struct Manifest {
   RpnSpec rpn;
   BoxHeadSpec box_head;
   DenseHeadSpec dense_head;
+  std::string surface_file;  // "" when the bundle has none
   // Of scenes.
   std::string basis_file;
 };

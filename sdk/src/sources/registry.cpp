@@ -1,7 +1,10 @@
+#include <algorithm>
+
 #include "core/error.h"
 #include "sources/control_options.h"
 #include "sources/depthai_source.h"
 #include "sources/faults.h"
+#include "sources/file_kind.h"
 #include "sources/file_sources.h"
 #include "sources/libcamera_cameras.h"
 #include "sources/live_source.h"
@@ -28,7 +31,12 @@ struct Entry {
   bool needs_target = true;  // otherwise nothing after the scheme means the first there is
 };
 
+// Those that find out which of the others is meant.
+constexpr char kFile[] = "file", kCamera[] = "camera";
+
 const Entry kEntries[] = {
+    {{kFile, "file:clip.mp4", "an image, a video file or a recording, by its content"}, nullptr, nullptr},
+    {{kCamera, "camera:?size=640x480", "the first camera that can be opened, of those below"}, nullptr, nullptr, false},
     {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"},
      without_log<open_image_source>,
      nullptr},
@@ -89,6 +97,21 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
   return std::make_unique<LiveSource>(std::move(opener), name, settings, controls);
 }
 
+// `options`: "?size=640x480" or nothing.
+std::unique_ptr<Source> open_first_camera(const std::string& options, const SourceSettings& settings) {
+  std::string problems;
+  for (const CameraListing& camera : list_cameras()) {
+    try {
+      if (camera.status == MAQ_OK) return open_source(camera.uri + options, settings);
+      problems += " " + camera.uri + ": " + camera.problem;
+    } catch (const Error& error) {
+      problems += " " + camera.uri + ": " + error.what();
+    }
+  }
+  if (problems.empty()) throw Error(MAQ_ERROR_NOT_FOUND, "No camera was found; is one plugged in?");
+  throw Error(MAQ_ERROR_NOT_FOUND, "No camera can be opened.", problems);
+}
+
 }  // namespace
 
 const std::vector<SourceScheme>& source_schemes() {
@@ -96,7 +119,7 @@ const std::vector<SourceScheme>& source_schemes() {
     std::vector<SourceScheme> list;
     for (const Entry& entry : kEntries) {
       list.push_back(entry.scheme);
-      list.back().is_camera = entry.camera != nullptr;
+      list.back().is_camera = entry.camera != nullptr || std::string(kCamera) == entry.scheme.name;
     }
     return list;
   }();
@@ -118,6 +141,8 @@ std::unique_ptr<Source> open_source(const std::string& text, const SourceSetting
         throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
                     entry.scheme.example, ".");
       }
+      if (uri.scheme == kFile) return open_source(scheme_of_file(uri.target) + text.substr(sizeof kFile - 1), settings);
+      if (uri.scheme == kCamera) return open_first_camera(text.substr(std::min(text.find('?'), text.size())), settings);
       return open_entry(entry, std::move(uri), settings);
     }
   }

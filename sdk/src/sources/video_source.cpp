@@ -5,7 +5,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "image/convert.h"
-#include "image/file_decoders.h"
+#include "image/file_codecs.h"
 #include "sources/file_sources.h"
 
 namespace maq {
@@ -16,7 +16,7 @@ class VideoSource : public Source {
   explicit VideoSource(SourceUri uri) : path_(uri.target), asked_fps_(uri.fps) {
     uri.expect_no_more_options("size and fps");
     if (!file_exists(path_)) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
-    clip_ = file_decoders().open_clip(path_);
+    clip_ = file_codecs().open_clip(path_);
     if (clip_ == nullptr) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be opened as a video: it is truncated, damaged or no video. ",
                   "Use a whole MP4, AVI, MOV or WebM file.");
@@ -103,7 +103,7 @@ class VideoSource : public Source {
   }
 
   std::string path_;
-  std::unique_ptr<Clip> clip_;
+  std::unique_ptr<ClipDecoder> clip_;
   cv::Mat decoded_;
   SourceInfo info_;
   double clip_fps_ = 0;

@@ -1,0 +1,39 @@
+#include "api/boundary.h"
+#include "image/clip_file.h"
+
+using namespace maq;
+
+struct maq_clip : Handle {
+  maq_clip(const char* path, double fps) : file(path, fps) {}
+  ClipFile file;
+};
+
+maq_status maq_clip_create(maq_context* context, const char* path, double fps, maq_clip** clip) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(path, "path");
+    require_argument(clip, "clip");
+    require_range("fps", fps, kLeastClipFps, kMostClipFps);
+    *clip = new maq_clip(path, fps);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_clip_add(maq_clip* clip, const maq_frame* frame) {
+  return guarded(clip, __func__, [&] {
+    require_argument(clip, "clip");
+    require_argument(frame, "frame");
+    clip->file.add(frame->frame.image);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_clip_finish(maq_clip* clip) {
+  return guarded(clip, __func__, [&] {
+    require_argument(clip, "clip");
+    clip->file.finish();
+    return MAQ_OK;
+  });
+}
+
+void maq_clip_destroy(maq_clip* clip) { delete clip; }

@@ -1,0 +1,64 @@
+#include "densepose/result_files.h"
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/new_file.h"
+#include "image/image_file.h"
+
+namespace maq {
+namespace {
+
+// Coordinates to a hundredth of a pixel and scores to four digits: what is there, without the noise of float to text.
+double rounded(double value, double step) { return std::round(value / step) * step; }
+
+std::string json_of(const DensePoseResult& result) {
+  nlohmann::ordered_json document;
+  document["width"] = result.planes.width_px;
+  document["height"] = result.planes.height_px;
+  document["people"] = nlohmann::json::array();
+  for (const Person& person : result.people) {
+    nlohmann::ordered_json entry;
+    entry["box"] = nlohmann::json::array();
+    for (const float edge : {person.box.x0, person.box.y0, person.box.x1, person.box.y1}) {
+      entry["box"].push_back(rounded(double(edge), 0.01));
+    }
+    entry["score"] = rounded(double(person.score), 0.0001);
+    document["people"].push_back(entry);
+  }
+  return document.dump() + "\n";
+}
+
+ImageView view_of(maq_pixel_format format, const DensePlanes& planes, const uint8_t* pixels) {
+  return packed_view(format, planes.width_px, planes.height_px, pixels);
+}
+
+// In the order of channels that the file has: I, U, V.
+std::vector<uint8_t> interleaved(const DensePlanes& planes) {
+  std::vector<uint8_t> pixels(3 * planes.part.size());
+  for (size_t i = 0; i < planes.part.size(); ++i) {
+    pixels[3 * i] = planes.part[i];
+    pixels[3 * i + 1] = planes.u[i];
+    pixels[3 * i + 2] = planes.v[i];
+  }
+  return pixels;
+}
+
+}  // namespace
+
+void write_result_files(const DensePoseResult& result, const std::string& folder, const std::string& stem) {
+  const auto path_of = [&](const char* ending) { return (std::filesystem::path(folder) / (stem + ending)).string(); };
+  NewFile iuv_file(path_of("_IUV.png")), inds_file(path_of("_INDS.png")), json_file(path_of(".json"));
+  const std::vector<uint8_t> pixels = interleaved(result.planes);
+  const std::vector<uint8_t> iuv = encode_image(view_of(MAQ_PIXEL_BGR8, result.planes, pixels.data()), ".png");
+  const std::vector<uint8_t> inds =
+      encode_image(view_of(MAQ_PIXEL_GREY8, result.planes, result.planes.person.data()), ".png");
+  const std::string json = json_of(result);
+  iuv_file.append(iuv.data(), iuv.size());
+  inds_file.append(inds.data(), inds.size());
+  json_file.append(json.data(), json.size());
+  for (NewFile* file : {&iuv_file, &inds_file, &json_file}) file->commit();
+}
+
+}  // namespace maq

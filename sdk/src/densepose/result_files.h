@@ -1,0 +1,15 @@
+// The files of a dense pose result, in the DensePose convention (docs/formats.md).
+#pragma once
+
+#include <string>
+
+#include "densepose/densepose.h"
+
+namespace maq {
+
+// Writes <stem>_IUV.png, <stem>_INDS.png and <stem>.json into a folder that is there. Each is whole or not at all, and none
+// takes its place before all are written.
+// Throws MAQ_ERROR_UNWRITABLE, and what encode_image() throws.
+void write_result_files(const DensePoseResult& result, const std::string& folder, const std::string& stem);
+
+}  // namespace maq

@@ -1,8 +1,11 @@
-// Hands values from a thread that makes them to one that shows them: the newest wins, nobody waits, nothing is copied.
-#pragma once
+// Hands values from a thread that makes them to one that uses them: the newest wins, nobody waits, nothing is copied.
+#ifndef MAQUETTE_NEWEST_HPP_
+#define MAQUETTE_NEWEST_HPP_
 
 #include <mutex>
 #include <utility>
+
+namespace maquette {
 
 template <class T>
 class Newest {
@@ -16,7 +19,7 @@ class Newest {
     fresh_ = true;
   }
 
-  // Of the showing thread: true when front() has become a newer value.
+  // Of the using thread: true when front() has become a newer value.
   bool take() {
     std::lock_guard<std::mutex> lock(mutex_);
     if (!fresh_) return false;
@@ -28,6 +31,10 @@ class Newest {
 
  private:
   std::mutex mutex_;
-  T back_, waiting_, front_;
+  T back_{}, waiting_{}, front_{};
   bool fresh_ = false;
 };
+
+}  // namespace maquette
+
+#endif  // MAQUETTE_NEWEST_HPP_

@@ -1,0 +1,477 @@
+#include "app.h"
+
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kMovingSidePx = 640, kStillSidePx = 1280;  // of a scene's pictures, while flying and after
+constexpr double kFlightSpeed = 0.12;                    // diagonals of the scene a second
+constexpr char kFirstCamera[] = "camera:", kRenderedPeople[] = "stub:people?count=2";
+constexpr int kLargestOutfitPx = 4096;
+constexpr double kToPhotoS = 0.6;
+constexpr double kIdleS = 0.25;                          // between two turns when nothing happens
+
+nlohmann::json as_json(const Rect& rect) { return {rect.x, rect.y, rect.width, rect.height}; }
+
+// An app's picture for the library; the memory stays the app's.
+maquette::Frame frame_of(const maquette::Context& context, const Picture& picture) {
+  maq_frame_desc desc;
+  maquette::check(maq_frame_desc_init(&desc, sizeof desc), nullptr);
+  desc.format = MAQ_PIXEL_RGBA8;
+  desc.width_px = picture.width_px;
+  desc.height_px = picture.height_px;
+  desc.planes[0] = picture.rgba.data();
+  return maquette::Frame(context, desc);
+}
+
+// A path as a URI of the library; what is no file stays.
+std::string uri_of(const std::string& path_or_uri) {
+  std::error_code error;
+  if (!fs::exists(path_or_uri, error)) return path_or_uri;
+  std::string uri = "file:";
+  for (const char c : path_or_uri) uri += c == '?' ? "%3F" : c == '%' ? "%25" : std::string(1, c);
+  return uri;
+}
+
+maquette::LiveOptions live_options(const Options& options) {
+  maquette::LiveOptions live;
+  live.in_real_time = !options.headless;
+  live.most_frames = options.frames;
+  if (options.headless) live.reconnect_ms = 4000;
+  return live;
+}
+
+}  // namespace
+
+App::App(const Options& options)
+    : options_(options),
+      start_s_(maquette::monotonic_s()),
+      window_("Maquette", options.width_px, options.height_px, !options.headless),
+      painter_(window_),
+      people_(context_, options.model, [this](const maquette::LiveFrame& mapped) {
+        mapped_.back().take_over(mapped, &seen_);
+        mapped_.publish();
+        Window::wake();
+      }, Window::wake, live_options(options)),
+      scenes_(options.scene_bundle, options.model.threads) {
+  if (!options.texture.empty()) load_outfit(options.texture);
+  open(options.source);
+}
+
+int App::run() {
+  double before_s = maquette::monotonic_s();
+  while (!window_.is_closing()) {
+    const bool flies = shows_scene_ && (moving_ || turned_);
+    window_.wait(flies || options_.headless ? 0.008 : kIdleS);
+    const double turn_s = maquette::monotonic_s();
+    take_news();
+    take_keys();
+    fly(float(std::min(0.1, turn_s - before_s)));
+    before_s = turn_s;
+    window_.begin_drawing();
+    draw();
+    window_.end_drawing();
+    if (clip_file_ && fresh_) add_to_clip();
+    const bool done = options_.headless && is_done();
+    if (done && !options_.screenshot.empty()) take_screenshot(options_.screenshot, window_.rect());
+    window_.show();
+    if (start_ms_ == 0) {
+      start_ms_ = (maquette::monotonic_s() - start_s_) * 1000;
+    } else {
+      turns_ms_.push_back(float((maquette::monotonic_s() - turn_s) * 1000));
+    }
+    if (done) window_.close();
+  }
+  if (!options_.headless) return 0;
+  std::puts(report().c_str());
+  const std::string problem = shows_scene_ ? scenes_.state()->text : people_.status().problem;
+  if (!has_failed()) return 0;
+  std::fprintf(stderr, "maquette-demo: %s\n", problem.c_str());
+  return 1;
+}
+
+void App::open(const std::string& path_or_uri) {
+  std::error_code error;
+  shows_scene_ = fs::is_directory(path_or_uri, error) || fs::path(path_or_uri).extension() == ".maqs";
+  stages_.clear();
+  people_.pause(shows_scene_ || paused_);
+  if (shows_scene_) {
+    flight_.reset();
+    pictures_ = 0;
+    scenes_.open(path_or_uri, options_.capture);
+  } else {
+    scenes_.close();
+    people_.open(uri_of(path_or_uri), path_or_uri == kFirstCamera ? kRenderedPeople : "");
+  }
+}
+
+void App::open_people() {
+  shows_scene_ = false;
+  scenes_.close();
+  stages_.clear();
+  if (people_.status().uri.empty()) open(kFirstCamera);
+  people_.pause(paused_);
+}
+
+void App::load_outfit(const std::string& path) {
+  files_.add([this, path] {
+    const auto frame = maquette::Source(context_, uri_of(path)).next();
+    if (!frame || std::max(frame->desc().width_px, frame->desc().height_px) > kLargestOutfitPx) {
+      return path + " cannot be worn: its sides must be up to " + std::to_string(kLargestOutfitPx) + " pixels.";
+    }
+    Picture& outfit = outfits_.back();
+    outfit.resize(frame->desc().width_px, frame->desc().height_px);
+    frame->copy_pixels(MAQ_PIXEL_RGBA8, outfit.rgba.data(), 0, outfit.rgba.size());
+    outfits_.publish();
+    Window::wake();
+    return std::string();
+  });
+}
+
+void App::take_news() {
+  for (const std::string& path : window_.take_drops()) {
+    // In the try-on view what is dropped is something to wear.
+    if (options_.view == View::kTryOn && !shows_scene_) {
+      load_outfit(path);
+    } else {
+      open(path);
+    }
+  }
+  if (outfits_.take()) painter_.set_outfit(outfits_.front());
+  int nodes = 0;
+  if (!has_surface_) {
+    const std::vector<float> points = people_.surface(&nodes);
+    if (nodes > 0) painter_.set_surface(points, nodes);
+    has_surface_ = nodes > 0;
+  }
+  fresh_ = false;
+  ended_ = people_.status().ended;  // asked before the frame is taken, which then is the last
+  if (mapped_.take()) {
+    fresh_ = true;
+    const MappedFrame& frame = mapped_.front();
+    painter_.set_frame(frame);
+    const maq_densepose_stats& s = frame.stats;
+    stages_.push_back({{s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.decode_ms, s.preprocess_ms,
+                        float(frame.copying_ms), float(frame.waiting_ms)}});
+  }
+  if (scenes_.shown().take()) {
+    fresh_ = true;
+    ++pictures_;
+    set_scene_pictures();
+    const maq_scene_image_stats& s = scenes_.shown().front().stats;
+    stages_.push_back({{s.project_ms, s.shade_ms, s.refine_ms, s.turn_ms}});
+  }
+  while (stages_.size() > 200) stages_.pop_front();
+}
+
+void App::set_scene_pictures() {
+  const SceneShown& shown = scenes_.shown().front();
+  painter_.set_scene(shown.rendering, options_.compare == Compare::kError ? shown.error : shown.photo);
+}
+
+void App::take_keys() {
+  const bool control = window_.is_down(GLFW_KEY_LEFT_CONTROL) || window_.is_down(GLFW_KEY_RIGHT_CONTROL);
+  for (const int key : window_.take_keys()) {
+    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) options_.view = View(key - GLFW_KEY_1);
+    if (key == GLFW_KEY_M) options_.mesh = !options_.mesh;
+    if (key == GLFW_KEY_H) options_.panel = !options_.panel;
+    if (key == GLFW_KEY_P) people_.pause((paused_ = !paused_) || shows_scene_);
+    if (key == GLFW_KEY_C && shows_scene_) set_compare(Compare((int(options_.compare) + 1) % 3));
+    if (key == GLFW_KEY_N && flight_) go_to_photo(flight_->nearest_photo(scenes_.state()->photos));
+    if (key == GLFW_KEY_COMMA) go_to_photo(photo_ - 1);
+    if (key == GLFW_KEY_PERIOD) go_to_photo(photo_ + 1);
+    if (key == GLFW_KEY_X && shows_scene_) open_people();
+    if (key == GLFW_KEY_TAB) ImGui::SetWindowFocus(ImGui::GetIO().NavActive ? nullptr : "panel");
+    if (key == GLFW_KEY_F1) help_ = !help_;
+    if (key == GLFW_KEY_F2) take_snapshot();
+    if (key == GLFW_KEY_F3) toggle_clip();
+    if (key == GLFW_KEY_F4) toggle_recording();
+    if (key == GLFW_KEY_F11) window_.toggle_full_screen();
+    if (key == GLFW_KEY_ESCAPE) help_ = false;
+    if (key == GLFW_KEY_Q && control) window_.close();
+  }
+}
+
+void App::set_compare(Compare compare) {
+  options_.compare = compare;
+  const auto state = scenes_.state();
+  if (compare != Compare::kNone && flight_ && flight_->at_photo() < 0) {
+    go_to_photo(flight_->nearest_photo(state->photos));
+  }
+  set_scene_pictures();
+}
+
+void App::go_to_photo(int index) {
+  const auto state = scenes_.state();
+  const int count = int(state->photos.size());
+  if (!flight_ || count == 0) return;
+  photo_ = (index + count) % count;
+  flight_->go_to(state->photos[size_t(photo_)], options_.headless ? 0 : kToPhotoS, photo_);
+  turned_ = true;
+}
+
+void App::fly(float seconds) {
+  const ImGuiIO& io = ImGui::GetIO();
+  const bool mouse = !io.WantCaptureMouse && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+  if (mouse && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
+    const Rect& body = body_rect_;
+    const float line = float(picture_rect_.x) + slider_ * float(picture_rect_.width);
+    const bool in_body = body.width > 0 && io.MousePos.x < float(body.x + body.width) && io.MousePos.y > float(body.y);
+    drags_ = !shows_scene_ ? (in_body ? Drag::kBody : Drag::kNothing)
+             : options_.compare == Compare::kSlider && photo_ >= 0 && std::abs(io.MousePos.x - line) < 14 * window_.scale()
+                 ? Drag::kSlider
+                 : Drag::kView;
+  }
+  const float dx = mouse ? io.MouseDelta.x : 0, dy = mouse ? io.MouseDelta.y : 0;
+  const auto held = [&](int more, int less) { return float(window_.is_down(more)) - float(window_.is_down(less)); };
+  const bool control = window_.is_down(GLFW_KEY_LEFT_CONTROL) || window_.is_down(GLFW_KEY_RIGHT_CONTROL);
+  const float arrows_x = io.NavActive ? 0 : held(GLFW_KEY_RIGHT, GLFW_KEY_LEFT) * seconds * 1.5f;
+  const float arrows_y = io.NavActive ? 0 : held(GLFW_KEY_DOWN, GLFW_KEY_UP) * seconds * 1.5f;
+  if (!shows_scene_) {
+    if (drags_ == Drag::kBody) yaw_ -= dx * 0.01f, pitch_ = std::clamp(pitch_ + dy * 0.01f, -1.5f, 1.5f);
+    yaw_ -= arrows_x, pitch_ = std::clamp(pitch_ + arrows_y, -1.5f, 1.5f);
+    return;
+  }
+  const auto state = scenes_.state();
+  if (state->what != SceneState::kReady) return;
+  bool moves = !flight_;
+  if (!flight_) flight_.emplace(state->info, state->photos);
+  if (drags_ == Drag::kSlider) slider_ = std::clamp(slider_ + dx / float(std::max(1, picture_rect_.width)), 0.0f, 1.0f);
+  const float turn_x = arrows_x + (drags_ == Drag::kView ? dx * 0.004f : 0);
+  const float turn_y = arrows_y + (drags_ == Drag::kView ? dy * 0.004f : 0);
+  const float right = held(GLFW_KEY_D, GLFW_KEY_A), up = held(GLFW_KEY_E, GLFW_KEY_Q);
+  const float forward = held(GLFW_KEY_W, GLFW_KEY_S), wheel = io.WantCaptureMouse ? 0 : io.MouseWheel;
+  if (!control && (turn_x != 0 || turn_y != 0 || right != 0 || up != 0 || forward != 0 || wheel != 0)) {
+    if (turn_x != 0 || turn_y != 0) flight_->turn(double(turn_x), double(-turn_y));
+    if (wheel != 0) flight_->zoom(std::pow(1.1, double(wheel)));
+    flight_->move(double(right), double(up), double(forward), double(seconds), kFlightSpeed);
+    moves = true;
+  }
+  moves |= flight_->update(double(seconds));
+  const bool ends = moving_ && !moves;
+  const bool resized = picture_area_.width != looked_at_.width || picture_area_.height != looked_at_.height;
+  moving_ = moves;
+  if (!moves && !ends && !resized && !turned_) return;
+  turned_ = false;
+  looked_at_ = picture_area_;
+  // In motion smaller pictures, for the sake of their number.
+  const int photo = flight_->at_photo();
+  const double side = std::max(picture_area_.width, picture_area_.height);
+  const double scale = std::min(1.0, (moves ? kMovingSidePx : kStillSidePx) / side);
+  const auto scaled = [&](int px) { return std::max(16, int(px * scale)); };
+  if (photo >= 0) {
+    photo_ = photo;
+    scenes_.look(state->photos[size_t(photo)], photo);
+  } else {
+    scenes_.look(flight_->camera(scaled(picture_area_.width), scaled(picture_area_.height)), -1);
+  }
+}
+
+void App::draw() {
+  const Rect all = window_.rect();
+  const int panel_px = options_.panel ? std::min(int(330 * window_.scale()), all.width / 2) : 0;
+  picture_area_ = {0, 0, std::max(1, all.width - panel_px), all.height};
+  body_rect_ = {};
+  if (shows_scene_) {
+    const SceneShown& shown = scenes_.shown().front();
+    if (pictures_ > 0) {
+      picture_rect_ = picture_area_.fit(shown.rendering.width_px, shown.rendering.height_px);
+      const bool compares = options_.compare != Compare::kNone && shown.photo_index >= 0;
+      painter_.draw_scene(picture_rect_, !compares ? 0 : options_.compare == Compare::kError ? 1 : slider_);
+      if (compares && options_.compare == Compare::kSlider) draw_slider();
+    }
+  } else if (mapped_.front().number > 0) {
+    const MappedFrame& frame = mapped_.front();
+    picture_rect_ = picture_area_.fit(frame.camera.width_px, frame.camera.height_px);
+    painter_.draw_people(options_.view, picture_rect_);
+    if (options_.view == View::kBoxes) draw_boxes(frame);
+    if (options_.mesh) {
+      const int side = std::min(picture_area_.width, picture_area_.height) * 3 / 10;
+      body_rect_ = {0, all.height - side, side, side};
+      painter_.draw_body(body_rect_, yaw_, pitch_);
+    }
+  }
+  draw_news();
+  if (options_.panel) draw_panel(panel_px);
+  if (help_) draw_help();
+}
+
+void App::draw_boxes(const MappedFrame& frame) {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const float scale = float(picture_rect_.width) / float(frame.camera.width_px);
+  const auto place = [&](float x, float y) {
+    return ImVec2(float(picture_rect_.x) + x * scale, float(picture_rect_.y) + y * scale);
+  };
+  for (const maq_person& person : frame.people) {
+    const ImVec2 from = place(person.box_px[0], person.box_px[1]), to = place(person.box_px[2], person.box_px[3]);
+    list->AddRect(from, to, IM_COL32(255, 255, 255, 255), 0, 0, 2 * window_.scale());
+    char score[8];
+    std::snprintf(score, sizeof score, "%.2f", double(person.score));
+    const ImVec2 size = ImGui::CalcTextSize(score);
+    const float top = std::max(float(picture_rect_.y), from.y - size.y - 4);
+    list->AddRectFilled({from.x, top}, {from.x + size.x + 8, top + size.y + 4}, IM_COL32(255, 255, 255, 255));
+    list->AddText({from.x + 4, top + 2}, IM_COL32(24, 26, 40, 255), score);
+  }
+}
+
+void App::draw_slider() {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const float x = float(picture_rect_.x) + slider_ * float(picture_rect_.width), top = float(picture_rect_.y);
+  const ImVec2 photo = ImGui::CalcTextSize("photo");
+  list->AddLine({x, top}, {x, top + float(picture_rect_.height)}, IM_COL32_WHITE, 2 * window_.scale());
+  list->AddRectFilled({x - photo.x - 14, top}, {x + ImGui::CalcTextSize("rendering").x + 14, top + photo.y + 6},
+                      IM_COL32(0, 0, 0, 150));
+  list->AddText({x - photo.x - 8, top + 3}, IM_COL32_WHITE, "photo");
+  list->AddText({x + 8, top + 3}, IM_COL32_WHITE, "rendering");
+}
+
+// What the person must know, over the picture: why there are no frames, what is being done, what was saved.
+void App::draw_news() {
+  std::string text;
+  if (shows_scene_) {
+    const auto state = scenes_.state();
+    if (state->what != SceneState::kReady) text = state->text;
+    if (state->what == SceneState::kOpening) text += " " + std::to_string(int(state->done * 100)) + " %";
+  } else {
+    const maquette::LiveStatus status = people_.status();
+    text = status.problem.empty() ? status.doing : status.problem;
+  }
+  const std::string told = files_.told();
+  if (told != told_) told_ = told, told_at_s_ = maquette::monotonic_s();
+  if (maquette::monotonic_s() - told_at_s_ < 5) text += (text.empty() ? "" : "\n") + told_;
+  if (text.empty()) return;
+  const float margin = 10 * window_.scale(), width = float(picture_area_.width) - 4 * margin;
+  const ImVec2 size = ImGui::CalcTextSize(text.c_str(), nullptr, false, width);
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  list->AddRectFilled({margin, margin}, {size.x + 3 * margin, size.y + 3 * margin}, IM_COL32(20, 20, 24, 220), margin / 2);
+  list->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {2 * margin, 2 * margin}, IM_COL32(255, 214, 120, 255),
+                text.c_str(), nullptr, width);
+}
+
+std::string App::new_path(const char* extension) const {
+  const std::time_t now = std::time(nullptr);
+  char name[40];
+  std::strftime(name, sizeof name, "maquette-%Y-%m-%d-%H-%M-%S", std::localtime(&now));
+  return (fs::path(options_.out) / name).string() + extension;
+}
+
+void App::take_screenshot(const std::string& path, const Rect& rect) {
+  auto picture = std::make_shared<Picture>(window_.read_pixels(rect));
+  files_.add([this, picture, path] {
+    frame_of(context_, *picture).save(path);
+    return "Saved " + path;
+  });
+}
+
+void App::take_snapshot() {
+  const std::string path = new_path("");
+  take_screenshot(path + ".png", picture_rect_);
+  const auto result = mapped_.front().result;
+  if (shows_scene_ || result == nullptr) return;
+  files_.add([path, result, folder = options_.out] {
+    result->save(folder, fs::path(path).filename().string());
+    return "Saved " + path + ".png, _IUV.png, _INDS.png and .json";
+  });
+}
+
+void App::toggle_clip() {
+  if (clip_file_ != nullptr) {
+    files_.add([file = std::move(clip_file_), path = clip_path_] {
+      if (*file) (*file)->finish();
+      return "Saved " + path;
+    });
+    clip_file_ = nullptr;
+    return;
+  }
+  clip_path_ = new_path(".mp4");
+  clip_rect_ = picture_rect_;
+  const double fps = shows_scene_ ? 25 : std::max(1.0, mapped_.front().fps);
+  clip_file_ = std::make_shared<std::optional<maquette::Clip>>();
+  files_.add([this, file = clip_file_, path = clip_path_, fps] {
+    file->emplace(context_, path, fps);
+    return "Recording " + path;
+  });
+}
+
+// A clip has one size: it ends where the window gets another.
+void App::add_to_clip() {
+  if (clip_rect_.width != picture_rect_.width || clip_rect_.height != picture_rect_.height) return toggle_clip();
+  auto picture = std::make_shared<Picture>(window_.read_pixels(picture_rect_));
+  files_.add([this, file = clip_file_, picture] {
+    if (*file) (*file)->add(frame_of(context_, *picture));
+    return std::string();
+  });
+}
+
+void App::toggle_recording() {
+  recording_ = recording_.empty() ? new_path(".maqrec") : "";
+  people_.record(recording_);
+}
+
+bool App::has_failed() const {
+  return shows_scene_ ? scenes_.state()->what == SceneState::kFailed : people_.status().failed;
+}
+
+bool App::is_done() {
+  if (has_failed()) return true;
+  if (!shows_scene_) return ended_;
+  if (pictures_ == 0 || pictures_ == done_pictures_) return false;
+  done_pictures_ = pictures_;
+  // It looks around, and ends where a photo was taken.
+  if (pictures_ + 1 < options_.frames) {
+    flight_->turn(pictures_ % 40 < 20 ? 0.02 : -0.02, 0);
+    turned_ = true;
+    return false;
+  }
+  if (scenes_.shown().front().photo_index >= 0 || scenes_.state()->photos.empty()) return true;
+  go_to_photo(flight_->nearest_photo(scenes_.state()->photos));
+  return false;
+}
+
+std::string App::report() const {
+  std::vector<float> sorted = turns_ms_;
+  std::sort(sorted.begin(), sorted.end());
+  const auto rank = [&](double share) {
+    return sorted.empty() ? 0.0f : sorted[size_t(share * double(sorted.size() - 1) + 0.5)];
+  };
+  const MappedFrame& frame = mapped_.front();
+  const maquette::LiveStatus status = people_.status();
+  nlohmann::ordered_json json;
+  json["frames"] = shows_scene_ ? pictures_ : frame.number;
+  json["source"] = status.uri;
+  json["view"] = kViewNames[size_t(options_.view)];
+  json["window_px"] = {window_.rect().width, window_.rect().height};
+  json["picture_px"] = as_json(picture_rect_);
+  json["mesh_px"] = body_rect_.width > 0 ? as_json(body_rect_) : nlohmann::json();
+  json["frame_px"] = {frame.camera.width_px, frame.camera.height_px};
+  json["people"] = nlohmann::json::array();
+  for (const maq_person& person : frame.people) {
+    json["people"].push_back({{"box", person.box_px}, {"score", person.score}});
+  }
+  json["drops"] = status.drops;
+  json["events"] = status.events;
+  json["problem"] = status.problem;
+  json["ui"] = {{"turns", sorted.size()}, {"longest_ms", rank(1)}, {"p99_ms", rank(0.99)}, {"start_ms", start_ms_}};
+  json["opengl"] = window_.opengl();
+  json["scene"] = nullptr;
+  if (shows_scene_) {
+    const auto state = scenes_.state();
+    const SceneShown& shown = scenes_.shown().front();
+    json["problem"] = state->what == SceneState::kFailed ? state->text : "";
+    json["scene"] = {{"points", state->info.point_count}, {"photo", nullptr}, {"psnr_db", nullptr}};
+    if (shown.photo_index >= 0) {
+      json["scene"]["photo"] = state->photo_names[size_t(shown.photo_index)];
+      json["scene"]["psnr_db"] = shown.psnr_db;
+    }
+  }
+  return json.dump();
+}

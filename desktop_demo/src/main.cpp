@@ -1,0 +1,83 @@
+// maquette-demo: a person's own body surface, live from a webcam.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+
+#include "app.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Beside the program, where the build and an installation have it.
+std::string shared_file(const char* variable, const char* path) {
+  const char* const given = variable == nullptr ? nullptr : std::getenv(variable);
+  if (given != nullptr && *given != '\0') return given;
+  std::error_code error;
+  const fs::path found = fs::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "share/maquette" / path;
+  return fs::exists(found, error) ? found.string() : "";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.bundle = shared_file("MAQ_BUNDLE", "models/densepose-b-int8");
+  options.scene_bundle = shared_file("MAQ_SCENE_BUNDLE", "models/scenes-int8");
+  options.texture = shared_file(nullptr, "demo/outfit.png");
+  options.out = fs::current_path().string();
+  options.model.spin = 0;  // a thread that stays awake takes a core from the window
+  bool part_only = false;
+  std::string path, view = "parts", compare = "none", size = "1280x800";
+
+  CLI::App cli(
+      "Shows the body surface of whoever is before the camera, live, on the processor alone.\n\n"
+      "  maquette-demo                       the first camera that works; without one, rendered people\n"
+      "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
+      "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
+      "  maquette-demo room.maqs --capture room --compare slider\n"
+      "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
+      "In the window F1 shows the keys. Files can be dropped on it.",
+      "maquette-demo");
+  cli.add_option("PATH", path, "A photo, clip, recording, scene file or capture folder");
+  cli.add_option("--source", options.source, "A source by its URI")->excludes("PATH");
+  cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
+  cli.add_flag("--mesh,!--no-mesh", options.mesh, "The body's surface in the corner, with what is seen of it in colour");
+  cli.add_option("--texture", options.texture, "Worn in the try-on view: a DensePose atlas (2:3), or any picture");
+  cli.add_option("--capture", options.capture, "Folder of the photos that the scene file was made of");
+  cli.add_option("--compare", compare, "Photo against rendering")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"none", "slider", "error"}));
+  cli.add_option("--bundle", options.bundle, "Folder of the dense pose networks");
+  cli.add_option("--scene-bundle", options.scene_bundle, "Folder of the scene networks");
+  cli.add_option("--threads", options.model.threads, "Of the networks; 0: all cores")->check(CLI::Range(0, 64));
+  cli.add_option("--key-frames", options.model.key_frame_interval, "People are looked for in one of so many frames")
+      ->check(CLI::Range(1, 1000));
+  cli.add_flag("--part-only", part_only, "No U and V: faster");
+  cli.add_option("--size", size, "Of the window")->capture_default_str();
+  cli.add_option("--out", options.out, "Folder of snapshots, clips and recordings; default: this one")
+      ->check(CLI::ExistingDirectory);
+  auto* const headless = cli.add_flag("--headless", options.headless, "No visible window; ends with a line of JSON");
+  cli.add_option("--frames", options.frames, "End after so many frames")->needs(headless)->check(CLI::Range(1, 1000000));
+  cli.add_option("--screenshot", options.screenshot, "PNG of the window at the end")->needs(headless);
+  CLI11_PARSE(cli, argc, argv);
+
+  try {
+    options.view = View(std::find(kViewNames.begin(), kViewNames.end(), view) - kViewNames.begin());
+    options.compare = compare == "slider" ? Compare::kSlider : compare == "error" ? Compare::kError : Compare::kNone;
+    if (std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) != 2 || options.width_px < 64 ||
+        options.height_px < 64 || std::max(options.width_px, options.height_px) > 16384) {
+      throw std::runtime_error("--size " + size + " is no size of a window, such as 1280x800.");
+    }
+    options.model.bundle_path = options.bundle.c_str();
+    options.model.detail = part_only ? MAQ_DETAIL_PART : MAQ_DETAIL_SURFACE;
+    if (options.headless && options.frames == 0) options.frames = 30;
+    if (!path.empty()) options.source = path;
+    if (options.source.empty()) options.source = "camera:";
+    return App(options).run();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "maquette-demo: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,35 @@
+#include "mapped_frame.h"
+
+void MappedFrame::take_over(const maquette::LiveFrame& mapped, std::vector<uint8_t>* seen_before) {
+  const double before_s = maquette::monotonic_s();
+  const maq_frame_desc desc = mapped.frame.desc();
+  camera.resize(desc.width_px, desc.height_px);
+  mapped.frame.copy_pixels(MAQ_PIXEL_RGBA8, camera.rgba.data(), 0, camera.rgba.size());
+  iuv.resize(camera.rgba.size());
+  const maq_densepose_plane planes[] = {MAQ_PLANE_PART, MAQ_PLANE_U, MAQ_PLANE_V, MAQ_PLANE_PERSON};
+  for (size_t channel = 0; channel < 4; ++channel) {
+    size_t stride_bytes = 0;
+    const uint8_t* from = mapped.result->plane(planes[channel], &stride_bytes);
+    uint8_t* to = iuv.data() + channel;
+    for (int y = 0; y < desc.height_px; ++y, from += stride_bytes) {
+      for (int x = 0; x < desc.width_px; ++x, to += 4) *to = from[x];
+    }
+  }
+  // What was seen fades within a second or so.
+  seen_before->resize(size_t(24 * kSeenCells * kSeenCells));
+  for (uint8_t& cell : *seen_before) cell = uint8_t(cell * 15 / 16);
+  for (size_t at = 0; at < iuv.size(); at += 4) {
+    if (iuv[at] == 0) continue;
+    const int u = iuv[at + 1] * kSeenCells / 256, v = iuv[at + 2] * kSeenCells / 256;
+    (*seen_before)[size_t(((iuv[at] - 1) * kSeenCells + v) * kSeenCells + u)] = 255;
+  }
+  seen = *seen_before;
+  people.assign(mapped.result->people().begin(), mapped.result->people().end());
+  result = mapped.result;
+  stats = result->stats();
+  number = mapped.number;
+  fps = mapped.fps;
+  age_ms = mapped.age_ms;
+  waiting_ms = mapped.waiting_ms;
+  copying_ms = (maquette::monotonic_s() - before_s) * 1000;
+}

@@ -1,0 +1,235 @@
+#include "painter.h"
+
+#include <epoxy/gl.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "shaders.h"
+
+namespace {
+
+constexpr float kContoursPerChart = 8;  // of U, and as many of V
+
+unsigned compiled(unsigned kind, const char* source) {
+  const unsigned shader = glCreateShader(kind);
+  glShaderSource(shader, 1, &source, nullptr);
+  glCompileShader(shader);
+  int fine = 0;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &fine);
+  char log[1024] = "";
+  if (fine == 0) glGetShaderInfoLog(shader, sizeof log, nullptr, log);
+  if (fine == 0) throw std::runtime_error(std::string("This OpenGL refuses a shader of the demo: ") + log);
+  return shader;
+}
+
+unsigned linked(const char* vertex_source, const char* fragment_source) {
+  const unsigned program = glCreateProgram();
+  const unsigned shaders[] = {compiled(GL_VERTEX_SHADER, vertex_source), compiled(GL_FRAGMENT_SHADER, fragment_source)};
+  for (const unsigned shader : shaders) glAttachShader(program, shader);
+  glLinkProgram(program);
+  for (const unsigned shader : shaders) glDeleteShader(shader);
+  int fine = 0;
+  glGetProgramiv(program, GL_LINK_STATUS, &fine);
+  if (fine == 0) throw std::runtime_error("This OpenGL cannot link the shaders of the demo; update its driver.");
+  glUseProgram(program);
+  for (int part = 0; part <= 24; ++part) {
+    uint8_t rgb[3];
+    maq_part_name(part, rgb);
+    const std::string name = "part_colours[" + std::to_string(part) + "]";
+    glUniform3f(glGetUniformLocation(program, name.c_str()), float(rgb[0]) / 255, float(rgb[1]) / 255, float(rgb[2]) / 255);
+  }
+  return program;
+}
+
+bool is_known(const float* point) { return !std::isnan(point[0]); }
+
+}  // namespace
+
+Painter::Painter(const Window& window) : window_(window) {
+  glGenTextures(kTextureCount, textures_);
+  glGenVertexArrays(1, &no_vertices_);
+  glGenVertexArrays(1, &body_vertices_);
+  glGenBuffers(1, &body_buffer_);
+  for (int texture = 0; texture < kTextureCount; ++texture) {
+    const bool layered = texture == kSurfaceTexture || texture == kSeenTexture;
+    const unsigned kind = layered ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D;
+    const int filter = texture == kIuvTexture ? GL_NEAREST : GL_LINEAR;
+    const int wrap = texture == kOutfitTexture ? GL_REPEAT : GL_CLAMP_TO_EDGE;
+    glActiveTexture(GL_TEXTURE0 + unsigned(texture));
+    glBindTexture(kind, textures_[texture]);
+    glTexParameteri(kind, GL_TEXTURE_MIN_FILTER, filter);
+    glTexParameteri(kind, GL_TEXTURE_MAG_FILTER, filter);
+    glTexParameteri(kind, GL_TEXTURE_WRAP_S, wrap);
+    glTexParameteri(kind, GL_TEXTURE_WRAP_T, wrap);
+    const uint8_t black[24 * 4] = {};
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    if (layered) {
+      glTexImage3D(kind, 0, GL_R8, 1, 1, 24, 0, GL_RED, GL_UNSIGNED_BYTE, black);
+    } else {
+      glTexImage2D(kind, 0, GL_RGBA8, 1, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, black);
+    }
+  }
+  people_program_ = linked(kPictureVertexShader, kPeopleShader);
+  scene_program_ = linked(kPictureVertexShader, kSceneShader);
+  body_program_ = linked(kBodyVertexShader, kBodyShader);
+}
+
+Painter::~Painter() {
+  glDeleteTextures(kTextureCount, textures_);
+  glDeleteVertexArrays(1, &no_vertices_);
+  glDeleteVertexArrays(1, &body_vertices_);
+  glDeleteBuffers(1, &body_buffer_);
+  for (const unsigned program : {people_program_, scene_program_, body_program_}) glDeleteProgram(program);
+}
+
+int Painter::uniform(const char* name) const { return glGetUniformLocation(program_, name); }
+
+// Each texture has a unit of its own, so binding is naming.
+void Painter::bind(const char* name, Texture texture) const { glUniform1i(uniform(name), int(texture)); }
+
+void Painter::upload(Texture texture, int width_px, int height_px, const uint8_t* rgba) {
+  glActiveTexture(GL_TEXTURE0 + unsigned(texture));
+  // Dear ImGui binds its own to the first unit.
+  glBindTexture(GL_TEXTURE_2D, textures_[texture]);
+  int (&size)[2] = sizes_[texture];
+  if (size[0] != width_px || size[1] != height_px) {
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width_px, height_px, 0, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+    size[0] = width_px, size[1] = height_px;
+  } else {
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_px, height_px, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+  }
+}
+
+void Painter::set_frame(const MappedFrame& frame) {
+  const int width_px = frame.camera.width_px, height_px = frame.camera.height_px;
+  upload(kCameraTexture, width_px, height_px, frame.camera.rgba.data());
+  upload(kIuvTexture, width_px, height_px, frame.iuv.data());
+  people_ = int(frame.people.size());
+  glActiveTexture(GL_TEXTURE0 + kSeenTexture);
+  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R8, MappedFrame::kSeenCells, MappedFrame::kSeenCells, 24, 0, GL_RED,
+               GL_UNSIGNED_BYTE, frame.seen.data());
+}
+
+void Painter::set_outfit(const Picture& outfit) {
+  upload(kOutfitTexture, outfit.width_px, outfit.height_px, outfit.rgba.data());
+  outfit_is_atlas_ = outfit.width_px * 3 == outfit.height_px * 2;
+}
+
+void Painter::set_scene(const Picture& rendering, const Picture& photo) {
+  upload(kRenderingTexture, rendering.width_px, rendering.height_px, rendering.rgba.data());
+  if (!photo.empty()) upload(kPhotoTexture, photo.width_px, photo.height_px, photo.rgba.data());
+}
+
+void Painter::set_surface(const std::vector<float>& points, int nodes) {
+  const auto point = [&](int part, int u, int v) { return &points[size_t(((part * nodes + u) * nodes + v) * 3)]; };
+  // Where a chart ends its last point goes on, so that what is between two nodes is never half unknown.
+  std::vector<float> filled(points.size());
+  for (int part = 0; part < 24; ++part) {
+    for (int v = 0; v < nodes; ++v) {
+      for (int u = 0; u < nodes; ++u) {
+        const float* nearest = point(part, u, v);
+        for (int least = 1 << 30, j = 0; !is_known(point(part, u, v)) && j < nodes * nodes; ++j) {
+          const int du = j / nodes - u, dv = j % nodes - v, away = du * du + dv * dv;
+          if (away < least && is_known(point(part, j / nodes, j % nodes))) {
+            nearest = point(part, j / nodes, j % nodes), least = away;
+          }
+        }
+        std::copy(nearest, nearest + 3, &filled[size_t(((part * nodes + v) * nodes + u) * 3)]);
+      }
+    }
+  }
+  glActiveTexture(GL_TEXTURE0 + kSurfaceTexture);
+  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGB32F, nodes, nodes, 24, 0, GL_RGB, GL_FLOAT, filled.data());
+
+  std::vector<float> vertices;  // point, normal, part - 1, U, V
+  const auto corner = [&](int part, int u, int v) {
+    const float* at = point(part, u, v);
+    const auto along = [&](int du, int dv, int axis) {
+      const int u1 = std::min(u + du, nodes - 1), v1 = std::min(v + dv, nodes - 1);
+      const int u0 = std::max(u - du, 0), v0 = std::max(v - dv, 0);
+      const float *after = point(part, u1, v1), *before = point(part, u0, v0);
+      return (is_known(after) ? after : at)[axis] - (is_known(before) ? before : at)[axis];
+    };
+    const float a[] = {along(1, 0, 0), along(1, 0, 1), along(1, 0, 2)};
+    const float b[] = {along(0, 1, 0), along(0, 1, 1), along(0, 1, 2)};
+    const float last = float(nodes - 1);
+    vertices.insert(vertices.end(), {at[0], at[1], at[2], a[1] * b[2] - a[2] * b[1] + 1e-12f,
+                                     a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], float(part),
+                                     float(u) / last, float(v) / last});
+  };
+  constexpr int kTriangles[4][3] = {{0, 1, 2}, {1, 3, 2}, {0, 1, 3}, {0, 3, 2}};  // of the corners 0 1 / 2 3
+  for (int part = 0; part < 24; ++part) {
+    for (int u = 0; u + 1 < nodes; ++u) {
+      for (int v = 0; v + 1 < nodes; ++v) {
+        const auto known = [&](int k) { return is_known(point(part, u + (k & 1), v + (k >> 1))); };
+        // At the edge of a chart three known corners of the cell make one triangle.
+        const bool other_way = !known(1) || !known(2);
+        for (const int* triangle : {kTriangles[other_way ? 2 : 0], kTriangles[other_way ? 3 : 1]}) {
+          if (!known(triangle[0]) || !known(triangle[1]) || !known(triangle[2])) continue;
+          for (int k = 0; k < 3; ++k) corner(part, u + (triangle[k] & 1), v + (triangle[k] >> 1));
+        }
+      }
+    }
+  }
+  body_vertex_count_ = int(vertices.size() / 9);
+  glBindVertexArray(body_vertices_);
+  glBindBuffer(GL_ARRAY_BUFFER, body_buffer_);
+  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(vertices.size() * sizeof(float)), vertices.data(), GL_STATIC_DRAW);
+  for (unsigned k = 0; k < 3; ++k) {
+    glEnableVertexAttribArray(k);
+    glVertexAttribPointer(k, 3, GL_FLOAT, GL_FALSE, 9 * sizeof(float),
+                          static_cast<const char*>(nullptr) + k * 3 * sizeof(float));
+  }
+}
+
+void Painter::use(unsigned program, const Rect& rect) {
+  glUseProgram(program_ = program);
+  glViewport(rect.x, window_.rect().height - rect.y - rect.height, rect.width, rect.height);
+  glBindVertexArray(no_vertices_);
+  glDisable(GL_DEPTH_TEST);
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, textures_[0]);
+}
+
+void Painter::draw_people(View view, const Rect& rect) {
+  use(people_program_, rect);
+  bind("camera", kCameraTexture);
+  bind("iuv", kIuvTexture);
+  bind("outfit", kOutfitTexture);
+  bind("surface", kSurfaceTexture);
+  glUniform1i(uniform("view"), int(view));
+  glUniform1i(uniform("people"), people_);
+  glUniform1i(uniform("outfit_is_atlas"), outfit_is_atlas_ ? 1 : 0);
+  glUniform1f(uniform("lines"), kContoursPerChart);
+  glUniform1f(uniform("screen_px"), float(rect.width) / float(std::max(1, sizes_[kCameraTexture][0])));
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void Painter::draw_scene(const Rect& rect, float slider) {
+  use(scene_program_, rect);
+  bind("rendering", kRenderingTexture);
+  bind("photo", kPhotoTexture);
+  glUniform1f(uniform("slider"), slider);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void Painter::draw_body(const Rect& rect, float yaw, float pitch) {
+  if (body_vertex_count_ == 0) return;
+  use(body_program_, rect);
+  glEnable(GL_DEPTH_TEST);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  glBindVertexArray(body_vertices_);
+  bind("seen", kSeenTexture);
+  // The body stands on z = 0, faces -y and is under 2 m tall and wide; seen from far away.
+  const float eye[] = {std::sin(yaw) * std::cos(pitch), -std::cos(yaw) * std::cos(pitch), std::sin(pitch)};
+  const float right[] = {std::cos(yaw), std::sin(yaw), 0};
+  const float up[] = {-std::sin(yaw) * std::sin(pitch), std::cos(yaw) * std::sin(pitch), std::cos(pitch)};
+  const float x = float(rect.height) / float(rect.width), middle = 0.85f;
+  const float projection[16] = {right[0] * x, up[0], -eye[0] / 4, 0, right[1] * x,  up[1],            -eye[1] / 4,         0,
+                                right[2] * x, up[2], -eye[2] / 4, 0, 0, -middle * up[2], middle * eye[2] / 4, 1};
+  glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, projection);
+  glUniform3fv(uniform("towards_eye"), 1, eye);
+  glDrawArrays(GL_TRIANGLES, 0, body_vertex_count_);
+  glDisable(GL_DEPTH_TEST);
+}

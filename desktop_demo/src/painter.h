@@ -1,0 +1,48 @@
+// Draws pictures of people, of scenes and of the body into the window, from textures that it keeps.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "mapped_frame.h"
+#include "picture.h"
+#include "window.h"
+
+enum class View { kCamera, kParts, kContours, kMask, kBoxes, kTryOn };
+constexpr std::array<const char*, 6> kViewNames = {"camera", "parts", "contours", "mask", "boxes", "try-on"};
+
+class Painter {
+ public:
+  explicit Painter(const Window& window);
+  ~Painter();
+
+  void set_frame(const MappedFrame& frame);
+  // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any picture, which is repeated
+  // over the body's front and back.
+  void set_outfit(const Picture& outfit);
+  // Points [24][nodes][nodes][3] in metres, NaN where a chart does not reach.
+  void set_surface(const std::vector<float>& points, int nodes);
+  void set_scene(const Picture& rendering, const Picture& photo);
+
+  void draw_people(View view, const Rect& rect);
+  // `slider`: the part of the width that shows the photo.
+  void draw_scene(const Rect& rect, float slider);
+  // The body from a direction, in radians, with what was seen of it in colour.
+  void draw_body(const Rect& rect, float yaw, float pitch);
+
+ private:
+  enum Texture { kCameraTexture, kIuvTexture, kOutfitTexture, kSurfaceTexture, kSeenTexture, kRenderingTexture,
+                 kPhotoTexture, kTextureCount };
+  void upload(Texture texture, int width_px, int height_px, const uint8_t* rgba);
+  void use(unsigned program, const Rect& rect);
+  int uniform(const char* name) const;
+  void bind(const char* uniform, Texture texture) const;
+
+  const Window& window_;
+  unsigned people_program_ = 0, scene_program_ = 0, body_program_ = 0, program_ = 0;
+  unsigned textures_[kTextureCount] = {};
+  int sizes_[kTextureCount][2] = {};
+  unsigned no_vertices_ = 0, body_vertices_ = 0, body_buffer_ = 0;
+  int body_vertex_count_ = 0, people_ = 0;
+  bool outfit_is_atlas_ = false;
+};

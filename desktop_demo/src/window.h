@@ -1,0 +1,57 @@
+// A window with an OpenGL 3.3 core context and Dear ImGui in it, and what a person does to it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "picture.h"
+
+struct GLFWwindow;
+
+// In pixels of the window's picture, from its top left corner.
+struct Rect {
+  int x = 0, y = 0, width = 0, height = 0;
+  // The largest of the shape width : height that fits, in the middle.
+  Rect fit(int of_width, int of_height) const;
+};
+
+class Window {
+ public:
+  // Throws std::runtime_error, a sentence with advice, where no window or no OpenGL 3.3 can be had.
+  Window(const char* title, int width, int height, bool visible);
+  ~Window();
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
+
+  bool is_closing() const;
+  void close();
+  // Lets the picture stay as it is until something happens, or for `most_s`.
+  void wait(double most_s);
+  // From any thread: ends a wait.
+  static void wake();
+  void begin_drawing();
+  void end_drawing();
+  // What was drawn, on the screen.
+  void show();
+  // Rows from top to bottom.
+  Picture read_pixels(const Rect& rect) const;
+  void toggle_full_screen();
+
+  Rect rect() const;
+  float scale() const { return scale_; }  // of texts, for screens of many pixels
+  std::string opengl() const;
+  // Keys (GLFW_KEY_…) that were pressed since the last call, and whether one is held down now.
+  std::vector<int> take_keys();
+  bool is_down(int key) const;
+  // Paths that were dropped since the last call.
+  std::vector<std::string> take_drops();
+
+ private:
+  void set_scale(float scale);
+
+  GLFWwindow* window_ = nullptr;
+  float scale_ = 0, font_scale_ = 1;
+  int placed_[4] = {};  // before it filled the screen: x, y, width, height
+  std::vector<int> keys_;
+  std::vector<std::string> drops_;
+};

@@ -17,7 +17,7 @@ constexpr int kMovingSidePx = 640, kStillSidePx = 1280;  // of a scene's picture
 constexpr double kFlightSpeed = 0.12;                    // diagonals of the scene a second
 constexpr char kFirstCamera[] = "camera:", kRenderedPeople[] = "stub:people?count=2";
 constexpr int kLargestOutfitPx = 4096;
-constexpr double kToPhotoS = 0.6;
+constexpr double kToPhotoS = 0.6, kFlightTurnS = 0.016;
 constexpr double kIdleS = 0.25;                          // between two turns when nothing happens
 
 nlohmann::json as_json(const Rect& rect) { return {rect.x, rect.y, rect.width, rect.height}; }
@@ -64,14 +64,17 @@ App::App(const Options& options)
       }, Window::wake, live_options(options)),
       scenes_(options.scene_bundle, options.model.threads) {
   if (!options.texture.empty()) load_outfit(options.texture);
+  // Software OpenGL compiles a shader when it draws with it first: now, before anybody waits.
+  for (const View view : {View::kCamera, View::kParts}) painter_.draw_people(view, {0, 0, 8, 8});
+  painter_.draw_scene({0, 0, 8, 8}, 0);
+  painter_.draw_body({0, 0, 8, 8}, 0, 0);
   open(options.source);
 }
 
 int App::run() {
   double before_s = maquette::monotonic_s();
   while (!window_.is_closing()) {
-    const bool flies = shows_scene_ && (moving_ || turned_);
-    window_.wait(flies || options_.headless ? 0.008 : kIdleS);
+    window_.wait(shows_scene_ && (moving_ || turned_) ? kFlightTurnS : kIdleS);
     const double turn_s = maquette::monotonic_s();
     take_news();
     take_keys();

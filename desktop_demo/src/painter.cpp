@@ -73,6 +73,7 @@ Painter::Painter(const Window& window) : window_(window) {
   people_program_ = linked(kPictureVertexShader, kPeopleShader);
   scene_program_ = linked(kPictureVertexShader, kSceneShader);
   body_program_ = linked(kBodyVertexShader, kBodyShader);
+  set_surface(std::vector<float>(24 * 2 * 2 * 3), 2);
 }
 
 Painter::~Painter() {

@@ -53,18 +53,21 @@ vec4 label(vec2 p, out float cover) {
 // Blue to red by way of green and yellow.
 vec3 by_value(float t) { return clamp(1.5 - abs(4.0 * t - vec3(3.0, 2.0, 1.0)), 0.0, 1.0); }
 
-// How much of an iso-line of U (1) or V (2) lies here, from the slope over four pixels of one chart.
+// How much of an iso-line of U (1) or V (2) lies here, from the slope over up to four pixels of one chart.
 float contour(vec4 here, vec2 p, int plane) {
   vec2 slope = vec2(0.0);
   for (int axis = 0; axis < 2; ++axis) {
     ivec2 d = axis == 0 ? ivec2(2, 0) : ivec2(0, 2);
-    vec4 a = texel(ivec2(round(p)) - d), b = texel(ivec2(round(p)) + d);
-    if (a.x == here.x && b.x == here.x) slope[axis] = (b[plane] - a[plane]) / (255.0 * 4.0) * lines;
+    vec4 a = texel(ivec2(round(p)) - d), b = texel(ivec2(round(p)) + d), middle = texel(ivec2(round(p)));
+    float span = 4.0;
+    if (a.x != here.x) a = middle, span -= 2.0;
+    if (b.x != here.x) b = middle, span -= 2.0;
+    if (span > 0.0 && middle.x == here.x) slope[axis] = (b[plane] - a[plane]) / (255.0 * span) * lines;
   }
   float steep = length(slope) / screen_px;
   float level = here[plane] * lines;
   float away_px = abs(level - round(level)) / max(steep, 1e-4);
-  return steep < 1e-4 ? 0.0 : (1.0 - smoothstep(0.6, 1.6, away_px)) * (1.0 - smoothstep(0.2, 0.5, steep));
+  return steep < 1e-4 ? 0.0 : (1.0 - smoothstep(0.6, 1.6, away_px)) * (1.0 - smoothstep(0.25, 0.6, steep));
 }
 
 vec3 worn(vec4 here) {

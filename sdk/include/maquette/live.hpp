@@ -113,7 +113,7 @@ class LiveDensePose {
   }
   // Begins a recording of the source's frames (.maqrec), or ends it with "".
   void record(const std::string& path) {
-    order([&](Orders& orders) { orders.recording = path; });
+    order([&](Orders& orders) { orders.recording = path, ++orders.recording_number; });
   }
 
   LiveStatus status() const {
@@ -131,7 +131,7 @@ class LiveDensePose {
   struct Orders {
     std::string uri, otherwise, bundle, recording;
     maq_densepose_config config{};
-    uint64_t source_number = 0, model_number = 0;
+    uint64_t source_number = 0, model_number = 0, recording_number = 0;
     bool paused = false, stop = false;
   };
 
@@ -199,6 +199,7 @@ class LiveDensePose {
       throw;
     }
     if (!frame) {
+      end_recording();
       source_.reset();
       change_status([](LiveStatus& status) { status.ended = true; });
       return false;
@@ -223,8 +224,7 @@ class LiveDensePose {
   void open_source(const Orders& orders) {
     source_.reset();
     held_.reset();
-    recorder_.reset();
-    recording_.clear();
+    end_recording();
     change_status([&](LiveStatus& status) {
       status = LiveStatus();
       status.uri = orders.uri;
@@ -305,17 +305,21 @@ class LiveDensePose {
   // A disk that is full ends the recording, not the picture.
   void keep_recording(const Orders& orders, const Frame& frame) {
     try {
-      if (recording_ != orders.recording) {
-        recording_ = orders.recording;
-        if (recorder_) recorder_->finish();
-        recorder_.reset();
-        if (!recording_.empty()) recorder_.emplace(context_, recording_, &*source_);
+      if (recording_number_ != orders.recording_number) {
+        recording_number_ = orders.recording_number;
+        end_recording();
+        if (!orders.recording.empty()) recorder_.emplace(context_, orders.recording, &*source_);
       }
       if (recorder_) recorder_->add(frame);
     } catch (const Error& error) {
       recorder_.reset();
       change_status([&](LiveStatus& status) { status.problem = error.what(); });
     }
+  }
+
+  void end_recording() {
+    if (recorder_) recorder_->finish();
+    recorder_.reset();
   }
 
   void map(const Frame& frame, double waiting_ms, double age_ms) {
@@ -349,8 +353,7 @@ class LiveDensePose {
   std::optional<DensePose> model_;
   std::optional<Recorder> recorder_;
   std::optional<Frame> held_;  // mapped last, to be mapped with other settings
-  std::string recording_;
-  uint64_t source_number_ = 0, model_number_ = 0, frames_ = 0;
+  uint64_t source_number_ = 0, model_number_ = 0, recording_number_ = 0, frames_ = 0;
   std::deque<double> times_s_;
   std::thread thread_;
 };

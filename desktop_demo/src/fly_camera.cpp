@@ -14,38 +14,36 @@ Vec3 vec3(const double* a) { return {a[0], a[1], a[2]}; }
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 // Not by the hypot of three numbers, which loses NaN in libstdc++ 12.
 double length(const Vec3& a) { return std::hypot(std::hypot(a[0], a[1]), a[2]); }
+bool finite(const Vec3& a) { return std::isfinite(length(a)); }
 Vec3 mix(double s, const Vec3& a, double t, const Vec3& b) {
   return {s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]};
 }
 Vec3 unit(const Vec3& a) { return mix(1 / length(a), a, 0, a); }
-bool finite(const Vec3& a) { return std::isfinite(a[0]) && std::isfinite(a[1]) && std::isfinite(a[2]); }
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-// The rotation nearest to these rows' forward and right; keeps rounding from adding up.
-Rows rotation_of(const Rows& rows) {
-  const Vec3 forward = unit(rows[2]), right = unit(mix(1, rows[0], -dot(rows[0], forward), forward));
-  return {right, cross(forward, right), forward};
+Rows rotation_of(const Vec3& right, const Vec3& forward) {
+  const Vec3 ahead = unit(forward), aside = unit(mix(1, right, -dot(right, ahead), ahead));
+  return {aside, cross(ahead, aside), ahead};
 }
-// Turned about an axis of length 1 (Rodrigues' formula).
-Rows turned(Rows rows, const Vec3& axis, double angle) {
-  for (Vec3& row : rows) {
+// About an axis of length 1 (Rodrigues' formula).
+Rows turned(const Rows& rows, const Vec3& axis, double angle) {
+  const auto turn = [&](const Vec3& row) {
     const Vec3 along = mix(dot(row, axis), axis, 0, axis), across = mix(1, row, -1, along);
-    row = mix(1, along, 1, mix(std::cos(angle), across, std::sin(angle), cross(axis, row)));
-  }
-  return rotation_of(rows);
+    return mix(1, along, 1, mix(std::cos(angle), across, std::sin(angle), cross(axis, row)));
+  };
+  return rotation_of(turn(rows[0]), turn(rows[2]));
 }
-// On the shortest arc between two rotations, about one axis.
+// On the shortest arc between two rotations.
 Rows between(const Rows& from, const Rows& to, double share) {
-  Vec3 sines{}, longest{};  // by half a turn, where the sine is 0, rows and their images add up along the axis
-  double cosines = 0;
+  Vec3 sines{}, longest{};  // by half a turn the sine is 0; rows and what becomes of them then add up along the axis
+  double cosines = -1;
   for (size_t i = 0; i < 3; ++i) {
     const Vec3 sum = mix(1, from[i], 1, to[i]);
-    sines = mix(1, sines, 0.5, cross(from[i], to[i])), cosines += dot(from[i], to[i]);
+    sines = mix(1, sines, 1, cross(from[i], to[i])), cosines += dot(from[i], to[i]);
     if (length(sum) > length(longest)) longest = sum;
   }
-  const double angle = std::atan2(length(sines), 0.5 * (cosines - 1));
-  return turned(from, unit(length(sines) > 1e-6 ? sines : longest), share * angle);
+  return turned(from, unit(length(sines) > 1e-6 ? sines : longest), share * std::atan2(length(sines), cosines));
 }
 
 }  // namespace
@@ -58,25 +56,21 @@ FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_camera>&
   const double diagonal = length(mix(1, vec3(scene.high), -1, vec3(scene.low))), far_out = length(middle);
   size_ = diagonal > 1e-10 * far_out && std::isfinite(diagonal) ? diagonal : std::max(1.0, 1e-6 * far_out);
   // From a little above, 60 degrees wide: the ball about the box fills the picture.
-  const Vec3 aside = std::abs(up_[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-  const Vec3 away =
-      mix(std::cos(26 * kDegree), unit(mix(1, aside, -dot(aside, up_), up_)), std::sin(26 * kDegree), up_);
-  const double focal_px = 240 / std::tan(30 * kDegree);
-  pose_ = {rotation_of({cross(up_, away), {}, mix(-1, away, 0, away)}),
-           mix(1, middle, size_, away),
-           {640, 480, focal_px, focal_px, 0, 0}};
+  const Vec3 right = unit(cross(up_, std::abs(up_[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
+  const Vec3 ahead = unit(mix(2, cross(up_, right), -1, up_));
+  pose_ = {rotation_of(right, ahead), mix(1, middle, -size_, ahead), {640, 480, 415, 415, 0, 0}};
   if (!photos.empty()) go_to(photos[photos.size() / 2], 0, int(photos.size() / 2));
 }
 
 std::optional<FlyCamera::Pose> FlyCamera::pose_of(const maq_camera& camera) {
-  const double w = camera.width_px, h = camera.height_px, x = camera.cx_px - (w - 1) / 2,
-               y = camera.cy_px - (h - 1) / 2;
+  const double w = camera.width_px, h = camera.height_px, fx = camera.fx_px, fy = camera.fy_px;
   const Rows given{vec3(camera.rotation), vec3(camera.rotation + 3), vec3(camera.rotation + 6)};
-  Pose pose{rotation_of(given), vec3(camera.centre), {w, h, camera.fx_px, camera.fy_px, x, y}};
-  double off = 0;  // may be 0.001
+  Pose pose{rotation_of(given[0], given[2]), vec3(camera.centre), {w, h, fx, fy}};
+  pose.lens[kOffsetX] = camera.cx_px - (w - 1) / 2, pose.lens[kOffsetY] = camera.cy_px - (h - 1) / 2;
+  double off = 0;  // cameras' rotations may be off by 0.001
   for (size_t row = 0; row < 3; ++row) off += length(mix(1, pose.rows[row], -1, given[row]));
   for (const double number : pose.lens) off += std::isfinite(number) ? 0 : 1;
-  if (!(off < 0.02) || !finite(pose.centre) || !(std::min({w, h, camera.fx_px, camera.fy_px}) > 0)) return {};
+  if (!(off < 0.02 && w > 0 && h > 0 && fx > 0 && fy > 0 && finite(pose.centre))) return {};
   if (off < 1e-10) pose.rows = given;
   return pose;
 }
@@ -94,7 +88,7 @@ void FlyCamera::turn(double yaw, double pitch) {
   if (!std::isfinite(yaw) || !std::isfinite(pitch) || (yaw == 0 && pitch == 0)) return;
   leave();
   Rows rows = turned(pose_.rows, up_, -yaw);
-  // Where the camera would look to the right if it did not lean. Straight up or down nothing leans.
+  // To the right, if it did not lean; straight up or down nothing leans.
   const Vec3 across = cross(rows[2], up_);
   const Vec3 level = unit(length(across) > 0.01 ? across : mix(1, rows[0], -dot(rows[0], up_), up_));
   const double steep = std::atan2(dot(rows[2], up_), length(across));
@@ -106,11 +100,8 @@ void FlyCamera::turn(double yaw, double pitch) {
 void FlyCamera::zoom(double factor) {
   if (!std::isfinite(factor) || factor <= 0 || factor == 1) return;
   leave();
-  double &fx = pose_.lens[kFx], half_px = 0.5 * std::max(pose_.lens[kWidth], pose_.lens[kHeight]);
-  // A photo's lens may be beyond these limits; it is then changed towards them alone.
-  const double least = std::min(fx, half_px / std::tan(55 * kDegree)),
-               most = std::max(fx, half_px / std::tan(10 * kDegree));
-  const double scale = std::clamp(fx * factor, least, most) / fx;
+  double &fx = pose_.lens[kFx], half_px = std::max(pose_.lens[kWidth], pose_.lens[kHeight]) / 2;
+  const double scale = std::clamp(fx * factor, half_px / std::tan(55 * kDegree), half_px / std::tan(10 * kDegree)) / fx;
   fx *= scale, pose_.lens[kFy] *= scale;
 }
 
@@ -121,32 +112,31 @@ void FlyCamera::go_to(const maq_camera& camera, double seconds, int photo_index)
   // The same view with the other's focal length: pictures of any shape then change without a jump.
   const double scale = to->lens[kFx] / pose_.lens[kFx];
   for (double& number : pose_.lens) number *= scale;
-  flight_ = Flight{pose_, *to, camera, photo_index, seconds, 0};
+  from_ = pose_, to_ = *to, target_ = camera, photo_index_ = photo_index, flight_s_ = seconds, flown_s_ = 0;
   if (seconds <= 0) update(0);
 }
 
 bool FlyCamera::update(double seconds) {
-  if (!flight_ || !(seconds >= 0)) return false;
-  auto& [from, to, camera, photo_index, all_s, done_s] = *flight_;
-  done_s += seconds;
-  if (done_s >= all_s) {
-    pose_ = to, at_ = camera, photo_index_ = photo_index;
-    flight_.reset();
+  if (!target_ || !(seconds >= 0)) return false;
+  flown_s_ += seconds;
+  if (flown_s_ >= flight_s_) {
+    pose_ = to_, at_ = target_;
+    target_.reset();
     return true;
   }
-  const double t = done_s / all_s, share = t * t * (3 - 2 * t);
-  pose_.rows = between(from.rows, to.rows, share);
-  pose_.centre = mix(1 - share, from.centre, share, to.centre);
-  for (size_t i = 0; i < kLensNumbers; ++i) pose_.lens[i] = (1 - share) * from.lens[i] + share * to.lens[i];
+  const double t = flown_s_ / flight_s_, share = t * t * (3 - 2 * t);
+  pose_.rows = between(from_.rows, to_.rows, share);
+  pose_.centre = mix(1 - share, from_.centre, share, to_.centre);
+  for (size_t i = 0; i < 6; ++i) pose_.lens[i] = (1 - share) * from_.lens[i] + share * to_.lens[i];
   return true;
 }
 
 maq_camera FlyCamera::camera(int width_px, int height_px) const {
-  const auto& lens = pose_.lens;
+  const std::array<double, 6>& lens = pose_.lens;
   const double scale = std::min(width_px / lens[kWidth], height_px / lens[kHeight]);
-  const double cx_px = (width_px - 1) / 2.0 + lens[kOffsetX] * scale,
-               cy_px = (height_px - 1) / 2.0 + lens[kOffsetY] * scale;
-  maq_camera camera{sizeof camera, width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, cx_px, cy_px, {}, {}, {}};
+  maq_camera camera{sizeof camera, width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, 0, 0, {}, {}, {}};
+  camera.cx_px = (width_px - 1) / 2.0 + lens[kOffsetX] * scale;
+  camera.cy_px = (height_px - 1) / 2.0 + lens[kOffsetY] * scale;
   for (size_t i = 0; i < 9; ++i) camera.rotation[i] = pose_.rows[i / 3][i % 3];
   std::copy(pose_.centre.begin(), pose_.centre.end(), camera.centre);
   return camera;

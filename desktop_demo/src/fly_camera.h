@@ -1,56 +1,45 @@
-// The camera with which a user flies through a scene: poses, neither keys nor drawing. Calls with a number that is not finite
-// or a camera that is none do nothing.
+// The camera with which a user flies through a scene. Calls with a number that is not finite or a camera that is none do
+// nothing.
 #pragma once
 
 #include <array>
 #include <maquette/maquette.hpp>
-#include <optional>
 #include <vector>
 
 class FlyCamera {
  public:
   // Begins at the middle photo; without photos outside of the scene's box, looking at it.
   FlyCamera(const maq_scene_info& scene, const std::vector<maq_camera>& photos);
-
   // Each -1 to 1: to the camera's right, along the world's up, forwards. `speed`: diagonals of the scene's box a second.
   void move(double right, double up, double forward, double seconds, double speed);
   // To the right about the world's up, and upwards, radians; ends short of straight up and down. A camera that leans to a
   // side gets upright by and by.
   void turn(double yaw, double pitch);
-  // Above 1 things get larger. The field of view of the picture's longer side stays between 20 and 110 degrees.
-  void zoom(double factor);
+  void zoom(double factor);  // above 1 things get larger; the longer side keeps within 20 to 110 degrees
   // Flies there while update() is called, until the user steers; is there at once for 0 seconds.
   void go_to(const maq_camera& camera, double seconds, int photo_index);
-  bool update(double seconds);  // true when it moved
-
-  // In a picture of any size: all that the photo it was at last would show.
-  maq_camera camera(int width_px, int height_px) const;
+  bool update(double seconds);                           // true when it moved
+  maq_camera camera(int width_px, int height_px) const;  // shows all that the photo it was at last would
   // What it began at or flew to, until it leaves: of the photo's own size, to be compared with it pixel by pixel.
   const std::optional<maq_camera>& photo_camera() const { return at_; }
-  int at_photo() const { return at_ ? photo_index_ : -1; }         // the index of that
+  int at_photo() const { return at_ ? photo_index_ : -1; }
   int nearest_photo(const std::vector<maq_camera>& photos) const;  // by place and direction; -1 without photos
 
  private:
   using Vec3 = std::array<double, 3>;
-  enum LensNumber { kWidth, kHeight, kFx, kFy, kOffsetX, kOffsetY, kLensNumbers };  // offset: of the principal point
+  enum { kWidth, kHeight, kFx, kFy, kOffsetX, kOffsetY };  // the offset is the principal point's from the middle
   struct Pose {
     std::array<Vec3, 3> rows;  // world to camera: to the right, down, forward
     Vec3 centre;
-    std::array<double, kLensNumbers> lens;  // pixels
-  };
-  struct Flight {
-    Pose from, to;
-    maq_camera camera;
-    int photo_index;
-    double seconds, done_s;
+    std::array<double, 6> lens;  // pixels
   };
   static std::optional<Pose> pose_of(const maq_camera& camera);
-  void leave() { at_.reset(), flight_.reset(); }
+  void leave() { at_.reset(), target_.reset(); }
 
   Vec3 up_;          // the world's
   double size_ = 1;  // the box's diagonal
-  Pose pose_;
-  std::optional<maq_camera> at_;
+  Pose pose_, from_, to_;
+  std::optional<maq_camera> at_, target_;  // target: while it flies
   int photo_index_ = -1;
-  std::optional<Flight> flight_;
+  double flight_s_ = 0, flown_s_ = 0;
 };

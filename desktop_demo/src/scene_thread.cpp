@@ -11,22 +11,21 @@ namespace {
 maq_camera within_limits(maq_camera camera) {
   const double scale = std::min(1280.0 / camera.width_px, 960.0 / camera.height_px);
   if (!(scale > 0 && scale < 1)) return camera;
-  const auto shrink = [&](int32_t& side_px, double& focal_px, double& middle_px) {
-    const double exact = std::max(1.0, std::round(side_px * scale)) / side_px;
-    side_px = int32_t(std::lround(side_px * exact));
-    focal_px *= exact, middle_px = (middle_px + 0.5) * exact - 0.5;
-  };
-  shrink(camera.width_px, camera.fx_px, camera.cx_px);
-  shrink(camera.height_px, camera.fy_px, camera.cy_px);
+  camera.width_px = std::max(1, int(camera.width_px * scale + 0.5));
+  camera.height_px = std::max(1, int(camera.height_px * scale + 0.5));
+  camera.fx_px *= scale, camera.fy_px *= scale;
+  camera.cx_px = (camera.cx_px + 0.5) * scale - 0.5, camera.cy_px = (camera.cy_px + 0.5) * scale - 0.5;
   return camera;
 }
 
-void copy(const maquette::Frame& frame, Picture& picture) {
+Picture copy(const maquette::Frame& frame) {
+  Picture picture;
   picture.resize(frame.desc().width_px, frame.desc().height_px);
   frame.copy_pixels(MAQ_PIXEL_RGBA8, picture.rgba.data(), 0, picture.rgba.size());
+  return picture;
 }
 
-// Each pixel is the mean of places all over it, at most one of the photo's pixels apart.
+// Each pixel is the mean of places all over it, less than one of the photo's pixels apart.
 Picture resized(Picture from, int width_px, int height_px) {
   if (from.width_px == width_px && from.height_px == height_px) return from;
   Picture to;
@@ -34,11 +33,10 @@ Picture resized(Picture from, int width_px, int height_px) {
   const double width = double(from.width_px) / width_px, height = double(from.height_px) / height_px;
   const int side = 1 + int(std::ceil(std::max(width, height)));
   for (size_t i = 0; i < to.rgba.size(); ++i) {
-    const size_t column = i / 4 % size_t(width_px), row = i / 4 / size_t(width_px);
     int sum = 0;
     for (int place = 0; place < side * side; ++place) {
-      const size_t x = size_t((double(column) + (place % side + 0.5) / side) * width);
-      const size_t y = size_t((double(row) + (place / side + 0.5) / side) * height);
+      const size_t x = size_t((double(i / 4 % size_t(width_px)) + (place % side + 0.5) / side) * width);
+      const size_t y = size_t((double(i / 4 / size_t(width_px)) + (place / side + 0.5) / side) * height);
       sum += from.rgba[(y * size_t(from.width_px) + x) * 4 + i % 4];
     }
     to.rgba[i] = uint8_t(sum / (side * side));
@@ -70,11 +68,10 @@ SceneThread::SceneThread(const std::string& bundle_path, int threads) : bundle_p
 }
 
 SceneThread::~SceneThread() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    wish_.ends = true;
-    wake_.notify_one();
-  }
+  std::unique_lock<std::mutex> lock(mutex_);
+  wish_.ends = true;
+  wake_.notify_one();
+  lock.unlock();
   thread_.join();
 }
 
@@ -83,7 +80,7 @@ void SceneThread::open(const std::string& path, const std::string& capture_folde
   if (!path.empty()) *state = {SceneState::kOpening, 0, path, "Opening " + path + ".", {}, {}, {}};
   const std::lock_guard<std::mutex> lock(mutex_);
   wish_ = {path, capture_folder, wish_.threads, -1, {}, true, false, false};
-  state_ = std::move(state);
+  std::atomic_store(&state_, std::shared_ptr<const SceneState>(state));
   shown_.take();
   wake_.notify_one();
 }
@@ -101,21 +98,14 @@ void SceneThread::set_threads(int threads) {
   wake_.notify_one();
 }
 
-std::shared_ptr<const SceneState> SceneThread::state() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return state_;
-}
-
 // False when the scene that it is about is no longer wanted.
-bool SceneThread::update(const std::function<void(SceneState&)>& change) noexcept try {
+bool SceneThread::update(const std::function<void(SceneState&)>& change) noexcept {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (wish_.opens || wish_.ends) return false;
   auto state = std::make_shared<SceneState>(*state_);
   change(*state);
-  state_ = std::move(state);
+  std::atomic_store(&state_, std::shared_ptr<const SceneState>(state));
   return true;
-} catch (const std::bad_alloc&) {
-  return false;
 }
 
 void SceneThread::run() {
@@ -142,7 +132,7 @@ void SceneThread::run() {
 
 void SceneThread::load(const Wish& wish) {
   renderer_.reset(), scene_.reset(), capture_.reset();
-  photo_index_ = -1, missing_.clear();
+  photo_key_ = {}, missing_.clear();
   if (wish.path.empty()) return;
   if (!context_) context_.emplace();
   std::error_code ignored;
@@ -160,9 +150,7 @@ void SceneThread::load(const Wish& wish) {
     config.progress = [](void* self, double done, const char* what) -> int32_t {
       return static_cast<SceneThread*>(self)->update([&](SceneState& state) { state.done = done, state.text = what; });
     };
-    maq_scene_build_stats stats{};
-    scene_.emplace(*context_, config, *capture_, &stats);
-    if (stats.unused_views > 0) missing_ = std::to_string(stats.unused_views) + " photos could not be used.";
+    scene_.emplace(*context_, config, *capture_);
   } else {
     scene_.emplace(*context_, wish.path);
   }
@@ -190,20 +178,17 @@ void SceneThread::draw(const Wish& wish) {
   maq_frame_desc desc{sizeof desc, MAQ_PIXEL_BGR8, camera.width_px, camera.height_px, {}, {}, 0, MAQ_CLOCK_MEDIA, 0};
   desc.planes[0] = static_cast<const uint8_t*>(image.plane(MAQ_SCENE_BGR, desc.stride_bytes));
   SceneShown& shown = shown_.back();
-  copy(maquette::Frame(*context_, desc), shown.rendering);
+  shown.rendering = copy(maquette::Frame(*context_, desc));
   shown.camera = camera, shown.stats = image.stats(), shown.photo_index = -1, shown.psnr_db = NAN;
   shown.photo.resize(0, 0), shown.error.resize(0, 0);
   std::string text = missing_;
+  const std::array<int, 3> key{wish.photo_index, camera.width_px, camera.height_px};
   try {
-    if (wish.photo_index >= 0 && capture_) {
-      if (photo_index_ != wish.photo_index || photo_.width_px != camera.width_px ||
-          photo_.height_px != camera.height_px) {
-        copy(capture_->load_view(uint32_t(wish.photo_index)), photo_);
-        photo_ = resized(std::move(photo_), camera.width_px, camera.height_px);
-        photo_index_ = wish.photo_index;
-      }
+    if (capture_ && wish.photo_index >= 0) {
+      if (photo_key_ != key) photo_ = resized(copy(capture_->load_view(uint32_t(key[0]))), key[1], key[2]);
+      photo_key_ = key;
       shown.photo = photo_;
-      shown.psnr_db = compare(shown.rendering, shown.photo, shown.error);
+      shown.psnr_db = compare(shown.rendering, photo_, shown.error);
       shown.photo_index = wish.photo_index;
     }
   } catch (const maquette::Error& error) {

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include <maquette/newest.hpp>
+#include "newest.h"
 #include "picture.h"
 
 struct SceneShown {
@@ -22,7 +22,7 @@ struct SceneShown {
 struct SceneState {
   enum What { kNothing, kOpening, kReady, kFailed } what = kNothing;
   double done = 0;         // 0 to 1, while opening
-  std::string path, text;  // text: what is being done, what is missing or why it failed, a sentence or nothing
+  std::string path, text;  // text: what is being done, what is missing or why it failed, in sentences; or nothing
   maq_scene_info info{};   // from here on: once it is ready
   std::vector<maq_camera> photos;
   std::vector<std::string> photo_names;  // with " (kept out)" where the capture keeps them for comparisons
@@ -39,9 +39,8 @@ class SceneThread {  // all calls by the thread that takes the pictures
   // Renders a picture once there is a scene, 1280 x 960 at most; the latest call wins. `photo_index`: whose camera, or -1.
   void look(const maq_camera& camera, int photo_index);
   void set_threads(int threads);  // renders the latest picture again
-  std::shared_ptr<const SceneState> state() const;
-  maquette::Newest<SceneShown>& shown() { return shown_; }
-  const maquette::Newest<SceneShown>& shown() const { return shown_; }
+  std::shared_ptr<const SceneState> state() const { return std::atomic_load(&state_); }
+  Newest<SceneShown>& shown() { return shown_; }
 
  private:
   struct Wish {
@@ -57,20 +56,20 @@ class SceneThread {  // all calls by the thread that takes the pictures
   bool update(const std::function<void(SceneState&)>& change) noexcept;
 
   const std::string bundle_path_;
-  mutable std::mutex mutex_;
+  std::mutex mutex_;  // of the wish, and of changes of the state
   std::condition_variable wake_;
   Wish wish_;
   std::shared_ptr<const SceneState> state_ = std::make_shared<SceneState>();
-  maquette::Newest<SceneShown> shown_;
+  Newest<SceneShown> shown_;
   // Of the thread alone:
   std::optional<maquette::Context> context_;
   std::optional<maquette::Capture> capture_;
   std::optional<maquette::Scene> scene_;
   std::optional<maquette::SceneRenderer> renderer_;
-  int threads_ = 0;
-  Picture photo_;  // the latest, of its rendering's size
-  int photo_index_ = -1;
   std::string missing_;  // the state's text while nothing fails
+  Picture photo_;        // the latest, and its index and size
+  std::array<int, 3> photo_key_{};
+  int threads_ = 0;
   uint64_t pictures_ = 0;
   std::thread thread_;
 };

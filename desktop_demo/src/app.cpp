@@ -18,20 +18,9 @@ constexpr double kFlightSpeed = 0.12;                    // diagonals of the sce
 constexpr char kFirstCamera[] = "camera:", kRenderedPeople[] = "stub:people?count=2";
 constexpr int kLargestOutfitPx = 4096;
 constexpr double kToPhotoS = 0.6, kFlightTurnS = 0.016;
-constexpr double kIdleS = 0.25;                          // between two turns when nothing happens
+constexpr double kIdleS = 0.25;  // between two turns when nothing happens
 
 nlohmann::json as_json(const Rect& rect) { return {rect.x, rect.y, rect.width, rect.height}; }
-
-// An app's picture for the library; the memory stays the app's.
-maquette::Frame frame_of(const maquette::Context& context, const Picture& picture) {
-  maq_frame_desc desc;
-  maquette::check(maq_frame_desc_init(&desc, sizeof desc), nullptr);
-  desc.format = MAQ_PIXEL_RGBA8;
-  desc.width_px = picture.width_px;
-  desc.height_px = picture.height_px;
-  desc.planes[0] = picture.rgba.data();
-  return maquette::Frame(context, desc);
-}
 
 // A path as a URI of the library; what is no file stays.
 std::string uri_of(const std::string& path_or_uri) {
@@ -57,12 +46,15 @@ App::App(const Options& options)
       start_s_(maquette::monotonic_s()),
       window_("Maquette", options.width_px, options.height_px, !options.headless),
       painter_(window_),
-      people_(context_, options.model, [this](const maquette::LiveFrame& mapped) {
-        mapped_.back().take_over(mapped, &seen_);
-        mapped_.publish();
-        Window::wake();
-      }, Window::wake, live_options(options)),
-      scenes_(options.scene_bundle, options.model.threads) {
+      people_(
+          context_, options.model,
+          [this](const maquette::LiveFrame& mapped) {
+            mapped_.back().take_over(mapped, &seen_);
+            mapped_.publish();
+            Window::wake();
+          },
+          Window::wake, live_options(options)),
+      scenes_(context_, options.scene_bundle, options.model.threads, Window::wake) {
   if (!options.texture.empty()) load_outfit(options.texture);
   // Software OpenGL compiles a shader when it draws with it first: now, before anybody waits.
   for (const View view : {View::kCamera, View::kParts}) painter_.draw_people(view, {0, 0, 8, 8});
@@ -131,9 +123,7 @@ void App::load_outfit(const std::string& path) {
     if (!frame || std::max(frame->desc().width_px, frame->desc().height_px) > kLargestOutfitPx) {
       return path + " cannot be worn: its sides must be up to " + std::to_string(kLargestOutfitPx) + " pixels.";
     }
-    Picture& outfit = outfits_.back();
-    outfit.resize(frame->desc().width_px, frame->desc().height_px);
-    frame->copy_pixels(MAQ_PIXEL_RGBA8, outfit.rgba.data(), 0, outfit.rgba.size());
+    outfits_.back().take(*frame);
     outfits_.publish();
     Window::wake();
     return std::string();
@@ -177,7 +167,7 @@ void App::take_news() {
 }
 
 void App::set_scene_pictures() {
-  const SceneShown& shown = scenes_.shown().front();
+  const maquette::LiveScenePicture& shown = scenes_.shown().front();
   painter_.set_scene(shown.rendering, options_.compare == Compare::kError ? shown.error : shown.photo);
 }
 
@@ -229,10 +219,11 @@ void App::fly(float seconds) {
     const Rect& body = body_rect_;
     const float line = float(picture_rect_.x) + slider_ * float(picture_rect_.width);
     const bool in_body = body.width > 0 && io.MousePos.x < float(body.x + body.width) && io.MousePos.y > float(body.y);
-    drags_ = !shows_scene_ ? (in_body ? Drag::kBody : Drag::kNothing)
-             : options_.compare == Compare::kSlider && photo_ >= 0 && std::abs(io.MousePos.x - line) < 14 * window_.scale()
-                 ? Drag::kSlider
-                 : Drag::kView;
+    drags_ =
+        !shows_scene_ ? (in_body ? Drag::kBody : Drag::kNothing)
+        : options_.compare == Compare::kSlider && photo_ >= 0 && std::abs(io.MousePos.x - line) < 14 * window_.scale()
+            ? Drag::kSlider
+            : Drag::kView;
   }
   const float dx = mouse ? io.MouseDelta.x : 0, dy = mouse ? io.MouseDelta.y : 0;
   const auto held = [&](int more, int less) { return float(window_.is_down(more)) - float(window_.is_down(less)); };
@@ -245,7 +236,7 @@ void App::fly(float seconds) {
     return;
   }
   const auto state = scenes_.state();
-  if (state->what != SceneState::kReady) return;
+  if (state->what != maquette::LiveSceneState::kReady) return;
   bool moves = !flight_;
   if (!flight_) flight_.emplace(state->info, state->photos);
   if (drags_ == Drag::kSlider) slider_ = std::clamp(slider_ + dx / float(std::max(1, picture_rect_.width)), 0.0f, 1.0f);
@@ -285,7 +276,7 @@ void App::draw() {
   picture_area_ = {0, 0, std::max(1, all.width - panel_px), all.height};
   body_rect_ = {};
   if (shows_scene_) {
-    const SceneShown& shown = scenes_.shown().front();
+    const maquette::LiveScenePicture& shown = scenes_.shown().front();
     if (pictures_ > 0) {
       picture_rect_ = picture_area_.fit(shown.rendering.width_px, shown.rendering.height_px);
       const bool compares = options_.compare != Compare::kNone && shown.photo_index >= 0;
@@ -342,8 +333,8 @@ void App::draw_news() {
   std::string text;
   if (shows_scene_) {
     const auto state = scenes_.state();
-    if (state->what != SceneState::kReady) text = state->text;
-    if (state->what == SceneState::kOpening) text += " " + std::to_string(int(state->done * 100)) + " %";
+    if (state->what != maquette::LiveSceneState::kReady) text = state->text;
+    if (state->what == maquette::LiveSceneState::kOpening) text += " " + std::to_string(int(state->done * 100)) + " %";
   } else {
     const maquette::LiveStatus status = people_.status();
     text = status.problem.empty() ? status.doing : status.problem;
@@ -355,7 +346,8 @@ void App::draw_news() {
   const float margin = 10 * window_.scale(), width = float(picture_area_.width) - 4 * margin;
   const ImVec2 size = ImGui::CalcTextSize(text.c_str(), nullptr, false, width);
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  list->AddRectFilled({margin, margin}, {size.x + 3 * margin, size.y + 3 * margin}, IM_COL32(20, 20, 24, 220), margin / 2);
+  list->AddRectFilled({margin, margin}, {size.x + 3 * margin, size.y + 3 * margin}, IM_COL32(20, 20, 24, 220),
+                      margin / 2);
   list->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {2 * margin, 2 * margin}, IM_COL32(255, 214, 120, 255),
                 text.c_str(), nullptr, width);
 }
@@ -368,9 +360,9 @@ std::string App::new_path(const char* extension) const {
 }
 
 void App::take_screenshot(const std::string& path, const Rect& rect) {
-  auto picture = std::make_shared<Picture>(window_.read_pixels(rect));
+  auto picture = std::make_shared<maquette::Picture>(window_.read_pixels(rect));
   files_.add([this, picture, path] {
-    frame_of(context_, *picture).save(path);
+    picture->frame(context_).save(path);
     return "Saved " + path;
   });
 }
@@ -408,9 +400,9 @@ void App::toggle_clip() {
 // A clip has one size: it ends where the window gets another.
 void App::add_to_clip() {
   if (clip_rect_.width != picture_rect_.width || clip_rect_.height != picture_rect_.height) return toggle_clip();
-  auto picture = std::make_shared<Picture>(window_.read_pixels(picture_rect_));
+  auto picture = std::make_shared<maquette::Picture>(window_.read_pixels(picture_rect_));
   files_.add([this, file = clip_file_, picture] {
-    if (*file) (*file)->add(frame_of(context_, *picture));
+    if (*file) (*file)->add(picture->frame(context_));
     return std::string();
   });
 }
@@ -421,7 +413,7 @@ void App::toggle_recording() {
 }
 
 bool App::has_failed() const {
-  return shows_scene_ ? scenes_.state()->what == SceneState::kFailed : people_.status().failed;
+  return shows_scene_ ? scenes_.state()->what == maquette::LiveSceneState::kFailed : people_.status().failed;
 }
 
 bool App::is_done() {
@@ -468,8 +460,8 @@ std::string App::report() const {
   json["scene"] = nullptr;
   if (shows_scene_) {
     const auto state = scenes_.state();
-    const SceneShown& shown = scenes_.shown().front();
-    json["problem"] = state->what == SceneState::kFailed ? state->text : "";
+    const maquette::LiveScenePicture& shown = scenes_.shown().front();
+    json["problem"] = state->what == maquette::LiveSceneState::kFailed ? state->text : "";
     json["scene"] = {{"points", state->info.point_count}, {"photo", nullptr}, {"psnr_db", nullptr}};
     if (shown.photo_index >= 0) {
       json["scene"]["photo"] = state->photo_names[size_t(shown.photo_index)];

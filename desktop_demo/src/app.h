@@ -3,16 +3,16 @@
 
 #include <array>
 #include <deque>
+#include <maquette/fly_camera.hpp>
+#include <maquette/live_scene.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "file_thread.h"
-#include "fly_camera.h"
 #include "mapped_frame.h"
 #include "painter.h"
-#include "scene_thread.h"
 #include "window.h"
 
 enum class Compare { kNone, kSlider, kError };
@@ -83,8 +83,8 @@ class App {
   maquette::Newest<MappedFrame> mapped_;
   std::vector<uint8_t> seen_;
   maquette::LiveDensePose people_;
-  SceneThread scenes_;
-  std::optional<FlyCamera> flight_;
+  maquette::LiveScene scenes_;
+  std::optional<maquette::FlyCamera> flight_;
 
   bool shows_scene_ = false, paused_ = false, help_ = false;
   bool fresh_ = false;   // this turn has a new picture
@@ -93,8 +93,8 @@ class App {
   bool has_surface_ = false;
   Drag drags_ = Drag::kNothing;
   float slider_ = 0.5f, yaw_ = 0.5f, pitch_ = 0.15f;
-  int photo_ = 0;         // where the flight was last or goes to
-  bool turned_ = false;   // the flight, other than by the person
+  int photo_ = 0;        // where the flight was last or goes to
+  bool turned_ = false;  // the flight, other than by the person
   Rect picture_area_{0, 0, 1, 1}, picture_rect_, looked_at_, body_rect_, clip_rect_;
   uint64_t pictures_ = 0, done_pictures_ = 0;  // of scenes
   std::deque<Stages> stages_;
@@ -102,6 +102,6 @@ class App {
   double told_at_s_ = -100, start_ms_ = 0, cpu_percent_ = 0, cpu_at_s_ = -10, cpu_s_ = 0, memory_mb_ = 0;
   std::vector<float> turns_ms_;
   std::shared_ptr<std::optional<maquette::Clip>> clip_file_;
-  maquette::Newest<Picture> outfits_;
+  maquette::Newest<maquette::Picture> outfits_;
   FileThread files_;  // last: its jobs use the others
 };

@@ -15,7 +15,8 @@ std::string shared_file(const char* variable, const char* path) {
   const char* const given = variable == nullptr ? nullptr : std::getenv(variable);
   if (given != nullptr && *given != '\0') return given;
   std::error_code error;
-  const fs::path found = fs::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "share/maquette" / path;
+  const fs::path found =
+      fs::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "share/maquette" / path;
   return fs::exists(found, error) ? found.string() : "";
 }
 
@@ -43,7 +44,8 @@ int main(int argc, char** argv) {
   cli.add_option("PATH", path, "A photo, clip, recording, scene file or capture folder");
   cli.add_option("--source", options.source, "A source by its URI")->excludes("PATH");
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
-  cli.add_flag("--mesh,!--no-mesh", options.mesh, "The body's surface in the corner, with what is seen of it in colour");
+  cli.add_flag("--mesh,!--no-mesh", options.mesh,
+               "The body's surface in the corner, with what is seen of it in colour");
   cli.add_option("--texture", options.texture, "Worn in the try-on view: a DensePose atlas (2:3), or any picture");
   cli.add_option("--capture", options.capture, "Folder of the photos that the scene file was made of");
   cli.add_option("--compare", compare, "Photo against rendering")
@@ -59,7 +61,9 @@ int main(int argc, char** argv) {
   cli.add_option("--out", options.out, "Folder of snapshots, clips and recordings; default: this one")
       ->check(CLI::ExistingDirectory);
   auto* const headless = cli.add_flag("--headless", options.headless, "No visible window; ends with a line of JSON");
-  cli.add_option("--frames", options.frames, "End after so many frames")->needs(headless)->check(CLI::Range(1, 1000000));
+  cli.add_option("--frames", options.frames, "End after so many frames")
+      ->needs(headless)
+      ->check(CLI::Range(1, 1000000));
   cli.add_option("--screenshot", options.screenshot, "PNG of the window at the end")->needs(headless);
   CLI11_PARSE(cli, argc, argv);
 

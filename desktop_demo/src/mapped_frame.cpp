@@ -2,17 +2,15 @@
 
 void MappedFrame::take_over(const maquette::LiveFrame& mapped, std::vector<uint8_t>* seen_before) {
   const double before_s = maquette::monotonic_s();
-  const maq_frame_desc desc = mapped.frame.desc();
-  camera.resize(desc.width_px, desc.height_px);
-  mapped.frame.copy_pixels(MAQ_PIXEL_RGBA8, camera.rgba.data(), 0, camera.rgba.size());
+  camera.take(mapped.frame);
   iuv.resize(camera.rgba.size());
   const maq_densepose_plane planes[] = {MAQ_PLANE_PART, MAQ_PLANE_U, MAQ_PLANE_V, MAQ_PLANE_PERSON};
   for (size_t channel = 0; channel < 4; ++channel) {
     size_t stride_bytes = 0;
     const uint8_t* from = mapped.result->plane(planes[channel], &stride_bytes);
     uint8_t* to = iuv.data() + channel;
-    for (int y = 0; y < desc.height_px; ++y, from += stride_bytes) {
-      for (int x = 0; x < desc.width_px; ++x, to += 4) *to = from[x];
+    for (int y = 0; y < camera.height_px; ++y, from += stride_bytes) {
+      for (int x = 0; x < camera.width_px; ++x, to += 4) *to = from[x];
     }
   }
   // What was seen fades within a second or so.

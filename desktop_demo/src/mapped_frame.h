@@ -2,15 +2,14 @@
 #pragma once
 
 #include <maquette/live.hpp>
+#include <maquette/picture.hpp>
 #include <memory>
 #include <vector>
-
-#include "picture.h"
 
 struct MappedFrame {
   static constexpr int kSeenCells = 16;  // of each chart, along U and along V
 
-  Picture camera;
+  maquette::Picture camera;
   std::vector<uint8_t> iuv;   // 4 bytes a pixel: part, U, V, person
   std::vector<uint8_t> seen;  // [24][V][U] cells of the body: 255 in this frame, less the longer ago
   std::vector<maq_person> people;

@@ -37,7 +37,8 @@ unsigned linked(const char* vertex_source, const char* fragment_source) {
     uint8_t rgb[3];
     maq_part_name(part, rgb);
     const std::string name = "part_colours[" + std::to_string(part) + "]";
-    glUniform3f(glGetUniformLocation(program, name.c_str()), float(rgb[0]) / 255, float(rgb[1]) / 255, float(rgb[2]) / 255);
+    glUniform3f(glGetUniformLocation(program, name.c_str()), float(rgb[0]) / 255, float(rgb[1]) / 255,
+                float(rgb[2]) / 255);
   }
   return program;
 }
@@ -93,7 +94,7 @@ void Painter::upload(Texture texture, int width_px, int height_px, const uint8_t
   glActiveTexture(GL_TEXTURE0 + unsigned(texture));
   // Dear ImGui binds its own to the first unit.
   glBindTexture(GL_TEXTURE_2D, textures_[texture]);
-  int (&size)[2] = sizes_[texture];
+  int(&size)[2] = sizes_[texture];
   if (size[0] != width_px || size[1] != height_px) {
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width_px, height_px, 0, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
     size[0] = width_px, size[1] = height_px;
@@ -112,12 +113,12 @@ void Painter::set_frame(const MappedFrame& frame) {
                GL_UNSIGNED_BYTE, frame.seen.data());
 }
 
-void Painter::set_outfit(const Picture& outfit) {
+void Painter::set_outfit(const maquette::Picture& outfit) {
   upload(kOutfitTexture, outfit.width_px, outfit.height_px, outfit.rgba.data());
   outfit_is_atlas_ = outfit.width_px * 3 == outfit.height_px * 2;
 }
 
-void Painter::set_scene(const Picture& rendering, const Picture& photo) {
+void Painter::set_scene(const maquette::Picture& rendering, const maquette::Picture& photo) {
   upload(kRenderingTexture, rendering.width_px, rendering.height_px, rendering.rgba.data());
   if (!photo.empty()) upload(kPhotoTexture, photo.width_px, photo.height_px, photo.rgba.data());
 }
@@ -155,9 +156,8 @@ void Painter::set_surface(const std::vector<float>& points, int nodes) {
     const float a[] = {along(1, 0, 0), along(1, 0, 1), along(1, 0, 2)};
     const float b[] = {along(0, 1, 0), along(0, 1, 1), along(0, 1, 2)};
     const float last = float(nodes - 1);
-    vertices.insert(vertices.end(), {at[0], at[1], at[2], a[1] * b[2] - a[2] * b[1] + 1e-12f,
-                                     a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], float(part),
-                                     float(u) / last, float(v) / last});
+    vertices.insert(vertices.end(), {at[0], at[1], at[2], a[1] * b[2] - a[2] * b[1] + 1e-12f, a[2] * b[0] - a[0] * b[2],
+                                     a[0] * b[1] - a[1] * b[0], float(part), float(u) / last, float(v) / last});
   };
   constexpr int kTriangles[4][3] = {{0, 1, 2}, {1, 3, 2}, {0, 1, 3}, {0, 3, 2}};  // of the corners 0 1 / 2 3
   for (int part = 0; part < 24; ++part) {
@@ -227,8 +227,22 @@ void Painter::draw_body(const Rect& rect, float yaw, float pitch) {
   const float right[] = {std::cos(yaw), std::sin(yaw), 0};
   const float up[] = {-std::sin(yaw) * std::sin(pitch), std::cos(yaw) * std::sin(pitch), std::cos(pitch)};
   const float x = float(rect.height) / float(rect.width), middle = 0.85f;
-  const float projection[16] = {right[0] * x, up[0], -eye[0] / 4, 0, right[1] * x,  up[1],            -eye[1] / 4,         0,
-                                right[2] * x, up[2], -eye[2] / 4, 0, 0, -middle * up[2], middle * eye[2] / 4, 1};
+  const float projection[16] = {right[0] * x,
+                                up[0],
+                                -eye[0] / 4,
+                                0,
+                                right[1] * x,
+                                up[1],
+                                -eye[1] / 4,
+                                0,
+                                right[2] * x,
+                                up[2],
+                                -eye[2] / 4,
+                                0,
+                                0,
+                                -middle * up[2],
+                                middle * eye[2] / 4,
+                                1};
   glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, projection);
   glUniform3fv(uniform("towards_eye"), 1, eye);
   glDrawArrays(GL_TRIANGLES, 0, body_vertex_count_);

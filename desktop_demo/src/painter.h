@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "mapped_frame.h"
-#include "picture.h"
 #include "window.h"
 
 enum class View { kCamera, kParts, kContours, kMask, kBoxes, kTryOn };
@@ -19,10 +18,10 @@ class Painter {
   void set_frame(const MappedFrame& frame);
   // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any picture, which is repeated
   // over the body's front and back.
-  void set_outfit(const Picture& outfit);
+  void set_outfit(const maquette::Picture& outfit);
   // Points [24][nodes][nodes][3] in metres, NaN where a chart does not reach.
   void set_surface(const std::vector<float>& points, int nodes);
-  void set_scene(const Picture& rendering, const Picture& photo);
+  void set_scene(const maquette::Picture& rendering, const maquette::Picture& photo);
 
   void draw_people(View view, const Rect& rect);
   // `slider`: the part of the width that shows the photo.
@@ -31,8 +30,16 @@ class Painter {
   void draw_body(const Rect& rect, float yaw, float pitch);
 
  private:
-  enum Texture { kCameraTexture, kIuvTexture, kOutfitTexture, kSurfaceTexture, kSeenTexture, kRenderingTexture,
-                 kPhotoTexture, kTextureCount };
+  enum Texture {
+    kCameraTexture,
+    kIuvTexture,
+    kOutfitTexture,
+    kSurfaceTexture,
+    kSeenTexture,
+    kRenderingTexture,
+    kPhotoTexture,
+    kTextureCount
+  };
   void upload(Texture texture, int width_px, int height_px, const uint8_t* rgba);
   void use(unsigned program, const Rect& rect);
   int uniform(const char* name) const;

@@ -10,11 +10,13 @@
 
 namespace {
 
-constexpr const char* kPeopleStages[] = {"trunk", "proposals", "box head", "dense head", "decode", "resize", "copy", "wait"};
+constexpr const char* kPeopleStages[] = {"trunk",  "proposals", "box head", "dense head",
+                                         "decode", "resize",    "copy",     "wait"};
 constexpr const char* kSceneStages[] = {"project", "shade", "refine", "turn"};
 constexpr const char* kCompareNames[] = {"off", "slider", "error"};
-constexpr ImU32 kStageColours[] = {IM_COL32(88, 140, 232, 255), IM_COL32(80, 200, 200, 255), IM_COL32(100, 200, 110, 255),
-                                   IM_COL32(236, 190, 70, 255), IM_COL32(240, 130, 60, 255), IM_COL32(214, 90, 110, 255),
+constexpr ImU32 kStageColours[] = {IM_COL32(88, 140, 232, 255),  IM_COL32(80, 200, 200, 255),
+                                   IM_COL32(100, 200, 110, 255), IM_COL32(236, 190, 70, 255),
+                                   IM_COL32(240, 130, 60, 255),  IM_COL32(214, 90, 110, 255),
                                    IM_COL32(170, 110, 210, 255), IM_COL32(110, 110, 118, 255)};
 
 double process_cpu_s() {
@@ -36,8 +38,9 @@ void App::draw_panel(int width_px) {
   const Rect all = window_.rect();
   ImGui::SetNextWindowPos({float(all.width - width_px), 0});
   ImGui::SetNextWindowSize({float(width_px), float(all.height)});
-  ImGui::Begin("panel", nullptr, ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
-                                     ImGuiWindowFlags_NoFocusOnAppearing);
+  ImGui::Begin("panel", nullptr,
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
+                   ImGuiWindowFlags_NoFocusOnAppearing);
   ImGui::PushItemWidth(-110 * window_.scale());
   const double now = ImGui::GetTime();
   if (now - cpu_at_s_ > 1) {
@@ -95,8 +98,10 @@ void App::draw_people_panel() {
     changed |= ImGui::IsItemDeactivatedAfterEdit();
   };
   slider("threads", &options_.model.threads, 0, cores, options_.model.threads == 0 ? "all cores" : "%d");
-  slider("key frames", &options_.model.key_frame_interval, 1, 30, options_.model.key_frame_interval == 1 ? "every" : "one in %d");
-  slider("long side", &options_.model.long_side_px, 0, 1024, options_.model.long_side_px == 0 ? "the model's" : "%d px");
+  slider("key frames", &options_.model.key_frame_interval, 1, 30,
+         options_.model.key_frame_interval == 1 ? "every" : "one in %d");
+  slider("long side", &options_.model.long_side_px, 0, 1024,
+         options_.model.long_side_px == 0 ? "the model's" : "%d px");
   if (options_.model.long_side_px > 0) options_.model.long_side_px = std::max(64, options_.model.long_side_px);
   changed |= ImGui::CheckboxFlags("parts alone, no U and V", &options_.model.detail, MAQ_DETAIL_PART);
   changed |= ImGui::CheckboxFlags("threads stay awake", &options_.model.spin, 1);
@@ -105,11 +110,13 @@ void App::draw_people_panel() {
 
 void App::draw_scene_panel() {
   const auto state = scenes_.state();
-  const SceneShown& shown = scenes_.shown().front();
+  const maquette::LiveScenePicture& shown = scenes_.shown().front();
   ImGui::TextWrapped("%s", state->path.c_str());
-  if (state->what == SceneState::kOpening) ImGui::ProgressBar(float(state->done), {-1, 0}, state->text.c_str());
-  if (state->what == SceneState::kReady) {
-    ImGui::Text("%llu points, %zu photos", static_cast<unsigned long long>(state->info.point_count), state->photos.size());
+  if (state->what == maquette::LiveSceneState::kOpening)
+    ImGui::ProgressBar(float(state->done), {-1, 0}, state->text.c_str());
+  if (state->what == maquette::LiveSceneState::kReady) {
+    ImGui::Text("%llu points, %zu photos", static_cast<unsigned long long>(state->info.point_count),
+                state->photos.size());
     ImGui::Text("%d x %d in %.1f ms, %llu points seen", shown.rendering.width_px, shown.rendering.height_px,
                 double(shown.stats.total_ms), static_cast<unsigned long long>(shown.stats.points_shaded));
     if (shown.photo_index >= 0) {

@@ -116,8 +116,8 @@ void Window::end_drawing() {
 
 void Window::show() { glfwSwapBuffers(window_); }
 
-Picture Window::read_pixels(const Rect& rect) const {
-  Picture picture;
+maquette::Picture Window::read_pixels(const Rect& rect) const {
+  maquette::Picture picture;
   picture.resize(rect.width, rect.height);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(rect.x, this->rect().height - rect.y - rect.height, rect.width, rect.height, GL_RGBA, GL_UNSIGNED_BYTE,

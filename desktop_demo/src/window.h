@@ -1,10 +1,9 @@
 // A window with an OpenGL 3.3 core context and Dear ImGui in it, and what a person does to it.
 #pragma once
 
+#include <maquette/picture.hpp>
 #include <string>
 #include <vector>
-
-#include "picture.h"
 
 struct GLFWwindow;
 
@@ -34,7 +33,7 @@ class Window {
   // What was drawn, on the screen.
   void show();
   // Rows from top to bottom.
-  Picture read_pixels(const Rect& rect) const;
+  maquette::Picture read_pixels(const Rect& rect) const;
   void toggle_full_screen();
 
   Rect rect() const;

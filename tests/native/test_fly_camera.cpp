@@ -1,5 +1,5 @@
 // The desktop demo's camera: where it begins, what steering does to it, flights to photos, poses at the edge of numbers.
-#include "fly_camera.h"
+#include <maquette/fly_camera.hpp>
 
 #include <gtest/gtest.h>
 
@@ -93,7 +93,7 @@ double pitch_of(const maq_camera& camera, const Vec3& up) {
 TEST(FlyCamera, BeginsAtTheMiddlePhotoExactly) {
   const std::vector<maq_camera> photos{photo({0, 0, 0}, {1, 0, 0}), photo({1, 2, 3}, {0, 1, 0.2}, 0.3),
                                        photo({4, 0, 0}, {1, 0, 0})};
-  const FlyCamera fly(scene(), photos);
+  const maquette::FlyCamera fly(scene(), photos);
   expect_same(fly.camera(640, 480), photos[1]);
   EXPECT_EQ(fly.at_photo(), 1);
   ASSERT_TRUE(fly.photo_camera().has_value());
@@ -102,7 +102,7 @@ TEST(FlyCamera, BeginsAtTheMiddlePhotoExactly) {
 
 TEST(FlyCamera, WithoutPhotosItSeesTheWholeBoxFromOutsideUpright) {
   for (const Vec3& up : {Vec3{0, 0, 1}, Vec3{1, 0, 0}, unit({1, -2, 0.5}), Vec3{0, -1, 0}}) {
-    const FlyCamera fly(scene(up), {});
+    const maquette::FlyCamera fly(scene(up), {});
     EXPECT_EQ(fly.at_photo(), -1);
     EXPECT_FALSE(fly.photo_camera().has_value());
     for (const auto& [width, height] : {std::pair<int, int>{640, 480}, {300, 900}, {1000, 200}}) {
@@ -123,7 +123,7 @@ TEST(FlyCamera, WithoutPhotosItSeesTheWholeBoxFromOutsideUpright) {
 
 TEST(FlyCamera, MovesByItsOwnAxesAndTheWorldsUp) {
   const maq_camera start = photo({1, 2, 3}, {1, 1, -0.5});
-  FlyCamera fly(scene(), {start});
+  maquette::FlyCamera fly(scene(), {start});
   const double diagonal = std::sqrt(4.0 + 16 + 36);
   fly.move(1, 0, 0, 2, 0.1);
   Vec3 expected = sum(place(start), scaled(row(start, 0), 0.2 * diagonal));
@@ -136,7 +136,7 @@ TEST(FlyCamera, MovesByItsOwnAxesAndTheWorldsUp) {
 }
 
 TEST(FlyCamera, WhatChangesNothingLeavesItAtThePhoto) {
-  FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5})});
+  maquette::FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5})});
   fly.move(0, 0, 0, 1, 0.1);
   fly.turn(0, 0);
   fly.zoom(1);
@@ -146,9 +146,9 @@ TEST(FlyCamera, WhatChangesNothingLeavesItAtThePhoto) {
 
 TEST(FlyCamera, TurnsRightAboutTheWorldsUpAndUpwards) {
   for (const Vec3& up : {Vec3{0, 0, 1}, unit({0.3, -1, 0.2})}) {
-    const FlyCamera start(scene(up), {});
+    const maquette::FlyCamera start(scene(up), {});
     const maq_camera before = start.camera(64, 48);
-    FlyCamera fly = start;
+    maquette::FlyCamera fly = start;
     fly.turn(0.2, 0);
     maq_camera after = fly.camera(64, 48);
     EXPECT_GT(dot(row(after, 2), row(before, 0)), 0.1) << "to the right";
@@ -167,7 +167,7 @@ TEST(FlyCamera, TurnsRightAboutTheWorldsUpAndUpwards) {
 TEST(FlyCamera, NeverFlipsOver) {
   for (const Vec3& up : {Vec3{0, 0, 1}, Vec3{0, -1, 0}, unit({1, 1, 1}), unit({-3, 0.1, 0.2})}) {
     for (const double pitch : {10.0, 1e6, -10.0, -1e300}) {
-      FlyCamera fly(scene(up), {});
+      maquette::FlyCamera fly(scene(up), {});
       for (int i = 0; i < 5; ++i) {
         fly.turn(0.4, pitch);
         const maq_camera camera = fly.camera(64, 48);
@@ -185,7 +185,7 @@ TEST(FlyCamera, NeverFlipsOver) {
 TEST(FlyCamera, ALeaningCameraTurnsWithoutAJumpAndGetsUpright) {
   for (const double lean : {0.5, -1.5, 3.0, 3.14159265358979}) {
     const maq_camera start = photo({1, 2, 3}, {1, 1, -0.5}, lean);
-    FlyCamera fly(scene(), {start});
+    maquette::FlyCamera fly(scene(), {start});
     fly.turn(1e-6, -1e-6);
     for (int i = 0; i < 9; ++i) EXPECT_NEAR(fly.camera(640, 480).rotation[i], start.rotation[i], 1e-5);
     double leaned = std::abs(lean);
@@ -206,7 +206,7 @@ TEST(FlyCamera, FromStraightUpOrDownItTurnsTheWayThePictureDoes) {
   for (const double forward : {1.0, -1.0}) {
     for (const double lean : {0.0, 0.7, 2.5}) {
       const maq_camera start = photo({0, 0, 0}, {1e-17, 0, forward}, lean);
-      FlyCamera fly(scene(), {start});
+      maquette::FlyCamera fly(scene(), {start});
       expect_same(fly.camera(640, 480), start);
       fly.turn(0, -forward * 0.5);
       const maq_camera camera = fly.camera(640, 480);
@@ -219,7 +219,7 @@ TEST(FlyCamera, FromStraightUpOrDownItTurnsTheWayThePictureDoes) {
 }
 
 TEST(FlyCamera, ZoomsBetween20And110Degrees) {
-  FlyCamera fly(scene(), {});
+  maquette::FlyCamera fly(scene(), {});
   const auto degrees = [&] { return 2 * std::atan(320 / fly.camera(640, 480).fx_px) / kDegree; };
   const double before = degrees();
   fly.zoom(1.1);
@@ -236,7 +236,7 @@ TEST(FlyCamera, ZoomsBetween20And110Degrees) {
 
 TEST(FlyCamera, AnyPictureShowsAllOfThePhoto) {
   const maq_camera start = photo({1, 2, 3}, {1, 1, -0.5}, 0.2);
-  const FlyCamera fly(scene(), {start});
+  const maquette::FlyCamera fly(scene(), {start});
   for (const auto& [width, height] : {std::pair<int, int>{1280, 960}, {1000, 480}, {320, 700}}) {
     const maq_camera camera = fly.camera(width, height);
     const double scale = std::min(width / 640.0, height / 480.0);
@@ -250,7 +250,7 @@ TEST(FlyCamera, AnyPictureShowsAllOfThePhoto) {
 TEST(FlyCamera, FliesSmoothlyAndEndsExactlyAtThePhoto) {
   maq_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1}, -0.4);
   target.width_px = 480, target.height_px = 640, target.fx_px = 900, target.cx_px = 200;
-  FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5}, 0.2)});
+  maquette::FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5}, 0.2)});
   const maq_camera start = fly.camera(800, 600);
   fly.go_to(target, 2, 7);
   expect_same(fly.camera(800, 600), start, 1e-9);
@@ -290,7 +290,7 @@ TEST(FlyCamera, FliesByHalfATurnAboutAnyAxis) {
         const Vec3 more = cross(a, row(target, i));
         for (size_t k = 0; k < 3; ++k) target.rotation[3 * i + int(k)] += off * more[k];
       }
-      FlyCamera fly(scene(), {start});
+      maquette::FlyCamera fly(scene(), {start});
       fly.go_to(target, 1, 0);
       maq_camera before = start;
       while (fly.update(0.01)) {
@@ -307,7 +307,7 @@ TEST(FlyCamera, FliesByHalfATurnAboutAnyAxis) {
 TEST(FlyCamera, SteeringEndsAFlight) {
   const std::vector<maq_camera> photos{photo({1, 2, 3}, {1, 1, -0.5}), photo({4, -2, 1}, {-1, 0.3, 0.1})};
   for (int way = 0; way < 3; ++way) {
-    FlyCamera fly(scene(), photos);
+    maquette::FlyCamera fly(scene(), photos);
     fly.go_to(photos[0], 1, 0);
     fly.update(0.5);
     const maq_camera half = fly.camera(800, 600);
@@ -322,7 +322,7 @@ TEST(FlyCamera, SteeringEndsAFlight) {
 
 TEST(FlyCamera, AFlightOfNoTimeIsThereAtOnce) {
   const maq_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1});
-  FlyCamera fly(scene(), {});
+  maquette::FlyCamera fly(scene(), {});
   fly.go_to(target, 0, 3);
   expect_same(fly.camera(640, 480), target);
   EXPECT_EQ(fly.at_photo(), 3);
@@ -331,7 +331,7 @@ TEST(FlyCamera, AFlightOfNoTimeIsThereAtOnce) {
 TEST(FlyCamera, FindsTheNearestPhotoByPlaceAndDirection) {
   const std::vector<maq_camera> photos{photo({0, 0, 0}, {1, 0, 0}), photo({0.1, 0, 0}, {-1, 0, 0}),
                                        photo({3, 0, 0}, {1, 0, 0})};
-  FlyCamera fly(scene(), {photo({0.12, 0, 0}, {1, 0.1, 0})});
+  maquette::FlyCamera fly(scene(), {photo({0.12, 0, 0}, {1, 0.1, 0})});
   EXPECT_EQ(fly.nearest_photo(photos), 0) << "1 is nearer, but looks the other way";
   fly.turn(3, 0);
   EXPECT_EQ(fly.nearest_photo(photos), 1);
@@ -344,7 +344,7 @@ TEST(FlyCamera, IsARotationAfterThousandsOfMoves) {
   for (const Vec3& up : {Vec3{0, 0, 1}, unit({-1, 2, 0.3})}) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> any(-1, 1);
-    FlyCamera fly(scene(up), {photo({1, 2, 3}, {1, 1, -0.5}, 0.9)});
+    maquette::FlyCamera fly(scene(up), {photo({1, 2, 3}, {1, 1, -0.5}, 0.9)});
     const maq_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1}, 2);
     for (int i = 0; i < 20000; ++i) {
       fly.turn(0.3 * any(random), 0.3 * any(random));
@@ -359,7 +359,7 @@ TEST(FlyCamera, IsARotationAfterThousandsOfMoves) {
 }
 
 TEST(FlyCamera, WhatIsNotFiniteOrNoCameraDoesNothing) {
-  FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5})});
+  maquette::FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5})});
   for (const double wrong : {kNan, kInfinity, -kInfinity}) {
     fly.move(wrong, 0, 0, kNan, 0.1);
     fly.move(1, 0, 0, wrong, 0.1);
@@ -391,14 +391,14 @@ TEST(FlyCamera, WhatIsNotFiniteOrNoCameraDoesNothing) {
   expect_ignored([](maq_camera& camera) { camera.cx_px = kInfinity; });
   fly.go_to(photo({4, -2, 1}, {-1, 0.3, 0.1}), kNan, 0);
   EXPECT_EQ(fly.at_photo(), 0) << "it never left";
-  expect_rotation(FlyCamera(scene({kNan, 0, 0}, {kInfinity, 0, 0}, {0, 0, kNan}), {maq_camera{}}).camera(64, 48));
-  expect_rotation(FlyCamera(scene({0, 0, 0}), {}).camera(64, 48));
+  expect_rotation(maquette::FlyCamera(scene({kNan, 0, 0}, {kInfinity, 0, 0}, {0, 0, kNan}), {maq_camera{}}).camera(64, 48));
+  expect_rotation(maquette::FlyCamera(scene({0, 0, 0}), {}).camera(64, 48));
 }
 
 TEST(FlyCamera, ARotationThatIsATrifleOffIsMadeOne) {
   maq_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1});
   for (double& number : target.rotation) number *= 1.0005;
-  FlyCamera fly(scene(), {});
+  maquette::FlyCamera fly(scene(), {});
   fly.go_to(target, 0, 0);
   EXPECT_EQ(fly.at_photo(), 0);
   expect_rotation(fly.camera(640, 480));
@@ -416,7 +416,7 @@ TEST(FlyCamera, FliesInScenesFarOutTinyHugeOrWithoutASize) {
                         {{1e6, 0, 0}, {1e6, 0, 0}, 1},
                         {{-1e9, 0, 0}, {1e9, 0, 0}, 2e9}};
   for (const Case& one : cases) {
-    FlyCamera fly(scene({0, 0, 1}, one.low, one.high), {});
+    maquette::FlyCamera fly(scene({0, 0, 1}, one.low, one.high), {});
     const maq_camera before = fly.camera(640, 480);
     expect_rotation(before);
     const Vec3 middle = scaled(sum(one.low, one.high), 0.5);

@@ -1,5 +1,5 @@
 // The desktop demo's thread of scenes, with the room of this repository and the shipped networks.
-#include "scene_thread.h"
+#include <maquette/live_scene.hpp>
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <set>
 
-#include "fly_camera.h"
+#include <maquette/fly_camera.hpp>
 #include "temp_folder.h"
 
 namespace {
@@ -32,9 +32,9 @@ bool wait_until(Condition is_so) {
   return false;
 }
 
-bool wait_until_open(const SceneThread& scene) {
-  return wait_until([&] { return scene.state()->what >= SceneState::kReady; }) &&
-         scene.state()->what == SceneState::kReady;
+bool wait_until_open(const maquette::LiveScene& scene) {
+  return wait_until([&] { return scene.state()->what >= maquette::LiveSceneState::kReady; }) &&
+         scene.state()->what == maquette::LiveSceneState::kReady;
 }
 
 size_t threads_of_this_process() {
@@ -60,20 +60,20 @@ const std::string& small_room() {
 }
 
 // From inside of the room, a small picture.
-maq_camera small_camera(const SceneThread& scene) {
-  FlyCamera fly(scene.state()->info, {});
+maq_camera small_camera(const maquette::LiveScene& scene) {
+  maquette::FlyCamera fly(scene.state()->info, {});
   fly.move(0, 0, 1, 1, 0.7);
   return fly.camera(160, 120);
 }
 
 // A picture that comes after this call.
-const SceneShown* look_at(SceneThread& scene, const maq_camera& camera, int photo_index = -1) {
+const maquette::LiveScenePicture* look_at(maquette::LiveScene& scene, const maq_camera& camera, int photo_index = -1) {
   scene.look(camera, photo_index);
   return wait_until([&] { return scene.shown().take(); }) ? &scene.shown().front() : nullptr;
 }
 
 // Nothing comes in the time in which a small picture is rendered many times.
-void expect_no_picture(SceneThread& scene) {
+void expect_no_picture(maquette::LiveScene& scene) {
   std::this_thread::sleep_for(std::chrono::milliseconds(400));
   EXPECT_FALSE(scene.shown().take());
 }
@@ -83,10 +83,10 @@ void copy_room(const TempFolder& folder) {
 }
 
 // Opens what is damaged; what the user reads about it.
-std::string failure_of(SceneThread& scene, const std::string& path) {
+std::string failure_of(maquette::LiveScene& scene, const std::string& path) {
   scene.open(path);
-  EXPECT_TRUE(wait_until([&] { return scene.state()->what >= SceneState::kReady; }));
-  EXPECT_EQ(scene.state()->what, SceneState::kFailed) << path;
+  EXPECT_TRUE(wait_until([&] { return scene.state()->what >= maquette::LiveSceneState::kReady; }));
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kFailed) << path;
   EXPECT_EQ(scene.state()->path, path);
   const std::string text = scene.state()->text;
   EXPECT_GT(text.size(), 20u);
@@ -94,18 +94,19 @@ std::string failure_of(SceneThread& scene, const std::string& path) {
   return text;
 }
 
-TEST(SceneThread, BuildsACaptureAndComparesWithItsPhotos) {
-  SceneThread scene(kBundle, 2);
-  EXPECT_EQ(scene.state()->what, SceneState::kNothing);
+TEST(LiveScene, BuildsACaptureAndComparesWithItsPhotos) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing);
   const auto start = Clock::now();
   scene.open(kRoom);
-  EXPECT_EQ(scene.state()->what, SceneState::kOpening);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kOpening);
   EXPECT_EQ(scene.state()->path, kRoom);
   std::set<std::string> texts;
   double done = 0;
   ASSERT_TRUE(wait_until([&] {
     const auto state = scene.state();
-    if (state->what != SceneState::kOpening) return true;
+    if (state->what != maquette::LiveSceneState::kOpening) return true;
     EXPECT_GE(state->done, done);
     EXPECT_LE(state->done, 1);
     EXPECT_EQ(state->text.back(), '.');
@@ -115,7 +116,7 @@ TEST(SceneThread, BuildsACaptureAndComparesWithItsPhotos) {
   }));
   std::printf("built in %.1f s\n", ms_since(start) / 1e3);
   const auto state = scene.state();
-  ASSERT_EQ(state->what, SceneState::kReady) << state->text;
+  ASSERT_EQ(state->what, maquette::LiveSceneState::kReady) << state->text;
   EXPECT_EQ(state->text, "");
   EXPECT_GT(texts.size(), 25u);
   EXPECT_GT(done, 0.9);
@@ -129,7 +130,7 @@ TEST(SceneThread, BuildsACaptureAndComparesWithItsPhotos) {
   for (size_t i = 0; i < 30; ++i) {
     scene.look(state->photos[i], int(i));
     ASSERT_TRUE(wait_until([&] { return scene.shown().take(); }));
-    const SceneShown& shown = scene.shown().front();
+    const maquette::LiveScenePicture& shown = scene.shown().front();
     std::printf("%s: %.2f dB, %.0f ms\n", state->photo_names[i].c_str(), shown.psnr_db, double(shown.stats.total_ms));
     EXPECT_EQ(shown.photo_index, int(i));
     EXPECT_EQ(shown.number, i + 1);
@@ -137,14 +138,15 @@ TEST(SceneThread, BuildsACaptureAndComparesWithItsPhotos) {
   }
 }
 
-TEST(SceneThread, ShowsTheErrorInColoursAndItsPsnr) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, ShowsTheErrorInColoursAndItsPsnr) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room(), kRoom);
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
   const maq_camera camera = scene.state()->photos[12];
-  const SceneShown* const shown = look_at(scene, camera, 12);
+  const maquette::LiveScenePicture* const shown = look_at(scene, camera, 12);
   ASSERT_NE(shown, nullptr);
-  for (const Picture* picture : {&shown->rendering, &shown->photo, &shown->error}) {
+  for (const maquette::Picture* picture : {&shown->rendering, &shown->photo, &shown->error}) {
     ASSERT_EQ(picture->width_px, camera.width_px);
     ASSERT_EQ(picture->height_px, camera.height_px);
   }
@@ -172,14 +174,15 @@ TEST(SceneThread, ShowsTheErrorInColoursAndItsPsnr) {
   EXPECT_NEAR(shown->psnr_db, 10 * std::log10(255.0 * 255 / mean_square), 1e-6);
 }
 
-TEST(SceneThread, APhotoIsBroughtToThePicturesSize) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, APhotoIsBroughtToThePicturesSize) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room(), kRoom);
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
   const maq_camera own = scene.state()->photos[3];
-  const SceneShown* shown = look_at(scene, own, 3);
+  const maquette::LiveScenePicture* shown = look_at(scene, own, 3);
   ASSERT_NE(shown, nullptr);
-  const Picture photo = shown->photo;
+  const maquette::Picture photo = shown->photo;
   for (const int share : {2, 3, 5}) {
     maq_camera camera = own;
     camera.width_px /= share, camera.height_px /= share;
@@ -204,8 +207,9 @@ TEST(SceneThread, APhotoIsBroughtToThePicturesSize) {
   }
 }
 
-TEST(SceneThread, LargePicturesAreMadeSmallerAndShowTheSame) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, LargePicturesAreMadeSmallerAndShowTheSame) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
   maq_camera camera = small_camera(scene);
@@ -213,8 +217,8 @@ TEST(SceneThread, LargePicturesAreMadeSmallerAndShowTheSame) {
                                                                  {4000, 3000, 1280, 960},
                                                                  {2560, 800, 1280, 400},
                                                                  {500, 1920, 250, 960}}) {
-    const maq_camera large = FlyCamera(scene.state()->info, {camera}).camera(width, height);
-    const SceneShown* const shown = look_at(scene, large);
+    const maq_camera large = maquette::FlyCamera(scene.state()->info, {camera}).camera(width, height);
+    const maquette::LiveScenePicture* const shown = look_at(scene, large);
     ASSERT_NE(shown, nullptr);
     EXPECT_EQ(shown->rendering.width_px, shown_width);
     EXPECT_EQ(shown->rendering.height_px, shown_height);
@@ -227,12 +231,13 @@ TEST(SceneThread, LargePicturesAreMadeSmallerAndShowTheSame) {
   }
 }
 
-TEST(SceneThread, RendersOncePerLookAndTheLatestWins) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, RendersOncePerLookAndTheLatestWins) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
   maq_camera camera = small_camera(scene);
-  const SceneShown* shown = look_at(scene, camera);
+  const maquette::LiveScenePicture* shown = look_at(scene, camera);
   ASSERT_NE(shown, nullptr);
   EXPECT_EQ(shown->number, 1u);
   expect_no_picture(scene);
@@ -245,23 +250,25 @@ TEST(SceneThread, RendersOncePerLookAndTheLatestWins) {
   expect_no_picture(scene);
 }
 
-TEST(SceneThread, ALookBeforeTheSceneIsThereWaitsForIt) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, ALookBeforeTheSceneIsThereWaitsForIt) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
   const maq_camera camera = small_camera(scene);
   scene.open(small_room());
   ASSERT_NE(look_at(scene, camera), nullptr);
-  EXPECT_EQ(scene.state()->what, SceneState::kReady);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kReady);
 }
 
-TEST(SceneThread, OtherThreadsRenderTheSamePictureAgain) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, OtherThreadsRenderTheSamePictureAgain) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
   scene.set_threads(1);
   expect_no_picture(scene);
-  const SceneShown* const shown = look_at(scene, small_camera(scene));
+  const maquette::LiveScenePicture* const shown = look_at(scene, small_camera(scene));
   ASSERT_NE(shown, nullptr);
   const std::vector<uint8_t> before = shown->rendering.rgba;
   scene.set_threads(2);
@@ -273,13 +280,14 @@ TEST(SceneThread, OtherThreadsRenderTheSamePictureAgain) {
   scene.set_threads(-7);
   ASSERT_TRUE(wait_until([&] { return !scene.state()->text.empty(); }));
   EXPECT_NE(scene.state()->text.find("-7"), std::string::npos) << scene.state()->text;
-  EXPECT_EQ(scene.state()->what, SceneState::kReady);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kReady);
   scene.set_threads(1);
   ASSERT_TRUE(wait_until([&] { return scene.shown().take() && scene.state()->text.empty(); }));
 }
 
-TEST(SceneThread, ACameraThatIsNoneIsSaidAndForgotten) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, ACameraThatIsNoneIsSaidAndForgotten) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
   const maq_camera good = small_camera(scene);
@@ -289,7 +297,7 @@ TEST(SceneThread, ACameraThatIsNoneIsSaidAndForgotten) {
     scene.look(camera, -1);
     EXPECT_TRUE(wait_until([&] { return !scene.state()->text.empty(); }));
     EXPECT_EQ(scene.state()->text.back(), '.') << scene.state()->text;
-    EXPECT_EQ(scene.state()->what, SceneState::kReady);
+    EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kReady);
     EXPECT_FALSE(scene.shown().take());
     ASSERT_NE(look_at(scene, good), nullptr);
     EXPECT_EQ(scene.state()->text, "");
@@ -301,30 +309,32 @@ TEST(SceneThread, ACameraThatIsNoneIsSaidAndForgotten) {
   expect_refused([](maq_camera& camera) { camera.struct_size = 3; });
 }
 
-TEST(SceneThread, WithoutItsCaptureASceneFileIsShownAllTheSame) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, WithoutItsCaptureASceneFileIsShownAllTheSame) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room(), "/nowhere/at all");
   ASSERT_TRUE(wait_until_open(scene));
   EXPECT_NE(scene.state()->text.find("/nowhere/at all"), std::string::npos) << scene.state()->text;
   EXPECT_EQ(scene.state()->text.back(), '.');
   EXPECT_TRUE(scene.state()->photos.empty());
-  const SceneShown* const shown = look_at(scene, small_camera(scene), 5);
+  const maquette::LiveScenePicture* const shown = look_at(scene, small_camera(scene), 5);
   ASSERT_NE(shown, nullptr);
   EXPECT_EQ(shown->photo_index, -1);
   EXPECT_TRUE(shown->photo.empty());
 }
 
-TEST(SceneThread, APhotoThatCannotBeReadIsSaidAndTheRenderingShown) {
+TEST(LiveScene, APhotoThatCannotBeReadIsSaidAndTheRenderingShown) {
   const TempFolder folder;
   copy_room(folder);
-  SceneThread scene(kBundle, 2);
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room(), folder.path().string());
   ASSERT_TRUE(wait_until_open(scene));
   ASSERT_EQ(scene.state()->photos.size(), 30u);
   write_text(folder.file("images/004.jpg"), "no photo any more");
   const auto photos = scene.state()->photos;
   ASSERT_NE(look_at(scene, photos[3], 3), nullptr);
-  const SceneShown* shown = look_at(scene, photos[4], 4);
+  const maquette::LiveScenePicture* shown = look_at(scene, photos[4], 4);
   ASSERT_NE(shown, nullptr);
   EXPECT_EQ(shown->photo_index, -1);
   EXPECT_TRUE(shown->photo.empty() && shown->error.empty() && std::isnan(shown->psnr_db));
@@ -341,9 +351,10 @@ TEST(SceneThread, APhotoThatCannotBeReadIsSaidAndTheRenderingShown) {
   EXPECT_EQ(scene.state()->text, "");
 }
 
-TEST(SceneThread, WhatCannotBeOpenedIsASentence) {
+TEST(LiveScene, WhatCannotBeOpenedIsASentence) {
   const TempFolder folder;
-  SceneThread scene(kBundle, 2);
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   const std::string whole = read_text(small_room());
   std::string changed = whole;
   changed[changed.size() / 2] = char(changed[changed.size() / 2] ^ 4);
@@ -362,35 +373,39 @@ TEST(SceneThread, WhatCannotBeOpenedIsASentence) {
   EXPECT_NE(look_at(scene, small_camera(scene)), nullptr);
 }
 
-TEST(SceneThread, WrongNetworksAreASentence) {
+TEST(LiveScene, WrongNetworksAreASentence) {
   for (const std::string& bundle : {std::string("/nowhere"), std::string(MAQ_TEST_MODELS "/densepose-b-int8")}) {
-    SceneThread scene(bundle, 2);
+    const maquette::Context context;
+    maquette::LiveScene scene(context, bundle, 2);
     failure_of(scene, small_room());
     failure_of(scene, kRoom);
   }
-  SceneThread scene(kBundle, 1000);
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 1000);
   EXPECT_NE(failure_of(scene, small_room()).find("1000"), std::string::npos);
 }
 
-TEST(SceneThread, CloseForgetsTheSceneAndItsPictures) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, CloseForgetsTheSceneAndItsPictures) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
   const maq_camera camera = small_camera(scene);
   scene.look(camera, -1);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it waits to be taken, or comes just now
   scene.close();
-  EXPECT_EQ(scene.state()->what, SceneState::kNothing);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing);
   EXPECT_EQ(scene.state()->path, "");
   EXPECT_EQ(scene.state()->text, "");
   expect_no_picture(scene);
   scene.look(camera, -1);
   expect_no_picture(scene);
-  EXPECT_EQ(scene.state()->what, SceneState::kNothing);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing);
 }
 
-TEST(SceneThread, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
   for (const double share : {0.0, 0.05, 0.3}) {
@@ -409,17 +424,18 @@ TEST(SceneThread, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
   ASSERT_TRUE(wait_until([&] { return scene.state()->done > 0; }));
   scene.close();
   expect_no_picture(scene);
-  EXPECT_EQ(scene.state()->what, SceneState::kNothing) << "and stays closed";
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing) << "and stays closed";
 }
 
-TEST(SceneThread, TheDestructorEndsBuildingWithinHalfASecond) {
+TEST(LiveScene, TheDestructorEndsBuildingWithinHalfASecond) {
   for (const double share : {-1.0, 0.0, 0.1, 0.5, 0.97}) {
     Clock::time_point start;
     {
-      SceneThread scene(kBundle, 2);
+      const maquette::Context context;
+      maquette::LiveScene scene(context, kBundle, 2);
       scene.open(kRoom);
-      ASSERT_TRUE(
-          wait_until([&] { return scene.state()->done > share || scene.state()->what != SceneState::kOpening; }));
+      ASSERT_TRUE(wait_until(
+          [&] { return scene.state()->done > share || scene.state()->what != maquette::LiveSceneState::kOpening; }));
       start = Clock::now();
     }
     std::printf("at %.2f: %.0f ms\n", share, ms_since(start));
@@ -427,10 +443,11 @@ TEST(SceneThread, TheDestructorEndsBuildingWithinHalfASecond) {
   }
 }
 
-TEST(SceneThread, OpeningManyTimesLeavesNothingBehind) {
+TEST(LiveScene, OpeningManyTimesLeavesNothingBehind) {
   size_t threads = 0;
   {
-    SceneThread scene(kBundle, 2);
+    const maquette::Context context;
+    maquette::LiveScene scene(context, kBundle, 2);
     for (int i = 0; i < 30; ++i) {
       scene.open(small_room(), i % 2 == 0 ? kRoom : "");
       if (i % 3 == 0) continue;
@@ -441,14 +458,16 @@ TEST(SceneThread, OpeningManyTimesLeavesNothingBehind) {
     EXPECT_EQ(threads_of_this_process(), threads);
   }
   for (int i = 0; i < 20; ++i) {
-    SceneThread scene(kBundle, 2);
+    const maquette::Context context;
+    maquette::LiveScene scene(context, kBundle, 2);
     scene.open(i % 2 == 0 ? small_room() : kRoom);
     ASSERT_TRUE(i % 4 != 0 || wait_until_open(scene));
   }
 }
 
-TEST(SceneThread, NoCallWaitsWhileItWorks) {
-  SceneThread scene(kBundle, 2);
+TEST(LiveScene, NoCallWaitsWhileItWorks) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   double longest_ms = 0;
   const auto timed = [&](auto call) {
     const auto start = Clock::now();
@@ -470,9 +489,10 @@ TEST(SceneThread, NoCallWaitsWhileItWorks) {
   EXPECT_LT(longest_ms, 50);
 }
 
-TEST(SceneThread, WorksAtALowerPriorityThanTheWindow) {
+TEST(LiveScene, WorksAtALowerPriorityThanTheWindow) {
   const int own = getpriority(PRIO_PROCESS, 0);
-  SceneThread scene(kBundle, 2);
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
   std::multiset<int> others;

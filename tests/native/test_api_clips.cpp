@@ -156,7 +156,7 @@ TEST_F(ApiClips, AFullDiskIsToldAndLeavesTheOldFile) {
 
 TEST_F(ApiClips, RatesAreKept) {
   for (const char* name : {"a.mp4", "a.avi"}) {
-    for (const double fps : {0.01, 0.5, 23.976, 29.97, 59.94, 65.6, 119.88, 143.856, 655.35, 1000.0}) {
+    for (const double fps : {0.01, 0.5, 23.976, 29.97, 59.94, 65.6, 119.88, 143.857, 655.351, 1000.0}) {
       maquette::Clip clip(context_, folder_.file(name), fps);
       for (int k = 0; k < 3; ++k) clip.add(picture(k));
       clip.finish();

@@ -1,12 +1,11 @@
 // Recordings: what goes in comes out, also after a crash, and nothing that was changed is believed.
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <cstring>
 
 #include "expect_error.h"
+#include "file_size_limit.h"
 #include "sources/recording.h"
 #include "sources/recording_format.h"
 #include "sources/source.h"
@@ -284,20 +283,16 @@ TEST_F(Recordings, OfHostileHeadsAreRefused) {
   expect_error(MAQ_ERROR_UNREADABLE, "its head is not what was written", [&] { play(); });
 }
 
-// A full disk: the system lets the file grow only so far.
 TEST_F(Recordings, OnAFullDiskEndWithAWholeFrameAndCanGoOn) {
   const std::vector<uint64_t> ends = record(3);
   std::filesystem::remove(path_of());
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit little{ends[2] + 100, before.rlim_max};
   maq::RecordingWriter writer(path_of(), {"stub:test", 10, {}}, 0);
   writer.add(frame_of(0));
-  setrlimit(RLIMIT_FSIZE, &little);
-  writer.add(frame_of(1));
-  expect_error(MAQ_ERROR_UNWRITABLE, "The 2 frames before are whole", [&] { writer.add(frame_of(2)); });
-  setrlimit(RLIMIT_FSIZE, &before);
+  {
+    const FileSizeLimit full(ends[2] + 100);
+    writer.add(frame_of(1));
+    expect_error(MAQ_ERROR_UNWRITABLE, "The 2 frames before are whole", [&] { writer.add(frame_of(2)); });
+  }
   EXPECT_EQ(std::filesystem::file_size(path_of()), ends[2]);
   writer.add(frame_of(3));
   writer.finish();

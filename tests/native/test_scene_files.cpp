@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,6 +9,7 @@
 #include <iostream>
 
 #include "expect_error.h"
+#include "file_size_limit.h"
 #include "modelled_scene.h"
 #include "peak_memory.h"
 #include "scene/ply_file.h"
@@ -48,20 +48,6 @@ void expect_same(const Scene& a, const Scene& b) {
 size_t files_in(const TempFolder& folder) {
   return size_t(std::distance(std::filesystem::directory_iterator(folder.path()), {}));
 }
-
-// No file of this process can be larger.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit = {bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
-
- private:
-  rlimit before_{};
-};
 
 TEST(SceneFiles, KeepScenesOfEveryKind) {
   TempFolder folder;
@@ -124,7 +110,6 @@ TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
   write_scene_file(large, folder.file("large.maqs"));
   const rlim_t whole = std::filesystem::file_size(folder.file("large.maqs"));
   std::filesystem::remove(folder.file("large.maqs"));
-  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
   // At the head, in the blocks, the places, the looks, and at the last byte.
   for (const rlim_t most : {rlim_t(0), rlim_t(100), rlim_t(5'000), rlim_t(20'000), rlim_t(200'000), whole - 1}) {
     const FileSizeLimit limit(most);
@@ -133,7 +118,6 @@ TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
       expect_error(MAQ_ERROR_UNWRITABLE, "cannot be written", [&] { write_scene_ply(large, ply); });
     }
   }
-  std::signal(SIGXFSZ, old_handler);
   expect_same(maq::open_scene_file(path), small);
   EXPECT_EQ(read_text(ply), old_ply);
   EXPECT_EQ(files_in(folder), 2u);

@@ -23,7 +23,7 @@ MAQ_API maq_status maq_clip_create(maq_context* context, const char* path, doubl
  * column or row is left out. They are shown `1 / fps` seconds each: their timestamps are not asked.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (another size, or the clip is finished), MAQ_ERROR_IMAGE_SIZE (too
  * small), MAQ_ERROR_UNSUPPORTED (a depth image; with the first picture also: this build cannot write that kind of file, or
- * not of that size; the other kind may do). Blocks while it is encoded. */
+ * not of that size; the other kind may do), MAQ_ERROR_UNWRITABLE (the disk is full already). Blocks while it is encoded. */
 MAQ_API maq_status maq_clip_add(maq_clip* clip, const maq_frame* frame);
 
 /* Completes the file. After it nothing can be added. Only here is it known whether the disk took all of it.

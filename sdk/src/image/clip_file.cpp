@@ -80,6 +80,9 @@ void ClipFile::begin(const ImageView& first) {
   const cv::Size size(first.width_px / 2 * 2, first.height_px / 2 * 2);
   encoder_ = file_codecs().begin_clip(path.front() == '/' ? path : "./" + path, format_, fps_, size);
   if (encoder_ == nullptr) {
+    // Or is the disk full? Then this throws; the next encoder begins the file anew.
+    constexpr char kProbe[4096] = {};
+    file_.append(kProbe, sizeof kProbe);
     throw Error(MAQ_ERROR_UNSUPPORTED, file_.path(), ": this OpenCV does not write ",
                 format_ == ClipFormat::kMpeg4 ? "MPEG-4" : "Motion JPEG", " of ", size.width, " x ", size.height,
                 " pixels; try a name that ends in ", format_ == ClipFormat::kMpeg4 ? ".avi" : ".mp4",

@@ -23,7 +23,8 @@ class ClipFile {
 
   // All have the size of the first; what an odd side has too much is left out at the right and at the bottom.
   // Throws MAQ_ERROR_INVALID_ARGUMENT for another size and after finish(), MAQ_ERROR_IMAGE_SIZE for less than 2 x 2 pixels,
-  // and MAQ_ERROR_UNSUPPORTED for depth images and, at the first, where this OpenCV does not write such clips.
+  // MAQ_ERROR_UNSUPPORTED for depth images and, at the first, where this OpenCV does not write such clips, and
+  // MAQ_ERROR_UNWRITABLE, at the first, when the disk is full already.
   void add(const ImageView& image);
 
   // Throws MAQ_ERROR_INVALID_ARGUMENT when nothing was added, MAQ_ERROR_UNWRITABLE when the disk did not take it all; then

@@ -3,24 +3,17 @@
 #include <GLFW/glfw3.h>
 #include <imgui.h>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kMovingSidePx = 640, kStillSidePx = 1280;  // of a scene's pictures, while flying and after
-constexpr double kFlightSpeed = 0.12;                    // diagonals of the scene a second
 constexpr char kFirstCamera[] = "camera:", kRenderedPeople[] = "stub:people?count=2";
 constexpr int kLargestOutfitPx = 4096;
-constexpr double kToPhotoS = 0.6, kFlightTurnS = 0.016;
-constexpr double kIdleS = 0.25;  // between two turns when nothing happens
-
-nlohmann::json as_json(const Rect& rect) { return {rect.x, rect.y, rect.width, rect.height}; }
+constexpr double kFlightTurnS = 0.016,
+                 kIdleS = 0.25;  // between two turns, when the picture moves and when nothing happens
 
 // A path as a URI of the library; what is no file stays.
 std::string uri_of(const std::string& path_or_uri) {
@@ -70,7 +63,7 @@ int App::run() {
     const double turn_s = maquette::monotonic_s();
     take_news();
     take_keys();
-    fly(float(std::min(0.1, turn_s - before_s)));
+    steer(float(std::min(0.1, turn_s - before_s)));
     before_s = turn_s;
     window_.begin_drawing();
     draw();
@@ -166,13 +159,8 @@ void App::take_news() {
   while (stages_.size() > 200) stages_.pop_front();
 }
 
-void App::set_scene_pictures() {
-  const maquette::LiveScenePicture& shown = scenes_.shown().front();
-  painter_.set_scene(shown.rendering, options_.compare == Compare::kError ? shown.error : shown.photo);
-}
-
 void App::take_keys() {
-  const bool control = window_.is_down(GLFW_KEY_LEFT_CONTROL) || window_.is_down(GLFW_KEY_RIGHT_CONTROL);
+  const bool control = window_.held(GLFW_KEY_LEFT_CONTROL) + window_.held(GLFW_KEY_RIGHT_CONTROL) > 0;
   for (const int key : window_.take_keys()) {
     if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) options_.view = View(key - GLFW_KEY_1);
     if (key == GLFW_KEY_M) options_.mesh = !options_.mesh;
@@ -194,80 +182,25 @@ void App::take_keys() {
   }
 }
 
-void App::set_compare(Compare compare) {
-  options_.compare = compare;
-  const auto state = scenes_.state();
-  if (compare != Compare::kNone && flight_ && flight_->at_photo() < 0) {
-    go_to_photo(flight_->nearest_photo(state->photos));
-  }
-  set_scene_pictures();
-}
-
-void App::go_to_photo(int index) {
-  const auto state = scenes_.state();
-  const int count = int(state->photos.size());
-  if (!flight_ || count == 0) return;
-  photo_ = (index + count) % count;
-  flight_->go_to(state->photos[size_t(photo_)], options_.headless ? 0 : kToPhotoS, photo_);
-  turned_ = true;
-}
-
-void App::fly(float seconds) {
+// Arrows, and the mouse where it was pressed: turns the body, moves the slider, or flies.
+void App::steer(float seconds) {
   const ImGuiIO& io = ImGui::GetIO();
   const bool mouse = !io.WantCaptureMouse && ImGui::IsMouseDown(ImGuiMouseButton_Left);
   if (mouse && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
-    const Rect& body = body_rect_;
-    const float line = float(picture_rect_.x) + slider_ * float(picture_rect_.width);
-    const bool in_body = body.width > 0 && io.MousePos.x < float(body.x + body.width) && io.MousePos.y > float(body.y);
-    drags_ =
-        !shows_scene_ ? (in_body ? Drag::kBody : Drag::kNothing)
-        : options_.compare == Compare::kSlider && photo_ >= 0 && std::abs(io.MousePos.x - line) < 14 * window_.scale()
-            ? Drag::kSlider
-            : Drag::kView;
+    drags_slider_ = shows_scene_ && options_.compare == Compare::kSlider &&
+                    std::abs(io.MousePos.x - slider_x()) < 14 * window_.scale();
   }
   const float dx = mouse ? io.MouseDelta.x : 0, dy = mouse ? io.MouseDelta.y : 0;
-  const auto held = [&](int more, int less) { return float(window_.is_down(more)) - float(window_.is_down(less)); };
-  const bool control = window_.is_down(GLFW_KEY_LEFT_CONTROL) || window_.is_down(GLFW_KEY_RIGHT_CONTROL);
-  const float arrows_x = io.NavActive ? 0 : held(GLFW_KEY_RIGHT, GLFW_KEY_LEFT) * seconds * 1.5f;
-  const float arrows_y = io.NavActive ? 0 : held(GLFW_KEY_DOWN, GLFW_KEY_UP) * seconds * 1.5f;
-  if (!shows_scene_) {
-    if (drags_ == Drag::kBody) yaw_ -= dx * 0.01f, pitch_ = std::clamp(pitch_ + dy * 0.01f, -1.5f, 1.5f);
-    yaw_ -= arrows_x, pitch_ = std::clamp(pitch_ + arrows_y, -1.5f, 1.5f);
+  if (mouse && drags_slider_) {
+    slider_ = std::clamp(slider_ + dx / float(std::max(1, picture_rect_.width)), 0.0f, 1.0f);
     return;
   }
-  const auto state = scenes_.state();
-  if (state->what != maquette::LiveSceneState::kReady) return;
-  bool moves = !flight_;
-  if (!flight_) flight_.emplace(state->info, state->photos);
-  if (drags_ == Drag::kSlider) slider_ = std::clamp(slider_ + dx / float(std::max(1, picture_rect_.width)), 0.0f, 1.0f);
-  const float turn_x = arrows_x + (drags_ == Drag::kView ? dx * 0.004f : 0);
-  const float turn_y = arrows_y + (drags_ == Drag::kView ? dy * 0.004f : 0);
-  const float right = held(GLFW_KEY_D, GLFW_KEY_A), up = held(GLFW_KEY_E, GLFW_KEY_Q);
-  const float forward = held(GLFW_KEY_W, GLFW_KEY_S), wheel = io.WantCaptureMouse ? 0 : io.MouseWheel;
-  if (!control && (turn_x != 0 || turn_y != 0 || right != 0 || up != 0 || forward != 0 || wheel != 0)) {
-    if (turn_x != 0 || turn_y != 0) flight_->turn(double(turn_x), double(-turn_y));
-    if (wheel != 0) flight_->zoom(std::pow(1.1, double(wheel)));
-    flight_->move(double(right), double(up), double(forward), double(seconds), kFlightSpeed);
-    moves = true;
-  }
-  moves |= flight_->update(double(seconds));
-  const bool ends = moving_ && !moves;
-  const bool resized = picture_area_.width != looked_at_.width || picture_area_.height != looked_at_.height;
-  moving_ = moves;
-  if (!moves && !ends && !resized && !turned_) return;
-  turned_ = false;
-  looked_at_ = picture_area_;
-  // In motion smaller pictures, for the sake of their number.
-  const int photo = flight_->at_photo();
-  const double side = std::max(picture_area_.width, picture_area_.height);
-  const double scale = std::min(1.0, (moves ? kMovingSidePx : kStillSidePx) / side);
-  const auto scaled = [&](int px) { return std::max(16, int(px * scale)); };
-  if (photo >= 0) {
-    photo_ = photo;
-    scenes_.look(state->photos[size_t(photo)], photo);
-  } else {
-    scenes_.look(flight_->camera(scaled(picture_area_.width), scaled(picture_area_.height)), -1);
-  }
+  const float arrows = io.NavActive ? 0 : seconds * 1.5f;
+  const float right = window_.held(GLFW_KEY_RIGHT, GLFW_KEY_LEFT) * arrows + dx * 0.005f;
+  const float down = window_.held(GLFW_KEY_DOWN, GLFW_KEY_UP) * arrows + dy * 0.005f;
+  if (shows_scene_) return fly(right, down, seconds);
+  yaw_ -= right;
+  pitch_ = std::clamp(pitch_ + down, -1.5f, 1.5f);
 }
 
 void App::draw() {
@@ -317,17 +250,6 @@ void App::draw_boxes(const MappedFrame& frame) {
   }
 }
 
-void App::draw_slider() {
-  ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  const float x = float(picture_rect_.x) + slider_ * float(picture_rect_.width), top = float(picture_rect_.y);
-  const ImVec2 photo = ImGui::CalcTextSize("photo");
-  list->AddLine({x, top}, {x, top + float(picture_rect_.height)}, IM_COL32_WHITE, 2 * window_.scale());
-  list->AddRectFilled({x - photo.x - 14, top}, {x + ImGui::CalcTextSize("rendering").x + 14, top + photo.y + 6},
-                      IM_COL32(0, 0, 0, 150));
-  list->AddText({x - photo.x - 8, top + 3}, IM_COL32_WHITE, "photo");
-  list->AddText({x + 8, top + 3}, IM_COL32_WHITE, "rendering");
-}
-
 // What the person must know, over the picture: why there are no frames, what is being done, what was saved.
 void App::draw_news() {
   std::string text;
@@ -350,123 +272,4 @@ void App::draw_news() {
                       margin / 2);
   list->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {2 * margin, 2 * margin}, IM_COL32(255, 214, 120, 255),
                 text.c_str(), nullptr, width);
-}
-
-std::string App::new_path(const char* extension) const {
-  const std::time_t now = std::time(nullptr);
-  char name[40];
-  std::strftime(name, sizeof name, "maquette-%Y-%m-%d-%H-%M-%S", std::localtime(&now));
-  return (fs::path(options_.out) / name).string() + extension;
-}
-
-void App::take_screenshot(const std::string& path, const Rect& rect) {
-  auto picture = std::make_shared<maquette::Picture>(window_.read_pixels(rect));
-  files_.add([this, picture, path] {
-    picture->frame(context_).save(path);
-    return "Saved " + path;
-  });
-}
-
-void App::take_snapshot() {
-  const std::string path = new_path("");
-  take_screenshot(path + ".png", picture_rect_);
-  const auto result = mapped_.front().result;
-  if (shows_scene_ || result == nullptr) return;
-  files_.add([path, result, folder = options_.out] {
-    result->save(folder, fs::path(path).filename().string());
-    return "Saved " + path + ".png, _IUV.png, _INDS.png and .json";
-  });
-}
-
-void App::toggle_clip() {
-  if (clip_file_ != nullptr) {
-    files_.add([file = std::move(clip_file_), path = clip_path_] {
-      if (*file) (*file)->finish();
-      return "Saved " + path;
-    });
-    clip_file_ = nullptr;
-    return;
-  }
-  clip_path_ = new_path(".mp4");
-  clip_rect_ = picture_rect_;
-  const double fps = shows_scene_ ? 25 : std::max(1.0, mapped_.front().fps);
-  clip_file_ = std::make_shared<std::optional<maquette::Clip>>();
-  files_.add([this, file = clip_file_, path = clip_path_, fps] {
-    file->emplace(context_, path, fps);
-    return "Recording " + path;
-  });
-}
-
-// A clip has one size: it ends where the window gets another.
-void App::add_to_clip() {
-  if (clip_rect_.width != picture_rect_.width || clip_rect_.height != picture_rect_.height) return toggle_clip();
-  auto picture = std::make_shared<maquette::Picture>(window_.read_pixels(picture_rect_));
-  files_.add([this, file = clip_file_, picture] {
-    if (*file) (*file)->add(picture->frame(context_));
-    return std::string();
-  });
-}
-
-void App::toggle_recording() {
-  recording_ = recording_.empty() ? new_path(".maqrec") : "";
-  people_.record(recording_);
-}
-
-bool App::has_failed() const {
-  return shows_scene_ ? scenes_.state()->what == maquette::LiveSceneState::kFailed : people_.status().failed;
-}
-
-bool App::is_done() {
-  if (has_failed()) return true;
-  if (!shows_scene_) return ended_;
-  if (pictures_ == 0 || pictures_ == done_pictures_) return false;
-  done_pictures_ = pictures_;
-  // It looks around, and ends where a photo was taken.
-  if (pictures_ + 1 < options_.frames) {
-    flight_->turn(pictures_ % 40 < 20 ? 0.02 : -0.02, 0);
-    turned_ = true;
-    return false;
-  }
-  if (scenes_.shown().front().photo_index >= 0 || scenes_.state()->photos.empty()) return true;
-  go_to_photo(flight_->nearest_photo(scenes_.state()->photos));
-  return false;
-}
-
-std::string App::report() const {
-  std::vector<float> sorted = turns_ms_;
-  std::sort(sorted.begin(), sorted.end());
-  const auto rank = [&](double share) {
-    return sorted.empty() ? 0.0f : sorted[size_t(share * double(sorted.size() - 1) + 0.5)];
-  };
-  const MappedFrame& frame = mapped_.front();
-  const maquette::LiveStatus status = people_.status();
-  nlohmann::ordered_json json;
-  json["frames"] = shows_scene_ ? pictures_ : frame.number;
-  json["source"] = status.uri;
-  json["view"] = kViewNames[size_t(options_.view)];
-  json["window_px"] = {window_.rect().width, window_.rect().height};
-  json["picture_px"] = as_json(picture_rect_);
-  json["mesh_px"] = body_rect_.width > 0 ? as_json(body_rect_) : nlohmann::json();
-  json["frame_px"] = {frame.camera.width_px, frame.camera.height_px};
-  json["people"] = nlohmann::json::array();
-  for (const maq_person& person : frame.people) {
-    json["people"].push_back({{"box", person.box_px}, {"score", person.score}});
-  }
-  json["drops"] = status.drops;
-  json["events"] = status.events;
-  json["problem"] = status.problem;
-  json["ui"] = {{"turns", sorted.size()}, {"longest_ms", rank(1)}, {"p99_ms", rank(0.99)}, {"start_ms", start_ms_}};
-  json["opengl"] = window_.opengl();
-  json["scene"] = nullptr;
-  if (shows_scene_) {
-    const auto state = scenes_.state();
-    const maquette::LiveScenePicture& shown = scenes_.shown().front();
-    json["problem"] = state->what == maquette::LiveSceneState::kFailed ? state->text : "";
-    json["scene"] = {{"points", state->info.point_count}, {"photo", nullptr}, {"psnr_db", nullptr}};
-    if (shown.photo_index >= 0) {
-      json["scene"]["photo"] = state->photo_names[size_t(shown.photo_index)];
-      json["scene"]["psnr_db"] = shown.psnr_db;
-    }
-  }
-  return json.dump();
 }

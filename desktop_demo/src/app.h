@@ -38,7 +38,6 @@ class App {
   int run();
 
  private:
-  enum class Drag { kNothing, kView, kBody, kSlider };
   struct Stages {
     std::array<float, 8> ms{};
   };
@@ -49,9 +48,11 @@ class App {
   // One turn:
   void take_news();
   void take_keys();
-  void fly(float seconds);
+  void steer(float seconds);
   void draw();
 
+  void fly(float look_right, float look_down, float seconds);
+  float slider_x() const;
   void set_compare(Compare compare);
   void set_scene_pictures();
   void go_to_photo(int index);
@@ -91,7 +92,7 @@ class App {
   bool ended_ = false;   // the source, at this turn's frame
   bool moving_ = false;  // the flight
   bool has_surface_ = false;
-  Drag drags_ = Drag::kNothing;
+  bool drags_slider_ = false;
   float slider_ = 0.5f, yaw_ = 0.5f, pitch_ = 0.15f;
   int photo_ = 0;        // where the flight was last or goes to
   bool turned_ = false;  // the flight, other than by the person

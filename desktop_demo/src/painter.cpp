@@ -186,7 +186,8 @@ void Painter::set_surface(const std::vector<float>& points, int nodes) {
 
 void Painter::use(unsigned program, const Rect& rect) {
   glUseProgram(program_ = program);
-  glViewport(rect.x, window_.rect().height - rect.y - rect.height, rect.width, rect.height);
+  const Rect pixels = window_.in_pixels(rect), all = window_.in_pixels(window_.rect());
+  glViewport(pixels.x, all.height - pixels.y - pixels.height, pixels.width, pixels.height);
   glBindVertexArray(no_vertices_);
   glDisable(GL_DEPTH_TEST);
   glActiveTexture(GL_TEXTURE0);
@@ -203,7 +204,8 @@ void Painter::draw_people(View view, const Rect& rect) {
   glUniform1i(uniform("people"), people_);
   glUniform1i(uniform("outfit_is_atlas"), outfit_is_atlas_ ? 1 : 0);
   glUniform1f(uniform("lines"), kContoursPerChart);
-  glUniform1f(uniform("screen_px"), float(rect.width) / float(std::max(1, sizes_[kCameraTexture][0])));
+  glUniform1f(uniform("screen_px"),
+              float(window_.in_pixels(rect).width) / float(std::max(1, sizes_[kCameraTexture][0])));
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 

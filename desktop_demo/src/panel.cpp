@@ -10,10 +10,7 @@
 
 namespace {
 
-constexpr const char* kPeopleStages[] = {"trunk",  "proposals", "box head", "dense head",
-                                         "decode", "resize",    "copy",     "wait"};
-constexpr const char* kSceneStages[] = {"project", "shade", "refine", "turn"};
-constexpr const char* kCompareNames[] = {"off", "slider", "error"};
+constexpr const char* kStages[] = {"trunk", "proposals", "box head", "dense head", "decode", "resize", "copy", "wait"};
 constexpr ImU32 kStageColours[] = {IM_COL32(88, 140, 232, 255),  IM_COL32(80, 200, 200, 255),
                                    IM_COL32(100, 200, 110, 255), IM_COL32(236, 190, 70, 255),
                                    IM_COL32(240, 130, 60, 255),  IM_COL32(214, 90, 110, 255),
@@ -75,7 +72,7 @@ void App::draw_people_panel() {
   ImGui::Text("%.1f ms a frame, %d people%s", double(frame.stats.total_ms), frame.stats.people,
               frame.stats.key_frame != 0 ? "" : ", followed");
   if (frame.age_ms >= 0) ImGui::Text("from camera to result: %.0f ms", frame.age_ms);
-  draw_stages(kPeopleStages, std::size(kPeopleStages));
+  draw_stages(kStages, std::size(kStages));
 
   ImGui::TextUnformatted("Views (1 to 6)");
   for (size_t view = 0; view < kViewNames.size(); ++view) {
@@ -106,42 +103,6 @@ void App::draw_people_panel() {
   changed |= ImGui::CheckboxFlags("parts alone, no U and V", &options_.model.detail, MAQ_DETAIL_PART);
   changed |= ImGui::CheckboxFlags("threads stay awake", &options_.model.spin, 1);
   if (changed) people_.set(options_.model);
-}
-
-void App::draw_scene_panel() {
-  const auto state = scenes_.state();
-  const maquette::LiveScenePicture& shown = scenes_.shown().front();
-  ImGui::TextWrapped("%s", state->path.c_str());
-  if (state->what == maquette::LiveSceneState::kOpening)
-    ImGui::ProgressBar(float(state->done), {-1, 0}, state->text.c_str());
-  if (state->what == maquette::LiveSceneState::kReady) {
-    ImGui::Text("%llu points, %zu photos", static_cast<unsigned long long>(state->info.point_count),
-                state->photos.size());
-    ImGui::Text("%d x %d in %.1f ms, %llu points seen", shown.rendering.width_px, shown.rendering.height_px,
-                double(shown.stats.total_ms), static_cast<unsigned long long>(shown.stats.points_shaded));
-    if (shown.photo_index >= 0) {
-      ImGui::TextWrapped("%s: PSNR %.1f dB", state->photo_names[size_t(shown.photo_index)].c_str(), shown.psnr_db);
-    } else {
-      ImGui::TextUnformatted("");
-    }
-    if (!state->text.empty()) ImGui::TextWrapped("%s", state->text.c_str());
-  }
-  draw_stages(kSceneStages, std::size(kSceneStages));
-  if (!state->photos.empty()) {
-    ImGui::TextUnformatted("Photo against rendering (C)");
-    for (size_t which = 0; which < std::size(kCompareNames); ++which) {
-      if (which != 0) ImGui::SameLine();
-      if (ImGui::RadioButton(kCompareNames[which], options_.compare == Compare(which))) set_compare(Compare(which));
-    }
-    if (options_.compare == Compare::kSlider) ImGui::SliderFloat("photo", &slider_, 0, 1, "");
-    if (ImGui::Button("Nearest photo (N)") && flight_) go_to_photo(flight_->nearest_photo(state->photos));
-    ImGui::SameLine();
-    if (ImGui::Button("<")) go_to_photo(photo_ - 1);
-    ImGui::SameLine();
-    if (ImGui::Button(">")) go_to_photo(photo_ + 1);
-  }
-  ImGui::TextWrapped("Fly: W A S D, Q E down and up, mouse or arrows to look, wheel to zoom.");
-  if (ImGui::Button("Back to people (X)")) open_people();
 }
 
 // Milliseconds of each stage over the last frames, one upon the other.

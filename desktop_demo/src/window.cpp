@@ -72,8 +72,9 @@ Window::~Window() {
 }
 
 // Letters are drawn once, for the scale at the start; on another screen they are stretched.
-void Window::set_scale(float scale) {
-  scale = std::clamp(scale, 0.5f, 4.0f);
+void Window::set_scale(float content_scale) {
+  const float unit_px = float(in_pixels({0, 0, 1000, 1000}).width) / 1000;
+  const float scale = std::clamp(content_scale / std::max(unit_px, 0.1f), 0.5f, 4.0f);
   ImGuiIO& io = ImGui::GetIO();
   if (scale_ == 0) {
     const char* const font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
@@ -104,7 +105,7 @@ void Window::begin_drawing() {
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
-  glViewport(0, 0, rect().width, rect().height);
+  glViewport(0, 0, in_pixels(rect()).width, in_pixels(rect()).height);
   glClearColor(0.07f, 0.07f, 0.08f, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
 }
@@ -117,13 +118,15 @@ void Window::end_drawing() {
 void Window::show() { glfwSwapBuffers(window_); }
 
 maquette::Picture Window::read_pixels(const Rect& rect) const {
+  const Rect pixels = in_pixels(rect), all = in_pixels(this->rect());
   maquette::Picture picture;
-  picture.resize(rect.width, rect.height);
+  picture.resize(pixels.width, pixels.height);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(rect.x, this->rect().height - rect.y - rect.height, rect.width, rect.height, GL_RGBA, GL_UNSIGNED_BYTE,
+  glReadPixels(pixels.x, all.height - pixels.y - pixels.height, pixels.width, pixels.height, GL_RGBA, GL_UNSIGNED_BYTE,
                picture.rgba.data());
-  const size_t row = size_t(rect.width) * 4;
-  for (size_t top = 0, bottom = size_t(rect.height); top + 1 < bottom; ++top) {
+  // OpenGL's first row is the lowest.
+  const size_t row = size_t(pixels.width) * 4;
+  for (size_t top = 0, bottom = size_t(pixels.height); top + 1 < bottom; ++top) {
     --bottom;
     std::swap_ranges(&picture.rgba[top * row], &picture.rgba[top * row] + row, &picture.rgba[bottom * row]);
   }
@@ -144,8 +147,16 @@ void Window::toggle_full_screen() {
 
 Rect Window::rect() const {
   Rect all;
-  glfwGetFramebufferSize(window_, &all.width, &all.height);
+  glfwGetWindowSize(window_, &all.width, &all.height);
   return all;
+}
+
+Rect Window::in_pixels(const Rect& rect) const {
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window_, &width, &height);
+  const double x = double(width) / std::max(1, this->rect().width),
+               y = double(height) / std::max(1, this->rect().height);
+  return {int(rect.x * x), int(rect.y * y), int(rect.width * x), int(rect.height * y)};
 }
 
 std::string Window::opengl() const {
@@ -154,5 +165,8 @@ std::string Window::opengl() const {
 }
 
 std::vector<int> Window::take_keys() { return std::exchange(keys_, {}); }
-bool Window::is_down(int key) const { return glfwGetKey(window_, key) == GLFW_PRESS; }
+float Window::held(int key, int other) const {
+  const auto down = [&](int k) { return k != 0 && glfwGetKey(window_, k) == GLFW_PRESS ? 1.0f : 0.0f; };
+  return down(key) - down(other);
+}
 std::vector<std::string> Window::take_drops() { return std::exchange(drops_, {}); }

@@ -7,7 +7,7 @@
 
 struct GLFWwindow;
 
-// In pixels of the window's picture, from its top left corner.
+// In units of the window, from its top left corner.
 struct Rect {
   int x = 0, y = 0, width = 0, height = 0;
   // The largest of the shape width : height that fits, in the middle.
@@ -32,21 +32,23 @@ class Window {
   void end_drawing();
   // What was drawn, on the screen.
   void show();
-  // Rows from top to bottom.
   maquette::Picture read_pixels(const Rect& rect) const;
   void toggle_full_screen();
 
+  // Layout is in the units of the window system, which may be several pixels each.
   Rect rect() const;
-  float scale() const { return scale_; }  // of texts, for screens of many pixels
+  Rect in_pixels(const Rect& rect) const;
+  float scale() const { return scale_; }  // of texts and margins
   std::string opengl() const;
-  // Keys (GLFW_KEY_…) that were pressed since the last call, and whether one is held down now.
+  // Keys (GLFW_KEY_…) that were pressed since the last call.
   std::vector<int> take_keys();
-  bool is_down(int key) const;
+  // 1 while `key` is held down, -1 while `other` is, 0 for both or none.
+  float held(int key, int other = 0) const;
   // Paths that were dropped since the last call.
   std::vector<std::string> take_drops();
 
  private:
-  void set_scale(float scale);
+  void set_scale(float content_scale);
 
   GLFWwindow* window_ = nullptr;
   float scale_ = 0, font_scale_ = 1;

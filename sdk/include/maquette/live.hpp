@@ -275,7 +275,7 @@ class LiveDensePose {
       const bool known = state >= MAQ_SOURCE_STARTED && state <= MAQ_SOURCE_BACK;
       const std::string name = known ? names[state] : "changed";
       static_cast<LiveDensePose*>(self)->change_status([&](LiveStatus& status) {
-        status.events.push_back(name);
+        if (status.events.size() < kMostEvents) status.events.push_back(name);
         const bool fine = state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_BACK;
         status.problem = fine ? "" : "The camera is " + name + ": " + reason;
       });
@@ -333,6 +333,7 @@ class LiveDensePose {
     mapped_(LiveFrame{frame, std::move(result), waiting_ms, age_ms, fps, ++frames_});
   }
 
+  static constexpr size_t kMostEvents = 1000;
   static constexpr int64_t kTurnNs = 100000000;  // how long a wait for a frame may hold up an order
 
   const Context& context_;

@@ -69,8 +69,8 @@ void App::draw_people_panel() {
   const MappedFrame& frame = mapped_.front();
   ImGui::TextWrapped("%s", status.uri.c_str());
   ImGui::Text("%.1f frames a second, %llu lost", frame.fps, static_cast<unsigned long long>(status.drops));
-  ImGui::Text("%.1f ms a frame, %d people%s", double(frame.stats.total_ms), frame.stats.people,
-              frame.stats.key_frame != 0 ? "" : ", followed");
+  ImGui::Text("%.1f ms a frame, %d %s%s", double(frame.stats.total_ms), frame.stats.people,
+              frame.stats.people == 1 ? "person" : "people", frame.stats.key_frame != 0 ? "" : ", followed");
   if (frame.age_ms >= 0) ImGui::Text("from camera to result: %.0f ms", frame.age_ms);
   draw_stages(kStages, std::size(kStages));
 

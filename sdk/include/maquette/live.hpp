@@ -290,15 +290,13 @@ class LiveDensePose {
     config.result_pool_size = uint32_t(options_.frames_held);
     model_.reset();
     model_.emplace(context_, config);
-    maq_surface surface{};
-    surface.struct_size = sizeof surface;
-    const bool has_surface = maq_densepose_get_surface(model_->get(), &surface) == MAQ_OK;
+    const std::optional<maq_surface> surface = model_->surface();
     change_status([&](LiveStatus& status) {
       status.doing.clear();
-      if (!has_surface) return;
-      surface_nodes_ = surface.nodes;
-      surface_.assign(surface.points_m,
-                      surface.points_m + size_t(24 * 3) * size_t(surface.nodes) * size_t(surface.nodes));
+      if (!surface) return;
+      surface_nodes_ = surface->nodes;
+      const size_t count = size_t(24 * 3) * size_t(surface->nodes) * size_t(surface->nodes);
+      surface_.assign(surface->points_m, surface->points_m + count);
     });
   }
 

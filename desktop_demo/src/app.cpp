@@ -98,7 +98,8 @@ void App::open(const std::string& path_or_uri) {
     scenes_.open(path_or_uri, options_.capture);
   } else {
     scenes_.close();
-    people_.open(uri_of(path_or_uri), path_or_uri == kFirstCamera ? kRenderedPeople : "");
+    seeks_camera_ = path_or_uri == kFirstCamera;
+    people_.open(uri_of(path_or_uri), seeks_camera_ ? kRenderedPeople : "");
   }
 }
 
@@ -160,7 +161,6 @@ void App::take_news() {
 }
 
 void App::take_keys() {
-  const bool control = window_.held(GLFW_KEY_LEFT_CONTROL) + window_.held(GLFW_KEY_RIGHT_CONTROL) > 0;
   for (const int key : window_.take_keys()) {
     if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) options_.view = View(key - GLFW_KEY_1);
     if (key == GLFW_KEY_M) options_.mesh = !options_.mesh;
@@ -178,7 +178,6 @@ void App::take_keys() {
     if (key == GLFW_KEY_F4) toggle_recording();
     if (key == GLFW_KEY_F11) window_.toggle_full_screen();
     if (key == GLFW_KEY_ESCAPE) help_ = false;
-    if (key == GLFW_KEY_Q && control) window_.close();
   }
 }
 
@@ -260,6 +259,9 @@ void App::draw_news() {
   } else {
     const maquette::LiveStatus status = people_.status();
     text = status.problem.empty() ? status.doing : status.problem;
+    if (seeks_camera_ && status.uri.rfind(kRenderedPeople, 0) == 0 && !text.empty()) {
+      text += " These people are rendered; drop a photo, a clip or a recording here.";
+    }
   }
   const std::string told = files_.told();
   if (told != told_) told_ = told, told_at_s_ = maquette::monotonic_s();

@@ -87,7 +87,7 @@ class App {
   maquette::LiveScene scenes_;
   std::optional<maquette::FlyCamera> flight_;
 
-  bool shows_scene_ = false, paused_ = false, help_ = false;
+  bool shows_scene_ = false, seeks_camera_ = false, paused_ = false, help_ = false;
   bool fresh_ = false;   // this turn has a new picture
   bool ended_ = false;   // the source, at this turn's frame
   bool moving_ = false;  // the flight

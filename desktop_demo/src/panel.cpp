@@ -147,18 +147,25 @@ void App::draw_help() {
   ImGui::Begin("Help", &help_, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
   ImGui::TextUnformatted(
       "Drop a photo, a clip, a recording, a scene (.maqs) or a folder with a capture here.\n"
-      "In the try-on view a dropped picture is worn.\n\n"
-      "1 to 6     camera, parts, U/V contours, mask, boxes, try-on\n"
-      "M          the body's surface in the corner; drag it or use the arrows to turn it\n"
-      "P          pause\n"
-      "F2         snapshot: the picture, and IUV, INDS and JSON of the people\n"
-      "F3         clip of the picture (.mp4)\n"
-      "F4         recording of the source (.maqrec), to be played here again\n\n"
-      "Scenes: W A S D Q E fly, mouse or arrows look, wheel zooms\n"
-      "N , .      nearest photo, the one before, the next\n"
-      "C          photo against rendering: off, slider, error\n"
-      "X          back to people\n\n"
-      "Tab        into the panel: arrows, Space, Enter; again: back to the picture\n"
-      "H          panel; F11 full screen; Ctrl+Q ends the program");
+      "In the try-on view a dropped picture is worn.\n\n");
+  constexpr const char* kKeys[][2] = {
+      {"1 to 6", "camera, parts, U/V contours, mask, boxes, try-on"},
+      {"M", "the body's surface in the corner; drag or use the arrows to turn it"},
+      {"P", "pause"},
+      {"F2", "snapshot: the picture, and IUV, INDS and JSON of the people"},
+      {"F3", "clip of the picture (.mp4): begin, end"},
+      {"F4", "recording of the source (.maqrec), to be played here again: begin, end"},
+      {"W A S D, Q E", "fly through a scene, down and up; mouse or arrows look, the wheel zooms"},
+      {"N  ,  .", "nearest photo of the scene, the one before, the next"},
+      {"C", "photo against rendering: off, slider, error"},
+      {"X", "from the scene back to people"},
+      {"Tab", "into the panel: arrows, Space, Enter; again: back to the picture"},
+      {"H, F11", "panel, full screen"},
+      {"Ctrl+Q", "ends the program"}};
+  for (const auto& [key, what] : kKeys) {
+    ImGui::TextUnformatted(key);
+    ImGui::SameLine(110 * window_.scale());
+    ImGui::TextUnformatted(what);
+  }
   ImGui::End();
 }

@@ -46,8 +46,11 @@ Window::Window(const char* title, int width, int height, bool visible) {
     auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
     self->drops_.insert(self->drops_.end(), paths, paths + count);
   });
-  glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int) {
-    if (action == GLFW_PRESS) static_cast<Window*>(glfwGetWindowUserPointer(window))->keys_.push_back(key);
+  glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int modifiers) {
+    if (action != GLFW_PRESS) return;
+    const bool quits = key == GLFW_KEY_Q && (modifiers & GLFW_MOD_CONTROL) != 0;
+    if (quits) glfwSetWindowShouldClose(window, GLFW_TRUE);
+    if (!quits) static_cast<Window*>(glfwGetWindowUserPointer(window))->keys_.push_back(key);
   });
   glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* window, float x, float) {
     static_cast<Window*>(glfwGetWindowUserPointer(window))->set_scale(x);

@@ -40,7 +40,7 @@ class Window {
   Rect in_pixels(const Rect& rect) const;
   float scale() const { return scale_; }  // of texts and margins
   std::string opengl() const;
-  // Keys (GLFW_KEY_…) that were pressed since the last call.
+  // Keys (GLFW_KEY_…) that were pressed since the last call; Ctrl+Q closes.
   std::vector<int> take_keys();
   // 1 while `key` is held down, -1 while `other` is, 0 for both or none.
   float held(int key, int other = 0) const;

@@ -276,8 +276,11 @@ class LiveDensePose {
       const std::string name = known ? names[state] : "changed";
       static_cast<LiveDensePose*>(self)->change_status([&](LiveStatus& status) {
         if (status.events.size() < kMostEvents) status.events.push_back(name);
-        const bool fine = state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_BACK;
-        status.problem = fine ? "" : "The camera is " + name + ": " + reason;
+        // What was said when it was opened stays when it starts.
+        if (state == MAQ_SOURCE_BACK) status.problem.clear();
+        if (state != MAQ_SOURCE_BACK && state != MAQ_SOURCE_STARTED) {
+          status.problem = "The camera is " + name + ": " + reason;
+        }
       });
     };
     return Source(context_, uri, &config);

@@ -162,6 +162,7 @@ void App::take_news() {
 
 void App::take_keys() {
   for (const int key : window_.take_keys()) {
+    if (ImGui::GetIO().WantTextInput) continue;
     if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) options_.view = View(key - GLFW_KEY_1);
     if (key == GLFW_KEY_M) options_.mesh = !options_.mesh;
     if (key == GLFW_KEY_H) options_.panel = !options_.panel;
@@ -171,7 +172,7 @@ void App::take_keys() {
     if (key == GLFW_KEY_COMMA) go_to_photo(photo_ - 1);
     if (key == GLFW_KEY_PERIOD) go_to_photo(photo_ + 1);
     if (key == GLFW_KEY_X && shows_scene_) open_people();
-    if (key == GLFW_KEY_TAB) ImGui::SetWindowFocus(ImGui::GetIO().NavActive ? nullptr : "panel");
+    if (key == GLFW_KEY_F6) ImGui::SetWindowFocus(ImGui::GetIO().NavActive ? nullptr : "panel");
     if (key == GLFW_KEY_F1) help_ = !help_;
     if (key == GLFW_KEY_F2) take_snapshot();
     if (key == GLFW_KEY_F3) toggle_clip();

@@ -36,8 +36,8 @@ void App::draw_panel(int width_px) {
   ImGui::SetNextWindowPos({float(all.width - width_px), 0});
   ImGui::SetNextWindowSize({float(width_px), float(all.height)});
   ImGui::Begin("panel", nullptr,
-               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
-                   ImGuiWindowFlags_NoFocusOnAppearing);
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize);
+  if (ImGui::IsWindowAppearing()) ImGui::SetWindowFocus(nullptr);  // arrows are the picture's at first
   ImGui::PushItemWidth(-110 * window_.scale());
   const double now = ImGui::GetTime();
   if (now - cpu_at_s_ > 1) {
@@ -159,7 +159,7 @@ void App::draw_help() {
       {"N  ,  .", "nearest photo of the scene, the one before, the next"},
       {"C", "photo against rendering: off, slider, error"},
       {"X", "from the scene back to people"},
-      {"Tab", "into the panel: arrows, Space, Enter; again: back to the picture"},
+      {"F6", "into the panel: arrows, Space, Enter; again: back to the picture"},
       {"H, F11", "panel, full screen"},
       {"Ctrl+Q", "ends the program"}};
   for (const auto& [key, what] : kKeys) {

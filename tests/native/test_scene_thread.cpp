@@ -16,6 +16,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr double kSlower = 8;  // than the build that is shipped
+#else
+constexpr double kSlower = 1;
+#endif
+
 const std::string kRoom = MAQ_TEST_MEDIA "/room", kBundle = MAQ_TEST_MODELS "/scenes-int8";
 
 double ms_since(Clock::time_point start) {
@@ -97,7 +103,6 @@ std::string failure_of(SceneThread& scene, const std::string& path) {
 TEST(SceneThread, BuildsACaptureAndComparesWithItsPhotos) {
   SceneThread scene(kBundle, 2);
   EXPECT_EQ(scene.state()->what, SceneState::kNothing);
-  const auto start = Clock::now();
   scene.open(kRoom);
   EXPECT_EQ(scene.state()->what, SceneState::kOpening);
   EXPECT_EQ(scene.state()->path, kRoom);
@@ -113,7 +118,6 @@ TEST(SceneThread, BuildsACaptureAndComparesWithItsPhotos) {
     texts.insert(state->text);
     return false;
   }));
-  std::printf("built in %.1f s\n", ms_since(start) / 1e3);
   const auto state = scene.state();
   ASSERT_EQ(state->what, SceneState::kReady) << state->text;
   EXPECT_EQ(state->text, "");
@@ -130,7 +134,6 @@ TEST(SceneThread, BuildsACaptureAndComparesWithItsPhotos) {
     scene.look(state->photos[i], int(i));
     ASSERT_TRUE(wait_until([&] { return scene.shown().take(); }));
     const SceneShown& shown = scene.shown().front();
-    std::printf("%s: %.2f dB, %.0f ms\n", state->photo_names[i].c_str(), shown.psnr_db, double(shown.stats.total_ms));
     EXPECT_EQ(shown.photo_index, int(i));
     EXPECT_EQ(shown.number, i + 1);
     EXPECT_GT(shown.psnr_db, 25) << state->photo_names[i];
@@ -398,11 +401,10 @@ TEST(SceneThread, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
     ASSERT_TRUE(wait_until([&] { return scene.state()->done > share; }));
     const auto start = Clock::now();
     scene.open(small_room());
-    EXPECT_LT(ms_since(start), 50);
+    EXPECT_LT(ms_since(start), 50 * kSlower);
     EXPECT_EQ(scene.state()->path, small_room());
     ASSERT_TRUE(wait_until_open(scene));
-    std::printf("cancelled at %.2f; the other is open after %.0f ms\n", share, ms_since(start));
-    EXPECT_LT(ms_since(start), 2000);
+    EXPECT_LT(ms_since(start), 1000 * kSlower);
     EXPECT_EQ(scene.state()->path, small_room());
   }
   scene.open(kRoom);
@@ -422,8 +424,7 @@ TEST(SceneThread, TheDestructorEndsBuildingWithinHalfASecond) {
           wait_until([&] { return scene.state()->done > share || scene.state()->what != SceneState::kOpening; }));
       start = Clock::now();
     }
-    std::printf("at %.2f: %.0f ms\n", share, ms_since(start));
-    EXPECT_LT(ms_since(start), 500) << share;
+    EXPECT_LT(ms_since(start), 500 * kSlower) << share;
   }
 }
 
@@ -466,8 +467,7 @@ TEST(SceneThread, NoCallWaitsWhileItWorks) {
     }
     timed([&] { scene.close(); });
   }
-  std::printf("longest call: %.2f ms\n", longest_ms);
-  EXPECT_LT(longest_ms, 50);
+  EXPECT_LT(longest_ms, 50 * kSlower);
 }
 
 TEST(SceneThread, WorksAtALowerPriorityThanTheWindow) {

@@ -279,7 +279,7 @@ TEST(FlyCamera, FliesSmoothlyAndEndsExactlyAtThePhoto) {
 }
 
 TEST(FlyCamera, FliesByHalfATurnAboutAnyAxis) {
-  const maq_camera start = photo({0, 0, 0}, {1, 0, 0});
+  const maq_camera start = photo({0, 0, 0}, {1, 0.4, -0.3}, 0.7);
   for (int axis = 0; axis < 3; ++axis) {
     for (const double off : {0.0, 1e-9, 1e-7, -1e-4}) {
       maq_camera target = start;

@@ -1,4 +1,4 @@
-// The desktop demo's thread of scenes, with the room of this repository and the shipped networks.
+// With the room of this repository and the shipped networks.
 #include <maquette/live_scene.hpp>
 
 #include <gtest/gtest.h>
@@ -15,6 +15,12 @@
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr double kSlower = 8;  // than the build that is shipped
+#else
+constexpr double kSlower = 1;
+#endif
 
 const std::string kRoom = MAQ_TEST_MEDIA "/room", kBundle = MAQ_TEST_MODELS "/scenes-int8";
 
@@ -98,7 +104,6 @@ TEST(LiveScene, BuildsACaptureAndComparesWithItsPhotos) {
   const maquette::Context context;
   maquette::LiveScene scene(context, kBundle, 2);
   EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing);
-  const auto start = Clock::now();
   scene.open(kRoom);
   EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kOpening);
   EXPECT_EQ(scene.state()->path, kRoom);
@@ -114,7 +119,6 @@ TEST(LiveScene, BuildsACaptureAndComparesWithItsPhotos) {
     texts.insert(state->text);
     return false;
   }));
-  std::printf("built in %.1f s\n", ms_since(start) / 1e3);
   const auto state = scene.state();
   ASSERT_EQ(state->what, maquette::LiveSceneState::kReady) << state->text;
   EXPECT_EQ(state->text, "");
@@ -131,7 +135,6 @@ TEST(LiveScene, BuildsACaptureAndComparesWithItsPhotos) {
     scene.look(state->photos[i], int(i));
     ASSERT_TRUE(wait_until([&] { return scene.shown().take(); }));
     const maquette::LiveScenePicture& shown = scene.shown().front();
-    std::printf("%s: %.2f dB, %.0f ms\n", state->photo_names[i].c_str(), shown.psnr_db, double(shown.stats.total_ms));
     EXPECT_EQ(shown.photo_index, int(i));
     EXPECT_EQ(shown.number, i + 1);
     EXPECT_GT(shown.psnr_db, 25) << state->photo_names[i];
@@ -413,11 +416,10 @@ TEST(LiveScene, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
     ASSERT_TRUE(wait_until([&] { return scene.state()->done > share; }));
     const auto start = Clock::now();
     scene.open(small_room());
-    EXPECT_LT(ms_since(start), 50);
+    EXPECT_LT(ms_since(start), 50 * kSlower);
     EXPECT_EQ(scene.state()->path, small_room());
     ASSERT_TRUE(wait_until_open(scene));
-    std::printf("cancelled at %.2f; the other is open after %.0f ms\n", share, ms_since(start));
-    EXPECT_LT(ms_since(start), 2000);
+    EXPECT_LT(ms_since(start), 1000 * kSlower);
     EXPECT_EQ(scene.state()->path, small_room());
   }
   scene.open(kRoom);
@@ -438,8 +440,7 @@ TEST(LiveScene, TheDestructorEndsBuildingWithinHalfASecond) {
           [&] { return scene.state()->done > share || scene.state()->what != maquette::LiveSceneState::kOpening; }));
       start = Clock::now();
     }
-    std::printf("at %.2f: %.0f ms\n", share, ms_since(start));
-    EXPECT_LT(ms_since(start), 500) << share;
+    EXPECT_LT(ms_since(start), 500 * kSlower) << share;
   }
 }
 
@@ -485,8 +486,7 @@ TEST(LiveScene, NoCallWaitsWhileItWorks) {
     }
     timed([&] { scene.close(); });
   }
-  std::printf("longest call: %.2f ms\n", longest_ms);
-  EXPECT_LT(longest_ms, 50);
+  EXPECT_LT(longest_ms, 50 * kSlower);
 }
 
 TEST(LiveScene, WorksAtALowerPriorityThanTheWindow) {

@@ -152,9 +152,6 @@ inline void FlyCamera::go_to(const maq_camera& camera, double seconds, int photo
   const std::optional<Pose> to = pose_of(camera);
   if (!to || !std::isfinite(seconds)) return;
   leave();
-  // The same view with the other's focal length: pictures of any shape then change without a jump.
-  const double scale = to->lens[kFx] / pose_.lens[kFx];
-  for (double& number : pose_.lens) number *= scale;
   from_ = pose_, to_ = *to, target_ = camera, photo_index_ = photo_index, flight_s_ = seconds, flown_s_ = 0;
   if (seconds <= 0) update(0);
 }

@@ -1,0 +1,75 @@
+"""Opens every view of the desktop demo, on rendered people, a clip and a room: the pictures of docs/desktop-demo.md.
+
+scripts/install-packages.sh test && make build && scripts/make-venv.sh
+.venv/bin/python scripts/desktop-demo-pictures.py
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+from tqdm import tqdm
+
+ROOT = Path(__file__).parent.parent
+DEMO = ROOT / "build/release/stage/bin/maquette-demo"
+VIEWS = ["camera", "parts", "contours", "mask", "boxes", "try-on"]
+PEOPLE = ("stub:people?count=2&seed=3", 99)
+CLIP = ("tests/media/clip.mp4", 24)
+ROOM = ("tests/media/room", 20)
+
+
+def shown(source: str, frames: int, folder: Path, *options: str) -> np.ndarray:
+    """The window at the end of a run: uint8 [height, width, 3] BGR."""
+    picture = folder / "shown.png"
+    command = ["xvfb-run", "-a", "-s", "-screen 0 1600x1200x24", DEMO, source, "--headless", "--frames", str(frames),
+               "--size", "1280x800", "--screenshot", picture, *options]  # fmt: skip
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    told = json.loads(ran.stdout)
+    print(" ".join([Path(source).name, *options]), told["ui"])
+    return cv2.imread(str(picture))
+
+
+def sheet(pictures: list[np.ndarray], columns: int, width_px: int) -> np.ndarray:
+    """Pictures of one size beside and below each other."""
+    height_px = round(pictures[0].shape[0] * width_px / pictures[0].shape[1])
+    small = [cv2.resize(p, (width_px, height_px), interpolation=cv2.INTER_AREA) for p in pictures]
+    rows = [np.hstack(small[i : i + columns]) for i in range(0, len(small), columns)]
+    return np.vstack(rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=ROOT / "docs/pictures")
+    options = parser.parse_args()
+    if not DEMO.exists():
+        parser.error(f"{DEMO} is not there; build it: make packages-test build")
+
+    def keep(name: str, picture: np.ndarray) -> None:
+        cv2.imwrite(str(options.out / name), picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
+
+    with tempfile.TemporaryDirectory() as temporary, tqdm(total=16, unit="picture") as progress:
+
+        def run(source: tuple[str, int], *arguments: str) -> np.ndarray:
+            picture = shown(*source, Path(temporary), *arguments)
+            progress.update()
+            return picture
+
+        keep("desktop-demo.jpg", run((CLIP[0], 84), "--view", "contours"))
+        # The picture alone, without the panel.
+        alone = ("--no-mesh",)
+        keep("desktop-people.jpg", sheet([run(PEOPLE, "--view", v, *alone)[44:756, :950] for v in VIEWS], 3, 520))
+        keep("desktop-clip.jpg", sheet([run(CLIP, "--view", v, *alone)[133:667, :950] for v in VIEWS], 3, 520))
+        keep(
+            "desktop-scene.jpg",
+            sheet([run(ROOM, "--compare", c)[44:756, :950] for c in ("none", "slider", "error")], 3, 520),
+        )
+
+
+if __name__ == "__main__":
+    main()

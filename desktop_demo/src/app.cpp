@@ -15,10 +15,10 @@ constexpr int kLargestOutfitPx = 4096;
 constexpr double kFlightTurnS = 0.016,
                  kIdleS = 0.25;  // between two turns, when the picture moves and when nothing happens
 
-// A path as a URI of the library; what is no file stays.
+// A path as a URI of the library, which says what is wrong with it.
 std::string uri_of(const std::string& path_or_uri) {
   std::error_code error;
-  if (!fs::exists(path_or_uri, error)) return path_or_uri;
+  if (!fs::exists(path_or_uri, error) && path_or_uri.find(':') != std::string::npos) return path_or_uri;
   std::string uri = "file:";
   for (const char c : path_or_uri) uri += c == '?' ? "%3F" : c == '%' ? "%25" : std::string(1, c);
   return uri;
@@ -79,6 +79,7 @@ int App::run() {
     }
     if (done) window_.close();
   }
+  window_.hide();  // before it waits for the threads
   if (!options_.headless) return 0;
   std::puts(report().c_str());
   const std::string problem = shows_scene_ ? scenes_.state()->text : people_.status().problem;

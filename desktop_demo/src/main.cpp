@@ -46,8 +46,10 @@ int main(int argc, char** argv) {
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");
-  cli.add_option("--texture", options.texture, "Worn in the try-on view: a DensePose atlas (2:3), or any picture");
-  cli.add_option("--capture", options.capture, "Folder of the photos that the scene file was made of");
+  cli.add_option("--texture", options.texture, "Worn in the try-on view: a DensePose atlas (2:3), or any picture")
+      ->check(CLI::ExistingFile);
+  cli.add_option("--capture", options.capture, "Folder of the photos that the scene file was made of")
+      ->check(CLI::ExistingDirectory);
   cli.add_option("--compare", compare, "Photo against rendering")
       ->capture_default_str()
       ->check(CLI::IsMember({"none", "slider", "error"}));

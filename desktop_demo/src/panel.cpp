@@ -35,8 +35,7 @@ void App::draw_panel(int width_px) {
   const Rect all = window_.rect();
   ImGui::SetNextWindowPos({float(all.width - width_px), 0});
   ImGui::SetNextWindowSize({float(width_px), float(all.height)});
-  ImGui::Begin("panel", nullptr,
-               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize);
+  ImGui::Begin("panel", nullptr, ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize);
   if (ImGui::IsWindowAppearing()) ImGui::SetWindowFocus(nullptr);  // arrows are the picture's at first
   ImGui::PushItemWidth(-110 * window_.scale());
   const double now = ImGui::GetTime();

@@ -66,7 +66,6 @@ Window::Window(const char* title, int width, int height, bool visible) {
 }
 
 Window::~Window() {
-  glfwHideWindow(window_);
   ImGui_ImplOpenGL3_Shutdown();
   ImGui_ImplGlfw_Shutdown();
   ImGui::DestroyContext();
@@ -99,6 +98,7 @@ void Window::set_scale(float content_scale) {
 }
 
 bool Window::is_closing() const { return glfwWindowShouldClose(window_) != 0; }
+void Window::hide() { glfwHideWindow(window_); }
 void Window::close() { glfwSetWindowShouldClose(window_, GLFW_TRUE); }
 void Window::wait(double most_s) { most_s > 0 ? glfwWaitEventsTimeout(most_s) : glfwPollEvents(); }
 void Window::wake() { glfwPostEmptyEvent(); }

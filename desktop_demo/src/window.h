@@ -24,6 +24,7 @@ class Window {
 
   bool is_closing() const;
   void close();
+  void hide();
   // Lets the picture stay as it is until something happens, or for `most_s`.
   void wait(double most_s);
   // From any thread: ends a wait.

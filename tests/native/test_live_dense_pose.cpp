@@ -162,6 +162,9 @@ TEST(LiveDensePose, ABadModelIsSaidAndAGoodOneGoesOn) {
   people.live.open("stub:pattern?frames=3&size=32x32");
   ASSERT_TRUE(people.until([&] { return people.live.status().failed; }));
   EXPECT_NE(people.live.status().problem.find("/no/bundle"), std::string::npos);
+  people.live.open("stub:pattern?frames=2&size=32x32");
+  ASSERT_TRUE(people.until([&] { return people.live.status().uri == "stub:pattern?frames=2&size=32x32"; }));
+  ASSERT_TRUE(people.until([&] { return people.live.status().failed; })) << "another source does not hide it";
   people.live.set(Live::config_of(kTinyBundle));
   people.live.open("stub:pattern?frames=3&size=32x32");
   ASSERT_TRUE(people.until([&] { return people.frames() == 3; }));

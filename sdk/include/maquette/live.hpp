@@ -185,8 +185,8 @@ class LiveDensePose {
       open_source(orders);
     }
     if (model_number_ != orders.model_number) {
+      load_model(orders);  // again with the next order if it fails
       model_number_ = orders.model_number;
-      load_model(orders);
       if (held_ && !orders.paused) map(*held_, 0, -1);
     }
     if (!source_ || !model_ || orders.paused || has_all_frames()) return false;

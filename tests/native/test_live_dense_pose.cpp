@@ -211,6 +211,13 @@ TEST(LiveDensePose, ClosesSoonWhenACameraHangs) {
   EXPECT_LT(maquette::monotonic_s() - before_s, 1.5);
 }
 
+TEST(LiveDensePose, LoadsNoModelBeforeThereIsASource) {
+  Live people({}, "/no/bundle");
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_EQ(people.live.status().problem, "");
+  EXPECT_FALSE(people.live.status().failed);
+}
+
 TEST(LiveDensePose, NoCallWaitsForTheModelOrTheSource) {
   Live people;
   double longest_s = 0;

@@ -180,6 +180,7 @@ class LiveDensePose {
 
   // False when there is nothing to do until the next order.
   bool step(const Orders& orders) {
+    if (orders.source_number == 0) return false;  // nor is a model loaded for nothing
     if (source_number_ != orders.source_number) {
       source_number_ = orders.source_number;
       open_source(orders);

@@ -205,8 +205,8 @@ def test_500_frames_leak_nothing(tmp_path):
     assert run("cc", "-shared", "-fPIC", tmp_path / "stay.c", "-o", tmp_path / "stay.so").returncode == 0
     sanitizers = "ASAN_OPTIONS=detect_leaks=1:verify_asan_link_order=0"
     options = ("--source", "stub:people?count=2&seed=7", "--frames", 500, "--view", "try-on", "--mesh")
-    ran = run(*ON_A_DISPLAY, "env", sanitizers, f"LD_PRELOAD={tmp_path}/stay.so", WITH_SANITIZERS, "--headless", *options,
-              timeout_s=900)  # fmt: skip
+    stay = f"LD_PRELOAD={tmp_path}/stay.so"
+    ran = run(*ON_A_DISPLAY, "env", sanitizers, stay, WITH_SANITIZERS, "--headless", *options, timeout_s=900)
     assert "Sanitizer" not in ran.stderr, ran.stderr[-3000:]
     assert ran.returncode == 0, ran.stderr[-3000:]
     assert json.loads(ran.stdout)["frames"] == 500

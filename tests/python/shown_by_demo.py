@@ -4,6 +4,7 @@
 frames, and the frame itself. Pictures are BGR, as cv2 has them.
 """
 
+import contextlib
 import ctypes
 import json
 import os
@@ -27,7 +28,6 @@ _BGR8, _RGB8 = 2, 1
 
 
 def run(*command, env=None, timeout_s=180) -> subprocess.CompletedProcess:
-    """Ends whatever the command started when it takes too long: xvfb-run leaves its display and program behind."""
     process = subprocess.Popen(
         [str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env, cwd=ROOT,
         start_new_session=True,
@@ -35,9 +35,11 @@ def run(*command, env=None, timeout_s=180) -> subprocess.CompletedProcess:
     try:
         out, error = process.communicate(timeout=timeout_s)
     except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        out, error = process.communicate()
-        raise AssertionError(f"{command} took over {timeout_s} s.\n{out}\n{error}") from None
+        raise AssertionError(f"{command} took over {timeout_s} s.") from None
+    finally:
+        # xvfb-run leaves its display and its program behind when it is ended early, and now and then a display.
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
     return subprocess.CompletedProcess(command, process.returncode, out, error)
 
 

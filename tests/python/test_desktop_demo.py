@@ -13,7 +13,6 @@ from shown_by_demo import DEMO, MAQUETTE, ON_A_DISPLAY, ROOT, headless, psnr_db,
 
 ROOM = ROOT / "tests/media/room"
 WITH_SANITIZERS = ROOT / "build/asan/stage/bin/maquette-demo"
-SUPPRESSED = Path(__file__).parent / "demo_leaks.txt"
 
 pytestmark = [
     pytest.mark.skipif(not DEMO.exists(), reason="maquette-demo is not built (scripts/install-packages.sh desktop)"),
@@ -178,13 +177,15 @@ def test_help_teaches_every_option():
 # --- the window, memory, size -----------------------------------------------------------------------------------------
 
 
-def test_the_window_is_never_held_up_for_50_ms(tmp_path):
-    report = show(tmp_path, "--source", f"video:{ROOT}/tests/media/clip.mp4", "--frames", 72).report
-    ui = report["ui"]
+def test_the_window_is_never_held_up_for_50_ms():
+    ran = headless("--source", "stub:people?count=2&seed=7&live=1", "--frames", 100)
+    assert ran.returncode == 0, ran.stderr
+    ui = json.loads(ran.stdout)["ui"]
     print(", ".join(f"{name} {value:.1f}" for name, value in ui.items()))
-    assert ui["turns"] >= 72
-    # The longest alone depends on what else the machine does.
+    assert ui["turns"] >= 20
+    # Of the longest alone no more can be asked: it depends on what else the machine does, which draws here as well.
     assert 0 < ui["p99_ms"] < 50
+    assert ui["longest_ms"] < 500
 
 
 def test_nothing_is_left_in_the_folder_that_it_is_started_in(tmp_path):
@@ -198,13 +199,15 @@ def test_nothing_is_left_in_the_folder_that_it_is_started_in(tmp_path):
 
 @pytest.mark.skipif(not WITH_SANITIZERS.exists(), reason="build/asan has no maquette-demo")
 def test_500_frames_leak_nothing(tmp_path):
-    env = os.environ | {
-        "ASAN_OPTIONS": "detect_leaks=1",
-        "LSAN_OPTIONS": f"suppressions={SUPPRESSED}:print_suppressions=0",
-    }
-    ran = headless("--source", "stub:people?count=2&seed=7", "--frames", 500, "--view", "try-on", "--mesh",
-                   program=WITH_SANITIZERS, env=env, timeout_s=900)  # fmt: skip
-    assert "LeakSanitizer" not in ran.stderr, ran.stderr[-3000:]
+    # Drivers and X libraries are unloaded before leaks are looked for, and what only their variables point to would
+    # count as leaked, with no name left to tell it by. So they stay.
+    (tmp_path / "stay.c").write_text("int dlclose(void* library) { return library == 0; }")
+    assert run("cc", "-shared", "-fPIC", tmp_path / "stay.c", "-o", tmp_path / "stay.so").returncode == 0
+    sanitizers = "ASAN_OPTIONS=detect_leaks=1:verify_asan_link_order=0"
+    options = ("--source", "stub:people?count=2&seed=7", "--frames", 500, "--view", "try-on", "--mesh")
+    stay = f"LD_PRELOAD={tmp_path}/stay.so"
+    ran = run(*ON_A_DISPLAY, "env", sanitizers, stay, WITH_SANITIZERS, "--headless", *options, timeout_s=900)
+    assert "Sanitizer" not in ran.stderr, ran.stderr[-3000:]
     assert ran.returncode == 0, ran.stderr[-3000:]
     assert json.loads(ran.stdout)["frames"] == 500
 

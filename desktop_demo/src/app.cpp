@@ -57,6 +57,7 @@ App::App(const Options& options)
 }
 
 int App::run() {
+  maquette::Picture last;
   double before_s = maquette::monotonic_s();
   while (!window_.is_closing()) {
     window_.wait(shows_scene_ && (moving_ || turned_) ? kFlightTurnS : kIdleS);
@@ -70,7 +71,7 @@ int App::run() {
     window_.end_drawing();
     if (clip_file_ && fresh_) add_to_clip();
     const bool done = options_.headless && is_done();
-    if (done && !options_.screenshot.empty()) take_screenshot(options_.screenshot, window_.rect());
+    if (done) last = window_.read_pixels(window_.rect());
     window_.show();
     if (start_ms_ == 0) {
       start_ms_ = (maquette::monotonic_s() - start_s_) * 1000;
@@ -81,6 +82,7 @@ int App::run() {
   }
   window_.hide();  // before it waits for the threads
   if (!options_.headless) return 0;
+  if (!options_.screenshot.empty() && !last.empty()) last.frame(context_).save(options_.screenshot);
   std::puts(report().c_str());
   const std::string problem = shows_scene_ ? scenes_.state()->text : people_.status().problem;
   if (!has_failed()) return 0;

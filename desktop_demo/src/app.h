@@ -65,8 +65,7 @@ class App {
   void draw_stages(const char* const* names, size_t count);
   void draw_help();
 
-  std::string new_path(const char* extension) const;
-  void take_screenshot(const std::string& path, const Rect& rect);
+  std::string new_path(const char* extension);
   void take_snapshot();
   void toggle_clip();
   void add_to_clip();
@@ -99,6 +98,7 @@ class App {
   Rect picture_area_{0, 0, 1, 1}, picture_rect_, looked_at_, body_rect_, clip_rect_;
   uint64_t pictures_ = 0, done_pictures_ = 0;  // of scenes
   std::deque<Stages> stages_;
+  int files_made_ = 0;
   std::string told_, clip_path_, recording_;
   double told_at_s_ = -100, start_ms_ = 0, cpu_percent_ = 0, cpu_at_s_ = -10, cpu_s_ = 0, memory_mb_ = 0;
   std::vector<float> turns_ms_;

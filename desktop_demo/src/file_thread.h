@@ -19,13 +19,15 @@ class FileThread {
     thread_.join();
   }
 
-  // False, and nothing is done, when too many jobs wait.
-  bool add(Job job) {
+  void add(Job job) {
     std::lock_guard<std::mutex> lock(mutex_);
-    if (job && jobs_.size() >= kMostJobs) return false;
     jobs_.push_back(std::move(job));
     wake_.notify_one();
-    return true;
+  }
+  // So many jobs wait that what can be left out should be.
+  bool is_busy() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return jobs_.size() >= 30;
   }
   // What was done last, "" before anything was; or why not.
   std::string told() const {
@@ -34,8 +36,6 @@ class FileThread {
   }
 
  private:
-  static constexpr size_t kMostJobs = 30;
-
   void run() {
     for (;;) {
       std::unique_lock<std::mutex> lock(mutex_);

@@ -6,29 +6,21 @@
 
 namespace fs = std::filesystem;
 
-std::string App::new_path(const char* extension) const {
+std::string App::new_path(const char* extension) {
   const std::time_t now = std::time(nullptr);
   char name[40];
   std::strftime(name, sizeof name, "maquette-%Y-%m-%d-%H-%M-%S", std::localtime(&now));
-  return (fs::path(options_.out) / name).string() + extension;
-}
-
-void App::take_screenshot(const std::string& path, const Rect& rect) {
-  auto picture = std::make_shared<maquette::Picture>(window_.read_pixels(rect));
-  files_.add([this, picture, path] {
-    picture->frame(context_).save(path);
-    return "Saved " + path;
-  });
+  return (fs::path(options_.out) / name).string() + "-" + std::to_string(++files_made_) + extension;
 }
 
 void App::take_snapshot() {
   const std::string path = new_path("");
-  take_screenshot(path + ".png", picture_rect_);
-  const auto result = mapped_.front().result;
-  if (shows_scene_ || result == nullptr) return;
-  files_.add([path, result, folder = options_.out] {
-    result->save(folder, fs::path(path).filename().string());
-    return "Saved " + path + ".png, _IUV.png, _INDS.png and .json";
+  auto picture = std::make_shared<maquette::Picture>(window_.read_pixels(picture_rect_));
+  const auto result = shows_scene_ ? nullptr : mapped_.front().result;
+  files_.add([this, path, picture, result] {
+    picture->frame(context_).save(path + ".png");
+    if (result != nullptr) result->save(options_.out, fs::path(path).filename().string());
+    return "Saved " + path + ".png" + (result != nullptr ? ", _IUV.png, _INDS.png and .json" : "");
   });
 }
 
@@ -54,6 +46,7 @@ void App::toggle_clip() {
 // A clip has one size: it ends where the window gets another.
 void App::add_to_clip() {
   if (clip_rect_.width != picture_rect_.width || clip_rect_.height != picture_rect_.height) return toggle_clip();
+  if (files_.is_busy()) return;
   auto picture = std::make_shared<maquette::Picture>(window_.read_pixels(picture_rect_));
   files_.add([this, file = clip_file_, picture] {
     if (*file) (*file)->add(picture->frame(context_));

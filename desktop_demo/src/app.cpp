@@ -140,7 +140,7 @@ void App::take_news() {
   int nodes = 0;
   if (!has_surface_) {
     const std::vector<float> points = people_.surface(&nodes);
-    if (nodes > 0) painter_.set_surface(points, nodes);
+    if (nodes > 0) painter_.set_body(maquette::BodyMesh(points, nodes));
     has_surface_ = nodes > 0;
   }
   fresh_ = false;

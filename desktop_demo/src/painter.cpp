@@ -43,8 +43,6 @@ unsigned linked(const char* vertex_source, const char* fragment_source) {
   return program;
 }
 
-bool is_known(const float* point) { return !std::isnan(point[0]); }
-
 }  // namespace
 
 Painter::Painter(const Window& window) : window_(window) {
@@ -74,7 +72,7 @@ Painter::Painter(const Window& window) : window_(window) {
   people_program_ = linked(kPictureVertexShader, kPeopleShader);
   scene_program_ = linked(kPictureVertexShader, kSceneShader);
   body_program_ = linked(kBodyVertexShader, kBodyShader);
-  set_surface(std::vector<float>(24 * 2 * 2 * 3), 2);
+  set_body(maquette::BodyMesh(std::vector<float>(24 * 2 * 2 * 3), 2));
 }
 
 Painter::~Painter() {
@@ -123,63 +121,19 @@ void Painter::set_scene(const maquette::Picture& rendering, const maquette::Pict
   if (!photo.empty()) upload(kPhotoTexture, photo.width_px, photo.height_px, photo.rgba.data());
 }
 
-void Painter::set_surface(const std::vector<float>& points, int nodes) {
-  const auto point = [&](int part, int u, int v) { return &points[size_t(((part * nodes + u) * nodes + v) * 3)]; };
-  // Where a chart ends its last point goes on, so that what is between two nodes is never half unknown.
-  std::vector<float> filled(points.size());
-  for (int part = 0; part < 24; ++part) {
-    for (int v = 0; v < nodes; ++v) {
-      for (int u = 0; u < nodes; ++u) {
-        const float* nearest = point(part, u, v);
-        for (int least = 1 << 30, j = 0; !is_known(point(part, u, v)) && j < nodes * nodes; ++j) {
-          const int du = j / nodes - u, dv = j % nodes - v, away = du * du + dv * dv;
-          if (away < least && is_known(point(part, j / nodes, j % nodes))) {
-            nearest = point(part, j / nodes, j % nodes), least = away;
-          }
-        }
-        std::copy(nearest, nearest + 3, &filled[size_t(((part * nodes + v) * nodes + u) * 3)]);
-      }
-    }
-  }
+void Painter::set_body(const maquette::BodyMesh& body) {
   glActiveTexture(GL_TEXTURE0 + kSurfaceTexture);
-  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGB32F, nodes, nodes, 24, 0, GL_RGB, GL_FLOAT, filled.data());
-
-  std::vector<float> vertices;  // point, normal, part - 1, U, V
-  const auto corner = [&](int part, int u, int v) {
-    const float* at = point(part, u, v);
-    const auto along = [&](int du, int dv, int axis) {
-      const int u1 = std::min(u + du, nodes - 1), v1 = std::min(v + dv, nodes - 1);
-      const int u0 = std::max(u - du, 0), v0 = std::max(v - dv, 0);
-      const float *after = point(part, u1, v1), *before = point(part, u0, v0);
-      return (is_known(after) ? after : at)[axis] - (is_known(before) ? before : at)[axis];
-    };
-    const float a[] = {along(1, 0, 0), along(1, 0, 1), along(1, 0, 2)};
-    const float b[] = {along(0, 1, 0), along(0, 1, 1), along(0, 1, 2)};
-    const float last = float(nodes - 1);
-    vertices.insert(vertices.end(), {at[0], at[1], at[2], a[1] * b[2] - a[2] * b[1] + 1e-12f, a[2] * b[0] - a[0] * b[2],
-                                     a[0] * b[1] - a[1] * b[0], float(part), float(u) / last, float(v) / last});
-  };
-  constexpr int kTriangles[4][3] = {{0, 1, 2}, {1, 3, 2}, {0, 1, 3}, {0, 3, 2}};  // of the corners 0 1 / 2 3
-  for (int part = 0; part < 24; ++part) {
-    for (int u = 0; u + 1 < nodes; ++u) {
-      for (int v = 0; v + 1 < nodes; ++v) {
-        const auto known = [&](int k) { return is_known(point(part, u + (k & 1), v + (k >> 1))); };
-        // At the edge of a chart three known corners of the cell make one triangle.
-        const bool other_way = !known(1) || !known(2);
-        for (const int* triangle : {kTriangles[other_way ? 2 : 0], kTriangles[other_way ? 3 : 1]}) {
-          if (!known(triangle[0]) || !known(triangle[1]) || !known(triangle[2])) continue;
-          for (int k = 0; k < 3; ++k) corner(part, u + (triangle[k] & 1), v + (triangle[k] >> 1));
-        }
-      }
-    }
-  }
-  body_vertex_count_ = int(vertices.size() / 9);
+  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGB32F, body.nodes, body.nodes, 24, 0, GL_RGB, GL_FLOAT,
+               body.filled_points_m.data());
+  body_vertex_count_ = int(body.triangles.size());
   glBindVertexArray(body_vertices_);
   glBindBuffer(GL_ARRAY_BUFFER, body_buffer_);
-  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(vertices.size() * sizeof(float)), vertices.data(), GL_STATIC_DRAW);
+  constexpr int kVertexBytes = sizeof(maquette::BodyMesh::Vertex);
+  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(body.triangles.size()) * kVertexBytes, body.triangles.data(),
+               GL_STATIC_DRAW);
   for (unsigned k = 0; k < 3; ++k) {
     glEnableVertexAttribArray(k);
-    glVertexAttribPointer(k, 3, GL_FLOAT, GL_FALSE, 9 * sizeof(float),
+    glVertexAttribPointer(k, 3, GL_FLOAT, GL_FALSE, kVertexBytes,
                           static_cast<const char*>(nullptr) + k * 3 * sizeof(float));
   }
 }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <array>
-#include <vector>
+#include <maquette/body_mesh.hpp>
 
 #include "mapped_frame.h"
 #include "window.h"
@@ -19,8 +19,7 @@ class Painter {
   // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any picture, which is repeated
   // over the body's front and back.
   void set_outfit(const maquette::Picture& outfit);
-  // Points [24][nodes][nodes][3] in metres, NaN where a chart does not reach.
-  void set_surface(const std::vector<float>& points, int nodes);
+  void set_body(const maquette::BodyMesh& body);
   void set_scene(const maquette::Picture& rendering, const maquette::Picture& photo);
 
   void draw_people(View view, const Rect& rect);

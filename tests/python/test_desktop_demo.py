@@ -213,9 +213,11 @@ def test_500_frames_leak_nothing(tmp_path):
 
 
 def test_its_own_code_stays_short():
-    lines = {path.name: len(path.read_text().splitlines()) for path in (ROOT / "desktop_demo/src").rglob("*.*")}
-    print(f"{sum(lines.values())} lines: {lines}")
-    assert sum(lines.values()) <= 1500
+    files = sorted((ROOT / "desktop_demo/src").rglob("*.*"))
+    lines = [line.strip() for path in files for line in path.read_text().splitlines()]
+    code = [line for line in lines if line and not line.startswith("//")]
+    print(f"{len(code)} lines of code, {len(lines)} with blank lines and those of comment alone")
+    assert len(code) <= 1500
 
 
 # --- installation -----------------------------------------------------------------------------------------------------

@@ -10,10 +10,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr char kFirstCamera[] = "camera:", kRenderedPeople[] = "stub:people?count=2";
+constexpr char kRenderedPeople[] = "stub:people?count=2";
 constexpr int kLargestOutfitPx = 4096;
-constexpr double kFlightTurnS = 0.016,
-                 kIdleS = 0.25;  // between two turns, when the picture moves and when nothing happens
+// Between two turns, when the picture moves and when nothing happens.
+constexpr double kFlightTurnS = 0.016, kIdleS = 0.25;
 
 // A path as a URI of the library, which says what is wrong with it.
 std::string uri_of(const std::string& path_or_uri) {
@@ -75,7 +75,7 @@ int App::run() {
     window_.show();
     if (start_ms_ == 0) {
       start_ms_ = (maquette::monotonic_s() - start_s_) * 1000;
-    } else {
+    } else if (options_.headless) {
       turns_ms_.push_back(float((maquette::monotonic_s() - turn_s) * 1000));
     }
     if (done) window_.close();
@@ -101,6 +101,7 @@ void App::open(const std::string& path_or_uri) {
     scenes_.open(path_or_uri, options_.capture);
   } else {
     scenes_.close();
+    recording_.clear();  // it ends with its source
     seeks_camera_ = path_or_uri == kFirstCamera;
     people_.open(uri_of(path_or_uri), seeks_camera_ ? kRenderedPeople : "");
   }

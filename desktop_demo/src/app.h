@@ -15,10 +15,12 @@
 #include "painter.h"
 #include "window.h"
 
+constexpr char kFirstCamera[] = "camera:";
+
 enum class Compare { kNone, kSlider, kError };
 
 struct Options {
-  std::string source;  // "": the first camera
+  std::string source = kFirstCamera;  // or a file, a folder with a capture
   View view = View::kParts;
   bool mesh = true, panel = true;
   std::string texture, capture, scene_bundle;

@@ -80,7 +80,6 @@ int main(int argc, char** argv) {
     options.model.detail = part_only ? MAQ_DETAIL_PART : MAQ_DETAIL_SURFACE;
     if (options.headless && options.frames == 0) options.frames = 30;
     if (!path.empty()) options.source = path;
-    if (options.source.empty()) options.source = "camera:";
     return App(options).run();
   } catch (const std::exception& error) {
     std::fprintf(stderr, "maquette-demo: %s\n", error.what());

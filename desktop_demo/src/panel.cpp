@@ -67,6 +67,7 @@ void App::draw_people_panel() {
   const maquette::LiveStatus status = people_.status();
   const MappedFrame& frame = mapped_.front();
   ImGui::TextWrapped("%s", status.uri.c_str());
+  if (ImGui::SmallButton("Look for a camera")) open(kFirstCamera);
   ImGui::Text("%.1f frames a second, %llu lost", frame.fps, static_cast<unsigned long long>(status.drops));
   ImGui::Text("%.1f ms a frame, %d %s%s", double(frame.stats.total_ms), frame.stats.people,
               frame.stats.people == 1 ? "person" : "people", frame.stats.key_frame != 0 ? "" : ", followed");

@@ -55,6 +55,8 @@ void App::add_to_clip() {
 }
 
 void App::toggle_recording() {
+  const std::string told = recording_.empty() ? "" : "Saved " + recording_;
   recording_ = recording_.empty() ? new_path(".maqrec") : "";
   people_.record(recording_);
+  files_.add([told = told.empty() ? "Recording " + recording_ : told] { return told; });
 }

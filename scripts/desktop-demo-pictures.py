@@ -60,7 +60,7 @@ def main() -> None:
             progress.update()
             return picture
 
-        keep("desktop-demo.jpg", run((CLIP[0], 84), "--view", "contours"))
+        keep("desktop-demo.jpg", run((CLIP[0], 40), "--view", "contours"))
         # The picture alone, without the panel.
         alone = ("--no-mesh",)
         keep("desktop-people.jpg", sheet([run(PEOPLE, "--view", v, *alone)[44:756, :950] for v in VIEWS], 3, 520))

@@ -102,7 +102,7 @@ class App {
   std::deque<Stages> stages_;
   int files_made_ = 0;
   std::string told_, clip_path_, recording_;
-  double told_at_s_ = -100, start_ms_ = 0, cpu_percent_ = 0, cpu_at_s_ = -10, cpu_s_ = 0, memory_mb_ = 0;
+  double told_at_s_ = -100, start_ms_ = 0, cpu_percent_ = 0, cpu_at_s_ = 0, cpu_s_ = 0, memory_mb_ = 0;
   std::vector<float> turns_ms_;
   std::shared_ptr<std::optional<maquette::Clip>> clip_file_;
   maquette::Newest<maquette::Picture> outfits_;

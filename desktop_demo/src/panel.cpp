@@ -50,7 +50,12 @@ void App::draw_panel(int width_px) {
   } else {
     draw_people_panel();
   }
-  ImGui::Text("CPU %.0f %% of %u cores, memory %.0f MB", cpu_percent_, std::thread::hardware_concurrency(), memory_mb_);
+  if (memory_mb_ > 0) {
+    ImGui::Text("CPU %.0f %% of %u cores, memory %.0f MB", cpu_percent_, std::thread::hardware_concurrency(),
+                memory_mb_);
+  } else {
+    ImGui::TextUnformatted("CPU and memory: in a second");
+  }
   ImGui::Separator();
   if (ImGui::Button("Snapshot (F2)")) take_snapshot();
   ImGui::SameLine();

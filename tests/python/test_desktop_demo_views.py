@@ -11,7 +11,7 @@ from export.people import outfit
 
 pytestmark = [
     pytest.mark.skipif(not DEMO.exists(), reason="maquette-demo is not built (scripts/install-packages.sh desktop)"),
-    pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="no xvfb-run (scripts/install-packages.sh test)"),
+    pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb (scripts/install-packages.sh test)"),
 ]
 
 # The walkers of the first are three in their 16th frame, one of them at the picture's edge.

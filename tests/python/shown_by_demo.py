@@ -4,11 +4,10 @@
 frames, and the frame itself. Pictures are BGR, as cv2 has them.
 """
 
-import contextlib
+import atexit
 import ctypes
 import json
 import os
-import signal
 import struct
 import subprocess
 from dataclasses import dataclass
@@ -21,30 +20,33 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 STAGE = ROOT / "build/release/stage"
 DEMO, MAQUETTE = STAGE / "bin/maquette-demo", STAGE / "bin/maquette"
-ON_A_DISPLAY = ("xvfb-run", "-a", "-s", "-screen 0 1600x1200x24")
 
 _FRAME_HEAD = struct.Struct("<IIqQIiiiiIQQ")  # docs/formats.md, recording
 _BGR8, _RGB8 = 2, 1
 
 
-def run(*command, env=None, timeout_s=180) -> subprocess.CompletedProcess:
-    process = subprocess.Popen(
-        [str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env, cwd=ROOT,
-        start_new_session=True,
+@cache
+def display() -> str:
+    """One for all tests: xvfb-run, which starts one for each program, now and then fails to clean up after it."""
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", "1", "-screen", "0", "1600x1200x24", "-nolisten", "tcp", "-noreset"],
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True,
     )  # fmt: skip
-    try:
-        out, error = process.communicate(timeout=timeout_s)
-    except subprocess.TimeoutExpired:
-        raise AssertionError(f"{command} took over {timeout_s} s.") from None
-    finally:
-        # xvfb-run leaves its display and its program behind when it is ended early, and now and then a display.
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGTERM)
-    return subprocess.CompletedProcess(command, process.returncode, out, error)
+    atexit.register(server.wait)
+    atexit.register(server.terminate)
+    number = server.stdout.readline().strip()
+    assert number, "Xvfb does not start"
+    return f":{number}"
 
 
-def headless(*options, program=DEMO, env=None, timeout_s=180) -> subprocess.CompletedProcess:
-    return run(*ON_A_DISPLAY, program, "--headless", *options, env=env, timeout_s=timeout_s)
+def run(*command, env=None, cwd=ROOT, timeout_s=180) -> subprocess.CompletedProcess:
+    words = [str(word) for word in command]
+    return subprocess.run(words, capture_output=True, text=True, env=env, cwd=cwd, timeout=timeout_s, check=False)
+
+
+def headless(*options, program=DEMO, env=None, cwd=ROOT, timeout_s=180) -> subprocess.CompletedProcess:
+    env = os.environ | (env or {}) | {"DISPLAY": display()}
+    return run(program, "--headless", *options, env=env, cwd=cwd, timeout_s=timeout_s)
 
 
 @dataclass(frozen=True)

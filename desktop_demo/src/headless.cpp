@@ -33,9 +33,7 @@ bool App::is_done() {
 std::string App::report() const {
   std::vector<float> sorted = turns_ms_;
   std::sort(sorted.begin(), sorted.end());
-  const auto rank = [&](double share) {
-    return sorted.empty() ? 0.0f : sorted[size_t(share * double(sorted.size() - 1) + 0.5)];
-  };
+  const auto rank = [&](size_t percent) { return sorted.empty() ? 0.0f : sorted[(sorted.size() - 1) * percent / 100]; };
   const MappedFrame& frame = mapped_.front();
   const maquette::LiveStatus status = people_.status();
   nlohmann::ordered_json json;
@@ -54,7 +52,7 @@ std::string App::report() const {
   json["drops"] = status.drops;
   json["events"] = status.events;
   json["problem"] = status.problem;
-  json["ui"] = {{"turns", sorted.size()}, {"longest_ms", rank(1)}, {"p99_ms", rank(0.99)}, {"start_ms", start_ms_}};
+  json["ui"] = {{"turns", sorted.size()}, {"longest_ms", rank(100)}, {"p99_ms", rank(99)}, {"start_ms", start_ms_}};
   json["opengl"] = window_.opengl();
   json["scene"] = nullptr;
   if (shows_scene_) {

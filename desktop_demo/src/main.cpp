@@ -10,23 +10,21 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Beside the program, where the build and an installation have it.
+// Beside the program, where the build and an installation have it; or what the environment says.
 std::string shared_file(const char* variable, const char* path) {
-  const char* const given = variable == nullptr ? nullptr : std::getenv(variable);
+  const char* const given = std::getenv(variable);
   if (given != nullptr && *given != '\0') return given;
-  std::error_code error;
-  const fs::path found =
-      fs::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "share/maquette" / path;
-  return fs::exists(found, error) ? found.string() : "";
+  return (fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "share/maquette" / path).string();
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   Options options;
   options.bundle = shared_file("MAQ_BUNDLE", "models/densepose-b-int8");
   options.scene_bundle = shared_file("MAQ_SCENE_BUNDLE", "models/scenes-int8");
-  options.texture = shared_file(nullptr, "demo/outfit.png");
+  options.texture = shared_file("MAQ_DEMO_OUTFIT", "demo/outfit.png");
+  if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
   options.model.spin = 0;  // a thread that stays awake takes a core from the window
   bool part_only = false;
@@ -69,20 +67,18 @@ int main(int argc, char** argv) {
   cli.add_option("--screenshot", options.screenshot, "PNG of the window at the end")->needs(headless);
   CLI11_PARSE(cli, argc, argv);
 
-  try {
-    options.view = View(std::find(kViewNames.begin(), kViewNames.end(), view) - kViewNames.begin());
-    options.compare = compare == "slider" ? Compare::kSlider : compare == "error" ? Compare::kError : Compare::kNone;
-    if (std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) != 2 || options.width_px < 64 ||
-        options.height_px < 64 || std::max(options.width_px, options.height_px) > 16384) {
-      throw std::runtime_error("--size " + size + " is no size of a window, such as 1280x800.");
-    }
-    options.model.bundle_path = options.bundle.c_str();
-    options.model.detail = part_only ? MAQ_DETAIL_PART : MAQ_DETAIL_SURFACE;
-    if (options.headless && options.frames == 0) options.frames = 30;
-    if (!path.empty()) options.source = path;
-    return App(options).run();
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "maquette-demo: %s\n", error.what());
-    return 1;
+  options.view = View(std::find(kViewNames.begin(), kViewNames.end(), view) - kViewNames.begin());
+  options.compare = compare == "slider" ? Compare::kSlider : compare == "error" ? Compare::kError : Compare::kNone;
+  if (std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) != 2 || options.width_px < 64 ||
+      options.height_px < 64 || std::max(options.width_px, options.height_px) > 16384) {
+    throw std::runtime_error("--size " + size + " is no size of a window, such as 1280x800.");
   }
+  options.model.bundle_path = options.bundle.c_str();
+  options.model.detail = part_only ? MAQ_DETAIL_PART : MAQ_DETAIL_SURFACE;
+  if (options.headless && options.frames == 0) options.frames = 30;
+  if (!path.empty()) options.source = path;
+  return App(options).run();
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "maquette-demo: %s\n", error.what());
+  return 1;
 }

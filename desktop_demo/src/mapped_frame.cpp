@@ -14,12 +14,12 @@ void MappedFrame::take_over(const maquette::LiveFrame& mapped, std::vector<uint8
     }
   }
   // What was seen fades within a second or so.
-  seen_before->resize(size_t(24 * kSeenCells * kSeenCells));
+  seen_before->resize(24 * kSeenCells * kSeenCells);
   for (uint8_t& cell : *seen_before) cell = uint8_t(cell * 15 / 16);
   for (size_t at = 0; at < iuv.size(); at += 4) {
     if (iuv[at] == 0) continue;
-    const int u = iuv[at + 1] * kSeenCells / 256, v = iuv[at + 2] * kSeenCells / 256;
-    (*seen_before)[size_t(((iuv[at] - 1) * kSeenCells + v) * kSeenCells + u)] = 255;
+    const size_t chart = iuv[at] - 1u, u = iuv[at + 1] * kSeenCells / 256, v = iuv[at + 2] * kSeenCells / 256;
+    (*seen_before)[(chart * kSeenCells + v) * kSeenCells + u] = 255;
   }
   seen = *seen_before;
   people.assign(mapped.result->people().begin(), mapped.result->people().end());

@@ -7,7 +7,7 @@
 #include <vector>
 
 struct MappedFrame {
-  static constexpr int kSeenCells = 16;  // of each chart, along U and along V
+  static constexpr size_t kSeenCells = 16;  // of each chart, along U and along V
 
   maquette::Picture camera;
   std::vector<uint8_t> iuv;   // 4 bytes a pixel: part, U, V, person

@@ -107,7 +107,7 @@ void Painter::set_frame(const MappedFrame& frame) {
   upload(kIuvTexture, width_px, height_px, frame.iuv.data());
   people_ = int(frame.people.size());
   glActiveTexture(GL_TEXTURE0 + kSeenTexture);
-  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R8, MappedFrame::kSeenCells, MappedFrame::kSeenCells, 24, 0, GL_RED,
+  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R8, int(MappedFrame::kSeenCells), int(MappedFrame::kSeenCells), 24, 0, GL_RED,
                GL_UNSIGNED_BYTE, frame.seen.data());
 }
 

@@ -40,7 +40,7 @@ struct BodyMesh {
     const std::vector<float>& points_m;
     int nodes;
 
-    const float* at(int part, int u, int v) const { return &points_m[size_t(((part * nodes + u) * nodes + v) * 3)]; }
+    const float* at(int part, int u, int v) const { return &points_m[3 * size_t((part * nodes + u) * nodes + v)]; }
     bool is_known(int part, int u, int v) const { return !std::isnan(at(part, u, v)[0]); }
   };
 

@@ -74,8 +74,8 @@ class LiveScene {  // all calls by the thread that takes the pictures
   static maq_camera within_limits(maq_camera camera) {
     const double scale = std::min(1280.0 / camera.width_px, 960.0 / camera.height_px);
     if (!(scale > 0 && scale < 1)) return camera;
-    camera.width_px = std::max(1, int(camera.width_px * scale + 0.5));
-    camera.height_px = std::max(1, int(camera.height_px * scale + 0.5));
+    camera.width_px = std::max(1, int(std::lround(camera.width_px * scale)));
+    camera.height_px = std::max(1, int(std::lround(camera.height_px * scale)));
     camera.fx_px *= scale, camera.fy_px *= scale;
     camera.cx_px = (camera.cx_px + 0.5) * scale - 0.5, camera.cy_px = (camera.cy_px + 0.5) * scale - 0.5;
     return camera;
@@ -89,11 +89,14 @@ class LiveScene {  // all calls by the thread that takes the pictures
     const double width = double(from.width_px) / width_px, height = double(from.height_px) / height_px;
     const int side = 1 + int(std::ceil(std::max(width, height)));
     for (size_t i = 0; i < to.rgba.size(); ++i) {
+      const size_t column = i / 4 % size_t(width_px), row = i / 4 / size_t(width_px);
       int sum = 0;
-      for (int place = 0; place < side * side; ++place) {
-        const size_t x = size_t((double(i / 4 % size_t(width_px)) + (place % side + 0.5) / side) * width);
-        const size_t y = size_t((double(i / 4 / size_t(width_px)) + (place / side + 0.5) / side) * height);
-        sum += from.rgba[(y * size_t(from.width_px) + x) * 4 + i % 4];
+      for (int down = 0; down < side; ++down) {
+        for (int right = 0; right < side; ++right) {
+          const size_t x = size_t((double(column) + (right + 0.5) / side) * width);
+          const size_t y = size_t((double(row) + (down + 0.5) / side) * height);
+          sum += from.rgba[(y * size_t(from.width_px) + x) * 4 + i % 4];
+        }
       }
       to.rgba[i] = uint8_t(sum / (side * side));
     }

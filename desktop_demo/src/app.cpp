@@ -80,6 +80,7 @@ int App::run() {
     }
     if (done) window_.close();
   }
+  if (clip_file_ != nullptr) toggle_clip();
   window_.hide();  // before it waits for the threads
   if (!options_.headless) return 0;
   if (!options_.screenshot.empty() && !last.empty()) last.frame(context_).save(options_.screenshot);

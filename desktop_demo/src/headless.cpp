@@ -60,7 +60,7 @@ std::string App::report() const {
     const maquette::LiveScenePicture& shown = scenes_.shown().front();
     json["problem"] = state->what == maquette::LiveSceneState::kFailed ? state->text : "";
     json["scene"] = {{"points", state->info.point_count}, {"photo", nullptr}, {"psnr_db", nullptr}};
-    if (shown.photo_index >= 0) {
+    if (pictures_ > 0 && shown.photo_index >= 0) {
       json["scene"]["photo"] = state->photo_names[size_t(shown.photo_index)];
       json["scene"]["psnr_db"] = shown.psnr_db;
     }

@@ -183,23 +183,11 @@ void Painter::draw_body(const Rect& rect, float yaw, float pitch) {
   const float right[] = {std::cos(yaw), std::sin(yaw), 0};
   const float up[] = {-std::sin(yaw) * std::sin(pitch), std::cos(yaw) * std::sin(pitch), std::cos(pitch)};
   const float x = float(rect.height) / float(rect.width), middle = 0.85f;
-  const float projection[16] = {right[0] * x,
-                                up[0],
-                                -eye[0] / 4,
-                                0,
-                                right[1] * x,
-                                up[1],
-                                -eye[1] / 4,
-                                0,
-                                right[2] * x,
-                                up[2],
-                                -eye[2] / 4,
-                                0,
-                                0,
-                                -middle * up[2],
-                                middle * eye[2] / 4,
-                                1};
-  glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, projection);
+  const float projection[4][4] = {{right[0] * x, up[0], -eye[0] / 4, 0},
+                                  {right[1] * x, up[1], -eye[1] / 4, 0},
+                                  {right[2] * x, up[2], -eye[2] / 4, 0},
+                                  {0, -middle * up[2], middle * eye[2] / 4, 1}};
+  glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, projection[0]);
   glUniform3fv(uniform("towards_eye"), 1, eye);
   glDrawArrays(GL_TRIANGLES, 0, body_vertex_count_);
   glDisable(GL_DEPTH_TEST);

@@ -18,7 +18,8 @@ constexpr const char* kStages[] = {"project", "shade", "refine", "turn"};
 
 void App::set_scene_pictures() {
   const maquette::LiveScenePicture& shown = scenes_.shown().front();
-  painter_.set_scene(shown.rendering, options_.compare == Compare::kError ? shown.error : shown.photo);
+  if (pictures_ > 0)
+    painter_.set_scene(shown.rendering, options_.compare == Compare::kError ? shown.error : shown.photo);
 }
 
 void App::set_compare(Compare compare) {
@@ -92,7 +93,8 @@ void App::draw_scene_panel() {
   ImGui::TextWrapped("%s", state->path.c_str());
   if (state->what == maquette::LiveSceneState::kOpening)
     ImGui::ProgressBar(float(state->done), {-1, 0}, state->text.c_str());
-  if (state->what == maquette::LiveSceneState::kReady) {
+  // Until its first picture is there the one that is shown may be of another scene.
+  if (state->what == maquette::LiveSceneState::kReady && pictures_ > 0) {
     ImGui::Text("%llu points, %zu photos", static_cast<unsigned long long>(state->info.point_count),
                 state->photos.size());
     ImGui::Text("%d x %d in %.1f ms, %llu points seen", shown.rendering.width_px, shown.rendering.height_px,

@@ -200,6 +200,24 @@ TEST(LiveDensePose, RecordsTheSource) {
   EXPECT_NE(people.live.status().problem.find("/no/folder"), std::string::npos);
 }
 
+TEST(LiveDensePose, ARecordingIsCompleteWhenItCloses) {
+  const TempFolder folder;
+  std::string warned;
+  maq_context_config config = maquette::default_context_config();
+  config.log_callback = [](void* text, maq_log_level, const char* line) { *static_cast<std::string*>(text) += line; };
+  config.log_user_data = &warned;
+  {
+    Live people;
+    people.live.record(folder.file("a.maqrec"));
+    people.live.open("stub:pattern?fps=50&size=64x48");
+    ASSERT_TRUE(people.until([&] { return people.frames() > 5; }));
+  }
+  const maquette::Context context(config);
+  maquette::Source played(context, "rec:" + folder.file("a.maqrec"));
+  EXPECT_GT(played.info().frame_count, 5);
+  EXPECT_EQ(warned, "") << "it has its index";
+}
+
 TEST(LiveDensePose, ClosesSoonWhenACameraHangs) {
   const double before_s = [&] {
     Live people;

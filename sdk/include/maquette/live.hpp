@@ -164,10 +164,11 @@ class LiveDensePose {
         orders = orders_;
         heard = order_number_;
       }
-      if (orders.stop) return;
       try {
+        if (orders.stop) return end_recording();
         idle = !step(orders);
       } catch (const std::exception& error) {
+        if (orders.stop) return;  // nobody asks any more
         idle = true;
         source_.reset();
         change_status([&](LiveStatus& status) {

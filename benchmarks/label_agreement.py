@@ -185,7 +185,7 @@ def clip_frames(clip: Path, numbers: Sequence[int], folder: Path) -> list[str]:
 def check_features(processor: Processor) -> list[str]:
     """The features that programs see on this processor. Raises ValueError if they are not those it is here for."""
     done = subprocess.run(
-        processor.command("tests/native/processor_features"), capture_output=True, text=True, check=True
+        processor.command("benchmarks/native/processor_features"), capture_output=True, text=True, check=True
     )
     seen = set(done.stdout.split())
     if not processor.has <= seen or processor.lacks & seen:

@@ -1,6 +1,6 @@
 """Point clouds in PLY files: ASCII and binary little-endian, positions and colours of the element `vertex`.
 
-For rendered places and captures alike; the SDK has a reader of its own (sdk/src/scene/ply_file.h)."""
+For rendered places and captures alike; the SDK has a reader of its own (sdk/src/scene/capture/ply_reader.h)."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ for preset in release asan; do
 done
 
 printf '\n== native tests of threads, tsan\n'
-ctest --test-dir build/tsan -R '^native\.(DepthaiCameras|Faults|LiveCameras|LiveDensePose|LookRaster|PictureCover|V4l2Controls|V4l2Faults|WorkerThreads|ZBuffer)$' \
+ctest --test-dir build/tsan -L threads \
     --output-on-failure --no-tests=error --output-junit "$PWD/$results/ctest-tsan.xml" || status=1
 
 printf '\n== Python tests\n'

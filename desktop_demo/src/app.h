@@ -3,8 +3,8 @@
 
 #include <array>
 #include <deque>
-#include <maquette/fly_camera.hpp>
-#include <maquette/live_scene.hpp>
+#include <app/fly_camera.hpp>
+#include <app/live_scene.hpp>
 #include <memory>
 #include <optional>
 #include <string>

@@ -1,8 +1,8 @@
 // A frame and what was found in it, as textures take it.
 #pragma once
 
-#include <maquette/live.hpp>
-#include <maquette/picture.hpp>
+#include <app/live_densepose.hpp>
+#include <app/rgba_image.hpp>
 #include <memory>
 #include <vector>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <array>
-#include <maquette/body_mesh.hpp>
+#include <maquette/densepose_mesh.hpp>
 
 #include "mapped_frame.h"
 #include "window.h"

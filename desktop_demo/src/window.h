@@ -1,7 +1,7 @@
 // A window with an OpenGL 3.3 core context and Dear ImGui in it, and what a person does to it.
 #pragma once
 
-#include <maquette/picture.hpp>
+#include <app/rgba_image.hpp>
 #include <string>
 #include <vector>
 

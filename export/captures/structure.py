@@ -71,7 +71,7 @@ def up_of_cameras(rotations: np.ndarray) -> np.ndarray:
 
     Cameras are held level more than they are held horizontally: x of all of them is at right angles to up. The mean of
     what is up in the pictures, tilted where all look down from one side, is therefore turned to be so by least squares:
-    (sum x x^T + small) up = mean up. The same as sdk/src/scene/up_axis.cpp.
+    (sum x x^T + small) up = mean up. The same as sdk/src/scene/capture/scene_up.cpp.
     """
     across, up = rotations[:, 0], -rotations[:, 1].sum(0)
     up = np.linalg.solve(across.T @ across + _LEVELLING * len(rotations) * np.eye(3), up)

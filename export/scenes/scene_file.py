@@ -1,6 +1,6 @@
 """Scene files (.maqs) in numpy: read, checked, and written again with other looks.
 
-The layout is that of sdk/src/scene/scene_file_format.h and scene.h, version 1. Points, blocks and kinds of numbers
+The layout is that of sdk/src/scene/format/scene_file_format.h and scene.h, version 1. Points, blocks and kinds of numbers
 stay as `maquette scene build` chose them: what is written differs in coefficients, their steps, and the networks'
 identity. Checks are 64-bit XXH3 hashes by libxxhash, which comes with the header that the SDK is built with
 (scripts/install-packages.sh).

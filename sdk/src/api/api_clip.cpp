@@ -1,5 +1,5 @@
 #include "api/boundary.h"
-#include "image/clip_file.h"
+#include "image/files/clip_file.h"
 
 using namespace maq;
 

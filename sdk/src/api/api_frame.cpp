@@ -1,6 +1,6 @@
 #include "api/boundary.h"
 #include "image/convert.h"
-#include "image/image_file.h"
+#include "image/files/image_file.h"
 
 using namespace maq;
 

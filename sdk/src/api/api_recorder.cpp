@@ -1,5 +1,5 @@
 #include "api/boundary.h"
-#include "sources/recording.h"
+#include "sources/recording/recording.h"
 
 using namespace maq;
 

@@ -2,8 +2,8 @@
 #include <limits>
 
 #include "api/boundary.h"
-#include "scene/ply_writer.h"
-#include "scene/scene_file.h"
+#include "scene/format/ply_writer.h"
+#include "scene/format/scene_file.h"
 
 using namespace maq;
 

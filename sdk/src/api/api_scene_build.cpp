@@ -7,9 +7,9 @@
 
 #include "api/boundary.h"
 #include "api/scene_arguments.h"
-#include "scene/capture_build.h"
-#include "scene/posed_view.h"
-#include "scene/scene_packing.h"
+#include "scene/build/build_scene.h"
+#include "scene/capture/posed_view.h"
+#include "scene/format/scene_packing.h"
 
 using namespace maq;
 

@@ -4,7 +4,7 @@
 
 #include "api/boundary.h"
 #include "api/scene_arguments.h"
-#include "scene/scene_renderer.h"
+#include "scene/render/scene_renderer.h"
 
 using namespace maq;
 

@@ -14,9 +14,9 @@
 #include "densepose/surface_grid.h"
 #include "maquette/maquette.h"
 #include "nn/onnxruntime_library.h"
-#include "scene/capture.h"
-#include "scene/scene.h"
-#include "scene/scene_renderer.h"
+#include "scene/capture/capture.h"
+#include "scene/format/scene.h"
+#include "scene/render/scene_renderer.h"
 #include "sources/source.h"
 
 namespace maq {

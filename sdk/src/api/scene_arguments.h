@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "api/boundary.h"
-#include "image/lens.h"
+#include "image/geometry/lens.h"
 #include "scene/pinhole_camera.h"
-#include "scene/scene_networks.h"
+#include "scene/networks/scene_networks.h"
 
 namespace maq {
 

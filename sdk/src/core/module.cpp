@@ -7,7 +7,7 @@
 
 #include "core/build_info.h"
 #include "core/error.h"
-#include "core/own_folder.h"
+#include "core/library_folder.h"
 
 namespace maq {
 

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "core/new_file.h"
-#include "image/image_file.h"
+#include "core/atomic_file.h"
+#include "image/files/image_file.h"
 
 namespace maq {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/own_folder.h"
+#include "core/library_folder.h"
 
 namespace maq {
 namespace {

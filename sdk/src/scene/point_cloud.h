@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "scene/visible_points.h"
+#include "scene/visibility/visible_points.h"
 
 namespace maq {
 

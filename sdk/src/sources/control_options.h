@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "sources/camera.h"
+#include "sources/camera_backend.h"
 #include "sources/uri.h"
 
 namespace maq {

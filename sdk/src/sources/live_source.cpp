@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "image/jpeg.h"
+#include "image/files/jpeg.h"
 
 namespace maq {
 namespace {

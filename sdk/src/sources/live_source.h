@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sources/camera.h"
+#include "sources/camera_backend.h"
 #include "sources/source.h"
 
 namespace maq {

@@ -2,18 +2,18 @@
 
 #include "core/error.h"
 #include "sources/control_options.h"
-#include "sources/depthai_source.h"
-#include "sources/faults.h"
-#include "sources/file_kind.h"
-#include "sources/file_sources.h"
-#include "sources/libcamera_cameras.h"
+#include "sources/depthai/depthai_source.h"
+#include "sources/synthetic/fault_injection.h"
+#include "sources/files/file_kind.h"
+#include "sources/files/file_sources.h"
+#include "sources/libcamera/module_client.h"
 #include "sources/live_source.h"
-#include "sources/played_camera.h"
+#include "sources/synthetic/replay_camera.h"
 #include "sources/source.h"
-#include "sources/stub_sources.h"
+#include "sources/synthetic/stub_sources.h"
 #include "sources/uri.h"
-#include "sources/v4l2_camera.h"
-#include "sources/v4l2_source.h"
+#include "sources/v4l2/v4l2_camera.h"
+#include "sources/v4l2/v4l2_source.h"
 
 namespace maq {
 namespace {

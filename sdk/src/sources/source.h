@@ -9,7 +9,7 @@
 #include "core/frame.h"
 #include "core/log.h"
 #include "maquette/source.h"
-#include "sources/camera.h"
+#include "sources/camera_backend.h"
 
 namespace maq {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "sources/camera.h"
+#include "sources/camera_backend.h"
 #include "sources/libcamera/controls.h"
 #include "sources/libcamera/manager.h"
 #include "sources/libcamera/receiver.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "sources/camera.h"
+#include "sources/camera_backend.h"
 
 namespace maq {
 

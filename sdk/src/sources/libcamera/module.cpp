@@ -5,7 +5,7 @@
 #include "core/module.h"
 #include "sources/libcamera/camera.h"
 #include "sources/libcamera/formats.h"
-#include "sources/libcamera_cameras.h"
+#include "sources/libcamera/module_client.h"
 
 namespace maq {
 namespace {

@@ -1,0 +1,73 @@
+#include "image/files/image_file.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/file_reader.h"
+#include "core/atomic_file.h"
+#include "image/files/file_codecs.h"
+#include "image/opencv_view.h"
+
+namespace maq {
+
+void read_image_file(const std::string& path, Frame& frame, Orientation orientation) {
+  std::error_code ignored;  // what is no file is for read_file() to say
+  const uintmax_t size_bytes = std::filesystem::file_size(path, ignored);
+  if (!ignored && size_bytes > uintmax_t(1) << 30) {
+    throw Error(MAQ_ERROR_UNREADABLE, path, " is over 1 GiB; an image file was expected.");
+  }
+  const std::vector<uint8_t> bytes = read_file(path);
+  if (bytes.empty()) throw Error(MAQ_ERROR_UNREADABLE, path, " is empty; an image file was expected.");
+  if (const auto size = read_image_size(bytes)) check_image_size(size->width, size->height, path);
+
+  const cv::Mat image = file_codecs().decode_image(bytes.data(), bytes.size(), orientation);
+  if (image.empty()) {
+    throw Error(MAQ_ERROR_UNREADABLE, path,
+                " cannot be decoded: it is damaged or no image; use a whole JPEG, PNG, WebP, BMP or TIFF file.");
+  }
+  check_image_size(image.cols, image.rows, path);
+  uint8_t* pixels = frame.allocate_bgr(image.cols, image.rows);
+  image.copyTo(cv::Mat(image.rows, image.cols, CV_8UC3, pixels));
+}
+
+SizePx read_image_file_size(const std::string& path) {
+  {
+    FileReader file(path);
+    // Up to a JPEG's size there may be a preview and colour tables.
+    std::vector<uint8_t> start(size_t(std::min<uint64_t>(file.remaining(), 1 << 18)));
+    file.read(start.data(), start.size());
+    if (const auto size = read_image_size(start)) return *size;
+  }
+  Frame frame;
+  read_image_file(path, frame, Orientation::kAsStored);
+  return {frame.image.width_px, frame.image.height_px};
+}
+
+std::vector<uint8_t> encode_image(const ImageView& image, const std::string& ending) {
+  std::vector<uint8_t> memory, bytes;
+  const bool is_grey = image.format == MAQ_PIXEL_GREY8;
+  const cv::Mat picture = is_grey ? cv::Mat(image.height_px, image.width_px, CV_8UC1,
+                                            const_cast<uint8_t*>(image.planes[0].data), image.planes[0].stride_bytes)
+                                  : as_bgr(image, memory);
+  if (!file_codecs().encode_image(ending, picture, bytes)) {
+    throw Error(MAQ_ERROR_INTERNAL, "A picture of ", image.width_px, " x ", image.height_px,
+                " could not be encoded as ", ending, ": there may be too little memory.");
+  }
+  return bytes;
+}
+
+void write_image_file(const ImageView& image, const std::string& path) {
+  const std::string ending = lower_case_ending(path);
+  if (ending != ".png" && ending != ".jpg" && ending != ".jpeg") {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .png nor in .jpg, by which its format is chosen.");
+  }
+  NewFile file(path);
+  const std::vector<uint8_t> bytes = encode_image(image, ending == ".png" ? ending : ".jpg");
+  file.append(bytes.data(), bytes.size());
+  file.commit();
+}
+
+}  // namespace maq

@@ -1,0 +1,53 @@
+#include "image/files/jpeg.h"
+
+#include <turbojpeg.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "image/opencv_view.h"
+
+namespace maq {
+
+JpegDecoder::~JpegDecoder() {
+  if (decoder_ != nullptr) tjDestroy(decoder_);
+}
+
+bool JpegDecoder::decode(const uint8_t* bytes, size_t size_bytes, int64_t most_pixels, Frame& frame) {
+  if (decoder_ == nullptr) decoder_ = tjInitDecompress();
+  if (decoder_ == nullptr) return false;
+  if (decode_by_library(bytes, size_bytes, most_pixels, frame)) return true;
+  // After some headers that are cut short it takes no other image any more.
+  tjDestroy(decoder_);
+  decoder_ = nullptr;
+  return false;
+}
+
+bool JpegDecoder::decode_by_library(const uint8_t* bytes, size_t size_bytes, int64_t most_pixels, Frame& frame) {
+  int width = 0, height = 0, subsampling = 0, colours = 0;
+  if (tjDecompressHeader3(decoder_, bytes, size_bytes, &width, &height, &subsampling, &colours) != 0) return false;
+  if (width < 1 || height < 1 || width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX) return false;
+  if (int64_t(width) * height > std::min<int64_t>(most_pixels, MAQ_MAX_PIXELS)) return false;
+  uint8_t* pixels = frame.allocate_bgr(width, height);
+  // A frame that was cut short is only a warning to the library, which fills the rest with grey.
+  return tjDecompress2(decoder_, bytes, size_bytes, pixels, width, width * 3, height, TJPF_BGR, TJFLAG_FASTDCT) == 0;
+}
+
+JpegEncoder::~JpegEncoder() {
+  if (encoder_ != nullptr) tjDestroy(encoder_);
+}
+
+void JpegEncoder::encode(const ImageView& image, int quality, std::vector<uint8_t>& bytes) {
+  if (encoder_ == nullptr) encoder_ = tjInitCompress();
+  const cv::Mat bgr = as_bgr(image, bgr_);
+  bytes.resize(tjBufSize(bgr.cols, bgr.rows, TJSAMP_420));
+  uint8_t* target = bytes.data();
+  unsigned long size_bytes = bytes.size();
+  if (encoder_ == nullptr || tjCompress2(encoder_, bgr.data, bgr.cols, int(bgr.step), bgr.rows, TJPF_BGR, &target,
+                                         &size_bytes, TJSAMP_420, quality, TJFLAG_NOREALLOC) != 0) {
+    throw Error(MAQ_ERROR_INTERNAL, "A frame could not be compressed as JPEG.");
+  }
+  bytes.resize(size_bytes);
+}
+
+}  // namespace maq

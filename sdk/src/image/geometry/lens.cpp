@@ -1,0 +1,124 @@
+#include "image/geometry/lens.h"
+
+#include <cmath>
+#include <limits>
+
+namespace maq {
+namespace {
+
+constexpr double kWidestAngle = 60 * 3.14159265358979323846 / 180;
+
+// What a distance from the axis (a tangent, squared: `r2`) is multiplied by.
+double radial_factor(const Lens& lens, double r2) {
+  const auto& k = lens.coefficients;
+  if (lens.distortion == Distortion::kFisheye) {
+    const double radius = std::sqrt(r2);
+    const double angle = std::atan(radius), a2 = angle * angle;
+    const double bent = angle * (1 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3]))));
+    return radius > 1e-8 ? bent / radius : 1;
+  }
+  return (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));
+}
+
+// Up to where farther from the axis is farther in the picture too.
+double widest_of(const Lens& lens) {
+  if (lens.distortion == Distortion::kNone) return std::numeric_limits<double>::infinity();
+  constexpr int kSteps = 2000;
+  double widest = 0, at = 0;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double radius = std::tan(kWidestAngle * i / kSteps);
+    const double next = radius * radial_factor(lens, radius * radius);
+    if (!(next > at) || !std::isfinite(next)) break;
+    at = next;
+    widest = radius;
+  }
+  return widest;
+}
+
+Lens with_focal_lengths_times(const Lens& lens, double factor) {
+  Lens made = lens;
+  made.distortion = Distortion::kNone;
+  made.coefficients = {};
+  made.fx_px *= factor;
+  made.fy_px *= factor;
+  return made;
+}
+
+// Whether every pixel on the edge of an undistorted picture, and so all inside, has its place in the distorted one.
+bool is_filled(const Lens& lens, const LensProjection& projection, const Lens& undistorted) {
+  const auto has_place = [&](int column, int row) {
+    const auto place = projection.find((column - undistorted.cx_px) / undistorted.fx_px,
+                                       (row - undistorted.cy_px) / undistorted.fy_px);
+    return place && place->column_px >= -0.5 && place->column_px <= lens.width_px - 0.5 && place->row_px >= -0.5 &&
+           place->row_px <= lens.height_px - 0.5;
+  };
+  const int right = undistorted.width_px - 1, bottom = undistorted.height_px - 1;
+  for (int column = 0; column <= right; ++column) {
+    if (!has_place(column, 0) || !has_place(column, bottom)) return false;
+  }
+  for (int row = 0; row <= bottom; ++row) {
+    if (!has_place(0, row) || !has_place(right, row)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+LensProjection::LensProjection(const Lens& lens) : lens_(lens), widest_(widest_of(lens)) {}
+
+std::optional<PlaceInPicture> LensProjection::find(double x, double y) const {
+  const double r2 = x * x + y * y;
+  if (!(r2 <= widest_ * widest_)) return {};
+  double column = x, row = y;
+  if (lens_.distortion != Distortion::kNone) {
+    const double factor = radial_factor(lens_, r2);
+    column *= factor;
+    row *= factor;
+  }
+  if (lens_.distortion == Distortion::kRational) {
+    const double p1 = lens_.coefficients[2], p2 = lens_.coefficients[3];
+    column += 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
+    row += p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+  }
+  return PlaceInPicture{column * lens_.fx_px + lens_.cx_px, row * lens_.fy_px + lens_.cy_px};
+}
+
+Lens resized(const Lens& lens, int width_px, int height_px) {
+  Lens made = lens;
+  const double across = double(width_px) / lens.width_px, down = double(height_px) / lens.height_px;
+  made.width_px = width_px;
+  made.height_px = height_px;
+  made.fx_px *= across;
+  made.fy_px *= down;
+  // The picture's edge, half a pixel outside of the first centre, stays where it is.
+  made.cx_px = (lens.cx_px + 0.5) * across - 0.5;
+  made.cy_px = (lens.cy_px + 0.5) * down - 0.5;
+  return made;
+}
+
+std::optional<Lens> without_distortion(const Lens& lens) {
+  if (lens.distortion == Distortion::kNone) return lens;
+  const LensProjection projection(lens);
+  const auto is_enough = [&](double factor) {
+    return is_filled(lens, projection, with_focal_lengths_times(lens, factor));
+  };
+  constexpr double kLeast = 1.0 / 16, kMost = 16;
+  double enough = 1;
+  while (!is_enough(enough)) {
+    enough *= 2;
+    if (enough > kMost) return {};
+  }
+  double short_of = enough / 2;
+  while (short_of >= kLeast && is_enough(short_of)) {
+    enough = short_of;
+    short_of /= 2;
+  }
+  // Whoever looks at a narrower picture around the axis sees a part of the wider one, so that halving finds the least.
+  for (int i = 0; i < 30; ++i) {
+    const double middle = (enough + short_of) / 2;
+    (is_enough(middle) ? enough : short_of) = middle;
+  }
+  return with_focal_lengths_times(lens, enough);
+}
+
+}  // namespace maq

@@ -1,0 +1,104 @@
+#include "scene/build/descriptor_regression.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace maq {
+namespace {
+
+// A diagonal element below this share of the largest is rounding: the directions do not span the basis.
+constexpr double kLeastDiagonal = 1e-12;
+
+// Turns `row` (values of the basis, then of the features) into the triangle, whose rows it is orthogonal to afterwards.
+template <class Value>
+void turn_in(Value* triangle, Value (*turned)[kFeatures], Value* row, Value* features) {
+  Value* diagonal = triangle;
+  for (int i = 0; i < kBasis; diagonal += kBasis - i, ++i) {
+    const Value length = std::sqrt(diagonal[0] * diagonal[0] + row[i] * row[i]);
+    if (row[i] == 0 || length == 0) continue;
+    // With 1 - cosine instead of cosine, which is nearly 1 after many rows and would be rounded the same way each time.
+    const Value sine = row[i] / length, less = row[i] * sine / (length + diagonal[0]);
+    diagonal[0] += row[i] * row[i] / (length + diagonal[0]);
+    for (int j = i + 1; j < kBasis; ++j) {
+      const Value kept = diagonal[j - i];
+      diagonal[j - i] += sine * row[j] - less * kept;
+      row[j] -= less * row[j] + sine * kept;
+    }
+    for (int c = 0; c < kFeatures; ++c) {
+      const Value kept = turned[i][c];
+      turned[i][c] += sine * features[c] - less * kept;
+      features[c] -= less * features[c] + sine * kept;
+    }
+  }
+}
+
+}  // namespace
+
+void ViewMoments::add(const float y[kFeatures], const float h[kBasis]) {
+  ++views;
+  const float share = 1.0f / float(views);
+  const float root = std::sqrt(float(views - 1) * share);  // the scatter grows by (K - 1) / K of the products
+  float dy[kFeatures], dh[kBasis];
+  for (int c = 0; c < kFeatures; ++c) {
+    const float off = y[c] - mean_y[c];
+    mean_y[c] += off * share;
+    dy[c] = root * off;
+  }
+  for (int i = 0; i < kBasis; ++i) {
+    const float off = h[i] - mean_h[i];
+    mean_h[i] += off * share;
+    dh[i] = root * off;
+  }
+  turn_in(triangle, turned, dh, dy);
+}
+
+LookKind solve_look(const ViewMoments& moments, double alpha, float beta[kBasis][kFeatures]) {
+  std::memset(beta, 0, sizeof(float) * kBasis * kFeatures);
+  if (moments.views == 0) return LookKind::kUnseen;
+  double triangle[kBasis * (kBasis + 1) / 2], turned[kBasis][kFeatures];
+  bool is_constant = true;
+  for (int i = 0; i < kBasis * (kBasis + 1) / 2; ++i) {
+    triangle[i] = moments.triangle[i];
+    is_constant = is_constant && triangle[i] == 0;
+  }
+  if (is_constant) return LookKind::kConstant;
+  for (int i = 0; i < kBasis; ++i) {
+    for (int c = 0; c < kFeatures; ++c) turned[i][c] = moments.turned[i][c];
+  }
+
+  // What the centred values leave out, and the regulariser, as rows whose features are 0.
+  for (int extra = -1; extra < kBasis; ++extra) {
+    double row[kBasis] = {}, features[kFeatures] = {};
+    if (extra >= 0) {
+      row[extra] = std::sqrt(alpha);
+    } else {
+      for (int i = 0; i < kBasis; ++i) row[i] = std::sqrt(double(moments.views)) * moments.mean_h[i];
+    }
+    turn_in(triangle, turned, row, features);
+  }
+
+  const double* diagonals[kBasis];
+  double largest = 0;
+  const double* diagonal = triangle;
+  for (int i = 0; i < kBasis; diagonal += kBasis - i, ++i) {
+    diagonals[i] = diagonal;
+    largest = std::max(largest, std::abs(*diagonal));
+  }
+  double solution[kBasis][kFeatures];
+  for (int i = kBasis - 1; i >= 0; --i) {
+    if (!(std::abs(*diagonals[i]) > kLeastDiagonal * largest)) return LookKind::kSingular;
+    for (int c = 0; c < kFeatures; ++c) {
+      double value = turned[i][c];
+      for (int j = i + 1; j < kBasis; ++j) value -= diagonals[i][j - i] * solution[j][c];
+      solution[i][c] = value / *diagonals[i];
+      if (!std::isfinite(float(solution[i][c]))) return LookKind::kSingular;
+    }
+  }
+  for (int i = 0; i < kBasis; ++i) {
+    for (int c = 0; c < kFeatures; ++c) beta[i][c] = float(solution[i][c]);
+  }
+  return LookKind::kVarying;
+}
+
+}  // namespace maq

@@ -1,0 +1,259 @@
+#include "scene/build/scene_builder.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/error.h"
+#include "image/geometry/turned_photo.h"
+#include "scene/build/descriptor_sampling.h"
+#include "scene/build/descriptor_solving.h"
+#include "scene/gravity_alignment.h"
+
+namespace maq {
+namespace {
+
+// Of the builder's memory: what is kept of each point of the cloud, and of each that was seen.
+constexpr uint64_t kBytesAPoint = sizeof(uint32_t), kBytesASeenPoint = sizeof(ViewMoments) + sizeof(uint32_t);
+// What networks make of photos is near 1; squares of these are still floats.
+constexpr float kLargestFeature = 1e15f;
+constexpr size_t kTaskSpans = 16;
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& sum_ms) : sum_ms_(sum_ms) {}
+  ~Stopwatch() {
+    sum_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& sum_ms_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+template <class... Parts>
+[[noreturn]] void refuse(const Parts&... parts) {
+  throw Error(MAQ_ERROR_INVALID_ARGUMENT, parts...);
+}
+
+void check_cloud(const PointCloud& cloud) {
+  const size_t count = cloud.count();
+  if (count == 0) refuse("The cloud has no points; a scene needs one at least.");
+  if (count > kMostPoints) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", count, " points, over the limit of ", kMostPoints,
+                "; make it thinner.");
+  }
+  if (cloud.y.size() != count || cloud.z.size() != count) {
+    refuse("The cloud has ", count, " x, ", cloud.y.size(), " y and ", cloud.z.size(),
+           " z coordinates, but must have as many of each.");
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(cloud.x[i]) || !std::isfinite(cloud.y[i]) || !std::isfinite(cloud.z[i])) {
+      refuse("Point ", i, " of the cloud is at (", cloud.x[i], ", ", cloud.y[i], ", ", cloud.z[i],
+             "), which is not finite; leave such points out.");
+    }
+  }
+  for (const double origin : cloud.origin) {
+    if (!std::isfinite(origin)) refuse("The cloud's origin has a coordinate ", origin, "; it must be finite.");
+  }
+}
+
+const BuildOptions& checked(const std::array<double, 3>& up, const BuildOptions& options) {
+  const double length = std::hypot(up[0], up[1], up[2]);
+  if (!(length > 0) || !std::isfinite(length)) {
+    refuse("Up is (", up[0], ", ", up[1], ", ", up[2], "), which is no direction.");
+  }
+  if (!(options.visibility_scale >= 1.0 / 16 && options.visibility_scale <= 1)) {
+    refuse("The visibility scale is ", options.visibility_scale, ", but must be 1/16 to 1.");
+  }
+  if (!(options.near >= 0) || !std::isfinite(options.near)) {
+    refuse("The depth of the nearest point is ", options.near, ", but must be finite and not negative.");
+  }
+  if (!(options.alpha >= 0) || !std::isfinite(options.alpha)) {
+    refuse("Alpha is ", options.alpha, ", but must be finite and not negative.");
+  }
+  if (options.threads < 1 || options.threads > 64) refuse("Threads are ", options.threads, ", but must be 1 to 64.");
+  return options;
+}
+
+int scaled(int side_px, double scale) { return std::max(1, int(std::nearbyint(side_px * scale))); }
+
+}  // namespace
+
+SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks,
+                           const BuildOptions& options)
+    : cloud_(std::move(cloud)),
+      up_(up),
+      networks_(networks),
+      options_(checked(up, options)),
+      threads_(options.threads) {
+  check_cloud(cloud_);
+  cloud_.rgb = {};
+  check_memory(0);
+  moments_.begin(cloud_.count());
+}
+
+SceneBuilder::SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options)
+    : SceneBuilder(std::move(state.cloud), state.up, networks, options) {
+  if (state.networks_sha256 != networks.sha256()) {
+    refuse("The points were told how they look by other networks than ", networks.name(),
+           ", whose features they cannot be given as well. Use those, or build the scene again from all photos.");
+  }
+  check_memory(state.seen.size());
+  moments_.reserve(state.seen.size());
+  for (size_t place = 0; place < state.seen.size(); ++place) {
+    moments_.add(state.seen[place]);
+    moments_.at(place) = state.moments[place];
+  }
+  views_ = state.photos;
+}
+
+ModellingStateView SceneBuilder::state() const {
+  ModellingStateView state;
+  state.cloud = cloud_.places();
+  state.seen = moments_.points().data();
+  state.seen_count = moments_.count();
+  state.moments = [this](size_t place) -> const ViewMoments& { return moments_.at(place); };
+  state.photos = uint32_t(views_);
+  return state;
+}
+
+void SceneBuilder::check_memory(size_t new_points) const {
+  const uint64_t wanted = cloud_.count() * kBytesAPoint + (moments_.count() + new_points) * kBytesASeenPoint;
+  if (wanted <= options_.most_bytes) return;
+  throw Error(MAQ_ERROR_OUT_OF_MEMORY, "What is known of ", moments_.count() + new_points, " seen points of ",
+              cloud_.count(), " would take ", wanted >> 20, " MiB, over the limit of ", options_.most_bytes >> 20,
+              "; make the cloud thinner, or allow more.");
+}
+
+size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera& camera) {
+  const PinholeCamera scaled_camera = resized(camera, scaled(camera.width_px, options_.visibility_scale),
+                                              scaled(camera.height_px, options_.visibility_scale));
+  visible_.begin(scaled_camera, options_.near, threads_.count());
+  PointSpan whole;
+  for (size_t i = 0; i < 3; ++i) whole.base[i] = cloud_.origin[i] - camera.centre[i];
+  constexpr size_t kTask = kTaskSpans * PointSpan::kMostPoints;
+  threads_.run((cloud_.count() + kTask - 1) / kTask, [&](size_t task, int worker) {
+    const size_t end = std::min(cloud_.count(), (task + 1) * kTask);
+    PointSpan span = whole;
+    for (size_t begin = task * kTask; begin < end; begin += PointSpan::kMostPoints) {
+      span.x = cloud_.x.data() + begin;
+      span.y = cloud_.y.data() + begin;
+      span.z = cloud_.z.data() + begin;
+      span.count = uint32_t(std::min<size_t>(PointSpan::kMostPoints, end - begin));
+      span.first = uint32_t(begin);
+      visible_.draw(span, worker);
+    }
+  });
+  visible_.finish(0, scaled_camera.height_px);
+  visible_.hide(0, scaled_camera.height_px, kHidingShare);
+
+  const size_t pixels = size_t(scaled_camera.width_px) * size_t(scaled_camera.height_px);
+  seen_.clear();
+  for (size_t pixel = 0; pixel < pixels; ++pixel) {
+    if (visible_.keys()[pixel] != kNoPointKey) seen_.push_back(point_of(visible_.keys()[pixel]));
+  }
+  if (valid != nullptr) keep_valid(cloud_.places(), camera, valid, seen_);
+  return size_t(std::count_if(seen_.begin(), seen_.end(), [&](uint32_t point) { return !moments_.has(point); }));
+}
+
+const float* SceneBuilder::find_features(const ImageView& photo, const PinholeCamera& camera,
+                                         const PinholeCamera& upright) {
+  {
+    const Stopwatch stopwatch(times_.turning_ms);
+    turn_photo(photo, pixels_between(upright, camera), upright.width_px, upright.height_px, turned_);
+  }
+  const Stopwatch stopwatch(times_.extractor_ms);
+  const float* features = networks_.extract(turned_.data(), upright.width_px, upright.height_px);
+  const size_t count = size_t(upright.width_px) * size_t(upright.height_px) * kFeatures;
+  for (size_t i = 0; i < count; ++i) {
+    if (!(std::abs(features[i]) <= kLargestFeature)) {
+      throw Error(MAQ_ERROR_INFERENCE, "The extractor of bundle ", networks_.name(), " gives the feature ", features[i],
+                  " for a photo; the network is broken. Fetch or export the bundle again.");
+    }
+  }
+  return features;
+}
+
+std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8_t* valid, const PinholeCamera& camera,
+                                             const BuildProgress& progress) {
+  check_camera(camera, "The photo's camera");
+  if (photo.format != MAQ_PIXEL_BGR8) {
+    refuse("The photo is in ", pixel_format_name(photo.format), ", but must be BGR.");
+  }
+  if (photo.width_px != camera.width_px || photo.height_px != camera.height_px) {
+    refuse("The photo is ", photo.width_px, " x ", photo.height_px, " pixels, but its camera is for ", camera.width_px,
+           " x ", camera.height_px, ".");
+  }
+  const PinholeCamera upright = upright_frame(camera, up_, SceneNetworks::kPhotoMultiple);
+  SceneNetworks::check_photo_size(upright.width_px, upright.height_px);
+  const auto goes_on = [&](double done, const char* what) {
+    const bool wanted = !progress || progress(done, what);
+    return wanted && !is_cancelled_;
+  };
+  // Whichever way this ends, a later photo is not cancelled by what was said of this one.
+  struct Reset {
+    std::atomic<bool>& flag;
+    ~Reset() { flag = false; }
+  } const reset{is_cancelled_};
+
+  if (!goes_on(0, "Finding the points that the photo sees.")) return {};
+  {
+    const Stopwatch stopwatch(times_.visibility_ms);
+    const size_t new_points = find_seen_points(valid, camera);
+    check_memory(new_points);
+    moments_.reserve(new_points);
+  }
+  if (seen_.empty()) return 0;
+  BackgroundColour background;
+  background.add(photo, valid, visible_);
+  if (!goes_on(0.1, "Turning the photo into features.")) return {};
+  const float* features = find_features(photo, camera, upright);
+  if (!goes_on(0.9, "Telling the points how they look.")) return {};
+
+  // From here on nothing fails, and nothing is asked.
+  background_.add(background);
+  const Stopwatch stopwatch(times_.moments_ms);
+  for (const uint32_t point : seen_) {
+    if (!moments_.has(point)) moments_.add(point);
+  }
+  const LookSampling sampling(cloud_.places(), upright, features, networks_.basis());
+  constexpr size_t kTask = kTaskSpans * LookSampling::kMostPoints;
+  threads_.run((seen_.size() + kTask - 1) / kTask, [&](size_t task, int) {
+    const size_t end = std::min(seen_.size(), (task + 1) * kTask);
+    for (size_t begin = task * kTask; begin < end; begin += LookSampling::kMostPoints) {
+      sampling.add(seen_.data() + begin, std::min(LookSampling::kMostPoints, end - begin), moments_);
+    }
+  });
+  ++views_;
+  return seen_.size();
+}
+
+ModelledPoints SceneBuilder::solve(bool forgets) {
+  if (moments_.count() == 0) {
+    refuse("None of the photos sees a point of the cloud, which has ", cloud_.count(),
+           ", so there is no scene; check that photos and cloud are of one place, in the same unit.");
+  }
+  const Stopwatch stopwatch(times_.solving_ms);
+  ModelledPoints made;
+  made.origin = cloud_.origin;
+  made.up = up_;
+  made.background = background_.mean();
+  made.never_seen = cloud_.count() - moments_.count();
+  solve_looks(moments_, cloud_.places(), options_.alpha, threads_, forgets, made);
+  return made;
+}
+
+ModelledPoints SceneBuilder::finish_and_forget() {
+  networks_.forget_extractor();
+  ModelledPoints made = solve(true);
+  moments_ = MomentStore();
+  moments_.begin(cloud_.count());
+  background_ = {};
+  views_ = 0;
+  return made;
+}
+
+}  // namespace maq

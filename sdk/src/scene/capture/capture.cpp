@@ -1,0 +1,235 @@
+#include "scene/capture/capture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "image/files/image_file.h"
+#include "image/geometry/undistort.h"
+#include "scene/capture/colmap_model.h"
+#include "scene/capture/ply_reader.h"
+#include "scene/capture/posed_photo.h"
+#include "scene/capture/transforms_file.h"
+#include "scene/capture/scene_up.h"
+
+namespace maq {
+namespace {
+
+template <size_t count>
+std::string first_file(const std::string& folder, const char* const (&names)[count]) {
+  for (const char* name : names) {
+    if (file_exists(folder + "/" + name)) return folder + "/" + name;
+  }
+  return "";
+}
+
+// Where most of the programs that make COLMAP models have the photos; the first folder that has one of them.
+std::string folder_of_photos(const std::string& folder, const std::vector<PosedPhoto>& photos) {
+  for (const char* name : {"images", "photos", "rgb", "input", "."}) {
+    const std::string candidate = folder + "/" + name;
+    for (const PosedPhoto& photo : photos) {
+      if (stays_inside(photo.name) && file_exists(candidate + "/" + photo.name)) return candidate;
+    }
+  }
+  return folder + "/images";
+}
+
+PinholeCamera camera_of(const Lens& undistorted, const PosedPhoto& photo) {
+  PinholeCamera camera;
+  camera.width_px = undistorted.width_px;
+  camera.height_px = undistorted.height_px;
+  camera.fx_px = undistorted.fx_px;
+  camera.fy_px = undistorted.fy_px;
+  camera.cx_px = undistorted.cx_px;
+  camera.cy_px = undistorted.cy_px;
+  camera.rotation = photo.rotation;
+  camera.centre = photo.centre;
+  make_exact_rotation(camera.rotation);
+  return camera;
+}
+
+// Makes views of photos, one after the other, or drops them.
+class ViewMaker {
+ public:
+  ViewMaker(std::string folder, DropCounts& drops) : folder_(std::move(folder)), drops_(drops) {}
+
+  void add(const PosedPhoto& photo) {
+    if (const char* reason = try_to_add(photo)) drops_.add(reason, photo.name);
+  }
+
+  std::vector<CaptureView> views;
+
+ private:
+  // The reason why it was dropped; null when it was not.
+  const char* try_to_add(const PosedPhoto& photo) {
+    if (!stays_inside(photo.name)) return kPhotosOutside;
+    if (!names_.insert(photo.name).second) return "photos that are named twice";
+    if (const char* reason = fault_of(photo.lens)) return reason;
+    if (const char* reason = fault_of_pose(photo)) return reason;
+    CaptureView view{photo.name, folder_ + "/" + photo.name, {}, {}, photo.is_held_out};
+    try {
+      const SizePx size = read_image_file_size(view.image_path);
+      check_image_size(size.width, size.height, view.image_path);
+      const double across = double(size.width) / photo.lens.width_px, down = double(size.height) / photo.lens.height_px;
+      constexpr double kTolerance = 0.01;
+      if (std::abs(across - down) > kTolerance * std::max(across, down)) {
+        return "photos of another shape than their camera";
+      }
+      view.lens = resized(photo.lens, int(size.width), int(size.height));
+    } catch (const Error& error) {
+      if (error.status() == MAQ_ERROR_NOT_FOUND) return kPhotosMissing;
+      if (error.status() == MAQ_ERROR_UNREADABLE) return kPhotosUnreadable;
+      if (error.status() == MAQ_ERROR_IMAGE_SIZE) return "photos without pixels, or over the limit of size";
+      throw;
+    }
+    if (!made_ || !(view.lens == last_lens_)) {
+      last_lens_ = view.lens;
+      made_ = true;
+      undistorted_ = without_distortion(view.lens);
+    }
+    if (!undistorted_) return "photos whose distortion folds the picture, or whose axis is outside of it";
+    view.camera = camera_of(*undistorted_, photo);
+    views.push_back(std::move(view));
+    return nullptr;
+  }
+
+  std::string folder_;
+  DropCounts& drops_;
+  std::set<std::string> names_;
+  // Many photos are of one camera.
+  bool made_ = false;
+  Lens last_lens_;
+  std::optional<Lens> undistorted_;
+};
+
+std::string text_of(const DropCounts& drops) {
+  std::string text;
+  for (const Dropped& dropped : drops.list()) text += (text.empty() ? "" : ", ") + sentence_part(dropped);
+  return text.empty() ? "there are none" : text;
+}
+
+std::vector<CaptureView> views_of(const std::string& folder, const std::vector<PosedPhoto>& photos,
+                                  const std::string& capture, DropCounts& drops) {
+  ViewMaker maker(folder, drops);
+  for (const PosedPhoto& photo : photos) maker.add(photo);
+  if (maker.views.empty()) {
+    throw Error(MAQ_ERROR_UNREADABLE, capture, " has no photo that can be used: ", text_of(drops), ".");
+  }
+  return std::move(maker.views);
+}
+
+std::vector<std::array<double, 9>> rotations_of(const std::vector<CaptureView>& views) {
+  std::vector<std::array<double, 9>> rotations;
+  for (const CaptureView& view : views) rotations.push_back(view.camera.rotation);
+  return rotations;
+}
+
+// The medians of the cameras' coordinates, so that points that they see are near, whatever a stray camera or point does.
+std::array<double, 3> middle_of(const std::vector<CaptureView>& views) {
+  std::array<double, 3> middle{};
+  for (size_t i = 0; i < 3; ++i) {
+    std::vector<double> values;
+    for (const CaptureView& view : views) values.push_back(view.camera.centre[i]);
+    std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
+    middle[i] = values[values.size() / 2];
+  }
+  return middle;
+}
+
+Capture open_colmap(const std::string& folder, const ColmapFiles& files) {
+  DropCounts drops;
+  Capture capture;
+  const std::vector<PosedPhoto> photos = read_colmap_photos(files, drops);
+  capture.views = views_of(folder_of_photos(folder, photos), photos, folder, drops);
+  capture.up = up_of_cameras(rotations_of(capture.views));
+  const std::string dense = folder + "/fused.ply";
+  capture.cloud = file_exists(dense) ? read_ply_file(dense, middle_of(capture.views), drops)
+                                     : read_colmap_points(files, middle_of(capture.views), drops);
+  capture.dropped = drops.list();
+  return capture;
+}
+
+Capture open_transforms(const std::string& folder, const std::string& file_name) {
+  DropCounts drops;
+  Capture capture;
+  const TransformsFile file = read_transforms_file(folder, file_name, drops);
+  std::string cloud;
+  if (!file.cloud.empty()) {
+    if (!stays_inside(file.cloud)) {
+      throw Error(MAQ_ERROR_UNREADABLE, folder, "/", file_name, ": the \"ply_file_path\" ", file.cloud.substr(0, 200),
+                  " leads out of its folder, where nothing is read; copy the cloud there.");
+    }
+    cloud = folder + "/" + file.cloud;
+  } else {
+    cloud = first_file(folder, {"sparse_pc.ply", "points3d.ply", "points3D.ply", "pointcloud.ply", "cloud.ply"});
+  }
+  if (cloud.empty()) {
+    throw Error(
+        MAQ_ERROR_NOT_FOUND, folder, "/", file_name,
+        " names no point cloud (\"ply_file_path\"), and there is no sparse_pc.ply, points3d.ply, pointcloud.ply or "
+        "cloud.ply beside it; a scene needs one.");
+  }
+  capture.views = views_of(folder, file.photos, folder, drops);
+  capture.up = up_by_convention({0, 0, 1}, rotations_of(capture.views));
+  capture.cloud = read_ply_file(cloud, middle_of(capture.views), drops);
+  capture.dropped = drops.list();
+  return capture;
+}
+
+Capture open_any(const std::string& folder) {
+  for (const char* place : {"sparse/0", "sparse", "colmap/sparse/0", "."}) {
+    if (const auto files = ColmapFiles::find(folder + "/" + place)) return open_colmap(folder, *files);
+  }
+  for (const char* name : {"transforms.json", "transforms_train.json"}) {
+    if (file_exists(folder + "/" + name)) return open_transforms(folder, name);
+  }
+  throw Error(
+      MAQ_ERROR_NOT_FOUND, folder,
+      " holds no capture: neither a COLMAP model (cameras, images and points3D, .bin or .txt, in sparse/0, sparse or "
+      "the folder itself) nor a transforms.json.");
+}
+
+}  // namespace
+
+Capture open_capture(const std::string& folder) {
+  if (!is_folder(folder)) throw Error(MAQ_ERROR_NOT_FOUND, folder, " is not a folder; check the path.");
+  Capture capture = open_any(folder);
+  if (capture.cloud.count() == 0) {
+    std::string text;
+    for (const Dropped& dropped : capture.dropped) {
+      if (dropped.reason == kPointsNotFinite || dropped.reason == kColoursNotFinite) {
+        text += (text.empty() ? ": " : ", ") + sentence_part(dropped);
+      }
+    }
+    throw Error(MAQ_ERROR_UNREADABLE, folder, " has a cloud without a point that can be used", text, ".");
+  }
+  return capture;
+}
+
+void load_view(const CaptureView& view, Frame& picture, std::vector<uint8_t>& valid) {
+  Frame photo;
+  const bool is_distorted = view.lens.distortion != Distortion::kNone;
+  Frame& target = is_distorted ? photo : picture;
+  read_image_file(view.image_path, target, Orientation::kAsStored);
+  if (target.image.width_px != view.lens.width_px || target.image.height_px != view.lens.height_px) {
+    throw Error(MAQ_ERROR_UNREADABLE, view.image_path, " is ", target.image.width_px, " x ", target.image.height_px,
+                " pixels, but was ", view.lens.width_px, " x ", view.lens.height_px,
+                " when the capture was opened; open it again.");
+  }
+  if (!is_distorted) {
+    valid.assign(size_t(view.camera.width_px) * size_t(view.camera.height_px), 255);
+    return;
+  }
+  Lens undistorted = view.lens;
+  undistorted.distortion = Distortion::kNone;
+  undistorted.fx_px = view.camera.fx_px;
+  undistorted.fy_px = view.camera.fy_px;
+  undistorted.cx_px = view.camera.cx_px;
+  undistorted.cy_px = view.camera.cy_px;
+  undistort(photo.image, view.lens, undistorted, picture, valid);
+}
+
+}  // namespace maq

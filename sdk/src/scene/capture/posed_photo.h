@@ -1,0 +1,32 @@
+// A photo as a capture's files describe it, before anything was looked at on disk.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "image/geometry/lens.h"
+
+namespace maq {
+
+struct PosedPhoto {
+  std::string name;  // relative to the folder of the photos
+  Lens lens;
+  std::array<double, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row by row: world to camera, in axes of OpenCV
+  std::array<double, 3> centre = {0, 0, 0};
+  bool is_held_out = false;  // kept to compare with: no scene is made of it
+};
+
+// Reasons why photos are dropped (drop_counts.h).
+inline constexpr char kPhotosOutside[] = "photos whose name leads out of their folder";
+inline constexpr char kPhotosMissing[] = "photos that are not in their folder";
+inline constexpr char kPhotosUnreadable[] = "photos that cannot be read as images";
+
+// And those that lie in their figures; null when there is none.
+const char* fault_of(const Lens& lens);
+const char* fault_of_pose(const PosedPhoto& photo);
+
+// Makes the rows of a rotation that is one to within 1 % exactly of length 1 and at right angles. False, and nothing is
+// changed, for other matrices, mirrors among them.
+bool make_exact_rotation(std::array<double, 9>& rotation);
+
+}  // namespace maq

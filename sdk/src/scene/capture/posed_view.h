@@ -1,0 +1,38 @@
+// A photo ready to be looked at: BGR, without distortion, no larger than asked for; what is valid in it, and its camera.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/frame.h"
+#include "image/geometry/lens.h"
+#include "scene/capture/capture.h"
+#include "scene/pinhole_camera.h"
+
+namespace maq {
+
+class PosedView {
+ public:
+  // A capture's photo from disk. `long_side_px`: larger ones are made smaller; 0: none. Throws as load_view() does.
+  void load(const CaptureView& view, int long_side_px);
+
+  // An app's picture of any format, taken with `lens`, whose picture has the size of `image`; `pose` says where the camera is
+  // and looks. What it points to must stay while this is used. Throws MAQ_ERROR_INVALID_ARGUMENT for another size and for a
+  // distortion that cannot be undone, and what copy_pixels() throws.
+  void load(const ImageView& image, const Lens& lens, const PinholeCamera& pose, int long_side_px);
+
+  const ImageView& image() const { return *image_; }
+  const uint8_t* valid() const { return valid_.empty() ? nullptr : valid_.data(); }  // null: all is
+  const PinholeCamera& camera() const { return camera_; }
+
+ private:
+  void shrink_to(int long_side_px);
+
+  Frame whole_, smaller_;
+  ImageView given_;
+  const ImageView* image_ = nullptr;
+  std::vector<uint8_t> valid_;
+  PinholeCamera camera_;
+};
+
+}  // namespace maq

@@ -1,0 +1,220 @@
+#include "scene/capture/transforms_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/file_reader.h"
+#include "image/files/image_file.h"
+
+namespace maq {
+namespace {
+
+using nlohmann::json;
+
+// Some 25,000 frames. Parsed, a hostile file takes twenty times as much.
+constexpr uint64_t kMostBytes = 16 << 20;
+
+// What is said of a frame: by itself, or by the file for all.
+class Facts {
+ public:
+  Facts(const json& frame, const json& shared, std::string where)
+      : frame_(frame), shared_(shared), where_(std::move(where)) {}
+
+  template <class... Parts>
+  [[noreturn]] void fail(const Parts&... parts) const {
+    throw Error(MAQ_ERROR_UNREADABLE, where_, ": ", parts..., ".");
+  }
+
+  const json* find(const char* key) const {
+    for (const json* owner : {&frame_, &shared_}) {
+      const auto found = owner->find(key);
+      if (found != owner->end()) return &*found;
+    }
+    return nullptr;
+  }
+  std::optional<double> number(const char* key) const {
+    const json* value = find(key);
+    if (value == nullptr) return {};
+    if (!value->is_number()) fail("\"", key, "\" is not a number");
+    return value->get<double>();
+  }
+  double number_or(const char* key, double otherwise) const { return number(key).value_or(otherwise); }
+  bool flag(const char* key) const {
+    const json* value = find(key);
+    if (value == nullptr) return false;
+    if (!value->is_boolean()) fail("\"", key, "\" is neither true nor false");
+    return value->get<bool>();
+  }
+  std::string text(const char* key) const {
+    const json* value = find(key);
+    if (value == nullptr) return "";
+    if (!value->is_string()) fail("\"", key, "\" is not a text");
+    return value->get<std::string>();
+  }
+
+ private:
+  const json& frame_;
+  const json& shared_;
+  std::string where_;
+};
+
+json parse(const std::string& path) {
+  FileReader file(path);
+  if (file.remaining() > kMostBytes) {
+    file.fail(" has ", file.remaining(), " bytes, over the limit of ", kMostBytes, "; leave some frames out.");
+  }
+  std::string text(size_t(file.remaining()), '\0');
+  file.read(text.data(), text.size());
+  json document = json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (document.is_discarded() || !document.is_object()) {
+    file.fail(" is not a JSON object: it is cut off or damaged, or has NaN in it.");
+  }
+  return document;
+}
+
+bool is_fisheye(const Facts& facts) {
+  const std::string model = facts.text("camera_model");
+  if (model == "OPENCV_FISHEYE") return true;
+  for (const char* known : {"", "OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL"}) {
+    if (model == known) return facts.flag("is_fisheye");
+  }
+  throw Error(MAQ_ERROR_UNSUPPORTED, "The \"camera_model\" ", model.substr(0, 40),
+              " is not read; OPENCV, OPENCV_FISHEYE, PINHOLE and SIMPLE_PINHOLE are. Undistort the photos first.");
+}
+
+int whole_pixels(double value) {
+  return value >= 0 && value <= INT32_MAX && value == std::floor(value) ? int(value) : 0;
+}
+
+void read_distortion(const Facts& facts, Lens& lens) {
+  auto& k = lens.coefficients;
+  if (is_fisheye(facts)) {
+    k = {facts.number_or("k1", 0), facts.number_or("k2", 0), facts.number_or("k3", 0), facts.number_or("k4", 0)};
+    lens.distortion = Distortion::kFisheye;
+    return;
+  }
+  // There k4 belongs to the eighth power of the radius, which the model of OpenCV does not have.
+  if (facts.number_or("k4", 0) != 0) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "A camera that is no fisheye has \"k4\" ", facts.number_or("k4", 0),
+                ", but k1, k2, k3, p1 and p2 are what is read. Undistort the photos first.");
+  }
+  k = {facts.number_or("k1", 0), facts.number_or("k2", 0), facts.number_or("p1", 0), facts.number_or("p2", 0),
+       facts.number_or("k3", 0)};
+  if (std::any_of(k.begin(), k.end(), [](double value) { return value != 0; })) lens.distortion = Distortion::kRational;
+}
+
+// Of the camera, where width and height are known.
+void read_intrinsics(const Facts& facts, Lens& lens) {
+  const auto from_angle = [&](const char* key, int side_px) -> std::optional<double> {
+    const auto angle = facts.number(key);
+    if (!angle) return {};
+    return 0.5 * side_px / std::tan(0.5 * *angle);
+  };
+  // What is said in pixels is exact; angles are for files without it.
+  auto across = facts.number("fl_x"), down = facts.number("fl_y");
+  if (!across && !down) {
+    across = from_angle("camera_angle_x", lens.width_px);
+    down = from_angle("camera_angle_y", lens.height_px);
+  }
+  if (!across && !down) facts.fail("there is neither \"fl_x\" nor \"camera_angle_x\"");
+  lens.fx_px = across ? *across : *down;
+  lens.fy_px = down ? *down : *across;
+  lens.cx_px = facts.number_or("cx", 0.5 * lens.width_px) - 0.5;
+  lens.cy_px = facts.number_or("cy", 0.5 * lens.height_px) - 0.5;
+  read_distortion(facts, lens);
+}
+
+void read_pose(const Facts& facts, PosedPhoto& photo) {
+  const json* matrix = facts.find("transform_matrix");
+  bool is_matrix = matrix != nullptr && matrix->is_array() && (matrix->size() == 3 || matrix->size() == 4);
+  double m[3][4] = {};
+  for (size_t i = 0; i < 3 && is_matrix; ++i) {
+    const json& row = (*matrix)[i];
+    is_matrix = row.is_array() && row.size() == 4 &&
+                std::all_of(row.begin(), row.end(), [](const json& value) { return value.is_number(); });
+    for (size_t k = 0; k < 4 && is_matrix; ++k) m[i][k] = row[k].get<double>();
+  }
+  if (!is_matrix) facts.fail("\"transform_matrix\" is not one of 3 or 4 rows of 4 numbers");
+  for (size_t i = 0; i < 3; ++i) {
+    photo.rotation[i] = m[i][0];
+    photo.rotation[3 + i] = -m[i][1];
+    photo.rotation[6 + i] = -m[i][2];
+    photo.centre[i] = m[i][3];
+  }
+}
+
+std::string with_ending(const std::string& folder, const std::string& name) {
+  if (file_exists(folder + "/" + name)) return name;
+  for (const char* ending : {".png", ".jpg", ".jpeg"}) {
+    if (file_exists(folder + "/" + name + ending)) return name + ending;
+  }
+  return name;
+}
+
+std::set<std::string> held_out_names(const json& document, const std::string& path) {
+  std::set<std::string> names;
+  const auto list = document.find("test_filenames");
+  if (list == document.end()) return names;
+  if (!list->is_array()) throw Error(MAQ_ERROR_UNREADABLE, path, ": \"test_filenames\" is not a list.");
+  for (const json& name : *list) {
+    if (!name.is_string()) {
+      throw Error(MAQ_ERROR_UNREADABLE, path, ": \"test_filenames\" has an entry that is not a text.");
+    }
+    names.insert(name.get<std::string>());
+  }
+  return names;
+}
+
+}  // namespace
+
+TransformsFile read_transforms_file(const std::string& folder, const std::string& file_name, DropCounts& drops) {
+  const std::string path = folder + "/" + file_name;
+  const json document = parse(path);
+  const json none = json::object();
+  TransformsFile read;
+  read.cloud = Facts(none, document, path).text("ply_file_path");
+  const auto frames = document.find("frames");
+  if (frames == document.end() || !frames->is_array()) {
+    throw Error(MAQ_ERROR_UNREADABLE, path, " has no list \"frames\".");
+  }
+  const std::set<std::string> held_out = held_out_names(document, path);
+  for (size_t i = 0; i < frames->size(); ++i) {
+    const std::string where = path + ", frame " + std::to_string(i);
+    const json& frame = (*frames)[i];
+    if (!frame.is_object()) throw Error(MAQ_ERROR_UNREADABLE, where, ": it is not a JSON object.");
+    const Facts facts(frame, document, where);
+    PosedPhoto photo;
+    photo.name = facts.text("file_path");
+    if (photo.name.empty()) facts.fail("\"file_path\" is missing");
+    photo.is_held_out = held_out.count(photo.name) != 0;
+    read_pose(facts, photo);
+    if (!stays_inside(photo.name)) {
+      drops.add(kPhotosOutside, photo.name);
+      continue;
+    }
+    photo.name = with_ending(folder, photo.name);
+    if (facts.find("w") != nullptr && facts.find("h") != nullptr) {
+      photo.lens.width_px = whole_pixels(facts.number_or("w", 0));
+      photo.lens.height_px = whole_pixels(facts.number_or("h", 0));
+    } else {
+      try {
+        const SizePx size = read_image_file_size(folder + "/" + photo.name);
+        photo.lens.width_px = whole_pixels(double(size.width));
+        photo.lens.height_px = whole_pixels(double(size.height));
+      } catch (const Error& error) {
+        drops.add(error.status() == MAQ_ERROR_NOT_FOUND ? kPhotosMissing : kPhotosUnreadable, photo.name);
+        continue;
+      }
+    }
+    read_intrinsics(facts, photo.lens);
+    read.photos.push_back(std::move(photo));
+  }
+  return read;
+}
+
+}  // namespace maq

@@ -1,0 +1,311 @@
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "core/error.h"
+#include "scene/format/scene_file.h"
+#include "scene/format/scene_file_format.h"
+#include "scene/format/scene_layout.h"
+
+namespace maq {
+namespace {
+
+constexpr size_t kReadAtOnce = 1 << 20;  // a multiple of the alignment, and of a float
+// A little over what make_scene takes, since steps are rounded.
+constexpr double kLargestStored = 2e30;
+
+bool is_sound(double value) { return std::abs(value) <= kLargestStored; }  // false for NaN
+bool are_sound(const float* values, size_t count) {
+  return std::all_of(values, values + count, [](float value) { return is_sound(value); });
+}
+bool are_zero(const uint8_t* bytes, size_t count) {
+  return std::all_of(bytes, bytes + count, [](uint8_t byte) { return byte == 0; });
+}
+
+class SceneFileReader {
+ public:
+  explicit SceneFileReader(const std::string& path);
+  ~SceneFileReader() { ::close(file_); }
+  SceneFileReader(const SceneFileReader&) = delete;
+  SceneFileReader& operator=(const SceneFileReader&) = delete;
+
+  const SceneFileHead& head() const { return head_; }
+
+  // Reads a section with the zeros behind it and compares the check; `use` gets its bytes, part by part.
+  template <class Use>
+  void read(SceneFileSection section, Use&& use) const {
+    const SceneFileSpan& span = head_.sections[section];
+    std::vector<float> part((size_t(std::min<uint64_t>(kReadAtOnce, filled_up(span.bytes))) + 3) / sizeof(float));
+    XXH3_state_t hash;
+    XXH3_64bits_reset(&hash);
+    for (uint64_t done = 0; done < filled_up(span.bytes);) {
+      const size_t count = size_t(std::min<uint64_t>(kReadAtOnce, filled_up(span.bytes) - done));
+      read_at(span.offset + done, part.data(), count);
+      XXH3_64bits_update(&hash, part.data(), count);
+      use(part.data(), size_t(std::min<uint64_t>(count, span.bytes - std::min(done, span.bytes))), size_t(done));
+      done += count;
+    }
+    if (XXH3_64bits_digest(&hash) != span.check)
+      fail(" is damaged at byte ", span.offset, " or behind; copy it again.");
+  }
+
+  // To memory that has room for it.
+  void read_to(SceneFileSection section, void* to) const {
+    read(section, [&](const float* part, size_t count, size_t done) {
+      std::memcpy(static_cast<uint8_t*>(to) + done, part, count);
+    });
+  }
+
+  std::shared_ptr<const uint8_t> map() const;
+
+  template <class... Parts>
+  [[noreturn]] void fail(const Parts&... parts) const {
+    throw Error(MAQ_ERROR_UNREADABLE, path_, parts...);
+  }
+
+ private:
+  void read_at(uint64_t offset, void* bytes, size_t count) const;
+  void check_head(uint64_t size_bytes) const;
+
+  std::string path_;
+  int file_ = -1;
+  SceneFileHead head_{};
+};
+
+SceneFileReader::SceneFileReader(const std::string& path) : path_(path) {
+  // Without O_NONBLOCK a pipe would wait for somebody who writes.
+  file_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (file_ < 0) {
+    const int reason = errno;
+    if (reason == ENOENT || reason == ENOTDIR) {
+      throw Error(MAQ_ERROR_NOT_FOUND, path, " does not exist; check the path.");
+    }
+    fail(" cannot be opened (", std::strerror(reason), ").");
+  }
+  try {
+    struct stat found {};
+    if (::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
+    if (uint64_t(found.st_size) < sizeof head_) fail(" is too short for a scene: ", found.st_size, " bytes.");
+    read_at(0, &head_, sizeof head_);
+    check_head(uint64_t(found.st_size));
+  } catch (...) {
+    ::close(file_);
+    throw;
+  }
+}
+
+void SceneFileReader::read_at(uint64_t offset, void* bytes, size_t count) const {
+  auto* to = static_cast<char*>(bytes);
+  while (count > 0) {
+    const ssize_t got = ::pread(file_, to, count, off_t(offset));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) fail(" cannot be read at byte ", offset, "; did it change meanwhile?");
+    to += got;
+    offset += uint64_t(got);
+    count -= size_t(got);
+  }
+}
+
+void SceneFileReader::check_head(uint64_t size_bytes) const {
+  if (std::memcmp(head_.magic, kSceneFileMagic, sizeof head_.magic) != 0) fail(" is not a scene (.maqs).");
+  if (head_.version != kSceneFileVersion) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " is a scene of version ", head_.version, "; this SDK reads version ",
+                kSceneFileVersion, ". Build the scene again.");
+  }
+  constexpr size_t kChecked = offsetof(SceneFileHead, file_bytes);
+  if (head_.head_bytes != sizeof head_ || head_.head_check != XXH3_64bits(&head_.file_bytes, sizeof head_ - kChecked)) {
+    fail(" is damaged in its first ", sizeof head_, " bytes; copy it again.");
+  }
+  if (head_.file_bytes != size_bytes) {
+    fail(" has ", size_bytes, " bytes, but should have ", head_.file_bytes,
+         ": it is cut off or damaged; copy it again.");
+  }
+  // From here on only who makes wrong files on purpose, or has a defect, is met.
+  const bool has_kinds = head_.place_kind <= uint8_t(Places::kUint16) &&
+                         head_.coefficient_kind <= uint8_t(Coefficients::kInt8) &&
+                         are_zero(head_.zero, sizeof head_.zero) && are_zero(head_.more_zeros, sizeof head_.more_zeros);
+  if (!has_kinds) fail(" stores its numbers in a way that version ", kSceneFileVersion, " does not have.");
+  if (head_.points > kMostPoints || head_.state_points > kMostPoints) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " has ", std::max(head_.points, head_.state_points), " points; at most ",
+                kMostPoints, " can be shown.");
+  }
+  if (head_.points == 0 || head_.blocks == 0 || head_.blocks > head_.points || head_.varying > head_.points ||
+      head_.state_seen > head_.state_points) {
+    fail(" claims ", head_.points, " points, ", head_.varying, " of which vary, in ", head_.blocks, " blocks, and ",
+         head_.state_seen, " of ", head_.state_points, " that were seen: that cannot be.");
+  }
+  for (const double* vector : {head_.origin, head_.up, head_.state_origin}) {
+    if (!std::isfinite(vector[0]) || !std::isfinite(vector[1]) || !std::isfinite(vector[2])) {
+      fail(" has an origin or a direction of up that is not finite.");
+    }
+  }
+  for (const float part : head_.background) {
+    if (!(part >= 0 && part <= 1)) fail(" has a background colour of ", part, ", which is not 0 to 1.");
+  }
+  const uint64_t place = size_bytes_of(Places(head_.place_kind));
+  const uint64_t coefficient = size_bytes_of(Coefficients(head_.coefficient_kind));
+  const uint64_t bytes[kSceneFileSections] = {
+      head_.blocks * uint64_t(sizeof(SceneBlock)),      head_.points * 3 * place,
+      head_.points * kFeatures * coefficient,           head_.varying * kSlopes * coefficient,
+      head_.state_points * 3 * uint64_t(sizeof(float)), head_.state_seen * uint64_t(sizeof(uint32_t)),
+      head_.state_seen * uint64_t(sizeof(ViewMoments))};
+  uint64_t offset = sizeof head_;
+  for (int s = 0; s < kSceneFileSections; ++s) {
+    if (head_.sections[s].offset != offset || head_.sections[s].bytes != bytes[s]) {
+      fail(", section ", s, ": is said to have ", head_.sections[s].bytes, " bytes from ", head_.sections[s].offset,
+           " on, but should have ", bytes[s], " from ", offset, " on.");
+    }
+    offset += filled_up(bytes[s]);
+  }
+  if (offset != size_bytes) fail(" has ", size_bytes - offset, " bytes that belong to nothing.");
+}
+
+std::shared_ptr<const uint8_t> SceneFileReader::map() const {
+  const size_t bytes = size_t(head_.file_bytes);
+  void* const at = bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_, 0) : MAP_FAILED;
+  if (at == MAP_FAILED) {
+    throw Error(MAQ_ERROR_OUT_OF_MEMORY, path_, " cannot be mapped into memory: it has ", head_.file_bytes, " bytes.");
+  }
+  return {static_cast<const uint8_t*>(at),
+          [bytes](const uint8_t* from) { ::munmap(const_cast<uint8_t*>(from), bytes); }};
+}
+
+// What the renderer takes for granted: blocks follow each other without gaps, and decoded numbers are finite.
+void check_blocks(const SceneFileReader& file, const std::vector<SceneBlock>& blocks) {
+  const SceneFileHead& head = file.head();
+  const double most_mean = head.coefficient_kind == uint8_t(Coefficients::kInt8)    ? 128
+                           : head.coefficient_kind == uint8_t(Coefficients::kInt16) ? 32768
+                                                                                    : 1;
+  const double most_place = head.place_kind == uint8_t(Places::kUint16) ? 65535 : 0;
+  uint64_t points = 0, varying = 0;
+  for (size_t b = 0; b < blocks.size(); ++b) {
+    const SceneBlock& block = blocks[b];
+    if (block.first != points || block.first_varying != varying || block.count == 0 ||
+        block.count > SceneBlock::kMostPoints || block.varying > block.count) {
+      file.fail(", block ", b, ": ", block.count, " points from ", block.first, " on, ", block.varying,
+                " that vary from ", block.first_varying, " on, after ", points, " and ", varying, ".");
+    }
+    points += block.count;
+    varying += block.varying;
+    bool is_right = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double reached = block.low[axis] + most_place * block.place_step[axis];
+      is_right &= is_sound(block.low[axis]) && is_sound(block.high[axis]) && block.place_step[axis] >= 0 &&
+                  is_sound(block.place_step[axis]) && reached <= block.high[axis];
+    }
+    for (int c = 0; c < kFeatures; ++c) {
+      is_right &=
+          is_sound(std::abs(double(block.mean_middle[c])) + most_mean * block.mean_step[c]) && block.mean_step[c] >= 0;
+    }
+    for (const float step : block.slope_step) is_right &= step >= 0 && is_sound(most_mean * step);
+    if (!is_right) file.fail(", block ", b, ": its bounds or steps are not finite, or do not hold its points.");
+  }
+  if (points != head.points || varying != head.varying) {
+    file.fail(" has blocks of ", points, " points, ", varying, " of which vary, but claims ", head.points, " and ",
+              head.varying, ".");
+  }
+}
+
+struct StoredArrays {
+  std::vector<SceneBlock> blocks;  // never mapped: what they say was checked and must stay so
+  std::shared_ptr<const uint8_t> mapping;
+  std::vector<uint8_t> memory;
+};
+
+}  // namespace
+
+Scene open_scene_file(const std::string& path, SceneStorage storage) {
+  const SceneFileReader file(path);
+  const SceneFileHead& head = file.head();
+  const auto arrays = std::make_shared<StoredArrays>();
+  arrays->blocks.resize(head.blocks);
+  file.read_to(kBlocksSection, arrays->blocks.data());
+  check_blocks(file, arrays->blocks);
+
+  constexpr SceneFileSection kArrays[3] = {kPlacesSection, kMeansSection, kSlopesSection};
+  const uint64_t begin = head.sections[kPlacesSection].offset, end = head.sections[kStatePlacesSection].offset;
+  if (storage == SceneStorage::kMemory) arrays->memory.resize(size_t(end - begin));
+  for (const SceneFileSection section : kArrays) {
+    const bool are_floats = section == kPlacesSection ? Places(head.place_kind) == Places::kFloat32
+                                                      : Coefficients(head.coefficient_kind) == Coefficients::kFloat32;
+    file.read(section, [&](const float* part, size_t bytes, size_t done) {
+      if (are_floats && !are_sound(part, bytes / sizeof(float))) {
+        file.fail(" has places or looks that are not finite; build the scene again.");
+      }
+      if (storage == SceneStorage::kMemory) {
+        std::memcpy(arrays->memory.data() + (head.sections[section].offset - begin) + done, part, bytes);
+      }
+    });
+  }
+  if (storage == SceneStorage::kMapped) arrays->mapping = file.map();
+  const auto at = [&](SceneFileSection section) -> const void* {
+    const uint64_t offset = head.sections[section].offset;
+    return storage == SceneStorage::kMapped ? arrays->mapping.get() + offset : arrays->memory.data() + (offset - begin);
+  };
+
+  Scene scene;
+  std::copy_n(head.origin, 3, scene.origin.begin());
+  std::copy_n(head.up, 3, scene.up.begin());
+  std::copy_n(head.background, 3, scene.background.begin());
+  scene.place_kind = Places(head.place_kind);
+  scene.coefficient_kind = Coefficients(head.coefficient_kind);
+  scene.points = head.points;
+  scene.varying = head.varying;
+  scene.block_count = head.blocks;
+  scene.blocks = arrays->blocks.data();
+  scene.places = at(kPlacesSection);
+  scene.means = at(kMeansSection);
+  scene.slopes = at(kSlopesSection);
+  std::copy_n(head.networks_sha256, scene.networks_sha256.size(), scene.networks_sha256.begin());
+  scene.owner = arrays;
+  return scene;
+}
+
+ModellingState read_modelling_state(const std::string& path) {
+  const SceneFileReader file(path);
+  const SceneFileHead& head = file.head();
+  if (head.state_points == 0) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, path, " does not hold the state of its modelling: no photo can be added. ",
+                "Build the scene again and keep it.");
+  }
+  ModellingState state;
+  std::copy_n(head.state_origin, 3, state.cloud.origin.begin());
+  state.photos = head.state_photos;
+  std::copy_n(head.up, 3, state.up.begin());
+  std::copy_n(head.networks_sha256, state.networks_sha256.size(), state.networks_sha256.begin());
+  std::vector<float> places(size_t(head.state_points) * 3);
+  file.read_to(kStatePlacesSection, places.data());
+  if (!are_sound(places.data(), places.size())) file.fail(" keeps points whose place is not finite.");
+  std::vector<float>* const axes[3] = {&state.cloud.x, &state.cloud.y, &state.cloud.z};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const auto from = places.begin() + std::ptrdiff_t(axis * head.state_points);
+    axes[axis]->assign(from, from + std::ptrdiff_t(head.state_points));
+  }
+  places = {};
+  state.seen.resize(head.state_seen);
+  file.read_to(kStateSeenSection, state.seen.data());
+  std::vector<bool> is_seen(head.state_points);
+  for (const uint32_t point : state.seen) {
+    if (point >= head.state_points || is_seen[point]) file.fail(" keeps what was seen of point ", point, " wrongly.");
+    is_seen[point] = true;
+  }
+  state.moments.resize(head.state_seen);
+  file.read_to(kStateMomentsSection, state.moments.data());
+  for (const ViewMoments& moments : state.moments) {
+    const auto* numbers = reinterpret_cast<const float*>(&moments) + 1;  // behind the count of views
+    if (moments.views == 0 || !are_sound(numbers, sizeof moments / sizeof(float) - 1)) {
+      file.fail(" keeps moments that are not finite, or of no view.");
+    }
+  }
+  return state;
+}
+
+}  // namespace maq

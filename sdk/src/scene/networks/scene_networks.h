@@ -1,0 +1,81 @@
+// The three networks of scenes, from a bundle (docs/formats.md): what photos are turned into features with, how looks depend
+// on the side, and what makes pictures of rasters.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "nn/bundle.h"
+#include "nn/sized_sessions.h"
+#include "scene/networks/view_basis.h"
+
+namespace maq {
+
+// How the refiner wants its rasters and gives its picture; channels are last everywhere.
+struct RefinerLayout {
+  int levels = 0;  // it reads the rasters at 1, 1/2, …, 1 / 2^(levels - 1) of the size
+  // Four pixels of the finest raster, and of the picture, are one: (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2, all channels
+  // of one before those of the next.
+  bool is_folded = false;
+
+  // Of what a picture of that size (sides multiples of kMultiple) is made of, and of the picture.
+  Shape raster_shape(int level, int width_px, int height_px) const;
+  Shape picture_shape(int width_px, int height_px) const;
+};
+
+class SceneNetworks {
+ public:
+  static constexpr int kPhotoMultiple = 32;    // of the sides of photos
+  static constexpr int kPictureMultiple = 16;  // of the sides of pictures that are rendered
+  static constexpr int kRasterChannels = kFeatures + 1;
+  // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
+  static constexpr int64_t kMostPixels = int64_t(1) << 23;
+
+  // Reads and verifies the bundle in a folder. Networks are made when they are needed first, the refiner for each size that
+  // it is needed for. Throws what read_bundle() throws, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the manifest
+  // are not those of the format.
+  SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::string& folder,
+                const SessionSettings& settings);
+  SceneNetworks(const SceneNetworks&) = delete;
+  SceneNetworks& operator=(const SceneNetworks&) = delete;
+
+  const std::string& name() const { return bundle_.manifest.name; }
+  const ViewBasis& basis() const { return basis_; }
+  const RefinerLayout& refiner_layout() const { return layout_; }
+  // Of the three networks' files: SHA-256 of their SHA-256 digests, extractor, refiner, basis.
+  const std::array<uint8_t, 32>& sha256() const { return sha256_; }
+
+  // Throws what extract() throws for a photo of that size.
+  static void check_photo_size(int width_px, int height_px);
+
+  // Features [height][width][kFeatures] of a photo [height][width][3], RGB in 0..1, sides multiples of kPhotoMultiple. They
+  // stay until the next photo. Not for two threads at once. Throws MAQ_ERROR_INVALID_ARGUMENT for other sides,
+  // MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says, MAQ_ERROR_INFERENCE.
+  const float* extract(const float* photo, int width_px, int height_px);
+
+  // The picture, not clamped, of rasters of kRasterChannels (features, then 1 where there is a point): as many and in the
+  // layout as refiner_layout() says, the finest first. It stays until the next. Sides are multiples of kPictureMultiple. Not
+  // for two threads at once; beside extract() is fine. Throws as extract() does.
+  const float* refine(const std::vector<const float*>& rasters, int width_px, int height_px);
+
+  // Gives memory of the networks back; they are made again when they are needed.
+  void forget_extractor() { extractor_.reset(); }
+  void forget_refiner() { refiner_.forget(); }
+
+ private:
+  Bundle bundle_;
+  ViewBasis basis_;
+  RefinerLayout layout_;
+  std::array<uint8_t, 32> sha256_{};
+  std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
+  SessionSettings settings_;
+  // With open sizes: photos turned upright are of many, and a session for each takes longer to make than it saves.
+  std::unique_ptr<Session> extractor_;
+  SizedSessions refiner_;
+  std::vector<TensorView> inputs_;
+};
+
+}  // namespace maq

@@ -1,0 +1,31 @@
+// Which of a rendered picture's pixels are covered by points, and how far away what they show is: both from the nearest
+// points at five scales, since a surface seen from near has holes between its points.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/worker_threads.h"
+#include "scene/render/descriptor_raster.h"
+
+namespace maq {
+
+class PictureCover {
+ public:
+  // Of the raster's window, whose figures are given; true what is wanted.
+  void find(const LookRaster& raster, int width_px, int height_px, bool with_depths, WorkerThreads& threads);
+
+  // How sure it is that a pixel shows the scene, 0..255, row by row: 255 where there is a point in the 4x4 pixels (2x2, 1)
+  // that it is in, half of it in the 8x8, a quarter in the 16x16; from each scale to the next finer one bilinearly, so that
+  // it has no steps, and the most of all scales counts.
+  const uint8_t* alphas() const { return alphas_[0].data(); }
+  // Depth of the nearest point at the finest scale that has one there, along the optical axis; 0 where there is none.
+  const float* depths() const { return depths_[0].data(); }
+
+ private:
+  std::vector<uint8_t> alphas_[LookRaster::kLevels];
+  std::vector<float> depths_[LookRaster::kLevels];
+  std::vector<std::vector<uint16_t>> rows_;  // one for each worker
+};
+
+}  // namespace maq

@@ -1,0 +1,246 @@
+#include "scene/render/scene_renderer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "image/geometry/turned_picture.h"
+#include "scene/render/refiner_roi.h"
+#include "scene/gravity_alignment.h"
+#include "scene/visibility/view_frustum.h"
+
+namespace maq {
+namespace {
+
+constexpr int kMultiple = LookRaster::kMultiple;
+// The frames of a camera that is turned a little otherwise every time have a few sizes: of every size is a network prepared
+// anew (export/scenes/config.py has the same).
+constexpr int kTurnedMultiple = 64;
+constexpr int kMostThreads = 64;
+// The scene's background shows where no point is within 16 x 16 pixels, and fades towards there: within them the picture is
+// the refiner's (export/scenes/modelling.py has the same). An app's own shows by alpha.
+constexpr int kOwnBackgroundGain = 4;
+
+class StopWatch {
+ public:
+  // Milliseconds since the last call.
+  double lap() {
+    const auto now = std::chrono::steady_clock::now(), before = std::exchange(last_, now);
+    return std::chrono::duration<double, std::milli>(now - before).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+void check_figures(const PinholeCamera& camera) {
+  check_camera(camera, "The camera");
+  constexpr double kFarthest_px = 1e6, kLargestRatio = 1e3;
+  if (std::max(std::abs(camera.cx_px), std::abs(camera.cy_px)) > kFarthest_px) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The camera's principal point (", camera.cx_px, ", ", camera.cy_px,
+                ") is over ", kFarthest_px, " pixels away from its picture.");
+  }
+  const double ratio = camera.fx_px / camera.fy_px;
+  if (!(ratio < kLargestRatio && ratio > 1 / kLargestRatio)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The camera's focal lengths of ", camera.fx_px, " and ", camera.fy_px,
+                " pixels differ by a factor over ", kLargestRatio, ".");
+  }
+}
+
+int rounded_up(int side_px) { return (side_px + kMultiple - 1) / kMultiple * kMultiple; }
+
+// Whether a corner of the picture moves by as much as interpolation, of 1/32 pixel, can show.
+bool is_turn(const PixelMap& map, const PinholeCamera& camera) {
+  constexpr double kLeast_px = 1.0 / 64;
+  for (const double x : {0.0, double(camera.width_px)}) {
+    for (const double y : {0.0, double(camera.height_px)}) {
+      const double moved_x = map[0] * x + map[1] * y + map[2] - x, moved_y = map[3] * x + map[4] * y + map[5] - y;
+      if (std::max(std::abs(moved_x), std::abs(moved_y)) > kLeast_px) return true;
+    }
+  }
+  return false;
+}
+
+void set_size(RenderedPicture& picture, int width_px, int height_px) {
+  const size_t pixels = size_t(width_px) * size_t(height_px);
+  picture.width_px = width_px;
+  picture.height_px = height_px;
+  picture.bgr.resize(3 * pixels);
+  picture.alpha.resize(pixels);
+  picture.depth.resize(pixels);
+}
+
+// BGR of red, green, blue in 0..1.
+std::array<uint8_t, 3> bytes_of(const std::array<float, 3>& colour) {
+  const auto byte = [](float value) { return uint8_t(std::lround(255 * std::clamp(value, 0.0f, 1.0f))); };
+  return {byte(colour[2]), byte(colour[1]), byte(colour[0])};
+}
+
+void clear(RenderedPicture& picture, const std::array<uint8_t, 3>& background) {
+  for (size_t i = 0; i < picture.bgr.size(); i += 3) std::copy_n(background.data(), 3, picture.bgr.data() + i);
+  std::fill(picture.alpha.begin(), picture.alpha.end(), uint8_t(0));
+  std::fill(picture.depth.begin(), picture.depth.end(), 0.0f);
+}
+
+}  // namespace
+
+SceneRenderer::SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options)
+    : scene_(std::move(scene)),
+      networks_(std::move(networks)),
+      options_(options),
+      threads_(std::clamp(options.threads, 1, kMostThreads)),
+      blocks_(scene_) {
+  if (options.threads < 1 || options.threads > kMostThreads) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A scene is rendered by 1 to ", kMostThreads, " threads, not by ",
+                options.threads, ".");
+  }
+  if (!std::isfinite(options.near)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The depth of the nearest point that is seen must be a finite number.");
+  }
+}
+
+void SceneRenderer::project(const PinholeCamera& frame, RenderCounts& counts) {
+  buffer_.begin(frame, options_.near, threads_.count());
+  const ViewFrustum frustum(frame, std::max(0.0, options_.near));
+  constexpr uint32_t kBlocksAtOnce = 8;
+  std::atomic<uint32_t> blocks{0};
+  std::atomic<uint64_t> points{0};
+  threads_.run((scene_.block_count + kBlocksAtOnce - 1) / kBlocksAtOnce, [&](size_t task, int worker) {
+    const uint32_t begin = uint32_t(task) * kBlocksAtOnce, end = std::min(scene_.block_count, begin + kBlocksAtOnce);
+    for (uint32_t i = begin; i < end; ++i) {
+      const SceneBlock& block = scene_.blocks[i];
+      if (options_.skips_unseen_blocks && !frustum.may_show(scene_, block)) continue;
+      buffer_.draw(span_of(scene_, block, frame.centre), worker);
+      blocks += 1;
+      points += block.count;
+    }
+  });
+  counts.projected_blocks = blocks;
+  counts.projected_points = points;
+}
+
+RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
+  const int cells = frame.width_px / kMultiple;
+  occupied_.assign(size_t(frame.height_px / kMultiple), {});
+  threads_.run(occupied_.size(), [&](size_t strip, int) {
+    const int top = int(strip) * kMultiple;
+    buffer_.finish(top, top + kMultiple);
+    buffer_.hide(top, top + kMultiple, kHidingShare);
+    int first = cells, last = -1;
+    for (int y = top; y < top + kMultiple; ++y) {
+      const DepthKey* const row = buffer_.keys() + size_t(y) * size_t(frame.width_px);
+      const auto has_points = [row](int cell) {
+        const DepthKey* const begin = row + cell * kMultiple;
+        return std::any_of(begin, begin + kMultiple, [](DepthKey key) { return key != kNoPointKey; });
+      };
+      for (int cell = 0; cell < first; ++cell) {
+        if (has_points(cell)) first = cell;
+      }
+      for (int cell = cells - 1; cell > last; --cell) {
+        if (has_points(cell)) last = cell;
+      }
+    }
+    if (last >= 0) occupied_[strip] = {first * kMultiple, top, (last + 1 - first) * kMultiple, kMultiple};
+  });
+  RasterWindow all;
+  for (const RasterWindow& strip : occupied_) {
+    if (strip.width_px == 0) continue;
+    if (all.width_px == 0) {
+      all = strip;
+      continue;
+    }
+    const int right = std::max(all.left_px + all.width_px, strip.left_px + strip.width_px);
+    all.left_px = std::min(all.left_px, strip.left_px);
+    all.width_px = right - all.left_px;
+    all.height_px = strip.top_px + kMultiple - all.top_px;
+  }
+  return all;
+}
+
+void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture) {
+  check_figures(camera);
+  StopWatch whole, watch;
+  RenderCounts counts;
+  counts.blocks = scene_.block_count;
+  PinholeCamera frame = upright_frame(camera, scene_.up, kMultiple);
+  const PixelMap back = pixels_between(camera, frame);
+  counts.is_turned = is_turn(back, camera);
+  if (counts.is_turned) {
+    frame = upright_frame(camera, scene_.up, kTurnedMultiple);
+  } else {
+    frame = camera;
+    frame.width_px = rounded_up(camera.width_px);
+    frame.height_px = rounded_up(camera.height_px);
+  }
+  counts.frame_pixels = uint64_t(frame.width_px) * uint64_t(frame.height_px);
+  if (counts.frame_pixels > uint64_t(SceneNetworks::kMostPixels)) {
+    throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of ", camera.width_px, " x ", camera.height_px,
+                " pixels is rendered in a frame of ", frame.width_px, " x ", frame.height_px, ", over the limit of ",
+                SceneNetworks::kMostPixels, " pixels; use a smaller one.");
+  }
+
+  const std::array<uint8_t, 3> background = options_.background.value_or(bytes_of(scene_.background));
+  project(frame, counts);
+  const RasterWindow occupied = finish(frame);
+  counts.project_ms = watch.lap();
+
+  RenderedPicture& upright = counts.is_turned ? upright_ : picture;
+  const PinholeCamera& shown = counts.is_turned ? frame : camera;
+  set_size(upright, shown.width_px, shown.height_px);
+  if (occupied.width_px == 0) {
+    clear(upright, background);
+  } else {
+    const RasterWindow window = options_.skips_empty_parts ? window_to_refine(occupied, frame.width_px, frame.height_px)
+                                                           : RasterWindow{0, 0, frame.width_px, frame.height_px};
+    const RefinerLayout& layout = networks_->refiner_layout();
+    raster_.shade(scene_, blocks_, buffer_, window, frame.centre, networks_->basis(), layout, threads_);
+    counts.shaded_points = raster_.shaded();
+    counts.varying_points = raster_.varying();
+    counts.refined_pixels = uint64_t(window.width_px) * uint64_t(window.height_px);
+    if (counts.refined_pixels < counts.frame_pixels) clear(upright, background);
+    if (!options_.with_depths) std::fill(upright.depth.begin(), upright.depth.end(), 0.0f);
+    counts.reduce_ms = double(raster_.reduce_ns()) * 1e-6;
+    counts.shade_ms = watch.lap() - counts.reduce_ms;
+
+    inputs_.clear();
+    for (int level = 0; level < layout.levels; ++level) inputs_.push_back(raster_.level(level));
+    const float* const refined = networks_->refine(inputs_, window.width_px, window.height_px);
+    counts.refine_ms = watch.lap();
+
+    cover_.find(raster_, window.width_px, window.height_px, options_.with_depths, threads_);
+    refined_.write(refined, layout, window, cover_.alphas(), cover_.depths(), background,
+                   options_.background ? 1 : kOwnBackgroundGain,
+                   {upright.bgr.data(), upright.alpha.data(), options_.with_depths ? upright.depth.data() : nullptr,
+                    upright.width_px, upright.height_px},
+                   threads_);
+    counts.cover_ms = watch.lap();
+  }
+
+  if (counts.is_turned) {
+    set_size(picture, camera.width_px, camera.height_px);
+    if (occupied.width_px == 0 || !options_.with_depths) clear(picture, background);
+    if (occupied.width_px > 0) {
+      constexpr int kRowsAtOnce = 64;
+      threads_.run(size_t((camera.height_px + kRowsAtOnce - 1) / kRowsAtOnce), [&](size_t strip, int) {
+        const int top = int(strip) * kRowsAtOnce, bottom = std::min(camera.height_px, top + kRowsAtOnce);
+        const auto raster = [](auto& of, auto* pixels) {
+          return Raster<std::remove_pointer_t<decltype(pixels)>>{pixels, of.width_px, of.height_px};
+        };
+        const RenderedPicture& from = upright;
+        turn_bytes(raster(from, from.bgr.data()), 3, back, raster(picture, picture.bgr.data()), top, bottom);
+        turn_bytes(raster(from, from.alpha.data()), 1, back, raster(picture, picture.alpha.data()), top, bottom);
+        if (options_.with_depths) {
+          turn_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
+        }
+      });
+    }
+    counts.turn_ms = watch.lap();
+  }
+  counts.all_ms = whole.lap();
+  picture.counts = counts;
+}
+
+}  // namespace maq

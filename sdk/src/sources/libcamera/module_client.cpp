@@ -1,0 +1,36 @@
+#include "core/module.h"
+#include "sources/control_options.h"
+#include "sources/libcamera/module_client.h"
+
+namespace maq {
+namespace {
+
+const LibcameraCameras& cameras() {
+  // Tried again when it throws.
+  static const auto* const opened = static_cast<const LibcameraCameras*>(
+      open_module("libmaquette_libcamera.so", kLibcameraSymbol, "Cameras of libcamera need",
+                  "Install libcamera, and an SDK that was built where its headers are (libcamera-dev on Debian)."));
+  return *opened;
+}
+
+}  // namespace
+
+CameraOpener libcamera_camera_opener(SourceUri uri, int buffers, const Log&) {
+  CameraWish wish{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
+  uri.expect_no_more_options(std::string("size, fps, format, ") + kControlOptions);
+  return [name = uri.target, wish = std::move(wish), buffers]() mutable {
+    std::shared_ptr<Camera> camera = cameras().open(name, wish, buffers);
+    name = camera->identity();
+    return camera;
+  };
+}
+
+std::vector<CameraListing> list_libcamera_cameras() {
+  try {
+    return cameras().list();
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
+}  // namespace maq

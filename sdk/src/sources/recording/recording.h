@@ -1,0 +1,112 @@
+// Recordings (.maqrec): frames as a camera gave them, with their times, depth and calibration. docs/formats.md has the
+// layout. Each frame carries its own checksum and lies whole in the file once add() has returned, so that after a crash
+// every frame but the one being written can be read; an index at the end, when there is one, saves looking for them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/frame.h"
+#include "core/log.h"
+#include "image/files/jpeg.h"
+#include "maquette/source.h"
+
+namespace maq {
+
+struct RecordingInfo {
+  std::string source;  // what was recorded: a URI
+  double fps = 0;      // 0: not known
+  std::optional<maq_calibration> calibration;
+};
+
+// An open file, closed when it goes.
+class FileHandle {
+ public:
+  explicit FileHandle(int fd = -1) : fd_(fd) {}
+  ~FileHandle();
+  FileHandle(const FileHandle&) = delete;
+  FileHandle& operator=(const FileHandle&) = delete;
+  int get() const { return fd_; }
+  void close();
+
+ private:
+  int fd_;
+};
+
+struct RecordingEntry {
+  uint64_t offset;
+  int64_t timestamp_ns;
+};
+
+class RecordingWriter {
+ public:
+  // Makes the file, which must not be there yet. `jpeg_quality` 0 keeps pixels as they are, 1 to 100 compresses them;
+  // what came from a camera as JPEG is kept as it came in both cases. Throws MAQ_ERROR_UNWRITABLE.
+  RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality);
+  // Without finish() the file has no index.
+  ~RecordingWriter() = default;
+
+  // Throws MAQ_ERROR_INVALID_ARGUMENT unless the frame is later than the one before, MAQ_ERROR_UNWRITABLE when the disk
+  // is full; the file then holds the frames before.
+  void add(const Frame& frame);
+  // Writes the index; nothing can be added afterwards. Throws MAQ_ERROR_UNWRITABLE.
+  void finish();
+
+  uint64_t frame_count() const { return entries_.size(); }
+  uint64_t size_bytes() const { return size_bytes_; }
+
+ private:
+  void append(const void* header, size_t header_bytes, const void* payload, size_t payload_bytes);
+
+  std::string path_;
+  FileHandle file_;
+  int jpeg_quality_;
+  JpegEncoder jpeg_;
+  std::vector<RecordingEntry> entries_;
+  std::vector<uint8_t> payload_;
+  uint64_t size_bytes_ = 0;
+  bool finished_ = false;
+};
+
+struct RecordedFrame {
+  int width_px, height_px;
+  uint64_t sequence;
+};
+
+class RecordingReader {
+ public:
+  // Throws MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (no recording, or no whole frame in it), MAQ_ERROR_UNSUPPORTED (of a
+  // newer version). A recording without a sound index is looked through; the log says so.
+  RecordingReader(std::string path, const Log& log);
+
+  const RecordingInfo& info() const { return info_; }
+  size_t frame_count() const { return entries_.size(); }
+  bool has_index() const { return has_index_; }
+  // As the camera gave it, later from frame to frame.
+  int64_t timestamp_ns(size_t index) const { return entries_[index].timestamp_ns; }
+  // From the frame's head alone; nothing when that was changed.
+  std::optional<RecordedFrame> describe(size_t index) const;
+
+  // Throws MAQ_ERROR_UNREADABLE for a frame that was changed; others can be read still.
+  void read(size_t index, Frame& frame);
+
+ private:
+  bool read_at(uint64_t offset, void* bytes, size_t size_bytes) const;
+  void read_head();
+  bool read_index();
+  void look_for_frames();
+
+  std::string path_;
+  FileHandle file_;
+  uint64_t size_bytes_ = 0;
+  uint64_t first_offset_ = 0;
+  RecordingInfo info_;
+  std::vector<RecordingEntry> entries_;
+  bool has_index_ = false;
+  std::vector<uint8_t> payload_;
+  JpegDecoder jpeg_;
+};
+
+}  // namespace maq

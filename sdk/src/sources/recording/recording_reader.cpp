@@ -1,0 +1,201 @@
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "sources/recording/recording.h"
+#include "sources/recording/recording_format.h"
+
+namespace maq {
+namespace {
+
+bool is_allowed_size(int64_t width_px, int64_t height_px) {
+  return width_px >= 1 && height_px >= 1 && width_px <= MAQ_MAX_SIDE_PX && height_px <= MAQ_MAX_SIDE_PX &&
+         width_px * height_px <= MAQ_MAX_PIXELS;
+}
+
+// Whether the head is one, and all its figures go together.
+bool is_sound(const FrameHead& head) {
+  constexpr size_t kChecked = offsetof(FrameHead, timestamp_ns);
+  if (head.magic != kFrameMagic) return false;
+  if (head.head_check != uint32_t(XXH3_64bits(&head.timestamp_ns, sizeof head - kChecked))) return false;
+  if (!is_allowed_size(head.width_px, head.height_px)) return false;
+  const bool has_depth = head.depth_width_px != 0 || head.depth_height_px != 0;
+  if (has_depth && !is_allowed_size(head.depth_width_px, head.depth_height_px)) return false;
+  if (head.encoding == kJpegEncoding) return head.picture_bytes <= size_t(MAQ_MAX_PIXELS) * 4;
+  if (head.encoding < MAQ_PIXEL_RGB8 || head.encoding > MAQ_PIXEL_DEPTH16) return false;
+  return head.picture_bytes == packed_bytes(maq_pixel_format(head.encoding), head.width_px, head.height_px);
+}
+
+size_t depth_bytes(const FrameHead& head) { return size_t(head.depth_width_px) * size_t(head.depth_height_px) * 2; }
+
+size_t whole_bytes(const FrameHead& head) { return sizeof head + head.picture_bytes + depth_bytes(head); }
+
+std::optional<maq_calibration> calibration_of(const nlohmann::json& from) {
+  maq_calibration calibration{};
+  calibration.struct_size = sizeof calibration;
+  calibration.width_px = from.at("width_px").get<int32_t>();
+  calibration.height_px = from.at("height_px").get<int32_t>();
+  calibration.fx_px = from.at("fx_px").get<double>();
+  calibration.fy_px = from.at("fy_px").get<double>();
+  calibration.cx_px = from.at("cx_px").get<double>();
+  calibration.cy_px = from.at("cy_px").get<double>();
+  const auto distortion = from.at("distortion").get<std::vector<double>>();
+  bool is_sane = is_allowed_size(calibration.width_px, calibration.height_px) && distortion.size() == 8 &&
+                 calibration.fx_px > 0 && calibration.fy_px > 0;
+  for (const double value : {calibration.fx_px, calibration.fy_px, calibration.cx_px, calibration.cy_px}) {
+    is_sane = is_sane && std::isfinite(value);
+  }
+  for (const double value : distortion) is_sane = is_sane && std::isfinite(value);
+  if (!is_sane) return {};
+  std::copy(distortion.begin(), distortion.end(), calibration.distortion);
+  return calibration;
+}
+
+}  // namespace
+
+RecordingReader::RecordingReader(std::string path, const Log& log)
+    : path_(std::move(path)), file_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC)) {
+  struct stat found {};
+  if (file_.get() < 0 && errno == ENOENT) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
+  if (file_.get() < 0 || ::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) {
+    throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be read; is it a file, and may you read it?");
+  }
+  size_bytes_ = uint64_t(found.st_size);
+  read_head();
+  has_index_ = read_index();
+  if (!has_index_) {
+    look_for_frames();
+    log.write(MAQ_LOG_WARNING, path_, " has no sound index, as after a crash or a change: ", entries_.size(),
+              " whole frames were found in it.");
+  }
+  if (entries_.empty()) throw Error(MAQ_ERROR_UNREADABLE, path_, " holds no whole frame.");
+}
+
+bool RecordingReader::read_at(uint64_t offset, void* bytes, size_t size_bytes) const {
+  if (offset > size_bytes_ || size_bytes > size_bytes_ - offset) return false;
+  auto* to = static_cast<uint8_t*>(bytes);
+  while (size_bytes > 0) {
+    const ssize_t got = ::pread(file_.get(), to, size_bytes, off_t(offset));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;  // also when the file became shorter meanwhile
+    to += got;
+    offset += uint64_t(got);
+    size_bytes -= size_t(got);
+  }
+  return true;
+}
+
+void RecordingReader::read_head() {
+  RecordingHead head{};
+  if (!read_at(0, &head, sizeof head) || std::memcmp(head.magic, kRecordingMagic, sizeof head.magic) != 0) {
+    throw Error(MAQ_ERROR_UNREADABLE, path_, " is no recording of Maquette.");
+  }
+  if (head.version != kRecordingVersion) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " is a recording of version ", head.version, ", but this SDK reads ",
+                kRecordingVersion, "; use a newer one.");
+  }
+  std::string json(std::min(head.json_bytes, kMostHeadBytes), '\0');
+  if (head.json_bytes > kMostHeadBytes || !read_at(sizeof head, json.data(), json.size()) ||
+      head.json_check != XXH3_64bits(json.data(), json.size())) {
+    throw Error(MAQ_ERROR_UNREADABLE, path_, " is damaged: its head is not what was written; copy it again.");
+  }
+  try {
+    const auto parsed = nlohmann::json::parse(json);
+    info_.source = parsed.at("source").get<std::string>();
+    info_.fps = parsed.at("fps").get<double>();
+    if (!(info_.fps >= 0 && info_.fps <= 1000)) info_.fps = 0;
+    if (parsed.contains("calibration")) info_.calibration = calibration_of(parsed.at("calibration"));
+  } catch (const nlohmann::json::exception&) {
+    throw Error(MAQ_ERROR_UNREADABLE, path_, " is damaged: its head says nothing of its frames.");
+  }
+  first_offset_ = sizeof head + json.size();
+}
+
+bool RecordingReader::read_index() {
+  RecordingTail tail{};
+  if (size_bytes_ < first_offset_ + sizeof tail || !read_at(size_bytes_ - sizeof tail, &tail, sizeof tail))
+    return false;
+  const uint64_t end = size_bytes_ - sizeof tail;
+  if (std::memcmp(tail.magic, kRecordingEnd, sizeof tail.magic) != 0) return false;
+  if (tail.index_offset < first_offset_ || tail.index_offset > end) return false;
+  const uint64_t index_bytes = end - tail.index_offset;
+  if (index_bytes % sizeof(RecordingEntry) != 0) return false;
+  std::vector<RecordingEntry> entries(index_bytes / sizeof(RecordingEntry));
+  if (!read_at(tail.index_offset, entries.data(), index_bytes)) return false;
+  if (tail.index_check != XXH3_64bits(entries.data(), index_bytes)) return false;
+  for (size_t i = 0; i < entries.size(); ++i) {
+    if (entries[i].offset < first_offset_ || entries[i].offset + sizeof(FrameHead) > tail.index_offset) return false;
+    if (i > 0 && entries[i].offset <= entries[i - 1].offset) return false;
+    if (i > 0 && entries[i].timestamp_ns <= entries[i - 1].timestamp_ns) return false;
+  }
+  entries_ = std::move(entries);
+  return true;
+}
+
+// From head to head; where there is none, at the next place that looks like one.
+void RecordingReader::look_for_frames() {
+  std::vector<uint8_t> window(1 << 20);
+  uint64_t offset = first_offset_;
+  while (offset + sizeof(FrameHead) <= size_bytes_) {
+    FrameHead head{};
+    if (!read_at(offset, &head, sizeof head)) return;
+    if (is_sound(head) && whole_bytes(head) <= size_bytes_ - offset) {
+      if (entries_.empty() || head.timestamp_ns > entries_.back().timestamp_ns) {
+        entries_.push_back({offset, head.timestamp_ns});
+      }
+      offset += whole_bytes(head);
+      continue;
+    }
+    const size_t size = size_t(std::min<uint64_t>(window.size(), size_bytes_ - offset - 1));
+    if (!read_at(offset + 1, window.data(), size)) return;
+    const auto* magic = reinterpret_cast<const uint8_t*>(&kFrameMagic);
+    const auto found = std::search(window.begin(), window.begin() + ptrdiff_t(size), magic, magic + sizeof kFrameMagic);
+    const size_t skipped = size_t(found - window.begin());
+    // A magic that lies across the window's end is found from its last bytes on.
+    offset += skipped < size ? 1 + skipped : 1 + size - std::min(size, sizeof kFrameMagic - 1);
+    if (size < sizeof kFrameMagic) return;
+  }
+}
+
+std::optional<RecordedFrame> RecordingReader::describe(size_t index) const {
+  FrameHead head{};
+  if (!read_at(entries_[index].offset, &head, sizeof head) || !is_sound(head)) return {};
+  return RecordedFrame{head.width_px, head.height_px, head.sequence};
+}
+
+void RecordingReader::read(size_t index, Frame& frame) {
+  const uint64_t offset = entries_[index].offset;
+  FrameHead head{};
+  bool is_whole = read_at(offset, &head, sizeof head) && is_sound(head) && whole_bytes(head) <= size_bytes_ - offset;
+  if (is_whole) {
+    payload_.resize(head.picture_bytes + depth_bytes(head));
+    is_whole = read_at(offset + sizeof head, payload_.data(), payload_.size()) &&
+               head.payload_check == XXH3_64bits(payload_.data(), payload_.size());
+  }
+  if (is_whole && head.encoding == kJpegEncoding) {
+    is_whole = jpeg_.decode(payload_.data(), head.picture_bytes, MAQ_MAX_PIXELS, frame);
+  } else if (is_whole) {
+    uint8_t* pixels = frame.allocate(maq_pixel_format(head.encoding), head.width_px, head.height_px);
+    std::memcpy(pixels, payload_.data(), head.picture_bytes);
+  }
+  if (!is_whole) {
+    throw Error(MAQ_ERROR_UNREADABLE, "Frame ", index, " of ", path_, " is damaged; copy the recording again.");
+  }
+  if (depth_bytes(head) > 0) {
+    frame.depth_storage.assign(payload_.begin() + ptrdiff_t(head.picture_bytes), payload_.end());
+    frame.depth = packed_view(MAQ_PIXEL_DEPTH16, head.depth_width_px, head.depth_height_px, frame.depth_storage.data());
+  }
+  frame.timestamp_ns = head.timestamp_ns;
+  frame.sequence = head.sequence;
+}
+
+}  // namespace maq

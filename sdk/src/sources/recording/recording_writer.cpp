@@ -1,0 +1,146 @@
+#include <fcntl.h>
+#include <sys/uio.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/build_info.h"
+#include "core/error.h"
+#include "sources/recording/recording.h"
+#include "sources/recording/recording_format.h"
+
+namespace maq {
+namespace {
+
+std::string head_json(const RecordingInfo& info) {
+  nlohmann::json head;
+  head["made_by"] = std::string("maquette ") + sdk_version();
+  head["source"] = info.source;
+  head["fps"] = info.fps;
+  if (info.calibration) {
+    const maq_calibration& from = *info.calibration;
+    head["calibration"] = {{"width_px", from.width_px},    {"height_px", from.height_px}, {"fx_px", from.fx_px},
+                           {"fy_px", from.fy_px},          {"cx_px", from.cx_px},         {"cy_px", from.cy_px},
+                           {"distortion", from.distortion}};
+  }
+  // A name that is no UTF-8 is no reason not to record.
+  return head.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+FileHandle::~FileHandle() { close(); }
+
+void FileHandle::close() {
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = -1;
+}
+
+RecordingWriter::RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality)
+    : path_(std::move(path)),
+      file_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)),
+      jpeg_quality_(jpeg_quality) {
+  if (file_.get() < 0) {
+    const char* remedy = errno == EEXIST ? " Recordings are never written over: give another name, or remove it." : "";
+    throw Error(MAQ_ERROR_UNWRITABLE, path_, " cannot be made: ", std::strerror(errno), ".", remedy);
+  }
+  const std::string json = head_json(info);
+  RecordingHead head{};
+  std::memcpy(head.magic, kRecordingMagic, sizeof head.magic);
+  head.version = kRecordingVersion;
+  head.json_bytes = uint32_t(json.size());
+  head.json_check = XXH3_64bits(json.data(), json.size());
+  append(&head, sizeof head, json.data(), json.size());
+}
+
+void RecordingWriter::append(const void* header, size_t header_bytes, const void* payload, size_t payload_bytes) {
+  iovec parts[2] = {{const_cast<void*>(header), header_bytes}, {const_cast<void*>(payload), payload_bytes}};
+  iovec* part = parts;
+  int left = 2;
+  while (left > 0) {
+    if (part->iov_len == 0) {
+      ++part;
+      --left;
+      continue;
+    }
+    ssize_t written = ::writev(file_.get(), part, left);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) {
+      const int error = written < 0 ? errno : ENOSPC;
+      // What was begun goes, so that the file ends with a whole frame and the next try begins there.
+      [[maybe_unused]] const bool cut =
+          ::ftruncate(file_.get(), off_t(size_bytes_)) == 0 && ::lseek(file_.get(), off_t(size_bytes_), SEEK_SET) >= 0;
+      throw Error(MAQ_ERROR_UNWRITABLE, path_, " cannot be written: ", std::strerror(error), ". The ", entries_.size(),
+                  " frames before are whole.");
+    }
+    for (int i = 0; i < left && written > 0; ++i) {
+      const size_t done = std::min(size_t(written), part[i].iov_len);
+      part[i].iov_base = static_cast<uint8_t*>(part[i].iov_base) + done;
+      part[i].iov_len -= done;
+      written -= ssize_t(done);
+    }
+  }
+  size_bytes_ += header_bytes + payload_bytes;
+}
+
+void RecordingWriter::add(const Frame& frame) {
+  if (finished_) throw Error(MAQ_ERROR_INVALID_ARGUMENT, path_, " is finished: nothing can be added.");
+  if (!entries_.empty() && frame.timestamp_ns <= entries_.back().timestamp_ns) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The frame is of ", frame.timestamp_ns, " ns, but the one before it of ",
+                entries_.back().timestamp_ns, " ns: frames must get later.");
+  }
+  const ImageView& image = frame.image;
+  FrameHead head{};
+  head.magic = kFrameMagic;
+  head.timestamp_ns = frame.timestamp_ns;
+  head.sequence = frame.sequence;
+  head.width_px = image.width_px;
+  head.height_px = image.height_px;
+  if (frame.jpeg != nullptr) {
+    head.encoding = kJpegEncoding;
+    payload_.assign(frame.jpeg, frame.jpeg + frame.jpeg_bytes);
+  } else if (jpeg_quality_ > 0 && image.format != MAQ_PIXEL_DEPTH16) {
+    head.encoding = kJpegEncoding;
+    jpeg_.encode(image, jpeg_quality_, payload_);
+  } else {
+    head.encoding = uint32_t(image.format);
+    payload_.resize(packed_bytes(image.format, image.width_px, image.height_px));
+    copy_packed(image, payload_.data());
+  }
+  head.picture_bytes = payload_.size();
+  const ImageView& depth = frame.depth;
+  if (depth.width_px > 0) {
+    head.depth_width_px = depth.width_px;
+    head.depth_height_px = depth.height_px;
+    payload_.resize(payload_.size() + packed_bytes(depth.format, depth.width_px, depth.height_px));
+    copy_packed(depth, payload_.data() + head.picture_bytes);
+  }
+  head.payload_check = XXH3_64bits(payload_.data(), payload_.size());
+  constexpr size_t kChecked = offsetof(FrameHead, timestamp_ns);
+  head.head_check = uint32_t(XXH3_64bits(&head.timestamp_ns, sizeof head - kChecked));
+  entries_.reserve(entries_.size() + 1);  // what is written is also in the index
+  const uint64_t offset = size_bytes_;
+  append(&head, sizeof head, payload_.data(), payload_.size());
+  entries_.push_back({offset, frame.timestamp_ns});
+}
+
+void RecordingWriter::finish() {
+  if (finished_) return;
+  const size_t index_bytes = entries_.size() * sizeof(RecordingEntry);
+  RecordingTail tail{};
+  tail.index_offset = size_bytes_;
+  tail.index_check = XXH3_64bits(entries_.data(), index_bytes);
+  std::memcpy(tail.magic, kRecordingEnd, sizeof tail.magic);
+  append(entries_.data(), index_bytes, &tail, sizeof tail);
+  finished_ = true;
+  if (::fsync(file_.get()) != 0 && errno != EINVAL && errno != EROFS) {
+    throw Error(MAQ_ERROR_UNWRITABLE, path_, " did not reach the disk: ", std::strerror(errno), ".");
+  }
+  file_.close();
+}
+
+}  // namespace maq

@@ -1,0 +1,218 @@
+#include "sources/synthetic/fault_injection.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <chrono>
+#include <climits>
+#include <mutex>
+#include <random>
+#include <thread>
+
+#include "core/error.h"
+
+namespace maq {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::nanoseconds;
+
+constexpr int64_t kForEver = INT64_MAX;
+
+// What goes on while cameras are opened and lost: events happen once, and random numbers do not begin anew.
+struct Course {
+  explicit Course(const FaultPlan& of) : plan(of), random(of.seed) {}
+
+  // Whether the event is due now; it then never is again.
+  bool comes(std::optional<FaultEvent>& event) const {
+    if (!event) return false;
+    return event->frame >= 0 ? frames >= event->frame : Clock::now() - begin >= nanoseconds(event->at_ns);
+  }
+  bool chance(double share) { return share > 0 && std::uniform_real_distribution<>(0, 1)(random) < share; }
+
+  FaultPlan plan;
+  std::mt19937_64 random;
+  Clock::time_point begin = Clock::now();
+  int64_t frames = 0;
+  std::optional<Clock::time_point> absent_until;
+};
+
+Clock::time_point after(int64_t lasts_ns) {
+  return lasts_ns == kForEver ? Clock::time_point::max() : Clock::now() + nanoseconds(lasts_ns);
+}
+
+class FaultyCamera : public Camera {
+ public:
+  FaultyCamera(std::shared_ptr<Camera> camera, std::shared_ptr<Course> course)
+      : camera_(std::move(camera)), course_(std::move(course)) {}
+
+  const CameraFormat& format() const override { return camera_->format(); }
+  const std::string& identity() const override { return camera_->identity(); }
+  const maq_calibration* calibration() const override { return camera_->calibration(); }
+  maq_control_info control(maq_control which) override { return camera_->control(which); }
+  void set_control(maq_control which, double value) override { camera_->set_control(which, value); }
+  void seek(int64_t time_ns) override { camera_->seek(time_ns); }
+  void close() override { camera_->close(); }
+  int dma_buf(int slot) override { return slot < kOwnSlots ? camera_->dma_buf(slot) : -1; }
+
+  void give_back(int slot) override {
+    if (slot < kOwnSlots) return camera_->give_back(slot);
+    std::lock_guard<std::mutex> lock(mutex_);
+    copies_[size_t(slot - kOwnSlots)].is_free = true;
+  }
+
+  Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) override {
+    const auto deadline = Clock::now() + std::chrono::milliseconds(timeout_ms);
+    Course& course = *course_;
+    for (;;) {
+      if (const auto lasts_ns = due(course.plan.hang)) {
+        std::this_thread::sleep_for(nanoseconds(*lasts_ns));
+      }
+      if (const auto lasts_ns = due(course.plan.unplug)) {
+        course.absent_until = after(*lasts_ns);
+        reason = "unplugged, as its URI asks";
+        return Event::kLost;
+      }
+      if (const auto lasts_ns = due(course.plan.stall)) stalled_until_ = after(*lasts_ns);
+
+      // Looks again at what is due after a few milliseconds, also when no frame comes.
+      const auto now = Clock::now();
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - now).count();
+      const Event event = camera_->wait(wake_fd, int(std::clamp<int64_t>(left, 0, kLookEveryMs)), buffer, reason);
+      if (event == Event::kTimeout && Clock::now() < deadline) continue;
+      if (event != Event::kFrame) return event;
+      ++course.frames;
+      if (Clock::now() < stalled_until_ || course.chance(course.plan.drop)) {
+        camera_->give_back(buffer.slot);
+        buffer = {};
+        continue;
+      }
+      if (course.chance(course.plan.corrupt)) damage(buffer);
+      if (course.plan.jitter_ns > 0 && delay(wake_fd)) {
+        give_back(buffer.slot);
+        return Event::kWoken;
+      }
+      return Event::kFrame;
+    }
+  }
+
+ private:
+  static constexpr int kOwnSlots = 1 << 16;
+  static constexpr int kLookEveryMs = 5;
+  struct Copy {
+    std::vector<uint8_t> pixels;
+    bool is_free = true;
+  };
+
+  std::optional<int64_t> due(std::optional<FaultEvent>& event) {
+    if (!course_->comes(event)) return {};
+    const int64_t lasts_ns = event->lasts_ns;
+    event.reset();
+    return lasts_ns;
+  }
+
+  // Late by a random time; true when the wait was cut short.
+  bool delay(int wake_fd) {
+    const int64_t late_ns = std::uniform_int_distribution<int64_t>(0, course_->plan.jitter_ns)(course_->random);
+    pollfd wake{wake_fd, POLLIN, 0};
+    const timespec time{late_ns / 1000000000, late_ns % 1000000000};
+    return ::ppoll(&wake, 1, &time, nullptr) > 0;
+  }
+
+  void damage(CameraBuffer& buffer) {
+    if (buffer.jpeg != nullptr) {
+      buffer.jpeg_bytes /= 2;
+      return;
+    }
+    // The camera's own memory may be read-only. Depth goes with it, being in the same buffer.
+    std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = std::find_if(copies_.begin(), copies_.end(), [](const Copy& copy) { return copy.is_free; });
+    Copy& copy = found == copies_.end() ? copies_.emplace_back() : *found;
+    copy.is_free = false;
+    const ImageView& image = buffer.image;
+    copy.pixels.resize(packed_bytes(image.format, image.width_px, image.height_px));
+    copy_packed(image, copy.pixels.data());
+    const size_t slot = size_t(&copy - copies_.data());
+    const size_t begin = std::uniform_int_distribution<size_t>(0, copy.pixels.size() / 2)(course_->random);
+    const size_t end = begin + copy.pixels.size() / 4;
+    for (size_t i = begin; i < end; ++i) copy.pixels[i] = uint8_t(course_->random());
+    camera_->give_back(buffer.slot);
+    buffer.depth.width_px = 0;
+    buffer.image = packed_view(image.format, image.width_px, image.height_px, copy.pixels.data());
+    buffer.slot = kOwnSlots + int(slot);
+  }
+
+  std::shared_ptr<Camera> camera_;
+  std::shared_ptr<Course> course_;
+  Clock::time_point stalled_until_ = Clock::time_point::min();
+  std::mutex mutex_;  // of copies_
+  std::vector<Copy> copies_;
+};
+
+// "2s", "20ms"; "" is for ever where that has a meaning.
+std::optional<int64_t> duration_ns(const std::string& text) {
+  size_t digits = text.find_first_not_of("0123456789.");
+  if (digits == 0 || digits == std::string::npos) return {};
+  const std::string unit = text.substr(digits);
+  const auto number = read_number(text.substr(0, digits));
+  if (!number || *number > 1e6 || (unit != "s" && unit != "ms")) return {};
+  return int64_t(*number * (unit == "s" ? 1e9 : 1e6));
+}
+
+std::optional<FaultEvent> take_event(SourceUri& uri, const std::string& key, bool may_last_for_ever) {
+  if (uri.options.count(key) == 0) return {};
+  const std::string text = uri.take_text(key);
+  const size_t at = text.find('@');
+  FaultEvent event;
+  if (at != std::string::npos) {
+    const std::string lasts = text.substr(0, at), when = text.substr(at + 1);
+    const auto lasts_ns = lasts.empty() && may_last_for_ever ? kForEver : duration_ns(lasts);
+    const auto at_ns = duration_ns(when);
+    const auto frame = read_number(when);
+    if (at_ns) event.at_ns = *at_ns;
+    if (frame && *frame >= 0 && *frame < 1e15) event.frame = int64_t(*frame);
+    if (lasts_ns && (at_ns || event.frame >= 0)) {
+      event.lasts_ns = *lasts_ns;
+      return event;
+    }
+  }
+  throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, " in ", uri.text, " is not understood; write ", key,
+              "=2s@10s (for 2 s after 10 s), or ", key, "=2s@100 (at frame 100)",
+              may_last_for_ever ? concatenate(", or ", key, "@10s (for ever).") : ".");
+}
+
+}  // namespace
+
+bool FaultPlan::is_empty() const { return drop == 0 && corrupt == 0 && jitter_ns == 0 && !stall && !unplug && !hang; }
+
+FaultPlan take_faults(SourceUri& uri) {
+  FaultPlan plan;
+  plan.drop = uri.take_number("drop", 0, 0, 1);
+  plan.corrupt = uri.take_number("corrupt", 0, 0, 1);
+  plan.stall = take_event(uri, "stall", true);
+  plan.unplug = take_event(uri, "unplug", true);
+  plan.hang = take_event(uri, "hang", false);
+  plan.seed = uint64_t(uri.take_integer("fault_seed", 1, 0, INT64_MAX));
+  const std::string jitter = uri.take_text("jitter");
+  if (!jitter.empty()) {
+    const auto jitter_ns = duration_ns(jitter);
+    if (!jitter_ns || *jitter_ns > 10000000000) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "jitter=", jitter, " in ", uri.text,
+                  " is not understood; write jitter=20ms, at most 10s.");
+    }
+    plan.jitter_ns = *jitter_ns;
+  }
+  return plan;
+}
+
+CameraOpener with_faults(CameraOpener open, const FaultPlan& plan) {
+  return [open = std::move(open), plan, course = std::shared_ptr<Course>()]() mutable -> std::shared_ptr<Camera> {
+    if (course == nullptr) course = std::make_shared<Course>(plan);
+    if (course->absent_until && Clock::now() < *course->absent_until) {
+      throw Error(MAQ_ERROR_NOT_FOUND, "It is unplugged, as its URI asks.");
+    }
+    return std::make_shared<FaultyCamera>(open(), course);
+  };
+}
+
+}  // namespace maq

@@ -1,0 +1,207 @@
+#include "sources/synthetic/replay_camera.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <chrono>
+#include <mutex>
+#include <optional>
+
+#include "core/error.h"
+
+namespace maq {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::nanoseconds;
+
+constexpr double kStillFps = 30;  // of one picture that is shown for ever
+
+int64_t monotonic_ns(Clock::time_point time) {
+  return std::chrono::duration_cast<nanoseconds>(time.time_since_epoch()).count();  // CLOCK_MONOTONIC, in libstdc++
+}
+
+// The source and where in it time has got to.
+class Reel {
+ public:
+  Reel(std::function<std::unique_ptr<Source>()> open, PlayOptions options)
+      : open_(std::move(open)), options_(options), source_(open_()), can_seek_(source_->can_seek()) {}
+
+  const SourceInfo& info() const { return source_->info(); }
+  const maq_calibration* calibration() const { return source_->calibration(); }
+  double fps() const { return (info().fps > 0 ? info().fps : kStillFps) * options_.speed; }
+
+  struct Next {
+    Clock::time_point due;
+    uint32_t sequence;
+    bool damaged;
+  };
+
+  // Reads the next frame; nothing at the end.
+  std::optional<Next> read(Frame& frame) {
+    frame.clear();
+    bool damaged = false;
+    for (bool again = false;; again = true) {
+      try {
+        if (source_->next(0, frame) == NextFrame::kFrame) break;
+      } catch (const Error& error) {
+        if (error.status() != MAQ_ERROR_UNREADABLE || readable_ == 0) throw;
+        damaged = true;  // a camera would leave the frame out
+        break;
+      }
+      if (!options_.loop || again) return {};
+      source_ = open_();
+      lap_ns_ = last_ns_ + int64_t(1e9 * options_.speed / fps());
+      lap_sequence_ = last_sequence_ + 1;
+    }
+    if (!damaged) {
+      ++readable_;
+      last_ns_ = lap_ns_ + frame.timestamp_ns;
+      last_sequence_ = lap_sequence_ + frame.sequence;
+    } else {
+      ++last_sequence_;
+    }
+    if (!begin_) begin_ = Clock::now() - nanoseconds(int64_t(double(last_ns_) / options_.speed));
+    return Next{*begin_ + nanoseconds(int64_t(double(last_ns_) / options_.speed)), uint32_t(last_sequence_), damaged};
+  }
+
+  bool can_seek() const { return can_seek_; }
+
+  void seek(int64_t time_ns) {
+    source_->seek(time_ns);
+    lap_ns_ = 0;
+    lap_sequence_ = 0;
+    begin_.reset();
+    ++seeks_;
+  }
+  uint32_t seeks() const { return seeks_; }
+
+ private:
+  std::function<std::unique_ptr<Source>()> open_;
+  PlayOptions options_;
+  std::unique_ptr<Source> source_;
+  const bool can_seek_;
+  std::optional<Clock::time_point> begin_;  // when time 0 of the source was, or would have been
+  int64_t readable_ = 0;
+  uint32_t seeks_ = 0;
+  int64_t last_ns_ = 0, lap_ns_ = 0;
+  uint64_t last_sequence_ = 0, lap_sequence_ = 0;
+};
+
+class PlayedCamera : public Camera {
+ public:
+  PlayedCamera(std::shared_ptr<Reel> reel, std::string identity, int buffers)
+      : reel_(std::move(reel)), identity_(std::move(identity)), slots_(size_t(buffers)) {
+    next_ = reel_->read(ahead_);
+    format_.pixels = ahead_.image.format;
+    format_.width_px = reel_->info().width_px;
+    format_.height_px = reel_->info().height_px;
+    format_.fps = reel_->fps();
+    patience_ = nanoseconds(int64_t(buffers * 1e9 / format_.fps));
+  }
+
+  const CameraFormat& format() const override { return format_; }
+  const std::string& identity() const override { return identity_; }
+  const maq_calibration* calibration() const override { return reel_->calibration(); }
+  void close() override {}
+
+  void give_back(int slot) override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    slots_[size_t(slot)].is_free = true;
+  }
+
+  void seek(int64_t time_ns) override {
+    if (!reel_->can_seek()) Camera::seek(time_ns);  // throws
+    std::lock_guard<std::mutex> lock(mutex_);
+    seek_to_ns_ = time_ns;
+  }
+
+  Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string&) override {
+    const auto deadline = Clock::now() + std::chrono::milliseconds(timeout_ms);
+    for (;;) {
+      seek_if_asked();
+      if (!next_) {
+        next_ = reel_->read(ahead_);
+        if (!next_) return Event::kEnd;
+      }
+      if (const bool woken = sleep_until(wake_fd, std::min(next_->due, deadline)); woken) return Event::kWoken;
+      if (Clock::now() < next_->due) return Event::kTimeout;
+      const Reel::Next now = *next_;
+      next_.reset();
+      // A device would have been away, or would have had no buffer left for it.
+      if (now.due < opened_ || Clock::now() - now.due > patience_) continue;
+      const int slot = free_slot();
+      if (slot < 0) continue;  // the app holds all: the frame is lost
+      Frame& frame = slots_[size_t(slot)].frame;
+      std::swap(frame, ahead_);
+      buffer.image = frame.image;
+      buffer.depth = frame.depth;
+      buffer.slot = slot;
+      buffer.timestamp_ns = monotonic_ns(now.due);
+      buffer.sequence = now.sequence;
+      buffer.damaged = now.damaged;
+      buffer.seeks = reel_->seeks();
+      return Event::kFrame;
+    }
+  }
+
+ private:
+  struct Slot {
+    Frame frame;
+    bool is_free = true;
+  };
+
+  // True when it was woken before.
+  static bool sleep_until(int wake_fd, Clock::time_point time) {
+    const int64_t left_ns = std::max<int64_t>(0, nanoseconds(time - Clock::now()).count());
+    pollfd wake{wake_fd, POLLIN, 0};
+    const timespec left{left_ns / 1000000000, left_ns % 1000000000};
+    return ::ppoll(&wake, 1, &left, nullptr) > 0;
+  }
+
+  int free_slot() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    for (size_t i = 0; i < slots_.size(); ++i) {
+      last_slot_ = (last_slot_ + 1) % slots_.size();  // in turns, so that each has its memory soon
+      if (!slots_[last_slot_].is_free) continue;
+      slots_[last_slot_].is_free = false;
+      return int(last_slot_);
+    }
+    return -1;
+  }
+
+  void seek_if_asked() {
+    std::optional<int64_t> time_ns;
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      time_ns.swap(seek_to_ns_);
+    }
+    if (!time_ns) return;
+    reel_->seek(*time_ns);
+    next_.reset();
+  }
+
+  std::shared_ptr<Reel> reel_;
+  std::string identity_;
+  const Clock::time_point opened_ = Clock::now();
+  CameraFormat format_;
+  nanoseconds patience_;
+  Frame ahead_;  // read before its time
+  std::optional<Reel::Next> next_;
+  std::mutex mutex_;  // of the rest
+  std::vector<Slot> slots_;
+  size_t last_slot_ = 0;
+  std::optional<int64_t> seek_to_ns_;
+};
+
+}  // namespace
+
+CameraOpener played_as_camera(std::function<std::unique_ptr<Source>()> open, std::string identity,
+                              PlayOptions options) {
+  auto reel = std::make_shared<Reel>(std::move(open), options);
+  return [reel, identity = std::move(identity), options] {
+    return std::make_shared<PlayedCamera>(reel, identity, options.buffers);
+  };
+}
+
+}  // namespace maq

@@ -1,0 +1,86 @@
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "sources/synthetic/stub_people.h"
+#include "sources/synthetic/stub_sources.h"
+
+namespace maq {
+namespace {
+
+constexpr double kDefaultFps = 30;
+constexpr int64_t kMostFrames = int64_t(1) << 40;
+
+// Seven bars of 75 % intensity in the usual order, moving to the left, above a grey ramp.
+void draw_pattern(int64_t index, double fps, Frame& frame) {
+  constexpr uint8_t kBars[7][3] = {{191, 191, 191}, {0, 191, 191}, {191, 191, 0}, {0, 191, 0},
+                                   {191, 0, 191},   {0, 0, 191},   {191, 0, 0}};  // B, G, R
+  const int width = frame.image.width_px;
+  const int height = frame.image.height_px;
+  const int shift_px = int(std::fmod(double(index) / fps * 0.1 * width, double(width)));
+  uint8_t* pixel = frame.storage.data();
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x, pixel += 3) {
+      const int at = (x + shift_px) % width;
+      const uint8_t ramp = uint8_t(at * 256 / width);
+      const uint8_t* bar = kBars[at * 7 / width];
+      for (int c = 0; c < 3; ++c) pixel[c] = y < height - height / 5 ? bar[c] : ramp;
+    }
+  }
+}
+
+class StubSource : public Source {
+ public:
+  explicit StubSource(SourceUri uri) {
+    const bool shows_people = uri.target == "people";
+    if (!shows_people && uri.target != "pattern") {
+      throw Error(MAQ_ERROR_UNSUPPORTED, "stub:", uri.target, " is not known; there are stub:people and stub:pattern.");
+    }
+    info_.width_px = uri.width_px > 0 ? uri.width_px : 640;
+    info_.height_px = uri.height_px > 0 ? uri.height_px : 480;
+    info_.fps = uri.fps > 0 ? uri.fps : kDefaultFps;
+    info_.frame_count = uri.take_integer("frames", -1, 1, kMostFrames);
+    if (shows_people) {
+      const int count = int(uri.take_integer("count", 2, 0, 30));
+      const uint64_t seed = uint64_t(uri.take_integer("seed", 1, 0, INT64_MAX));
+      uri.expect_no_more_options("count, seed, frames, size and fps");
+      people_ = std::make_unique<StubPeople>(count, seed, info_.width_px, info_.height_px);
+    } else {
+      uri.expect_no_more_options("frames, size and fps");
+    }
+  }
+
+  const SourceInfo& info() const override { return info_; }
+
+  bool can_seek() const override { return true; }
+  void seek(int64_t time_ns) override {
+    const double index = std::ceil(double(time_ns) / 1e9 * info_.fps - 1e-6);
+    index_ = int64_t(std::min(index, double(info_.frame_count < 0 ? kMostFrames : info_.frame_count)));
+  }
+
+  NextFrame next(int64_t, Frame& frame) override {
+    if (index_ == info_.frame_count) return NextFrame::kEnd;
+    frame.allocate_bgr(info_.width_px, info_.height_px);
+    if (people_ != nullptr) {
+      people_->draw(double(index_) / info_.fps, frame);
+    } else {
+      draw_pattern(index_, info_.fps, frame);
+    }
+    frame.timestamp_ns = int64_t(std::llround(double(index_) * 1e9 / info_.fps));
+    frame.clock = MAQ_CLOCK_MEDIA;
+    frame.sequence = uint64_t(index_);
+    ++index_;
+    return NextFrame::kFrame;
+  }
+
+ private:
+  SourceInfo info_;
+  std::unique_ptr<StubPeople> people_;
+  int64_t index_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Source> open_stub_source(SourceUri uri) { return std::make_unique<StubSource>(std::move(uri)); }
+
+}  // namespace maq

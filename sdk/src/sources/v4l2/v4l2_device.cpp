@@ -1,0 +1,184 @@
+#include "sources/v4l2/v4l2_device.h"
+
+#include <fcntl.h>
+#include <linux/videodev2.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "core/error.h"
+
+namespace maq {
+namespace {
+
+constexpr V4l2Format kKnownFormats[] = {
+    {V4L2_PIX_FMT_NV12, MAQ_PIXEL_NV12, false, 1},  {V4L2_PIX_FMT_NV12M, MAQ_PIXEL_NV12, false, 2},
+    {V4L2_PIX_FMT_YUYV, MAQ_PIXEL_YUYV, false, 1},  {V4L2_PIX_FMT_BGR24, MAQ_PIXEL_BGR8, false, 1},
+    {V4L2_PIX_FMT_RGB24, MAQ_PIXEL_RGB8, false, 1}, {V4L2_PIX_FMT_GREY, MAQ_PIXEL_GREY8, false, 1},
+    {V4L2_PIX_FMT_MJPEG, MAQ_PIXEL_BGR8, true, 1},  {V4L2_PIX_FMT_JPEG, MAQ_PIXEL_BGR8, true, 1},
+};
+// A driver that never ends its lists, or is interrupted for ever, must not hold us.
+constexpr int kMostEnumerated = 256;
+constexpr int kMostInterruptions = 1000;
+
+// Of a field of fixed size, which may lack the zero at its end.
+std::string text_of(const uint8_t* bytes, size_t size) {
+  const char* begin = reinterpret_cast<const char*>(bytes);
+  return std::string(begin, strnlen(begin, size));
+}
+
+template <class Call>
+int repeated(Call call) {
+  for (int interruptions = 0;; ++interruptions) {
+    const int result = call();
+    if (result >= 0 || errno != EINTR || interruptions == kMostInterruptions) return result;
+  }
+}
+
+}  // namespace
+
+const V4l2Format* known_v4l2_format(uint32_t fourcc) {
+  for (const V4l2Format& format : kKnownFormats) {
+    if (format.fourcc == fourcc) return &format;
+  }
+  return nullptr;
+}
+
+std::string fourcc_name(uint32_t fourcc) {
+  char name[5] = {};
+  std::memcpy(name, &fourcc, 4);
+  return name;
+}
+
+V4l2Device::V4l2Device(SystemCalls& calls, std::string path) : calls_(calls), path_(std::move(path)) {
+  fd_ = repeated([&] { return calls_.open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC); });
+  if (fd_ < 0) fail("cannot be opened", errno);
+  try {
+    look();
+  } catch (...) {
+    calls_.close(fd_);
+    throw;
+  }
+}
+
+V4l2Device::~V4l2Device() { calls_.close(fd_); }
+
+void V4l2Device::look() {
+  v4l2_capability found{};
+  if (call(VIDIOC_QUERYCAP, &found) != 0) {
+    if (errno == ENOTTY || errno == EINVAL) fail("is not a video device", errno);
+    fail("does not tell what it can do", errno);
+  }
+  name_ = text_of(found.card, sizeof found.card);
+  bus_ = text_of(found.bus_info, sizeof found.bus_info);
+  identity_ = name_ + " at " + bus_;
+  const uint32_t able = (found.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? found.device_caps : found.capabilities;
+  if ((able & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) == 0) {
+    fail("captures no pictures (it is another kind of video device)", EINVAL);
+  }
+  if ((able & V4L2_CAP_STREAMING) == 0) fail("cannot stream into memory", EINVAL);
+  is_planar_ = (able & V4L2_CAP_VIDEO_CAPTURE) == 0;
+  buffer_type_ = is_planar_ ? V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE : V4L2_BUF_TYPE_VIDEO_CAPTURE;
+}
+
+int V4l2Device::call(unsigned long request, void* argument) const {
+  return repeated([&] { return calls_.ioctl(fd_, request, argument); });
+}
+
+bool V4l2Device::is_lost(int error) { return error == ENODEV || error == ENXIO || error == EIO || error == EBADF; }
+
+void V4l2Device::fail(const std::string& what, int error) const {
+  maq_status status = MAQ_ERROR_UNSUPPORTED;
+  const char* remedy = "";
+  switch (error) {
+    case ENOENT:
+      status = MAQ_ERROR_NOT_FOUND;
+      remedy = " Is the camera plugged in, and is this its name?";
+      break;
+    case EACCES:
+    case EPERM:
+      status = MAQ_ERROR_NO_PERMISSION;
+      remedy =
+          " Cameras belong to the group \"video\": add the user to it (sudo usermod -aG video $USER), log in again.";
+      break;
+    case EBUSY:
+      status = MAQ_ERROR_BUSY;
+      remedy = " Another program uses the camera; close it.";
+      break;
+    case ENOSPC:
+      status = MAQ_ERROR_BUSY;
+      remedy = " The USB bus has no room left: ask for a smaller size or rate, or plug the camera in elsewhere.";
+      break;
+    case ENOMEM:
+    case EAGAIN:
+    case EMFILE:
+    case ENFILE:
+      status = MAQ_ERROR_OUT_OF_MEMORY;
+      remedy = " Ask for a smaller size or fewer frames, or close other files.";
+      break;
+    default:
+      if (is_lost(error)) {
+        status = MAQ_ERROR_DEVICE_LOST;
+        remedy = " The device is gone; plug it in again.";
+      }
+  }
+  throw Error(status, path_, " ", what, ": ", std::strerror(error), ".", remedy);
+}
+
+std::vector<uint32_t> V4l2Device::formats() const {
+  std::vector<uint32_t> found;
+  for (uint32_t index = 0; index < kMostEnumerated; ++index) {
+    v4l2_fmtdesc described{};
+    described.index = index;
+    described.type = buffer_type_;
+    if (call(VIDIOC_ENUM_FMT, &described) != 0) {
+      if (is_lost(errno)) fail("was lost while its formats were read", errno);
+      break;
+    }
+    found.push_back(described.pixelformat);
+  }
+  return found;
+}
+
+std::vector<CameraMode> V4l2Device::modes() const {
+  std::vector<CameraMode> found;
+  for (const uint32_t fourcc : formats()) list_sizes(fourcc, found);
+  return found;
+}
+
+void V4l2Device::list_sizes(uint32_t fourcc, std::vector<CameraMode>& modes) const {
+  for (uint32_t index = 0; index < kMostEnumerated && modes.size() < kMostEnumerated; ++index) {
+    v4l2_frmsizeenum size{};
+    size.index = index;
+    size.pixel_format = fourcc;
+    if (call(VIDIOC_ENUM_FRAMESIZES, &size) != 0) break;
+    const bool is_discrete = size.type == V4L2_FRMSIZE_TYPE_DISCRETE;
+    const int width = int(is_discrete ? size.discrete.width : size.stepwise.max_width);
+    const int height = int(is_discrete ? size.discrete.height : size.stepwise.max_height);
+    if (width >= 1 && height >= 1) {
+      modes.push_back({fourcc_name(fourcc), known_v4l2_format(fourcc) != nullptr, width, height,
+                       fastest_rate(fourcc, width, height).value_or(0)});
+    }
+    if (!is_discrete) break;  // every size up to that one
+  }
+}
+
+std::optional<double> V4l2Device::fastest_rate(uint32_t fourcc, int width_px, int height_px) const {
+  std::optional<double> best;
+  for (uint32_t index = 0; index < kMostEnumerated; ++index) {
+    v4l2_frmivalenum interval{};
+    interval.index = index;
+    interval.pixel_format = fourcc;
+    interval.width = uint32_t(width_px);
+    interval.height = uint32_t(height_px);
+    if (call(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) break;
+    const bool is_discrete = interval.type == V4L2_FRMIVAL_TYPE_DISCRETE;
+    const v4l2_fract& shortest = is_discrete ? interval.discrete : interval.stepwise.min;
+    if (shortest.numerator > 0) best = std::max(best.value_or(0), double(shortest.denominator) / shortest.numerator);
+    if (!is_discrete) break;
+  }
+  return best;
+}
+
+}  // namespace maq

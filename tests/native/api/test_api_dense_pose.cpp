@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+
+#include <maquette/maquette.hpp>
+#include <thread>
+#include <vector>
+
+#include "support/bundle_copy.h"
+
+namespace {
+
+constexpr char kBundle[] = MAQ_TEST_DATA "/tiny_bundle";
+
+// 320 x 256, black but for one red cell: one person (make_tiny_bundle.py).
+struct RedCell {
+  RedCell() : pixels(320 * 256 * 3) {
+    for (int y = 100; y < 104; ++y) {
+      for (int x = 80; x < 84; ++x) pixels[size_t(y * 320 + x) * 3] = 255;
+    }
+    maq_frame_desc_init(&desc, sizeof desc);
+    desc.format = MAQ_PIXEL_RGB8;
+    desc.width_px = 320;
+    desc.height_px = 256;
+    desc.planes[0] = pixels.data();
+  }
+  std::vector<uint8_t> pixels;
+  maq_frame_desc desc;
+};
+
+TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
+  const maquette::Context context;
+  maquette::DensePose densepose(context, kBundle);
+  const RedCell image;
+  const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
+  EXPECT_EQ(result.width_px(), 320);
+  EXPECT_EQ(result.height_px(), 256);
+  ASSERT_EQ(result.people().size(), 1u);
+  EXPECT_NEAR(result.people()[0].box_px[0], 67.2, 1e-3);
+  size_t stride = 0;
+  int64_t body = 0;
+  const uint8_t* person = result.plane(MAQ_PLANE_PERSON, &stride);
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 320; ++x) body += person[size_t(y) * stride + size_t(x)] == 1;
+  }
+  const maq_densepose_stats stats = result.stats();
+  EXPECT_GT(body, 500);
+  EXPECT_EQ(stats.body_pixels, body);
+  EXPECT_EQ(stats.people, 1);
+  EXPECT_EQ(stats.network_width_px, 320);
+  EXPECT_GT(stats.total_ms, 0);
+  EXPECT_GE(stats.total_ms, stats.trunk_ms);
+  const uint8_t* pixels = nullptr;
+  EXPECT_EQ(maq_densepose_result_plane(result.get(), maq_densepose_plane(5), &pixels, &stride),
+            MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(ApiDensePose, ResultsAreBoundedReusedAndOutliveEverything) {
+  const RedCell image;
+  std::vector<maquette::DensePoseResult> held;
+  {
+    const maquette::Context context;
+    maquette::DensePose densepose(context, kBundle);
+    const maquette::Frame frame(context, image.desc);
+    for (int i = 0; i < 4; ++i) held.push_back(densepose.run(frame));
+    maq_densepose_result* result = nullptr;
+    EXPECT_EQ(maq_densepose_run(densepose.get(), frame.get(), &result), MAQ_ERROR_POOL_EMPTY);
+    held.pop_back();
+    held.push_back(densepose.run(frame));
+  }
+  EXPECT_EQ(held[3].people().size(), 1u);
+}
+
+TEST(ApiDensePose, EachThreadCanHaveItsOwnAndShareTheContext) {
+  const maquette::Context context;
+  const RedCell image;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t) {
+    threads.emplace_back([&] {
+      maquette::DensePose densepose(context, kBundle);
+      const maquette::Frame frame(context, image.desc);
+      for (int i = 0; i < 5; ++i) EXPECT_EQ(densepose.run(frame).people().size(), 1u);
+      maq_source* source = nullptr;
+      EXPECT_EQ(maq_source_create(context.get(), "nothing", nullptr, &source), MAQ_ERROR_INVALID_ARGUMENT);
+      EXPECT_NE(std::string(maq_last_error(context.get())), "");
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST(ApiDensePose, ADamagedBundleIsAStatusOfTheContext) {
+  const maquette::Context context;
+  const BundleCopy bundle;
+  bundle.flip_byte("trunk.onnx");
+  maq_densepose_config config = maquette::default_densepose_config();
+  const std::string path = bundle.path();
+  config.bundle_path = path.c_str();
+  maq_densepose* densepose = nullptr;
+  EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_BAD_BUNDLE);
+  EXPECT_NE(std::string(maq_last_error(context.get())).find("trunk.onnx"), std::string::npos);
+  config.bundle_path = "/no/such/bundle";
+  EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_NOT_FOUND);
+  EXPECT_EQ(densepose, nullptr);
+}
+
+TEST(ApiDensePose, AMissingRuntimeLibraryIsAStatusAndCanBeMended) {
+  maq_context_config config = maquette::default_context_config();
+  config.onnxruntime_library = "/no/such/libonnxruntime.so.1";
+  const maquette::Context named(config);
+  const char* version = nullptr;
+  EXPECT_EQ(maq_context_onnxruntime(named.get(), &version, nullptr), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_EQ(version, nullptr);
+
+  const maquette::Context context;
+  setenv("MAQ_ONNXRUNTIME_LIB", "/no/such/libonnxruntime.so.1", 1);
+  EXPECT_EQ(maq_context_onnxruntime(context.get(), &version, nullptr), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_NE(std::string(maq_last_error(context.get())).find("MAQ_ONNXRUNTIME_LIB"), std::string::npos);
+  unsetenv("MAQ_ONNXRUNTIME_LIB");
+  EXPECT_EQ(context.onnxruntime_version().rfind("1.", 0), 0u);
+}
+
+TEST(ApiDensePose, TheLogHookHearsWhatIsLoadedAndNothingBelowItsLevel) {
+  std::vector<std::string> lines;
+  maq_context_config config = maquette::default_context_config();
+  config.log_callback = [](void* user_data, maq_log_level, const char* text) {
+    static_cast<std::vector<std::string>*>(user_data)->push_back(text);
+  };
+  config.log_user_data = &lines;
+  {
+    const maquette::Context quiet(config);
+    maquette::DensePose densepose(quiet, kBundle);
+  }
+  EXPECT_TRUE(lines.empty()) << lines[0];
+  config.log_level = MAQ_LOG_INFO;
+  const maquette::Context context(config);
+  maquette::DensePose densepose(context, kBundle);
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_NE(lines[1].find("Bundle tiny"), std::string::npos) << lines[1];
+}
+
+}  // namespace

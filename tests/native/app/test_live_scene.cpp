@@ -1,0 +1,520 @@
+// With the room of this repository and the shipped networks.
+#include <app/live_scene.hpp>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include <app/fly_camera.hpp>
+#include "support/temp_folder.h"
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+const std::string kRoom = MAQ_TEST_MEDIA "/room", kBundle = MAQ_TEST_MODELS "/scenes-int8";
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+// Waits until `is_so`, looking every few milliseconds as a window does. False after two minutes.
+template <class Condition>
+bool wait_until(Condition is_so) {
+  for (const auto start = Clock::now(); ms_since(start) < 120e3;) {
+    if (is_so()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return false;
+}
+
+bool wait_until_open(const maquette::LiveScene& scene) {
+  return wait_until([&] { return scene.state()->what >= maquette::LiveSceneState::kReady; }) &&
+         scene.state()->what == maquette::LiveSceneState::kReady;
+}
+
+// How long the room takes on this machine as it is now, what else may run: the measure of "soon".
+double room_ms() {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  const auto start = Clock::now();
+  scene.open(kRoom);
+  EXPECT_TRUE(wait_until_open(scene));
+  return ms_since(start);
+}
+
+// Most calls are faster than this; one or two may be held up by the machine.
+double usual_ms(std::vector<double> times_ms) {
+  std::sort(times_ms.begin(), times_ms.end());
+  return times_ms[times_ms.size() * 2 / 3];
+}
+
+size_t threads_of_this_process() {
+  size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task")) count += entry.exists() ? 1 : 0;
+  return count;
+}
+
+// The room of a few of its photos and points, as a file; made once.
+const std::string& small_room() {
+  static const TempFolder folder;
+  static const std::string path = [] {
+    const maquette::Context context;
+    maq_scene_build_config config = maquette::default_scene_build_config();
+    config.bundle_path = kBundle.c_str();
+    config.most_views = 3;
+    config.most_points = 20000;
+    const std::string file = folder.file("room.maqs");
+    maquette::Scene(context, config, maquette::Capture(context, kRoom)).save(file);
+    return file;
+  }();
+  return path;
+}
+
+// From inside of the room, a small picture.
+maq_camera small_camera(const maquette::LiveScene& scene) {
+  maquette::FlyCamera fly(scene.state()->info, {});
+  fly.move(0, 0, 1, 1, 0.7);
+  return fly.camera(160, 120);
+}
+
+// A picture that comes after this call.
+const maquette::LiveScenePicture* look_at(maquette::LiveScene& scene, const maq_camera& camera, int photo_index = -1) {
+  scene.look(camera, photo_index);
+  return wait_until([&] { return scene.shown().take(); }) ? &scene.shown().front() : nullptr;
+}
+
+// Nothing comes in the time in which a small picture is rendered many times.
+void expect_no_picture(maquette::LiveScene& scene) {
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  EXPECT_FALSE(scene.shown().take());
+}
+
+void copy_room(const TempFolder& folder) {
+  std::filesystem::copy(kRoom, folder.path(), std::filesystem::copy_options::recursive);
+}
+
+// Opens what is damaged; what the user reads about it.
+std::string failure_of(maquette::LiveScene& scene, const std::string& path) {
+  scene.open(path);
+  EXPECT_TRUE(wait_until([&] { return scene.state()->what >= maquette::LiveSceneState::kReady; }));
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kFailed) << path;
+  EXPECT_EQ(scene.state()->path, path);
+  const std::string text = scene.state()->text;
+  EXPECT_GT(text.size(), 20u);
+  EXPECT_EQ(text.back(), '.') << text;
+  return text;
+}
+
+TEST(LiveScene, BuildsACaptureAndComparesWithItsPhotos) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing);
+  scene.open(kRoom);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kOpening);
+  EXPECT_EQ(scene.state()->path, kRoom);
+  std::set<std::string> texts;
+  double done = 0;
+  ASSERT_TRUE(wait_until([&] {
+    const auto state = scene.state();
+    if (state->what != maquette::LiveSceneState::kOpening) return true;
+    EXPECT_GE(state->done, done);
+    EXPECT_LE(state->done, 1);
+    EXPECT_EQ(state->text.back(), '.');
+    done = state->done;
+    texts.insert(state->text);
+    return false;
+  }));
+  const auto state = scene.state();
+  ASSERT_EQ(state->what, maquette::LiveSceneState::kReady) << state->text;
+  EXPECT_EQ(state->text, "");
+  EXPECT_GT(texts.size(), 25u);
+  EXPECT_GT(done, 0.9);
+  EXPECT_GT(state->info.point_count, 100000u);
+  ASSERT_EQ(state->photos.size(), 30u);
+  ASSERT_EQ(state->photo_names.size(), 30u);
+  size_t kept_out = 0;
+  for (const std::string& name : state->photo_names) kept_out += name.find(" (kept out)") != std::string::npos;
+  EXPECT_EQ(kept_out, 5u);
+
+  for (size_t i = 0; i < 30; ++i) {
+    scene.look(state->photos[i], int(i));
+    ASSERT_TRUE(wait_until([&] { return scene.shown().take(); }));
+    const maquette::LiveScenePicture& shown = scene.shown().front();
+    EXPECT_EQ(shown.photo_index, int(i));
+    EXPECT_EQ(shown.number, i + 1);
+    EXPECT_GT(shown.psnr_db, 25) << state->photo_names[i];
+  }
+}
+
+TEST(LiveScene, ShowsTheErrorInColoursAndItsPsnr) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room(), kRoom);
+  ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
+  const maq_camera camera = scene.state()->photos[12];
+  const maquette::LiveScenePicture* const shown = look_at(scene, camera, 12);
+  ASSERT_NE(shown, nullptr);
+  for (const maquette::Picture* picture : {&shown->rendering, &shown->photo, &shown->error}) {
+    ASSERT_EQ(picture->width_px, camera.width_px);
+    ASSERT_EQ(picture->height_px, camera.height_px);
+  }
+  double squares = 0;
+  size_t coloured = 0;
+  for (size_t i = 0; i < shown->error.rgba.size(); i += 4) {
+    double mean = 0;
+    for (size_t c = i; c < i + 3; ++c) {
+      const double difference = double(shown->rendering.rgba[c]) - double(shown->photo.rgba[c]);
+      mean += std::abs(difference) / 3;
+      squares += difference * difference;
+    }
+    // Red grows up to a third of 128, then green, then blue.
+    const double third = 128.0 / 3;
+    for (size_t c = 0; c < 3; ++c) {
+      const double expected = 255 * std::min(1.0, std::max(0.0, mean - double(c) * third) / third);
+      ASSERT_NEAR(shown->error.rgba[i + c], expected, 1) << i;
+    }
+    ASSERT_EQ(shown->error.rgba[i + 3], 255);
+    ASSERT_EQ(shown->rendering.rgba[i + 3], 255);
+    coloured += shown->error.rgba[i] > 20;
+  }
+  EXPECT_GT(coloured, 1000u);
+  const double mean_square = squares / (3.0 * camera.width_px * camera.height_px);
+  EXPECT_NEAR(shown->psnr_db, 10 * std::log10(255.0 * 255 / mean_square), 1e-6);
+}
+
+TEST(LiveScene, APhotoIsBroughtToThePicturesSize) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room(), kRoom);
+  ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
+  const maq_camera own = scene.state()->photos[3];
+  const maquette::LiveScenePicture* shown = look_at(scene, own, 3);
+  ASSERT_NE(shown, nullptr);
+  const maquette::Picture photo = shown->photo;
+  for (const int share : {2, 3, 5}) {
+    maq_camera camera = own;
+    camera.width_px /= share, camera.height_px /= share;
+    const int width = camera.width_px;
+    shown = look_at(scene, camera, 3);
+    ASSERT_NE(shown, nullptr);
+    ASSERT_EQ(shown->photo.width_px, width);
+    ASSERT_EQ(shown->error.height_px, camera.height_px);
+    double squares = 0;
+    for (int y = 0; y < camera.height_px; ++y) {
+      for (int x = 0; x < width; ++x) {
+        double sum = 0;
+        for (int k = 0; k < share * share; ++k) {
+          sum += photo.rgba[size_t((y * share + k / share) * photo.width_px + x * share + k % share) * 4 + 1];
+        }
+        const double off = sum / (share * share) - shown->photo.rgba[size_t(y * width + x) * 4 + 1];
+        squares += off * off;
+      }
+    }
+    // The last column of 640 / 3 covers a third of a pixel less here.
+    EXPECT_LT(std::sqrt(squares / (width * camera.height_px)), 6) << share;
+  }
+}
+
+TEST(LiveScene, LargePicturesAreMadeSmallerAndShowTheSame) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
+  maq_camera camera = small_camera(scene);
+  for (const auto& [width, height, shown_width, shown_height] : {std::array<int, 4>{1280, 960, 1280, 960},
+                                                                 {4000, 3000, 1280, 960},
+                                                                 {2560, 800, 1280, 400},
+                                                                 {500, 1920, 250, 960}}) {
+    const maq_camera large = maquette::FlyCamera(scene.state()->info, {camera}).camera(width, height);
+    const maquette::LiveScenePicture* const shown = look_at(scene, large);
+    ASSERT_NE(shown, nullptr);
+    EXPECT_EQ(shown->rendering.width_px, shown_width);
+    EXPECT_EQ(shown->rendering.height_px, shown_height);
+    EXPECT_EQ(shown->camera.width_px, shown_width);
+    EXPECT_NEAR(shown->camera.fx_px / shown_width, large.fx_px / width, 1e-9);
+    EXPECT_NEAR((shown->camera.cy_px + 0.5) / shown_height, (large.cy_px + 0.5) / height, 1e-9);
+    EXPECT_TRUE(std::isnan(shown->psnr_db));
+    EXPECT_TRUE(shown->photo.empty() && shown->error.empty());
+    EXPECT_EQ(shown->photo_index, -1);
+  }
+}
+
+TEST(LiveScene, RendersOncePerLookAndTheLatestWins) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
+  maq_camera camera = small_camera(scene);
+  const maquette::LiveScenePicture* shown = look_at(scene, camera);
+  ASSERT_NE(shown, nullptr);
+  EXPECT_EQ(shown->number, 1u);
+  expect_no_picture(scene);
+  for (int i = 1; i <= 1000; ++i) {
+    camera.fx_px = 100 + i;
+    scene.look(camera, -1);
+  }
+  ASSERT_TRUE(wait_until([&] { return scene.shown().take() && scene.shown().front().camera.fx_px == 1100; }));
+  EXPECT_LT(scene.shown().front().number, 500u);
+  expect_no_picture(scene);
+}
+
+TEST(LiveScene, ALookBeforeTheSceneIsThereWaitsForIt) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene));
+  const maq_camera camera = small_camera(scene);
+  scene.open(small_room());
+  ASSERT_NE(look_at(scene, camera), nullptr);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kReady);
+}
+
+TEST(LiveScene, OtherThreadsRenderTheSamePictureAgain) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene));
+  scene.set_threads(1);
+  expect_no_picture(scene);
+  const maquette::LiveScenePicture* const shown = look_at(scene, small_camera(scene));
+  ASSERT_NE(shown, nullptr);
+  const std::vector<uint8_t> before = shown->rendering.rgba;
+  scene.set_threads(2);
+  ASSERT_TRUE(wait_until([&] { return scene.shown().take(); }));
+  EXPECT_EQ(shown->rendering.rgba, before);
+  EXPECT_EQ(shown->number, 2u);
+  scene.set_threads(2);
+  expect_no_picture(scene);
+  scene.set_threads(-7);
+  ASSERT_TRUE(wait_until([&] { return !scene.state()->text.empty(); }));
+  EXPECT_NE(scene.state()->text.find("-7"), std::string::npos) << scene.state()->text;
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kReady);
+  scene.set_threads(1);
+  ASSERT_TRUE(wait_until([&] { return scene.shown().take() && scene.state()->text.empty(); }));
+}
+
+TEST(LiveScene, ACameraThatIsNoneIsSaidAndForgotten) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene));
+  const maq_camera good = small_camera(scene);
+  const auto expect_refused = [&](auto change) {
+    maq_camera camera = good;
+    change(camera);
+    scene.look(camera, -1);
+    EXPECT_TRUE(wait_until([&] { return !scene.state()->text.empty(); }));
+    EXPECT_EQ(scene.state()->text.back(), '.') << scene.state()->text;
+    EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kReady);
+    EXPECT_FALSE(scene.shown().take());
+    ASSERT_NE(look_at(scene, good), nullptr);
+    EXPECT_EQ(scene.state()->text, "");
+  };
+  expect_refused([](maq_camera& camera) { camera.rotation[0] = NAN; });
+  expect_refused([](maq_camera& camera) { camera.fx_px = 0; });
+  expect_refused([](maq_camera& camera) { camera.width_px = 0; });
+  expect_refused([](maq_camera& camera) { camera.height_px = -2000000000; });
+  expect_refused([](maq_camera& camera) { camera.struct_size = 3; });
+}
+
+TEST(LiveScene, WithoutItsCaptureASceneFileIsShownAllTheSame) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room(), "/nowhere/at all");
+  ASSERT_TRUE(wait_until_open(scene));
+  EXPECT_NE(scene.state()->text.find("/nowhere/at all"), std::string::npos) << scene.state()->text;
+  EXPECT_EQ(scene.state()->text.back(), '.');
+  EXPECT_TRUE(scene.state()->photos.empty());
+  const maquette::LiveScenePicture* const shown = look_at(scene, small_camera(scene), 5);
+  ASSERT_NE(shown, nullptr);
+  EXPECT_EQ(shown->photo_index, -1);
+  EXPECT_TRUE(shown->photo.empty());
+}
+
+TEST(LiveScene, APhotoThatCannotBeReadIsSaidAndTheRenderingShown) {
+  const TempFolder folder;
+  copy_room(folder);
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room(), folder.path().string());
+  ASSERT_TRUE(wait_until_open(scene));
+  ASSERT_EQ(scene.state()->photos.size(), 30u);
+  write_text(folder.file("images/004.jpg"), "no photo any more");
+  const auto photos = scene.state()->photos;
+  ASSERT_NE(look_at(scene, photos[3], 3), nullptr);
+  const maquette::LiveScenePicture* shown = look_at(scene, photos[4], 4);
+  ASSERT_NE(shown, nullptr);
+  EXPECT_EQ(shown->photo_index, -1);
+  EXPECT_TRUE(shown->photo.empty() && shown->error.empty() && std::isnan(shown->psnr_db));
+  EXPECT_FALSE(shown->rendering.empty());
+  EXPECT_NE(scene.state()->text.find("004.jpg"), std::string::npos) << scene.state()->text;
+  for (const int index : {30, 1000000}) {
+    ASSERT_NE(look_at(scene, photos[4], index), nullptr);
+    EXPECT_EQ(scene.shown().front().photo_index, -1);
+    EXPECT_NE(scene.state()->text, "");
+  }
+  shown = look_at(scene, photos[5], 5);
+  ASSERT_NE(shown, nullptr);
+  EXPECT_EQ(shown->photo_index, 5);
+  EXPECT_EQ(scene.state()->text, "");
+}
+
+TEST(LiveScene, WhatCannotBeOpenedIsASentence) {
+  const TempFolder folder;
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  const std::string whole = read_text(small_room());
+  std::string changed = whole;
+  changed[changed.size() / 2] = char(changed[changed.size() / 2] ^ 4);
+  write_text(folder.file("changed.maqs"), changed);
+  write_text(folder.file("cut.maqs"), whole.substr(0, whole.size() / 2));
+  write_text(folder.file("none.maqs"), "");
+  std::filesystem::create_directory(folder.path() / "empty");
+  for (const char* name : {"changed.maqs", "cut.maqs", "none.maqs", "empty", "missing"}) {
+    const std::string text = failure_of(scene, folder.file(name));
+    EXPECT_NE(text.find(name), std::string::npos) << text;
+  }
+  scene.look(maq_camera{}, -1);
+  expect_no_picture(scene);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene)) << "after all of this: " << scene.state()->text;
+  EXPECT_NE(look_at(scene, small_camera(scene)), nullptr);
+}
+
+TEST(LiveScene, WrongNetworksAreASentence) {
+  for (const std::string& bundle : {std::string("/nowhere"), std::string(MAQ_TEST_MODELS "/densepose-b-int8")}) {
+    const maquette::Context context;
+    maquette::LiveScene scene(context, bundle, 2);
+    failure_of(scene, small_room());
+    failure_of(scene, kRoom);
+  }
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 1000);
+  EXPECT_NE(failure_of(scene, small_room()).find("1000"), std::string::npos);
+}
+
+TEST(LiveScene, CloseForgetsTheSceneAndItsPictures) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene));
+  const maq_camera camera = small_camera(scene);
+  scene.look(camera, -1);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it waits to be taken, or comes just now
+  scene.close();
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing);
+  EXPECT_EQ(scene.state()->path, "");
+  EXPECT_EQ(scene.state()->text, "");
+  expect_no_picture(scene);
+  scene.look(camera, -1);
+  expect_no_picture(scene);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing);
+}
+
+TEST(LiveScene, BuildingEndsSoonWhenAnotherSceneIsOpenedOrNone) {
+  const double whole_ms = room_ms();
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene));
+  for (const double share : {0.0, 0.05, 0.3}) {
+    scene.open(kRoom);
+    ASSERT_TRUE(wait_until([&] { return scene.state()->done > share; }));
+    const auto start = Clock::now();
+    scene.open(small_room());
+    EXPECT_EQ(scene.state()->path, small_room());
+    ASSERT_TRUE(wait_until_open(scene));
+    EXPECT_LT(ms_since(start), 0.6 * whole_ms);
+    EXPECT_EQ(scene.state()->path, small_room());
+  }
+  scene.open(kRoom);
+  ASSERT_TRUE(wait_until([&] { return scene.state()->done > 0; }));
+  scene.close();
+  expect_no_picture(scene);
+  EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kNothing) << "and stays closed";
+}
+
+TEST(LiveScene, TheDestructorEndsBuildingSoon) {
+  const double whole_ms = room_ms();
+  for (const double share : {-1.0, 0.0, 0.1, 0.5, 0.97}) {
+    Clock::time_point start;
+    {
+      const maquette::Context context;
+      maquette::LiveScene scene(context, kBundle, 2);
+      scene.open(kRoom);
+      ASSERT_TRUE(wait_until(
+          [&] { return scene.state()->done > share || scene.state()->what != maquette::LiveSceneState::kOpening; }));
+      start = Clock::now();
+    }
+    EXPECT_LT(ms_since(start), 0.5 * whole_ms) << share;
+  }
+}
+
+TEST(LiveScene, OpeningManyTimesLeavesNothingBehind) {
+  size_t threads = 0;
+  {
+    const maquette::Context context;
+    maquette::LiveScene scene(context, kBundle, 2);
+    for (int i = 0; i < 30; ++i) {
+      scene.open(small_room(), i % 2 == 0 ? kRoom : "");
+      if (i % 3 == 0) continue;
+      ASSERT_TRUE(wait_until_open(scene));
+      ASSERT_NE(look_at(scene, small_camera(scene)), nullptr);
+      if (i == 1) threads = threads_of_this_process();
+    }
+    EXPECT_EQ(threads_of_this_process(), threads);
+  }
+  for (int i = 0; i < 20; ++i) {
+    const maquette::Context context;
+    maquette::LiveScene scene(context, kBundle, 2);
+    scene.open(i % 2 == 0 ? small_room() : kRoom);
+    ASSERT_TRUE(i % 4 != 0 || wait_until_open(scene));
+  }
+}
+
+TEST(LiveScene, NoCallWaitsWhileItWorks) {
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  std::vector<double> opening_ms, closing_ms, others_ms;
+  const auto timed = [](std::vector<double>& times_ms, auto call) {
+    const auto start = Clock::now();
+    call();
+    times_ms.push_back(ms_since(start));
+  };
+  for (int turn = 0; turn < 3; ++turn) {
+    timed(opening_ms, [&] { scene.open(turn == 1 ? small_room() : kRoom); });
+    for (int i = 0; i < 300; ++i) {
+      timed(others_ms, [&] { scene.look(small_camera(scene), -1); });
+      timed(others_ms, [&] { scene.state(); });
+      timed(others_ms, [&] { scene.shown().take(); });
+      if (i % 100 == 50) timed(others_ms, [&] { scene.set_threads(1 + i / 100); });
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    timed(closing_ms, [&] { scene.close(); });
+  }
+  for (const auto& times_ms : {opening_ms, closing_ms, others_ms}) EXPECT_LT(usual_ms(times_ms), 20);
+}
+
+TEST(LiveScene, WorksAtALowerPriorityThanTheWindow) {
+  const int own = getpriority(PRIO_PROCESS, 0);
+  const maquette::Context context;
+  maquette::LiveScene scene(context, kBundle, 2);
+  scene.open(small_room());
+  ASSERT_TRUE(wait_until_open(scene));
+  std::multiset<int> others;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task")) {
+    const int id = std::stoi(entry.path().filename());
+    if (id != getpid()) others.insert(getpriority(PRIO_PROCESS, id_t(id)));
+  }
+  EXPECT_EQ(getpriority(PRIO_PROCESS, 0), own);
+  EXPECT_GE(others.size(), 2u) << "its own and one of the networks";
+  EXPECT_EQ(others.count(std::min(own + 5, 19)), others.size());
+}
+
+}  // namespace

@@ -1,0 +1,268 @@
+// The whole chain on the tiny bundle, whose answers are known (make_tiny_bundle.py says what it sees).
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "support/bundle_copy.h"
+#include "densepose/densepose.h"
+
+namespace {
+
+const cv::Scalar kRed(0, 0, 255), kGreen(0, 255, 0), kBlue(255, 0, 0);
+
+class DensePose : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    runtime_ = std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());
+  }
+  static void TearDownTestSuite() { runtime_.reset(); }
+
+  static maq::DensePose make(maq::DensePoseSettings settings,
+                             const std::string& bundle = std::string(MAQ_TEST_DATA) + "/tiny_bundle") {
+    return {runtime_, maq::read_bundle(bundle), settings};
+  }
+
+  maq::DensePoseResult run(const cv::Mat& bgr, maq::DensePoseSettings settings = {}) {
+    maq::DensePoseResult result;
+    make(settings).run({MAQ_PIXEL_BGR8, bgr.cols, bgr.rows, {{bgr.data, bgr.step}, {}}}, result);
+    return result;
+  }
+
+  // Whatever comes out, it must be inside the frame, finite and consistent.
+  static void expect_sane(const maq::DensePoseResult& result, int width, int height) {
+    ASSERT_EQ(result.planes.part.size(), size_t(width) * size_t(height));
+    for (const maq::Person& person : result.people) {
+      EXPECT_TRUE(person.box.x0 >= 0 && person.box.y0 >= 0 && person.box.x1 <= float(width) &&
+                  person.box.y1 <= float(height));
+      EXPECT_TRUE(person.score >= 0 && person.score <= 1);
+    }
+    int64_t body = 0;
+    for (size_t i = 0; i < result.planes.part.size(); ++i) {
+      ASSERT_LE(result.planes.part[i], 24);
+      ASSERT_LE(result.planes.person[i], result.people.size());
+      ASSERT_EQ(result.planes.part[i] == 0, result.planes.person[i] == 0);
+      body += result.planes.part[i] != 0;
+    }
+    EXPECT_EQ(body, result.stats.decoded.body_pixels);
+  }
+
+  static std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime_;
+};
+
+std::shared_ptr<const maq::OnnxRuntimeLibrary> DensePose::runtime_;
+
+cv::Mat black(int width, int height) { return cv::Mat::zeros(height, width, CV_8UC3); }
+
+TEST_F(DensePose, OneCellOfColourIsOnePersonInItsAnchor) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(80, 100, 4, 4)) = kRed;     // cell (20, 25) of P2
+  image(cv::Rect(200, 128, 8, 8)) = kGreen;  // cell (25, 16) of P3
+  const maq::DensePoseResult result = run(image);
+  ASSERT_EQ(result.people.size(), 2u);
+  const maq::Box& red = result.people[0].box;
+  const maq::Box& green = result.people[1].box;
+  EXPECT_NEAR(red.x0, 80 - 16 + 3.2, 1e-3);
+  EXPECT_NEAR(red.y0, 100 - 16, 1e-3);
+  EXPECT_NEAR(red.x1, 80 + 16 + 3.2, 1e-3);
+  EXPECT_NEAR(red.y1, 100 + 16, 1e-3);
+  EXPECT_NEAR(green.x0, 200 - 32 + 6.4, 1e-3);
+  EXPECT_NEAR(green.y1, 128 + 32, 1e-3);
+  EXPECT_GT(result.people[0].score, 0.9);
+  expect_sane(result, 320, 256);
+}
+
+TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;  // cell (10, 6) of P4: a person of 128 px
+  const maq::DensePoseResult result = run(image);
+  ASSERT_EQ(result.people.size(), 1u);
+  const maq::PixelRect rect = maq::pixel_rect(result.people[0].box);
+  ASSERT_NEAR(rect.width, 128, 1);
+  int64_t body = 0, clamped = 0;
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 320; ++x) {
+      const size_t pixel = size_t(y * 320 + x);
+      const auto cell = [](int at, int extent) { return std::clamp((at + 0.5) * 64 / extent - 0.5, 0.0, 63.0); };
+      const double col = cell(x - rect.x, rect.width), row = cell(y - rect.y, rect.height);
+      const bool in_box = x >= rect.x && y >= rect.y && x < rect.x + rect.width && y < rect.y + rect.height;
+      const bool is_body = in_box && row > 15.5;
+      ASSERT_EQ(result.planes.person[pixel], is_body ? 1 : 0) << x << " " << y;
+      if (!is_body) continue;
+      const double u = 0.5 + 0.61 * (2 * col / 63 - 1), v = 0.5 + 0.5 * (2 * row / 63 - 1);
+      ASSERT_EQ(result.planes.part[pixel], col <= 31.5 ? 3 : 7) << x;
+      ASSERT_NEAR(result.planes.u[pixel], 255 * std::clamp(u, 0.0, 1.0), 0.51);
+      ASSERT_NEAR(result.planes.v[pixel], 255 * v, 0.51);
+      ++body;
+      clamped += u < 0 || u > 1;
+    }
+  }
+  EXPECT_EQ(result.stats.decoded.body_pixels, body);
+  EXPECT_EQ(result.stats.decoded.clamped_uv, clamped);
+}
+
+TEST_F(DensePose, ASecondLookStartsWhereTheFirstEnded) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(80, 100, 4, 4)) = kRed;
+  const BundleCopy bundle;
+  const auto box_of = [&](std::optional<float> second_look_score, maq::DensePoseSettings settings) {
+    nlohmann::json manifest = bundle.manifest();
+    if (second_look_score) manifest["box_head"]["second_look_score"] = *second_look_score;
+    bundle.write_manifest(manifest);
+    maq::DensePoseResult result;
+    make(settings, bundle.path()).run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    return result.people.empty() ? maq::Box{} : result.people[0].box;
+  };
+  const maq::Box once = box_of(std::nullopt, {});
+  const maq::Box twice = box_of(0.3f, {});
+  EXPECT_NEAR(once.width(), 32, 1e-3);
+  EXPECT_NEAR(twice.x0, once.x0 + 3.2f, 1e-3) << "each look moves the box by a tenth of its width";
+  EXPECT_NEAR(twice.width(), once.width(), 1e-3);
+  EXPECT_NEAR(box_of(1.0f, {}).x0, twice.x0, 1e-3) << "who is sure enough to be shown is always looked at again";
+}
+
+TEST_F(DensePose, ABoxHiddenBehindAnotherIsNoPerson) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;  // a person of 128 px
+  const maq::DensePoseResult alone = run(image);
+  image(cv::Rect(180, 132, 4, 4)) = kRed * 0.75;  // one of 32 px inside its body, with a worse score
+  const maq::DensePoseResult result = run(image);
+  EXPECT_EQ(result.people.size(), 1u);
+  EXPECT_EQ(result.planes.person, alone.planes.person);
+  image(cv::Rect(160, 96, 16, 16)) = cv::Scalar::all(0);
+  EXPECT_EQ(run(image).people.size(), 1u);  // it is seen when nobody is in front
+}
+
+TEST_F(DensePose, BoxesComeBackInPixelsOfTheFrame) {
+  cv::Mat image = black(640, 512);
+  image(cv::Rect(160, 200, 8, 8)) = kRed;  // the cell of the first test, at twice the size
+  const maq::DensePoseResult result = run(image);
+  ASSERT_EQ(result.people.size(), 1u);
+  EXPECT_NEAR(result.people[0].box.x0, 2 * (80 - 16 + 3.2), 1e-3);
+  EXPECT_NEAR(result.people[0].box.y1, 2 * (100 + 16), 1e-3);
+  EXPECT_EQ(result.stats.network_width_px, 320);
+  expect_sane(result, 640, 512);
+}
+
+TEST_F(DensePose, WithoutPeopleTheDenseHeadDoesNotRunAndPlanesAreZero) {
+  const maq::DensePoseResult result = run(black(320, 256));
+  EXPECT_TRUE(result.people.empty());
+  EXPECT_EQ(result.stats.dense_head_ms, 0);
+  EXPECT_EQ(result.stats.decode_ms, 0);
+  EXPECT_EQ(cv::countNonZero(result.planes.part), 0);
+}
+
+TEST_F(DensePose, SettingsChangeThresholdCountAndSize) {
+  cv::Mat image = black(320, 256);
+  for (const int x : {40, 120, 200, 280}) image(cv::Rect(x, 100, 4, 4)) = kRed;
+  EXPECT_EQ(run(image).people.size(), 4u);
+  EXPECT_EQ(run(image, {1, 0, -1, 2}).people.size(), 2u);
+  EXPECT_EQ(run(image, {1, 0, 1, 0}).people.size(), 0u);
+  const maq::DensePoseResult small = run(image, {1, 64, -1, 0});
+  EXPECT_EQ(small.stats.network_width_px, 64);
+  EXPECT_EQ(small.stats.network_height_px, 51);
+}
+
+TEST_F(DensePose, ExtremeFramesGiveSaneResults) {
+  for (const auto& [width, height] :
+       {std::pair{1, 1}, {16, 16}, {31, 33}, {1, 4000}, {4000, 1}, {320, 256}, {257, 319}}) {
+    cv::Mat noise(height, width, CV_8UC3);
+    cv::randu(noise, 0, 256);
+    expect_sane(run(noise), width, height);
+    expect_sane(run(black(width, height)), width, height);
+    expect_sane(run(cv::Mat(height, width, CV_8UC3, cv::Scalar::all(255))), width, height);
+  }
+}
+
+TEST_F(DensePose, BetweenKeyFramesPeopleAreFollowedAndNobodyNewIsFound) {
+  maq::DensePoseSettings settings;
+  settings.key_frame_interval = 3;
+  maq::DensePose densepose = make(settings);
+  maq::DensePoseResult result;
+  const auto see = [&](const cv::Mat& image) {
+    densepose.run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    return result.people.size();
+  };
+  cv::Mat one = black(320, 256);
+  one(cv::Rect(80, 100, 4, 4)) = kRed;
+  cv::Mat two = one.clone();
+  two(cv::Rect(200, 128, 8, 8)) = kGreen;
+  EXPECT_EQ(see(one), 1u);
+  EXPECT_TRUE(result.stats.key_frame);
+  const float first_x0 = result.people[0].box.x0;
+  EXPECT_EQ(see(two), 1u);
+  EXPECT_FALSE(result.stats.key_frame);
+  EXPECT_EQ(result.stats.proposals, 1);
+  EXPECT_NEAR(result.people[0].box.x0, first_x0 + 3.2, 1e-3) << "this box head moves what it is given";
+  EXPECT_EQ(see(black(320, 256)), 0u) << "who is gone is not made up";
+  EXPECT_EQ(see(two), 2u);
+  EXPECT_TRUE(result.stats.key_frame);
+  EXPECT_EQ(see(black(160, 256)), 0u);
+  EXPECT_TRUE(result.stats.key_frame) << "another size is another stream";
+  EXPECT_EQ(see(black(160, 256)), 0u);
+  EXPECT_EQ(result.stats.trunk_ms, 0) << "with nobody to follow nothing runs";
+  expect_sane(result, 160, 256);
+  densepose.restart();
+  EXPECT_EQ(see(black(160, 256)), 0u);
+  EXPECT_TRUE(result.stats.key_frame);
+}
+
+TEST_F(DensePose, PeopleBelowTheLeastHeightMayBeMissedAndNobodyElse) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(80, 100, 4, 4)) = kRed;     // 32 px, found at the finest level
+  image(cv::Rect(200, 128, 8, 8)) = kGreen;  // 64 px
+  maq::DensePoseSettings settings;
+  settings.least_person_px = 70;  // sqrt(3 * 32 * 64) = 78 px
+  EXPECT_EQ(run(image, settings).people.size(), 2u);
+  settings.least_person_px = 90;
+  const maq::DensePoseResult result = run(image, settings);
+  ASSERT_EQ(result.people.size(), 1u);
+  EXPECT_NEAR(result.people[0].box.width(), 64, 1e-3);
+  cv::Mat small = black(160, 128);  // the same people, now 90 px count as 180
+  small(cv::Rect(40, 50, 2, 2)) = kRed;
+  settings.least_person_px = 45;
+  EXPECT_EQ(run(small, settings).people.size(), 0u);
+  settings.least_person_px = 35;
+  EXPECT_GT(run(small, settings).people.size(), 0u);
+}
+
+TEST_F(DensePose, PartsAloneAreTheSamePartsWithoutUAndV) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;
+  maq::DensePoseSettings settings;
+  settings.surface = false;
+  const maq::DensePoseResult whole = run(image), parts = run(image, settings);
+  EXPECT_EQ(parts.planes.part, whole.planes.part);
+  EXPECT_EQ(cv::countNonZero(parts.planes.u) + cv::countNonZero(parts.planes.v), 0);
+  EXPECT_EQ(parts.stats.decoded.clamped_uv, 0);
+}
+
+TEST_F(DensePose, ProposalsAreBounded) {
+  cv::Mat image = black(320, 256);
+  for (const int x : {40, 120, 200, 280}) image(cv::Rect(x, 100, 4, 4)) = kRed;
+  maq::DensePoseSettings settings;
+  settings.max_proposals = 3;
+  const maq::DensePoseResult result = run(image, settings);
+  EXPECT_EQ(result.stats.proposals, 3);
+  EXPECT_EQ(result.people.size(), 3u);
+}
+
+TEST_F(DensePose, TwoThreadsAndReusedMemoryGiveTheSameResult) {
+  cv::Mat image(200, 300, CV_8UC3);
+  cv::randu(image, 0, 256);
+  const maq::ImageView view{MAQ_PIXEL_BGR8, 300, 200, {{image.data, image.step}, {}}};
+  maq::DensePose densepose = make({2});
+  maq::DensePoseResult first, again;
+  densepose.run(view, first);
+  densepose.run({MAQ_PIXEL_BGR8, 100, 50, {{image.data, image.step}, {}}}, again);
+  densepose.run(view, again);
+  const maq::DensePoseResult single = run(image);
+  for (const maq::DensePoseResult* other : std::initializer_list<const maq::DensePoseResult*>{&again, &single}) {
+    EXPECT_EQ(first.planes.part, other->planes.part);
+    EXPECT_EQ(first.planes.u, other->planes.u);
+    EXPECT_EQ(first.planes.person, other->planes.person);
+    EXPECT_EQ(first.people.size(), other->people.size());
+  }
+}
+
+}  // namespace

@@ -1,0 +1,64 @@
+// Turning pictures against reading them bilinearly at each pixel.
+#include "image/geometry/turned_picture.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace {
+
+constexpr int kFromWidth = 60, kFromHeight = 50, kWidth = 40, kHeight = 70;
+
+// A smooth picture of so many channels.
+std::vector<uint8_t> smooth(int channels) {
+  std::vector<uint8_t> pixels;
+  for (int y = 0; y < kFromHeight; ++y) {
+    for (int x = 0; x < kFromWidth; ++x) {
+      for (int c = 0; c < channels; ++c) pixels.push_back(uint8_t(128 + 100 * std::sin(0.2 * x + 0.15 * y + c)));
+    }
+  }
+  return pixels;
+}
+
+TEST(Warp, IsBilinearWithTheBorderRepeatedInAnyStrips) {
+  const double angle = 0.4;
+  const std::array<double, 6> back = {std::cos(angle), -std::sin(angle), 12.3, std::sin(angle), std::cos(angle), -5.1};
+  for (const int channels : {1, 3}) {
+    const std::vector<uint8_t> from = smooth(channels);
+    std::vector<uint8_t> to(size_t(kWidth * kHeight * channels));
+    for (int top = 0; top < kHeight; top += 32) {
+      maq::turn_bytes({from.data(), kFromWidth, kFromHeight}, channels, back, {to.data(), kWidth, kHeight}, top,
+                      std::min(kHeight, top + 32));
+    }
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const double at_x = std::clamp(back[0] * x + back[1] * y + back[2], 0.0, kFromWidth - 1.0);
+        const double at_y = std::clamp(back[3] * x + back[4] * y + back[5], 0.0, kFromHeight - 1.0);
+        const int x0 = int(at_x), y0 = int(at_y), x1 = std::min(x0 + 1, kFromWidth - 1),
+                  y1 = std::min(y0 + 1, kFromHeight - 1);
+        for (int c = 0; c < channels; ++c) {
+          const auto pixel = [&](int px, int py) {
+            return double(from[size_t((py * kFromWidth + px) * channels + c)]);
+          };
+          const double u = at_x - x0, v = at_y - y0;
+          const double expected = (1 - v) * ((1 - u) * pixel(x0, y0) + u * pixel(x1, y0)) +
+                                  v * ((1 - u) * pixel(x0, y1) + u * pixel(x1, y1));
+          ASSERT_NEAR(to[size_t((y * kWidth + x) * channels + c)], expected, 0.6) << x << " " << y;
+        }
+      }
+    }
+  }
+}
+
+TEST(Warp, DepthsAreNotMixed) {
+  std::vector<float> from(kFromWidth * kFromHeight);
+  for (size_t i = 0; i < from.size(); ++i) from[i] = i % 2 == 0 ? 1.0f : 1000.0f;
+  std::vector<float> to(kWidth * kHeight, -1);
+  maq::turn_depths({from.data(), kFromWidth, kFromHeight}, {0.9, 0.3, 1, -0.3, 0.9, 20}, {to.data(), kWidth, kHeight},
+                   0, kHeight);
+  for (const float depth : to) EXPECT_TRUE(depth == 1 || depth == 1000) << depth;
+}
+
+}  // namespace

@@ -1,0 +1,84 @@
+// Alpha and depth of a picture against their definitions, pixel by pixel.
+#include "scene/render/coverage.h"
+
+#include <gtest/gtest.h>
+
+#include "support/synthetic_scene.h"
+#include "scene/format/scene_packing.h"
+
+namespace {
+
+using maq::DepthKey;
+using maq::kNoPointKey;
+using maq::LookRaster;
+
+constexpr size_t kWidth = 112, kHeight = 80;
+
+void shade(LookRaster& raster, size_t count, maq::WorkerThreads& threads) {
+  const maq::Scene scene = make_scene(made_up_points(count), {});
+  const maq::PinholeCamera camera = camera_of(int(kWidth), int(kHeight), 70);
+  maq::ZBuffer buffer;
+  buffer.begin(camera, 0.01, 1);
+  for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
+  buffer.finish(0, int(kHeight));
+  const maq::ViewBasis basis(std::vector<float>(maq::ViewBasis::kWeights, 0.0f));
+  raster.shade(scene, maq::BlockIndex(scene), buffer, {0, 0, int(kWidth), int(kHeight)}, camera.centre, basis,
+               {5, true}, threads);
+}
+
+// Of the pixel (x, y) at a level, in double.
+double alpha_at(const LookRaster& raster, int level, int x, int y) {
+  const double sureness[] = {255, 255, 255, 128, 64};
+  const int width = int(kWidth) >> level, height = int(kHeight) >> level;
+  const double own = raster.keys(level)[y * width + x] == kNoPointKey ? 0 : sureness[level];
+  if (level == 4) return own;
+  const auto coarser = [&](int at_x, int at_y) {
+    return alpha_at(raster, level + 1, std::clamp(at_x, 0, width / 2 - 1), std::clamp(at_y, 0, height / 2 - 1));
+  };
+  const int in_x = x / 2, in_y = y / 2, beside_x = in_x + (x % 2 == 0 ? -1 : 1),
+            beside_y = in_y + (y % 2 == 0 ? -1 : 1);
+  return std::max(own, 0.5625 * coarser(in_x, in_y) + 0.1875 * coarser(beside_x, in_y) +
+                           0.1875 * coarser(in_x, beside_y) + 0.0625 * coarser(beside_x, beside_y));
+}
+
+TEST(Coverage, IsAsItsDefinitionSays) {
+  for (const size_t count : {1u, 40u, 3000u}) {
+    maq::WorkerThreads threads(2);
+    LookRaster raster;
+    shade(raster, count, threads);
+    maq::PictureCover cover;
+    cover.find(raster, int(kWidth), int(kHeight), true, threads);
+    for (size_t y = 0; y < kHeight; ++y) {
+      for (size_t x = 0; x < kWidth; ++x) {
+        // Each of four scales rounds.
+        ASSERT_NEAR(cover.alphas()[y * kWidth + x], alpha_at(raster, 0, int(x), int(y)), 2.01) << x << " " << y;
+        float depth = 0;
+        for (int level = 4; level >= 0; --level) {
+          const DepthKey key = raster.keys(level)[(y >> level) * (kWidth >> level) + (x >> level)];
+          if (key != kNoPointKey) depth = maq::depth_of(key);
+        }
+        ASSERT_EQ(cover.depths()[y * kWidth + x], depth);
+      }
+    }
+  }
+}
+
+TEST(Coverage, IsWholeWhereThereIsAPointAndNothingFarFromAll) {
+  maq::WorkerThreads threads(1);
+  LookRaster raster;
+  shade(raster, 1, threads);
+  maq::PictureCover cover;
+  cover.find(raster, int(kWidth), int(kHeight), false, threads);
+  size_t covered = 0, nothing = 0;
+  for (size_t i = 0; i < kWidth * kHeight; ++i) {
+    if (raster.keys(0)[i] != kNoPointKey) {
+      EXPECT_EQ(cover.alphas()[i], 255);
+      ++covered;
+    }
+    nothing += cover.alphas()[i] == 0 ? 1 : 0;
+  }
+  EXPECT_EQ(covered, 1u);
+  EXPECT_GT(nothing, kWidth * kHeight * 3 / 4);
+}
+
+}  // namespace

@@ -1,0 +1,322 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <iostream>
+
+#include "support/expect_error.h"
+#include "support/file_size_limit.h"
+#include "support/fitted_scene.h"
+#include "support/peak_memory.h"
+#include "scene/capture/ply_reader.h"
+#include "scene/format/ply_writer.h"
+#include "scene/build/scene_builder.h"
+#include "scene/format/scene_file.h"
+#include "scene/format/scene_packing.h"
+#include "scene/format/block_decoding.h"
+#include "support/temp_folder.h"
+#include "support/tiny_scene.h"
+
+namespace {
+
+using maq::Coefficients;
+using maq::Places;
+using maq::Scene;
+using maq::SceneStorage;
+
+bool are_same(const void* a, const void* b, size_t bytes) { return bytes == 0 || std::memcmp(a, b, bytes) == 0; }
+
+void expect_same(const Scene& a, const Scene& b) {
+  EXPECT_EQ(a.origin, b.origin);
+  EXPECT_EQ(a.up, b.up);
+  EXPECT_EQ(a.networks_sha256, b.networks_sha256);
+  ASSERT_EQ(a.place_kind, b.place_kind);
+  ASSERT_EQ(a.coefficient_kind, b.coefficient_kind);
+  ASSERT_EQ(a.points, b.points);
+  ASSERT_EQ(a.varying, b.varying);
+  ASSERT_EQ(a.block_count, b.block_count);
+  EXPECT_TRUE(are_same(a.blocks, b.blocks, blocks_bytes(a)));
+  EXPECT_TRUE(are_same(a.places, b.places, places_bytes(a)));
+  EXPECT_TRUE(are_same(a.means, b.means, means_bytes(a)));
+  EXPECT_TRUE(are_same(a.slopes, b.slopes, slopes_bytes(a)));
+}
+
+size_t files_in(const TempFolder& folder) {
+  return size_t(std::distance(std::filesystem::directory_iterator(folder.path()), {}));
+}
+
+TEST(SceneFiles, KeepScenesOfEveryKind) {
+  TempFolder folder;
+  const maq::ModelledPoints points = made_up_points(3'000);
+  for (const Places places : {Places::kFloat32, Places::kUint16}) {
+    for (const Coefficients kind : {Coefficients::kFloat32, Coefficients::kInt16, Coefficients::kInt8}) {
+      for (const float least : {0.0f, 0.1f, 100.0f}) {
+        Scene scene = make_scene(points, {places, kind, least});
+        for (size_t i = 0; i < 32; ++i) scene.networks_sha256[i] = uint8_t(200 + i);
+        write_scene_file(scene, folder.file("a.maqs"));
+        for (const SceneStorage storage : {SceneStorage::kMapped, SceneStorage::kMemory}) {
+          expect_same(maq::open_scene_file(folder.file("a.maqs"), storage), scene);
+        }
+      }
+    }
+  }
+  EXPECT_EQ(files_in(folder), 1u);
+}
+
+TEST(SceneFiles, ASceneOfOnePointIsOne) {
+  TempFolder folder;
+  const Scene scene = make_scene(made_up_points(1), {});
+  write_scene_file(scene, folder.file("a.maqs"));
+  expect_same(maq::open_scene_file(folder.file("a.maqs")), scene);
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "no points", [&] { write_scene_file(Scene(), folder.file("b.maqs")); });
+  EXPECT_EQ(files_in(folder), 1u);
+}
+
+TEST(SceneFiles, AnOpenSceneStaysWhenItsFileIsWrittenAnewOrRemoved) {
+  TempFolder folder;
+  const std::string path = folder.file("a.maqs");
+  const Scene first = make_scene(made_up_points(2'000, 1), {}), second = make_scene(made_up_points(500, 2), {});
+  write_scene_file(first, path);
+  const Scene opened = maq::open_scene_file(path);
+  write_scene_file(second, path);
+  expect_same(opened, first);
+  const Scene opened_second = maq::open_scene_file(path);
+  std::filesystem::remove(path);
+  expect_same(opened, first);
+  expect_same(opened_second, second);
+}
+
+TEST(SceneFiles, ASceneInMemoryStaysWhenItsFileIsCut) {
+  TempFolder folder;
+  const std::string path = folder.file("a.maqs");
+  const Scene scene = make_scene(made_up_points(2'000), {});
+  write_scene_file(scene, path);
+  const Scene opened = maq::open_scene_file(path, SceneStorage::kMemory);
+  ASSERT_EQ(truncate(path.c_str(), 10), 0);
+  expect_same(opened, scene);
+}
+
+TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
+  TempFolder folder;
+  const std::string path = folder.file("a.maqs"), ply = folder.file("a.ply");
+  const Scene small = make_scene(made_up_points(100), {}), large = make_scene(made_up_points(20'000), {});
+  write_scene_file(small, path);
+  write_scene_ply(small, ply);
+  const std::string old_ply = read_text(ply);
+  write_scene_file(large, folder.file("large.maqs"));
+  const rlim_t whole = std::filesystem::file_size(folder.file("large.maqs"));
+  std::filesystem::remove(folder.file("large.maqs"));
+  // At the head, in the blocks, the places, the looks, and at the last byte.
+  for (const rlim_t most : {rlim_t(0), rlim_t(100), rlim_t(5'000), rlim_t(20'000), rlim_t(200'000), whole - 1}) {
+    const FileSizeLimit limit(most);
+    expect_error(MAQ_ERROR_UNWRITABLE, "cannot be written", [&] { write_scene_file(large, path); });
+    if (most < 300'000) {
+      expect_error(MAQ_ERROR_UNWRITABLE, "cannot be written", [&] { write_scene_ply(large, ply); });
+    }
+  }
+  expect_same(maq::open_scene_file(path), small);
+  EXPECT_EQ(read_text(ply), old_ply);
+  EXPECT_EQ(files_in(folder), 2u);
+  write_scene_file(large, path);
+  expect_same(maq::open_scene_file(path), large);
+}
+
+TEST(SceneFiles, AProcessThatDiesWhileItWritesLeavesTheOldFile) {
+  TempFolder folder;
+  const std::string path = folder.file("a.maqs");
+  const Scene small = make_scene(made_up_points(100), {}), large = make_scene(made_up_points(20'000), {});
+  write_scene_file(small, path);
+  const pid_t child = fork();
+  if (child == 0) {
+    const FileSizeLimit limit(100'000);  // the signal ends it there
+    std::signal(SIGXFSZ, SIG_DFL);
+    try {
+      write_scene_file(large, path);
+    } catch (...) {
+    }
+    _exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(files_in(folder), 2u);  // what it had written is beside it
+  expect_same(maq::open_scene_file(path), small);
+  write_scene_file(large, path);
+  expect_same(maq::open_scene_file(path), large);
+}
+
+TEST(SceneFiles, WhereNoneCanBeWrittenIsOneSentence) {
+  TempFolder folder;
+  const Scene scene = make_scene(made_up_points(10), {});
+  std::filesystem::create_directory(folder.file("folder"));
+  expect_error(MAQ_ERROR_UNWRITABLE, "is not a file", [&] { write_scene_file(scene, folder.file("folder")); });
+  expect_error(MAQ_ERROR_UNWRITABLE, "cannot be made",
+               [&] { write_scene_file(scene, folder.file("not there/a.maqs")); });
+  expect_error(MAQ_ERROR_UNWRITABLE, "is not a file", [&] { write_scene_file(scene, "/dev/null"); });
+}
+
+TEST(SceneFiles, WhatIsNoSceneIsOneSentence) {
+  TempFolder folder;
+  const auto open = [&](const std::string& name) { maq::open_scene_file(folder.file(name)); };
+  expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { open("nothing.maqs"); });
+  expect_error(MAQ_ERROR_UNREADABLE, "is not a file", [&] { open("."); });
+  write_text(folder.file("empty"), "");
+  expect_error(MAQ_ERROR_UNREADABLE, "too short", [&] { open("empty"); });
+  write_text(folder.file("text"), std::string(5'000, 'x'));
+  expect_error(MAQ_ERROR_UNREADABLE, "is not a scene", [&] { open("text"); });
+}
+
+// Moments of `count` points of which every third was never seen.
+struct KeptState {
+  maq::ModelledPoints points = made_up_points(900);
+  std::vector<uint32_t> seen;
+  std::vector<maq::ViewMoments> moments;
+
+  KeptState() {
+    std::mt19937 random(3);
+    std::normal_distribution<float> normal;
+    for (uint32_t i = 900; i-- > 0;) {
+      if (i % 3 == 0) continue;
+      seen.push_back(i);
+      moments.push_back({});
+      for (uint32_t view = 0; view <= i % 4; ++view) {
+        float y[maq::kFeatures], h[maq::kBasis];
+        for (float& value : y) value = normal(random);
+        for (float& value : h) value = normal(random);
+        moments.back().add(y, h);
+      }
+    }
+  }
+
+  maq::ModellingStateView view() const {
+    maq::ModellingStateView state;
+    state.cloud = {points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin};
+    state.seen = seen.data();
+    state.seen_count = seen.size();
+    state.moments = [this](size_t place) -> const maq::ViewMoments& { return moments[place]; };
+    state.photos = 24;
+    return state;
+  }
+};
+
+TEST(SceneFiles, KeepTheStateOfModelling) {
+  TempFolder folder;
+  const KeptState kept;
+  const maq::ModellingStateView view = kept.view();
+  const Scene scene = make_scene(kept.points, {});
+  write_scene_file(scene, folder.file("a.maqs"), &view);
+  expect_same(maq::open_scene_file(folder.file("a.maqs")), scene);
+  const maq::ModellingState state = maq::read_modelling_state(folder.file("a.maqs"));
+  EXPECT_EQ(state.cloud.origin, kept.points.origin);
+  EXPECT_EQ(state.cloud.x, kept.points.x);
+  EXPECT_EQ(state.cloud.y, kept.points.y);
+  EXPECT_EQ(state.cloud.z, kept.points.z);
+  EXPECT_EQ(state.seen, kept.seen);
+  EXPECT_EQ(state.photos, 24u);
+  ASSERT_EQ(state.moments.size(), kept.moments.size());
+  EXPECT_EQ(std::memcmp(state.moments.data(), kept.moments.data(), kept.moments.size() * sizeof(maq::ViewMoments)), 0);
+
+  write_scene_file(scene, folder.file("a.maqs"));
+  expect_error(MAQ_ERROR_UNSUPPORTED, "state of its modelling",
+               [&] { maq::read_modelling_state(folder.file("a.maqs")); });
+}
+
+TEST(SceneFiles, APhotoCanBeAddedToASceneOfWhichOnlyTheFileIsLeft) {
+  TempFolder folder;
+  const maq::Capture capture = tiny_scene::capture();
+  const auto networks = tiny_scene::networks();
+  const auto add = [&](maq::SceneBuilder& builder, size_t view) {
+    maq::Frame photo;
+    std::vector<uint8_t> valid;
+    maq::load_view(capture.views[view], photo, valid);
+    EXPECT_GT(builder.add_view(photo.image, valid.data(), capture.views[view].camera).value(), 0u);
+  };
+  maq::SceneBuilder all(capture.cloud, capture.up, *networks, {}), first(capture.cloud, capture.up, *networks, {});
+  for (const size_t view : {0, 1, 2}) add(all, view);
+  for (const size_t view : {0, 1}) add(first, view);
+  const auto write = [&] {
+    Scene scene = make_scene(first.finish(), {});
+    scene.networks_sha256 = networks->sha256();
+    const maq::ModellingStateView state = first.state();
+    write_scene_file(scene, folder.file("a.maqs"), &state);
+  };
+  write();
+  maq::SceneBuilder second(maq::read_modelling_state(folder.file("a.maqs")), *networks, {});
+  EXPECT_EQ(second.views(), 2u);
+  EXPECT_EQ(second.finish().slopes, first.finish().slopes);
+  add(second, 2);
+  const maq::ModelledPoints a = all.finish(), b = second.finish();
+  EXPECT_EQ(a.x, b.x);
+  EXPECT_EQ(a.up, b.up);
+  EXPECT_EQ(a.means, b.means);
+  EXPECT_EQ(a.slopes, b.slopes);
+  EXPECT_EQ(a.views, b.views);
+  EXPECT_EQ(a.variations, b.variations);
+
+  maq::ModellingState other = maq::read_modelling_state(folder.file("a.maqs"));
+  other.networks_sha256[0] ^= 1;
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "other networks",
+               [&] { maq::SceneBuilder(std::move(other), *networks, {}); });
+}
+
+TEST(SceneFiles, ThePlyHasTheScenesPointsAndColours) {
+  TempFolder folder;
+  maq::ModelledPoints points = made_up_points(5'000);
+  points.means[0] = -0.5f;  // darker than black
+  points.means[1] = 7;
+  for (const bool is_far : {false, true}) {
+    if (is_far) points.origin = {4e6, -5e5, 1e7};
+    for (const Places places : {Places::kFloat32, Places::kUint16}) {
+      const Scene scene = make_scene(points, {places, Coefficients::kInt8, 0});
+      write_scene_ply(scene, folder.file("a.ply"));
+      EXPECT_EQ(
+          read_text(folder.file("a.ply")).find(is_far ? "property double x" : "property float x") != std::string::npos,
+          true);
+      maq::DropCounts drops;
+      const maq::PointCloud cloud = maq::read_ply_file(folder.file("a.ply"), points.origin, drops);
+      EXPECT_TRUE(drops.list().empty());
+      ASSERT_EQ(cloud.count(), 5'000u);
+      const float tolerance = is_far ? 1e-6f : 1e-5f;
+      for (uint32_t b = 0; b < scene.block_count; ++b) {
+        const maq::SceneBlock& block = scene.blocks[b];
+        const maq::ModelledPoints part = unpack_block(scene, block);
+        for (uint32_t k = 0; k < block.count; ++k) {
+          const size_t i = block.first + k;
+          ASSERT_NEAR(cloud.x[i], part.x[k], tolerance);
+          ASSERT_NEAR(cloud.y[i], part.y[k], tolerance);
+          ASSERT_NEAR(cloud.z[i], part.z[k], tolerance);
+          for (size_t c = 0; c < 3; ++c) {
+            const float wanted = 255 * std::clamp(part.means[k * size_t(maq::kFeatures) + c], 0.0f, 1.0f);
+            ASSERT_NEAR(cloud.rgb[3 * i + c], wanted, 0.501f);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(SceneFiles, AMillionPointsAreOpenedWithoutBeingCopied) {
+  TempFolder folder;
+  const std::string path = folder.file("a.maqs");
+  write_scene_file(make_scene(made_up_points(1'000'000), {}), path);
+  const double file_mib = double(std::filesystem::file_size(path)) / 1048576;
+  for (const SceneStorage storage : {SceneStorage::kMapped, SceneStorage::kMemory}) {
+    const bool is_mapped = storage == SceneStorage::kMapped;
+    double seconds = 0;
+    const double grown_mib = peak_memory_growth_mib([&] {
+      const auto begin = std::chrono::steady_clock::now();
+      const Scene scene = maq::open_scene_file(path, storage);
+      seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      EXPECT_EQ(scene.points, 1'000'000u);
+    });
+    std::cout << (is_mapped ? "mapped" : "in memory") << ": " << file_mib << " MiB opened in " << 1e3 * seconds
+              << " ms, " << grown_mib << " MiB\n";
+    EXPECT_LT(grown_mib, is_mapped ? 8 : file_mib + 8);
+  }
+}
+
+}  // namespace

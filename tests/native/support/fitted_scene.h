@@ -1,0 +1,37 @@
+// Points with looks, made up: a ball over a floor, smooth colours, slopes of which many are small.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+
+#include "scene/format/fitted_points.h"
+#include "scene/format/scene_layout.h"
+
+inline maq::ModelledPoints made_up_points(size_t count, uint32_t seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal;
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  maq::ModelledPoints points;
+  points.origin = {12.5, -3, 100};
+  points.up = {0, 0, 1};
+  for (size_t i = 0; i < count; ++i) {
+    float at[3] = {uniform(random), uniform(random), -1};
+    if (i % 2 == 0) {
+      for (float& value : at) value = normal(random);
+      const float length = std::sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]) + 1e-6f;
+      for (float& value : at) value /= length;
+    }
+    points.x.push_back(at[0]);
+    points.y.push_back(at[1]);
+    points.z.push_back(at[2]);
+    for (int c = 0; c < maq::kFeatures; ++c) {
+      points.means.push_back(0.5f + 0.3f * std::sin(3 * at[c % 3] + float(c)) + 0.02f * normal(random));
+    }
+    const float strength = 0.02f * std::abs(normal(random));
+    for (size_t k = 0; k < maq::kSlopes; ++k) points.slopes.push_back(strength * normal(random));
+    points.variations.push_back(7 * strength);  // about as long as all its slopes together
+    points.views.push_back(uint32_t(1 + i % 9));
+  }
+  return points;
+}

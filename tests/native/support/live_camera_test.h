@@ -1,0 +1,89 @@
+// A live source on a driver in memory.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "support/expect_error.h"
+#include "support/fake_v4l2.h"
+#include "support/source_threads.h"
+#include "sources/live_source.h"
+#include "sources/v4l2/v4l2_camera.h"
+
+using namespace std::chrono_literals;
+using maq::NextFrame;
+constexpr int64_t kSecond = 1000000000;
+
+// What was reported, in order.
+class Reports {
+ public:
+  static void note(void* self, maq_source_state state, const char*) {
+    auto* reports = static_cast<Reports*>(self);
+    std::lock_guard<std::mutex> lock(reports->mutex_);
+    reports->states_.push_back(state);
+  }
+  std::vector<maq_source_state> states() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return states_;
+  }
+  bool wait_for(maq_source_state state) const {
+    for (int i = 0; i < 500; ++i) {
+      const auto all = states();
+      if (std::find(all.begin(), all.end(), state) != all.end()) return true;
+      std::this_thread::sleep_for(10ms);
+    }
+    return false;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<maq_source_state> states_;
+};
+
+class LiveCameraTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<maq::Camera> camera(const maq::CameraWish& wish = {}) {
+    return maq::open_v4l2_camera(fake_, "/dev/video0", wish, 4);
+  }
+  maq::SourceSettings settings() {
+    maq::SourceSettings settings;
+    settings.on_state = Reports::note;
+    settings.user_data = &reports_;
+    return settings;
+  }
+  std::unique_ptr<maq::LiveSource> source(const maq::SourceSettings& settings, const maq::CameraWish& wish = {},
+                                          const std::vector<maq::ControlSetting>& controls = {}) {
+    const auto open = [this, wish] { return maq::open_v4l2_camera(fake_, "/dev/video0", wish, 6); };
+    return std::make_unique<maq::LiveSource>(open, "/dev/video0", settings, controls);
+  }
+  void TearDown() override { wait_until_closed(fake_); }
+
+  // On a busy machine a source's thread may need longer to end than its source waits.
+  static void wait_until_closed(const FakeV4l2& fake) {
+    for (int i = 0; i < 500 && fake.mappings() > 0; ++i) std::this_thread::sleep_for(10ms);
+    EXPECT_EQ(fake.open_files(), 0);
+    EXPECT_EQ(fake.mappings(), 0);
+    EXPECT_EQ(fake.exported(), 0u);
+  }
+  void expect_nothing_left() {
+    EXPECT_EQ(fake_.open_files(), 0);
+    EXPECT_EQ(fake_.mappings(), 0);
+    EXPECT_EQ(fake_.exported(), 0u);
+  }
+
+  // The next frame, which must come.
+  maq::Frame next(maq::LiveSource& live) {
+    maq::Frame frame;
+    EXPECT_EQ(live.next(5 * kSecond, frame), NextFrame::kFrame);
+    return frame;
+  }
+
+  FakeV4l2 fake_;
+  Reports reports_;
+};

@@ -1,0 +1,38 @@
+"""What the README shows is what is tested."""
+
+import re
+from pathlib import Path
+
+README = Path("README.md").read_text()
+
+
+def test_the_c_program_is_the_one_that_the_native_tests_build_against_an_installed_sdk():
+    program = Path("tests/consumers/people.c").read_text()
+    assert f"```c\n{program}```" in README
+    assert len(program.splitlines()) <= 30
+
+
+def test_every_file_that_it_links_to_is_there():
+    targets = re.findall(r"\]\(([^)#]+)\)", README)
+    assert [target for target in targets if not Path(target).exists()] == []
+
+
+def test_every_make_target_that_it_names_exists():
+    makefile = Path("Makefile").read_text()
+    for target in re.findall(r"make ([a-z][a-z-]*)", README):
+        assert f"\n{target}:" in makefile, target
+
+
+def test_every_native_test_that_the_list_of_extreme_cases_names_exists():
+    listed = Path("tests/native/README.md").read_text().split("## Extreme cases")[1]
+    tests = {
+        (suite, name)
+        for path in Path("tests/native").glob("*/test_*.cpp")
+        for suite, name in re.findall(r"^TEST(?:_F)?\((\w+), (\w+)\)", path.read_text(), re.MULTILINE)
+    }
+    named, suite = [], ""
+    for written_suite, name in re.findall(r"`(\w*)\.([A-Z]\w+)`", listed):
+        suite = written_suite or suite  # `.Name` is of the suite before it
+        named.append((suite, name))
+    assert len(named) > 20
+    assert [test for test in named if test not in tests] == []

@@ -28,10 +28,9 @@ from rich.table import Table
 from tqdm import tqdm
 
 from export.densepose import bundle as bundle_format
-from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.maquette_api import MaquetteError
-from export.evaluation.shards import ShardError
+from export.shards import load_records
 from quantization import agreement, qdq
 from quantization.activations import Activations
 from quantization.errors import output_sqnr
@@ -226,7 +225,7 @@ def main(argv: list[str] | None = None) -> int:
     onnxruntime.set_default_logger_severity(3)
     try:
         return run(arguments)
-    except (MaquetteError, ShardError, FileNotFoundError, ValueError) as error:
+    except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Nothing was chosen: {error}", file=sys.stderr)
         return 1
 
@@ -234,11 +233,11 @@ def main(argv: list[str] | None = None) -> int:
 def workpieces(arguments: argparse.Namespace, source: Bundle, folder: Path) -> dict[str, Workpiece]:
     """Prepared and calibrated graphs of the bundle, written to `folder`."""
     settings = read_settings(arguments.settings)
-    records = spread(data.load_records(arguments.data), settings.calibration_images)
+    records = spread(load_records(arguments.data), settings.calibration_images)
     if arguments.photos:
-        records += spread(data.load_records(arguments.photos), settings.calibration_photos)
+        records += spread(load_records(arguments.photos), settings.calibration_photos)
     calibration = collect(source, records, settings.people_per_image)
-    held_out = collect(source, spread(data.load_records(arguments.held_out), arguments.samples), 4)
+    held_out = collect(source, spread(load_records(arguments.held_out), arguments.samples), 4)
     pieces = {}
     for name, graph_settings in tqdm(settings.graphs.items(), desc="calibrating", unit="graph", disable=None):
         path = folder / f"{name}.onnx"

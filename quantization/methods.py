@@ -19,9 +19,9 @@ import onnxruntime
 from rich.console import Console
 from rich.table import Table
 
-from export.densepose import data
 from export.densepose.bundle import GRAPHS
 from export.densepose.graphs import open_bundle
+from export.shards import load_records
 from quantization import agreement
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     source, settings = open_bundle(arguments.bundle), read_settings(arguments.settings)
     document = json.loads(arguments.json.read_text())
     sets = [
-        collect(source, spread(data.load_records(folder), count), settings.people_per_image)
+        collect(source, spread(load_records(folder), count), settings.people_per_image)
         for folder, count in ((arguments.data, arguments.calibration), (arguments.held_out, arguments.images))
     ]
     table = Table(title=f"outputs, dB; {arguments.calibration} calibration images", title_justify="left")

@@ -23,8 +23,8 @@ from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
 from onnxruntime.quantization.registry import QDQRegistry, QLinearOpsRegistry
 
 from export.densepose import bundle as bundle_format
-from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
+from export.shards import Record, load_records
 from quantization.bias_correction import correct_biases
 from quantization.errors import float_nodes_left, output_sqnr
 from quantization.prepare import prepare
@@ -153,13 +153,13 @@ def matching_nodes(graph: onnx.GraphProto, patterns: tuple[str, ...]) -> list[st
     return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
-def spread(records: list[data.Record], count: int) -> list[data.Record]:
+def spread(records: list[Record], count: int) -> list[Record]:
     """At most `count` records, evenly over the shards (a shard holds one orientation)."""
     return records[:: max(1, len(records) // count)][:count]
 
 
 def quantise_bundle(
-    source: Bundle, target: Path, settings: Settings, records: list[data.Record], held_out: list[data.Record]
+    source: Bundle, target: Path, settings: Settings, records: list[Record], held_out: list[Record]
 ) -> dict[str, dict[str, float]]:
     """Quantises the graphs of `source` into the folder `target`; chart weights stay float. Returns each output's SQNR
     in dB."""
@@ -191,10 +191,10 @@ def main() -> None:
     options = parser.parse_args()
     settings = read_settings(options.settings)
     source = open_bundle(options.bundle)
-    records = spread(data.load_records(options.data), settings.calibration_images)
+    records = spread(load_records(options.data), settings.calibration_images)
     if options.photos:
-        records += spread(data.load_records(options.photos), settings.calibration_photos)
-    held_out = spread(data.load_records(options.held_out), settings.held_out_images)
+        records += spread(load_records(options.photos), settings.calibration_photos)
+    held_out = spread(load_records(options.held_out), settings.held_out_images)
     quality = quantise_bundle(source, options.out, settings, records, held_out)
     info = bundle_format.BundleInfo(
         name=options.name or options.out.name,

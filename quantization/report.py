@@ -19,11 +19,11 @@ import onnxruntime
 from rich.console import Console
 from rich.table import Table
 
-from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.backends import fingerprint
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
+from export.shards import load_records
 from quantization import agreement, check
 from quantization.comparison import TensorError, activation_errors, weight_errors, worst_first
 from quantization.errors import float_nodes_left
@@ -187,7 +187,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _write(arguments: argparse.Namespace, paths: tuple[Path, Path, Path], console: Console) -> int:
     source = open_bundle(arguments.reference)
-    samples = collect(source, spread(data.load_records(arguments.data), arguments.images), 4)
+    samples = collect(source, spread(load_records(arguments.data), arguments.images), 4)
     with tempfile.TemporaryDirectory() as folder:
         reference = check.prepared_graphs(source.folder, Path(folder))
         found = document(source, arguments.int8, samples, reference)

@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.people.dataset import visible_boxes
 from export.people.scene import SPLITS, Studio
+from export.shards import visible_boxes
 
 
 def part_colours() -> np.ndarray:

@@ -17,7 +17,7 @@ import onnx
 
 from export.densepose import bundle as bundle_format
 from export.densepose.config import DecodeConfig
-from export.densepose.data import Record
+from export.shards import Record
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.sheet import clip_frames
 from quantization.comparison import TensorError, pair_errors, weight_errors

@@ -26,15 +26,8 @@ def shards(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def short_pictures(monkeypatch):
+def short_pictures(monkeypatch, one_thread, signal_handlers):
     monkeypatch.setattr(train, "STAGES", (train.Stage(0.0, 96),))
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    handlers = {name: signal.getsignal(name) for name in (signal.SIGTERM, signal.SIGINT)}
-    yield
-    torch.set_num_threads(threads)
-    for name, handler in handlers.items():
-        signal.signal(name, handler)
 
 
 def run(monkeypatch, shards, out, *options, stop_after=None) -> list[float]:

@@ -15,7 +15,7 @@ from quantization.settings import GraphSettings, read_settings
 from quantization.simplify import drop_unused_constants, fold_scalar_products, share_scales
 
 WIDTH = 16
-torch.set_num_threads(1)  # the graphs are small
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 @pytest.fixture(scope="module")

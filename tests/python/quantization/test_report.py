@@ -20,7 +20,7 @@ from quantization.quantize import quantise_graph
 from quantization.saturation import bound, columns, count, layers, saturation
 from quantization.settings import GraphSettings
 
-torch.set_num_threads(1)
+pytestmark = pytest.mark.usefixtures("one_thread")
 SHIPPED = report.agreement.INT8_BUNDLE
 RNG = np.random.default_rng(0)
 

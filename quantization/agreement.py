@@ -34,7 +34,7 @@ FLOAT_BUNDLE, INT8_BUNDLE = DEFAULT_PATHS["onnx"], DEFAULT_PATHS["capi"]
 EPILOG = """\
 examples:
   python -m quantization.agreement
-  python -m quantization.agreement --images .data/photos/val --int8 build/quantised
+  python -m quantization.agreement --images .data/photos/val --int8 build/quantized
   python -m quantization.agreement --images tests/media/clip.mp4 --backend onnx
   python -m quantization.agreement --in-float trunk       what would be left if the trunk were not int8?
 

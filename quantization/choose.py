@@ -35,7 +35,7 @@ from quantization import agreement, qdq
 from quantization.activations import Activations
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import calibrate, correct, quantise_prepared, spread
+from quantization.quantize import calibrate, correct, quantize_prepared, spread
 from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, read_settings
 
@@ -44,7 +44,7 @@ EPILOG = """\
 examples:
   python -m quantization.choose --out build/chosen.toml
   python -m quantization.choose --graphs trunk dense_head --budget 3.2 --out quantization/densepose.toml
-  python -m quantization.quantize --settings build/chosen.toml --out build/quantised
+  python -m quantization.quantize --settings build/chosen.toml --out build/quantized
 The exit status is 1 when the budget is spent before the gate holds; the settings are written all the same.
 """
 
@@ -79,9 +79,9 @@ class Workpiece:
     calibration: list[Sample]
     held_out: list[Sample]
 
-    def quantise(self, target: Path, extra: tuple[str, ...] = ()) -> None:
+    def quantize(self, target: Path, extra: tuple[str, ...] = ()) -> None:
         settings = replace(self.settings, float_nodes=self.settings.float_nodes + extra)
-        quantise_prepared(self.path, target, self.ranges, settings)
+        quantize_prepared(self.path, target, self.ranges, settings)
         correct(self.path, target, self.calibration, settings)
 
 
@@ -124,11 +124,11 @@ def candidates(piece: Workpiece) -> list[Candidate]:
     found = []
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "tried.onnx"
-        piece.quantise(target)
+        piece.quantize(target)
         before, size = output_sqnr(piece.path, target, piece.held_out), target.stat().st_size
         patterns = blocks(onnx.load(piece.path).graph, piece.settings.float_nodes)
         for pattern in tqdm(patterns, desc=f"blocks of {piece.name}", unit="block", leave=False, disable=None):
-            piece.quantise(target, (pattern,))
+            piece.quantize(target, (pattern,))
             after = output_sqnr(piece.path, target, piece.held_out)
             found.append(
                 Candidate(
@@ -261,7 +261,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         def made(taken: list[Candidate]) -> Path:
             def graph(name: str, path: Path) -> None:
-                pieces[name].quantise(path, tuple(c.pattern for c in taken if c.graph == name))
+                pieces[name].quantize(path, tuple(c.pattern for c in taken if c.graph == name))
 
             return write_bundle(Path(folder) / "bundle", source, graph)
 

@@ -43,7 +43,7 @@ def test_the_gated_refiner_has_the_papers_parameters_and_multiply_adds():
 
 def test_extractor_and_light_refiner_fit_into_the_bundle():
     networks = Networks(SceneConfig())
-    # One byte a weight when quantised; the bundle should stay below two megabytes.
+    # One byte a weight when quantized; the bundle should stay below two megabytes.
     assert parameters(networks.extractor) + parameters(networks.refiner) < 2_000_000
 
 

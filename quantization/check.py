@@ -17,9 +17,9 @@ import onnx
 
 from export.densepose import bundle as bundle_format
 from export.densepose.config import DecodeConfig
-from export.shards import Record
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.sheet import clip_frames
+from export.shards import Record
 from quantization.comparison import TensorError, pair_errors, weight_errors
 from quantization.prepare import prepare
 from quantization.samples import Sample, collect

@@ -1,6 +1,7 @@
 """Renders shards of labelled people.
 
     python -m export.people.dataset --split train --images 12000 --processes 2
+    python -m export.people.dataset --variety wide --out .data/people-wide    # 640 x 512: small, tilted, crowded
 
 A shard is a function of (split, shard number) alone, so several machines can render one set with
 `--first-shard`. Format: docs/formats.md. Splits share no body, motion clip, fabric or photo.
@@ -19,9 +20,8 @@ import numpy as np
 from tqdm import tqdm
 
 from export.people.scene import SPLITS, Studio
+from export.people.variety import VARIETIES
 
-VERSION = "people-4"
-SIZES = ((320, 256), (320, 256), (256, 320))  # landscape, landscape, portrait, by shard number
 POINT_RANGE = np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 2.1]], np.float32)
 MIN_PIXELS, MIN_SIDE_PX = 64, 12  # smaller people are marked "ignore"
 # Instance numbers of photographs: from BOX_ALONE on people of whom only the box is known, from UNCERTAIN on regions in
@@ -86,7 +86,7 @@ def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
         "box_image": np.concatenate(owners),
         "box_instance": np.concatenate(instances),
         "box_ignore": np.concatenate(ignored),
-        "meta": np.array(json.dumps({"split": studio.split, "shard": number, "generator": VERSION})),
+        "meta": np.array(json.dumps({"split": studio.split, "shard": number, "generator": studio.variety.generator})),
     }
     for name, store in stores.items():
         if store.parts:
@@ -101,11 +101,12 @@ def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
 _studios: dict[tuple[int, int], Studio] = {}
 
 
-def _work(job: tuple[str, int, int, Path, Path, bool]) -> int:
-    split, number, images, out, places, bare = job
-    size = SIZES[number % len(SIZES)]
+def _work(job: tuple[str, int, int, Path, Path, bool, str]) -> int:
+    split, number, images, out, places, bare, variety_name = job
+    variety = VARIETIES[variety_name]
+    size = variety.sizes[number % len(variety.sizes)]
     if size not in _studios:
-        _studios[size] = Studio(split, *size, places, points=split != "train", bare=bare)
+        _studios[size] = Studio(split, *size, places, points=split != "train", bare=bare, variety=variety)
     render_shard(_studios[size], number, images, out / f"shard-{number:05d}.npz")
     return images
 
@@ -119,12 +120,17 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path(".data/people"))
     parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
+    parser.add_argument(
+        "--variety", choices=VARIETIES, default="close",
+        help="close: 320 x 256, mostly upright; wide: 640 x 512, small, tilted, crowded people (default %(default)s)",
+    )  # fmt: skip
     parser.add_argument("--bare", action="store_true", help="nobody wears clothes (export.evaluation.ablation)")
     options = parser.parse_args()
     out = options.out / options.split
     out.mkdir(parents=True, exist_ok=True)
     shards = range(options.first_shard, options.first_shard + -(-options.images // options.per_shard))
-    jobs = [(options.split, n, options.per_shard, out, options.places, options.bare) for n in shards]
+    common = (options.places, options.bare, options.variety)
+    jobs = [(options.split, n, options.per_shard, out, *common) for n in shards]
     jobs = [job for job in jobs if not (out / f"shard-{job[1]:05d}.npz").exists()]
     cv2.setNumThreads(1)
     pool = multiprocessing.get_context("spawn").Pool(options.processes)

@@ -21,7 +21,8 @@ import numpy as np
 from tqdm import tqdm
 
 from export import surface
-from export.people.dataset import BOX_ALONE, SIZES, UNCERTAIN, EncodedImages, visible_boxes
+from export.people.dataset import BOX_ALONE, UNCERTAIN, EncodedImages, visible_boxes
+from export.people.variety import CLOSE
 from export.teachers.coarse import SOMEWHERE, coarse_labels
 from export.teachers.fit import PhotoFits
 from export.teachers.label import PhotoLabels
@@ -245,7 +246,7 @@ def main(argv: list[str] | None = None) -> int:
     rng.shuffle(pictures)  # so that every shard holds both kinds
     count = arguments.composed if people and empty else 0
     more = (
-        composed(empty[rng.integers(len(empty))][0], people, SIZES[rng.integers(len(SIZES))], rng)
+        composed(empty[rng.integers(len(empty))][0], people, CLOSE.sizes[rng.integers(len(CLOSE.sizes))], rng)
         for _ in range(count)
     )  # fmt: skip
     write_shards(itertools.chain(pictures, more), len(pictures) + count, arguments.out)

@@ -41,7 +41,6 @@ POSSIBLE_PARTS[UNSURE] = True
 # which there may be people or not ("ignore").
 BOX_ALONE, UNCERTAIN = 128, 192
 
-SIZES = ((320, 256), (320, 256), (256, 320))  # of rendered images, width and height, by shard number
 MIN_PIXELS, MIN_SIDE_PX = 64, 12  # smaller people are marked "ignore"
 POINT_RANGE = np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 2.1]], np.float32)  # of stored surface points, metres
 

@@ -1,6 +1,7 @@
 """Renders shards of labelled people.
 
     python -m export.people.dataset --split train --images 12000 --processes 2
+    python -m export.people.dataset --variety wide --out .data/people-wide    # 640 x 512: small, tilted, crowded
 
 A shard is a function of (split, shard number) alone, so several machines can render one set with
 `--first-shard`. Format: docs/formats.md. Splits share no body, motion clip, fabric or photo.
@@ -18,9 +19,8 @@ import numpy as np
 from tqdm import tqdm
 
 from export.people.scene import SPLITS, Studio
-from export.shards import SIZES, ShardWriter
-
-VERSION = "people-4"
+from export.people.variety import VARIETIES
+from export.shards import ShardWriter
 
 
 def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
@@ -30,17 +30,18 @@ def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
         rng = np.random.default_rng([SPLITS[studio.split], 7, number, k])
         sample = studio.sample(rng)
         shard.add(sample.image, sample.label, int(rng.integers(55, 96)), sample.point)
-    shard.write(path, {"split": studio.split, "shard": number, "generator": VERSION})
+    shard.write(path, {"split": studio.split, "shard": number, "generator": studio.variety.generator})
 
 
 _studios: dict[tuple[int, int], Studio] = {}
 
 
-def _work(job: tuple[str, int, int, Path, Path, bool]) -> int:
-    split, number, images, out, places, bare = job
-    size = SIZES[number % len(SIZES)]
+def _work(job: tuple[str, int, int, Path, Path, bool, str]) -> int:
+    split, number, images, out, places, bare, variety_name = job
+    variety = VARIETIES[variety_name]
+    size = variety.sizes[number % len(variety.sizes)]
     if size not in _studios:
-        _studios[size] = Studio(split, *size, places, points=split != "train", bare=bare)
+        _studios[size] = Studio(split, *size, places, points=split != "train", bare=bare, variety=variety)
     render_shard(_studios[size], number, images, out / f"shard-{number:05d}.npz")
     return images
 
@@ -54,12 +55,17 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path(".data/people"))
     parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
+    parser.add_argument(
+        "--variety", choices=VARIETIES, default="close",
+        help="close: 320 x 256, mostly upright; wide: 640 x 512, small, tilted, crowded people (default %(default)s)",
+    )  # fmt: skip
     parser.add_argument("--bare", action="store_true", help="nobody wears clothes (export.evaluation.ablation)")
     options = parser.parse_args()
     out = options.out / options.split
     out.mkdir(parents=True, exist_ok=True)
     shards = range(options.first_shard, options.first_shard + -(-options.images // options.per_shard))
-    jobs = [(options.split, n, options.per_shard, out, options.places, options.bare) for n in shards]
+    common = (options.places, options.bare, options.variety)
+    jobs = [(options.split, n, options.per_shard, out, *common) for n in shards]
     jobs = [job for job in jobs if not (out / f"shard-{job[1]:05d}.npz").exists()]
     cv2.setNumThreads(1)
     pool = multiprocessing.get_context("spawn").Pool(options.processes)

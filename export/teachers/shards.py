@@ -19,7 +19,8 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.shards import BOX_ALONE, PERSON, REGION, SIZES, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
+from export.people.variety import CLOSE
+from export.shards import BOX_ALONE, PERSON, REGION, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
 from export.surface import PART_COUNT
 from export.teachers.coarse import SOMEWHERE, coarse_labels
 from export.teachers.fit import PhotoFits
@@ -239,7 +240,7 @@ def main(argv: list[str] | None = None) -> int:
     rng.shuffle(pictures)  # so that every shard holds both kinds
     count = arguments.composed if people and empty else 0
     more = (
-        composed(empty[rng.integers(len(empty))][0], people, SIZES[rng.integers(len(SIZES))], rng)
+        composed(empty[rng.integers(len(empty))][0], people, CLOSE.sizes[rng.integers(len(CLOSE.sizes))], rng)
         for _ in range(count)
     )  # fmt: skip
     write_shards(itertools.chain(pictures, more), len(pictures) + count, arguments.out)

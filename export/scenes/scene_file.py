@@ -92,11 +92,11 @@ class SceneFile:
     def positions(self) -> np.ndarray:
         """Where the points are in the world, float64 [P, 3]."""
         found = np.empty((len(self.means), 3), np.float32)
-        quantised = self.head["place_kind"] == 1
+        quantized = self.head["place_kind"] == 1
         for block in self.blocks:
             first, count = int(block["first"]), int(block["count"])
             stored = self.places[3 * first : 3 * (first + count)].reshape(3, count).T.astype(np.float32)
-            found[first : first + count] = block["low"] + stored * block["place_step"] if quantised else stored
+            found[first : first + count] = block["low"] + stored * block["place_step"] if quantized else stored
         return found + self.head["origin"]
 
     def background(self) -> np.ndarray:

@@ -27,14 +27,7 @@ from export.scenes.scene_file import HEAD, SceneFileError, read_scene_file, writ
 from export.scenes.system import Networks, load_networks, save_networks
 from export.scenes.tuning import Rates, TunedScene, Tuning
 
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 
 
 @pytest.fixture(scope="module")

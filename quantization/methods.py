@@ -1,7 +1,7 @@
 """Which ranges and which corrections suit which graph: signal to noise of its outputs for each.
 
 Everything is calibrated on the same few training images and measured on held-out ones; what stays float is as in the
-settings. Writes the rows into docs/quantisation.json; `python -m quantization.report` puts them into the page.
+settings. Writes the rows into docs/quantization.json; `python -m quantization.report` puts them into the page.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ import onnxruntime
 from rich.console import Console
 from rich.table import Table
 
-from export.densepose import data
 from export.densepose.bundle import GRAPHS
 from export.densepose.graphs import open_bundle
+from export.shards import load_records
 from quantization import agreement
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import calibrate, correct, quantise_prepared, spread
+from quantization.quantize import calibrate, correct, quantize_prepared, spread
 from quantization.report import JSON, compact
 from quantization.samples import Sample, collect
 from quantization.settings import GraphSettings, read_settings
@@ -64,7 +64,7 @@ def compare(
             key = (variant.method, variant.percentile)
             if key not in known:
                 known[key] = calibrate(prepared, calibration, variant)
-            quantise_prepared(prepared, target, known[key], variant)
+            quantize_prepared(prepared, target, known[key], variant)
             correct(prepared, target, calibration, variant)
             values = list(output_sqnr(prepared, target, held_out).values())
             yield {
@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     source, settings = open_bundle(arguments.bundle), read_settings(arguments.settings)
     document = json.loads(arguments.json.read_text())
     sets = [
-        collect(source, spread(data.load_records(folder), count), settings.people_per_image)
+        collect(source, spread(load_records(folder), count), settings.people_per_image)
         for folder, count in ((arguments.data, arguments.calibration), (arguments.held_out, arguments.images))
     ]
     table = Table(title=f"outputs, dB; {arguments.calibration} calibration images", title_justify="left")

@@ -23,8 +23,8 @@ from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
 from onnxruntime.quantization.registry import QDQRegistry, QLinearOpsRegistry
 
 from export.densepose import bundle as bundle_format
-from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
+from export.shards import Record, load_records
 from quantization.bias_correction import correct_biases
 from quantization.errors import float_nodes_left, output_sqnr
 from quantization.prepare import prepare
@@ -53,19 +53,19 @@ class Samples(CalibrationDataReader):
         return next(self._left, None)
 
 
-def quantise_graph(source: Path, target: Path, samples: list[Sample], settings: GraphSettings) -> None:
+def quantize_graph(source: Path, target: Path, samples: list[Sample], settings: GraphSettings) -> None:
     """Writes the int8 form (QDQ) of one graph. Raises ValueError for a pattern that matches nothing."""
     if not samples:
         raise ValueError(f"nothing to calibrate {source.name} with: the bundle finds nobody in the images")
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
         prepare(source, prepared)
-        quantise_prepared(prepared, target, calibrate(prepared, samples, settings), settings)
+        quantize_prepared(prepared, target, calibrate(prepared, samples, settings), settings)
         correct(prepared, target, samples, settings)
 
 
 def correct(prepared: Path, target: Path, samples: list[Sample], settings: GraphSettings) -> None:
-    """What makes the integers of a quantised graph better once scales are fixed."""
+    """What makes the integers of a quantized graph better once scales are fixed."""
     if settings.round_together:
         round_together(prepared, target, samples, SEVEN_BITS if settings.reduce_range else EIGHT_BITS)
     if settings.bias_correction:
@@ -91,7 +91,7 @@ def calibrate(prepared: Path, samples: list[Sample], settings: GraphSettings) ->
         return calibrator.compute_data()
 
 
-def quantise_prepared(prepared: Path, target: Path, ranges: TensorsData, settings: GraphSettings) -> None:
+def quantize_prepared(prepared: Path, target: Path, ranges: TensorsData, settings: GraphSettings) -> None:
     """Writes the int8 form of a prepared graph with known ranges: `quantize_static` without its calibration, so that
     many choices of what stays float can be tried at the cost of one calibration."""
     model = onnx.load(prepared)
@@ -153,15 +153,15 @@ def matching_nodes(graph: onnx.GraphProto, patterns: tuple[str, ...]) -> list[st
     return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
-def spread(records: list[data.Record], count: int) -> list[data.Record]:
+def spread(records: list[Record], count: int) -> list[Record]:
     """At most `count` records, evenly over the shards (a shard holds one orientation)."""
     return records[:: max(1, len(records) // count)][:count]
 
 
-def quantise_bundle(
-    source: Bundle, target: Path, settings: Settings, records: list[data.Record], held_out: list[data.Record]
+def quantize_bundle(
+    source: Bundle, target: Path, settings: Settings, records: list[Record], held_out: list[Record]
 ) -> dict[str, dict[str, float]]:
-    """Quantises the graphs of `source` into the folder `target`; chart weights stay float. Returns each output's SQNR
+    """Quantizes the graphs of `source` into the folder `target`; chart weights stay float. Returns each output's SQNR
     in dB."""
     target.mkdir(parents=True, exist_ok=True)
     shutil.copy(source.folder / bundle_format.CHARTS, target)
@@ -170,7 +170,7 @@ def quantise_bundle(
     quality = {}
     for name, graph_settings in settings.graphs.items():
         paths = source.folder / f"{name}.onnx", target / f"{name}.onnx"
-        quantise_graph(*paths, calibration[name], graph_settings)
+        quantize_graph(*paths, calibration[name], graph_settings)
         quality[name] = output_sqnr(*paths, test[name])
         sizes = [path.stat().st_size / 1e6 for path in paths]
         print(f"{name}: {sizes[0]:.2f} -> {sizes[1]:.2f} MB, {len(calibration[name])} samples")
@@ -191,11 +191,11 @@ def main() -> None:
     options = parser.parse_args()
     settings = read_settings(options.settings)
     source = open_bundle(options.bundle)
-    records = spread(data.load_records(options.data), settings.calibration_images)
+    records = spread(load_records(options.data), settings.calibration_images)
     if options.photos:
-        records += spread(data.load_records(options.photos), settings.calibration_photos)
-    held_out = spread(data.load_records(options.held_out), settings.held_out_images)
-    quality = quantise_bundle(source, options.out, settings, records, held_out)
+        records += spread(load_records(options.photos), settings.calibration_photos)
+    held_out = spread(load_records(options.held_out), settings.held_out_images)
+    quality = quantize_bundle(source, options.out, settings, records, held_out)
     info = bundle_format.BundleInfo(
         name=options.name or options.out.name,
         precision="int8",

@@ -7,9 +7,9 @@ from tqdm import tqdm
 
 from export.densepose import targets as tg
 from export.densepose.bundle import GRAPHS
-from export.densepose.data import Record
 from export.densepose.decode import detect
 from export.densepose.graphs import Bundle
+from export.shards import Record
 
 # Proposals are many and mostly background; so many of each image are enough to see what the box head sees.
 PROPOSALS = 32

@@ -34,7 +34,7 @@ from export.scenes.modelling import Options, gathered, modelled, render
 from export.scenes.picture_quality import psnr_db
 from export.scenes.source_views import scores
 from quantization.errors import float_nodes_left, output_sqnr
-from quantization.quantize import quantise_graph
+from quantization.quantize import quantize_graph
 from quantization.samples import Sample
 from quantization.settings import GraphSettings, graph_settings
 
@@ -182,7 +182,7 @@ def main() -> None:
     quality = {}
     for name in GRAPHS:
         paths = options.fp32 / f"{name}.onnx", options.out / f"{name}.onnx"
-        quantise_graph(*paths, calibration[name], settings.graphs[name])
+        quantize_graph(*paths, calibration[name], settings.graphs[name])
         quality[name] = output_sqnr(*paths, test[name])
         sizes = [path.stat().st_size / 1e6 for path in paths]
         print(f"{name}: {sizes[0]:.2f} -> {sizes[1]:.2f} MB, {len(calibration[name])} samples")

@@ -1,4 +1,4 @@
-"""The settings of a quantisation, read from a TOML file such as `quantization/densepose.toml`."""
+"""The settings of a quantization, read from a TOML file such as `quantization/densepose.toml`."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from export.scenes.export_onnx import export_refiner
 from export.scenes.light_refiner import LightRefiner, folded
 from export.scenes.tuning import Shown, TunedScene
 from quantization import scenes as quantization
-from quantization.quantize import quantise_graph
+from quantization.quantize import quantize_graph
 from quantization.samples import Sample
 
 SETTINGS = Path(quantization.__file__).with_name("scenes.toml")
@@ -35,7 +35,7 @@ def write_tuned_bundle(scene: TunedScene, views: list[Shown], shipped: Path, fol
             scene.networks.refiner.to(scene.places.device)
             samples = [_sample(scene, view) for view in views[:: -(-len(views) // MOST_VIEWS)]]
             settings = quantization.read_settings(SETTINGS).graphs["refiner"]
-            quantise_graph(Path(work) / "refiner.onnx", folder / "refiner.onnx", samples, settings)
+            quantize_graph(Path(work) / "refiner.onnx", folder / "refiner.onnx", samples, settings)
     else:
         export_refiner(scene.networks.refiner.cpu(), folder / "refiner.onnx")
         scene.networks.refiner.to(scene.places.device)

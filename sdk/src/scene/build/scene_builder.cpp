@@ -71,9 +71,6 @@ const BuildOptions& checked(const std::array<double, 3>& up, const BuildOptions&
   if (!(options.near >= 0) || !std::isfinite(options.near)) {
     refuse("The depth of the nearest point is ", options.near, ", but must be finite and not negative.");
   }
-  if (!(options.alpha >= 0) || !std::isfinite(options.alpha)) {
-    refuse("Alpha is ", options.alpha, ", but must be finite and not negative.");
-  }
   if (options.threads < 1 || options.threads > 64) refuse("Threads are ", options.threads, ", but must be 1 to 64.");
   return options;
 }
@@ -93,31 +90,6 @@ SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, Sc
   cloud_.rgb = {};
   check_memory(0);
   moments_.begin(cloud_.count());
-}
-
-SceneBuilder::SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options)
-    : SceneBuilder(std::move(state.cloud), state.up, networks, options) {
-  if (state.networks_sha256 != networks.sha256()) {
-    refuse("The points were told how they look by other networks than ", networks.name(),
-           ", whose features they cannot be given as well. Use those, or build the scene again from all photos.");
-  }
-  check_memory(state.seen.size());
-  moments_.reserve(state.seen.size());
-  for (size_t place = 0; place < state.seen.size(); ++place) {
-    moments_.add(state.seen[place]);
-    moments_.at(place) = state.moments[place];
-  }
-  views_ = state.photos;
-}
-
-ModellingStateView SceneBuilder::state() const {
-  ModellingStateView state;
-  state.cloud = cloud_.places();
-  state.seen = moments_.points().data();
-  state.seen_count = moments_.count();
-  state.moments = [this](size_t place) -> const ViewMoments& { return moments_.at(place); };
-  state.photos = uint32_t(views_);
-  return state;
 }
 
 void SceneBuilder::check_memory(size_t new_points) const {
@@ -242,7 +214,7 @@ ModelledPoints SceneBuilder::solve(bool forgets) {
   made.up = up_;
   made.background = background_.mean();
   made.never_seen = cloud_.count() - moments_.count();
-  solve_looks(moments_, cloud_.places(), options_.alpha, threads_, forgets, made);
+  solve_looks(moments_, cloud_.places(), threads_, forgets, made);
   return made;
 }
 

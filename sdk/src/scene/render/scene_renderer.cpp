@@ -8,8 +8,8 @@
 
 #include "core/error.h"
 #include "image/geometry/turned_picture.h"
-#include "scene/render/refiner_roi.h"
 #include "scene/gravity_alignment.h"
+#include "scene/render/refiner_roi.h"
 #include "scene/visibility/view_frustum.h"
 
 namespace maq {
@@ -201,7 +201,6 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
     counts.varying_points = raster_.varying();
     counts.refined_pixels = uint64_t(window.width_px) * uint64_t(window.height_px);
     if (counts.refined_pixels < counts.frame_pixels) clear(upright, background);
-    if (!options_.with_depths) std::fill(upright.depth.begin(), upright.depth.end(), 0.0f);
     counts.reduce_ms = double(raster_.reduce_ns()) * 1e-6;
     counts.shade_ms = watch.lap() - counts.reduce_ms;
 
@@ -210,19 +209,20 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
     const float* const refined = networks_->refine(inputs_, window.width_px, window.height_px);
     counts.refine_ms = watch.lap();
 
-    cover_.find(raster_, window.width_px, window.height_px, options_.with_depths, threads_);
-    refined_.write(refined, layout, window, cover_.alphas(), cover_.depths(), background,
-                   options_.background ? 1 : kOwnBackgroundGain,
-                   {upright.bgr.data(), upright.alpha.data(), options_.with_depths ? upright.depth.data() : nullptr,
-                    upright.width_px, upright.height_px},
-                   threads_);
+    cover_.find(raster_, window.width_px, window.height_px, threads_);
+    refined_.write(
+        refined, layout, window, cover_.alphas(), cover_.depths(), background,
+        options_.background ? 1 : kOwnBackgroundGain,
+        {upright.bgr.data(), upright.alpha.data(), upright.depth.data(), upright.width_px, upright.height_px},
+        threads_);
     counts.cover_ms = watch.lap();
   }
 
   if (counts.is_turned) {
     set_size(picture, camera.width_px, camera.height_px);
-    if (occupied.width_px == 0 || !options_.with_depths) clear(picture, background);
-    if (occupied.width_px > 0) {
+    if (occupied.width_px == 0) {
+      clear(picture, background);
+    } else {
       constexpr int kRowsAtOnce = 64;
       threads_.run(size_t((camera.height_px + kRowsAtOnce - 1) / kRowsAtOnce), [&](size_t strip, int) {
         const int top = int(strip) * kRowsAtOnce, bottom = std::min(camera.height_px, top + kRowsAtOnce);
@@ -232,9 +232,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
         const RenderedPicture& from = upright;
         turn_bytes(raster(from, from.bgr.data()), 3, back, raster(picture, picture.bgr.data()), top, bottom);
         turn_bytes(raster(from, from.alpha.data()), 1, back, raster(picture, picture.alpha.data()), top, bottom);
-        if (options_.with_depths) {
-          turn_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
-        }
+        turn_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
       });
     }
     counts.turn_ms = watch.lap();

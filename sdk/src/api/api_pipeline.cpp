@@ -42,8 +42,8 @@ struct ResultHandles {
     list_people(*densepose);
     maq_pipeline_result result{sizeof result, nullptr,      nullptr,     times.number,
                                times.wait_ms, times.run_ms, times.age_ms};
-    result.frame = hand_out<maq_frame>(std::move(frame));
-    result.densepose = hand_out<maq_densepose_result>(std::move(densepose));
+    result.frame = lend<maq_frame>(std::move(frame));
+    result.densepose = lend<maq_densepose_result>(std::move(densepose));
     return result;
   }
 
@@ -192,8 +192,8 @@ maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_n
 
 void maq_pipeline_release_result(maq_pipeline_result* result) {
   if (result == nullptr) return;
-  take_back(std::exchange(result->frame, nullptr));
-  take_back(std::exchange(result->densepose, nullptr));
+  return_to_pool(std::exchange(result->frame, nullptr));
+  return_to_pool(std::exchange(result->densepose, nullptr));
 }
 
 maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info* info) {

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "nn/bundle.h"
 #include "sources/recording/recording.h"
@@ -25,7 +26,7 @@
 namespace maq {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = MonotonicClock;
 
 constexpr int64_t kWaitSliceNs = 50000000;  // how long a wait for a frame may hold up a request
 constexpr std::chrono::milliseconds kOpeningPatience(50);
@@ -359,8 +360,7 @@ struct Pipeline::State {
     if (is_ending || request.source_number != now.source_number) return;
     PipelineTimes times{++counts.results, wait_ms, ms_between(begin, end), -1};
     if (source->info().is_live && frame.clock == MAQ_CLOCK_MONOTONIC) {
-      const int64_t now_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(end.time_since_epoch()).count();
-      times.age_ms = double(now_ns - frame.timestamp_ns) * 1e-6;
+      times.age_ms = double(to_ns(end) - frame.timestamp_ns) * 1e-6;
     }
     counts.dropped_frames = dropped_frames;
     counts.results_per_second = rate.add(end);

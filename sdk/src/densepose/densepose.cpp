@@ -1,9 +1,9 @@
 #include "densepose/densepose.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/error.h"
 
 namespace maq {
@@ -19,20 +19,6 @@ std::vector<std::string> at_levels(const std::string& name, int first, int last)
   for (int level = first; level <= last; ++level) all.push_back(name + std::to_string(level));
   return all;
 }
-
-class Stopwatch {
- public:
-  // Milliseconds since it was made or last read.
-  float lap_ms() {
-    const auto now = std::chrono::steady_clock::now();
-    const float ms = std::chrono::duration<float, std::milli>(now - start_).count();
-    start_ = now;
-    return ms;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 // Those of a graph's tensors that are called `names`, in this order; the manifest may list more, in any order.
 std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std::vector<std::string>& names,
@@ -130,10 +116,10 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
       !followed_.empty()) {  // else nobody was there, and nobody is looked for until the next key frame
     make_network_input(image, {settings_.long_side_px, spec_.input.multiple_of, spec_.input.mean, spec_.input.std},
                        input_);
-    stats.preprocess_ms = stage.lap_ms();
+    stats.preprocess_ms = float(stage.lap_ms());
 
     run_trunk();
-    stats.trunk_ms = stage.lap_ms();
+    stats.trunk_ms = float(stage.lap_ms());
 
     if (stats.key_frame) {
       propose(image.height_px, proposals_, &stats.dropped_boxes);
@@ -142,7 +128,7 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
     }
     followed_.clear();
     stats.proposals = int(proposals_.size());
-    stats.proposals_ms = stage.lap_ms();
+    stats.proposals_ms = float(stage.lap_ms());
 
     // People who are followed come from a look at the frame before.
     const bool looks_again = stats.key_frame && spec_.box_head.second_look_score.has_value();
@@ -152,11 +138,11 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
       proposals_.swap(found_);
     }
     run_box_head(proposals_, least_score, found_, &stats.dropped_boxes);
-    stats.box_head_ms = stage.lap_ms();
+    stats.box_head_ms = float(stage.lap_ms());
 
     if (!found_.empty()) run_dense_head(found_, result);
   }
-  stats.total_ms = total.lap_ms();
+  stats.total_ms = float(total.lap_ms());
 }
 
 void DensePose::restart() {
@@ -255,7 +241,7 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
   shapes_.assign(2, {count, spec.pool, spec.pool, 4 * classes});
   shapes_[1][3] = charts_.channels();
   const std::vector<TensorView>& outputs = dense_head_->run(inputs_, shapes_);
-  result.stats.dense_head_ms = stage.lap_ms();
+  result.stats.dense_head_ms = float(stage.lap_ms());
 
   const float scale_x = float(result.planes.width_px) / float(input_.width_px);
   const float scale_y = float(result.planes.height_px) / float(input_.height_px);
@@ -277,7 +263,7 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
   }
-  result.stats.decode_ms = stage.lap_ms();
+  result.stats.decode_ms = float(stage.lap_ms());
 }
 
 }  // namespace maq

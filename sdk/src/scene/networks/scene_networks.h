@@ -60,9 +60,8 @@ class SceneNetworks {
   // for two threads at once; beside extract() is fine. Throws as extract() does.
   const float* refine(const std::vector<const float*>& rasters, int width_px, int height_px);
 
-  // Gives memory of the networks back; they are made again when they are needed.
+  // Gives the extractor's memory back; it is made again when it is needed.
   void forget_extractor() { extractor_.reset(); }
-  void forget_refiner() { refiner_.forget(); }
 
  private:
   Bundle bundle_;

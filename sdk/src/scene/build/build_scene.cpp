@@ -1,9 +1,9 @@
 #include "scene/build/build_scene.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "scene/capture/posed_photo.h"
 #include "scene/capture/posed_view.h"
@@ -60,9 +60,9 @@ std::optional<BuiltCapture> build_from_capture(Capture capture, SceneNetworks& n
              progress(share, "Photo " + std::to_string(i + 1) + " of " + std::to_string(views.size()) + ": " + what);
     };
     try {
-      const auto start = std::chrono::steady_clock::now();
+      const Stopwatch watch;
       photo.load(view, options.long_side_px);
-      built.loading_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+      built.loading_ms += watch.elapsed_ms();
       const auto seen = builder.add_view(photo.image(), photo.valid(), photo.camera(), in_all);
       if (!seen) return {};
       if (*seen == 0) drops.add("photos that see no point of the cloud", view.name);

@@ -1,9 +1,9 @@
 #include "scene/build/scene_builder.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "image/geometry/turned_photo.h"
 #include "scene/build/descriptor_sampling.h"
@@ -18,20 +18,6 @@ constexpr uint64_t kBytesAPoint = sizeof(uint32_t), kBytesASeenPoint = sizeof(Vi
 // What networks make of photos is near 1; squares of these are still floats.
 constexpr float kLargestFeature = 1e15f;
 constexpr size_t kTaskSpans = 16;
-
-class Stopwatch {
- public:
-  explicit Stopwatch(double& sum_ms) : sum_ms_(sum_ms) {}
-  ~Stopwatch() {
-    sum_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& sum_ms_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 template <class... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
@@ -71,7 +57,9 @@ const BuildOptions& checked(const std::array<double, 3>& up, const BuildOptions&
   if (!(options.near >= 0) || !std::isfinite(options.near)) {
     refuse("The depth of the nearest point is ", options.near, ", but must be finite and not negative.");
   }
-  if (options.threads < 1 || options.threads > 64) refuse("Threads are ", options.threads, ", but must be 1 to 64.");
+  if (options.threads < 1 || options.threads > kMaxThreads) {
+    refuse("Threads are ", options.threads, ", but must be 1 to ", kMaxThreads, ".");
+  }
   return options;
 }
 
@@ -134,10 +122,10 @@ size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera&
 const float* SceneBuilder::find_features(const ImageView& photo, const PinholeCamera& camera,
                                          const PinholeCamera& upright) {
   {
-    const Stopwatch stopwatch(times_.turning_ms);
+    const ScopedTimer timer(times_.turning_ms);
     turn_photo(photo, pixels_between(upright, camera), upright.width_px, upright.height_px, turned_);
   }
-  const Stopwatch stopwatch(times_.extractor_ms);
+  const ScopedTimer timer(times_.extractor_ms);
   const float* features = networks_.extract(turned_.data(), upright.width_px, upright.height_px);
   const size_t count = size_t(upright.width_px) * size_t(upright.height_px) * kFeatures;
   for (size_t i = 0; i < count; ++i) {
@@ -173,7 +161,7 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
 
   if (!goes_on(0, "Finding the points that the photo sees.")) return {};
   {
-    const Stopwatch stopwatch(times_.visibility_ms);
+    const ScopedTimer timer(times_.visibility_ms);
     const size_t new_points = find_seen_points(valid, camera);
     check_memory(new_points);
     moments_.reserve(new_points);
@@ -187,7 +175,7 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
 
   // From here on nothing fails, and nothing is asked.
   background_.add(background);
-  const Stopwatch stopwatch(times_.moments_ms);
+  const ScopedTimer timer(times_.moments_ms);
   for (const uint32_t point : seen_) {
     if (!moments_.has(point)) moments_.add(point);
   }
@@ -208,7 +196,7 @@ ModelledPoints SceneBuilder::solve(bool forgets) {
     refuse("None of the photos sees a point of the cloud, which has ", cloud_.count(),
            ", so there is no scene; check that photos and cloud are of one place, in the same unit.");
   }
-  const Stopwatch stopwatch(times_.solving_ms);
+  const ScopedTimer timer(times_.solving_ms);
   ModelledPoints made;
   made.origin = cloud_.origin;
   made.up = up_;

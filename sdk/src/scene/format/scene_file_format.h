@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/rounding.h"
 #include "scene/format/scene.h"
 
 namespace maq {
@@ -47,8 +48,6 @@ static_assert(sizeof(SceneFileHead) % kSceneFileAlignment == 0);
 static_assert(sizeof(SceneBlock) == 308 && offsetof(SceneBlock, mean_middle) == 52,
               "version 1 stores blocks like that");
 
-constexpr uint64_t filled_up(uint64_t bytes) {
-  return (bytes + kSceneFileAlignment - 1) / kSceneFileAlignment * kSceneFileAlignment;
-}
+constexpr uint64_t filled_up(uint64_t bytes) { return round_up<uint64_t>(bytes, kSceneFileAlignment); }
 
 }  // namespace maq

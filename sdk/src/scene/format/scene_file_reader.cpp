@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/unique_fd.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
 #include "scene/format/scene_layout.h"
@@ -37,11 +38,6 @@ class SceneFileReader {
  public:
   explicit SceneFileReader(const std::string& path);
   SceneFileReader(const void* bytes, size_t count);
-  ~SceneFileReader() {
-    if (file_ >= 0) ::close(file_);
-  }
-  SceneFileReader(const SceneFileReader&) = delete;
-  SceneFileReader& operator=(const SceneFileReader&) = delete;
 
   const SceneFileHead& head() const { return head_; }
   bool is_file() const { return memory_ == nullptr; }
@@ -85,29 +81,24 @@ class SceneFileReader {
   void check_head(uint64_t size_bytes) const;
 
   std::string path_;  // begins each sentence
-  int file_ = -1;
+  UniqueFd file_;
   const char* memory_ = nullptr;  // in place of the file
   SceneFileHead head_{};
 };
 
 SceneFileReader::SceneFileReader(const std::string& path) : path_(path) {
-  // Without O_NONBLOCK a pipe would wait for somebody who writes.
-  file_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file_ < 0) {
+  // Without O_NONBLOCK, opening a pipe would wait for a writer.
+  file_ = UniqueFd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file_.is_open()) {
     const int reason = errno;
     if (reason == ENOENT || reason == ENOTDIR) {
       throw Error(MAQ_ERROR_NOT_FOUND, path, " does not exist; check the path.");
     }
     fail(" cannot be opened (", std::strerror(reason), ").");
   }
-  try {
-    struct stat found {};
-    if (::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
-    read_head(uint64_t(found.st_size));
-  } catch (...) {
-    ::close(file_);
-    throw;
-  }
+  struct stat found {};
+  if (::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
+  read_head(uint64_t(found.st_size));
 }
 
 SceneFileReader::SceneFileReader(const void* bytes, size_t count)
@@ -128,7 +119,7 @@ void SceneFileReader::read_at(uint64_t offset, void* bytes, size_t count) const 
   }
   auto* to = static_cast<char*>(bytes);
   while (count > 0) {
-    const ssize_t got = ::pread(file_, to, count, off_t(offset));
+    const ssize_t got = ::pread(file_.get(), to, count, off_t(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) fail(" cannot be read at byte ", offset, "; did it change meanwhile?");
     to += got;
@@ -194,7 +185,8 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
 
 std::shared_ptr<const uint8_t> SceneFileReader::map() const {
   const size_t bytes = size_t(head_.file_bytes);
-  void* const at = bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_, 0) : MAP_FAILED;
+  void* const at =
+      bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_.get(), 0) : MAP_FAILED;
   if (at == MAP_FAILED) {
     throw Error(MAQ_ERROR_OUT_OF_MEMORY, path_, " cannot be mapped into memory: it has ", head_.file_bytes, " bytes.");
   }

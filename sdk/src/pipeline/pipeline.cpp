@@ -11,7 +11,9 @@
 #include <array>
 #include <chrono>
 #include <condition_variable>
+#include <cstring>
 #include <deque>
+#include <list>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -66,11 +68,11 @@ class EventRate {
   size_t count_ = 0;
 };
 
-// A surface grid, found again when another model has the same.
-struct KnownSurface {
-  std::vector<uint8_t> bytes;
-  std::unique_ptr<BodySurface> surface;
-};
+// Of the same bytes: points outside of a chart are NaN.
+bool is_same(const SurfaceGrid& one, const SurfaceGrid& other) {
+  return one.nodes == other.nodes &&
+         std::memcmp(one.points_m.data(), other.points_m.data(), one.points_m.size() * sizeof one.points_m[0]) == 0;
+}
 
 // What callers ask for. The numbers count the changes.
 struct Request {
@@ -107,15 +109,14 @@ struct Pipeline::State {
   Frame newest_frame;
   DensePoseResult newest_densepose;
   PipelineStats counts;
-  std::vector<KnownSurface> surfaces;
-  BodySurface* surface = nullptr;
+  std::shared_ptr<DensePose> model;  // none before the first is loaded; networks are run by the thread alone
+  std::list<SurfaceGrid> surfaces;   // that were asked for
 
   // Of the thread alone. Source and model are done when their numbers are those of the request.
   Request now;
   uint64_t heard_number = 0;
   std::unique_ptr<Source> source;
   uint64_t source_number = 0;
-  std::unique_ptr<DensePose> model;
   uint64_t model_number = 0;
   std::unique_ptr<RecordingWriter> recording;
   uint64_t recording_number = 0;
@@ -181,7 +182,7 @@ struct Pipeline::State {
       }
     }
     close_source();
-    model.reset();
+    show_model(nullptr);
     std::lock_guard<std::mutex> lock(mutex);
     has_ended = true;
     changed.notify_all();
@@ -313,22 +314,21 @@ struct Pipeline::State {
     note_change();
   }
 
+  void show_model(std::shared_ptr<DensePose> next) {
+    std::lock_guard<std::mutex> lock(mutex);
+    model.swap(next);
+  }
+
   bool load_model() {
     if (!enter_if_current(MAQ_PIPELINE_LOADING)) return false;
-    model.reset();
-    Bundle bundle = read_bundle(now.model.bundle_path);
-    model = std::make_unique<DensePose>(settings.runtime(), bundle, now.model.settings);
-    model_number = now.model_number;
+    show_model(nullptr);  // before the next one takes memory
+    const Bundle bundle = read_bundle(now.model.bundle_path);
+    const auto loaded = std::make_shared<DensePose>(settings.runtime(), bundle, now.model.settings);
     settings.source.log.write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                               bundle.manifest.precision, ") loaded, ", now.model.settings.threads, " thread(s)");
-    const std::string& file = bundle.manifest.surface_file;
-    std::vector<uint8_t>& bytes = bundle.files[file];
+    show_model(loaded);
+    model_number = now.model_number;
     std::lock_guard<std::mutex> lock(mutex);
-    const auto same = [&](const KnownSurface& known) { return known.bytes == bytes; };
-    if (std::none_of(surfaces.begin(), surfaces.end(), same)) {
-      surfaces.push_back({bytes, std::make_unique<BodySurface>(bytes, bundle.folder + "/" + file)});
-    }
-    surface = std::find_if(surfaces.begin(), surfaces.end(), same)->surface.get();
     return is_current();
   }
 
@@ -543,13 +543,18 @@ PipelineStats Pipeline::stats() const {
 }
 
 const SurfaceGrid& Pipeline::surface() {
-  BodySurface* surface = nullptr;
+  std::shared_ptr<DensePose> model;
   {
     std::lock_guard<std::mutex> lock(state_->mutex);
-    surface = state_->surface;
+    model = state_->model;
   }
-  if (surface == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "No model is loaded yet; wait for MAQ_PIPELINE_RUNNING.");
-  return surface->grid();
+  if (model == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "No model is loaded yet; wait for MAQ_PIPELINE_RUNNING.");
+  const SurfaceGrid& grid = model->surface();
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  for (const SurfaceGrid& known : state_->surfaces) {
+    if (is_same(known, grid)) return known;
+  }
+  return state_->surfaces.emplace_back(grid);
 }
 
 }  // namespace maq

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/frame.h"
 #include "core/atomic_file.h"
+#include "core/frame.h"
 #include "image/files/file_codecs.h"
 
 namespace maq {

@@ -65,13 +65,11 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     require_argument(densepose, "densepose");
     const maq_densepose_config config = read_config(given, "config", default_config(), sizeof(maq_densepose_config));
     const DensePoseSettings settings = checked_settings(config);
-    Bundle bundle = read_bundle(config.bundle_path);
+    const Bundle bundle = read_bundle(config.bundle_path);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                                 bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");
-    const std::string& surface = bundle.manifest.surface_file;
-    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size,
-                                   std::move(bundle.files[surface]), bundle.folder + "/" + surface);
+    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size);
     return MAQ_OK;
   });
 }
@@ -181,7 +179,7 @@ maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_surface* surf
   return guarded(densepose, __func__, [&] {
     require_argument(densepose, "densepose");
     require_argument(surface, "surface");
-    const SurfaceGrid& grid = densepose->surface.grid();
+    const SurfaceGrid& grid = densepose->densepose->surface();
     write_struct(surface, "surface", maq_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_surface));
     return MAQ_OK;
   });

@@ -11,7 +11,6 @@
 #include "core/frame.h"
 #include "core/log.h"
 #include "densepose/densepose.h"
-#include "densepose/surface_grid.h"
 #include "maquette/maquette.h"
 #include "nn/onnxruntime_library.h"
 #include "scene/capture/capture.h"
@@ -96,16 +95,11 @@ struct maq_densepose_result : maq::Handle {
 };
 
 struct maq_densepose : maq::Handle {
-  maq_densepose(std::shared_ptr<maq::ContextState> of, std::unique_ptr<maq::DensePose> made, size_t pool_size,
-                std::vector<uint8_t> surface_bytes, std::string surface_path)
-      : state(std::move(of)),
-        densepose(std::move(made)),
-        results(pool_size, "results"),
-        surface(std::move(surface_bytes), std::move(surface_path)) {}
+  maq_densepose(std::shared_ptr<maq::ContextState> of, std::unique_ptr<maq::DensePose> made, size_t pool_size)
+      : state(std::move(of)), densepose(std::move(made)), results(pool_size, "results") {}
   std::shared_ptr<maq::ContextState> state;
   std::unique_ptr<maq::DensePose> densepose;
   maq::BoundedPool<maq_densepose_result> results;
-  maq::BodySurface surface;
 };
 
 struct maq_capture : maq::Handle {

@@ -25,7 +25,7 @@ inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, 
   SessionSettings settings;
   settings.threads = threads;
   settings.spin = spin;
-  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), folder, settings);
+  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), read_bundle(folder), settings);
 }
 
 // The camera without its distortion.

@@ -24,7 +24,7 @@ from pathlib import Path
 
 from benchmarks import cameras, frame_time, gates, report, scenes
 from export.evaluation.maquette_api import LIBRARY, MaquetteError
-from export.evaluation.shards import ShardError, read_images, shard_paths
+from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-2"
 PARTS = ("frames", "sweep", "agreement", "peers", "cameras", "scenes")
@@ -53,7 +53,7 @@ def main(argv: list[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     try:
         document = measure(options)
-    except (MaquetteError, ShardError, FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
+    except (MaquetteError, FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
         print(f"The benchmark stopped: {error}", file=sys.stderr)
         return 2
     verdicts = gates.check(document["figures"], document["machine"], document["missing"])

@@ -74,7 +74,7 @@ def work_of(path: Path, feed: Feed) -> list[Work]:
     shapes = {x.name: [d.dim_value for d in x.type.tensor_type.shape.dim] for x in [*graph.value_info, *graph.input]}
     shapes |= {x.name: [d.dim_value for d in x.type.tensor_type.shape.dim] for x in graph.output}
     shapes |= {x.name: list(x.dims) for x in graph.initializer}
-    dequantised = {name for node in graph.node if node.op_type == "DequantizeLinear" for name in node.output}
+    dequantized = {name for node in graph.node if node.op_type == "DequantizeLinear" for name in node.output}
     work = []
     for node in graph.node:
         if node.op_type not in ("Conv", "ConvTranspose", "Gemm", "MatMul"):
@@ -82,7 +82,7 @@ def work_of(path: Path, feed: Feed) -> list[Work]:
         source, weight, out = (shapes.get(name, []) for name in (node.input[0], node.input[1], node.output[0]))
         if not all([source, weight, out]) or 0 in [*source, *weight, *out]:
             raise ValueError(f"{path}: sizes at {node.name} are not known; export the bundle again")
-        integer = node.input[1] in dequantised
+        integer = node.input[1] in dequantized
         size = 1 if integer else 4
         moved = size * sum(int(np.prod(shape)) for shape in (source, weight, out))
         work.append(Work(node.name, multiply_adds(node, source, weight, out), moved, integer))

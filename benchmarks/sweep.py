@@ -15,8 +15,8 @@ from tqdm import tqdm
 from export.evaluation.backends import Prediction
 from export.evaluation.maquette_api import DensePose
 from export.evaluation.measure import measure as measure_figures
-from export.evaluation.shards import LabelledImage
 from export.evaluation.surface_accuracy import SurfaceTable
+from export.shards import LabelledImage
 
 SCORE_FLOOR = 0.05  # boxes below it enter no figure
 BLOCK = 10  # images that one setting works on before the next one's turn

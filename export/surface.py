@@ -1,4 +1,4 @@
-"""The body surface's naming: 24 parts, coarse groups, and what a mirror does to (I, U, V).
+"""The body surface's naming: 24 parts, coarse groups, and what a mirror does to parts and chart axes.
 
 Part numbers, coarse numbers and the direction of U and V follow the DensePose convention
 (Guler et al., "DensePose: Dense Human Pose Estimation in the Wild", CVPR 2018). The charts
@@ -34,31 +34,3 @@ MIRROR_PART = np.array(
 MIRROR_COARSE = np.array([0, 1, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 14], np.uint8)
 MIRROR_FLIPS_U = np.isin(np.arange(25), (5, 6, 23, 24))
 MIRROR_FLIPS_V = np.isin(np.arange(25), (1, 2, *range(7, 23)))
-
-# Labels of photographs may know less than the part. Values of I beside 0..24, in training data alone; U and V are 0:
-REGION = 100  # REGION + k: a person, coarse class k (1..14), front and back not told apart
-PERSON = 255  # a person, somewhere on the body
-UNSURE = 254  # a person or not
-# Which of the 25 classes (0 background) each value of I leaves possible: bool [256, 25].
-POSSIBLE_PARTS = np.zeros((256, 25), bool)
-POSSIBLE_PARTS[np.arange(25), np.arange(25)] = True
-POSSIBLE_PARTS[REGION + 1 : REGION + 1 + COARSE_COUNT] = np.arange(1, COARSE_COUNT + 1)[:, None] == PART_TO_COARSE
-POSSIBLE_PARTS[PERSON, 1:] = True
-POSSIBLE_PARTS[UNSURE] = True
-
-_MIRROR_VALUE = np.arange(256, dtype=np.uint8)
-_MIRROR_VALUE[:25] = MIRROR_PART
-_MIRROR_VALUE[REGION : REGION + COARSE_COUNT + 1] = REGION + MIRROR_COARSE
-
-
-def mirror_iuv(iuv: np.ndarray) -> np.ndarray:
-    """Labels of the mirrored image, before the pixels themselves are mirrored.
-
-    iuv: uint8 [..., 3] holding I, U*255, V*255. Returns a new array of the same shape.
-    """
-    part = np.where(iuv[..., 0] <= PART_COUNT, iuv[..., 0], 0)
-    out = np.empty_like(iuv)
-    out[..., 0] = _MIRROR_VALUE[iuv[..., 0]]
-    out[..., 1] = np.where(MIRROR_FLIPS_U[part], 255 - iuv[..., 1], iuv[..., 1])
-    out[..., 2] = np.where(MIRROR_FLIPS_V[part], 255 - iuv[..., 2], iuv[..., 2])
-    return out

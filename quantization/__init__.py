@@ -1,1 +1,1 @@
-"""Static int8 quantisation of model bundles, and its error."""
+"""Static int8 quantization of model bundles, and its error."""

@@ -24,9 +24,9 @@ from tqdm import tqdm
 from export.evaluation.backends import DEFAULT_PATHS, Backend, Prediction, open_backend
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
-from export.evaluation.shards import ShardError, count_images, read_images, shard_paths
 from export.evaluation.sheet import pictures
 from export.evaluation.surface_accuracy import share
+from export.shards import count_images, read_images, shard_paths
 
 GATE, STRETCH = 0.98, 0.99
 FLOAT_BUNDLE, INT8_BUNDLE = DEFAULT_PATHS["onnx"], DEFAULT_PATHS["capi"]
@@ -34,7 +34,7 @@ FLOAT_BUNDLE, INT8_BUNDLE = DEFAULT_PATHS["onnx"], DEFAULT_PATHS["capi"]
 EPILOG = """\
 examples:
   python -m quantization.agreement
-  python -m quantization.agreement --images .data/photos/val --int8 build/quantised
+  python -m quantization.agreement --images .data/photos/val --int8 build/quantized
   python -m quantization.agreement --images tests/media/clip.mp4 --backend onnx
   python -m quantization.agreement --in-float trunk       what would be left if the trunk were not int8?
 
@@ -199,7 +199,7 @@ def main(argv: list[str] | None = None) -> int:
         with tempfile.TemporaryDirectory() as folder:
             int8 = mixed(arguments.reference, arguments.int8, arguments.in_float, Path(folder) / arguments.int8.name)
             figures = agreement(arguments.reference, int8, images, arguments.backend)
-    except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
+    except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Nothing was compared: {error}", file=sys.stderr)
         return 1
     name = " with float ".join([str(arguments.int8), *filter(None, [", ".join(arguments.in_float)])])

@@ -19,12 +19,12 @@ from quantization.activations import float_session
 from quantization.samples import Sample
 
 
-def correct_biases(prepared: Path, quantised: Path, samples: list[Sample]) -> int:
+def correct_biases(prepared: Path, quantized: Path, samples: list[Sample]) -> int:
     """Changes the int8 graph in place; returns how many biases. Convolutions without a bias stay as they are.
 
     Means are taken over everything but channels; the zeros of padding are left out of account.
     """
-    reference, model = onnx.load(prepared), onnx.load(quantised)
+    reference, model = onnx.load(prepared), onnx.load(quantized)
     held = {w.output: w for w in qdq.weights(model.graph, reference.graph)}
     layers = {n.name: n for n in qdq.heavy_nodes(model.graph) if n.op_type == "Conv" and len(n.input) == 3}
     layers = {name: n for name, n in layers.items() if n.input[1] in held and n.input[2] in held}
@@ -34,13 +34,13 @@ def correct_biases(prepared: Path, quantised: Path, samples: list[Sample]) -> in
     for node, layer in layers.items():
         kernel, bias = held[layer.input[1]], held[layer.input[2]]
         groups = next((a.i for a in layer.attribute if a.name == "group"), 1)
-        taps = (kernel.dequantised() - kernel.expected).sum((2, 3))  # [out, in of the group]
+        taps = (kernel.dequantized() - kernel.expected).sum((2, 3))  # [out, in of the group]
         mean = means[inputs[node]].reshape(groups, -1).repeat(len(taps) // groups, 0)
         shift = (taps * mean).sum(1)
         values = np.rint((bias.expected - shift) / bias.scale.astype(np.float64)).astype(np.int32)
         name = bias.name + TENSOR_NAME_QUANT_SUFFIX
         stored[name].CopyFrom(numpy_helper.from_array(values, name))
-    onnx.save(model, quantised)
+    onnx.save(model, quantized)
     return len(layers)
 
 

@@ -2,7 +2,7 @@
 
 The fp32 graphs are made anew from the weights in `export/weights`, run on the pictures in `tests/media`, and every
 integer tensor is compared with its float original. A tensor whose signal to noise ratio is not the one written in
-`docs/quantisation.json` (by `python -m quantization.report`) is named: a scale that is too large rounds coarsely, one
+`docs/quantization.json` (by `python -m quantization.report`) is named: a scale that is too large rounds coarsely, one
 that is too small cuts off.
 """
 
@@ -17,9 +17,9 @@ import onnx
 
 from export.densepose import bundle as bundle_format
 from export.densepose.config import DecodeConfig
-from export.densepose.data import Record
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.sheet import clip_frames
+from export.shards import Record
 from quantization.comparison import TensorError, pair_errors, weight_errors
 from quantization.prepare import prepare
 from quantization.samples import Sample, collect
@@ -63,12 +63,12 @@ def media_samples(bundle: Bundle) -> dict[str, list[Sample]]:
 
 
 def own_errors(
-    reference: dict[str, onnx.ModelProto], quantised: Path, samples: dict[str, list[Sample]]
+    reference: dict[str, onnx.ModelProto], quantized: Path, samples: dict[str, list[Sample]]
 ) -> list[TensorError]:
     """Each integer tensor's own error: weights, biases and activations of all graphs of an int8 bundle."""
     found = []
     for name, model in reference.items():
-        graph = onnx.load(quantised / f"{name}.onnx")
+        graph = onnx.load(quantized / f"{name}.onnx")
         found += weight_errors(name, model, graph) + pair_errors(name, model, graph, samples[name])
     return found
 
@@ -86,8 +86,8 @@ def _finite(value: float | None) -> float | None:
 def complaints(expected: dict[str, list[float | None]], errors: list[TensorError]) -> list[str]:
     """One sentence for every tensor that is not as expected; worst first, empty if all is well."""
     actual = figures_of(errors)
-    found = [(math.inf, f"{name} is no longer quantised, or is gone") for name in expected.keys() - actual.keys()]
-    found += [(math.inf, f"{name} is quantised, but unknown") for name in actual.keys() - expected.keys()]
+    found = [(math.inf, f"{name} is no longer quantized, or is gone") for name in expected.keys() - actual.keys()]
+    found += [(math.inf, f"{name} is quantized, but unknown") for name in actual.keys() - expected.keys()]
     for name in expected.keys() & actual.keys():
         gaps = []
         for label, before, after in zip(("", " in its worst channel"), expected[name], actual[name], strict=True):

@@ -28,24 +28,23 @@ from rich.table import Table
 from tqdm import tqdm
 
 from export.densepose import bundle as bundle_format
-from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.maquette_api import MaquetteError
-from export.evaluation.shards import ShardError
+from export.shards import load_records
 from quantization import agreement, qdq
 from quantization.activations import Activations
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import calibrate, correct, quantise_prepared, spread
-from quantization.samples import Sample, collect
-from quantization.settings import GraphSettings, read_settings
+from quantization.quantize import calibrate, correct, quantize_prepared
+from quantization.samples import Sample, calibration_records, collect, options_of_calibration, spread
+from quantization.settings import DensePoseSettings, GraphSettings, read_settings
 
 BUDGET_MB = 3.6
 EPILOG = """\
 examples:
   python -m quantization.choose --out build/chosen.toml
   python -m quantization.choose --graphs trunk dense_head --budget 3.2 --out quantization/densepose.toml
-  python -m quantization.quantize --settings build/chosen.toml --out build/quantised
+  python -m quantization.quantize --settings build/chosen.toml --out build/quantized
 The exit status is 1 when the budget is spent before the gate holds; the settings are written all the same.
 """
 
@@ -80,9 +79,9 @@ class Workpiece:
     calibration: list[Sample]
     held_out: list[Sample]
 
-    def quantise(self, target: Path, extra: tuple[str, ...] = ()) -> None:
+    def quantize(self, target: Path, extra: tuple[str, ...] = ()) -> None:
         settings = replace(self.settings, float_nodes=self.settings.float_nodes + extra)
-        quantise_prepared(self.path, target, self.ranges, settings)
+        quantize_prepared(self.path, target, self.ranges, settings)
         correct(self.path, target, self.calibration, settings)
 
 
@@ -125,11 +124,11 @@ def candidates(piece: Workpiece) -> list[Candidate]:
     found = []
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "tried.onnx"
-        piece.quantise(target)
+        piece.quantize(target)
         before, size = output_sqnr(piece.path, target, piece.held_out), target.stat().st_size
         patterns = blocks(onnx.load(piece.path).graph, piece.settings.float_nodes)
         for pattern in tqdm(patterns, desc=f"blocks of {piece.name}", unit="block", leave=False, disable=None):
-            piece.quantise(target, (pattern,))
+            piece.quantize(target, (pattern,))
             after = output_sqnr(piece.path, target, piece.held_out)
             found.append(
                 Candidate(
@@ -208,17 +207,12 @@ def print_candidates(ranked: list[Candidate], taken: list[Candidate], console: C
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m quantization.choose", description=__doc__, epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=argparse.RawDescriptionHelpFormatter, parents=[options_of_calibration()],
     )  # fmt: skip
-    parser.add_argument("--bundle", type=Path, default=agreement.FLOAT_BUNDLE, metavar="DIR", help="fp32 bundle")
-    parser.add_argument("--settings", type=Path, default=Path(__file__).with_name("densepose.toml"), metavar="TOML")
     parser.add_argument("--out", type=Path, required=True, metavar="TOML", help="where the settings go")
-    parser.add_argument("--data", type=Path, default=Path(".data/people/train"), metavar="DIR", help="for calibration")
-    parser.add_argument("--photos", type=Path, metavar="DIR", help="calibrate on these shards too")
-    parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), metavar="DIR", help="to measure on")
     parser.add_argument("--graphs", nargs="+", default=list(bundle_format.GRAPHS), choices=bundle_format.GRAPHS)
     parser.add_argument("--budget", type=float, default=BUDGET_MB, metavar="MB", help=f"bundle (default {BUDGET_MB})")
-    parser.add_argument("--gate", type=float, default=agreement.GATE, metavar="SHARE", help="label agreement wanted")
+    parser.add_argument("--gate", type=float, default=agreement.GATE, metavar="FRACTION", help="label agreement wanted")
     parser.add_argument("--samples", type=int, default=6, metavar="N", help="images a candidate is judged by")
     parser.add_argument("--images", type=int, metavar="N", help="images labels are compared on (default: all)")
     parser.add_argument("--backend", choices=("capi", "onnx"), default="capi", help="default: capi")
@@ -226,19 +220,17 @@ def main(argv: list[str] | None = None) -> int:
     onnxruntime.set_default_logger_severity(3)
     try:
         return run(arguments)
-    except (MaquetteError, ShardError, FileNotFoundError, ValueError) as error:
+    except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Nothing was chosen: {error}", file=sys.stderr)
         return 1
 
 
 def workpieces(arguments: argparse.Namespace, source: Bundle, folder: Path) -> dict[str, Workpiece]:
     """Prepared and calibrated graphs of the bundle, written to `folder`."""
-    settings = read_settings(arguments.settings)
-    records = spread(data.load_records(arguments.data), settings.calibration_images)
-    if arguments.photos:
-        records += spread(data.load_records(arguments.photos), settings.calibration_photos)
+    settings = read_settings(arguments.settings, DensePoseSettings)
+    records = calibration_records(settings, arguments.data, arguments.photos)
     calibration = collect(source, records, settings.people_per_image)
-    held_out = collect(source, spread(data.load_records(arguments.held_out), arguments.samples), 4)
+    held_out = collect(source, spread(load_records(arguments.held_out), arguments.samples), 4)
     pieces = {}
     for name, graph_settings in tqdm(settings.graphs.items(), desc="calibrating", unit="graph", disable=None):
         path = folder / f"{name}.onnx"
@@ -262,7 +254,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         def made(taken: list[Candidate]) -> Path:
             def graph(name: str, path: Path) -> None:
-                pieces[name].quantise(path, tuple(c.pattern for c in taken if c.graph == name))
+                pieces[name].quantize(path, tuple(c.pattern for c in taken if c.graph == name))
 
             return write_bundle(Path(folder) / "bundle", source, graph)
 

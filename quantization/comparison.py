@@ -1,7 +1,7 @@
 """Tensor by tensor: how much error an int8 graph makes here, and how much has gathered.
 
 All figures are signal to noise ratios in dB against the prepared float graph. An activation has two: `here`, the float
-tensor against its own quantise-dequantise (what this pair alone does), and `gathered`, the float tensor against the
+tensor against its own quantize-dequantize (what this pair alone does), and `gathered`, the float tensor against the
 same tensor of the int8 graph. A node's `jump` is the worst gathered figure of its inputs less that of its output: how
 much this node spoils.
 """
@@ -60,12 +60,12 @@ class Noise:
         return sqnr_db(self.signal, self.noise)
 
 
-def weight_errors(graph: str, reference: onnx.ModelProto, quantised: onnx.ModelProto) -> list[TensorError]:
+def weight_errors(graph: str, reference: onnx.ModelProto, quantized: onnx.ModelProto) -> list[TensorError]:
     """Weights and biases against the float ones. Channels that are all zero have no error and are passed over."""
     found = []
-    for weight in qdq.weights(quantised.graph, reference.graph):
+    for weight in qdq.weights(quantized.graph, reference.graph):
         whole, channels = Noise(), []
-        expected, actual = (weight.channels(x) for x in (weight.expected, weight.dequantised()))
+        expected, actual = (weight.channels(x) for x in (weight.expected, weight.dequantized()))
         for first, second in zip(expected, actual, strict=True):
             whole.add(first, second)
             if first.any():
@@ -84,17 +84,17 @@ def weight_errors(graph: str, reference: onnx.ModelProto, quantised: onnx.ModelP
 
 
 def pair_errors(
-    graph: str, reference: onnx.ModelProto, quantised: onnx.ModelProto, samples: Iterable[Sample]
+    graph: str, reference: onnx.ModelProto, quantized: onnx.ModelProto, samples: Iterable[Sample]
 ) -> list[TensorError]:
     """`here` of every activation with a pair: runs the float graph alone, and so is quick."""
-    pairs = qdq.pairs(quantised.graph)
+    pairs = qdq.pairs(quantized.graph)
     run = Activations(reference, [pair.name for pair in pairs])
     noise = {pair.name: Noise() for pair in pairs}
     for sample in samples:
         values = run(sample)
         for pair in pairs:
             noise[pair.name].add(values[pair.name], pair.applied(values[pair.name]))
-    makers = _makers(quantised.graph)
+    makers = _makers(quantized.graph)
     return [
         TensorError(
             graph, pair.name, "activation", *makers.get(pair.before, ("", "input")), noise[pair.name].db,
@@ -105,16 +105,16 @@ def pair_errors(
 
 
 def activation_errors(
-    graph: str, reference: onnx.ModelProto, quantised: onnx.ModelProto, samples: list[Sample]
+    graph: str, reference: onnx.ModelProto, quantized: onnx.ModelProto, samples: list[Sample]
 ) -> list[TensorError]:
     """Every activation that both graphs have, with all its figures."""
-    pairs = {pair.name: pair for pair in qdq.pairs(quantised.graph)}
-    there = set(tensor_names(quantised))
+    pairs = {pair.name: pair for pair in qdq.pairs(quantized.graph)}
+    there = set(tensor_names(quantized))
     names = [n for n in tensor_names(reference) if n in pairs or n in there]
     names += [n for n in pairs if n not in names]  # numbers that activations are multiplied by
     # What a node of the int8 graph sees under this name: the tensor behind its pair where it has one.
     seen = {name: pairs[name].after if name in pairs else name for name in names}
-    expect, run = Activations(reference, names), Activations(quantised, list(seen.values()))
+    expect, run = Activations(reference, names), Activations(quantized, list(seen.values()))
     here, gathered = ({name: Noise() for name in names} for _ in range(2))
     for sample in tqdm(samples, desc=f"comparing {graph}", unit="sample", leave=False, disable=None):
         expected, actual = expect(sample), run(sample)
@@ -123,9 +123,9 @@ def activation_errors(
             gathered[name].add(expected[name], actual[seen[name]] / factor)
             if name in pairs:
                 here[name].add(expected[name], pairs[name].applied(expected[name]))
-    makers = _makers(quantised.graph)
+    makers = _makers(quantized.graph)
     original = {behind: name for name, behind in seen.items()}
-    nodes = {node.name: node for node in quantised.graph.node}
+    nodes = {node.name: node for node in quantized.graph.node}
     found = []
     for name in names:
         pair = pairs.get(name)

@@ -1,4 +1,4 @@
-"""The float graph that quantisation starts from, and that its error is measured against."""
+"""The float graph that quantization starts from, and that its error is measured against."""
 
 from __future__ import annotations
 

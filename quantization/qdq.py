@@ -1,4 +1,4 @@
-"""What a quantised (QDQ) graph holds: its weights and activations with their scales, matched to the float graph."""
+"""What a quantized (QDQ) graph holds: its weights and activations with their scales, matched to the float graph."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Weight:
     axis: int
     expected: np.ndarray
 
-    def dequantised(self) -> np.ndarray:
+    def dequantized(self) -> np.ndarray:
         """float64, shaped like `stored`."""
         shape = [1] * self.stored.ndim
         if self.scale.size > 1:
@@ -47,7 +47,7 @@ class Weight:
 
 @dataclass(frozen=True)
 class Pair:
-    """An activation that is quantised and dequantised. name: as in the float graph; before, after: names in the
+    """An activation that is quantized and dequantized. name: as in the float graph; before, after: names in the
     int8 graph of the tensor that goes in and of the one that comes out; factor: what the latter is multiplied by."""
 
     name: str
@@ -67,21 +67,21 @@ def constants(graph: onnx.GraphProto) -> dict[str, np.ndarray]:
     return {value.name: numpy_helper.to_array(value) for value in graph.initializer}
 
 
-def weights(quantised: onnx.GraphProto, reference: onnx.GraphProto) -> list[Weight]:
+def weights(quantized: onnx.GraphProto, reference: onnx.GraphProto) -> list[Weight]:
     """All constants that the int8 graph stores as integers.
 
-    They are matched by the node that reads them, since the quantiser gives a bias that several nodes share
+    They are matched by the node that reads them, since the quantizer gives a bias that several nodes share
     one copy each, with names that the float graph does not know (so `create_weight_matching` of ONNX Runtime
     loses them). Raises ValueError for one that has no float counterpart.
     """
-    known, expected = constants(quantised), constants(reference)
+    known, expected = constants(quantized), constants(reference)
     readers: dict[str, tuple[onnx.NodeProto, int]] = {}
-    for node in quantised.node:
+    for node in quantized.node:
         for slot, name in enumerate(node.input):
             readers.setdefault(name, (node, slot))
     nodes = {node.name: node for node in reference.node}
     found = []
-    for node in quantised.node:
+    for node in quantized.node:
         if node.op_type != "DequantizeLinear" or node.input[0] not in known:
             continue
         reader, slot = readers[node.output[0]]
@@ -101,18 +101,18 @@ def weights(quantised: onnx.GraphProto, reference: onnx.GraphProto) -> list[Weig
     return found
 
 
-def pairs(quantised: onnx.GraphProto) -> list[Pair]:
-    """All activations with a quantise-dequantise pair, in the order of the graph.
+def pairs(quantized: onnx.GraphProto) -> list[Pair]:
+    """All activations with a quantize-dequantize pair, in the order of the graph.
 
     Where a map times a number is the same map with another scale (quantization.simplify), the product is a pair too.
     """
-    known = constants(quantised)
+    known = constants(quantized)
     readers: dict[str, list[onnx.NodeProto]] = {}
-    for node in quantised.node:
+    for node in quantized.node:
         if node.op_type == "DequantizeLinear":
             readers.setdefault(node.input[0], []).append(node)
     found = []
-    for node in quantised.node:
+    for node in quantized.node:
         if node.op_type != "QuantizeLinear":
             continue
         scale, zero = float(known[node.input[1]]), int(known[node.input[2]])

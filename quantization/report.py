@@ -1,6 +1,6 @@
 """The error of an int8 bundle, tensor by tensor.
 
-Prints the worst; writes all to docs/quantisation.json, tables to docs/quantisation.md, a picture to docs/pictures.
+Prints the worst; writes all to docs/quantization.json, tables to docs/quantization.md, a picture to docs/pictures.
 """
 
 from __future__ import annotations
@@ -19,35 +19,34 @@ import onnxruntime
 from rich.console import Console
 from rich.table import Table
 
-from export.densepose import data
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.backends import fingerprint
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
+from export.shards import load_records
 from quantization import agreement, check
 from quantization.comparison import TensorError, activation_errors, weight_errors, worst_first
 from quantization.errors import float_nodes_left
-from quantization.quantize import spread
 from quantization.report_files import write_markdown, write_picture
-from quantization.samples import Sample, collect
+from quantization.samples import Sample, collect, spread
 from quantization.saturation import Saturation, saturation
 
-SCHEMA = "maquette-quantisation-1"
-JSON = Path("docs/quantisation.json")
-MARKDOWN = Path("docs/quantisation.md")
-PICTURE = Path("docs/pictures/quantisation.png")
+SCHEMA = "maquette-quantization-1"
+JSON = Path("docs/quantization.json")
+MARKDOWN = Path("docs/quantization.md")
+PICTURE = Path("docs/pictures/quantization.png")
 SHOWN = 15
 SATURATION_SAMPLES = 2
 
 EPILOG = """\
 examples:
   python -m quantization.report                      all of it; needs .data (renderings, fp32 bundle)
-  python -m quantization.report --int8 build/quantised --out build/report
+  python -m quantization.report --int8 build/quantized --out build/report
   python -m quantization.report --check              is every scale of the shipped bundle right? Needs no .data
-  python -m quantization.report --check --int8 build/quantised
+  python -m quantization.report --check --int8 build/quantized
 
 figures, in dB (6 dB are one bit):
-  here            this tensor alone: float against quantised and dequantised
+  here            this tensor alone: float against quantized and dequantized
   worst channel   the same of the worst output channel of a weight
   gathered        float graph against int8 graph, with all that came before
   jump            dB lost between the worst input of the node and its output
@@ -56,47 +55,47 @@ Which nodes should stay float: python -m quantization.choose --help
 
 
 def tensor_report(
-    reference: dict[str, onnx.ModelProto], quantised: Path, samples: dict[str, list[Sample]]
+    reference: dict[str, onnx.ModelProto], quantized: Path, samples: dict[str, list[Sample]]
 ) -> list[TensorError]:
     """Every tensor of every graph; graphs in the bundle's order, tensors in the graph's."""
     found = []
     for name, model in reference.items():
-        graph = onnx.load(quantised / f"{name}.onnx")
+        graph = onnx.load(quantized / f"{name}.onnx")
         found += weight_errors(name, model, graph) + activation_errors(name, model, graph, samples[name])
     return found
 
 
 def saturation_report(
-    reference: dict[str, onnx.ModelProto], quantised: Path, samples: dict[str, list[Sample]], bits: int | None = None
+    reference: dict[str, onnx.ModelProto], quantized: Path, samples: dict[str, list[Sample]], bits: int | None = None
 ) -> list[Saturation]:
     """Every int8 layer, with its own weights or with `bits` bits."""
     found = []
     for name, model in reference.items():
-        graph = onnx.load(quantised / f"{name}.onnx")
+        graph = onnx.load(quantized / f"{name}.onnx")
         found += saturation(name, model, graph, samples[name][:SATURATION_SAMPLES], bits)
     return found
 
 
 def document(
-    source: Bundle, quantised: Path, samples: dict[str, list[Sample]], reference: dict[str, onnx.ModelProto]
+    source: Bundle, quantized: Path, samples: dict[str, list[Sample]], reference: dict[str, onnx.ModelProto]
 ) -> dict:
     """Everything that is measured, as JSON values; without agreement, which needs the SDK."""
-    tensors = tensor_report(reference, quantised, samples)
+    tensors = tensor_report(reference, quantized, samples)
     outputs: dict[str, dict[str, float]] = defaultdict(dict)
     for name, model in reference.items():
         there = {value.name for value in model.graph.output}
         outputs[name] = {t.name: t.gathered for t in tensors if t.graph == name and t.name in there}
-    own = check.own_errors(reference, quantised, check.media_samples(source))
+    own = check.own_errors(reference, quantized, check.media_samples(source))
     return {
         "schema": SCHEMA,
-        "bundle": quantised.name,
-        "fingerprint": fingerprint(quantised),
+        "bundle": quantized.name,
+        "fingerprint": fingerprint(quantized),
         "images": len(samples["trunk"]),
         "tensors": [_row(tensor) for tensor in tensors],
         "outputs": {g: {n: check._finite(v) for n, v in values.items()} for g, values in outputs.items()},
-        "float_nodes": {name: float_nodes_left(quantised / f"{name}.onnx") for name in reference},
-        "saturation": [plain(asdict(layer)) for layer in saturation_report(reference, quantised, samples)],
-        "saturation_8_bit": [plain(asdict(layer)) for layer in saturation_report(reference, quantised, samples, 8)],
+        "float_nodes": {name: float_nodes_left(quantized / f"{name}.onnx") for name in reference},
+        "saturation": [plain(asdict(layer)) for layer in saturation_report(reference, quantized, samples)],
+        "saturation_8_bit": [plain(asdict(layer)) for layer in saturation_report(reference, quantized, samples, 8)],
         "check": check.figures_of(own),
     }
 
@@ -170,7 +169,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, metavar="DIR", help="write there instead of docs/")
     parser.add_argument("--check", action="store_true", help="compare scales with the written report; exit status 1")
     arguments = parser.parse_args(argv)
-    onnxruntime.set_default_logger_severity(3)  # constants left over by the quantiser are no news
+    onnxruntime.set_default_logger_severity(3)  # constants left over by the quantizer are no news
     console = Console(width=None if sys.stdout.isatty() else 140)
     paths = (JSON, MARKDOWN, PICTURE)
     if arguments.out:
@@ -187,7 +186,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _write(arguments: argparse.Namespace, paths: tuple[Path, Path, Path], console: Console) -> int:
     source = open_bundle(arguments.reference)
-    samples = collect(source, spread(data.load_records(arguments.data), arguments.images), 4)
+    samples = collect(source, spread(load_records(arguments.data), arguments.images), 4)
     with tempfile.TemporaryDirectory() as folder:
         reference = check.prepared_graphs(source.folder, Path(folder))
         found = document(source, arguments.int8, samples, reference)

@@ -1,4 +1,4 @@
-"""The quantisation report as Markdown and as a picture."""
+"""The quantization report as Markdown and as a picture."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAMED = 3  # tensors named in each graph of the picture, if they lose more than 
 
 def write_markdown(path: Path, document: dict) -> None:
     """Replaces what is between the markers; appends it to a file without them."""
-    text = path.read_text() if path.exists() else "# Quantisation\n"
+    text = path.read_text() if path.exists() else "# Quantization\n"
     part = f"{BEGIN}\n\n{markdown(document)}\n{END}"
     if BEGIN in text:
         before, rest = text.split(BEGIN, 1)

@@ -26,12 +26,12 @@ DAMPING = 0.01  # of H's mean diagonal: inputs that were never seen apart must n
 PIXELS = 512  # of a sample's input, at most: they are alike
 
 
-def round_together(prepared: Path, quantised: Path, samples: list[Sample], limit: int) -> int:
+def round_together(prepared: Path, quantized: Path, samples: list[Sample], limit: int) -> int:
     """Changes the int8 graph in place; returns how many layers. limit: the largest integer of a weight.
 
     Depthwise layers are left alone: their few weights have all 8 bits.
     """
-    reference, model = onnx.load(prepared), onnx.load(quantised)
+    reference, model = onnx.load(prepared), onnx.load(quantized)
     held = {w.output: w for w in qdq.weights(model.graph, reference.graph)}
     layers = {n.name: n for n in qdq.heavy_nodes(reference.graph) if n.op_type == "Conv" and _groups(n) == 1}
     chosen = {n.name: held[n.input[1]] for n in qdq.heavy_nodes(model.graph) if n.name in layers and n.input[1] in held}
@@ -47,7 +47,7 @@ def round_together(prepared: Path, quantised: Path, samples: list[Sample], limit
         integers = rounded(flat, moment, weight.scale.astype(np.float64), limit)
         key = name + TENSOR_NAME_QUANT_SUFFIX
         stored[key].CopyFrom(numpy_helper.from_array(integers.reshape(weight.stored.shape).astype(np.int8), key))
-    onnx.save(model, quantised)
+    onnx.save(model, quantized)
     return len(chosen)
 
 

@@ -90,13 +90,13 @@ def count(columns: np.ndarray, weights: np.ndarray) -> tuple[int, int, int]:
     return pairs, clamped, worst
 
 
-def layers(reference: onnx.ModelProto, quantised: onnx.ModelProto) -> list[Layer]:
-    """All convolutions and matrix products with int8 weights and a quantised input."""
-    held = {w.output: w for w in qdq.weights(quantised.graph, reference.graph) if w.slot == 1}
-    pairs = {pair.after: pair for pair in qdq.pairs(quantised.graph)}
-    behind = {n.output[0]: n.input[0] for n in quantised.graph.node if n.op_type == "Flatten"}
+def layers(reference: onnx.ModelProto, quantized: onnx.ModelProto) -> list[Layer]:
+    """All convolutions and matrix products with int8 weights and a quantized input."""
+    held = {w.output: w for w in qdq.weights(quantized.graph, reference.graph) if w.slot == 1}
+    pairs = {pair.after: pair for pair in qdq.pairs(quantized.graph)}
+    behind = {n.output[0]: n.input[0] for n in quantized.graph.node if n.op_type == "Flatten"}
     found = []
-    for node in qdq.heavy_nodes(quantised.graph):
+    for node in qdq.heavy_nodes(quantized.graph):
         given = node.input[0]
         while given in behind:  # passes integers on
             given = behind[given]
@@ -166,13 +166,13 @@ def _thinned(rows: np.ndarray) -> np.ndarray:
 
 
 def saturation(
-    graph: str, reference: onnx.ModelProto, quantised: onnx.ModelProto, samples: list[Sample], bits: int | None = None
+    graph: str, reference: onnx.ModelProto, quantized: onnx.ModelProto, samples: list[Sample], bits: int | None = None
 ) -> list[Saturation]:
     """Every int8 layer of a graph, with its own weights, or with float weights rounded to `bits` bits.
 
     Pairs are counted on the float graph's activations, for layers whose bound does not already exclude an overflow.
     """
-    found = layers(reference, quantised)
+    found = layers(reference, quantized)
     if bits is not None:
         found = [with_bits(layer, reference, bits) for layer in found]
     results = {}

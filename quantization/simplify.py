@@ -1,4 +1,4 @@
-"""Makes a quantised graph (QDQ) simpler where the result stays as good: fewer operations, fewer roundings."""
+"""Makes a quantized graph (QDQ) simpler where the result stays as good: fewer operations, fewer roundings."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class _Graph:
         return readers[0] if len(readers) == 1 and readers[0].op_type == kind and name not in self.outputs else None
 
     def value(self, name: str) -> np.ndarray | None:
-        """A constant as it was before quantisation; None for what is computed."""
+        """A constant as it was before quantization; None for what is computed."""
         for kind in ("DequantizeLinear", "QuantizeLinear"):
             node = self.made_by(name, kind)
             name = node.input[0] if node is not None else name
@@ -51,9 +51,9 @@ class _Graph:
 
 
 def fold_scalar_products(model: onnx.ModelProto) -> int:
-    """A quantised map times a positive number is the same map with another scale: no operation, no rounding.
+    """A quantized map times a positive number is the same map with another scale: no operation, no rounding.
 
-    Written as DequantizeLinear with the product of both; the multiplication and the quantisation of its result go.
+    Written as DequantizeLinear with the product of both; the multiplication and the quantization of its result go.
     Returns how many multiplications went.
     """
     graph = model.graph
@@ -65,18 +65,18 @@ def fold_scalar_products(model: onnx.ModelProto) -> int:
             source, number = view.made_by(tensor, "DequantizeLinear"), view.value(factor)
             if source is None or number is None or number.size != 1 or number.item() <= 0:
                 continue
-            quantise = view.only_reader(node.output[0], "QuantizeLinear")
-            dequantise = quantise and view.only_reader(quantise.output[0], "DequantizeLinear")
+            quantize = view.only_reader(node.output[0], "QuantizeLinear")
+            dequantize = quantize and view.only_reader(quantize.output[0], "DequantizeLinear")
             scale = view.constants.get(source.input[1])
-            if dequantise is None or scale is None:
+            if dequantize is None or scale is None:
                 continue
             product = (numpy_helper.to_array(scale) * np.float32(number.item())).astype(np.float32)
             name = f"{node.name}/scale"
             graph.initializer.append(numpy_helper.from_array(product, name))
             added.append((source, helper.make_node(
-                "DequantizeLinear", [source.input[0], name, *source.input[2:]], dequantise.output, f"{node.name}/scaled"
+                "DequantizeLinear", [source.input[0], name, *source.input[2:]], dequantize.output, f"{node.name}/scaled"
             )))  # fmt: skip
-            gone += [node, quantise, dequantise]
+            gone += [node, quantize, dequantize]
             break
     _replace(graph, gone, added)
     return len(added)
@@ -93,14 +93,14 @@ def share_scales(model: onnx.ModelProto) -> int:
         if joined is None:
             continue
         for name in node.input:
-            dequantise = view.made_by(name, "DequantizeLinear")
-            quantise = dequantise and view.made_by(dequantise.input[0], "QuantizeLinear")
-            if quantise is None or view.only_reader(quantise.output[0], "DequantizeLinear") is None:
+            dequantize = view.made_by(name, "DequantizeLinear")
+            quantize = dequantize and view.made_by(dequantize.input[0], "QuantizeLinear")
+            if quantize is None or view.only_reader(quantize.output[0], "DequantizeLinear") is None:
                 continue
-            if view.only_reader(dequantise.output[0], "Concat") is None:
+            if view.only_reader(dequantize.output[0], "Concat") is None:
                 continue
-            quantise.input[1:] = joined.input[1:]
-            dequantise.input[1:] = joined.input[1:]
+            quantize.input[1:] = joined.input[1:]
+            dequantize.input[1:] = joined.input[1:]
             count += 1
     return count
 

@@ -10,12 +10,12 @@
 #include <cstdio>
 
 #include "core/error.h"
-#include "scene/capture/posed_view.h"
 #include "scene/build/scene_builder.h"
+#include "scene/capture/posed_view.h"
+#include "scene/format/block_decoding.h"
 #include "scene/format/scene_layout.h"
 #include "scene/format/scene_packing.h"
 #include "scene/render/scene_renderer.h"
-#include "scene/format/block_decoding.h"
 
 namespace {
 
@@ -55,8 +55,8 @@ std::array<double, kFeatures> deviations(const maq::ModelledPoints& points) {
   return found;
 }
 
-// `order`: of the scene's points among the given, which are in the order of the state.
-void print_errors(const maq::ModelledPoints& points, const maq::ModellingStateView& state, const maq::Scene& scene,
+// `order`: of the scene's points among the given, which are in the order of the moments.
+void print_errors(const maq::ModelledPoints& points, const maq::MomentStore& moments, const maq::Scene& scene,
                   const std::vector<uint32_t>& order) {
   const std::array<double, kFeatures> deviation = deviations(points);
   std::vector<double> errors;
@@ -74,7 +74,7 @@ void print_errors(const maq::ModelledPoints& points, const maq::ModellingStateVi
         const double off = double(part.slopes[k * maq::kSlopes + c]) - points.slopes[point * maq::kSlopes + c];
         slope[c] = off / deviation[c % kFeatures];
       }
-      errors.push_back(error_over_photos(state.moments(point), mean, slope));
+      errors.push_back(error_over_photos(moments.at(point), mean, slope));
       squares += errors.back() * errors.back();
     }
   }
@@ -119,7 +119,7 @@ void print_views(const maq::Scene& scene, const std::shared_ptr<maq::SceneNetwor
 
 int measure(const char* capture_folder, const char* bundle) {
   const auto runtime = std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());
-  const auto networks = std::make_shared<maq::SceneNetworks>(runtime, bundle, maq::SessionSettings());
+  const auto networks = std::make_shared<maq::SceneNetworks>(runtime, maq::read_bundle(bundle), maq::SessionSettings());
   const maq::Capture capture = maq::open_capture(capture_folder);
   maq::SceneBuilder builder(capture.cloud, capture.up, *networks, {});
   std::vector<HeldOut> views;
@@ -136,7 +136,6 @@ int measure(const char* capture_folder, const char* bundle) {
     }
   }
   const maq::ModelledPoints points = builder.finish();
-  const maq::ModellingStateView state = builder.state();
   std::vector<float> variations = points.variations;
   std::sort(variations.begin(), variations.end());
   const auto quantile = [&](double share) { return double(variations[size_t(share * double(variations.size() - 1))]); };
@@ -151,13 +150,13 @@ int measure(const char* capture_folder, const char* bundle) {
                                    {"int16", maq::Coefficients::kInt16},
                                    {"int8", maq::Coefficients::kInt8}}) {
     for (const float least : {0.0f, 0.005f, 0.011f, 0.02f, 0.03f, 0.05f, 0.08f, 0.12f, 0.2f, 1e9f}) {
-      std::vector<uint32_t> order;
       const auto places = kind == maq::Coefficients::kFloat32 ? maq::Places::kFloat32 : maq::Places::kUint16;
-      const maq::Scene scene = make_scene(points, {places, kind, least}, &order);
+      const maq::ScenePacking packing = {places, kind, least};
+      const maq::Scene scene = make_scene(points, packing);
       const size_t bytes = blocks_bytes(scene) + places_bytes(scene) + means_bytes(scene) + slopes_bytes(scene);
       std::printf("%-6s %9.3g %7.3f %6.1f ", name, double(least), double(scene.varying) / scene.points,
                   double(bytes) / scene.points);
-      print_errors(points, state, scene, order);
+      print_errors(points, builder.moments(), scene, order_points(points, packing).points);
       print_views(scene, networks, views);
       std::printf("\n");
     }

@@ -1,57 +1,20 @@
-"""Reads shards (docs/formats.md), draws augmented batches in background threads."""
+"""Augmented batches of shards' records (export.shards), drawn in a background thread."""
 
 from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 import torch
-from tqdm import tqdm
 
-from export import surface
 from export.densepose.targets import Truth
-from export.people.dataset import visible_boxes
+from export.shards import Record, mirror_iuv, visible_boxes
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)  # RGB, 0..255
 STD = np.array([58.395, 57.12, 57.375], np.float32)
-
-
-@dataclass(frozen=True)
-class Record:
-    """One encoded image with its label."""
-
-    image: bytes
-    label: bytes
-
-    def decoded(self) -> tuple[np.ndarray, np.ndarray]:
-        """BGR uint8 [H, W, 3] and label uint8 [H, W, 4]."""
-        image = cv2.imdecode(np.frombuffer(self.image, np.uint8), cv2.IMREAD_COLOR)
-        label = cv2.imdecode(np.frombuffer(self.label, np.uint8), cv2.IMREAD_UNCHANGED)
-        if image is None or label is None or image.shape[:2] != label.shape[:2]:
-            raise ValueError("a shard holds a damaged picture or label; render it again (export.people.dataset)")
-        return image, label
-
-
-def load_records(folder: Path, limit: int | None = None) -> list[Record]:
-    """All images of a split, still encoded (about 40 kB each)."""
-    shards = sorted(folder.glob("shard-?????.npz"))
-    if not shards:
-        raise FileNotFoundError(f"no shards in {folder}: run `python -m export.people.dataset` first")
-    records: list[Record] = []
-    for path in tqdm(shards, desc=f"reading {folder.name}", unit="shard", leave=False):
-        with np.load(path) as data:
-            pieces = []
-            for name in ("image", "label"):
-                ends = data[f"{name}_end"]
-                pieces.append([p.tobytes() for p in np.split(data[name], ends[:-1])])
-            records += [Record(*pair) for pair in zip(*pieces, strict=True)]
-        if limit and len(records) >= limit:
-            return records[:limit]
-    return records
 
 
 def normalised(image: np.ndarray) -> np.ndarray:
@@ -96,7 +59,7 @@ def augmented(
     if rng.random() < 0.5:
         image = image[:, ::-1]
         label = label[:, ::-1].copy()
-        label[..., :3] = surface.mirror_iuv(label[..., :3])
+        label[..., :3] = mirror_iuv(label[..., :3])
     return _recoloured(np.ascontiguousarray(image), rng), label
 
 

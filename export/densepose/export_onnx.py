@@ -24,12 +24,13 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from export.densepose import bundle, data
+from export.densepose import bundle
 from export.densepose import targets as tg
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.decode import Graphs, detect
 from export.densepose.graphs import chart_maps, read_charts, session
 from export.densepose.network import Aspp, Fusion, MobileParsingRCNN
+from export.shards import load_records
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the tensor's largest value
 
@@ -360,7 +361,7 @@ def main() -> None:
     torch.manual_seed(0)
     net = MobileParsingRCNN(NetworkConfig(width=options.width)) if options.random else load_network(options.checkpoint)
     export_graphs(net.eval(), options.out)
-    records = data.load_records(options.data, options.images)
+    records = load_records(options.data, options.images)
     images = [np.ascontiguousarray(record.decoded()[0][..., ::-1]) for record in records]
     errors = parity(net, options.out, images)
     for name, error in errors.items():

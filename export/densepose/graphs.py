@@ -21,7 +21,7 @@ def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
     """A CPU session of one graph."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
-    options.log_severity_level = 3  # else every constant that quantisation left behind is worth a warning
+    options.log_severity_level = 3  # else every constant that quantization left behind is worth a warning
     return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
 
 

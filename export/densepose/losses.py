@@ -15,6 +15,7 @@ from export.densepose import boxes as bx
 from export.densepose import targets as tg
 from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
+from export.shards import POSSIBLE_PARTS, UNSURE
 
 RPN_ANCHORS, BOX_ROIS, DENSE_ROIS, GRID = 256, 24, 2, 64
 WEIGHTS = {
@@ -37,10 +38,10 @@ _SHARE = np.array([.092, .253, .0165, .0165, .010, .010, .0135, .0135, .053, .05
 INDEX_WEIGHTS = torch.tensor([0.5, *np.clip(np.sqrt(0.04 / _SHARE), 0.5, 2.5)], dtype=torch.float32)
 
 # By value of I (export.surface): the classes that it leaves possible, [256, 25] and [256, 15], and how much it weighs.
-_PARTS = torch.from_numpy(surface.POSSIBLE_PARTS)
+_PARTS = torch.from_numpy(POSSIBLE_PARTS)
 _REGIONS = torch.stack([_PARTS[:, k == surface.PART_TO_COARSE].any(1) for k in range(surface.COARSE_COUNT + 1)], 1)
 _WEIGHT = (_PARTS * INDEX_WEIGHTS).sum(1) / _PARTS.sum(1).clamp(min=1)
-_WEIGHT[surface.UNSURE] = 0
+_WEIGHT[UNSURE] = 0
 
 
 def possible_classes_loss(logits: Tensor, value: Tensor, possible: Tensor, weight: Tensor) -> Tensor:
@@ -162,10 +163,10 @@ def _box_terms(
 def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
     coarse, index, u, v = outputs
     value = label[..., 0].long()
-    told = (value > 0) & (value < surface.UNSURE)
+    told = (value > 0) & (value < UNSURE)
     # Decoding takes background from `coarse` alone, so the index is asked about body pixels only, as in DensePose.
     of_body = index[:, 1:].permute(0, 2, 3, 1)[told]
-    every, sure = coarse.permute(0, 2, 3, 1).flatten(0, 2), (torch.arange(256) != surface.UNSURE).float()
+    every, sure = coarse.permute(0, 2, 3, 1).flatten(0, 2), (torch.arange(256) != UNSURE).float()
     return {
         "coarse": possible_classes_loss(every, value.flatten(), _REGIONS, sure),
         "index": possible_classes_loss(of_body, value[told], _PARTS[:, 1:], _WEIGHT),

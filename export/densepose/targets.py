@@ -8,10 +8,9 @@ import torch
 from torch import Tensor
 from torchvision.ops import batched_nms, box_iou
 
-from export import surface
 from export.densepose import boxes as bx
 from export.densepose.config import NetworkConfig
-from export.people.dataset import BOX_ALONE
+from export.shards import BOX_ALONE, UNSURE
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tens
     """Labels at the centres of a grid x grid lattice over each box: uint8 [P, grid, grid, 3].
 
     Channels are I, U*255, V*255. Other people's pixels and what lies outside the image are background; what is
-    `surface.UNSURE` stays so, whosever it may be.
+    `UNSURE` stays so, whosever it may be.
     """
     height, width = truth.label.shape[:2]
     at = (torch.arange(grid, device=boxes.device) + 0.5) / grid
@@ -131,7 +130,7 @@ def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tens
     y = (boxes[:, 1:2] + at * (boxes[:, 3:] - boxes[:, 1:2])).floor().long()
     inside = ((y >= 0) & (y < height))[:, :, None] & ((x >= 0) & (x < width))[:, None]
     picked = truth.label[y.clamp(0, height - 1)[:, :, None], x.clamp(0, width - 1)[:, None]]
-    own = (picked[..., 3] == truth.instance[person][:, None, None]) | (picked[..., 0] == surface.UNSURE)
+    own = (picked[..., 3] == truth.instance[person][:, None, None]) | (picked[..., 0] == UNSURE)
     own &= inside
     return picked[..., :3] * own[..., None]
 

@@ -37,6 +37,7 @@ from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.decode import Graphs, infer
 from export.densepose.losses import PixelHead, batch_loss, surface_loss
 from export.densepose.network import MobileParsingRCNN
+from export.shards import Record, load_records
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Ema:
 
 
 @torch.no_grad()
-def validate(net: MobileParsingRCNN, records: list[data.Record]) -> dict[str, float]:
+def validate(net: MobileParsingRCNN, records: list[Record]) -> dict[str, float]:
     """Quick figures on validation images: box recall and precision at IoU 0.5, part accuracy, mask IoU."""
     device = next(net.parameters()).device
     net = copy.deepcopy(net).cpu().eval() if device.type != "cpu" else net.eval()
@@ -105,7 +106,7 @@ def validate(net: MobileParsingRCNN, records: list[data.Record]) -> dict[str, fl
 
 
 @torch.no_grad()
-def validate_surface(net: MobileParsingRCNN, pixel_head: PixelHead, records: list[data.Record]) -> dict[str, float]:
+def validate_surface(net: MobileParsingRCNN, pixel_head: PixelHead, records: list[Record]) -> dict[str, float]:
     """Part accuracy and mask IoU of PixelHead, on cuts drawn as in training (the same at each call)."""
     device = next(net.parameters()).device
     rng, stage = np.random.default_rng(0), STAGES[0]
@@ -331,9 +332,9 @@ def main() -> None:
 
     signal.signal(signal.SIGTERM, stop)
     signal.signal(signal.SIGINT, stop)
-    train = data.load_records(options.data / "train")[rank::world]
-    held_out = data.load_records(options.data / "val", 100)
-    photos = data.load_records(options.photos)[rank::world] if options.photos else []
+    train = load_records(options.data / "train")[rank::world]
+    held_out = load_records(options.data / "val", 100)
+    photos = load_records(options.photos)[rank::world] if options.photos else []
     # On the one core of this process a second thread would only take turns with it, a fifth slower than one alone.
     ahead = 0 if device.type == "cpu" and torch.get_num_threads() == 1 else 4
     batches = data.Batches(train, options.batch, options.seed * 1000 + rank, step, photos, options.photo_share, ahead)

@@ -14,7 +14,7 @@ from export.evaluation.backends import fingerprint, open_backend
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.measure import Figures, measure
 from export.evaluation.picture import write_picture
-from export.evaluation.shards import ShardError, count_images, read_images, shard_paths
+from export.shards import count_images, read_images, shard_paths
 
 EPILOG = """\
 backends, each `kind` or `kind=path`, separated by commas:
@@ -66,7 +66,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     try:
         return run(arguments)
-    except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
+    except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Evaluation stopped: {error}", file=sys.stderr)
         return 1
 

@@ -41,6 +41,7 @@ from export.densepose.train import CLOSE, Ema, bf16_pays, optimiser_of, rate_at,
 from export.evaluation.backends import Prediction
 from export.evaluation.photos import PhotoSet, Tally, read_photo
 from export.photos.backgrounds import load_photographs
+from export.shards import Record, load_records
 from export.teachers import shards
 from export.teachers.label import PhotoLabels
 
@@ -90,7 +91,7 @@ VARIATIONS = {
 }
 
 
-class PlainRecord(data.Record):
+class PlainRecord(Record):
     """A record with one colour, its own, around the people."""
 
     def decoded(self) -> tuple[np.ndarray, np.ndarray]:
@@ -100,8 +101,8 @@ class PlainRecord(data.Record):
         return image, label
 
 
-def records_of(variation: Variation, folder: Path) -> list[data.Record]:
-    records = data.load_records(folder / variation.rendered / "train", variation.count)
+def records_of(variation: Variation, folder: Path) -> list[Record]:
+    records = load_records(folder / variation.rendered / "train", variation.count)
     if variation.keep:
         records = [r for r in records if variation.keep(r.decoded()[1])]
     return [PlainRecord(r.image, r.label) for r in records] if variation.plain else records
@@ -161,7 +162,7 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
         net.backbone.freeze()
     trained = nn.ModuleList([net, pixel_head])
     ema, optimiser = Ema(trained, 0.997), optimiser_of(net, pixel_head, 2e-3, 0.02)
-    photos = data.load_records(options.data / "photos" / "shards" / variation.photos) if variation.photos else []
+    photos = load_records(options.data / "photos" / "shards" / variation.photos) if variation.photos else []
     records = records_of(variation, options.data)
     batches = data.Batches(records, BATCH, seed, 0, photos, PHOTO_SHARE, ahead=0)
     steps = options.images // BATCH
@@ -181,7 +182,7 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     averaged, averaged_head = ema.net
     dev = [options.data / "photos" / "val", options.data / "photos" / "ablation" / "dev"]
     dev = PhotoSet.find(dev, options.data / "teachers" / "labels", [])
-    rendered = validate_surface(averaged, averaged_head, data.load_records(options.data / "people" / "val", 100))
+    rendered = validate_surface(averaged, averaged_head, load_records(options.data / "people" / "val", 100))
     return judge(averaged, averaged_head, dev) | rendered | {"rendered": len(records)}
 
 

@@ -19,7 +19,7 @@ from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.paint import labelled_tile, mosaic, paint
 from export.evaluation.photos import read_photo
 from export.evaluation.report import column_of
-from export.evaluation.shards import ShardError, read_image
+from export.shards import read_image
 
 # Photographs that may be redistributed, and where they lie (tests/media/README.md); all others are told in words.
 REDISTRIBUTABLE = {"astronaut.png": Path("tests/media/photo.jpg")}
@@ -62,7 +62,7 @@ def main(argv: list[str] | None = None) -> int:
         rows = [
             draw_kind(kind, backend, document["data"], figures, arguments.cases, arguments.all_photos) for kind in KINDS
         ]
-    except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
+    except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"No gallery was drawn: {error}", file=sys.stderr)
         return 1
     arguments.out.parent.mkdir(parents=True, exist_ok=True)

@@ -15,8 +15,8 @@ from export.evaluation.breakdown import GroupFigures, breakdown, left_right
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
 from export.evaluation.people import FalseAlarm, PersonRecord, compare, rendered_people
-from export.evaluation.shards import LabelledImage
 from export.evaluation.surface_accuracy import PixelAccuracy, PointAccuracy, SurfaceTable, mask_overlap, share
+from export.shards import LabelledImage
 
 # Under GPS a detection that overlaps somebody too small or too hidden by this much counts neither way.
 IGNORE_IOU = 0.5

@@ -11,7 +11,7 @@ import numpy as np
 
 from export.evaluation.average_precision import ImageMatches, box_iou, match
 from export.evaluation.backends import Prediction
-from export.evaluation.shards import LabelledImage
+from export.shards import LabelledImage
 from export.surface import COARSE_COUNT, PART_NAMES, PART_TO_COARSE
 
 MATCH_IOU = 0.5

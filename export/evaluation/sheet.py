@@ -13,7 +13,7 @@ from tqdm import tqdm
 from export.evaluation.backends import Prediction, open_backend
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.paint import labelled_tile, mosaic, paint
-from export.evaluation.shards import ShardError, read_images
+from export.shards import read_images
 
 SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp"}
 CLIPS = {".mp4", ".avi", ".mov", ".mkv"}
@@ -82,7 +82,7 @@ def main(argv: list[str] | None = None) -> int:
         ):
             shown = backend.predict(image).above(threshold)
             tiles.append(labelled_tile(paint(image, shown), caption(name, shown), arguments.side, arguments.side))
-    except (ShardError, MaquetteError, FileNotFoundError, ValueError) as error:
+    except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"No sheet was drawn: {error}", file=sys.stderr)
         return 1
     arguments.out.parent.mkdir(parents=True, exist_ok=True)

@@ -14,10 +14,11 @@ from typing import Protocol
 
 import numpy as np
 
-from export.evaluation.shards import LabelledImage, sample_pixels
+from export.shards import LabelledImage
 from export.surface import MIRROR_COARSE, PART_COUNT, PART_TO_COARSE
 
 KAPPA_M = 0.255
+POINTS_PER_PERSON = 196
 
 
 FATES = ("the right part", "front for back", "left for right", "another part", "background")
@@ -36,6 +37,18 @@ def _fate_of() -> np.ndarray:
 
 
 _FATE = _fate_of()
+
+
+def sample_pixels(image: LabelledImage, number: int, count: int = POINTS_PER_PERSON) -> np.ndarray:
+    """Positions (y, x), int64 [K, 2], of up to `count` visible pixels of one person, always the same ones.
+
+    They stand for the about 100 annotated points a person of DensePose-COCO; 196 is the most there are in it.
+    """
+    pixels = np.argwhere(image.label[..., 3] == number)
+    if len(pixels) <= count:
+        return pixels
+    seed = [*image.name.encode(), number]
+    return pixels[np.sort(np.random.default_rng(seed).choice(len(pixels), count, replace=False))]
 
 
 class SurfaceTable(Protocol):

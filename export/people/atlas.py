@@ -95,7 +95,7 @@ class Atlas:
 
     rest: float64 [V, 3] metres, the template body's vertices and those that the cuts made; faces: [F, 3] into them.
     part: uint8 [F]; uv: float32 [F, 3, 2] at the faces' corners. Built on the right half and mirrored, so that the
-    mirror image of a label (`export.surface.mirror_iuv`) is exactly the label of the mirror image.
+    mirror image of a label (`export.shards.mirror_iuv`) is exactly the label of the mirror image.
     """
 
     def __init__(self, body: Body) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from export import surface
 from export.people.atlas import Atlas
+from export.shards import mirror_iuv
 
 CELL_M = 0.004
 _MARGIN_M = 0.02
@@ -70,5 +70,5 @@ class LabelLookup:
         weight /= weight.sum(1, keepdims=True)
         uv = (weight[..., None] * self._uv[face]).sum(1)
         out = np.concatenate([self._part[face][:, None], np.round(np.clip(uv, 0, 1) * 255)], 1).astype(np.uint8)
-        out[left] = surface.mirror_iuv(out[left])
+        out[left] = mirror_iuv(out[left])
         return out

@@ -7,7 +7,7 @@ and averaged; labels are taken from one of the samples, since labels must not be
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 os.environ.setdefault("LP_NUM_THREADS", "1")  # the software rasteriser; processes are the parallelism here
 
@@ -15,6 +15,7 @@ import cv2
 import moderngl
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial.transform import Rotation
 
 from export.people.lookup import LabelLookup
 from export.people.props import Prop
@@ -109,6 +110,13 @@ class Camera:
     height: int
     focal_px: float
     world_to_camera: np.ndarray
+
+    def rolled(self, degrees: float) -> Camera:
+        """The camera rolled about its axis, so that what it shows turns clockwise by a positive angle."""
+        if not degrees:
+            return self
+        turn = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
+        return replace(self, world_to_camera=turn @ self.world_to_camera)
 
 
 @dataclass(frozen=True)

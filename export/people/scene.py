@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from export.people import assets
+from export.people.animals import load_animals
 from export.people.atlas import Atlas
 from export.people.body import Body, Shape, sample_phenotype
 from export.people.imaging import camera_faults, lens_map, through_lens
@@ -18,10 +19,12 @@ from export.people.motion import load_clips, load_photo_poses
 from export.people.panoramas import load_panoramas
 from export.people.render import Camera, Light, Picture, Renderer
 from export.people.staging import Director
+from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model
 
 SPLITS = {"train": 0, "val": 1, "test": 2}
 PANORAMA_SHARE = 0.2  # of the images outside rendered rooms
+TILTED_PEOPLE = 0.25  # of the tilted images: the people are, not the camera
 BODIES = {"train": 400, "val": 60, "test": 60}
 
 
@@ -37,8 +40,11 @@ class Sample:
 class Studio:
     """Everything one process needs to draw images of one split and size."""
 
-    def __init__(self, split: str, width: int, height: int, places: Path, points: bool, bare: bool = False) -> None:
-        self.split, self.width, self.height = split, width, height
+    def __init__(
+        self, split: str, width: int, height: int, places: Path, points: bool, bare: bool = False,
+        variety: Variety = CLOSE,
+    ) -> None:  # fmt: skip
+        self.split, self.width, self.height, self.variety = split, width, height, variety
         self.body = Body()
         atlas = Atlas(self.body)
         self.model = Model(self.body, atlas)
@@ -55,7 +61,7 @@ class Studio:
         self.shape = lru_cache(maxsize=128)(self._shape)
         self.director = Director(
             self.model, self.fabrics, load_clips(split), load_photo_poses(split), self.shape, BODIES[split],
-            (width, height),
+            (width, height), variety, load_animals(split) if variety.animals_alone else (),
         )  # fmt: skip
 
     def _shape(self, number: int) -> Shape:
@@ -70,7 +76,7 @@ class Studio:
             behind = panorama.seen(stage.camera, yaw, exposure)
             light = panorama.light(stage.camera, yaw, exposure, rng)
         else:
-            behind = self._background(rng, self.width, self.height)
+            behind = self._background_behind(rng, stage.roll_degrees)
             light = _light(rng, stage.camera, behind, stage.indoors)
         picture = self.renderer.draw(stage.people, stage.camera, light, rng, stage.props)
         image = _composed(rng, picture, behind)
@@ -83,6 +89,16 @@ class Studio:
             label, point = (through_lens(a, source, labels=True) for a in (label, point))
         point = np.where(label[..., 3:] > 0, point, 0) if self.points else None
         return Sample(camera_faults(rng, image), label, point)
+
+    def _background_behind(self, rng: np.random.Generator, roll_degrees: float) -> np.ndarray:
+        """A photo behind people; most of the time it is tilted with them, as by a camera that is held so."""
+        if not roll_degrees or rng.random() < TILTED_PEOPLE:
+            return self._background(rng, self.width, self.height)
+        side = int(np.ceil(np.hypot(self.width, self.height)))
+        photo = self._background(rng, side, side)
+        matrix = cv2.getRotationMatrix2D(((side - 1) / 2, (side - 1) / 2), -roll_degrees, 1.0)
+        matrix[:, 2] -= [(side - self.width) / 2, (side - self.height) / 2]
+        return cv2.warpAffine(photo, matrix, (self.width, self.height))
 
     def _background(self, rng: np.random.Generator, width: int, height: int) -> np.ndarray:
         if rng.random() < 0.05:

@@ -11,8 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.people.dataset import visible_boxes
 from export.people.scene import SPLITS, Studio
+from export.people.variety import VARIETIES
+from export.shards import visible_boxes
 
 
 def part_colours() -> np.ndarray:
@@ -40,13 +41,15 @@ def painted(image: np.ndarray, label: np.ndarray) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--split", choices=SPLITS, default="train")
+    parser.add_argument("--variety", choices=VARIETIES, default="close", help="as for export.people.dataset")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=int, default=5)
     parser.add_argument("--columns", type=int, default=3)
     parser.add_argument("--out", type=Path, default=Path("people-sheet.png"))
     parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
     options = parser.parse_args()
-    studio = Studio(options.split, 320, 256, options.places, points=False)
+    variety = VARIETIES[options.variety]
+    studio = Studio(options.split, *variety.sizes[0], options.places, points=False, variety=variety)
     rng = np.random.default_rng([SPLITS[options.split], options.seed, 99])
     rows = []
     for _ in range(options.rows):

@@ -11,27 +11,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from export.people.animals import Animal
 from export.people.body import Shape
 from export.people.motion import Clips, PhotoPoses, Pose, clip_pose, drawn_pose, lying, photo_pose, posed
 from export.people.props import Prop, PropMaker
 from export.people.render import Camera, Person
+from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model, brim, dress
 
-# Layouts: share of the images, and the shares of 1, 2, 3, … people.
-LAYOUTS = {
-    "empty": (0.1, ()),
-    "scattered": (0.5, (0.48, 0.26, 0.13, 0.07, 0.04, 0.02)),
-    "group": (0.18, (0, 0.24, 0.24, 0.18, 0.12, 0.09, 0.07, 0.06)),
-    "webcam": (0.22, (0.54, 0.26, 0.13, 0.07)),
-}
-# Framing of the scattered: (share, centre of view in body heights, visible height in body heights: low, high)
-FRAMINGS = (
-    (0.38, 0.5, 1.05, 1.7),
-    (0.16, 0.66, 0.75, 0.95),
-    (0.16, 0.78, 0.45, 0.65),
-    (0.08, 0.9, 0.28, 0.4),
-    (0.22, 0.5, 1.8, 4.5),
-)
 PHOTO_POSE_SHARE = 0.25  # of the people scattered or before a webcam, where there are poses of photographs
 _LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])  # camera axes in the world before pitch and roll
 _MIN_DEPTH = 0.9  # metres from the camera to whoever is not framed
@@ -39,12 +26,13 @@ _MIN_DEPTH = 0.9  # metres from the camera to whoever is not framed
 
 @dataclass
 class Stage:
-    """What is to be drawn. `indoors`: the props have a floor."""
+    """What is to be drawn. `indoors`: the props have a floor; `roll_degrees`: the camera's tilt, if it has one."""
 
     people: list[Person]
     props: list[Prop]
     camera: Camera
     indoors: bool = False
+    roll_degrees: float = 0.0
 
 
 @dataclass
@@ -86,18 +74,24 @@ class Director:
         shape: Callable[[int], Shape],
         bodies: int,
         size: tuple[int, int],
+        variety: Variety = CLOSE,
+        animals: tuple[Animal, ...] = (),
     ) -> None:
         self.model, self.fabrics, self.shape, self.bodies = model, fabrics, shape, bodies
         self.clips, self.photo_poses = clips, photo_poses
         self.width, self.height = size
+        self.variety, self.animals = variety, animals
         self.maker = PropMaker(lambda rng: fabrics.draw(rng, worn=False))
 
     def stage(self, rng: np.random.Generator) -> Stage:
-        name = list(LAYOUTS)[rng.choice(len(LAYOUTS), p=[share for share, _ in LAYOUTS.values()])]
-        counts = LAYOUTS[name][1]
+        layouts = self.variety.layouts
+        name = list(layouts)[rng.choice(len(layouts), p=[fraction for fraction, _ in layouts.values()])]
+        counts = layouts[name][1]
         count = 1 + int(rng.choice(len(counts), p=counts)) if counts else 0
         if name == "group":
             actors, aim = self._group(rng, count)
+        elif name == "crowd":
+            actors, aim = self._crowd(rng, count)
         elif name == "webcam":
             actors, aim = self._webcam(rng, count)
         else:
@@ -114,12 +108,18 @@ class Director:
             behind = [a.person.vertices[self.model.torso, 1].max() + 0.3 for a in actors]
             far = max([aim.eye[1] + aim.distance, *behind]) + rng.uniform(0.3, 2.5)
             props += self.maker.room(rng, aim.eye, far)
-        return Stage([a.person for a in actors], props, aim.camera, indoors)
+        fraction = self.variety.animals_beside if actors else self.variety.animals_alone
+        if self.animals and fraction and rng.random() < fraction:
+            props += self._some_animals(rng, aim, alone=not actors)
+        roll = self.variety.draw_roll(rng)
+        return Stage([a.person for a in actors], props, aim.camera.rolled(roll), indoors, roll)
 
     def actor(self, rng: np.random.Generator, pose: Pose, yaw: float, table_share: float = 0.0) -> Actor:
         """Dresses a body in a pose, feet (or whatever is lowest) on z = 0, turned by `yaw` radians."""
         model, u = self.model, rng.uniform
-        layers = dress(model, self.fabrics, rng)
+        layers = dress(model, self.fabrics, rng, self.variety)
+        if self.variety.turns_around(rng):
+            yaw += np.pi
         vertices = posed(model.body, self.shape(int(rng.integers(self.bodies))), pose, rng)
         body = model.body.groups["body"]
         vertices -= [*vertices[body, :2].mean(0), vertices[body, 2].min()]
@@ -186,8 +186,8 @@ class Director:
         actors = [self._anybody(rng) for _ in range(count)]
         tall, extent = (actors[0].tall, actors[0].extent) if actors else (1.7, 1.7)
         lies = bool(actors) and actors[0].rests == "lies"
-        kind = rng.choice(len(FRAMINGS), p=[f[0] for f in FRAMINGS])
-        _, middle, low, high = FRAMINGS[0 if lies and low_view(kind) else kind]
+        kind = rng.choice(len(self.variety.framings), p=[f[0] for f in self.variety.framings])
+        _, middle, low, high = self.variety.framings[0 if lies and self._cuts_off(kind) else kind]
         visible = extent * u(low, high)
         shift = u(-0.35, 0.35) * visible * self.width / self.height * min(1, visible / extent)
         target = np.array([shift, 0, middle * tall + u(-0.08, 0.08) * visible])
@@ -228,6 +228,23 @@ class Director:
         target = np.array([u(-0.25, 0.25) * spacing * front, 0.2, z])
         return actors, self._aim(target, visible, u(28, 65), rng.normal(3, 5), rng.normal(0, 2.5))
 
+    def _crowd(self, rng: np.random.Generator, count: int) -> tuple[list[Actor], Aim]:
+        """One behind another, as in a queue, on a pavement or before a stage: boxes overlap by a third and more."""
+        u = rng.uniform
+        together = u() < 0.7  # they look the same way
+        heading = u(-np.pi, np.pi) if u() < 0.4 else np.radians(rng.normal(0, 30))
+        depth, actors = 0.0, []
+        for _ in range(count):
+            pose = drawn_pose(rng, 0.08) if u() < 0.6 else clip_pose(rng, self.clips)
+            yaw = heading + np.radians(rng.normal(0, 25)) if together else u(-np.pi, np.pi)
+            actors.append(self.actor(rng, pose, yaw).moved(rng.normal(0, 0.2 + 0.07 * count), depth))
+            depth += u(0.3, 1.1)
+        tall = float(np.median([a.tall for a in actors]))
+        visible = u(0.5, 0.95) * tall if u() < 0.3 else u(1.02, 2.6) * tall
+        z = tall * 0.52 if visible > tall else tall - 0.4 * visible
+        target = np.array([u(-0.3, 0.3), 0.3 * depth, z])
+        return actors, self._aim(target, visible, u(25, 60), rng.normal(7, 6), rng.normal(0, 2.5))
+
     def _webcam(self, rng: np.random.Generator, count: int) -> tuple[list[Actor], Aim]:
         """Head and shoulders close to a wide lens, others beside or behind."""
         u = rng.uniform
@@ -252,7 +269,21 @@ class Director:
             placed.append(actor.moved(side * u(0.32, 0.6) * (1 + k // 2) * (1 + 0.5 * behind), behind))
         return placed, aim
 
+    def _some_animals(self, rng: np.random.Generator, aim: Aim, alone: bool) -> list[Prop]:
+        """One to three animals on the ground: alone as large in the picture as a subject, else of their own size."""
+        visible = aim.distance * aim.width_per_depth * self.height / self.width
+        placed = []
+        for k in range(1 + int(rng.choice(3, p=[0.6, 0.25, 0.15]))):
+            animal = self.animals[rng.integers(len(self.animals))]
+            scale = rng.uniform(0.85, 1.15)
+            spot = self._spot(rng, aim, max(aim.distance * rng.uniform(0.9, 2.0), _MIN_DEPTH))
+            if alone:
+                scale = visible * rng.uniform(0.25, 1.0) / animal.extent
+                if not k:
+                    spot = aim.eye + aim.distance * (aim.forward + rng.uniform(-0.2, 0.2) * aim.right)
+            placed.append(animal.scaled(rng, scale).moved(*spot[:2], rng.uniform(-np.pi, np.pi)))
+        return placed
 
-def low_view(kind: int) -> bool:
-    """Whether a framing shows less than the whole body."""
-    return FRAMINGS[kind][2] < 1
+    def _cuts_off(self, kind: int) -> bool:
+        """Whether a framing shows less than the whole body."""
+        return self.variety.framings[kind][2] < 1

@@ -19,6 +19,7 @@ from export.people.atlas import REGIONS, Atlas, vertex_regions
 from export.people.body import Body
 from export.people.motion import split_of
 from export.people.props import Prop
+from export.people.variety import CLOSE, Variety
 
 # Skin tones from light to dark (RGB), and the mean colour of the skin texture that they re-tint.
 _TONES = np.array(
@@ -281,7 +282,7 @@ def _striped(rng: np.random.Generator) -> np.ndarray:
     return np.clip(cloth, 0, 255).astype(np.uint8)
 
 
-def dress(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Layer]:
+def dress(model: Model, fabrics: Fabrics, rng: np.random.Generator, variety: Variety = CLOSE) -> list[Layer]:
     """Skin, eyes, clothes, hair and what is on the head of one person, in drawing order."""
     u = rng.uniform
     place = u() * 5.999
@@ -293,9 +294,9 @@ def dress(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Laye
     )
     if fabrics.bare:
         return [skin, eyes, *_hair(model, rng)]
-    upper = _upper(model, fabrics, rng)
+    upper = _upper(model, fabrics, rng, variety.bare_chest)
     return [skin, eyes, *_lower(model, fabrics, rng), *upper, *_shoes(model, fabrics, rng), *_hair(model, rng),
-            *_on_head(model, fabrics, upper, rng)]  # fmt: skip
+            *_on_head(model, fabrics, upper, rng, variety)]  # fmt: skip
 
 
 def _cloth(rng: np.random.Generator, **more) -> dict:
@@ -323,9 +324,9 @@ def _lower(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Lay
     return [layer, Layer(**cut_out(skirt, z - end), texture=fabric, **cloth)]
 
 
-def _upper(model: Model, fabrics: Fabrics, rng: np.random.Generator) -> list[Layer]:
+def _upper(model: Model, fabrics: Fabrics, rng: np.random.Generator, bare_chest: float) -> list[Layer]:
     u = rng.uniform
-    if u() < 0.06:
+    if u() < bare_chest:
         return []
     region = model.within("tights", "torso", "head", "upper_arm", "lower_arm", "upper_leg")
     x, y, height, arm = (*model.corner[region][..., :2].transpose(2, 0, 1), model.height[region], model.arm[region])
@@ -422,20 +423,22 @@ def _hair(model: Model, rng: np.random.Generator) -> list[Layer]:
     return layers
 
 
-def _on_head(model: Model, fabrics: Fabrics, upper: list[Layer], rng: np.random.Generator) -> list[Layer]:
+def _on_head(
+    model: Model, fabrics: Fabrics, upper: list[Layer], rng: np.random.Generator, variety: Variety
+) -> list[Layer]:
     """Hat, hood or headscarf; glasses; a mask over mouth and nose. Each follows the head's surface."""
     u = rng.uniform
     radius, skull = model.head_radius, model.within("body", "head")
     x, y, z = model.corner[skull].transpose(2, 0, 1)
     layers = []
     kind = u()
-    if kind < 0.1:  # hat; `brim` gives some of them a brim
+    if kind < variety.hat:  # hat; `brim` gives some of them a brim
         tilt = u(-0.1, 0.5)
         above = (tilt * (y - model.head_y) + z - model.eye_z - u(0.25, 0.55) * radius) / np.hypot(1, tilt)
         layers.append(
             Layer(**cut_out(skull, above), texture=fabrics.draw(rng), name="hat", **_cloth(rng, offset=u(0.03, 0.04)))
         )
-    elif kind < 0.15:  # hood or headscarf: open at the face
+    elif kind < variety.hat + variety.hood:  # hood or headscarf: open at the face
         width, high = u(0.55, 0.8) * radius, u(0.8, 1.0) * radius
         face = np.hypot(x / width, (z - model.eye_z + 0.3 * radius) / high)
         open_ = np.where(y < model.head_y, (face - 1) * width, 1.0)

@@ -1,7 +1,7 @@
 """Which point each pixel shows, and rasters of their looks: NPBG++ (arXiv 2203.13318), section 3.4.
 
 One pixel a point; the nearest wins, of equal depths the lowest index, by the same arithmetic as the SDK's
-`VisiblePoints` (sdk/src/scene/visibility/visible_points.h). A key is the depth's bits, then the index: the least wins.
+`ZBuffer` (sdk/src/scene/visibility/z_buffer.h). A key is the depth's bits, then the index: the least wins.
 
 Coarser levels are the least keys of 2x2 pixels of the next finer one. That is what a camera of half the size would
 find, and exactly: a point at (x, y) is in pixel floor(x + 1/2), and half the size moves it to (x + 1/2) / 2 - 1/2, so

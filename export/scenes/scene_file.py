@@ -24,7 +24,6 @@ LARGEST_STORED = 2e30
 SLOPES = BASIS * FEATURES
 PLACES = {0: np.dtype("<f4"), 1: np.dtype("<u2")}
 COEFFICIENTS = {0: np.dtype("<f4"), 1: np.dtype("<i2"), 2: np.dtype("i1")}
-MOMENTS_BYTES = 4 * (1 + FEATURES + BASIS + BASIS * (BASIS + 1) // 2 + SLOPES)
 
 SPAN = np.dtype([("offset", "<u8"), ("bytes", "<u8"), ("check", "<u8")])
 HEAD = np.dtype(
@@ -43,13 +42,9 @@ HEAD = np.dtype(
         ("coefficient_kind", "u1"),
         ("zero", "u1", 2),
         ("networks_sha256", "u1", 32),
-        ("state_points", "<u4"),
-        ("state_seen", "<u4"),
-        ("state_origin", "<f8", 3),
-        ("state_photos", "<u4"),
         ("background", "<f4", 3),
-        ("more_zeros", "u1", 40),
-        ("sections", SPAN, 7),
+        ("more_zeros", "u1", 20),
+        ("sections", SPAN, 4),
     ]
 )
 BLOCK = np.dtype(
@@ -76,15 +71,13 @@ class SceneFileError(ValueError):
 @dataclass(frozen=True, eq=False)
 class SceneFile:
     """head: one HEAD. blocks: BLOCK [B]. places: [3 P] as stored, block by block x of all, then y, then z. means: [P,
-    8] and slopes: [V, 48] as stored. state: bytes of three sections, empty where the file keeps no state of
-    modelling."""
+    8] and slopes: [V, 48] as stored."""
 
     head: np.ndarray
     blocks: np.ndarray
     places: np.ndarray
     means: np.ndarray
     slopes: np.ndarray
-    state: tuple[bytes, bytes, bytes] = (b"", b"", b"")
 
     @property
     def up(self) -> tuple[float, float, float]:
@@ -99,11 +92,11 @@ class SceneFile:
     def positions(self) -> np.ndarray:
         """Where the points are in the world, float64 [P, 3]."""
         found = np.empty((len(self.means), 3), np.float32)
-        quantised = self.head["place_kind"] == 1
+        quantized = self.head["place_kind"] == 1
         for block in self.blocks:
             first, count = int(block["first"]), int(block["count"])
             stored = self.places[3 * first : 3 * (first + count)].reshape(3, count).T.astype(np.float32)
-            found[first : first + count] = block["low"] + stored * block["place_step"] if quantised else stored
+            found[first : first + count] = block["low"] + stored * block["place_step"] if quantized else stored
         return found + self.head["origin"]
 
     def background(self) -> np.ndarray:
@@ -127,16 +120,14 @@ class SceneFile:
         return means, self.slopes.astype(np.float32) * steps
 
     def with_looks(self, means: np.ndarray, slopes: np.ndarray) -> SceneFile:
-        """The same points with other means [P, 8] and slopes [V, 48], stored in the same kind of numbers. No state of
-        modelling: a photo added to it would undo them. Raises ValueError for other shapes or numbers too large."""
+        """The same points with other means [P, 8] and slopes [V, 48], stored in the same kind of numbers. Raises
+        ValueError for other shapes or numbers too large."""
         if means.shape != self.means.shape or slopes.shape != self.slopes.shape:
             raise ValueError(f"looks of shapes {means.shape} and {slopes.shape} are not of this scene's points")
         if not all(_sound(values) for values in (means, slopes)):
             raise ValueError("the looks are not finite, or too large for a scene file")
         blocks, head = self.blocks.copy(), self.head.copy()
         kind = COEFFICIENTS[int(head["coefficient_kind"])]
-        for name in ("state_points", "state_seen", "state_photos", "state_origin"):
-            head[name] = 0
         if kind.kind == "f":
             return SceneFile(head, blocks, self.places, means.astype(kind), slopes.astype(kind))
         most = np.iinfo(kind).max
@@ -190,7 +181,6 @@ def read_scene_file(path: Path) -> SceneFile:
         np.frombuffer(sections[1], PLACES[int(head["place_kind"])]),
         np.frombuffer(sections[2], coefficient).reshape(-1, FEATURES),
         np.frombuffer(sections[3], coefficient).reshape(-1, SLOPES),
-        tuple(sections[4:]),
     )
     _check_blocks(scene, path)
     return scene
@@ -200,7 +190,7 @@ def write_scene_file(scene: SceneFile, path: Path) -> None:
     """Beside its place first: a crash leaves the old file whole."""
     head = scene.head.copy()
     arrays = (scene.blocks, scene.places, scene.means, scene.slopes)
-    sections, offset = [*(np.ascontiguousarray(x).tobytes() for x in arrays), *scene.state], HEAD.itemsize
+    sections, offset = [np.ascontiguousarray(x).tobytes() for x in arrays], HEAD.itemsize
     for k, data in enumerate(sections):
         sections[k] = data + bytes(_filled_up(len(data)) - len(data))
         head["sections"][k] = (offset, len(data), xxh3(sections[k]))
@@ -248,10 +238,8 @@ def _checked_head(raw: bytes, size: int, path: Path) -> np.ndarray:
     kinds = int(head["place_kind"]), int(head["coefficient_kind"])
     if kinds[0] not in PLACES or kinds[1] not in COEFFICIENTS:
         raise SceneFileError(f"{path} stores its numbers in kinds {kinds}, which version {VERSION} does not have.")
-    points, varying, blocks, kept, seen = (
-        int(head[name]) for name in ("points", "varying", "blocks", "state_points", "state_seen")
-    )
-    if not (0 < blocks <= points <= MOST_POINTS and varying <= points and seen <= kept <= MOST_POINTS):
+    points, varying, blocks = (int(head[name]) for name in ("points", "varying", "blocks"))
+    if not (0 < blocks <= points <= MOST_POINTS and varying <= points):
         raise SceneFileError(f"{path} claims {points} points, {varying} that vary, in {blocks} blocks: that cannot be.")
     if not ((head["background"] >= 0) & (head["background"] <= 1)).all():
         raise SceneFileError(f"{path} has a background colour of {head['background']}, which is not 0 to 1.")
@@ -263,9 +251,6 @@ def _checked_head(raw: bytes, size: int, path: Path) -> np.ndarray:
         3 * points * PLACES[kinds[0]].itemsize,
         points * FEATURES * coefficient,
         varying * SLOPES * coefficient,
-        3 * 4 * kept,
-        4 * seen,
-        seen * MOMENTS_BYTES,
     )
     offset = HEAD.itemsize
     for k, expected in enumerate(sizes):

@@ -3,14 +3,13 @@ people cut out and set before other places.
 
     python -m export.teachers.shards --photos .data/photos/train --out .data/photos/shards/train
 
-The format is that of rendered people (docs/formats.md), with the weaker labels of `export.surface`.
+The format is that of rendered people (docs/formats.md), with the weaker labels of `export.shards`.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,8 +19,9 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export import surface
-from export.people.dataset import BOX_ALONE, SIZES, UNCERTAIN, EncodedImages, visible_boxes
+from export.people.variety import CLOSE
+from export.shards import BOX_ALONE, PERSON, REGION, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
+from export.surface import PART_COUNT
 from export.teachers.coarse import SOMEWHERE, coarse_labels
 from export.teachers.fit import PhotoFits
 from export.teachers.label import PhotoLabels
@@ -31,12 +31,13 @@ LEAST_SCORE = 0.5  # of the detector; less sure boxes are regions that training 
 _BORDER = 0.012  # of the person's height: this close to the mask's edge a pixel may be the person or not
 LEAST_CUT_OUT_PX = 60  # height of people worth cutting out
 PER_SHARD = 100
+JPEG_QUALITY = 92
 _SIZES_APART = (0.5, 0.3, 0.15, 0.05, 0.0, 0.0)  # of 1, 2, ... 6 people
 _GROUP_SIZES = (0.0, 0.4, 0.25, 0.15, 0.1, 0.1)
 
 
 def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | None = None) -> np.ndarray:
-    """uint8 [H, W, 4] = (I, U, V, instance) of a photo of `shape` pixels, with I as in `export.surface`.
+    """uint8 [H, W, 4] = (I, U, V, instance) of a photo of `shape` pixels, with I as in `export.shards`.
 
     Whose body was fitted well has the fit's labels, others the coarse regions of their landmarks.
 
@@ -49,23 +50,23 @@ def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | No
     for k in sorted(np.flatnonzero(~labels.outlined), key=lambda k: labels.score[k]):
         x0, y0, x1, y1 = np.round(labels.box[k]).astype(int)
         first = BOX_ALONE if labels.score[k] >= LEAST_SCORE else UNCERTAIN
-        out[max(y0, 0) : y1, max(x0, 0) : x1] = (surface.UNSURE, 0, 0, first + k % (UNCERTAIN - BOX_ALONE))
+        out[max(y0, 0) : y1, max(x0, 0) : x1] = (UNSURE, 0, 0, first + k % (UNCERTAIN - BOX_ALONE))
     for k in sorted(outlined, key=lambda k: -labels.mask[k].sum()):
         mask = labels.mask[k]
         border = max(1, round(_BORDER * float(labels.box[k, 3] - labels.box[k, 1])))
         ring = cv2.dilate(mask.astype(np.uint8), np.ones((2 * border + 1, 2 * border + 1), np.uint8)) > 0
-        out[(ring | labels.doubt[k]) & ~mask & (out[..., 3] == 0), 0] = surface.UNSURE
-        value = np.full(shape, surface.PERSON, np.uint8)
+        out[(ring | labels.doubt[k]) & ~mask & (out[..., 3] == 0), 0] = UNSURE
+        value = np.full(shape, PERSON, np.uint8)
         if labels.sure[k]:
             region = coarse_labels(labels.point[k], labels.visible[k], mask)
-            value = np.where(region == SOMEWHERE, surface.PERSON, surface.REGION + region)
-            value[(region == SOMEWHERE) & labels.doubt[k]] = surface.UNSURE
+            value = np.where(region == SOMEWHERE, PERSON, REGION + region)
+            value[(region == SOMEWHERE) & labels.doubt[k]] = UNSURE
         out[mask, 0] = value[mask]
         out[mask, 1:3] = 0
         if k in dense:
             fitted = cv2.resize(dense[k], shape[::-1], interpolation=cv2.INTER_NEAREST)
-            known = mask & (fitted[..., 0] > 0) & (fitted[..., 0] <= surface.PART_COUNT)
-            out[mask & ~known, 0] = surface.PERSON
+            known = mask & (fitted[..., 0] > 0) & (fitted[..., 0] <= PART_COUNT)
+            out[mask & ~known, 0] = PERSON
             out[known, :3] = fitted[known]
         out[mask, 3] = k + 1
     return out
@@ -153,7 +154,7 @@ def composed(
         edge = cv2.morphologyEx(np.pad(seen, 1).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))[
             1:-1, 1:-1
         ]
-        label[into][(edge > 0) & ~seen & (label[into][..., 3] == 0), 0] = surface.UNSURE
+        label[into][(edge > 0) & ~seen & (label[into][..., 3] == 0), 0] = UNSURE
     return np.clip(image, 0, 255).astype(np.uint8), label
 
 
@@ -180,17 +181,11 @@ def write_shards(pictures: Iterator[tuple[np.ndarray, np.ndarray]], count: int, 
     out.mkdir(parents=True, exist_ok=True)
     with tqdm(total=count, desc=str(out), unit="image", disable=None) as bar:
         for number in range(-(-count // PER_SHARD)):
-            stores = {"image": EncodedImages(), "label": EncodedImages()}
+            shard = ShardWriter(boxes=False)
             for image, label in itertools.islice(pictures, PER_SHARD):
-                stores["image"].add(".jpg", image, cv2.IMWRITE_JPEG_QUALITY, 92)
-                stores["label"].add(".png", label, cv2.IMWRITE_PNG_COMPRESSION, 3)
+                shard.add(image, label, JPEG_QUALITY)
                 bar.update()
-            arrays = {"meta": np.array(json.dumps({"split": out.name, "shard": number, "generator": "photos"}))}
-            for name, store in stores.items():
-                arrays |= store.arrays(name)
-            temporary = out / "partial.npz"
-            np.savez(temporary, **arrays)
-            temporary.replace(out / f"shard-{number:05d}.npz")
+            shard.write(out / f"shard-{number:05d}.npz", {"split": out.name, "shard": number, "generator": "photos"})
 
 
 def read(path: Path) -> np.ndarray:
@@ -245,7 +240,7 @@ def main(argv: list[str] | None = None) -> int:
     rng.shuffle(pictures)  # so that every shard holds both kinds
     count = arguments.composed if people and empty else 0
     more = (
-        composed(empty[rng.integers(len(empty))][0], people, SIZES[rng.integers(len(SIZES))], rng)
+        composed(empty[rng.integers(len(empty))][0], people, CLOSE.sizes[rng.integers(len(CLOSE.sizes))], rng)
         for _ in range(count)
     )  # fmt: skip
     write_shards(itertools.chain(pictures, more), len(pictures) + count, arguments.out)

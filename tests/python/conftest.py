@@ -1,7 +1,38 @@
-"""What several files need and is slow to make: the body, its atlas, and a renderer of undressed bodies."""
+"""What several files need: one thread for torch, signal handlers put back, and what is slow to make (the body, its
+atlas, a renderer of undressed bodies)."""
+
+import signal
 
 import numpy as np
 import pytest
+
+
+@pytest.fixture(scope="module")
+def one_thread():
+    """Torch computes in one thread: tensors of tests are small."""
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture
+def fixed_seed():
+    """Torch draws the same random numbers in every test."""
+    import torch
+
+    torch.manual_seed(0)
+
+
+@pytest.fixture
+def signal_handlers():
+    """Trainings handle SIGTERM and SIGINT; afterwards they are handled as before."""
+    handlers = {name: signal.getsignal(name) for name in (signal.SIGTERM, signal.SIGINT)}
+    yield
+    for name, handler in handlers.items():
+        signal.signal(name, handler)
 
 
 @pytest.fixture(scope="session")

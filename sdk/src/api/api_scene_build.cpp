@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
 
 #include "api/boundary.h"
 #include "api/scene_arguments.h"
+#include "core/clock.h"
 #include "scene/build/build_scene.h"
 #include "scene/capture/posed_view.h"
 #include "scene/format/scene_packing.h"
@@ -75,10 +75,6 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
     };
   }
   return settings;
-}
-
-double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
 void fill(maq_scene_build_stats& stats, const BuildTimes& times) {
@@ -151,9 +147,9 @@ maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* g
         build_from_capture(std::move(copy), *networks, options, settings.progress);
     if (!built) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback ended the building.");
     networks->forget_extractor();
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     auto made = std::make_unique<maq_scene>(packed(built->points, settings.packing, *networks));
-    filled.pack_ms = milliseconds_since(start);
+    filled.pack_ms = watch.elapsed_ms();
     if (stats != nullptr) {
       filled.view_count = uint32_t(built->views);
       for (const Dropped& dropped : built->dropped) filled.unused_view_count += uint32_t(dropped.count);
@@ -210,10 +206,10 @@ maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_fram
     require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
     check_camera(pinhole_of(*camera), "The photo's camera");
     check_distortion(*camera);
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     PosedView view;
     view.load(photo->frame.image, lens_of(*camera), pinhole_of(*camera), builder->settings.long_side_px);
-    builder->load_ms += milliseconds_since(start);
+    builder->load_ms += watch.elapsed_ms();
     const std::optional<size_t> seen =
         builder->builder.add_view(view.image(), view.valid(), view.camera(), builder->settings.progress);
     if (!seen) return keep_error(builder, MAQ_CANCELLED, nullptr, "The photo was not added: the app cancelled it.");
@@ -252,9 +248,9 @@ maq_status maq_scene_builder_finish(maq_scene_builder* builder, maq_scene** scen
     require_argument(builder, "builder");
     require_argument(scene, "scene");
     const ModelledPoints points = builder->builder.finish();
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     *scene = new maq_scene(packed(points, builder->settings.packing, *builder->networks));
-    builder->packing_ms += milliseconds_since(start);
+    builder->packing_ms += watch.elapsed_ms();
     return MAQ_OK;
   });
 }

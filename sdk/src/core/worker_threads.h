@@ -12,6 +12,12 @@
 
 namespace maq {
 
+// Of a network or a piece of work; what asks for more is refused.
+inline constexpr int kMaxThreads = 64;
+
+// For who does not say: the processor's cores, but at most 4. More do not pay for networks of this size.
+int default_threads();
+
 class WorkerThreads {
  public:
   // `count` includes the thread that calls run(), so that of 1 none is started. Throws std::system_error where the system

@@ -21,7 +21,6 @@ class SizedSessions {
   // The session for a picture of that size: the sizes that the graph's inputs call "height", "width", "height/2" and so on
   // are fixed. Stays until `most_kept` others were asked for. Throws what Session throws.
   Session& at(int width_px, int height_px);
-  void forget() { kept_.clear(); }
 
  private:
   struct Kept {

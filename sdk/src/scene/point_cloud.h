@@ -8,8 +8,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "scene/visibility/visible_points.h"
-
 namespace maq {
 
 // 450 MB of places and colours.
@@ -18,6 +16,15 @@ inline constexpr uint64_t kMostPoints = 30'000'000;
 // Reasons why points are dropped (drop_counts.h).
 inline constexpr char kPointsNotFinite[] = "points whose place is not finite";
 inline constexpr char kColoursNotFinite[] = "points whose colour is not finite";
+
+// Places of points, one array for each coordinate, relative to `origin`.
+struct PointPlaces {
+  const float* x = nullptr;
+  const float* y = nullptr;
+  const float* z = nullptr;
+  size_t count = 0;
+  std::array<double, 3> origin = {0, 0, 0};
+};
 
 struct PointCloud {
   std::array<double, 3> origin = {0, 0, 0};

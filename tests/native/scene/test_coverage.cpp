@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "support/synthetic_scene.h"
 #include "scene/format/scene_packing.h"
+#include "support/synthetic_scene.h"
 
 namespace {
 
@@ -47,7 +47,7 @@ TEST(Coverage, IsAsItsDefinitionSays) {
     LookRaster raster;
     shade(raster, count, threads);
     maq::PictureCover cover;
-    cover.find(raster, int(kWidth), int(kHeight), true, threads);
+    cover.find(raster, int(kWidth), int(kHeight), threads);
     for (size_t y = 0; y < kHeight; ++y) {
       for (size_t x = 0; x < kWidth; ++x) {
         // Each of four scales rounds.
@@ -68,7 +68,7 @@ TEST(Coverage, IsWholeWhereThereIsAPointAndNothingFarFromAll) {
   LookRaster raster;
   shade(raster, 1, threads);
   maq::PictureCover cover;
-  cover.find(raster, int(kWidth), int(kHeight), false, threads);
+  cover.find(raster, int(kWidth), int(kHeight), threads);
   size_t covered = 0, nothing = 0;
   for (size_t i = 0; i < kWidth * kHeight; ++i) {
     if (raster.keys(0)[i] != kNoPointKey) {

@@ -5,11 +5,11 @@
 #include <limits>
 #include <thread>
 
+#include "scene/build/build_scene.h"
+#include "scene/build/scene_builder.h"
+#include "scene/capture/posed_photo.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "scene/build/build_scene.h"
-#include "scene/capture/posed_photo.h"
-#include "scene/build/scene_builder.h"
 #include "support/tiny_scene.h"
 
 namespace {
@@ -241,7 +241,6 @@ TEST_F(SceneBuilder, OptionsOutOfRangeAreRefused) {
   refused("visibility scale is 2", [](auto& options, auto&) { options.visibility_scale = 2; });
   refused("visibility scale is nan", [](auto& options, auto&) { options.visibility_scale = std::nan(""); });
   refused("nearest point is -1", [](auto& options, auto&) { options.near = -1; });
-  refused("Alpha is -1", [](auto& options, auto&) { options.alpha = -1; });
   refused("Threads are 0", [](auto& options, auto&) { options.threads = 0; });
 }
 
@@ -333,9 +332,6 @@ TEST_F(SceneBuilder, CapturesAreBuiltWithoutWhatIsHeldOut) {
   EXPECT_EQ(all.views, 4u);
   EXPECT_TRUE(all.dropped.empty());
   expect_the_same(all.points, built({0, 1, 2, 3}), 0);
-  options.leaves_out = {"images/0.png"};
-  expect_the_same(maq::build_from_capture(capture_, *networks_, options)->points, built({1, 2, 3}), 0);
-  options.leaves_out = {};
   options.most_views = 2;
   expect_the_same(maq::build_from_capture(capture_, *networks_, options)->points, built({0, 2}), 0);
   options.most_views = 0;
@@ -369,13 +365,10 @@ TEST_F(SceneBuilder, PhotosOfACaptureThatCannotBeReadAreDroppedAndCounted) {
 
 TEST_F(SceneBuilder, ChoicesThatLeaveNoPhotoAreASentence) {
   maq::CaptureBuildOptions options;
-  options.leaves_out = {"images/9.png"};
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "images/9.png is to be left out",
-               [&] { maq::build_from_capture(capture_, *networks_, options); });
-  options.leaves_out = {"images/0.png", "images/1.png", "images/2.png", "images/4.png"};
+  maq::Capture held_out = capture_;
+  for (maq::CaptureView& view : held_out.views) view.is_held_out = true;
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "All of the capture's 5 photos",
-               [&] { maq::build_from_capture(capture_, *networks_, options); });
-  options.leaves_out = {};
+               [&] { maq::build_from_capture(held_out, *networks_, options); });
   options.long_side_px = -1;
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "long side",
                [&] { maq::build_from_capture(capture_, *networks_, options); });

@@ -8,25 +8,22 @@
 #include <cstring>
 #include <iostream>
 
+#include "scene/capture/ply_reader.h"
+#include "scene/format/block_decoding.h"
+#include "scene/format/ply_writer.h"
+#include "scene/format/scene_file.h"
+#include "scene/format/scene_packing.h"
 #include "support/expect_error.h"
 #include "support/file_size_limit.h"
 #include "support/fitted_scene.h"
 #include "support/peak_memory.h"
-#include "scene/capture/ply_reader.h"
-#include "scene/format/ply_writer.h"
-#include "scene/build/scene_builder.h"
-#include "scene/format/scene_file.h"
-#include "scene/format/scene_packing.h"
-#include "scene/format/block_decoding.h"
 #include "support/temp_folder.h"
-#include "support/tiny_scene.h"
 
 namespace {
 
 using maq::Coefficients;
 using maq::Places;
 using maq::Scene;
-using maq::SceneStorage;
 
 bool are_same(const void* a, const void* b, size_t bytes) { return bytes == 0 || std::memcmp(a, b, bytes) == 0; }
 
@@ -58,9 +55,9 @@ TEST(SceneFiles, KeepScenesOfEveryKind) {
         Scene scene = make_scene(points, {places, kind, least});
         for (size_t i = 0; i < 32; ++i) scene.networks_sha256[i] = uint8_t(200 + i);
         write_scene_file(scene, folder.file("a.maqs"));
-        for (const SceneStorage storage : {SceneStorage::kMapped, SceneStorage::kMemory}) {
-          expect_same(maq::open_scene_file(folder.file("a.maqs"), storage), scene);
-        }
+        expect_same(maq::open_scene_file(folder.file("a.maqs")), scene);
+        const std::string bytes = read_text(folder.file("a.maqs"));
+        expect_same(maq::open_scene_memory(bytes.data(), bytes.size()), scene);
       }
     }
   }
@@ -90,14 +87,17 @@ TEST(SceneFiles, AnOpenSceneStaysWhenItsFileIsWrittenAnewOrRemoved) {
   expect_same(opened_second, second);
 }
 
-TEST(SceneFiles, ASceneInMemoryStaysWhenItsFileIsCut) {
+TEST(SceneFiles, ASceneFromMemoryKeepsNothingOfItAndNeedsNoAlignment) {
   TempFolder folder;
-  const std::string path = folder.file("a.maqs");
-  const Scene scene = make_scene(made_up_points(2'000), {});
-  write_scene_file(scene, path);
-  const Scene opened = maq::open_scene_file(path, SceneStorage::kMemory);
-  ASSERT_EQ(truncate(path.c_str(), 10), 0);
-  expect_same(opened, scene);
+  const Scene scene = make_scene(made_up_points(2'000), {Places::kFloat32, Coefficients::kFloat32, 0});
+  write_scene_file(scene, folder.file("a.maqs"));
+  for (size_t shift = 0; shift < 4; ++shift) {
+    std::string bytes = std::string(shift, 'x') + read_text(folder.file("a.maqs"));
+    const Scene opened = maq::open_scene_memory(bytes.data() + shift, bytes.size() - shift);
+    std::fill(bytes.begin(), bytes.end(), '\xff');
+    bytes = {};
+    expect_same(opened, scene);
+  }
 }
 
 TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
@@ -168,99 +168,9 @@ TEST(SceneFiles, WhatIsNoSceneIsOneSentence) {
   expect_error(MAQ_ERROR_UNREADABLE, "too short", [&] { open("empty"); });
   write_text(folder.file("text"), std::string(5'000, 'x'));
   expect_error(MAQ_ERROR_UNREADABLE, "is not a scene", [&] { open("text"); });
-}
-
-// Moments of `count` points of which every third was never seen.
-struct KeptState {
-  maq::ModelledPoints points = made_up_points(900);
-  std::vector<uint32_t> seen;
-  std::vector<maq::ViewMoments> moments;
-
-  KeptState() {
-    std::mt19937 random(3);
-    std::normal_distribution<float> normal;
-    for (uint32_t i = 900; i-- > 0;) {
-      if (i % 3 == 0) continue;
-      seen.push_back(i);
-      moments.push_back({});
-      for (uint32_t view = 0; view <= i % 4; ++view) {
-        float y[maq::kFeatures], h[maq::kBasis];
-        for (float& value : y) value = normal(random);
-        for (float& value : h) value = normal(random);
-        moments.back().add(y, h);
-      }
-    }
-  }
-
-  maq::ModellingStateView view() const {
-    maq::ModellingStateView state;
-    state.cloud = {points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin};
-    state.seen = seen.data();
-    state.seen_count = seen.size();
-    state.moments = [this](size_t place) -> const maq::ViewMoments& { return moments[place]; };
-    state.photos = 24;
-    return state;
-  }
-};
-
-TEST(SceneFiles, KeepTheStateOfModelling) {
-  TempFolder folder;
-  const KeptState kept;
-  const maq::ModellingStateView view = kept.view();
-  const Scene scene = make_scene(kept.points, {});
-  write_scene_file(scene, folder.file("a.maqs"), &view);
-  expect_same(maq::open_scene_file(folder.file("a.maqs")), scene);
-  const maq::ModellingState state = maq::read_modelling_state(folder.file("a.maqs"));
-  EXPECT_EQ(state.cloud.origin, kept.points.origin);
-  EXPECT_EQ(state.cloud.x, kept.points.x);
-  EXPECT_EQ(state.cloud.y, kept.points.y);
-  EXPECT_EQ(state.cloud.z, kept.points.z);
-  EXPECT_EQ(state.seen, kept.seen);
-  EXPECT_EQ(state.photos, 24u);
-  ASSERT_EQ(state.moments.size(), kept.moments.size());
-  EXPECT_EQ(std::memcmp(state.moments.data(), kept.moments.data(), kept.moments.size() * sizeof(maq::ViewMoments)), 0);
-
-  write_scene_file(scene, folder.file("a.maqs"));
-  expect_error(MAQ_ERROR_UNSUPPORTED, "state of its modelling",
-               [&] { maq::read_modelling_state(folder.file("a.maqs")); });
-}
-
-TEST(SceneFiles, APhotoCanBeAddedToASceneOfWhichOnlyTheFileIsLeft) {
-  TempFolder folder;
-  const maq::Capture capture = tiny_scene::capture();
-  const auto networks = tiny_scene::networks();
-  const auto add = [&](maq::SceneBuilder& builder, size_t view) {
-    maq::Frame photo;
-    std::vector<uint8_t> valid;
-    maq::load_view(capture.views[view], photo, valid);
-    EXPECT_GT(builder.add_view(photo.image, valid.data(), capture.views[view].camera).value(), 0u);
-  };
-  maq::SceneBuilder all(capture.cloud, capture.up, *networks, {}), first(capture.cloud, capture.up, *networks, {});
-  for (const size_t view : {0, 1, 2}) add(all, view);
-  for (const size_t view : {0, 1}) add(first, view);
-  const auto write = [&] {
-    Scene scene = make_scene(first.finish(), {});
-    scene.networks_sha256 = networks->sha256();
-    const maq::ModellingStateView state = first.state();
-    write_scene_file(scene, folder.file("a.maqs"), &state);
-  };
-  write();
-  maq::SceneBuilder second(maq::read_modelling_state(folder.file("a.maqs")), *networks, {});
-  EXPECT_EQ(second.views(), 2u);
-  EXPECT_EQ(second.finish().slopes, first.finish().slopes);
-  add(second, 2);
-  const maq::ModelledPoints a = all.finish(), b = second.finish();
-  EXPECT_EQ(a.x, b.x);
-  EXPECT_EQ(a.up, b.up);
-  EXPECT_EQ(a.means, b.means);
-  EXPECT_EQ(a.slopes, b.slopes);
-  EXPECT_EQ(a.views, b.views);
-  EXPECT_EQ(a.variations, b.variations);
-
-  maq::ModellingState other = maq::read_modelling_state(folder.file("a.maqs"));
-  other.networks_sha256[0] ^= 1;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "other networks",
-               [&] { maq::SceneBuilder(std::move(other), *networks, {}); });
+  expect_error(MAQ_ERROR_UNREADABLE, "in memory is too short", [&] { maq::open_scene_memory(nullptr, 0); });
+  const std::string text(5'000, 'x');
+  expect_error(MAQ_ERROR_UNREADABLE, "in memory is not a scene", [&] { maq::open_scene_memory(text.data(), 5'000); });
 }
 
 TEST(SceneFiles, ThePlyHasTheScenesPointsAndColours) {
@@ -304,16 +214,16 @@ TEST(SceneFiles, AMillionPointsAreOpenedWithoutBeingCopied) {
   const std::string path = folder.file("a.maqs");
   write_scene_file(make_scene(made_up_points(1'000'000), {}), path);
   const double file_mib = double(std::filesystem::file_size(path)) / 1048576;
-  for (const SceneStorage storage : {SceneStorage::kMapped, SceneStorage::kMemory}) {
-    const bool is_mapped = storage == SceneStorage::kMapped;
+  const std::string bytes = read_text(path);
+  for (const bool is_mapped : {true, false}) {
     double seconds = 0;
     const double grown_mib = peak_memory_growth_mib([&] {
       const auto begin = std::chrono::steady_clock::now();
-      const Scene scene = maq::open_scene_file(path, storage);
+      const Scene scene = is_mapped ? maq::open_scene_file(path) : maq::open_scene_memory(bytes.data(), bytes.size());
       seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       EXPECT_EQ(scene.points, 1'000'000u);
     });
-    std::cout << (is_mapped ? "mapped" : "in memory") << ": " << file_mib << " MiB opened in " << 1e3 * seconds
+    std::cout << (is_mapped ? "mapped" : "from memory") << ": " << file_mib << " MiB opened in " << 1e3 * seconds
               << " ms, " << grown_mib << " MiB\n";
     EXPECT_LT(grown_mib, is_mapped ? 8 : file_mib + 8);
   }

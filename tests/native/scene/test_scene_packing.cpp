@@ -9,11 +9,11 @@
 #include <iostream>
 #include <numeric>
 
+#include "scene/format/block_decoding.h"
+#include "scene/point_cloud.h"
 #include "support/expect_error.h"
 #include "support/fitted_scene.h"
 #include "support/peak_memory.h"
-#include "scene/point_cloud.h"
-#include "scene/format/block_decoding.h"
 
 namespace {
 
@@ -83,8 +83,8 @@ LookError look_error(const ModelledPoints& given, const ModelledPoints& stored, 
 
 TEST(ScenePacking, EveryPointIsInOneBlockAndBlocksAreSmallAndFull) {
   const ModelledPoints points = made_up_points(50'000);
-  std::vector<uint32_t> order;
-  const Scene scene = make_scene(points, kExact, &order);
+  const std::vector<uint32_t> order = order_points(points, kExact).points;
+  const Scene scene = make_scene(points, kExact);
   EXPECT_EQ(scene.points, 50'000u);
   EXPECT_EQ(scene.block_count, 49u);
   std::vector<uint32_t> sorted = order, all(50'000);
@@ -108,8 +108,8 @@ TEST(ScenePacking, EveryPointIsInOneBlockAndBlocksAreSmallAndFull) {
 
 TEST(ScenePacking, FloatsAreThoseGiven) {
   const ModelledPoints points = made_up_points(5'000);
-  std::vector<uint32_t> order;
-  const ModelledPoints stored = unpack(make_scene(points, kExact, &order), order);
+  const std::vector<uint32_t> order = order_points(points, kExact).points;
+  const ModelledPoints stored = unpack(make_scene(points, kExact), order);
   EXPECT_EQ(stored.x, points.x);
   EXPECT_EQ(stored.y, points.y);
   EXPECT_EQ(stored.z, points.z);
@@ -119,8 +119,8 @@ TEST(ScenePacking, FloatsAreThoseGiven) {
 
 TEST(ScenePacking, PlacesOf16BitsAreWithinHalfAStepAndInTheirBox) {
   const ModelledPoints points = made_up_points(20'000);
-  std::vector<uint32_t> order;
-  const Scene scene = make_scene(points, {Places::kUint16, Coefficients::kInt8, 0}, &order);
+  const std::vector<uint32_t> order = order_points(points, {Places::kUint16, Coefficients::kInt8, 0}).points;
+  const Scene scene = make_scene(points, {Places::kUint16, Coefficients::kInt8, 0});
   for (uint32_t b = 0; b < scene.block_count; ++b) {
     const SceneBlock& block = scene.blocks[b];
     const ModelledPoints part = unpack_block(scene, block);
@@ -150,8 +150,8 @@ TEST(ScenePacking, ItsErrorIsSmallForDescriptorsOfAnySize) {
     for (float& value : points.means) value *= size;
     for (float& value : points.slopes) value *= size;
     for (const Coefficients kind : {Coefficients::kInt16, Coefficients::kInt8}) {
-      std::vector<uint32_t> order;
-      const Scene scene = make_scene(points, {Places::kUint16, kind, 0}, &order);
+      const std::vector<uint32_t> order = order_points(points, {Places::kUint16, kind, 0}).points;
+      const Scene scene = make_scene(points, {Places::kUint16, kind, 0});
       const LookError error = look_error(points, unpack(scene, order));
       const bool is_int8 = kind == Coefficients::kInt8;
       std::cout << "descriptors of " << size << (is_int8 ? ", int8" : ", int16") << ": error " << error.rms / size
@@ -166,8 +166,8 @@ TEST(ScenePacking, ItsErrorIsSmallForDescriptorsOfAnySize) {
 TEST(ScenePacking, PointsThatVaryLessKeepTheMeanAlone) {
   const ModelledPoints points = made_up_points(10'000);
   const float least = 0.1f;
-  std::vector<uint32_t> order;
-  const Scene scene = make_scene(points, {Places::kFloat32, Coefficients::kFloat32, least}, &order);
+  const std::vector<uint32_t> order = order_points(points, {Places::kFloat32, Coefficients::kFloat32, least}).points;
+  const Scene scene = make_scene(points, {Places::kFloat32, Coefficients::kFloat32, least});
   EXPECT_EQ(scene.varying, std::count_if(points.variations.begin(), points.variations.end(),
                                          [&](float variation) { return variation >= least; }));
   const ModelledPoints stored = unpack(scene, order);
@@ -185,8 +185,8 @@ TEST(ScenePacking, NoMorePointsVaryThanTheShareAllowsAndTheseAreTheMostVarying) 
   maq::ScenePacking packing = kExact;
   for (const float share : {0.0f, 0.3f, 0.9999f, 1.0f}) {
     packing.most_varying = share;
-    std::vector<uint32_t> order;
-    const Scene scene = make_scene(points, packing, &order);
+    const std::vector<uint32_t> order = order_points(points, packing).points;
+    const Scene scene = make_scene(points, packing);
     EXPECT_NEAR(scene.varying, share * 10'000, 1);
     float least_kept = 1e9f, most_dropped = 0;
     for (uint32_t b = 0; b < scene.block_count; ++b) {
@@ -225,17 +225,19 @@ TEST(ScenePacking, SlopesThatAreZeroAreNotStored) {
 TEST(ScenePacking, AWildLookDoesNotSpoilItsNeighbours) {
   const maq::ScenePacking packing = {Places::kUint16, Coefficients::kInt8, 0};
   ModelledPoints points = made_up_points(20'000);
-  std::vector<uint32_t> order;
-  const LookError before = look_error(points, unpack(make_scene(points, packing, &order), order));
+  const auto error_of = [&](const std::vector<uint32_t>& skipped) {
+    return look_error(points, unpack(make_scene(points, packing), order_points(points, packing).points), skipped);
+  };
+  const LookError before = error_of({});
   const std::vector<uint32_t> wild = {17, 4'711, 12'345, 12'347};
   for (const uint32_t i : wild) {
     for (int c = 0; c < kFeatures; ++c) points.means[i * kFeatures + size_t(c)] = 1e6f + float(i);
     for (size_t k = 0; k < kSlopes; ++k) points.slopes[i * kSlopes + k] = 1e5f;
   }
   points.means[99 * kFeatures] = -1e20f;  // and one among the wild ones
-  const Scene scene = make_scene(points, packing, &order);
-  const ModelledPoints stored = unpack(scene, order);
-  const LookError after = look_error(points, stored, {17, 99, 4'711, 12'345, 12'347});
+  const Scene scene = make_scene(points, packing);
+  const ModelledPoints stored = unpack(scene, order_points(points, packing).points);
+  const LookError after = error_of({17, 99, 4'711, 12'345, 12'347});
   EXPECT_LT(after.worst, 1.2 * before.worst);
   for (const uint32_t i : wild) {
     EXPECT_NEAR(stored.means[i * kFeatures], points.means[i * kFeatures], 100);
@@ -249,8 +251,8 @@ TEST(ScenePacking, APointFarAwayDoesNotSpoilItsNeighbours) {
   ModelledPoints points = made_up_points(20'000);
   points.x[5] = 3e7f;
   points.y[6] = -1e12f;
-  std::vector<uint32_t> order;
-  const Scene scene = make_scene(points, {Places::kUint16, Coefficients::kInt8, 0}, &order);
+  const std::vector<uint32_t> order = order_points(points, {Places::kUint16, Coefficients::kInt8, 0}).points;
+  const Scene scene = make_scene(points, {Places::kUint16, Coefficients::kInt8, 0});
   const ModelledPoints stored = unpack(scene, order);
   for (size_t i = 0; i < points.count(); ++i) {
     ASSERT_NEAR(stored.x[i], points.x[i], 2e-5f + 1e-6f * std::abs(points.x[i])) << i;
@@ -276,8 +278,8 @@ TEST(ScenePacking, OnePointAndPointsInOnePlace) {
     std::fill(points.z.begin(), points.z.end(), 1e30f);
     for (const Coefficients kind : {Coefficients::kFloat32, Coefficients::kInt16, Coefficients::kInt8}) {
       for (const Places places : {Places::kFloat32, Places::kUint16}) {
-        std::vector<uint32_t> order;
-        const Scene scene = make_scene(points, {places, kind, 0}, &order);
+        const std::vector<uint32_t> order = order_points(points, {places, kind, 0}).points;
+        const Scene scene = make_scene(points, {places, kind, 0});
         const ModelledPoints stored = unpack(scene, order);
         EXPECT_EQ(stored.x, points.x);
         EXPECT_EQ(stored.y, points.y);
@@ -299,8 +301,8 @@ TEST(ScenePacking, TheLargestNumbersStayFinite) {
     points.slopes[i * kSlopes + 3] = points.x[i];
   }
   for (const Coefficients kind : {Coefficients::kInt16, Coefficients::kInt8}) {
-    std::vector<uint32_t> order;
-    const ModelledPoints stored = unpack(make_scene(points, {Places::kUint16, kind, 0}, &order), order);
+    const std::vector<uint32_t> order = order_points(points, {Places::kUint16, kind, 0}).points;
+    const ModelledPoints stored = unpack(make_scene(points, {Places::kUint16, kind, 0}), order);
     for (const auto* values : {&stored.x, &stored.y, &stored.z, &stored.means, &stored.slopes}) {
       EXPECT_TRUE(std::all_of(values->begin(), values->end(), [](float value) { return std::isfinite(value); }));
     }

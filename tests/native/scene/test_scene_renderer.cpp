@@ -5,10 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "support/expect_error.h"
 #include "image/files/image_file.h"
-#include "support/synthetic_scene.h"
 #include "scene/format/scene_packing.h"
+#include "support/expect_error.h"
+#include "support/synthetic_scene.h"
 #include "support/tiny_scene.h"
 
 namespace {
@@ -291,10 +291,6 @@ TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenTurned) {
     for (const float depth : picture.depth) ASSERT_NEAR(depth, 2, 1e-4);
     for (const uint8_t alpha : picture.alpha) ASSERT_EQ(alpha, 255);
   }
-  RenderOptions without;
-  without.with_depths = false;
-  const RenderedPicture picture = render(scene, camera_of(101, 77, 50), without);
-  EXPECT_EQ(std::count(picture.depth.begin(), picture.depth.end(), 0.0f), 101 * 77);
 }
 
 // A camera that is held otherwise takes the same picture, turned.

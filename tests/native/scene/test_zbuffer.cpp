@@ -1,10 +1,11 @@
 // Scenes in blocks drawn by several workers, against the whole cloud and against a projection in long double.
 #include <gtest/gtest.h>
 
-#include "support/synthetic_scene.h"
 #include "scene/format/scene_packing.h"
 #include "scene/visibility/view_frustum.h"
-#include "scene/visibility/visible_points.h"
+#include "scene/visibility/z_buffer.h"
+#include "support/front_points.h"
+#include "support/synthetic_scene.h"
 
 namespace {
 
@@ -96,16 +97,16 @@ TEST(ZBuffer, BlocksShowWhatTheWholeCloudShows) {
   size_t seen = 0;
   for (int i = 0; i < 20; ++i) {
     const PinholeCamera camera = random_camera(random);
-    maq::VisiblePoints visible;
-    visible.find({points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin}, camera, 0.1);
+    const FrontPoints visible({points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin},
+                              camera, 0.1);
     const std::vector<DepthKey> keys = keys_of(scene, camera, 0.1, 3);
-    ASSERT_EQ(keys.size(), visible.winners().size());
+    ASSERT_EQ(keys.size(), visible.points.size());
     for (size_t pixel = 0; pixel < keys.size(); ++pixel) {
-      const uint32_t winner = visible.winners()[pixel];
-      ASSERT_EQ(keys[pixel] == kNoPointKey, winner == maq::kNoPoint);
-      if (winner == maq::kNoPoint) continue;
+      const uint32_t winner = visible.points[pixel];
+      ASSERT_EQ(keys[pixel] == kNoPointKey, winner == kNoPoint);
+      if (winner == kNoPoint) continue;
       ++seen;
-      ASSERT_EQ(maq::depth_of(keys[pixel]), visible.depths()[pixel]);
+      ASSERT_EQ(maq::depth_of(keys[pixel]), visible.depths[pixel]);
       const std::array<long double, 3> place = stored_place(scene, maq::point_of(keys[pixel]), camera);
       ASSERT_EQ(place[0], points.x[winner] - (long double)(camera.centre[0]));
       ASSERT_EQ(place[1], points.y[winner] - (long double)(camera.centre[1]));

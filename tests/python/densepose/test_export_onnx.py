@@ -13,7 +13,7 @@ from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 
 WIDTH = 16
-torch.set_num_threads(1)  # the graphs are small
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from export.densepose import data
 from export.densepose import targets as tg
 from export.densepose.config import NetworkConfig
 from export.densepose.losses import possible_classes_loss
-from export.people.dataset import BOX_ALONE
+from export.shards import BOX_ALONE, UNSURE, Record
 
 
 def truth(boxes, ignore=None) -> tg.Truth:
@@ -130,11 +130,11 @@ def test_a_mirrored_cut_carries_the_mirrored_labels():
     assert not surface.MIRROR_FLIPS_U[9]
 
 
-def as_record(image: np.ndarray, label: np.ndarray) -> data.Record:
+def as_record(image: np.ndarray, label: np.ndarray) -> Record:
     import cv2
 
     files = [cv2.imencode(".png", array)[1].tobytes() for array in (image, label)]
-    return data.Record(*files)
+    return Record(*files)
 
 
 def test_boxes_of_a_cut_are_around_what_is_left_of_a_person():
@@ -163,7 +163,7 @@ def test_batches_depend_on_seed_and_number_alone():
 
 
 def test_an_error_while_a_batch_is_made_reaches_the_caller():
-    broken = data.Batches([data.Record(b"no picture", b"no label")], 1, seed=0)
+    broken = data.Batches([Record(b"no picture", b"no label")], 1, seed=0)
     with pytest.raises(ValueError, match="damaged picture"):
         broken.next(64)
     broken.close()
@@ -214,7 +214,7 @@ def test_pooled_rois_come_in_the_order_of_the_boxes():
 
 def test_people_known_by_box_alone_teach_boxes_but_no_surface():
     label = torch.zeros(40, 40, 4, dtype=torch.uint8)
-    label[5:35, 5:35] = torch.tensor([surface.UNSURE, 0, 0, BOX_ALONE], dtype=torch.uint8)
+    label[5:35, 5:35] = torch.tensor([UNSURE, 0, 0, BOX_ALONE], dtype=torch.uint8)
     truth = data.truth_of(label.numpy())
     assert len(truth.box) == 1
     assert not truth.ignore.any()
@@ -225,10 +225,10 @@ def test_people_known_by_box_alone_teach_boxes_but_no_surface():
 def test_unsure_pixels_stay_unsure_for_everybody():
     label = torch.zeros(40, 40, 4, dtype=torch.uint8)
     label[..., 0], label[..., 3] = 3, 1
-    label[:, 20:] = torch.tensor([surface.UNSURE, 0, 0, BOX_ALONE], dtype=torch.uint8)
+    label[:, 20:] = torch.tensor([UNSURE, 0, 0, BOX_ALONE], dtype=torch.uint8)
     truth = data.truth_of(label.numpy())
     found = tg.dense_labels(torch.tensor([[0.0, 0, 40, 40]]), torch.tensor([0]), truth, 4)[0, ..., 0]
-    assert found.tolist() == [[3, 3, surface.UNSURE, surface.UNSURE]] * 4
+    assert found.tolist() == [[3, 3, UNSURE, UNSURE]] * 4
 
 
 def test_a_label_asks_only_for_what_it_tells():

@@ -14,6 +14,7 @@ from export.densepose import data, train
 from export.densepose.config import NetworkConfig
 from export.densepose.losses import PixelHead, _dense_terms, batch_loss, surface_loss
 from export.densepose.network import MobileNetV2, MobileParsingRCNN
+from export.shards import load_records
 
 
 @pytest.fixture(scope="module")
@@ -25,15 +26,8 @@ def shards(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def short_pictures(monkeypatch):
+def short_pictures(monkeypatch, one_thread, signal_handlers):
     monkeypatch.setattr(train, "STAGES", (train.Stage(0.0, 96),))
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    handlers = {name: signal.getsignal(name) for name in (signal.SIGTERM, signal.SIGINT)}
-    yield
-    torch.set_num_threads(threads)
-    for name, handler in handlers.items():
-        signal.signal(name, handler)
 
 
 def run(monkeypatch, shards, out, *options, stop_after=None) -> list[float]:
@@ -123,7 +117,7 @@ def test_a_run_learns_the_surface_first_and_resumes_across_the_stages(monkeypatc
 
 def test_the_surface_alone_is_learnt_on_a_few_pictures(shards):
     torch.manual_seed(0)
-    image, truths = data.Batches(data.load_records(shards / "train"), 4, seed=0).make(0, 96, train.CLOSE)
+    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, 96, train.CLOSE)
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
     trained = torch.nn.ModuleList([net, PixelHead(net.config)])
     optimiser = torch.optim.AdamW(trained.parameters(), lr=3e-3)
@@ -143,7 +137,7 @@ def test_the_surface_alone_is_learnt_on_a_few_pictures(shards):
 
 
 def test_close_framing_shows_people_larger(shards):
-    records = data.load_records(shards / "train")
+    records = load_records(shards / "train")
     share = {}
     for framing in (data.ANY_FRAMING, train.CLOSE):
         rng = np.random.default_rng(0)
@@ -154,7 +148,7 @@ def test_close_framing_shows_people_larger(shards):
 
 def test_the_loss_falls_on_a_few_pictures(shards):
     torch.manual_seed(0)
-    batches = data.Batches(data.load_records(shards / "train"), 4, seed=0)
+    batches = data.Batches(load_records(shards / "train"), 4, seed=0)
     fixed = [batches.make(k, 96) for k in range(2)]
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
     optimiser = torch.optim.AdamW(net.parameters(), lr=3e-3)
@@ -177,7 +171,7 @@ def test_the_loss_falls_on_a_few_pictures(shards):
 def test_every_weight_gets_a_gradient(shards):
     torch.manual_seed(0)
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
-    image, truths = data.Batches(data.load_records(shards / "train"), 4, seed=0).make(0, 96)
+    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, 96)
     sum(batch_loss(net, image, truths, torch.autocast("cpu", enabled=False)).values()).backward()
     assert [name for name, p in net.named_parameters() if p.grad is None] == []
 

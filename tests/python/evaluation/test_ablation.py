@@ -8,14 +8,12 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from photo_labels import BOX, SIZE, labels
 from rectangle_people import write_shard
-from test_evaluation_photos import SIZE, labels
 
 from export.densepose.network import MobileNetV2
 from export.evaluation import ablation
 from export.evaluation.photos import PhotoSet
-
-BOX = np.array([[40, 20, 120, 180]], np.float32)
 
 
 @pytest.fixture

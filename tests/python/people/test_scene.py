@@ -245,11 +245,15 @@ def test_a_shard_depends_on_split_and_number_only(studio, tmp_path):
 
 
 @needs_body
-def test_instances_labels_and_points_agree_in_every_layout(studio, monkeypatch):
-    from export.people import staging
+@pytest.mark.parametrize("name", ["close", "wide"])
+def test_instances_labels_and_points_agree_in_every_layout(studio, monkeypatch, name):
+    from dataclasses import replace
 
-    for name, (_, counts) in staging.LAYOUTS.items():
-        monkeypatch.setattr(staging, "LAYOUTS", {name: (1.0, counts)})
+    from export.people.variety import VARIETIES
+
+    variety = VARIETIES[name]
+    for name, (_, counts) in variety.layouts.items():
+        monkeypatch.setattr(studio.director, "variety", replace(variety, layouts={name: (1.0, counts)}))
         most = 0
         for seed in range(4):
             sample = studio.sample(np.random.default_rng(seed))
@@ -260,3 +264,44 @@ def test_instances_labels_and_points_agree_in_every_layout(studio, monkeypatch):
             most = max(most, int(sample.label[..., 3].max()))
         assert most <= len(counts)
         assert (most > 0) == bool(counts)
+
+
+@needs_body
+def test_a_rolled_camera_turns_labels_and_background_clockwise(studio, monkeypatch):
+    from dataclasses import replace
+
+    from export.people import scene
+    from export.people.variety import CLOSE
+
+    monkeypatch.setattr(scene, "TILTED_PEOPLE", 0.0)
+    monkeypatch.setattr(studio, "_background", lambda rng, w, h: _left_half_dark(w, h))
+    alone = replace(CLOSE, layouts={"scattered": (1.0, (1.0,))}, framings=((1.0, 0.5, 1.6, 1.7),))
+    quarter = replace(alone, rolls=((1.0, 90, 90),))
+    for seed in range(3):
+        monkeypatch.setattr(studio.director, "variety", alone)
+        upright = studio.director.stage(np.random.default_rng(seed)).camera
+        monkeypatch.setattr(studio.director, "variety", quarter)
+        stage = studio.director.stage(np.random.default_rng(seed))
+        up = stage.camera.world_to_camera[:, :3] @ [0, 0, 1.0]
+        before = upright.world_to_camera[:, :3] @ [0, 0, 1.0]  # points to -y of the picture, which is up
+        sign = np.sign(stage.roll_degrees)
+        assert up[0] == pytest.approx(-sign * before[1], abs=1e-9)
+        behind = studio._background_behind(np.random.default_rng(seed), stage.roll_degrees)
+        top, bottom = behind[:40].mean(), behind[-40:].mean()
+        assert (top < bottom) == (sign > 0)  # the left half, turned clockwise, is above
+
+
+def _left_half_dark(width: int, height: int) -> np.ndarray:
+    photo = np.full((height, width, 3), 200, np.float32)
+    photo[:, : width // 2] = 20
+    return photo
+
+
+def test_fractions_of_each_variety_sum_to_one():
+    from export.people.variety import VARIETIES
+
+    for variety in VARIETIES.values():
+        assert sum(f for f, _ in variety.layouts.values()) == pytest.approx(1)
+        assert all(sum(counts) == pytest.approx(1) for _, counts in variety.layouts.values() if counts)
+        assert sum(f[0] for f in variety.framings) == pytest.approx(1)
+        assert not variety.rolls or sum(r[0] for r in variety.rolls) == pytest.approx(1)

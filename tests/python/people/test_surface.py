@@ -10,6 +10,7 @@ from export.densepose import bundle
 from export.people import assets
 from export.people.charts import Mesh, border_loops, cut, flattened, on_square, pieces, signed_areas, without_chords
 from export.people.surface_files import surface_grid
+from export.shards import mirror_iuv
 from export.surface_grid import FILE, SurfaceGrid
 
 pytestmark = pytest.mark.skipif(
@@ -79,7 +80,7 @@ def test_a_square_laid_flat_stays_a_square():
 
 def test_mirroring_labels_twice_gives_them_back():
     iuv = np.stack(np.meshgrid(np.arange(25), [0, 7, 255], [0, 100, 254], indexing="ij"), -1).astype(np.uint8)
-    assert np.array_equal(surface.mirror_iuv(surface.mirror_iuv(iuv)), iuv)
+    assert np.array_equal(mirror_iuv(mirror_iuv(iuv)), iuv)
 
 
 def test_mirrored_part_lies_in_the_mirrored_coarse_group():
@@ -124,7 +125,7 @@ def test_atlas_of_the_mirrored_body_is_the_mirrored_atlas(atlas):
     half = len(atlas.faces) // 2
     assert np.allclose(atlas.rest[atlas.faces[:half]], (atlas.rest[atlas.faces[half:]] * [-1, 1, 1])[:, ::-1])
     iuv = np.concatenate([atlas.part[:, None], np.round(atlas.uv.mean(1) * 255)], 1).astype(np.uint8)
-    mirrored = surface.mirror_iuv(iuv[:half])
+    mirrored = mirror_iuv(iuv[:half])
     assert np.abs(mirrored.astype(int) - iuv[half:]).max() <= 1
 
 
@@ -153,7 +154,7 @@ def test_points_of_the_surface_are_looked_up_with_their_labels(atlas):
     assert np.median(error) < 0.005
     assert np.quantile(error, 0.95) < 0.02
     mirrored = lookup.iuv(points * [-1, 1, 1])
-    assert np.array_equal(mirrored, surface.mirror_iuv(found))
+    assert np.array_equal(mirrored, mirror_iuv(found))
 
 
 def test_left_parts_lie_on_the_left_and_front_parts_in_front(atlas):

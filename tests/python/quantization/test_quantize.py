@@ -10,12 +10,13 @@ from export.densepose import export_onnx
 from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 from quantization.errors import float_nodes_left, output_sqnr, sqnr_db
-from quantization.quantize import equal_sizes, matching_nodes, quantise_graph, spread
-from quantization.settings import GraphSettings, read_settings
+from quantization.quantize import equal_sizes, matching_nodes, quantize_graph
+from quantization.samples import spread
+from quantization.settings import DENSEPOSE, DensePoseSettings, GraphSettings, read_settings
 from quantization.simplify import drop_unused_constants, fold_scalar_products, share_scales
 
 WIDTH = 16
-torch.set_num_threads(1)  # the graphs are small
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def rois(count: int, pool: int, loud: float = 1) -> list[dict[str, np.ndarray]]:
 
 def test_the_int8_dense_head_is_small_and_close(folder, tmp_path):
     source, target = folder / "dense_head.onnx", tmp_path / "dense_head.onnx"
-    quantise_graph(source, target, rois(6, 32), GraphSettings())
+    quantize_graph(source, target, rois(6, 32), GraphSettings())
     quality = output_sqnr(source, target, rois(2, 32))
     assert min(quality.values()) > 20
     assert target.stat().st_size < 0.7 * source.stat().st_size
@@ -52,7 +53,7 @@ def test_the_int8_dense_head_is_small_and_close(folder, tmp_path):
 
 def test_named_nodes_stay_float(folder, tmp_path):
     settings = GraphSettings(float_nodes=("/predict/*",))
-    quantise_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", rois(4, 7), settings)
+    quantize_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", rois(4, 7), settings)
     assert float_nodes_left(tmp_path / "box_head.onnx") == ["/predict/Gemm"]
 
 
@@ -60,7 +61,7 @@ def test_reduced_weights_use_seven_bits(folder, tmp_path):
     largest = {}
     for reduced in (True, False):
         target = tmp_path / f"{reduced}.onnx"
-        quantise_graph(folder / "box_head.onnx", target, rois(2, 7), GraphSettings(reduce_range=reduced))
+        quantize_graph(folder / "box_head.onnx", target, rois(2, 7), GraphSettings(reduce_range=reduced))
         arrays = [onnx.numpy_helper.to_array(value) for value in onnx.load(target).graph.initializer]
         largest[reduced] = max(int(np.abs(a.astype(int)).max()) for a in arrays if a.dtype == np.int8)
     assert largest[True] <= 64
@@ -76,11 +77,11 @@ def test_a_name_that_matches_nothing_is_an_error(folder):
 
 def test_nobody_to_calibrate_with_is_an_error(folder, tmp_path):
     with pytest.raises(ValueError, match="nobody"):
-        quantise_graph(folder / "dense_head.onnx", tmp_path / "x.onnx", [], GraphSettings())
+        quantize_graph(folder / "dense_head.onnx", tmp_path / "x.onnx", [], GraphSettings())
 
 
 def test_the_shipped_settings_name_every_graph():
-    settings = read_settings(export_onnx.Path("quantization/densepose.toml"))
+    settings = read_settings(DENSEPOSE, DensePoseSettings)
     assert set(settings.graphs) == {"trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head"}
 
 
@@ -91,7 +92,7 @@ def test_wrong_settings_are_errors(tmp_path, text):
         f"calibration_images = 1\ncalibration_photos = 1\nheld_out_images = 1\npeople_per_image = 1\n{text}"
     )
     with pytest.raises(ValueError, match=str(path)):
-        read_settings(path)
+        read_settings(path, DensePoseSettings)
 
 
 def test_signal_to_noise_in_decibels():
@@ -112,7 +113,7 @@ def test_pictures_of_both_orientations_calibrate_together(folder, tmp_path):
     assert np.array_equal(padded[0][..., :64, :], samples[0]["image"])
     assert not padded[0][..., 64:, :].any()
     settings = GraphSettings(method="percentile")
-    quantise_graph(folder / "trunk.onnx", tmp_path / "trunk.onnx", samples, settings)
+    quantize_graph(folder / "trunk.onnx", tmp_path / "trunk.onnx", samples, settings)
     assert float_nodes_left(tmp_path / "trunk.onnx") == []
 
 
@@ -132,15 +133,15 @@ def test_people_calibrate_one_by_one():
 
 def test_ranges_come_from_all_samples_not_only_the_last_ones(folder, tmp_path):
     loud, quiet = rois(1, 7, loud=10), rois(40, 7)
-    quantise_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", [*loud, *quiet], GraphSettings())
+    quantize_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", [*loud, *quiet], GraphSettings())
     graph = onnx.load(tmp_path / "box_head.onnx").graph
     constants = {c.name: onnx.numpy_helper.to_array(c) for c in graph.initializer}
     first = next(n for n in graph.node if n.op_type == "QuantizeLinear")  # of the RoIs, in whichever layout
     assert 255 * constants[first.input[1]] == pytest.approx(loud[0]["rois"].max(), rel=0.02)
 
 
-def quantised_sum() -> onnx.ModelProto:
-    """y = quantised(0.25 x) + quantised(0.5 x), the products quantised too, and a constant that nobody reads."""
+def quantized_sum() -> onnx.ModelProto:
+    """y = quantized(0.25 x) + quantized(0.5 x), the products quantized too, and a constant that nobody reads."""
     make, value = onnx.helper.make_node, onnx.helper.make_tensor_value_info
 
     def constant(name: str, number: float, kind: type = np.float32) -> onnx.TensorProto:
@@ -168,7 +169,7 @@ def evaluate(model: onnx.ModelProto, **feed: np.ndarray) -> np.ndarray:
 
 
 def test_products_with_a_number_cost_no_operation_and_no_rounding():
-    model = quantised_sum()
+    model = quantized_sum()
     x = np.linspace(-1, 20, 8, dtype=np.float32)
     assert fold_scalar_products(model) == 2
     assert drop_unused_constants(model) == 5  # two factors, two scales, and one that was idle before
@@ -180,7 +181,7 @@ def test_products_with_a_number_cost_no_operation_and_no_rounding():
 
 @pytest.mark.parametrize("factor", [0.0, -2.0])
 def test_products_that_no_scale_can_say_are_left_alone(factor):
-    model = quantised_sum()
+    model = quantized_sum()
     for value in model.graph.initializer:
         if value.name == "a.factor":
             value.CopyFrom(onnx.numpy_helper.from_array(np.array(factor, np.float32), value.name))
@@ -190,7 +191,7 @@ def test_products_that_no_scale_can_say_are_left_alone(factor):
 
 def test_maps_that_are_joined_share_the_scale_of_the_whole(folder, tmp_path):
     target = tmp_path / "dense_head.onnx"
-    quantise_graph(folder / "dense_head.onnx", target, rois(4, 32), GraphSettings())
+    quantize_graph(folder / "dense_head.onnx", target, rois(4, 32), GraphSettings())
     model = onnx.load(target)
     made = {name: node for node in model.graph.node for name in node.output}
     joined = [node for node in model.graph.node if node.op_type == "Concat"]

@@ -1,4 +1,4 @@
-"""The quantisation report names every tensor, sees a broken scale, and finds layers that overflow 16 bits."""
+"""The quantization report names every tensor, sees a broken scale, and finds layers that overflow 16 bits."""
 
 import hashlib
 import json
@@ -16,11 +16,11 @@ from quantization.bias_correction import correct_biases
 from quantization.comparison import TensorError, activation_errors, pair_errors, weight_errors, worst_first
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import quantise_graph
+from quantization.quantize import quantize_graph
 from quantization.saturation import bound, columns, count, layers, saturation
 from quantization.settings import GraphSettings
 
-torch.set_num_threads(1)
+pytestmark = pytest.mark.usefixtures("one_thread")
 SHIPPED = report.agreement.INT8_BUNDLE
 RNG = np.random.default_rng(0)
 
@@ -59,17 +59,17 @@ def samples(count):
 
 
 @pytest.fixture(scope="module")
-def quantised(tmp_path_factory):
+def quantized(tmp_path_factory):
     """(prepared float model, path of the int8 graph, samples)"""
     folder = tmp_path_factory.mktemp("small")
     small_graph(folder / "float.onnx")
     given = samples(4)
-    quantise_graph(folder / "float.onnx", folder / "int8.onnx", given, GraphSettings())
+    quantize_graph(folder / "float.onnx", folder / "int8.onnx", given, GraphSettings())
     return prepare(folder / "float.onnx", folder / "prepared.onnx"), folder / "int8.onnx", given
 
 
-def test_every_integer_tensor_is_in_the_report_once(quantised):
-    reference, path, given = quantised
+def test_every_integer_tensor_is_in_the_report_once(quantized):
+    reference, path, given = quantized
     model = onnx.load(path)
     found = [*weight_errors("small", reference, model), *activation_errors("small", reference, model, given)]
     integers = {c.name for c in model.graph.initializer if c.data_type in (2, 3, 6) and "zero_point" not in c.name}
@@ -81,8 +81,8 @@ def test_every_integer_tensor_is_in_the_report_once(quantised):
     assert len({(e.kind, e.name) for e in found}) == len(found)
 
 
-def test_errors_are_those_of_rounding_and_gather_along_the_graph(quantised):
-    reference, path, given = quantised
+def test_errors_are_those_of_rounding_and_gather_along_the_graph(quantized):
+    reference, path, given = quantized
     model = onnx.load(path)
     found = {e.name: e for e in activation_errors("small", reference, model, given)}
     assert found["x"].here == found["x"].gathered
@@ -105,8 +105,8 @@ def test_the_worst_come_first():
     assert [e.name for e in worst_first(errors)] == ["b", "c", "a", "d"]
 
 
-def test_weights_of_another_float_graph_are_an_error(quantised):
-    reference, path, _ = quantised
+def test_weights_of_another_float_graph_are_an_error(quantized):
+    reference, path, _ = quantized
     other = onnx.ModelProto.FromString(reference.SerializeToString())
     del other.graph.node[0]
     with pytest.raises(ValueError, match="other weights"):
@@ -171,8 +171,8 @@ def test_a_scale_broken_by_hand_is_named(rebuilt, tmp_path, graph, tensor, chann
 def test_missing_and_new_tensors_are_named():
     error = TensorError("g", "new", "activation", "", "", here=40.0)
     assert check.complaints({"g: old": [40.0, None]}, [error]) == [
-        "g: new is quantised, but unknown",
-        "g: old is no longer quantised, or is gone",
+        "g: new is quantized, but unknown",
+        "g: old is no longer quantized, or is gone",
     ]
     assert check.complaints({"g: new": [40.4, None]}, [error]) == []
     assert "no noise" in check.complaints({"g: new": [None, None]}, [error])[0]
@@ -194,9 +194,9 @@ def test_overflows_are_counted_as_the_instruction_makes_them():
     assert count(rows, weights // 2)[1] == 0
 
 
-def test_columns_times_weights_are_the_convolution(quantised, monkeypatch):
+def test_columns_times_weights_are_the_convolution(quantized, monkeypatch):
     monkeypatch.setattr("quantization.saturation.ROWS", 10**6)
-    reference, path, given = quantised
+    reference, path, given = quantized
     (layer, depthwise, _) = layers(reference, onnx.load(path))
     assert depthwise.depthwise
     assert not layer.depthwise
@@ -215,7 +215,7 @@ def test_a_saturating_layer_is_found_and_seven_bits_are_silent(tmp_path):
     given = [{"x": np.abs(sample["x"])} for sample in samples(3)]
     reference = prepare(tmp_path / "float.onnx", tmp_path / "prepared.onnx")
     for reduced in (True, False):
-        quantise_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", given, GraphSettings(reduce_range=reduced))
+        quantize_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", given, GraphSettings(reduce_range=reduced))
         found = {x.layer: x for x in saturation("small", reference, onnx.load(tmp_path / "int8.onnx"), given)}
         assert found["/b/Conv"].exempt
         assert found["/a/Conv"].safe == reduced
@@ -234,7 +234,7 @@ def test_no_layer_of_the_shipped_bundle_can_overflow_16_bits(rebuilt):
 def test_depthwise_layers_keep_eight_bits_when_asked(tmp_path):
     small_graph(tmp_path / "float.onnx")
     settings = GraphSettings(depthwise_8_bit=True)
-    quantise_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", samples(2), settings)
+    quantize_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", samples(2), settings)
     reference = prepare(tmp_path / "float.onnx", tmp_path / "prepared.onnx")
     held = qdq.weights(onnx.load(tmp_path / "int8.onnx").graph, reference.graph)
     largest = {w.name: int(np.abs(w.stored.astype(int)).max()) for w in held if w.slot == 1}
@@ -250,7 +250,7 @@ def test_bias_correction_takes_the_mean_error_out(tmp_path):
     reference = prepare(tmp_path / "float.onnx", tmp_path / "prepared.onnx")
     gaps = []
     for corrected in (False, True):
-        quantise_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", given, GraphSettings())
+        quantize_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", given, GraphSettings())
         if corrected:
             assert correct_biases(tmp_path / "prepared.onnx", tmp_path / "int8.onnx", given) == 3
         run = [report_session(model) for model in (reference, onnx.load(tmp_path / "int8.onnx"))]
@@ -293,7 +293,7 @@ def test_rounding_together_changes_integers_alone_and_helps_the_graph(tmp_path):
     held, quality = [], []
     for together in (False, True):
         settings = GraphSettings(round_together=together, bias_correction=True)
-        quantise_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", given, settings)
+        quantize_graph(tmp_path / "float.onnx", tmp_path / "int8.onnx", given, settings)
         held.append({w.name: w for w in qdq.weights(onnx.load(tmp_path / "int8.onnx").graph, reference.graph)})
         quality.append(output_sqnr(tmp_path / "prepared.onnx", tmp_path / "int8.onnx", given)["y"])
     for name, weight in held[0].items():

@@ -27,14 +27,7 @@ from export.scenes.scene_file import HEAD, SceneFileError, read_scene_file, writ
 from export.scenes.system import Networks, load_networks, save_networks
 from export.scenes.tuning import Rates, TunedScene, Tuning
 
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +110,7 @@ def test_a_damaged_file_is_refused_whatever_byte_it_is(place, tmp_path):
             read_scene_file(tmp_path / "bad.maqs")
 
 
-@pytest.mark.parametrize("field", ["points", "varying", "blocks", "coefficient_kind", "state_seen"])
+@pytest.mark.parametrize("field", ["points", "varying", "blocks", "coefficient_kind"])
 def test_a_head_that_lies_is_refused_though_its_check_is_right(place, tmp_path, field):
     whole = bytearray((place / "8-bit.maqs").read_bytes())
     head = np.frombuffer(bytes(whole[: HEAD.itemsize]), HEAD)[0].copy()

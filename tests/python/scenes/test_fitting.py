@@ -16,14 +16,7 @@ from export.scenes.raster import HIDING_PX, NOTHING, depths_of, filled, halved, 
 from export.scenes.source_views import drawn, scores
 from export.scenes.system import Networks
 
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 
 
 def pixels_of(camera: Camera, places: np.ndarray) -> np.ndarray:

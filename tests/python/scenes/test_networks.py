@@ -5,7 +5,6 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from export.scenes import compare_refiners
 from export.scenes.basis import Basis, directions, encoded
 from export.scenes.config import SIZES, ExtractorConfig, RefinerConfig, SceneConfig
 from export.scenes.export_onnx import ExtractorGraph, RefinerGraph, export, export_extractor, export_refiner, parity
@@ -15,17 +14,11 @@ from export.scenes.gated_refiner import GatedRefiner
 from export.scenes.light_refiner import LightRefiner, folded, unfolded
 from export.scenes.refiner import make_refiner
 from export.scenes.system import Networks, load_networks, save_networks
+from quantization import compare_refiners
+
+pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 
 LIGHT = RefinerConfig(widths=(8, 8, 12))
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(threads)
 
 
 def parameters(module: torch.nn.Module) -> int:
@@ -50,7 +43,7 @@ def test_the_gated_refiner_has_the_papers_parameters_and_multiply_adds():
 
 def test_extractor_and_light_refiner_fit_into_the_bundle():
     networks = Networks(SceneConfig())
-    # One byte a weight when quantised; the bundle should stay below two megabytes.
+    # One byte a weight when quantized; the bundle should stay below two megabytes.
     assert parameters(networks.extractor) + parameters(networks.refiner) < 2_000_000
 
 

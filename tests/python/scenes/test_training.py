@@ -19,6 +19,8 @@ from export.scenes.perceptual import Perceptual
 from export.scenes.samples import Sampling, draw_sample
 from export.scenes.system import Networks, load_networks
 
+pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed", "signal_handlers")
+
 SAMPLING = Sampling(crop_px=64, sources=(2, 2), margin_px=32, long_side_px=96)
 
 
@@ -28,18 +30,6 @@ def places(tmp_path_factory):
     for split, seed in (("train", 0), ("val", 1)):
         write_capture(folder / split / "room", seed, views=5, width=96, height=64)
     return folder
-
-
-@pytest.fixture(autouse=True)
-def as_before():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    handlers = {name: signal.getsignal(name) for name in (signal.SIGTERM, signal.SIGINT)}
-    torch.manual_seed(0)
-    yield
-    torch.set_num_threads(threads)
-    for name, handler in handlers.items():
-        signal.signal(name, handler)
 
 
 def run(monkeypatch, places, out, *options, stop_after=None) -> list[float]:

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-import cv2
 import numpy as np
+
+from export.shards import ShardWriter
 
 # Part number: x0, y0, x1, y1 in shares of the person's box. What is not covered is background.
 BODY = {
@@ -40,13 +41,7 @@ def write_shard(folder: Path, images: int, seed: int = 0) -> None:
     """Writes `folder/shard-00000.npz` with what training reads (docs/formats.md)."""
     rng = np.random.default_rng(seed)
     folder.mkdir(parents=True)
-    pictures, labels = [], []
+    shard = ShardWriter(boxes=False)
     for k in range(images):
-        image, label = picture(rng, people=1 + k % 2)
-        pictures.append(cv2.imencode(".jpg", image)[1].reshape(-1))
-        labels.append(cv2.imencode(".png", label)[1].reshape(-1))
-    arrays = {}
-    for name, files in (("image", pictures), ("label", labels)):
-        arrays[name] = np.concatenate(files)
-        arrays[f"{name}_end"] = np.cumsum([len(file) for file in files], dtype=np.int64)
-    np.savez(folder / "shard-00000.npz", **arrays)
+        shard.add(*picture(rng, people=1 + k % 2), jpeg_quality=95)
+    shard.write(folder / "shard-00000.npz", {})

@@ -21,14 +21,11 @@ _INDEX = {name: k for k, name in enumerate(NAMES)}
 
 
 @pytest.fixture(scope="module")
-def teacher():
-    import torch
-
+def teacher(one_thread):
     from export.people.body import Body
     from export.teachers.dense import DenseTeacher
     from export.teachers.puppet import Puppet
 
-    torch.set_num_threads(1)
     return DenseTeacher(Puppet(Body()))
 
 

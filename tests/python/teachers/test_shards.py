@@ -8,7 +8,7 @@ import pytest
 
 from export import surface
 from export.densepose import data
-from export.people.dataset import BOX_ALONE, UNCERTAIN
+from export.shards import BOX_ALONE, PERSON, POSSIBLE_PARTS, REGION, UNCERTAIN, UNSURE, load_records, mirror_iuv
 from export.teachers.fit import PhotoFits
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
@@ -36,26 +36,26 @@ def photo_labels() -> PhotoLabels:
 
 def test_what_each_kind_of_person_is_labelled_with():
     label = weak_label(photo_labels(), SHAPE)
-    assert label[50, 40].tolist() == [surface.REGION + 12, 0, 0, 1]  # left lower arm
-    assert label[78, 30].tolist() == [surface.PERSON, 0, 0, 1]
-    assert label[50, 70].tolist() == [surface.PERSON, 0, 0, 2]
-    assert label[82, 80].tolist() == [surface.UNSURE, 0, 0, 0]
-    assert label[50, 130].tolist() == [surface.UNSURE, 0, 0, BOX_ALONE + 2]
-    assert label[50, 170].tolist() == [surface.UNSURE, 0, 0, UNCERTAIN + 3]
+    assert label[50, 40].tolist() == [REGION + 12, 0, 0, 1]  # left lower arm
+    assert label[78, 30].tolist() == [PERSON, 0, 0, 1]
+    assert label[50, 70].tolist() == [PERSON, 0, 0, 2]
+    assert label[82, 80].tolist() == [UNSURE, 0, 0, 0]
+    assert label[50, 130].tolist() == [UNSURE, 0, 0, BOX_ALONE + 2]
+    assert label[50, 170].tolist() == [UNSURE, 0, 0, UNCERTAIN + 3]
     assert label[50, 5].tolist() == [0, 0, 0, 0]
 
 
 def test_a_fitted_body_gives_part_u_and_v_where_it_is_believed():
     label = np.zeros((2, 50, 100, 3), np.uint8)  # half the photo's size
     label[0, 10:40, 7:15], label[1, 10:40, 30:50] = (2, 50, 60), (2, 70, 80)
-    label[0, 30:40, 7:15] = (surface.PERSON, 0, 0)
+    label[0, 30:40, 7:15] = (PERSON, 0, 0)
     turned = np.zeros((2, 19, 3, 3))
     fits = PhotoFits(np.array([0, 1]), np.ones(2), np.zeros(2), np.array(["", "IoU"]), label, turned)
     found = weak_label(photo_labels(), SHAPE, fits)
     assert found[50, 20].tolist() == [2, 50, 60, 1]
-    assert found[70, 20].tolist() == [surface.PERSON, 0, 0, 1]  # of the fit's own
-    assert found[50, 40].tolist() == [surface.PERSON, 0, 0, 1]  # beside the fit
-    assert found[50, 70].tolist() == [surface.PERSON, 0, 0, 2]  # not believed
+    assert found[70, 20].tolist() == [PERSON, 0, 0, 1]  # of the fit's own
+    assert found[50, 40].tolist() == [PERSON, 0, 0, 1]  # beside the fit
+    assert found[50, 70].tolist() == [PERSON, 0, 0, 2]  # not believed
 
 
 def test_boxes_and_masks_become_people_and_doubtful_boxes_are_ignored():
@@ -67,11 +67,11 @@ def test_boxes_and_masks_become_people_and_doubtful_boxes_are_ignored():
 
 def test_every_value_has_its_mirror_image():
     value = np.arange(256, dtype=np.uint8)
-    once = surface.mirror_iuv(np.stack([value, 0 * value, 0 * value], -1))[:, 0]
+    once = mirror_iuv(np.stack([value, 0 * value, 0 * value], -1))[:, 0]
     assert np.array_equal(once[once], value)
     # What a value leaves possible is mirrored with it.
-    assert np.array_equal(surface.POSSIBLE_PARTS[once][:, surface.MIRROR_PART], surface.POSSIBLE_PARTS)
-    assert once[surface.REGION + 12] == surface.REGION + 13
+    assert np.array_equal(POSSIBLE_PARTS[once][:, surface.MIRROR_PART], POSSIBLE_PARTS)
+    assert once[REGION + 12] == REGION + 13
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_shards_are_read_by_the_training(folders, capsys):
     told = capsys.readouterr().out
     assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body)" in told
     assert "1 with a box alone; each 2 times; 3 images composed" in told
-    records = data.load_records(folders / "shards")
+    records = load_records(folders / "shards")
     sizes = sorted(record.decoded()[0].shape[:2] for record in records)
     assert sizes[0] == SHAPE
     assert sizes[-1] == (round(600 * LONG_SIDE / 900), LONG_SIDE)
@@ -116,8 +116,8 @@ def test_photos_without_labels_are_named_before_anything_is_written(folders, cap
 def cut_out_scene() -> tuple[np.ndarray, np.ndarray]:
     """A red person cut by the lower border, and two who touch each other."""
     image, label = np.zeros((200, 300, 3), np.uint8), np.zeros((200, 300, 4), np.uint8)
-    image[80:, 20:80], label[80:, 20:80] = (0, 0, 255), (surface.PERSON, 0, 0, 1)
-    label[50:150, 150:200], label[50:150, 200:250] = (surface.PERSON, 0, 0, 2), (surface.PERSON, 0, 0, 3)
+    image[80:, 20:80], label[80:, 20:80] = (0, 0, 255), (PERSON, 0, 0, 1)
+    label[50:150, 150:200], label[50:150, 200:250] = (PERSON, 0, 0, 2), (PERSON, 0, 0, 3)
     return image, label
 
 

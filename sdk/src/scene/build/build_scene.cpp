@@ -1,9 +1,9 @@
 #include "scene/build/build_scene.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "scene/capture/posed_photo.h"
 #include "scene/capture/posed_view.h"
@@ -15,23 +15,13 @@ namespace {
 constexpr double kSolvingShare = 0.05;
 
 std::vector<const CaptureView*> chosen_views(const Capture& capture, const CaptureBuildOptions& options) {
-  for (const std::string& name : options.leaves_out) {
-    const bool is_there = std::any_of(capture.views.begin(), capture.views.end(),
-                                      [&](const CaptureView& view) { return view.name == name; });
-    if (!is_there) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The photo ", name.substr(0, 200),
-                  " is to be left out, but the capture has none of that name; check it.");
-    }
-  }
   std::vector<const CaptureView*> views;
   for (const CaptureView& view : capture.views) {
-    const bool is_left_out = (view.is_held_out && !options.uses_held_out) ||
-                             std::count(options.leaves_out.begin(), options.leaves_out.end(), view.name) != 0;
-    if (!is_left_out) views.push_back(&view);
+    if (!view.is_held_out || options.uses_held_out) views.push_back(&view);
   }
   if (views.empty()) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "All of the capture's ", capture.views.size(),
-                " photos are to be left out or held out; a scene needs one.");
+                " photos are held out; a scene needs one.");
   }
   const size_t count = options.most_views == 0 ? views.size() : std::min(views.size(), options.most_views);
   std::vector<const CaptureView*> even;
@@ -70,9 +60,9 @@ std::optional<BuiltCapture> build_from_capture(Capture capture, SceneNetworks& n
              progress(share, "Photo " + std::to_string(i + 1) + " of " + std::to_string(views.size()) + ": " + what);
     };
     try {
-      const auto start = std::chrono::steady_clock::now();
+      const Stopwatch watch;
       photo.load(view, options.long_side_px);
-      built.loading_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+      built.loading_ms += watch.elapsed_ms();
       const auto seen = builder.add_view(photo.image(), photo.valid(), photo.camera(), in_all);
       if (!seen) return {};
       if (*seen == 0) drops.add("photos that see no point of the cloud", view.name);

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "scene/capture/capture.h"
 #include "scene/build/scene_builder.h"
+#include "scene/capture/capture.h"
 
 namespace maq {
 
@@ -14,9 +14,8 @@ struct CaptureBuildOptions {
   BuildOptions points;
   // Larger photos are shrunk; 0: to no size, and over the networks' limit (SceneNetworks::kMostPixels) they are left out.
   int long_side_px = 1024;
-  size_t most_views = 0;                // evenly from all that may be used; 0: all
-  bool uses_held_out = false;           // photos that the capture keeps to compare with
-  std::vector<std::string> leaves_out;  // names of further photos
+  size_t most_views = 0;       // evenly from all that may be used; 0: all
+  bool uses_held_out = false;  // photos that the capture keeps to compare with
 };
 
 struct BuiltCapture {
@@ -28,7 +27,7 @@ struct BuiltCapture {
 };
 
 // Reads one photo after the other. `capture` may be given away (std::move), which saves a copy of its cloud. Returns nothing
-// where `progress` cancelled. Throws MAQ_ERROR_INVALID_ARGUMENT for options out of range, names of no photo, and where no photo
+// where `progress` cancelled. Throws MAQ_ERROR_INVALID_ARGUMENT for options out of range and where no photo
 // is left; MAQ_ERROR_UNREADABLE where none can be used or sees a point; and what SceneBuilder throws.
 std::optional<BuiltCapture> build_from_capture(Capture capture, SceneNetworks& networks,
                                                const CaptureBuildOptions& options, const BuildProgress& progress = {});

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "scene/build/regression_store.h"
-#include "scene/pinhole_camera.h"
 #include "scene/networks/view_basis.h"
-#include "scene/visibility/visible_points.h"
+#include "scene/pinhole_camera.h"
+#include "scene/point_cloud.h"
 
 namespace maq {
 

@@ -7,6 +7,9 @@
 namespace maq {
 namespace {
 
+// Of the ridge regression; NPBG++ (arXiv 2203.13318) has the same.
+constexpr double kAlpha = 1;
+
 struct Solved {
   float slope[kBasis][kFeatures];
   float variation;
@@ -36,7 +39,7 @@ void append(std::vector<Value>& to, const Value* from, size_t count) {
 
 }  // namespace
 
-void solve_looks(MomentStore& moments, const PointPlaces& places, double alpha, WorkerThreads& threads, bool forgets,
+void solve_looks(MomentStore& moments, const PointPlaces& places, WorkerThreads& threads, bool forgets,
                  ModelledPoints& made) {
   const size_t count = moments.count();
   // Asked for at once, or each array would be there twice while it grows; what is not written yet takes no memory.
@@ -54,7 +57,7 @@ void solve_looks(MomentStore& moments, const PointPlaces& places, double alpha, 
       for (size_t i = task * kTask; i < std::min(size, (task + 1) * kTask); ++i) {
         const ViewMoments& known = moments.at(first + i);
         Solved& look = solved[i];
-        look.is_singular = solve_look(known, alpha, look.slope) == LookKind::kSingular;
+        look.is_singular = solve_look(known, kAlpha, look.slope) == LookKind::kSingular;
         look.variation = variation_of(known, look.slope);
       }
     });

@@ -1,9 +1,9 @@
 #include "scene/build/scene_builder.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "image/geometry/turned_photo.h"
 #include "scene/build/descriptor_sampling.h"
@@ -18,20 +18,6 @@ constexpr uint64_t kBytesAPoint = sizeof(uint32_t), kBytesASeenPoint = sizeof(Vi
 // What networks make of photos is near 1; squares of these are still floats.
 constexpr float kLargestFeature = 1e15f;
 constexpr size_t kTaskSpans = 16;
-
-class Stopwatch {
- public:
-  explicit Stopwatch(double& sum_ms) : sum_ms_(sum_ms) {}
-  ~Stopwatch() {
-    sum_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& sum_ms_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 template <class... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
@@ -71,10 +57,9 @@ const BuildOptions& checked(const std::array<double, 3>& up, const BuildOptions&
   if (!(options.near >= 0) || !std::isfinite(options.near)) {
     refuse("The depth of the nearest point is ", options.near, ", but must be finite and not negative.");
   }
-  if (!(options.alpha >= 0) || !std::isfinite(options.alpha)) {
-    refuse("Alpha is ", options.alpha, ", but must be finite and not negative.");
+  if (options.threads < 1 || options.threads > kMaxThreads) {
+    refuse("Threads are ", options.threads, ", but must be 1 to ", kMaxThreads, ".");
   }
-  if (options.threads < 1 || options.threads > 64) refuse("Threads are ", options.threads, ", but must be 1 to 64.");
   return options;
 }
 
@@ -93,31 +78,6 @@ SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, Sc
   cloud_.rgb = {};
   check_memory(0);
   moments_.begin(cloud_.count());
-}
-
-SceneBuilder::SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options)
-    : SceneBuilder(std::move(state.cloud), state.up, networks, options) {
-  if (state.networks_sha256 != networks.sha256()) {
-    refuse("The points were told how they look by other networks than ", networks.name(),
-           ", whose features they cannot be given as well. Use those, or build the scene again from all photos.");
-  }
-  check_memory(state.seen.size());
-  moments_.reserve(state.seen.size());
-  for (size_t place = 0; place < state.seen.size(); ++place) {
-    moments_.add(state.seen[place]);
-    moments_.at(place) = state.moments[place];
-  }
-  views_ = state.photos;
-}
-
-ModellingStateView SceneBuilder::state() const {
-  ModellingStateView state;
-  state.cloud = cloud_.places();
-  state.seen = moments_.points().data();
-  state.seen_count = moments_.count();
-  state.moments = [this](size_t place) -> const ViewMoments& { return moments_.at(place); };
-  state.photos = uint32_t(views_);
-  return state;
 }
 
 void SceneBuilder::check_memory(size_t new_points) const {
@@ -162,10 +122,10 @@ size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera&
 const float* SceneBuilder::find_features(const ImageView& photo, const PinholeCamera& camera,
                                          const PinholeCamera& upright) {
   {
-    const Stopwatch stopwatch(times_.turning_ms);
+    const ScopedTimer timer(times_.turning_ms);
     turn_photo(photo, pixels_between(upright, camera), upright.width_px, upright.height_px, turned_);
   }
-  const Stopwatch stopwatch(times_.extractor_ms);
+  const ScopedTimer timer(times_.extractor_ms);
   const float* features = networks_.extract(turned_.data(), upright.width_px, upright.height_px);
   const size_t count = size_t(upright.width_px) * size_t(upright.height_px) * kFeatures;
   for (size_t i = 0; i < count; ++i) {
@@ -201,7 +161,7 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
 
   if (!goes_on(0, "Finding the points that the photo sees.")) return {};
   {
-    const Stopwatch stopwatch(times_.visibility_ms);
+    const ScopedTimer timer(times_.visibility_ms);
     const size_t new_points = find_seen_points(valid, camera);
     check_memory(new_points);
     moments_.reserve(new_points);
@@ -215,7 +175,7 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
 
   // From here on nothing fails, and nothing is asked.
   background_.add(background);
-  const Stopwatch stopwatch(times_.moments_ms);
+  const ScopedTimer timer(times_.moments_ms);
   for (const uint32_t point : seen_) {
     if (!moments_.has(point)) moments_.add(point);
   }
@@ -236,13 +196,13 @@ ModelledPoints SceneBuilder::solve(bool forgets) {
     refuse("None of the photos sees a point of the cloud, which has ", cloud_.count(),
            ", so there is no scene; check that photos and cloud are of one place, in the same unit.");
   }
-  const Stopwatch stopwatch(times_.solving_ms);
+  const ScopedTimer timer(times_.solving_ms);
   ModelledPoints made;
   made.origin = cloud_.origin;
   made.up = up_;
   made.background = background_.mean();
   made.never_seen = cloud_.count() - moments_.count();
-  solve_looks(moments_, cloud_.places(), options_.alpha, threads_, forgets, made);
+  solve_looks(moments_, cloud_.places(), threads_, forgets, made);
   return made;
 }
 

@@ -13,12 +13,11 @@
 #include "core/frame.h"
 #include "core/worker_threads.h"
 #include "scene/build/background_colour.h"
-#include "scene/format/fitted_points.h"
-#include "scene/build/modelling_state.h"
 #include "scene/build/regression_store.h"
+#include "scene/format/fitted_points.h"
+#include "scene/networks/scene_networks.h"
 #include "scene/pinhole_camera.h"
 #include "scene/point_cloud.h"
-#include "scene/networks/scene_networks.h"
 #include "scene/visibility/z_buffer.h"
 
 namespace maq {
@@ -26,9 +25,8 @@ namespace maq {
 struct BuildOptions {
   // Of a photo's sides, for finding which points it sees: below 1 a point hides more of what is behind it. 1/16 to 1.
   double visibility_scale = 1;
-  double near = 0;   // depth of the nearest point that is seen, in units of the scene
-  double alpha = 1;  // of the ridge regression; 0 or more
-  int threads = 2;   // for what is done point by point; the networks have theirs
+  double near = 0;  // depth of the nearest point that is seen, in units of the scene
+  int threads = 2;  // for what is done point by point; the networks have theirs
   // What the builder may take in all for what it knows of points: 336 bytes each that was seen, 4 for others.
   uint64_t most_bytes = uint64_t(2) << 30;
 };
@@ -46,8 +44,6 @@ class SceneBuilder {
   // points or with one that is not finite, an up that is no direction, options out of range; MAQ_ERROR_UNSUPPORTED for more
   // than kMostPoints; MAQ_ERROR_OUT_OF_MEMORY where most_bytes do not do for the cloud.
   SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks, const BuildOptions& options);
-  // Goes on where another left off, with all the photos it had. Likewise; MAQ_ERROR_INVALID_ARGUMENT for other networks.
-  SceneBuilder(ModellingState state, SceneNetworks& networks, const BuildOptions& options);
 
   // A photo, BGR, and its camera. `valid`: 0 for pixels that say nothing, row by row; null when all do. Returns how many points
   // it saw, which may be none; nothing where it was cancelled. Whatever it throws, the builder stays as it was before:
@@ -66,8 +62,8 @@ class SceneBuilder {
   // builder knows nothing, as at first.
   ModelledPoints finish_and_forget();
 
-  // What such a builder needs, until this one learns or forgets something.
-  ModellingStateView state() const;
+  // What is known of the points that some photo saw, in the order of finish().
+  const MomentStore& moments() const { return moments_; }
 
   size_t views() const { return views_; }
   size_t seen_points() const { return moments_.count(); }

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "scene/visibility/visible_points.h"
+#include "scene/point_cloud.h"
 
 namespace maq {
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/rounding.h"
 #include "scene/format/scene.h"
 
 namespace maq {
@@ -14,13 +15,10 @@ inline constexpr uint64_t kSceneFileAlignment = 64;
 
 // In this order, one behind the other, each at a multiple of 64 bytes and filled up to one with zeros.
 enum SceneFileSection {
-  kBlocksSection,        // SceneBlock [blocks]
-  kPlacesSection,        // as Scene::places
-  kMeansSection,         // as Scene::means
-  kSlopesSection,        // as Scene::slopes
-  kStatePlacesSection,   // float [3][state_points]: x of all, then y, then z, relative to state_origin
-  kStateSeenSection,     // uint32 [state_seen]: indices of points that some photo saw, rising or not, each once
-  kStateMomentsSection,  // ViewMoments [state_seen]
+  kBlocksSection,  // SceneBlock [blocks]
+  kPlacesSection,  // as Scene::places
+  kMeansSection,   // as Scene::means
+  kSlopesSection,  // as Scene::slopes
   kSceneFileSections
 };
 
@@ -41,20 +39,15 @@ struct SceneFileHead {
   uint8_t place_kind, coefficient_kind;
   uint8_t zero[2];
   uint8_t networks_sha256[32];
-  uint32_t state_points, state_seen;  // 0: no state of modelling
-  double state_origin[3];
-  uint32_t state_photos;  // how many were added
   float background[3];
-  uint8_t more_zeros[40];
+  uint8_t more_zeros[20];
   SceneFileSpan sections[kSceneFileSections];
 };
-static_assert(sizeof(SceneFileHead) == 384 && offsetof(SceneFileHead, file_bytes) == 24);
+static_assert(sizeof(SceneFileHead) == 256 && offsetof(SceneFileHead, file_bytes) == 24);
 static_assert(sizeof(SceneFileHead) % kSceneFileAlignment == 0);
 static_assert(sizeof(SceneBlock) == 308 && offsetof(SceneBlock, mean_middle) == 52,
               "version 1 stores blocks like that");
 
-constexpr uint64_t filled_up(uint64_t bytes) {
-  return (bytes + kSceneFileAlignment - 1) / kSceneFileAlignment * kSceneFileAlignment;
-}
+constexpr uint64_t filled_up(uint64_t bytes) { return round_up<uint64_t>(bytes, kSceneFileAlignment); }
 
 }  // namespace maq

@@ -9,11 +9,14 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <vector>
 
 #include "core/error.h"
+#include "core/unique_fd.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
 #include "scene/format/scene_layout.h"
+#include "scene/point_cloud.h"
 
 namespace maq {
 namespace {
@@ -30,19 +33,20 @@ bool are_zero(const uint8_t* bytes, size_t count) {
   return std::all_of(bytes, bytes + count, [](uint8_t byte) { return byte == 0; });
 }
 
+// The head and the sections of a scene, from a file or from memory.
 class SceneFileReader {
  public:
   explicit SceneFileReader(const std::string& path);
-  ~SceneFileReader() { ::close(file_); }
-  SceneFileReader(const SceneFileReader&) = delete;
-  SceneFileReader& operator=(const SceneFileReader&) = delete;
+  SceneFileReader(const void* bytes, size_t count);
 
   const SceneFileHead& head() const { return head_; }
+  bool is_file() const { return memory_ == nullptr; }
 
   // Reads a section with the zeros behind it and compares the check; `use` gets its bytes, part by part.
   template <class Use>
   void read(SceneFileSection section, Use&& use) const {
     const SceneFileSpan& span = head_.sections[section];
+    // Floats, so that `use` may look at them as such.
     std::vector<float> part((size_t(std::min<uint64_t>(kReadAtOnce, filled_up(span.bytes))) + 3) / sizeof(float));
     XXH3_state_t hash;
     XXH3_64bits_reset(&hash);
@@ -73,39 +77,49 @@ class SceneFileReader {
 
  private:
   void read_at(uint64_t offset, void* bytes, size_t count) const;
+  void read_head(uint64_t size_bytes);
   void check_head(uint64_t size_bytes) const;
 
-  std::string path_;
-  int file_ = -1;
+  std::string path_;  // begins each sentence
+  UniqueFd file_;
+  const char* memory_ = nullptr;  // in place of the file
   SceneFileHead head_{};
 };
 
 SceneFileReader::SceneFileReader(const std::string& path) : path_(path) {
-  // Without O_NONBLOCK a pipe would wait for somebody who writes.
-  file_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file_ < 0) {
+  // Without O_NONBLOCK, opening a pipe would wait for a writer.
+  file_ = UniqueFd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file_.is_open()) {
     const int reason = errno;
     if (reason == ENOENT || reason == ENOTDIR) {
       throw Error(MAQ_ERROR_NOT_FOUND, path, " does not exist; check the path.");
     }
     fail(" cannot be opened (", std::strerror(reason), ").");
   }
-  try {
-    struct stat found {};
-    if (::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
-    if (uint64_t(found.st_size) < sizeof head_) fail(" is too short for a scene: ", found.st_size, " bytes.");
-    read_at(0, &head_, sizeof head_);
-    check_head(uint64_t(found.st_size));
-  } catch (...) {
-    ::close(file_);
-    throw;
-  }
+  struct stat found {};
+  if (::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
+  read_head(uint64_t(found.st_size));
+}
+
+SceneFileReader::SceneFileReader(const void* bytes, size_t count)
+    : path_("The scene in memory"), memory_(static_cast<const char*>(bytes)) {
+  read_head(count);
+}
+
+void SceneFileReader::read_head(uint64_t size_bytes) {
+  if (size_bytes < sizeof head_) fail(" is too short for a scene: ", size_bytes, " bytes.");
+  read_at(0, &head_, sizeof head_);
+  check_head(size_bytes);
 }
 
 void SceneFileReader::read_at(uint64_t offset, void* bytes, size_t count) const {
+  if (memory_ != nullptr) {
+    std::memcpy(bytes, memory_ + offset, count);  // check_head() compared the sizes
+    return;
+  }
   auto* to = static_cast<char*>(bytes);
   while (count > 0) {
-    const ssize_t got = ::pread(file_, to, count, off_t(offset));
+    const ssize_t got = ::pread(file_.get(), to, count, off_t(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) fail(" cannot be read at byte ", offset, "; did it change meanwhile?");
     to += got;
@@ -121,7 +135,11 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
                 kSceneFileVersion, ". Build the scene again.");
   }
   constexpr size_t kChecked = offsetof(SceneFileHead, file_bytes);
-  if (head_.head_bytes != sizeof head_ || head_.head_check != XXH3_64bits(&head_.file_bytes, sizeof head_ - kChecked)) {
+  if (head_.head_bytes != sizeof head_) {
+    fail(" has a head of ", head_.head_bytes, " bytes, where version ", kSceneFileVersion, " has ", sizeof head_,
+         ": it is damaged, or of an SDK before the first release. Build the scene again.");
+  }
+  if (head_.head_check != XXH3_64bits(&head_.file_bytes, sizeof head_ - kChecked)) {
     fail(" is damaged in its first ", sizeof head_, " bytes; copy it again.");
   }
   if (head_.file_bytes != size_bytes) {
@@ -133,16 +151,15 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
                          head_.coefficient_kind <= uint8_t(Coefficients::kInt8) &&
                          are_zero(head_.zero, sizeof head_.zero) && are_zero(head_.more_zeros, sizeof head_.more_zeros);
   if (!has_kinds) fail(" stores its numbers in a way that version ", kSceneFileVersion, " does not have.");
-  if (head_.points > kMostPoints || head_.state_points > kMostPoints) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " has ", std::max(head_.points, head_.state_points), " points; at most ",
-                kMostPoints, " can be shown.");
+  if (head_.points > kMostPoints) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " has ", head_.points, " points; at most ", kMostPoints,
+                " can be shown.");
   }
-  if (head_.points == 0 || head_.blocks == 0 || head_.blocks > head_.points || head_.varying > head_.points ||
-      head_.state_seen > head_.state_points) {
-    fail(" claims ", head_.points, " points, ", head_.varying, " of which vary, in ", head_.blocks, " blocks, and ",
-         head_.state_seen, " of ", head_.state_points, " that were seen: that cannot be.");
+  if (head_.points == 0 || head_.blocks == 0 || head_.blocks > head_.points || head_.varying > head_.points) {
+    fail(" claims ", head_.points, " points, ", head_.varying, " of which vary, in ", head_.blocks,
+         " blocks: that cannot be.");
   }
-  for (const double* vector : {head_.origin, head_.up, head_.state_origin}) {
+  for (const double* vector : {head_.origin, head_.up}) {
     if (!std::isfinite(vector[0]) || !std::isfinite(vector[1]) || !std::isfinite(vector[2])) {
       fail(" has an origin or a direction of up that is not finite.");
     }
@@ -152,11 +169,9 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
   }
   const uint64_t place = size_bytes_of(Places(head_.place_kind));
   const uint64_t coefficient = size_bytes_of(Coefficients(head_.coefficient_kind));
-  const uint64_t bytes[kSceneFileSections] = {
-      head_.blocks * uint64_t(sizeof(SceneBlock)),      head_.points * 3 * place,
-      head_.points * kFeatures * coefficient,           head_.varying * kSlopes * coefficient,
-      head_.state_points * 3 * uint64_t(sizeof(float)), head_.state_seen * uint64_t(sizeof(uint32_t)),
-      head_.state_seen * uint64_t(sizeof(ViewMoments))};
+  const uint64_t bytes[kSceneFileSections] = {head_.blocks * uint64_t(sizeof(SceneBlock)), head_.points * 3 * place,
+                                              head_.points * kFeatures * coefficient,
+                                              head_.varying * kSlopes * coefficient};
   uint64_t offset = sizeof head_;
   for (int s = 0; s < kSceneFileSections; ++s) {
     if (head_.sections[s].offset != offset || head_.sections[s].bytes != bytes[s]) {
@@ -170,7 +185,8 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
 
 std::shared_ptr<const uint8_t> SceneFileReader::map() const {
   const size_t bytes = size_t(head_.file_bytes);
-  void* const at = bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_, 0) : MAP_FAILED;
+  void* const at =
+      bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_.get(), 0) : MAP_FAILED;
   if (at == MAP_FAILED) {
     throw Error(MAQ_ERROR_OUT_OF_MEMORY, path_, " cannot be mapped into memory: it has ", head_.file_bytes, " bytes.");
   }
@@ -220,10 +236,8 @@ struct StoredArrays {
   std::vector<uint8_t> memory;
 };
 
-}  // namespace
-
-Scene open_scene_file(const std::string& path, SceneStorage storage) {
-  const SceneFileReader file(path);
+// Checks all that `file` holds. Its arrays are mapped where it is a file, else copied.
+Scene open_checked(const SceneFileReader& file) {
   const SceneFileHead& head = file.head();
   const auto arrays = std::make_shared<StoredArrays>();
   arrays->blocks.resize(head.blocks);
@@ -231,8 +245,8 @@ Scene open_scene_file(const std::string& path, SceneStorage storage) {
   check_blocks(file, arrays->blocks);
 
   constexpr SceneFileSection kArrays[3] = {kPlacesSection, kMeansSection, kSlopesSection};
-  const uint64_t begin = head.sections[kPlacesSection].offset, end = head.sections[kStatePlacesSection].offset;
-  if (storage == SceneStorage::kMemory) arrays->memory.resize(size_t(end - begin));
+  const uint64_t begin = head.sections[kPlacesSection].offset;
+  if (!file.is_file()) arrays->memory.resize(size_t(head.file_bytes - begin));
   for (const SceneFileSection section : kArrays) {
     const bool are_floats = section == kPlacesSection ? Places(head.place_kind) == Places::kFloat32
                                                       : Coefficients(head.coefficient_kind) == Coefficients::kFloat32;
@@ -240,15 +254,16 @@ Scene open_scene_file(const std::string& path, SceneStorage storage) {
       if (are_floats && !are_sound(part, bytes / sizeof(float))) {
         file.fail(" has places or looks that are not finite; build the scene again.");
       }
-      if (storage == SceneStorage::kMemory) {
+      // The part that was checked, whatever happens to the caller's bytes meanwhile.
+      if (!file.is_file()) {
         std::memcpy(arrays->memory.data() + (head.sections[section].offset - begin) + done, part, bytes);
       }
     });
   }
-  if (storage == SceneStorage::kMapped) arrays->mapping = file.map();
+  if (file.is_file()) arrays->mapping = file.map();
   const auto at = [&](SceneFileSection section) -> const void* {
     const uint64_t offset = head.sections[section].offset;
-    return storage == SceneStorage::kMapped ? arrays->mapping.get() + offset : arrays->memory.data() + (offset - begin);
+    return file.is_file() ? arrays->mapping.get() + offset : arrays->memory.data() + (offset - begin);
   };
 
   Scene scene;
@@ -269,43 +284,10 @@ Scene open_scene_file(const std::string& path, SceneStorage storage) {
   return scene;
 }
 
-ModellingState read_modelling_state(const std::string& path) {
-  const SceneFileReader file(path);
-  const SceneFileHead& head = file.head();
-  if (head.state_points == 0) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, path, " does not hold the state of its modelling: no photo can be added. ",
-                "Build the scene again and keep it.");
-  }
-  ModellingState state;
-  std::copy_n(head.state_origin, 3, state.cloud.origin.begin());
-  state.photos = head.state_photos;
-  std::copy_n(head.up, 3, state.up.begin());
-  std::copy_n(head.networks_sha256, state.networks_sha256.size(), state.networks_sha256.begin());
-  std::vector<float> places(size_t(head.state_points) * 3);
-  file.read_to(kStatePlacesSection, places.data());
-  if (!are_sound(places.data(), places.size())) file.fail(" keeps points whose place is not finite.");
-  std::vector<float>* const axes[3] = {&state.cloud.x, &state.cloud.y, &state.cloud.z};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const auto from = places.begin() + std::ptrdiff_t(axis * head.state_points);
-    axes[axis]->assign(from, from + std::ptrdiff_t(head.state_points));
-  }
-  places = {};
-  state.seen.resize(head.state_seen);
-  file.read_to(kStateSeenSection, state.seen.data());
-  std::vector<bool> is_seen(head.state_points);
-  for (const uint32_t point : state.seen) {
-    if (point >= head.state_points || is_seen[point]) file.fail(" keeps what was seen of point ", point, " wrongly.");
-    is_seen[point] = true;
-  }
-  state.moments.resize(head.state_seen);
-  file.read_to(kStateMomentsSection, state.moments.data());
-  for (const ViewMoments& moments : state.moments) {
-    const auto* numbers = reinterpret_cast<const float*>(&moments) + 1;  // behind the count of views
-    if (moments.views == 0 || !are_sound(numbers, sizeof moments / sizeof(float) - 1)) {
-      file.fail(" keeps moments that are not finite, or of no view.");
-    }
-  }
-  return state;
-}
+}  // namespace
+
+Scene open_scene_file(const std::string& path) { return open_checked(SceneFileReader(path)); }
+
+Scene open_scene_memory(const void* bytes, size_t count) { return open_checked(SceneFileReader(bytes, count)); }
 
 }  // namespace maq

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/error.h"
 #include "core/atomic_file.h"
+#include "core/error.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
 #include "scene/format/scene_layout.h"
@@ -15,7 +15,7 @@ namespace {
 // One section after the other, each filled up with zeros.
 class SectionWriter {
  public:
-  SectionWriter(NewFile& file, SceneFileHead& head) : file_(file), head_(head) {}
+  SectionWriter(AtomicFile& file, SceneFileHead& head) : file_(file), head_(head) {}
 
   void begin() {
     XXH3_64bits_reset(&hash_);
@@ -42,39 +42,17 @@ class SectionWriter {
   }
 
  private:
-  NewFile& file_;
+  AtomicFile& file_;
   SceneFileHead& head_;
   XXH3_state_t hash_;
   uint64_t offset_ = 0;
 };
 
-void write_state(const ModellingStateView& state, SectionWriter& sections) {
-  sections.begin();
-  for (const float* axis : {state.cloud.x, state.cloud.y, state.cloud.z}) {
-    sections.add(axis, state.cloud.count * sizeof(float));
-  }
-  sections.end(kStatePlacesSection);
-  sections.write(kStateSeenSection, state.seen, state.seen_count * sizeof(uint32_t));
-  sections.begin();
-  constexpr size_t kAtOnce = 1 << 12;  // 1.4 MB
-  std::vector<ViewMoments> moments(std::min(kAtOnce, state.seen_count));
-  for (size_t first = 0; first < state.seen_count; first += kAtOnce) {
-    const size_t count = std::min(kAtOnce, state.seen_count - first);
-    for (size_t i = 0; i < count; ++i) moments[i] = state.moments(first + i);
-    sections.add(moments.data(), count * sizeof(ViewMoments));
-  }
-  sections.end(kStateMomentsSection);
-}
-
 }  // namespace
 
-void write_scene_file(const Scene& scene, const std::string& path, const ModellingStateView* state) {
+void write_scene_file(const Scene& scene, const std::string& path) {
   if (scene.points == 0 || scene.block_count == 0) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " is not written: the scene has no points.");
-  }
-  if (state != nullptr && (state->cloud.count > kMostPoints || state->seen_count > state->cloud.count)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " is not written: its state has ", state->cloud.count,
-                " points of which ", state->seen_count, " were seen; at most ", kMostPoints, " can be kept.");
   }
   SceneFileHead head{};
   std::memcpy(head.magic, kSceneFileMagic, sizeof head.magic);
@@ -90,21 +68,13 @@ void write_scene_file(const Scene& scene, const std::string& path, const Modelli
   head.coefficient_kind = uint8_t(scene.coefficient_kind);
   std::copy_n(scene.networks_sha256.begin(), sizeof head.networks_sha256, head.networks_sha256);
 
-  NewFile file(path);
+  AtomicFile file(path);
   file.append(&head, sizeof head);  // is written again when its checks are known
   SectionWriter sections(file, head);
   sections.write(kBlocksSection, scene.blocks, blocks_bytes(scene));
   sections.write(kPlacesSection, scene.places, places_bytes(scene));
   sections.write(kMeansSection, scene.means, means_bytes(scene));
   sections.write(kSlopesSection, scene.slopes, slopes_bytes(scene));
-  const ModellingStateView none;
-  write_state(state == nullptr ? none : *state, sections);
-  if (state != nullptr) {
-    head.state_points = uint32_t(state->cloud.count);
-    head.state_seen = uint32_t(state->seen_count);
-    std::copy_n(state->cloud.origin.begin(), 3, head.state_origin);
-    head.state_photos = state->photos;
-  }
   head.file_bytes = file.size_bytes();
   constexpr size_t kChecked = offsetof(SceneFileHead, file_bytes);
   head.head_check = XXH3_64bits(&head.file_bytes, sizeof head - kChecked);

@@ -5,10 +5,10 @@
 
 #include "core/error.h"
 #include "scene/format/block_encoding.h"
-#include "scene/point_cloud.h"
+#include "scene/format/descriptor_outliers.h"
 #include "scene/format/scene_blocks.h"
 #include "scene/format/scene_layout.h"
-#include "scene/format/descriptor_outliers.h"
+#include "scene/point_cloud.h"
 
 namespace maq {
 namespace {
@@ -77,24 +77,33 @@ float least_variation(const ModelledPoints& points, const ScenePacking& packing)
   return std::max(packing.least_variation, std::nextafter(*last_left_out, HUGE_VALF));
 }
 
-// What has no steps needs no groups.
-BlockOrder cut_all(const ModelledPoints& points, const ScenePacking& packing, float least) {
+}  // namespace
+
+PointOrder order_points(const ModelledPoints& points, const ScenePacking& packing) {
+  check(points);
+  const float least = least_variation(points, packing);
   const PointPlaces places = {points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin};
+  // Without steps one group will do.
   const bool has_steps = packing.coefficients != Coefficients::kFloat32;
   BlockOrder cut;
   for (const auto& group : set_wild_apart(points, least, has_steps)) {
     cut_into_blocks(places, group, SceneBlock::kMostPoints, cut);
   }
-  return cut;
+  PointOrder order;
+  order.blocks.reserve(cut.ends.size());
+  auto begin = cut.order.begin();
+  for (const uint32_t last : cut.ends) {
+    const auto end = cut.order.begin() + last;
+    const auto constant = std::stable_partition(begin, end, [&](uint32_t i) { return look_varies(points, i, least); });
+    order.blocks.push_back({uint32_t(end - begin), uint32_t(constant - begin)});
+    begin = end;
+  }
+  order.points = std::move(cut.order);
+  return order;
 }
 
-}  // namespace
-
-Scene make_scene(const ModelledPoints& points, const ScenePacking& packing, std::vector<uint32_t>* order) {
-  check(points);
-  const float least = least_variation(points, packing);
-  BlockOrder cut = cut_all(points, packing, least);
-
+Scene make_scene(const ModelledPoints& points, const ScenePacking& packing) {
+  const PointOrder order = order_points(points, packing);
   const auto owned = std::make_shared<OwnedArrays>();
   Scene scene;
   scene.origin = points.origin;
@@ -102,14 +111,12 @@ Scene make_scene(const ModelledPoints& points, const ScenePacking& packing, std:
   scene.background = points.background;
   scene.place_kind = packing.places;
   scene.coefficient_kind = packing.coefficients;
-  owned->blocks.resize(cut.ends.size());
-  for (size_t b = 0; b < cut.ends.size(); ++b) {
-    const auto begin = cut.order.begin() + scene.points, end = cut.order.begin() + cut.ends[b];
-    const auto constant = std::stable_partition(begin, end, [&](uint32_t i) { return look_varies(points, i, least); });
+  owned->blocks.resize(order.blocks.size());
+  for (size_t b = 0; b < order.blocks.size(); ++b) {
     SceneBlock& block = owned->blocks[b];
     block.first = scene.points;
-    block.count = uint32_t(end - begin);
-    block.varying = uint32_t(constant - begin);
+    block.count = order.blocks[b].count;
+    block.varying = order.blocks[b].varying;
     block.first_varying = scene.varying;
     scene.points += block.count;
     scene.varying += block.varying;
@@ -124,9 +131,8 @@ Scene make_scene(const ModelledPoints& points, const ScenePacking& packing, std:
   scene.slopes = owned->slopes.data();
   const SceneArrays arrays = {packing.places, packing.coefficients, owned->places.data(), owned->means.data(),
                               owned->slopes.data()};
-  for (SceneBlock& block : owned->blocks) encode_block(points, &cut.order[block.first], block, arrays);
+  for (SceneBlock& block : owned->blocks) encode_block(points, &order.points[block.first], block, arrays);
   scene.owner = owned;
-  if (order != nullptr) *order = std::move(cut.order);
   return scene;
 }
 

@@ -23,10 +23,21 @@ struct ScenePacking {
 // Beyond that numbers stand for something broken, and sums of them would not be finite.
 inline constexpr float kLargestInScene = 1e30f;
 
-// The scene owns its arrays. With kFloat32 places and looks are exactly those given. `order`, if it is not null, gets the
-// index among the given points of each of the scene's.
+// The points of a scene in the order in which it stores them: block after block.
+struct PointOrder {
+  struct Block {
+    uint32_t count, varying;  // points, and how many of them, the first, keep their slopes
+  };
+  std::vector<uint32_t> points;  // indices among those given
+  std::vector<Block> blocks;
+};
+
+// The first half of make_scene(), which throws the same.
+PointOrder order_points(const ModelledPoints& points, const ScenePacking& packing);
+
+// The scene owns its arrays. With kFloat32 places and looks are exactly those given.
 // Throws MAQ_ERROR_INVALID_ARGUMENT without points, where lists differ in length, a share outside 0..1, and
 // for places and looks that are not finite or over kLargestInScene; MAQ_ERROR_UNSUPPORTED for more than kMostPoints.
-Scene make_scene(const ModelledPoints& points, const ScenePacking& packing, std::vector<uint32_t>* order = nullptr);
+Scene make_scene(const ModelledPoints& points, const ScenePacking& packing);
 
 }  // namespace maq

@@ -34,11 +34,10 @@ class SceneNetworks {
   // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
   static constexpr int64_t kMostPixels = int64_t(1) << 23;
 
-  // Reads and verifies the bundle in a folder. Networks are made when they are needed first, the refiner for each size that
-  // it is needed for. Throws what read_bundle() throws, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the manifest
-  // are not those of the format.
-  SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::string& folder,
-                const SessionSettings& settings);
+  // Networks are made when they are needed first, the refiner for each size that it is needed for. Throws
+  // MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the
+  // manifest are not those of the format.
+  SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const SessionSettings& settings);
   SceneNetworks(const SceneNetworks&) = delete;
   SceneNetworks& operator=(const SceneNetworks&) = delete;
 
@@ -61,9 +60,8 @@ class SceneNetworks {
   // for two threads at once; beside extract() is fine. Throws as extract() does.
   const float* refine(const std::vector<const float*>& rasters, int width_px, int height_px);
 
-  // Gives memory of the networks back; they are made again when they are needed.
+  // Gives the extractor's memory back; it is made again when it is needed.
   void forget_extractor() { extractor_.reset(); }
-  void forget_refiner() { refiner_.forget(); }
 
  private:
   Bundle bundle_;

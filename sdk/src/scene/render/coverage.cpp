@@ -34,8 +34,7 @@ MAQ_SIMD_CLONES void depth_row(const DepthKey* __restrict keys, size_t width, co
 
 }  // namespace
 
-void PictureCover::find(const LookRaster& raster, int width_px, int height_px, bool with_depths,
-                        WorkerThreads& threads) {
+void PictureCover::find(const LookRaster& raster, int width_px, int height_px, WorkerThreads& threads) {
   rows_.resize(size_t(threads.count()));
   for (std::vector<uint16_t>& row : rows_) row.resize(size_t(width_px / 2) + 2);
   for (int level = kCoarsest; level >= 0; --level) {
@@ -44,11 +43,11 @@ void PictureCover::find(const LookRaster& raster, int width_px, int height_px, b
     std::vector<uint8_t>& alphas = alphas_[level];
     std::vector<float>& depths = depths_[level];
     alphas.resize(width * height);
-    if (with_depths) depths.resize(width * height);
+    depths.resize(width * height);
     if (level == kCoarsest) {
       for (size_t i = 0; i < alphas.size(); ++i) {
         alphas[i] = keys[i] == kNoPointKey ? 0 : kSureness[level];
-        if (with_depths) depths[i] = keys[i] == kNoPointKey ? 0 : depth_of(keys[i]);
+        depths[i] = keys[i] == kNoPointKey ? 0 : depth_of(keys[i]);
       }
       continue;
     }
@@ -61,9 +60,7 @@ void PictureCover::find(const LookRaster& raster, int width_px, int height_px, b
         const size_t beside = y % 2 == 0 ? (in == 0 ? 0 : in - 1) : std::min(in + 1, last);
         alpha_row(keys + y * width, width, kSureness[level], coarser + in * half, coarser + beside * half,
                   rows_[size_t(worker)].data(), alphas.data() + y * width);
-        if (with_depths) {
-          depth_row(keys + y * width, width, depths_[level + 1].data() + in * half, depths.data() + y * width);
-        }
+        depth_row(keys + y * width, width, depths_[level + 1].data() + in * half, depths.data() + y * width);
       }
     });
   }

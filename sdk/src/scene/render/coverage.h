@@ -12,8 +12,8 @@ namespace maq {
 
 class PictureCover {
  public:
-  // Of the raster's window, whose figures are given; true what is wanted.
-  void find(const LookRaster& raster, int width_px, int height_px, bool with_depths, WorkerThreads& threads);
+  // Of the raster's window, which has that size.
+  void find(const LookRaster& raster, int width_px, int height_px, WorkerThreads& threads);
 
   // How sure it is that a pixel shows the scene, 0..255, row by row: 255 where there is a point in the 4x4 pixels (2x2, 1)
   // that it is in, half of it in the 8x8, a quarter in the 16x16; from each scale to the next finer one bilinearly, so that

@@ -1,8 +1,8 @@
 #include "scene/render/descriptor_raster.h"
 
 #include <algorithm>
-#include <chrono>
 
+#include "core/clock.h"
 #include "core/error.h"
 
 namespace maq {
@@ -10,11 +10,6 @@ namespace {
 
 constexpr int kStripRows = LookRaster::kMultiple;
 constexpr size_t kChannels = LookRaster::kChannels;
-
-int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 }  // namespace
 
@@ -58,13 +53,13 @@ void LookRaster::shade(const Scene& scene, const BlockIndex& blocks, const ZBuff
   threads.run(size_t(height / kStripRows), [&](size_t strip, int worker) {
     Scratch& scratch = scratch_[size_t(worker)];
     const int top = int(strip) * kStripRows;
-    const int64_t begin = now_ns();
+    const int64_t begin = monotonic_ns();
     shade_strip(task, top, scratch);
-    const int64_t between = now_ns();
+    const int64_t between = monotonic_ns();
     reduce_strip(task, top);
     fill_strip(task, top);
     scratch.shade_ns += between - begin;
-    scratch.reduce_ns += now_ns() - between;
+    scratch.reduce_ns += monotonic_ns() - between;
   });
   shaded_ = varying_ = 0;
   shade_ns_ = reduce_ns_ = 0;

@@ -49,7 +49,7 @@ void RefinedPicture::write(const float* refined, const RefinerLayout& layout, co
         for (size_t c = 0; c < kColours; ++c) bgr[x * kColours + c] = over(rgb[2 - c], background[c], share);
       }
       std::copy_n(alpha, columns, to.alpha + first);
-      if (to.depth != nullptr) std::copy_n(depths + size_t(y) * width, columns, to.depth + first);
+      std::copy_n(depths + size_t(y) * width, columns, to.depth + first);
     }
   });
 }

@@ -15,7 +15,7 @@ namespace maq {
 struct PictureRows {
   uint8_t* bgr = nullptr;
   uint8_t* alpha = nullptr;
-  float* depth = nullptr;  // null where it is not wanted
+  float* depth = nullptr;
   int columns = 0, rows = 0;
 };
 

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
+#include "core/clock.h"
 #include "core/error.h"
+#include "core/rounding.h"
 #include "image/geometry/turned_picture.h"
-#include "scene/render/refiner_roi.h"
 #include "scene/gravity_alignment.h"
+#include "scene/render/refiner_roi.h"
 #include "scene/visibility/view_frustum.h"
 
 namespace maq {
@@ -19,22 +20,9 @@ constexpr int kMultiple = LookRaster::kMultiple;
 // The frames of a camera that is turned a little otherwise every time have a few sizes: of every size is a network prepared
 // anew (export/scenes/config.py has the same).
 constexpr int kTurnedMultiple = 64;
-constexpr int kMostThreads = 64;
 // The scene's background shows where no point is within 16 x 16 pixels, and fades towards there: within them the picture is
 // the refiner's (export/scenes/modelling.py has the same). An app's own shows by alpha.
 constexpr int kOwnBackgroundGain = 4;
-
-class StopWatch {
- public:
-  // Milliseconds since the last call.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now(), before = std::exchange(last_, now);
-    return std::chrono::duration<double, std::milli>(now - before).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 void check_figures(const PinholeCamera& camera) {
   check_camera(camera, "The camera");
@@ -49,8 +37,6 @@ void check_figures(const PinholeCamera& camera) {
                 " pixels differ by a factor over ", kLargestRatio, ".");
   }
 }
-
-int rounded_up(int side_px) { return (side_px + kMultiple - 1) / kMultiple * kMultiple; }
 
 // Whether a corner of the picture moves by as much as interpolation, of 1/32 pixel, can show.
 bool is_turn(const PixelMap& map, const PinholeCamera& camera) {
@@ -91,10 +77,10 @@ SceneRenderer::SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> network
     : scene_(std::move(scene)),
       networks_(std::move(networks)),
       options_(options),
-      threads_(std::clamp(options.threads, 1, kMostThreads)),
+      threads_(std::clamp(options.threads, 1, kMaxThreads)),
       blocks_(scene_) {
-  if (options.threads < 1 || options.threads > kMostThreads) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A scene is rendered by 1 to ", kMostThreads, " threads, not by ",
+  if (options.threads < 1 || options.threads > kMaxThreads) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A scene is rendered by 1 to ", kMaxThreads, " threads, not by ",
                 options.threads, ".");
   }
   if (!std::isfinite(options.near)) {
@@ -162,7 +148,7 @@ RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
 
 void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture) {
   check_figures(camera);
-  StopWatch whole, watch;
+  Stopwatch whole, watch;
   RenderCounts counts;
   counts.blocks = scene_.block_count;
   PinholeCamera frame = upright_frame(camera, scene_.up, kMultiple);
@@ -172,8 +158,8 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
     frame = upright_frame(camera, scene_.up, kTurnedMultiple);
   } else {
     frame = camera;
-    frame.width_px = rounded_up(camera.width_px);
-    frame.height_px = rounded_up(camera.height_px);
+    frame.width_px = round_up(camera.width_px, kMultiple);
+    frame.height_px = round_up(camera.height_px, kMultiple);
   }
   counts.frame_pixels = uint64_t(frame.width_px) * uint64_t(frame.height_px);
   if (counts.frame_pixels > uint64_t(SceneNetworks::kMostPixels)) {
@@ -185,7 +171,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
   const std::array<uint8_t, 3> background = options_.background.value_or(bytes_of(scene_.background));
   project(frame, counts);
   const RasterWindow occupied = finish(frame);
-  counts.project_ms = watch.lap();
+  counts.project_ms = watch.lap_ms();
 
   RenderedPicture& upright = counts.is_turned ? upright_ : picture;
   const PinholeCamera& shown = counts.is_turned ? frame : camera;
@@ -201,28 +187,28 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
     counts.varying_points = raster_.varying();
     counts.refined_pixels = uint64_t(window.width_px) * uint64_t(window.height_px);
     if (counts.refined_pixels < counts.frame_pixels) clear(upright, background);
-    if (!options_.with_depths) std::fill(upright.depth.begin(), upright.depth.end(), 0.0f);
     counts.reduce_ms = double(raster_.reduce_ns()) * 1e-6;
-    counts.shade_ms = watch.lap() - counts.reduce_ms;
+    counts.shade_ms = watch.lap_ms() - counts.reduce_ms;
 
     inputs_.clear();
     for (int level = 0; level < layout.levels; ++level) inputs_.push_back(raster_.level(level));
     const float* const refined = networks_->refine(inputs_, window.width_px, window.height_px);
-    counts.refine_ms = watch.lap();
+    counts.refine_ms = watch.lap_ms();
 
-    cover_.find(raster_, window.width_px, window.height_px, options_.with_depths, threads_);
-    refined_.write(refined, layout, window, cover_.alphas(), cover_.depths(), background,
-                   options_.background ? 1 : kOwnBackgroundGain,
-                   {upright.bgr.data(), upright.alpha.data(), options_.with_depths ? upright.depth.data() : nullptr,
-                    upright.width_px, upright.height_px},
-                   threads_);
-    counts.cover_ms = watch.lap();
+    cover_.find(raster_, window.width_px, window.height_px, threads_);
+    refined_.write(
+        refined, layout, window, cover_.alphas(), cover_.depths(), background,
+        options_.background ? 1 : kOwnBackgroundGain,
+        {upright.bgr.data(), upright.alpha.data(), upright.depth.data(), upright.width_px, upright.height_px},
+        threads_);
+    counts.cover_ms = watch.lap_ms();
   }
 
   if (counts.is_turned) {
     set_size(picture, camera.width_px, camera.height_px);
-    if (occupied.width_px == 0 || !options_.with_depths) clear(picture, background);
-    if (occupied.width_px > 0) {
+    if (occupied.width_px == 0) {
+      clear(picture, background);
+    } else {
       constexpr int kRowsAtOnce = 64;
       threads_.run(size_t((camera.height_px + kRowsAtOnce - 1) / kRowsAtOnce), [&](size_t strip, int) {
         const int top = int(strip) * kRowsAtOnce, bottom = std::min(camera.height_px, top + kRowsAtOnce);
@@ -232,14 +218,12 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
         const RenderedPicture& from = upright;
         turn_bytes(raster(from, from.bgr.data()), 3, back, raster(picture, picture.bgr.data()), top, bottom);
         turn_bytes(raster(from, from.alpha.data()), 1, back, raster(picture, picture.alpha.data()), top, bottom);
-        if (options_.with_depths) {
-          turn_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
-        }
+        turn_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
       });
     }
-    counts.turn_ms = watch.lap();
+    counts.turn_ms = watch.lap_ms();
   }
-  counts.all_ms = whole.lap();
+  counts.all_ms = whole.lap_ms();
   picture.counts = counts;
 }
 

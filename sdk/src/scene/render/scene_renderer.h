@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/worker_threads.h"
+#include "scene/networks/scene_networks.h"
 #include "scene/render/coverage.h"
 #include "scene/render/refined_picture.h"
-#include "scene/networks/scene_networks.h"
 
 namespace maq {
 
@@ -20,7 +20,6 @@ struct RenderOptions {
   // BGR, which the picture is drawn over by its alpha. Without, what has no point near is of the scene's background
   // colour, and the refiner's picture is left as it is elsewhere.
   std::optional<std::array<uint8_t, 3>> background;
-  bool with_depths = true;
   // Work that is left out. Neither changes a pixel with an alpha above 0.
   bool skips_unseen_blocks = true;
   bool skips_empty_parts = true;
@@ -44,8 +43,7 @@ struct RenderedPicture {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> bgr;
   std::vector<uint8_t> alpha;  // as of PictureCover: 0 nothing near, 255 surely covered
-  // Depth of the nearest point, along the optical axis in units of the scene; 0 where no point is near, and everywhere
-  // without `with_depths`.
+  // Depth of the nearest point, along the optical axis in units of the scene; 0 where no point is near.
   std::vector<float> depth;
   RenderCounts counts;
 };

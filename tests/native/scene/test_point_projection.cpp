@@ -1,4 +1,4 @@
-// Which points are seen, against a projection in long double, over the extreme cases of geometry.
+// Which points of a cloud are visible, against a projection in long double, over the extreme cases of geometry.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,12 +6,11 @@
 #include <random>
 #include <vector>
 
-#include "support/expect_error.h"
-#include "scene/visibility/visible_points.h"
+#include "support/front_points.h"
+#include "support/synthetic_scene.h"
 
 namespace {
 
-using maq::kNoPoint;
 using maq::PinholeCamera;
 using Place = std::array<double, 3>;
 
@@ -26,15 +25,6 @@ struct Cloud {
   }
   maq::PointPlaces places() const { return {x.data(), y.data(), z.data(), x.size(), origin}; }
 };
-
-// Of unit quaternion (w, x, y, z).
-std::array<double, 9> rotation_of(double w, double x, double y, double z) {
-  const double length = std::sqrt(w * w + x * x + y * y + z * z);
-  w /= length, x /= length, y /= length, z /= length;
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
-          2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-          2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
-}
 
 struct Projected {
   long double column, row, depth;
@@ -52,9 +42,8 @@ Projected reference(const Cloud& cloud, size_t i, const PinholeCamera& camera) {
 
 // Every point that the reference sees well inside of a pixel is its winner or behind it; nobody else wins.
 void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double near, double least_px = 0.01) {
-  maq::VisiblePoints visible;
-  visible.find(cloud.places(), camera, near);
-  ASSERT_EQ(visible.winners().size(), size_t(camera.width_px) * size_t(camera.height_px));
+  const FrontPoints visible(cloud.places(), camera, near);
+  ASSERT_EQ(visible.points.size(), size_t(camera.width_px) * size_t(camera.height_px));
   for (size_t i = 0; i < cloud.x.size(); ++i) {
     const Projected at = reference(cloud, i, camera);
     if (!(at.depth > near * 1.000001L)) continue;
@@ -63,31 +52,21 @@ void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double
                            std::abs(at.row + 0.5L - std::round(at.row + 0.5L)) < least_px;
     if (near_edge || column < 0 || row < 0 || column >= camera.width_px || row >= camera.height_px) continue;
     const size_t pixel = size_t(row) * size_t(camera.width_px) + size_t(column);
-    ASSERT_NE(visible.winners()[pixel], kNoPoint) << "point " << i;
-    EXPECT_LE(visible.depths()[pixel], at.depth * 1.00001L) << "point " << i;
+    ASSERT_NE(visible.points[pixel], kNoPoint) << "point " << i;
+    EXPECT_LE(visible.depths[pixel], at.depth * 1.00001L) << "point " << i;
   }
-  for (size_t pixel = 0; pixel < visible.winners().size(); ++pixel) {
-    const uint32_t winner = visible.winners()[pixel];
+  for (size_t pixel = 0; pixel < visible.points.size(); ++pixel) {
+    const uint32_t winner = visible.points[pixel];
     if (winner == kNoPoint) {
-      EXPECT_TRUE(std::isinf(visible.depths()[pixel]));
+      EXPECT_TRUE(std::isinf(visible.depths[pixel]));
       continue;
     }
     ASSERT_LT(winner, cloud.x.size());
     const Projected at = reference(cloud, winner, camera);
     EXPECT_NEAR(double(at.column), double(pixel % size_t(camera.width_px)), 0.5 + least_px);
     EXPECT_NEAR(double(at.row), double(pixel / size_t(camera.width_px)), 0.5 + least_px);
-    EXPECT_NEAR(double(visible.depths()[pixel] / at.depth), 1, 1e-5);
+    EXPECT_NEAR(double(visible.depths[pixel] / at.depth), 1, 1e-5);
   }
-}
-
-PinholeCamera camera_of(int width, int height, double degrees) {
-  PinholeCamera camera;
-  camera.width_px = width;
-  camera.height_px = height;
-  camera.fx_px = camera.fy_px = width / 2.0 / std::tan(degrees / 2 * M_PI / 180);
-  camera.cx_px = (width - 1) / 2.0;
-  camera.cy_px = (height - 1) / 2.0;
-  return camera;
 }
 
 // Points around the camera, most of them ahead.
@@ -107,7 +86,7 @@ Cloud cloud_around(const PinholeCamera& camera, double units, const Place& origi
   return cloud;
 }
 
-TEST(VisiblePoints, OfCamerasOfEveryKind) {
+TEST(PointProjection, OfCamerasOfEveryKind) {
   unsigned seed = 0;
   for (const double degrees : {1.0, 30.0, 60.0, 120.0, 170.0}) {
     for (const auto& [width, height] : {std::pair(64, 48), std::pair(33, 61), std::pair(1, 1), std::pair(1, 50)}) {
@@ -123,7 +102,7 @@ TEST(VisiblePoints, OfCamerasOfEveryKind) {
   }
 }
 
-TEST(VisiblePoints, OfScenesInAnyUnitAndFarFromTheOriginOfTheWorld) {
+TEST(PointProjection, OfScenesInAnyUnitAndFarFromTheOriginOfTheWorld) {
   for (const double units : {1e-3, 1.0, 1e6}) {
     for (const double away : {0.0, 1e6}) {
       PinholeCamera camera = camera_of(640, 480, 60);
@@ -135,7 +114,7 @@ TEST(VisiblePoints, OfScenesInAnyUnitAndFarFromTheOriginOfTheWorld) {
   }
 }
 
-TEST(VisiblePoints, AtBehindAndBesideTheCamera) {
+TEST(PointProjection, AtBehindAndBesideTheCamera) {
   const PinholeCamera camera = camera_of(8, 8, 90);
   Cloud cloud;
   cloud.add({0, 0, 0});
@@ -144,14 +123,13 @@ TEST(VisiblePoints, AtBehindAndBesideTheCamera) {
     cloud.add({1, 0, depth});
     cloud.add({1e30, 1e30, depth});
   }
-  maq::VisiblePoints visible;
-  visible.find(cloud.places(), camera, 0.01);
-  for (const uint32_t winner : visible.winners()) EXPECT_EQ(winner, kNoPoint);
-  visible.find(cloud.places(), camera, 0);
-  for (const uint32_t winner : visible.winners()) EXPECT_TRUE(winner == kNoPoint || cloud.z[winner] > 0);
+  FrontPoints visible(cloud.places(), camera, 0.01);
+  for (const uint32_t winner : visible.points) EXPECT_EQ(winner, kNoPoint);
+  visible = FrontPoints(cloud.places(), camera, 0);
+  for (const uint32_t winner : visible.points) EXPECT_TRUE(winner == kNoPoint || cloud.z[winner] > 0);
 }
 
-TEST(VisiblePoints, OnTheEdgesOfThePicture) {
+TEST(PointProjection, OnTheEdgesOfThePicture) {
   for (const int side : {1, 2, 7, 512, 640}) {
     PinholeCamera camera;
     camera.width_px = camera.height_px = side;
@@ -162,30 +140,28 @@ TEST(VisiblePoints, OnTheEdgesOfThePicture) {
     for (const float at : {-0.5f, std::nextafter(-0.5f, -1.0f), std::nextafter(last, 0.0f), last}) {
       cloud.add({at, at, 1});
     }
-    maq::VisiblePoints visible;
-    visible.find(cloud.places(), camera, 0.1);
-    const auto& winners = visible.winners();
+    const FrontPoints visible(cloud.places(), camera, 0.1);
+    const auto& winners = visible.points;
     EXPECT_EQ(winners.front(), 0u) << side;
     EXPECT_EQ(winners.back(), side == 1 ? 0u : 2u) << side;
     EXPECT_EQ(std::count(winners.begin(), winners.end(), kNoPoint), int64_t(side) * side - (side == 1 ? 1 : 2));
   }
 }
 
-TEST(VisiblePoints, TheNearestWinsAndOfEqualsTheFirst) {
+TEST(PointProjection, TheNearestWinsAndOfEqualsTheFirst) {
   const PinholeCamera camera = camera_of(3, 3, 60);
   Cloud cloud;
   for (const double depth : {5.0, 2.0, 2.0, 3.0, 2.0}) cloud.add({0, 0, depth});
-  maq::VisiblePoints visible;
-  visible.find(cloud.places(), camera, 0.1);
-  EXPECT_EQ(visible.winners()[4], 1u);
-  EXPECT_EQ(visible.depths()[4], 2);
+  FrontPoints visible(cloud.places(), camera, 0.1);
+  EXPECT_EQ(visible.points[4], 1u);
+  EXPECT_EQ(visible.depths[4], 2);
   for (int i = 0; i < 100000; ++i) cloud.add({0, 0, 2});
   cloud.add({0, 0, 1.9999});
-  visible.find(cloud.places(), camera, 0.1);
-  EXPECT_EQ(visible.winners()[4], cloud.x.size() - 1);
+  visible = FrontPoints(cloud.places(), camera, 0.1);
+  EXPECT_EQ(visible.points[4], cloud.x.size() - 1);
 }
 
-TEST(VisiblePoints, WhatIsNotFiniteIsNotSeen) {
+TEST(PointProjection, WhatIsNotFiniteIsNotSeen) {
   const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
   Cloud cloud;
   for (const float bad : {nan, infinite, -infinite, std::numeric_limits<float>::max()}) {
@@ -197,59 +173,15 @@ TEST(VisiblePoints, WhatIsNotFiniteIsNotSeen) {
       cloud.z.push_back(place[2]);
     }
   }
-  maq::VisiblePoints visible;
-  visible.find(cloud.places(), camera_of(16, 16, 60), 0.1);
-  for (const uint32_t winner : visible.winners()) {
+  const FrontPoints visible(cloud.places(), camera_of(16, 16, 60), 0.1);
+  for (const uint32_t winner : visible.points) {
     EXPECT_TRUE(winner == kNoPoint || cloud.z[winner] == std::numeric_limits<float>::max()) << winner;
   }
 }
 
-TEST(VisiblePoints, WithoutPointsThereIsNothing) {
-  maq::VisiblePoints visible;
-  visible.find({}, camera_of(5, 4, 60), 0.1);
-  EXPECT_EQ(visible.winners(), std::vector<uint32_t>(20, kNoPoint));
-}
-
-TEST(VisiblePoints, ASmallerPictureOfTheSameCameraShowsTheSame) {
-  const PinholeCamera camera = camera_of(640, 480, 60), half = maq::resized(camera, 320, 240);
-  EXPECT_DOUBLE_EQ(half.fx_px, camera.fx_px / 2);
-  // The centre of a block of four pixels is that of the small one.
-  EXPECT_DOUBLE_EQ((0.5 - camera.cx_px) / camera.fx_px, (0 - half.cx_px) / half.fx_px);
-}
-
-TEST(VisiblePoints, CamerasAreTurnedUprightAndContinuouslyWhereThatMeansNothing) {
-  PinholeCamera camera = camera_of(100, 100, 60);
-  for (const double roll : {0.0, 0.5, 2.0, -3.0}) {
-    camera.rotation = {std::cos(roll), -std::sin(roll), 0, std::sin(roll), std::cos(roll), 0, 0, 0, 1};
-    const PinholeCamera upright = maq::turned_upright(camera, {0, -2, 0});
-    EXPECT_NEAR(upright.rotation[0], 1, 1e-12) << roll;
-    EXPECT_NEAR(upright.rotation[4], 1, 1e-12) << roll;
-    maq::check_camera(upright, "The camera");
-  }
-  const PinholeCamera along = maq::turned_upright(camera, {0, 0, 1});
-  EXPECT_EQ(along.rotation, camera.rotation);
-  EXPECT_EQ(maq::turned_upright(camera, {0, 0, 0}).rotation, camera.rotation);
-  std::array<double, 9> before = along.rotation;
-  for (double tilt = 0; tilt < 0.1; tilt += 1e-4) {
-    const auto turned = maq::turned_upright(camera, {std::sin(tilt), 0, std::cos(tilt)}).rotation;
-    for (size_t i = 0; i < 9; ++i) EXPECT_NEAR(turned[i], before[i], 0.02) << tilt;
-    before = turned;
-  }
-}
-
-TEST(VisiblePoints, CamerasThatAreNoneAreRefused) {
-  const auto refuses = [](const char* text, auto change) {
-    PinholeCamera camera = camera_of(64, 48, 60);
-    change(camera);
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { maq::check_camera(camera, "Camera 3"); });
-  };
-  refuses("not finite", [](PinholeCamera& camera) { camera.cx_px = NAN; });
-  refuses("not finite", [](PinholeCamera& camera) { camera.centre[1] = INFINITY; });
-  refuses("must be positive", [](PinholeCamera& camera) { camera.fx_px = 0; });
-  refuses("right angles", [](PinholeCamera& camera) { camera.rotation[1] = 0.5; });
-  refuses("mirrors", [](PinholeCamera& camera) { camera.rotation[8] = -1; });
-  PinholeCamera camera = camera_of(0, 48, 60);
-  expect_error(MAQ_ERROR_IMAGE_SIZE, "Camera 3 is 0 x 48", [&] { maq::check_camera(camera, "Camera 3"); });
+TEST(PointProjection, WithoutPointsThereIsNothing) {
+  const FrontPoints visible({}, camera_of(5, 4, 60), 0.1);
+  EXPECT_EQ(visible.points, std::vector<uint32_t>(20, kNoPoint));
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 """Refiners compared: parameters, multiply-adds and milliseconds under ONNX Runtime, fp32 and int8.
 
-    python -m export.scenes.compare_refiners                       all candidates at 640 x 480, two threads
-    python -m export.scenes.compare_refiners --only light --json refiners.json
+    python -m quantization.compare_refiners                       all candidates at 640 x 480, two threads
+    python -m quantization.compare_refiners --only light --json refiners.json
 
 Weights are random and so are the rasters: time does not depend on them. Each figure is the 10th percentile of many
 runs; `core ms` is processor time of a run with one thread, which others who use the machine disturb least. Candidates
@@ -28,7 +28,7 @@ from tqdm import tqdm
 from export.scenes.config import RefinerConfig
 from export.scenes.export_onnx import RefinerGraph, export_refiner, raster_shapes
 from export.scenes.refiner import Refiner, make_refiner
-from quantization.quantize import quantise_graph
+from quantization.quantize import quantize_graph
 from quantization.settings import GraphSettings
 
 CANDIDATES = {
@@ -112,7 +112,7 @@ def measure(names: list[str], height: int, width: int, rounds: int) -> dict[str,
             }
             paths = {kind: Path(folder) / f"{len(graphs)}-{kind}.onnx" for kind in ("fp32", "int8")}
             export_refiner(refiner, paths["fp32"])
-            quantise_graph(paths["fp32"], paths["int8"], [given], GraphSettings(depthwise_8_bit=True))
+            quantize_graph(paths["fp32"], paths["int8"], [given], GraphSettings(depthwise_8_bit=True))
             for kind, path in paths.items():
                 rows[name][f"{kind}_megabytes"] = path.stat().st_size / 1e6
             graphs[name] = paths, given

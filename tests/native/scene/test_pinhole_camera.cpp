@@ -1,0 +1,56 @@
+#include "scene/pinhole_camera.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/expect_error.h"
+#include "support/synthetic_scene.h"
+
+namespace {
+
+using maq::PinholeCamera;
+
+TEST(PinholeCamera, ASmallerPictureOfTheSameCameraShowsTheSame) {
+  const PinholeCamera camera = camera_of(640, 480, 60), half = maq::resized(camera, 320, 240);
+  EXPECT_DOUBLE_EQ(half.fx_px, camera.fx_px / 2);
+  // The centre of a block of four pixels is that of the small one.
+  EXPECT_DOUBLE_EQ((0.5 - camera.cx_px) / camera.fx_px, (0 - half.cx_px) / half.fx_px);
+}
+
+TEST(PinholeCamera, CamerasAreTurnedUprightAndContinuouslyWhereThatMeansNothing) {
+  PinholeCamera camera = camera_of(100, 100, 60);
+  for (const double roll : {0.0, 0.5, 2.0, -3.0}) {
+    camera.rotation = {std::cos(roll), -std::sin(roll), 0, std::sin(roll), std::cos(roll), 0, 0, 0, 1};
+    const PinholeCamera upright = maq::turned_upright(camera, {0, -2, 0});
+    EXPECT_NEAR(upright.rotation[0], 1, 1e-12) << roll;
+    EXPECT_NEAR(upright.rotation[4], 1, 1e-12) << roll;
+    maq::check_camera(upright, "The camera");
+  }
+  const PinholeCamera along = maq::turned_upright(camera, {0, 0, 1});
+  EXPECT_EQ(along.rotation, camera.rotation);
+  EXPECT_EQ(maq::turned_upright(camera, {0, 0, 0}).rotation, camera.rotation);
+  std::array<double, 9> before = along.rotation;
+  for (double tilt = 0; tilt < 0.1; tilt += 1e-4) {
+    const auto turned = maq::turned_upright(camera, {std::sin(tilt), 0, std::cos(tilt)}).rotation;
+    for (size_t i = 0; i < 9; ++i) EXPECT_NEAR(turned[i], before[i], 0.02) << tilt;
+    before = turned;
+  }
+}
+
+TEST(PinholeCamera, CamerasThatAreNoneAreRefused) {
+  const auto refuses = [](const char* text, auto change) {
+    PinholeCamera camera = camera_of(64, 48, 60);
+    change(camera);
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { maq::check_camera(camera, "Camera 3"); });
+  };
+  refuses("not finite", [](PinholeCamera& camera) { camera.cx_px = NAN; });
+  refuses("not finite", [](PinholeCamera& camera) { camera.centre[1] = INFINITY; });
+  refuses("must be positive", [](PinholeCamera& camera) { camera.fx_px = 0; });
+  refuses("right angles", [](PinholeCamera& camera) { camera.rotation[1] = 0.5; });
+  refuses("mirrors", [](PinholeCamera& camera) { camera.rotation[8] = -1; });
+  PinholeCamera camera = camera_of(0, 48, 60);
+  expect_error(MAQ_ERROR_IMAGE_SIZE, "Camera 3 is 0 x 48", [&] { maq::check_camera(camera, "Camera 3"); });
+}
+
+}  // namespace

@@ -237,7 +237,7 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   expect_refused("max_proposals", [](auto& config) { config.max_proposals = 1001; });
   expect_refused("key_frame_interval", [](auto& config) { config.key_frame_interval = 0; });
   expect_refused("min_person_height_px", [](auto& config) { config.min_person_height_px = -1; });
-  expect_refused("detail", [](auto& config) { config.detail = maq_densepose_detail(2); });
+  expect_refused("detail", [](auto& config) { reinterpret_cast<int32_t&>(config.detail) = 2; });
   expect_refused("allow_spinning", [](auto& config) { config.allow_spinning = 2; });
 }
 

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "image/convert.h"
+#include "image/geometry/resize.h"
 #include "sources/files/file_sources.h"
 #include "sources/recording/recording.h"
 

@@ -24,6 +24,7 @@
 #include "maquette/context.h"
 #include "maquette/densepose.h"
 #include "maquette/frame.h"
+#include "maquette/pipeline.h"
 #include "maquette/recorder.h"
 #include "maquette/scene.h"
 #include "maquette/source.h"

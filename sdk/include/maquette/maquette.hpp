@@ -320,6 +320,87 @@ class DensePose {
   Owner<maq_densepose, maq_densepose_destroy> owner_;
 };
 
+inline maq_pipeline_config default_pipeline_config() {
+  maq_pipeline_config config;
+  check(maq_pipeline_config_init(&config, sizeof config), nullptr);
+  return config;
+}
+
+// A result of a pipeline with its frame.
+struct PipelineResult {
+  // Takes over what a callback or the C API gives.
+  explicit PipelineResult(const maq_pipeline_result& result)
+      : frame(result.frame),
+        densepose(result.densepose),
+        number(result.number),
+        wait_ms(result.wait_ms),
+        run_ms(result.run_ms),
+        age_ms(result.age_ms) {}
+
+  Frame frame;
+  DensePoseResult densepose;
+  uint64_t number;
+  double wait_ms, run_ms, age_ms;
+};
+
+class Pipeline {
+ public:
+  Pipeline(const Context& context, const maq_pipeline_config& config) {
+    maq_pipeline* made = nullptr;
+    check(maq_pipeline_create(context.get(), &config, &made), context.get());
+    owner_.reset(made);
+  }
+
+  maq_pipeline* get() const { return owner_.get(); }
+
+  void set_source(const std::string& uri) { check(maq_pipeline_set_source(get(), uri.c_str()), get()); }
+  void set_densepose(const maq_densepose_config& config) { check(maq_pipeline_set_densepose(get(), &config), get()); }
+  void set_paused(bool is_paused) { check(maq_pipeline_set_paused(get(), is_paused ? 1 : 0), get()); }
+  // "" ends the recording.
+  void set_recording(const std::string& path) {
+    check(maq_pipeline_set_recording(get(), path.empty() ? nullptr : path.c_str()), get());
+  }
+  void stop() { check(maq_pipeline_stop(get()), get()); }
+
+  // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when no result came in time.
+  std::optional<PipelineResult> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
+    maq_pipeline_result result{};
+    result.struct_size = sizeof result;
+    const maq_status status = maq_pipeline_acquire_result(get(), timeout_ns, &result);
+    if (status == MAQ_END_OF_STREAM) return std::nullopt;
+    check(status, get());
+    return PipelineResult(result);
+  }
+
+  // Its texts stay until this thread asks again.
+  maq_pipeline_info info() const {
+    maq_pipeline_info info{};
+    info.struct_size = sizeof info;
+    check(maq_pipeline_get_info(get(), &info), get());
+    return info;
+  }
+
+  maq_pipeline_stats stats() const {
+    maq_pipeline_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_pipeline_get_stats(get(), &stats), get());
+    return stats;
+  }
+
+  // Nothing before a model is loaded, or when its bundle has none. The points are this object's.
+  std::optional<maq_densepose_surface> surface() const {
+    maq_densepose_surface surface{};
+    surface.struct_size = sizeof surface;
+    const maq_status status = maq_pipeline_get_surface(get(), &surface);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status, get());
+    return surface;
+  }
+
+ private:
+  Owner<maq_pipeline, maq_pipeline_destroy> owner_;
+};
+
 inline maq_scene_build_config default_scene_build_config() {
   maq_scene_build_config config;
   check(maq_scene_build_config_init(&config, sizeof config), nullptr);

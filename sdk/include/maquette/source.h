@@ -36,6 +36,11 @@ typedef struct maq_source_config {
   int32_t reconnect_ms;                     /* how long a lost camera is waited for, 0 to 86400000; default 30000 */
   maq_source_state_callback state_callback; /* may be NULL */
   void* state_user_data;                    /* of state_callback */
+  /* The rest is for what is no camera. */
+  int32_t real_time;   /* 1: clips, recordings and stubs play at their own pace, as a camera would (is_live), unless the
+                          URI has live=0; 0 (default): as fast as frames are taken, unless it has live=1 */
+  int32_t loop;        /* 1: what plays as a camera begins anew at its end, unless the URI has loop=0; default 0 */
+  int32_t max_side_px; /* larger pictures are made smaller, to a longer side of this; 0 (default): they stay */
 } maq_source_config;
 
 typedef struct maq_source_info {

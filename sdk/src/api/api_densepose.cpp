@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "api/boundary.h"
+#include "api/config_arguments.h"
 #include "core/worker_threads.h"
 #include "densepose/body_parts.h"
 #include "densepose/result_files.h"
@@ -20,7 +21,15 @@ maq_densepose_config default_config() {
   return config;
 }
 
-DensePoseSettings checked_settings(const maq_densepose_config& config) {
+}  // namespace
+
+namespace maq {
+
+maq_densepose_config read_densepose_config(const maq_densepose_config* given, const char* name) {
+  return read_config(given, name, default_config(), sizeof(maq_densepose_config));
+}
+
+DensePoseSettings densepose_settings(const maq_densepose_config& config) {
   require_argument(config.bundle_path, "config.bundle_path");
   require_range("config.threads", config.threads, 0, kMaxThreads);
   if (config.long_side_px != 0) require_range("config.long_side_px", config.long_side_px, 32, 2048);
@@ -45,7 +54,14 @@ DensePoseSettings checked_settings(const maq_densepose_config& config) {
   return settings;
 }
 
-}  // namespace
+void list_people(maq_densepose_result& result) {
+  result.people.clear();
+  for (const Person& person : result.result.people) {
+    result.people.push_back({{person.box.x0, person.box.y0, person.box.x1, person.box.y1}, person.score});
+  }
+}
+
+}  // namespace maq
 
 const char* maq_densepose_get_part_name(int32_t part, uint8_t* rgb) {
   const bool known = part >= 0 && size_t(part) < kBodyParts.size();
@@ -63,8 +79,8 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     require_argument(context, "context");
     require_argument(given, "config");
     require_argument(densepose, "densepose");
-    const maq_densepose_config config = read_config(given, "config", default_config(), sizeof(maq_densepose_config));
-    const DensePoseSettings settings = checked_settings(config);
+    const maq_densepose_config config = read_densepose_config(given, "config");
+    const DensePoseSettings settings = densepose_settings(config);
     const Bundle bundle = read_bundle(config.bundle_path);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
@@ -83,10 +99,7 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     require_argument(result, "result");
     BoundedPool<maq_densepose_result>::Pooled handle = densepose->results.acquire();
     densepose->densepose->run(frame->frame.image, handle->result);
-    handle->people.clear();
-    for (const Person& person : handle->result.people) {
-      handle->people.push_back({{person.box.x0, person.box.y0, person.box.x1, person.box.y1}, person.score});
-    }
+    list_people(*handle);
     *result = lend<maq_densepose_result>(std::move(handle));
     return MAQ_OK;
   });

@@ -2,6 +2,7 @@
 #include <cstddef>
 
 #include "api/boundary.h"
+#include "api/config_arguments.h"
 
 using namespace maq;
 
@@ -30,6 +31,36 @@ void require_control(maq_control control) {
 
 }  // namespace
 
+namespace maq {
+
+maq_source_config read_source_config(const maq_source_config* given, const char* name) {
+  return read_config(given, name, default_config(), kFirstConfigSize);
+}
+
+SourceSettings source_settings(const maq_source_config& config, const Log& log) {
+  require_range("config.frame_pool_size", config.frame_pool_size, 1u, kLargestPoolSize);
+  require_range("config.queue_length", config.queue_length, 1u, kLargestPoolSize);
+  require_range("config.stall_ms", config.stall_ms, 50, 60000);
+  require_range("config.reconnect_ms", config.reconnect_ms, 0, 86400000);
+  require_range("config.real_time", config.real_time, 0, 1);
+  require_range("config.loop", config.loop, 0, 1);
+  if (config.max_side_px != 0) require_range("config.max_side_px", config.max_side_px, 1, MAQ_MAX_SIDE_PX);
+  SourceSettings settings;
+  settings.pool_size = int(config.frame_pool_size);
+  settings.queue_length = int(config.queue_length);
+  settings.stall_ms = config.stall_ms;
+  settings.reconnect_ms = config.reconnect_ms;
+  settings.real_time = config.real_time == 1;
+  settings.loop = config.loop == 1;
+  settings.max_side_px = config.max_side_px;
+  settings.on_state = config.state_callback;
+  settings.user_data = config.state_user_data;
+  settings.log = log;
+  return settings;
+}
+
+}  // namespace maq
+
 maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size) {
   return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
 }
@@ -40,19 +71,8 @@ maq_status maq_source_create(maq_context* context, const char* uri, const maq_so
     require_argument(context, "context");
     require_argument(uri, "uri");
     require_argument(source, "source");
-    const maq_source_config config = read_config(given, "config", default_config(), kFirstConfigSize);
-    require_range("config.frame_pool_size", config.frame_pool_size, 1u, kLargestPoolSize);
-    require_range("config.queue_length", config.queue_length, 1u, kLargestPoolSize);
-    require_range("config.stall_ms", config.stall_ms, 50, 60000);
-    require_range("config.reconnect_ms", config.reconnect_ms, 0, 86400000);
-    SourceSettings settings;
-    settings.pool_size = int(config.frame_pool_size);
-    settings.queue_length = int(config.queue_length);
-    settings.stall_ms = config.stall_ms;
-    settings.reconnect_ms = config.reconnect_ms;
-    settings.on_state = config.state_callback;
-    settings.user_data = config.state_user_data;
-    settings.log = context->state->log();
+    const maq_source_config config = read_source_config(given, "config");
+    const SourceSettings settings = source_settings(config, context->state->log());
     *source = new maq_source(uri, open_source(uri, settings), config.frame_pool_size);
     return MAQ_OK;
   });

@@ -110,6 +110,41 @@ TEST(ApiSources, WhatIsRecordedIsPlayedAgain) {
   EXPECT_FALSE(player.next().has_value());
 }
 
+TEST(ApiSources, FilesAndStubsPlayAtTheirOwnPaceWhenTheConfigSaysSo) {
+  const maquette::Context context;
+  maq_source_config config = maquette::default_source_config();
+  config.real_time = 1;
+  config.loop = 1;
+  const auto is_live = [&](const char* uri) { return maquette::Source(context, uri, &config).info().is_live == 1; };
+  EXPECT_TRUE(is_live("stub:pattern?size=16x16"));
+  EXPECT_FALSE(is_live("stub:pattern?size=16x16&live=0")) << "the URI has the last word";
+  EXPECT_FALSE(is_live("image:" MAQ_TEST_MEDIA "/photo.jpg")) << "a photo has no pace";
+  maquette::Source looping(context, "stub:pattern?frames=2&fps=100&size=16x16", &config);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(looping.next().has_value());
+  maquette::Source once(context, "stub:pattern?frames=2&fps=10&size=16x16&loop=0", &config);
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(once.next().has_value());
+  EXPECT_FALSE(once.next().has_value());
+  config.real_time = 2;
+  maq_source* source = nullptr;
+  EXPECT_EQ(maq_source_create(context.get(), "stub:pattern", &config, &source), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(ApiSources, LargePicturesAreMadeSmallerWhenTheConfigSaysSo) {
+  const maquette::Context context;
+  maq_source_config config = maquette::default_source_config();
+  config.max_side_px = 100;
+  for (const int real_time : {0, 1}) {
+    config.real_time = real_time;
+    for (const std::string uri : {"image:" MAQ_TEST_MEDIA "/photo.jpg", "video:" MAQ_TEST_MEDIA "/clip.mp4",
+                                  "stub:pattern?size=50x300", "stub:pattern?size=50x100"}) {
+      maquette::Source source(context, uri, &config);
+      const maq_frame_desc desc = source.next()->desc();
+      EXPECT_EQ(std::max(desc.width_px, desc.height_px), 100) << uri;
+      EXPECT_EQ(desc.width_px, source.info().width_px);
+    }
+  }
+}
+
 TEST(ApiSources, OnlyCamerasHaveControls) {
   const maquette::Context context;
   maquette::Source source(context, "stub:pattern?size=16x16");

@@ -267,7 +267,9 @@ static_assert(sizeof(void*) != 8 || sizeof(maq_context_config) == 32, "");
 static_assert(offsetof(maq_source_config, queue_length) == 8, "");
 static_assert(sizeof(void*) != 8 || (offsetof(maq_source_config, real_time) == 40 && sizeof(maq_source_config) == 56),
               "");
-static_assert(sizeof(void*) != 8 || (offsetof(maq_source_info, drops) == 48 && sizeof(maq_source_info) == 56), "");
+static_assert(sizeof(void*) != 8 ||
+                  (offsetof(maq_source_info, dropped_frame_count) == 48 && sizeof(maq_source_info) == 56),
+              "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 56, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");

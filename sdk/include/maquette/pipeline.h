@@ -41,7 +41,7 @@ typedef struct maq_pipeline_result {
   maq_densepose_result* densepose; /* the caller's: for maq_densepose_result_release or maq_pipeline_release_result */
   uint64_t number;                 /* counts the results of the pipeline, from 1; gaps are results that were dropped */
   double wait_ms;                  /* how long the pipeline waited for the frame */
-  double run_ms;                   /* how long the model took; maq_densepose_result_stats has its stages */
+  double run_ms;                   /* how long the model took; maq_densepose_result_get_stats has its stages */
   double age_ms;                   /* from the capture of a camera's frame to the result; -1 where that is not known */
 } maq_pipeline_result;
 
@@ -61,7 +61,7 @@ typedef struct maq_pipeline_config {
   uint32_t result_pool_size;             /* results, and frames, that the app may hold at once, 1 to 64;
                                                    default 4 */
   const maq_densepose_config* densepose; /* the model; required. Copied, result_pool_size is not used. */
-  const maq_source_config* source;       /* of all sources; NULL (default): the defaults. Copied, pool_size is not
+  const maq_source_config* source;       /* of all sources; NULL (default): the defaults. Copied, frame_pool_size is not
                                                    used and state_callback must be NULL. */
   maq_pipeline_result_callback result_callback; /* NULL (default): results are taken by maq_pipeline_acquire_result */
   void* result_user_data;                       /* of result_callback */
@@ -156,7 +156,7 @@ MAQ_API maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipe
  * as the pipeline, also when the model is replaced.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (no model is loaded, or it has none),
  * MAQ_ERROR_BAD_BUNDLE (it is damaged). Blocks briefly the first time, while it is decoded. */
-MAQ_API maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_surface* surface);
+MAQ_API maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surface* surface);
 
 #ifdef __cplusplus
 }

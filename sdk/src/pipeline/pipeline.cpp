@@ -300,7 +300,7 @@ struct Pipeline::State {
     std::lock_guard<std::mutex> lock(mutex);
     switch (state) {
       case MAQ_SOURCE_STARTED:
-      case MAQ_SOURCE_BACK: camera = MAQ_PIPELINE_RUNNING; break;
+      case MAQ_SOURCE_RECONNECTED: camera = MAQ_PIPELINE_RUNNING; break;
       case MAQ_SOURCE_STALLED:
         camera = MAQ_PIPELINE_STALLED;
         camera_problem = concatenate("The camera stalled: ", reason, ".");

@@ -1,4 +1,4 @@
-/* The context: what everything else is created from. It owns the log hook and the ONNX Runtime library. */
+/* The context: everything else is created from it. It owns the log hook and the ONNX Runtime library. */
 #ifndef MAQUETTE_CONTEXT_H_
 #define MAQUETTE_CONTEXT_H_
 
@@ -24,10 +24,10 @@ typedef void (*maq_log_callback)(void* user_data, maq_log_level level, const cha
 
 typedef struct maq_context_config {
   uint32_t struct_size;
-  maq_log_level log_level;         /* lines above this level are not made; default MAQ_LOG_WARNING */
+  maq_log_level log_level;         /* messages above this level are left out; default MAQ_LOG_WARNING */
   maq_log_callback log_callback;   /* NULL (default): nothing is logged; the SDK itself never prints */
   void* log_user_data;             /* passed to log_callback */
-  const char* onnxruntime_library; /* file to open; NULL (default): search as described below. Copied. */
+  const char* onnxruntime_library; /* file to open; NULL (default): searched for as described below. Copied. */
 } maq_context_config;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_context_config) of the caller.
@@ -35,7 +35,7 @@ typedef struct maq_context_config {
 MAQ_API maq_status maq_context_config_init(maq_context_config* config, uint32_t struct_size);
 
 /* Creates a context. `header_version` is MAQ_HEADER_VERSION; `config` may be NULL for the defaults.
- * `*context` is the caller's, to be given to maq_context_destroy. Nothing is opened yet: ONNX Runtime is looked for
+ * `*context` is the caller's, to be given to maq_context_destroy. Nothing is opened yet: ONNX Runtime is searched for
  * when first needed, in this order: config's onnxruntime_library; the file named by the environment variable
  * MAQ_ONNXRUNTIME_LIB; maquette/libonnxruntime.so.1 and libonnxruntime.so.1 in the folder of libmaquette.so; the
  * system's search path. It is opened privately and does not clash with a copy of the app's own.
@@ -46,7 +46,7 @@ MAQ_API maq_status maq_context_create(uint32_t header_version, const maq_context
  * Once for each context, from any thread. Does not block. */
 MAQ_API void maq_context_destroy(maq_context* context);
 
-/* The version of the ONNX Runtime library in use ("1.26.0"), and the file it was opened from.
+/* Gets the version of the ONNX Runtime library in use ("1.26.0"), and the file it was opened from.
  * Both texts are the context's and live as long as it does; either pointer may be NULL.
  * Any thread. Errors: MAQ_ERROR_RUNTIME_LIBRARY. Blocks the first time, while the library is opened. */
 MAQ_API maq_status maq_context_get_onnxruntime(maq_context* context, const char** version, const char** library_path);

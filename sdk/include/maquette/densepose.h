@@ -11,35 +11,40 @@ extern "C" {
 typedef struct maq_densepose maq_densepose;
 typedef struct maq_densepose_result maq_densepose_result;
 
-/* What is computed of each pixel of a person. */
+/* What is computed for each pixel of a person. */
 typedef enum maq_densepose_detail {
   MAQ_DENSEPOSE_DETAIL_SURFACE = 0, /* part, U and V */
   MAQ_DENSEPOSE_DETAIL_PART = 1     /* part alone: faster; U and V stay 0 */
 } maq_densepose_detail;
 
-/* The later fields leave out work that a scene does not need. */
 typedef struct maq_densepose_config {
   uint32_t struct_size;
-  int32_t threads;            /* for the networks; 0 (default): the machine's cores, at most 4 */
-  const char* bundle_path;    /* folder with manifest.json; required. Copied. */
-  int32_t long_side_px;       /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
-  float score_threshold;      /* only people above it count, 0 to 1; negative (default): the bundle's */
-  int32_t max_people;         /* at most so many, best first, 1 to 255; 0 (default): the bundle's */
-  uint32_t result_pool_size;  /* results the app may hold at once, 1 to 64; default 4 */
-  int32_t max_proposals;      /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's. Fewer are faster
+  int32_t threads;         /* for the networks; 0 (default): the machine's cores, at most 4 */
+  const char* bundle_path; /* folder with manifest.json; NULL (default): bundle_files, or without them the bundle
+                                 installed with the library (share/maquette/models/densepose-b-int8). Copied. */
+  const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
+  uint32_t bundle_file_count;          /* default 0 */
+  int32_t long_side_px;                /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
+  float score_threshold;     /* people with a lower score are left out, 0 to 1; negative (default): the bundle's */
+  int32_t max_people;        /* 1 to 255, best scores first; 0 (default): the bundle's */
+  uint32_t result_pool_size; /* results the app may hold at once, 1 to 64; default 4 */
+  int32_t max_proposals;     /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's. Fewer are faster
                                 and may miss people in a crowd. */
-  int32_t key_frame_interval; /* 1 (default): people are looked for in every frame. N, to 1000: in every N-th frame of a
-                                 stream; in between those found are followed, nobody new is, and frames without anybody
-                                 cost nothing. A frame of another size starts anew. */
-  int32_t min_person_height_px; /* people less tall than this in the frame may be missed; 0 (default): nobody */
+  int32_t
+      key_frame_interval; /* 1 (default): people are detected in every frame. N, up to 1000: in every N-th frame of a
+                                 stream; in between, boxes are propagated, nobody new is found, and frames without people
+                                 cost nothing. A frame of another size is a key frame. */
+  int32_t min_person_height_px; /* people less tall than this in the frame may be missed; 0 (default): none */
   maq_densepose_detail detail;  /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
-  int32_t allow_spinning;       /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
+  int32_t allow_spinning; /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy and costs
+                                   some speed */
 } maq_densepose_config;
 
-/* One person. The box is in pixels of the frame: left, top, right, bottom, the latter two exclusive. */
 typedef struct maq_person {
-  float box_px[4];
-  float score; /* 0 to 1 */
+  uint32_t struct_size;
+  float score;     /* 0 to 1 */
+  float box_px[4]; /* in pixels of the frame: left, top, right, bottom, the latter two exclusive */
+  int64_t id;      /* the same in each frame that shows the person; MAQ_NO_ID: people are not tracked yet */
 } maq_person;
 
 /* The planes of a result: one byte a pixel of the frame. */
@@ -47,19 +52,22 @@ typedef enum maq_densepose_plane {
   MAQ_DENSEPOSE_PLANE_PART = 1,  /* I: body part 1 to 24, 0 for background (the DensePose numbering) */
   MAQ_DENSEPOSE_PLANE_U = 2,     /* U * 255, rounded; 0 on background */
   MAQ_DENSEPOSE_PLANE_V = 3,     /* V * 255, rounded; 0 on background */
-  MAQ_DENSEPOSE_PLANE_PERSON = 4 /* k for the k-th person of the result, counted from 1; 0 for nobody */
+  MAQ_DENSEPOSE_PLANE_PERSON = 4 /* index of the person in the result, plus 1; 0 for background */
 } maq_densepose_plane;
 
-/* A part's name ("left upper arm, outside") and a colour to paint it with: red, green, blue. 0 is "background", black; a
- * number that is no part is "unknown part", black. The text is static; `rgb` has room for three bytes, or is NULL.
- * Any thread. Does not fail or block. */
-MAQ_API const char* maq_densepose_get_part_name(int32_t part, uint8_t* rgb);
+/* Returns the name of a body part ("left upper arm, outside"): 0 is "background", other numbers than 0 to 24 are
+ * "unknown part". The text is static. Any thread. Does not fail or block. */
+MAQ_API const char* maq_densepose_get_part_name(int32_t part);
 
-/* What a run did and how long its stages took. Times are wall-clock milliseconds. */
+/* Writes the colour that the part is painted with in the SDK's pictures: red, green, blue; black for 0 and for other
+ * numbers than 1 to 24. Any thread. Does not fail (NULL is fine) or block. */
+MAQ_API void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]);
+
+/* Times of the stages of a run, in wall-clock milliseconds, and counts. */
 typedef struct maq_densepose_stats {
   uint32_t struct_size;
   float preprocess_ms; /* resize and normalise */
-  float trunk_ms;      /* backbone and neck: features of the whole image */
+  float trunk_ms;      /* the trunk, that is backbone and FPN: features of the whole image */
   float proposals_ms;  /* region proposal network, top-k, NMS */
   float box_head_ms;   /* RoIAlign, box network, NMS */
   float dense_head_ms; /* RoIAlign, dense network */
@@ -70,9 +78,9 @@ typedef struct maq_densepose_stats {
   int32_t proposal_count;      /* boxes that reached the box head */
   int32_t person_count;        /* in the result */
   int32_t dropped_box_count;   /* boxes with NaN, or with no area inside the frame */
-  int64_t body_pixel_count;    /* pixels that belong to somebody */
+  int64_t body_pixel_count;    /* pixels that belong to a person */
   int64_t clamped_pixel_count; /* of these, pixels where the network's U or V was outside 0 to 1 */
-  int32_t is_key_frame;        /* 1: people were looked for; 0: those of the frame before were followed */
+  int32_t is_key_frame;        /* 1: people were detected; 0: boxes of the frame before were propagated */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
@@ -80,71 +88,76 @@ typedef struct maq_densepose_stats {
 MAQ_API maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size);
 
 /* Loads a model bundle: checks every file's size and SHA-256, and the networks' inputs and outputs, against its
- * manifest. `*densepose` is the caller's, to be given to maq_densepose_destroy.
+ * manifest. `config` may be NULL for the defaults. `*densepose` is the caller's, to be given to maq_densepose_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE,
  * MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read and networks are prepared. */
 MAQ_API maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* config,
                                         maq_densepose** densepose);
 
 /* Frees the networks (NULL is fine). Results still held stay valid until they are released.
- * Once for each handle, from any thread. May block shortly. */
+ * Once for each handle, from any thread. May block briefly. */
 MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
 
-/* Finds the people of a frame. The frame is not kept. `*result` comes from a pool of fixed size: give it back with
- * maq_densepose_result_release. Without people no head network runs and the planes are zero.
- * One at a time. Errors: MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the networks run. */
+/* Finds the people in a frame, which is not kept, and maps their pixels to the body surface. `*result` comes from a pool
+ * of result_pool_size: give it back with maq_densepose_result_release. Without people no head network runs and the planes
+ * are zero.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the networks
+ * run. */
 MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
 
-/* Forgets whom it followed: the next frame is a key frame, of another stream. Only of use with key_frame_interval
- * above 1. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+/* Starts a new stream: the next frame is a key frame. Of use only with key_frame_interval above 1.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_reset(maq_densepose* densepose);
 
 /* Gives the result back (NULL is fine). Pointers into it are invalid afterwards.
  * Once for each result, from any thread. Does not block. */
 MAQ_API void maq_densepose_result_release(maq_densepose_result* result);
 
-/* Size of the planes: that of the frame. Either pointer may be NULL.
+/* Gets the size of the planes, which is the frame's. Either pointer may be NULL.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_size(const maq_densepose_result* result, int32_t* width_px,
                                                  int32_t* height_px);
 
-/* The people found, best score first: `*people` points to `*count` of them, inside the result. Each has a pixel at
- * least: a box with nothing of a body left to paint in it is no person.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_get_people(const maq_densepose_result* result, const maq_person** people,
-                                                   uint32_t* count);
+/* Returns the number of people found; 0 for NULL. Any thread. Does not fail or block. */
+MAQ_API uint32_t maq_densepose_result_get_person_count(const maq_densepose_result* result);
 
-/* A plane of the result: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one
- * with the better score is in front.
+/* Gets the person at `index`, best score first. The caller sets person->struct_size. Each has at least one pixel: boxes
+ * without any pixel of a body are left out.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
+MAQ_API maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index,
+                                                   maq_person* person);
+
+/* Gets a plane: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one with the better
+ * score is in front.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
                                                   const uint8_t** pixels, size_t* stride_bytes);
 
-/* Times and counts of the run. The caller sets stats->struct_size.
+/* Gets times and counts of the run. The caller sets stats->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
-/* Writes three files into a folder that is there ("": the current one), in the DensePose convention (docs/formats.md):
- * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png (MAQ_DENSEPOSE_PLANE_PERSON) and
- * <stem>.json (size, boxes, scores). Each appears whole or not at all, in place of one that is there, and none before all
- * are written. `stem` begins their names and names no folder.
+/* Writes three files into an existing folder ("": the current one), in the DensePose convention (docs/formats.md):
+ * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png
+ * (MAQ_DENSEPOSE_PLANE_PERSON) and <stem>.json (size, boxes, scores). Each is written atomically and replaces an existing
+ * one, after all have been written. `stem` begins their names and names no folder.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
  * (libmaquette_files.so is missing). Blocks while they are written. */
 MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* folder, const char* stem);
 
-/* Where on the body a label lies: points of the template body in its rest pose, in metres; x to the body's left, y to its
- * back, z up. */
+/* The points of the template body, in its rest pose, that parts, U and V stand for: in metres, x to the body's left, y to
+ * its back, z up. */
 typedef struct maq_densepose_surface {
   uint32_t struct_size;
-  int32_t nodes;         /* along U, and along V; 2 at least */
+  int32_t nodes;         /* along U, and along V; at least 2 */
   const float* points_m; /* [24][nodes][nodes][3]: part - 1, U * (nodes - 1), V * (nodes - 1); x, y, z. Between nodes,
                             bilinear. x, y and z are NaN where the chart does not reach. */
 } maq_densepose_surface;
 
-/* The surface that the bundle's labels mean. The caller sets surface->struct_size; the points are the handle's and live as
- * long as it does.
+/* Gets the surface that the bundle's labels refer to. The caller sets surface->struct_size; the points are the handle's
+ * and live as long as it does.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has none), MAQ_ERROR_BAD_BUNDLE (it is
- * damaged). Blocks shortly the first time, while it is decoded. */
+ * damaged). Blocks briefly the first time, while it is decoded. */
 MAQ_API maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_densepose_surface* surface);
 
 #ifdef __cplusplus

@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-/* Images outside these limits are refused with MAQ_ERROR_IMAGE_SIZE, from the file header where the format has one. */
+/* Images beyond these limits are refused with MAQ_ERROR_IMAGE_SIZE, from the file header where the format has one. */
 #define MAQ_MAX_SIDE_PX 16384
 #define MAQ_MAX_PIXELS (64 * 1024 * 1024)
 
@@ -25,7 +25,7 @@ typedef enum maq_pixel_format {
   MAQ_PIXEL_DEPTH16 = 7 /* one plane, uint16_t a pixel: millimetres along the optical axis, 0 where nothing is known */
 } maq_pixel_format;
 
-/* What a timestamp counts from. */
+/* The zero of a timestamp. */
 typedef enum maq_clock {
   MAQ_CLOCK_MEDIA = 1,    /* presentation time: 0 at the start of the file or of the stub */
   MAQ_CLOCK_MONOTONIC = 2 /* the system's monotonic clock (CLOCK_MONOTONIC) at the time of capture */
@@ -44,17 +44,18 @@ typedef struct maq_frame_desc {
   uint64_t sequence; /* number of the frame in its source, from 0; gaps are frames that were dropped */
 } maq_frame_desc;
 
-/* Called once when the library no longer needs the pixels of a frame made by maq_frame_wrap. */
+/* Called once, when the library no longer needs the pixels of a frame made by maq_frame_wrap, on the thread that
+ * released it last. */
 typedef void (*maq_frame_release_callback)(void* user_data);
 
 /* Fills `desc` with zeros, MAQ_CLOCK_MEDIA and struct_size. `struct_size` is sizeof(maq_frame_desc) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size);
 
-/* Makes a frame of pixels that the app holds, without a copy.
- * The pixels stay the app's: they must not change or go away until `release_callback` is called with `user_data`, or,
- * with a NULL callback, until the frame was released. On failure the callback is not called.
- * `*frame` is the caller's, to be given to maq_frame_release.
+/* Wraps pixels of the app in a frame, without a copy.
+ * The pixels stay the app's: they must not change or be freed until `release_callback` is called with `user_data`, or,
+ * with a NULL callback, until the frame has been released. On failure the callback is not called.
+ * `*frame` is the caller's: give it back with maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (NULL plane, stride shorter than a row), MAQ_ERROR_IMAGE_SIZE,
  * MAQ_ERROR_UNSUPPORTED (format). Does not block. */
 MAQ_API maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* desc,
@@ -73,23 +74,23 @@ MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* de
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (it came without). Does not block. */
 MAQ_API maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc);
 
-/* The frame's memory as a dma-buf, for a GPU or an encoder to read without a copy. `*fd` stays the frame's: it is valid
- * until the frame is released, and duplicated (dup) by who needs it longer; the planes lie in it as in maq_frame_desc.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the memory is none of a device, or the device
- * cannot). Does not block. */
+/* Gets the frame's memory as a dma-buf, which a GPU or an encoder reads without a copy. `*fd` stays the frame's and is
+ * valid until the frame is released; duplicate it (dup) to keep it longer. The planes lie in it as in maq_frame_desc.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the memory is not a device's, or the device does
+ * not export it). Does not block. */
 MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 
-/* Writes the frame's pixels to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8), height_px rows of `stride_bytes`
- * (0: rows without padding); `size_bytes` is what the caller holds there.
+/* Copies the frame's pixels to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8), height_px rows of `stride_bytes`
+ * (0: rows without padding). `size_bytes` is the size of the caller's memory there.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory), MAQ_ERROR_UNSUPPORTED (format).
  * Does not block. */
 MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
                                          size_t stride_bytes, size_t size_bytes);
 
-/* Writes the frame's picture to a file, by the path's ending: PNG (.png), without loss, or JPEG (.jpg, .jpeg) at quality 95.
- * Grey pictures stay grey, others are written as RGB, without alpha. The file appears whole or not at all, in place of one
- * that is there; its folder must be there.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another ending), MAQ_ERROR_UNSUPPORTED (a depth image),
+/* Writes the frame's picture to a file, in the format of the path's extension: PNG (.png), lossless, or JPEG (.jpg, .jpeg)
+ * at quality 95. Grey pictures stay grey, others are written as RGB, without alpha. The file is written atomically and
+ * replaces an existing one; its folder must exist.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNSUPPORTED (a depth image),
  * MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is written. */
 MAQ_API maq_status maq_frame_save(const maq_frame* frame, const char* path);
 

@@ -1,6 +1,6 @@
-/* Recordings: frames of any source in a file (.maqrec), to be played by the source "rec:file.maqrec". They keep the times,
- * numbers, depth and calibration of the frames, carry checksums, and survive a crash: every frame that was added can be
- * read. docs/formats.md has the layout. */
+/* Recordings: frames of any source in a file (.maqrec), which the source "rec:file.maqrec" plays. They keep the frames'
+ * times, numbers, depth and intrinsics, carry checksums, and survive a crash: every frame that was added can be read.
+ * docs/formats.md has the layout. */
 #ifndef MAQUETTE_RECORDER_H_
 #define MAQUETTE_RECORDER_H_
 
@@ -29,23 +29,23 @@ typedef struct maq_recorder_info {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_recorder_config_init(maq_recorder_config* config, uint32_t struct_size);
 
-/* Makes the file at `path` (UTF-8), which must not be there yet. `source`, which may be NULL, is where the frames will
- * come from: its rate and calibration are noted down. `config` may be NULL.
+/* Creates the file `path` (UTF-8), which must not exist yet. `source`, which may be NULL, is where the frames will come
+ * from: its rate and intrinsics are recorded too. `config` may be NULL.
  * `*recorder` is the caller's, to be given to maq_recorder_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks while the file is made. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks while the file is created. */
 MAQ_API maq_status maq_recorder_create(maq_context* context, const char* path, const maq_source* source,
                                        const maq_recorder_config* config, maq_recorder** recorder);
 
-/* Writes a frame: it is in the file, whole, when the call returns. Frames may have different sizes and formats.
+/* Writes a frame: it is complete in the file when the call returns. Frames may have different sizes and formats.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the frame before), MAQ_ERROR_UNWRITABLE (the disk is
- * full: the frames before are whole, and one can be added again when there is room). Blocks while it is written. */
+ * full: earlier frames stay readable, and frames can be added again once there is space). Blocks while it is written. */
 MAQ_API maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame);
 
-/* Writes the index, which saves a player from looking for the frames, and closes the file.
- * One at a time. Errors: MAQ_ERROR_UNWRITABLE. Blocks until the disk has all. */
+/* Writes the index, without which a player has to search for the frames, and closes the file.
+ * One at a time. Errors: MAQ_ERROR_UNWRITABLE. Blocks until the file is on the disk. */
 MAQ_API maq_status maq_recorder_finish(maq_recorder* recorder);
 
-/* What was written so far. The caller sets info->struct_size.
+/* Tells how much was written so far. The caller sets info->struct_size.
  * Not while a frame is added. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_recorder_get_info(const maq_recorder* recorder, maq_recorder_info* info);
 

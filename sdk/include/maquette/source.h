@@ -8,39 +8,39 @@
 extern "C" {
 #endif
 
-/* As a timeout: wait until there is a frame. */
+/* A timeout without bound. */
 #define MAQ_WAIT_FOREVER (-1)
 
 typedef struct maq_source maq_source;
 
-/* What happens to a camera. */
+/* A camera's changes of state. */
 typedef enum maq_source_state {
   MAQ_SOURCE_STARTED = 1,
   MAQ_SOURCE_STALLED = 2,      /* no frame for stall_ms; it may still go on by itself */
   MAQ_SOURCE_LOST = 3,         /* unplugged or broken */
-  MAQ_SOURCE_RECONNECTING = 4, /* opened anew every 100 ms, for reconnect_ms */
+  MAQ_SOURCE_RECONNECTING = 4, /* opened again every 100 ms, for reconnect_ms */
   MAQ_SOURCE_RECONNECTED = 5   /* frames come again */
 } maq_source_state;
 
-/* Called from a thread of the source; it must return soon and must not destroy the source. `reason` is valid during the
- * call. After maq_source_destroy has returned no call begins. */
+/* Receives a change of state on a thread of the source; it must return promptly and must not destroy the source. `reason`
+ * is valid during the call. No call begins after maq_source_destroy has returned. */
 typedef void (*maq_source_state_callback)(void* user_data, maq_source_state state, const char* reason);
 
 typedef struct maq_source_config {
   uint32_t struct_size;
   uint32_t frame_pool_size; /* frames the app may hold at once, 1 to 64; default 4 */
-  /* The rest is for cameras (is_live). */
+  /* For cameras (is_live): */
   uint32_t
-      queue_length; /* frames that wait for the app, 1 to 64; a new one pushes out the oldest; default 1: the newest */
-  int32_t stall_ms; /* without a frame for so long the camera counts as stalled, 50 to 60000; default 2000 */
-  int32_t reconnect_ms;                     /* how long a lost camera is waited for, 0 to 86400000; default 30000 */
+      queue_length; /* frames that wait for the app, 1 to 64; a new one replaces the oldest; default 1: the newest */
+  int32_t stall_ms; /* after this time without a frame the camera counts as stalled, 50 to 60000; default 2000 */
+  int32_t reconnect_ms;                     /* how long to wait for a lost camera, 0 to 86400000; default 30000 */
   maq_source_state_callback state_callback; /* may be NULL */
-  void* state_user_data;                    /* of state_callback */
-  /* The rest is for what is no camera. */
+  void* state_user_data;                    /* passed to state_callback */
+  /* For sources other than cameras: */
   int32_t real_time;   /* 1: clips, recordings and stubs play at their own pace, as a camera would (is_live), unless the
                           URI has live=0; 0 (default): as fast as frames are taken, unless it has live=1 */
-  int32_t loop;        /* 1: what plays as a camera begins anew at its end, unless the URI has loop=0; default 0 */
-  int32_t max_side_px; /* larger pictures are made smaller, to a longer side of this; 0 (default): they stay */
+  int32_t loop;        /* 1: what plays as a camera starts again at its end, unless the URI has loop=0; default 0 */
+  int32_t max_side_px; /* larger pictures are scaled down to this longer side; 0 (default): they are not scaled */
 } maq_source_config;
 
 typedef struct maq_source_info {
@@ -48,25 +48,25 @@ typedef struct maq_source_info {
   int32_t width_px;
   int32_t height_px;
   double fps;                   /* frames a second; 0 for a single image */
-  int64_t frame_count;          /* frames in all; -1 when it is not known or has no end */
-  int32_t is_live;              /* 1 for a camera: frames that are not fetched in time are lost */
+  int64_t frame_count;          /* frames in all; -1 when unknown or without end */
+  int32_t is_live;              /* 1 for a camera: frames that are not taken in time are lost */
   maq_clock clock;              /* of the timestamps of its frames */
   uint32_t frame_pool_size;     /* frames the app may hold at once */
-  uint64_t dropped_frame_count; /* frames of a camera that were lost so far, on their way or because nobody took them */
+  uint64_t dropped_frame_count; /* frames of a camera that were lost so far, on their way or because none took them */
 } maq_source_info;
 
-/* How a camera maps the world into its picture, in the convention of OpenCV: x to the right, y down, z forward; the
- * centre of the top left pixel is (0, 0). With x' = x / z and y' = y / z, distorted by the rational model
- * (k1, k2, p1, p2, k3, k4, k5, k6), a point appears at (fx x' + cx, fy y' + cy). */
+/* How a camera maps directions to pixels, in the convention of OpenCV: x to the right, y down, z forward; the centre of
+ * the top left pixel is (0, 0). With x' = x / z and y' = y / z, distorted by the rational model
+ * (k1, k2, p1, p2, k3, k4, k5, k6), a point appears at (fx x' + cx, fy y' + cy). This struct never grows. */
 typedef struct maq_intrinsics {
-  uint32_t struct_size;
-  int32_t width_px; /* of the picture that the figures are for */
+  int32_t width_px; /* of the picture that these numbers are for */
   int32_t height_px;
-  double fx_px, fy_px, cx_px, cy_px;
-  double distortion[8]; /* 0: none */
+  double fx_px, fy_px;  /* focal lengths, positive */
+  double cx_px, cy_px;  /* the principal point; may lie outside of the picture */
+  double distortion[8]; /* all 0: none */
 } maq_intrinsics;
 
-/* What can be set of a camera, where the device has it. */
+/* The controls of a camera, where the device has them. */
 typedef enum maq_control {
   MAQ_CONTROL_AUTO_EXPOSURE = 1,      /* 1: the device chooses exposure and, on most, gain; 0: they stay */
   MAQ_CONTROL_EXPOSURE = 2,           /* microseconds */
@@ -80,12 +80,12 @@ typedef enum maq_control {
 
 typedef struct maq_control_info {
   uint32_t struct_size;
-  double min, max, step; /* values in between are rounded to the nearest step */
-  double default_value;  /* what the device starts with */
+  double min, max, step; /* values are rounded to the nearest step */
+  double default_value;  /* the device's at start */
   double value;          /* now */
 } maq_control_info;
 
-/* One kind of source that this build knows; all texts are static. */
+/* A kind of source of this build. The texts are static. */
 typedef struct maq_source_scheme {
   uint32_t struct_size;
   const char* name;    /* "image" */
@@ -99,13 +99,13 @@ typedef struct maq_source_scheme {
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
 /* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec", "stub:people?count=2&seed=7",
- * "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:". "file:clip.mp4" is whichever of the first three the file's
- * content says, "camera:" the first camera that can be opened.
- * "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out to that rate; a camera
- * takes the nearest that it offers, which maq_source_get_info tells. Of a camera, "format=MJPG" names the format and
- * "exposure=10000&focus=auto" sets controls. "live=1" plays what is no camera as if it were one, and faults such as
- * "drop=0.1" or "unplug=3s@5s" are put into any source (docs/cameras/stand-ins.md).
- * A '?' that is part of a file name is written %3F, '%' is written %25. `config` may be NULL.
+ * "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:". "file:clip.mp4" chooses among the first three by the
+ * file's content, "camera:" opens the first camera that can be opened.
+ * "?size=640x480&fps=15" works with each: frames are scaled to that size, frames of a clip are left out down to that rate;
+ * a camera takes the nearest that it offers, which maq_source_get_info tells. For cameras, "format=MJPG" selects a pixel
+ * format and "exposure=10000&focus=auto" sets controls. "live=1" plays a file or stub as a camera would, and faults such as
+ * "drop=0.1" or "unplug=3s@5s" can be injected into any source (docs/cameras/stand-ins.md).
+ * Write a '?' of a file name as %3F and a '%' as %25. `config` may be NULL.
  * `*source` is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),
  * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE; for cameras MAQ_ERROR_DEVICE_LOST,
@@ -122,48 +122,48 @@ MAQ_API void maq_source_destroy(maq_source* source);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info* info);
 
-/* Takes the next frame: of a camera the oldest that waits. A camera's frame is in memory of the device, which has a few
- * such buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources
- * (MAQ_WAIT_FOREVER: no bound); files and stubs deliver at once and ignore it. `*frame` comes from a pool of fixed size:
- * give it back with maq_frame_release soon.
+/* Takes the next frame: of a camera the oldest that waits. A camera's frame lies in memory of the device, which has few
+ * buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources (MAQ_WAIT_FOREVER:
+ * no bound); files and stubs deliver at once and ignore it. `*frame` comes from a pool of frame_pool_size: give it back
+ * with maq_frame_release soon.
  * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_ERROR_DEVICE_LOST,
  * MAQ_ERROR_POOL_EMPTY when all frames are held, MAQ_ERROR_UNREADABLE when a clip ends before its header says, after all
  * readable frames, or for a damaged frame of a recording, which is left out. Blocks while decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
 
-/* How the camera maps the world into its picture. The caller sets calibration->struct_size.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the source does not know). Does not block. */
-MAQ_API maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* calibration);
+/* Gets the camera's intrinsics.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (they are not known). Does not block. */
+MAQ_API maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* intrinsics);
 
-/* What a control of the camera is now and what it can be. The caller sets info->struct_size.
+/* Gets the value and the range of a control. The caller sets info->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the device does not have it), MAQ_ERROR_BUSY
  * (not now), MAQ_ERROR_DEVICE_LOST (also while the camera is lost). Blocks while the device is asked. */
 MAQ_API maq_status maq_source_get_control(maq_source* source, maq_control control, maq_control_info* info);
 
-/* Sets a control. A manual exposure, gain, focus or white balance switches its automatic off. What was set is set again
- * when a lost camera comes back.
+/* Sets a control. A manual exposure, gain, focus or white balance switches off its automatic. Controls are set again when
+ * a lost camera is reconnected.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (out of range), MAQ_ERROR_UNSUPPORTED (the device does not have it),
  * MAQ_ERROR_BUSY (not now), MAQ_ERROR_DEVICE_LOST (also while the camera is lost). Blocks while the device is asked. */
 MAQ_API maq_status maq_source_set_control(maq_source* source, maq_control control, double value);
 
-/* Goes to the first frame at `time_ns` after the source's first frame, or later; it is the next that is acquired.
- * Not while a frame is being acquired. Errors: MAQ_ERROR_INVALID_ARGUMENT (negative), MAQ_ERROR_UNSUPPORTED (only
+/* Moves to the first frame at `time_ns` after the source's first frame, or later: the next call acquires it.
+ * One at a time, together with maq_source_acquire_frame. Errors: MAQ_ERROR_INVALID_ARGUMENT (negative), MAQ_ERROR_UNSUPPORTED (only
  * recordings and stubs can). Does not block. */
 MAQ_API maq_status maq_source_seek(maq_source* source, int64_t time_ns);
 
-/* The kinds of sources of this build: their number, and the one at `index`. The caller sets scheme->struct_size.
+/* Get the number of kinds of sources of this build, and the kind at `index`. The caller sets scheme->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Do not block. */
 MAQ_API uint32_t maq_source_get_scheme_count(void);
 MAQ_API maq_status maq_source_get_scheme(uint32_t index, maq_source_scheme* scheme);
 
-/* The cameras that are there when the list is made. */
+/* The cameras that were connected when the list was created. */
 typedef struct maq_camera_list maq_camera_list;
 
-/* A camera; texts stay valid until its list is destroyed. */
+/* A connected camera. The texts stay valid until the list is destroyed. */
 typedef struct maq_camera_info {
   uint32_t struct_size;
   const char* uri;     /* for maq_source_create: "v4l2:/dev/video0" */
-  const char* name;    /* as the device calls itself; "" when it cannot be opened */
+  const char* name;    /* the device's own name; "" when it cannot be opened */
   const char* bus;     /* where it is plugged in */
   maq_status status;   /* MAQ_OK, or why it cannot be opened now */
   const char* problem; /* that in a sentence, and what to do */
@@ -180,13 +180,18 @@ typedef struct maq_camera_mode {
   double fps; /* the fastest; 0 when the device does not say */
 } maq_camera_mode;
 
-/* Looks for cameras; none is no error. `*list` is the caller's, to be given to maq_camera_list_destroy.
+/* Lists the connected cameras, of which there may be none. `*list` is the caller's, to be given to
+ * maq_camera_list_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Blocks while devices are asked. */
 MAQ_API maq_status maq_camera_list_create(maq_context* context, maq_camera_list** list);
-/* NULL is fine. */
+
+/* Frees the list (NULL is fine). Once for each list, from any thread. Does not block. */
 MAQ_API void maq_camera_list_destroy(maq_camera_list* list);
+
+/* Returns the number of cameras; 0 for NULL. Any thread. Does not fail or block. */
 MAQ_API uint32_t maq_camera_list_get_count(const maq_camera_list* list);
-/* The caller sets struct_size of `info` and `mode`.
+
+/* Get the camera at `index`, and of its modes the one at `mode_index`. The caller sets struct_size of `info` and `mode`.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (also an index out of range). Do not block. */
 MAQ_API maq_status maq_camera_list_get_camera(const maq_camera_list* list, uint32_t index, maq_camera_info* info);
 MAQ_API maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index, uint32_t mode_index,

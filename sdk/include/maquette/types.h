@@ -1,4 +1,4 @@
-/* Status codes, error text and version: what every other header of Maquette uses. */
+/* Status codes, error text, version, and what every other header of Maquette uses. */
 #ifndef MAQUETTE_TYPES_H_
 #define MAQUETTE_TYPES_H_
 
@@ -27,12 +27,12 @@
 extern "C" {
 #endif
 
-/* What a call came to. Values never change meaning; new ones are added at the end. */
+/* The outcome of a call. Values never change meaning; new ones are added at the end. */
 typedef enum maq_status {
   MAQ_OK = 0,
   MAQ_ERROR_INVALID_ARGUMENT = 1, /* a NULL, an out-of-range value, a wrong struct_size, an ill-formed URI */
   MAQ_ERROR_VERSION_MISMATCH = 2, /* the app's headers do not fit this library */
-  MAQ_ERROR_NOT_FOUND = 3,        /* a file or folder is not there */
+  MAQ_ERROR_NOT_FOUND = 3,        /* a file or folder does not exist */
   MAQ_ERROR_UNREADABLE = 4,       /* a file is there but cannot be decoded: damaged, truncated or another format */
   MAQ_ERROR_IMAGE_SIZE = 5,       /* an image has no pixels, or more than the limits in frame.h */
   MAQ_ERROR_BAD_BUNDLE = 6,       /* a model bundle is incomplete, changed, or not what its manifest says */
@@ -43,26 +43,38 @@ typedef enum maq_status {
   MAQ_ERROR_OUT_OF_MEMORY = 11,
   MAQ_ERROR_INTERNAL = 12,      /* a defect of the library; please report it */
   MAQ_END_OF_STREAM = 13,       /* not an error: the source has no more frames */
-  MAQ_TIMEOUT = 14,             /* not an error: no frame came in the time that was given */
+  MAQ_TIMEOUT = 14,             /* not an error: no frame or result came within the timeout */
   MAQ_ERROR_DEVICE_LOST = 15,   /* a camera was unplugged, or broke, and did not come back in time */
   MAQ_ERROR_BUSY = 16,          /* another program has the camera */
   MAQ_ERROR_NO_PERMISSION = 17, /* the user may not open the camera */
-  MAQ_ERROR_UNWRITABLE = 18,    /* a file cannot be made or written: it is there already, the disk is full */
-  MAQ_CANCELLED = 19            /* not an error: the app ended the call before its time */
+  MAQ_ERROR_UNWRITABLE = 18,    /* a file cannot be created or written: it exists already, the disk is full */
+  MAQ_CANCELLED = 19            /* not an error: the app cancelled the call */
 } maq_status;
 
-/* The status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.
+/* The id of something that is not tracked. */
+#define MAQ_NO_ID (-1)
+
+/* A file that lies in memory of the app, where there is no file system to read it from (phones, browsers). The call that
+ * takes it copies it: name and data may be freed when the call returns. */
+typedef struct maq_memory_file {
+  const char* name; /* as in the folder: "manifest.json", "trunk.onnx" */
+  const void* data;
+  size_t size_bytes;
+} maq_memory_file;
+
+/* Returns the status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.
  * The text is static. Any thread. Does not fail or block. */
 MAQ_API const char* maq_status_get_name(maq_status status);
 
-/* The text of the latest failed call on `handle` (any handle of this API), as one sentence; "" when none failed.
- * With NULL: of this thread's latest failed call that had no handle yet (a `_create`, or a NULL handle).
- * The text is the library's; it stays until this thread calls maq_get_last_error again. Calls that succeed do not clear it.
- * Any thread, as long as `handle` is alive. Does not fail or block. */
+/* Returns what was wrong and what to do, in a sentence: with NULL, of this thread's latest failed call, on whatever handle
+ * or none; with a handle of this API, of the latest failed call on that handle, on any thread. "" when none failed. A call
+ * that fails to create an object is one on the context. Calls that succeed do not clear the text.
+ * The text is the library's and stays valid until this thread calls maq_get_last_error again.
+ * Any thread, while `handle` is alive. Does not fail or block. */
 MAQ_API const char* maq_get_last_error(const void* handle);
 
-/* Version of the library found at run time ("0.2.0"), the git commit it was built from, and the options it was built
- * with ("release, g++ 12.2, opencv 4.6.0"). Static text. Any thread. Do not fail or block. */
+/* Return the version of the library found at run time ("0.2.0"), the git commit it was built from, and the options it was
+ * built with ("release, g++ 12.2"). The texts are static. Any thread. Do not fail or block. */
 MAQ_API const char* maq_get_sdk_version(void);
 MAQ_API const char* maq_get_git_commit(void);
 MAQ_API const char* maq_get_build_options(void);

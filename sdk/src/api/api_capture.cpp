@@ -1,7 +1,7 @@
 #include <memory>
 
 #include "api/boundary.h"
-#include "api/scene_arguments.h"
+#include "api/scene_conversions.h"
 
 using namespace maq;
 

@@ -5,11 +5,6 @@ using namespace maq;
 
 namespace {
 
-// The errors of calls without a handle, and the copy that maq_get_last_error hands out. Of the thread, so that no call
-// waits for another and no text is freed under its reader.
-thread_local std::string handleless_error;
-thread_local std::string handed_out_error;
-
 maq_context_config default_config() {
   maq_context_config config{};
   config.struct_size = sizeof config;
@@ -27,24 +22,6 @@ void check_header_version(uint32_t header_version) {
 }
 
 }  // namespace
-
-namespace maq {
-
-maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept {
-  try {
-    std::string sentence = function == nullptr ? text : concatenate(function, ": ", text);
-    if (handle != nullptr) {
-      handle->set_error(std::move(sentence));
-    } else {
-      handleless_error = std::move(sentence);
-    }
-  } catch (...) {
-    // No memory for the text: the status still says what happened.
-  }
-  return status;
-}
-
-}  // namespace maq
 
 const char* maq_status_get_name(maq_status status) {
   switch (status) {
@@ -72,14 +49,7 @@ const char* maq_status_get_name(maq_status status) {
   return "unknown status";
 }
 
-const char* maq_get_last_error(const void* handle) {
-  try {
-    handed_out_error = handle == nullptr ? handleless_error : static_cast<const Handle*>(handle)->error();
-    return handed_out_error.c_str();
-  } catch (...) {
-    return "There is not enough memory for the text of the error.";
-  }
-}
+const char* maq_get_last_error(const void* handle) { return last_error(static_cast<const Handle*>(handle)); }
 
 const char* maq_get_sdk_version(void) { return sdk_version(); }
 const char* maq_get_git_commit(void) { return git_commit(); }

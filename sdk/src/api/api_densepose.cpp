@@ -1,7 +1,9 @@
 #include <algorithm>
 
 #include "api/boundary.h"
-#include "api/config_arguments.h"
+#include "api/bundle_argument.h"
+#include "api/densepose_handle.h"
+#include "api/frame_handle.h"
 #include "core/worker_threads.h"
 #include "densepose/body_parts.h"
 #include "densepose/result_files.h"
@@ -21,6 +23,11 @@ maq_densepose_config default_config() {
   return config;
 }
 
+// NULL for a number that is not a part's.
+const BodyPart* body_part(int32_t part) {
+  return part >= 0 && size_t(part) < kBodyParts.size() ? &kBodyParts[size_t(part)] : nullptr;
+}
+
 }  // namespace
 
 namespace maq {
@@ -30,7 +37,6 @@ maq_densepose_config read_densepose_config(const maq_densepose_config* given, co
 }
 
 DensePoseSettings densepose_settings(const maq_densepose_config& config) {
-  require_argument(config.bundle_path, "config.bundle_path");
   require_range("config.threads", config.threads, 0, kMaxThreads);
   if (config.long_side_px != 0) require_range("config.long_side_px", config.long_side_px, 32, 2048);
   if (!(config.score_threshold < 0)) require_range("config.score_threshold", config.score_threshold, 0.0f, 1.0f);
@@ -54,20 +60,17 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config) {
   return settings;
 }
 
-void list_people(maq_densepose_result& result) {
-  result.people.clear();
-  for (const Person& person : result.result.people) {
-    result.people.push_back({{person.box.x0, person.box.y0, person.box.x1, person.box.y1}, person.score});
-  }
-}
-
 }  // namespace maq
 
-const char* maq_densepose_get_part_name(int32_t part, uint8_t* rgb) {
-  const bool known = part >= 0 && size_t(part) < kBodyParts.size();
-  const BodyPart& found = known ? kBodyParts[size_t(part)] : BodyPart{"unknown part", {0, 0, 0}};
-  if (rgb != nullptr) std::copy(found.rgb.begin(), found.rgb.end(), rgb);
-  return found.name;
+const char* maq_densepose_get_part_name(int32_t part) {
+  const BodyPart* const known = body_part(part);
+  return known == nullptr ? "unknown part" : known->name;
+}
+
+void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]) {
+  if (rgb == nullptr) return;
+  const BodyPart* const known = body_part(part);
+  for (size_t i = 0; i < 3; ++i) rgb[i] = known == nullptr ? uint8_t(0) : known->rgb[i];
 }
 
 maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
@@ -77,11 +80,10 @@ maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t stru
 maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* given, maq_densepose** densepose) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
-    require_argument(given, "config");
     require_argument(densepose, "densepose");
     const maq_densepose_config config = read_densepose_config(given, "config");
     const DensePoseSettings settings = densepose_settings(config);
-    const Bundle bundle = read_bundle(config.bundle_path);
+    const Bundle bundle = bundle_reader(config, kDensePoseBundle)();
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                                 bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");
@@ -99,7 +101,6 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     require_argument(result, "result");
     BoundedPool<maq_densepose_result>::Pooled handle = densepose->results.acquire();
     densepose->densepose->run(frame->frame.image, handle->result);
-    list_people(*handle);
     *result = lend<maq_densepose_result>(std::move(handle));
     return MAQ_OK;
   });
@@ -124,14 +125,17 @@ maq_status maq_densepose_result_get_size(const maq_densepose_result* result, int
   });
 }
 
-maq_status maq_densepose_result_get_people(const maq_densepose_result* result, const maq_person** people,
-                                           uint32_t* count) {
+uint32_t maq_densepose_result_get_person_count(const maq_densepose_result* result) {
+  return result == nullptr ? 0 : uint32_t(result->result.people.size());
+}
+
+maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index, maq_person* person) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
-    require_argument(people, "people");
-    require_argument(count, "count");
-    *people = result->people.data();
-    *count = uint32_t(result->people.size());
+    require_index("index", index, result->result.people.size());
+    const Person& from = result->result.people[index];
+    const maq_person filled{0, from.score, {from.box.x0, from.box.y0, from.box.x1, from.box.y1}, MAQ_NO_ID};
+    write_struct(person, "person", filled, sizeof(maq_person));
     return MAQ_OK;
   });
 }
@@ -166,7 +170,7 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.network_width_px = from.network_width_px;
     filled.network_height_px = from.network_height_px;
     filled.proposal_count = from.proposals;
-    filled.person_count = int32_t(result->people.size());
+    filled.person_count = int32_t(result->result.people.size());
     filled.dropped_box_count = from.dropped_boxes;
     filled.body_pixel_count = from.decoded.body_pixels;
     filled.clamped_pixel_count = from.decoded.clamped_uv;

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "api/boundary.h"
-#include "api/scene_arguments.h"
+#include "api/scene_conversions.h"
 #include "core/clock.h"
 #include "scene/build/build_scene.h"
 #include "scene/capture/posed_view.h"

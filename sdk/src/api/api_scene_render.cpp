@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "api/boundary.h"
-#include "api/scene_arguments.h"
+#include "api/scene_conversions.h"
 #include "scene/render/scene_renderer.h"
 
 using namespace maq;

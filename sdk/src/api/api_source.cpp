@@ -2,7 +2,7 @@
 #include <cstddef>
 
 #include "api/boundary.h"
-#include "api/config_arguments.h"
+#include "api/source_handle.h"
 
 using namespace maq;
 
@@ -165,7 +165,7 @@ uint32_t maq_source_get_scheme_count(void) {
 maq_status maq_source_get_scheme(uint32_t index, maq_source_scheme* scheme) {
   return guarded(nullptr, __func__, [&] {
     const std::vector<SourceScheme>& schemes = source_schemes();
-    require_range("index", index, 0u, uint32_t(schemes.size() - 1));
+    require_index("index", index, schemes.size());
     const SourceScheme& from = schemes[index];
     write_struct(scheme, "scheme", maq_source_scheme{0, from.name, from.example, from.summary, from.is_camera ? 1 : 0},
                  kFirstSchemeSize);
@@ -193,7 +193,7 @@ uint32_t maq_camera_list_get_count(const maq_camera_list* list) {
 maq_status maq_camera_list_get_camera(const maq_camera_list* list, uint32_t index, maq_camera_info* info) {
   return guarded(list, __func__, [&] {
     require_argument(list, "list");
-    if (index >= list->cameras.size()) throw ArgumentError("index is ", index, " of ", list->cameras.size(), ".");
+    require_index("index", index, list->cameras.size());
     const CameraListing& from = list->cameras[index];
     write_struct(info, "info",
                  maq_camera_info{0, from.uri.c_str(), from.name.c_str(), from.bus.c_str(), from.status,
@@ -207,9 +207,9 @@ maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index,
                                     maq_camera_mode* mode) {
   return guarded(list, __func__, [&] {
     require_argument(list, "list");
-    if (index >= list->cameras.size()) throw ArgumentError("index is ", index, " of ", list->cameras.size(), ".");
+    require_index("index", index, list->cameras.size());
     const std::vector<CameraMode>& modes = list->cameras[index].modes;
-    if (mode_index >= modes.size()) throw ArgumentError("mode_index is ", mode_index, " of ", modes.size(), ".");
+    require_index("mode_index", mode_index, modes.size());
     const CameraMode& from = modes[mode_index];
     maq_camera_mode filled{};
     from.format.copy(filled.format, sizeof filled.format - 1);

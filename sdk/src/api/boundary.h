@@ -6,7 +6,7 @@
 #include <new>
 #include <string>
 
-#include "api/handles.h"
+#include "api/handle.h"
 #include "core/error.h"
 
 namespace maq {
@@ -18,9 +18,12 @@ class ArgumentError : public Error {
   explicit ArgumentError(const Parts&... parts) : Error(MAQ_ERROR_INVALID_ARGUMENT, parts...) {}
 };
 
-// Keeps the text for maq_get_last_error: with the handle, or for this thread when there is none. `function` begins the
-// text when it is not NULL.
+// Keeps the text for maq_get_last_error: as the thread's latest, and with the handle unless that is NULL. `function` begins
+// the text when it is not NULL.
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept;
+
+// The text of the handle, or the thread's latest for NULL; it stays until the thread calls this again.
+const char* last_error(const Handle* handle) noexcept;
 
 // Runs `body`, which returns a status or throws. Nothing gets past this.
 template <class Body>
@@ -46,10 +49,14 @@ void require_argument(const T* pointer, const char* name) {
 }
 
 template <class T>
-void require_range(const char* name, T value, T least, T most) {
-  if (!(value >= least && value <= most)) {
-    throw ArgumentError(name, " is ", value, ", but must be ", least, " to ", most, ".");
+void require_range(const char* name, T value, T min, T max) {
+  if (!(value >= min && value <= max)) {
+    throw ArgumentError(name, " is ", value, ", but must be ", min, " to ", max, ".");
   }
+}
+
+inline void require_index(const char* name, uint32_t index, size_t count) {
+  if (index >= count) throw ArgumentError(name, " is ", index, ", but there are ", count, " (from 0).");
 }
 
 // Structs grow at their end. `smallest` is the size of the struct's first release: whatever lies between that and this

@@ -1,0 +1,81 @@
+/* Captures: posed photos of a place and a point cloud, read from a folder. Scenes (scene.h) are built from them. */
+#ifndef MAQUETTE_CAPTURE_H_
+#define MAQUETTE_CAPTURE_H_
+
+#include "maquette/source.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct maq_capture maq_capture;
+
+/* A camera and its pose, in the convention of OpenCV: x to the right, y down, z forward. The world's point X is at
+ * rotation * (X - centre) in the camera's coordinates. Lengths are in the unit of the point cloud ("units of the scene"). */
+typedef struct maq_pinhole_camera {
+  uint32_t struct_size;
+  maq_intrinsics
+      intrinsics;     /* of the photo, or of the picture to render; photos are undistorted by the library, pictures
+                                are rendered without distortion */
+  double rotation[9]; /* world to camera, row-major; right-handed and orthonormal (to 0.001) */
+  double centre[3];   /* the camera's position in the world */
+} maq_pinhole_camera;
+
+typedef struct maq_capture_info {
+  uint32_t struct_size;
+  uint32_t view_count;
+  uint64_t point_count;
+  uint32_t drop_count; /* reasons why parts of the capture were dropped, see maq_capture_get_drop */
+  double up[3];        /* of the world; unit vector */
+} maq_capture_info;
+
+/* A photo of the capture. The text is the capture's. */
+typedef struct maq_capture_view {
+  uint32_t struct_size;
+  int32_t is_held_out;       /* 1: the photo is kept for comparisons; do not build from it */
+  const char* name;          /* of the photo in the capture */
+  maq_pinhole_camera camera; /* of the photo after undistortion */
+} maq_capture_view;
+
+/* Parts of the capture that cannot be used. The text is the capture's. */
+typedef struct maq_capture_drop {
+  uint32_t struct_size;
+  const char* reason; /* with the first of them: "photos without a camera (first: images/7.jpg)" */
+  uint64_t count;     /* how many of them */
+} maq_capture_drop;
+
+/* Opens a folder: a COLMAP model (text or binary, in sparse/0, sparse, colmap/sparse/0 or the folder itself) with its
+ * photos, or transforms.json as nerfstudio and Instant-NGP write it, with a PLY cloud. Photos are read when they are
+ * needed. `*capture` is the caller's, to be given to maq_capture_close.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the folder does not exist, or has no capture or no
+ * cloud), MAQ_ERROR_UNREADABLE (damaged, or without a usable photo or point), MAQ_ERROR_UNSUPPORTED (camera models, sizes).
+ * Blocks while cameras and cloud are read. */
+MAQ_API maq_status maq_capture_open(maq_context* context, const char* folder, maq_capture** capture);
+
+/* Closes the capture (NULL is fine). Scenes built from it and frames loaded from it stay valid.
+ * Once for each capture, from any thread. Does not block. */
+MAQ_API void maq_capture_close(maq_capture* capture);
+
+/* Gets the counts and the up vector. The caller sets info->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_info* info);
+
+/* Gets the view at `index`, below view_count. The caller sets view->struct_size; the library sets that of view->camera.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
+MAQ_API maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_capture_view* view);
+
+/* Gets why parts of the capture were dropped. `index` is below drop_count. The caller sets drop->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
+MAQ_API maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t index, maq_capture_drop* drop);
+
+/* Reads the photo of a view and undistorts it: BGR, of the size of the view's camera. `*frame` is the caller's: give it
+ * back with maq_frame_release.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE,
+ * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the photo is read. */
+MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq_frame** frame);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* MAQUETTE_CAPTURE_H_ */

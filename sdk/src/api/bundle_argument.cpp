@@ -1,0 +1,53 @@
+#include "api/bundle_argument.h"
+
+#include <unistd.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "api/boundary.h"
+#include "core/module.h"
+
+namespace maq {
+namespace {
+
+// The library may lie in lib/ or, as on Debian, in lib/<architecture>/.
+Bundle read_installed_bundle(const std::string& name) {
+  const std::string library = library_folder();
+  for (const char* up : {"../", "../../"}) {
+    const std::string folder = concatenate(library, up, "share/maquette/models/", name);
+    if (access((folder + "/manifest.json").c_str(), F_OK) == 0) return read_bundle(folder);
+  }
+  throw Error(MAQ_ERROR_NOT_FOUND, "config.bundle_path is NULL, but ", library, "../share/maquette/models/", name,
+              " does not exist; install the models with the library, or set bundle_path or bundle_files.");
+}
+
+}  // namespace
+
+std::function<Bundle()> bundle_reader(const char* path, const maq_memory_file* files, uint32_t file_count,
+                                      const char* installed) {
+  if (path != nullptr && file_count > 0) throw ArgumentError("config has both bundle_path and bundle_files; set one.");
+  if (path != nullptr) return [folder = std::string(path)] { return read_bundle(folder); };
+  if (file_count == 0) return [name = std::string(installed)] { return read_installed_bundle(name); };
+  require_argument(files, "config.bundle_files");
+  struct File {
+    std::string name;
+    std::vector<uint8_t> bytes;
+  };
+  const auto copies = std::make_shared<std::vector<File>>();
+  for (uint32_t i = 0; i < file_count; ++i) {
+    if (files[i].name == nullptr || files[i].data == nullptr) {
+      throw ArgumentError("config.bundle_files[", i, "] has no ", files[i].name == nullptr ? "name" : "data", ".");
+    }
+    const auto* const bytes = static_cast<const uint8_t*>(files[i].data);
+    copies->push_back({files[i].name, {bytes, bytes + files[i].size_bytes}});
+  }
+  return [copies] {
+    std::vector<NamedBuffer> buffers;
+    for (const File& file : *copies) buffers.push_back({file.name, file.bytes.data(), file.bytes.size()});
+    return read_bundle(buffers);
+  };
+}
+
+}  // namespace maq

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "api/handle.h"
+#include "maquette/scene.h"
+#include "scene/capture/capture.h"
+#include "scene/format/scene.h"
+#include "scene/render/scene_renderer.h"
+
+struct maq_capture : maq::Handle {
+  explicit maq_capture(maq::Capture opened) : capture(std::move(opened)) {}
+  maq::Capture capture;
+  std::vector<std::string> dropped;  // as sentences
+};
+
+struct maq_scene : maq::Handle {
+  explicit maq_scene(maq::Scene made) : scene(std::move(made)) {}
+  maq::Scene scene;
+};
+
+struct maq_scene_image : maq::Handle {
+  maq::RenderedPicture picture;
+  maq::BoundedPool<maq_scene_image>::Deleter deleter;
+};

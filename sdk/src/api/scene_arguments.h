@@ -33,7 +33,7 @@ inline Intrinsics intrinsics_of(const maq_camera& camera) {
 }
 
 // The camera without its distortion.
-inline PinholeCamera pinhole_of(const maq_camera& given) {
+inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
   PinholeCamera camera;
   camera.intrinsics() = intrinsics_of(given);
   std::copy_n(given.rotation, 9, camera.rotation.begin());
@@ -41,8 +41,8 @@ inline PinholeCamera pinhole_of(const maq_camera& given) {
   return camera;
 }
 
-inline maq_camera camera_of(const PinholeCamera& camera) {
-  maq_camera filled{};
+inline maq_pinhole_camera camera_of(const PinholeCamera& camera) {
+  maq_pinhole_camera filled{};
   filled.struct_size = sizeof filled;
   filled.width_px = camera.width_px;
   filled.height_px = camera.height_px;
@@ -55,11 +55,11 @@ inline maq_camera camera_of(const PinholeCamera& camera) {
   return filled;
 }
 
-inline bool is_distorted(const maq_camera& camera) {
+inline bool is_distorted(const maq_pinhole_camera& camera) {
   return std::any_of(std::begin(camera.distortion), std::end(camera.distortion), [](double k) { return k != 0; });
 }
 
-inline void check_distortion(const maq_camera& camera) {
+inline void check_distortion(const maq_pinhole_camera& camera) {
   for (size_t i = 0; i < std::size(camera.distortion); ++i) {
     if (!std::isfinite(camera.distortion[i])) {
       throw ArgumentError("camera.distortion[", i, "] is ", camera.distortion[i], ", but must be finite.");
@@ -68,7 +68,7 @@ inline void check_distortion(const maq_camera& camera) {
 }
 
 // How it maps directions into its picture.
-inline Lens lens_of(const maq_camera& camera) {
+inline Lens lens_of(const maq_pinhole_camera& camera) {
   Lens lens;
   lens.intrinsics() = intrinsics_of(camera);
   if (is_distorted(camera)) {

@@ -28,7 +28,7 @@ inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, 
   return std::make_shared<SceneNetworks>(context->state->onnxruntime(), read_bundle(folder), settings);
 }
 
-inline Intrinsics intrinsics_of(const maq_camera& camera) {
+inline Intrinsics intrinsics_of(const maq_pinhole_camera& camera) {
   return {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px};
 }
 

@@ -89,7 +89,7 @@ class Column:
         self._results: list[tuple] = []
 
     def run(self, image: np.ndarray, counted: bool) -> None:
-        self._densepose.restart(), self._timed.restart()
+        self._densepose.reset(), self._timed.reset()
         total = 0.0
         for frame in moving(image, self.setting.frames):
             result = self._densepose.run(frame)

@@ -23,7 +23,7 @@ void MappedFrame::take_over(const maquette::LiveFrame& mapped, std::vector<uint8
     (*seen_before)[(chart * kSeenCells + v) * kSeenCells + u] = 255;
   }
   seen = *seen_before;
-  people.assign(mapped.result->people().begin(), mapped.result->people().end());
+  people = mapped.result->people();
   result = mapped.result;
   stats = result->stats();
   number = mapped.number;

@@ -26,6 +26,8 @@ class _DenseposeConfig(ctypes.Structure):
         ("struct_size", c_uint32),
         ("threads", c_int32),
         ("bundle_path", c_char_p),
+        ("bundle_files", Handle),
+        ("bundle_file_count", c_uint32),
         ("long_side_px", c_int32),
         ("score_threshold", c_float),
         ("max_people", c_int32),
@@ -53,7 +55,7 @@ class _FrameDesc(ctypes.Structure):
 
 
 class _Person(ctypes.Structure):
-    _fields_ = (("box_px", c_float * 4), ("score", c_float))
+    _fields_ = (("struct_size", c_uint32), ("score", c_float), ("box_px", c_float * 4), ("id", c_int64))
 
 
 class _Stats(ctypes.Structure):
@@ -117,7 +119,7 @@ def _signatures(library: ctypes.CDLL) -> None:
         "maq_densepose_config_init": (POINTER(_DenseposeConfig), c_uint32),
         "maq_densepose_create": (Handle, POINTER(_DenseposeConfig), POINTER(Handle)),
         "maq_densepose_run": (Handle, Handle, POINTER(Handle)),
-        "maq_densepose_result_get_people": (Handle, POINTER(POINTER(_Person)), POINTER(c_uint32)),
+        "maq_densepose_result_get_person": (Handle, c_uint32, POINTER(_Person)),
         "maq_densepose_result_get_plane": (Handle, c_int32, POINTER(POINTER(c_uint8)), POINTER(c_size_t)),
         "maq_densepose_result_get_stats": (Handle, POINTER(_Stats)),
         "maq_densepose_reset": (Handle,),
@@ -135,6 +137,8 @@ def _signatures(library: ctypes.CDLL) -> None:
     ):
         function = getattr(library, name)
         function.argtypes, function.restype = (Handle,), None
+    count = library.maq_densepose_result_get_person_count
+    count.argtypes, count.restype = (Handle,), c_uint32
     library.maq_get_last_error.argtypes, library.maq_get_last_error.restype = (Handle,), c_char_p
     library.maq_status_get_name.argtypes, library.maq_status_get_name.restype = (c_int32,), c_char_p
 
@@ -161,9 +165,9 @@ class DensePose:
             raise MaquetteError(f"{path} is not there. Build the SDK (make build), or set MAQ_LIBRARY.")
         self._library = ctypes.CDLL(str(path.resolve()))
         _signatures(self._library)
-        self._call(None, "maq_context_create", HEADER_VERSION, None, byref(self._context))
+        self._call("maq_context_create", HEADER_VERSION, None, byref(self._context))
         config = _DenseposeConfig()
-        self._call(self._context, "maq_densepose_config_init", byref(config), ctypes.sizeof(config))
+        self._call("maq_densepose_config_init", byref(config), ctypes.sizeof(config))
         config.bundle_path = os.fsencode(bundle)
         config.threads = threads
         if score_threshold is not None:
@@ -172,7 +176,7 @@ class DensePose:
             if name not in (field for field, _ in config._fields_):
                 raise TypeError(f"maq_densepose_config has no field {name}")
             setattr(config, name, value)
-        self._call(self._context, "maq_densepose_create", self._context, byref(config), byref(self._densepose))
+        self._call("maq_densepose_create", self._context, byref(config), byref(self._densepose))
 
     def __enter__(self) -> DensePose:
         return self
@@ -185,9 +189,9 @@ class DensePose:
         self._library.maq_context_destroy(self._context)
         self._densepose, self._context = Handle(), Handle()
 
-    def restart(self) -> None:
-        """The next image begins another stream (key_frame_interval above 1)."""
-        self._call(self._densepose, "maq_densepose_reset", self._densepose)
+    def reset(self) -> None:
+        """The next image starts a new stream (key_frame_interval above 1)."""
+        self._call("maq_densepose_reset", self._densepose)
 
     def run(self, image: np.ndarray) -> DensePoseResult:
         """image: uint8 [H, W, 3] RGB. Raises MaquetteError."""
@@ -195,39 +199,40 @@ class DensePose:
             raise ValueError(f"an image is uint8 [H, W, 3], not {image.dtype} {image.shape}")
         image = np.ascontiguousarray(image)
         description = _FrameDesc()
-        self._call(self._context, "maq_frame_desc_init", byref(description), ctypes.sizeof(description))
+        self._call("maq_frame_desc_init", byref(description), ctypes.sizeof(description))
         description.format = PIXEL_RGB8
         description.height_px, description.width_px = image.shape[:2]
         description.planes[0] = image.ctypes.data
         frame, result = Handle(), Handle()
-        self._call(self._context, "maq_frame_wrap", self._context, byref(description), None, None, byref(frame))
+        self._call("maq_frame_wrap", self._context, byref(description), None, None, byref(frame))
         try:
-            self._call(self._densepose, "maq_densepose_run", self._densepose, frame, byref(result))
+            self._call("maq_densepose_run", self._densepose, frame, byref(result))
             return self._copy(result, image.shape[0], image.shape[1])
         finally:
             self._library.maq_densepose_result_release(result)
             self._library.maq_frame_release(frame)
 
     def _copy(self, result: Handle, height: int, width: int) -> DensePoseResult:
-        people, count = POINTER(_Person)(), c_uint32()
-        self._call(result, "maq_densepose_result_get_people", result, byref(people), byref(count))
-        found = np.array([[*people[k].box_px, people[k].score] for k in range(count.value)], np.float32)
-        found = found.reshape(-1, 5)
+        found = np.empty((self._library.maq_densepose_result_get_person_count(result), 5), np.float32)
+        person = _Person(struct_size=ctypes.sizeof(_Person))
+        for k, row in enumerate(found):
+            self._call("maq_densepose_result_get_person", result, k, byref(person))
+            row[:4], row[4] = person.box_px, person.score
         planes = np.empty((height, width, 4), np.uint8)
         for channel, plane in enumerate((PLANE_PART, PLANE_U, PLANE_V, PLANE_PERSON)):
             pixels, stride = POINTER(c_uint8)(), c_size_t()
-            self._call(result, "maq_densepose_result_get_plane", result, plane, byref(pixels), byref(stride))
+            self._call("maq_densepose_result_get_plane", result, plane, byref(pixels), byref(stride))
             rows = np.ctypeslib.as_array(pixels, ((height - 1) * stride.value + width,))
             planes[..., channel] = np.lib.stride_tricks.as_strided(rows, (height, width), (stride.value, 1))
         stats = _Stats(struct_size=ctypes.sizeof(_Stats))
-        self._call(result, "maq_densepose_result_get_stats", result, byref(stats))
+        self._call("maq_densepose_result_get_stats", result, byref(stats))
         values = Stats(**{field.name: getattr(stats, field.name) for field in fields(Stats)})
         return DensePoseResult(found[:, :4], found[:, 4], planes, values)
 
-    def _call(self, handle: Handle | None, function: str, *arguments: object) -> None:
+    def _call(self, function: str, *arguments: object) -> None:
         """Calls the library; a status other than MAQ_OK becomes MaquetteError with the library's text."""
         status = getattr(self._library, function)(*arguments)
         if status:
-            text = self._library.maq_get_last_error(handle)
+            text = self._library.maq_get_last_error(None)
             name = self._library.maq_status_get_name(status).decode()
             raise MaquetteError(f"{function}: {(text or b'').decode() or name} ({name})")

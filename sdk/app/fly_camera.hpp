@@ -106,10 +106,12 @@ inline FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_p
 }
 
 inline std::optional<FlyCamera::Pose> FlyCamera::pose_of(const maq_pinhole_camera& camera) {
-  const double w = camera.width_px, h = camera.height_px, fx = camera.fx_px, fy = camera.fy_px;
+  const double w = camera.intrinsics.width_px, h = camera.intrinsics.height_px, fx = camera.intrinsics.fx_px,
+               fy = camera.intrinsics.fy_px;
   const Rows given{vec3(camera.rotation), vec3(camera.rotation + 3), vec3(camera.rotation + 6)};
   Pose pose{rotation_of(given[0], given[2]), vec3(camera.centre), {w, h, fx, fy}};
-  pose.lens[kOffsetX] = camera.cx_px - (w - 1) / 2, pose.lens[kOffsetY] = camera.cy_px - (h - 1) / 2;
+  pose.lens[kOffsetX] = camera.intrinsics.cx_px - (w - 1) / 2,
+  pose.lens[kOffsetY] = camera.intrinsics.cy_px - (h - 1) / 2;
   double off = 0;  // cameras' rotations may be off by 0.001
   for (size_t row = 0; row < 3; ++row) off += length(mix(1, pose.rows[row], -1, given[row]));
   for (const double number : pose.lens) off += std::isfinite(number) ? 0 : 1;
@@ -174,9 +176,11 @@ inline bool FlyCamera::update(double seconds) {
 inline maq_pinhole_camera FlyCamera::camera(int width_px, int height_px) const {
   const std::array<double, 6>& lens = pose_.lens;
   const double scale = std::min(width_px / lens[kWidth], height_px / lens[kHeight]);
-  maq_pinhole_camera camera{sizeof camera, width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, 0, 0, {}, {}, {}};
-  camera.cx_px = (width_px - 1) / 2.0 + lens[kOffsetX] * scale;
-  camera.cy_px = (height_px - 1) / 2.0 + lens[kOffsetY] * scale;
+  maq_pinhole_camera camera{};
+  camera.struct_size = sizeof camera;
+  camera.intrinsics = {width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, 0, 0, {}};
+  camera.intrinsics.cx_px = (width_px - 1) / 2.0 + lens[kOffsetX] * scale;
+  camera.intrinsics.cy_px = (height_px - 1) / 2.0 + lens[kOffsetY] * scale;
   for (size_t i = 0; i < 9; ++i) camera.rotation[i] = pose_.rows[i / 3][i % 3];
   std::copy(pose_.centre.begin(), pose_.centre.end(), camera.centre);
   return camera;

@@ -72,12 +72,13 @@ class LiveScene {  // all calls by the thread that takes the pictures
     bool opens = false, draws = false, ends = false;
   };
   static maq_pinhole_camera within_limits(maq_pinhole_camera camera) {
-    const double scale = std::min(1280.0 / camera.width_px, 960.0 / camera.height_px);
+    const double scale = std::min(1280.0 / camera.intrinsics.width_px, 960.0 / camera.intrinsics.height_px);
     if (!(scale > 0 && scale < 1)) return camera;
-    camera.width_px = std::max(1, int(std::lround(camera.width_px * scale)));
-    camera.height_px = std::max(1, int(std::lround(camera.height_px * scale)));
-    camera.fx_px *= scale, camera.fy_px *= scale;
-    camera.cx_px = (camera.cx_px + 0.5) * scale - 0.5, camera.cy_px = (camera.cy_px + 0.5) * scale - 0.5;
+    camera.intrinsics.width_px = std::max(1, int(std::lround(camera.intrinsics.width_px * scale)));
+    camera.intrinsics.height_px = std::max(1, int(std::lround(camera.intrinsics.height_px * scale)));
+    camera.intrinsics.fx_px *= scale, camera.intrinsics.fy_px *= scale;
+    camera.intrinsics.cx_px = (camera.intrinsics.cx_px + 0.5) * scale - 0.5,
+    camera.intrinsics.cy_px = (camera.intrinsics.cy_px + 0.5) * scale - 0.5;
     return camera;
   }
 
@@ -264,14 +265,22 @@ inline void LiveScene::draw(const Wish& wish) {
   if (threads_ != wish.threads) make_renderer(wish.threads);
   const maq_pinhole_camera camera = within_limits(*wish.camera);
   const SceneImage image = renderer_->run(camera);
-  maq_frame_desc desc{sizeof desc, MAQ_PIXEL_BGR8, camera.width_px, camera.height_px, {}, {}, 0, MAQ_CLOCK_MEDIA, 0};
+  maq_frame_desc desc{sizeof desc,
+                      MAQ_PIXEL_BGR8,
+                      camera.intrinsics.width_px,
+                      camera.intrinsics.height_px,
+                      {},
+                      {},
+                      0,
+                      MAQ_CLOCK_MEDIA,
+                      0};
   desc.planes[0] = static_cast<const uint8_t*>(image.plane(MAQ_SCENE_PLANE_BGR, desc.stride_bytes));
   LiveScenePicture& shown = shown_.back();
   shown.rendering.take(Frame(context_, desc));
   shown.camera = camera, shown.stats = image.stats(), shown.photo_index = -1, shown.psnr_db = NAN;
   shown.photo.resize(0, 0), shown.error.resize(0, 0);
   std::string text = missing_;
-  const std::array<int, 3> key{wish.photo_index, camera.width_px, camera.height_px};
+  const std::array<int, 3> key{wish.photo_index, camera.intrinsics.width_px, camera.intrinsics.height_px};
   try {
     if (capture_ && wish.photo_index >= 0) {
       if (photo_key_ != key) {

@@ -27,7 +27,7 @@ struct Picture {
   // For the library, without a copy: the pixels must stay until the frame is gone.
   Frame frame(const Context& context) const {
     maq_frame_desc desc;
-    check(maq_frame_desc_init(&desc, sizeof desc), nullptr);
+    check(maq_frame_desc_init(&desc, sizeof desc));
     desc.format = MAQ_PIXEL_RGBA8;
     desc.width_px = width_px;
     desc.height_px = height_px;

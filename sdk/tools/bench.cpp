@@ -212,7 +212,7 @@ int run_bench(const Options& options) {
       if (!unfinished(*scene)) continue;
       any = true;
       scene->pause();
-      densepose.restart();
+      densepose.reset();
       for (int i = 0; i < kBlock && !interrupted(); ++i) scene->run(densepose, true);
       done += kBlock;
       progress.advance(done, scene->uri());

@@ -28,7 +28,7 @@ bool is_camera(const std::string& uri) {
   for (uint32_t i = 0; i < maq_source_get_scheme_count(); ++i) {
     maq_source_scheme scheme{};
     scheme.struct_size = sizeof scheme;
-    maquette::check(maq_source_get_scheme(i, &scheme), nullptr);
+    maquette::check(maq_source_get_scheme(i, &scheme));
     if (uri.rfind(std::string(scheme.name) + ":", 0) == 0) return scheme.is_camera != 0;
   }
   return false;

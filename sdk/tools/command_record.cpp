@@ -37,7 +37,7 @@ int record(const Options& options) {
     throw std::runtime_error(argument.uri + " has no end: say how much of it with --frames or --seconds.");
   }
   maq_recorder_config how{};
-  maquette::check(maq_recorder_config_init(&how, sizeof how), nullptr);
+  maquette::check(maq_recorder_config_init(&how, sizeof how));
   how.jpeg_quality = options.quality;
   maquette::Recorder recorder(context, options.out, &source, &how);
 
@@ -55,7 +55,7 @@ int record(const Options& options) {
     const maq_status status = maq_source_acquire_frame(source.get(), kPatienceNs, &taken);
     if (status == MAQ_TIMEOUT) continue;
     if (status == MAQ_END_OF_STREAM) break;
-    maquette::check(status, source.get());
+    maquette::check(status);
     const maquette::Frame frame(taken);
     last_ns = frame.desc().timestamp_ns;
     if (done == 0) first_ns = last_ns;

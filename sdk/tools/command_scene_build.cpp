@@ -70,9 +70,8 @@ int build(const Options& options) {
   std::fprintf(stderr, "%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count,
                info.point_count);
   for (uint32_t i = 0; i < info.drop_count; ++i) {
-    uint64_t count = 0;
-    const char* const reason = capture.dropped(i, &count);
-    std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", count, reason);
+    const maq_capture_drop drop = capture.drop(i);
+    std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
   }
   const std::string networks = scene_bundle_or_default(options.networks);
   for (const std::string* path : {&options.out, &options.ply}) require_writable(*path);

@@ -79,23 +79,8 @@ maquette::SceneRenderer make_renderer(const maquette::Context& context, const ma
 cv::Mat picture_of(const maquette::SceneImage& image, const maq_pinhole_camera& camera) {
   size_t stride_bytes = 0;
   const void* pixels = image.plane(MAQ_SCENE_PLANE_BGR, &stride_bytes);
-  return cv::Mat(camera.height_px, camera.width_px, CV_8UC3, const_cast<void*>(pixels), stride_bytes);
-}
-
-void write_picture(const maquette::SceneImage& image, const maq_pinhole_camera& camera, bool with_alpha,
-                   const fs::path& path) {
-  cv::Mat picture = picture_of(image, camera);
-  if (with_alpha) {
-    size_t stride_bytes = 0;
-    const void* alphas = image.plane(MAQ_SCENE_PLANE_ALPHA, &stride_bytes);
-    const cv::Mat alpha(camera.height_px, camera.width_px, CV_8UC1, const_cast<void*>(alphas), stride_bytes);
-    const cv::Mat colours = picture;
-    picture = cv::Mat(colours.size(), CV_8UC4);
-    cv::mixChannels(std::vector<cv::Mat>{colours, alpha}, {picture}, {0, 0, 1, 1, 2, 2, 3, 3});
-  }
-  std::vector<uchar> bytes;
-  cv::imencode(".png", picture, bytes);
-  write_whole_file(path, bytes.data(), bytes.size());
+  return cv::Mat(camera.intrinsics.height_px, camera.intrinsics.width_px, CV_8UC3, const_cast<void*>(pixels),
+                 stride_bytes);
 }
 
 float median(std::vector<float> values) {
@@ -175,7 +160,7 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     nlohmann::ordered_json ms;
     const maquette::SceneImage image = timed(renderer, camera, options.repeat, ms);
     const maq_scene_image_stats stats = image.stats();
-    write_picture(image, camera, !options.no_alpha, fs::path(options.out) / picture_name(view));
+    image.save((fs::path(options.out) / picture_name(view)).string(), !options.no_alpha);
     document["views"].push_back({{"name", view.name},
                                  {"ms", ms},
                                  {"blocks_drawn", stats.drawn_block_count},

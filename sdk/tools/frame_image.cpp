@@ -9,7 +9,7 @@ cv::Mat image_of(const maquette::Frame& frame) {
 
 maquette::Frame frame_of(const maquette::Context& context, const cv::Mat& image) {
   maq_frame_desc desc;
-  maquette::check(maq_frame_desc_init(&desc, sizeof desc), nullptr);
+  maquette::check(maq_frame_desc_init(&desc, sizeof desc));
   desc.format = MAQ_PIXEL_BGR8;
   desc.width_px = image.cols;
   desc.height_px = image.rows;

@@ -73,11 +73,11 @@ std::vector<maq_pinhole_camera> flight_around(const maq_scene_info& scene, int w
     const cv::Vec3d forward = -away, right = cv::normalize(forward.cross(up)), down = forward.cross(right);
     maq_pinhole_camera camera{};
     camera.struct_size = sizeof camera;
-    camera.width_px = width_px;
-    camera.height_px = height_px;
-    camera.fx_px = camera.fy_px = focal_px;
-    camera.cx_px = 0.5 * (width_px - 1);
-    camera.cy_px = 0.5 * (height_px - 1);
+    camera.intrinsics.width_px = width_px;
+    camera.intrinsics.height_px = height_px;
+    camera.intrinsics.fx_px = camera.intrinsics.fy_px = focal_px;
+    camera.intrinsics.cx_px = 0.5 * (width_px - 1);
+    camera.intrinsics.cy_px = 0.5 * (height_px - 1);
     set_rotation(camera, cv::Matx33d(right[0], right[1], right[2], down[0], down[1], down[2], forward[0], forward[1],
                                      forward[2]));
     const cv::Vec3d centre = middle + radius * away;
@@ -88,14 +88,17 @@ std::vector<maq_pinhole_camera> flight_around(const maq_scene_info& scene, int w
 }
 
 maq_pinhole_camera with_size(const maq_pinhole_camera& camera, int width_px, int height_px) {
-  const double scale = std::min(double(width_px) / camera.width_px, double(height_px) / camera.height_px);
+  const double scale =
+      std::min(double(width_px) / camera.intrinsics.width_px, double(height_px) / camera.intrinsics.height_px);
   maq_pinhole_camera sized = camera;
-  sized.width_px = width_px;
-  sized.height_px = height_px;
-  sized.fx_px *= scale;
-  sized.fy_px *= scale;
+  sized.intrinsics.width_px = width_px;
+  sized.intrinsics.height_px = height_px;
+  sized.intrinsics.fx_px *= scale;
+  sized.intrinsics.fy_px *= scale;
   // The middle stays the middle.
-  sized.cx_px = (camera.cx_px - 0.5 * (camera.width_px - 1)) * scale + 0.5 * (width_px - 1);
-  sized.cy_px = (camera.cy_px - 0.5 * (camera.height_px - 1)) * scale + 0.5 * (height_px - 1);
+  sized.intrinsics.cx_px =
+      (camera.intrinsics.cx_px - 0.5 * (camera.intrinsics.width_px - 1)) * scale + 0.5 * (width_px - 1);
+  sized.intrinsics.cy_px =
+      (camera.intrinsics.cy_px - 0.5 * (camera.intrinsics.height_px - 1)) * scale + 0.5 * (height_px - 1);
   return sized;
 }

@@ -1,5 +1,5 @@
 # Installs the build, moves the installed tree elsewhere, builds the programs of this folder against it in WAY
-# (find_package or pkg_config), and runs them: cmake -DWAY=… -DBUILD_DIR=… -DWORK_DIR=… -DBUNDLE=… -P run.cmake
+# (find_package or pkg_config), and runs them: cmake -DWAY=… -DBUILD_DIR=… -DWORK_DIR=… -P run.cmake
 set(installed "${WORK_DIR}/installed")
 set(moved "${WORK_DIR}/moved")
 file(REMOVE_RECURSE "${WORK_DIR}")
@@ -24,10 +24,10 @@ if(WAY STREQUAL "find_package")
   run("${CMAKE_COMMAND}" --build build)
   set(programs build/people build/count_people)
   set(scene "${CMAKE_CURRENT_LIST_DIR}/../native/data/tiny_scene")
-  run(build/new_view "${scene}/bundle" "${scene}/capture" view.ppm)
-  file(SIZE "${WORK_DIR}/view.ppm" size_bytes)
-  if(NOT size_bytes EQUAL 12109)  # 72 x 56 pixels and "P6 72 56 255\n"
-    message(FATAL_ERROR "new_view wrote ${size_bytes} bytes")
+  run(build/new_view "${scene}/bundle" "${scene}/capture" view.png)
+  file(READ "${WORK_DIR}/view.png" head LIMIT 26 HEX)
+  if(NOT head MATCHES "^89504e470d0a1a0a0000000d494844520000004800000038")  # 72 x 56 pixels
+    message(FATAL_ERROR "new_view wrote ${head}")
   endif()
 else()
   set(ENV{PKG_CONFIG_PATH} "${moved}/${LIBDIR}/pkgconfig")
@@ -40,9 +40,9 @@ else()
 endif()
 
 foreach(program ${programs})
-  run("${program}" "${BUNDLE}" "stub:pattern?frames=1&size=320x256")
+  run("${program}" "stub:pattern?frames=1&size=320x256")
   # The program's own failure, too, is a sentence and an exit code.
-  execute_process(COMMAND "${program}" "${BUNDLE}" "image:missing.jpg" WORKING_DIRECTORY "${WORK_DIR}"
+  execute_process(COMMAND "${program}" "image:missing.jpg" WORKING_DIRECTORY "${WORK_DIR}"
     RESULT_VARIABLE result ERROR_VARIABLE error)
   if(NOT result EQUAL 1 OR NOT error MATCHES "missing.jpg does not exist")
     message(FATAL_ERROR "${program} with a missing image: exit code ${result}, ${error}")

@@ -2,7 +2,7 @@
 //
 //   maquette::Context context;
 //   maquette::Source source(context, "video:clip.mp4");
-//   maquette::DensePose densepose(context, "models/densepose-b-int8");
+//   maquette::DensePose densepose(context);
 //   while (auto frame = source.next()) {
 //     auto result = densepose.run(*frame);
 //     for (const maq_person& person : result.people()) …
@@ -17,6 +17,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "maquette/maquette.h"
 
@@ -31,9 +32,9 @@ class Error : public std::runtime_error {
   maq_status status_;
 };
 
-// Throws the error of the latest call when `status` is one; `handle` is the call's, or null for `_init` functions.
-inline void check(maq_status status, const void* handle) {
-  if (status != MAQ_OK) throw Error(status, maq_get_last_error(handle));
+// Throws the error of this thread's latest call when `status` is one.
+inline void check(maq_status status) {
+  if (status != MAQ_OK) throw Error(status, maq_get_last_error(nullptr));
 }
 
 template <class Handle, void (*destroy)(Handle*)>
@@ -43,37 +44,21 @@ struct HandleDeleter {
 template <class Handle, void (*destroy)(Handle*)>
 using Owner = std::unique_ptr<Handle, HandleDeleter<Handle, destroy>>;
 
-// A range over `size` elements that somebody else owns.
-template <class T>
-class Span {
- public:
-  Span(const T* data, size_t size) : data_(data), size_(size) {}
-  const T* begin() const { return data_; }
-  const T* end() const { return data_ + size_; }
-  size_t size() const { return size_; }
-  bool empty() const { return size_ == 0; }
-  const T& operator[](size_t index) const { return data_[index]; }
-
- private:
-  const T* data_;
-  size_t size_;
-};
-
 inline maq_context_config default_context_config() {
   maq_context_config config;
-  check(maq_context_config_init(&config, sizeof config), nullptr);
+  check(maq_context_config_init(&config, sizeof config));
   return config;
 }
 
 inline maq_densepose_config default_densepose_config() {
   maq_densepose_config config;
-  check(maq_densepose_config_init(&config, sizeof config), nullptr);
+  check(maq_densepose_config_init(&config, sizeof config));
   return config;
 }
 
 inline maq_source_config default_source_config() {
   maq_source_config config;
-  check(maq_source_config_init(&config, sizeof config), nullptr);
+  check(maq_source_config_init(&config, sizeof config));
   return config;
 }
 
@@ -82,7 +67,7 @@ class Context {
   Context() : Context(default_context_config()) {}
   explicit Context(const maq_context_config& config) {
     maq_context* made = nullptr;
-    check(maq_context_create(MAQ_HEADER_VERSION, &config, &made), nullptr);
+    check(maq_context_create(MAQ_HEADER_VERSION, &config, &made));
     owner_.reset(made);
   }
 
@@ -90,12 +75,12 @@ class Context {
 
   std::string onnxruntime_version() const {
     const char* version = "";
-    check(maq_context_get_onnxruntime(get(), &version, nullptr), get());
+    check(maq_context_get_onnxruntime(get(), &version, nullptr));
     return version;
   }
   std::string onnxruntime_path() const {
     const char* path = "";
-    check(maq_context_get_onnxruntime(get(), nullptr, &path), get());
+    check(maq_context_get_onnxruntime(get(), nullptr, &path));
     return path;
   }
 
@@ -111,7 +96,7 @@ class Frame {
   // Pixels of the app, which must stay until the frame is gone.
   Frame(const Context& context, const maq_frame_desc& desc) {
     maq_frame* made = nullptr;
-    check(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &made), context.get());
+    check(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &made));
     owner_.reset(made);
   }
 
@@ -120,7 +105,7 @@ class Frame {
   maq_frame_desc desc() const {
     maq_frame_desc desc{};
     desc.struct_size = sizeof desc;
-    check(maq_frame_get_desc(get(), &desc), get());
+    check(maq_frame_get_desc(get(), &desc));
     return desc;
   }
 
@@ -130,15 +115,15 @@ class Frame {
     desc.struct_size = sizeof desc;
     const maq_status status = maq_frame_get_depth(get(), &desc);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
-    check(status, get());
+    check(status);
     return desc;
   }
 
   void copy_pixels(maq_pixel_format format, uint8_t* pixels, size_t stride_bytes, size_t size_bytes) const {
-    check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes), get());
+    check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes));
   }
 
-  void save(const std::string& path) const { check(maq_frame_save(get(), path.c_str()), get()); }
+  void save(const std::string& path) const { check(maq_frame_save(get(), path.c_str())); }
 
  private:
   Owner<maq_frame, maq_frame_release> owner_;
@@ -148,7 +133,7 @@ class Source {
  public:
   Source(const Context& context, const std::string& uri, const maq_source_config* config = nullptr) {
     maq_source* made = nullptr;
-    check(maq_source_create(context.get(), uri.c_str(), config, &made), context.get());
+    check(maq_source_create(context.get(), uri.c_str(), config, &made));
     owner_.reset(made);
   }
 
@@ -157,18 +142,17 @@ class Source {
   maq_source_info info() const {
     maq_source_info info{};
     info.struct_size = sizeof info;
-    check(maq_source_get_info(get(), &info), get());
+    check(maq_source_get_info(get(), &info));
     return info;
   }
 
-  // Nothing when the source does not know.
-  std::optional<maq_intrinsics> calibration() const {
-    maq_intrinsics calibration{};
-    calibration.struct_size = sizeof calibration;
-    const maq_status status = maq_source_get_intrinsics(get(), &calibration);
+  // Nothing when they are not known.
+  std::optional<maq_intrinsics> intrinsics() const {
+    maq_intrinsics intrinsics{};
+    const maq_status status = maq_source_get_intrinsics(get(), &intrinsics);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
-    check(status, get());
-    return calibration;
+    check(status);
+    return intrinsics;
   }
 
   // Nothing when the camera does not have it.
@@ -177,19 +161,19 @@ class Source {
     info.struct_size = sizeof info;
     const maq_status status = maq_source_get_control(get(), which, &info);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
-    check(status, get());
+    check(status);
     return info;
   }
-  void set_control(maq_control which, double value) { check(maq_source_set_control(get(), which, value), get()); }
+  void set_control(maq_control which, double value) { check(maq_source_set_control(get(), which, value)); }
 
-  void seek(int64_t time_ns) { check(maq_source_seek(get(), time_ns), get()); }
+  void seek(int64_t time_ns) { check(maq_source_seek(get(), time_ns)); }
 
   // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when none came in time.
   std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
     maq_frame* frame = nullptr;
     const maq_status status = maq_source_acquire_frame(get(), timeout_ns, &frame);
     if (status == MAQ_END_OF_STREAM) return std::nullopt;
-    check(status, get());
+    check(status);
     return Frame(frame);
   }
 
@@ -204,18 +188,18 @@ class Recorder {
            const maq_recorder_config* config = nullptr) {
     maq_recorder* made = nullptr;
     const maq_source* from = source == nullptr ? nullptr : source->get();
-    check(maq_recorder_create(context.get(), path.c_str(), from, config, &made), context.get());
+    check(maq_recorder_create(context.get(), path.c_str(), from, config, &made));
     owner_.reset(made);
   }
 
   maq_recorder* get() const { return owner_.get(); }
-  void add(const Frame& frame) { check(maq_recorder_add_frame(get(), frame.get()), get()); }
-  void finish() { check(maq_recorder_finish(get()), get()); }
+  void add(const Frame& frame) { check(maq_recorder_add_frame(get(), frame.get())); }
+  void finish() { check(maq_recorder_finish(get())); }
 
   maq_recorder_info info() const {
     maq_recorder_info info{};
     info.struct_size = sizeof info;
-    check(maq_recorder_get_info(get(), &info), get());
+    check(maq_recorder_get_info(get(), &info));
     return info;
   }
 
@@ -227,13 +211,13 @@ class Clip {
  public:
   Clip(const Context& context, const std::string& path, double fps) {
     maq_clip* made = nullptr;
-    check(maq_clip_create(context.get(), path.c_str(), fps, &made), context.get());
+    check(maq_clip_create(context.get(), path.c_str(), fps, &made));
     owner_.reset(made);
   }
 
   maq_clip* get() const { return owner_.get(); }
-  void add(const Frame& frame) { check(maq_clip_add_frame(get(), frame.get()), get()); }
-  void finish() { check(maq_clip_finish(get()), get()); }
+  void add(const Frame& frame) { check(maq_clip_add_frame(get(), frame.get())); }
+  void finish() { check(maq_clip_finish(get())); }
 
  private:
   Owner<maq_clip, maq_clip_destroy> owner_;
@@ -243,36 +227,44 @@ class DensePoseResult {
  public:
   // Takes over a result of the C API.
   explicit DensePoseResult(maq_densepose_result* result) : owner_(result) {
-    check(maq_densepose_result_get_size(get(), &width_px_, &height_px_), get());
+    check(maq_densepose_result_get_size(get(), &width_px_, &height_px_));
   }
 
   maq_densepose_result* get() const { return owner_.get(); }
   int32_t width_px() const { return width_px_; }
   int32_t height_px() const { return height_px_; }
 
-  Span<maq_person> people() const {
-    const maq_person* people = nullptr;
-    uint32_t count = 0;
-    check(maq_densepose_result_get_people(get(), &people, &count), get());
-    return {people, count};
+  uint32_t person_count() const { return maq_densepose_result_get_person_count(get()); }
+
+  maq_person person(uint32_t index) const {
+    maq_person person{};
+    person.struct_size = sizeof person;
+    check(maq_densepose_result_get_person(get(), index, &person));
+    return person;
+  }
+
+  std::vector<maq_person> people() const {
+    std::vector<maq_person> people;
+    for (uint32_t i = 0; i < person_count(); ++i) people.push_back(person(i));
+    return people;
   }
 
   // height_px() rows of *stride_bytes.
   const uint8_t* plane(maq_densepose_plane plane, size_t* stride_bytes) const {
     const uint8_t* pixels = nullptr;
-    check(maq_densepose_result_get_plane(get(), plane, &pixels, stride_bytes), get());
+    check(maq_densepose_result_get_plane(get(), plane, &pixels, stride_bytes));
     return pixels;
   }
 
   maq_densepose_stats stats() const {
     maq_densepose_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_densepose_result_get_stats(get(), &stats), get());
+    check(maq_densepose_result_get_stats(get(), &stats));
     return stats;
   }
 
   void save(const std::string& folder, const std::string& stem) const {
-    check(maq_densepose_result_save(get(), folder.c_str(), stem.c_str()), get());
+    check(maq_densepose_result_save(get(), folder.c_str(), stem.c_str()));
   }
 
  private:
@@ -284,6 +276,8 @@ class DensePoseResult {
 class DensePose {
  public:
   DensePose(const Context& context, const maq_densepose_config& config) { create(context, config); }
+  // The bundle installed with the library.
+  explicit DensePose(const Context& context) { create(context, default_densepose_config()); }
   DensePose(const Context& context, const std::string& bundle_path) {
     maq_densepose_config config = default_densepose_config();
     config.bundle_path = bundle_path.c_str();
@@ -294,11 +288,11 @@ class DensePose {
 
   DensePoseResult run(const Frame& frame) {
     maq_densepose_result* result = nullptr;
-    check(maq_densepose_run(get(), frame.get(), &result), get());
+    check(maq_densepose_run(get(), frame.get(), &result));
     return DensePoseResult(result);
   }
 
-  void restart() { check(maq_densepose_reset(get()), get()); }
+  void reset() { check(maq_densepose_reset(get())); }
 
   // Nothing when the bundle has none. The points are this object's.
   std::optional<maq_densepose_surface> surface() const {
@@ -306,14 +300,14 @@ class DensePose {
     surface.struct_size = sizeof surface;
     const maq_status status = maq_densepose_get_surface(get(), &surface);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
-    check(status, get());
+    check(status);
     return surface;
   }
 
  private:
   void create(const Context& context, const maq_densepose_config& config) {
     maq_densepose* made = nullptr;
-    check(maq_densepose_create(context.get(), &config, &made), context.get());
+    check(maq_densepose_create(context.get(), &config, &made));
     owner_.reset(made);
   }
 
@@ -322,7 +316,7 @@ class DensePose {
 
 inline maq_pipeline_config default_pipeline_config() {
   maq_pipeline_config config;
-  check(maq_pipeline_config_init(&config, sizeof config), nullptr);
+  check(maq_pipeline_config_init(&config, sizeof config));
   return config;
 }
 
@@ -347,20 +341,20 @@ class Pipeline {
  public:
   Pipeline(const Context& context, const maq_pipeline_config& config) {
     maq_pipeline* made = nullptr;
-    check(maq_pipeline_create(context.get(), &config, &made), context.get());
+    check(maq_pipeline_create(context.get(), &config, &made));
     owner_.reset(made);
   }
 
   maq_pipeline* get() const { return owner_.get(); }
 
-  void set_source(const std::string& uri) { check(maq_pipeline_set_source(get(), uri.c_str()), get()); }
-  void set_densepose(const maq_densepose_config& config) { check(maq_pipeline_set_densepose(get(), &config), get()); }
-  void set_paused(bool is_paused) { check(maq_pipeline_set_paused(get(), is_paused ? 1 : 0), get()); }
+  void set_source(const std::string& uri) { check(maq_pipeline_set_source(get(), uri.c_str())); }
+  void set_densepose(const maq_densepose_config& config) { check(maq_pipeline_set_densepose(get(), &config)); }
+  void set_paused(bool is_paused) { check(maq_pipeline_set_paused(get(), is_paused ? 1 : 0)); }
   // "" ends the recording.
   void set_recording(const std::string& path) {
-    check(maq_pipeline_set_recording(get(), path.empty() ? nullptr : path.c_str()), get());
+    check(maq_pipeline_set_recording(get(), path.empty() ? nullptr : path.c_str()));
   }
-  void stop() { check(maq_pipeline_stop(get()), get()); }
+  void stop() { check(maq_pipeline_stop(get())); }
 
   // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when no result came in time.
   std::optional<PipelineResult> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
@@ -368,7 +362,7 @@ class Pipeline {
     result.struct_size = sizeof result;
     const maq_status status = maq_pipeline_acquire_result(get(), timeout_ns, &result);
     if (status == MAQ_END_OF_STREAM) return std::nullopt;
-    check(status, get());
+    check(status);
     return PipelineResult(result);
   }
 
@@ -376,14 +370,14 @@ class Pipeline {
   maq_pipeline_info info() const {
     maq_pipeline_info info{};
     info.struct_size = sizeof info;
-    check(maq_pipeline_get_info(get(), &info), get());
+    check(maq_pipeline_get_info(get(), &info));
     return info;
   }
 
   maq_pipeline_stats stats() const {
     maq_pipeline_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_pipeline_get_stats(get(), &stats), get());
+    check(maq_pipeline_get_stats(get(), &stats));
     return stats;
   }
 
@@ -393,7 +387,7 @@ class Pipeline {
     surface.struct_size = sizeof surface;
     const maq_status status = maq_pipeline_get_surface(get(), &surface);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
-    check(status, get());
+    check(status);
     return surface;
   }
 
@@ -403,13 +397,13 @@ class Pipeline {
 
 inline maq_scene_build_config default_scene_build_config() {
   maq_scene_build_config config;
-  check(maq_scene_build_config_init(&config, sizeof config), nullptr);
+  check(maq_scene_build_config_init(&config, sizeof config));
   return config;
 }
 
 inline maq_scene_renderer_config default_scene_renderer_config() {
   maq_scene_renderer_config config;
-  check(maq_scene_renderer_config_init(&config, sizeof config), nullptr);
+  check(maq_scene_renderer_config_init(&config, sizeof config));
   return config;
 }
 
@@ -417,7 +411,7 @@ class Capture {
  public:
   Capture(const Context& context, const std::string& folder) {
     maq_capture* opened = nullptr;
-    check(maq_capture_open(context.get(), folder.c_str(), &opened), context.get());
+    check(maq_capture_open(context.get(), folder.c_str(), &opened));
     owner_.reset(opened);
   }
 
@@ -426,7 +420,7 @@ class Capture {
   maq_capture_info info() const {
     maq_capture_info info{};
     info.struct_size = sizeof info;
-    check(maq_capture_get_info(get(), &info), get());
+    check(maq_capture_get_info(get(), &info));
     return info;
   }
 
@@ -434,22 +428,22 @@ class Capture {
   maq_capture_view view(uint32_t index) const {
     maq_capture_view view{};
     view.struct_size = sizeof view;
-    view.camera.struct_size = sizeof view.camera;
-    check(maq_capture_get_view(get(), index, &view), get());
+    check(maq_capture_get_view(get(), index, &view));
     return view;
   }
 
-  // Why something was dropped; the text is the capture's. `*count`: how many were.
-  const char* dropped(uint32_t index, uint64_t* count) const {
-    const char* reason = nullptr;
-    check(maq_capture_get_dropped(get(), index, &reason, count), get());
-    return reason;
+  // Its text is the capture's.
+  maq_capture_drop drop(uint32_t index) const {
+    maq_capture_drop drop{};
+    drop.struct_size = sizeof drop;
+    check(maq_capture_get_drop(get(), index, &drop));
+    return drop;
   }
 
   // BGR, undistorted.
   Frame load_view(uint32_t index) const {
     maq_frame* frame = nullptr;
-    check(maq_capture_load_view(get(), index, &frame), get());
+    check(maq_capture_load_view(get(), index, &frame));
     return Frame(frame);
   }
 
@@ -464,7 +458,14 @@ class Scene {
 
   Scene(const Context& context, const std::string& path) {
     maq_scene* opened = nullptr;
-    check(maq_scene_open(context.get(), path.c_str(), &opened), context.get());
+    check(maq_scene_open(context.get(), path.c_str(), &opened));
+    owner_.reset(opened);
+  }
+
+  // A scene file in memory, which is copied.
+  Scene(const Context& context, const void* data, size_t size_bytes) {
+    maq_scene* opened = nullptr;
+    check(maq_scene_open_memory(context.get(), data, size_bytes, &opened));
     owner_.reset(opened);
   }
 
@@ -473,19 +474,19 @@ class Scene {
         maq_scene_build_stats* stats = nullptr) {
     if (stats != nullptr) stats->struct_size = sizeof *stats;
     maq_scene* built = nullptr;
-    check(maq_scene_build(context.get(), &config, capture.get(), stats, &built), context.get());
+    check(maq_scene_build(context.get(), &config, capture.get(), stats, &built));
     owner_.reset(built);
   }
 
   maq_scene* get() const { return owner_.get(); }
 
-  void save(const std::string& path) const { check(maq_scene_save(get(), path.c_str()), get()); }
-  void save_ply(const std::string& path) const { check(maq_scene_save_ply(get(), path.c_str()), get()); }
+  void save(const std::string& path) const { check(maq_scene_save(get(), path.c_str())); }
+  void save_ply(const std::string& path) const { check(maq_scene_save_ply(get(), path.c_str())); }
 
   maq_scene_info info() const {
     maq_scene_info info{};
     info.struct_size = sizeof info;
-    check(maq_scene_get_info(get(), &info), get());
+    check(maq_scene_get_info(get(), &info));
     return info;
   }
 
@@ -497,7 +498,7 @@ class SceneBuilder {
  public:
   SceneBuilder(const Context& context, const maq_scene_build_config& config, const maq_point_cloud& cloud) {
     maq_scene_builder* made = nullptr;
-    check(maq_scene_builder_create(context.get(), &config, &cloud, &made), context.get());
+    check(maq_scene_builder_create(context.get(), &config, &cloud, &made));
     owner_.reset(made);
   }
 
@@ -505,23 +506,23 @@ class SceneBuilder {
 
   // Returns how many points the photo saw.
   uint64_t add_view(const Frame& photo, const maq_pinhole_camera& camera) {
-    uint64_t seen_points = 0;
-    check(maq_scene_builder_add_view(get(), photo.get(), &camera, &seen_points), get());
-    return seen_points;
+    uint64_t seen_point_count = 0;
+    check(maq_scene_builder_add_view(get(), photo.get(), &camera, &seen_point_count));
+    return seen_point_count;
   }
 
-  void cancel() { check(maq_scene_builder_cancel(get()), get()); }
+  void cancel() { check(maq_scene_builder_cancel(get())); }
 
   maq_scene_build_stats stats() const {
     maq_scene_build_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_scene_builder_get_stats(get(), &stats), get());
+    check(maq_scene_builder_get_stats(get(), &stats));
     return stats;
   }
 
   Scene finish() {
     maq_scene* scene = nullptr;
-    check(maq_scene_builder_finish(get(), &scene), get());
+    check(maq_scene_builder_finish(get(), &scene));
     return Scene(scene);
   }
 
@@ -539,15 +540,19 @@ class SceneImage {
   // Rows of *stride_bytes.
   const void* plane(maq_scene_plane plane, size_t* stride_bytes) const {
     const void* pixels = nullptr;
-    check(maq_scene_image_get_plane(get(), plane, &pixels, stride_bytes), get());
+    check(maq_scene_image_get_plane(get(), plane, &pixels, stride_bytes));
     return pixels;
   }
 
   maq_scene_image_stats stats() const {
     maq_scene_image_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_scene_image_get_stats(get(), &stats), get());
+    check(maq_scene_image_get_stats(get(), &stats));
     return stats;
+  }
+
+  void save(const std::string& path, bool with_alpha = false) const {
+    check(maq_scene_image_save(get(), path.c_str(), with_alpha ? 1 : 0));
   }
 
  private:
@@ -558,7 +563,7 @@ class SceneRenderer {
  public:
   SceneRenderer(const Context& context, const maq_scene_renderer_config& config, const Scene& scene) {
     maq_scene_renderer* made = nullptr;
-    check(maq_scene_renderer_create(context.get(), &config, scene.get(), &made), context.get());
+    check(maq_scene_renderer_create(context.get(), &config, scene.get(), &made));
     owner_.reset(made);
   }
 
@@ -566,7 +571,7 @@ class SceneRenderer {
 
   SceneImage run(const maq_pinhole_camera& camera) {
     maq_scene_image* image = nullptr;
-    check(maq_scene_renderer_run(get(), &camera, &image), get());
+    check(maq_scene_renderer_run(get(), &camera, &image));
     return SceneImage(image);
   }
 

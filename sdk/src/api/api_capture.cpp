@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "api/boundary.h"
+#include "api/frame_handle.h"
 #include "api/scene_conversions.h"
 
 using namespace maq;
@@ -39,10 +40,8 @@ maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_
   return guarded(capture, __func__, [&] {
     require_argument(capture, "capture");
     require_argument(view, "view");
-    require_range("index", index, 0u, uint32_t(capture->capture.views.size() - 1));
+    require_index("index", index, capture->capture.views.size());
     const CaptureView& from = capture->capture.views[index];
-    require_struct_size("view->camera", view->camera.struct_size, sizeof(maq_pinhole_camera),
-                        sizeof(maq_pinhole_camera));
     maq_capture_view filled{};
     filled.is_held_out = from.is_held_out ? 1 : 0;
     filled.name = from.name.c_str();
@@ -52,16 +51,12 @@ maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_
   });
 }
 
-maq_status maq_capture_get_dropped(const maq_capture* capture, uint32_t index, const char** reason, uint64_t* count) {
+maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t index, maq_capture_drop* drop) {
   return guarded(capture, __func__, [&] {
     require_argument(capture, "capture");
-    require_argument(reason, "reason");
-    require_argument(count, "count");
-    if (index >= capture->dropped.size()) {
-      throw ArgumentError("index is ", index, ", but ", capture->dropped.size(), " things were dropped.");
-    }
-    *reason = capture->dropped[index].c_str();
-    *count = capture->capture.dropped[index].count;
+    require_index("index", index, capture->dropped.size());
+    const maq_capture_drop filled{0, capture->dropped[index].c_str(), capture->capture.dropped[index].count};
+    write_struct(drop, "drop", filled, sizeof(maq_capture_drop));
     return MAQ_OK;
   });
 }
@@ -70,7 +65,7 @@ maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq
   return guarded(capture, __func__, [&] {
     require_argument(capture, "capture");
     require_argument(frame, "frame");
-    require_range("index", index, 0u, uint32_t(capture->capture.views.size() - 1));
+    require_index("index", index, capture->capture.views.size());
     auto made = std::make_unique<maq_frame>();
     std::vector<uint8_t> valid;
     load_view(capture->capture.views[index], made->frame, valid);

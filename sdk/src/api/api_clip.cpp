@@ -1,5 +1,7 @@
 #include "api/boundary.h"
+#include "api/frame_handle.h"
 #include "image/files/clip_file.h"
+#include "maquette/clip.h"
 
 using namespace maq;
 

@@ -1,4 +1,5 @@
 #include "api/boundary.h"
+#include "api/frame_handle.h"
 #include "image/convert.h"
 #include "image/files/image_file.h"
 

@@ -1,7 +1,10 @@
 #include <optional>
 
 #include "api/boundary.h"
-#include "api/config_arguments.h"
+#include "api/bundle_argument.h"
+#include "api/densepose_handle.h"
+#include "api/source_handle.h"
+#include "maquette/pipeline.h"
 #include "pipeline/pipeline.h"
 
 using namespace maq;
@@ -23,7 +26,7 @@ maq_pipeline_config default_config() {
 PipelineModel model_of(const maq_densepose_config* given, const char* name) {
   const maq_densepose_config config = read_densepose_config(given, name);
   const DensePoseSettings settings = densepose_settings(config);
-  return {config.bundle_path, settings};
+  return {bundle_reader(config, kDensePoseBundle), settings};
 }
 
 // The handles of results. A copy has the same pools.
@@ -39,7 +42,6 @@ struct ResultHandles {
   explicit ResultHandles(ResultPools& pools) : frame(pools.frames.acquire()), densepose(pools.results.acquire()) {}
 
   maq_pipeline_result hand_over(const PipelineTimes& times) {
-    list_people(*densepose);
     maq_pipeline_result result{sizeof result, nullptr,      nullptr,     times.number,
                                times.wait_ms, times.run_ms, times.age_ms};
     result.frame = lend<maq_frame>(std::move(frame));
@@ -53,7 +55,6 @@ struct ResultHandles {
 
 PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std::shared_ptr<ContextState>& state,
                                    const ResultPools& pools) {
-  require_argument(config.densepose, "config.densepose");
   require_range("config.nice", config.nice, 0, 19);
   const maq_source_config source = read_source_config(config.source, "config.source");
   if (source.state_callback != nullptr) {
@@ -225,7 +226,8 @@ maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surfac
     require_argument(pipeline, "pipeline");
     require_argument(surface, "surface");
     const SurfaceGrid& grid = pipeline->pipeline.surface();
-    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_densepose_surface));
+    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()},
+                 sizeof(maq_densepose_surface));
     return MAQ_OK;
   });
 }

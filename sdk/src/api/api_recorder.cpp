@@ -1,4 +1,6 @@
 #include "api/boundary.h"
+#include "api/source_handle.h"
+#include "maquette/recorder.h"
 #include "sources/recording/recording.h"
 
 using namespace maq;

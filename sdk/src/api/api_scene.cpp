@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "api/boundary.h"
+#include "api/scene_handles.h"
 #include "scene/format/ply_writer.h"
 #include "scene/format/scene_file.h"
 
@@ -13,6 +14,16 @@ maq_status maq_scene_open(maq_context* context, const char* path, maq_scene** sc
     require_argument(path, "path");
     require_argument(scene, "scene");
     *scene = new maq_scene(open_scene_file(path));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_scene_open_memory(maq_context* context, const void* data, size_t size_bytes, maq_scene** scene) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(data, "data");
+    require_argument(scene, "scene");
+    *scene = new maq_scene(open_scene_memory(data, size_bytes));
     return MAQ_OK;
   });
 }

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 
 #include "api/boundary.h"
+#include "api/frame_handle.h"
 #include "api/scene_conversions.h"
 #include "core/clock.h"
 #include "scene/build/build_scene.h"
@@ -18,7 +20,7 @@ namespace {
 // A config that was checked.
 struct BuildSettings {
   int threads = 1;
-  std::string bundle_path;
+  std::function<Bundle()> read_bundle;
   int long_side_px = 0;
   ScenePacking packing;
   BuildOptions points;
@@ -37,10 +39,9 @@ maq_scene_build_config default_config() {
 }
 
 BuildSettings checked_settings(const maq_scene_build_config& config) {
-  require_argument(config.bundle_path, "config.bundle_path");
   BuildSettings settings;
   settings.threads = scene_threads(config.threads);
-  settings.bundle_path = config.bundle_path;
+  settings.read_bundle = bundle_reader(config, kSceneBundle);
   require_range("config.long_side_px", config.long_side_px, 0, MAQ_MAX_SIDE_PX);
   settings.long_side_px = config.long_side_px;
   switch (config.coefficient_bits) {
@@ -126,7 +127,6 @@ maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* g
                            maq_scene_build_stats* stats, maq_scene** scene) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
-    require_argument(given, "config");
     require_argument(capture, "capture");
     require_argument(scene, "scene");
     const maq_scene_build_config config =
@@ -134,7 +134,7 @@ maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* g
     const BuildSettings settings = checked_settings(config);
     maq_scene_build_stats filled{};
     if (stats != nullptr) require_struct_size("stats", stats->struct_size, sizeof filled, sizeof filled);
-    const auto networks = open_scene_networks(context, settings.bundle_path.c_str(), settings.threads, true);
+    const auto networks = open_scene_networks(context, settings.read_bundle(), settings.threads, true);
     CaptureBuildOptions options;
     options.points = settings.points;
     options.long_side_px = settings.long_side_px;
@@ -167,7 +167,6 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
                                     const maq_point_cloud* cloud, maq_scene_builder** builder) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
-    require_argument(given, "config");
     require_argument(cloud, "cloud");
     require_argument(builder, "builder");
     require_struct_size("cloud", cloud->struct_size, sizeof(maq_point_cloud), sizeof(maq_point_cloud));
@@ -179,7 +178,7 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     const maq_scene_build_config config =
         read_config(given, "config", default_config(), sizeof(maq_scene_build_config));
     BuildSettings settings = checked_settings(config);
-    auto networks = open_scene_networks(context, settings.bundle_path.c_str(), settings.threads, true);
+    auto networks = open_scene_networks(context, settings.read_bundle(), settings.threads, true);
     PointCloud points;
     std::copy_n(cloud->origin, 3, points.origin.begin());
     points.reserve(cloud->point_count, false);
@@ -198,23 +197,23 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
 void maq_scene_builder_destroy(maq_scene_builder* builder) { delete builder; }
 
 maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
-                                      const maq_pinhole_camera* camera, uint64_t* seen_points) {
+                                      const maq_pinhole_camera* camera, uint64_t* seen_point_count) {
   return guarded(builder, __func__, [&] {
     require_argument(builder, "builder");
     require_argument(photo, "photo");
     require_argument(camera, "camera");
     require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
     check_camera(pinhole_of(*camera), "The photo's camera");
-    check_distortion(*camera);
+    check_distortion(camera->intrinsics);
     const Stopwatch watch;
     PosedView view;
-    view.load(photo->frame.image, lens_of(*camera), pinhole_of(*camera), builder->settings.long_side_px);
+    view.load(photo->frame.image, lens_of(camera->intrinsics), pinhole_of(*camera), builder->settings.long_side_px);
     builder->load_ms += watch.elapsed_ms();
     const std::optional<size_t> seen =
         builder->builder.add_view(view.image(), view.valid(), view.camera(), builder->settings.progress);
     if (!seen) return keep_error(builder, MAQ_CANCELLED, nullptr, "The photo was not added: the app cancelled it.");
     if (*seen == 0) builder->unused_views += 1;
-    if (seen_points != nullptr) *seen_points = *seen;
+    if (seen_point_count != nullptr) *seen_point_count = *seen;
     return MAQ_OK;
   });
 }

@@ -4,6 +4,7 @@
 
 #include "api/boundary.h"
 #include "api/scene_conversions.h"
+#include "image/files/image_file.h"
 #include "scene/render/scene_renderer.h"
 
 using namespace maq;
@@ -36,30 +37,29 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
                                      const maq_scene* scene, maq_scene_renderer** renderer) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
-    require_argument(given, "config");
     require_argument(scene, "scene");
     require_argument(renderer, "renderer");
     const maq_scene_renderer_config config =
         read_config(given, "config", default_config(), sizeof(maq_scene_renderer_config));
-    require_argument(config.bundle_path, "config.bundle_path");
     require_range("config.image_pool_size", config.image_pool_size, 1u, 64u);
     require_range("config.allow_spinning", config.allow_spinning, 0, 1);
     require_range("config.near_depth", config.near_depth, 0.0, std::numeric_limits<double>::max());
-    require_range("config.use_background", int(config.use_background), 0, 1);
-    require_range("config.draw_unseen_blocks", int(config.draw_unseen_blocks), 0, 1);
-    require_range("config.refine_empty_parts", int(config.refine_empty_parts), 0, 1);
+    require_range("config.use_background", config.use_background, 0, 1);
+    require_range("config.draw_unseen_blocks", config.draw_unseen_blocks, 0, 1);
+    require_range("config.refine_empty_parts", config.refine_empty_parts, 0, 1);
     RenderOptions options;
     options.threads = scene_threads(config.threads);
     options.near = config.near_depth;
-    require_range("config.use_background", int(config.use_background), 0, 1);
     if (config.use_background == 1) {
       options.background = {config.background[2], config.background[1], config.background[0]};
     }
     options.skips_unseen_blocks = config.draw_unseen_blocks == 0;
     options.skips_empty_parts = config.refine_empty_parts == 0;
-    auto networks = open_scene_networks(context, config.bundle_path, options.threads, config.allow_spinning == 1);
+    Bundle bundle = bundle_reader(config, kSceneBundle)();
+    const std::string where = bundle.prefix;
+    auto networks = open_scene_networks(context, std::move(bundle), options.threads, config.allow_spinning == 1);
     if (scene->scene.networks_sha256 != networks->sha256()) {
-      throw Error(MAQ_ERROR_BAD_BUNDLE, "The scene was made with other networks than those in ", config.bundle_path,
+      throw Error(MAQ_ERROR_BAD_BUNDLE, "The scene was made with other networks than those in ", where,
                   "; give the bundle that it was built with, or build it anew.");
     }
     *renderer = new maq_scene_renderer(scene->scene, std::move(networks), options, config.image_pool_size);
@@ -76,8 +76,8 @@ maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhol
     require_argument(camera, "camera");
     require_argument(image, "image");
     require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
-    if (is_distorted(*camera)) {
-      throw ArgumentError("camera.distortion is not 0; pictures are rendered without distortion.");
+    if (is_distorted(camera->intrinsics)) {
+      throw ArgumentError("camera.intrinsics.distortion is not 0; pictures are rendered without distortion.");
     }
     BoundedPool<maq_scene_image>::Pooled handle = renderer->images.acquire();
     renderer->renderer.render(pinhole_of(*camera), handle->picture);
@@ -134,6 +134,23 @@ maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_ima
     filled.shaded_point_count = from.shaded_points;
     filled.refined_pixel_count = int64_t(from.refined_pixels);
     write_struct(stats, "stats", filled, sizeof filled);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_scene_image_save(const maq_scene_image* image, const char* path, int32_t with_alpha) {
+  return guarded(image, __func__, [&] {
+    require_argument(image, "image");
+    require_argument(path, "path");
+    require_range("with_alpha", with_alpha, 0, 1);
+    const RenderedPicture& picture = image->picture;
+    const ImageView bgr{
+        MAQ_PIXEL_BGR8, picture.width_px, picture.height_px, {{picture.bgr.data(), 3 * size_t(picture.width_px)}, {}}};
+    if (with_alpha == 1) {
+      write_image_file(bgr, picture.alpha.data(), path);
+    } else {
+      write_image_file(bgr, path);
+    }
     return MAQ_OK;
   });
 }

@@ -115,12 +115,13 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
   });
 }
 
-maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* calibration) {
+maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* intrinsics) {
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
+    require_argument(intrinsics, "intrinsics");
     const maq_intrinsics* found = source->source->calibration();
-    if (found == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The source does not know its calibration.");
-    write_struct(calibration, "calibration", *found, sizeof(maq_intrinsics));
+    if (found == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The intrinsics of the source are not known.");
+    *intrinsics = *found;
     return MAQ_OK;
   });
 }

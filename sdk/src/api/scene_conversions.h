@@ -1,4 +1,4 @@
-// What the functions of the C API for scenes have in common.
+// Structs of the C API for scenes as the SDK has them, and back.
 #pragma once
 
 #include <algorithm>
@@ -8,6 +8,8 @@
 #include <string>
 
 #include "api/boundary.h"
+#include "api/bundle_argument.h"
+#include "api/scene_handles.h"
 #include "core/worker_threads.h"
 #include "image/geometry/lens.h"
 #include "scene/networks/scene_networks.h"
@@ -20,22 +22,25 @@ inline int scene_threads(int32_t wanted) {
   return wanted > 0 ? wanted : default_threads();
 }
 
-inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, const char* folder, int threads,
-                                                          bool spin) {
+// The bundle that a config without one means.
+inline constexpr char kSceneBundle[] = "scenes-int8";
+
+inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, Bundle bundle, int threads, bool spin) {
   SessionSettings settings;
   settings.threads = threads;
   settings.spin = spin;
-  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), read_bundle(folder), settings);
+  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), std::move(bundle), settings);
 }
 
-inline Intrinsics intrinsics_of(const maq_pinhole_camera& camera) {
-  return {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px};
+// Without the distortion.
+inline Intrinsics intrinsics_of(const maq_intrinsics& given) {
+  return {given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
 }
 
 // The camera without its distortion.
 inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
   PinholeCamera camera;
-  camera.intrinsics() = intrinsics_of(given);
+  camera.intrinsics() = intrinsics_of(given.intrinsics);
   std::copy_n(given.rotation, 9, camera.rotation.begin());
   std::copy_n(given.centre, 3, camera.centre.begin());
   return camera;
@@ -44,36 +49,31 @@ inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
 inline maq_pinhole_camera camera_of(const PinholeCamera& camera) {
   maq_pinhole_camera filled{};
   filled.struct_size = sizeof filled;
-  filled.width_px = camera.width_px;
-  filled.height_px = camera.height_px;
-  filled.fx_px = camera.fx_px;
-  filled.fy_px = camera.fy_px;
-  filled.cx_px = camera.cx_px;
-  filled.cy_px = camera.cy_px;
+  filled.intrinsics = {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, {}};
   std::copy_n(camera.rotation.begin(), 9, filled.rotation);
   std::copy_n(camera.centre.begin(), 3, filled.centre);
   return filled;
 }
 
-inline bool is_distorted(const maq_pinhole_camera& camera) {
-  return std::any_of(std::begin(camera.distortion), std::end(camera.distortion), [](double k) { return k != 0; });
+inline bool is_distorted(const maq_intrinsics& given) {
+  return std::any_of(std::begin(given.distortion), std::end(given.distortion), [](double k) { return k != 0; });
 }
 
-inline void check_distortion(const maq_pinhole_camera& camera) {
-  for (size_t i = 0; i < std::size(camera.distortion); ++i) {
-    if (!std::isfinite(camera.distortion[i])) {
-      throw ArgumentError("camera.distortion[", i, "] is ", camera.distortion[i], ", but must be finite.");
+inline void check_distortion(const maq_intrinsics& given) {
+  for (size_t i = 0; i < std::size(given.distortion); ++i) {
+    if (!std::isfinite(given.distortion[i])) {
+      throw ArgumentError("camera.intrinsics.distortion[", i, "] is ", given.distortion[i], ", but must be finite.");
     }
   }
 }
 
-// How it maps directions into its picture.
-inline Lens lens_of(const maq_pinhole_camera& camera) {
+// With the distortion.
+inline Lens lens_of(const maq_intrinsics& given) {
   Lens lens;
-  lens.intrinsics() = intrinsics_of(camera);
-  if (is_distorted(camera)) {
+  lens.intrinsics() = intrinsics_of(given);
+  if (is_distorted(given)) {
     lens.distortion = Distortion::kRational;
-    std::copy_n(camera.distortion, lens.coefficients.size(), lens.coefficients.begin());
+    std::copy_n(given.distortion, lens.coefficients.size(), lens.coefficients.begin());
   }
   return lens;
 }

@@ -322,7 +322,7 @@ struct Pipeline::State {
   bool load_model() {
     if (!enter_if_current(MAQ_PIPELINE_LOADING)) return false;
     show_model(nullptr);  // before the next one takes memory
-    const Bundle bundle = read_bundle(now.model.bundle_path);
+    const Bundle bundle = now.model.read_bundle();
     const auto loaded = std::make_shared<DensePose>(settings.runtime(), bundle, now.model.settings);
     settings.source.log.write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                               bundle.manifest.precision, ") loaded, ", now.model.settings.threads, " thread(s)");

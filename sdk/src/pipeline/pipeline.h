@@ -10,6 +10,7 @@
 #include "densepose/densepose.h"
 #include "densepose/surface_grid.h"
 #include "maquette/pipeline.h"
+#include "nn/bundle.h"
 #include "nn/onnxruntime_library.h"
 #include "sources/source.h"
 
@@ -40,7 +41,7 @@ struct PipelineStats {
 };
 
 struct PipelineModel {
-  std::string bundle_path;
+  std::function<Bundle()> read_bundle;  // on the thread
   DensePoseSettings settings;
 };
 

@@ -41,10 +41,9 @@ TEST_F(ApiArguments, NullHandlesAreRefusedByName) {
   maq_source_info info{};
   maq_densepose_stats stats{};
   maq_densepose_config config{};
-  const maq_person* people = nullptr;
+  maq_person person{};
   const uint8_t* pixels = nullptr;
   size_t stride = 0;
-  uint32_t count = 0;
   uint8_t byte = 0;
   expect_error(maq_context_create(MAQ_HEADER_VERSION, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "maq_context_create: context is NULL");
@@ -63,8 +62,7 @@ TEST_F(ApiArguments, NullHandlesAreRefusedByName) {
   expect_error(maq_densepose_reset(nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
   expect_error(maq_densepose_run(nullptr, nullptr, &result), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
   expect_error(maq_densepose_result_get_size(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
-  expect_error(maq_densepose_result_get_people(nullptr, &people, &count), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
-               "result");
+  expect_error(maq_densepose_result_get_person(nullptr, 0, &person), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
   expect_error(maq_densepose_result_get_plane(nullptr, MAQ_DENSEPOSE_PLANE_PART, &pixels, &stride),
                MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
   expect_error(maq_densepose_result_get_stats(nullptr, &stats), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
@@ -83,7 +81,6 @@ TEST_F(ApiArguments, NullOutputsAreRefusedAndTheTextIsTheHandles) {
                "desc is NULL");
   expect_error(maq_frame_wrap(context_, &desc, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
                "frame is NULL");
-  expect_error(maq_densepose_create(context_, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "config");
   expect_error(maq_densepose_create(context_, &config, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "densepose");
 }
 
@@ -104,7 +101,6 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
   maq_control_info control{};
   control.struct_size = sizeof control;
   maq_intrinsics calibration{};
-  calibration.struct_size = sizeof calibration;
   maq_frame_desc desc{};
   desc.struct_size = sizeof desc;
   int32_t fd = -5;
@@ -114,7 +110,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
                "value");
   expect_error(maq_source_set_control(source, maq_control(0), 1), MAQ_ERROR_INVALID_ARGUMENT, source, "control is 0");
   expect_error(maq_source_get_control(source, MAQ_CONTROL_GAIN, nullptr), MAQ_ERROR_INVALID_ARGUMENT, source, "info");
-  expect_error(maq_source_get_intrinsics(source, &calibration), MAQ_ERROR_UNSUPPORTED, source, "calibration");
+  expect_error(maq_source_get_intrinsics(source, &calibration), MAQ_ERROR_UNSUPPORTED, source, "intrinsics");
   expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, source, "negative");
   expect_error(maq_frame_get_depth(frame, &desc), MAQ_ERROR_UNSUPPORTED, frame, "without depth");
   expect_error(maq_frame_get_dma_buf(frame, &fd), MAQ_ERROR_UNSUPPORTED, frame, "dma-buf");
@@ -225,7 +221,20 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
     maq_densepose* densepose = nullptr;
     expect_error(maq_densepose_create(context_, &config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, context_, name);
   };
-  expect_refused("bundle_path is NULL", [](auto& config) { config.bundle_path = nullptr; });
+  const maq_memory_file file{"manifest.json", nullptr, 1};
+  expect_refused("both bundle_path and bundle_files", [&](auto& config) {
+    config.bundle_files = &file;
+    config.bundle_file_count = 1;
+  });
+  expect_refused("bundle_files[0] has no data", [&](auto& config) {
+    config.bundle_path = nullptr;
+    config.bundle_files = &file;
+    config.bundle_file_count = 1;
+  });
+  expect_refused("bundle_files is NULL", [](auto& config) {
+    config.bundle_path = nullptr;
+    config.bundle_file_count = 1;
+  });
   expect_refused("threads", [](auto& config) { config.threads = -1; });
   expect_refused("threads", [](auto& config) { config.threads = 65; });
   expect_refused("long_side_px", [](auto& config) { config.long_side_px = 31; });
@@ -245,6 +254,19 @@ TEST_F(ApiArguments, ErrorsWithoutAHandleAreOfTheThread) {
   maq_context_create(0, nullptr, nullptr);
   EXPECT_NE(std::string(maq_get_last_error(nullptr)), "");
   std::thread([] { EXPECT_STREQ(maq_get_last_error(nullptr), ""); }).join();
+}
+
+TEST_F(ApiArguments, WithoutAHandleTheErrorIsTheThreadsLatestOnAnyHandle) {
+  maq_source* source = nullptr;
+  maq_context_create(0, nullptr, nullptr);
+  expect_error(maq_source_create(context_, "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND, nullptr,
+               "/no/such.jpg");
+  ASSERT_EQ(maq_source_create(context_, "stub:pattern?size=16x16", nullptr, &source), MAQ_OK);
+  expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "negative");
+  EXPECT_NE(std::string(maq_get_last_error(context_)).find("/no/such.jpg"), std::string::npos)
+      << "and the handle's stays";
+  std::thread([] { EXPECT_STREQ(maq_get_last_error(nullptr), ""); }).join();
+  maq_source_destroy(source);
 }
 
 TEST_F(ApiArguments, EveryStatusHasItsName) {
@@ -271,9 +293,11 @@ static_assert(sizeof(void*) != 8 ||
                   (offsetof(maq_source_info, dropped_frame_count) == 48 && sizeof(maq_source_info) == 56),
               "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
-static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 56, "");
+static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 72, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
-static_assert(sizeof(maq_person) == 20, "");
+static_assert(sizeof(maq_person) == 32 && offsetof(maq_person, id) == 24, "");
+static_assert(sizeof(maq_intrinsics) == 104, "");
+static_assert(sizeof(maq_pixel_format) == 4 && sizeof(maq_status) == 4 && sizeof(maq_densepose_detail) == 4, "");
 static_assert(sizeof(maq_densepose_stats) == 80, "");
 static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_RECONNECTED == 5 &&
                   MAQ_PIXEL_DEPTH16 == 7 && MAQ_DENSEPOSE_PLANE_PERSON == 4,

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <filesystem>
 #include <maquette/maquette.hpp>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -51,6 +54,70 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
   const uint8_t* pixels = nullptr;
   EXPECT_EQ(maq_densepose_result_get_plane(result.get(), maq_densepose_plane(5), &pixels, &stride),
             MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(ApiDensePose, PeopleAreReadByIndexAndHaveNoIdYet) {
+  const maquette::Context context;
+  maquette::DensePose densepose(context, kBundle);
+  const RedCell image;
+  const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
+  EXPECT_EQ(result.person_count(), 1u);
+  EXPECT_EQ(result.person(0).id, MAQ_NO_ID);
+  EXPECT_GT(result.person(0).score, 0);
+  maq_person person{};
+  person.struct_size = sizeof person;
+  EXPECT_EQ(maq_densepose_result_get_person(result.get(), 1, &person), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_densepose_result_get_person(result.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  person.struct_size = 20;
+  EXPECT_EQ(maq_densepose_result_get_person(result.get(), 0, &person), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_densepose_result_get_person_count(nullptr), 0u);
+}
+
+TEST(ApiDensePose, ABundleInMemoryIsCopiedAndGivesTheSame) {
+  const maquette::Context context;
+  const RedCell image;
+  std::optional<maquette::DensePose> densepose;
+  {
+    std::vector<std::pair<std::string, std::string>> contents;
+    for (const auto& entry : std::filesystem::directory_iterator(kBundle)) {
+      contents.emplace_back(entry.path().filename().string(), read_text(entry.path().string()));
+    }
+    std::vector<maq_memory_file> files;
+    for (const auto& [name, bytes] : contents) files.push_back({name.c_str(), bytes.data(), bytes.size()});
+    maq_densepose_config config = maquette::default_densepose_config();
+    config.bundle_files = files.data();
+    config.bundle_file_count = uint32_t(files.size());
+    densepose.emplace(context, config);
+    for (auto& [name, bytes] : contents) bytes.assign(bytes.size(), 'x');
+  }
+  maquette::DensePose from_folder(context, kBundle);
+  const maquette::Frame frame(context, image.desc);
+  const maq_person found = densepose->run(frame).person(0), expected = from_folder.run(frame).person(0);
+  EXPECT_EQ(std::memcmp(&found, &expected, sizeof found), 0);
+}
+
+TEST(ApiDensePose, WithoutABundleTheInstalledOneIsUsed) {
+  const maquette::Context context;
+  maquette::DensePose densepose(context), named(context, MAQ_TEST_MODELS "/densepose-b-int8");
+  EXPECT_EQ(densepose.surface()->nodes, named.surface()->nodes);
+  maq_densepose* made = nullptr;
+  ASSERT_EQ(maq_densepose_create(context.get(), nullptr, &made), MAQ_OK) << maq_get_last_error(nullptr);
+  maq_densepose_destroy(made);
+}
+
+TEST(ApiDensePose, PartsHaveNamesAndColours) {
+  EXPECT_STREQ(maq_densepose_get_part_name(0), "background");
+  EXPECT_STREQ(maq_densepose_get_part_name(2), "torso, front");
+  for (const int32_t part : {-1, 25}) {
+    EXPECT_STREQ(maq_densepose_get_part_name(part), "unknown part");
+    uint8_t rgb[3] = {1, 2, 3};
+    maq_densepose_get_part_colour(part, rgb);
+    EXPECT_TRUE(rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0);
+  }
+  uint8_t rgb[3] = {};
+  maq_densepose_get_part_colour(2, rgb);
+  EXPECT_TRUE(rgb[0] == 246 && rgb[1] == 198 && rgb[2] == 82);
+  maq_densepose_get_part_colour(2, nullptr);
 }
 
 TEST(ApiDensePose, ResultsAreBoundedReusedAndOutliveEverything) {

@@ -38,14 +38,14 @@ TEST_F(ApiSceneArguments, NullHandlesAreRefusedByName) {
   maq_scene_renderer* renderer = nullptr;
   maq_scene_image* image = nullptr;
   maq_scene_image_stats image_stats{};
-  const char* reason = nullptr;
+  maq_capture_drop drop{};
   uint64_t count = 0;
   const void* pixels = nullptr;
   size_t stride = 0;
   expect_invalid(maq_capture_open(nullptr, "f", &capture), nullptr, "maq_capture_open: context is NULL");
   expect_invalid(maq_capture_get_info(nullptr, &capture_info), nullptr, "maq_capture_get_info: capture is NULL");
   expect_invalid(maq_capture_get_view(nullptr, 0, &view), nullptr, "maq_capture_get_view: capture is NULL");
-  expect_invalid(maq_capture_get_dropped(nullptr, 0, &reason, &count), nullptr, "maq_capture_get_dropped: capture");
+  expect_invalid(maq_capture_get_drop(nullptr, 0, &drop), nullptr, "maq_capture_get_drop: capture");
   expect_invalid(maq_capture_load_view(nullptr, 0, &frame), nullptr, "maq_capture_load_view: capture is NULL");
   expect_invalid(maq_scene_build(nullptr, &building_, capture_.get(), nullptr, &scene), nullptr,
                  "maq_scene_build: context is NULL");
@@ -76,7 +76,6 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   maq_scene_builder* none = nullptr;
   maq_scene_renderer* no_renderer = nullptr;
   maq_scene_image* image = nullptr;
-  const char* reason = nullptr;
   uint64_t count = 0;
   const void* pixels = nullptr;
   size_t stride = 0;
@@ -86,21 +85,18 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   expect_invalid(maq_capture_open(context, "f", nullptr), context, "capture is NULL");
   expect_invalid(maq_capture_get_info(capture, nullptr), capture, "info is NULL");
   expect_invalid(maq_capture_get_view(capture, 0, nullptr), capture, "view is NULL");
-  expect_invalid(maq_capture_get_dropped(capture, 0, nullptr, &count), capture, "reason is NULL");
-  expect_invalid(maq_capture_get_dropped(capture, 0, &reason, nullptr), capture, "count is NULL");
+  expect_invalid(maq_capture_get_drop(capture, 0, nullptr), capture, "index is 0, but there are 0");
   expect_invalid(maq_capture_load_view(capture, 0, nullptr), capture, "frame is NULL");
-  expect_invalid(maq_scene_build(context, nullptr, capture, nullptr, &scene), context, "config is NULL");
   expect_invalid(maq_scene_build(context, &building_, nullptr, nullptr, &scene), context, "capture is NULL");
   expect_invalid(maq_scene_build(context, &building_, capture, nullptr, nullptr), context, "scene is NULL");
-  expect_invalid(maq_scene_builder_create(context, nullptr, &cloud_, &none), context, "config is NULL");
   expect_invalid(maq_scene_builder_create(context, &building_, nullptr, &none), context, "cloud is NULL");
   expect_invalid(maq_scene_builder_create(context, &building_, &cloud_, nullptr), context, "builder is NULL");
   expect_invalid(maq_scene_open(context, nullptr, &scene), context, "path is NULL");
   expect_invalid(maq_scene_open(context, "f", nullptr), context, "scene is NULL");
+  expect_invalid(maq_scene_open_memory(context, nullptr, 1, &scene), context, "data is NULL");
   expect_invalid(maq_scene_save(scene_.get(), nullptr), scene_.get(), "path is NULL");
   expect_invalid(maq_scene_save_ply(scene_.get(), nullptr), scene_.get(), "path is NULL");
   expect_invalid(maq_scene_get_info(scene_.get(), nullptr), scene_.get(), "info is NULL");
-  expect_invalid(maq_scene_renderer_create(context, nullptr, scene_.get(), &no_renderer), context, "config is NULL");
   expect_invalid(maq_scene_renderer_create(context, &rendering_, nullptr, &no_renderer), context, "scene is NULL");
   expect_invalid(maq_scene_renderer_create(context, &rendering_, scene_.get(), nullptr), context, "renderer is NULL");
 
@@ -120,6 +116,8 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   expect_invalid(maq_scene_image_get_plane(rendered.get(), MAQ_SCENE_PLANE_BGR, &pixels, nullptr), rendered.get(),
                  "stride_bytes is NULL");
   expect_invalid(maq_scene_image_get_stats(rendered.get(), nullptr), rendered.get(), "stats is NULL");
+  expect_invalid(maq_scene_image_save(rendered.get(), nullptr, 0), rendered.get(), "path is NULL");
+  expect_invalid(maq_scene_image_save(rendered.get(), "f.png", 2), rendered.get(), "with_alpha is 2");
 }
 
 TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
@@ -134,7 +132,6 @@ TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
     expect_invalid(maq_capture_get_info(capture_.get(), &capture_info), capture_.get(), "info" + is);
     maq_capture_view view{};
     view.struct_size = wrong;
-    view.camera.struct_size = sizeof view.camera;
     expect_invalid(maq_capture_get_view(capture_.get(), 0, &view), capture_.get(), "view" + is);
     EXPECT_EQ(view.name, nullptr) << "nothing is written";
     maq_scene_build_config building = building_;
@@ -191,6 +188,13 @@ TEST_F(ApiSceneArguments, DefaultsAreThoseOfTheHeader) {
   EXPECT_EQ(rendering.allow_spinning, 1);
 }
 
+TEST_F(ApiSceneArguments, WithoutAConfigTheInstalledBundleIsUsed) {
+  maq_scene_builder* builder = nullptr;
+  ASSERT_EQ(maq_scene_builder_create(context_.get(), nullptr, &cloud_, &builder), MAQ_OK)
+      << maq_get_last_error(nullptr);
+  maq_scene_builder_destroy(builder);
+}
+
 TEST_F(ApiSceneArguments, DestroyingNullIsFine) {
   maq_capture_close(nullptr);
   maq_scene_close(nullptr);
@@ -210,7 +214,7 @@ TEST_F(ApiSceneArguments, FoldersAndPathsThatAreEmptyAreAStatus) {
 
 // Layouts that apps rely on.
 static_assert(sizeof(void*) != 8 ||
-                  (sizeof(maq_pinhole_camera) == 208 && offsetof(maq_pinhole_camera, distortion) == 144),
+                  (sizeof(maq_pinhole_camera) == 208 && offsetof(maq_pinhole_camera, rotation) == 112),
               "");
 
 }  // namespace

@@ -145,16 +145,16 @@ TEST_F(ApiSceneBuilding, DistortedCamerasAreUndistorted) {
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
   maq_pinhole_camera camera = camera_at(0);
-  camera.distortion[0] = -0.1;
+  camera.intrinsics.distortion[0] = -0.1;
   EXPECT_GT(builder.add_view(frame, camera), 300u);
-  camera.distortion[0] = -1000;
+  camera.intrinsics.distortion[0] = -1000;
   expect_error(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr), MAQ_ERROR_INVALID_ARGUMENT,
                builder.get(), "folds the picture");
-  camera.distortion[0] = 0;
+  camera.intrinsics.distortion[0] = 0;
   for (const double value : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    camera.distortion[7] = value;
+    camera.intrinsics.distortion[7] = value;
     expect_error(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr), MAQ_ERROR_INVALID_ARGUMENT,
-                 builder.get(), "camera.distortion[7]");
+                 builder.get(), "camera.intrinsics.distortion[7]");
   }
   EXPECT_EQ(builder.stats().view_count, 1u);
 }
@@ -277,10 +277,11 @@ TEST_F(ApiSceneBuilding, CamerasAndPhotosThatDoNotFitAreRefusedAndChangeNothing)
     EXPECT_EQ(seen, 77u);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expect(MAQ_ERROR_INVALID_ARGUMENT, "its camera is for 65 x 48", [](auto& camera) { camera.width_px = 65; });
-  expect(MAQ_ERROR_IMAGE_SIZE, "0", [](auto& camera) { camera.height_px = 0; });
-  expect(MAQ_ERROR_INVALID_ARGUMENT, "focal lengths", [](auto& camera) { camera.fx_px = 0; });
-  expect(MAQ_ERROR_INVALID_ARGUMENT, "not finite", [=](auto& camera) { camera.cy_px = nan; });
+  expect(MAQ_ERROR_INVALID_ARGUMENT, "its camera is for 65 x 48",
+         [](auto& camera) { camera.intrinsics.width_px = 65; });
+  expect(MAQ_ERROR_IMAGE_SIZE, "0", [](auto& camera) { camera.intrinsics.height_px = 0; });
+  expect(MAQ_ERROR_INVALID_ARGUMENT, "focal lengths", [](auto& camera) { camera.intrinsics.fx_px = 0; });
+  expect(MAQ_ERROR_INVALID_ARGUMENT, "not finite", [=](auto& camera) { camera.intrinsics.cy_px = nan; });
   expect(MAQ_ERROR_INVALID_ARGUMENT, "not finite", [=](auto& camera) { camera.centre[2] = nan; });
   expect(MAQ_ERROR_INVALID_ARGUMENT, "rotation", [](auto& camera) { camera.rotation[1] = 2; });
   expect(MAQ_ERROR_INVALID_ARGUMENT, "mirrors", [](auto& camera) {
@@ -289,8 +290,8 @@ TEST_F(ApiSceneBuilding, CamerasAndPhotosThatDoNotFitAreRefusedAndChangeNothing)
   expect(MAQ_ERROR_INVALID_ARGUMENT, "camera.struct_size", [](auto& camera) { camera.struct_size = 0; });
   // With a distortion too: nothing is undistorted by figures that are none.
   expect(MAQ_ERROR_INVALID_ARGUMENT, "focal lengths", [](auto& camera) {
-    camera.fy_px = -3;
-    camera.distortion[0] = 0.1;
+    camera.intrinsics.fy_px = -3;
+    camera.intrinsics.distortion[0] = 0.1;
   });
   EXPECT_EQ(builder.stats().view_count, 0u);
   EXPECT_EQ(builder.stats().seen_point_count, 0u);

@@ -22,9 +22,9 @@ class ApiSceneRendering : public ::testing::Test {
     size_t stride = 0;
     const auto* const rows = static_cast<const uint8_t*>(image.plane(plane, &stride));
     std::vector<T> values;
-    for (int y = 0; y < camera.height_px; ++y) {
+    for (int y = 0; y < camera.intrinsics.height_px; ++y) {
       const T* const row = reinterpret_cast<const T*>(rows + size_t(y) * stride);
-      values.insert(values.end(), row, row + camera.width_px * channels);
+      values.insert(values.end(), row, row + camera.intrinsics.width_px * channels);
     }
     return values;
   }
@@ -69,6 +69,25 @@ TEST_F(ApiSceneRendering, GivesPlanesAndStats) {
     EXPECT_EQ(maq_scene_image_get_plane(image.get(), maq_scene_plane(wrong), &pixels, &stride),
               MAQ_ERROR_INVALID_ARGUMENT);
   }
+}
+
+TEST_F(ApiSceneRendering, SavedImagesAreThePlanes) {
+  const maq_pinhole_camera camera = camera_at(0.3, 100, 80);
+  maquette::SceneRenderer renderer(context_, api_tiny_scene::renderer_config(), scene_);
+  const maquette::SceneImage image = renderer.run(camera);
+  const TempFolder folder;
+  image.save(folder.file("plain.png"));
+  image.save(folder.file("alpha.png"), true);
+  image.save(folder.file("photo.jpg"));
+  maquette::Source source(context_, "image:" + folder.file("plain.png"));
+  const maq_frame_desc desc = source.next()->desc();
+  EXPECT_EQ(desc.width_px, 100);
+  EXPECT_EQ(desc.height_px, 80);
+  const std::string alpha = read_text(folder.file("alpha.png"));
+  EXPECT_EQ(alpha[25], 6) << "PNG's colour type with alpha";
+  EXPECT_EQ(read_text(folder.file("plain.png"))[25], 2);
+  EXPECT_EQ(maq_scene_image_save(image.get(), folder.file("alpha.jpg").c_str(), 1), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_scene_image_save(image.get(), "/no/such/folder/a.png", 0), MAQ_ERROR_UNWRITABLE);
 }
 
 TEST_F(ApiSceneRendering, ImagesAreBoundedReusedAndOutliveEverything) {
@@ -166,11 +185,11 @@ TEST_F(ApiSceneRendering, CamerasThatAreNoneAreRefusedAndCostNoImage) {
     EXPECT_EQ(image, nullptr);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expect("rendered without distortion", [](auto& camera) { camera.distortion[3] = 1e-9; });
-  expect("rendered without distortion", [=](auto& camera) { camera.distortion[0] = nan; });
-  expect("focal lengths", [](auto& camera) { camera.fy_px = -1; });
-  expect("differ by a factor", [](auto& camera) { camera.fy_px = camera.fx_px * 2000; });
-  expect("principal point", [](auto& camera) { camera.cx_px = 1e7; });
+  expect("rendered without distortion", [](auto& camera) { camera.intrinsics.distortion[3] = 1e-9; });
+  expect("rendered without distortion", [=](auto& camera) { camera.intrinsics.distortion[0] = nan; });
+  expect("focal lengths", [](auto& camera) { camera.intrinsics.fy_px = -1; });
+  expect("differ by a factor", [](auto& camera) { camera.intrinsics.fy_px = camera.intrinsics.fx_px * 2000; });
+  expect("principal point", [](auto& camera) { camera.intrinsics.cx_px = 1e7; });
   expect("not finite", [=](auto& camera) { camera.rotation[4] = nan; });
   expect("rotation", [](auto& camera) { camera.rotation[5] = 0; });
   expect("camera.struct_size", [](auto& camera) { camera.struct_size += 8; });

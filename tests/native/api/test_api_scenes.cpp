@@ -43,6 +43,18 @@ TEST_F(ApiScenes, AFileIsTheSceneThatWasSaved) {
   EXPECT_EQ(read_text(folder_.file("again.maqs")), read_text(path()));
 }
 
+TEST_F(ApiScenes, AFileInMemoryIsTheSameSceneAndIsCopied) {
+  std::string bytes = read_text(path());
+  const maquette::Scene opened(context_, bytes.data(), bytes.size());
+  bytes.assign(bytes.size(), 'x');
+  opened.save(folder_.file("again.maqs"));
+  EXPECT_EQ(read_text(folder_.file("again.maqs")), read_text(path()));
+  maq_scene* scene = nullptr;
+  EXPECT_EQ(maq_scene_open_memory(context_.get(), bytes.data(), bytes.size(), &scene), MAQ_ERROR_UNREADABLE);
+  EXPECT_EQ(maq_scene_open_memory(context_.get(), bytes.data(), 0, &scene), MAQ_ERROR_UNREADABLE);
+  EXPECT_EQ(scene, nullptr);
+}
+
 TEST_F(ApiScenes, ASceneInUseMayBeSavedToItsOwnFileOrDeleted) {
   const maquette::Scene opened(context_, path());
   const std::string bytes = read_text(path());

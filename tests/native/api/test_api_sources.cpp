@@ -101,7 +101,7 @@ TEST(ApiSources, WhatIsRecordedIsPlayedAgain) {
   EXPECT_EQ(recorder.info().size_bytes, std::filesystem::file_size(folder.file("a.maqrec")));
   maquette::Source player(context, "rec:" + folder.file("a.maqrec"));
   EXPECT_NEAR(player.info().fps, 10, 1e-9);
-  EXPECT_FALSE(player.calibration().has_value());
+  EXPECT_FALSE(player.intrinsics().has_value());
   player.seek(200000000);
   const auto frame = player.next();
   EXPECT_FALSE(frame->depth().has_value());
@@ -293,7 +293,6 @@ TEST(ApiSources, DepthAiDeliversDepthAndCalibrationAcrossItsLibrary) {
       << "an exception of the library: " << sdk.last_error();
   sdk.use("depthai:?size=64x48&fps=100", [&](maq_source* source) {
     maq_intrinsics calibration{};
-    calibration.struct_size = sizeof calibration;
     EXPECT_EQ(sdk.function<decltype(maq_source_get_intrinsics)>("maq_source_get_intrinsics")(source, &calibration),
               MAQ_OK);
     EXPECT_EQ(calibration.width_px, 64);

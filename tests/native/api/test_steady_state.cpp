@@ -203,11 +203,14 @@ TEST(SteadyState, AFrameTakesNothingFromTheHeap) {
     for (int i = 0; i < frames; ++i) {
       maq_frame* frame = nullptr;
       maq_densepose_result* result = nullptr;
-      const maq_person* found = nullptr;
-      uint32_t count = 0;
+      maq_person found{};
+      found.struct_size = sizeof found;
       ASSERT_EQ(maq_source_acquire_frame(source.get(), MAQ_WAIT_FOREVER, &frame), MAQ_OK);
       ASSERT_EQ(maq_densepose_run(densepose.get(), frame, &result), MAQ_OK);
-      ASSERT_EQ(maq_densepose_result_get_people(result, &found, &count), MAQ_OK);
+      const uint32_t count = maq_densepose_result_get_person_count(result);
+      for (uint32_t k = 0; k < count; ++k) {
+        ASSERT_EQ(maq_densepose_result_get_person(result, k, &found), MAQ_OK);
+      }
       people += int(count);
       maq_densepose_result_release(result);
       maq_frame_release(frame);

@@ -41,12 +41,12 @@ maq_scene_info scene(const Vec3& up = {0, 0, 1}, const Vec3& low = {-1, -2, -3},
 maq_pinhole_camera photo(const Vec3& at, const Vec3& forward, double lean = 0, const Vec3& up = {0, 0, 1}) {
   maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = 431;
-  camera.fy_px = 433;
-  camera.cx_px = 310;
-  camera.cy_px = 250;
+  camera.intrinsics.width_px = 640;
+  camera.intrinsics.height_px = 480;
+  camera.intrinsics.fx_px = 431;
+  camera.intrinsics.fy_px = 433;
+  camera.intrinsics.cx_px = 310;
+  camera.intrinsics.cy_px = 250;
   const Vec3 f = unit(forward);
   Vec3 right = cross(f, up);
   if (dot(right, right) < 1e-12) right = cross(f, {f[1], f[2], f[0]});
@@ -65,7 +65,8 @@ void expect_rotation(const maq_pinhole_camera& camera, const std::string& when =
   }
   EXPECT_NEAR(dot(cross(row(camera, 0), row(camera, 1)), row(camera, 2)), 1, 1e-9) << when;
   for (const double number : camera.centre) EXPECT_TRUE(std::isfinite(number)) << when;
-  EXPECT_TRUE(std::isfinite(camera.fx_px) && camera.fx_px > 0 && std::isfinite(camera.fy_px) && camera.fy_px > 0);
+  EXPECT_TRUE(std::isfinite(camera.intrinsics.fx_px) && camera.intrinsics.fx_px > 0 &&
+              std::isfinite(camera.intrinsics.fy_px) && camera.intrinsics.fy_px > 0);
 }
 
 void expect_same(const maq_pinhole_camera& a, const maq_pinhole_camera& b, double tolerance = 0) {
@@ -73,7 +74,7 @@ void expect_same(const maq_pinhole_camera& a, const maq_pinhole_camera& b, doubl
   EXPECT_EQ(a.height_px, b.height_px);
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(a.rotation[i], b.rotation[i], tolerance) << i;
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(a.centre[i], b.centre[i], tolerance) << i;
-  EXPECT_NEAR(a.fx_px, b.fx_px, tolerance);
+  EXPECT_NEAR(a.intrinsics.fx_px, b.intrinsics.fx_px, tolerance);
   EXPECT_NEAR(a.fy_px, b.fy_px, tolerance);
   EXPECT_NEAR(a.cx_px, b.cx_px, tolerance);
   EXPECT_NEAR(a.cy_px, b.cy_px, tolerance);
@@ -83,7 +84,8 @@ void expect_same(const maq_pinhole_camera& a, const maq_pinhole_camera& b, doubl
 Vec3 seen(const maq_pinhole_camera& camera, const Vec3& point) {
   const Vec3 away = sum(point, scaled(place(camera), -1));
   const double x = dot(row(camera, 0), away), y = dot(row(camera, 1), away), z = dot(row(camera, 2), away);
-  return {camera.fx_px * x / z + camera.cx_px, camera.fy_px * y / z + camera.cy_px, z};
+  return {camera.intrinsics.fx_px * x / z + camera.intrinsics.cx_px,
+          camera.intrinsics.fy_px * y / z + camera.intrinsics.cy_px, z};
 }
 
 double pitch_of(const maq_pinhole_camera& camera, const Vec3& up) {
@@ -249,7 +251,8 @@ TEST(FlyCamera, AnyPictureShowsAllOfThePhoto) {
 
 TEST(FlyCamera, FliesSmoothlyAndEndsExactlyAtThePhoto) {
   maq_pinhole_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1}, -0.4);
-  target.width_px = 480, target.height_px = 640, target.fx_px = 900, target.cx_px = 200;
+  target.intrinsics.width_px = 480, target.intrinsics.height_px = 640, target.intrinsics.fx_px = 900,
+  target.intrinsics.cx_px = 200;
   maquette::FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5}, 0.2)});
   const maq_pinhole_camera start = fly.camera(800, 600);
   fly.go_to(target, 2, 7);
@@ -264,7 +267,7 @@ TEST(FlyCamera, FliesSmoothlyAndEndsExactlyAtThePhoto) {
     const double step = distance(place(before), place(now));
     way += step, longest = std::max(longest, step);
     turned += std::acos(std::min(1.0, dot(row(before, 2), row(now, 2))));
-    EXPECT_LT(std::abs(now.fx_px - before.fx_px), 20);
+    EXPECT_LT(std::abs(now.intrinsics.fx_px - before.intrinsics.fx_px), 20);
     EXPECT_LT(std::acos(std::min(1.0, dot(row(before, 0), row(now, 0)))), 0.05);
     before = now;
     ASSERT_LE(++steps, 202);
@@ -385,10 +388,10 @@ TEST(FlyCamera, WhatIsNotFiniteOrNoCameraDoesNothing) {
     for (double& number : camera.rotation) number = -number;
   });
   expect_ignored([](maq_pinhole_camera& camera) { camera.centre[2] = kInfinity; });
-  expect_ignored([](maq_pinhole_camera& camera) { camera.width_px = 0; });
-  expect_ignored([](maq_pinhole_camera& camera) { camera.fy_px = -1; });
-  expect_ignored([](maq_pinhole_camera& camera) { camera.fx_px = kNan; });
-  expect_ignored([](maq_pinhole_camera& camera) { camera.cx_px = kInfinity; });
+  expect_ignored([](maq_pinhole_camera& camera) { camera.intrinsics.width_px = 0; });
+  expect_ignored([](maq_pinhole_camera& camera) { camera.intrinsics.fy_px = -1; });
+  expect_ignored([](maq_pinhole_camera& camera) { camera.intrinsics.fx_px = kNan; });
+  expect_ignored([](maq_pinhole_camera& camera) { camera.intrinsics.cx_px = kInfinity; });
   fly.go_to(photo({4, -2, 1}, {-1, 0.3, 0.1}), kNan, 0);
   EXPECT_EQ(fly.at_photo(), 0) << "it never left";
   expect_rotation(

@@ -162,8 +162,8 @@ TEST(LiveScene, ShowsTheErrorInColoursAndItsPsnr) {
   const maquette::LiveScenePicture* const shown = look_at(scene, camera, 12);
   ASSERT_NE(shown, nullptr);
   for (const maquette::Picture* picture : {&shown->rendering, &shown->photo, &shown->error}) {
-    ASSERT_EQ(picture->width_px, camera.width_px);
-    ASSERT_EQ(picture->height_px, camera.height_px);
+    ASSERT_EQ(picture->width_px, camera.intrinsics.width_px);
+    ASSERT_EQ(picture->height_px, camera.intrinsics.height_px);
   }
   double squares = 0;
   size_t coloured = 0;
@@ -185,7 +185,7 @@ TEST(LiveScene, ShowsTheErrorInColoursAndItsPsnr) {
     coloured += shown->error.rgba[i] > 20;
   }
   EXPECT_GT(coloured, 1000u);
-  const double mean_square = squares / (3.0 * camera.width_px * camera.height_px);
+  const double mean_square = squares / (3.0 * camera.intrinsics.width_px * camera.intrinsics.height_px);
   EXPECT_NEAR(shown->psnr_db, 10 * std::log10(255.0 * 255 / mean_square), 1e-6);
 }
 
@@ -200,14 +200,14 @@ TEST(LiveScene, APhotoIsBroughtToThePicturesSize) {
   const maquette::Picture photo = shown->photo;
   for (const int share : {2, 3, 5}) {
     maq_pinhole_camera camera = own;
-    camera.width_px /= share, camera.height_px /= share;
-    const int width = camera.width_px;
+    camera.intrinsics.width_px /= share, camera.intrinsics.height_px /= share;
+    const int width = camera.intrinsics.width_px;
     shown = look_at(scene, camera, 3);
     ASSERT_NE(shown, nullptr);
     ASSERT_EQ(shown->photo.width_px, width);
-    ASSERT_EQ(shown->error.height_px, camera.height_px);
+    ASSERT_EQ(shown->error.height_px, camera.intrinsics.height_px);
     double squares = 0;
-    for (int y = 0; y < camera.height_px; ++y) {
+    for (int y = 0; y < camera.intrinsics.height_px; ++y) {
       for (int x = 0; x < width; ++x) {
         double sum = 0;
         for (int k = 0; k < share * share; ++k) {
@@ -218,7 +218,7 @@ TEST(LiveScene, APhotoIsBroughtToThePicturesSize) {
       }
     }
     // The last column of 640 / 3 covers a third of a pixel less here.
-    EXPECT_LT(std::sqrt(squares / (width * camera.height_px)), 6) << share;
+    EXPECT_LT(std::sqrt(squares / (width * camera.intrinsics.height_px)), 6) << share;
   }
 }
 
@@ -237,9 +237,9 @@ TEST(LiveScene, LargePicturesAreMadeSmallerAndShowTheSame) {
     ASSERT_NE(shown, nullptr);
     EXPECT_EQ(shown->rendering.width_px, shown_width);
     EXPECT_EQ(shown->rendering.height_px, shown_height);
-    EXPECT_EQ(shown->camera.width_px, shown_width);
-    EXPECT_NEAR(shown->camera.fx_px / shown_width, large.fx_px / width, 1e-9);
-    EXPECT_NEAR((shown->camera.cy_px + 0.5) / shown_height, (large.cy_px + 0.5) / height, 1e-9);
+    EXPECT_EQ(shown->camera.intrinsics.width_px, shown_width);
+    EXPECT_NEAR(shown->camera.intrinsics.fx_px / shown_width, large.intrinsics.fx_px / width, 1e-9);
+    EXPECT_NEAR((shown->camera.intrinsics.cy_px + 0.5) / shown_height, (large.intrinsics.cy_px + 0.5) / height, 1e-9);
     EXPECT_TRUE(std::isnan(shown->psnr_db));
     EXPECT_TRUE(shown->photo.empty() && shown->error.empty());
     EXPECT_EQ(shown->photo_index, -1);
@@ -257,10 +257,11 @@ TEST(LiveScene, RendersOncePerLookAndTheLatestWins) {
   EXPECT_EQ(shown->number, 1u);
   expect_no_picture(scene);
   for (int i = 1; i <= 1000; ++i) {
-    camera.fx_px = 100 + i;
+    camera.intrinsics.fx_px = 100 + i;
     scene.look(camera, -1);
   }
-  ASSERT_TRUE(wait_until([&] { return scene.shown().take() && scene.shown().front().camera.fx_px == 1100; }));
+  ASSERT_TRUE(
+      wait_until([&] { return scene.shown().take() && scene.shown().front().camera.intrinsics.fx_px == 1100; }));
   EXPECT_LT(scene.shown().front().number, 500u);
   expect_no_picture(scene);
 }
@@ -318,9 +319,9 @@ TEST(LiveScene, ACameraThatIsNoneIsSaidAndForgotten) {
     EXPECT_EQ(scene.state()->text, "");
   };
   expect_refused([](maq_pinhole_camera& camera) { camera.rotation[0] = NAN; });
-  expect_refused([](maq_pinhole_camera& camera) { camera.fx_px = 0; });
-  expect_refused([](maq_pinhole_camera& camera) { camera.width_px = 0; });
-  expect_refused([](maq_pinhole_camera& camera) { camera.height_px = -2000000000; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.intrinsics.fx_px = 0; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.intrinsics.width_px = 0; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.intrinsics.height_px = -2000000000; });
   expect_refused([](maq_pinhole_camera& camera) { camera.struct_size = 3; });
 }
 

@@ -62,11 +62,11 @@ inline maq_point_cloud cloud_of(const std::vector<float>& places) {
 inline maq_pinhole_camera camera_at(double angle, int width_px = 64, int height_px = 48) {
   maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;
-  camera.width_px = width_px;
-  camera.height_px = height_px;
-  camera.fx_px = camera.fy_px = width_px;
-  camera.cx_px = 0.5 * (width_px - 1);
-  camera.cy_px = 0.5 * (height_px - 1);
+  camera.intrinsics.width_px = width_px;
+  camera.intrinsics.height_px = height_px;
+  camera.intrinsics.fx_px = camera.intrinsics.fy_px = width_px;
+  camera.intrinsics.cx_px = 0.5 * (width_px - 1);
+  camera.intrinsics.cy_px = 0.5 * (height_px - 1);
   const double c = std::cos(angle), s = std::sin(angle);
   const double rotation[9] = {-s, c, 0, 0, 0, -1, -c, -s, 0};
   std::memcpy(camera.rotation, rotation, sizeof rotation);

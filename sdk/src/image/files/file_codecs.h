@@ -55,7 +55,7 @@ class FileCodecs {
   virtual ~FileCodecs() = default;
   // BGR8; nothing for what is damaged or no image.
   virtual DecodedImage decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const = 0;
-  // `extension`: ".png" or ".jpg"; the image is BGR8 or GREY8. False where it cannot be encoded.
+  // `extension`: ".png" or ".jpg"; the image is BGR8, GREY8 or, for PNG, RGBA8. False where it cannot be encoded.
   virtual bool encode_image(const std::string& extension, const ImageView& image,
                             std::vector<uint8_t>& bytes) const = 0;
   // Nothing for what is damaged or no video.

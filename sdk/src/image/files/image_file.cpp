@@ -45,23 +45,54 @@ SizePx read_image_file_size(const std::string& path) {
   return {frame.image.width_px, frame.image.height_px};
 }
 
-std::vector<uint8_t> encode_image(const ImageView& image, const std::string& extension) {
-  std::vector<uint8_t> memory, bytes;
-  const ImageView picture = image.format == MAQ_PIXEL_GREY8 ? image : as_bgr(image, memory);
-  if (!file_codecs().encode_image(extension, picture, bytes)) {
+namespace {
+
+std::vector<uint8_t> encode(const ImageView& image, const std::string& extension) {
+  std::vector<uint8_t> bytes;
+  if (!file_codecs().encode_image(extension, image, bytes)) {
     throw Error(MAQ_ERROR_INTERNAL, "A picture of ", image.width_px, " x ", image.height_px,
                 " could not be encoded as ", extension, ": there may be too little memory.");
   }
   return bytes;
 }
 
+}  // namespace
+
+std::vector<uint8_t> encode_image(const ImageView& image, const std::string& extension) {
+  std::vector<uint8_t> memory;
+  return encode(image.format == MAQ_PIXEL_GREY8 ? image : as_bgr(image, memory), extension);
+}
+
 void write_image_file(const ImageView& image, const std::string& path) {
-  const std::string ending = lower_case_extension(path);
-  if (ending != ".png" && ending != ".jpg" && ending != ".jpeg") {
+  const std::string extension = lower_case_extension(path);
+  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .png nor in .jpg, by which its format is chosen.");
   }
   AtomicFile file(path);
-  const std::vector<uint8_t> bytes = encode_image(image, ending == ".png" ? ending : ".jpg");
+  const std::vector<uint8_t> bytes = encode_image(image, extension == ".png" ? extension : ".jpg");
+  file.append(bytes.data(), bytes.size());
+  file.commit();
+}
+
+void write_image_file(const ImageView& image, const uint8_t* alpha, const std::string& path) {
+  if (lower_case_extension(path) != ".png") {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " does not end in .png, the format for pictures with alpha.");
+  }
+  AtomicFile file(path);
+  std::vector<uint8_t> rgba(size_t(4) * size_t(image.width_px) * size_t(image.height_px));
+  uint8_t* to = rgba.data();
+  for (int y = 0; y < image.height_px; ++y) {
+    const uint8_t* from = image.planes[0].data + size_t(y) * image.planes[0].stride_bytes;
+    for (int x = 0; x < image.width_px; ++x, from += 3, to += 4) {
+      to[0] = from[2];
+      to[1] = from[1];
+      to[2] = from[0];
+      to[3] = *alpha++;
+    }
+  }
+  const ImageView picture{
+      MAQ_PIXEL_RGBA8, image.width_px, image.height_px, {{rgba.data(), size_t(4) * size_t(image.width_px)}, {}}};
+  const std::vector<uint8_t> bytes = encode(picture, ".png");
   file.append(bytes.data(), bytes.size());
   file.commit();
 }

@@ -27,4 +27,8 @@ std::vector<uint8_t> encode_image(const ImageView& image, const std::string& ext
 // Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, MAQ_ERROR_UNWRITABLE, and what encode_image() throws.
 void write_image_file(const ImageView& image, const std::string& path);
 
+// The same with an alpha plane: one byte a pixel of a BGR8 image, rows without padding.
+// Throws MAQ_ERROR_INVALID_ARGUMENT for an extension other than .png too.
+void write_image_file(const ImageView& image, const uint8_t* alpha, const std::string& path);
+
 }  // namespace maq

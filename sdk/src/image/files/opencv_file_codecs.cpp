@@ -96,7 +96,12 @@ class OpenCvFileCodecs : public FileCodecs {
 
   bool encode_image(const std::string& extension, const ImageView& image, std::vector<uint8_t>& bytes) const override {
     try {
-      return cv::imencode(extension, as_mat(image), bytes);
+      if (image.format != MAQ_PIXEL_RGBA8) return cv::imencode(extension, as_mat(image), bytes);
+      const cv::Mat rgba(image.height_px, image.width_px, CV_8UC4, const_cast<uint8_t*>(image.planes[0].data),
+                         image.planes[0].stride_bytes);
+      cv::Mat bgra(rgba.size(), CV_8UC4);
+      cv::mixChannels({rgba}, {bgra}, {0, 2, 1, 1, 2, 0, 3, 3});
+      return cv::imencode(extension, bgra, bytes);
     } catch (const std::exception&) {
       return false;
     }

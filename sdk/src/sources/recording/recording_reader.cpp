@@ -41,7 +41,6 @@ size_t whole_bytes(const FrameHead& head) { return sizeof head + head.picture_by
 
 std::optional<maq_intrinsics> calibration_of(const nlohmann::json& from) {
   maq_intrinsics calibration{};
-  calibration.struct_size = sizeof calibration;
   calibration.width_px = from.at("width_px").get<int32_t>();
   calibration.height_px = from.at("height_px").get<int32_t>();
   calibration.fx_px = from.at("fx_px").get<double>();

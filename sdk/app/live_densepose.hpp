@@ -242,7 +242,7 @@ class LiveDensePose {
       uri = orders.otherwise;
       open_in_shape(&uri);
     }
-    if (model_) model_->restart();
+    if (model_) model_->reset();
     change_status([&](LiveStatus& status) {
       status.uri = uri;
       status.doing.clear();

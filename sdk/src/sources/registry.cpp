@@ -1,19 +1,19 @@
+#include "sources/registry.h"
+
 #include <algorithm>
 
 #include "core/error.h"
 #include "sources/control_options.h"
-#include "sources/depthai/depthai_source.h"
-#include "sources/synthetic/fault_injection.h"
-#include "sources/files/file_kind.h"
+#include "sources/depthai/depthai_backend.h"
 #include "sources/files/file_sources.h"
 #include "sources/libcamera/module_client.h"
 #include "sources/live_source.h"
+#include "sources/recording/recording.h"
+#include "sources/synthetic/fault_injection.h"
 #include "sources/synthetic/replay_camera.h"
-#include "sources/source.h"
-#include "sources/synthetic/stub_sources.h"
+#include "sources/synthetic/stub_source.h"
 #include "sources/uri.h"
 #include "sources/v4l2/v4l2_camera.h"
-#include "sources/v4l2/v4l2_source.h"
 
 namespace maq {
 namespace {
@@ -23,15 +23,15 @@ std::unique_ptr<Source> without_log(SourceUri uri, const Log&) {
   return open(std::move(uri));
 }
 
-// Of one kind of sources: either opens one, or makes what opens its cameras.
+// A kind of source: opens one itself, or makes what opens its cameras.
 struct Entry {
   SourceScheme scheme;
   std::unique_ptr<Source> (*open)(SourceUri uri, const Log& log);
   CameraOpener (*camera)(SourceUri uri, int buffers, const Log& log);
-  bool needs_target = true;  // otherwise nothing after the scheme means the first there is
+  bool needs_target = true;  // false: without a target, the first one that is found
 };
 
-// Those that find out which of the others is meant.
+// Entries that stand for one of the others.
 constexpr char kFile[] = "file", kCamera[] = "camera";
 
 const Entry kEntries[] = {
@@ -51,36 +51,45 @@ const Entry kEntries[] = {
      without_log<open_stub_source>,
      nullptr},
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
-      "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG&exposure=10000 (microseconds)"},
+      "a camera of Linux (Video4Linux2); the nearest size and rate that it offers; ?format=MJPG&exposure=10000 "
+      "(microseconds)"},
      nullptr,
-     v4l2_camera_opener},
+     v4l2_uri_opener},
     {{"libcamera", "libcamera:0?size=640x480&fps=30",
       "a camera of libcamera, by number or id: those of the Raspberry Pi and other boards; ?format=NV12"},
      nullptr,
-     libcamera_camera_opener},
+     libcamera_uri_opener},
     {{"depthai", "depthai:?size=640x480&fps=30",
       "an OAK camera with depth, the first or depthai:<id or IP>; ?depth=0 for colour alone"},
      nullptr,
-     depthai_camera_opener,
+     depthai_uri_opener,
      false},
 };
 
-// Of a source that is played as if it were a camera.
-CameraOpener played(const Entry& entry, SourceUri uri, const Log& log, int buffers) {
-  PlayOptions play;
-  play.buffers = buffers;
-  play.speed = uri.take_number("speed", 1, 0.01, 100);
-  play.loop = uri.take_integer("loop", 0, 0, 1) == 1;
-  std::string name = uri.scheme + ":" + uri.target;
-  return played_as_camera([&entry, uri = std::move(uri), log] { return entry.open(uri, log); }, std::move(name), play);
+const Entry* find_entry(const std::string& scheme) {
+  const auto found = std::find_if(std::begin(kEntries), std::end(kEntries),
+                                  [&](const Entry& entry) { return scheme == entry.scheme.name; });
+  return found == std::end(kEntries) ? nullptr : found;
 }
 
+// A camera that replays a source.
+CameraOpener replay_opener(const Entry& entry, SourceUri uri, const Log& log, int buffers) {
+  ReplayOptions options;
+  options.buffers = buffers;
+  options.speed = uri.take_number("speed", 1, 0.01, 100);
+  options.loop = uri.take_integer("loop", 0, 0, 1) == 1;
+  std::string identity = uri.scheme + ":" + uri.target;
+  return replay_as_camera([&entry, uri = std::move(uri), log] { return entry.open(uri, log); }, std::move(identity),
+                          options);
+}
+
+// Of a scheme that does not stand for another.
 std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
   const FaultPlan faults = take_faults(uri);
   const bool is_camera = entry.camera != nullptr;
   std::vector<ControlSetting> controls;
   if (is_camera) controls = take_control_options(uri);
-  // Faults happen in time, so that a file or a stub with faults runs as a camera does.
+  // Faults happen in time, so that a file or a stub with faults is replayed as a camera.
   if (!is_camera && uri.take_integer("live", faults.is_empty() ? 0 : 1, 0, 1) == 0) {
     if (!faults.is_empty()) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "live=0 in ", uri.text, " does not go with ", kFaultOptions, ".");
@@ -92,21 +101,35 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
   CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers, settings.log)
-                                  : played(entry, std::move(uri), settings.log, buffers);
+                                  : replay_opener(entry, std::move(uri), settings.log, buffers);
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
   return std::make_unique<LiveSource>(std::move(opener), name, settings, controls);
 }
 
-// `options`: "?size=640x480" or nothing.
-std::unique_ptr<Source> open_first_camera(const std::string& options, const SourceSettings& settings) {
+// The file of `uri`, with its options.
+std::unique_ptr<Source> open_file(SourceUri uri, const SourceSettings& settings) {
+  uri.scheme = scheme_of_file(uri.target);
+  const Entry& entry = *find_entry(uri.scheme);
+  return open_entry(entry, std::move(uri), settings);
+}
+
+// With the options of `uri`.
+std::unique_ptr<Source> open_first_camera(const SourceUri& uri, const SourceSettings& settings) {
   std::string problems;
   for (const CameraListing& camera : list_cameras()) {
-    try {
-      if (camera.status == MAQ_OK) return open_source(camera.uri + options, settings);
-      problems += " " + camera.uri + ": " + camera.problem;
-    } catch (const Error& error) {
-      problems += " " + camera.uri + ": " + error.what();
+    std::string problem = camera.problem;
+    if (camera.status == MAQ_OK) {
+      try {
+        SourceUri same = uri;
+        const SourceUri listed = parse_source_uri(camera.uri);
+        same.scheme = listed.scheme;
+        same.target = listed.target;
+        return open_entry(*find_entry(same.scheme), std::move(same), settings);
+      } catch (const Error& error) {
+        problem = error.what();
+      }
     }
+    problems += " " + camera.uri + ": " + problem;
   }
   if (problems.empty()) throw Error(MAQ_ERROR_NOT_FOUND, "No camera was found; is one plugged in?");
   throw Error(MAQ_ERROR_NOT_FOUND, "No camera can be opened.", problems);
@@ -129,27 +152,26 @@ const std::vector<SourceScheme>& source_schemes() {
 std::vector<CameraListing> list_cameras() {
   std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
   for (CameraListing& camera : list_libcamera_cameras()) all.push_back(std::move(camera));
-  for (CameraListing& listing : list_depthai_sources()) all.push_back(std::move(listing));
+  for (CameraListing& camera : list_depthai_cameras()) all.push_back(std::move(camera));
   return all;
 }
 
 std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {
   SourceUri uri = parse_source_uri(text);
-  for (const Entry& entry : kEntries) {
-    if (uri.scheme == entry.scheme.name) {
-      if (entry.needs_target && uri.target.empty()) {
-        throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
-                    entry.scheme.example, ".");
-      }
-      if (uri.scheme == kFile) return open_source(scheme_of_file(uri.target) + text.substr(sizeof kFile - 1), settings);
-      if (uri.scheme == kCamera) return open_first_camera(text.substr(std::min(text.find('?'), text.size())), settings);
-      return open_entry(entry, std::move(uri), settings);
-    }
+  const Entry* entry = find_entry(uri.scheme);
+  if (entry == nullptr) {
+    std::string known;
+    for (const Entry& other : kEntries) known += std::string(known.empty() ? "" : ", ") + other.scheme.name + ":";
+    throw Error(MAQ_ERROR_UNSUPPORTED, "\"", uri.scheme, ":\" is not a kind of source of this build; there are ", known,
+                ".");
   }
-  std::string known;
-  for (const Entry& entry : kEntries) known += std::string(known.empty() ? "" : ", ") + entry.scheme.name + ":";
-  throw Error(MAQ_ERROR_UNSUPPORTED, "\"", uri.scheme, ":\" is not a kind of source of this build; there are ", known,
-              ".");
+  if (entry->needs_target && uri.target.empty()) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
+                entry->scheme.example, ".");
+  }
+  if (uri.scheme == kFile) return open_file(std::move(uri), settings);
+  if (uri.scheme == kCamera) return open_first_camera(uri, settings);
+  return open_entry(*entry, std::move(uri), settings);
 }
 
 }  // namespace maq

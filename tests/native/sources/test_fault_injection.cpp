@@ -8,11 +8,11 @@
 #include <set>
 #include <thread>
 
+#include "sources/recording/recording.h"
+#include "sources/registry.h"
+#include "sources/synthetic/fault_injection.h"
 #include "support/expect_error.h"
 #include "support/source_threads.h"
-#include "sources/synthetic/fault_injection.h"
-#include "sources/recording/recording.h"
-#include "sources/source.h"
 #include "support/temp_folder.h"
 
 namespace {

@@ -119,7 +119,7 @@ void print_views(const maq::Scene& scene, const std::shared_ptr<maq::SceneNetwor
 
 int measure(const char* capture_folder, const char* bundle) {
   const auto runtime = std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());
-  const auto networks = std::make_shared<maq::SceneNetworks>(runtime, bundle, maq::SessionSettings());
+  const auto networks = std::make_shared<maq::SceneNetworks>(runtime, maq::read_bundle(bundle), maq::SessionSettings());
   const maq::Capture capture = maq::open_capture(capture_folder);
   maq::SceneBuilder builder(capture.cloud, capture.up, *networks, {});
   std::vector<HeldOut> views;

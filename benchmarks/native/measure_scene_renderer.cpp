@@ -106,7 +106,7 @@ int main(int argc, char** argv) {
     const auto runtime = std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());
     maq::SessionSettings settings;
     settings.threads = threads;
-    const auto networks = std::make_shared<maq::SceneNetworks>(runtime, argv[1], settings);
+    const auto networks = std::make_shared<maq::SceneNetworks>(runtime, maq::read_bundle(argv[1]), settings);
     for (const Kind kind : {Kind::kRoom, Kind::kObject}) {
       const maq::ModelledPoints points = points_of(kind, size_t(count));
       for (const auto coefficients : {maq::Coefficients::kInt8, maq::Coefficients::kFloat32}) {

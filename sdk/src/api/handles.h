@@ -11,7 +11,6 @@
 #include "core/frame.h"
 #include "core/log.h"
 #include "densepose/densepose.h"
-#include "densepose/surface_grid.h"
 #include "maquette/maquette.h"
 #include "nn/onnxruntime_library.h"
 #include "scene/capture/capture.h"
@@ -21,7 +20,7 @@
 
 namespace maq {
 
-// Every handle begins with this, so that maq_last_error works on each of them.
+// Every handle begins with this, so that maq_get_last_error works on each of them.
 class Handle {
  public:
   void set_error(std::string text) const {
@@ -69,10 +68,10 @@ struct maq_context : maq::Handle {
 // Frames of sources and results are whole handles from pools, so that lending one allocates nothing.
 struct maq_frame : maq::Handle {
   ~maq_frame() {
-    if (free_callback != nullptr) free_callback(user_data);
+    if (release_callback != nullptr) release_callback(user_data);
   }
   maq::Frame frame;
-  maq_frame_free_callback free_callback = nullptr;
+  maq_frame_release_callback release_callback = nullptr;
   void* user_data = nullptr;
   maq::BoundedPool<maq_frame>::Deleter deleter;  // empty: the app's own memory
 };
@@ -96,16 +95,11 @@ struct maq_densepose_result : maq::Handle {
 };
 
 struct maq_densepose : maq::Handle {
-  maq_densepose(std::shared_ptr<maq::ContextState> of, std::unique_ptr<maq::DensePose> made, size_t pool_size,
-                std::vector<uint8_t> surface_bytes, std::string surface_path)
-      : state(std::move(of)),
-        densepose(std::move(made)),
-        results(pool_size, "results"),
-        surface(std::move(surface_bytes), std::move(surface_path)) {}
+  maq_densepose(std::shared_ptr<maq::ContextState> of, std::unique_ptr<maq::DensePose> made, size_t pool_size)
+      : state(std::move(of)), densepose(std::move(made)), results(pool_size, "results") {}
   std::shared_ptr<maq::ContextState> state;
   std::unique_ptr<maq::DensePose> densepose;
   maq::BoundedPool<maq_densepose_result> results;
-  maq::BodySurface surface;
 };
 
 struct maq_capture : maq::Handle {

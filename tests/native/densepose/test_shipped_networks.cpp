@@ -174,7 +174,7 @@ class ShippedNetworks : public ::testing::Test {
 
   // The photo as the trunk takes it, [1, 3, kSide, kSide].
   static std::vector<float> trunk_input() {
-    const maq::InputSpec& spec = bundle_->manifest.input;
+    const maq::InputSpec spec = maq::read_densepose_spec(bundle_->manifest).input;
     maq::NetworkInput input;
     maq::make_network_input(view_of(photo_), {int(kSide), spec.multiple_of, spec.mean, spec.std}, input);
     EXPECT_EQ(input.values.size(), size_t(3 * kSide * kSide));

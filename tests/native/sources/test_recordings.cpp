@@ -78,7 +78,7 @@ TEST_F(Recordings, GiveBackEachFrameAsItWas) {
 }
 
 TEST_F(Recordings, KeepEveryFormatDepthAndCalibration) {
-  maq::RecordingInfo info{"a source\xff", 30, maq_calibration{}};
+  maq::RecordingInfo info{"a source\xff", 30, maq_intrinsics{}};
   info.calibration->width_px = 64;
   info.calibration->height_px = 48;
   info.calibration->fx_px = 50.25;

@@ -30,7 +30,7 @@ CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, De
 // The connected devices. They are not opened for it, so that their modes are not known.
 std::vector<CameraListing> list_depthai_cameras(DepthAiDriver& driver);
 
-// Nothing when maq_calibration cannot express the lens, or its values make no sense.
-std::optional<maq_calibration> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan);
+// Nothing when maq_intrinsics cannot express the lens, or its values make no sense.
+std::optional<maq_intrinsics> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan);
 
 }  // namespace maq

@@ -4,7 +4,7 @@
 
 #include "api/frame_handle.h"
 #include "maquette/source.h"
-#include "sources/source.h"
+#include "sources/registry.h"
 
 namespace maq {
 

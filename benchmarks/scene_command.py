@@ -55,7 +55,7 @@ class Rendered:
 
 def build(capture: Path, scene: Path, networks: Path, *options: str) -> Built:
     """A scene file of a capture's source photos. Raises SceneCommandError, FileNotFoundError without the program."""
-    said, wall_s = _run("build", str(capture), "--out", str(scene), "--networks", str(networks), *options)
+    said, wall_s = _run("build", str(capture), "--out", str(scene), "--bundle", str(networks), *options)
     try:
         seconds = {str(stage): _number(value) for stage, value in said["seconds"].items()}
         names = ("cloud_points", "points", "varying", "bytes")
@@ -77,7 +77,7 @@ def render(
     """
     names = views if isinstance(views, str) else ",".join(views)
     folder.mkdir(parents=True, exist_ok=True)
-    said, wall_s = _run("render", str(scene), "--networks", str(networks), "--capture", str(capture), "--views", names,
+    said, wall_s = _run("render", str(scene), "--bundle", str(networks), "--capture", str(capture), "--views", names,
                         "--out", str(folder), "--no-alpha", *options)  # fmt: skip
     try:
         times = [{stage: _number(view["ms"][stage]) for stage in ("total", *STAGES)} for view in said["views"]]

@@ -1,6 +1,6 @@
 """Fine-tunes one scene to its photos: the looks of its points and, if wanted, the refiner.
 
-    maquette scene build PLACE --networks BUNDLE --out place.maqs
+    maquette scene build PLACE --bundle BUNDLE --out place.maqs
     python -m export.scenes.finetune PLACE --scene place.maqs --networks BUNDLE --weights RUN/weights.pt \\
         --seconds 60 --out tuned.maqs
 

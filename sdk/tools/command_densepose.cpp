@@ -199,23 +199,23 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
       ->add_option("source", options->sources,
                    "Images, clips or URIs: photo.jpg, video:clip.mp4, stub:people?count=3 (see `maquette sources`)")
       ->required();
-  command->add_option("-o,--out", options->out, "Folder for the results; made when it is not there")->required();
+  command->add_option("-o,--out", options->out, "Folder for the results; created if needed")->required();
   command->add_flag("--overlay", options->overlay,
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
   command->add_flag("--json", options->json, "Print one JSON line a frame with counts and times, instead of text");
   add_model_options(*command, options->model);
   command
       ->add_option("--max-frames", options->max_frames,
-                   "Stop after so many frames; default: all, and 100 of a source without end")
+                   "Stop after N frames; default: all, and 100 of a source without end")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 40));
-  command->add_option("--every", options->every, "Take only every N-th frame of a clip")
+  command->add_option("--every", options->every, "Process only every N-th frame of a clip")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 30));
   command->footer(
       "Writes for each image, in the DensePose convention:\n"
       "  <stem>_IUV.png   body part I, U * 255, V * 255 (channels B, G, R of the file)\n"
-      "  <stem>_INDS.png  which person a pixel belongs to, 0 for nobody\n"
+      "  <stem>_INDS.png  index of the person a pixel belongs to, from 1; 0: background\n"
       "  <stem>.json      boxes in pixels and scores\n"
-      "Frames of a clip are named <stem>_<frame number>. Files appear whole or not at all.\n\n"
+      "Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
       "Examples:\n"
       "  maquette densepose photo.jpg --out results --overlay\n"
       "  maquette densepose holiday/*.jpg --out results --size 480\n"

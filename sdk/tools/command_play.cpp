@@ -96,19 +96,20 @@ int play(const Options& options) {
 void add_play_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("play", "Watch a camera, a recording or another source, and how it delivers");
-  command->add_option("source", options->source, "Where frames come from; see `maquette sources`")->required();
-  command->add_option("-s,--speed", options->speed, "Of a recording, clip or stub: 2 is twice as fast")
+  command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
+  command->add_option("-s,--speed", options->speed, "Speed of a recording, clip or stub: 2 is twice as fast")
       ->check(CLI::Range(0.01, 100.0));
-  command->add_option("--from", options->from_s, "Begin so many seconds after the start of a recording")
+  command->add_option("--from", options->from_s, "Start at this time of a recording, in seconds")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("-n,--frames", options->frames, "End after so many frames")->check(CLI::PositiveNumber);
-  command->add_option("-t,--seconds", options->seconds, "End after so much time")->check(CLI::PositiveNumber);
+  command->add_option("-n,--frames", options->frames, "Stop after N frames")->check(CLI::PositiveNumber);
+  command->add_option("-t,--seconds", options->seconds, "Stop after this time")->check(CLI::PositiveNumber);
   command->add_flag_callback(
-      "--no-picture", [=] { options->picture = false; }, "Only figures; so it is where no terminal is");
-  command->add_option("--json", options->json, "Write the figures to this file");
+      "--no-picture", [=] { options->picture = false; }, "Print statistics only; the default without a terminal");
+  command->add_option("--json", options->json, "Write the statistics to this file");
   command->footer(
-      "Frames come at their times, also those of files. In a terminal the picture is shown in its colours; what does\n"
-      "not come, comes late or goes away is counted:\n\n"
+      "Plays frames at their own times, also from files. A terminal shows the picture in colour; missing and late "
+      "frames\n"
+      "and interruptions are counted:\n\n"
       "  maquette play v4l2:/dev/video0\n"
       "  maquette play take.maqrec --from 5 --speed 0.5\n"
       "  maquette play 'stub:people?drop=0.1&unplug=3s@5s'");

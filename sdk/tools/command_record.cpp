@@ -80,17 +80,17 @@ int record(const Options& options) {
 void add_record_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("record", "Record a camera, or another source, to a file that can be played");
-  command->add_option("source", options->source, "Where frames come from; see `maquette sources`")->required();
-  command->add_option("out", options->out, "The recording: take.maqrec; must not be there yet")->required();
-  command->add_option("-n,--frames", options->frames, "So many frames")->check(CLI::PositiveNumber);
-  command->add_option("-t,--seconds", options->seconds, "So much time")->check(CLI::PositiveNumber);
+  command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
+  command->add_option("out", options->out, "File of the recording: take.maqrec; must not exist yet")->required();
+  command->add_option("-n,--frames", options->frames, "Stop after N frames")->check(CLI::PositiveNumber);
+  command->add_option("-t,--seconds", options->seconds, "Stop after this time")->check(CLI::PositiveNumber);
   command
       ->add_option("-q,--quality", options->quality,
-                   "Compress frames as JPEG of this quality, 1 to 100; otherwise they stay exactly as they came")
+                   "Compress frames as JPEG of this quality, 1 to 100; default: keep them exactly as they came")
       ->check(CLI::Range(1, 100));
   command->footer(
-      "Frames keep their times, numbers, depth and calibration. Ctrl-C ends a recording; after a crash or a power cut\n"
-      "what was recorded can be played all the same.\n\n"
+      "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording; after a crash or a power cut\n"
+      "it can still be played.\n\n"
       "  maquette record v4l2:/dev/video0 take.maqrec --seconds 10\n"
       "  maquette densepose take.maqrec --out results --overlay\n"
       "  maquette play 'rec:take.maqrec?from=2&speed=0.5'");

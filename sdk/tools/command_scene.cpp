@@ -46,7 +46,7 @@ std::string scene_bundle_or_default(const std::string& given) {
   const std::string bundle = given.empty() ? default_scene_bundle() : given;
   if (bundle.empty()) {
     throw std::runtime_error(
-        "No networks of scenes were found; name their folder with --networks or MAQ_SCENE_BUNDLE.");
+        "No bundle of scene networks was found; name its folder with --bundle or MAQ_SCENE_BUNDLE.");
   }
   return bundle;
 }
@@ -76,6 +76,6 @@ void add_scene_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = scene->add_subcommand("info", "What is in a scene file; checks all of it");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
-  command->add_option("--json", options->json, "Write the figures to this file too");
+  command->add_option("--json", options->json, "Also write the numbers to this file");
   command->callback([=] { *exit_code = show(*options); });
 }

@@ -21,7 +21,7 @@ namespace {
 struct Options {
   std::string capture;
   std::string out;
-  std::string networks;
+  std::string bundle;
   std::string ply;
   std::string json;
   int threads = 0;
@@ -73,7 +73,7 @@ int build(const Options& options) {
     const maq_capture_drop drop = capture.drop(i);
     std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
   }
-  const std::string networks = scene_bundle_or_default(options.networks);
+  const std::string networks = scene_bundle_or_default(options.bundle);
   for (const std::string* path : {&options.out, &options.ply}) require_writable(*path);
   ProgressBar progress("building", kPermille);
   maq_scene_build_config config = maquette::default_scene_build_config();
@@ -131,33 +131,34 @@ int build(const Options& options) {
 void add_scene_build_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<Options>();
   CLI::App* command = scene.add_subcommand("build", "Make a scene of a folder with photos, cameras and a cloud");
-  command->add_option("capture", options->capture, "COLMAP model or transforms.json with its photos and cloud")
+  command->add_option("capture", options->capture, "Folder with a COLMAP model or transforms.json, photos and cloud")
       ->required();
-  command->add_option("-o,--out", options->out, "The scene: place.maqs; replaces one that is there")->required();
-  command->add_option("--networks", options->networks,
-                      "Bundle of scene networks; else MAQ_SCENE_BUNDLE, else the one that came with this program");
-  command->add_option("--points", options->points, "Take so many points of the cloud at most")
+  command->add_option("-o,--out", options->out, "File of the scene: place.maqs; replaces an existing one")->required();
+  command->add_option("--bundle", options->bundle,
+                      "Bundle of scene networks; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
+  command->add_option("--points", options->points, "Maximum number of points; larger clouds are thinned out evenly")
       ->check(CLI::PositiveNumber);
-  command->add_option("--views", options->views, "Take so many photos at most, evenly")->check(CLI::PositiveNumber);
-  command->add_option("--long-side", options->long_side, "Photos are made smaller to this long side, pixels; 0: never")
+  command->add_option("--views", options->views, "Maximum number of photos, selected evenly")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--long-side", options->long_side, "Scale larger photos down to this long side in pixels; 0: never")
       ->check(CLI::Range(0, 16384));
   command->add_option("--coefficients", options->coefficients, "Bits of the numbers in the file: 8, 16 or 32")
       ->check(CLI::IsMember({8, 16, 32}));
   command
-      ->add_option(
-          "--min-variation", options->min_variation,
-          "Points whose look varies less keep one colour from all sides, for a smaller file; colours are 0 to 1")
+      ->add_option("--min-variation", options->min_variation,
+                   "Points that vary less between views keep one colour, for a smaller file; RMS of colours of 0 to 1")
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option("--visibility-scale", options->visibility_scale,
-                   "For sparse clouds: below 1, points hide more of what is behind them")
+                   "Test visibility at this fraction of the resolution; below 1 for sparse clouds")
       ->check(CLI::Range(1.0 / 16, 1.0));
-  command->add_option("--near", options->near_depth, "Cameras do not see points nearer than this, in scene units")
+  command->add_option("--near", options->near_depth, "Ignore points nearer to a camera than this, in scene units")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--threads", options->threads, "Default: the cores, at most 4")->check(CLI::Range(1, 64));
-  command->add_flag("--all-photos", options->all_photos,
-                    "Use the photos that the capture holds out for comparisons too");
-  command->add_option("--ply", options->ply, "Write the points with their colours as PLY too, for other programs");
-  command->add_option("--json", options->json, "Write figures and times to this file");
+  command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
+      ->check(CLI::Range(1, 64));
+  command->add_flag("--all-photos", options->all_photos, "Also use photos that the capture holds out for comparisons");
+  command->add_option("--ply", options->ply, "Also write the points with their colours as PLY");
+  command->add_option("--json", options->json, "Write counts and times to this file");
   command->callback([=] { *exit_code = build(*options); });
 }

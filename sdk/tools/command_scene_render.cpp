@@ -28,7 +28,7 @@ namespace {
 struct Options {
   std::string scene;
   std::string out;
-  std::string networks;
+  std::string bundle;
   std::string capture;
   std::string views;
   std::string path;
@@ -63,7 +63,7 @@ std::optional<Size> size_of(const std::string& text) {
 
 maquette::SceneRenderer make_renderer(const maquette::Context& context, const maquette::Scene& scene,
                                       const Options& options) {
-  const std::string networks = scene_bundle_or_default(options.networks);
+  const std::string networks = scene_bundle_or_default(options.bundle);
   maq_scene_renderer_config config = maquette::default_scene_renderer_config();
   config.bundle_path = networks.c_str();
   config.threads = options.threads;
@@ -144,8 +144,7 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
   for (const uint32_t index : views) {
     const std::string name = picture_name(capture.view(index));
     if (!names.insert(name).second) {
-      throw std::runtime_error("Two photos of the capture would both be " + name +
-                               "; name the one you mean in --views.");
+      throw std::runtime_error("Two photos of the capture would both be " + name + "; name one of them in --views.");
     }
   }
   std::error_code error;
@@ -237,7 +236,7 @@ int render(const Options& options) {
     throw std::runtime_error("Say what to render: --views with --capture for pictures, or --path for a clip.");
   }
   if (options.path.empty() ? options.is_timed_clip : options.repeat != 1 || options.no_alpha) {
-    throw std::runtime_error(options.path.empty() ? "--seconds and --fps are those of a clip: use them with --path."
+    throw std::runtime_error(options.path.empty() ? "--seconds and --fps are for clips: use them with --path."
                                                   : "--repeat and --no-alpha are for pictures: use them with --views.");
   }
   if (!options.views.empty() && options.capture.empty()) {
@@ -259,25 +258,27 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<Options>();
   CLI::App* command = scene.add_subcommand("render", "Look at a scene: pictures from given cameras, or a clip");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
-  command->add_option("-o,--out", options->out, "The clip (clip.mp4), or the folder of the pictures")->required();
-  command->add_option("--path", options->path, "A clip: `orbit` around the scene, or `through` the capture's cameras")
+  command->add_option("-o,--out", options->out, "File of the clip (clip.mp4), or folder for the pictures")->required();
+  command
+      ->add_option("--path", options->path,
+                   "Path of the camera in a clip: `orbit` around the scene, or `through` the cameras of the capture")
       ->check(CLI::IsMember({"orbit", "through"}));
   command->add_option("--seconds", options->seconds, "Length of the clip")->check(CLI::Range(0.04, 600.0));
-  command->add_option("--fps", options->fps, "Pictures a second of the clip")->check(CLI::Range(1.0, 240.0));
-  command->add_option("--capture", options->capture, "The folder that the scene was made of, for its cameras");
-  command->add_option("--views", options->views, "Pictures from the capture's cameras: held-out, all, or names,…");
-  command->add_option("--size", options->size, "As 640x480; pictures have otherwise the size of their photo");
-  command->add_option("--networks", options->networks,
-                      "The bundle that the scene was built with; else MAQ_SCENE_BUNDLE, else the one that came along");
-  command->add_option("--near", options->near_depth, "Points nearer than this are not drawn, in scene units")
+  command->add_option("--fps", options->fps, "Frames a second of the clip")->check(CLI::Range(1.0, 240.0));
+  command->add_option("--capture", options->capture, "Folder that the scene was built from, for its cameras");
+  command->add_option("--views", options->views, "Cameras of the capture to render: held-out, all, or names,…");
+  command->add_option("--size", options->size, "Size of the pictures, as 640x480; default: that of the photo");
+  command->add_option(
+      "--bundle", options->bundle,
+      "Bundle that built the scene; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
+  command->add_option("--near", options->near_depth, "Do not draw points nearer than this, in scene units")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--threads", options->threads, "Default: the cores, at most 4")->check(CLI::Range(1, 64));
-  command->add_flag("--no-alpha", options->no_alpha, "Pictures without an alpha channel");
-  command->add_option("--repeat", options->repeat, "Render each picture so often and tell the median times")
+  command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
+      ->check(CLI::Range(1, 64));
+  command->add_flag("--no-alpha", options->no_alpha, "Leave out the alpha channel");
+  command->add_option("--repeat", options->repeat, "Render each picture N times and report median times")
       ->check(CLI::Range(1, 10000));
-  command
-      ->add_option("--without", options->without,
-                   "Do work all the same that is otherwise left out, to measure what it saves: culling, tiles")
+  command->add_option("--without", options->without, "Switch off an optimisation, to measure it: culling, tiles")
       ->delimiter(',')
       ->check(CLI::IsMember({"culling", "tiles"}));
   command->add_option("--json", options->json, "Write times and counts to this file");

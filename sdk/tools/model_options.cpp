@@ -8,27 +8,26 @@
 
 void add_model_options(CLI::App& command, ModelOptions& options) {
   command.add_option("--bundle", options.bundle,
-                     "Model bundle folder; else MAQ_BUNDLE, else the one that came with this program");
+                     "Folder of the model bundle; default: MAQ_BUNDLE, then the one installed with this program");
   command.add_option("--size", options.size, "Long side of the network's input in pixels; larger is finer and slower")
       ->check(CLI::Range(32, 2048));
-  command.add_option("--threshold", options.threshold, "Score that a person must exceed")
-      ->check(CLI::Range(0.0f, 1.0f));
+  command.add_option("--threshold", options.threshold, "Minimum score of a person")->check(CLI::Range(0.0f, 1.0f));
   command.add_option("--threads", options.threads, "Threads of the networks; default: the cores, at most 4")
       ->check(CLI::Range(1, 64));
   command
       .add_option("--max-proposals", options.max_proposals,
-                  "Boxes that are looked at more closely; fewer are faster and may miss people in a crowd")
+                  "Maximum number of boxes for the box head; fewer are faster and may miss people in a crowd")
       ->check(CLI::Range(1, 1000));
   command
       .add_option("--key-frames", options.key_frames,
-                  "Look for new people only in every N-th frame of a stream, and follow them in between")
+                  "Detect people in every N-th frame of a stream, and propagate their boxes in between")
       ->check(CLI::Range(1, 1000));
   command
       .add_option("--min-person-height", options.min_person_height_px,
-                  "Nobody who matters is less tall than so many pixels; large values are faster")
+                  "People less tall than this, in pixels, may be missed; large values are faster")
       ->check(CLI::Range(0, 100000));
   command.add_flag("--no-surface", options.no_surface, "Body parts alone: U and V stay 0");
-  command.add_flag("--no-spin", options.no_spin, "Idle threads sleep at once: slower, but saves energy");
+  command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: slower, saves energy");
 }
 
 std::string bundle_of(const ModelOptions& options) {

@@ -11,7 +11,8 @@ extern "C" {
 typedef struct maq_capture maq_capture;
 
 /* A camera and its pose, in the convention of OpenCV: x to the right, y down, z forward. The world's point X is at
- * rotation * (X - centre) in the camera's coordinates. Lengths are in the unit of the point cloud ("units of the scene"). */
+ * rotation * (X - centre) in the camera's coordinates. Lengths are in the unit of the point cloud ("units of the
+ * scene"). */
 typedef struct maq_pinhole_camera {
   uint32_t struct_size;
   maq_intrinsics
@@ -44,12 +45,12 @@ typedef struct maq_capture_drop {
   uint64_t count;     /* how many of them */
 } maq_capture_drop;
 
-/* Opens a folder: a COLMAP model (text or binary, in sparse/0, sparse, colmap/sparse/0 or the folder itself) with its
- * photos, or transforms.json as nerfstudio and Instant-NGP write it, with a PLY cloud. Photos are read when they are
- * needed. `*capture` is the caller's, to be given to maq_capture_close.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the folder does not exist, or has no capture or no
- * cloud), MAQ_ERROR_UNREADABLE (damaged, or without a usable photo or point), MAQ_ERROR_UNSUPPORTED (camera models, sizes).
- * Blocks while cameras and cloud are read. */
+/* Opens a folder: a COLMAP model (text or binary, in sparse/0, sparse, colmap/sparse/0 or the folder itself) with
+ * its photos, or transforms.json as nerfstudio and Instant-NGP write it, with a PLY cloud. Photos are read when they
+ * are needed. `*capture` is the caller's, to be given to maq_capture_close.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the folder does not exist, or has no capture
+ * or no cloud), MAQ_ERROR_UNREADABLE (damaged, or without a usable photo or point), MAQ_ERROR_UNSUPPORTED (camera
+ * models, sizes). Blocks while cameras and cloud are read. */
 MAQ_API maq_status maq_capture_open(maq_context* context, const char* folder, maq_capture** capture);
 
 /* Closes the capture (NULL is fine). Scenes built from it and frames loaded from it stay valid.

@@ -1,4 +1,5 @@
-/* Clips: pictures as a video file that any player shows. A recorder (recorder.h) keeps frames exactly, with their times. */
+/* Clips: pictures as a video file that any player shows. A recorder (recorder.h) keeps frames exactly, with their
+ * times. */
 #ifndef MAQUETTE_CLIP_H_
 #define MAQUETTE_CLIP_H_
 
@@ -10,24 +11,25 @@ extern "C" {
 
 typedef struct maq_clip maq_clip;
 
-/* Begins a video file: MPEG-4 in .mp4 or Motion JPEG in .avi, by the path's extension. It is written under another name in
- * the same folder, which must exist, and takes the place of `path` atomically when maq_clip_finish is called.
- * `fps`: pictures a second, 0.01 to 1000, rounded to three decimals, above 65.5 to four digits. `*clip` is the caller's,
- * to be given to maq_clip_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
- * (libmaquette_files.so is missing). May block while libraries are opened. */
+/* Begins a video file: MPEG-4 in .mp4 or Motion JPEG in .avi, by the path's extension. It is written under another
+ * name in the same folder, which must exist, and takes the place of `path` atomically when maq_clip_finish is
+ * called. `fps`: pictures a second, 0.01 to 1000, rounded to three decimals, above 65.5 to four digits. `*clip` is
+ * the caller's, to be given to maq_clip_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE,
+ * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). May block while libraries are opened. */
 MAQ_API maq_status maq_clip_create(maq_context* context, const char* path, double fps, maq_clip** clip);
 
-/* Adds a picture; the frame is not kept. All have the size of the first, at least 2 x 2; of an odd width or height the last
- * column or row is left out. Each is shown for `1 / fps` seconds: timestamps are ignored.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (another size, or the clip is finished), MAQ_ERROR_IMAGE_SIZE (too
- * small), MAQ_ERROR_UNSUPPORTED (a depth image; with the first picture also: this build cannot write that kind of file, or
- * not of that size; try the other extension), MAQ_ERROR_UNWRITABLE (the disk is full already). Blocks while it is encoded. */
+/* Adds a picture; the frame is not kept. All have the size of the first, at least 2 x 2; of an odd width or height
+ * the last column or row is left out. Each is shown for `1 / fps` seconds: timestamps are ignored.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (another size, or the clip is finished), MAQ_ERROR_IMAGE_SIZE
+ * (too small), MAQ_ERROR_UNSUPPORTED (a depth image; with the first picture also: this build cannot write that kind
+ * of file, or not of that size; try the other extension), MAQ_ERROR_UNWRITABLE (the disk is full already). Blocks
+ * while it is encoded. */
 MAQ_API maq_status maq_clip_add_frame(maq_clip* clip, const maq_frame* frame);
 
 /* Completes the file; nothing can be added afterwards. Only this call tells whether the whole file reached the disk.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (nothing was added), MAQ_ERROR_UNWRITABLE (the disk is full; a former
- * file of that name stays). Blocks until the file is on the disk. */
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (nothing was added), MAQ_ERROR_UNWRITABLE (the disk is full; a
+ * former file of that name stays). Blocks until the file is on the disk. */
 MAQ_API maq_status maq_clip_finish(maq_clip* clip);
 
 /* Frees the clip (NULL is fine); an unfinished file is removed.

@@ -25,15 +25,14 @@ typedef struct maq_densepose_config {
   const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
   uint32_t bundle_file_count;          /* default 0 */
   int32_t long_side_px;                /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
-  float score_threshold;     /* people with a lower score are left out, 0 to 1; negative (default): the bundle's */
-  int32_t max_people;        /* 1 to 255, best scores first; 0 (default): the bundle's */
-  uint32_t result_pool_size; /* results the app may hold at once, 1 to 64; default 4 */
-  int32_t max_proposals;     /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's. Fewer are faster
+  float score_threshold;        /* people with a lower score are left out, 0 to 1; negative (default): the bundle's */
+  int32_t max_people;           /* 1 to 255, best scores first; 0 (default): the bundle's */
+  uint32_t result_pool_size;    /* results the app may hold at once, 1 to 64; default 4 */
+  int32_t max_proposals;        /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's. Fewer are faster
                                 and may miss people in a crowd. */
-  int32_t
-      key_frame_interval; /* 1 (default): people are detected in every frame. N, up to 1000: in every N-th frame of a
-                                 stream; in between, boxes are propagated, nobody new is found, and frames without people
-                                 cost nothing. A frame of another size is a key frame. */
+  int32_t key_frame_interval;   /* 1 (default): people are detected in every frame. N, up to 1000: in every N-th
+                                 frame of a stream; in between, boxes are propagated, no new people are found, and
+                                 frames without people cost nothing. A frame of another size is a key frame. */
   int32_t min_person_height_px; /* people less tall than this in the frame may be missed; 0 (default): none */
   maq_densepose_detail detail;  /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
   int32_t allow_spinning; /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy and costs
@@ -98,11 +97,11 @@ MAQ_API maq_status maq_densepose_create(maq_context* context, const maq_densepos
  * Once for each handle, from any thread. May block briefly. */
 MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
 
-/* Finds the people in a frame, which is not kept, and maps their pixels to the body surface. `*result` comes from a pool
- * of result_pool_size: give it back with maq_densepose_result_release. Without people no head network runs and the planes
- * are zero.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the networks
- * run. */
+/* Finds the people in a frame, which is not kept, and maps their pixels to the body surface. `*result` comes from a
+ * pool of result_pool_size: give it back with maq_densepose_result_release. Without people no head network runs and
+ * the planes are zero.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the
+ * networks run. */
 MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
 
 /* Starts a new stream: the next frame is a key frame. Of use only with key_frame_interval above 1.
@@ -127,8 +126,8 @@ MAQ_API uint32_t maq_densepose_result_get_person_count(const maq_densepose_resul
 MAQ_API maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index,
                                                    maq_person* person);
 
-/* Gets a plane: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one with the better
- * score is in front.
+/* Gets a plane: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one with the
+ * better score is in front.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
                                                   const uint8_t** pixels, size_t* stride_bytes);
@@ -139,14 +138,14 @@ MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* re
 
 /* Writes three files into an existing folder ("": the current one), in the DensePose convention (docs/formats.md):
  * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png
- * (MAQ_DENSEPOSE_PLANE_PERSON) and <stem>.json (size, boxes, scores). Each is written atomically and replaces an existing
- * one, after all have been written. `stem` begins their names and names no folder.
+ * (MAQ_DENSEPOSE_PLANE_PERSON) and <stem>.json (size, boxes, scores). Each is written atomically and replaces an
+ * existing one, after all have been written. `stem` begins their names and names no folder.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
  * (libmaquette_files.so is missing). Blocks while they are written. */
 MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* folder, const char* stem);
 
-/* The points of the template body, in its rest pose, that parts, U and V stand for: in metres, x to the body's left, y to
- * its back, z up. */
+/* The points of the template body, in its rest pose, that parts, U and V stand for: in metres, x to the body's left,
+ * y to its back, z up. */
 typedef struct maq_densepose_surface {
   uint32_t struct_size;
   int32_t nodes;         /* along U, and along V; at least 2 */
@@ -154,10 +153,10 @@ typedef struct maq_densepose_surface {
                             bilinear. x, y and z are NaN where the chart does not reach. */
 } maq_densepose_surface;
 
-/* Gets the surface that the bundle's labels refer to. The caller sets surface->struct_size; the points are the handle's
- * and live as long as it does.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has none), MAQ_ERROR_BAD_BUNDLE (it is
- * damaged). Blocks briefly the first time, while it is decoded. */
+/* Gets the surface that the bundle's labels refer to. The caller sets surface->struct_size; the points are the
+ * handle's and live as long as it does.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has none), MAQ_ERROR_BAD_BUNDLE
+ * (it is damaged). Blocks briefly the first time, while it is decoded. */
 MAQ_API maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_densepose_surface* surface);
 
 #ifdef __cplusplus

@@ -1,4 +1,5 @@
-// The body that labels lie on (maq_densepose_surface), as triangles to draw and as a texture to sample. For C++17, in this header alone.
+// The body surface (maq_densepose_surface) as triangles to draw and as a texture to sample. For C++17, in this header
+// alone.
 #ifndef MAQUETTE_BODY_MESH_HPP_
 #define MAQUETTE_BODY_MESH_HPP_
 
@@ -19,8 +20,8 @@ struct BodyMesh {
     float part, u, v;              // part - 1, 0 to 23; U and V, 0 to 1
   };
   std::vector<Vertex> triangles;  // three each
-  // [24][nodes along V][nodes along U][3], metres: where a chart does not reach its nearest point goes on, so that what lies
-  // between two nodes is always known.
+  // [24][nodes along V][nodes along U][3], metres. Outside of a chart its nearest point is repeated, so that every value
+  // between two nodes is known.
   std::vector<float> filled_points_m;
   int nodes = 0;
 

@@ -74,10 +74,11 @@ MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* de
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (it came without). Does not block. */
 MAQ_API maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc);
 
-/* Gets the frame's memory as a dma-buf, which a GPU or an encoder reads without a copy. `*fd` stays the frame's and is
- * valid until the frame is released; duplicate it (dup) to keep it longer. The planes lie in it as in maq_frame_desc.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the memory is not a device's, or the device does
- * not export it). Does not block. */
+/* Gets the frame's memory as a dma-buf, which a GPU or an encoder reads without a copy. `*fd` stays the frame's and
+ * is valid until the frame is released; duplicate it (dup) to keep it longer. The planes lie in it as in
+ * maq_frame_desc.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the memory is not a device's, or the device
+ * does not export it). Does not block. */
 MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 
 /* Copies the frame's pixels to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8), height_px rows of `stride_bytes`
@@ -87,9 +88,9 @@ MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
                                          size_t stride_bytes, size_t size_bytes);
 
-/* Writes the frame's picture to a file, in the format of the path's extension: PNG (.png), lossless, or JPEG (.jpg, .jpeg)
- * at quality 95. Grey pictures stay grey, others are written as RGB, without alpha. The file is written atomically and
- * replaces an existing one; its folder must exist.
+/* Writes the frame's picture to a file, in the format of the path's extension: PNG (.png), lossless, or JPEG (.jpg,
+ * .jpeg) at quality 95. Grey pictures stay grey, others are written as RGB, without alpha. The file is written
+ * atomically and replaces an existing one; its folder must exist.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNSUPPORTED (a depth image),
  * MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is written. */
 MAQ_API maq_status maq_frame_save(const maq_frame* frame, const char* path);

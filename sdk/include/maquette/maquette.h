@@ -9,22 +9,20 @@
  *
  * The grammar, which holds everywhere:
  * - Names are maq_<object>_<verb>_<noun>. `_get_…` reads and changes nothing; `_get_<thing>_count` returns how many there
- *   are and `_get_<thing>(…, index, &thing)` one of them. Enum values begin with the noun of their type. The words are min
- *   and max, for bounds of every kind.
- * - Whoever calls one of these gives back what it returned, once, in any order; NULL is fine:
- *     _create                                       _destroy   objects that work: contexts, sources, models, renderers
- *     _open, _open_memory, _build, _finish          _close     data: captures and scenes, from a file or just built
- *       (_finish of a clip or recorder completes its file and returns nothing)
- *     _acquire_…, _run, _load_…, _wrap              _release   frames, results and images; most come from a pool of fixed
- *                                                              size, named in the config
- *   What `_get_…` returns belongs to the object it was asked of.
+ *   are and `_get_<thing>(…, index, &thing)` gets one of them. Enum values begin with the noun of their type. Bounds of
+ *   every kind are min and max.
+ * - What one of these verbs returned is given back by the verb on its right, once, in any order; NULL is fine:
+ *     _create                               _destroy  contexts, sources, lists, models, builders, renderers, writers
+ *     _open, _open_memory, _build, _finish  _close    captures and scenes (_finish of a builder; that of a clip or a
+ *                                                     recorder completes its file and returns nothing)
+ *     _acquire_…, _run, _load_…, _wrap      _release  frames, results and images, most of them from a pool of fixed size
+ *   What `_get_…` returns belongs to the object that it was called with.
  * - Every call that can fail returns maq_status and writes its result through its last argument only when it returns
  *   MAQ_OK. maq_get_last_error(NULL) is the sentence that says what was wrong and what to do.
- * - Structs that may grow begin with struct_size, which the caller sets to sizeof the struct; the `_init` functions do so,
- *   and fill in the defaults. A NULL config means the defaults. Pointers in a config are read during the call only.
- * - Yes or no is an int32_t, 1 or 0. A field or argument that holds an enum has the enum's type, which is 4 bytes; one
- *   that is optional is 0. Sizes in memory are size_t, counts uint32_t or uint64_t.
- * - Units are in the names: _px, _ms, _ns, _m, _bytes. Texts are UTF-8 and end with 0.
+ * - Structs that may grow begin with struct_size, which the caller sets to sizeof the struct; the `_init` functions do
+ *   so and fill in the defaults. A NULL config means the defaults. Configs are copied.
+ * - Yes or no is an int32_t, 1 or 0. What holds a value of an enum has the enum's type, which takes 4 bytes.
+ * - Units are in the names: _px, _ms, _ns, _m, _bytes. Texts are UTF-8 and end with a zero byte.
  * - No C++ exception leaves the library, and it never ends the process.
  * - Each function names its thread level: "any thread" may be called at any time from any thread; "one at a time" may
  *   be called from any thread, but not for the same handle from two threads at once.

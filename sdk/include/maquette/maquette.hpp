@@ -1,4 +1,4 @@
-// Maquette for C++17: owners and exceptions over the C API, in this header alone. The C headers say what each call does.
+// Maquette for C++17: owners and exceptions over the C API, in this header alone. The C headers document each call.
 //
 //   maquette::Context context;
 //   maquette::Source source(context, "video:clip.mp4");

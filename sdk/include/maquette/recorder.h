@@ -37,8 +37,9 @@ MAQ_API maq_status maq_recorder_create(maq_context* context, const char* path, c
                                        const maq_recorder_config* config, maq_recorder** recorder);
 
 /* Writes a frame: it is complete in the file when the call returns. Frames may have different sizes and formats.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the frame before), MAQ_ERROR_UNWRITABLE (the disk is
- * full: earlier frames stay readable, and frames can be added again once there is space). Blocks while it is written. */
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the frame before), MAQ_ERROR_UNWRITABLE (the
+ * disk is full: earlier frames stay readable, and frames can be added again once there is space). Blocks while it is
+ * written. */
 MAQ_API maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame);
 
 /* Writes the index, without which a player has to search for the frames, and closes the file.

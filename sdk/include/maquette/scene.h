@@ -1,5 +1,5 @@
-/* Scenes: captures of a place as posed photos and a point cloud, built into scenes that are rendered from new viewpoints,
- * without training for each place (NPBG++, arXiv 2203.13318; docs/scenes.md).
+/* Scenes: captures of a place as posed photos and a point cloud, built into scenes that are rendered from new
+ * viewpoints, without training for each place (NPBG++, arXiv 2203.13318; docs/scenes.md).
  *
  *   maq_capture* capture;          maq_capture_open(context, "folder", &capture);
  *   maq_scene* scene;              maq_scene_build(context, NULL, capture, NULL, &scene);
@@ -10,8 +10,8 @@
  *
  * An app with a point cloud and cameras of its own adds its photos to a maq_scene_builder.
  *
- * Lengths are in the unit of the cloud and the cameras ("units of the scene"). A scene is rendered with the bundle of
- * networks that it was built with. Objects may be destroyed and closed in any order: each keeps what it needs. */
+ * Lengths are in the unit of the cloud and the cameras ("units of the scene"). A scene is rendered with the bundle
+ * of networks that it was built with. Objects may be destroyed and closed in any order: each keeps what it needs. */
 #ifndef MAQUETTE_SCENE_H_
 #define MAQUETTE_SCENE_H_
 
@@ -26,7 +26,8 @@ typedef struct maq_scene_builder maq_scene_builder;
 typedef struct maq_scene_renderer maq_scene_renderer;
 typedef struct maq_scene_image maq_scene_image;
 
-/* ---- Building ------------------------------------------------------------------------------------------------------ */
+/* ---- Building
+ * ------------------------------------------------------------------------------------------------------ */
 
 /* Receives the progress of a call on the thread that builds: `done` is its fraction, 0 to 1, `stage` a sentence that is
  * valid during the call. Return 0 to cancel, anything else to go on. It must not call the builder, nor throw. */
@@ -45,8 +46,8 @@ typedef struct maq_scene_build_config {
    * makes the file smaller. 0: all points keep view dependence; negative (default): 0.05, with 8 bits more where needed
    * for at most half of the points to depend on the view. */
   double min_variation;
-  /* Fraction of a photo's resolution at which visibility is tested: the smaller, the more a point hides of what is behind
-   * it, for sparse clouds. 1/16 to 1 (default). */
+  /* Fraction of a photo's resolution at which visibility is tested: the smaller, the more a point hides of what is
+   * behind it, for sparse clouds. 1/16 to 1 (default). */
   double visibility_scale;
   double near_depth; /* points nearer to a camera, along its axis, are not seen by it; units of the scene, default 0 */
   uint64_t max_points; /* larger clouds are thinned out evenly; 0 (default): no limit */
@@ -66,7 +67,7 @@ typedef struct maq_scene_build_stats {
   uint32_t unused_view_count; /* photos that saw none; for maq_scene_build also those missing, damaged or too large */
   uint64_t cloud_point_count; /* after max_points */
   uint64_t seen_point_count;  /* points that a photo has seen */
-  /* Wall-clock milliseconds so far, over all photos: reading and undistorting, finding the visible points, aligning with
+  /* Wall-clock milliseconds so far, over all photos: reading and undistorting, finding visible points, aligning with
    * gravity, the extractor network, accumulating the regression; then solving it, and packing the scene. */
   double load_ms, visibility_ms, align_ms, extract_ms, accumulate_ms, solve_ms, pack_ms;
 } maq_scene_build_stats;
@@ -96,12 +97,12 @@ typedef struct maq_point_cloud {
   double up[3];         /* of the world; any length but 0 */
 } maq_point_cloud;
 
-/* Creates a builder for a cloud of the app. `config` may be NULL for the defaults. `*builder` is the caller's, to be given
- * to maq_scene_builder_destroy.
+/* Creates a builder for a cloud of the app. `config` may be NULL for the defaults. `*builder` is the caller's, to be
+ * given to maq_scene_builder_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (no points, a point that is not finite, `up` without length),
- * MAQ_ERROR_UNSUPPORTED (over 30 million points; a bundle for another task), MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE,
- * MAQ_ERROR_RUNTIME_LIBRARY, MAQ_ERROR_OUT_OF_MEMORY (max_memory_bytes). Blocks while networks are read and the cloud is
- * copied. */
+ * MAQ_ERROR_UNSUPPORTED (over 30 million points; a bundle for another task), MAQ_ERROR_NOT_FOUND,
+ * MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_RUNTIME_LIBRARY, MAQ_ERROR_OUT_OF_MEMORY (max_memory_bytes). Blocks while networks
+ * are read and the cloud is copied. */
 MAQ_API maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_config* config,
                                             const maq_point_cloud* cloud, maq_scene_builder** builder);
 
@@ -109,17 +110,18 @@ MAQ_API maq_status maq_scene_builder_create(maq_context* context, const maq_scen
  * Once for each builder, from any thread. Does not block. */
 MAQ_API void maq_scene_builder_destroy(maq_scene_builder* builder);
 
-/* Adds a photo, of any pixel format but depth: finds the points it sees and accumulates their features. The photo is not
- * kept: memory does not grow with the number of photos. On failure and when cancelled the builder stays as it was.
- * `*seen_point_count`, unless NULL: how many points this photo saw, possibly 0.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, one of another size than the photo, or with a
- * distortion that is not invertible within the photo), MAQ_ERROR_IMAGE_SIZE (too large for the network after scaling to
- * long_side_px), MAQ_ERROR_UNSUPPORTED (a depth image), MAQ_ERROR_OUT_OF_MEMORY (max_memory_bytes, or the machine's
- * memory), MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks until the photo has been added. */
+/* Adds a photo, of any pixel format but depth: finds the points it sees and accumulates their features. The photo is
+ * not kept: memory does not grow with the number of photos. On failure and when cancelled the builder stays as it
+ * was. `*seen_point_count`, unless NULL: how many points this photo saw, possibly 0.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, one of another size than the photo, or with
+ * a distortion that is not invertible within the photo), MAQ_ERROR_IMAGE_SIZE (too large for the network after
+ * scaling to long_side_px), MAQ_ERROR_UNSUPPORTED (a depth image), MAQ_ERROR_OUT_OF_MEMORY (max_memory_bytes, or the
+ * machine's memory), MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks until the photo has been added. */
 MAQ_API maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
                                               const maq_pinhole_camera* camera, uint64_t* seen_point_count);
 
-/* Cancels the maq_scene_builder_add_view that runs, or else the next: it returns MAQ_CANCELLED. Later ones run as usual.
+/* Cancels the maq_scene_builder_add_view that runs, or else the next: it returns MAQ_CANCELLED. Later ones run as
+ * usual.
  * Any thread, also while another adds a view. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_builder_cancel(maq_scene_builder* builder);
 
@@ -134,7 +136,8 @@ MAQ_API maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder,
  * done. */
 MAQ_API maq_status maq_scene_builder_finish(maq_scene_builder* builder, maq_scene** scene);
 
-/* ---- Scenes -------------------------------------------------------------------------------------------------------- */
+/* ---- Scenes
+ * -------------------------------------------------------------------------------------------------------- */
 
 typedef struct maq_scene_info {
   uint32_t struct_size;
@@ -147,11 +150,11 @@ typedef struct maq_scene_info {
   uint8_t networks_sha256[32];         /* of the networks that built it; a renderer needs the same */
 } maq_scene_info;
 
-/* Opens a scene file (.maqs): checks it completely and maps it into memory. While the scene is open the file must not be
- * written to or truncated; it may be deleted or renamed, and maq_scene_save to its name is fine (it makes a new file).
- * `*scene` is the caller's, to be given to maq_scene_close.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (truncated, damaged, or not a
- * scene), MAQ_ERROR_UNSUPPORTED (another version), MAQ_ERROR_OUT_OF_MEMORY. Blocks while it is checked. */
+/* Opens a scene file (.maqs): checks it completely and maps it into memory. While the scene is open the file must
+ * not be written to or truncated; it may be deleted or renamed, and maq_scene_save to its name is fine (it makes a
+ * new file). `*scene` is the caller's, to be given to maq_scene_close.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (truncated, damaged, or
+ * not a scene), MAQ_ERROR_UNSUPPORTED (another version), MAQ_ERROR_OUT_OF_MEMORY. Blocks while it is checked. */
 MAQ_API maq_status maq_scene_open(maq_context* context, const char* path, maq_scene** scene);
 
 /* Opens a scene file that lies in memory, of any alignment; it is copied. As maq_scene_open otherwise. */
@@ -173,7 +176,8 @@ MAQ_API maq_status maq_scene_save_ply(const maq_scene* scene, const char* path);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info);
 
-/* ---- Rendering ----------------------------------------------------------------------------------------------------- */
+/* ---- Rendering
+ * ----------------------------------------------------------------------------------------------------- */
 
 typedef struct maq_scene_renderer_config {
   uint32_t struct_size;
@@ -221,10 +225,11 @@ typedef struct maq_scene_image_stats {
  * caller. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_renderer_config_init(maq_scene_renderer_config* config, uint32_t struct_size);
 
-/* Creates a renderer of a scene. Several renderers of one scene may run at once; they share its points, not the networks.
- * `config` may be NULL for the defaults. `*renderer` is the caller's, to be given to maq_scene_renderer_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE (also: the scene was built
- * with other networks), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while networks are read. */
+/* Creates a renderer of a scene. Several renderers of one scene may run at once; they share its points, not the
+ * networks. `config` may be NULL for the defaults. `*renderer` is the caller's, to be given to
+ * maq_scene_renderer_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE (also: the scene was
+ * built with other networks), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while networks are read. */
 MAQ_API maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_renderer_config* config,
                                              const maq_scene* scene, maq_scene_renderer** renderer);
 
@@ -232,12 +237,12 @@ MAQ_API maq_status maq_scene_renderer_create(maq_context* context, const maq_sce
  * Once for each renderer, from any thread, while it does not render. Does not block. */
 MAQ_API void maq_scene_renderer_destroy(maq_scene_renderer* renderer);
 
-/* Renders the view of a camera, in a picture of the camera's size. The first picture of a size takes longer, since networks
- * are prepared for it. Where no points are visible no network runs. `*image` comes from a pool of image_pool_size: give it
- * back with maq_scene_image_release.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, or one with distortion; a principal point over a
- * million pixels away; focal lengths that differ by a factor over 1000), MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_POOL_EMPTY,
- * MAQ_ERROR_OUT_OF_MEMORY, MAQ_ERROR_INFERENCE. Blocks while it renders. */
+/* Renders the view of a camera, in a picture of the camera's size. The first picture of a size takes longer, since
+ * networks are prepared for it. Where no points are visible no network runs. `*image` comes from a pool of
+ * image_pool_size: give it back with maq_scene_image_release.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, or one with distortion; a principal point
+ * over a million pixels away; focal lengths that differ by a factor over 1000), MAQ_ERROR_IMAGE_SIZE,
+ * MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_OUT_OF_MEMORY, MAQ_ERROR_INFERENCE. Blocks while it renders. */
 MAQ_API maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhole_camera* camera,
                                           maq_scene_image** image);
 
@@ -254,9 +259,9 @@ MAQ_API maq_status maq_scene_image_get_plane(const maq_scene_image* image, maq_s
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_image_stats* stats);
 
-/* Writes the image to a file, in the format of the path's extension: PNG (.png), lossless, with alpha where `with_alpha`
- * is 1, or JPEG (.jpg, .jpeg) at quality 95, without alpha. The file is written atomically and replaces an existing one;
- * its folder must exist.
+/* Writes the image to a file, in the format of the path's extension: PNG (.png), lossless, with alpha where
+ * `with_alpha` is 1, or JPEG (.jpg, .jpeg) at quality 95, without alpha. The file is written atomically and replaces
+ * an existing one; its folder must exist.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension, alpha in a JPEG file), MAQ_ERROR_UNWRITABLE,
  * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is written. */
 MAQ_API maq_status maq_scene_image_save(const maq_scene_image* image, const char* path, int32_t with_alpha);

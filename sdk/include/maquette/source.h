@@ -22,8 +22,8 @@ typedef enum maq_source_state {
   MAQ_SOURCE_RECONNECTED = 5   /* frames come again */
 } maq_source_state;
 
-/* Receives a change of state on a thread of the source; it must return promptly and must not destroy the source. `reason`
- * is valid during the call. No call begins after maq_source_destroy has returned. */
+/* Receives a change of state on a thread of the source; it must return promptly and must not destroy the source.
+ * `reason` is valid during the call. No call begins after maq_source_destroy has returned. */
 typedef void (*maq_source_state_callback)(void* user_data, maq_source_state state, const char* reason);
 
 typedef struct maq_source_config {
@@ -98,15 +98,15 @@ typedef struct maq_source_scheme {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
-/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec", "stub:people?count=2&seed=7",
- * "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:". "file:clip.mp4" chooses among the first three by the
- * file's content, "camera:" opens the first camera that can be opened.
- * "?size=640x480&fps=15" works with each: frames are scaled to that size, frames of a clip are left out down to that rate;
- * a camera takes the nearest that it offers, which maq_source_get_info tells. For cameras, "format=MJPG" selects a pixel
- * format and "exposure=10000&focus=auto" sets controls. "live=1" plays a file or stub as a camera would, and faults such as
- * "drop=0.1" or "unplug=3s@5s" can be injected into any source (docs/cameras/stand-ins.md).
- * Write a '?' of a file name as %3F and a '%' as %25. `config` may be NULL.
- * `*source` is the caller's, to be given to maq_source_destroy.
+/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec",
+ * "stub:people?count=2&seed=7", "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:". "file:clip.mp4"
+ * chooses among the first three by the file's content, "camera:" opens the first camera that can be opened.
+ * "?size=640x480&fps=15" works with each: frames are scaled to that size, frames of a clip are left out down to that
+ * rate; a camera takes the nearest that it offers, which maq_source_get_info tells. For cameras, "format=MJPG"
+ * selects a pixel format and "exposure=10000&focus=auto" sets controls. "live=1" plays a file or stub as a camera
+ * would, and faults such as "drop=0.1" or "unplug=3s@5s" can be injected into any source
+ * (docs/cameras/stand-ins.md). Write a '?' of a file name as %3F and a '%' as %25. `config` may be NULL. `*source`
+ * is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),
  * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE; for cameras MAQ_ERROR_DEVICE_LOST,
  * MAQ_ERROR_BUSY, MAQ_ERROR_NO_PERMISSION, MAQ_ERROR_RUNTIME_LIBRARY too. Blocks while files are read and devices
@@ -122,13 +122,13 @@ MAQ_API void maq_source_destroy(maq_source* source);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info* info);
 
-/* Takes the next frame: of a camera the oldest that waits. A camera's frame lies in memory of the device, which has few
- * buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources (MAQ_WAIT_FOREVER:
- * no bound); files and stubs deliver at once and ignore it. `*frame` comes from a pool of frame_pool_size: give it back
- * with maq_frame_release soon.
+/* Takes the next frame: of a camera the oldest that waits. A camera's frame lies in memory of the device, which has
+ * few buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources
+ * (MAQ_WAIT_FOREVER: no bound); files and stubs deliver at once and ignore it. `*frame` comes from a pool of
+ * frame_pool_size: give it back with maq_frame_release soon.
  * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_ERROR_DEVICE_LOST,
- * MAQ_ERROR_POOL_EMPTY when all frames are held, MAQ_ERROR_UNREADABLE when a clip ends before its header says, after all
- * readable frames, or for a damaged frame of a recording, which is left out. Blocks while decoding. */
+ * MAQ_ERROR_POOL_EMPTY when all frames are held, MAQ_ERROR_UNREADABLE when a clip ends before its header says, after
+ * all readable frames, or for a damaged frame of a recording, which is left out. Blocks while decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
 
 /* Gets the camera's intrinsics.
@@ -140,15 +140,16 @@ MAQ_API maq_status maq_source_get_intrinsics(const maq_source* source, maq_intri
  * (not now), MAQ_ERROR_DEVICE_LOST (also while the camera is lost). Blocks while the device is asked. */
 MAQ_API maq_status maq_source_get_control(maq_source* source, maq_control control, maq_control_info* info);
 
-/* Sets a control. A manual exposure, gain, focus or white balance switches off its automatic. Controls are set again when
- * a lost camera is reconnected.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (out of range), MAQ_ERROR_UNSUPPORTED (the device does not have it),
- * MAQ_ERROR_BUSY (not now), MAQ_ERROR_DEVICE_LOST (also while the camera is lost). Blocks while the device is asked. */
+/* Sets a control. A manual exposure, gain, focus or white balance switches off its automatic. Controls are set again
+ * when a lost camera is reconnected.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (out of range), MAQ_ERROR_UNSUPPORTED (the device does not have
+ * it), MAQ_ERROR_BUSY (not now), MAQ_ERROR_DEVICE_LOST (also while the camera is lost). Blocks while the device is
+ * asked. */
 MAQ_API maq_status maq_source_set_control(maq_source* source, maq_control control, double value);
 
 /* Moves to the first frame at `time_ns` after the source's first frame, or later: the next call acquires it.
- * One at a time, together with maq_source_acquire_frame. Errors: MAQ_ERROR_INVALID_ARGUMENT (negative), MAQ_ERROR_UNSUPPORTED (only
- * recordings and stubs can). Does not block. */
+ * One at a time, together with maq_source_acquire_frame. Errors: MAQ_ERROR_INVALID_ARGUMENT (negative),
+ * MAQ_ERROR_UNSUPPORTED (only recordings and stubs can). Does not block. */
 MAQ_API maq_status maq_source_seek(maq_source* source, int64_t time_ns);
 
 /* Get the number of kinds of sources of this build, and the kind at `index`. The caller sets scheme->struct_size.
@@ -191,7 +192,8 @@ MAQ_API void maq_camera_list_destroy(maq_camera_list* list);
 /* Returns the number of cameras; 0 for NULL. Any thread. Does not fail or block. */
 MAQ_API uint32_t maq_camera_list_get_count(const maq_camera_list* list);
 
-/* Get the camera at `index`, and of its modes the one at `mode_index`. The caller sets struct_size of `info` and `mode`.
+/* Get the camera at `index`, and of its modes the one at `mode_index`. The caller sets struct_size of `info` and
+ * `mode`.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (also an index out of range). Do not block. */
 MAQ_API maq_status maq_camera_list_get_camera(const maq_camera_list* list, uint32_t index, maq_camera_info* info);
 MAQ_API maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index, uint32_t mode_index,

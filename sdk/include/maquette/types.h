@@ -54,8 +54,8 @@ typedef enum maq_status {
 /* The id of something that is not tracked. */
 #define MAQ_NO_ID (-1)
 
-/* A file that lies in memory of the app, where there is no file system to read it from (phones, browsers). The call that
- * takes it copies it: name and data may be freed when the call returns. */
+/* A file that lies in memory of the app, where there is no file system to read it from (phones, browsers). The call
+ * that takes it copies it: name and data may be freed when the call returns. */
 typedef struct maq_memory_file {
   const char* name; /* as in the folder: "manifest.json", "trunk.onnx" */
   const void* data;
@@ -66,15 +66,15 @@ typedef struct maq_memory_file {
  * The text is static. Any thread. Does not fail or block. */
 MAQ_API const char* maq_status_get_name(maq_status status);
 
-/* Returns what was wrong and what to do, in a sentence: with NULL, of this thread's latest failed call, on whatever handle
- * or none; with a handle of this API, of the latest failed call on that handle, on any thread. "" when none failed. A call
- * that fails to create an object is one on the context. Calls that succeed do not clear the text.
- * The text is the library's and stays valid until this thread calls maq_get_last_error again.
+/* Returns what was wrong and what to do, in a sentence: with NULL, of this thread's latest failed call, on whatever
+ * handle or none; with a handle of this API, of the latest failed call on that handle, on any thread. "" when none
+ * failed. A call that fails to create an object is one on the context. Calls that succeed do not clear the text. The
+ * text is the library's and stays valid until this thread calls maq_get_last_error again.
  * Any thread, while `handle` is alive. Does not fail or block. */
 MAQ_API const char* maq_get_last_error(const void* handle);
 
-/* Return the version of the library found at run time ("0.2.0"), the git commit it was built from, and the options it was
- * built with ("release, g++ 12.2"). The texts are static. Any thread. Do not fail or block. */
+/* Return the version of the library found at run time ("0.2.0"), the git commit it was built from, and the options
+ * it was built with ("release, g++ 12.2"). The texts are static. Any thread. Do not fail or block. */
 MAQ_API const char* maq_get_sdk_version(void);
 MAQ_API const char* maq_get_git_commit(void);
 MAQ_API const char* maq_get_build_options(void);

@@ -105,7 +105,7 @@ TEST_F(SceneCommandLine, EveryOptionOfBuildingDoesWhatItSays) {
   EXPECT_LT(built("--long-side 16").at("points"), usual.at("points"));
   EXPECT_EQ(built("--long-side 0 --threads 2").at("points"), usual.at("points"));
   environment_ = "MAQ_SCENE_BUNDLE=";
-  EXPECT_EQ(built("--networks '" MAQ_TEST_DATA "/tiny_scene/bundle'").at("points"), usual.at("points"));
+  EXPECT_EQ(built("--bundle '" MAQ_TEST_DATA "/tiny_scene/bundle'").at("points"), usual.at("points"));
 }
 
 TEST_F(SceneCommandLine, RendersPicturesWithTheFiguresThatTheBenchmarkReads) {
@@ -150,7 +150,7 @@ TEST_F(SceneCommandLine, RendersClipsThatPlay) {
 TEST_F(SceneCommandLine, WhatIsMissingOrWrongIsOneSentence) {
   expect_failure("build nowhere --out a.maqs", "nowhere");
   expect_failure("build . --out a.maqs", "");
-  expect_failure("build place --out a.maqs --networks none", "none");
+  expect_failure("build place --out a.maqs --bundle none", "none");
   expect_failure("build place --out out.txt/a.maqs", "cannot be written");
   expect_failure("build place --out place", "is a folder");
   expect_failure("render none.maqs --path orbit --out c.mp4", "none.maqs");

@@ -39,7 +39,7 @@ def build(options: argparse.Namespace) -> dict:
     noise = 0.02 + 0.01 * (varying == 0) + 0.002 * (options.coefficients == 8) + 20 / points
     said = {"cloud_points": cloud, "points": points, "varying": varying, "bytes": size,
             "seconds": {"total": 0.1, "extract": 0.08}, "peak_memory_mib": 100 + points / 1e4}  # fmt: skip
-    options.out.write_text(json.dumps(said | {"noise": noise, "networks": options.networks.name}))
+    options.out.write_text(json.dumps(said | {"noise": noise, "networks": options.bundle.name}))
     return said
 
 
@@ -72,7 +72,7 @@ def main(words: list[str], refused: tuple[str, ...]) -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("command", choices=("build", "render", "info"))
     parser.add_argument("first", type=Path)
-    for name in ("--out", "--networks", "--json", "--capture"):
+    for name in ("--out", "--bundle", "--json", "--capture"):
         parser.add_argument(name, type=Path)
     for name, value in (("--points", 10**9), ("--views", None), ("--long-side", 640), ("--coefficients", 8),
                         ("--min-variation", 0.01), ("--size", None), ("--repeat", 1), ("--threads", 2)):  # fmt: skip

@@ -22,7 +22,9 @@ def tune_place(place: Path, options: argparse.Namespace) -> None:
     """Raises subprocess.CalledProcessError where a command fails; it has said why."""
     with tempfile.TemporaryDirectory() as work:
         scene = Path(work) / "scene.maqs"
-        subprocess.run([options.program, "scene", "build", place, "--bundle", options.networks, "--out", scene], check=True)
+        subprocess.run(
+            [options.program, "scene", "build", place, "--bundle", options.networks, "--out", scene], check=True
+        )
         tuning = [sys.executable, "-m", "export.scenes.finetune", place, "--networks", options.networks]
         tuning += ["--weights", options.weights, "--scene", scene, "--out", options.out / place.resolve().name]
         tuning += ["--save-at", *(f"{x:g}" for x in options.save_at), *(["--refiner"] if options.refiner else [])]

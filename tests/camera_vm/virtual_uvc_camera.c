@@ -210,7 +210,7 @@ struct message {
 
 static int host; /* our end of the socket pair */
 
-/* The kernel closes the socket when the port is detached; there is nobody left to serve then. */
+/* The kernel closes the socket when the port is detached; nothing is left to serve then. */
 static void write_all(const void* bytes, size_t n) {
   const char* at = bytes;
   while (n > 0) {

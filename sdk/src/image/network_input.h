@@ -1,4 +1,4 @@
-// A frame as the detector wants it.
+// A frame as the input of a network: resized, normalised, padded.
 #pragma once
 
 #include <array>
@@ -16,7 +16,8 @@ struct NetworkInputSpec {
   std::array<float, 3> std{};
 };
 
-// How one side of an image is resized: for each new pixel the first of the old ones that it draws on, and their weights.
+// How one side of an image is resized: for each new pixel the first of the old ones that it draws on, and their
+// weights.
 struct ResizeAxis {
   int from_px = 0;
   int to_px = 0;
@@ -37,8 +38,8 @@ struct NetworkInput {
   int padded_height_px = 0;
 
   // Scratch, kept so that frames of one size allocate nothing.
-  ResizeAxis across;
-  ResizeAxis down;
+  ResizeAxis columns;
+  ResizeAxis rows;
   std::vector<float> row;
   std::vector<uint8_t> converted;  // the image as BGR, where it comes in another format
 };

@@ -5,7 +5,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
-#include "image/geometry/turned_photo.h"
+#include "image/geometry/warp.h"
 #include "scene/build/descriptor_sampling.h"
 #include "scene/build/descriptor_solving.h"
 #include "scene/gravity_alignment.h"
@@ -123,7 +123,7 @@ const float* SceneBuilder::find_features(const ImageView& photo, const PinholeCa
                                          const PinholeCamera& upright) {
   {
     const ScopedTimer timer(times_.turning_ms);
-    turn_photo(photo, pixels_between(upright, camera), upright.width_px, upright.height_px, turned_);
+    warp_to_rgb(photo, pixels_between(upright, camera), upright.width_px, upright.height_px, turned_);
   }
   const ScopedTimer timer(times_.extractor_ms);
   const float* features = networks_.extract(turned_.data(), upright.width_px, upright.height_px);

@@ -8,7 +8,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/rounding.h"
-#include "image/geometry/turned_picture.h"
+#include "image/geometry/warp.h"
 #include "scene/gravity_alignment.h"
 #include "scene/render/refiner_roi.h"
 #include "scene/visibility/view_frustum.h"
@@ -216,9 +216,9 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture
           return Raster<std::remove_pointer_t<decltype(pixels)>>{pixels, of.width_px, of.height_px};
         };
         const RenderedPicture& from = upright;
-        turn_bytes(raster(from, from.bgr.data()), 3, back, raster(picture, picture.bgr.data()), top, bottom);
-        turn_bytes(raster(from, from.alpha.data()), 1, back, raster(picture, picture.alpha.data()), top, bottom);
-        turn_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
+        warp_bytes(raster(from, from.bgr.data()), 3, back, raster(picture, picture.bgr.data()), top, bottom);
+        warp_bytes(raster(from, from.alpha.data()), 1, back, raster(picture, picture.alpha.data()), top, bottom);
+        warp_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
       });
     }
     counts.turn_ms = watch.lap_ms();

@@ -10,7 +10,7 @@
 
 #include "core/error.h"
 #include "support/peak_memory.h"
-#include "scene/build/scene_builder.h"
+#include "scene/build/descriptor_fitter.h"
 
 namespace {
 
@@ -63,7 +63,7 @@ void measure(int count, char** arguments) {
   for (int i = 0; i < 3 * width * height; ++i) pixels[i] = uint8_t(random());
 
   double seconds = 0, first_ms = 0;
-  maq::BuildTimes times;
+  maq::FittingTimes times;
   size_t seen = 0, looks = 0;
   uint64_t never_seen = 0;
   const double grown_mib = peak_memory_growth_mib([&] {
@@ -73,15 +73,15 @@ void measure(int count, char** arguments) {
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     };
     maq::SceneNetworks networks(runtime, arguments[1], maq::SessionSettings{threads});
-    maq::BuildOptions options;
+    maq::FittingOptions options;
     options.threads = threads;
-    maq::SceneBuilder builder(std::move(cloud), {0, 0, 1}, networks, options);
+    maq::DescriptorFitter builder(std::move(cloud), {0, 0, 1}, networks, options);
     for (int view = 0; view < views; ++view) {
       const double roll = roll_deg * kPi / 180 * std::sin(2.4 * view);
       looks += builder.add_view(photo.image, nullptr, camera_of(width, height, 2 * kPi * view / views, roll)).value();
       if (view == 0) first_ms = 1000 * seconds_since_start();
     }
-    const maq::ModelledPoints made = builder.finish_and_forget();
+    const maq::FittedPoints made = builder.finish_and_forget();
     seconds = seconds_since_start();
     seen = made.count();
     never_seen = made.never_seen;
@@ -92,8 +92,8 @@ void measure(int count, char** arguments) {
   std::printf("%zu points seen %.1f times, %llu never\n", seen, double(looks) / double(seen),
               static_cast<unsigned long long>(never_seen));
   std::printf("seconds in all %.2f, until after the first photo %.2f, visibility %.2f, turning %.2f, extractor %.2f, ",
-              seconds, first_ms / 1000, times.visibility_ms / 1000, times.turning_ms / 1000, times.extractor_ms / 1000);
-  std::printf("moments %.2f, solving %.2f; peak memory %.0f MiB\n", times.moments_ms / 1000, times.solving_ms / 1000,
+              seconds, first_ms / 1000, times.visibility_ms / 1000, times.rotation_ms / 1000, times.extractor_ms / 1000);
+  std::printf("moments %.2f, solving %.2f; peak memory %.0f MiB\n", times.regression_ms / 1000, times.solving_ms / 1000,
               grown_mib);
 }
 

@@ -9,16 +9,15 @@
 #include <thread>
 
 #include "api/boundary.h"
+#include "core/worker_threads.h"
 #include "image/geometry/lens.h"
 #include "scene/pinhole_camera.h"
 #include "scene/networks/scene_networks.h"
 
 namespace maq {
 
-inline constexpr int kMostSceneThreads = 64;
-
 inline int scene_threads(int32_t wanted) {
-  require_range("config.threads", wanted, 0, kMostSceneThreads);
+  require_range("config.threads", wanted, 0, WorkerThreads::kMaxThreads);
   // More threads than this do not pay for networks of this size.
   constexpr unsigned kMostDefaultThreads = 4;
   return wanted > 0 ? wanted : int(std::clamp(std::thread::hardware_concurrency(), 1u, kMostDefaultThreads));

@@ -1,8 +1,13 @@
 #include "core/worker_threads.h"
 
+#include "core/error.h"
+
 namespace maq {
 
 WorkerThreads::WorkerThreads(int count) {
+  if (count < 1 || count > kMaxThreads) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Threads are ", count, ", but must be 1 to ", kMaxThreads, ".");
+  }
   try {
     for (int worker = 1; worker < count; ++worker) threads_.emplace_back([this, worker] { stay(worker); });
   } catch (...) {

@@ -104,7 +104,7 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   expect_invalid(maq_scene_renderer_create(context, &rendering_, nullptr, &no_renderer), context, "scene is NULL");
   expect_invalid(maq_scene_renderer_create(context, &rendering_, scene_.get(), nullptr), context, "renderer is NULL");
 
-  maquette::SceneBuilder builder(context_, building_, cloud_);
+  maquette::DescriptorFitter builder(context_, building_, cloud_);
   const maquette::Frame photo = capture_.load_view(0);
   expect_invalid(maq_scene_builder_add_view(builder.get(), nullptr, &camera_, &count), builder.get(), "photo is NULL");
   expect_invalid(maq_scene_builder_add_view(builder.get(), photo.get(), nullptr, &count), builder.get(),
@@ -123,7 +123,7 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
 }
 
 TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
-  maquette::SceneBuilder builder(context_, building_, cloud_);
+  maquette::DescriptorFitter builder(context_, building_, cloud_);
   maquette::SceneRenderer renderer(context_, rendering_, scene_);
   const maquette::SceneImage image = renderer.run(camera_);
   const maquette::Frame photo = capture_.load_view(0);

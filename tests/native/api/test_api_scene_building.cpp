@@ -104,7 +104,7 @@ TEST_F(ApiSceneBuilding, AnAppsOwnCloudAndPhotosGiveTheSceneOfTheCapture) {
   const maquette::Capture capture(context_, kCapture);
   const maq_scene_info expected = maquette::Scene(context_, build_config(), capture).info();
   const std::vector<float> places = api_tiny_scene::capture_places();
-  maquette::SceneBuilder builder(context_, build_config(), cloud_of(places));
+  maquette::DescriptorFitter builder(context_, build_config(), cloud_of(places));
   for (const uint32_t i : {0u, 1u, 2u, 4u}) builder.add_view(capture.load_view(i), capture.view(i).camera);
   const maq_scene_info found = builder.finish().info();
   EXPECT_EQ(found.point_count, expected.point_count);
@@ -122,7 +122,7 @@ TEST_F(ApiSceneBuilding, AnAppsOwnCloudAndPhotosGiveTheSceneOfTheCapture) {
 }
 
 TEST_F(ApiSceneBuilding, PhotosOfEveryPixelFormatSeeTheSame) {
-  maquette::SceneBuilder builder(context_, build_config(), cloud_of(places_));
+  maquette::DescriptorFitter builder(context_, build_config(), cloud_of(places_));
   uint64_t expected = 0;
   for (const maq_pixel_format format :
        {MAQ_PIXEL_BGR8, MAQ_PIXEL_RGB8, MAQ_PIXEL_RGBA8, MAQ_PIXEL_GREY8, MAQ_PIXEL_NV12, MAQ_PIXEL_YUYV}) {
@@ -141,7 +141,7 @@ TEST_F(ApiSceneBuilding, PhotosOfEveryPixelFormatSeeTheSame) {
 }
 
 TEST_F(ApiSceneBuilding, DistortedCamerasAreUndistorted) {
-  maquette::SceneBuilder builder(context_, build_config(), cloud_of(places_));
+  maquette::DescriptorFitter builder(context_, build_config(), cloud_of(places_));
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
   maq_camera camera = camera_at(0);
@@ -149,7 +149,7 @@ TEST_F(ApiSceneBuilding, DistortedCamerasAreUndistorted) {
   EXPECT_GT(builder.add_view(frame, camera), 300u);
   camera.distortion[0] = -1000;
   expect_error(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr), MAQ_ERROR_INVALID_ARGUMENT,
-               builder.get(), "folds the picture");
+               builder.get(), "not invertible");
   camera.distortion[0] = 0;
   for (const double value : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     camera.distortion[7] = value;
@@ -160,7 +160,7 @@ TEST_F(ApiSceneBuilding, DistortedCamerasAreUndistorted) {
 }
 
 TEST_F(ApiSceneBuilding, ViewsCanBeAddedAfterAScene) {
-  maquette::SceneBuilder builder(context_, build_config(), cloud_of(places_));
+  maquette::DescriptorFitter builder(context_, build_config(), cloud_of(places_));
   const Photo photo;
   const uint64_t seen = builder.add_view(maquette::Frame(context_, photo.desc), camera_at(0));
   const maquette::Scene first = builder.finish();
@@ -173,7 +173,7 @@ TEST_F(ApiSceneBuilding, ViewsCanBeAddedAfterAScene) {
 }
 
 TEST_F(ApiSceneBuilding, AViewThatSeesNothingIsNoErrorAndASceneOfSuchIsOne) {
-  maquette::SceneBuilder builder(context_, build_config(), cloud_of(places_));
+  maquette::DescriptorFitter builder(context_, build_config(), cloud_of(places_));
   const Photo photo;
   maq_camera away = camera_at(0);
   away.centre[0] = -3;
@@ -192,7 +192,7 @@ TEST_F(ApiSceneBuilding, UpMayBeAlongTheViewAndOfAnyLength) {
     maq_point_cloud cloud = cloud_of(places_);
     cloud.up[0] = length;
     cloud.up[2] = 0;
-    maquette::SceneBuilder builder(context_, build_config(), cloud);
+    maquette::DescriptorFitter builder(context_, build_config(), cloud);
     EXPECT_GT(builder.add_view(maquette::Frame(context_, photo.desc), camera_at(0)), 300u);
     const maq_scene_info info = builder.finish().info();
     EXPECT_EQ(info.up[0], 1);
@@ -266,7 +266,7 @@ TEST_F(ApiSceneBuilding, CoefficientsAreOfTheBitsAskedForAndMayAllVaryOrNone) {
 }
 
 TEST_F(ApiSceneBuilding, CamerasAndPhotosThatDoNotFitAreRefusedAndChangeNothing) {
-  maquette::SceneBuilder builder(context_, build_config(), cloud_of(places_));
+  maquette::DescriptorFitter builder(context_, build_config(), cloud_of(places_));
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
   const auto expect = [&](maq_status status, const std::string& text, auto change) {
@@ -302,11 +302,11 @@ TEST_F(ApiSceneBuilding, PhotosOverTheNetworksLimitNeedALongSide) {
   const Photo large(MAQ_PIXEL_GREY8, 4096, 2112);
   const maquette::Frame frame(context_, large.desc);
   const maq_camera camera = camera_at(0, 4096, 2112);
-  maquette::SceneBuilder whole(context_, config, cloud_of(places_));
+  maquette::DescriptorFitter whole(context_, config, cloud_of(places_));
   expect_error(maq_scene_builder_add_view(whole.get(), frame.get(), &camera, nullptr), MAQ_ERROR_IMAGE_SIZE,
                whole.get(), "4096");
   config.long_side_px = 96;
-  maquette::SceneBuilder shrunk(context_, config, cloud_of(places_));
+  maquette::DescriptorFitter shrunk(context_, config, cloud_of(places_));
   EXPECT_GT(shrunk.add_view(frame, camera), 300u);
 }
 
@@ -315,7 +315,7 @@ TEST_F(ApiSceneBuilding, TheLimitOfMemoryIsAStatus) {
   config.most_bytes = 1000;
   expect_refused(cloud_of(places_), config, MAQ_ERROR_OUT_OF_MEMORY, "over the limit");
   config.most_bytes = 4 * 2000 + 100;
-  maquette::SceneBuilder builder(context_, config, cloud_of(places_));
+  maquette::DescriptorFitter builder(context_, config, cloud_of(places_));
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
   const maq_camera camera = camera_at(0);
@@ -367,7 +367,7 @@ TEST_F(ApiSceneBuilding, AnotherThreadCancelsTheViewThatRuns) {
     return 1;
   };
   config.progress_user_data = &waiting;
-  maquette::SceneBuilder builder(context_, config, cloud_of(places_));
+  maquette::DescriptorFitter builder(context_, config, cloud_of(places_));
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
   const maq_camera camera = camera_at(0);
@@ -401,7 +401,7 @@ TEST_F(ApiSceneBuilding, ScenesAreBuiltSideBySideOfOneCapture) {
 }
 
 TEST_F(ApiSceneBuilding, ABuilderOutlivesWhatItWasMadeOf) {
-  std::unique_ptr<maquette::SceneBuilder> builder;
+  std::unique_ptr<maquette::DescriptorFitter> builder;
   std::unique_ptr<maquette::Frame> frame;
   {
     const maquette::Context context;
@@ -409,7 +409,7 @@ TEST_F(ApiSceneBuilding, ABuilderOutlivesWhatItWasMadeOf) {
     maq_scene_build_config config = build_config();
     config.bundle_path = bundle.c_str();
     const std::vector<float> places = places_;
-    builder = std::make_unique<maquette::SceneBuilder>(context, config, cloud_of(places));
+    builder = std::make_unique<maquette::DescriptorFitter>(context, config, cloud_of(places));
     frame = std::make_unique<maquette::Frame>(maquette::Capture(context, kCapture).load_view(0));
   }
   EXPECT_GT(builder->add_view(*frame, camera_at(0, 72, 56)), 300u);

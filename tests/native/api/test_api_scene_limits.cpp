@@ -26,7 +26,7 @@ TEST(ApiSceneLimits, TwentyMillionPointsOfAnAppTakeLittleMoreThanACopyOfThem) {
   const maquette::Context context;
   const Photo photo;
   const double grown_mib = peak_memory_growth_mib([&] {
-    maquette::SceneBuilder builder(context, build_config(), cloud_of(places));
+    maquette::DescriptorFitter builder(context, build_config(), cloud_of(places));
     EXPECT_GT(builder.add_view(maquette::Frame(context, photo.desc), camera_at(0)), 300u);
     const maquette::Scene scene = builder.finish();
     EXPECT_EQ(builder.stats().cloud_points, kPoints);
@@ -44,7 +44,7 @@ TEST(ApiSceneLimits, MostPointsThinsThemOut) {
   const maquette::Context context;
   maq_scene_build_config config = build_config();
   config.most_points = 999;
-  maquette::SceneBuilder builder(context, config, cloud_of(places));
+  maquette::DescriptorFitter builder(context, config, cloud_of(places));
   EXPECT_EQ(builder.stats().cloud_points, 999u);
   const Photo photo;
   for (const double angle : {0.0, 2.1, 4.2}) {

@@ -10,12 +10,12 @@ namespace {
 
 using maq::DepthKey;
 using maq::kNoPointKey;
-using maq::LookRaster;
+using maq::DescriptorRaster;
 
 constexpr size_t kWidth = 112, kHeight = 80;
 
-void shade(LookRaster& raster, size_t count, maq::WorkerThreads& threads) {
-  const maq::Scene scene = make_scene(made_up_points(count), {});
+void shade(DescriptorRaster& raster, size_t count, maq::WorkerThreads& threads) {
+  const maq::Scene scene = make_scene(synthetic_points(count), {});
   const maq::PinholeCamera camera = camera_of(int(kWidth), int(kHeight), 70);
   maq::ZBuffer buffer;
   buffer.begin(camera, 0.01, 1);
@@ -27,10 +27,10 @@ void shade(LookRaster& raster, size_t count, maq::WorkerThreads& threads) {
 }
 
 // Of the pixel (x, y) at a level, in double.
-double alpha_at(const LookRaster& raster, int level, int x, int y) {
-  const double sureness[] = {255, 255, 255, 128, 64};
+double alpha_at(const DescriptorRaster& raster, int level, int x, int y) {
+  const double confidence[] = {255, 255, 255, 128, 64};
   const int width = int(kWidth) >> level, height = int(kHeight) >> level;
-  const double own = raster.keys(level)[y * width + x] == kNoPointKey ? 0 : sureness[level];
+  const double own = raster.keys(level)[y * width + x] == kNoPointKey ? 0 : confidence[level];
   if (level == 4) return own;
   const auto coarser = [&](int at_x, int at_y) {
     return alpha_at(raster, level + 1, std::clamp(at_x, 0, width / 2 - 1), std::clamp(at_y, 0, height / 2 - 1));
@@ -44,9 +44,9 @@ double alpha_at(const LookRaster& raster, int level, int x, int y) {
 TEST(Coverage, IsAsItsDefinitionSays) {
   for (const size_t count : {1u, 40u, 3000u}) {
     maq::WorkerThreads threads(2);
-    LookRaster raster;
+    DescriptorRaster raster;
     shade(raster, count, threads);
-    maq::PictureCover cover;
+    maq::Coverage cover;
     cover.find(raster, int(kWidth), int(kHeight), threads);
     for (size_t y = 0; y < kHeight; ++y) {
       for (size_t x = 0; x < kWidth; ++x) {
@@ -65,9 +65,9 @@ TEST(Coverage, IsAsItsDefinitionSays) {
 
 TEST(Coverage, IsWholeWhereThereIsAPointAndNothingFarFromAll) {
   maq::WorkerThreads threads(1);
-  LookRaster raster;
+  DescriptorRaster raster;
   shade(raster, 1, threads);
-  maq::PictureCover cover;
+  maq::Coverage cover;
   cover.find(raster, int(kWidth), int(kHeight), threads);
   size_t covered = 0, nothing = 0;
   for (size_t i = 0; i < kWidth * kHeight; ++i) {

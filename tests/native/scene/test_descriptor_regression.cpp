@@ -13,7 +13,7 @@ namespace {
 
 using maq::kBasis;
 using maq::kFeatures;
-using maq::LookKind;
+using maq::DescriptorKind;
 using Feature = std::array<float, kFeatures>;
 using Basis = std::array<float, kBasis>;
 struct View {
@@ -80,20 +80,20 @@ class Reference {
 
 struct Look {
   explicit Look(const std::vector<View>& views, double alpha = 1) {
-    for (const View& view : views) moments.add(view.y.data(), view.h.data());
-    outcome = maq::solve_look(moments, alpha, beta);
+    for (const View& view : views) regressions.add(view.y.data(), view.h.data());
+    outcome = maq::solve_descriptor(regressions, alpha, beta);
   }
   double at(const Basis& h, int c) const {
-    double value = moments.mean_y[c];
+    double value = regressions.mean_y[c];
     for (int i = 0; i < kBasis; ++i) value += double(beta[i][c]) * h[size_t(i)];
     return value;
   }
   bool is_constant() const {
     return std::all_of(&beta[0][0], &beta[0][0] + kBasis * kFeatures, [](float value) { return value == 0; });
   }
-  maq::ViewMoments moments{};
+  maq::DescriptorRegression regressions{};
   float beta[kBasis][kFeatures];
-  LookKind outcome;
+  DescriptorKind outcome;
 };
 
 // Views from within `spread` of one direction, of a look that depends on the direction, with noise.
@@ -129,18 +129,18 @@ double error_of(const std::vector<View>& views, double alpha = 1) {
   return error / largest;
 }
 
-TEST(DescriptorRegression, APointThatNobodySawHasNoLook) { EXPECT_EQ(Look({}).outcome, LookKind::kUnseen); }
+TEST(DescriptorRegression, APointThatNobodySawHasNoLook) { EXPECT_EQ(Look({}).outcome, DescriptorKind::kUnseen); }
 
 TEST(DescriptorRegression, SeenOnceOrAlwaysFromTheSameSideTheLookIsTheMean) {
   const std::vector<View> some = views_around(50, 0.3, 1);
   const Look once({some[0]});
-  EXPECT_EQ(once.outcome, LookKind::kConstant);
+  EXPECT_EQ(once.outcome, DescriptorKind::kConstant);
   EXPECT_TRUE(once.is_constant());
-  EXPECT_TRUE(std::equal(some[0].y.begin(), some[0].y.end(), once.moments.mean_y));
+  EXPECT_TRUE(std::equal(some[0].y.begin(), some[0].y.end(), once.regressions.mean_y));
   std::vector<View> same = some;
   for (View& view : same) view.h = some[0].h;
   const Look constant(same);
-  EXPECT_EQ(constant.outcome, LookKind::kConstant);
+  EXPECT_EQ(constant.outcome, DescriptorKind::kConstant);
   EXPECT_TRUE(constant.is_constant()) << "exactly, although the features differ";
 }
 
@@ -178,10 +178,10 @@ TEST(DescriptorRegression, BadlyConditionedSystems) {
 
 TEST(DescriptorRegression, WithoutRegularisationASingularSystemFallsBackToTheMean) {
   const Look few(views_around(3, 0.4, 2), 0);
-  EXPECT_EQ(few.outcome, LookKind::kSingular);
+  EXPECT_EQ(few.outcome, DescriptorKind::kSingular);
   EXPECT_TRUE(few.is_constant());
   const std::vector<View> enough = views_around(300, 0.4, 3);
-  EXPECT_EQ(Look(enough, 0).outcome, LookKind::kVarying);
+  EXPECT_EQ(Look(enough, 0).outcome, DescriptorKind::kViewDependent);
   EXPECT_LE(error_of(enough, 0), 1e-4);
 }
 

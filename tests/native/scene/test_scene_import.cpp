@@ -18,7 +18,7 @@ using nlohmann::json;
 
 std::string texts_of(const std::vector<maq::Dropped>& dropped) {
   std::string text;
-  for (const maq::Dropped& one : dropped) text += maq::sentence_part(one) + "\n";
+  for (const maq::Dropped& one : dropped) text += maq::describe(one) + "\n";
   return text;
 }
 
@@ -308,9 +308,9 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
               "1 photos without a camera (first: orphan.png)\n"
               "1 cameras without a photo (first: 14)\n"
               "2 photos whose camera has no positive focal length (first: camera8.png)\n"
-              "1 photos whose camera has figures that are not finite (first: camera10.png)\n"
+              "1 photos whose camera has numbers that are not finite (first: camera10.png)\n"
               "2 photos whose camera has no size, or one over the limit (first: camera11.png)\n"
-              "1 photos whose distortion folds the picture, or whose axis is outside of it (first: camera13.png)\n"
+              "1 photos whose distortion is not invertible, or whose axis is outside of them (first: camera13.png)\n"
               "1 photos that are named twice (first: a.png)\n"
               "2 photos whose rotation is not of length 1, or mirrors (first: zero.png)\n"
               "3 photos whose pose is not finite (first: nan.png)\n"
@@ -318,7 +318,7 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
               "3 photos whose name leads out of their folder (first: ../up.png)\n"
               "2 photos that cannot be read as images (first: text.png)\n"
               "1 photos without pixels, or over the limit of size (first: huge.png)\n"
-              "2 points whose place is not finite\n");
+              "2 points whose position is not finite\n");
   }
   std::filesystem::remove(folder_.path().parent_path() / "up.png");
 }
@@ -365,7 +365,7 @@ TEST_F(SceneImport, FoldersWithoutACaptureAreASentence) {
   expect_refused(MAQ_ERROR_UNREADABLE, "without a point that can be used.");
   made.points = {{std::nan(""), 0, 0, 0, 0, 0}};
   made.write_colmap(folder_, false);
-  expect_refused(MAQ_ERROR_UNREADABLE, "used: 1 points whose place is not finite.");
+  expect_refused(MAQ_ERROR_UNREADABLE, "used: 1 points whose position is not finite.");
   made.images.clear();
   made.write_colmap(folder_, false);
   expect_refused(MAQ_ERROR_UNREADABLE, "no photo that can be used: 1 cameras without a photo (first: 7)");

@@ -134,7 +134,7 @@ TEST_F(SceneImportDamage, BytesBehindTheLastRecordAreRefused) {
   for (const char* name : {"cameras", "images", "points3D"}) {
     const std::string path = folder_.file(std::string("sparse/0/") + name + ".bin"), whole = read_text(path);
     write_text(path, whole + "x");
-    expect_error(MAQ_ERROR_UNREADABLE, "1 bytes behind the last", [&] { maq::open_capture(folder_.path().string()); });
+    expect_error(MAQ_ERROR_UNREADABLE, "1 bytes after the last", [&] { maq::open_capture(folder_.path().string()); });
     write_text(path, whole);
   }
 }

@@ -94,7 +94,7 @@ struct Photo {
 // Of the ball, from four sides.
 inline maquette::Scene ball_scene(const maquette::Context& context, size_t points = 2000) {
   const std::vector<float> places = ball(points);
-  maquette::SceneBuilder builder(context, build_config(), cloud_of(places));
+  maquette::DescriptorFitter builder(context, build_config(), cloud_of(places));
   const Photo photo;
   for (int i = 0; i < 4; ++i) builder.add_view(maquette::Frame(context, photo.desc), camera_at(1.5 * i));
   return builder.finish();

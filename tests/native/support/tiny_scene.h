@@ -31,11 +31,11 @@ inline maq::Capture capture() { return maq::open_capture(kFolder + "/capture"); 
 
 struct Look {
   uint32_t index, views;
-  float mean[maq::kFeatures], slope[maq::kBasis * maq::kFeatures], variation;
+  float mean[maq::kFeatures], slope[maq::kBasis * maq::kFeatures], view_dependence;
 };
 
 // What torch found.
-inline std::vector<Look> expected_looks() {
+inline std::vector<Look> expected_descriptors() {
   const std::string bytes = read_text(kFolder + "/looks.bin");
   std::vector<Look> looks(bytes.size() / sizeof(Look));
   std::memcpy(looks.data(), bytes.data(), looks.size() * sizeof(Look));

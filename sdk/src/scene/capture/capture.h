@@ -1,4 +1,4 @@
-// A captured place, read from disk and checked: photos with their cameras, and a point cloud.
+// A capture, read from disk and checked: photos with their cameras, and a point cloud.
 #pragma once
 
 #include <array>
@@ -34,9 +34,9 @@ struct Capture {
 // one; or transforms.json (or transforms_train.json) with the PLY cloud that it names, or sparse_pc.ply, points3d.ply,
 // points3D.ply, pointcloud.ply or cloud.ply. The first of these that is there is taken.
 //
-// A photo of another size than its camera stands for it when both have the same shape to within 1 %. Photos are looked at as
-// they are stored, not turned by EXIF, as the programs do that find the cameras. What cannot be used of the rest is
-// dropped and counted. Up is the cameras' for COLMAP (up_axis.h); +z for transforms.json, unless the cameras say otherwise
+// A photo of another size than its camera stands for it when both have the same shape to within 1 %. Photos are read as they
+// are stored, not rotated by EXIF, as by the programs that find the cameras. What cannot be used of the rest is
+// dropped and counted. Up is the cameras' for COLMAP (scene_up.h); +z for transforms.json, unless the cameras say otherwise
 // by over 45 degrees.
 //
 // Throws MAQ_ERROR_NOT_FOUND when there is no such folder, no capture in it or no cloud, MAQ_ERROR_UNREADABLE for damaged

@@ -29,8 +29,8 @@ struct PlyElement {
   uint64_t header_line = 0;
 
   // What one of them takes in the file at least: lists may be empty; in text, a digit and a space for each property.
-  uint64_t least_bytes(PlyForm form) const;
-  // Of the property of that name that is no list; -1 when there is none.
+  uint64_t min_bytes(PlyForm form) const;
+  // Of the property of that name that is not a list; -1 when there is none.
   int index_of(const std::string& property) const;
 };
 

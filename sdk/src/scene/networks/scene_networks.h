@@ -1,5 +1,5 @@
-// The three networks of scenes, from a bundle (docs/formats.md): what photos are turned into features with, how looks depend
-// on the side, and what makes pictures of rasters.
+// The three networks of scenes, from a bundle (docs/formats.md): the extractor makes features of photos, the view basis says
+// how descriptors depend on the viewing direction, the refiner makes images of descriptor rasters.
 #pragma once
 
 #include <array>
@@ -17,9 +17,9 @@ namespace maq {
 // How the refiner wants its rasters and gives its picture; channels are last everywhere.
 struct RefinerLayout {
   int levels = 0;  // it reads the rasters at 1, 1/2, …, 1 / 2^(levels - 1) of the size
-  // Four pixels of the finest raster, and of the picture, are one: (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2, all channels
-  // of one before those of the next.
-  bool is_folded = false;
+  // The finest raster and the image are space-to-depth (pixel unshuffle): pixels (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2
+  // are one, all channels of one before those of the next.
+  bool is_space_to_depth = false;
 
   // Of what a picture of that size (sides multiples of kMultiple) is made of, and of the picture.
   Shape raster_shape(int level, int width_px, int height_px) const;
@@ -32,7 +32,7 @@ class SceneNetworks {
   static constexpr int kPictureMultiple = 16;  // of the sides of pictures that are rendered
   static constexpr int kRasterChannels = kFeatures + 1;
   // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
-  static constexpr int64_t kMostPixels = int64_t(1) << 23;
+  static constexpr int64_t kMaxPixels = int64_t(1) << 23;
 
   // Reads and verifies the bundle in a folder. Networks are made when they are needed first, the refiner for each size that
   // it is needed for. Throws what read_bundle() throws, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the manifest
@@ -71,7 +71,7 @@ class SceneNetworks {
   std::array<uint8_t, 32> sha256_{};
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   SessionSettings settings_;
-  // With open sizes: photos turned upright are of many, and a session for each takes longer to make than it saves.
+  // With open sizes: gravity-aligned photos are of many, and a session for each takes longer to make than it saves.
   std::unique_ptr<Session> extractor_;
   SizedSessions refiner_;
   std::vector<TensorView> inputs_;

@@ -1,4 +1,4 @@
-// The refiner's picture as bytes.
+// The refiner's output as bytes.
 #pragma once
 
 #include <array>
@@ -19,13 +19,13 @@ struct PictureRows {
   int columns = 0, rows = 0;
 };
 
-class RefinedPicture {
+class RefinedImage {
  public:
-  // `refined` is what SceneNetworks::refine() gave for the window (RGB, 0..1, clamped here; what is no number is 0).
-  // `alphas` and `depths`, of the window too, are copied. The picture is drawn over `background` (BGR) by `alphas` times
-  // `sureness_gain`, at most wholly.
+  // `refined` is what SceneNetworks::refine() gave for the window (RGB, 0..1, clamped here; NaN becomes 0).
+  // `alphas` and `depths`, of the window too, are copied. The picture is blended over `background` (BGR) by `alphas`
+  // times `confidence_gain`, clamped.
   void write(const float* refined, const RefinerLayout& layout, const RasterWindow& window, const uint8_t* alphas,
-             const float* depths, const std::array<uint8_t, 3>& background, int sureness_gain, const PictureRows& to,
+             const float* depths, const std::array<uint8_t, 3>& background, int confidence_gain, const PictureRows& to,
              WorkerThreads& threads);
 
  private:

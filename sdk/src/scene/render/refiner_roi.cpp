@@ -5,14 +5,14 @@
 namespace maq {
 namespace {
 
-constexpr int kMultiple = LookRaster::kMultiple;
+constexpr int kMultiple = DescriptorRaster::kMultiple;
 
 struct Part {
   int begin, size;
 };
 
 Part part_of(int begin, int size, int whole) {
-  const int first = std::max(0, begin - kRefinerReach_px), end = std::min(whole, begin + size + kRefinerReach_px);
+  const int first = std::max(0, begin - kReceptiveFieldRadius_px), end = std::min(whole, begin + size + kReceptiveFieldRadius_px);
   for (int quarters = 1; quarters < 4; ++quarters) {
     const int side = (whole * quarters / 4 + kMultiple - 1) / kMultiple * kMultiple;
     if (side < end - first) continue;

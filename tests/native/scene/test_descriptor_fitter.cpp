@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "scene/build/build_scene.h"
-#include "scene/build/scene_builder.h"
+#include "scene/build/descriptor_fitter.h"
 #include "scene/capture/posed_photo.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
@@ -16,10 +16,10 @@ namespace {
 
 using maq::kBasis;
 using maq::kFeatures;
-using maq::ModelledPoints;
+using maq::FittedPoints;
 
-maq::BuildOptions as_in_the_reference() {
-  maq::BuildOptions options;
+maq::FittingOptions as_in_the_reference() {
+  maq::FittingOptions options;
   options.visibility_scale = 0.5;
   return options;
 }
@@ -30,9 +30,9 @@ struct Photo {
   maq::PinholeCamera camera;
 };
 
-class SceneBuilder : public testing::Test {
+class DescriptorFitter : public testing::Test {
  protected:
-  SceneBuilder() : capture_(tiny_scene::capture()), networks_(tiny_scene::networks()) {
+  DescriptorFitter() : capture_(tiny_scene::capture()), networks_(tiny_scene::networks()) {
     for (const maq::CaptureView& view : capture_.views) {
       if (view.is_held_out) continue;
       photos_.emplace_back();
@@ -41,46 +41,46 @@ class SceneBuilder : public testing::Test {
     }
   }
 
-  maq::SceneBuilder builder(const maq::BuildOptions& options = as_in_the_reference()) {
+  maq::DescriptorFitter builder(const maq::FittingOptions& options = as_in_the_reference()) {
     return {capture_.cloud, capture_.up, *networks_, options};
   }
-  size_t add(maq::SceneBuilder& builder, size_t photo) {
+  size_t add(maq::DescriptorFitter& builder, size_t photo) {
     return builder.add_view(photos_[photo].frame.image, photos_[photo].valid.data(), photos_[photo].camera).value();
   }
-  ModelledPoints built(const std::vector<size_t>& order, const maq::BuildOptions& options = as_in_the_reference()) {
-    maq::SceneBuilder made = builder(options);
+  FittedPoints built(const std::vector<size_t>& order, const maq::FittingOptions& options = as_in_the_reference()) {
+    maq::DescriptorFitter made = builder(options);
     for (const size_t photo : order) add(made, photo);
     return made.finish();
   }
 
   // Where in `points` each point of the cloud is.
-  std::vector<size_t> places_in(const ModelledPoints& points) const {
-    std::vector<size_t> places(capture_.cloud.count(), SIZE_MAX);
+  std::vector<size_t> indices_in(const FittedPoints& points) const {
+    std::vector<size_t> positions(capture_.cloud.count(), SIZE_MAX);
     for (size_t i = 0; i < points.count(); ++i) {
       for (size_t k = 0; k < capture_.cloud.count(); ++k) {
         if (points.x[i] == capture_.cloud.x[k] && points.y[i] == capture_.cloud.y[k] &&
             points.z[i] == capture_.cloud.z[k]) {
-          places[k] = i;
+          positions[k] = i;
         }
       }
     }
-    return places;
+    return positions;
   }
 
-  void expect_the_same(const ModelledPoints& a, const ModelledPoints& b, float tolerance) {
+  void expect_the_same(const FittedPoints& a, const FittedPoints& b, float tolerance) {
     ASSERT_EQ(a.count(), b.count());
     EXPECT_EQ(a.never_seen, b.never_seen);
-    const std::vector<size_t> in_a = places_in(a), in_b = places_in(b);
+    const std::vector<size_t> in_a = indices_in(a), in_b = indices_in(b);
     for (size_t k = 0; k < in_a.size(); ++k) {
       ASSERT_EQ(in_a[k] == SIZE_MAX, in_b[k] == SIZE_MAX);
       if (in_a[k] == SIZE_MAX) continue;
       EXPECT_EQ(a.views[in_a[k]], b.views[in_b[k]]);
-      EXPECT_NEAR(a.variations[in_a[k]], b.variations[in_b[k]], tolerance);
+      EXPECT_NEAR(a.view_dependence[in_a[k]], b.view_dependence[in_b[k]], tolerance);
       for (size_t c = 0; c < kFeatures; ++c) {
-        EXPECT_NEAR(a.means[in_a[k] * kFeatures + c], b.means[in_b[k] * kFeatures + c], tolerance);
+        EXPECT_NEAR(a.constant_terms[in_a[k] * kFeatures + c], b.constant_terms[in_b[k] * kFeatures + c], tolerance);
       }
       for (size_t c = 0; c < kBasis * kFeatures; ++c) {
-        EXPECT_NEAR(a.slopes[in_a[k] * kBasis * kFeatures + c], b.slopes[in_b[k] * kBasis * kFeatures + c], tolerance);
+        EXPECT_NEAR(a.linear_terms[in_a[k] * kBasis * kFeatures + c], b.linear_terms[in_b[k] * kBasis * kFeatures + c], tolerance);
       }
     }
   }
@@ -91,40 +91,40 @@ class SceneBuilder : public testing::Test {
 };
 
 // Features are some 1 large. Photos are turned and sampled in float on both sides, in another order.
-TEST_F(SceneBuilder, AgreesWithTorch) {
-  const ModelledPoints points = built({0, 1, 2, 3});
-  const auto expected = tiny_scene::expected_looks();
-  const std::vector<size_t> places = places_in(points);
+TEST_F(DescriptorFitter, AgreesWithTorch) {
+  const FittedPoints points = built({0, 1, 2, 3});
+  const auto expected = tiny_scene::expected_descriptors();
+  const std::vector<size_t> positions = indices_in(points);
   ASSERT_EQ(points.count(), expected.size());
   EXPECT_EQ(points.never_seen, capture_.cloud.count() - expected.size());
   EXPECT_EQ(points.singular, 0u);
   constexpr float kTolerance = 1e-5f;
-  size_t varying = 0;
+  size_t view_dependent = 0;
   for (const tiny_scene::Look& look : expected) {
-    const size_t at = places[look.index];
+    const size_t at = positions[look.index];
     ASSERT_NE(at, SIZE_MAX) << "point " << look.index << " is seen";
     EXPECT_EQ(points.views[at], look.views);
-    for (size_t c = 0; c < kFeatures; ++c) EXPECT_NEAR(points.means[at * kFeatures + c], look.mean[c], kTolerance);
+    for (size_t c = 0; c < kFeatures; ++c) EXPECT_NEAR(points.constant_terms[at * kFeatures + c], look.mean[c], kTolerance);
     for (size_t c = 0; c < kBasis * kFeatures; ++c) {
-      EXPECT_NEAR(points.slopes[at * kBasis * kFeatures + c], look.slope[c], kTolerance);
+      EXPECT_NEAR(points.linear_terms[at * kBasis * kFeatures + c], look.slope[c], kTolerance);
     }
-    EXPECT_NEAR(points.variations[at], look.variation, kTolerance);
-    varying += look.variation > 0.01f ? 1 : 0;
+    EXPECT_NEAR(points.view_dependence[at], look.view_dependence, kTolerance);
+    view_dependent += look.view_dependence > 0.01f ? 1 : 0;
   }
-  EXPECT_GT(varying, expected.size() / 4) << "the reference must be one whose looks depend on the side";
+  EXPECT_GT(view_dependent, expected.size() / 4) << "the reference must be one whose looks depend on the side";
   const std::array<float, 3> background = tiny_scene::expected_background();
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(points.background[c], background[c], kTolerance);
 }
 
-TEST_F(SceneBuilder, TheOrderOfPhotosChangesRoundingAlone) {
+TEST_F(DescriptorFitter, TheOrderOfPhotosChangesRoundingAlone) {
   expect_the_same(built({0, 1, 2, 3}), built({3, 1, 0, 2}), 1e-5f);
 }
 
-TEST_F(SceneBuilder, PhotosCanBeAddedAfterLookingAtWhatIsThere) {
-  maq::SceneBuilder made = builder();
+TEST_F(DescriptorFitter, PhotosCanBeAddedAfterLookingAtWhatIsThere) {
+  maq::DescriptorFitter made = builder();
   add(made, 0);
   add(made, 1);
-  const ModelledPoints first = made.finish();
+  const FittedPoints first = made.finish();
   expect_the_same(first, built({0, 1}), 0);
   add(made, 2);
   add(made, 3);
@@ -132,8 +132,8 @@ TEST_F(SceneBuilder, PhotosCanBeAddedAfterLookingAtWhatIsThere) {
   EXPECT_EQ(made.views(), 4u);
 }
 
-TEST_F(SceneBuilder, FinishingInLessMemoryGivesTheSameAndABuilderThatKnowsNothing) {
-  maq::SceneBuilder made = builder();
+TEST_F(DescriptorFitter, FinishingInLessMemoryGivesTheSameAndABuilderThatKnowsNothing) {
+  maq::DescriptorFitter made = builder();
   add(made, 0);
   add(made, 2);
   expect_the_same(made.finish_and_forget(), built({0, 2}), 0);
@@ -143,22 +143,22 @@ TEST_F(SceneBuilder, FinishingInLessMemoryGivesTheSameAndABuilderThatKnowsNothin
   expect_the_same(made.finish(), built({1}), 0);
 }
 
-TEST_F(SceneBuilder, PixelsThatAreNotValidSayNothing) {
-  maq::SceneBuilder whole = builder(), half = builder(), none = builder();
+TEST_F(DescriptorFitter, PixelsThatAreNotValidSayNothing) {
+  maq::DescriptorFitter whole = builder(), half = builder(), none = builder();
   const size_t all = add(whole, 0);
   std::vector<uint8_t> left(photos_[0].valid.size());
   for (size_t i = 0; i < left.size(); ++i) left[i] = i % 72 < 36 ? 255 : 0;
   const auto seen = half.add_view(photos_[0].frame.image, left.data(), photos_[0].camera);
   EXPECT_GT(seen.value(), all / 5);
   EXPECT_LT(seen.value(), all * 4 / 5);
-  const ModelledPoints points = half.finish();
+  const FittedPoints points = half.finish();
   for (size_t i = 0; i < points.count(); ++i) {
-    const double place[3] = {points.x[i] + points.origin[0], points.y[i] + points.origin[1],
+    const double position[3] = {points.x[i] + points.origin[0], points.y[i] + points.origin[1],
                              points.z[i] + points.origin[2]};
     double seen_as[3] = {};
     for (size_t row = 0; row < 3; ++row) {
       for (size_t k = 0; k < 3; ++k) {
-        seen_as[row] += photos_[0].camera.rotation[3 * row + k] * (place[k] - photos_[0].camera.centre[k]);
+        seen_as[row] += photos_[0].camera.rotation[3 * row + k] * (position[k] - photos_[0].camera.centre[k]);
       }
     }
     EXPECT_LT(photos_[0].camera.fx_px * seen_as[0] / seen_as[2] + photos_[0].camera.cx_px, 35.5);
@@ -168,11 +168,11 @@ TEST_F(SceneBuilder, PixelsThatAreNotValidSayNothing) {
 }
 
 // Whenever it is cancelled, and whoever does, the builder is as it was.
-TEST_F(SceneBuilder, ACancelledPhotoChangesNothing) {
-  const ModelledPoints before = built({0, 1});
+TEST_F(DescriptorFitter, ACancelledPhotoChangesNothing) {
+  const FittedPoints before = built({0, 1});
   std::vector<double> steps;
   {
-    maq::SceneBuilder made = builder();
+    maq::DescriptorFitter made = builder();
     made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera, [&](double done, const std::string& what) {
       EXPECT_FALSE(what.empty());
       steps.push_back(done);
@@ -183,7 +183,7 @@ TEST_F(SceneBuilder, ACancelledPhotoChangesNothing) {
   EXPECT_TRUE(std::is_sorted(steps.begin(), steps.end()));
   for (size_t last = 1; last <= steps.size(); ++last) {
     for (const bool by_flag : {false, true}) {
-      maq::SceneBuilder made = builder();
+      maq::DescriptorFitter made = builder();
       add(made, 0);
       add(made, 1);
       size_t step = 0;
@@ -203,16 +203,16 @@ TEST_F(SceneBuilder, ACancelledPhotoChangesNothing) {
   }
 }
 
-TEST_F(SceneBuilder, ACancelBeforeAPhotoIsOfThatPhotoAlone) {
-  maq::SceneBuilder made = builder();
+TEST_F(DescriptorFitter, ACancelBeforeAPhotoIsOfThatPhotoAlone) {
+  maq::DescriptorFitter made = builder();
   made.cancel();
   EXPECT_FALSE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
   EXPECT_TRUE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
 }
 
-TEST_F(SceneBuilder, CloudsThatAreNoneAreRefused) {
+TEST_F(DescriptorFitter, CloudsThatAreNoneAreRefused) {
   const auto refused = [&](maq_status status, const char* text, const maq::PointCloud& cloud) {
-    expect_error(status, text, [&] { maq::SceneBuilder(cloud, capture_.up, *networks_, {}); });
+    expect_error(status, text, [&] { maq::DescriptorFitter(cloud, capture_.up, *networks_, {}); });
   };
   refused(MAQ_ERROR_INVALID_ARGUMENT, "has no points", {});
   for (const float value : {std::nanf(""), INFINITY, -INFINITY}) {
@@ -228,12 +228,12 @@ TEST_F(SceneBuilder, CloudsThatAreNoneAreRefused) {
   refused(MAQ_ERROR_INVALID_ARGUMENT, "origin", nowhere);
 }
 
-TEST_F(SceneBuilder, OptionsOutOfRangeAreRefused) {
+TEST_F(DescriptorFitter, OptionsOutOfRangeAreRefused) {
   const auto refused = [&](const char* text, auto change) {
-    maq::BuildOptions options;
+    maq::FittingOptions options;
     std::array<double, 3> up = capture_.up;
     change(options, up);
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { maq::SceneBuilder(capture_.cloud, up, *networks_, options); });
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { maq::DescriptorFitter(capture_.cloud, up, *networks_, options); });
   };
   refused("no direction", [](auto&, auto& up) { up = {0, 0, 0}; });
   refused("no direction", [](auto&, auto& up) { up = {0, std::nan(""), 1}; });
@@ -244,8 +244,8 @@ TEST_F(SceneBuilder, OptionsOutOfRangeAreRefused) {
   refused("Threads are 0", [](auto& options, auto&) { options.threads = 0; });
 }
 
-TEST_F(SceneBuilder, PhotosThatDoNotFitAreRefusedAndChangeNothing) {
-  maq::SceneBuilder made = builder();
+TEST_F(DescriptorFitter, PhotosThatDoNotFitAreRefusedAndChangeNothing) {
+  maq::DescriptorFitter made = builder();
   add(made, 0);
   const Photo& photo = photos_[1];
   const auto refused = [&](const char* text, const maq::ImageView& image, const maq::PinholeCamera& camera) {
@@ -272,17 +272,17 @@ TEST_F(SceneBuilder, PhotosThatDoNotFitAreRefusedAndChangeNothing) {
   expect_the_same(made.finish(), built({0}), 0);
 }
 
-TEST_F(SceneBuilder, PhotosOverTheLimitOfTheNetworksAreRefused) {
+TEST_F(DescriptorFitter, PhotosOverTheLimitOfTheNetworksAreRefused) {
   maq::Frame large;
   maq::PinholeCamera camera = maq::resized(photos_[0].camera, 4000, 3000);
   large.allocate_bgr(4000, 3000);
-  maq::SceneBuilder made = builder();
+  maq::DescriptorFitter made = builder();
   expect_error(MAQ_ERROR_IMAGE_SIZE, "over the limit", [&] { made.add_view(large.image, nullptr, camera); });
   EXPECT_EQ(made.views(), 0u);
 }
 
-TEST_F(SceneBuilder, APhotoThatSeesNothingIsCountedAsNone) {
-  maq::SceneBuilder made = builder();
+TEST_F(DescriptorFitter, APhotoThatSeesNothingIsCountedAsNone) {
+  maq::DescriptorFitter made = builder();
   maq::PinholeCamera away = photos_[0].camera;
   for (size_t i = 0; i < 3; ++i) {  // turned by half a circle about its vertical
     away.rotation[i] = -away.rotation[i];
@@ -295,30 +295,30 @@ TEST_F(SceneBuilder, APhotoThatSeesNothingIsCountedAsNone) {
   expect_the_same(made.finish(), built({1}), 0);
 }
 
-TEST_F(SceneBuilder, UpAlongTheViewIsLikeNoTurn) {
+TEST_F(DescriptorFitter, UpAlongTheViewIsLikeNoTurn) {
   maq::PinholeCamera down = photos_[0].camera;
   down.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1};
   down.centre = {0, 0, 3};
-  maq::SceneBuilder along(capture_.cloud, {0, 0, 1}, *networks_, as_in_the_reference());
-  maq::SceneBuilder across(capture_.cloud, {0, 1, 0}, *networks_, as_in_the_reference());
+  maq::DescriptorFitter along(capture_.cloud, {0, 0, 1}, *networks_, as_in_the_reference());
+  maq::DescriptorFitter across(capture_.cloud, {0, 1, 0}, *networks_, as_in_the_reference());
   EXPECT_GT(along.add_view(photos_[0].frame.image, nullptr, down).value(), 50u);
   across.add_view(photos_[0].frame.image, nullptr, down);
   expect_the_same(along.finish(), across.finish(), 0);
 }
 
-TEST_F(SceneBuilder, TheLimitOfMemoryIsKept) {
-  maq::BuildOptions options = as_in_the_reference();
-  options.most_bytes = capture_.cloud.count() * 4 - 1;
+TEST_F(DescriptorFitter, TheLimitOfMemoryIsKept) {
+  maq::FittingOptions options = as_in_the_reference();
+  options.max_bytes = capture_.cloud.count() * 4 - 1;
   expect_error(MAQ_ERROR_OUT_OF_MEMORY, "over the limit", [&] { builder(options); });
-  options.most_bytes = capture_.cloud.count() * 4 + built({0}).count() * 340;
-  maq::SceneBuilder made = builder(options);
+  options.max_bytes = capture_.cloud.count() * 4 + built({0}).count() * 340;
+  maq::DescriptorFitter made = builder(options);
   add(made, 0);
   expect_error(MAQ_ERROR_OUT_OF_MEMORY, "seen points", [&] { add(made, 2); });
   add(made, 0);
   expect_the_same(made.finish(), built({0, 0}, options), 0);
 }
 
-TEST_F(SceneBuilder, CapturesAreBuiltWithoutWhatIsHeldOut) {
+TEST_F(DescriptorFitter, CapturesAreBuiltWithoutWhatIsHeldOut) {
   maq::CaptureBuildOptions options;
   options.points = as_in_the_reference();
   double last = -1;
@@ -332,14 +332,14 @@ TEST_F(SceneBuilder, CapturesAreBuiltWithoutWhatIsHeldOut) {
   EXPECT_EQ(all.views, 4u);
   EXPECT_TRUE(all.dropped.empty());
   expect_the_same(all.points, built({0, 1, 2, 3}), 0);
-  options.most_views = 2;
+  options.max_views = 2;
   expect_the_same(maq::build_from_capture(capture_, *networks_, options)->points, built({0, 2}), 0);
-  options.most_views = 0;
+  options.max_views = 0;
   options.uses_held_out = true;
   EXPECT_EQ(maq::build_from_capture(capture_, *networks_, options)->views, 5u);
 }
 
-TEST_F(SceneBuilder, PhotosOfACaptureAreShrunkToALongSide) {
+TEST_F(DescriptorFitter, PhotosOfACaptureAreShrunkToALongSide) {
   maq::CaptureBuildOptions options;
   options.points = as_in_the_reference();
   options.long_side_px = 36;
@@ -348,7 +348,7 @@ TEST_F(SceneBuilder, PhotosOfACaptureAreShrunkToALongSide) {
   EXPECT_LT(small.points.count(), built({0, 1, 2, 3}).count());
 }
 
-TEST_F(SceneBuilder, PhotosOfACaptureThatCannotBeReadAreDroppedAndCounted) {
+TEST_F(DescriptorFitter, PhotosOfACaptureThatCannotBeReadAreDroppedAndCounted) {
   maq::CaptureBuildOptions options;
   options.points = as_in_the_reference();
   maq::Capture capture = capture_;
@@ -363,7 +363,7 @@ TEST_F(SceneBuilder, PhotosOfACaptureThatCannotBeReadAreDroppedAndCounted) {
                [&] { maq::build_from_capture(capture, *networks_, options); });
 }
 
-TEST_F(SceneBuilder, ChoicesThatLeaveNoPhotoAreASentence) {
+TEST_F(DescriptorFitter, ChoicesThatLeaveNoPhotoAreASentence) {
   maq::CaptureBuildOptions options;
   maq::Capture held_out = capture_;
   for (maq::CaptureView& view : held_out.views) view.is_held_out = true;
@@ -374,7 +374,7 @@ TEST_F(SceneBuilder, ChoicesThatLeaveNoPhotoAreASentence) {
                [&] { maq::build_from_capture(capture_, *networks_, options); });
 }
 
-TEST_F(SceneBuilder, ACancelledCaptureIsNothing) {
+TEST_F(DescriptorFitter, ACancelledCaptureIsNothing) {
   const auto cancelling = [](double done, const std::string&) { return done < 0.5; };
   EXPECT_FALSE(maq::build_from_capture(capture_, *networks_, {}, cancelling).has_value());
 }
@@ -390,15 +390,15 @@ maq::PointCloud wall(size_t across, size_t down) {
 }
 
 // As many points as all threads get a share of.
-TEST_F(SceneBuilder, ThreadsChangeNothing) {
+TEST_F(DescriptorFitter, ThreadsChangeNothing) {
   constexpr int kSide = 224;
   maq::Frame photo;
   uint8_t* pixels = photo.allocate_bgr(kSide, kSide);
   for (int i = 0; i < 3 * kSide * kSide; ++i) pixels[i] = uint8_t(i * 7919 % 251);
   const auto built_by = [&](int threads) {
-    maq::BuildOptions options;
+    maq::FittingOptions options;
     options.threads = threads;
-    maq::SceneBuilder made(wall(300, 300), {0, -1, 0}, *networks_, options);
+    maq::DescriptorFitter made(wall(300, 300), {0, -1, 0}, *networks_, options);
     maq::PinholeCamera camera;
     camera.width_px = camera.height_px = kSide;
     camera.fx_px = camera.fy_px = 110;
@@ -408,17 +408,17 @@ TEST_F(SceneBuilder, ThreadsChangeNothing) {
     }
     return made.finish();
   };
-  const ModelledPoints one = built_by(1), three = built_by(3);
+  const FittedPoints one = built_by(1), three = built_by(3);
   EXPECT_GT(one.count(), 40000u);
   EXPECT_EQ(one.x, three.x);
   EXPECT_EQ(one.views, three.views);
-  EXPECT_EQ(one.means, three.means);
-  EXPECT_EQ(one.slopes, three.slopes);
-  EXPECT_EQ(one.variations, three.variations);
+  EXPECT_EQ(one.constant_terms, three.constant_terms);
+  EXPECT_EQ(one.linear_terms, three.linear_terms);
+  EXPECT_EQ(one.view_dependence, three.view_dependence);
 }
 
 // The extractor of this bundle is small; what the real one takes is in docs/scenes.md.
-TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan450MB) {
+TEST_F(DescriptorFitter, AMillionSeenPointsTakeLessThan450MB) {
   constexpr int kWidth = 500, kHeight = 500;
   maq::PinholeCamera camera;
   camera.width_px = kWidth;
@@ -429,12 +429,12 @@ TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan450MB) {
   constexpr size_t kAcross = 2 * kWidth, kDown = 2 * kHeight;
   size_t seen = 0;
   const double grown_mib = peak_memory_growth_mib([&] {
-    maq::SceneBuilder made(wall(kAcross, kDown), {0, -1, 0}, *networks_, {});
+    maq::DescriptorFitter made(wall(kAcross, kDown), {0, -1, 0}, *networks_, {});
     for (int view = 0; view < 8; ++view) {
       camera.centre = {double(view % 2 * kWidth), double(view / 2 % 2 * kHeight), 0};
       made.add_view(photo.image, nullptr, camera);
     }
-    const ModelledPoints points = made.finish_and_forget();
+    const FittedPoints points = made.finish_and_forget();
     seen = points.count();
   });
   EXPECT_EQ(seen, kAcross * kDown);
@@ -442,7 +442,7 @@ TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan450MB) {
   EXPECT_LT(grown_mib * 1048576, 450e6);
 }
 
-TEST_F(SceneBuilder, TwentyMillionPointsOfWhichFewAreSeenTakeLittleMoreThanTheCloud) {
+TEST_F(DescriptorFitter, TwentyMillionPointsOfWhichFewAreSeenTakeLittleMoreThanTheCloud) {
   maq::PinholeCamera camera;
   camera.width_px = 640;
   camera.height_px = 480;
@@ -451,7 +451,7 @@ TEST_F(SceneBuilder, TwentyMillionPointsOfWhichFewAreSeenTakeLittleMoreThanTheCl
   std::fill_n(photo.allocate_bgr(640, 480), 3 * 640 * 480, uint8_t(90));
   size_t seen = 0;
   const double grown_mib = peak_memory_growth_mib([&] {
-    maq::SceneBuilder made(wall(5000, 4000), {0, -1, 0}, *networks_, {});
+    maq::DescriptorFitter made(wall(5000, 4000), {0, -1, 0}, *networks_, {});
     seen = made.add_view(photo.image, nullptr, camera).value();
   });
   EXPECT_EQ(seen, 640u * 480u);

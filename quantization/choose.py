@@ -35,9 +35,9 @@ from quantization import agreement, qdq
 from quantization.activations import Activations
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import calibrate, correct, quantize_prepared, spread
-from quantization.samples import Sample, collect
-from quantization.settings import GraphSettings, read_settings
+from quantization.quantize import calibrate, correct, quantize_prepared
+from quantization.samples import Sample, calibration_records, collect, options_of_calibration, spread
+from quantization.settings import DensePoseSettings, GraphSettings, read_settings
 
 BUDGET_MB = 3.6
 EPILOG = """\
@@ -207,17 +207,12 @@ def print_candidates(ranked: list[Candidate], taken: list[Candidate], console: C
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m quantization.choose", description=__doc__, epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=argparse.RawDescriptionHelpFormatter, parents=[options_of_calibration()],
     )  # fmt: skip
-    parser.add_argument("--bundle", type=Path, default=agreement.FLOAT_BUNDLE, metavar="DIR", help="fp32 bundle")
-    parser.add_argument("--settings", type=Path, default=Path(__file__).with_name("densepose.toml"), metavar="TOML")
     parser.add_argument("--out", type=Path, required=True, metavar="TOML", help="where the settings go")
-    parser.add_argument("--data", type=Path, default=Path(".data/people/train"), metavar="DIR", help="for calibration")
-    parser.add_argument("--photos", type=Path, metavar="DIR", help="calibrate on these shards too")
-    parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), metavar="DIR", help="to measure on")
     parser.add_argument("--graphs", nargs="+", default=list(bundle_format.GRAPHS), choices=bundle_format.GRAPHS)
     parser.add_argument("--budget", type=float, default=BUDGET_MB, metavar="MB", help=f"bundle (default {BUDGET_MB})")
-    parser.add_argument("--gate", type=float, default=agreement.GATE, metavar="SHARE", help="label agreement wanted")
+    parser.add_argument("--gate", type=float, default=agreement.GATE, metavar="FRACTION", help="label agreement wanted")
     parser.add_argument("--samples", type=int, default=6, metavar="N", help="images a candidate is judged by")
     parser.add_argument("--images", type=int, metavar="N", help="images labels are compared on (default: all)")
     parser.add_argument("--backend", choices=("capi", "onnx"), default="capi", help="default: capi")
@@ -232,10 +227,8 @@ def main(argv: list[str] | None = None) -> int:
 
 def workpieces(arguments: argparse.Namespace, source: Bundle, folder: Path) -> dict[str, Workpiece]:
     """Prepared and calibrated graphs of the bundle, written to `folder`."""
-    settings = read_settings(arguments.settings)
-    records = spread(load_records(arguments.data), settings.calibration_images)
-    if arguments.photos:
-        records += spread(load_records(arguments.photos), settings.calibration_photos)
+    settings = read_settings(arguments.settings, DensePoseSettings)
+    records = calibration_records(settings, arguments.data, arguments.photos)
     calibration = collect(source, records, settings.people_per_image)
     held_out = collect(source, spread(load_records(arguments.held_out), arguments.samples), 4)
     pieces = {}

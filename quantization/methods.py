@@ -22,13 +22,12 @@ from rich.table import Table
 from export.densepose.bundle import GRAPHS
 from export.densepose.graphs import open_bundle
 from export.shards import load_records
-from quantization import agreement
 from quantization.errors import output_sqnr
 from quantization.prepare import prepare
-from quantization.quantize import calibrate, correct, quantize_prepared, spread
+from quantization.quantize import calibrate, correct, quantize_prepared
 from quantization.report import JSON, compact
-from quantization.samples import Sample, collect
-from quantization.settings import GraphSettings, read_settings
+from quantization.samples import Sample, collect, options_of_calibration, spread
+from quantization.settings import DensePoseSettings, GraphSettings, read_settings
 
 RANGES = (("minmax", None), ("percentile", 99.99), ("percentile", 99.999), ("entropy", None))
 EPILOG = """\
@@ -78,12 +77,8 @@ def compare(
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m quantization.methods", description=__doc__, epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=argparse.RawDescriptionHelpFormatter, parents=[options_of_calibration(photos=False)],
     )  # fmt: skip
-    parser.add_argument("--bundle", type=Path, default=agreement.FLOAT_BUNDLE, metavar="DIR", help="fp32 bundle")
-    parser.add_argument("--settings", type=Path, default=Path(__file__).with_name("densepose.toml"), metavar="TOML")
-    parser.add_argument("--data", type=Path, default=Path(".data/people/train"), metavar="DIR", help="for calibration")
-    parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), metavar="DIR", help="to measure on")
     parser.add_argument("--calibration", type=int, default=16, metavar="N", help="calibration images (default 16)")
     parser.add_argument("--images", type=int, default=6, metavar="N", help="held-out images (default 6)")
     parser.add_argument("--graphs", nargs="+", default=list(GRAPHS), choices=GRAPHS)
@@ -99,7 +94,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def run(arguments: argparse.Namespace) -> int:
     console = Console(width=None if sys.stdout.isatty() else 140)
-    source, settings = open_bundle(arguments.bundle), read_settings(arguments.settings)
+    source, settings = open_bundle(arguments.bundle), read_settings(arguments.settings, DensePoseSettings)
     document = json.loads(arguments.json.read_text())
     sets = [
         collect(source, spread(load_records(folder), count), settings.people_per_image)

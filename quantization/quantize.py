@@ -23,14 +23,14 @@ from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
 from onnxruntime.quantization.registry import QDQRegistry, QLinearOpsRegistry
 
 from export.densepose import bundle as bundle_format
-from export.densepose.graphs import Bundle, open_bundle
-from export.shards import Record, load_records
+from export.densepose.graphs import open_bundle
+from export.shards import load_records
 from quantization.bias_correction import correct_biases
 from quantization.errors import float_nodes_left, output_sqnr
 from quantization.prepare import prepare
 from quantization.rounding import round_together
-from quantization.samples import Sample, collect
-from quantization.settings import GraphSettings, Settings, read_settings
+from quantization.samples import Sample, calibration_records, collect, options_of_calibration, spread
+from quantization.settings import DensePoseSettings, GraphSettings, read_settings
 from quantization.simplify import simplify
 
 METHODS = {
@@ -153,25 +153,20 @@ def matching_nodes(graph: onnx.GraphProto, patterns: tuple[str, ...]) -> list[st
     return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
-def spread(records: list[Record], count: int) -> list[Record]:
-    """At most `count` records, evenly over the shards (a shard holds one orientation)."""
-    return records[:: max(1, len(records) // count)][:count]
-
-
-def quantize_bundle(
-    source: Bundle, target: Path, settings: Settings, records: list[Record], held_out: list[Record]
+def quantize_graphs(
+    source: Path,
+    target: Path,
+    settings: dict[str, GraphSettings],
+    calibration: dict[str, list[Sample]],
+    held_out: dict[str, list[Sample]],
 ) -> dict[str, dict[str, float]]:
-    """Quantizes the graphs of `source` into the folder `target`; chart weights stay float. Returns each output's SQNR
-    in dB."""
-    target.mkdir(parents=True, exist_ok=True)
-    shutil.copy(source.folder / bundle_format.CHARTS, target)
-    calibration = collect(source, records, settings.people_per_image)
-    test = collect(source, held_out, settings.people_per_image)
+    """Quantizes graphs, by name, from one folder into another and prints what became of each. calibration, held_out:
+    inputs of each graph. Returns each output's SQNR in dB on `held_out`."""
     quality = {}
-    for name, graph_settings in settings.graphs.items():
-        paths = source.folder / f"{name}.onnx", target / f"{name}.onnx"
+    for name, graph_settings in settings.items():
+        paths = source / f"{name}.onnx", target / f"{name}.onnx"
         quantize_graph(*paths, calibration[name], graph_settings)
-        quality[name] = output_sqnr(*paths, test[name])
+        quality[name] = output_sqnr(*paths, held_out[name])
         sizes = [path.stat().st_size / 1e6 for path in paths]
         print(f"{name}: {sizes[0]:.2f} -> {sizes[1]:.2f} MB, {len(calibration[name])} samples")
         print("  dB: " + ", ".join(f"{output} {value:.1f}" for output, value in quality[name].items()))
@@ -179,34 +174,32 @@ def quantize_bundle(
     return quality
 
 
+def as_measured(quality: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+    """What `quantize_graphs` returns, for the manifest."""
+    return {graph: {name: round(value, 1) for name, value in outputs.items()} for graph, outputs in quality.items()}
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bundle", type=Path, default=Path(".data/bundles/densepose-b-fp32"))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, parents=[options_of_calibration()]
+    )
     parser.add_argument("--out", type=Path, default=Path("sdk/models/densepose-b-int8"))
     parser.add_argument("--name", help="default: the folder's name")
-    parser.add_argument("--data", type=Path, default=Path(".data/people/train"), help="calibration shards")
-    parser.add_argument("--photos", type=Path, help="calibrate on these shards too (export.teachers.shards)")
-    parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), help="shards to measure on")
-    parser.add_argument("--settings", type=Path, default=Path(__file__).with_name("densepose.toml"))
     options = parser.parse_args()
-    settings = read_settings(options.settings)
+    settings = read_settings(options.settings, DensePoseSettings)
     source = open_bundle(options.bundle)
-    records = spread(load_records(options.data), settings.calibration_images)
-    if options.photos:
-        records += spread(load_records(options.photos), settings.calibration_photos)
+    calibration = calibration_records(settings, options.data, options.photos)
     held_out = spread(load_records(options.held_out), settings.held_out_images)
-    quality = quantize_bundle(source, options.out, settings, records, held_out)
+    options.out.mkdir(parents=True, exist_ok=True)
+    shutil.copy(source.folder / bundle_format.CHARTS, options.out)  # chart weights stay float
+    samples = [collect(source, records, settings.people_per_image) for records in (calibration, held_out)]
+    quality = quantize_graphs(source.folder, options.out, settings.graphs, *samples)
     info = bundle_format.BundleInfo(
         name=options.name or options.out.name,
         precision="int8",
         version=source.manifest["version"],
         training_data=tuple(source.manifest["training_data"]),
-        measured={
-            "sqnr_db": {
-                graph: {output: round(value, 1) for output, value in outputs.items()}
-                for graph, outputs in quality.items()
-            }
-        },
+        measured={"sqnr_db": as_measured(quality)},
     )
     bundle_format.write_manifest(options.out, info, source.network, source.decode)
     sizes = [bundle_format.bytes_of(folder) / 1e6 for folder in (options.bundle, options.out)]

@@ -27,9 +27,8 @@ from export.shards import load_records
 from quantization import agreement, check
 from quantization.comparison import TensorError, activation_errors, weight_errors, worst_first
 from quantization.errors import float_nodes_left
-from quantization.quantize import spread
 from quantization.report_files import write_markdown, write_picture
-from quantization.samples import Sample, collect
+from quantization.samples import Sample, collect, spread
 from quantization.saturation import Saturation, saturation
 
 SCHEMA = "maquette-quantization-1"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
+from pathlib import Path
+
 import numpy as np
 from tqdm import tqdm
 
@@ -9,7 +12,9 @@ from export.densepose import targets as tg
 from export.densepose.bundle import GRAPHS
 from export.densepose.decode import detect
 from export.densepose.graphs import Bundle
-from export.shards import Record
+from export.evaluation.backends import DEFAULT_PATHS
+from export.shards import Record, load_records
+from quantization.settings import DENSEPOSE, DensePoseSettings
 
 # Proposals are many and mostly background; so many of each image are enough to see what the box head sees.
 PROPOSALS = 32
@@ -42,3 +47,30 @@ def collect(bundle: Bundle, records: list[Record], people: int) -> dict[str, lis
                 {x: np.ascontiguousarray(tensor.numpy()) for x, tensor in zip(inputs, tensors, strict=True)}
             )
     return samples
+
+
+def spread(records: list[Record], count: int) -> list[Record]:
+    """At most `count` records, evenly over the shards (a shard holds one orientation)."""
+    return records[:: max(1, len(records) // count)][:count]
+
+
+def calibration_records(settings: DensePoseSettings, rendered: Path, photos: Path | None) -> list[Record]:
+    """What sets the ranges: images of the shards in `rendered`, and of those in `photos` where they are given."""
+    records = spread(load_records(rendered), settings.calibration_images)
+    if photos:
+        records += spread(load_records(photos), settings.calibration_photos)
+    return records
+
+
+def options_of_calibration(photos: bool = True) -> argparse.ArgumentParser:
+    """The options of all commands that calibrate a bundle, to be a parent of theirs."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--bundle", type=Path, default=DEFAULT_PATHS["onnx"], metavar="DIR", help="fp32 bundle")
+    parser.add_argument("--settings", type=Path, default=DENSEPOSE, metavar="TOML")
+    parser.add_argument("--data", type=Path, default=Path(".data/people/train"), metavar="DIR", help="for calibration")
+    if photos:
+        parser.add_argument(
+            "--photos", type=Path, metavar="DIR", help="calibrate on these shards too (export.teachers.shards)"
+        )
+    parser.add_argument("--held-out", type=Path, default=Path(".data/people/val"), metavar="DIR", help="to measure on")
+    return parser

@@ -5,9 +5,12 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar, TypeVar
 
-from export.densepose.bundle import GRAPHS
+from export.densepose import bundle as densepose
+from export.scenes import bundle as scenes
 
+DENSEPOSE, SCENES = (Path(__file__).with_name(f"{system}.toml") for system in ("densepose", "scenes"))
 METHODS = ("minmax", "percentile", "entropy")
 
 
@@ -34,11 +37,13 @@ class GraphSettings:
 
 
 @dataclass(frozen=True)
-class Settings:
+class DensePoseSettings:
     """graphs: settings by graph name. calibration_images, calibration_photos, held_out_images: how many images
     and photographs set the ranges, and how many images measure the error. people_per_image: at most so many people
     of an image calibrate the dense head.
     """
+
+    GRAPHS: ClassVar[tuple[str, ...]] = densepose.GRAPHS
 
     graphs: dict[str, GraphSettings]
     calibration_images: int
@@ -47,17 +52,31 @@ class Settings:
     people_per_image: int
 
 
-def read_settings(path: Path) -> Settings:
+@dataclass(frozen=True)
+class SceneSettings:
+    """graphs: settings by graph name. views, held_out_views: how many pictures calibrate, and measure the error."""
+
+    GRAPHS: ClassVar[tuple[str, ...]] = scenes.GRAPHS
+
+    graphs: dict[str, GraphSettings]
+    views: int
+    held_out_views: int
+
+
+Settings = TypeVar("Settings", DensePoseSettings, SceneSettings)
+
+
+def read_settings(path: Path, kind: type[Settings]) -> Settings:
     """Raises ValueError for unknown keys or methods."""
     values = tomllib.loads(path.read_text())
-    graphs = {name: graph_settings(values.pop(name, {}), f"{path}, [{name}]") for name in GRAPHS}
+    graphs = {name: _graph_settings(values.pop(name, {}), f"{path}, [{name}]") for name in kind.GRAPHS}
     try:
-        return Settings(graphs, **values)
+        return kind(graphs, **values)
     except TypeError as error:
         raise ValueError(f"{path}: {error}") from error
 
 
-def graph_settings(table: dict[str, object], where: str) -> GraphSettings:
+def _graph_settings(table: dict[str, object], where: str) -> GraphSettings:
     """Of a table of such a file; `where` begins the sentence of a ValueError."""
     try:
         settings = GraphSettings(**{**table, "float_nodes": tuple(table.get("float_nodes", ()))})

@@ -41,10 +41,11 @@ maq::FittedPoints points_of(Kind kind, size_t count) {
     points.x.push_back(at[0]);
     points.y.push_back(at[1]);
     points.z.push_back(at[2]);
-    // Half of the points' looks do not depend on the side.
+    // Half of the points are view-dependent.
     points.view_dependence.push_back(random() % 2 == 0 ? 0.0f : 1.0f);
     points.views.push_back(1);
-    for (int c = 0; c < kFeatures; ++c) points.constant_terms.push_back(0.5f + 0.3f * std::sin(5 * at[c % 3] + float(c)));
+    for (int c = 0; c < kFeatures; ++c)
+      points.constant_terms.push_back(0.5f + 0.3f * std::sin(5 * at[c % 3] + float(c)));
     for (int k = 0; k < kBasis * kFeatures; ++k) points.linear_terms.push_back(0.05f * normal(random));
   }
   return points;
@@ -71,11 +72,13 @@ maq::PinholeCamera camera_of(Kind kind, int width, int height, double angle, dou
 void measure(const char* name, maq::SceneRenderer& renderer, Kind kind, int width, int height, double roll,
              int frames) {
   using Figure = double maq::RenderCounts::*;
-  const std::pair<const char*, Figure> figures[] = {
-      {"project", &maq::RenderCounts::project_ms}, {"shade", &maq::RenderCounts::shade_ms},
-      {"reduce", &maq::RenderCounts::reduce_ms},   {"refine", &maq::RenderCounts::refine_ms},
-      {"cover", &maq::RenderCounts::cover_ms},     {"turn", &maq::RenderCounts::rotate_ms},
-      {"all", &maq::RenderCounts::all_ms}};
+  const std::pair<const char*, Figure> figures[] = {{"project", &maq::RenderCounts::project_ms},
+                                                    {"shade", &maq::RenderCounts::shade_ms},
+                                                    {"reduce", &maq::RenderCounts::reduce_ms},
+                                                    {"refine", &maq::RenderCounts::refine_ms},
+                                                    {"coverage", &maq::RenderCounts::coverage_ms},
+                                                    {"rotate", &maq::RenderCounts::rotate_ms},
+                                                    {"all", &maq::RenderCounts::all_ms}};
   maq::RenderedImage picture;
   std::vector<maq::RenderCounts> all;
   for (int frame = 0; frame <= frames; ++frame) {
@@ -90,10 +93,10 @@ void measure(const char* name, maq::SceneRenderer& renderer, Kind kind, int widt
     std::printf(" %s %5.2f", title, values[values.size() / 2]);
   }
   const maq::RenderCounts& last = all.back();
-  std::printf(" ms | blocks %u/%u points %llu shaded %llu view_dependent %llu refined %llu/%llu px\n", last.projected_blocks,
-              last.blocks, (unsigned long long)last.projected_points, (unsigned long long)last.shaded_points,
-              (unsigned long long)last.view_dependent_points, (unsigned long long)last.refined_pixels,
-              (unsigned long long)last.frame_pixels);
+  std::printf(" ms | blocks %u/%u points %llu shaded %llu view_dependent %llu refined %llu/%llu px\n",
+              last.projected_blocks, last.blocks, (unsigned long long)last.projected_points,
+              (unsigned long long)last.shaded_points, (unsigned long long)last.view_dependent_points,
+              (unsigned long long)last.refined_pixels, (unsigned long long)last.frame_pixels);
 }
 
 }  // namespace
@@ -106,7 +109,7 @@ int main(int argc, char** argv) {
     const auto runtime = std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());
     maq::SessionSettings settings;
     settings.threads = threads;
-    const auto networks = std::make_shared<maq::SceneNetworks>(runtime, argv[1], settings);
+    const auto networks = std::make_shared<maq::SceneNetworks>(runtime, maq::read_bundle(argv[1]), settings);
     for (const Kind kind : {Kind::kRoom, Kind::kObject}) {
       const maq::FittedPoints points = points_of(kind, size_t(count));
       for (const auto coefficients : {maq::CoefficientFormat::kInt8, maq::CoefficientFormat::kFloat32}) {

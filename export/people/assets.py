@@ -65,7 +65,7 @@ PACKAGES = (
         "0ad-data_0.0.26-1_all.deb",
         "53745ae74d05bccf6783400fa98f3932b21729ab9d2e86151aa2c331c3455178",
         "CC-BY-SA-3.0",
-        "motions, fabrics",
+        "motions, fabrics, animals",
     ),
     Package(
         "apt",
@@ -166,7 +166,10 @@ def _unpack_bullet(archive: Path) -> None:
 def _unpack_zero_ad(archive: Path) -> None:
     subprocess.run(["dpkg", "-x", str(archive), str(UNPACKED / "0ad.deb")], check=True)
     public = UNPACKED / "0ad.deb/usr/share/games/0ad/mods/public/public.zip"
-    _unzip(public, ("art/animation/biped/", "art/skeletons/", "art/textures/skins/skeletal/"), UNPACKED / "0ad")
+    folders = (
+        "actors/fauna/", "animation/biped/", "meshes/skeletal/", "skeletons/", "textures/skins/skeletal/", "variants/",
+    )  # fmt: skip
+    _unzip(public, tuple(f"art/{folder}" for folder in folders), UNPACKED / "0ad")
     shutil.rmtree(UNPACKED / "0ad.deb")
 
 

@@ -17,6 +17,7 @@ class Prop:
     """corners [F, 3, 3] in world axes, uv [F, 3, 2] of a texture uint8 [h, w, 3] that repeats.
 
     points [F, 3, 3], if given, lie on the template's surface below each corner: the prop is worn and labelled.
+    normals [F, 3, 3], if given, are those of a round surface; else each triangle is flat.
     """
 
     corners: np.ndarray
@@ -25,18 +26,24 @@ class Prop:
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
     specular: float = 0.0
     points: np.ndarray | None = None
+    normals: np.ndarray | None = None
 
     def corners_in(self, rotation: np.ndarray, shift: np.ndarray) -> np.ndarray:
         """Position and normal of each corner in camera axes, float32 [F, 3, 6]."""
         at = self.corners @ rotation.T + shift
-        normal = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
-        return np.concatenate([at, np.repeat(normal[:, None], 3, 1)], 2).astype(np.float32)
+        if self.normals is None:
+            normal = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
+            normal = np.repeat(normal[:, None], 3, 1)
+        else:
+            normal = self.normals @ rotation.T
+        normal = normal / (np.linalg.norm(normal, axis=2, keepdims=True) + 1e-12)
+        return np.concatenate([at, normal], 2).astype(np.float32)
 
     def moved(self, x: float, y: float, yaw: float = 0.0) -> Prop:
         """Turned about the vertical through the origin by `yaw` radians, then shifted."""
         turn = Rotation.from_euler("z", yaw).as_matrix()
-        return replace(self, corners=self.corners @ turn.T + [x, y, 0])
+        normals = None if self.normals is None else self.normals @ turn.T
+        return replace(self, corners=self.corners @ turn.T + [x, y, 0], normals=normals)
 
 
 @dataclass(frozen=True)

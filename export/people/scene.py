@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from export.people import assets
+from export.people.animals import load_animals
 from export.people.atlas import Atlas
 from export.people.body import Body, Shape, sample_phenotype
 from export.people.imaging import camera_faults, lens_map, through_lens
@@ -60,7 +61,7 @@ class Studio:
         self.shape = lru_cache(maxsize=128)(self._shape)
         self.director = Director(
             self.model, self.fabrics, load_clips(split), load_photo_poses(split), self.shape, BODIES[split],
-            (width, height), variety,
+            (width, height), variety, load_animals(split) if variety.animals_alone else (),
         )  # fmt: skip
 
     def _shape(self, number: int) -> Shape:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from export.people.animals import Animal
 from export.people.body import Shape
 from export.people.motion import Clips, PhotoPoses, Pose, clip_pose, drawn_pose, lying, photo_pose, posed
 from export.people.props import Prop, PropMaker
@@ -74,11 +75,12 @@ class Director:
         bodies: int,
         size: tuple[int, int],
         variety: Variety = CLOSE,
+        animals: tuple[Animal, ...] = (),
     ) -> None:
         self.model, self.fabrics, self.shape, self.bodies = model, fabrics, shape, bodies
         self.clips, self.photo_poses = clips, photo_poses
         self.width, self.height = size
-        self.variety = variety
+        self.variety, self.animals = variety, animals
         self.maker = PropMaker(lambda rng: fabrics.draw(rng, worn=False))
 
     def stage(self, rng: np.random.Generator) -> Stage:
@@ -106,6 +108,9 @@ class Director:
             behind = [a.person.vertices[self.model.torso, 1].max() + 0.3 for a in actors]
             far = max([aim.eye[1] + aim.distance, *behind]) + rng.uniform(0.3, 2.5)
             props += self.maker.room(rng, aim.eye, far)
+        fraction = self.variety.animals_beside if actors else self.variety.animals_alone
+        if self.animals and fraction and rng.random() < fraction:
+            props += self._some_animals(rng, aim, alone=not actors)
         roll = self.variety.draw_roll(rng)
         return Stage([a.person for a in actors], props, aim.camera.rolled(roll), indoors, roll)
 
@@ -263,6 +268,21 @@ class Director:
             behind = u(-0.15, 0.35) if u() < 0.6 else u(0.5, 2.2)
             placed.append(actor.moved(side * u(0.32, 0.6) * (1 + k // 2) * (1 + 0.5 * behind), behind))
         return placed, aim
+
+    def _some_animals(self, rng: np.random.Generator, aim: Aim, alone: bool) -> list[Prop]:
+        """One to three animals on the ground: alone as large in the picture as a subject, else of their own size."""
+        visible = aim.distance * aim.width_per_depth * self.height / self.width
+        placed = []
+        for k in range(1 + int(rng.choice(3, p=[0.6, 0.25, 0.15]))):
+            animal = self.animals[rng.integers(len(self.animals))]
+            scale = rng.uniform(0.85, 1.15)
+            spot = self._spot(rng, aim, max(aim.distance * rng.uniform(0.9, 2.0), _MIN_DEPTH))
+            if alone:
+                scale = visible * rng.uniform(0.25, 1.0) / animal.extent
+                if not k:
+                    spot = aim.eye + aim.distance * (aim.forward + rng.uniform(-0.2, 0.2) * aim.right)
+            placed.append(animal.scaled(rng, scale).moved(*spot[:2], rng.uniform(-np.pi, np.pi)))
+        return placed
 
     def _cuts_off(self, kind: int) -> bool:
         """Whether a framing shows less than the whole body."""

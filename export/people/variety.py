@@ -24,6 +24,7 @@ class Variety:
         hand's unsteadiness.
     turned_around: fraction of the people who are turned by half a turn after their yaw was drawn.
     bare_chest, hat, hood: fractions of the people.
+    animals_alone, animals_beside: fractions of the pictures without and with people that show animals.
     """
 
     generator: str
@@ -35,6 +36,8 @@ class Variety:
     bare_chest: float = 0.06
     hat: float = 0.1
     hood: float = 0.05
+    animals_alone: float = 0.0
+    animals_beside: float = 0.0
 
     def draw_roll(self, rng: np.random.Generator) -> float:
         """Degrees by which the camera is rolled, either way; nothing is drawn where there are no `rolls`."""
@@ -89,6 +92,8 @@ WIDE = Variety(
     bare_chest=0.15,
     hat=0.18,
     hood=0.06,
+    animals_alone=0.6,
+    animals_beside=0.07,
 )
 
 VARIETIES = {"close": CLOSE, "wide": WIDE}

@@ -20,6 +20,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -34,19 +37,21 @@ from export.point_cloud import PointCloudError
 from export.scenes.bundle import BASIS, identity
 from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture, CaptureError, read_capture
+from export.scenes.export_onnx import export_refiner
 from export.scenes.extractor import STRIDE
 from export.scenes.feature_scale import factors_between, scaled
+from export.scenes.light_refiner import LightRefiner, folded
 from export.scenes.losses import LossWeights
 from export.scenes.modelling import View
 from export.scenes.perceptual import load_perceptual
 from export.scenes.picture_quality import psnr_db
 from export.scenes.scene_file import SceneFile, SceneFileError, read_scene_file, write_scene_file
 from export.scenes.system import Networks, load_networks
-from export.scenes.tuned_bundle import write_tuned_bundle
-from export.scenes.tuning import Rates, TunedScene, Tuning
+from export.scenes.tuning import Rates, Shown, TunedScene, Tuning
 
 REFINER_RATE = 1e-4
 LEAST_SHARE = 0.1  # of the learning rates, where a save is due
+MAX_VIEWS = 8  # of the scene that set the ranges of an int8 refiner
 
 
 def networks_of_bundle(weights: Path, bundle: Path, view: View, up: tuple[float, float, float]) -> Networks:
@@ -88,6 +93,31 @@ def share_of_rate(spent_s: float, saves_s: Sequence[float]) -> float:
 def measured(scene: TunedScene, views: Iterable[View]) -> float:
     """Mean PSNR in dB of pictures of the scene."""
     return float(np.mean([psnr_db(scene.rendered(view.camera), view.image) for view in views]))
+
+
+def write_tuned_networks(scene: TunedScene, views: list[Shown], shipped: Path, folder: Path) -> str:
+    """A bundle of the precision of the one in `shipped`, calibrated on views of the scene; returns its identity."""
+    with tempfile.TemporaryDirectory() as work:
+        refiner = Path(work) / "refiner.onnx"
+        export_refiner(scene.networks.refiner.cpu(), refiner)
+        scene.networks.refiner.to(scene.places.device)
+        for k, view in enumerate(views[:: -(-len(views) // MAX_VIEWS)]):
+            np.savez(Path(work) / f"{k}.npz", **_refiner_inputs(scene, view))
+        # A program of its own: calibration builds on this package, not the other way round.
+        command = [sys.executable, "-m", "quantization.tuned_bundle", "--refiner", refiner, "--samples", work]
+        subprocess.run([*command, "--shipped", shipped, "--out", folder], check=True)
+    return identity(json.loads((folder / "manifest.json").read_text()))
+
+
+@torch.no_grad()
+def _refiner_inputs(scene: TunedScene, view: Shown) -> dict[str, np.ndarray]:
+    """What the refiner's graph is given for one view."""
+    rasters, refiner = scene.rasters(view), scene.networks.refiner
+    if isinstance(refiner, LightRefiner):
+        rasters = rasters[: refiner.config.levels]
+        if refiner.config.folded:
+            rasters = [folded(rasters[0]), *rasters[1:]]
+    return {f"raster{k}": x.permute(0, 2, 3, 1).contiguous().cpu().numpy() for k, x in enumerate(rasters)}
 
 
 class Files:
@@ -136,7 +166,7 @@ def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argpar
         begin_s = time.monotonic()
         tuned = scene.with_looks(*model.looks())
         if options.refiner:
-            sha256 = write_tuned_bundle(model, tuning.shown, options.networks, files.networks(due_s))
+            sha256 = write_tuned_networks(model, tuning.shown, options.networks, files.networks(due_s))
             tuned = tuned.with_networks(sha256)
         write_scene_file(tuned, files.scene(due_s))
         print(f"{files.scene(due_s)}: {spent_s:.1f} s, {steps} steps; saved in {time.monotonic() - begin_s:.1f} s")

@@ -1,17 +1,13 @@
 #include <algorithm>
-#include <thread>
 
 #include "api/boundary.h"
+#include "core/worker_threads.h"
 #include "densepose/body_parts.h"
 #include "densepose/result_files.h"
 
 using namespace maq;
 
 namespace {
-
-constexpr int kMostThreads = 64;
-// More threads than this do not pay for networks of this size.
-constexpr unsigned kMostDefaultThreads = 4;
 
 maq_densepose_config default_config() {
   maq_densepose_config config{};
@@ -26,7 +22,7 @@ maq_densepose_config default_config() {
 
 DensePoseSettings checked_settings(const maq_densepose_config& config) {
   require_argument(config.bundle_path, "config.bundle_path");
-  require_range("config.threads", config.threads, 0, kMostThreads);
+  require_range("config.threads", config.threads, 0, kMaxThreads);
   if (config.long_side_px != 0) require_range("config.long_side_px", config.long_side_px, 32, 2048);
   if (!(config.score_threshold < 0)) require_range("config.score_threshold", config.score_threshold, 0.0f, 1.0f);
   if (config.max_people != 0) require_range("config.max_people", config.max_people, 1, 255);
@@ -36,9 +32,8 @@ DensePoseSettings checked_settings(const maq_densepose_config& config) {
   require_range("config.least_person_px", config.least_person_px, 0, 100000);
   require_range("config.detail", config.detail, int32_t(MAQ_DETAIL_SURFACE), int32_t(MAQ_DETAIL_PART));
   require_range("config.spin", config.spin, 0, 1);
-  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   DensePoseSettings settings;
-  settings.threads = config.threads > 0 ? config.threads : int(std::min(cores, kMostDefaultThreads));
+  settings.threads = config.threads > 0 ? config.threads : default_threads();
   settings.long_side_px = config.long_side_px;
   settings.score_threshold = config.score_threshold;
   settings.max_people = config.max_people;
@@ -70,13 +65,11 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     require_argument(densepose, "densepose");
     const maq_densepose_config config = read_config(given, "config", default_config(), sizeof(maq_densepose_config));
     const DensePoseSettings settings = checked_settings(config);
-    Bundle bundle = read_bundle(config.bundle_path);
+    const Bundle bundle = read_bundle(config.bundle_path);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                                 bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");
-    const std::string& surface = bundle.manifest.surface_file;
-    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size,
-                                   std::move(bundle.files[surface]), bundle.folder + "/" + surface);
+    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size);
     return MAQ_OK;
   });
 }
@@ -94,7 +87,7 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     for (const Person& person : handle->result.people) {
       handle->people.push_back({{person.box.x0, person.box.y0, person.box.x1, person.box.y1}, person.score});
     }
-    *result = hand_out<maq_densepose_result>(std::move(handle));
+    *result = lend<maq_densepose_result>(std::move(handle));
     return MAQ_OK;
   });
 }
@@ -107,7 +100,7 @@ maq_status maq_densepose_restart(maq_densepose* densepose) {
   });
 }
 
-void maq_densepose_result_release(maq_densepose_result* result) { take_back(result); }
+void maq_densepose_result_release(maq_densepose_result* result) { return_to_pool(result); }
 
 maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px) {
   return guarded(result, __func__, [&] {
@@ -186,7 +179,7 @@ maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_surface* surf
   return guarded(densepose, __func__, [&] {
     require_argument(densepose, "densepose");
     require_argument(surface, "surface");
-    const SurfaceGrid& grid = densepose->surface.grid();
+    const SurfaceGrid& grid = densepose->densepose->surface();
     write_struct(surface, "surface", maq_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_surface));
     return MAQ_OK;
   });

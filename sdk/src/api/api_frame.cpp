@@ -49,7 +49,7 @@ maq_status maq_frame_create(maq_context* context, const maq_frame_desc* given, m
   });
 }
 
-void maq_frame_release(maq_frame* frame) { take_back(frame); }
+void maq_frame_release(maq_frame* frame) { return_to_pool(frame); }
 
 maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {

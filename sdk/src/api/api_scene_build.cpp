@@ -170,8 +170,8 @@ maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_fram
     require_struct_size("camera", camera->struct_size, sizeof(maq_camera), sizeof(maq_camera));
     check_camera(pinhole_of(*camera), "The photo's camera");
     check_distortion(*camera);
-    const std::optional<size_t> seen = builder->builder.add_view(photo->frame.image, lens_of(*camera),
-                                                                 pinhole_of(*camera), builder->progress);
+    const std::optional<size_t> seen =
+        builder->builder.add_view(photo->frame.image, lens_of(*camera), pinhole_of(*camera), builder->progress);
     if (!seen) return keep_error(builder, MAQ_CANCELLED, nullptr, "The photo was not added: the app cancelled it.");
     if (seen_points != nullptr) *seen_points = *seen;
     return MAQ_OK;

@@ -79,12 +79,12 @@ maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_camera
     }
     BoundedPool<maq_scene_image>::Pooled handle = renderer->images.acquire();
     renderer->renderer.render(pinhole_of(*camera), handle->image);
-    *image = hand_out<maq_scene_image>(std::move(handle));
+    *image = lend<maq_scene_image>(std::move(handle));
     return MAQ_OK;
   });
 }
 
-void maq_scene_image_release(maq_scene_image* image) { take_back(image); }
+void maq_scene_image_release(maq_scene_image* image) { return_to_pool(image); }
 
 maq_status maq_scene_image_plane(const maq_scene_image* image, maq_scene_plane plane, const void** pixels,
                                  size_t* stride_bytes) {

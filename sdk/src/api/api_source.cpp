@@ -90,7 +90,7 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
         return keep_error(source, MAQ_TIMEOUT, nullptr,
                           concatenate("No frame came within ", timeout_ns / 1000000, " ms.").c_str());
     }
-    *frame = hand_out<maq_frame>(std::move(handle));
+    *frame = lend<maq_frame>(std::move(handle));
     return MAQ_OK;
   });
 }

@@ -11,7 +11,6 @@
 #include "core/frame.h"
 #include "core/log.h"
 #include "densepose/densepose.h"
-#include "densepose/surface_grid.h"
 #include "maquette/maquette.h"
 #include "nn/onnxruntime_library.h"
 #include "scene/capture/capture.h"
@@ -66,7 +65,7 @@ struct maq_context : maq::Handle {
   std::shared_ptr<maq::ContextState> state;
 };
 
-// Frames of sources and results are whole handles from pools, so that handing one out takes nothing from the heap.
+// Frames of sources and results are whole handles from pools, so that lending one allocates nothing.
 struct maq_frame : maq::Handle {
   ~maq_frame() {
     if (free_callback != nullptr) free_callback(user_data);
@@ -74,7 +73,7 @@ struct maq_frame : maq::Handle {
   maq::Frame frame;
   maq_frame_free_callback free_callback = nullptr;
   void* user_data = nullptr;
-  maq::BoundedPool<maq_frame>::Home home;  // none: an app's own memory
+  maq::BoundedPool<maq_frame>::Deleter deleter;  // empty: the app's own memory
 };
 
 struct maq_source : maq::Handle {
@@ -92,20 +91,15 @@ struct maq_camera_list : maq::Handle {
 struct maq_densepose_result : maq::Handle {
   maq::DensePoseResult result;
   std::vector<maq_person> people;
-  maq::BoundedPool<maq_densepose_result>::Home home;
+  maq::BoundedPool<maq_densepose_result>::Deleter deleter;
 };
 
 struct maq_densepose : maq::Handle {
-  maq_densepose(std::shared_ptr<maq::ContextState> of, std::unique_ptr<maq::DensePose> made, size_t pool_size,
-                std::vector<uint8_t> surface_bytes, std::string surface_path)
-      : state(std::move(of)),
-        densepose(std::move(made)),
-        results(pool_size, "results"),
-        surface(std::move(surface_bytes), std::move(surface_path)) {}
+  maq_densepose(std::shared_ptr<maq::ContextState> of, std::unique_ptr<maq::DensePose> made, size_t pool_size)
+      : state(std::move(of)), densepose(std::move(made)), results(pool_size, "results") {}
   std::shared_ptr<maq::ContextState> state;
   std::unique_ptr<maq::DensePose> densepose;
   maq::BoundedPool<maq_densepose_result> results;
-  maq::BodySurface surface;
 };
 
 struct maq_capture : maq::Handle {
@@ -121,30 +115,30 @@ struct maq_scene : maq::Handle {
 
 struct maq_scene_image : maq::Handle {
   maq::RenderedImage image;
-  maq::BoundedPool<maq_scene_image>::Home home;
+  maq::BoundedPool<maq_scene_image>::Deleter deleter;
 };
 
 namespace maq {
 
-// Gives a handle to the caller.
+// Lends a handle of a pool to the caller.
 template <class T>
-T* hand_out(typename BoundedPool<T>::Pooled handle) {
-  handle->set_error({});  // of whoever had it before
-  handle->home = handle.get_deleter();
+T* lend(typename BoundedPool<T>::Pooled handle) {
+  handle->set_error({});  // of its use before
+  handle->deleter = handle.get_deleter();
   return handle.release();
 }
 
-// Takes it back; NULL is fine.
-inline void take_back(maq_frame* frame) {
+// Returns it; NULL is fine.
+inline void return_to_pool(maq_frame* frame) {
   if (frame == nullptr) return;
   frame->frame.clear();
-  std::exchange(frame->home, {})(frame);
+  std::exchange(frame->deleter, {})(frame);
 }
-inline void take_back(maq_densepose_result* result) {
-  if (result != nullptr) std::exchange(result->home, {})(result);
+inline void return_to_pool(maq_densepose_result* result) {
+  if (result != nullptr) std::exchange(result->deleter, {})(result);
 }
-inline void take_back(maq_scene_image* image) {
-  if (image != nullptr) std::exchange(image->home, {})(image);
+inline void return_to_pool(maq_scene_image* image) {
+  if (image != nullptr) std::exchange(image->deleter, {})(image);
 }
 
 }  // namespace maq

@@ -6,21 +6,18 @@
 #include <iterator>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "api/boundary.h"
 #include "core/worker_threads.h"
 #include "image/geometry/lens.h"
-#include "scene/pinhole_camera.h"
 #include "scene/networks/scene_networks.h"
+#include "scene/pinhole_camera.h"
 
 namespace maq {
 
 inline int scene_threads(int32_t wanted) {
-  require_range("config.threads", wanted, 0, WorkerThreads::kMaxThreads);
-  // More threads than this do not pay for networks of this size.
-  constexpr unsigned kMostDefaultThreads = 4;
-  return wanted > 0 ? wanted : int(std::clamp(std::thread::hardware_concurrency(), 1u, kMostDefaultThreads));
+  require_range("config.threads", wanted, 0, kMaxThreads);
+  return wanted > 0 ? wanted : default_threads();
 }
 
 inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, const char* folder, int threads,
@@ -28,7 +25,7 @@ inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, 
   SessionSettings settings;
   settings.threads = threads;
   settings.spin = spin;
-  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), folder, settings);
+  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), read_bundle(folder), settings);
 }
 
 // The camera without its distortion.

@@ -1,5 +1,5 @@
 // A pool of at most `capacity` objects that are made when first needed and reused afterwards, so that memory stays
-// bounded and steady. An acquired object keeps the pool alive; the last owner may be any thread.
+// bounded and steady. An acquired object keeps the pool's memory alive, and may be returned from any thread.
 #pragma once
 
 #include <memory>
@@ -19,10 +19,10 @@ class BoundedPool {
   };
 
  public:
-  // Gives an object back to its pool, or deletes one that is of none.
-  class Home {
+  // Returns an object to its pool; one that has no pool is deleted.
+  class Deleter {
    public:
-    Home() = default;
+    Deleter() = default;
     void operator()(T* object) const {
       std::unique_ptr<T> owned(object);
       if (state_ == nullptr) return;
@@ -32,15 +32,15 @@ class BoundedPool {
 
    private:
     friend BoundedPool;
-    explicit Home(std::shared_ptr<State> state) : state_(std::move(state)) {}
+    explicit Deleter(std::shared_ptr<State> state) : state_(std::move(state)) {}
     std::shared_ptr<State> state_;
   };
-  using Pooled = std::unique_ptr<T, Home>;
+  using Pooled = std::unique_ptr<T, Deleter>;
 
   // `what` names the pooled thing in the error text: "frames".
   BoundedPool(size_t capacity, std::string what)
       : state_(std::make_shared<State>()), capacity_(capacity), what_(std::move(what)) {
-    // Room for every object, so that giving one back never allocates.
+    // Room for every object, so that returning one never allocates.
     state_->idle.reserve(capacity_);
   }
 
@@ -60,7 +60,7 @@ class BoundedPool {
       object = std::make_unique<T>();
       ++state_->made;
     }
-    return Pooled(object.release(), Home(state_));
+    return Pooled(object.release(), Deleter(state_));
   }
 
  private:

@@ -29,13 +29,13 @@ bool stays_inside(const std::string& relative_path) {
   return parts.find("/../") == std::string::npos;
 }
 
-std::string lower_case_ending(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  // Whatever the language of the system: these are ASCII.
-  for (char& letter : ending) {
+std::string lower_case_extension(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  // ASCII, whatever the locale of the process.
+  for (char& letter : extension) {
     if (letter >= 'A' && letter <= 'Z') letter = char(letter - 'A' + 'a');
   }
-  return ending;
+  return extension;
 }
 
 std::vector<uint8_t> read_file(const std::string& path) {

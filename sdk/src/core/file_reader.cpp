@@ -18,9 +18,9 @@ bool is_space(int character) { return character == ' ' || (character >= '\t' && 
 }  // namespace
 
 FileReader::FileReader(std::string path) : path_(std::move(path)) {
-  // Without O_NONBLOCK a pipe would wait for somebody who writes.
-  file_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file_ < 0) {
+  // Without O_NONBLOCK, opening a pipe would wait for a writer.
+  file_ = UniqueFd(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file_.is_open()) {
     const int reason = errno;
     if (reason == ENOENT || reason == ENOTDIR) {
       throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
@@ -28,22 +28,17 @@ FileReader::FileReader(std::string path) : path_(std::move(path)) {
     fail(" cannot be opened (", std::strerror(reason), ").");
   }
   struct stat found {};
-  if (::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) {
-    ::close(file_);
-    fail(" is not a file.");
-  }
+  if (::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
   size_bytes_ = uint64_t(found.st_size);
   buffer_ = std::make_unique<uint8_t[]>(kBufferBytes);
 }
-
-FileReader::~FileReader() { ::close(file_); }
 
 bool FileReader::fill() {
   buffer_offset_ += position_;
   position_ = filled_ = 0;
   const size_t count = size_t(std::min<uint64_t>(kBufferBytes, size_bytes_ - buffer_offset_));
   while (filled_ < count) {
-    const ssize_t got = ::pread(file_, buffer_.get() + filled_, count - filled_, off_t(buffer_offset_ + filled_));
+    const ssize_t got = ::pread(file_.get(), buffer_.get() + filled_, count - filled_, off_t(buffer_offset_ + filled_));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) fail(" cannot be read to its end; did it change meanwhile?");
     filled_ += size_t(got);
@@ -52,7 +47,7 @@ bool FileReader::fill() {
 }
 
 void FileReader::read_over_the_end(uint8_t* bytes, size_t count) {
-  if (count > remaining()) fail(" ends early: it is cut off or damaged; copy it again.");
+  if (count > remaining()) fail(" ends early: it is truncated or damaged; copy it again.");
   while (count > 0) {
     if (position_ == filled_) fill();
     const size_t part = std::min(count, filled_ - position_);
@@ -64,7 +59,7 @@ void FileReader::read_over_the_end(uint8_t* bytes, size_t count) {
 }
 
 void FileReader::skip(uint64_t count) {
-  if (count > remaining()) fail(" ends early: it is cut off or damaged; copy it again.");
+  if (count > remaining()) fail(" ends early: it is truncated or damaged; copy it again.");
   if (count <= filled_ - position_) {
     position_ += size_t(count);
     return;
@@ -78,7 +73,7 @@ int FileReader::next_character() {
   return buffer_[position_++];
 }
 
-bool FileReader::next_line(std::string& line, size_t most_bytes) {
+bool FileReader::next_line(std::string& line, size_t max_bytes) {
   line.clear();
   bool is_there = false;
   while (position_ < filled_ || fill()) {
@@ -86,7 +81,7 @@ bool FileReader::next_line(std::string& line, size_t most_bytes) {
     const uint8_t* begin = buffer_.get() + position_;
     const auto* end = static_cast<const uint8_t*>(std::memchr(begin, '\n', filled_ - position_));
     const size_t count = end == nullptr ? filled_ - position_ : size_t(end - begin);
-    const size_t kept = std::min(count, most_bytes - std::min(most_bytes, line.size()));
+    const size_t kept = std::min(count, max_bytes - std::min(max_bytes, line.size()));
     line.append(reinterpret_cast<const char*>(begin), kept);
     position_ += count;
     if (end == nullptr) continue;
@@ -119,7 +114,7 @@ bool parse_number(std::string_view text, double& number) {
   if (!text.empty() && text[0] == '+') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error == std::errc::result_out_of_range) {
-    // Too small is nothing, too large is not finite; both are what strtod says.
+    // As strtod: what underflows is 0, what overflows is infinite.
     const bool is_small = text.find("e-") != std::string_view::npos || text.find("E-") != std::string_view::npos;
     number = is_small ? 0 : HUGE_VAL;
     return end == text.data() + text.size();

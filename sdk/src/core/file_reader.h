@@ -1,4 +1,4 @@
-// A file read from front to back: as numbers, words or lines, with memory that does not depend on what it claims.
+// A file read from front to back as numbers, words or lines, in memory of fixed size whatever the file claims.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/unique_fd.h"
 
 namespace maq {
 
@@ -18,11 +19,8 @@ enum class ByteOrder { kLittle, kBig };
 
 class FileReader {
  public:
-  // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE for what is no file or may not be read.
+  // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE for what is not a file or may not be read.
   explicit FileReader(std::string path);
-  ~FileReader();
-  FileReader(const FileReader&) = delete;
-  FileReader& operator=(const FileReader&) = delete;
 
   const std::string& path() const { return path_; }
   // Bytes that have not been read or skipped yet.
@@ -49,12 +47,11 @@ class FileReader {
     return number;
   }
 
-  // The next line without its end ("\n" or "\r\n"); what is behind its first `most_bytes` is left out. False at the end of
-  // the file.
-  bool next_line(std::string& line, size_t most_bytes);
+  // The next line without its end ("\n" or "\r\n"), cut after `max_bytes`. False at the end of the file.
+  bool next_line(std::string& line, size_t max_bytes);
 
-  // What comes next between white space, until the next call; empty at the end of the file. Throws MAQ_ERROR_UNREADABLE
-  // when it is longer than any number.
+  // The next word between white space, valid until the next call; empty at the end of the file. Throws
+  // MAQ_ERROR_UNREADABLE when it is longer than any number.
   std::string_view next_word();
 
   // Throws MAQ_ERROR_UNREADABLE: the path, then what is wrong.
@@ -69,7 +66,7 @@ class FileReader {
   int next_character();  // -1 at the end of the file
 
   std::string path_;
-  int file_ = -1;
+  UniqueFd file_;
   uint64_t size_bytes_ = 0;
   uint64_t buffer_offset_ = 0;  // of the buffer's first byte in the file
   std::unique_ptr<uint8_t[]> buffer_;
@@ -79,7 +76,7 @@ class FileReader {
   bool ended_line_ = true;
 };
 
-// The whole text as a number, in the way of C whatever the language of the system; false when it is none.
+// Reads the whole text as a number, in the C locale whatever that of the process; false when it is not one.
 bool parse_number(std::string_view text, double& number);
 
 }  // namespace maq

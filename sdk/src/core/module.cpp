@@ -7,11 +7,18 @@
 
 #include "core/build_info.h"
 #include "core/error.h"
-#include "core/library_folder.h"
 
 namespace maq {
 
-std::string module_path(const char* file) { return own_folder() + "maquette/" + file; }
+std::string library_folder() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<const void*>(&library_folder), &info) == 0 || info.dli_fname == nullptr) return "";
+  const std::string file = info.dli_fname;
+  const size_t slash = file.rfind('/');
+  return slash == std::string::npos ? "./" : file.substr(0, slash + 1);
+}
+
+std::string module_path(const char* file) { return library_folder() + "maquette/" + file; }
 
 void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy) {
   const std::string path = module_path(file);

@@ -1,24 +1,36 @@
-// Parts of the SDK that bring libraries of others: each is a library of its own, which is opened when it is needed first,
-// so that an app that never needs it does without those libraries.
+// Modules: parts of the SDK that bring foreign libraries along (OpenCV's codecs, libcamera, DepthAI). Each is a shared
+// library of its own, opened when it is first needed, so that an app without cameras or files does without them.
+//
+// Exceptions may cross the boundary between the SDK and a module, under two rules:
+// - What a call throws to the other side is an Error, or another exception of the standard library. Both sides are built
+//   together and share one C++ runtime, so that their types are the same. A foreign library's own exceptions
+//   (cv::Exception, dai::…) are caught inside the module and thrown again as one of those, because the module's symbols
+//   are private (RTLD_LOCAL).
+// - A call that a foreign library's thread, or C code, makes into either side is noexcept.
 #pragma once
 
 #include <string>
 
 namespace maq {
 
-// What such a library exports, by a function without arguments: its version, which must be that of the SDK, and an object
-// whose type both sides know.
+// What a module exports, by a function without arguments: its version, which must be that of the SDK, and an object whose
+// type both sides know.
 struct ModuleExport {
   const char* version;
   void* object;
 };
 
-// Where such a library lies: in maquette/ beside this copy of the SDK.
+// The folder of the shared library (or program) that this function was linked into, with a final '/'; "" if the system
+// does not tell.
+std::string library_folder();
+
+// The path of a module: in maquette/ beside this copy of the SDK.
 std::string module_path(const char* file);
 
-// Opens it and returns the object that its function `symbol` exports. Never closed again: the libraries below it do not
-// survive unloading, and threads of theirs may still run. Throws MAQ_ERROR_RUNTIME_LIBRARY where it is missing or of
-// another build; the sentence begins with `needed_for` ("Image and video files need") and ends with `remedy`.
+// Opens a module and returns the object that its function `symbol` exports. It is never closed again: the foreign
+// libraries do not survive unloading, and their threads may still run. Throws MAQ_ERROR_RUNTIME_LIBRARY where the module
+// is missing or of another build; the sentence begins with `needed_for` ("Image and video files need") and ends with
+// `remedy`.
 void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy);
 
 }  // namespace maq

@@ -1,8 +1,12 @@
 #include "core/worker_threads.h"
 
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace maq {
+
+int default_threads() { return int(std::clamp(std::thread::hardware_concurrency(), 1u, 4u)); }
 
 WorkerThreads::WorkerThreads(int count) {
   if (count < 1 || count > kMaxThreads) {
@@ -42,7 +46,7 @@ void WorkerThreads::run_with(size_t tasks, Call call, void* work) {
   if (tasks > 1) begins_.notify_all();
   take_tasks(0);
   std::unique_lock<std::mutex> lock(mutex_);
-  // Who has not woken up by now is not waited for.
+  // A thread that has not woken up by now is not waited for.
   is_open_ = false;
   ends_.wait(lock, [this] { return working_ == 0; });
   if (failure_ != nullptr) std::rethrow_exception(failure_);

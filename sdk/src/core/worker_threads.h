@@ -12,10 +12,14 @@
 
 namespace maq {
 
+// Of a network or a piece of work; what asks for more is refused.
+inline constexpr int kMaxThreads = 64;
+
+// For who does not say: the processor's cores, but at most 4. More do not pay for networks of this size.
+int default_threads();
+
 class WorkerThreads {
  public:
-  static constexpr int kMaxThreads = 64;
-
   // `count` includes the thread that calls run(), so that of 1 none is started. Throws MAQ_ERROR_INVALID_ARGUMENT unless it
   // is 1 to kMaxThreads, and std::system_error where the system has no more threads.
   explicit WorkerThreads(int count);

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <optional>
 
+#include "core/rounding.h"
 #include "core/simd_clones.h"
 
 namespace maq {
@@ -15,8 +16,6 @@ constexpr int kMostClasses = 64;
 // Below every logit, yet finite, so that it survives interpolation; -kNever bounds them from above.
 constexpr float kNever = -1e30f;
 constexpr int kLanes = 8;
-
-int round_up_to_lanes(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
 using Tap = ResizeTap;
 
@@ -55,7 +54,7 @@ inline int best_of(const float* values, int count, int padded) {
 class ClassRow {
  public:
   ClassRow(int classes, int size, std::vector<float>& values)
-      : classes_(classes), size_(size), padded_(round_up_to_lanes(classes)), values_(values) {
+      : classes_(classes), size_(size), padded_(round_up(classes, kLanes)), values_(values) {
     values_.assign(size_t(size) * size_t(padded_), kNever);
   }
 
@@ -105,7 +104,7 @@ inline float exp_of_negative(float x) {
 // classes but the background, summed as probabilities, against the background's. A class that is NaN counts as absent.
 MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<float>& odds) {
   const int parts = logits.coarse_classes - 1;
-  const int padded = round_up_to_lanes(parts);
+  const int padded = round_up(parts, kLanes);
   alignas(64) std::array<float, kMostClasses> values;
   values.fill(kNever);
   const auto finite = [](float logit) {
@@ -144,7 +143,7 @@ MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<floa
 // Of each cell the part with the largest logit, from 0 (of equal ones the lowest); -1 if all are NaN.
 MAQ_SIMD_CLONES void best_parts(const DenseLogits& logits, std::vector<int8_t>& best) {
   const int parts = logits.index_classes - 1;
-  const int padded = round_up_to_lanes(parts);
+  const int padded = round_up(parts, kLanes);
   std::array<float, kMostClasses> values;
   values.fill(kNever);
   best.resize(size_t(logits.size) * size_t(logits.size));

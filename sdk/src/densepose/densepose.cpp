@@ -1,9 +1,9 @@
 #include "densepose/densepose.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/error.h"
 
 namespace maq {
@@ -20,20 +20,6 @@ std::vector<std::string> at_levels(const std::string& name, int first, int last)
   return all;
 }
 
-class Stopwatch {
- public:
-  // Milliseconds since it was made or last read.
-  float lap_ms() {
-    const auto now = std::chrono::steady_clock::now();
-    const float ms = std::chrono::duration<float, std::milli>(now - start_).count();
-    start_ = now;
-    return ms;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 // Those of a graph's tensors that are called `names`, in this order; the manifest may list more, in any order.
 std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std::vector<std::string>& names,
                               const std::string& where) {
@@ -47,15 +33,32 @@ std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std:
   return chosen;
 }
 
-int feature_channels(const Manifest& manifest) {
-  const std::vector<Dimension>& shape = manifest.graphs.at("trunk").outputs[0].shape;
+GraphSpec graph_with(const Manifest& manifest, const std::string& graph, const std::vector<std::string>& inputs,
+                     const std::vector<std::string>& outputs) {
+  const std::string where = concatenate("Bundle ", manifest.name, ": graph ", graph, " lists no ");
+  const GraphSpec& listed = manifest.graphs.at(graph);
+  return {listed.file, named(listed.inputs, inputs, where + "input"), named(listed.outputs, outputs, where + "output")};
+}
+
+// Of P2, and so of all levels.
+int feature_channels(const GraphSpec& trunk, const std::string& bundle_name) {
+  const std::vector<Dimension>& shape = trunk.outputs[0].shape;
   const int64_t* channels = shape.size() == 4 ? std::get_if<int64_t>(&shape[3]) : nullptr;
   if (channels == nullptr) {
-    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name,
+    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", bundle_name,
                 ": output p2 of the trunk must have the shape [1, h, w, channels] with a number of channels. "
                 "Export the bundle again.");
   }
   return int(*channels);
+}
+
+// Settings with the bundle's values where they were left open.
+DensePoseSettings resolved(DensePoseSettings settings, const DensePoseSpec& spec) {
+  if (settings.long_side_px == 0) settings.long_side_px = spec.input.long_side_px;
+  if (settings.score_threshold < 0) settings.score_threshold = spec.box_head.score_threshold;
+  if (settings.max_people == 0) settings.max_people = spec.box_head.max_people;
+  if (settings.max_proposals == 0) settings.max_proposals = spec.rpn.post_nms_top_k;
+  return settings;
 }
 
 Box scaled(const Box& box, float x, float y) { return {box.x0 * x, box.y0 * y, box.x1 * x, box.y1 * y}; }
@@ -67,37 +70,29 @@ float first_of_two(const float* logits) { return 1.0f / (1.0f + std::exp(logits[
 
 DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle,
                      const DensePoseSettings& settings)
-    : manifest_(bundle.manifest),
-      settings_(settings),
-      charts_(bundle.files.at(manifest_.dense_head.charts_file), manifest_.dense_head.index_classes - 1,
-              bundle.folder + "/" + manifest_.dense_head.charts_file) {
-  if (settings_.long_side_px == 0) settings_.long_side_px = manifest_.input.long_side_px;
-  if (settings_.score_threshold < 0) settings_.score_threshold = manifest_.box_head.score_threshold;
-  if (settings_.max_people == 0) settings_.max_people = manifest_.box_head.max_people;
-
-  if (settings_.max_proposals == 0) settings_.max_proposals = manifest_.rpn.post_nms_top_k;
-  manifest_.rpn.post_nms_top_k = settings_.max_proposals;
-
-  const auto make = [&](const std::string& graph, const std::vector<std::string>& inputs,
-                        const std::vector<std::string>& outputs) {
-    const std::string where = concatenate("Bundle ", manifest_.name, ": graph ", graph, " lists no ");
-    GraphSpec& spec = manifest_.graphs.at(graph);
-    spec.inputs = named(spec.inputs, inputs, where + "input");
-    spec.outputs = named(spec.outputs, outputs, where + "output");
-    return std::make_unique<Session>(runtime, bundle.files.at(spec.file), spec, bundle.folder + "/" + spec.file,
+    : spec_(read_densepose_spec(bundle.manifest)),
+      settings_(resolved(settings, spec_)),
+      charts_(bundle.files.at(spec_.dense_head.charts_file), spec_.dense_head.index_classes - 1,
+              bundle.path_of(spec_.dense_head.charts_file)),
+      surface_(spec_.surface_file.empty() ? std::vector<uint8_t>() : bundle.files.at(spec_.surface_file),
+               bundle.path_of(spec_.surface_file)) {
+  const Manifest& manifest = bundle.manifest;
+  const auto make = [&](const GraphSpec& graph) {
+    return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file),
                                      SessionSettings{settings_.threads, settings_.spin});
   };
-  const int last_level = kFirstLevel + int(kRpnLevels) - 1;
-  trunk_ = make("trunk", {"image"}, at_levels("p", kFirstLevel, last_level));
-  channels_ = feature_channels(manifest_);
-  rpn_fine_ = make("rpn_fine", at_levels("p", kFirstLevel, kFirstLevel), at_levels("rpn", kFirstLevel, kFirstLevel));
+  const int first = kFirstLevel, last = kFirstLevel + int(kRpnLevels) - 1;
+  const GraphSpec trunk = graph_with(manifest, "trunk", {"image"}, at_levels("p", first, last));
+  channels_ = feature_channels(trunk, manifest.name);
+  trunk_ = make(trunk);
+  rpn_fine_ = make(graph_with(manifest, "rpn_fine", at_levels("p", first, first), at_levels("rpn", first, first)));
   rpn_coarse_ =
-      make("rpn_coarse", at_levels("p", kFirstLevel + 1, last_level), at_levels("rpn", kFirstLevel + 1, last_level));
-  box_head_ = make("box_head", {"rois"}, {"boxes"});
-  dense_head_ = make("dense_head", {"rois"}, {"labels", "surface"});
-  if (manifest_.dense_head.output != 2 * manifest_.dense_head.pool) {
-    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest_.name, ": the dense head's output is ",
-                manifest_.dense_head.output, " cells wide, but must be twice its pool of ", manifest_.dense_head.pool,
+      make(graph_with(manifest, "rpn_coarse", at_levels("p", first + 1, last), at_levels("rpn", first + 1, last)));
+  box_head_ = make(graph_with(manifest, "box_head", {"rois"}, {"boxes"}));
+  dense_head_ = make(graph_with(manifest, "dense_head", {"rois"}, {"labels", "surface"}));
+  if (spec_.dense_head.output != 2 * spec_.dense_head.pool) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": the dense head's output is ",
+                spec_.dense_head.output, " cells wide, but must be twice its pool of ", spec_.dense_head.pool,
                 ". Export the bundle again.");
   }
 }
@@ -119,37 +114,35 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
   if (frames_since_key_ >= settings_.key_frame_interval) frames_since_key_ = 0;
   if (stats.key_frame ||
       !followed_.empty()) {  // else nobody was there, and nobody is looked for until the next key frame
-    make_network_input(image,
-                       {settings_.long_side_px, manifest_.input.multiple_of, manifest_.input.mean, manifest_.input.std},
+    make_network_input(image, {settings_.long_side_px, spec_.input.multiple_of, spec_.input.mean, spec_.input.std},
                        input_);
-    stats.preprocess_ms = stage.lap_ms();
+    stats.preprocess_ms = float(stage.lap_ms());
 
     run_trunk();
-    stats.trunk_ms = stage.lap_ms();
+    stats.trunk_ms = float(stage.lap_ms());
 
     if (stats.key_frame) {
-      propose(image, proposals_, &stats.dropped_boxes);
+      propose(image.height_px, proposals_, &stats.dropped_boxes);
     } else {
       proposals_ = followed_;
     }
     followed_.clear();
     stats.proposals = int(proposals_.size());
-    stats.proposals_ms = stage.lap_ms();
+    stats.proposals_ms = float(stage.lap_ms());
 
     // People who are followed come from a look at the frame before.
-    const bool looks_again = stats.key_frame && manifest_.box_head.second_look_score.has_value();
+    const bool looks_again = stats.key_frame && spec_.box_head.second_look_score.has_value();
     const float least_score = settings_.score_threshold;
     if (looks_again) {
-      run_box_head(proposals_, std::min(least_score, *manifest_.box_head.second_look_score), found_,
-                   &stats.dropped_boxes);
+      run_box_head(proposals_, std::min(least_score, *spec_.box_head.second_look_score), found_, &stats.dropped_boxes);
       proposals_.swap(found_);
     }
     run_box_head(proposals_, least_score, found_, &stats.dropped_boxes);
-    stats.box_head_ms = stage.lap_ms();
+    stats.box_head_ms = float(stage.lap_ms());
 
     if (!found_.empty()) run_dense_head(found_, result);
   }
-  stats.total_ms = total.lap_ms();
+  stats.total_ms = float(total.lap_ms());
 }
 
 void DensePose::restart() {
@@ -162,7 +155,7 @@ void DensePose::run_trunk() {
   const int64_t width = input_.padded_width_px;
   const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
   shapes_.clear();
-  for (const int stride : manifest_.rpn.strides) {
+  for (const int stride : spec_.rpn.strides) {
     shapes_.push_back({1, cells(height, stride), cells(width, stride), channels_});
   }
   inputs_.assign(1, {input_.values.data(), {1, 3, height, width}});
@@ -170,16 +163,16 @@ void DensePose::run_trunk() {
   features_.clear();
   for (size_t l = 0; l < kFeatureLevels; ++l) {
     const TensorView& map = pyramid_[l];
-    features_.push_back({map.data, channels_, int(map.shape[1]), int(map.shape[2]), manifest_.box_head.strides[l]});
+    features_.push_back({map.data, channels_, int(map.shape[1]), int(map.shape[2]), spec_.box_head.strides[l]});
   }
 }
 
-void DensePose::propose(const ImageView& image, std::vector<ScoredBox>& found, int* dropped) {
+void DensePose::propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped) {
   rpn_levels_.assign(kRpnLevels, {});
   // Runs a graph of the RPN on the levels from `first` on.
   const auto ask = [&](Session& rpn, size_t first, size_t count) {
     inputs_.assign(pyramid_.begin() + std::ptrdiff_t(first), pyramid_.begin() + std::ptrdiff_t(first + count));
-    const int64_t anchors = int64_t(manifest_.rpn.aspect_ratios.size());
+    const int64_t anchors = int64_t(spec_.rpn.aspect_ratios.size());
     shapes_.clear();
     for (const TensorView& map : inputs_) shapes_.push_back({1, map.shape[1], map.shape[2], 5 * anchors});
     const std::vector<TensorView>& outputs = rpn.run(inputs_, shapes_);
@@ -190,16 +183,16 @@ void DensePose::propose(const ImageView& image, std::vector<ScoredBox>& found, i
   ask(*rpn_coarse_, 1, kRpnLevels - 1);
   // The finest anchors are for boxes smaller than the geometric mean of their side and the next level's. Somebody who
   // stands is about three times as high as wide, so that the box's side (root of its area) is height / sqrt(3).
-  const float scale = float(input_.height_px) / float(image.height_px);
-  const std::vector<float>& sizes = manifest_.rpn.anchor_sizes_px;
+  const float scale = float(input_.height_px) / float(image_height_px);
+  const std::vector<float>& sizes = spec_.rpn.anchor_sizes_px;
   if (float(settings_.least_person_px) * scale < std::sqrt(3.0f * sizes[0] * sizes[1])) ask(*rpn_fine_, 0, 1);
-  select_proposals(rpn_levels_, manifest_.rpn, float(input_.width_px), float(input_.height_px), candidates_, found,
-                   dropped);
+  select_proposals(rpn_levels_, spec_.rpn, settings_.max_proposals, float(input_.width_px), float(input_.height_px),
+                   candidates_, found, dropped);
 }
 
 // The larger the box, the coarser the level (Lin et al., Feature Pyramid Networks, 2017, equation 1).
 const FeatureMap& DensePose::level_for(const Box& box) const {
-  const BoxHeadSpec& spec = manifest_.box_head;
+  const BoxHeadSpec& spec = spec_.box_head;
   const double level = std::floor(spec.canonical_level +
                                   std::log2(std::sqrt(double(box.area())) / double(spec.canonical_size_px) + 1e-8));
   const int slot = int(std::clamp(level, double(kFirstLevel), double(kFirstLevel + kFeatureLevels - 1))) - kFirstLevel;
@@ -210,7 +203,7 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float least_sc
                              int* dropped) {
   found.clear();
   if (boxes.empty()) return;
-  const BoxHeadSpec& spec = manifest_.box_head;
+  const BoxHeadSpec& spec = spec_.box_head;
   const int64_t count = int64_t(boxes.size());
   const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
   rois_.resize(size_t(count) * roi_size);
@@ -236,7 +229,7 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float least_sc
 
 void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result) {
   Stopwatch stage;
-  const DenseHeadSpec& spec = manifest_.dense_head;
+  const DenseHeadSpec& spec = spec_.dense_head;
   const int64_t count = int64_t(people.size());
   const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
   rois_.resize(size_t(count) * roi_size);
@@ -248,7 +241,7 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
   shapes_.assign(2, {count, spec.pool, spec.pool, 4 * classes});
   shapes_[1][3] = charts_.channels();
   const std::vector<TensorView>& outputs = dense_head_->run(inputs_, shapes_);
-  result.stats.dense_head_ms = stage.lap_ms();
+  result.stats.dense_head_ms = float(stage.lap_ms());
 
   const float scale_x = float(result.planes.width_px) / float(input_.width_px);
   const float scale_y = float(result.planes.height_px) / float(input_.height_px);
@@ -270,7 +263,7 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
   }
-  result.stats.decode_ms = stage.lap_ms();
+  result.stats.decode_ms = float(stage.lap_ms());
 }
 
 }  // namespace maq

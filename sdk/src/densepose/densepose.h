@@ -9,8 +9,10 @@
 #include "core/frame.h"
 #include "densepose/chart_predictor.h"
 #include "densepose/dense_decode.h"
+#include "densepose/manifest.h"
 #include "densepose/proposals.h"
 #include "densepose/roi_align.h"
+#include "densepose/surface_grid.h"
 #include "image/network_input.h"
 #include "nn/bundle.h"
 #include "nn/session.h"
@@ -59,7 +61,8 @@ struct DensePoseResult {
 
 class DensePose {
  public:
-  // Makes the three networks of `bundle`. Throws MAQ_ERROR_BAD_BUNDLE.
+  // Makes the networks of `bundle`, which is not needed afterwards. Throws MAQ_ERROR_BAD_BUNDLE, and MAQ_ERROR_UNSUPPORTED
+  // for a bundle of another task.
   DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, const DensePoseSettings& settings);
 
   // Memory of `result` is reused. Not for two threads at once. With key_frame_interval above 1 images are frames of one
@@ -68,10 +71,13 @@ class DensePose {
   // The next image begins another stream.
   void restart();
 
+  // Where on the body labels lie; from any thread, also during run(). Throws what BodySurface::grid() throws.
+  const SurfaceGrid& surface() { return surface_.grid(); }
+
  private:
   void run_trunk();
   // The best boxes of the RPN. The finest level is asked only if somebody may be that small.
-  void propose(const ImageView& image, std::vector<ScoredBox>& found, int* dropped);
+  void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
   // Those of `boxes` that show somebody with more than `least_score`, moved to where they are.
   void run_box_head(const std::vector<ScoredBox>& boxes, float least_score, std::vector<ScoredBox>& found,
                     int* dropped);
@@ -79,8 +85,8 @@ class DensePose {
   void run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result);
   const FeatureMap& level_for(const Box& box) const;
 
-  Manifest manifest_;
-  DensePoseSettings settings_;
+  DensePoseSpec spec_;
+  DensePoseSettings settings_;  // with the bundle's values where they were left open
   int channels_ = 0;
   std::unique_ptr<Session> trunk_;
   std::unique_ptr<Session> rpn_fine_;
@@ -88,6 +94,7 @@ class DensePose {
   std::unique_ptr<Session> box_head_;
   std::unique_ptr<Session> dense_head_;
   ChartPredictor charts_;
+  BodySurface surface_;
   NetworkInput input_;
   std::vector<TensorView> pyramid_;   // P2 to P6, in memory of the trunk
   std::vector<FeatureMap> features_;  // P2 to P5, the same

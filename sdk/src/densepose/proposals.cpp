@@ -45,8 +45,9 @@ Box anchor_box(int x, int y, int stride, float size_px, float ratio) {
   return {centre_x - 0.5f * width, centre_y - 0.5f * height, centre_x + 0.5f * width, centre_y + 0.5f * height};
 }
 
-void select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, float width, float height,
-                      std::vector<RpnCandidate>& candidates, std::vector<ScoredBox>& found, int* dropped) {
+void select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, int max_proposals, float width,
+                      float height, std::vector<RpnCandidate>& candidates, std::vector<ScoredBox>& found,
+                      int* dropped) {
   const int anchors = int(spec.aspect_ratios.size());
   found.clear();
   for (size_t l = 0; l < levels.size(); ++l) {
@@ -55,7 +56,7 @@ void select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, 
     best_candidates(level, anchors, spec.pre_nms_top_k, candidates, dropped);
     const size_t before = found.size();
     for (const RpnCandidate& candidate : candidates) {
-      if (found.size() - before == size_t(spec.post_nms_top_k)) break;
+      if (found.size() - before == size_t(max_proposals)) break;
       const int anchor = candidate.index % anchors;
       const int cell = candidate.index / anchors;
       const float* deltas = level.values + size_t(cell) * size_t(5 * anchors) + size_t(anchors + 4 * anchor);
@@ -73,7 +74,7 @@ void select_proposals(const std::vector<RpnLevel>& levels, const RpnSpec& spec, 
     }
   }
   std::sort(found.begin(), found.end(), comes_before);
-  if (found.size() > size_t(spec.post_nms_top_k)) found.resize(size_t(spec.post_nms_top_k));
+  if (found.size() > size_t(max_proposals)) found.resize(size_t(max_proposals));
 }
 
 }  // namespace maq

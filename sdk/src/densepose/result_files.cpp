@@ -49,7 +49,7 @@ std::vector<uint8_t> interleaved(const DensePlanes& planes) {
 
 void write_result_files(const DensePoseResult& result, const std::string& folder, const std::string& stem) {
   const auto path_of = [&](const char* ending) { return (std::filesystem::path(folder) / (stem + ending)).string(); };
-  NewFile iuv_file(path_of("_IUV.png")), inds_file(path_of("_INDS.png")), json_file(path_of(".json"));
+  AtomicFile iuv_file(path_of("_IUV.png")), inds_file(path_of("_INDS.png")), json_file(path_of(".json"));
   const std::vector<uint8_t> pixels = interleaved(result.planes);
   const std::vector<uint8_t> iuv = encode_image(view_of(MAQ_PIXEL_BGR8, result.planes, pixels.data()), ".png");
   const std::vector<uint8_t> inds =
@@ -58,7 +58,7 @@ void write_result_files(const DensePoseResult& result, const std::string& folder
   iuv_file.append(iuv.data(), iuv.size());
   inds_file.append(inds.data(), inds.size());
   json_file.append(json.data(), json.size());
-  for (NewFile* file : {&iuv_file, &inds_file, &json_file}) file->commit();
+  for (AtomicFile* file : {&iuv_file, &inds_file, &json_file}) file->commit();
 }
 
 }  // namespace maq

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/rounding.h"
 #include "core/simd_clones.h"
 #include "image/opencv_view.h"
 
@@ -10,8 +11,6 @@ namespace maq {
 namespace {
 
 constexpr int kChannels = 3;
-
-int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 
 // row[i] = sum of weight[k] * line_k[i] over the taps' lines. The compiler makes vectors of it.
 MAQ_SIMD_CLONES void weighted_lines(const uint8_t* first_line, size_t stride_bytes, const float* weight, int taps,

@@ -1,7 +1,9 @@
 #include "nn/bundle.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
+#include <optional>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -10,53 +12,95 @@
 namespace maq {
 namespace {
 
+using Bytes = std::vector<uint8_t>;
+// The bytes of a file of that name; nothing where there is none.
+using FileReading = std::function<std::optional<Bytes>(const std::string& name)>;
+
+constexpr char kManifest[] = "manifest.json";
+constexpr char kRemedy[] = "Fetch or export the bundle again.";
+
 // Whether an ONNX file keeps weights in other files, which the manifest would not cover. Such a tensor has an entry with
 // the key "location": field 1 of a protobuf message, 8 bytes long.
-bool refers_to_other_files(const std::vector<uint8_t>& onnx) {
+bool refers_to_other_files(const Bytes& onnx) {
   constexpr uint8_t kEntry[] = {0x0a, 8, 'l', 'o', 'c', 'a', 't', 'i', 'o', 'n'};
   return std::search(onnx.begin(), onnx.end(), std::begin(kEntry), std::end(kEntry)) != onnx.end();
 }
 
+void verify(const Bytes& bytes, const FileSpec& spec, const std::string& path) {
+  if (int64_t(bytes.size()) != spec.bytes) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has ", bytes.size(), " bytes, but the manifest says ", spec.bytes,
+                ": it is incomplete or was changed. ", kRemedy);
+  }
+  if (const std::string digest = sha256_hex(bytes.data(), bytes.size()); digest != spec.sha256) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has SHA-256 ", digest.substr(0, 12), "…, but the manifest says ",
+                spec.sha256.substr(0, 12), "…: it is damaged or was changed. ", kRemedy);
+  }
+  if (refers_to_other_files(bytes)) {
+    throw Error(
+        MAQ_ERROR_BAD_BUNDLE, path,
+        " keeps weights in another file, which the manifest cannot vouch for. Export the bundle with all weights "
+        "inside.");
+  }
+}
+
+Bundle read_verified(const std::string& prefix, const Bytes& manifest, const FileReading& read) {
+  Bundle bundle{prefix, parse_manifest(std::string(manifest.begin(), manifest.end()), prefix + kManifest), {}};
+  for (const auto& [name, spec] : bundle.manifest.files) {
+    std::optional<Bytes> bytes = read(name);
+    if (!bytes) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, bundle.path_of(name), " is missing, but the manifest lists it. ", kRemedy);
+    }
+    verify(*bytes, spec, bundle.path_of(name));
+    bundle.files[name] = std::move(*bytes);
+  }
+  return bundle;
+}
+
 }  // namespace
 
-Bundle read_bundle(const std::string& folder, BundleTask task) {
+Bundle read_bundle(const std::string& folder) {
   if (!is_folder(folder)) {
     throw Error(MAQ_ERROR_NOT_FOUND, "Model bundle ", folder,
                 " is not a folder; give the folder that holds manifest.json and the .onnx files.");
   }
-  const std::string manifest_path = folder + "/manifest.json";
-  if (!file_exists(manifest_path)) {
+  const FileReading read = [&](const std::string& name) -> std::optional<Bytes> {
+    const std::string path = folder + "/" + name;
+    if (!file_exists(path)) return std::nullopt;
+    return read_file(path);
+  };
+  const std::optional<Bytes> manifest = read(kManifest);
+  if (!manifest) {
     throw Error(MAQ_ERROR_NOT_FOUND, folder, " has no manifest.json, so it is not a model bundle; check the path.");
   }
-  const std::vector<uint8_t> text = read_file(manifest_path);
+  return read_verified(folder + "/", *manifest, read);
+}
 
-  Bundle bundle;
-  bundle.folder = folder;
-  bundle.manifest = parse_manifest(std::string(text.begin(), text.end()), manifest_path, task);
-  for (const auto& [name, spec] : bundle.manifest.files) {
-    const std::string path = folder + "/" + name;
-    if (!file_exists(path)) {
-      throw Error(MAQ_ERROR_BAD_BUNDLE, path,
-                  " is missing, but the manifest lists it. Fetch or export the bundle again.");
+Bundle read_bundle(const std::vector<NamedBuffer>& buffers) {
+  for (const NamedBuffer& buffer : buffers) {
+    if (buffer.name.empty()) throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A buffer of the bundle has no name.");
+    if (buffer.data == nullptr && buffer.size_bytes > 0) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Buffer ", buffer.name, " of the bundle has ", buffer.size_bytes,
+                  " bytes, but its data is NULL.");
     }
-    std::vector<uint8_t> bytes = read_file(path);
-    if (int64_t(bytes.size()) != spec.bytes) {
-      throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has ", bytes.size(), " bytes, but the manifest says ", spec.bytes,
-                  ": it is incomplete or was changed. Fetch or export the bundle again.");
+    const auto is_of_that_name = [&](const NamedBuffer& other) { return other.name == buffer.name; };
+    if (std::count_if(buffers.begin(), buffers.end(), is_of_that_name) > 1) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Two buffers of the bundle are named ", buffer.name,
+                  "; give each file once.");
     }
-    if (const std::string digest = sha256_hex(bytes.data(), bytes.size()); digest != spec.sha256) {
-      throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has SHA-256 ", digest.substr(0, 12), "…, but the manifest says ",
-                  spec.sha256.substr(0, 12), "…: it is damaged or was changed. Fetch or export the bundle again.");
-    }
-    if (refers_to_other_files(bytes)) {
-      throw Error(
-          MAQ_ERROR_BAD_BUNDLE, path,
-          " keeps weights in another file, which the manifest cannot vouch for. Export the bundle with all weights "
-          "inside.");
-    }
-    bundle.files[name] = std::move(bytes);
   }
-  return bundle;
+  const FileReading read = [&](const std::string& name) -> std::optional<Bytes> {
+    const auto found =
+        std::find_if(buffers.begin(), buffers.end(), [&](const NamedBuffer& buffer) { return buffer.name == name; });
+    if (found == buffers.end()) return std::nullopt;
+    const auto* bytes = static_cast<const uint8_t*>(found->data);
+    return Bytes(bytes, bytes + found->size_bytes);
+  };
+  const std::optional<Bytes> manifest = read(kManifest);
+  if (!manifest) {
+    throw Error(MAQ_ERROR_NOT_FOUND, "None of the ", buffers.size(),
+                " buffers of the bundle is named manifest.json; give the manifest and each file that it lists.");
+  }
+  return read_verified("memory:", *manifest, read);
 }
 
 }  // namespace maq

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/library_folder.h"
+#include "core/module.h"
 
 namespace maq {
 namespace {
@@ -32,7 +32,7 @@ void* open_library(const std::string& explicit_path, std::string* opened_path) {
     *opened_path = named;
     return library;
   }
-  const std::string folder = own_folder();
+  const std::string folder = library_folder();
   for (const std::string& path : {folder + "maquette/" + kFileName, folder + kFileName, std::string(kFileName)}) {
     if (void* library = open_privately(path)) {
       *opened_path = path;

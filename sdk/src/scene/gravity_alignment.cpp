@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/rounding.h"
 
 namespace maq {
 
@@ -49,7 +50,7 @@ PinholeCamera gravity_aligned_frame(const PinholeCamera& camera, const std::arra
     constexpr double kRounding = 1e-6;
     first[i] = int(std::floor(low + 0.5 + kRounding));
     const int whole = int(std::ceil(high + 0.5 - kRounding)) - first[i];
-    size[i] = (whole + multiple - 1) / multiple * multiple;
+    size[i] = round_up(whole, multiple);
   }
   aligned.width_px = size[0];
   aligned.height_px = size[1];

@@ -1,8 +1,6 @@
 #include "sources/live_source.h"
 
 #include <pthread.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -12,13 +10,16 @@
 #include <utility>
 #include <vector>
 
+#include "core/clock.h"
 #include "core/error.h"
+#include "core/rounding.h"
+#include "core/unique_fd.h"
 #include "image/files/jpeg.h"
 
 namespace maq {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = MonotonicClock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kReconnectPause(100);
@@ -30,7 +31,7 @@ constexpr int kLongestWaitMs = 200;           // whether the camera stalls is lo
 int64_t most_pixels(const ImageView& agreed) {
   constexpr int64_t kBlock = 16;
   if (agreed.width_px == 0) return MAQ_MAX_PIXELS;
-  return ((agreed.width_px + kBlock - 1) / kBlock * kBlock) * ((agreed.height_px + kBlock - 1) / kBlock * kBlock);
+  return round_up<int64_t>(agreed.width_px, kBlock) * round_up<int64_t>(agreed.height_px, kBlock);
 }
 
 }  // namespace
@@ -46,7 +47,7 @@ struct LiveSource::State {
   CameraOpener open;
   std::string name;
   SourceSettings settings;
-  int wake_fd = -1;
+  EventFd wake;
 
   std::mutex mutex;
   std::condition_variable changed;
@@ -66,10 +67,6 @@ struct LiveSource::State {
   std::mutex control_mutex;                  // one call at a time; before `mutex`, and never taken by the thread
   std::weak_ptr<Camera> present;             // nobody but the thread keeps the camera; none while it is lost
   std::vector<ControlSetting> set_controls;  // the latest last
-
-  ~State() {
-    if (wake_fd >= 0) ::close(wake_fd);
-  }
 
   void report(maq_source_state state, const std::string& reason) {
     settings.log.write(state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_BACK ? MAQ_LOG_INFO : MAQ_LOG_WARNING, name,
@@ -198,7 +195,7 @@ struct LiveSource::State {
     for (;;) {
       CameraBuffer buffer;
       std::string reason;
-      const Camera::Event event = camera->wait(wake_fd, wait_ms, buffer, reason);
+      const Camera::Event event = camera->wait(wake.get(), wait_ms, buffer, reason);
       if (event == Camera::Event::kWoken || stop_asked()) {
         if (event == Camera::Event::kFrame) camera->give_back(buffer.slot);
         break;
@@ -291,8 +288,6 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
   state_->name = std::move(name);
   state_->settings = settings;
   state_->ring.resize(std::max<size_t>(1, settings.queue_length));
-  state_->wake_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-  if (state_->wake_fd < 0) throw Error(MAQ_ERROR_INTERNAL, state_->name, ": no event can be made to wake its thread.");
   std::shared_ptr<Camera> camera = state_->open();
   for (const ControlSetting& setting : controls) camera->set_control(setting.which, setting.value);
   state_->set_controls = controls;
@@ -317,8 +312,7 @@ LiveSource::~LiveSource() {
     std::unique_lock<std::mutex> lock(state.mutex);
     state.stopping = true;
     state.changed.notify_all();
-    const uint64_t one = 1;
-    [[maybe_unused]] const ssize_t written = ::write(state.wake_fd, &one, sizeof one);
+    state.wake.signal();
     ended = state.changed.wait_for(lock, kStopPatience, [&] { return state.ended; });
     left.swap(state.ring);
     state.ring.resize(1);

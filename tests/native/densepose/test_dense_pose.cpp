@@ -4,8 +4,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "support/bundle_copy.h"
 #include "densepose/densepose.h"
+#include "support/bundle_copy.h"
 
 namespace {
 
@@ -70,6 +70,30 @@ TEST_F(DensePose, OneCellOfColourIsOnePersonInItsAnchor) {
   EXPECT_NEAR(green.y1, 128 + 32, 1e-3);
   EXPECT_GT(result.people[0].score, 0.9);
   expect_sane(result, 320, 256);
+}
+
+TEST_F(DensePose, ABundleFromMemoryGivesTheResultOfItsFolder) {
+  const BundleCopy folder;
+  std::map<std::string, std::string> contents;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    contents[entry.path().filename().string()] = read_text(entry.path().string());
+  }
+  std::vector<maq::NamedBuffer> buffers;
+  for (const auto& [name, bytes] : contents) buffers.push_back({name, bytes.data(), bytes.size()});
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(80, 100, 4, 4)) = kRed;
+  image(cv::Rect(200, 128, 8, 8)) = kGreen;
+  maq::DensePoseResult result;
+  maq::DensePose(runtime_, maq::read_bundle(buffers), {})
+      .run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+  const maq::DensePoseResult expected = run(image);
+  ASSERT_EQ(result.people.size(), 2u);
+  EXPECT_EQ(result.people[0].score, expected.people[0].score);
+  EXPECT_EQ(result.people[1].box.x0, expected.people[1].box.x0);
+  for (const auto plane :
+       {&maq::DensePlanes::part, &maq::DensePlanes::u, &maq::DensePlanes::v, &maq::DensePlanes::person}) {
+    EXPECT_EQ(result.planes.*plane, expected.planes.*plane);
+  }
 }
 
 TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {

@@ -42,7 +42,7 @@ std::vector<maq::ScoredBox> select(const std::vector<maq::RpnLevel>& levels, con
                                    float height, int* dropped) {
   std::vector<maq::RpnCandidate> candidates(3);  // what they hold, and what is in `found`, is of no matter
   std::vector<maq::ScoredBox> found(2);
-  select_proposals(levels, spec, width, height, candidates, found, dropped);
+  select_proposals(levels, spec, spec.post_nms_top_k, width, height, candidates, found, dropped);
   return found;
 }
 

@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
 
-#include "support/bundle_copy.h"
 #include "core/log.h"
-#include "densepose/densepose.h"
-#include "support/expect_error.h"
 #include "nn/bundle.h"
+#include "nn/session.h"
 #include "nn/sha256.h"
+#include "support/bundle_copy.h"
+#include "support/expect_error.h"
 
 namespace {
 
@@ -13,10 +13,32 @@ std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime() {
   return std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());
 }
 
-void load(const BundleCopy& bundle) {
-  const maq::Bundle read = maq::read_bundle(bundle.path());
-  const maq::DensePose densepose(runtime(), read, {});
+// Makes a session of each graph.
+void open_graphs(const maq::Bundle& bundle) {
+  const auto library = runtime();
+  for (const auto& [name, graph] : bundle.manifest.graphs) {
+    maq::Session(library, bundle.files.at(graph.file), graph, bundle.path_of(graph.file), {});
+  }
 }
+
+void load(const BundleCopy& copy) { open_graphs(maq::read_bundle(copy.path())); }
+
+// The files of a bundle's folder as an app without a file system has them.
+struct InMemory {
+  explicit InMemory(const BundleCopy& bundle) {
+    for (const auto& entry : std::filesystem::directory_iterator(bundle.path())) {
+      const std::string name = entry.path().filename().string();
+      contents[name] = read_text(bundle.file(name));
+    }
+  }
+  std::vector<maq::NamedBuffer> buffers() const {
+    std::vector<maq::NamedBuffer> all;
+    for (const auto& [name, bytes] : contents) all.push_back({name, bytes.data(), bytes.size()});
+    return all;
+  }
+
+  std::map<std::string, std::string> contents;
+};
 
 // Puts `content` in place of a file and its hash into the manifest, as one who makes a bundle could.
 void replace_file(const BundleCopy& bundle, const std::string& name, const std::string& content) {
@@ -81,16 +103,12 @@ TEST(Bundle, AShapeThatIsNotTheManifestsIsSeen) {
   expect_error(MAQ_ERROR_BAD_BUNDLE, "output labels has shape [?, 32, 32, 160] in the graph", [&] { load(bundle); });
 }
 
-TEST(Bundle, AMissingTensorIsSeenInTheGraphAndInTheManifest) {
-  const BundleCopy in_graph, in_manifest;
-  nlohmann::json manifest = in_graph.manifest();
+TEST(Bundle, AMissingTensorIsSeen) {
+  const BundleCopy bundle;
+  nlohmann::json manifest = bundle.manifest();
   manifest["graphs"]["trunk"]["outputs"][0]["name"] = "p7";
-  in_graph.write_manifest(manifest);
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "graph trunk lists no output p2", [&] { load(in_graph); });
-  manifest = in_manifest.manifest();
-  manifest["graphs"]["trunk"]["inputs"][0]["name"] = "picture";
-  in_manifest.write_manifest(manifest);
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "graph trunk lists no input image", [&] { load(in_manifest); });
+  bundle.write_manifest(manifest);
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "trunk.onnx has no output p7", [&] { load(bundle); });
 }
 
 TEST(Bundle, ATypeOtherThanFloatIsSeen) {
@@ -99,6 +117,54 @@ TEST(Bundle, ATypeOtherThanFloatIsSeen) {
   manifest["graphs"]["trunk"]["inputs"][0]["type"] = "uint8";
   bundle.write_manifest(manifest);
   expect_error(MAQ_ERROR_BAD_BUNDLE, "must be float32", [&] { load(bundle); });
+}
+
+TEST(Bundle, FromMemoryIsTheSameAsFromItsFolder) {
+  const BundleCopy folder;
+  const InMemory memory(folder);
+  const maq::Bundle read = maq::read_bundle(folder.path()), given = maq::read_bundle(memory.buffers());
+  EXPECT_EQ(given.files, read.files);
+  EXPECT_EQ(given.manifest.name, read.manifest.name);
+  EXPECT_EQ(given.manifest.graphs.size(), read.manifest.graphs.size());
+  EXPECT_EQ(given.path_of("trunk.onnx"), "memory:trunk.onnx");
+  EXPECT_NO_THROW(open_graphs(given));
+}
+
+TEST(Bundle, FromMemoryDoesNotNeedTheBuffersAfterwards) {
+  auto memory = std::make_unique<InMemory>(BundleCopy());
+  const maq::Bundle given = maq::read_bundle(memory->buffers());
+  for (auto& [name, bytes] : memory->contents) std::fill(bytes.begin(), bytes.end(), '\x7f');
+  memory.reset();
+  EXPECT_NO_THROW(open_graphs(given));
+}
+
+TEST(Bundle, FromMemoryIsCheckedLikeAFolder) {
+  InMemory changed{BundleCopy()}, cut = changed, missing = changed, outside = changed;
+  std::string& trunk = changed.contents["trunk.onnx"];
+  trunk[trunk.size() / 2] = char(trunk[trunk.size() / 2] ^ 1);
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "memory:trunk.onnx has SHA-256", [&] { maq::read_bundle(changed.buffers()); });
+  cut.contents["charts.f32"].pop_back();
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "memory:charts.f32 has", [&] { maq::read_bundle(cut.buffers()); });
+  missing.contents.erase("box_head.onnx");
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "memory:box_head.onnx is missing", [&] { maq::read_bundle(missing.buffers()); });
+  outside.contents["manifest.json"] = "{";
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "memory:manifest.json is not a JSON object",
+               [&] { maq::read_bundle(outside.buffers()); });
+}
+
+TEST(Bundle, FromMemoryNeedsAManifestAndEachNameOnce) {
+  InMemory memory{BundleCopy()};
+  std::vector<maq::NamedBuffer> twice = memory.buffers(), nameless = twice, empty = twice;
+  twice.push_back(twice.back());
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "Two buffers of the bundle are named trunk.onnx",
+               [&] { maq::read_bundle(twice); });
+  nameless[1].name.clear();
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "has no name", [&] { maq::read_bundle(nameless); });
+  empty[1].data = nullptr;
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "but its data is NULL", [&] { maq::read_bundle(empty); });
+  memory.contents.erase("manifest.json");
+  expect_error(MAQ_ERROR_NOT_FOUND, "None of the 6 buffers", [&] { maq::read_bundle(memory.buffers()); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "manifest.json", [] { maq::read_bundle(std::vector<maq::NamedBuffer>()); });
 }
 
 TEST(Bundle, AMissingRuntimeLibraryIsNamedWithARemedy) {

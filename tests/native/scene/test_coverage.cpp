@@ -9,8 +9,8 @@
 namespace {
 
 using maq::DepthKey;
-using maq::kNoPointKey;
 using maq::DescriptorRaster;
+using maq::kNoPointKey;
 
 constexpr size_t kWidth = 112, kHeight = 80;
 
@@ -22,8 +22,9 @@ void shade(DescriptorRaster& raster, size_t count, maq::WorkerThreads& threads) 
   for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
   buffer.finish(0, int(kHeight));
   const maq::ViewBasis basis(std::vector<float>(maq::ViewBasis::kWeights, 0.0f));
-  raster.shade(scene, maq::BlockIndex(scene), buffer, {0, 0, int(kWidth), int(kHeight)}, camera.centre, basis,
-               {5, true}, threads);
+  const maq::BlockIndex blocks(scene);
+  const maq::RefinerLayout layout{5, true};
+  raster.shade({scene, blocks, buffer, camera.centre, {0, 0, int(kWidth), int(kHeight)}, basis, layout}, threads);
 }
 
 // Of the pixel (x, y) at a level, in double.
@@ -46,18 +47,18 @@ TEST(Coverage, IsAsItsDefinitionSays) {
     maq::WorkerThreads threads(2);
     DescriptorRaster raster;
     shade(raster, count, threads);
-    maq::Coverage cover;
-    cover.find(raster, int(kWidth), int(kHeight), threads);
+    maq::Coverage coverage;
+    coverage.find(raster, int(kWidth), int(kHeight), threads);
     for (size_t y = 0; y < kHeight; ++y) {
       for (size_t x = 0; x < kWidth; ++x) {
         // Each of four scales rounds.
-        ASSERT_NEAR(cover.alphas()[y * kWidth + x], alpha_at(raster, 0, int(x), int(y)), 2.01) << x << " " << y;
+        ASSERT_NEAR(coverage.alphas()[y * kWidth + x], alpha_at(raster, 0, int(x), int(y)), 2.01) << x << " " << y;
         float depth = 0;
         for (int level = 4; level >= 0; --level) {
           const DepthKey key = raster.keys(level)[(y >> level) * (kWidth >> level) + (x >> level)];
           if (key != kNoPointKey) depth = maq::depth_of(key);
         }
-        ASSERT_EQ(cover.depths()[y * kWidth + x], depth);
+        ASSERT_EQ(coverage.depths()[y * kWidth + x], depth);
       }
     }
   }
@@ -67,15 +68,15 @@ TEST(Coverage, IsWholeWhereThereIsAPointAndNothingFarFromAll) {
   maq::WorkerThreads threads(1);
   DescriptorRaster raster;
   shade(raster, 1, threads);
-  maq::Coverage cover;
-  cover.find(raster, int(kWidth), int(kHeight), threads);
+  maq::Coverage coverage;
+  coverage.find(raster, int(kWidth), int(kHeight), threads);
   size_t covered = 0, nothing = 0;
   for (size_t i = 0; i < kWidth * kHeight; ++i) {
     if (raster.keys(0)[i] != kNoPointKey) {
-      EXPECT_EQ(cover.alphas()[i], 255);
+      EXPECT_EQ(coverage.alphas()[i], 255);
       ++covered;
     }
-    nothing += cover.alphas()[i] == 0 ? 1 : 0;
+    nothing += coverage.alphas()[i] == 0 ? 1 : 0;
   }
   EXPECT_EQ(covered, 1u);
   EXPECT_GT(nothing, kWidth * kHeight * 3 / 4);

@@ -1,22 +1,20 @@
-// Photos and a cloud to points that know how they look: against torch, in any order, cancelled, and with what is wrong.
+// Photos and a cloud to fitted points: against torch, in any order, cancelled, and with invalid input.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <thread>
 
-#include "scene/build/build_scene.h"
 #include "scene/build/descriptor_fitter.h"
-#include "scene/capture/posed_photo.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
 #include "support/tiny_scene.h"
 
 namespace {
 
+using maq::FittedPoints;
 using maq::kBasis;
 using maq::kFeatures;
-using maq::FittedPoints;
 
 maq::FittingOptions as_in_the_reference() {
   maq::FittingOptions options;
@@ -41,30 +39,30 @@ class DescriptorFitter : public testing::Test {
     }
   }
 
-  maq::DescriptorFitter builder(const maq::FittingOptions& options = as_in_the_reference()) {
+  maq::DescriptorFitter fitter(const maq::FittingOptions& options = as_in_the_reference()) {
     return {capture_.cloud, capture_.up, *networks_, options};
   }
-  size_t add(maq::DescriptorFitter& builder, size_t photo) {
-    return builder.add_view(photos_[photo].frame.image, photos_[photo].valid.data(), photos_[photo].camera).value();
+  size_t add(maq::DescriptorFitter& fitter, size_t photo) {
+    return fitter.add_view(photos_[photo].frame.image, photos_[photo].valid.data(), photos_[photo].camera).value();
   }
   FittedPoints built(const std::vector<size_t>& order, const maq::FittingOptions& options = as_in_the_reference()) {
-    maq::DescriptorFitter made = builder(options);
+    maq::DescriptorFitter made = fitter(options);
     for (const size_t photo : order) add(made, photo);
     return made.finish();
   }
 
-  // Where in `points` each point of the cloud is.
+  // The index in `points` of each point of the cloud, SIZE_MAX for those that are not there.
   std::vector<size_t> indices_in(const FittedPoints& points) const {
-    std::vector<size_t> positions(capture_.cloud.count(), SIZE_MAX);
+    std::vector<size_t> indices(capture_.cloud.count(), SIZE_MAX);
     for (size_t i = 0; i < points.count(); ++i) {
       for (size_t k = 0; k < capture_.cloud.count(); ++k) {
         if (points.x[i] == capture_.cloud.x[k] && points.y[i] == capture_.cloud.y[k] &&
             points.z[i] == capture_.cloud.z[k]) {
-          positions[k] = i;
+          indices[k] = i;
         }
       }
     }
-    return positions;
+    return indices;
   }
 
   void expect_the_same(const FittedPoints& a, const FittedPoints& b, float tolerance) {
@@ -80,7 +78,8 @@ class DescriptorFitter : public testing::Test {
         EXPECT_NEAR(a.constant_terms[in_a[k] * kFeatures + c], b.constant_terms[in_b[k] * kFeatures + c], tolerance);
       }
       for (size_t c = 0; c < kBasis * kFeatures; ++c) {
-        EXPECT_NEAR(a.linear_terms[in_a[k] * kBasis * kFeatures + c], b.linear_terms[in_b[k] * kBasis * kFeatures + c], tolerance);
+        EXPECT_NEAR(a.linear_terms[in_a[k] * kBasis * kFeatures + c], b.linear_terms[in_b[k] * kBasis * kFeatures + c],
+                    tolerance);
       }
     }
   }
@@ -90,28 +89,29 @@ class DescriptorFitter : public testing::Test {
   std::vector<Photo> photos_;
 };
 
-// Features are some 1 large. Photos are turned and sampled in float on both sides, in another order.
+// Features are some 1 large. Photos are rotated and sampled in float on both sides, in another order.
 TEST_F(DescriptorFitter, AgreesWithTorch) {
   const FittedPoints points = built({0, 1, 2, 3});
   const auto expected = tiny_scene::expected_descriptors();
-  const std::vector<size_t> positions = indices_in(points);
+  const std::vector<size_t> indices = indices_in(points);
   ASSERT_EQ(points.count(), expected.size());
   EXPECT_EQ(points.never_seen, capture_.cloud.count() - expected.size());
   EXPECT_EQ(points.singular, 0u);
   constexpr float kTolerance = 1e-5f;
   size_t view_dependent = 0;
-  for (const tiny_scene::Look& look : expected) {
-    const size_t at = positions[look.index];
-    ASSERT_NE(at, SIZE_MAX) << "point " << look.index << " is seen";
-    EXPECT_EQ(points.views[at], look.views);
-    for (size_t c = 0; c < kFeatures; ++c) EXPECT_NEAR(points.constant_terms[at * kFeatures + c], look.mean[c], kTolerance);
+  for (const tiny_scene::Descriptor& expected_point : expected) {
+    const size_t at = indices[expected_point.index];
+    ASSERT_NE(at, SIZE_MAX) << "point " << expected_point.index << " is seen";
+    EXPECT_EQ(points.views[at], expected_point.views);
+    for (size_t c = 0; c < kFeatures; ++c)
+      EXPECT_NEAR(points.constant_terms[at * kFeatures + c], expected_point.constant_terms[c], kTolerance);
     for (size_t c = 0; c < kBasis * kFeatures; ++c) {
-      EXPECT_NEAR(points.linear_terms[at * kBasis * kFeatures + c], look.slope[c], kTolerance);
+      EXPECT_NEAR(points.linear_terms[at * kBasis * kFeatures + c], expected_point.linear_terms[c], kTolerance);
     }
-    EXPECT_NEAR(points.view_dependence[at], look.view_dependence, kTolerance);
-    view_dependent += look.view_dependence > 0.01f ? 1 : 0;
+    EXPECT_NEAR(points.view_dependence[at], expected_point.view_dependence, kTolerance);
+    view_dependent += expected_point.view_dependence > 0.01f ? 1 : 0;
   }
-  EXPECT_GT(view_dependent, expected.size() / 4) << "the reference must be one whose looks depend on the side";
+  EXPECT_GT(view_dependent, expected.size() / 4) << "the reference must be view-dependent";
   const std::array<float, 3> background = tiny_scene::expected_background();
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(points.background[c], background[c], kTolerance);
 }
@@ -120,8 +120,8 @@ TEST_F(DescriptorFitter, TheOrderOfPhotosChangesRoundingAlone) {
   expect_the_same(built({0, 1, 2, 3}), built({3, 1, 0, 2}), 1e-5f);
 }
 
-TEST_F(DescriptorFitter, PhotosCanBeAddedAfterLookingAtWhatIsThere) {
-  maq::DescriptorFitter made = builder();
+TEST_F(DescriptorFitter, PhotosCanBeAddedAfterFinishing) {
+  maq::DescriptorFitter made = fitter();
   add(made, 0);
   add(made, 1);
   const FittedPoints first = made.finish();
@@ -132,8 +132,8 @@ TEST_F(DescriptorFitter, PhotosCanBeAddedAfterLookingAtWhatIsThere) {
   EXPECT_EQ(made.views(), 4u);
 }
 
-TEST_F(DescriptorFitter, FinishingInLessMemoryGivesTheSameAndABuilderThatKnowsNothing) {
-  maq::DescriptorFitter made = builder();
+TEST_F(DescriptorFitter, FinishingInLessMemoryGivesTheSameAndAnEmptyFitter) {
+  maq::DescriptorFitter made = fitter();
   add(made, 0);
   add(made, 2);
   expect_the_same(made.finish_and_forget(), built({0, 2}), 0);
@@ -143,8 +143,8 @@ TEST_F(DescriptorFitter, FinishingInLessMemoryGivesTheSameAndABuilderThatKnowsNo
   expect_the_same(made.finish(), built({1}), 0);
 }
 
-TEST_F(DescriptorFitter, PixelsThatAreNotValidSayNothing) {
-  maq::DescriptorFitter whole = builder(), half = builder(), none = builder();
+TEST_F(DescriptorFitter, PixelsOutsideOfTheMaskAreIgnored) {
+  maq::DescriptorFitter whole = fitter(), half = fitter(), none = fitter();
   const size_t all = add(whole, 0);
   std::vector<uint8_t> left(photos_[0].valid.size());
   for (size_t i = 0; i < left.size(); ++i) left[i] = i % 72 < 36 ? 255 : 0;
@@ -154,7 +154,7 @@ TEST_F(DescriptorFitter, PixelsThatAreNotValidSayNothing) {
   const FittedPoints points = half.finish();
   for (size_t i = 0; i < points.count(); ++i) {
     const double position[3] = {points.x[i] + points.origin[0], points.y[i] + points.origin[1],
-                             points.z[i] + points.origin[2]};
+                                points.z[i] + points.origin[2]};
     double seen_as[3] = {};
     for (size_t row = 0; row < 3; ++row) {
       for (size_t k = 0; k < 3; ++k) {
@@ -167,12 +167,12 @@ TEST_F(DescriptorFitter, PixelsThatAreNotValidSayNothing) {
   EXPECT_EQ(none.add_view(photos_[0].frame.image, blank.data(), photos_[0].camera).value(), 0u);
 }
 
-// Whenever it is cancelled, and whoever does, the builder is as it was.
+// Whenever it is cancelled, and from whichever thread, the fitter is as it was.
 TEST_F(DescriptorFitter, ACancelledPhotoChangesNothing) {
   const FittedPoints before = built({0, 1});
   std::vector<double> steps;
   {
-    maq::DescriptorFitter made = builder();
+    maq::DescriptorFitter made = fitter();
     made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera, [&](double done, const std::string& what) {
       EXPECT_FALSE(what.empty());
       steps.push_back(done);
@@ -183,7 +183,7 @@ TEST_F(DescriptorFitter, ACancelledPhotoChangesNothing) {
   EXPECT_TRUE(std::is_sorted(steps.begin(), steps.end()));
   for (size_t last = 1; last <= steps.size(); ++last) {
     for (const bool by_flag : {false, true}) {
-      maq::DescriptorFitter made = builder();
+      maq::DescriptorFitter made = fitter();
       add(made, 0);
       add(made, 1);
       size_t step = 0;
@@ -204,13 +204,13 @@ TEST_F(DescriptorFitter, ACancelledPhotoChangesNothing) {
 }
 
 TEST_F(DescriptorFitter, ACancelBeforeAPhotoIsOfThatPhotoAlone) {
-  maq::DescriptorFitter made = builder();
+  maq::DescriptorFitter made = fitter();
   made.cancel();
   EXPECT_FALSE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
   EXPECT_TRUE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
 }
 
-TEST_F(DescriptorFitter, CloudsThatAreNoneAreRefused) {
+TEST_F(DescriptorFitter, InvalidCloudsAreRefused) {
   const auto refused = [&](maq_status status, const char* text, const maq::PointCloud& cloud) {
     expect_error(status, text, [&] { maq::DescriptorFitter(cloud, capture_.up, *networks_, {}); });
   };
@@ -233,10 +233,11 @@ TEST_F(DescriptorFitter, OptionsOutOfRangeAreRefused) {
     maq::FittingOptions options;
     std::array<double, 3> up = capture_.up;
     change(options, up);
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { maq::DescriptorFitter(capture_.cloud, up, *networks_, options); });
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text,
+                 [&] { maq::DescriptorFitter(capture_.cloud, up, *networks_, options); });
   };
-  refused("no direction", [](auto&, auto& up) { up = {0, 0, 0}; });
-  refused("no direction", [](auto&, auto& up) { up = {0, std::nan(""), 1}; });
+  refused("has no direction", [](auto&, auto& up) { up = {0, 0, 0}; });
+  refused("has no direction", [](auto&, auto& up) { up = {0, std::nan(""), 1}; });
   refused("visibility scale is 0", [](auto& options, auto&) { options.visibility_scale = 0; });
   refused("visibility scale is 2", [](auto& options, auto&) { options.visibility_scale = 2; });
   refused("visibility scale is nan", [](auto& options, auto&) { options.visibility_scale = std::nan(""); });
@@ -245,7 +246,7 @@ TEST_F(DescriptorFitter, OptionsOutOfRangeAreRefused) {
 }
 
 TEST_F(DescriptorFitter, PhotosThatDoNotFitAreRefusedAndChangeNothing) {
-  maq::DescriptorFitter made = builder();
+  maq::DescriptorFitter made = fitter();
   add(made, 0);
   const Photo& photo = photos_[1];
   const auto refused = [&](const char* text, const maq::ImageView& image, const maq::PinholeCamera& camera) {
@@ -276,15 +277,15 @@ TEST_F(DescriptorFitter, PhotosOverTheLimitOfTheNetworksAreRefused) {
   maq::Frame large;
   maq::PinholeCamera camera = maq::resized(photos_[0].camera, 4000, 3000);
   large.allocate_bgr(4000, 3000);
-  maq::DescriptorFitter made = builder();
+  maq::DescriptorFitter made = fitter();
   expect_error(MAQ_ERROR_IMAGE_SIZE, "over the limit", [&] { made.add_view(large.image, nullptr, camera); });
   EXPECT_EQ(made.views(), 0u);
 }
 
-TEST_F(DescriptorFitter, APhotoThatSeesNothingIsCountedAsNone) {
-  maq::DescriptorFitter made = builder();
+TEST_F(DescriptorFitter, APhotoThatSeesNothingIsNotCounted) {
+  maq::DescriptorFitter made = fitter();
   maq::PinholeCamera away = photos_[0].camera;
-  for (size_t i = 0; i < 3; ++i) {  // turned by half a circle about its vertical
+  for (size_t i = 0; i < 3; ++i) {  // rotated by half a circle about its vertical
     away.rotation[i] = -away.rotation[i];
     away.rotation[6 + i] = -away.rotation[6 + i];
   }
@@ -295,7 +296,7 @@ TEST_F(DescriptorFitter, APhotoThatSeesNothingIsCountedAsNone) {
   expect_the_same(made.finish(), built({1}), 0);
 }
 
-TEST_F(DescriptorFitter, UpAlongTheViewIsLikeNoTurn) {
+TEST_F(DescriptorFitter, UpAlongTheViewIsLikeNoRotation) {
   maq::PinholeCamera down = photos_[0].camera;
   down.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1};
   down.centre = {0, 0, 3};
@@ -309,74 +310,13 @@ TEST_F(DescriptorFitter, UpAlongTheViewIsLikeNoTurn) {
 TEST_F(DescriptorFitter, TheLimitOfMemoryIsKept) {
   maq::FittingOptions options = as_in_the_reference();
   options.max_bytes = capture_.cloud.count() * 4 - 1;
-  expect_error(MAQ_ERROR_OUT_OF_MEMORY, "over the limit", [&] { builder(options); });
+  expect_error(MAQ_ERROR_OUT_OF_MEMORY, "over the limit", [&] { fitter(options); });
   options.max_bytes = capture_.cloud.count() * 4 + built({0}).count() * 340;
-  maq::DescriptorFitter made = builder(options);
+  maq::DescriptorFitter made = fitter(options);
   add(made, 0);
   expect_error(MAQ_ERROR_OUT_OF_MEMORY, "seen points", [&] { add(made, 2); });
   add(made, 0);
   expect_the_same(made.finish(), built({0, 0}, options), 0);
-}
-
-TEST_F(DescriptorFitter, CapturesAreBuiltWithoutWhatIsHeldOut) {
-  maq::CaptureBuildOptions options;
-  options.points = as_in_the_reference();
-  double last = -1;
-  const auto progress = [&](double done, const std::string&) {
-    EXPECT_GE(done, last);
-    last = done;
-    return true;
-  };
-  const auto all = maq::build_from_capture(capture_, *networks_, options, progress).value();
-  EXPECT_EQ(last, 1);
-  EXPECT_EQ(all.views, 4u);
-  EXPECT_TRUE(all.dropped.empty());
-  expect_the_same(all.points, built({0, 1, 2, 3}), 0);
-  options.max_views = 2;
-  expect_the_same(maq::build_from_capture(capture_, *networks_, options)->points, built({0, 2}), 0);
-  options.max_views = 0;
-  options.uses_held_out = true;
-  EXPECT_EQ(maq::build_from_capture(capture_, *networks_, options)->views, 5u);
-}
-
-TEST_F(DescriptorFitter, PhotosOfACaptureAreShrunkToALongSide) {
-  maq::CaptureBuildOptions options;
-  options.points = as_in_the_reference();
-  options.long_side_px = 36;
-  const auto small = maq::build_from_capture(capture_, *networks_, options).value();
-  EXPECT_GT(small.points.count(), 50u);
-  EXPECT_LT(small.points.count(), built({0, 1, 2, 3}).count());
-}
-
-TEST_F(DescriptorFitter, PhotosOfACaptureThatCannotBeReadAreDroppedAndCounted) {
-  maq::CaptureBuildOptions options;
-  options.points = as_in_the_reference();
-  maq::Capture capture = capture_;
-  capture.views[0].image_path = "nowhere.png";
-  const auto left = maq::build_from_capture(capture, *networks_, options).value();
-  EXPECT_EQ(left.views, 3u);
-  ASSERT_EQ(left.dropped.size(), 1u);
-  EXPECT_EQ(left.dropped[0].reason, maq::kPhotosMissing);
-  expect_the_same(left.points, built({1, 2, 3}), 0);
-  for (maq::CaptureView& view : capture.views) view.image_path = "nowhere.png";
-  expect_error(MAQ_ERROR_UNREADABLE, "None of the photos can be used: 4 photos that are not in their folder",
-               [&] { maq::build_from_capture(capture, *networks_, options); });
-}
-
-TEST_F(DescriptorFitter, ChoicesThatLeaveNoPhotoAreASentence) {
-  maq::CaptureBuildOptions options;
-  maq::Capture held_out = capture_;
-  for (maq::CaptureView& view : held_out.views) view.is_held_out = true;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "All of the capture's 5 photos",
-               [&] { maq::build_from_capture(held_out, *networks_, options); });
-  options.long_side_px = -1;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "long side",
-               [&] { maq::build_from_capture(capture_, *networks_, options); });
-}
-
-TEST_F(DescriptorFitter, ACancelledCaptureIsNothing) {
-  const auto cancelling = [](double done, const std::string&) { return done < 0.5; };
-  EXPECT_FALSE(maq::build_from_capture(capture_, *networks_, {}, cancelling).has_value());
 }
 
 // A wall of points that fills the photos of cameras side by side: each photo sees other ones.
@@ -389,7 +329,7 @@ maq::PointCloud wall(size_t across, size_t down) {
   return cloud;
 }
 
-// As many points as all threads get a share of.
+// As many points as all threads have some of.
 TEST_F(DescriptorFitter, ThreadsChangeNothing) {
   constexpr int kSide = 224;
   maq::Frame photo;

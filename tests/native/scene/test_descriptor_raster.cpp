@@ -3,17 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include "scene/format/scene_packing.h"
 #include "support/expect_error.h"
 #include "support/synthetic_scene.h"
-#include "scene/format/scene_packing.h"
 
 namespace {
 
 using maq::DepthKey;
+using maq::DescriptorRaster;
 using maq::kBasis;
 using maq::kFeatures;
 using maq::kNoPointKey;
-using maq::DescriptorRaster;
 using maq::RasterWindow;
 using maq::Scene;
 
@@ -41,12 +41,12 @@ double coefficient(const Scene& scene, const void* values, size_t at) {
     default: return stored<int8_t>(values, at);
   }
 }
-double position(const Scene& scene, size_t at) {
+double coordinate(const Scene& scene, size_t at) {
   return scene.position_format == maq::PositionFormat::kFloat32 ? stored<float>(scene.positions, at)
-                                                   : stored<uint16_t>(scene.positions, at);
+                                                                : stored<uint16_t>(scene.positions, at);
 }
 
-// The look of a point from a camera's centre, by its formula, from what the scene's header says of stored numbers.
+// The descriptor of a point from a camera's centre, by its formula, from what the scene's header says of stored numbers.
 std::array<double, kFeatures> look_of(const Scene& scene, uint32_t point, const maq::PinholeCamera& camera) {
   const maq::SceneBlock* block = scene.blocks;
   while (point >= block->first + block->count) ++block;
@@ -54,27 +54,28 @@ std::array<double, kFeatures> look_of(const Scene& scene, uint32_t point, const 
   const bool is_float = scene.coefficient_format == maq::CoefficientFormat::kFloat32;
   double d[3], length = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
-    d[axis] = position(scene, 3 * size_t(block->first) + axis * block->count + in_block);
-    if (scene.position_format == maq::PositionFormat::kUint16) d[axis] = block->low[axis] + d[axis] * block->position_step[axis];
+    d[axis] = coordinate(scene, 3 * size_t(block->first) + axis * block->count + in_block);
+    if (scene.position_format == maq::PositionFormat::kUint16)
+      d[axis] = block->low[axis] + d[axis] * block->position_step[axis];
     d[axis] += scene.origin[axis] - camera.centre[axis];
     length += d[axis] * d[axis];
   }
   float unit[3], h[kBasis];
   for (size_t axis = 0; axis < 3; ++axis) unit[axis] = float(d[axis] / std::sqrt(length));
   basis().evaluate(&unit[0], &unit[1], &unit[2], 1, h);
-  std::array<double, kFeatures> look;
+  std::array<double, kFeatures> descriptor;
   for (size_t c = 0; c < size_t(kFeatures); ++c) {
-    look[c] = coefficient(scene, scene.constant_terms, point * size_t(kFeatures) + c);
-    if (!is_float) look[c] = block->constant_middle[c] + look[c] * block->constant_step[c];
+    descriptor[c] = coefficient(scene, scene.constant_terms, point * size_t(kFeatures) + c);
+    if (!is_float) descriptor[c] = block->constant_middle[c] + descriptor[c] * block->constant_step[c];
     if (in_block >= block->view_dependent) continue;
     for (size_t k = 0; k < size_t(kBasis); ++k) {
       const size_t at = k * kFeatures + c;
-      const double slope =
+      const double linear =
           coefficient(scene, scene.linear_terms, (block->first_view_dependent + in_block) * kBasis * kFeatures + at);
-      look[c] += h[k] * slope * (is_float ? 1 : double(block->linear_step[at]));
+      descriptor[c] += h[k] * linear * (is_float ? 1 : double(block->linear_step[at]));
     }
   }
-  return look;
+  return descriptor;
 }
 
 struct View {
@@ -84,7 +85,8 @@ struct View {
     buffer.begin(camera, 0.01, 1);
     for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
     buffer.finish(0, camera.height_px);
-    raster.shade(scene, maq::BlockIndex(scene), buffer, window, camera.centre, basis(), layout, workers);
+    const maq::BlockIndex blocks(scene);
+    raster.shade({scene, blocks, buffer, camera.centre, window, basis(), layout}, workers);
   }
   // Of a pixel of the window at a level.
   const float* at(int level, size_t x, size_t y) const {
@@ -103,7 +105,8 @@ struct View {
 Scene packed(size_t count, maq::CoefficientFormat coefficients, size_t copies = 1) {
   maq::ScenePacking packing;
   packing.coefficients = coefficients;
-  packing.positions = coefficients == maq::CoefficientFormat::kFloat32 ? maq::PositionFormat::kFloat32 : maq::PositionFormat::kUint16;
+  packing.positions =
+      coefficients == maq::CoefficientFormat::kFloat32 ? maq::PositionFormat::kFloat32 : maq::PositionFormat::kUint16;
   return make_scene(synthetic_points(count, 1, 1, {1, 2, 3}, copies), packing);
 }
 
@@ -114,7 +117,8 @@ maq::PinholeCamera camera_near(int width, int height) {
 }
 
 TEST(DescriptorRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
-  for (const auto kind : {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt16, maq::CoefficientFormat::kInt8}) {
+  for (const auto kind :
+       {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt16, maq::CoefficientFormat::kInt8}) {
     for (const size_t count : {1u, 300u, 20000u}) {
       const Scene scene = packed(count, kind, count > 1 ? 3 : 1);
       const maq::PinholeCamera camera = camera_near(96, 64);
@@ -154,7 +158,7 @@ TEST(DescriptorRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
   }
 }
 
-TEST(DescriptorRaster, WithoutSlopesALookIsItsMean) {
+TEST(DescriptorRaster, WithoutLinearTermsADescriptorIsItsConstantTerm) {
   maq::FittedPoints points = synthetic_points(500);
   std::fill(points.linear_terms.begin(), points.linear_terms.end(), 0.0f);
   maq::ScenePacking packing;
@@ -190,7 +194,7 @@ TEST(DescriptorRaster, AWindowHasThatPartOfThePictureWithAnyNumberOfThreads) {
   }
 }
 
-TEST(DescriptorRaster, MemoryOfAnEarlierPictureDoesNotShine) {
+TEST(DescriptorRaster, MemoryOfAnEarlierPictureIsNotSeen) {
   const Scene scene = packed(5000, maq::CoefficientFormat::kInt8);
   View view(scene, camera_near(96, 64), {0, 0, 96, 64}, {5, true});
   ASSERT_GT(view.raster.shaded(), 0u);
@@ -198,8 +202,9 @@ TEST(DescriptorRaster, MemoryOfAnEarlierPictureDoesNotShine) {
   away.rotation = {-1, 0, 0, 0, 1, 0, 0, 0, -1};
   view.buffer.begin(away, 0.01, 1);
   view.buffer.finish(0, 64);
-  view.raster.shade(scene, maq::BlockIndex(scene), view.buffer, {0, 0, 96, 64}, away.centre, basis(), {5, true},
-                    view.workers);
+  const maq::BlockIndex blocks(scene);
+  const maq::RefinerLayout layout{5, true};
+  view.raster.shade({scene, blocks, view.buffer, away.centre, {0, 0, 96, 64}, basis(), layout}, view.workers);
   EXPECT_EQ(view.raster.shaded(), 0u);
   for (int level = 0; level < DescriptorRaster::kLevels; ++level) {
     const float* values = view.raster.level(level);

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "scene/capture/ply_reader.h"
 #include "support/capture_files.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "scene/capture/ply_reader.h"
 
 namespace {
 
@@ -74,7 +74,7 @@ TEST_F(PlyFiles, EveryTypeIsReadInBothByteOrders) {
   }
 }
 
-TEST_F(PlyFiles, PlacesFarFromTheWorldsOriginKeepTheirPrecision) {
+TEST_F(PlyFiles, PositionsFarFromTheWorldsOriginKeepTheirPrecision) {
   const maq::PointCloud cloud =
       read(ascii("property double x\nproperty double y\nproperty double z\n", "1000000.123456 -2000000.5 3e6"),
            {1e6, -2e6, 3e6});
@@ -189,7 +189,7 @@ TEST_F(PlyFiles, MoreThan30MillionPointsAreUnsupported) {
   EXPECT_LT(growth_mib, 8);
 }
 
-TEST_F(PlyFiles, TwoMillionPointsTakeTheirPlacesAndColoursAndLittleMore) {
+TEST_F(PlyFiles, TwoMillionPointsTakeTheirPositionsAndColoursAndLittleMore) {
   constexpr size_t kCount = 2'000'000;
   const std::string path = folder_.file("large.ply");
   {

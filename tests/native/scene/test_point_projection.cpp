@@ -12,13 +12,13 @@
 namespace {
 
 using maq::PinholeCamera;
-using Place = std::array<double, 3>;
+using Position = std::array<double, 3>;
 
 struct Cloud {
   std::vector<float> x, y, z;
-  Place origin = {0, 0, 0};
+  Position origin = {0, 0, 0};
   // In the world: what float keeps of it.
-  void add(const Place& position) {
+  void add(const Position& position) {
     x.push_back(float(position[0] - origin[0]));
     y.push_back(float(position[1] - origin[1]));
     z.push_back(float(position[2] - origin[2]));
@@ -40,7 +40,7 @@ Projected reference(const Cloud& cloud, size_t i, const PinholeCamera& camera) {
   return {seen[0] / seen[2] * camera.fx_px + camera.cx_px, seen[1] / seen[2] * camera.fy_px + camera.cy_px, seen[2]};
 }
 
-// Every point that the reference sees well inside of a pixel is its winner or behind it; nobody else wins.
+// Every point that the reference sees well inside of a pixel is visible there or behind the one that is; no other is.
 void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double near, double least_px = 0.01) {
   const FrontPoints visible(cloud.positions(), camera, near);
   ASSERT_EQ(visible.points.size(), size_t(camera.width_px) * size_t(camera.height_px));
@@ -70,14 +70,14 @@ void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double
 }
 
 // Points around the camera, most of them ahead.
-Cloud cloud_around(const PinholeCamera& camera, double units, const Place& origin, int count, unsigned seed) {
+Cloud cloud_around(const PinholeCamera& camera, double units, const Position& origin, int count, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   Cloud cloud;
   cloud.origin = origin;
   for (int i = 0; i < count; ++i) {
     const double seen[3] = {normal(random), normal(random), 3 + normal(random) * 1.5};
-    Place position = camera.centre;
+    Position position = camera.centre;
     for (size_t k = 0; k < 3; ++k) {
       for (size_t j = 0; j < 3; ++j) position[k] += units * camera.rotation[3 * j + k] * seen[j];
     }
@@ -148,7 +148,7 @@ TEST(PointProjection, OnTheEdgesOfThePicture) {
   }
 }
 
-TEST(PointProjection, TheNearestWinsAndOfEqualsTheFirst) {
+TEST(PointProjection, TheNearestIsVisibleAndOfEqualsTheFirst) {
   const PinholeCamera camera = camera_of(3, 3, 60);
   Cloud cloud;
   for (const double depth : {5.0, 2.0, 2.0, 3.0, 2.0}) cloud.add({0, 0, depth});

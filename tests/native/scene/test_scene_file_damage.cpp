@@ -240,11 +240,13 @@ TEST(SceneFileDamage, BlocksThatLieAreRefusedThoughTheirChecksAreRight) {
       {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].linear_step[46] = 1e35f; }},
       {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].linear_step[45] = -1; }},
   };
-  for (const Attack& attack : attacks) expect_refused(attack, {maq::PositionFormat::kUint16, maq::CoefficientFormat::kInt8, 0});
+  for (const Attack& attack : attacks)
+    expect_refused(attack, {maq::PositionFormat::kUint16, maq::CoefficientFormat::kInt8, 0});
 }
 
 TEST(SceneFileDamage, NumbersThatAreNotFiniteAreRefused) {
-  for (const maq::SceneFileSection section : {maq::kPositionsSection, maq::kConstantTermsSection, maq::kLinearTermsSection}) {
+  for (const maq::SceneFileSection section :
+       {maq::kPositionsSection, maq::kConstantTermsSection, maq::kLinearTermsSection}) {
     for (const float value : {float(NAN), INFINITY, -3e30f}) {
       TempFolder folder;
       std::string bytes = small_file(folder, {maq::PositionFormat::kFloat32, maq::CoefficientFormat::kFloat32, 0});
@@ -265,7 +267,8 @@ TEST(SceneFileDamage, RandomChangesWithRightChecksAreRefusedOrHarmless) {
                             0x7f800000, 0xff800000, 0x7fc00000, 0x7f7fffff, 0x00000001, 0x7149f2ca};
   int refused = 0, opened = 0;
   for (const auto positions : {maq::PositionFormat::kFloat32, maq::PositionFormat::kUint16}) {
-    for (const auto kind : {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt16, maq::CoefficientFormat::kInt8}) {
+    for (const auto kind :
+         {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt16, maq::CoefficientFormat::kInt8}) {
       TempFolder folder;
       const std::string path = folder.file("small.maqs"), whole = small_file(folder, {positions, kind, 0});
       for (int round = 0; round < 2'000; ++round) {
@@ -279,7 +282,7 @@ TEST(SceneFileDamage, RandomChangesWithRightChecksAreRefusedOrHarmless) {
         }
         if (random() % 8 == 0) bytes.resize(random() % (bytes.size() + 1));
         if (bytes.size() >= sizeof(SceneFileHead)) {
-          // The size too, so that more than the size is looked at.
+          // The size too, so that more than the size is checked.
           const uint64_t size = bytes.size();
           if (random() % 2 == 0) std::memcpy(bytes.data() + offsetof(SceneFileHead, file_bytes), &size, sizeof size);
           repair(bytes);

@@ -50,7 +50,8 @@ TEST(SceneFiles, KeepScenesOfEveryKind) {
   TempFolder folder;
   const maq::FittedPoints points = synthetic_points(3'000);
   for (const PositionFormat positions : {PositionFormat::kFloat32, PositionFormat::kUint16}) {
-    for (const CoefficientFormat kind : {CoefficientFormat::kFloat32, CoefficientFormat::kInt16, CoefficientFormat::kInt8}) {
+    for (const CoefficientFormat kind :
+         {CoefficientFormat::kFloat32, CoefficientFormat::kInt16, CoefficientFormat::kInt8}) {
       for (const float min : {0.0f, 0.1f, 100.0f}) {
         Scene scene = make_scene(points, {positions, kind, min});
         for (size_t i = 0; i < 32; ++i) scene.networks_sha256[i] = uint8_t(200 + i);
@@ -110,7 +111,7 @@ TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
   write_scene_file(large, folder.file("large.maqs"));
   const rlim_t whole = std::filesystem::file_size(folder.file("large.maqs"));
   std::filesystem::remove(folder.file("large.maqs"));
-  // At the head, in the blocks, the places, the looks, and at the last byte.
+  // At the head, in the blocks, the positions, the coefficients, and at the last byte.
   for (const rlim_t max : {rlim_t(0), rlim_t(100), rlim_t(5'000), rlim_t(20'000), rlim_t(200'000), whole - 1}) {
     const FileSizeLimit limit(max);
     expect_error(MAQ_ERROR_UNWRITABLE, "cannot be written", [&] { write_scene_file(large, path); });

@@ -1,13 +1,13 @@
-// Captured places from disk: COLMAP models and transforms.json, with their photos and clouds.
+// Captures from disk: COLMAP models and transforms.json, with their photos and clouds.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "scene/capture/capture.h"
 #include "support/capture_files.h"
 #include "support/expect_error.h"
-#include "scene/capture/capture.h"
 
 namespace {
 
@@ -126,7 +126,7 @@ TEST_F(SceneImport, CamerasOfColmapAreThoseOfOpenCvHalfAPixelOff) {
   }
 }
 
-// x' = R x + t, R of the quaternion, as COLMAP's documentation has it; the quaternion turned here by hand.
+// x' = R x + t, R of the quaternion, as COLMAP's documentation has it; the quaternion rotated here by hand.
 TEST_F(SceneImport, PosesOfColmapAreWorldToCamera) {
   const MadeCapture made = of_every_model();
   const Capture capture = open_colmap(made);
@@ -437,7 +437,7 @@ TEST_F(SceneImport, TransformsThatSayNothingOfUseAreASentence) {
   expect(std::string(1 << 20, '['), "is not a JSON object");
 }
 
-TEST_F(SceneImport, PhotosAreTakenAsTheyAreStoredNotTurnedByExif) {
+TEST_F(SceneImport, PhotosAreTakenAsTheyAreStoredNotRotatedByExif) {
   MadeCapture made;
   for (MadeImage& image : made.images) image.name[1] = '.', image.name.replace(2, 3, "jpg");
   made.write_photos(folder_);
@@ -465,7 +465,7 @@ TEST_F(SceneImport, PhotosAreTakenAsTheyAreStoredNotTurnedByExif) {
   EXPECT_EQ(picture.image.height_px, 24);
 }
 
-// A picture that tells the place of each pixel, seen by a distorted camera, tells after loading where each came from.
+// A picture that encodes the coordinates of each pixel, seen by a distorted camera, tells after loading where each came from.
 TEST_F(SceneImport, ViewsAreLoadedUndistorted) {
   MadeCapture made = of_every_model();
   const Capture capture = open_colmap(made);
@@ -501,7 +501,7 @@ TEST_F(SceneImport, APhotoThatChangedSinceIsASentence) {
   expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { maq::load_view(capture.views[1], picture, valid); });
 }
 
-TEST_F(SceneImport, TheCloudsOriginIsAmidTheCamerasSoThatPlacesFarAwayAreExact) {
+TEST_F(SceneImport, TheCloudsOriginIsAmidTheCamerasSoThatPositionsFarAwayAreExact) {
   MadeCapture made;
   made.images.resize(2);
   for (MadeImage& image : made.images) image.pose = {1, 0, 0, 0, -1e7, 2e7, 0};

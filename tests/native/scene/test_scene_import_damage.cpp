@@ -3,10 +3,10 @@
 
 #include <cmath>
 
+#include "scene/capture/capture.h"
 #include "support/capture_files.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "scene/capture/capture.h"
 
 namespace {
 

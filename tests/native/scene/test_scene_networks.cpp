@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "support/expect_error.h"
 #include "nn/sha256.h"
+#include "support/expect_error.h"
 #include "support/tiny_scene.h"
 
 namespace {
@@ -19,7 +19,7 @@ class SceneNetworks : public testing::Test {
   }
 
   std::unique_ptr<maq::SceneNetworks> open() const {
-    return std::make_unique<maq::SceneNetworks>(tiny_scene::runtime(), folder_.path().string(),
+    return std::make_unique<maq::SceneNetworks>(tiny_scene::runtime(), maq::read_bundle(folder_.path().string()),
                                                 maq::SessionSettings{1, false});
   }
   json manifest() const { return json::parse(read_text(folder_.file("manifest.json"))); }
@@ -111,8 +111,9 @@ TEST_F(SceneNetworks, AreToldApartByTheirFiles) {
 }
 
 TEST_F(SceneNetworks, ADenseposeBundleIsNone) {
-  expect_error(MAQ_ERROR_UNSUPPORTED, "scenes need a bundle with the task scenes", [] {
-    maq::SceneNetworks(tiny_scene::runtime(), std::string(MAQ_TEST_DATA) + "/tiny_bundle", maq::SessionSettings{});
+  expect_error(MAQ_ERROR_UNSUPPORTED, "is for the task densepose, but one for scenes is needed", [] {
+    maq::SceneNetworks(tiny_scene::runtime(), maq::read_bundle(std::string(MAQ_TEST_DATA) + "/tiny_bundle"),
+                       maq::SessionSettings{});
   });
 }
 

@@ -18,15 +18,15 @@
 namespace {
 
 using maq::CoefficientFormat;
+using maq::FittedPoints;
 using maq::kBasis;
 using maq::kFeatures;
 using maq::kLinearTerms;
-using maq::FittedPoints;
 using maq::PositionFormat;
 using maq::Scene;
 using maq::SceneBlock;
 
-constexpr maq::ScenePacking kExact = {PositionFormat::kFloat32, CoefficientFormat::kFloat32, 0};  // all points may vary
+constexpr maq::ScenePacking kExact = {PositionFormat::kFloat32, CoefficientFormat::kFloat32, 0};  // all linear terms are kept
 
 // All points of a scene in the order in which they were given.
 FittedPoints unpack(const Scene& scene, const std::vector<uint32_t>& order) {
@@ -54,7 +54,8 @@ struct DescriptorError {
 };
 
 // Of y(h) over basis values of length 1, in all directions; points in `skipped` do not count.
-DescriptorError descriptor_error(const FittedPoints& given, const FittedPoints& stored, std::vector<uint32_t> skipped = {}) {
+DescriptorError descriptor_error(const FittedPoints& given, const FittedPoints& stored,
+                                 std::vector<uint32_t> skipped = {}) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   DescriptorError error;
@@ -117,9 +118,10 @@ TEST(ScenePacking, FloatsAreThoseGiven) {
   EXPECT_EQ(stored.linear_terms, points.linear_terms);
 }
 
-TEST(ScenePacking, PlacesOf16BitsAreWithinHalfAStepAndInTheirBox) {
+TEST(ScenePacking, PositionsOf16BitsAreWithinHalfAStepAndInTheirBox) {
   const FittedPoints points = synthetic_points(20'000);
-  const std::vector<uint32_t> order = order_points(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0}).points;
+  const std::vector<uint32_t> order =
+      order_points(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0}).points;
   const Scene scene = make_scene(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0});
   for (uint32_t b = 0; b < scene.block_count; ++b) {
     const SceneBlock& block = scene.blocks[b];
@@ -163,13 +165,14 @@ TEST(ScenePacking, ItsErrorIsSmallForDescriptorsOfAnySize) {
   }
 }
 
-TEST(ScenePacking, PointsThatVaryLessKeepTheMeanAlone) {
+TEST(ScenePacking, LessViewDependentPointsKeepTheConstantTermAlone) {
   const FittedPoints points = synthetic_points(10'000);
   const float min = 0.1f;
-  const std::vector<uint32_t> order = order_points(points, {PositionFormat::kFloat32, CoefficientFormat::kFloat32, min}).points;
+  const std::vector<uint32_t> order =
+      order_points(points, {PositionFormat::kFloat32, CoefficientFormat::kFloat32, min}).points;
   const Scene scene = make_scene(points, {PositionFormat::kFloat32, CoefficientFormat::kFloat32, min});
   EXPECT_EQ(scene.view_dependent, std::count_if(points.view_dependence.begin(), points.view_dependence.end(),
-                                         [&](float view_dependence) { return view_dependence >= min; }));
+                                                [&](float view_dependence) { return view_dependence >= min; }));
   const FittedPoints stored = unpack(scene, order);
   EXPECT_EQ(stored.constant_terms, points.constant_terms);
   for (size_t i = 0; i < points.count(); ++i) {
@@ -180,7 +183,7 @@ TEST(ScenePacking, PointsThatVaryLessKeepTheMeanAlone) {
   }
 }
 
-TEST(ScenePacking, NoMorePointsVaryThanTheShareAllowsAndTheseAreTheMostVarying) {
+TEST(ScenePacking, TheFractionOfViewDependentPointsIsKeptByTheMostViewDependent) {
   FittedPoints points = synthetic_points(10'000);
   maq::ScenePacking packing = kExact;
   for (const float fraction : {0.0f, 0.3f, 0.9999f, 1.0f}) {
@@ -204,42 +207,43 @@ TEST(ScenePacking, NoMorePointsVaryThanTheShareAllowsAndTheseAreTheMostVarying) 
   EXPECT_LE(make_scene(points, packing).view_dependent, 5'000u);
   for (const float fraction : {-0.1f, 1.5f, float(NAN)}) {
     packing.max_view_dependent_fraction = fraction;
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "share of points", [&] { make_scene(points, packing); });
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "fraction of view-dependent points", [&] { make_scene(points, packing); });
   }
 }
 
-TEST(ScenePacking, AScenesBytesAPointAreAtMost39WhereHalfOfThemMayVary) {
+TEST(ScenePacking, AScenesBytesAPointAreAtMost39WithHalfOfThemViewDependent) {
   const FittedPoints points = synthetic_points(20'000);
   const Scene scene = make_scene(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0, 0.5f});
-  const size_t bytes = blocks_bytes(scene) + positions_bytes(scene) + constant_terms_bytes(scene) + linear_terms_bytes(scene);
+  const size_t bytes =
+      blocks_bytes(scene) + positions_bytes(scene) + constant_terms_bytes(scene) + linear_terms_bytes(scene);
   EXPECT_EQ(scene.view_dependent, 10'000u);
   EXPECT_LT(double(bytes) / scene.points, 39);
 }
 
-TEST(ScenePacking, SlopesThatAreZeroAreNotStored) {
+TEST(ScenePacking, LinearTermsThatAreZeroAreNotStored) {
   FittedPoints points = synthetic_points(3'000);
   std::fill(points.linear_terms.begin() + 1'000 * kLinearTerms, points.linear_terms.end(), 0.0f);
   EXPECT_EQ(make_scene(points, kExact).view_dependent, 1'000u);
 }
 
-TEST(ScenePacking, AWildLookDoesNotSpoilItsNeighbours) {
+TEST(ScenePacking, AnOutlierDoesNotSpoilItsNeighbours) {
   const maq::ScenePacking packing = {PositionFormat::kUint16, CoefficientFormat::kInt8, 0};
   FittedPoints points = synthetic_points(20'000);
   const auto error_of = [&](const std::vector<uint32_t>& skipped) {
     return descriptor_error(points, unpack(make_scene(points, packing), order_points(points, packing).points), skipped);
   };
   const DescriptorError before = error_of({});
-  const std::vector<uint32_t> wild = {17, 4'711, 12'345, 12'347};
-  for (const uint32_t i : wild) {
+  const std::vector<uint32_t> outliers = {17, 4'711, 12'345, 12'347};
+  for (const uint32_t i : outliers) {
     for (int c = 0; c < kFeatures; ++c) points.constant_terms[i * kFeatures + size_t(c)] = 1e6f + float(i);
     for (size_t k = 0; k < kLinearTerms; ++k) points.linear_terms[i * kLinearTerms + k] = 1e5f;
   }
-  points.constant_terms[99 * kFeatures] = -1e20f;  // and one among the wild ones
+  points.constant_terms[99 * kFeatures] = -1e20f;  // and one among the outliers
   const Scene scene = make_scene(points, packing);
   const FittedPoints stored = unpack(scene, order_points(points, packing).points);
   const DescriptorError after = error_of({17, 99, 4'711, 12'345, 12'347});
   EXPECT_LT(after.worst, 1.2 * before.worst);
-  for (const uint32_t i : wild) {
+  for (const uint32_t i : outliers) {
     EXPECT_NEAR(stored.constant_terms[i * kFeatures], points.constant_terms[i * kFeatures], 100);
     EXPECT_NEAR(stored.linear_terms[i * kLinearTerms], 1e5f, 1e3);
   }
@@ -251,7 +255,8 @@ TEST(ScenePacking, APointFarAwayDoesNotSpoilItsNeighbours) {
   FittedPoints points = synthetic_points(20'000);
   points.x[5] = 3e7f;
   points.y[6] = -1e12f;
-  const std::vector<uint32_t> order = order_points(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0}).points;
+  const std::vector<uint32_t> order =
+      order_points(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0}).points;
   const Scene scene = make_scene(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0});
   const FittedPoints stored = unpack(scene, order);
   for (size_t i = 0; i < points.count(); ++i) {
@@ -270,13 +275,14 @@ TEST(ScenePacking, BlocksStayFewHoweverPointsAreSpread) {
   EXPECT_LE(make_scene(points, kExact).block_count, 4u * 4);
 }
 
-TEST(ScenePacking, OnePointAndPointsInOnePlace) {
+TEST(ScenePacking, OnePointAndPointsAtOnePosition) {
   for (const size_t count : {size_t(1), size_t(2), size_t(3), size_t(3'000)}) {
     FittedPoints points = synthetic_points(count);
     std::fill(points.x.begin(), points.x.end(), 0.1f);
     std::fill(points.y.begin(), points.y.end(), -7e-30f);
     std::fill(points.z.begin(), points.z.end(), 1e30f);
-    for (const CoefficientFormat kind : {CoefficientFormat::kFloat32, CoefficientFormat::kInt16, CoefficientFormat::kInt8}) {
+    for (const CoefficientFormat kind :
+         {CoefficientFormat::kFloat32, CoefficientFormat::kInt16, CoefficientFormat::kInt8}) {
       for (const PositionFormat positions : {PositionFormat::kFloat32, PositionFormat::kUint16}) {
         const std::vector<uint32_t> order = order_points(points, {positions, kind, 0}).points;
         const Scene scene = make_scene(points, {positions, kind, 0});
@@ -317,10 +323,10 @@ TEST(ScenePacking, WhatIsNoSceneIsRefused) {
     change(points);
     expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { make_scene(points, {}); });
   };
-  refused("look of point 60", [](auto& points) { points.constant_terms[60 * 8 + 7] = NAN; });
-  refused("look of point 61", [](auto& points) { points.linear_terms[61 * 48 + 47] = -INFINITY; });
-  refused("look of point 62", [](auto& points) { points.linear_terms[62 * 48] = 2e30f; });
-  refused("look of point 63", [](auto& points) { points.view_dependence[63] = NAN; });
+  refused("descriptor of point 60", [](auto& points) { points.constant_terms[60 * 8 + 7] = NAN; });
+  refused("descriptor of point 61", [](auto& points) { points.linear_terms[61 * 48 + 47] = -INFINITY; });
+  refused("descriptor of point 62", [](auto& points) { points.linear_terms[62 * 48] = 2e30f; });
+  refused("descriptor of point 63", [](auto& points) { points.view_dependence[63] = NAN; });
   refused("Point 64", [](auto& points) { points.y[64] = NAN; });
   refused("Point 65", [](auto& points) { points.z[65] = -3e30f; });
   refused("origin", [](auto& points) { points.origin[2] = NAN; });

@@ -31,14 +31,14 @@ maq::FittedPoints tiny_points() {
   points.origin = capture.cloud.origin;
   points.up = capture.up;
   points.background = tiny_scene::expected_background();
-  for (const tiny_scene::Look& look : tiny_scene::expected_descriptors()) {
-    points.x.push_back(capture.cloud.x[look.index]);
-    points.y.push_back(capture.cloud.y[look.index]);
-    points.z.push_back(capture.cloud.z[look.index]);
-    points.views.push_back(look.views);
-    points.view_dependence.push_back(look.view_dependence);
-    points.constant_terms.insert(points.constant_terms.end(), std::begin(look.mean), std::end(look.mean));
-    points.linear_terms.insert(points.linear_terms.end(), std::begin(look.slope), std::end(look.slope));
+  for (const tiny_scene::Descriptor& expected : tiny_scene::expected_descriptors()) {
+    points.x.push_back(capture.cloud.x[expected.index]);
+    points.y.push_back(capture.cloud.y[expected.index]);
+    points.z.push_back(capture.cloud.z[expected.index]);
+    points.views.push_back(expected.views);
+    points.view_dependence.push_back(expected.view_dependence);
+    points.constant_terms.insert(points.constant_terms.end(), std::begin(expected.constant_terms), std::end(expected.constant_terms));
+    points.linear_terms.insert(points.linear_terms.end(), std::begin(expected.linear_terms), std::end(expected.linear_terms));
   }
   return points;
 }
@@ -47,7 +47,8 @@ Scene packed(const maq::FittedPoints& points, maq::CoefficientFormat coefficient
   maq::ScenePacking packing;
   packing.coefficients = coefficients;
   packing.min_view_dependence = 0;
-  packing.positions = coefficients == maq::CoefficientFormat::kFloat32 ? maq::PositionFormat::kFloat32 : maq::PositionFormat::kUint16;
+  packing.positions =
+      coefficients == maq::CoefficientFormat::kFloat32 ? maq::PositionFormat::kFloat32 : maq::PositionFormat::kUint16;
   return make_scene(points, packing);
 }
 
@@ -109,20 +110,20 @@ TEST(SceneRenderer, RendersWhatTorchRenders) {
   const Scene scene = packed(tiny_points(), maq::CoefficientFormat::kFloat32);
   const std::vector<ExpectedView> views = views_by_torch();
   ASSERT_GE(views.size(), 5u);
-  size_t turned = 0;
+  size_t rotated = 0;
   for (size_t i = 0; i < views.size(); ++i) {
     const RenderedImage picture = render(scene, views[i].camera);
     expect_sound(picture, views[i].camera);
-    turned += picture.counts.is_rotated ? 1 : 0;
+    rotated += picture.counts.is_rotated ? 1 : 0;
     const double found = psnr(picture.bgr, views[i].bgr);
-    std::printf("view %zu: %.1f dB%s\n", i, found, picture.counts.is_rotated ? ", turned" : "");
+    std::printf("view %zu: %.1f dB%s\n", i, found, picture.counts.is_rotated ? ", rotated" : "");
     EXPECT_GE(found, 45) << i;
     // So that the bar constant_terms something: a picture of one colour is far below it.
     double mean = 0;
     for (const uint8_t value : views[i].bgr) mean += value / double(views[i].bgr.size());
     EXPECT_LE(psnr(std::vector<uint8_t>(views[i].bgr.size(), uint8_t(mean)), views[i].bgr), 25) << i;
   }
-  EXPECT_EQ(turned, views.size() - 1);
+  EXPECT_EQ(rotated, views.size() - 1);
 }
 
 TEST(SceneRenderer, StoredIn8BitsItShowsNearlyTheSame) {
@@ -144,7 +145,7 @@ TEST(SceneRenderer, StoredIn8BitsItShowsNearlyTheSame) {
 }
 
 TEST(SceneRenderer, AnyNumberOfThreadsRendersTheSamePicture) {
-  // Four points at each place: ties everywhere.
+  // Four points at each position: ties everywhere.
   const Scene scene = packed(synthetic_points(30000, 3, 1, {0, 0, 0}, 4), maq::CoefficientFormat::kInt8);
   for (const double roll : {0.0, 0.6}) {
     PinholeCamera camera = camera_of(200, 150, 70);
@@ -278,7 +279,7 @@ TEST(SceneRenderer, WhereNothingIsSeenThereIsBackgroundAndNoNetworkRuns) {
   }
 }
 
-TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenTurned) {
+TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenRotated) {
   // A wall across the axis, 2 away, wider than the picture.
   maq::FittedPoints points = synthetic_points(20000);
   for (float& z : points.z) z = 2;
@@ -293,17 +294,17 @@ TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenTurned) {
   }
 }
 
-// A camera that is held otherwise takes the same picture, turned.
-TEST(SceneRenderer, ATurnedCameraTakesTheTurnedPicture) {
+// A rolled camera takes the same picture, rotated.
+TEST(SceneRenderer, ARolledCameraTakesTheRotatedPicture) {
   const Scene scene = packed(synthetic_points(20000), maq::CoefficientFormat::kFloat32);
-  const PinholeCamera upright = camera_of(96, 64, 60);
+  const PinholeCamera level = camera_of(96, 64, 60);
   PinholeCamera portrait = camera_of(64, 96, 60);
-  portrait.fx_px = portrait.fy_px = upright.fx_px;
+  portrait.fx_px = portrait.fy_px = level.fx_px;
   portrait.rotation = {0, 1, 0, -1, 0, 0, 0, 0, 1};  // its right is down in the world
-  const RenderedImage expected = render(scene, upright), found = render(scene, portrait);
+  const RenderedImage expected = render(scene, level), found = render(scene, portrait);
   EXPECT_TRUE(found.counts.is_rotated);
   EXPECT_FALSE(expected.counts.is_rotated);
-  // At the frame's right and lower edges the turned one sees more around the picture: the refiner knows better there.
+  // At the frame's right and lower edges the rotated one sees more around the picture, and the refiner more of the scene.
   size_t same = 0;
   for (size_t y = 0; y < 64; ++y) {
     for (size_t x = 0; x < 96; ++x) {
@@ -393,7 +394,7 @@ TEST(SceneRenderer, WhatCannotBeRenderedIsASentence) {
           [](PinholeCamera& camera) { camera.width_px = camera.height_px = 4000; });
   RenderOptions options;
   options.threads = 0;
-  expect_error(wrong, "1 to 64 threads, not by 0", [&] { SceneRenderer(scene, networks(), options); });
+  expect_error(wrong, "Threads are 0, but must be 1 to 64", [&] { SceneRenderer(scene, networks(), options); });
   options.threads = 1;
   options.near = INFINITY;
   expect_error(wrong, "must be a finite number", [&] { SceneRenderer(scene, networks(), options); });

@@ -10,8 +10,8 @@
 namespace {
 
 using maq::DepthKey;
-using maq::kNoPointKey;
 using maq::FittedPoints;
+using maq::kNoPointKey;
 using maq::PinholeCamera;
 using maq::Scene;
 
@@ -46,9 +46,9 @@ std::array<long double, 3> stored_position(const Scene& scene, uint32_t point, c
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const size_t at = 3 * size_t(block->first) + axis * block->count + (point - block->first);
     position[axis] = scene.position_format == maq::PositionFormat::kFloat32
-                      ? static_cast<const float*>(scene.positions)[at]
-                      : block->low[axis] +
-                            static_cast<const uint16_t*>(scene.positions)[at] * (long double)(block->position_step[axis]);
+                         ? static_cast<const float*>(scene.positions)[at]
+                         : block->low[axis] + static_cast<const uint16_t*>(scene.positions)[at] *
+                                                  (long double)(block->position_step[axis]);
     position[axis] += (long double)(scene.origin[axis]) - camera.centre[axis];
   }
   return position;
@@ -66,7 +66,7 @@ Projected reference(const Scene& scene, uint32_t point, const PinholeCamera& cam
   return {seen[0] / seen[2] * camera.fx_px + camera.cx_px, seen[1] / seen[2] * camera.fy_px + camera.cy_px, seen[2]};
 }
 
-// Every point that is well inside of a pixel wins it or is behind who does; who wins is there.
+// Every point that is well inside of a pixel is visible there or behind the one that is; visible ones are in their pixel.
 void expect_as_reference(const Scene& scene, const PinholeCamera& camera, double near) {
   constexpr long double kMinMove_px = 0.01L;
   const std::vector<DepthKey> keys = keys_of(scene, camera, near, 2);
@@ -116,7 +116,7 @@ TEST(ZBuffer, BlocksShowWhatTheWholeCloudShows) {
 }
 
 TEST(ZBuffer, AnyNumberOfWorkersInAnyOrderDrawTheSamePicture) {
-  // Eight points at each place: ties everywhere.
+  // Eight points at each position: ties everywhere.
   const Scene scene = packed(synthetic_points(16000, 5, 1, {0, 0, 0}, 8), maq::PositionFormat::kUint16);
   std::mt19937 random(4);
   for (int i = 0; i < 20; ++i) {
@@ -129,7 +129,7 @@ TEST(ZBuffer, AnyNumberOfWorkersInAnyOrderDrawTheSamePicture) {
   }
 }
 
-TEST(ZBuffer, OfEqualsTheFirstWinsAcrossBlocksAndWorkers) {
+TEST(ZBuffer, OfEqualsTheFirstIsVisibleAcrossBlocksAndWorkers) {
   FittedPoints points = synthetic_points(5000);
   for (size_t i = 0; i < points.count(); ++i) points.x[i] = points.y[i] = 0, points.z[i] = 2;
   for (const auto positions : {maq::PositionFormat::kFloat32, maq::PositionFormat::kUint16}) {
@@ -144,7 +144,7 @@ TEST(ZBuffer, OfEqualsTheFirstWinsAcrossBlocksAndWorkers) {
   }
 }
 
-TEST(ZBuffer, StoredPlacesInAnyUnitAndFarFromTheOriginOfTheWorld) {
+TEST(ZBuffer, StoredPositionsInAnyUnitAndFarFromTheOriginOfTheWorld) {
   for (const auto positions : {maq::PositionFormat::kFloat32, maq::PositionFormat::kUint16}) {
     for (const double unit : {1e-3, 1.0, 1e6}) {
       for (const double away : {0.0, 1e6}) {
@@ -159,7 +159,7 @@ TEST(ZBuffer, StoredPlacesInAnyUnitAndFarFromTheOriginOfTheWorld) {
   }
 }
 
-TEST(ZBuffer, StoredPlacesByCamerasOfEveryKind) {
+TEST(ZBuffer, StoredPositionsByCamerasOfEveryKind) {
   for (const auto positions : {maq::PositionFormat::kFloat32, maq::PositionFormat::kUint16}) {
     const Scene scene = packed(synthetic_points(4000, 9), positions);
     for (const double degrees : {1.0, 30.0, 60.0, 120.0, 170.0}) {
@@ -197,7 +197,7 @@ TEST(ZBuffer, BlocksLeftOutShowNothing) {
   EXPECT_GT(unseen, 0u);
 }
 
-TEST(ZBuffer, BlocksWhoseBoundsAreNotFiniteAreNotLeftOut) {
+TEST(ZBuffer, BlocksWhoseBoundsAreNotFiniteAreNotCulled) {
   Scene scene = packed(synthetic_points(100), maq::PositionFormat::kFloat32);
   maq::SceneBlock block = scene.blocks[0];
   block.low[1] = NAN;
@@ -206,7 +206,7 @@ TEST(ZBuffer, BlocksWhoseBoundsAreNotFiniteAreNotLeftOut) {
   EXPECT_TRUE(maq::ViewFrustum(camera, 0).may_show(scene, block));
 }
 
-TEST(ZBuffer, WhatShinesThroughANearerSurfaceIsHidden) {
+TEST(ZBuffer, PointsThatBleedThroughANearerSurfaceAreRemoved) {
   // A sparse wall at depth 2 before a dense one at depth 4, in a picture whose sides are no multiples of the blocks'.
   std::mt19937 random(3);
   std::uniform_real_distribution<float> position(-1, 1);
@@ -238,7 +238,7 @@ TEST(ZBuffer, WhatShinesThroughANearerSurfaceIsHidden) {
     return std::vector<maq::DepthKey>(buffer.keys(), buffer.keys() + 66 * 46);
   };
   const std::vector<maq::DepthKey> all = drawn(std::numeric_limits<double>::infinity()), left = drawn(0.1);
-  size_t hidden = 0, kept = 0;
+  size_t occluded = 0, kept = 0;
   for (int row = 0; row < 46; ++row) {
     for (int column = 0; column < 66; ++column) {
       const maq::DepthKey key = all[size_t(row * 66 + column)];
@@ -249,12 +249,12 @@ TEST(ZBuffer, WhatShinesThroughANearerSurfaceIsHidden) {
           if (other != maq::kNoPointKey) nearest = std::min(nearest, maq::depth_of(other));
         }
       }
-      const bool is_hidden = key != maq::kNoPointKey && maq::depth_of(key) > nearest * 1.1f;
-      EXPECT_EQ(left[size_t(row * 66 + column)], is_hidden ? maq::kNoPointKey : key) << row << " " << column;
-      (is_hidden ? hidden : kept) += key != maq::kNoPointKey ? 1 : 0;
+      const bool is_occluded = key != maq::kNoPointKey && maq::depth_of(key) > nearest * 1.1f;
+      EXPECT_EQ(left[size_t(row * 66 + column)], is_occluded ? maq::kNoPointKey : key) << row << " " << column;
+      (is_occluded ? occluded : kept) += key != maq::kNoPointKey ? 1 : 0;
     }
   }
-  EXPECT_GT(hidden, 300u);
+  EXPECT_GT(occluded, 300u);
   EXPECT_GT(kept, 300u);
 }
 

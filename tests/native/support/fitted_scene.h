@@ -1,4 +1,4 @@
-// Points with looks, made up: a ball over a floor, smooth colours, linear_terms of which many are small.
+// Synthetic fitted points: a ball over a floor, smooth colours, linear terms of which many are small.
 #pragma once
 
 #include <cmath>

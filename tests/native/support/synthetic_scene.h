@@ -1,4 +1,4 @@
-// Points with made-up looks, and cameras, for tests of rendering.
+// Synthetic fitted points, and cameras, for tests of rendering.
 #pragma once
 
 #include <cmath>
@@ -7,8 +7,8 @@
 #include "scene/format/fitted_points.h"
 #include "scene/pinhole_camera.h"
 
-// Around (0, 0, 3) in units of `unit`, moved by `origin`; all depths differ but where `copies` says that each place is taken
-// by so many.
+// Around (0, 0, 3) in units of `unit`, moved by `origin`; all depths differ unless `copies` points
+// are to be at each position.
 inline maq::FittedPoints synthetic_points(size_t count, unsigned seed = 1, double unit = 1,
                                           const std::array<double, 3>& origin = {0, 0, 0}, size_t copies = 1) {
   std::mt19937 random(seed);

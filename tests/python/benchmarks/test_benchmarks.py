@@ -1,6 +1,7 @@
 """Gates say what they should, counts of work are right, and a report holds its tables and pictures."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import onnx
@@ -120,6 +121,18 @@ def test_multiply_adds_are_counted_at_the_sizes_of_the_input(tmp_path, weight, a
     onnx.save(model, tmp_path / "g.onnx")
     (work,) = graphs.work_of(tmp_path / "g.onnx", feed)
     assert (work.node, work.macs, work.integer) == ("conv", expected, False)
+
+
+@pytest.mark.parametrize("graph", ["box_head", "dense_head"])
+def test_the_work_of_the_shipped_heads_is_linear_in_people(graph):
+    path = Path("sdk/models/densepose-b-int8") / f"{graph}.onnx"
+    (value,) = onnx.load(path).graph.input
+    sizes = [dimension.dim_value for dimension in value.type.tensor_type.shape.dim][1:]
+
+    def multiply_adds(people):
+        return sum(work.macs for work in graphs.work_of(path, {value.name: np.zeros((people, *sizes), np.float32)}))
+
+    assert multiply_adds(30) == 30 * multiply_adds(1) > 0
 
 
 def test_the_roofline_is_the_slower_of_work_and_bytes():

@@ -12,7 +12,7 @@ from quantization.agreement import Agreement, Tally, compare, load_images
 from quantization.choose import Candidate, Workpiece, block_of, candidates, pick, with_float_nodes
 from quantization.prepare import prepare
 from quantization.quantize import calibrate
-from quantization.settings import GraphSettings, read_settings
+from quantization.settings import DensePoseSettings, GraphSettings, read_settings
 
 TOML = Path("quantization/densepose.toml")
 
@@ -48,7 +48,7 @@ def test_chosen_nodes_are_written_and_read_back_with_the_rest_as_it_was(tmp_path
     text = TOML.read_text()
     path = tmp_path / "chosen.toml"
     path.write_text(with_float_nodes(text, {"trunk": ("/a/*", "/b/*"), "dense_head": ("/c/Conv",)}))
-    before, after = read_settings(TOML), read_settings(path)
+    before, after = (read_settings(toml, DensePoseSettings) for toml in (TOML, path))
     assert after.graphs["trunk"].float_nodes == ("/a/*", "/b/*")
     assert after.graphs["dense_head"].float_nodes == ("/c/Conv",)
     for name in ("rpn_fine", "rpn_coarse", "box_head"):

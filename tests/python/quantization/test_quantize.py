@@ -10,8 +10,9 @@ from export.densepose import export_onnx
 from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 from quantization.errors import float_nodes_left, output_sqnr, sqnr_db
-from quantization.quantize import equal_sizes, matching_nodes, quantize_graph, spread
-from quantization.settings import GraphSettings, read_settings
+from quantization.quantize import equal_sizes, matching_nodes, quantize_graph
+from quantization.samples import spread
+from quantization.settings import DENSEPOSE, DensePoseSettings, GraphSettings, read_settings
 from quantization.simplify import drop_unused_constants, fold_scalar_products, share_scales
 
 WIDTH = 16
@@ -80,7 +81,7 @@ def test_nobody_to_calibrate_with_is_an_error(folder, tmp_path):
 
 
 def test_the_shipped_settings_name_every_graph():
-    settings = read_settings(export_onnx.Path("quantization/densepose.toml"))
+    settings = read_settings(DENSEPOSE, DensePoseSettings)
     assert set(settings.graphs) == {"trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head"}
 
 
@@ -91,7 +92,7 @@ def test_wrong_settings_are_errors(tmp_path, text):
         f"calibration_images = 1\ncalibration_photos = 1\nheld_out_images = 1\npeople_per_image = 1\n{text}"
     )
     with pytest.raises(ValueError, match=str(path)):
-        read_settings(path)
+        read_settings(path, DensePoseSettings)
 
 
 def test_signal_to_noise_in_decibels():

@@ -5,7 +5,6 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from export.scenes import compare_refiners
 from export.scenes.basis import Basis, directions, encoded
 from export.scenes.config import SIZES, ExtractorConfig, RefinerConfig, SceneConfig
 from export.scenes.export_onnx import ExtractorGraph, RefinerGraph, export, export_extractor, export_refiner, parity
@@ -15,6 +14,7 @@ from export.scenes.gated_refiner import GatedRefiner
 from export.scenes.light_refiner import LightRefiner, folded, unfolded
 from export.scenes.refiner import make_refiner
 from export.scenes.system import Networks, load_networks, save_networks
+from quantization import compare_refiners
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 

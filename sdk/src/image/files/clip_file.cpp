@@ -12,7 +12,7 @@ namespace maq {
 namespace {
 
 ClipFormat format_of(const std::string& path) {
-  const std::string ending = lower_case_ending(path);
+  const std::string ending = lower_case_extension(path);
   if (ending == ".mp4") return ClipFormat::kMpeg4;
   if (ending == ".avi") return ClipFormat::kMotionJpeg;
   throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .mp4 nor in .avi, by which its format is chosen.");

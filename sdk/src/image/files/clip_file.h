@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/frame.h"
 #include "core/atomic_file.h"
+#include "core/frame.h"
 #include "image/files/file_codecs.h"
 
 namespace maq {
@@ -18,7 +18,7 @@ constexpr double kMostClipFps = 1000;
 class ClipFile {
  public:
   // MPEG-4 in .mp4 or Motion JPEG in .avi, by the ending of `path`; `fps` from kLeastClipFps to kMostClipFps.
-  // Throws MAQ_ERROR_INVALID_ARGUMENT for another ending, what NewFile throws, and what file_codecs() throws.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT for another ending, what AtomicFile throws, and what file_codecs() throws.
   ClipFile(const std::string& path, double fps);
 
   // All have the size of the first; what an odd side has too much is left out at the right and at the bottom.
@@ -40,7 +40,7 @@ class ClipFile {
   uint64_t images_ = 0;
   bool is_finished_ = false;
   std::vector<uint8_t> bgr_;
-  NewFile file_;
+  AtomicFile file_;
   std::unique_ptr<ClipEncoder> encoder_;  // goes before the file
 };
 

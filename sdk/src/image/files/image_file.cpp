@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/file_reader.h"
-#include "core/atomic_file.h"
 #include "image/files/file_codecs.h"
 #include "image/opencv_view.h"
 
@@ -60,11 +60,11 @@ std::vector<uint8_t> encode_image(const ImageView& image, const std::string& end
 }
 
 void write_image_file(const ImageView& image, const std::string& path) {
-  const std::string ending = lower_case_ending(path);
+  const std::string ending = lower_case_extension(path);
   if (ending != ".png" && ending != ".jpg" && ending != ".jpeg") {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .png nor in .jpg, by which its format is chosen.");
   }
-  NewFile file(path);
+  AtomicFile file(path);
   const std::vector<uint8_t> bytes = encode_image(image, ending == ".png" ? ending : ".jpg");
   file.append(bytes.data(), bytes.size());
   file.commit();

@@ -65,7 +65,7 @@ int scaled(int side_px, double scale) { return std::max(1, int(std::nearbyint(si
 }  // namespace
 
 DescriptorFitter::DescriptorFitter(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks,
-                           const FittingOptions& options)
+                                   const FittingOptions& options)
     : cloud_(std::move(cloud)),
       up_(up),
       networks_(networks),
@@ -117,7 +117,7 @@ size_t DescriptorFitter::find_seen_points(const uint8_t* valid, const PinholeCam
 }
 
 const float* DescriptorFitter::find_features(const ImageView& photo, const PinholeCamera& camera,
-                                         const PinholeCamera& aligned) {
+                                             const PinholeCamera& aligned) {
   {
     const ScopedTimer timer(times_.rotation_ms);
     turn_photo(photo, pixel_map_between(aligned, camera), aligned.width_px, aligned.height_px, aligned_photo_);
@@ -134,8 +134,8 @@ const float* DescriptorFitter::find_features(const ImageView& photo, const Pinho
   return features;
 }
 
-std::optional<size_t> DescriptorFitter::add_view(const ImageView& photo, const uint8_t* valid, const PinholeCamera& camera,
-                                             const BuildProgress& progress) {
+std::optional<size_t> DescriptorFitter::add_view(const ImageView& photo, const uint8_t* valid,
+                                                 const PinholeCamera& camera, const BuildProgress& progress) {
   check_camera(camera, "The photo's camera");
   if (photo.format != MAQ_PIXEL_BGR8) {
     refuse("The photo is in ", pixel_format_name(photo.format), ", but must be BGR.");

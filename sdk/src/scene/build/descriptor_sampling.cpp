@@ -57,8 +57,8 @@ void keep_valid(const PointPositions& positions, const PinholeCamera& camera, co
   points.erase(std::remove_if(points.begin(), points.end(), is_blank), points.end());
 }
 
-DescriptorSampling::DescriptorSampling(const PointPositions& positions, const PinholeCamera& camera, const float* features,
-                           const ViewBasis& basis)
+DescriptorSampling::DescriptorSampling(const PointPositions& positions, const PinholeCamera& camera,
+                                       const float* features, const ViewBasis& basis)
     : places_(positions), camera_(camera), features_(features), basis_(basis) {
   scaled_rotation(camera, rotation_);
 }
@@ -82,7 +82,8 @@ void DescriptorSampling::add(const uint32_t* points, size_t count, RegressionSto
   for (size_t i = 0; i < count; ++i) {
     if (i + kAhead < count) {
       const char* later = reinterpret_cast<const char*>(&regressions.of(points[i + kAhead]));
-      for (size_t offset = 0; offset < sizeof(DescriptorRegression); offset += kCacheLine) __builtin_prefetch(later + offset, 1);
+      for (size_t offset = 0; offset < sizeof(DescriptorRegression); offset += kCacheLine)
+        __builtin_prefetch(later + offset, 1);
     }
     const float x = within(pixels[i].column, width), y = within(pixels[i].row, height);
     const int left = int(x), above = int(y);

@@ -18,7 +18,8 @@ void keep_valid(const PointPositions& positions, const PinholeCamera& camera, co
 class DescriptorSampling {
  public:
   // `features` [height][width][kFeatures] of the photo as `camera` shows it. All must outlive this.
-  DescriptorSampling(const PointPositions& positions, const PinholeCamera& camera, const float* features, const ViewBasis& basis);
+  DescriptorSampling(const PointPositions& positions, const PinholeCamera& camera, const float* features,
+                     const ViewBasis& basis);
 
   static constexpr size_t kMaxPoints = 256;
 

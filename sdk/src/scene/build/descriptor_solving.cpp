@@ -38,8 +38,8 @@ void append(std::vector<Value>& to, const Value* from, size_t count) {
 
 }  // namespace
 
-void solve_descriptors(RegressionStore& regressions, const PointPositions& positions, WorkerThreads& threads, bool forgets,
-                 FittedPoints& made) {
+void solve_descriptors(RegressionStore& regressions, const PointPositions& positions, WorkerThreads& threads,
+                       bool forgets, FittedPoints& made) {
   const size_t count = regressions.count();
   // Reserved at once, or each array would be there twice while it grows; pages not yet written take no memory.
   for (std::vector<float>* array : {&made.x, &made.y, &made.z, &made.view_dependence}) array->reserve(count);

@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "scene/point_cloud.h"
 #include "scene/build/descriptor_regression.h"
+#include "scene/point_cloud.h"
 
 namespace maq {
 
@@ -43,7 +43,7 @@ class RegressionStore {
  private:
   static constexpr uint32_t kNowhere = UINT32_MAX;
 
-  std::vector<uint32_t> slots_;  // of each point of the cloud
+  std::vector<uint32_t> slots_;   // of each point of the cloud
   std::vector<uint32_t> points_;  // of each slot
   struct Free {
     void operator()(DescriptorRegression* regressions) const { std::free(regressions); }

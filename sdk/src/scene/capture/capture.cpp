@@ -12,8 +12,8 @@
 #include "scene/capture/colmap_model.h"
 #include "scene/capture/ply_reader.h"
 #include "scene/capture/posed_photo.h"
-#include "scene/capture/transforms_file.h"
 #include "scene/capture/scene_up.h"
+#include "scene/capture/transforms_file.h"
 
 namespace maq {
 namespace {

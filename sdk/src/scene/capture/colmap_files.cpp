@@ -15,9 +15,9 @@ struct ColmapModelInfo {
 };
 
 // In the order of ColmapModel; numbers are those of binary files.
-constexpr ColmapModelInfo kColmapModels[] = {
-    {"SIMPLE_PINHOLE", 0, 3}, {"PINHOLE", 1, 4},        {"SIMPLE_RADIAL", 2, 4}, {"RADIAL", 3, 5},
-    {"OPENCV", 4, 8},         {"OPENCV_FISHEYE", 5, 8}, {"FULL_OPENCV", 6, 12}};
+constexpr ColmapModelInfo kColmapModels[] = {{"SIMPLE_PINHOLE", 0, 3}, {"PINHOLE", 1, 4}, {"SIMPLE_RADIAL", 2, 4},
+                                             {"RADIAL", 3, 5},         {"OPENCV", 4, 8},  {"OPENCV_FISHEYE", 5, 8},
+                                             {"FULL_OPENCV", 6, 12}};
 
 const ColmapModelInfo& info_of(ColmapModel model) { return kColmapModels[size_t(model)]; }
 
@@ -61,8 +61,8 @@ class Line {
   uint64_t whole(const char* what, double max) {
     const double value = number(what);
     if (!(value >= 0 && value <= max) || value != std::floor(value)) {
-      file_.fail(", line ", file_.line(), ": the ", what, " is ", value, ", but must be a whole number from 0 to ",
-                 max, ".");
+      file_.fail(", line ", file_.line(), ": the ", what, " is ", value, ", but must be a whole number from 0 to ", max,
+                 ".");
     }
     return uint64_t(value);
   }

@@ -5,8 +5,8 @@
 
 #include "scene/capture/colmap_files.h"
 #include "scene/capture/import_report.h"
-#include "scene/point_cloud.h"
 #include "scene/capture/posed_photo.h"
+#include "scene/point_cloud.h"
 
 namespace maq {
 

@@ -22,7 +22,9 @@ class PosedView {
   void load(const ImageView& image, const Lens& lens, const PinholeCamera& pose, int long_side_px);
 
   const ImageView& image() const { return *image_; }
-  const uint8_t* valid() const { return valid_.empty() ? nullptr : valid_.data(); }  // validity mask, 0: not of the photo; null: all is
+  const uint8_t* valid() const {
+    return valid_.empty() ? nullptr : valid_.data();
+  }  // validity mask, 0: not of the photo; null: all is
   const PinholeCamera& camera() const { return camera_; }
 
  private:

@@ -86,13 +86,15 @@ void encode_numbers(Given given, uint32_t count, float* middle, float* step, Sto
 }
 
 template <class Stored>
-void encode_descriptors(const FittedPoints& points, const uint32_t* indices, SceneBlock& block, const SceneArrays& arrays) {
+void encode_descriptors(const FittedPoints& points, const uint32_t* indices, SceneBlock& block,
+                        const SceneArrays& arrays) {
   const auto constant = [&](uint32_t k) { return &points.constant_terms[size_t(indices[k]) * kFeatures]; };
   const auto linear = [&](uint32_t k) { return &points.linear_terms[size_t(indices[k]) * kLinearTerms]; };
   encode_numbers<kFeatures>(constant, block.count, block.constant_middle, block.constant_step,
                             from<Stored>(arrays.constant_terms, size_t(block.first) * kFeatures));
-  encode_numbers<int(kLinearTerms)>(linear, block.view_dependent, nullptr, block.linear_step,
-                               from<Stored>(arrays.linear_terms, size_t(block.first_view_dependent) * kLinearTerms));
+  encode_numbers<int(kLinearTerms)>(
+      linear, block.view_dependent, nullptr, block.linear_step,
+      from<Stored>(arrays.linear_terms, size_t(block.first_view_dependent) * kLinearTerms));
 }
 
 // `numbers` of `columns` a row, each with its own middle and step; `middle` may be null.
@@ -112,8 +114,12 @@ void decode(const void* array, size_t first, size_t rows, size_t columns, const 
 void encode_block(const FittedPoints& points, const uint32_t* indices, SceneBlock& block, const SceneArrays& arrays) {
   const size_t first = size_t(block.first) * 3;
   switch (arrays.position_format) {
-    case PositionFormat::kFloat32: encode_positions(points, indices, block, from<float>(arrays.positions, first)); break;
-    case PositionFormat::kUint16: encode_positions(points, indices, block, from<uint16_t>(arrays.positions, first)); break;
+    case PositionFormat::kFloat32:
+      encode_positions(points, indices, block, from<float>(arrays.positions, first));
+      break;
+    case PositionFormat::kUint16:
+      encode_positions(points, indices, block, from<uint16_t>(arrays.positions, first));
+      break;
   }
   switch (arrays.coefficient_format) {
     case CoefficientFormat::kFloat32: encode_descriptors<float>(points, indices, block, arrays); break;
@@ -137,11 +143,11 @@ FittedPoints decode_block(const Scene& scene, const SceneBlock& block) {
   points.linear_terms.resize(size_t(block.count) * kLinearTerms);
   const auto decode_terms = scene.coefficient_format == CoefficientFormat::kFloat32 ? decode<float>
                             : scene.coefficient_format == CoefficientFormat::kInt16 ? decode<int16_t>
-                                                                             : decode<int8_t>;
-  decode_terms(scene.constant_terms, size_t(block.first) * kFeatures, block.count, kFeatures, block.constant_middle, block.constant_step,
-               points.constant_terms.data());
-  decode_terms(scene.linear_terms, size_t(block.first_view_dependent) * kLinearTerms, block.view_dependent, kLinearTerms, nullptr, block.linear_step,
-               points.linear_terms.data());
+                                                                                    : decode<int8_t>;
+  decode_terms(scene.constant_terms, size_t(block.first) * kFeatures, block.count, kFeatures, block.constant_middle,
+               block.constant_step, points.constant_terms.data());
+  decode_terms(scene.linear_terms, size_t(block.first_view_dependent) * kLinearTerms, block.view_dependent,
+               kLinearTerms, nullptr, block.linear_step, points.linear_terms.data());
   return points;
 }
 

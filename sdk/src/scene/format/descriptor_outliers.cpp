@@ -59,7 +59,8 @@ bool is_view_dependent(const FittedPoints& points, uint32_t index, float min_vie
   return std::any_of(terms, terms + kLinearTerms, [](float value) { return value != 0; });
 }
 
-std::vector<std::vector<uint32_t>> separate_outliers(const FittedPoints& points, float min_view_dependence, bool has_steps) {
+std::vector<std::vector<uint32_t>> separate_outliers(const FittedPoints& points, float min_view_dependence,
+                                                     bool has_steps) {
   std::vector<std::vector<uint32_t>> groups(1);
   groups[0].resize(points.count());
   std::iota(groups[0].begin(), groups[0].end(), 0);

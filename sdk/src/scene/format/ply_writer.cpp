@@ -40,7 +40,7 @@ void write_scene_ply(const Scene& scene, const std::string& path) {
       "ply\nformat binary_little_endian 1.0\ncomment points of a Maquette scene\nelement vertex " +
       std::to_string(scene.points) + "\nproperty " + type + " x\nproperty " + type + " y\nproperty " + type +
       " z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
-  NewFile file(path);
+  AtomicFile file(path);
   file.append(header.data(), header.size());
   std::vector<uint8_t> bytes;
   for (uint32_t b = 0; b < scene.block_count; ++b) {

@@ -87,7 +87,7 @@ class BlockSplitter {
 }  // namespace
 
 void split_into_blocks(const PointPositions& positions, const std::vector<uint32_t>& chosen, uint32_t max_points,
-                     BlockOrder& blocks) {
+                       BlockOrder& blocks) {
   if (chosen.empty()) return;
   std::vector<Entry> entries;
   entries.reserve(chosen.size());

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/rounding.h"
 #include "scene/format/scene.h"
 
 namespace maq {
@@ -14,10 +15,10 @@ inline constexpr uint64_t kSceneFileAlignment = 64;
 
 // In this order, one after the other, each at a multiple of 64 bytes and filled up to one with zeros.
 enum SceneFileSection {
-  kBlocksSection,  // SceneBlock [blocks]
-  kPositionsSection,  // as Scene::positions
-  kConstantTermsSection,   // as Scene::constant_terms
-  kLinearTermsSection,  // as Scene::linear_terms
+  kBlocksSection,         // SceneBlock [blocks]
+  kPositionsSection,      // as Scene::positions
+  kConstantTermsSection,  // as Scene::constant_terms
+  kLinearTermsSection,    // as Scene::linear_terms
   kSceneFileSections
 };
 
@@ -47,8 +48,6 @@ static_assert(sizeof(SceneFileHead) % kSceneFileAlignment == 0);
 static_assert(sizeof(SceneBlock) == 308 && offsetof(SceneBlock, constant_middle) == 52,
               "version 1 stores blocks like that");
 
-constexpr uint64_t filled_up(uint64_t bytes) {
-  return (bytes + kSceneFileAlignment - 1) / kSceneFileAlignment * kSceneFileAlignment;
-}
+constexpr uint64_t filled_up(uint64_t bytes) { return round_up<uint64_t>(bytes, kSceneFileAlignment); }
 
 }  // namespace maq

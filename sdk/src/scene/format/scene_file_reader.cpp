@@ -12,9 +12,10 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/unique_fd.h"
+#include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
-#include "scene/format/scene.h"
 #include "scene/point_cloud.h"
 
 namespace maq {
@@ -37,11 +38,6 @@ class SceneFileReader {
  public:
   explicit SceneFileReader(const std::string& path);
   SceneFileReader(const void* bytes, size_t count);
-  ~SceneFileReader() {
-    if (file_ >= 0) ::close(file_);
-  }
-  SceneFileReader(const SceneFileReader&) = delete;
-  SceneFileReader& operator=(const SceneFileReader&) = delete;
 
   const SceneFileHead& head() const { return head_; }
   bool is_file() const { return memory_ == nullptr; }
@@ -85,29 +81,24 @@ class SceneFileReader {
   void check_head(uint64_t size_bytes) const;
 
   std::string path_;  // begins each sentence
-  int file_ = -1;
+  UniqueFd file_;
   const char* memory_ = nullptr;  // in place of the file
   SceneFileHead head_{};
 };
 
 SceneFileReader::SceneFileReader(const std::string& path) : path_(path) {
-  // Without O_NONBLOCK opening a pipe would wait for its writer.
-  file_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file_ < 0) {
+  // Without O_NONBLOCK, opening a pipe would wait for a writer.
+  file_ = UniqueFd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file_.is_open()) {
     const int reason = errno;
     if (reason == ENOENT || reason == ENOTDIR) {
       throw Error(MAQ_ERROR_NOT_FOUND, path, " does not exist; check the path.");
     }
     fail(" cannot be opened (", std::strerror(reason), ").");
   }
-  try {
-    struct stat found {};
-    if (::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
-    read_head(uint64_t(found.st_size));
-  } catch (...) {
-    ::close(file_);
-    throw;
-  }
+  struct stat found {};
+  if (::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
+  read_head(uint64_t(found.st_size));
 }
 
 SceneFileReader::SceneFileReader(const void* bytes, size_t count)
@@ -128,7 +119,7 @@ void SceneFileReader::read_at(uint64_t offset, void* bytes, size_t count) const 
   }
   auto* to = static_cast<char*>(bytes);
   while (count > 0) {
-    const ssize_t got = ::pread(file_, to, count, off_t(offset));
+    const ssize_t got = ::pread(file_.get(), to, count, off_t(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) fail(" cannot be read at byte ", offset, "; did it change meanwhile?");
     to += got;
@@ -161,8 +152,7 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
                          are_zero(head_.zero, sizeof head_.zero) && are_zero(head_.more_zeros, sizeof head_.more_zeros);
   if (!has_kinds) fail(" stores its numbers in a way that version ", kSceneFileVersion, " does not have.");
   if (head_.points > kMaxPoints) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " has ", head_.points, " points; at most ", kMaxPoints,
-                " can be shown.");
+    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " has ", head_.points, " points; at most ", kMaxPoints, " can be shown.");
   }
   if (head_.points == 0 || head_.blocks == 0 || head_.blocks > head_.points || head_.view_dependent > head_.points) {
     fail(" claims ", head_.points, " points, ", head_.view_dependent, " of them view-dependent, in ", head_.blocks,
@@ -178,8 +168,8 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
   }
   const uint64_t coordinate = size_bytes_of(PositionFormat(head_.position_format));
   const uint64_t coefficient = size_bytes_of(CoefficientFormat(head_.coefficient_format));
-  const uint64_t bytes[kSceneFileSections] = {head_.blocks * uint64_t(sizeof(SceneBlock)), head_.points * 3 * coordinate,
-                                              head_.points * kFeatures * coefficient,
+  const uint64_t bytes[kSceneFileSections] = {head_.blocks * uint64_t(sizeof(SceneBlock)),
+                                              head_.points * 3 * coordinate, head_.points * kFeatures * coefficient,
                                               head_.view_dependent * kLinearTerms * coefficient};
   uint64_t offset = sizeof head_;
   for (int s = 0; s < kSceneFileSections; ++s) {
@@ -194,7 +184,8 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
 
 std::shared_ptr<const uint8_t> SceneFileReader::map() const {
   const size_t bytes = size_t(head_.file_bytes);
-  void* const at = bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_, 0) : MAP_FAILED;
+  void* const at =
+      bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_.get(), 0) : MAP_FAILED;
   if (at == MAP_FAILED) {
     throw Error(MAQ_ERROR_OUT_OF_MEMORY, path_, " cannot be mapped into memory: it has ", head_.file_bytes, " bytes.");
   }
@@ -206,8 +197,8 @@ std::shared_ptr<const uint8_t> SceneFileReader::map() const {
 void check_blocks(const SceneFileReader& file, const std::vector<SceneBlock>& blocks) {
   const SceneFileHead& head = file.head();
   const double max_constant = head.coefficient_format == uint8_t(CoefficientFormat::kInt8)    ? 128
-                           : head.coefficient_format == uint8_t(CoefficientFormat::kInt16) ? 32768
-                                                                                    : 1;
+                              : head.coefficient_format == uint8_t(CoefficientFormat::kInt16) ? 32768
+                                                                                              : 1;
   const double max_position = head.position_format == uint8_t(PositionFormat::kUint16) ? 65535 : 0;
   uint64_t points = 0, view_dependent = 0;
   for (size_t b = 0; b < blocks.size(); ++b) {
@@ -215,7 +206,8 @@ void check_blocks(const SceneFileReader& file, const std::vector<SceneBlock>& bl
     if (block.first != points || block.first_view_dependent != view_dependent || block.count == 0 ||
         block.count > SceneBlock::kMaxPoints || block.view_dependent > block.count) {
       file.fail(", block ", b, ": ", block.count, " points from ", block.first, " on, ", block.view_dependent,
-                " view-dependent from ", block.first_view_dependent, " on, after ", points, " and ", view_dependent, ".");
+                " view-dependent from ", block.first_view_dependent, " on, after ", points, " and ", view_dependent,
+                ".");
     }
     points += block.count;
     view_dependent += block.view_dependent;
@@ -226,15 +218,15 @@ void check_blocks(const SceneFileReader& file, const std::vector<SceneBlock>& bl
                   is_sound(block.position_step[axis]) && reached <= block.high[axis];
     }
     for (int c = 0; c < kFeatures; ++c) {
-      is_right &=
-          is_sound(std::abs(double(block.constant_middle[c])) + max_constant * block.constant_step[c]) && block.constant_step[c] >= 0;
+      is_right &= is_sound(std::abs(double(block.constant_middle[c])) + max_constant * block.constant_step[c]) &&
+                  block.constant_step[c] >= 0;
     }
     for (const float step : block.linear_step) is_right &= step >= 0 && is_sound(max_constant * step);
     if (!is_right) file.fail(", block ", b, ": its bounds or steps are not finite, or do not hold its points.");
   }
   if (points != head.points || view_dependent != head.view_dependent) {
-    file.fail(" has blocks of ", points, " points, ", view_dependent, " of them view-dependent, but claims ", head.points, " and ",
-              head.view_dependent, ".");
+    file.fail(" has blocks of ", points, " points, ", view_dependent, " of them view-dependent, but claims ",
+              head.points, " and ", head.view_dependent, ".");
   }
 }
 
@@ -256,8 +248,9 @@ Scene open_checked(const SceneFileReader& file) {
   const uint64_t begin = head.sections[kPositionsSection].offset;
   if (!file.is_file()) arrays->memory.resize(size_t(head.file_bytes - begin));
   for (const SceneFileSection section : kArrays) {
-    const bool are_floats = section == kPositionsSection ? PositionFormat(head.position_format) == PositionFormat::kFloat32
-                                                      : CoefficientFormat(head.coefficient_format) == CoefficientFormat::kFloat32;
+    const bool are_floats = section == kPositionsSection
+                                ? PositionFormat(head.position_format) == PositionFormat::kFloat32
+                                : CoefficientFormat(head.coefficient_format) == CoefficientFormat::kFloat32;
     file.read(section, [&](const float* part, size_t bytes, size_t done) {
       if (are_floats && !are_sound(part, bytes / sizeof(float))) {
         file.fail(" has positions or coefficients that are not finite; build the scene again.");

@@ -5,9 +5,9 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
-#include "scene/format/scene.h"
 
 namespace maq {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 // One section after the other, each filled up with zeros.
 class SectionWriter {
  public:
-  SectionWriter(NewFile& file, SceneFileHead& head) : file_(file), head_(head) {}
+  SectionWriter(AtomicFile& file, SceneFileHead& head) : file_(file), head_(head) {}
 
   void begin() {
     XXH3_64bits_reset(&hash_);
@@ -42,7 +42,7 @@ class SectionWriter {
   }
 
  private:
-  NewFile& file_;
+  AtomicFile& file_;
   SceneFileHead& head_;
   XXH3_state_t hash_;
   uint64_t offset_ = 0;
@@ -68,7 +68,7 @@ void write_scene_file(const Scene& scene, const std::string& path) {
   head.coefficient_format = uint8_t(scene.coefficient_format);
   std::copy_n(scene.networks_sha256.begin(), sizeof head.networks_sha256, head.networks_sha256);
 
-  NewFile file(path);
+  AtomicFile file(path);
   file.append(&head, sizeof head);  // is written again when its checks are known
   SectionWriter sections(file, head);
   sections.write(kBlocksSection, scene.blocks, blocks_bytes(scene));

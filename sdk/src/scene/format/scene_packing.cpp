@@ -6,8 +6,8 @@
 #include "core/error.h"
 #include "scene/format/block_codec.h"
 #include "scene/format/descriptor_outliers.h"
-#include "scene/format/scene_blocks.h"
 #include "scene/format/scene.h"
+#include "scene/format/scene_blocks.h"
 #include "scene/point_cloud.h"
 
 namespace maq {
@@ -55,8 +55,8 @@ void check(const FittedPoints& points) {
     }
     const float* constant = &points.constant_terms[i * kFeatures];
     const float* linear = &points.linear_terms[i * kLinearTerms];
-    if (!std::all_of(constant, constant + kFeatures, is_sound) || !std::all_of(linear, linear + kLinearTerms, is_sound) ||
-        std::isnan(points.view_dependence[i])) {
+    if (!std::all_of(constant, constant + kFeatures, is_sound) ||
+        !std::all_of(linear, linear + kLinearTerms, is_sound) || std::isnan(points.view_dependence[i])) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The descriptor of point ", i,
                   " is not finite or too large; the networks may be damaged.");
     }
@@ -66,8 +66,8 @@ void check(const FittedPoints& points) {
 // The threshold of view-dependence that keeps both limits.
 float threshold_of(const FittedPoints& points, const ScenePacking& packing) {
   if (!(packing.max_view_dependent_fraction >= 0 && packing.max_view_dependent_fraction <= 1)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The fraction of view-dependent points is ", packing.max_view_dependent_fraction,
-                ", but must be 0 to 1.");
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The fraction of view-dependent points is ",
+                packing.max_view_dependent_fraction, ", but must be 0 to 1.");
   }
   const auto kept = size_t(double(packing.max_view_dependent_fraction) * double(points.count()));
   if (kept == points.count()) return packing.min_view_dependence;
@@ -107,7 +107,8 @@ PointOrder order_points(const FittedPoints& points, const ScenePacking& packing)
   auto begin = split.order.begin();
   for (const uint32_t last : split.ends) {
     const auto end = split.order.begin() + last;
-    const auto constant = std::stable_partition(begin, end, [&](uint32_t i) { return is_view_dependent(points, i, threshold); });
+    const auto constant =
+        std::stable_partition(begin, end, [&](uint32_t i) { return is_view_dependent(points, i, threshold); });
     order.blocks.push_back({uint32_t(end - begin), uint32_t(constant - begin)});
     begin = end;
   }
@@ -142,8 +143,8 @@ Scene make_scene(const FittedPoints& points, const ScenePacking& packing) {
   scene.positions = owned->positions.data();
   scene.constant_terms = owned->constant_terms.data();
   scene.linear_terms = owned->linear_terms.data();
-  const SceneArrays arrays = {packing.positions, packing.coefficients, owned->positions.data(), owned->constant_terms.data(),
-                              owned->linear_terms.data()};
+  const SceneArrays arrays = {packing.positions, packing.coefficients, owned->positions.data(),
+                              owned->constant_terms.data(), owned->linear_terms.data()};
   for (SceneBlock& block : owned->blocks) encode_block(points, &order.points[block.first], block, arrays);
   scene.owner = owned;
   return scene;

@@ -62,18 +62,25 @@ RefinerLayout layout_of(const Manifest& manifest) {
   return layout;
 }
 
+Bundle checked(Bundle bundle) {
+  bundle.manifest.require_task("scenes");
+  bundle.manifest.require_graphs({"extractor", "refiner"});
+  return bundle;
+}
+
+std::string basis_file(const Manifest& manifest) { return manifest.listed_file(manifest.root.at("basis").at("file")); }
+
 std::vector<float> basis_weights(const Bundle& bundle) {
-  const std::vector<uint8_t>& bytes = bundle.files.at(bundle.manifest.basis_file);
+  const std::string file = basis_file(bundle.manifest);
+  const std::vector<uint8_t>& bytes = bundle.files.at(file);
   std::vector<float> weights(ViewBasis::kWeights);
   if (bytes.size() != weights.size() * sizeof(float)) {
-    fail(bundle.manifest.name, bundle.manifest.basis_file, " has ", bytes.size(), " bytes, but must have ",
-         weights.size() * sizeof(float));
+    fail(bundle.manifest.name, file, " has ", bytes.size(), " bytes, but must have ", weights.size() * sizeof(float));
   }
   std::memcpy(weights.data(), bytes.data(), bytes.size());
   for (const float weight : weights) {
     if (!(std::abs(weight) <= kLargestWeight)) {
-      fail(bundle.manifest.name, bundle.manifest.basis_file, " has the weight ", weight, ", but none may be over ",
-           kLargestWeight);
+      fail(bundle.manifest.name, file, " has the weight ", weight, ", but none may be over ", kLargestWeight);
     }
   }
   return weights;
@@ -82,7 +89,7 @@ std::vector<float> basis_weights(const Bundle& bundle) {
 std::array<uint8_t, 32> identity_of(const Manifest& manifest) {
   std::string digests;
   for (const std::string& file :
-       {manifest.graphs.at("extractor").file, manifest.graphs.at("refiner").file, manifest.basis_file}) {
+       {manifest.graphs.at("extractor").file, manifest.graphs.at("refiner").file, basis_file(manifest)}) {
     digests += manifest.files.at(file).sha256;
   }
   const std::string hex = sha256_hex(digests.data(), digests.size());
@@ -116,16 +123,16 @@ Shape RefinerLayout::picture_shape(int width_px, int height_px) const {
   return {1, height_px, width_px, kColours};
 }
 
-SceneNetworks::SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::string& folder,
+SceneNetworks::SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle,
                              const SessionSettings& settings)
-    : bundle_(read_bundle(folder, BundleTask::kScenes)),
+    : bundle_(checked(std::move(bundle))),
       basis_(basis_weights(bundle_)),
       layout_(layout_of(bundle_.manifest)),
       sha256_(identity_of(bundle_.manifest)),
       runtime_(runtime),
       settings_(settings),
       refiner_(runtime, bundle_.files.at(bundle_.manifest.graphs.at("refiner").file),
-               bundle_.manifest.graphs.at("refiner"), folder + "/" + bundle_.manifest.graphs.at("refiner").file,
+               bundle_.manifest.graphs.at("refiner"), bundle_.path_of(bundle_.manifest.graphs.at("refiner").file),
                settings, kRefinersKept) {
   check_extractor(bundle_.manifest);
 }
@@ -140,8 +147,8 @@ const float* SceneNetworks::extract(const float* photo, int width_px, int height
     const GraphSpec& spec = bundle_.manifest.graphs.at("extractor");
     SessionSettings settings = settings_;
     settings.plans_memory = false;
-    extractor_ = std::make_unique<Session>(runtime_, bundle_.files.at(spec.file), spec,
-                                           bundle_.folder + "/" + spec.file, settings);
+    extractor_ =
+        std::make_unique<Session>(runtime_, bundle_.files.at(spec.file), spec, bundle_.path_of(spec.file), settings);
   }
   return extractor_->run({{photo, {1, height_px, width_px, kColours}}}, {{1, height_px, width_px, kFeatures}})[0].data;
 }

@@ -34,11 +34,10 @@ class SceneNetworks {
   // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
   static constexpr int64_t kMaxPixels = int64_t(1) << 23;
 
-  // Reads and verifies the bundle in a folder. Networks are made when they are needed first, the refiner for each size that
-  // it is needed for. Throws what read_bundle() throws, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the manifest
-  // are not those of the format.
-  SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::string& folder,
-                const SessionSettings& settings);
+  // Networks are made when they are needed first, the refiner for each size that it is needed for. Throws
+  // MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the
+  // manifest are not those of the format.
+  SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const SessionSettings& settings);
   SceneNetworks(const SceneNetworks&) = delete;
   SceneNetworks& operator=(const SceneNetworks&) = delete;
 

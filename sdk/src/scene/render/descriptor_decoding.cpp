@@ -20,7 +20,8 @@ template <class Stored>
 inline void decode_all(const Scene& scene, const PointToShade* points, size_t count, const float* basis) {
   for (size_t i = 0; i < count; ++i) {
     const SceneBlock& block = scene.blocks[points[i].block];
-    const Stored* constant = static_cast<const Stored*>(scene.constant_terms) + (block.first + points[i].point) * size_t(kFeatures);
+    const Stored* constant =
+        static_cast<const Stored*>(scene.constant_terms) + (block.first + points[i].point) * size_t(kFeatures);
     float descriptor[kFeatures];
     for (int c = 0; c < kFeatures; ++c) {
       if constexpr (std::is_same_v<Stored, float>) {
@@ -30,8 +31,8 @@ inline void decode_all(const Scene& scene, const PointToShade* points, size_t co
       }
     }
     if (basis != nullptr) {
-      const Stored* linear =
-          static_cast<const Stored*>(scene.linear_terms) + (block.first_view_dependent + points[i].point) * kLinearTerms;
+      const Stored* linear = static_cast<const Stored*>(scene.linear_terms) +
+                             (block.first_view_dependent + points[i].point) * kLinearTerms;
       for (size_t k = 0; k < size_t(kBasis); ++k) {
         const float h = basis[k * count + i];
         for (size_t c = 0; c < size_t(kFeatures); ++c) {
@@ -98,7 +99,8 @@ void prefetch(const Scene& scene, const PointToShade* points, size_t count, bool
     for (size_t axis = 0; axis < 3; ++axis) {
       __builtin_prefetch(positions + (3 * size_t(block.first) + axis * block.count + points[i].point) * coordinate);
     }
-    prefetch_bytes(linear_terms + (block.first_view_dependent + points[i].point) * kLinearTerms * coefficient, kLinearTerms * coefficient);
+    prefetch_bytes(linear_terms + (block.first_view_dependent + points[i].point) * kLinearTerms * coefficient,
+                   kLinearTerms * coefficient);
   }
 }
 

@@ -72,8 +72,9 @@ void DescriptorRaster::shade_strip(const View& view, int top, Scratch& scratch) 
                            size_t(view.window.left_px);
     DepthKey* const keys = keys_[0].data() + size_t(y) * width;
     std::copy_n(from, width, keys);
-    float* const row = levels_[0].data() + (is_space_to_depth ? size_t(y / 2) * (width / 2) * cell + (y % 2) * 2 * kChannels
-                                                      : size_t(y) * width * kChannels);
+    float* const row =
+        levels_[0].data() + (is_space_to_depth ? size_t(y / 2) * (width / 2) * cell + (y % 2) * 2 * kChannels
+                                               : size_t(y) * width * kChannels);
     for (size_t x = 0; x < width; ++x) {
       float* const to = row + x / 2 * cell + x % 2 * kChannels;
       if (keys[x] == kNoPointKey) {
@@ -148,7 +149,7 @@ void DescriptorRaster::fill_strip(const View& view, int top) {
       const DepthKey* const keys = keys_[level].data() + size_t(y) * columns;
       float* const row =
           levels_[level].data() + (is_space_to_depth ? size_t(y / 2) * (columns / 2) * cell + (y % 2) * 2 * kChannels
-                                             : size_t(y) * columns * kChannels);
+                                                     : size_t(y) * columns * kChannels);
       const float* const coarser =
           level < last ? levels_[level + 1].data() + size_t(y / 2) * (columns / 2) * kChannels : nullptr;
       for (size_t x = 0; x < columns; ++x) {

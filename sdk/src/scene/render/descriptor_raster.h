@@ -14,8 +14,8 @@
 
 #include "core/worker_threads.h"
 #include "scene/format/scene.h"
-#include "scene/render/descriptor_decoding.h"
 #include "scene/networks/scene_networks.h"
+#include "scene/render/descriptor_decoding.h"
 #include "scene/visibility/z_buffer.h"
 
 namespace maq {
@@ -53,7 +53,7 @@ class DescriptorRaster {
   // Keys of the visible points, row by row, at each of the kLevels scales.
   const DepthKey* keys(int level) const { return keys_[level].data(); }
 
-  size_t shaded() const { return shaded_; }  // visible points
+  size_t shaded() const { return shaded_; }                  // visible points
   size_t view_dependent() const { return view_dependent_; }  // of those
   // Time spent, as a mean over the threads.
   int64_t shade_ns() const { return shade_ns_; }

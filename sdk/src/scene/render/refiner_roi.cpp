@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/rounding.h"
+
 namespace maq {
 namespace {
 
@@ -12,9 +14,10 @@ struct Part {
 };
 
 Part part_of(int begin, int size, int whole) {
-  const int first = std::max(0, begin - kReceptiveFieldRadius_px), end = std::min(whole, begin + size + kReceptiveFieldRadius_px);
+  const int first = std::max(0, begin - kReceptiveFieldRadius_px),
+            end = std::min(whole, begin + size + kReceptiveFieldRadius_px);
   for (int quarters = 1; quarters < 4; ++quarters) {
-    const int side = (whole * quarters / 4 + kMultiple - 1) / kMultiple * kMultiple;
+    const int side = round_up(whole * quarters / 4, kMultiple);
     if (side < end - first) continue;
     const int centred = (first + end - side) / 2 / kMultiple * kMultiple;
     return {std::clamp(centred, std::max(0, end - side), std::min(first, whole - side)), side};

@@ -6,6 +6,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/rounding.h"
 #include "image/geometry/turned_picture.h"
 #include "scene/gravity_alignment.h"
 #include "scene/render/refiner_roi.h"
@@ -35,8 +36,6 @@ void check_render_camera(const PinholeCamera& camera) {
                 " pixels differ by a factor over ", kLargestRatio, ".");
   }
 }
-
-int rounded_up(int side_px) { return (side_px + kMultiple - 1) / kMultiple * kMultiple; }
 
 // Whether a corner of the picture moves by as much as interpolation, of 1/32 pixel, can show.
 bool is_visible_rotation(const PixelMap& map, const PinholeCamera& camera) {
@@ -149,8 +148,8 @@ SceneRenderer::Frame SceneRenderer::frame_of(const PinholeCamera& camera) const 
   frame.is_rotated = is_visible_rotation(frame.to_frame, camera);
   if (!frame.is_rotated) {
     frame.camera = camera;
-    frame.camera.width_px = rounded_up(camera.width_px);
-    frame.camera.height_px = rounded_up(camera.height_px);
+    frame.camera.width_px = round_up(camera.width_px, kMultiple);
+    frame.camera.height_px = round_up(camera.height_px, kMultiple);
   }
   if (int64_t(frame.camera.width_px) * frame.camera.height_px > SceneNetworks::kMaxPixels) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of ", camera.width_px, " x ", camera.height_px,

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "scene/pinhole_camera.h"
 #include "scene/format/scene.h"
+#include "scene/pinhole_camera.h"
 
 namespace maq {
 

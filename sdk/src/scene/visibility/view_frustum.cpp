@@ -34,7 +34,8 @@ bool ViewFrustum::may_show(const Scene& scene, const SceneBlock& block) const {
   for (size_t i = 0; i < 3; ++i) {
     const double low = block.low[i];
     // As far as stored positions reach, whatever the bounds say.
-    const double high = scene.position_format == PositionFormat::kUint16 ? low + 65535.0 * block.position_step[i] : block.high[i];
+    const double high =
+        scene.position_format == PositionFormat::kUint16 ? low + 65535.0 * block.position_step[i] : block.high[i];
     middle[i] = scene.origin[i] - centre_[i] + (low + high) / 2;
     half[i] = (high - low) / 2;
   }

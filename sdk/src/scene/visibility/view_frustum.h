@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "scene/pinhole_camera.h"
 #include "scene/format/scene.h"
+#include "scene/pinhole_camera.h"
 
 namespace maq {
 

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <mutex>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "sources/depthai/depthai_controls.h"
 #include "sources/depthai/depthai_inbox.h"
@@ -112,10 +113,10 @@ class DepthAiCamera : public Camera {
   }
 
   Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) override {
-    const int64_t end_ns = monotonic_now_ns() + int64_t(timeout_ms) * 1000000;
+    const int64_t end_ns = monotonic_ns() + int64_t(timeout_ms) * 1000000;
     for (;;) {
-      inbox_->drain();
-      const int64_t now_ns = monotonic_now_ns();
+      inbox_->event().take();
+      const int64_t now_ns = monotonic_ns();
       int64_t due_ns = end_ns;
       // While all buffers are held, the oldest frames in the inbox make room for new ones.
       if (const std::optional<int> slot = free_slot()) {
@@ -123,14 +124,14 @@ class DepthAiCamera : public Camera {
         if (pair && fill(*slot, std::move(*pair), buffer)) return Event::kFrame;
         due_ns = pair ? now_ns : std::min(end_ns, inbox_->due_ns());
       }
-      pollfd fds[2] = {{inbox_->event_fd(), POLLIN, 0}, {wake_fd, POLLIN, 0}};
+      pollfd fds[2] = {{inbox_->event().get(), POLLIN, 0}, {wake_fd, POLLIN, 0}};
       const int64_t wait_ms = std::max<int64_t>(0, (due_ns - now_ns + 999999) / 1000000);
       if (::poll(fds, 2, int(wait_ms)) < 0 && errno != EINTR) {
         reason = concatenate("poll: ", std::strerror(errno));
         return Event::kLost;
       }
       if ((fds[1].revents & POLLIN) != 0) return Event::kWoken;
-      if (monotonic_now_ns() < end_ns) continue;
+      if (monotonic_ns() < end_ns) continue;
       reason = link_problem();
       return reason.empty() ? Event::kTimeout : Event::kLost;
     }
@@ -142,7 +143,7 @@ class DepthAiCamera : public Camera {
       std::lock_guard<std::mutex> lock(mutex_);
       std::swap(emptied, slots_[size_t(slot)]);
     }
-    inbox_->signal();
+    inbox_->event().signal();
   }
 
   void close() override {

@@ -1,13 +1,9 @@
 #include "sources/depthai/depthai_inbox.h"
 
-#include <sys/eventfd.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdlib>
-#include <ctime>
 
-#include "core/error.h"
+#include "core/clock.h"
 #include "core/frame.h"
 
 namespace maq {
@@ -49,19 +45,6 @@ bool is_usable_depth(const DepthAiFrame& frame, const DepthAiPlan& plan) {
 
 }  // namespace
 
-int64_t monotonic_now_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return int64_t(now.tv_sec) * 1000000000 + now.tv_nsec;
-}
-
-DepthAiInbox::DepthAiInbox(const DepthAiPlan& plan)
-    : plan_(plan), pairing_(plan.fps, plan.with_depth), event_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  if (event_fd_ < 0) throw Error(MAQ_ERROR_INTERNAL, "No event can be made to wait for frames.");
-}
-
-DepthAiInbox::~DepthAiInbox() { ::close(event_fd_); }
-
 void DepthAiInbox::receive_colour(DepthAiFrame frame) noexcept {
   if (is_usable_colour(frame, plan_)) add(true, std::move(frame));
 }
@@ -86,29 +69,19 @@ void DepthAiInbox::close() {
   pairing_.clear();
 }
 
-void DepthAiInbox::signal() noexcept {
-  const uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(event_fd_, &one, sizeof one);
-}
-
-void DepthAiInbox::drain() noexcept {
-  uint64_t count = 0;
-  [[maybe_unused]] const ssize_t taken = ::read(event_fd_, &count, sizeof count);
-}
-
 void DepthAiInbox::add(bool is_colour, DepthAiFrame frame) noexcept {
   try {
     std::lock_guard<std::mutex> lock(mutex_);
     if (!open_) return;
     if (is_colour) {
-      pairing_.add_colour(std::move(frame), monotonic_now_ns());
+      pairing_.add_colour(std::move(frame), monotonic_ns());
     } else {
-      pairing_.add_depth(std::move(frame), monotonic_now_ns());
+      pairing_.add_depth(std::move(frame), monotonic_ns());
     }
   } catch (const std::exception&) {
     return;  // no memory: the frame is lost
   }
-  signal();
+  event_.signal();
 }
 
 }  // namespace maq

@@ -4,19 +4,16 @@
 #include <mutex>
 #include <optional>
 
+#include "core/unique_fd.h"
 #include "sources/depthai/depthai_pairing.h"
 
 namespace maq {
-
-int64_t monotonic_now_ns();
 
 // The vendor's queues cannot be polled together with a file, and they call back before a message is in them: so the
 // messages are taken in the call, and an event, which can be polled, says that there are some.
 class DepthAiInbox : public DepthAiReceiver {
  public:
-  // Throws MAQ_ERROR_INTERNAL when the system gives no event.
-  explicit DepthAiInbox(const DepthAiPlan& plan);
-  ~DepthAiInbox() override;
+  explicit DepthAiInbox(const DepthAiPlan& plan) : plan_(plan), pairing_(plan.fps, plan.with_depth) {}
 
   // A frame that is not as agreed, or has fewer bytes than it claims, is dropped: the gap in the numbers tells.
   void receive_colour(DepthAiFrame frame) noexcept override;
@@ -28,9 +25,8 @@ class DepthAiInbox : public DepthAiReceiver {
   // What waits is given up, what comes later is dropped.
   void close();
 
-  int event_fd() const { return event_fd_; }
-  void signal() noexcept;
-  void drain() noexcept;
+  // Readable when frames have come; also signalled by the camera, when a buffer is free again.
+  EventFd& event() { return event_; }
 
  private:
   void add(bool is_colour, DepthAiFrame frame) noexcept;
@@ -39,7 +35,7 @@ class DepthAiInbox : public DepthAiReceiver {
   std::mutex mutex_;
   DepthAiPairing pairing_;
   bool open_ = true;
-  int event_fd_;
+  EventFd event_;
 };
 
 }  // namespace maq

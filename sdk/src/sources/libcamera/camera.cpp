@@ -11,8 +11,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "sources/libcamera/failure.h"
 #include "sources/libcamera/formats.h"
@@ -22,12 +22,6 @@ namespace {
 
 constexpr int kFencePatienceMs = 100;
 constexpr int64_t kOldestFrameNs = 10000000000;
-
-int64_t monotonic_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return int64_t(now.tv_sec) * 1000000000 + now.tv_nsec;
-}
 
 }  // namespace
 

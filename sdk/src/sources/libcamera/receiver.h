@@ -9,6 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "core/unique_fd.h"
+
 namespace maq {
 
 class LibcameraMailbox {
@@ -18,18 +20,13 @@ class LibcameraMailbox {
     const char* lost = "";  // how
   };
 
-  LibcameraMailbox();
-  ~LibcameraMailbox();
-  LibcameraMailbox(const LibcameraMailbox&) = delete;
-  LibcameraMailbox& operator=(const LibcameraMailbox&) = delete;
-
-  // Can be read as long as there is an item.
-  int fd() const { return fd_; }
+  // Readable as long as there is an item.
+  int fd() const { return posted_.get(); }
   void post(Item item);
   std::optional<Item> take();
 
  private:
-  int fd_;
+  EventFd posted_{EventFd::Kind::kCounting};
   std::mutex mutex_;
   std::vector<Item> items_;
 };

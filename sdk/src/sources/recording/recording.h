@@ -10,6 +10,7 @@
 
 #include "core/frame.h"
 #include "core/log.h"
+#include "core/unique_fd.h"
 #include "image/files/jpeg.h"
 #include "maquette/source.h"
 
@@ -19,20 +20,6 @@ struct RecordingInfo {
   std::string source;  // what was recorded: a URI
   double fps = 0;      // 0: not known
   std::optional<maq_calibration> calibration;
-};
-
-// An open file, closed when it goes.
-class FileHandle {
- public:
-  explicit FileHandle(int fd = -1) : fd_(fd) {}
-  ~FileHandle();
-  FileHandle(const FileHandle&) = delete;
-  FileHandle& operator=(const FileHandle&) = delete;
-  int get() const { return fd_; }
-  void close();
-
- private:
-  int fd_;
 };
 
 struct RecordingEntry {
@@ -61,7 +48,7 @@ class RecordingWriter {
   void append(const void* header, size_t header_bytes, const void* payload, size_t payload_bytes);
 
   std::string path_;
-  FileHandle file_;
+  UniqueFd file_;
   int jpeg_quality_;
   JpegEncoder jpeg_;
   std::vector<RecordingEntry> entries_;
@@ -99,7 +86,7 @@ class RecordingReader {
   void look_for_frames();
 
   std::string path_;
-  FileHandle file_;
+  UniqueFd file_;
   uint64_t size_bytes_ = 0;
   uint64_t first_offset_ = 0;
   RecordingInfo info_;

@@ -65,8 +65,8 @@ std::optional<maq_calibration> calibration_of(const nlohmann::json& from) {
 RecordingReader::RecordingReader(std::string path, const Log& log)
     : path_(std::move(path)), file_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC)) {
   struct stat found {};
-  if (file_.get() < 0 && errno == ENOENT) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
-  if (file_.get() < 0 || ::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) {
+  if (!file_.is_open() && errno == ENOENT) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
+  if (!file_.is_open() || ::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) {
     throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be read; is it a file, and may you read it?");
   }
   size_bytes_ = uint64_t(found.st_size);

@@ -33,18 +33,11 @@ std::string head_json(const RecordingInfo& info) {
 
 }  // namespace
 
-FileHandle::~FileHandle() { close(); }
-
-void FileHandle::close() {
-  if (fd_ >= 0) ::close(fd_);
-  fd_ = -1;
-}
-
 RecordingWriter::RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality)
     : path_(std::move(path)),
       file_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)),
       jpeg_quality_(jpeg_quality) {
-  if (file_.get() < 0) {
+  if (!file_.is_open()) {
     const char* remedy = errno == EEXIST ? " Recordings are never written over: give another name, or remove it." : "";
     throw Error(MAQ_ERROR_UNWRITABLE, path_, " cannot be made: ", std::strerror(errno), ".", remedy);
   }
@@ -140,7 +133,7 @@ void RecordingWriter::finish() {
   if (::fsync(file_.get()) != 0 && errno != EINVAL && errno != EROFS) {
     throw Error(MAQ_ERROR_UNWRITABLE, path_, " did not reach the disk: ", std::strerror(errno), ".");
   }
-  file_.close();
+  file_.reset();
 }
 
 }  // namespace maq

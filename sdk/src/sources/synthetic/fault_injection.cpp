@@ -9,12 +9,13 @@
 #include <random>
 #include <thread>
 
+#include "core/clock.h"
 #include "core/error.h"
 
 namespace maq {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = MonotonicClock;
 using std::chrono::nanoseconds;
 
 constexpr int64_t kForEver = INT64_MAX;

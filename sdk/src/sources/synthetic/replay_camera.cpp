@@ -7,19 +7,16 @@
 #include <mutex>
 #include <optional>
 
+#include "core/clock.h"
 #include "core/error.h"
 
 namespace maq {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = MonotonicClock;
 using std::chrono::nanoseconds;
 
 constexpr double kStillFps = 30;  // of one picture that is shown for ever
-
-int64_t monotonic_ns(Clock::time_point time) {
-  return std::chrono::duration_cast<nanoseconds>(time.time_since_epoch()).count();  // CLOCK_MONOTONIC, in libstdc++
-}
 
 // The source and where in it time has got to.
 class Reel {
@@ -137,7 +134,7 @@ class PlayedCamera : public Camera {
       buffer.image = frame.image;
       buffer.depth = frame.depth;
       buffer.slot = slot;
-      buffer.timestamp_ns = monotonic_ns(now.due);
+      buffer.timestamp_ns = to_ns(now.due);
       buffer.sequence = now.sequence;
       buffer.damaged = now.damaged;
       buffer.seeks = reel_->seeks();

@@ -9,12 +9,12 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <mutex>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "sources/v4l2/v4l2_controls.h"
 #include "sources/v4l2/v4l2_device.h"
@@ -26,12 +26,6 @@ constexpr int kDefaultWidthPx = 640;
 constexpr int kDefaultHeightPx = 480;
 constexpr int64_t kSecondNs = 1000000000;
 constexpr int64_t kOldestStampNs = 10 * kSecondNs;
-
-int64_t monotonic_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return int64_t(now.tv_sec) * kSecondNs + now.tv_nsec;
-}
 
 // When the driver says that the picture was taken. When it arrived, where that cannot be: a stamp of another clock, in
 // the future, or older than frames in a queue become.

@@ -1,7 +1,7 @@
 """Refiners compared: parameters, multiply-adds and milliseconds under ONNX Runtime, fp32 and int8.
 
-    python -m export.scenes.compare_refiners                       all candidates at 640 x 480, two threads
-    python -m export.scenes.compare_refiners --only light --json refiners.json
+    python -m quantization.compare_refiners                       all candidates at 640 x 480, two threads
+    python -m quantization.compare_refiners --only light --json refiners.json
 
 Weights are random and so are the rasters: time does not depend on them. Each figure is the 10th percentile of many
 runs; `core ms` is processor time of a run with one thread, which others who use the machine disturb least. Candidates

@@ -1,0 +1,64 @@
+// What a manifest says of dense pose (docs/formats.md), read and checked.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nn/manifest.h"
+
+namespace maq {
+
+struct InputSpec {
+  std::array<float, 3> mean{};  // of R, G, B, in 0..255
+  std::array<float, 3> std{};
+  int multiple_of = 32;
+  int long_side_px = 0;
+};
+
+struct RpnSpec {
+  std::vector<int> strides;
+  std::vector<float> anchor_sizes_px;
+  std::vector<float> aspect_ratios;  // height / width
+  int pre_nms_top_k = 0;             // per level
+  int post_nms_top_k = 0;            // over all levels
+  float nms_iou = 0;
+};
+
+struct BoxHeadSpec {
+  int pool = 0;
+  std::vector<int> strides;
+  int canonical_level = 0;
+  float canonical_size_px = 0;
+  std::array<float, 4> delta_weights{};
+  float score_threshold = 0;
+  float nms_iou = 0;
+  std::optional<float> second_look_score;  // boxes with more go through the box head again; none: one pass
+  int max_people = 0;
+};
+
+struct DenseHeadSpec {
+  std::string charts_file;
+  int pool = 0;
+  int stride = 0;
+  int output = 0;
+  int coarse_classes = 0;
+  int index_classes = 0;
+  float mask_threshold = 0;
+  float least_own_share = 0;
+};
+
+struct DensePoseSpec {
+  InputSpec input;
+  RpnSpec rpn;
+  BoxHeadSpec box_head;
+  DenseHeadSpec dense_head;
+  std::string surface_file;  // "" when the bundle has none
+};
+
+// Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE for what is missing, of the wrong
+// type or out of range.
+DensePoseSpec read_densepose_spec(const Manifest& manifest);
+
+}  // namespace maq

@@ -1,0 +1,71 @@
+#include "nn/manifest_node.h"
+
+#include <cmath>
+
+namespace maq {
+
+using nlohmann::json;
+
+ManifestNode ManifestNode::parse(const std::string& text, const std::string& origin) {
+  const auto document =
+      std::make_shared<const Document>(Document{json::parse(text, nullptr, /*allow_exceptions=*/false), origin});
+  if (!document->root.is_object()) {  // also where the text is not JSON
+    throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object. Fetch or export the bundle again.");
+  }
+  return {document, document->root, ""};
+}
+
+ManifestNode ManifestNode::at(const std::string& key) const {
+  const std::string path = path_.empty() ? key : path_ + "." + key;
+  if (!value_->is_object() || !value_->contains(key)) ManifestNode(document_, *value_, path).fail("is missing");
+  return {document_, value_->at(key), path};
+}
+
+std::optional<ManifestNode> ManifestNode::find(const std::string& key) const {
+  if (value_->is_object() && !value_->contains(key)) return std::nullopt;
+  return at(key);
+}
+
+std::vector<ManifestNode> ManifestNode::elements() const {
+  if (!value_->is_array()) fail("is not a list");
+  std::vector<ManifestNode> nodes;
+  for (size_t i = 0; i < value_->size(); ++i) {
+    nodes.push_back(ManifestNode(document_, (*value_)[i], path_ + "[" + std::to_string(i) + "]"));
+  }
+  return nodes;
+}
+
+std::vector<std::pair<std::string, ManifestNode>> ManifestNode::members() const {
+  if (!value_->is_object()) fail("is not an object");
+  std::vector<std::pair<std::string, ManifestNode>> nodes;
+  for (const auto& [key, value] : value_->items()) {
+    nodes.emplace_back(key, ManifestNode(document_, value, path_ + "." + key));
+  }
+  return nodes;
+}
+
+std::string ManifestNode::text() const {
+  if (!value_->is_string()) fail("is not a text");
+  return value_->get<std::string>();
+}
+
+float ManifestNode::number(double min, double max) const {
+  if (!value_->is_number()) fail("is not a number");
+  const double number = value_->get<double>();
+  if (!std::isfinite(number) || number < min || number > max) {
+    fail("is ", number, ", but must be ", min, " to ", max);
+  }
+  return float(number);
+}
+
+int ManifestNode::integer(int min, int max) const {
+  if (!value_->is_number_integer()) fail("is not a whole number");
+  return int(number(min, max));
+}
+
+int64_t ManifestNode::size() const {
+  if (!value_->is_number_unsigned()) fail("is not a whole number of 0 or more");
+  return value_->get<int64_t>();
+}
+
+}  // namespace maq

@@ -1,0 +1,90 @@
+"""Which Python package may import which, and what reads shards without a renderer."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+# A package, and those beside itself that it may import; files directly in export/ are packages of their own here.
+ALLOWED = {
+    "export.surface": set(),
+    "export.surface_grid": {"export.surface"},
+    "export.shards": {"export.surface"},
+    "export.camera": set(),
+    "export.point_cloud": set(),
+    "export.training": set(),
+    "export.bundle": set(),
+    "export.photos": set(),
+    "export.people": {"export.camera", "export.shards", "export.surface", "export.surface_grid"},
+    "export.places": {"export.camera", "export.people", "export.photos", "export.point_cloud"},
+    "export.densepose": {
+        "export.bundle", "export.shards", "export.surface", "export.surface_grid", "export.training",
+    },
+    "export.teachers": {
+        "export.camera", "export.densepose", "export.people", "export.photos", "export.shards", "export.surface",
+    },
+    "export.scenes": {"export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training"},
+    "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
+    "export.evaluation": {
+        "export.densepose", "export.people", "export.photos", "export.shards", "export.surface", "export.teachers",
+        "export.training",
+    },
+    "quantization": {"export"},
+    "benchmarks": {"export", "quantization"},
+}  # fmt: skip
+
+
+def package_of(module: str) -> str:
+    parts = module.split(".")
+    return ".".join(parts[:2]) if parts[0] == "export" else parts[0]
+
+
+def imported(path: Path) -> set[str]:
+    """Packages of this project that a file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {package_of(alias.name) for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {package_of(f"{node.module}.{alias.name}") for alias in node.names}
+    return {name for name in found if name.split(".")[0] in ("export", "quantization", "benchmarks")}
+
+
+@pytest.mark.parametrize("folder", ["export", "quantization", "benchmarks"])
+def test_packages_import_only_what_lies_below_them(folder):
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        own = package_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
+        if own == "export.__init__":
+            continue
+        others = imported(path) - {own}
+        allowed = ALLOWED[own]
+        wrong = {name for name in others if name not in allowed and name.split(".")[0] not in allowed}
+        assert not wrong, f"{path.relative_to(ROOT)} imports {', '.join(sorted(wrong))}"
+
+
+def test_the_table_of_packages_has_no_circle():
+    floors = {"export": set().union(*(names for own, names in ALLOWED.items() if own.startswith("export.")))}
+    left = dict(ALLOWED)
+    while left:
+        ready = [own for own, names in left.items() if not any(name in left for name in names - floors.keys())]
+        assert ready, f"a circle among {', '.join(left)}"
+        for own in ready:
+            del left[own]
+
+
+READERS = (
+    "export.densepose.train", "export.densepose.export_onnx", "export.scenes.train", "export.teachers.shards",
+    "export.evaluation.__main__", "export.evaluation.gallery", "quantization.quantize", "quantization.choose",
+    "quantization.report", "quantization.scenes",
+)  # fmt: skip
+
+
+def test_training_calibration_and_evaluation_need_no_renderer():
+    pytest.importorskip("torch")
+    program = "import importlib, sys\nsys.modules['moderngl'] = None  # an import of it fails\n"
+    program += f"for name in {READERS}: importlib.import_module(name)"
+    ran = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr

@@ -66,12 +66,14 @@ format: packages-lint  ## rewrite C++ (clang-format) and Python (ruff) sources i
 	@.venv/bin/ruff format . && .venv/bin/ruff check --fix .
 
 .PHONY: lint
-lint: packages-lint  ## check layout and lint rules without changing anything
+lint: packages-lint packages-test  ## check layout and lint rules without changing anything
 	@scripts/make-venv.sh dev
 	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format --dry-run --Werror
+	@! LC_ALL=C.UTF-8 git grep -nE '^.{121}' -- '*.h' '*.hpp' '*.c' '*.cpp' || { echo "Lines have at most 120 characters." >&2; exit 1; }
 	@.venv/bin/ruff format --check . && .venv/bin/ruff check .
-	@cmake --preset release >/dev/null
-	@git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/tools/*.cpp' 'desktop_demo/src/*.cpp' | xargs -r clang-tidy -p build/release --quiet
+	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
+	@git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/app/*.cpp' 'sdk/tools/*.cpp' 'desktop_demo/src/*.cpp' \
+	    | xargs -r .venv/bin/python scripts/clang_tidy.py --build build/release
 
 .PHONY: clean
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)

@@ -122,12 +122,15 @@ def replace(figures: dict, missing: dict, names: Iterable[str], found: dict, why
 
 def float_bundle_in(folder: Path) -> Path:
     """The fp32 bundle of the shipped weights, exported once and again when these change."""
-    from export.densepose import bundle, export_onnx
+    from export import bundle
+    from export.densepose import bundle as densepose_bundle
+    from export.densepose import export_onnx
     from quantization.check import fp32_bundle
 
     target, stamp = folder / "densepose-b-fp32", folder / "densepose-b-fp32.made-from"
     # The exporter decides too what the graphs look like.
-    made_from = "".join(str(Path(p).stat().st_mtime_ns) for p in (CHECKPOINT, export_onnx.__file__, bundle.__file__))
+    sources = (CHECKPOINT, export_onnx.__file__, densepose_bundle.__file__, bundle.__file__)
+    made_from = "".join(str(Path(path).stat().st_mtime_ns) for path in sources)
     if not (target / "manifest.json").exists() or not stamp.exists() or stamp.read_text() != made_from:
         print(f"Exporting {CHECKPOINT} as fp32 graphs")
         fp32_bundle(CHECKPOINT, target)
@@ -148,7 +151,7 @@ def test_images(options: argparse.Namespace) -> list:
 
 def sweep_part(options: argparse.Namespace, float_bundle: Path) -> tuple[list[dict], dict[str, float]]:
     from benchmarks import sweep
-    from export.evaluation.backends import read_manifest
+    from export.bundle import read_manifest
     from export.people.atlas import load_surface_table
 
     wanted = sweep.settings()

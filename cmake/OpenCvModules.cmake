@@ -1,4 +1,5 @@
-# The four OpenCV modules the SDK uses, as targets opencv_core, opencv_imgproc, opencv_imgcodecs and opencv_videoio.
+# OpenCV for what reads and writes files (libmaquette_files.so), the command line and the tests; libmaquette.so does without.
+# Targets opencv_core, opencv_imgproc, opencv_imgcodecs and opencv_videoio.
 # Sets OpenCV_VERSION. Taken from OpenCV's own CMake package where there is one; Debian ships that only with the
 # complete libopencv-dev, while the -dev packages of the modules, a fifth of its size, have headers and libraries only.
 find_package(OpenCV 4.5 CONFIG QUIET COMPONENTS core imgproc imgcodecs videoio)

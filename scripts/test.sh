@@ -1,35 +1,54 @@
 #!/usr/bin/env bash
-# Runs the native tests (release and asan builds; those with threads of their own in the tsan build too), the Python tests
-# and those with cameras in a virtual machine, where there can be one, and closes with their sum:
-#   scripts/test.sh
-# Everything runs even when something before it failed; the exit status says whether anything did.
+# Runs the native tests (release and asan builds; those of threads in the tsan build), the Python tests and those with
+# cameras in a virtual machine, where there can be one, two groups at a time, and closes with their sum:
+#   scripts/test.sh [GROUP...]      default: python asan camera-vm release tsan
+# Each group prints when it ends. Everything runs even when something before it failed; the exit status says whether
+# anything did.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 results=build/test-results
+
+# native BUILD [CTEST_OPTION...]: the native tests of one build.
+native() {
+    local build=$1
+    shift
+    ctest --test-dir "build/$build" "$@" --output-on-failure --no-tests=error \
+        --output-junit "$PWD/$results/ctest-$build.xml"
+}
+
+# group NAME: runs one group and prints its title, its output and its time at its end, unmixed with the other's.
+group() {
+    local status=0 log="$results/$1.log"
+    {
+        printf '\n== %s\n' "$1"
+        case "$1" in
+            python) .venv/bin/python -m pytest -rs --junitxml "$results/pytest.xml" ;;
+            camera-vm) tests/camera_vm/run.sh ;;
+            tsan) native tsan -L threads ;;
+            *) native "$1" ;;
+        esac
+    } >"$log" 2>&1 || status=$?
+    flock "$results" cat "$log"
+    echo "# $1 took $SECONDS s"
+    [ "$1 $status" != "camera-vm 77" ] || status=0  # it said why it could not be run
+    [ "$status" -eq 0 ] || touch "$results/failed"
+}
+
+case "${1:-}" in
+    --group) group "$2"; exit ;;
+    -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
+esac
+[ $# -gt 0 ] || set -- python asan camera-vm release tsan  # the longest first
+for name in "$@"; do
+    case "$name" in
+        python | asan | camera-vm | release | tsan) ;;
+        *) sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
+    esac
+done
 rm -rf "$results"
 mkdir -p "$results"
-status=0
-
-for preset in release asan; do
-    printf '\n== native tests, %s\n' "$preset"
-    ctest --test-dir "build/$preset" --output-on-failure --no-tests=error \
-        --output-junit "$PWD/$results/ctest-$preset.xml" || status=1
-done
-
-printf '\n== native tests of threads, tsan\n'
-ctest --test-dir build/tsan -L threads \
-    --output-on-failure --no-tests=error --output-junit "$PWD/$results/ctest-tsan.xml" || status=1
-
-printf '\n== Python tests\n'
-.venv/bin/python -m pytest -rs --junitxml "$results/pytest.xml" || status=1
-
-printf '\n== cameras on a real kernel, in a virtual machine\n'
-tests/camera_vm/run.sh
-case $? in
-    0 | 77) ;;  # 77: it said why it could not be run
-    *) status=1 ;;
-esac
+printf '%s\n' "$@" | xargs -P 2 -n 1 "$0" --group
 
 printf '\n'
-.venv/bin/python scripts/sum_test_results.py "$results"/*.xml || status=1
-exit $status
+.venv/bin/python scripts/sum_test_results.py "$results"/*.xml || touch "$results/failed"
+[ ! -e "$results/failed" ]

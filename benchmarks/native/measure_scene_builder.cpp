@@ -1,6 +1,6 @@
-// Seconds and memory of making a scene of noise photos and a made-up room, step by step:
-// `measure_scene_builder BUNDLE [points [views [width height [threads [roll in degrees]]]]]`. Each photo is rolled by an
-// angle of its own, up to `roll`, as cameras in hands are; with 0 all are of one size.
+// Seconds and memory of making a scene of noise photos and a made-up room, step by step: `measure_scene_builder BUNDLE
+// [points [views [width height [threads [roll in degrees]]]]]`. Each photo is rolled by an angle of its own, up to
+// `roll`, as cameras in hands are; with 0 all are of one size.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -78,7 +78,8 @@ void measure(int count, char** arguments) {
     maq::DescriptorFitter fitter(std::move(cloud), {0, 0, 1}, networks, options);
     for (int view = 0; view < views; ++view) {
       const double roll = roll_deg * kPi / 180 * std::sin(2.4 * view);
-      observations += fitter.add_view(photo.image, nullptr, camera_of(width, height, 2 * kPi * view / views, roll)).value();
+      observations +=
+          fitter.add_view(photo.image, nullptr, camera_of(width, height, 2 * kPi * view / views, roll)).value();
       if (view == 0) first_ms = 1000 * seconds_since_start();
     }
     networks.forget_extractor();
@@ -93,10 +94,9 @@ void measure(int count, char** arguments) {
   std::printf("%zu points seen %.1f times, %llu never\n", seen, double(observations) / double(seen),
               static_cast<unsigned long long>(never_seen));
   std::printf("seconds in all %.2f, until after the first photo %.2f, visibility %.2f, rotation %.2f, extractor %.2f, ",
-              seconds, first_ms / 1000, times.visibility_ms / 1000, times.rotation_ms / 1000,
-              times.extractor_ms / 1000);
-  std::printf("regression %.2f, solving %.2f; peak memory %.0f MiB\n", times.regression_ms / 1000,
-              times.solving_ms / 1000, grown_mib);
+              seconds, first_ms / 1000, times.visibility_ms / 1000, times.align_ms / 1000, times.extract_ms / 1000);
+  std::printf("regression %.2f, solving %.2f; peak memory %.0f MiB\n", times.accumulate_ms / 1000,
+              times.solve_ms / 1000, grown_mib);
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
 // Bytes a point of a scene against what packing changes: `measure_scene_packing CAPTURE BUNDLE`.
 //
-// The scene is built of the capture's photos with the networks of the bundle. Then, for each way to store coefficients and
-// some thresholds of ScenePacking::min_view_dependence: the fraction of view-dependent points; bytes a point of the file; the error
-// against the fitted descriptors, over the photos that saw each point and all features, in fractions of a feature's standard
-// deviation over the points: RMS over all points, what 99 % of points stay below of, and the worst point's; and, where the
-// capture holds photos out, PSNR of their views against the photos, and against views of the scene in floats.
+// The scene is built of the capture's photos with the networks of the bundle. Then, for each way to store coefficients
+// and some thresholds of ScenePacking::min_view_dependence: the fraction of view-dependent points; bytes a point of the
+// file; the error against the fitted descriptors, over the photos that saw each point and all features, in fractions of
+// a feature's standard deviation over the points: RMS over all points, what 99 % of points stay below of, and the worst
+// point's; and, where the capture holds photos out, PSNR of their views against the photos, and against views of the
+// scene in floats.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -23,7 +24,8 @@ using maq::kBasis;
 using maq::kFeatures;
 
 // The root of the mean square, over features and the photos that a point was seen in, of what an error of its mean and
-// linear_terms makes of its descriptor: known from the mean and the scatter R^T R of the basis values, without the photos.
+// linear_terms makes of its descriptor: known from the mean and the scatter R^T R of the basis values, without the
+// photos.
 double error_over_photos(const maq::DescriptorRegression& regression, const double* constant, const double* linear) {
   double sum = 0;
   const float* row = regression.triangle;

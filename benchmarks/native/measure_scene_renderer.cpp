@@ -1,6 +1,6 @@
-// Milliseconds of each step of rendering, on made-up scenes: `measure_scene_renderer BUNDLE [points [width height [threads
-// [frames]]]]`. Medians over the frames of an orbit, and the work of the last one; the first frame, which prepares the
-// refiner, is apart.
+// Milliseconds of each step of rendering, on made-up scenes: `measure_scene_renderer BUNDLE [points [width height
+// [threads [frames]]]]`. Medians over the frames of an orbit, and the work of the last one; the first frame, which
+// prepares the refiner, is apart.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -160,7 +160,7 @@ void App::take_news() {
     ++pictures_;
     set_scene_pictures();
     const maq_scene_image_stats& s = scenes_.shown().front().stats;
-    stages_.push_back({{s.project_ms, s.shade_ms, s.refine_ms, s.turn_ms}});
+    stages_.push_back({{s.project_ms, s.shade_ms, s.refine_ms, s.resample_ms}});
   }
   while (stages_.size() > 200) stages_.pop_front();
 }

@@ -4,7 +4,8 @@ void MappedFrame::take_over(const maquette::LiveFrame& mapped, std::vector<uint8
   const double before_s = maquette::monotonic_s();
   camera.take(mapped.frame);
   iuv.resize(camera.rgba.size());
-  const maq_densepose_plane planes[] = {MAQ_PLANE_PART, MAQ_PLANE_U, MAQ_PLANE_V, MAQ_PLANE_PERSON};
+  const maq_densepose_plane planes[] = {MAQ_DENSEPOSE_PLANE_PART, MAQ_DENSEPOSE_PLANE_U, MAQ_DENSEPOSE_PLANE_V,
+                                        MAQ_DENSEPOSE_PLANE_PERSON};
   for (size_t channel = 0; channel < 4; ++channel) {
     size_t stride_bytes = 0;
     const uint8_t* from = mapped.result->plane(planes[channel], &stride_bytes);

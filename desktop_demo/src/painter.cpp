@@ -35,7 +35,7 @@ unsigned linked(const char* vertex_source, const char* fragment_source) {
   glUseProgram(program);
   for (int part = 0; part <= 24; ++part) {
     uint8_t rgb[3];
-    maq_part_name(part, rgb);
+    maq_densepose_get_part_name(part, rgb);
     const std::string name = "part_colours[" + std::to_string(part) + "]";
     glUniform3f(glGetUniformLocation(program, name.c_str()), float(rgb[0]) / 255, float(rgb[1]) / 255,
                 float(rgb[2]) / 255);

@@ -74,8 +74,8 @@ void App::draw_people_panel() {
   ImGui::TextWrapped("%s", status.uri.c_str());
   if (ImGui::SmallButton("Look for a camera")) open(kFirstCamera);
   ImGui::Text("%.1f frames a second, %llu lost", frame.fps, static_cast<unsigned long long>(status.drops));
-  ImGui::Text("%.1f ms a frame, %d %s%s", double(frame.stats.total_ms), frame.stats.people,
-              frame.stats.people == 1 ? "person" : "people", frame.stats.key_frame != 0 ? "" : ", followed");
+  ImGui::Text("%.1f ms a frame, %d %s%s", double(frame.stats.total_ms), frame.stats.person_count,
+              frame.stats.person_count == 1 ? "person" : "people", frame.stats.is_key_frame != 0 ? "" : ", followed");
   if (frame.age_ms >= 0) ImGui::Text("from camera to result: %.0f ms", frame.age_ms);
   draw_stages(kStages, std::size(kStages));
 
@@ -105,8 +105,12 @@ void App::draw_people_panel() {
   slider("long side", &options_.model.long_side_px, 0, 1024,
          options_.model.long_side_px == 0 ? "the model's" : "%d px");
   if (options_.model.long_side_px > 0) options_.model.long_side_px = std::max(64, options_.model.long_side_px);
-  changed |= ImGui::CheckboxFlags("parts alone, no U and V", &options_.model.detail, MAQ_DETAIL_PART);
-  changed |= ImGui::CheckboxFlags("threads stay awake", &options_.model.spin, 1);
+  bool parts_alone = options_.model.detail == MAQ_DENSEPOSE_DETAIL_PART;
+  if (ImGui::Checkbox("parts alone, no U and V", &parts_alone)) {
+    options_.model.detail = parts_alone ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
+    changed = true;
+  }
+  changed |= ImGui::CheckboxFlags("threads stay awake", &options_.model.allow_spinning, 1);
   if (changed) people_.set(options_.model);
 }
 

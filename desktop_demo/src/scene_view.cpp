@@ -98,7 +98,7 @@ void App::draw_scene_panel() {
     ImGui::Text("%llu points, %zu photos", static_cast<unsigned long long>(state->info.point_count),
                 state->photos.size());
     ImGui::Text("%d x %d in %.1f ms, %llu points seen", shown.rendering.width_px, shown.rendering.height_px,
-                double(shown.stats.total_ms), static_cast<unsigned long long>(shown.stats.points_shaded));
+                double(shown.stats.total_ms), static_cast<unsigned long long>(shown.stats.shaded_point_count));
     if (shown.photo_index >= 0) {
       ImGui::TextWrapped("%s: PSNR %.1f dB", state->photo_names[size_t(shown.photo_index)].c_str(), shown.psnr_db);
     } else {

@@ -23,39 +23,41 @@ def normalised(image: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Framing:
-    """How cuts are drawn: how often towards a person, whose long side then is `share` cuts (log-uniform)."""
+class Cropping:
+    """How crops are drawn: how often towards a person, whose long side then is `person_scale` crop sides
+    (log-uniform)."""
 
     towards_person: float = 0.8
-    share: tuple[float, float] = (0.3, 1.3)  # from far away to cut by the frame
+    person_scale: tuple[float, float] = (0.3, 1.3)  # from far away to truncated by the crop
 
 
-ANY_FRAMING = Framing()
+ANY_CROPPING = Cropping()
+CLOSE_CROPPING = Cropping(towards_person=0.95, person_scale=(0.6, 1.3))
 SCALES = (0.15, 2.0)  # of the stored picture
 
 
 def augmented(
-    record: Record, size: int, rng: np.random.Generator, framing: Framing = ANY_FRAMING
+    record: Record, size: int, rng: np.random.Generator, cropping: Cropping = ANY_CROPPING
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A random square cut at a random scale, mirrored half of the time, with other colours.
+    """A random square crop at a random scale, mirrored half of the time, with other colours.
 
-    Where the cut is drawn towards a person, the scale is chosen by that person's size, so that people of all
+    Where the crop is drawn towards a person, the scale is chosen by that person's size, so that people of all
     sizes in pixels are seen equally often.
     """
     image, label = record.decoded()
     people = np.unique(label[..., 3])[1:]
-    focus = int(rng.choice(people)) if len(people) and rng.random() < framing.towards_person else 0
+    focus = int(rng.choice(people)) if len(people) and rng.random() < cropping.towards_person else 0
     if focus:
         y, x = np.nonzero(label[..., 3] == focus)
         long_side = max(np.ptp(x), np.ptp(y)) + 1
-        scale = np.clip(size / long_side * np.exp(rng.uniform(*np.log(framing.share))), *SCALES)
+        scale = np.clip(size / long_side * np.exp(rng.uniform(*np.log(cropping.person_scale))), *SCALES)
     else:
         scale = size / 256 * np.exp(rng.uniform(*np.log((0.6, 1.3))))
     shape = (max(int(image.shape[1] * scale), 8), max(int(image.shape[0] * scale), 8))
     image = cv2.resize(image, shape, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     label = cv2.resize(label, shape, interpolation=cv2.INTER_NEAREST)
     corner = _corner(label, size, focus, rng)
-    image, label = _cut(image, corner, size, MEAN[::-1]), _cut(label, corner, size, np.zeros(4))
+    image, label = _crop(image, corner, size, MEAN[::-1]), _crop(label, corner, size, np.zeros(4))
     if rng.random() < 0.5:
         image = image[:, ::-1]
         label = label[:, ::-1].copy()
@@ -64,7 +66,7 @@ def augmented(
 
 
 def _corner(label: np.ndarray, size: int, focus: int, rng: np.random.Generator) -> tuple[int, int]:
-    """Upper left corner (x, y) of the cut, with the middle of person `focus` well inside it (0: anywhere)."""
+    """Upper left corner (x, y) of the crop, with the middle of person `focus` well inside it (0: anywhere)."""
     y, x = np.nonzero(label[..., 3] == focus) if focus else ((), ())
     corner = []
     for axis, length in enumerate((label.shape[1], label.shape[0])):
@@ -77,7 +79,7 @@ def _corner(label: np.ndarray, size: int, focus: int, rng: np.random.Generator) 
     return corner[0], corner[1]
 
 
-def _cut(array: np.ndarray, corner: tuple[int, int], size: int, fill: np.ndarray) -> np.ndarray:
+def _crop(array: np.ndarray, corner: tuple[int, int], size: int, fill: np.ndarray) -> np.ndarray:
     out = np.empty((size, size, array.shape[2]), np.uint8)
     out[:] = fill
     x, y = corner
@@ -107,44 +109,44 @@ class Batches:
     """Endless shuffled batches, `ahead` of them made ahead by a thread (OpenCV releases the interpreter's lock).
 
     Batch k depends on `seed` and k alone, so that a run resumed at step k sees what it would have seen. `photos`
-    take the place of the share `photo_share` of the records; they are few, and so drawn with replacement.
+    replace the fraction `photo_fraction` of the records; they are few, and so drawn with replacement.
     """
 
     def __init__(
         self, records: list[Record], batch: int, seed: int, first: int = 0,
-        photos: list[Record] | None = None, photo_share: float = 0.0, ahead: int = 4,
+        photos: list[Record] | None = None, photo_fraction: float = 0.0, ahead: int = 4,
     ) -> None:  # fmt: skip
         self.records, self.batch, self.seed, self.ahead = records, batch, seed, ahead
-        self.photos, self.photo_share = photos or [], photo_share if photos else 0.0
+        self.photos, self.photo_fraction = photos or [], photo_fraction if photos else 0.0
         self._epoch, self._order = -1, np.empty(0, np.int64)
         cv2.setNumThreads(1)
         self._number, self._kind = first, None
         self._made: deque[Future] = deque()
         self._worker = ThreadPoolExecutor(1)
 
-    def make(self, number: int, size: int, framing: Framing = ANY_FRAMING) -> tuple[torch.Tensor, list[Truth]]:
+    def make(self, number: int, size: int, cropping: Cropping = ANY_CROPPING) -> tuple[torch.Tensor, list[Truth]]:
         """Batch `number` at an image side of `size` pixels."""
         rng = np.random.default_rng([self.seed, number])
         images, truths = [], []
         for k in range(number * self.batch, (number + 1) * self.batch):
             record = self.records[self._shuffled(k)]
-            if rng.random() < self.photo_share:
+            if rng.random() < self.photo_fraction:
                 record = self.photos[rng.integers(len(self.photos))]
-            image, label = augmented(record, size, rng, framing)
+            image, label = augmented(record, size, rng, cropping)
             images.append(normalised(image))
             truths.append(truth_of(label))
         return torch.from_numpy(np.stack(images)), truths
 
-    def next(self, size: int, framing: Framing = ANY_FRAMING) -> tuple[torch.Tensor, list[Truth]]:
-        """Image [N, 3, size, size] and its people; those made ahead of another kind are thrown away."""
+    def next(self, size: int, cropping: Cropping = ANY_CROPPING) -> tuple[torch.Tensor, list[Truth]]:
+        """Image [N, 3, size, size] and its people; those made ahead of another kind are discarded."""
         if not self.ahead:
             self._number += 1
-            return self.make(self._number - 1, size, framing)
-        if self._kind != (size, framing):
+            return self.make(self._number - 1, size, cropping)
+        if self._kind != (size, cropping):
             self._drop()
-            self._kind = (size, framing)
+            self._kind = (size, cropping)
         while len(self._made) <= self.ahead:
-            self._made.append(self._worker.submit(self.make, self._number + len(self._made), size, framing))
+            self._made.append(self._worker.submit(self.make, self._number + len(self._made), size, cropping))
         self._number += 1
         return self._made.popleft().result()
 
@@ -160,8 +162,8 @@ class Batches:
 
     def _shuffled(self, k: int) -> int:
         """The k-th record drawn: every record once before any comes again."""
-        epoch, place = divmod(k, len(self.records))
+        epoch, index = divmod(k, len(self.records))
         if epoch != self._epoch:
             self._order = np.random.default_rng([self.seed, epoch, 1]).permutation(len(self.records))
             self._epoch = epoch
-        return int(self._order[place])
+        return int(self._order[index])

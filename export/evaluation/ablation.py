@@ -37,13 +37,15 @@ from export.densepose import data
 from export.densepose.config import NetworkConfig
 from export.densepose.losses import PixelHead, surface_loss
 from export.densepose.network import MobileParsingRCNN
-from export.densepose.train import CLOSE, Ema, bf16_pays, optimiser_of, rate_at, validate_surface
+from export.densepose.train import optimiser_of
+from export.densepose.validation import validate_surface
 from export.evaluation.backends import Prediction
 from export.evaluation.photos import PhotoSet, Tally, read_photo
 from export.photos.backgrounds import load_photographs
 from export.shards import Record, load_records
 from export.teachers import shards
 from export.teachers.label import PhotoLabels
+from export.training import Ema, bf16_pays, rate_at
 
 SIZE = 128
 BATCH = 8
@@ -54,7 +56,7 @@ FIGURES = {  # of photographs, the last one of rendered people
     "pixel_part": "part, rendered",
 }
 MARGIN = 1.15  # of the box judged
-PHOTO_SHARE = 0.33
+PHOTO_FRACTION = 0.33
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class Variation:
     rendered: str = "people"
     count: int | None = None  # of the rendered images
     size: int = SIZE
-    framing: data.Framing = CLOSE
+    cropping: data.Cropping = data.CLOSE_CROPPING
     photos: str = ""  # shards of photographs in place of a third of the images
     width: int = 64
     backbone: str = "mobilenet_v2"
@@ -75,7 +77,7 @@ class Variation:
 
 
 VARIATIONS = {
-    "reference": Variation("close cuts of 128 pixels, pretrained MobileNetV2"),
+    "reference": Variation("close crops of 128 pixels, pretrained MobileNetV2"),
     "scratch": Variation("MobileNetV2 from random weights", pretrained=False),
     "v3": Variation("MobileNetV3-Large from random weights", pretrained=False, backbone="mobilenet_v3_large"),
     "photos": Variation("a third of the images photographs: masks, regions, fitted bodies", photos="ablation"),
@@ -85,8 +87,8 @@ VARIATIONS = {
     "bare": Variation("3,000 rendered images without clothes", rendered="people-bare", count=3000),
     "plain": Variation("one colour in place of the background", plain=True),
     "alone": Variation("only images of one person or nobody", keep=lambda label: label[..., 3].max() < 2),
-    "any-framing": Variation("people of a third to 1.3 times the cut", framing=data.ANY_FRAMING),
-    "small-cuts": Variation("cuts of 96 pixels", size=96),
+    "any-framing": Variation("people of a third to 1.3 times the crop", cropping=data.ANY_CROPPING),
+    "small-cuts": Variation("crops of 96 pixels", size=96),
     "wide": Variation("neck and heads 112 channels wide", width=112),
 }
 
@@ -108,7 +110,7 @@ def records_of(variation: Variation, folder: Path) -> list[Record]:
     return [PlainRecord(r.image, r.label) for r in records] if variation.plain else records
 
 
-def cut_around(image: np.ndarray, box: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+def crop_around(image: np.ndarray, box: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     """The square around `box`, `MARGIN` times as large, as uint8 [size, size, 3], and the 2 x 3 map into it."""
     x0, y0, x1, y1 = box
     scale = size / (MARGIN * max(x1 - x0, y1 - y0))
@@ -132,8 +134,8 @@ def judge(net: MobileParsingRCNN, pixel_head: PixelHead, photos: PhotoSet, size:
         height, width = image.shape[:2]
         part, person = np.zeros((2, height, width), np.uint8)
         for k in np.argsort(-labels.score):
-            cut, into = cut_around(image, labels.box[k], size)
-            tensor = torch.from_numpy(data.normalised(cut))[None]
+            crop, into = crop_around(image, labels.box[k], size)
+            tensor = torch.from_numpy(data.normalised(crop))[None]
             found = pixel_head.index(net.detector(tensor)[0][0])[0].argmax(0).byte().numpy()
             # A cell of P2 is judged at its middle, four pixels from the next (PixelHead.cells).
             found = cv2.resize(found, (size, size), interpolation=cv2.INTER_NEAREST)
@@ -151,7 +153,7 @@ def judge(net: MobileParsingRCNN, pixel_head: PixelHead, photos: PhotoSet, size:
 
 
 def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dict[str, float]:
-    """One training of `options.images` cuts, and its figures."""
+    """One training of `options.images` crops, and its figures."""
     variation = VARIATIONS[name]
     torch.set_num_threads(1)
     torch.manual_seed(seed)
@@ -164,14 +166,14 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     ema, optimiser = Ema(trained, 0.997), optimiser_of(net, pixel_head, 2e-3, 0.02)
     photos = load_records(options.data / "photos" / "shards" / variation.photos) if variation.photos else []
     records = records_of(variation, options.data)
-    batches = data.Batches(records, BATCH, seed, 0, photos, PHOTO_SHARE, ahead=0)
+    batches = data.Batches(records, BATCH, seed, 0, photos, PHOTO_FRACTION, ahead=0)
     steps = options.images // BATCH
     net.train()
     autocast = torch.autocast("cpu", torch.bfloat16, enabled=options.bf16)
     for step in tqdm(range(steps), desc=f"{name} {seed}", unit="step", disable=not shown):
         for group in optimiser.param_groups:
             group["lr"] = group["rate"] * rate_at(step, step / steps, 2e-3)
-        image, truths = batches.next(variation.size, variation.framing)
+        image, truths = batches.next(variation.size, variation.cropping)
         image = image.contiguous(memory_format=torch.channels_last)
         optimiser.zero_grad(set_to_none=True)
         sum(surface_loss(net, image, truths, autocast, pixel_head).values()).backward()
@@ -182,7 +184,9 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     averaged, averaged_head = ema.net
     dev = [options.data / "photos" / "val", options.data / "photos" / "ablation" / "dev"]
     dev = PhotoSet.find(dev, options.data / "teachers" / "labels", [])
-    rendered = validate_surface(averaged, averaged_head, load_records(options.data / "people" / "val", 100))
+    rendered = validate_surface(
+        averaged, averaged_head, load_records(options.data / "people" / "val", 100), 128, data.CLOSE_CROPPING
+    )
     return judge(averaged, averaged_head, dev) | rendered | {"rendered": len(records)}
 
 
@@ -266,7 +270,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(".data/ablation"))
     parser.add_argument("--data", type=Path, default=Path(".data"), help="people, people-bare, photos, teachers")
     parser.add_argument("--pretrained", type=Path, default=Path(".data/teachers/backbone.pt"))
-    parser.add_argument("--images", type=int, default=30_000, help="cuts a training (default %(default)s)")
+    parser.add_argument("--images", type=int, default=30_000, help="crops a training (default %(default)s)")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--only", nargs="+", choices=VARIATIONS, default=list(VARIATIONS), metavar="NAME")
     parser.add_argument("--processes", type=int, default=os.cpu_count())

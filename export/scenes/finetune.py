@@ -18,7 +18,6 @@ learning; what is found once, saving and measuring come on top and are said apar
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import subprocess
 import sys
@@ -32,6 +31,7 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
+from export.bundle import read_manifest
 from export.densepose.graphs import session
 from export.point_cloud import PointCloudError
 from export.scenes.bundle import BASIS, identity
@@ -106,7 +106,7 @@ def write_tuned_networks(scene: TunedScene, views: list[Shown], shipped: Path, f
         # A program of its own: calibration builds on this package, not the other way round.
         command = [sys.executable, "-m", "quantization.tuned_bundle", "--refiner", refiner, "--samples", work]
         subprocess.run([*command, "--shipped", shipped, "--out", folder], check=True)
-    return identity(json.loads((folder / "manifest.json").read_text()))
+    return identity(read_manifest(folder))
 
 
 @torch.no_grad()
@@ -202,7 +202,7 @@ def main() -> None:
     torch.manual_seed(0)
     try:
         capture, scene = read_capture(options.capture), read_scene_file(options.scene)
-        manifest = json.loads((options.networks / "manifest.json").read_text())
+        manifest = read_manifest(options.networks)
         if not capture.sources():
             raise CaptureError(f"All photos of {options.capture} are held out; there is none to learn from.")
         if identity(manifest) != scene.networks_sha256:

@@ -14,18 +14,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
-import signal
-import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 import cv2
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -42,10 +36,23 @@ from export.scenes.picture_quality import psnr_db
 from export.scenes.samples import Sample, Sampling, draw_sample
 from export.scenes.source_views import scores
 from export.scenes.system import Networks, save_networks
+from export.training import (
+    SAVE_EVERY_S,
+    Interval,
+    Schedule,
+    SmoothedTerms,
+    StopSignal,
+    Stopwatch,
+    rate_at,
+    save_atomically,
+    seed_step,
+    write_log,
+)
 
 WARM_UP_STEPS = 100
-LARGEST_GRADIENT = 1.0
-STANDING_BLOCKS = 3  # of a pretrained trunk, to stride 4, that are not trained
+MAX_GRADIENT_NORM = 1.0
+FROZEN_BLOCKS = 3  # of a pretrained trunk, to stride 4, that are not trained
+FIGURES = ("psnr_db", "plain_psnr_db")
 PRECISIONS = {"float32": torch.float32, "bfloat16": torch.bfloat16}
 
 
@@ -56,7 +63,7 @@ def batch_terms(
     perceptual: Perceptual | None,
     precision: torch.dtype = torch.float32,
 ) -> dict[str, Tensor]:
-    """The loss's terms over a batch of cuts of one size. Extractor, basis and refiner get gradients. precision: of
+    """The loss's terms over a batch of crops of one size. Extractor, basis and refiner get gradients. precision: of
     convolutions; the regression is always float64."""
     device = next(networks.parameters()).device
     images = torch.cat([torch.stack(sample.sources.images) for sample in samples]).to(device)
@@ -113,181 +120,176 @@ def validate(
     return {"psnr_db": float(ours), "plain_psnr_db": float(plain)}, sheet
 
 
-def rate_at(step: int, share: float, rate: float) -> float:
-    """Learning rate after `step` steps and that share of the run: a short rise, then a cosine down to a fiftieth."""
-    wave = 0.5 * (1 + math.cos(math.pi * min(share, 1)))
-    return rate * min(1.0, (step + 1) / WARM_UP_STEPS) * (0.02 + 0.98 * wave)
+@dataclass(frozen=True)
+class TrainingConfig:
+    """One training; the options of the command have the same names and say what they mean."""
 
-
-def draw_curves(log: list[dict], path: Path) -> None:
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.5))
-    steps = [row for row in log if "loss" in row]
-    for name in steps[-1]["terms"] if steps else ():
-        left.plot([r["step"] for r in steps], [r["terms"][name] for r in steps], label=name, lw=1)
-    left.plot([r["step"] for r in steps], [r["loss"] for r in steps], "k", label="sum", lw=1.5)
-    left.set(xlabel="step", ylabel="weighted loss", yscale="log")
-    for name in ("psnr_db", "plain_psnr_db"):
-        checks = [row for row in log if name in row]
-        right.plot([r["step"] for r in checks], [r[name] for r in checks], "o-", ms=3, label=name)
-    right.set(xlabel="step", ylabel="validation, dB")
-    for axis in (left, right):
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=7)
-    figure.tight_layout()
-    figure.savefig(path, dpi=90)
-    plt.close(figure)
+    data: Path = Path(".data/places")
+    out: Path = Path(".data/runs/scenes")
+    size: str = "small"
+    minutes: float = 120
+    steps: int | None = None
+    batch: int = 4
+    crop: int = 256
+    sources: tuple[int, int] = (2, 5)
+    margin: int = 64
+    long_side: int = 640
+    lr: float = 5e-4
+    seed: int = 0
+    threads: int | None = None
+    precision: str = "float32"
+    pretrained: Path | None = None
+    validate_minutes: float = 10
 
 
 class Run:
     """One training: networks, optimiser, how far it is; saved to and resumed from a folder."""
 
-    def __init__(self, options: argparse.Namespace, device: torch.device) -> None:
-        self.folder: Path = options.out
-        self.folder.mkdir(parents=True, exist_ok=True)
-        torch.manual_seed(options.seed)
-        self.networks = Networks(SIZES[options.size]).to(device)
-        self.perceptual = load_perceptual(options.pretrained).to(device) if options.pretrained else None
-        self.step, self.spent, self.log = 0, 0.0, []
+    def __init__(self, config: TrainingConfig, device: torch.device) -> None:
+        self.config, self.checkpoint = config, config.out / "checkpoint.pt"
+        config.out.mkdir(parents=True, exist_ok=True)
+        self.networks = Networks(SIZES[config.size]).to(device)
+        self.perceptual = load_perceptual(config.pretrained).to(device) if config.pretrained else None
+        self.step, self.spent_s, self.log = 0, 0.0, []
         saved = None
-        if (self.folder / "checkpoint.pt").exists():
-            saved = torch.load(self.folder / "checkpoint.pt", map_location=device, weights_only=True)
-            if saved["size"] != options.size:
+        if self.checkpoint.exists():
+            saved = torch.load(self.checkpoint, map_location=device, weights_only=True)
+            if saved["size"] != config.size:
                 raise SystemExit(
-                    f"{self.folder} holds a run of --size {saved['size']}, not {options.size}: give another --out."
+                    f"{config.out} holds a run of --size {saved['size']}, not {config.size}: give another --out."
                 )
-        self.size = options.size
         if self.perceptual and not saved:
             self.networks.extractor.trunk.load_state_dict(self.perceptual.trunk.state_dict())
         if self.perceptual:
-            # What has learnt edges from photographs needs no lesson, and would be the dearest to teach: half of the
-            # way back through the extractor is at the largest sizes.
+            # Layers that found edges in photographs need no training, and theirs would be the most expensive: half of
+            # the way back through the extractor is at the largest sizes.
             trunk = self.networks.extractor.trunk
-            for module in (trunk.stem, *trunk.blocks[:STANDING_BLOCKS]):
+            for module in (trunk.stem, *trunk.blocks[:FROZEN_BLOCKS]):
                 module.requires_grad_(False)
         learning = [p for p in self.networks.parameters() if p.requires_grad]
-        self.optimiser = torch.optim.Adam(learning, lr=options.lr)
+        self.optimiser = torch.optim.Adam(learning, lr=config.lr)
         if saved:
             self.networks.load_state_dict(saved["networks"])
             self.optimiser.load_state_dict(saved["optimiser"])
-            self.step, self.spent, self.log = saved["step"], saved["spent"], saved["log"]
-            print(f"resumed at step {self.step}, {self.spent / 60:.1f} minutes")
+            self.step, self.spent_s, self.log = saved["step"], saved["spent"], saved["log"]
+            print(f"resumed at step {self.step}, {self.spent_s / 60:.1f} minutes")
 
     def save(self) -> None:
-        state = {
-            "networks": self.networks.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
-            "step": self.step,
-            "spent": self.spent,
-            "log": self.log,
-            "size": self.size,
-        }
-        path = self.folder / "checkpoint.pt"
-        torch.save(state, path.with_suffix(".tmp"))
-        path.with_suffix(".tmp").rename(path)
-        save_networks(self.networks, self.folder / "weights.pt")
-        (self.folder / "log.json").write_text(json.dumps(self.log))
-        draw_curves(self.log, self.folder / "curves.png")
+        parts = {"networks": self.networks.state_dict(), "optimiser": self.optimiser.state_dict()}
+        progress = {"step": self.step, "spent": self.spent_s, "log": self.log, "size": self.config.size}
+        save_atomically({**parts, **progress}, self.checkpoint)
+        save_networks(self.networks, self.config.out / "weights.pt")
+        write_log(self.log, self.config.out, FIGURES, against="step", label="validation, dB")
 
-    def check(self, captures: Sequence[Capture], long_side_px: int) -> None:
-        figures, sheet = validate(self.networks, captures, long_side_px)
-        self.log.append({"step": self.step, "spent": self.spent, **figures})
-        cv2.imwrite(str(self.folder / "sample.png"), sheet[..., ::-1])
+    def check(self, captures: Sequence[Capture]) -> None:
+        """Adds figures on held-out photos to the log and writes sample.png."""
+        figures, sheet = validate(self.networks, captures, self.config.long_side)
+        self.log.append({"step": self.step, "spent": self.spent_s, **figures})
+        cv2.imwrite(str(self.config.out / "sample.png"), sheet[..., ::-1])
         tqdm.write(json.dumps(self.log[-1]))
 
 
-def parsed() -> argparse.Namespace:
+def train(config: TrainingConfig) -> None:
+    """Trains as the head of this file says. Raises SystemExit where captures cannot be read."""
+    if config.threads:
+        torch.set_num_threads(config.threads)
+    torch.manual_seed(config.seed)
+    run = Run(config, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
+    try:
+        captures, held_out = (read_captures(config.data / split) for split in ("train", "val"))
+    except (CaptureError, PointCloudError) as error:
+        raise SystemExit(str(error)) from None
+    sampling = Sampling(config.crop, tuple(config.sources), config.margin, config.long_side)
+    schedule, stopped = Schedule(config.minutes, config.steps), StopSignal()
+    if schedule.finished(run.step, run.spent_s):
+        print(f"{config.out} is finished: {run.step} steps.")
+        return
+    smoothed, watch = SmoothedTerms(), Stopwatch(run.spent_s)
+    save_due, check_due = Interval(SAVE_EVERY_S), Interval(config.validate_minutes * 60)
+    bar = schedule.bar(run.step, run.spent_s)
+    run.networks.train()
+    finished = False
+    while not finished:
+        seed_step(config.seed, run.step)
+        rate = rate_at(run.step, schedule.fraction(run.step, run.spent_s), config.lr, WARM_UP_STEPS)
+        for group in run.optimiser.param_groups:
+            group["lr"] = rate
+
+        rng = np.random.default_rng([config.seed, run.step])
+        samples = [draw_sample(captures, sampling, rng) for _ in range(config.batch)]
+        terms = batch_terms(run.networks, samples, LossWeights(), run.perceptual, PRECISIONS[config.precision])
+        run.optimiser.zero_grad(set_to_none=True)
+        sum(terms.values()).backward()
+        if torch.isfinite(nn.utils.clip_grad_norm_(run.networks.parameters(), MAX_GRADIENT_NORM)):
+            run.optimiser.step()
+
+        run.step += 1
+        smoothed.update(terms)
+        watch.lap()
+        run.spent_s = watch.spent_s
+        finished = bool(stopped) or schedule.finished(run.step, run.spent_s)
+        schedule.advance(bar, run.step, run.spent_s)
+        if run.step % 10 == 0 or finished:
+            run.log.append({"step": run.step, "loss": smoothed.loss, "terms": smoothed.values, "rate": rate})
+            bar.set_postfix(step=run.step, loss=f"{smoothed.loss:.3f}")
+        if check_due.due() and not finished:
+            run.check(held_out)
+            check_due.restart()
+            watch.skip()
+        if save_due.due():
+            run.save()
+            save_due.restart()
+            watch.skip()
+    bar.close()
+    run.check(held_out)
+    run.save()
+
+
+def parsed() -> TrainingConfig:
+    default = TrainingConfig
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=Path(".data/places"))
-    parser.add_argument("--out", type=Path, default=Path(".data/runs/scenes"))
-    parser.add_argument("--size", choices=SIZES, default="small", help="of the networks; full is the paper's refiner")
-    parser.add_argument("--minutes", type=float, default=120, help="length of the whole schedule, resumes counted in")
-    parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
-    parser.add_argument("--batch", type=int, default=4, help="cuts a step")
-    parser.add_argument("--crop", type=int, default=256, help="side of the cuts, pixels; a multiple of 32")
+    parser.add_argument("--data", type=Path, default=default.data)
+    parser.add_argument("--out", type=Path, default=default.out)
     parser.add_argument(
-        "--sources", type=int, nargs=2, default=(2, 5), help="photos that a cut is made from, from .. to"
+        "--size", choices=SIZES, default=default.size, help="of the networks; full is the paper's refiner"
     )
-    parser.add_argument("--margin", type=int, default=64, help="the extractor sees so much more than a cut, pixels")
-    parser.add_argument("--long-side", type=int, default=640, help="larger photos are made smaller, pixels")
-    parser.add_argument("--lr", type=float, default=5e-4)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--minutes", type=float, default=default.minutes, help="length of the whole schedule, resumes counted in"
+    )
+    parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
+    parser.add_argument("--batch", type=int, default=default.batch, help="crops a step")
+    parser.add_argument("--crop", type=int, default=default.crop, help="side of the crops, pixels; a multiple of 32")
+    parser.add_argument(
+        "--sources", type=int, nargs=2, default=default.sources, help="photos that a crop is made from, from .. to"
+    )
+    parser.add_argument(
+        "--margin", type=int, default=default.margin, help="the extractor sees so much more than a crop, pixels"
+    )
+    parser.add_argument(
+        "--long-side", type=int, default=default.long_side, help="larger photos are made smaller, pixels"
+    )
+    parser.add_argument("--lr", type=float, default=default.lr)
+    parser.add_argument("--seed", type=int, default=default.seed)
     parser.add_argument("--threads", type=int, help="default: one a core")
     parser.add_argument(
         "--precision",
         choices=PRECISIONS,
-        default="float32",
+        default=default.precision,
         help="of convolutions; processors with AVX512_BF16 or AMX train about twice as fast with bfloat16",
     )
     parser.add_argument("--pretrained", type=Path, help="weights of the trunk (export.teachers.backbone)")
-    parser.add_argument("--validate-minutes", type=float, default=10)
+    parser.add_argument("--validate-minutes", type=float, default=default.validate_minutes)
     options = parser.parse_args()
-    for name, value, least in (("crop", options.crop, STRIDE), ("margin", options.margin, 0)):
-        if value < least or value % STRIDE:
+    for name, value, smallest in (("crop", options.crop, STRIDE), ("margin", options.margin, 0)):
+        if value < smallest or value % STRIDE:
             parser.error(f"--{name} {value}: must be a multiple of {STRIDE}")
     if min(options.batch, options.sources[0]) < 1 or options.sources[1] < options.sources[0]:
         parser.error("--batch and --sources must be at least 1, and --sources rise")
-    return options
+    return TrainingConfig(**{**vars(options), "sources": tuple(options.sources)})
 
 
 def main() -> None:
-    options = parsed()
-    if options.threads:
-        torch.set_num_threads(options.threads)
-    run = Run(options, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
-    try:
-        captures, held_out = (read_captures(options.data / split) for split in ("train", "val"))
-    except (CaptureError, PointCloudError) as error:
-        raise SystemExit(str(error)) from None
-    sampling = Sampling(options.crop, tuple(options.sources), options.margin, options.long_side)
-    stopped = False
-
-    def stop(*_: object) -> None:
-        nonlocal stopped
-        stopped = True
-
-    signal.signal(signal.SIGTERM, stop)
-    signal.signal(signal.SIGINT, stop)
-    run.networks.train()
-    smooth: dict[str, float] = {}
-    length = options.minutes * 60
-    clock = saved_at = checked_at = time.monotonic()
-    finished = run.step >= options.steps if options.steps else run.spent >= length
-    if finished:
-        print(f"{run.folder} is finished: {run.step} steps.")
-        return
-    bar = tqdm(total=options.steps or round(length), initial=run.step if options.steps else round(run.spent))
-    while not finished:
-        torch.manual_seed((options.seed << 32) + run.step)  # as in a run that never stopped
-        share = run.step / options.steps if options.steps else run.spent / length
-        rate = rate_at(run.step, share, options.lr)
-        for group in run.optimiser.param_groups:
-            group["lr"] = rate
-        rng = np.random.default_rng([options.seed, run.step])
-        samples = [draw_sample(captures, sampling, rng) for _ in range(options.batch)]
-        terms = batch_terms(run.networks, samples, LossWeights(), run.perceptual, PRECISIONS[options.precision])
-        run.optimiser.zero_grad(set_to_none=True)
-        sum(terms.values()).backward()
-        if torch.isfinite(nn.utils.clip_grad_norm_(run.networks.parameters(), LARGEST_GRADIENT)):
-            run.optimiser.step()
-        run.step += 1
-        for name, value in terms.items():
-            smooth[name] = 0.95 * smooth.get(name, value.item()) + 0.05 * value.item()
-        now = time.monotonic()
-        run.spent, clock = run.spent + now - clock, now
-        finished = stopped or (run.step >= options.steps if options.steps else run.spent >= length)
-        bar.update((run.step if options.steps else round(run.spent)) - bar.n)
-        if run.step % 10 == 0 or finished:
-            run.log.append({"step": run.step, "loss": sum(smooth.values()), "terms": dict(smooth), "rate": rate})
-            bar.set_postfix(step=run.step, loss=f"{run.log[-1]['loss']:.3f}")
-        if now - checked_at > options.validate_minutes * 60 and not finished:
-            run.check(held_out, options.long_side)
-            checked_at = clock = time.monotonic()
-        if now - saved_at > 180:
-            run.save()
-            saved_at = clock = time.monotonic()
-    bar.close()
-    run.check(held_out, options.long_side)
-    run.save()
+    train(parsed())
 
 
 if __name__ == "__main__":

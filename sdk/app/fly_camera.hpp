@@ -16,7 +16,7 @@ namespace maquette {
 class FlyCamera {
  public:
   // Begins at the middle photo; without photos outside of the scene's box, looking at it.
-  FlyCamera(const maq_scene_info& scene, const std::vector<maq_camera>& photos);
+  FlyCamera(const maq_scene_info& scene, const std::vector<maq_pinhole_camera>& photos);
   // Each -1 to 1: to the camera's right, along the world's up, forwards. `speed`: diagonals of the scene's box a second.
   void move(double right, double up, double forward, double seconds, double speed);
   // To the right about the world's up, and upwards, radians; ends short of straight up and down. A camera that leans to a
@@ -24,13 +24,13 @@ class FlyCamera {
   void turn(double yaw, double pitch);
   void zoom(double factor);  // above 1 things get larger; the longer side keeps within 20 to 110 degrees
   // Flies there while update() is called, until the user steers; is there at once for 0 seconds.
-  void go_to(const maq_camera& camera, double seconds, int photo_index);
-  bool update(double seconds);                           // true when it moved
-  maq_camera camera(int width_px, int height_px) const;  // shows all that the photo it was at last would
+  void go_to(const maq_pinhole_camera& camera, double seconds, int photo_index);
+  bool update(double seconds);                                   // true when it moved
+  maq_pinhole_camera camera(int width_px, int height_px) const;  // shows all that the photo it was at last would
   // What it began at or flew to, until it leaves: of the photo's own size, to be compared with it pixel by pixel.
-  const std::optional<maq_camera>& photo_camera() const { return at_; }
+  const std::optional<maq_pinhole_camera>& photo_camera() const { return at_; }
   int at_photo() const { return at_ ? photo_index_ : -1; }
-  int nearest_photo(const std::vector<maq_camera>& photos) const;  // by place and direction; -1 without photos
+  int nearest_photo(const std::vector<maq_pinhole_camera>& photos) const;  // by place and direction; -1 without photos
 
  private:
   using Vec3 = std::array<double, 3>;
@@ -79,24 +79,24 @@ class FlyCamera {
     return turned(from, unit(length(sines) > 1e-6 ? sines : longest), share * std::atan2(length(sines), cosines));
   }
 
-  static std::optional<Pose> pose_of(const maq_camera& camera);
+  static std::optional<Pose> pose_of(const maq_pinhole_camera& camera);
   void leave() { at_.reset(), target_.reset(); }
 
   Vec3 up_;          // the world's
   double size_ = 1;  // the box's diagonal
   Pose pose_, from_, to_;
-  std::optional<maq_camera> at_, target_;  // target: while it flies
+  std::optional<maq_pinhole_camera> at_, target_;  // target: while it flies
   int photo_index_ = -1;
   double flight_s_ = 0, flown_s_ = 0;
 };
 
-inline FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_camera>& photos)
+inline FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_pinhole_camera>& photos)
     : up_(unit(vec3(scene.up))) {
   if (!finite(up_)) up_ = {0, 0, 1};
-  Vec3 middle = mix(0.5, vec3(scene.low), 0.5, vec3(scene.high));
+  Vec3 middle = mix(0.5, vec3(scene.bounds_min), 0.5, vec3(scene.bounds_max));
   if (!finite(middle)) middle = {};
   // A box without a size, or with one that is lost in 16 digits so far out, gets one in which one can move.
-  const double diagonal = length(mix(1, vec3(scene.high), -1, vec3(scene.low))), far_out = length(middle);
+  const double diagonal = length(mix(1, vec3(scene.bounds_max), -1, vec3(scene.bounds_min))), far_out = length(middle);
   size_ = diagonal > 1e-10 * far_out && std::isfinite(diagonal) ? diagonal : std::max(1.0, 1e-6 * far_out);
   // From a little above, 60 degrees wide: the ball about the box fills the picture.
   const Vec3 right = unit(cross(up_, std::abs(up_[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
@@ -105,7 +105,7 @@ inline FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_c
   if (!photos.empty()) go_to(photos[photos.size() / 2], 0, int(photos.size() / 2));
 }
 
-inline std::optional<FlyCamera::Pose> FlyCamera::pose_of(const maq_camera& camera) {
+inline std::optional<FlyCamera::Pose> FlyCamera::pose_of(const maq_pinhole_camera& camera) {
   const double w = camera.width_px, h = camera.height_px, fx = camera.fx_px, fy = camera.fy_px;
   const Rows given{vec3(camera.rotation), vec3(camera.rotation + 3), vec3(camera.rotation + 6)};
   Pose pose{rotation_of(given[0], given[2]), vec3(camera.centre), {w, h, fx, fy}};
@@ -148,7 +148,7 @@ inline void FlyCamera::zoom(double factor) {
   fx *= scale, pose_.lens[kFy] *= scale;
 }
 
-inline void FlyCamera::go_to(const maq_camera& camera, double seconds, int photo_index) {
+inline void FlyCamera::go_to(const maq_pinhole_camera& camera, double seconds, int photo_index) {
   const std::optional<Pose> to = pose_of(camera);
   if (!to || !std::isfinite(seconds)) return;
   leave();
@@ -171,10 +171,10 @@ inline bool FlyCamera::update(double seconds) {
   return true;
 }
 
-inline maq_camera FlyCamera::camera(int width_px, int height_px) const {
+inline maq_pinhole_camera FlyCamera::camera(int width_px, int height_px) const {
   const std::array<double, 6>& lens = pose_.lens;
   const double scale = std::min(width_px / lens[kWidth], height_px / lens[kHeight]);
-  maq_camera camera{sizeof camera, width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, 0, 0, {}, {}, {}};
+  maq_pinhole_camera camera{sizeof camera, width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, 0, 0, {}, {}, {}};
   camera.cx_px = (width_px - 1) / 2.0 + lens[kOffsetX] * scale;
   camera.cy_px = (height_px - 1) / 2.0 + lens[kOffsetY] * scale;
   for (size_t i = 0; i < 9; ++i) camera.rotation[i] = pose_.rows[i / 3][i % 3];
@@ -182,7 +182,7 @@ inline maq_camera FlyCamera::camera(int width_px, int height_px) const {
   return camera;
 }
 
-inline int FlyCamera::nearest_photo(const std::vector<maq_camera>& photos) const {
+inline int FlyCamera::nearest_photo(const std::vector<maq_pinhole_camera>& photos) const {
   int nearest = -1;
   double least = HUGE_VAL;
   for (size_t i = 0; i < photos.size(); ++i) {

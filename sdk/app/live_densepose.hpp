@@ -30,8 +30,8 @@
 #include <utility>
 #include <vector>
 
-#include "maquette/maquette.hpp"
 #include "app/triple_buffer.hpp"
+#include "maquette/maquette.hpp"
 
 namespace maquette {
 
@@ -121,7 +121,7 @@ class LiveDensePose {
     std::lock_guard<std::mutex> lock(mutex_);
     return status_;
   }
-  // Points [24][nodes][nodes][3] as in maq_surface, once a model is loaded that has them; until then none.
+  // Points [24][nodes][nodes][3] as in maq_densepose_surface, once a model is loaded that has them; until then none.
   std::vector<float> surface(int* nodes) const {
     std::lock_guard<std::mutex> lock(mutex_);
     *nodes = surface_nodes_;
@@ -216,7 +216,7 @@ class LiveDensePose {
     map(*frame, (monotonic_s() - before_s) * 1000, age_ms);
     held_ = std::move(frame);
     change_status([&](LiveStatus& status) {
-      status.drops = info.drops;
+      status.drops = info.dropped_frame_count;
       status.ended = has_all_frames();
     });
     return true;
@@ -270,18 +270,18 @@ class LiveDensePose {
 
   Source opened(const std::string& uri) {
     maq_source_config config = default_source_config();
-    config.pool_size = uint32_t(options_.frames_held);
+    config.frame_pool_size = uint32_t(options_.frames_held);
     config.reconnect_ms = options_.reconnect_ms;
-    config.user_data = this;
+    config.state_user_data = this;
     config.state_callback = [](void* self, maq_source_state state, const char* reason) {
       static const char* const names[] = {"", "started", "stalled", "lost", "reconnecting", "back"};
-      const bool known = state >= MAQ_SOURCE_STARTED && state <= MAQ_SOURCE_BACK;
+      const bool known = state >= MAQ_SOURCE_STARTED && state <= MAQ_SOURCE_RECONNECTED;
       const std::string name = known ? names[state] : "changed";
       static_cast<LiveDensePose*>(self)->change_status([&](LiveStatus& status) {
         if (status.events.size() < kMostEvents) status.events.push_back(name);
         // What was said when it was opened stays when it starts.
-        if (state == MAQ_SOURCE_BACK) status.problem.clear();
-        if (state != MAQ_SOURCE_BACK && state != MAQ_SOURCE_STARTED) {
+        if (state == MAQ_SOURCE_RECONNECTED) status.problem.clear();
+        if (state != MAQ_SOURCE_RECONNECTED && state != MAQ_SOURCE_STARTED) {
           status.problem = "The camera is " + name + ": " + reason;
         }
       });
@@ -296,7 +296,7 @@ class LiveDensePose {
     config.result_pool_size = uint32_t(options_.frames_held);
     model_.reset();
     model_.emplace(context_, config);
-    const std::optional<maq_surface> surface = model_->surface();
+    const std::optional<maq_densepose_surface> surface = model_->surface();
     change_status([&](LiveStatus& status) {
       status.doing.clear();
       if (!surface) return;

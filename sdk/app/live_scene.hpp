@@ -29,7 +29,7 @@ struct LiveScenePicture {
   Picture rendering, photo, error;  // photo and error (mean of the channels) are empty unless the camera is a photo's;
   double psnr_db = 0;               // this is NaN then, and infinite where nothing differs
   int photo_index = -1;
-  maq_camera camera{};  // of the rendering's size
+  maq_pinhole_camera camera{};  // of the rendering's size
   maq_scene_image_stats stats{};
   uint64_t number = 0;  // counts pictures from 1
 };
@@ -39,7 +39,7 @@ struct LiveSceneState {
   double done = 0;         // 0 to 1, while opening
   std::string path, text;  // text: what is being done, what is missing or why it failed, in sentences; or nothing
   maq_scene_info info{};   // from here on: once it is ready
-  std::vector<maq_camera> photos;
+  std::vector<maq_pinhole_camera> photos;
   std::vector<std::string> photo_names;  // with " (kept out)" where the capture keeps them for comparisons
 };
 
@@ -55,7 +55,7 @@ class LiveScene {  // all calls by the thread that takes the pictures
   void open(const std::string& path, const std::string& capture_folder = {});
   void close() { open({}); }
   // Renders a picture once there is a scene, 1280 x 960 at most; the latest call wins. `photo_index`: whose camera, or -1.
-  void look(const maq_camera& camera, int photo_index);
+  void look(const maq_pinhole_camera& camera, int photo_index);
   void set_threads(int threads);  // renders the latest picture again
   std::shared_ptr<const LiveSceneState> state() const {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -68,10 +68,10 @@ class LiveScene {  // all calls by the thread that takes the pictures
   struct Wish {
     std::string path, capture_folder;
     int threads = 0, photo_index = -1;
-    std::optional<maq_camera> camera;
+    std::optional<maq_pinhole_camera> camera;
     bool opens = false, draws = false, ends = false;
   };
-  static maq_camera within_limits(maq_camera camera) {
+  static maq_pinhole_camera within_limits(maq_pinhole_camera camera) {
     const double scale = std::min(1280.0 / camera.width_px, 960.0 / camera.height_px);
     if (!(scale > 0 && scale < 1)) return camera;
     camera.width_px = std::max(1, int(std::lround(camera.width_px * scale)));
@@ -170,7 +170,7 @@ inline void LiveScene::open(const std::string& path, const std::string& capture_
   wake_.notify_one();
 }
 
-inline void LiveScene::look(const maq_camera& camera, int photo_index) {
+inline void LiveScene::look(const maq_pinhole_camera& camera, int photo_index) {
   const std::lock_guard<std::mutex> lock(mutex_);
   wish_.camera = camera, wish_.photo_index = photo_index, wish_.draws = true;
   wake_.notify_one();
@@ -235,7 +235,7 @@ inline void LiveScene::load(const Wish& wish) {
   if (builds) {
     maq_scene_build_config config = default_scene_build_config();
     config.bundle_path = bundle_path_.c_str(), config.threads = wish.threads, config.progress_user_data = this;
-    config.progress = [](void* self, double done, const char* what) -> int32_t {
+    config.progress_callback = [](void* self, double done, const char* what) -> int32_t {
       return static_cast<LiveScene*>(self)->update(
           [&](LiveSceneState& state) { state.done = done, state.text = what; });
     };
@@ -248,7 +248,7 @@ inline void LiveScene::load(const Wish& wish) {
   for (uint32_t i = 0; capture_ && i < capture_->info().view_count; ++i) {
     const maq_capture_view view = capture_->view(i);
     ready.photos.push_back(view.camera);
-    ready.photo_names.push_back(std::string(view.name) + (view.held_out == 1 ? " (kept out)" : ""));
+    ready.photo_names.push_back(std::string(view.name) + (view.is_held_out == 1 ? " (kept out)" : ""));
   }
   update([&](LiveSceneState& state) { state = ready; });
 }
@@ -262,10 +262,10 @@ inline void LiveScene::make_renderer(int threads) {
 
 inline void LiveScene::draw(const Wish& wish) {
   if (threads_ != wish.threads) make_renderer(wish.threads);
-  const maq_camera camera = within_limits(*wish.camera);
+  const maq_pinhole_camera camera = within_limits(*wish.camera);
   const SceneImage image = renderer_->run(camera);
   maq_frame_desc desc{sizeof desc, MAQ_PIXEL_BGR8, camera.width_px, camera.height_px, {}, {}, 0, MAQ_CLOCK_MEDIA, 0};
-  desc.planes[0] = static_cast<const uint8_t*>(image.plane(MAQ_SCENE_BGR, desc.stride_bytes));
+  desc.planes[0] = static_cast<const uint8_t*>(image.plane(MAQ_SCENE_PLANE_BGR, desc.stride_bytes));
   LiveScenePicture& shown = shown_.back();
   shown.rendering.take(Frame(context_, desc));
   shown.camera = camera, shown.stats = image.stats(), shown.photo_index = -1, shown.psnr_db = NAN;

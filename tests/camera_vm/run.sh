@@ -12,7 +12,7 @@ usage() { sed -n '2,9s/^# \{0,1\}//p' "$0"; }
 
 guests=(vivid uvc sdk libcamera figures)
 frames="${FRAMES:-100}"
-limit_s=$((300 + frames / 2))  # for one guest; each takes up to two minutes where nothing else runs
+limit_s=$((900 + frames / 2))  # for one guest; each takes up to two minutes where nothing else runs
 work=build/camera-vm
 report=build/test-results/camera-vm.xml
 

@@ -1,4 +1,4 @@
-// The body that labels lie on (maq_surface), as triangles to draw and as a texture to sample. For C++17, in this header alone.
+// The body that labels lie on (maq_densepose_surface), as triangles to draw and as a texture to sample. For C++17, in this header alone.
 #ifndef MAQUETTE_BODY_MESH_HPP_
 #define MAQUETTE_BODY_MESH_HPP_
 
@@ -24,7 +24,7 @@ struct BodyMesh {
   std::vector<float> filled_points_m;
   int nodes = 0;
 
-  // `points_m` [24][nodes along U][nodes along V][3], as in maq_surface.
+  // `points_m` [24][nodes along U][nodes along V][3], as in maq_densepose_surface.
   BodyMesh(const std::vector<float>& points_m, int nodes_a_side) : nodes(nodes_a_side) {
     const Grid grid{points_m, nodes};
     for (int part = 0; part < 24; ++part) {

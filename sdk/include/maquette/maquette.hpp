@@ -33,7 +33,7 @@ class Error : public std::runtime_error {
 
 // Throws the error of the latest call when `status` is one; `handle` is the call's, or null for `_init` functions.
 inline void check(maq_status status, const void* handle) {
-  if (status != MAQ_OK) throw Error(status, maq_last_error(handle));
+  if (status != MAQ_OK) throw Error(status, maq_get_last_error(handle));
 }
 
 template <class Handle, void (*destroy)(Handle*)>
@@ -90,12 +90,12 @@ class Context {
 
   std::string onnxruntime_version() const {
     const char* version = "";
-    check(maq_context_onnxruntime(get(), &version, nullptr), get());
+    check(maq_context_get_onnxruntime(get(), &version, nullptr), get());
     return version;
   }
   std::string onnxruntime_path() const {
     const char* path = "";
-    check(maq_context_onnxruntime(get(), nullptr, &path), get());
+    check(maq_context_get_onnxruntime(get(), nullptr, &path), get());
     return path;
   }
 
@@ -111,7 +111,7 @@ class Frame {
   // Pixels of the app, which must stay until the frame is gone.
   Frame(const Context& context, const maq_frame_desc& desc) {
     maq_frame* made = nullptr;
-    check(maq_frame_create(context.get(), &desc, nullptr, nullptr, &made), context.get());
+    check(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &made), context.get());
     owner_.reset(made);
   }
 
@@ -162,10 +162,10 @@ class Source {
   }
 
   // Nothing when the source does not know.
-  std::optional<maq_calibration> calibration() const {
-    maq_calibration calibration{};
+  std::optional<maq_intrinsics> calibration() const {
+    maq_intrinsics calibration{};
     calibration.struct_size = sizeof calibration;
-    const maq_status status = maq_source_get_calibration(get(), &calibration);
+    const maq_status status = maq_source_get_intrinsics(get(), &calibration);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
     check(status, get());
     return calibration;
@@ -209,7 +209,7 @@ class Recorder {
   }
 
   maq_recorder* get() const { return owner_.get(); }
-  void add(const Frame& frame) { check(maq_recorder_add(get(), frame.get()), get()); }
+  void add(const Frame& frame) { check(maq_recorder_add_frame(get(), frame.get()), get()); }
   void finish() { check(maq_recorder_finish(get()), get()); }
 
   maq_recorder_info info() const {
@@ -232,7 +232,7 @@ class Clip {
   }
 
   maq_clip* get() const { return owner_.get(); }
-  void add(const Frame& frame) { check(maq_clip_add(get(), frame.get()), get()); }
+  void add(const Frame& frame) { check(maq_clip_add_frame(get(), frame.get()), get()); }
   void finish() { check(maq_clip_finish(get()), get()); }
 
  private:
@@ -243,7 +243,7 @@ class DensePoseResult {
  public:
   // Takes over a result of the C API.
   explicit DensePoseResult(maq_densepose_result* result) : owner_(result) {
-    check(maq_densepose_result_size(get(), &width_px_, &height_px_), get());
+    check(maq_densepose_result_get_size(get(), &width_px_, &height_px_), get());
   }
 
   maq_densepose_result* get() const { return owner_.get(); }
@@ -253,21 +253,21 @@ class DensePoseResult {
   Span<maq_person> people() const {
     const maq_person* people = nullptr;
     uint32_t count = 0;
-    check(maq_densepose_result_people(get(), &people, &count), get());
+    check(maq_densepose_result_get_people(get(), &people, &count), get());
     return {people, count};
   }
 
   // height_px() rows of *stride_bytes.
   const uint8_t* plane(maq_densepose_plane plane, size_t* stride_bytes) const {
     const uint8_t* pixels = nullptr;
-    check(maq_densepose_result_plane(get(), plane, &pixels, stride_bytes), get());
+    check(maq_densepose_result_get_plane(get(), plane, &pixels, stride_bytes), get());
     return pixels;
   }
 
   maq_densepose_stats stats() const {
     maq_densepose_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_densepose_result_stats(get(), &stats), get());
+    check(maq_densepose_result_get_stats(get(), &stats), get());
     return stats;
   }
 
@@ -298,11 +298,11 @@ class DensePose {
     return DensePoseResult(result);
   }
 
-  void restart() { check(maq_densepose_restart(get()), get()); }
+  void restart() { check(maq_densepose_reset(get()), get()); }
 
   // Nothing when the bundle has none. The points are this object's.
-  std::optional<maq_surface> surface() const {
-    maq_surface surface{};
+  std::optional<maq_densepose_surface> surface() const {
+    maq_densepose_surface surface{};
     surface.struct_size = sizeof surface;
     const maq_status status = maq_densepose_get_surface(get(), &surface);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
@@ -318,6 +318,87 @@ class DensePose {
   }
 
   Owner<maq_densepose, maq_densepose_destroy> owner_;
+};
+
+inline maq_pipeline_config default_pipeline_config() {
+  maq_pipeline_config config;
+  check(maq_pipeline_config_init(&config, sizeof config), nullptr);
+  return config;
+}
+
+// A result of a pipeline with its frame.
+struct PipelineResult {
+  // Takes over what a callback or the C API gives.
+  explicit PipelineResult(const maq_pipeline_result& result)
+      : frame(result.frame),
+        densepose(result.densepose),
+        number(result.number),
+        wait_ms(result.wait_ms),
+        run_ms(result.run_ms),
+        age_ms(result.age_ms) {}
+
+  Frame frame;
+  DensePoseResult densepose;
+  uint64_t number;
+  double wait_ms, run_ms, age_ms;
+};
+
+class Pipeline {
+ public:
+  Pipeline(const Context& context, const maq_pipeline_config& config) {
+    maq_pipeline* made = nullptr;
+    check(maq_pipeline_create(context.get(), &config, &made), context.get());
+    owner_.reset(made);
+  }
+
+  maq_pipeline* get() const { return owner_.get(); }
+
+  void set_source(const std::string& uri) { check(maq_pipeline_set_source(get(), uri.c_str()), get()); }
+  void set_densepose(const maq_densepose_config& config) { check(maq_pipeline_set_densepose(get(), &config), get()); }
+  void set_paused(bool is_paused) { check(maq_pipeline_set_paused(get(), is_paused ? 1 : 0), get()); }
+  // "" ends the recording.
+  void set_recording(const std::string& path) {
+    check(maq_pipeline_set_recording(get(), path.empty() ? nullptr : path.c_str()), get());
+  }
+  void stop() { check(maq_pipeline_stop(get()), get()); }
+
+  // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when no result came in time.
+  std::optional<PipelineResult> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
+    maq_pipeline_result result{};
+    result.struct_size = sizeof result;
+    const maq_status status = maq_pipeline_acquire_result(get(), timeout_ns, &result);
+    if (status == MAQ_END_OF_STREAM) return std::nullopt;
+    check(status, get());
+    return PipelineResult(result);
+  }
+
+  // Its texts stay until this thread asks again.
+  maq_pipeline_info info() const {
+    maq_pipeline_info info{};
+    info.struct_size = sizeof info;
+    check(maq_pipeline_get_info(get(), &info), get());
+    return info;
+  }
+
+  maq_pipeline_stats stats() const {
+    maq_pipeline_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_pipeline_get_stats(get(), &stats), get());
+    return stats;
+  }
+
+  // Nothing before a model is loaded, or when its bundle has none. The points are this object's.
+  std::optional<maq_densepose_surface> surface() const {
+    maq_densepose_surface surface{};
+    surface.struct_size = sizeof surface;
+    const maq_status status = maq_pipeline_get_surface(get(), &surface);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status, get());
+    return surface;
+  }
+
+ private:
+  Owner<maq_pipeline, maq_pipeline_destroy> owner_;
 };
 
 inline maq_scene_build_config default_scene_build_config() {
@@ -373,7 +454,7 @@ class Capture {
   }
 
  private:
-  Owner<maq_capture, maq_capture_destroy> owner_;
+  Owner<maq_capture, maq_capture_close> owner_;
 };
 
 class Scene {
@@ -409,7 +490,7 @@ class Scene {
   }
 
  private:
-  Owner<maq_scene, maq_scene_destroy> owner_;
+  Owner<maq_scene, maq_scene_close> owner_;
 };
 
 class SceneBuilder {
@@ -423,7 +504,7 @@ class SceneBuilder {
   maq_scene_builder* get() const { return owner_.get(); }
 
   // Returns how many points the photo saw.
-  uint64_t add_view(const Frame& photo, const maq_camera& camera) {
+  uint64_t add_view(const Frame& photo, const maq_pinhole_camera& camera) {
     uint64_t seen_points = 0;
     check(maq_scene_builder_add_view(get(), photo.get(), &camera, &seen_points), get());
     return seen_points;
@@ -458,7 +539,7 @@ class SceneImage {
   // Rows of *stride_bytes.
   const void* plane(maq_scene_plane plane, size_t* stride_bytes) const {
     const void* pixels = nullptr;
-    check(maq_scene_image_plane(get(), plane, &pixels, stride_bytes), get());
+    check(maq_scene_image_get_plane(get(), plane, &pixels, stride_bytes), get());
     return pixels;
   }
 
@@ -483,7 +564,7 @@ class SceneRenderer {
 
   maq_scene_renderer* get() const { return owner_.get(); }
 
-  SceneImage run(const maq_camera& camera) {
+  SceneImage run(const maq_pinhole_camera& camera) {
     maq_scene_image* image = nullptr;
     check(maq_scene_renderer_run(get(), &camera, &image), get());
     return SceneImage(image);

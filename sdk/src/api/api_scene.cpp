@@ -45,16 +45,16 @@ maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
       case CoefficientFormat::kFloat32: filled.coefficient_bits = 32; break;
     }
     filled.point_count = from.points;
-    filled.varying_count = from.view_dependent;
+    filled.view_dependent_count = from.view_dependent;
     filled.block_count = from.block_count;
     const SceneBounds bounds = bounds_of(from);
     std::copy_n(from.up.begin(), 3, filled.up);
-    std::copy_n(bounds.low.begin(), 3, filled.low);
-    std::copy_n(bounds.high.begin(), 3, filled.high);
+    std::copy_n(bounds.low.begin(), 3, filled.bounds_min);
+    std::copy_n(bounds.high.begin(), 3, filled.bounds_max);
     std::copy(from.networks_sha256.begin(), from.networks_sha256.end(), filled.networks_sha256);
     write_struct(info, "info", filled, sizeof filled);
     return MAQ_OK;
   });
 }
 
-void maq_scene_destroy(maq_scene* scene) { delete scene; }
+void maq_scene_close(maq_scene* scene) { delete scene; }

@@ -24,7 +24,7 @@ maq_scene_build_config default_config() {
   config.struct_size = sizeof config;
   config.long_side_px = 640;
   config.coefficient_bits = 8;
-  config.least_variation = -1;
+  config.min_variation = -1;
   config.visibility_scale = 1;
   return config;
 }
@@ -43,23 +43,23 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
     case 32: format = CoefficientFormat::kFloat32; break;
     default: throw ArgumentError("config.coefficient_bits is ", config.coefficient_bits, ", but must be 8, 16 or 32.");
   }
-  if (std::isnan(config.least_variation)) throw ArgumentError("config.least_variation is not a number.");
+  if (std::isnan(config.min_variation)) throw ArgumentError("config.min_variation is not a number.");
   std::optional<float> min_view_dependence;
   // Colours are 0 to 1, and what is over this would not fit into a float.
   constexpr double kMaxVariation = 1e30;
-  if (config.least_variation >= 0) min_view_dependence = float(std::min(config.least_variation, kMaxVariation));
+  if (config.min_variation >= 0) min_view_dependence = float(std::min(config.min_variation, kMaxVariation));
   options.packing = packing_of(format, min_view_dependence);
   options.fitting.visibility_scale = config.visibility_scale;
   options.fitting.near = config.near_depth;
   options.fitting.threads = scene_threads(config.threads);
-  if (config.most_bytes != 0) options.fitting.max_bytes = config.most_bytes;
-  options.max_points = config.most_points;
-  options.max_views = config.most_views;
-  require_range("config.uses_held_out", config.uses_held_out, 0, 1);
-  options.uses_held_out = config.uses_held_out == 1;
-  if (config.progress != nullptr) {
-    settings.progress = [callback = config.progress, user_data = config.progress_user_data](double done,
-                                                                                            const std::string& what) {
+  if (config.max_memory_bytes != 0) options.fitting.max_bytes = config.max_memory_bytes;
+  options.max_points = config.max_points;
+  options.max_views = config.max_views;
+  require_range("config.use_held_out", config.use_held_out, 0, 1);
+  options.uses_held_out = config.use_held_out == 1;
+  if (config.progress_callback != nullptr) {
+    settings.progress = [callback = config.progress_callback, user_data = config.progress_user_data](
+                            double done, const std::string& what) {
       return callback(user_data, done, what.c_str()) != 0;
     };
   }
@@ -69,16 +69,16 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
 maq_scene_build_stats stats_of(const SceneBuildStats& from) {
   maq_scene_build_stats stats{};
   stats.view_count = uint32_t(from.views);
-  stats.unused_views = uint32_t(from.unused_views);
-  stats.cloud_points = from.cloud_points;
-  stats.seen_points = from.seen_points;
+  stats.unused_view_count = uint32_t(from.unused_views);
+  stats.cloud_point_count = from.cloud_points;
+  stats.seen_point_count = from.seen_points;
   stats.load_ms = from.load_ms;
   stats.visibility_ms = from.fitting.visibility_ms;
-  stats.turning_ms = from.fitting.rotation_ms;
-  stats.extractor_ms = from.fitting.extractor_ms;
-  stats.moments_ms = from.fitting.regression_ms;
-  stats.solving_ms = from.fitting.solving_ms;
-  stats.packing_ms = from.packing_ms;
+  stats.align_ms = from.fitting.align_ms;
+  stats.extract_ms = from.fitting.extract_ms;
+  stats.accumulate_ms = from.fitting.accumulate_ms;
+  stats.solve_ms = from.fitting.solve_ms;
+  stats.pack_ms = from.pack_ms;
   return stats;
 }
 
@@ -136,10 +136,10 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     require_argument(cloud, "cloud");
     require_argument(builder, "builder");
     require_struct_size("cloud", cloud->struct_size, sizeof(maq_point_cloud), sizeof(maq_point_cloud));
-    if (cloud->count > 0) require_argument(cloud->xyz, "cloud.xyz");
-    if (cloud->count > kMaxPoints) {
-      throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", cloud->count, " points, over the limit of ", kMaxPoints,
-                  "; make it thinner.");
+    if (cloud->point_count > 0) require_argument(cloud->xyz, "cloud.xyz");
+    if (cloud->point_count > kMaxPoints) {
+      throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", cloud->point_count, " points, over the limit of ",
+                  kMaxPoints, "; make it thinner.");
     }
     const maq_scene_build_config config =
         read_config(given, "config", default_config(), sizeof(maq_scene_build_config));
@@ -147,8 +147,8 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     auto networks = open_scene_networks(context, settings.bundle_path.c_str(), settings.options.fitting.threads, true);
     PointCloud points;
     std::copy_n(cloud->origin, 3, points.origin.begin());
-    points.reserve(cloud->count, false);
-    for (uint64_t i = 0; i < cloud->count; ++i) {
+    points.reserve(cloud->point_count, false);
+    for (uint64_t i = 0; i < cloud->point_count; ++i) {
       points.x.push_back(cloud->xyz[3 * i]);
       points.y.push_back(cloud->xyz[3 * i + 1]);
       points.z.push_back(cloud->xyz[3 * i + 2]);
@@ -161,13 +161,13 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
 
 void maq_scene_builder_destroy(maq_scene_builder* builder) { delete builder; }
 
-maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo, const maq_camera* camera,
-                                      uint64_t* seen_points) {
+maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
+                                      const maq_pinhole_camera* camera, uint64_t* seen_points) {
   return guarded(builder, __func__, [&] {
     require_argument(builder, "builder");
     require_argument(photo, "photo");
     require_argument(camera, "camera");
-    require_struct_size("camera", camera->struct_size, sizeof(maq_camera), sizeof(maq_camera));
+    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
     check_camera(pinhole_of(*camera), "The photo's camera");
     check_distortion(*camera);
     const std::optional<size_t> seen =

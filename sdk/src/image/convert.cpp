@@ -1,69 +1,189 @@
 #include "image/convert.h"
 
-#include <opencv2/imgproc.hpp>
+#include <algorithm>
+#include <cstring>
 
 #include "core/error.h"
-#include "image/opencv_view.h"
+#include "core/simd_clones.h"
 
 namespace maq {
 namespace {
 
-cv::Mat plane_as_mat(const ImageView& image, int plane, int rows, int cols, int type) {
-  const PlaneView& view = image.planes[plane];
-  return cv::Mat(rows, cols, type, const_cast<uint8_t*>(view.data), view.stride_bytes);
-}
+// --- YUV: BT.601 in video range, coefficients of 20 fractional bits ----------------------------------------------------
 
-// A picture of three channels in memory that is kept.
-cv::Mat picture_in(std::vector<uint8_t>& memory, int rows, int cols) {
-  memory.resize(size_t(rows) * size_t(cols) * 3);
-  return cv::Mat(rows, cols, CV_8UC3, memory.data());
-}
+constexpr int kYuvBits = 20;
+constexpr int kLuma = 1220542;      // 1.164
+constexpr int kRedOfV = 1673527;    // 1.596
+constexpr int kGreenOfV = -852492;  // -0.813
+constexpr int kGreenOfU = -409993;  // -0.391
+constexpr int kBlueOfU = 2116026;   // 2.018
 
-// OpenCV wants even sizes for subsampled colour. The last row and column are repeated to get there and cut off after.
-cv::Mat nv12_to_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
-  const int width = image.width_px;
-  const int height = image.height_px;
-  const int even_width = (width + 1) / 2 * 2;
-  const int even_height = (height + 1) / 2 * 2;
-  cv::Mat luma = plane_as_mat(image, 0, height, width, CV_8UC1);
-  if (even_width != width || even_height != height) {
-    cv::Mat padded;
-    cv::copyMakeBorder(luma, padded, 0, even_height - height, 0, even_width - width, cv::BORDER_REPLICATE);
-    luma = padded;
+constexpr int kBlockPx = 128;  // even; the work of a block stays in the first cache
+
+// What the chroma of a block adds to each of its pixels, with the half that rounds.
+struct ChromaTerms {
+  int blue[kBlockPx], green[kBlockPx], red[kBlockPx];
+};
+
+// `chroma`: U, V of each pair of pixels.
+inline void make_chroma_terms(const uint8_t* chroma, int pairs, ChromaTerms& terms) {
+  constexpr int kHalf = 1 << (kYuvBits - 1);
+  for (int i = 0; i < pairs; ++i) {
+    const int u = chroma[2 * i] - 128, v = chroma[2 * i + 1] - 128;
+    terms.blue[2 * i] = terms.blue[2 * i + 1] = kHalf + kBlueOfU * u;
+    terms.green[2 * i] = terms.green[2 * i + 1] = kHalf + kGreenOfV * v + kGreenOfU * u;
+    terms.red[2 * i] = terms.red[2 * i + 1] = kHalf + kRedOfV * v;
   }
-  const cv::Mat chroma = plane_as_mat(image, 1, even_height / 2, even_width / 2, CV_8UC2);
-  cv::Mat bgr = picture_in(memory, even_height, even_width);
-  cv::cvtColorTwoPlane(luma, chroma, bgr, cv::COLOR_YUV2BGR_NV12);
-  return bgr(cv::Rect(0, 0, width, height));
 }
 
-cv::Mat yuyv_to_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
-  const int even_width = (image.width_px + 1) / 2 * 2;
-  const cv::Mat yuyv = plane_as_mat(image, 0, image.height_px, even_width, CV_8UC2);
-  cv::Mat bgr = picture_in(memory, image.height_px, even_width);
-  cv::cvtColor(yuyv, bgr, cv::COLOR_YUV2BGR_YUYV);
-  return bgr(cv::Rect(0, 0, image.width_px, image.height_px));
+inline uint8_t yuv_to_byte(int sum) { return uint8_t(std::clamp(sum >> kYuvBits, 0, 255)); }
+
+inline void add_luma(const uint8_t* luma, int count, const ChromaTerms& terms, uint8_t* bgr) {
+  uint8_t blue[kBlockPx], green[kBlockPx], red[kBlockPx];
+  for (int i = 0; i < count; ++i) {
+    const int y = std::max(luma[i] - 16, 0) * kLuma;
+    blue[i] = yuv_to_byte(y + terms.blue[i]);
+    green[i] = yuv_to_byte(y + terms.green[i]);
+    red[i] = yuv_to_byte(y + terms.red[i]);
+  }
+  for (int i = 0; i < count; ++i) {
+    bgr[3 * i] = blue[i];
+    bgr[3 * i + 1] = green[i];
+    bgr[3 * i + 2] = red[i];
+  }
 }
 
-cv::Mat converted(const ImageView& image, int type, int code, std::vector<uint8_t>& memory) {
-  cv::Mat bgr = picture_in(memory, image.height_px, image.width_px);
-  cv::cvtColor(plane_as_mat(image, 0, image.height_px, image.width_px, type), bgr, code);
-  return bgr;
+// One or two rows of pixels that share a row of chroma.
+MAQ_SIMD_CLONES void yuv_rows_to_bgr(const uint8_t* const* luma_rows, const uint8_t* chroma, int rows, int width,
+                                     uint8_t* bgr, size_t bgr_stride) {
+  for (int x = 0; x < width; x += kBlockPx) {
+    const int count = std::min(kBlockPx, width - x);
+    ChromaTerms terms;
+    make_chroma_terms(chroma + x, (count + 1) / 2, terms);
+    for (int row = 0; row < rows; ++row) {
+      add_luma(luma_rows[row] + x, count, terms, bgr + size_t(row) * bgr_stride + 3 * size_t(x));
+    }
+  }
+}
+
+void yuyv_row_to_bgr(const uint8_t* yuyv, int width, uint8_t* bgr) {
+  uint8_t luma[kBlockPx], chroma[kBlockPx];
+  for (int x = 0; x < width; x += kBlockPx, yuyv += 2 * kBlockPx, bgr += 3 * kBlockPx) {
+    const int count = std::min(kBlockPx, width - x);
+    for (int i = 0; i < (count + 1) / 2 * 2; ++i) {
+      luma[i] = yuyv[2 * i];
+      chroma[i] = yuyv[2 * i + 1];
+    }
+    const uint8_t* const luma_rows[] = {luma};
+    yuv_rows_to_bgr(luma_rows, chroma, 1, count, bgr, 0);
+  }
+}
+
+void nv12_to_bgr(const ImageView& image, uint8_t* bgr) {
+  const size_t bgr_stride = size_t(image.width_px) * 3;
+  for (int y = 0; y < image.height_px; y += 2) {
+    const uint8_t* const luma = image.planes[0].data + size_t(y) * image.planes[0].stride_bytes;
+    const uint8_t* const luma_rows[] = {luma, luma + image.planes[0].stride_bytes};
+    yuv_rows_to_bgr(luma_rows, image.planes[1].data + size_t(y / 2) * image.planes[1].stride_bytes,
+                    std::min(2, image.height_px - y), image.width_px, bgr + size_t(y) * bgr_stride, bgr_stride);
+  }
+}
+
+// --- packed formats, row by row ---------------------------------------------------------------------------------------
+
+// RGB to BGR and back.
+MAQ_SIMD_CLONES void swap_red_and_blue(const uint8_t* from, int width, uint8_t* to) {
+  for (int i = 0; i < width; ++i) {
+    to[3 * i] = from[3 * i + 2];
+    to[3 * i + 1] = from[3 * i + 1];
+    to[3 * i + 2] = from[3 * i];
+  }
+}
+
+MAQ_SIMD_CLONES void rgba_to_bgr(const uint8_t* rgba, int width, uint8_t* bgr) {
+  for (int i = 0; i < width; ++i) {
+    bgr[3 * i] = rgba[4 * i + 2];
+    bgr[3 * i + 1] = rgba[4 * i + 1];
+    bgr[3 * i + 2] = rgba[4 * i];
+  }
+}
+
+// Four bytes at once: compilers make no good vectors of pixels that grow.
+void bgr_to_rgba(const uint8_t* bgr, int width, uint8_t* rgba) {
+  const auto put = [&](uint32_t blue_first) {
+    const uint32_t red_first = __builtin_bswap32(blue_first) >> 8 | 0xff000000;
+    std::memcpy(rgba, &red_first, 4);
+  };
+  uint32_t pixel = 0;
+  for (int i = 0; i + 1 < width; ++i, bgr += 3, rgba += 4) {
+    std::memcpy(&pixel, bgr, 4);  // and a byte of the next one
+    put(pixel);
+  }
+  std::memcpy(&pixel, bgr, 3);
+  put(pixel);
+}
+
+MAQ_SIMD_CLONES void grey_to_bgr(const uint8_t* grey, int width, uint8_t* bgr) {
+  for (int i = 0; i < width; ++i) bgr[3 * i] = bgr[3 * i + 1] = bgr[3 * i + 2] = grey[i];
+}
+
+// BT.601's weights, of 15 fractional bits.
+MAQ_SIMD_CLONES void bgr_to_grey(const uint8_t* bgr, int width, uint8_t* grey) {
+  for (int i = 0; i < width; ++i) {
+    grey[i] = uint8_t((bgr[3 * i] * 3735 + bgr[3 * i + 1] * 19235 + bgr[3 * i + 2] * 9798 + (1 << 14)) >> 15);
+  }
+}
+
+void copy_bgr(const uint8_t* from, int width, uint8_t* to) { std::memcpy(to, from, 3 * size_t(width)); }
+
+using ConvertRow = void (*)(const uint8_t* from, int width, uint8_t* to);
+
+void convert_rows(const ImageView& image, ConvertRow convert, uint8_t* to, size_t to_stride) {
+  for (int y = 0; y < image.height_px; ++y) {
+    convert(image.planes[0].data + size_t(y) * image.planes[0].stride_bytes, image.width_px,
+            to + size_t(y) * to_stride);
+  }
+}
+
+// From a format other than BGR8; null for those that are no rows of pixels in colour.
+ConvertRow row_to_bgr(maq_pixel_format format) {
+  switch (format) {
+    case MAQ_PIXEL_RGB8: return swap_red_and_blue;
+    case MAQ_PIXEL_RGBA8: return rgba_to_bgr;
+    case MAQ_PIXEL_GREY8: return grey_to_bgr;
+    case MAQ_PIXEL_YUYV: return yuyv_row_to_bgr;
+    default: return nullptr;
+  }
+}
+
+ConvertRow row_from_bgr(maq_pixel_format format) {
+  switch (format) {
+    case MAQ_PIXEL_RGB8: return swap_red_and_blue;
+    case MAQ_PIXEL_RGBA8: return bgr_to_rgba;
+    case MAQ_PIXEL_GREY8: return bgr_to_grey;
+    default: return copy_bgr;
+  }
 }
 
 }  // namespace
 
-cv::Mat as_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
-  switch (image.format) {
-    case MAQ_PIXEL_BGR8: return plane_as_mat(image, 0, image.height_px, image.width_px, CV_8UC3);
-    case MAQ_PIXEL_RGB8: return converted(image, CV_8UC3, cv::COLOR_RGB2BGR, memory);
-    case MAQ_PIXEL_RGBA8: return converted(image, CV_8UC4, cv::COLOR_RGBA2BGR, memory);
-    case MAQ_PIXEL_GREY8: return converted(image, CV_8UC1, cv::COLOR_GRAY2BGR, memory);
-    case MAQ_PIXEL_NV12: return nv12_to_bgr(image, memory);
-    case MAQ_PIXEL_YUYV: return yuyv_to_bgr(image, memory);
-    case MAQ_PIXEL_DEPTH16: throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours; give the picture.");
+ImageView as_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
+  if (image.format == MAQ_PIXEL_BGR8) return image;
+  const ConvertRow convert = row_to_bgr(image.format);
+  if (convert == nullptr && image.format != MAQ_PIXEL_NV12) {
+    if (image.format == MAQ_PIXEL_DEPTH16) {
+      throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours; give the picture.");
+    }
+    throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(image.format), " is not known.");
   }
-  throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(image.format), " is not known.");
+  const size_t stride = size_t(image.width_px) * 3;
+  memory.resize(stride * size_t(image.height_px));
+  if (convert == nullptr) {
+    nv12_to_bgr(image, memory.data());
+  } else {
+    convert_rows(image, convert, memory.data(), stride);
+  }
+  return {MAQ_PIXEL_BGR8, image.width_px, image.height_px, {{memory.data(), stride}, {}}};
 }
 
 void copy_pixels(const ImageView& image, maq_pixel_format format, uint8_t* pixels, size_t stride_bytes,
@@ -85,23 +205,7 @@ void copy_pixels(const ImageView& image, maq_pixel_format format, uint8_t* pixel
                 image.height_px, " pixels in ", pixel_format_name(format), " take ", needed, " bytes.");
   }
   std::vector<uint8_t> memory;
-  const cv::Mat bgr = as_bgr(image, memory);
-  const int channels = int(shortest / size_t(image.width_px));
-  cv::Mat target(image.height_px, image.width_px, CV_8UC(channels), pixels, stride);
-  switch (format) {
-    case MAQ_PIXEL_RGB8: cv::cvtColor(bgr, target, cv::COLOR_BGR2RGB); break;
-    case MAQ_PIXEL_RGBA8: cv::cvtColor(bgr, target, cv::COLOR_BGR2RGBA); break;
-    case MAQ_PIXEL_GREY8: cv::cvtColor(bgr, target, cv::COLOR_BGR2GRAY); break;
-    default: bgr.copyTo(target); break;
-  }
-}
-
-void resize_to_bgr(const ImageView& from, int width_px, int height_px, Frame& to) {
-  std::vector<uint8_t> memory;
-  const cv::Mat bgr = as_bgr(from, memory);
-  cv::Mat target(height_px, width_px, CV_8UC3, to.allocate_bgr(width_px, height_px));
-  const bool shrinks = width_px <= from.width_px && height_px <= from.height_px;
-  cv::resize(bgr, target, target.size(), 0, 0, shrinks ? cv::INTER_AREA : cv::INTER_LINEAR);
+  convert_rows(as_bgr(image, memory), row_from_bgr(format), pixels, stride);
 }
 
 }  // namespace maq

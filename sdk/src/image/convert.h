@@ -1,19 +1,22 @@
-// Between pixel formats and sizes.
+// Between pixel formats.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "core/frame.h"
 
 namespace maq {
 
+// The image as BGR8: of the same memory when it is BGR8 already, otherwise a converted copy in `memory`, which the caller
+// keeps so that the next image takes nothing from the heap. YUV is that of BT.601 in video range, in the fixed-point
+// arithmetic of OpenCV's cvtColor. Throws MAQ_ERROR_UNSUPPORTED for a depth image.
+ImageView as_bgr(const ImageView& image, std::vector<uint8_t>& memory);
+
 // Writes the image to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8); `stride_bytes` 0 means rows without padding.
-// Throws MAQ_ERROR_UNSUPPORTED for other formats, MAQ_ERROR_INVALID_ARGUMENT when `size_bytes` is too little.
+// Throws MAQ_ERROR_UNSUPPORTED for other formats, MAQ_ERROR_INVALID_ARGUMENT when `size_bytes` is too small.
 void copy_pixels(const ImageView& image, maq_pixel_format format, uint8_t* pixels, size_t stride_bytes,
                  size_t size_bytes);
-
-// Scales the image of `from` into `to`, as BGR: area averages when shrinking both ways, bilinear otherwise.
-void resize_to_bgr(const ImageView& from, int width_px, int height_px, Frame& to);
 
 }  // namespace maq

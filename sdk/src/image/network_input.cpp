@@ -5,7 +5,7 @@
 
 #include "core/rounding.h"
 #include "core/simd_clones.h"
-#include "image/opencv_view.h"
+#include "image/convert.h"
 
 namespace maq {
 namespace {
@@ -61,7 +61,7 @@ void make_network_input(const ImageView& image, const NetworkInputSpec& spec, Ne
   input.padded_width_px = round_up(input.width_px, spec.multiple_of);
   input.padded_height_px = round_up(input.height_px, spec.multiple_of);
 
-  const cv::Mat bgr = as_bgr(image, input.converted);
+  const ImageView bgr = as_bgr(image, input.converted);
   const bool shrinks = spec.long_side_px < std::max(image.width_px, image.height_px);
   input.across.prepare(image.width_px, input.width_px, shrinks);
   input.down.prepare(image.height_px, input.height_px, shrinks);
@@ -83,9 +83,9 @@ void make_network_input(const ImageView& image, const NetworkInputSpec& spec, Ne
     const int used = y < input.height_px ? input.width_px : 0;
     for (float* line : {red, green, blue}) std::fill(line + used, line + input.padded_width_px, 0.0f);
     if (used == 0) continue;
-    weighted_lines(bgr.ptr<uint8_t>(input.down.first[size_t(y)]), bgr.step,
-                   input.down.weight.data() + size_t(y) * size_t(input.down.taps), input.down.taps, row_values,
-                   input.row.data());
+    weighted_lines(bgr.planes[0].data + size_t(input.down.first[size_t(y)]) * bgr.planes[0].stride_bytes,
+                   bgr.planes[0].stride_bytes, input.down.weight.data() + size_t(y) * size_t(input.down.taps),
+                   input.down.taps, row_values, input.row.data());
     const float* weight = input.across.weight.data();
     for (int x = 0; x < used; ++x, weight += taps) {
       const float* pixel = input.row.data() + kChannels * input.across.first[size_t(x)];

@@ -3,9 +3,9 @@
 #include <webp/decode.h>
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "image/geometry/resize.h"
 
 namespace maq {
 
@@ -24,20 +24,26 @@ BgraImage decode_webp(const uint8_t* bytes, size_t size_bytes, const std::string
 
 BgraImage cut_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
                      bool mirrored) {
-  const cv::Mat whole(sheet.height_px, sheet.width_px, CV_8UC4, const_cast<uint8_t*>(sheet.pixels.data()));
-  cv::Mat tile = whole(cv::Rect(x, y, width, height)).clone();
   // Multiplied before scaling: otherwise the colour of transparent pixels bleeds into the edges.
-  for (int row = 0; row < tile.rows; ++row) {
-    for (int col = 0; col < tile.cols; ++col) {
-      auto& pixel = tile.at<cv::Vec4b>(row, col);
-      for (int c = 0; c < 3; ++c) pixel[c] = uint8_t((pixel[c] * pixel[3] + 127) / 255);
+  std::vector<uint8_t> tile;
+  tile.reserve(size_t(width) * size_t(height) * 4);
+  for (int row = y; row < y + height; ++row) {
+    const uint8_t* pixel = sheet.pixels.data() + (size_t(row) * size_t(sheet.width_px) + size_t(x)) * 4;
+    for (int col = 0; col < width; ++col, pixel += 4) {
+      for (int c = 0; c < 3; ++c) tile.push_back(uint8_t((pixel[c] * pixel[3] + 127) / 255));
+      tile.push_back(pixel[3]);
     }
   }
-  BgraImage sprite{to_width, to_height, std::vector<uint8_t>(size_t(to_width) * size_t(to_height) * 4)};
-  cv::Mat target(to_height, to_width, CV_8UC4, sprite.pixels.data());
-  const bool shrinks = to_width <= width && to_height <= height;
-  cv::resize(tile, target, target.size(), 0, 0, shrinks ? cv::INTER_AREA : cv::INTER_LINEAR);
-  if (mirrored) cv::flip(target, target, 1);
+  const size_t stride = size_t(to_width) * 4;
+  BgraImage sprite{to_width, to_height, std::vector<uint8_t>(stride * size_t(to_height))};
+  resize({tile.data(), size_t(width) * 4, width, height, 4}, {sprite.pixels.data(), stride, to_width, to_height, 4});
+  if (!mirrored) return sprite;
+  for (int row = 0; row < to_height; ++row) {
+    uint8_t* const pixels = sprite.pixels.data() + size_t(row) * stride;
+    for (int left = 0, right = to_width - 1; left < right; ++left, --right) {
+      std::swap_ranges(pixels + 4 * left, pixels + 4 * left + 4, pixels + 4 * right);
+    }
+  }
   return sprite;
 }
 

@@ -1,5 +1,5 @@
-// A camera without lens distortion, in the convention of OpenCV: x to the right, y down, z forward; the centre of the top
-// left pixel is (0, 0).
+// A camera without lens distortion, in the convention of OpenCV: x to the right, y down, z forward; the centre of the
+// top left pixel is (0, 0).
 #pragma once
 
 #include <array>

@@ -3,13 +3,13 @@
 #include "core/error.h"
 #include "sources/control_options.h"
 #include "sources/depthai/depthai_source.h"
-#include "sources/synthetic/fault_injection.h"
 #include "sources/files/file_kind.h"
 #include "sources/files/file_sources.h"
 #include "sources/libcamera/module_client.h"
 #include "sources/live_source.h"
-#include "sources/synthetic/replay_camera.h"
 #include "sources/source.h"
+#include "sources/synthetic/fault_injection.h"
+#include "sources/synthetic/replay_camera.h"
 #include "sources/synthetic/stub_sources.h"
 #include "sources/uri.h"
 #include "sources/v4l2/v4l2_camera.h"
@@ -65,34 +65,61 @@ const Entry kEntries[] = {
      false},
 };
 
-// Of a source that is played as if it were a camera.
-CameraOpener played(const Entry& entry, SourceUri uri, const Log& log, int buffers) {
-  PlayOptions play;
-  play.buffers = buffers;
-  play.speed = uri.take_number("speed", 1, 0.01, 100);
-  play.loop = uri.take_integer("loop", 0, 0, 1) == 1;
+// Opens a source that is not a camera; pictures larger than the settings want are made smaller, which is kept in `uri`.
+std::unique_ptr<Source> open_within(const Entry& entry, SourceUri& uri, const SourceSettings& settings) {
+  std::unique_ptr<Source> source = entry.open(uri, settings.log);
+  const SourceInfo& info = source->info();
+  const int side_px = std::max(info.width_px, info.height_px);
+  if (settings.max_side_px == 0 || side_px <= settings.max_side_px) return source;
+  const double scale = double(settings.max_side_px) / side_px;
+  uri.width_px = std::max(1, int(info.width_px * scale));
+  uri.height_px = std::max(1, int(info.height_px * scale));
+  source.reset();
+  return entry.open(uri, settings.log);
+}
+
+// Of a source that is played as if it were a camera. `opened`: that source, which is played first, or null.
+CameraOpener played(const Entry& entry, SourceUri uri, std::unique_ptr<Source> opened, const PlayOptions& play,
+                    const Log& log) {
   std::string name = uri.scheme + ":" + uri.target;
-  return played_as_camera([&entry, uri = std::move(uri), log] { return entry.open(uri, log); }, std::move(name), play);
+  const auto first = std::make_shared<std::unique_ptr<Source>>(std::move(opened));
+  return played_as_camera([&entry, uri = std::move(uri), log,
+                           first] { return *first != nullptr ? std::move(*first) : entry.open(uri, log); },
+                          std::move(name), play);
+}
+
+// Faults happen in time, so that a file or a stub with faults runs as a camera does.
+bool takes_live(SourceUri& uri, const SourceSettings& settings, bool has_faults) {
+  const bool is_asked = uri.options.count("live") > 0;
+  const bool is_live = uri.take_integer("live", has_faults || settings.real_time ? 1 : 0, 0, 1) == 1;
+  if (is_asked && !is_live && has_faults) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "live=0 in ", uri.text, " does not go with ", kFaultOptions, ".");
+  }
+  return is_live;
 }
 
 std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
   const FaultPlan faults = take_faults(uri);
-  const bool is_camera = entry.camera != nullptr;
-  std::vector<ControlSetting> controls;
-  if (is_camera) controls = take_control_options(uri);
-  // Faults happen in time, so that a file or a stub with faults runs as a camera does.
-  if (!is_camera && uri.take_integer("live", faults.is_empty() ? 0 : 1, 0, 1) == 0) {
-    if (!faults.is_empty()) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "live=0 in ", uri.text, " does not go with ", kFaultOptions, ".");
-    }
-    return entry.open(std::move(uri), settings.log);
-  }
-  const bool is_path = is_camera && uri.target.rfind("/", 0) == 0;
+  const bool is_path = entry.camera != nullptr && uri.target.rfind("/", 0) == 0;
   const std::string name = is_path ? uri.target : uri.scheme + ":" + uri.target;
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
-  CameraOpener opener = is_camera ? entry.camera(std::move(uri), buffers, settings.log)
-                                  : played(entry, std::move(uri), settings.log, buffers);
+  std::vector<ControlSetting> controls;
+  CameraOpener opener;
+  if (entry.camera != nullptr) {
+    controls = take_control_options(uri);
+    opener = entry.camera(std::move(uri), buffers, settings.log);
+  } else {
+    const bool must_be_live = !faults.is_empty() || uri.options.count("live") > 0;
+    if (!takes_live(uri, settings, !faults.is_empty())) return open_within(entry, uri, settings);
+    PlayOptions play;
+    play.buffers = buffers;
+    play.speed = uri.take_number("speed", 1, 0.01, 100);
+    play.loop = uri.take_integer("loop", settings.loop ? 1 : 0, 0, 1) == 1;
+    std::unique_ptr<Source> opened = open_within(entry, uri, settings);
+    if (!must_be_live && opened->info().fps <= 0) return opened;  // a photo has no pace
+    opener = played(entry, std::move(uri), std::move(opened), play, settings.log);
+  }
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
   return std::make_unique<LiveSource>(std::move(opener), name, settings, controls);
 }

@@ -31,7 +31,7 @@ class Source {
   // Frames that were lost so far, on their way or because nobody took them.
   virtual uint64_t drops() const { return 0; }
   // Null when the source does not know.
-  virtual const maq_calibration* calibration() const { return nullptr; }
+  virtual const maq_intrinsics* calibration() const { return nullptr; }
   // As those of a camera; every other source throws MAQ_ERROR_UNSUPPORTED.
   virtual maq_control_info control(maq_control which);
   virtual void set_control(maq_control which, double value);
@@ -43,12 +43,15 @@ class Source {
   virtual NextFrame next(int64_t timeout_ns, Frame& frame) = 0;
 };
 
-// Of maq_source_config, whose comments say what they mean. Cameras heed them.
+// Of maq_source_config, whose comments say what they mean.
 struct SourceSettings {
   int pool_size = 4;
   int queue_length = 1;
   int stall_ms = 2000;
   int reconnect_ms = 30000;
+  bool real_time = false;
+  bool loop = false;
+  int max_side_px = 0;
   maq_source_state_callback on_state = nullptr;
   void* user_data = nullptr;
   Log log;

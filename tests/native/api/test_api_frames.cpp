@@ -40,12 +40,12 @@ TEST(ApiFrames, CallTheAppBackOnceWhenReleased) {
   const auto count = [](void* user_data) { ++*static_cast<int*>(user_data); };
   maq_frame_desc desc = desc_of(pixels, 10, 10);
   maq_frame* frame = nullptr;
-  ASSERT_EQ(maq_frame_create(context.get(), &desc, count, &freed, &frame), MAQ_OK);
+  ASSERT_EQ(maq_frame_wrap(context.get(), &desc, count, &freed, &frame), MAQ_OK);
   EXPECT_EQ(freed, 0);
   maq_frame_release(frame);
   EXPECT_EQ(freed, 1);
   desc.width_px = 0;
-  EXPECT_EQ(maq_frame_create(context.get(), &desc, count, &freed, &frame), MAQ_ERROR_IMAGE_SIZE);
+  EXPECT_EQ(maq_frame_wrap(context.get(), &desc, count, &freed, &frame), MAQ_ERROR_IMAGE_SIZE);
   EXPECT_EQ(freed, 1) << "a frame that was not made is not freed";
 }
 
@@ -71,7 +71,7 @@ TEST(ApiFrames, WrongDescriptionsAreStatusesOfTheContext) {
       maquette::Frame(context, desc);
       return MAQ_OK;
     } catch (const maquette::Error& error) {
-      EXPECT_STREQ(error.what(), maq_last_error(context.get()));
+      EXPECT_STREQ(error.what(), maq_get_last_error(context.get()));
       return error.status();
     }
   };

@@ -86,7 +86,7 @@ TEST(DensePoseMesh, AChartOfNothingHasNoTriangles) {
 TEST(DensePoseMesh, TheShippedBodyIsWholeAndStandsUpright) {
   const maquette::Context context;
   const maquette::DensePose densepose(context, MAQ_TEST_MODELS "/densepose-b-int8");
-  const maq_surface surface = *densepose.surface();
+  const maq_densepose_surface surface = *densepose.surface();
   const size_t count = size_t(24 * surface.nodes * surface.nodes * 3);
   const maquette::BodyMesh mesh({surface.points_m, surface.points_m + count}, surface.nodes);
   float low = 10, high = -10;

@@ -98,7 +98,7 @@ TEST(LiveDensePose, APhotoIsMappedAgainWithOtherSettings) {
   ASSERT_TRUE(people.until_ended());
   ASSERT_EQ(people.frames(), 1u);
   maq_densepose_config config = Live::config_of(kTinyBundle);
-  config.detail = MAQ_DETAIL_PART;
+  config.detail = MAQ_DENSEPOSE_DETAIL_PART;
   people.live.set(config);
   ASSERT_TRUE(people.until([&] { return people.frames() == 2; }));
 }

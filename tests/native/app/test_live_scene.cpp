@@ -67,8 +67,8 @@ const std::string& small_room() {
     const maquette::Context context;
     maq_scene_build_config config = maquette::default_scene_build_config();
     config.bundle_path = kBundle.c_str();
-    config.most_views = 3;
-    config.most_points = 20000;
+    config.max_views = 3;
+    config.max_points = 20000;
     const std::string file = folder.file("room.maqs");
     maquette::Scene(context, config, maquette::Capture(context, kRoom)).save(file);
     return file;
@@ -77,14 +77,15 @@ const std::string& small_room() {
 }
 
 // From inside of the room, a small picture.
-maq_camera small_camera(const maquette::LiveScene& scene) {
+maq_pinhole_camera small_camera(const maquette::LiveScene& scene) {
   maquette::FlyCamera fly(scene.state()->info, {});
   fly.move(0, 0, 1, 1, 0.7);
   return fly.camera(160, 120);
 }
 
 // A picture that comes after this call.
-const maquette::LiveScenePicture* look_at(maquette::LiveScene& scene, const maq_camera& camera, int photo_index = -1) {
+const maquette::LiveScenePicture* look_at(maquette::LiveScene& scene, const maq_pinhole_camera& camera,
+                                          int photo_index = -1) {
   scene.look(camera, photo_index);
   return wait_until([&] { return scene.shown().take(); }) ? &scene.shown().front() : nullptr;
 }
@@ -157,7 +158,7 @@ TEST(LiveScene, ShowsTheErrorInColoursAndItsPsnr) {
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room(), kRoom);
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
-  const maq_camera camera = scene.state()->photos[12];
+  const maq_pinhole_camera camera = scene.state()->photos[12];
   const maquette::LiveScenePicture* const shown = look_at(scene, camera, 12);
   ASSERT_NE(shown, nullptr);
   for (const maquette::Picture* picture : {&shown->rendering, &shown->photo, &shown->error}) {
@@ -193,12 +194,12 @@ TEST(LiveScene, APhotoIsBroughtToThePicturesSize) {
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room(), kRoom);
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
-  const maq_camera own = scene.state()->photos[3];
+  const maq_pinhole_camera own = scene.state()->photos[3];
   const maquette::LiveScenePicture* shown = look_at(scene, own, 3);
   ASSERT_NE(shown, nullptr);
   const maquette::Picture photo = shown->photo;
   for (const int share : {2, 3, 5}) {
-    maq_camera camera = own;
+    maq_pinhole_camera camera = own;
     camera.width_px /= share, camera.height_px /= share;
     const int width = camera.width_px;
     shown = look_at(scene, camera, 3);
@@ -226,12 +227,12 @@ TEST(LiveScene, LargePicturesAreMadeSmallerAndShowTheSame) {
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
-  maq_camera camera = small_camera(scene);
+  maq_pinhole_camera camera = small_camera(scene);
   for (const auto& [width, height, shown_width, shown_height] : {std::array<int, 4>{1280, 960, 1280, 960},
                                                                  {4000, 3000, 1280, 960},
                                                                  {2560, 800, 1280, 400},
                                                                  {500, 1920, 250, 960}}) {
-    const maq_camera large = maquette::FlyCamera(scene.state()->info, {camera}).camera(width, height);
+    const maq_pinhole_camera large = maquette::FlyCamera(scene.state()->info, {camera}).camera(width, height);
     const maquette::LiveScenePicture* const shown = look_at(scene, large);
     ASSERT_NE(shown, nullptr);
     EXPECT_EQ(shown->rendering.width_px, shown_width);
@@ -250,7 +251,7 @@ TEST(LiveScene, RendersOncePerLookAndTheLatestWins) {
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene)) << scene.state()->text;
-  maq_camera camera = small_camera(scene);
+  maq_pinhole_camera camera = small_camera(scene);
   const maquette::LiveScenePicture* shown = look_at(scene, camera);
   ASSERT_NE(shown, nullptr);
   EXPECT_EQ(shown->number, 1u);
@@ -269,7 +270,7 @@ TEST(LiveScene, ALookBeforeTheSceneIsThereWaitsForIt) {
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
-  const maq_camera camera = small_camera(scene);
+  const maq_pinhole_camera camera = small_camera(scene);
   scene.open(small_room());
   ASSERT_NE(look_at(scene, camera), nullptr);
   EXPECT_EQ(scene.state()->what, maquette::LiveSceneState::kReady);
@@ -304,9 +305,9 @@ TEST(LiveScene, ACameraThatIsNoneIsSaidAndForgotten) {
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
-  const maq_camera good = small_camera(scene);
+  const maq_pinhole_camera good = small_camera(scene);
   const auto expect_refused = [&](auto change) {
-    maq_camera camera = good;
+    maq_pinhole_camera camera = good;
     change(camera);
     scene.look(camera, -1);
     EXPECT_TRUE(wait_until([&] { return !scene.state()->text.empty(); }));
@@ -316,11 +317,11 @@ TEST(LiveScene, ACameraThatIsNoneIsSaidAndForgotten) {
     ASSERT_NE(look_at(scene, good), nullptr);
     EXPECT_EQ(scene.state()->text, "");
   };
-  expect_refused([](maq_camera& camera) { camera.rotation[0] = NAN; });
-  expect_refused([](maq_camera& camera) { camera.fx_px = 0; });
-  expect_refused([](maq_camera& camera) { camera.width_px = 0; });
-  expect_refused([](maq_camera& camera) { camera.height_px = -2000000000; });
-  expect_refused([](maq_camera& camera) { camera.struct_size = 3; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.rotation[0] = NAN; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.fx_px = 0; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.width_px = 0; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.height_px = -2000000000; });
+  expect_refused([](maq_pinhole_camera& camera) { camera.struct_size = 3; });
 }
 
 TEST(LiveScene, WithoutItsCaptureASceneFileIsShownAllTheSame) {
@@ -380,7 +381,7 @@ TEST(LiveScene, WhatCannotBeOpenedIsASentence) {
     const std::string text = failure_of(scene, folder.file(name));
     EXPECT_NE(text.find(name), std::string::npos) << text;
   }
-  scene.look(maq_camera{}, -1);
+  scene.look(maq_pinhole_camera{}, -1);
   expect_no_picture(scene);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene)) << "after all of this: " << scene.state()->text;
@@ -404,7 +405,7 @@ TEST(LiveScene, CloseForgetsTheSceneAndItsPictures) {
   maquette::LiveScene scene(context, kBundle, 2);
   scene.open(small_room());
   ASSERT_TRUE(wait_until_open(scene));
-  const maq_camera camera = small_camera(scene);
+  const maq_pinhole_camera camera = small_camera(scene);
   scene.look(camera, -1);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it waits to be taken, or comes just now
   scene.close();

@@ -3,10 +3,11 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <opencv2/imgproc.hpp>
 
 #include "core/frame.h"
-#include "support/expect_error.h"
 #include "image/convert.h"
+#include "support/expect_error.h"
 
 namespace {
 
@@ -126,6 +127,108 @@ TEST(FrameFormats, DescriptionsAreCheckedPlaneByPlane) {
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[1] is 5", [&] { maq::checked_image_view(desc); });
   desc.format = maq_pixel_format(0);
   expect_error(MAQ_ERROR_UNSUPPORTED, "Pixel format 0", [&] { maq::checked_image_view(desc); });
+}
+
+// A picture of noise in any format, rows of odd padding.
+class Noise {
+ public:
+  Noise(maq_pixel_format format, int width, int height, int seed) {
+    view_ = {format, width, height, {}};
+    cv::RNG random(uint64_t(seed) + 1);
+    for (int plane = 0; plane < maq::plane_count(format); ++plane) {
+      const size_t stride = maq::row_bytes(format, plane, width) + size_t(seed % 3) * 7;
+      planes_[plane] = cv::Mat(maq::plane_rows(format, plane, height), int(stride), CV_8UC1);
+      random.fill(planes_[plane], cv::RNG::UNIFORM, 0, 256);
+      view_.planes[plane] = {planes_[plane].data, stride};
+    }
+  }
+
+  const ImageView& view() const { return view_; }
+  cv::Mat mat(int plane, int cols, int type) const {
+    return cv::Mat(planes_[plane].rows, cols, type, planes_[plane].data, planes_[plane].step);
+  }
+
+ private:
+  ImageView view_;
+  cv::Mat planes_[2];
+};
+
+// OpenCV wants even sizes for subsampled colour: the last row and column are repeated.
+cv::Mat by_opencv(const Noise& image) {
+  const int width = image.view().width_px, height = image.view().height_px;
+  const int even_width = (width + 1) / 2 * 2, even_height = (height + 1) / 2 * 2;
+  cv::Mat bgr;
+  switch (image.view().format) {
+    case MAQ_PIXEL_BGR8: return image.mat(0, width, CV_8UC3);
+    case MAQ_PIXEL_RGB8: cv::cvtColor(image.mat(0, width, CV_8UC3), bgr, cv::COLOR_RGB2BGR); break;
+    case MAQ_PIXEL_RGBA8: cv::cvtColor(image.mat(0, width, CV_8UC4), bgr, cv::COLOR_RGBA2BGR); break;
+    case MAQ_PIXEL_GREY8: cv::cvtColor(image.mat(0, width, CV_8UC1), bgr, cv::COLOR_GRAY2BGR); break;
+    case MAQ_PIXEL_YUYV: cv::cvtColor(image.mat(0, even_width, CV_8UC2), bgr, cv::COLOR_YUV2BGR_YUYV); break;
+    case MAQ_PIXEL_NV12: {
+      cv::Mat luma;
+      cv::copyMakeBorder(image.mat(0, width, CV_8UC1), luma, 0, even_height - height, 0, even_width - width,
+                         cv::BORDER_REPLICATE);
+      cv::cvtColorTwoPlane(luma, image.mat(1, even_width / 2, CV_8UC2), bgr, cv::COLOR_YUV2BGR_NV12);
+      break;
+    }
+    case MAQ_PIXEL_DEPTH16: break;
+  }
+  return bgr(cv::Rect(0, 0, width, height)).clone();
+}
+
+void expect_same_rows(const cv::Mat& expected, const uint8_t* pixels, size_t stride, const std::string& what) {
+  for (int y = 0; y < expected.rows; ++y) {
+    ASSERT_EQ(std::memcmp(expected.ptr(y), pixels + size_t(y) * stride, size_t(expected.cols) * expected.elemSize()), 0)
+        << what << " " << expected.cols << " x " << expected.rows << ", row " << y;
+  }
+}
+
+constexpr std::pair<int, int> kSizes[] = {{1, 1},   {2, 1},   {1, 2},   {3, 3},     {16, 2},    {31, 33}, {127, 5},
+                                          {128, 4}, {129, 3}, {257, 4}, {640, 480}, {333, 251}, {1, 400}, {1000, 1}};
+
+TEST(FrameFormats, EveryPixelIsToTheBitThatOfOpenCv) {
+  int seed = 0;
+  for (const maq_pixel_format format :
+       {MAQ_PIXEL_RGB8, MAQ_PIXEL_BGR8, MAQ_PIXEL_RGBA8, MAQ_PIXEL_GREY8, MAQ_PIXEL_NV12, MAQ_PIXEL_YUYV}) {
+    for (const auto& [width, height] : kSizes) {
+      const Noise image(format, width, height, seed++);
+      const std::string what = maq::pixel_format_name(format);
+      const cv::Mat expected = by_opencv(image);
+      std::vector<uint8_t> memory;
+      const ImageView bgr = maq::as_bgr(image.view(), memory);
+      expect_same_rows(expected, bgr.planes[0].data, bgr.planes[0].stride_bytes, what);
+      const std::pair<maq_pixel_format, int> targets[] = {{MAQ_PIXEL_RGB8, cv::COLOR_BGR2RGB},
+                                                          {MAQ_PIXEL_RGBA8, cv::COLOR_BGR2RGBA},
+                                                          {MAQ_PIXEL_GREY8, cv::COLOR_BGR2GRAY}};
+      for (const auto& [target, code] : targets) {
+        cv::Mat converted;
+        cv::cvtColor(expected, converted, code);
+        const size_t stride = size_t(width) * converted.elemSize() + 5;
+        std::vector<uint8_t> pixels(stride * size_t(height));
+        maq::copy_pixels(image.view(), target, pixels.data(), stride, pixels.size());
+        expect_same_rows(converted, pixels.data(), stride, what + " to " + maq::pixel_format_name(target));
+      }
+    }
+  }
+}
+
+// Every luma with every pair of chromas that is a multiple of 3, which has the extremes.
+TEST(FrameFormats, EveryColourOfYuvIsToTheBitThatOfOpenCv) {
+  cv::Mat luma(512, 256 * 2, CV_8UC1), chroma(256, 256, CV_8UC2);
+  for (int v = 0; v < 256; v += 3) {
+    for (int y = 0; y < luma.rows; ++y) {
+      for (int x = 0; x < luma.cols; ++x) luma.at<uint8_t>(y, x) = uint8_t(y / 2);
+    }
+    for (int y = 0; y < 256; ++y) {
+      for (int x = 0; x < 256; ++x) chroma.at<cv::Vec2b>(y, x) = {uint8_t(x), uint8_t(v)};
+    }
+    cv::Mat expected;
+    cv::cvtColorTwoPlane(luma, chroma, expected, cv::COLOR_YUV2BGR_NV12);
+    std::vector<uint8_t> memory;
+    const ImageView bgr = maq::as_bgr(
+        {MAQ_PIXEL_NV12, luma.cols, luma.rows, {{luma.data, luma.step}, {chroma.data, chroma.step}}}, memory);
+    expect_same_rows(expected, bgr.planes[0].data, bgr.planes[0].stride_bytes, "v " + std::to_string(v));
+  }
 }
 
 }  // namespace

@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "support/expect_error.h"
 #include "image/geometry/lens.h"
 #include "image/geometry/undistort.h"
+#include "support/expect_error.h"
 
 namespace {
 
@@ -154,6 +156,76 @@ TEST(Lenses, PixelsOfTheUndistortedPictureComeFromTheirPlaces) {
     }
     EXPECT_GT(blanks, 100);
     EXPECT_LT(blanks, 15000);
+  }
+}
+
+TEST(Lenses, ARowOfDirectionsFallsToTheBitWhereEachDoes) {
+  std::vector<double> x;
+  for (int i = -500; i <= 500; ++i) x.push_back(i * 0.0041 + 1e-7);
+  Lens folding = rational();
+  folding.coefficients = {-0.6};
+  for (const Lens& lens : {rational(), fisheye(), folding, Lens{100, 50, 80, 90, 10, 20}}) {
+    const maq::LensProjection projection(lens);
+    int places = 0;
+    for (const double y : {0.0, -0.3, 0.77, 1.9}) {
+      std::vector<double> columns(x.size()), rows(x.size());
+      projection.find_row(x, y, columns.data(), rows.data());
+      for (size_t i = 0; i < x.size(); ++i) {
+        const auto at = projection.find(x[i], y);
+        ASSERT_EQ(std::isnan(columns[i]), !at) << x[i] << ", " << y;
+        ASSERT_EQ(std::isnan(rows[i]), !at) << x[i] << ", " << y;
+        if (!at) continue;
+        ++places;
+        ASSERT_EQ(columns[i], at->column_px) << x[i] << ", " << y;
+        ASSERT_EQ(rows[i], at->row_px) << x[i] << ", " << y;
+      }
+    }
+    EXPECT_GT(places, 100);
+  }
+}
+
+// The places by the formula above, the pixels to the bit by cv::remap.
+TEST(Lenses, UndistortedPicturesAreReadToTheBitAsOpenCvDoes) {
+  const Lens lenses[] = {rational(),
+                         fisheye(),
+                         maq::resized(rational(), 333, 251),
+                         maq::resized(fisheye(), 31, 17),
+                         maq::resized(rational(), 2, 2),
+                         maq::resized(rational(), 1, 1)};
+  uint64_t seed = 1;
+  for (const Lens& lens : lenses) {
+    for (const double zoom : {0.7, 1.0, 1.6}) {
+      cv::Mat whole(lens.height_px, lens.width_px + 5, CV_8UC3);
+      cv::RNG random(seed++);
+      random.fill(whole, cv::RNG::UNIFORM, 0, 256);
+      if (seed % 2 == 0) whole = (whole > 127) / 255 * 255;
+      const cv::Mat photo = whole(cv::Rect(0, 0, lens.width_px, lens.height_px));
+      Lens straight = maq::resized(lens, lens.width_px + int(seed % 3), lens.height_px + int(seed % 5));
+      straight.distortion = Distortion::kNone;
+      straight.fx_px *= zoom;
+      straight.fy_px *= zoom;
+      cv::Mat columns(straight.height_px, straight.width_px, CV_32FC1), rows = columns.clone(), expected;
+      const maq::LensProjection projection(lens);
+      for (int y = 0; y < columns.rows; ++y) {
+        for (int x = 0; x < columns.cols; ++x) {
+          const auto at = projection.find((x - straight.cx_px) / straight.fx_px, (y - straight.cy_px) / straight.fy_px);
+          columns.at<float>(y, x) = at ? float(at->column_px) : 0;
+          rows.at<float>(y, x) = at ? float(at->row_px) : 0;
+        }
+      }
+      cv::remap(photo, expected, columns, rows, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+      maq::Frame picture;
+      std::vector<uint8_t> valid;
+      maq::undistort({MAQ_PIXEL_BGR8, photo.cols, photo.rows, {{photo.data, photo.step}, {}}}, lens, straight, picture,
+                     valid);
+      for (int y = 0; y < columns.rows; ++y) {
+        for (int x = 0; x < columns.cols; ++x) {
+          const size_t i = size_t(y * columns.cols + x);
+          if (valid[i] == 0) expected.at<cv::Vec3b>(y, x) = {};
+          ASSERT_EQ(std::memcmp(expected.ptr(y, x), picture.storage.data() + 3 * i, 3), 0) << x << ", " << y;
+        }
+      }
+    }
   }
 }
 

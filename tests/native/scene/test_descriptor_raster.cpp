@@ -46,7 +46,8 @@ double coordinate(const Scene& scene, size_t at) {
                                                                 : stored<uint16_t>(scene.positions, at);
 }
 
-// The descriptor of a point from a camera's centre, by its formula, from what the scene's header says of stored numbers.
+// The descriptor of a point from a camera's centre, by its formula, from what the scene's header says of stored
+// numbers.
 std::array<double, kFeatures> look_of(const Scene& scene, uint32_t point, const maq::PinholeCamera& camera) {
   const maq::SceneBlock* block = scene.blocks;
   while (point >= block->first + block->count) ++block;

@@ -71,8 +71,8 @@ TEST_F(SceneBuilder, CapturesAreBuiltWithoutWhatIsHeldOut) {
   EXPECT_EQ(all.stats.cloud_points, capture_.cloud.count());
   EXPECT_EQ(all.stats.seen_points, all.scene.points);
   EXPECT_GT(all.stats.load_ms, 0);
-  EXPECT_GT(all.stats.fitting.extractor_ms, 0);
-  EXPECT_GT(all.stats.packing_ms, 0);
+  EXPECT_GT(all.stats.fitting.extract_ms, 0);
+  EXPECT_GT(all.stats.pack_ms, 0);
   EXPECT_TRUE(all.dropped.empty());
   EXPECT_EQ(all.scene.networks_sha256, networks_->sha256());
   const std::vector<size_t> views = usable();

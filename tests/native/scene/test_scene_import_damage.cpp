@@ -1,4 +1,5 @@
-// Captures cut at every byte, with every byte changed, and with counts that no file holds: a status or a smaller capture.
+// Captures cut at every byte, with every byte changed, and with counts that no file holds: a status or a smaller
+// capture.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -26,7 +26,8 @@ using maq::PositionFormat;
 using maq::Scene;
 using maq::SceneBlock;
 
-constexpr maq::ScenePacking kExact = {PositionFormat::kFloat32, CoefficientFormat::kFloat32, 0};  // all linear terms are kept
+constexpr maq::ScenePacking kExact = {PositionFormat::kFloat32, CoefficientFormat::kFloat32,
+                                      0};  // all linear terms are kept
 
 // All points of a scene in the order in which they were given.
 FittedPoints unpack(const Scene& scene, const std::vector<uint32_t>& order) {

@@ -37,8 +37,10 @@ maq::FittedPoints tiny_points() {
     points.z.push_back(capture.cloud.z[expected.index]);
     points.views.push_back(expected.views);
     points.view_dependence.push_back(expected.view_dependence);
-    points.constant_terms.insert(points.constant_terms.end(), std::begin(expected.constant_terms), std::end(expected.constant_terms));
-    points.linear_terms.insert(points.linear_terms.end(), std::begin(expected.linear_terms), std::end(expected.linear_terms));
+    points.constant_terms.insert(points.constant_terms.end(), std::begin(expected.constant_terms),
+                                 std::end(expected.constant_terms));
+    points.linear_terms.insert(points.linear_terms.end(), std::begin(expected.linear_terms),
+                               std::end(expected.linear_terms));
   }
   return points;
 }
@@ -304,7 +306,8 @@ TEST(SceneRenderer, ARolledCameraTakesTheRotatedPicture) {
   const RenderedImage expected = render(scene, level), found = render(scene, portrait);
   EXPECT_TRUE(found.counts.is_rotated);
   EXPECT_FALSE(expected.counts.is_rotated);
-  // At the frame's right and lower edges the rotated one sees more around the picture, and the refiner more of the scene.
+  // At the frame's right and lower edges the rotated one sees more around the picture, and the refiner more of the
+  // scene.
   size_t same = 0;
   for (size_t y = 0; y < 64; ++y) {
     for (size_t x = 0; x < 96; ++x) {

@@ -66,7 +66,8 @@ Projected reference(const Scene& scene, uint32_t point, const PinholeCamera& cam
   return {seen[0] / seen[2] * camera.fx_px + camera.cx_px, seen[1] / seen[2] * camera.fy_px + camera.cy_px, seen[2]};
 }
 
-// Every point that is well inside of a pixel is visible there or behind the one that is; visible ones are in their pixel.
+// Every point that is well inside of a pixel is visible there or behind the one that is; visible ones are in their
+// pixel.
 void expect_as_reference(const Scene& scene, const PinholeCamera& camera, double near) {
   constexpr long double kMinMove_px = 0.01L;
   const std::vector<DepthKey> keys = keys_of(scene, camera, near, 2);

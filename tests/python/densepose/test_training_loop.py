@@ -10,6 +10,7 @@ import pytest
 import torch
 from rectangle_people import write_shard
 
+from export import training
 from export.densepose import data, train
 from export.densepose.config import NetworkConfig
 from export.densepose.losses import PixelHead, _dense_terms, batch_loss, surface_loss
@@ -103,7 +104,7 @@ def test_a_finished_run_is_not_trained_on(monkeypatch, shards, tmp_path):
 
 
 def test_a_run_learns_the_surface_first_and_resumes_across_the_stages(monkeypatch, shards, tmp_path):
-    stages = (train.Stage(0.0, 64, train.CLOSE, surface_only=True), train.Stage(0.5, 96))
+    stages = (train.Stage(0.0, 64, data.CLOSE_CROPPING, surface_only=True), train.Stage(0.5, 96))
     monkeypatch.setattr(train, "STAGES", stages)
     surface = []
     monkeypatch.setattr(train, "surface_loss", lambda *given: surface.append(1) or surface_loss(*given))
@@ -117,7 +118,7 @@ def test_a_run_learns_the_surface_first_and_resumes_across_the_stages(monkeypatc
 
 def test_the_surface_alone_is_learnt_on_a_few_pictures(shards):
     torch.manual_seed(0)
-    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, 96, train.CLOSE)
+    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, 96, data.CLOSE_CROPPING)
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
     trained = torch.nn.ModuleList([net, PixelHead(net.config)])
     optimiser = torch.optim.AdamW(trained.parameters(), lr=3e-3)
@@ -136,14 +137,14 @@ def test_the_surface_alone_is_learnt_on_a_few_pictures(shards):
     assert learning == {"backbone", "neck"}
 
 
-def test_close_framing_shows_people_larger(shards):
+def test_close_crops_show_people_larger(shards):
     records = load_records(shards / "train")
-    share = {}
-    for framing in (data.ANY_FRAMING, train.CLOSE):
+    covered = {}
+    for cropping in (data.ANY_CROPPING, data.CLOSE_CROPPING):
         rng = np.random.default_rng(0)
-        labels = [data.augmented(r, 96, rng, framing)[1] for r in records for _ in range(8)]
-        share[framing] = np.mean([(label[..., 0] > 0).mean() for label in labels])
-    assert share[train.CLOSE] > 1.2 * share[data.ANY_FRAMING]
+        labels = [data.augmented(r, 96, rng, cropping)[1] for r in records for _ in range(8)]
+        covered[cropping] = np.mean([(label[..., 0] > 0).mean() for label in labels])
+    assert covered[data.CLOSE_CROPPING] > 1.2 * covered[data.ANY_CROPPING]
 
 
 def test_the_loss_falls_on_a_few_pictures(shards):
@@ -187,19 +188,19 @@ def test_pictures_without_people_can_be_learnt_from():
 
 
 def test_bfloat16_is_taken_where_a_probe_says_so_and_survives(monkeypatch):
-    assert train.bf16_pays() in (False, True)
+    assert training.bf16_pays() in (False, True)
     for probe, pays in (
         ("raise SystemExit(0)", True),
         ("raise SystemExit(1)", False),
         ("import os, signal; os.kill(os.getpid(), signal.SIGILL)", False),
     ):
-        monkeypatch.setattr(train, "_BF16_PROBE", probe)
-        assert train.bf16_pays() == pays
+        monkeypatch.setattr(training, "_BF16_PROBE", probe)
+        assert training.bf16_pays() == pays
 
 
 def test_averaged_weights_follow_slowly():
     net = torch.nn.Linear(2, 2)
-    mean = train.Ema(net, decay=0.5)
+    mean = training.Ema(net, decay=0.5)
     before = mean.net.weight.clone()
     with torch.no_grad():
         net.weight += 1
@@ -221,7 +222,7 @@ def test_gradients_averaged_over_processes_move_weights_as_alone(tmp_path):
                 optimiser.zero_grad()
                 layer(image)[:, :4].square().sum().backward()
                 if layer is shared:
-                    assert train.average_gradients(list(layer.parameters()), 2.5, False, 1) == (2.5, False)
+                    assert training.average_gradients(list(layer.parameters()), 2.5, False, 1) == (2.5, False)
                 optimiser.step()
     finally:
         torch.distributed.destroy_process_group()

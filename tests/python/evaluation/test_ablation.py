@@ -29,11 +29,11 @@ def dev(tmp_path) -> PhotoSet:
     return PhotoSet.find([photos], known, [])
 
 
-def test_a_cut_shows_the_whole_box_in_its_middle():
+def test_a_crop_shows_the_whole_box_in_its_middle():
     image = np.zeros((300, 400, 3), np.uint8)
     image[50:250, 300:380] = 255
-    cut, into = ablation.cut_around(image, np.array([300, 50, 380, 250]), 128)
-    y, x = np.nonzero(cut[..., 0] > 200)
+    crop, into = ablation.crop_around(image, np.array([300, 50, 380, 250]), 128)
+    y, x = np.nonzero(crop[..., 0] > 200)
     assert np.ptp(y) + 1 == pytest.approx(128 / ablation.MARGIN, abs=2)
     assert (x.mean(), y.mean()) == pytest.approx((63.5, 63.5), abs=1)
     assert into @ [340, 150, 1] == pytest.approx([64, 64])

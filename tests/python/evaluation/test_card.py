@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from export.bundle import read_manifest
 from export.evaluation import gallery
-from export.evaluation.backends import Prediction, fingerprint, read_manifest
+from export.evaluation.backends import Prediction, fingerprint
 from export.evaluation.breakdown import GroupFigures
 from export.evaluation.calibration import BINS
 from export.evaluation.card import card, main

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from small_scene import scene_of
 
 from benchmarks.frame_time import PROGRAM
-from export.densepose.bundle import BundleInfo
+from export.bundle import BundleInfo
 from export.scenes import finetune
 from export.scenes.bundle import identity, write_manifest
 from export.scenes.captures import Capture, read_capture

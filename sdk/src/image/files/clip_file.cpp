@@ -1,12 +1,11 @@
 #include "image/files/clip_file.h"
 
 #include <cmath>
-#include <opencv2/core.hpp>
 
 #include "core/error.h"
 #include "core/file.h"
 #include "core/file_reader.h"
-#include "image/opencv_view.h"
+#include "image/convert.h"
 
 namespace maq {
 namespace {
@@ -77,14 +76,14 @@ ClipFile::ClipFile(const std::string& path, double fps)
 void ClipFile::begin(const ImageView& first) {
   // FFmpeg takes what is before a colon for a protocol, but not behind a slash.
   const std::string& path = file_.temporary_path();
-  const cv::Size size(first.width_px / 2 * 2, first.height_px / 2 * 2);
-  encoder_ = file_codecs().begin_clip(path.front() == '/' ? path : "./" + path, format_, fps_, size);
+  const int width = first.width_px / 2 * 2, height = first.height_px / 2 * 2;
+  encoder_ = file_codecs().begin_clip(path.front() == '/' ? path : "./" + path, format_, fps_, width, height);
   if (encoder_ == nullptr) {
     // Or is the disk full? Then this throws; the next encoder begins the file anew.
     constexpr char kProbe[4096] = {};
     file_.append(kProbe, sizeof kProbe);
     throw Error(MAQ_ERROR_UNSUPPORTED, file_.path(), ": this OpenCV does not write ",
-                format_ == ClipFormat::kMpeg4 ? "MPEG-4" : "Motion JPEG", " of ", size.width, " x ", size.height,
+                format_ == ClipFormat::kMpeg4 ? "MPEG-4" : "Motion JPEG", " of ", width, " x ", height,
                 " pixels; try a name that ends in ", format_ == ClipFormat::kMpeg4 ? ".avi" : ".mp4",
                 ", or a smaller picture.");
   }
@@ -105,9 +104,11 @@ void ClipFile::add(const ImageView& image) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, "The picture has ", image.width_px, " x ", image.height_px,
                 " pixels, but a clip needs 2 x 2 at least.");
   }
-  const cv::Mat bgr = as_bgr(image, bgr_);
+  ImageView bgr = as_bgr(image, bgr_);
+  bgr.width_px = image.width_px / 2 * 2;
+  bgr.height_px = image.height_px / 2 * 2;
   if (encoder_ == nullptr) begin(image);
-  if (!encoder_->write(bgr(cv::Rect(0, 0, image.width_px / 2 * 2, image.height_px / 2 * 2)))) {
+  if (!encoder_->write(bgr)) {
     throw Error(MAQ_ERROR_INTERNAL, "A picture of ", file_.path(), " could not be encoded.");
   }
   ++images_;

@@ -1,4 +1,5 @@
-// What decodes and encodes image and video files: OpenCV's imgcodecs and videoio.
+// What decodes and encodes image and video files: OpenCV's imgcodecs and videoio, the only place of the library where
+// OpenCV is.
 //
 // They bring some two hundred shared libraries on Debian (GDAL and FFmpeg among them), 65 MB of memory and more than a
 // tenth of a second, which an app with a camera does not need. So they are in a library of their own,
@@ -7,13 +8,21 @@
 
 #include <cstdint>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
-#include "image/files/orientation.h"
+#include "core/frame.h"
 
 namespace maq {
+
+// Whether an image is rotated as its EXIF orientation says or left as it lies in the file.
+enum class Orientation { kUpright, kAsStored };
+
+// An image that was decoded, and its memory. No width: nothing was decoded.
+struct DecodedImage {
+  ImageView view;
+  std::shared_ptr<const void> memory;
+};
 
 // A clip that is read. Numbers are as its file says and may be anything.
 class ClipDecoder {
@@ -25,8 +34,9 @@ class ClipDecoder {
   virtual double frame_count() const = 0;
   // The presentation time of the frame that read() gave last.
   virtual double position_ms() const = 0;
-  // False after the last frame that can be decoded.
-  virtual bool read(cv::Mat& image) = 0;
+  // The next frame, BGR8 or GREY8, valid until the next call. False after the last that can be decoded. `image` has no
+  // pixels where those of the frame are of another kind.
+  virtual bool read(ImageView& image) = 0;
 };
 
 enum class ClipFormat { kMpeg4, kMotionJpeg };
@@ -35,23 +45,24 @@ enum class ClipFormat { kMpeg4, kMotionJpeg };
 class ClipEncoder {
  public:
   virtual ~ClipEncoder() = default;
-  // BGR, of the size that begin_clip() was told. False where it cannot be encoded.
-  virtual bool write(const cv::Mat& image) = 0;
+  // BGR8, of the size that begin_clip() was told. False where it cannot be encoded.
+  virtual bool write(const ImageView& image) = 0;
 };
 
 // No function of these throws: they are called across libraries.
 class FileCodecs {
  public:
   virtual ~FileCodecs() = default;
-  // BGR, 8 bits; empty for what is damaged or no image.
-  virtual cv::Mat decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const = 0;
-  // `ending`: ".png" or ".jpg"; the image is BGR or grey, of 8 bits. False where it cannot be encoded.
-  virtual bool encode_image(const std::string& ending, const cv::Mat& image, std::vector<uint8_t>& bytes) const = 0;
+  // BGR8; nothing for what is damaged or no image.
+  virtual DecodedImage decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const = 0;
+  // `extension`: ".png" or ".jpg"; the image is BGR8 or GREY8. False where it cannot be encoded.
+  virtual bool encode_image(const std::string& extension, const ImageView& image,
+                            std::vector<uint8_t>& bytes) const = 0;
   // Nothing for what is damaged or no video.
   virtual std::unique_ptr<ClipDecoder> open_clip(const std::string& path) const = 0;
   // `path` ends in .mp4 or .avi, like the format; sides are even. Nothing where this OpenCV does not write such clips.
-  virtual std::unique_ptr<ClipEncoder> begin_clip(const std::string& path, ClipFormat format, double fps,
-                                                  cv::Size size) const = 0;
+  virtual std::unique_ptr<ClipEncoder> begin_clip(const std::string& path, ClipFormat format, double fps, int width_px,
+                                                  int height_px) const = 0;
 };
 
 // Opens libmaquette_files.so at the first call. Throws MAQ_ERROR_RUNTIME_LIBRARY where it is missing or of another

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <opencv2/core.hpp>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/file_reader.h"
+#include "image/convert.h"
 #include "image/files/file_codecs.h"
-#include "image/opencv_view.h"
 
 namespace maq {
 
@@ -23,14 +22,14 @@ void read_image_file(const std::string& path, Frame& frame, Orientation orientat
   if (bytes.empty()) throw Error(MAQ_ERROR_UNREADABLE, path, " is empty; an image file was expected.");
   if (const auto size = read_image_size(bytes)) check_image_size(size->width, size->height, path);
 
-  const cv::Mat image = file_codecs().decode_image(bytes.data(), bytes.size(), orientation);
-  if (image.empty()) {
+  const DecodedImage image = file_codecs().decode_image(bytes.data(), bytes.size(), orientation);
+  if (image.view.width_px == 0) {
     throw Error(MAQ_ERROR_UNREADABLE, path,
                 " cannot be decoded: it is damaged or no image; use a whole JPEG, PNG, WebP, BMP or TIFF file.");
   }
-  check_image_size(image.cols, image.rows, path);
-  uint8_t* pixels = frame.allocate_bgr(image.cols, image.rows);
-  image.copyTo(cv::Mat(image.rows, image.cols, CV_8UC3, pixels));
+  check_image_size(image.view.width_px, image.view.height_px, path);
+  uint8_t* pixels = frame.allocate_bgr(image.view.width_px, image.view.height_px);
+  copy_pixels(image.view, MAQ_PIXEL_BGR8, pixels, 0, frame.storage.size());
 }
 
 SizePx read_image_file_size(const std::string& path) {
@@ -46,15 +45,12 @@ SizePx read_image_file_size(const std::string& path) {
   return {frame.image.width_px, frame.image.height_px};
 }
 
-std::vector<uint8_t> encode_image(const ImageView& image, const std::string& ending) {
+std::vector<uint8_t> encode_image(const ImageView& image, const std::string& extension) {
   std::vector<uint8_t> memory, bytes;
-  const bool is_grey = image.format == MAQ_PIXEL_GREY8;
-  const cv::Mat picture = is_grey ? cv::Mat(image.height_px, image.width_px, CV_8UC1,
-                                            const_cast<uint8_t*>(image.planes[0].data), image.planes[0].stride_bytes)
-                                  : as_bgr(image, memory);
-  if (!file_codecs().encode_image(ending, picture, bytes)) {
+  const ImageView picture = image.format == MAQ_PIXEL_GREY8 ? image : as_bgr(image, memory);
+  if (!file_codecs().encode_image(extension, picture, bytes)) {
     throw Error(MAQ_ERROR_INTERNAL, "A picture of ", image.width_px, " x ", image.height_px,
-                " could not be encoded as ", ending, ": there may be too little memory.");
+                " could not be encoded as ", extension, ": there may be too little memory.");
   }
   return bytes;
 }

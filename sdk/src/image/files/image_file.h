@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/frame.h"
+#include "image/files/file_codecs.h"
 #include "image/files/image_header.h"
-#include "image/files/orientation.h"
 
 namespace maq {
 
@@ -19,12 +19,12 @@ void read_image_file(const std::string& path, Frame& frame, Orientation orientat
 // Throws what read_image_file() throws. The size may be over the limits.
 SizePx read_image_file_size(const std::string& path);
 
-// GREY8 as one channel, all others in colour; `ending` is ".png" or ".jpg".
+// GREY8 as one channel, all others in colour; `extension` is ".png" or ".jpg".
 // Throws MAQ_ERROR_UNSUPPORTED for a depth image, and what file_codecs() throws.
-std::vector<uint8_t> encode_image(const ImageView& image, const std::string& ending);
+std::vector<uint8_t> encode_image(const ImageView& image, const std::string& extension);
 
-// PNG or JPEG by the ending of `path`; whole or not at all.
-// Throws MAQ_ERROR_INVALID_ARGUMENT for another ending, MAQ_ERROR_UNWRITABLE, and what encode_image() throws.
+// PNG or JPEG by the extension of `path`, written atomically.
+// Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, MAQ_ERROR_UNWRITABLE, and what encode_image() throws.
 void write_image_file(const ImageView& image, const std::string& path);
 
 }  // namespace maq

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "image/opencv_view.h"
+#include "image/convert.h"
 
 namespace maq {
 
@@ -39,12 +39,13 @@ JpegEncoder::~JpegEncoder() {
 
 void JpegEncoder::encode(const ImageView& image, int quality, std::vector<uint8_t>& bytes) {
   if (encoder_ == nullptr) encoder_ = tjInitCompress();
-  const cv::Mat bgr = as_bgr(image, bgr_);
-  bytes.resize(tjBufSize(bgr.cols, bgr.rows, TJSAMP_420));
+  const ImageView bgr = as_bgr(image, bgr_);
+  bytes.resize(tjBufSize(bgr.width_px, bgr.height_px, TJSAMP_420));
   uint8_t* target = bytes.data();
   unsigned long size_bytes = bytes.size();
-  if (encoder_ == nullptr || tjCompress2(encoder_, bgr.data, bgr.cols, int(bgr.step), bgr.rows, TJPF_BGR, &target,
-                                         &size_bytes, TJSAMP_420, quality, TJFLAG_NOREALLOC) != 0) {
+  if (encoder_ == nullptr ||
+      tjCompress2(encoder_, bgr.planes[0].data, bgr.width_px, int(bgr.planes[0].stride_bytes), bgr.height_px, TJPF_BGR,
+                  &target, &size_bytes, TJSAMP_420, quality, TJFLAG_NOREALLOC) != 0) {
     throw Error(MAQ_ERROR_INTERNAL, "A frame could not be compressed as JPEG.");
   }
   bytes.resize(size_bytes);

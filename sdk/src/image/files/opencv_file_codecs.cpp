@@ -8,6 +8,18 @@
 namespace maq {
 namespace {
 
+cv::Mat as_mat(const ImageView& image) {
+  return cv::Mat(image.height_px, image.width_px, image.format == MAQ_PIXEL_GREY8 ? CV_8UC1 : CV_8UC3,
+                 const_cast<uint8_t*>(image.planes[0].data), image.planes[0].stride_bytes);
+}
+
+// Without pixels where it is neither BGR nor grey, of 8 bits.
+ImageView as_view(const cv::Mat& image) {
+  if (image.type() != CV_8UC3 && image.type() != CV_8UC1) return {MAQ_PIXEL_BGR8, image.cols, image.rows, {}};
+  const maq_pixel_format format = image.type() == CV_8UC3 ? MAQ_PIXEL_BGR8 : MAQ_PIXEL_GREY8;
+  return {format, image.cols, image.rows, {{image.data, image.step}, {}}};
+}
+
 class OpenCvClipDecoder : public ClipDecoder {
  public:
   bool open(const std::string& path) {
@@ -19,9 +31,11 @@ class OpenCvClipDecoder : public ClipDecoder {
   double fps() const override { return clip_.get(cv::CAP_PROP_FPS); }
   double frame_count() const override { return clip_.get(cv::CAP_PROP_FRAME_COUNT); }
   double position_ms() const override { return clip_.get(cv::CAP_PROP_POS_MSEC); }
-  bool read(cv::Mat& image) override {
+  bool read(ImageView& image) override {
     try {
-      return clip_.read(image) && !image.empty();
+      if (!clip_.read(decoded_) || decoded_.empty()) return false;
+      image = as_view(decoded_);
+      return true;
     } catch (const std::exception&) {
       return false;
     }
@@ -29,6 +43,7 @@ class OpenCvClipDecoder : public ClipDecoder {
 
  private:
   cv::VideoCapture clip_;
+  cv::Mat decoded_;
 };
 
 class OpenCvClipEncoder : public ClipEncoder {
@@ -39,7 +54,8 @@ class OpenCvClipEncoder : public ClipEncoder {
     } catch (const std::exception&) {
     }
   }
-  bool open(const std::string& path, ClipFormat format, double fps, cv::Size size) {
+  bool open(const std::string& path, ClipFormat format, double fps, int width_px, int height_px) {
+    const cv::Size size(width_px, height_px);
     if (format == ClipFormat::kMpeg4) {
       return file_.open(path, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), fps, size);
     }
@@ -48,9 +64,9 @@ class OpenCvClipEncoder : public ClipEncoder {
     return file_.open(path, cv::CAP_FFMPEG, fourcc, fps, size) ||
            file_.open(path, cv::CAP_OPENCV_MJPEG, fourcc, fps, size);
   }
-  bool write(const cv::Mat& image) override {
+  bool write(const ImageView& image) override {
     try {
-      file_.write(image);
+      file_.write(as_mat(image));
       return true;
     } catch (const std::exception&) {
       return false;
@@ -64,20 +80,23 @@ class OpenCvClipEncoder : public ClipEncoder {
 class OpenCvFileCodecs : public FileCodecs {
  public:
   // OpenCV throws for some damaged files and returns an empty image for others.
-  cv::Mat decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const override {
+  DecodedImage decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const override {
     try {
       const cv::Mat encoded(1, int(size_bytes), CV_8UC1, const_cast<uint8_t*>(bytes));
-      return cv::imdecode(encoded, orientation == Orientation::kUpright
-                                       ? cv::IMREAD_COLOR
-                                       : int(cv::IMREAD_COLOR) | int(cv::IMREAD_IGNORE_ORIENTATION));
+      const int flags = orientation == Orientation::kUpright
+                            ? int(cv::IMREAD_COLOR)
+                            : int(cv::IMREAD_COLOR) | int(cv::IMREAD_IGNORE_ORIENTATION);
+      const auto image = std::make_shared<cv::Mat>(cv::imdecode(encoded, flags));
+      if (image->empty()) return {};
+      return {as_view(*image), image};
     } catch (const std::exception&) {
       return {};
     }
   }
 
-  bool encode_image(const std::string& ending, const cv::Mat& image, std::vector<uint8_t>& bytes) const override {
+  bool encode_image(const std::string& extension, const ImageView& image, std::vector<uint8_t>& bytes) const override {
     try {
-      return cv::imencode(ending, image, bytes);
+      return cv::imencode(extension, as_mat(image), bytes);
     } catch (const std::exception&) {
       return false;
     }
@@ -92,11 +111,11 @@ class OpenCvFileCodecs : public FileCodecs {
     return nullptr;
   }
 
-  std::unique_ptr<ClipEncoder> begin_clip(const std::string& path, ClipFormat format, double fps,
-                                          cv::Size size) const override {
+  std::unique_ptr<ClipEncoder> begin_clip(const std::string& path, ClipFormat format, double fps, int width_px,
+                                          int height_px) const override {
     try {
       auto clip = std::make_unique<OpenCvClipEncoder>();
-      if (clip->open(path, format, fps, size)) return clip;
+      if (clip->open(path, format, fps, width_px, height_px)) return clip;
     } catch (const std::exception&) {
     }
     return nullptr;

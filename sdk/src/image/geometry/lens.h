@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <vector>
 
 namespace maq {
 
@@ -34,6 +35,10 @@ class LensProjection {
   // Where the direction (x, y, 1) falls; outside of the picture too. Nothing where the formula does not hold: farther
   // from the axis than the widest angle that undistorted pictures have, or than where the distortion folds back.
   std::optional<PlaceInPicture> find(double x, double y) const;
+
+  // Likewise for the directions (x[i], y, 1) of a row of pixels: where they fall, to the bit as find() says; NaN where it says
+  // nothing.
+  void find_row(const std::vector<double>& x, double y, double* column_px, double* row_px) const;
 
  private:
   Lens lens_;

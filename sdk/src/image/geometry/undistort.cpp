@@ -1,15 +1,89 @@
 #include "image/geometry/undistort.h"
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/simd_clones.h"
 
 namespace maq {
+namespace {
 
-// The way from the undistorted picture into the distorted one is a formula. It is written out in lens.cpp because OpenCV
-// has it in calib3d, which is three more libraries for an app to ship, and says nothing of places where the formula folds
-// back into the picture.
+constexpr int kFractionBits = 5;
+constexpr int kOne = 1 << kFractionBits;
+
+// To the nearest, halves to even. Adding 1.5 * 2^23 leaves no bits for a fraction.
+inline int in_fractions(double at_px) {
+  constexpr float kNoFraction = 12582912;
+  return int(float(at_px) * kOne + kNoFraction) - int(kNoFraction);
+}
+
+// The three bytes of a pixel, far enough apart for their sums of products with 1024.
+inline uint64_t spread(const uint8_t* pixel) {
+  return uint64_t(pixel[0]) | uint64_t(pixel[1]) << 20 | uint64_t(pixel[2]) << 40;
+}
+
+// Of all three at once: what one borrows from the next cancels in the sum, which has no negative part.
+inline uint64_t blend(uint64_t first, uint64_t second, unsigned weight) {
+  return first * kOne + (second - first) * weight;
+}
+
+// A row of pixels that are read at places in another picture.
+struct Places {
+  explicit Places(int width)
+      : column_px(size_t(width)), row_px(size_t(width)), column(size_t(width)), row(size_t(width)) {}
+
+  std::vector<double> column_px, row_px;  // NaN: nowhere
+  std::vector<int> column, row;           // the same in fractions of a pixel, where they are in the picture
+};
+
+// `valid` becomes 255 for places inside of the picture, 0 for others.
+MAQ_SIMD_CLONES void to_fractions(Places& places, int width, int height, uint8_t* valid) {
+  const double right = width - 0.5, bottom = height - 0.5;
+  const size_t count = places.column.size();
+  const double* const column_px = places.column_px.data();
+  const double* const row_px = places.row_px.data();
+  int* const column = places.column.data();
+  int* const row = places.row.data();
+  for (size_t i = 0; i < count; ++i) {
+    const bool is_inside =
+        (column_px[i] >= -0.5) & (column_px[i] <= right) & (row_px[i] >= -0.5) & (row_px[i] <= bottom);
+    column[i] = in_fractions(is_inside ? column_px[i] : 0);
+    row[i] = in_fractions(is_inside ? row_px[i] : 0);
+    valid[i] = is_inside ? 255 : 0;
+  }
+}
+
+// A row of pixels of the BGR picture, bilinear, to the bit as OpenCV's remap reads it: at the nearest 1/32 of a pixel.
+// Beyond the border the last pixels are repeated. What is not valid is black.
+void read_row(const ImageView& bgr, const Places& places, const uint8_t* valid, uint8_t* to) {
+  const uint8_t* const pixels = bgr.planes[0].data;
+  const size_t stride = bgr.planes[0].stride_bytes;
+  const int last_column = bgr.width_px - 1, last_row = bgr.height_px - 1;
+  const size_t count = places.column.size();
+  for (size_t i = 0; i < count; ++i, to += 3) {
+    if (valid[i] == 0) {
+      to[0] = to[1] = to[2] = 0;
+      continue;
+    }
+    const int x = places.column[i] >> kFractionBits, y = places.row[i] >> kFractionBits;
+    const unsigned right = unsigned(places.column[i] & (kOne - 1)), below = unsigned(places.row[i] & (kOne - 1));
+    const uint8_t* const upper = pixels + size_t(std::max(y, 0)) * stride + 3 * size_t(std::max(x, 0));
+    const size_t next = x >= 0 && x < last_column ? 3 : 0;
+    const uint8_t* const lower = y >= 0 && y < last_row ? upper + stride : upper;
+    const uint64_t over = blend(spread(upper), spread(upper + next), right);
+    const uint64_t under = blend(spread(lower), spread(lower + next), right);
+    constexpr uint64_t kHalf = kOne * kOne / 2;
+    const uint64_t sums = blend(over, under, below) + (kHalf | kHalf << 20 | kHalf << 40);
+    to[0] = uint8_t(sums >> (2 * kFractionBits));
+    to[1] = uint8_t(sums >> (2 * kFractionBits + 20));
+    to[2] = uint8_t(sums >> (2 * kFractionBits + 40));
+  }
+}
+
+}  // namespace
+
+// The way from the undistorted picture into the distorted one is a formula, which is written out in lens.cpp: OpenCV's says
+// nothing of places where it folds back into the picture.
 void undistort(const ImageView& distorted, const Lens& lens, const Lens& undistorted, Frame& frame,
                std::vector<uint8_t>& valid) {
   if (distorted.format != MAQ_PIXEL_BGR8 || distorted.width_px != lens.width_px ||
@@ -20,36 +94,21 @@ void undistort(const ImageView& distorted, const Lens& lens, const Lens& undisto
   }
   check_image_size(undistorted.width_px, undistorted.height_px, "The undistorted picture");
   const int width = undistorted.width_px, height = undistorted.height_px;
-  const cv::Mat from(lens.height_px, lens.width_px, CV_8UC3, const_cast<uint8_t*>(distorted.planes[0].data),
-                     distorted.planes[0].stride_bytes);
-  cv::Mat to(height, width, CV_8UC3, frame.allocate_bgr(width, height));
-  valid.assign(size_t(width) * size_t(height), 0);
+  uint8_t* pixels = frame.allocate_bgr(width, height);
+  valid.resize(size_t(width) * size_t(height));
+  uint8_t* row_valid = valid.data();
 
   const LensProjection projection(lens);
-  const double right = lens.width_px - 0.5, bottom = lens.height_px - 0.5;
-  constexpr int kStripRows = 32;
-  cv::Mat columns(kStripRows, width, CV_32FC1), rows(kStripRows, width, CV_32FC1);
-  for (int top = 0; top < height; top += kStripRows) {
-    const int count = std::min(kStripRows, height - top);
-    for (int i = 0; i < count; ++i) {
-      uint8_t* is_valid = valid.data() + size_t(top + i) * size_t(width);
-      const double y = (top + i - undistorted.cy_px) / undistorted.fy_px;
-      for (int x = 0; x < width; ++x) {
-        const auto at = projection.find((x - undistorted.cx_px) / undistorted.fx_px, y);
-        const bool is_inside =
-            at && at->column_px >= -0.5 && at->column_px <= right && at->row_px >= -0.5 && at->row_px <= bottom;
-        columns.at<float>(i, x) = is_inside ? float(at->column_px) : 0;
-        rows.at<float>(i, x) = is_inside ? float(at->row_px) : 0;
-        is_valid[x] = is_inside ? 255 : 0;
-      }
-    }
-    cv::Mat strip = to.rowRange(top, top + count);
-    cv::remap(from, strip, columns.rowRange(0, count), rows.rowRange(0, count), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-    for (int i = 0; i < count; ++i) {
-      for (int x = 0; x < width; ++x) {
-        if (valid[size_t(top + i) * size_t(width) + size_t(x)] == 0) strip.at<cv::Vec3b>(i, x) = {};
-      }
-    }
+  std::vector<double> x(size_t(width), 0.0);
+  for (int column = 0; column < width; ++column) {
+    x[size_t(column)] = (column - undistorted.cx_px) / undistorted.fx_px;
+  }
+  Places places(width);
+  for (int row = 0; row < height; ++row, pixels += 3 * size_t(width), row_valid += width) {
+    const double y = (row - undistorted.cy_px) / undistorted.fy_px;
+    projection.find_row(x, y, places.column_px.data(), places.row_px.data());
+    to_fractions(places, lens.width_px, lens.height_px, row_valid);
+    read_row(distorted, places, row_valid, pixels);
   }
 }
 

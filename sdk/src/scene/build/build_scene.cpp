@@ -80,7 +80,7 @@ std::optional<size_t> SceneBuilder::add_loaded(const BuildProgress& progress) {
 }
 
 Scene SceneBuilder::packed(const FittedPoints& points) {
-  const ScopedTimer timer(stats_.packing_ms);
+  const ScopedTimer timer(stats_.pack_ms);
   Scene scene = make_scene(points, options_.packing);
   scene.networks_sha256 = networks_->sha256();
   return scene;
@@ -135,7 +135,7 @@ std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_
   // Views and points were counted before they were forgotten.
   const SceneBuildStats after = builder.stats();
   built.stats.fitting = after.fitting;
-  built.stats.packing_ms = after.packing_ms;
+  built.stats.pack_ms = after.pack_ms;
   if (progress) progress(1, "The scene is built.");
   return built;
 }

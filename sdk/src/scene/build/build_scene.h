@@ -28,7 +28,7 @@ struct SceneBuildStats {
   size_t views = 0, unused_views = 0;  // photos that saw points; that saw none or could not be used
   uint64_t cloud_points = 0;           // after max_points
   uint64_t seen_points = 0;
-  double load_ms = 0, packing_ms = 0;
+  double load_ms = 0, pack_ms = 0;
   FittingTimes fitting;
 };
 
@@ -39,14 +39,14 @@ class SceneBuilder {
   SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, std::shared_ptr<SceneNetworks> networks,
                const SceneBuildOptions& options);
 
-  // Both return how many points the photo sees, and nothing where they were cancelled; they throw what PosedView::load()
-  // and DescriptorFitter::add_view() throw, and then change nothing.
+  // Both return how many points the photo sees, and nothing where they were cancelled; they throw what
+  // PosedView::load() and DescriptorFitter::add_view() throw, and then change nothing.
   std::optional<size_t> add_view(const CaptureView& view, const BuildProgress& progress = {});
   std::optional<size_t> add_view(const ImageView& image, const Lens& lens, const PinholeCamera& pose,
                                  const BuildProgress& progress = {});
 
-  // As DescriptorFitter has them: more photos can be added after finish(), and none were after finish_and_forget(), which
-  // takes less memory.
+  // As DescriptorFitter has them: more photos can be added after finish(), and none were after finish_and_forget(),
+  // which takes less memory.
   Scene finish() { return packed(fitter_.finish()); }
   Scene finish_and_forget();
   void cancel() { fitter_.cancel(); }

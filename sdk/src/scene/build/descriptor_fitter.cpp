@@ -119,10 +119,10 @@ size_t DescriptorFitter::find_seen_points(const uint8_t* valid, const PinholeCam
 const float* DescriptorFitter::find_features(const ImageView& photo, const PinholeCamera& camera,
                                              const PinholeCamera& aligned) {
   {
-    const ScopedTimer timer(times_.rotation_ms);
+    const ScopedTimer timer(times_.align_ms);
     turn_photo(photo, pixel_map_between(aligned, camera), aligned.width_px, aligned.height_px, aligned_photo_);
   }
-  const ScopedTimer timer(times_.extractor_ms);
+  const ScopedTimer timer(times_.extract_ms);
   const float* features = networks_.extract(aligned_photo_.data(), aligned.width_px, aligned.height_px);
   const size_t count = size_t(aligned.width_px) * size_t(aligned.height_px) * kFeatures;
   for (size_t i = 0; i < count; ++i) {
@@ -172,7 +172,7 @@ std::optional<size_t> DescriptorFitter::add_view(const ImageView& photo, const u
 
   // From here on nothing fails or is cancelled.
   background_.add(background);
-  const ScopedTimer timer(times_.regression_ms);
+  const ScopedTimer timer(times_.accumulate_ms);
   for (const uint32_t point : seen_) {
     if (!regressions_.has(point)) regressions_.add(point);
   }
@@ -193,7 +193,7 @@ FittedPoints DescriptorFitter::solve(bool forgets) {
     refuse("None of the photos sees a point of the cloud, which has ", cloud_.count(),
            ", so there is no scene; check that photos and cloud are of the same scene, in the same unit.");
   }
-  const ScopedTimer timer(times_.solving_ms);
+  const ScopedTimer timer(times_.solve_ms);
   FittedPoints made;
   made.origin = cloud_.origin;
   made.up = up_;

@@ -1,5 +1,5 @@
-// Fits the descriptors of a cloud's points to posed photos: NPBG++ (arXiv 2203.13318), sections 3.1 to 3.3, one photo at
-// a time.
+// Fits the descriptors of a cloud's points to posed photos: NPBG++ (arXiv 2203.13318), sections 3.1 to 3.3, one photo
+// at a time.
 #pragma once
 
 #include <array>
@@ -23,7 +23,8 @@
 namespace maq {
 
 struct FittingOptions {
-  // Of a photo's sides, for finding which points it sees: below 1 a point occludes more of what is behind it. 1/16 to 1.
+  // Of a photo's sides, for finding which points it sees: below 1 a point occludes more of what is behind it. 1/16 to
+  // 1.
   double visibility_scale = 1;
   double near = 0;  // depth of the nearest point that is seen, in units of the scene
   int threads = 2;  // for what is done point by point; the networks have their own
@@ -35,22 +36,23 @@ struct FittingOptions {
 using BuildProgress = std::function<bool(double done, const std::string& what)>;
 
 struct FittingTimes {
-  double visibility_ms = 0, rotation_ms = 0, extractor_ms = 0, regression_ms = 0, solving_ms = 0;
+  double visibility_ms = 0, align_ms = 0, extract_ms = 0, accumulate_ms = 0, solve_ms = 0;
 };
 
 class DescriptorFitter {
  public:
-  // `networks` must outlive this, and not be used elsewhere meanwhile. Throws MAQ_ERROR_INVALID_ARGUMENT for a cloud without
-  // points or with one that is not finite, an up without a direction, options out of range; MAQ_ERROR_UNSUPPORTED for more
-  // than kMaxPoints; MAQ_ERROR_OUT_OF_MEMORY where max_bytes is too little for the cloud.
+  // `networks` must outlive this, and not be used elsewhere meanwhile. Throws MAQ_ERROR_INVALID_ARGUMENT for a cloud
+  // without points or with one that is not finite, an up without a direction, options out of range;
+  // MAQ_ERROR_UNSUPPORTED for more than kMaxPoints; MAQ_ERROR_OUT_OF_MEMORY where max_bytes is too little for the
+  // cloud.
   DescriptorFitter(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks,
                    const FittingOptions& options);
 
-  // A photo, BGR, and its camera. `valid`: the validity mask, 0 for pixels that are not of the photo, row by row; null when
-  // all are. Returns how many points it saw, 0 included; nothing where it was cancelled. Whatever it throws, the fitter
-  // stays as it was before: MAQ_ERROR_INVALID_ARGUMENT for an invalid camera or one of another size, MAQ_ERROR_IMAGE_SIZE
-  // for a photo over the limit of the networks, MAQ_ERROR_OUT_OF_MEMORY where max_bytes is too little, and what
-  // SceneNetworks::extract() throws.
+  // A photo, BGR, and its camera. `valid`: the validity mask, 0 for pixels that are not of the photo, row by row; null
+  // when all are. Returns how many points it saw, 0 included; nothing where it was cancelled. Whatever it throws, the
+  // fitter stays as it was before: MAQ_ERROR_INVALID_ARGUMENT for an invalid camera or one of another size,
+  // MAQ_ERROR_IMAGE_SIZE for a photo over the limit of the networks, MAQ_ERROR_OUT_OF_MEMORY where max_bytes is too
+  // little, and what SceneNetworks::extract() throws.
   std::optional<size_t> add_view(const ImageView& photo, const uint8_t* valid, const PinholeCamera& camera,
                                  const BuildProgress& progress = {});
 

@@ -10,8 +10,8 @@ namespace {
 // A diagonal element below this fraction of the largest is rounding: the directions do not span the basis.
 constexpr double kMinDiagonal = 1e-12;
 
-// Rotates a row of the system (values of the basis, of the features) into R and Q^T y, one Givens rotation for each row of R,
-// after which the row's values of the basis are 0.
+// Rotates a row of the system (values of the basis, of the features) into R and Q^T y, one Givens rotation for each row
+// of R, after which the row's values of the basis are 0.
 template <class Value>
 void givens_rotate(Value* triangle, Value (*rotated)[kFeatures], Value* row, Value* features) {
   Value* diagonal = triangle;

@@ -16,7 +16,8 @@ struct Solved {
   bool is_singular;
 };
 
-// The view-dependence of a descriptor: the root of the mean square of |(h - mean h) beta| over the photos that saw the point. The triangle R has the scatter of h as R^T R, so that the sum of squares is that of R beta.
+// The view-dependence of a descriptor: the root of the mean square of |(h - mean h) beta| over the photos that saw the
+// point. The triangle R has the scatter of h as R^T R, so that the sum of squares is that of R beta.
 float view_dependence_of(const DescriptorRegression& regression, const float beta[kBasis][kFeatures]) {
   double sum = 0;
   const float* row = regression.triangle;

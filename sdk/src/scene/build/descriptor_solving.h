@@ -8,8 +8,8 @@
 
 namespace maq {
 
-// Appends all points of `regressions` to the arrays of `made`, in their order, and counts singular ones. With `forgets`,
-// the regressions are freed on the way.
+// Appends all points of `regressions` to the arrays of `made`, in their order, and counts singular ones. With
+// `forgets`, the regressions are freed on the way.
 void solve_descriptors(RegressionStore& regressions, const PointPositions& positions, WorkerThreads& threads,
                        bool forgets, FittedPoints& made);
 

@@ -34,8 +34,8 @@ class RegressionStore {
   const DescriptorRegression& at(size_t slot) const { return chunks_[slot / kChunk][slot % kChunk]; }
   const std::vector<uint32_t>& points() const { return points_; }
 
-  // Points whose memory is allocated and freed at once: 33.6 MB, which allocators take from the system and give back whole.
-  // The system makes its pages, zeros, when they are first used.
+  // Points whose memory is allocated and freed at once: 33.6 MB, which allocators take from the system and give back
+  // whole. The system makes its pages, zeros, when they are first used.
   static constexpr size_t kChunk = 100'000;
   // Frees the memory of a chunk; its points must not be used afterwards.
   void forget_chunk(size_t chunk) { chunks_[chunk].reset(); }

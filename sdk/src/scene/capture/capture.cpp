@@ -126,7 +126,8 @@ std::vector<std::array<double, 9>> rotations_of(const std::vector<CaptureView>& 
   return rotations;
 }
 
-// The medians of the cameras' coordinates, so that points that they see are near, whatever a stray camera or point does.
+// The medians of the cameras' coordinates, so that points that they see are near, whatever a stray camera or point
+// does.
 std::array<double, 3> middle_of(const std::vector<CaptureView>& views) {
   std::array<double, 3> middle{};
   for (size_t i = 0; i < 3; ++i) {

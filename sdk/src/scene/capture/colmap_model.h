@@ -10,9 +10,9 @@
 
 namespace maq {
 
-// COLMAP counts pixels from their corners: the centre of the first one is at (0.5, 0.5) there. Dropped and counted: photos
-// without a camera, photos and cameras whose number was there before, cameras without photos. Faults of numbers are left
-// to the caller (posed_photo.h).
+// COLMAP counts pixels from their corners: the centre of the first one is at (0.5, 0.5) there. Dropped and counted:
+// photos without a camera, photos and cameras whose number was there before, cameras without photos. Faults of numbers
+// are left to the caller (posed_photo.h).
 std::vector<PosedPhoto> read_colmap_photos(const ColmapFiles& files, ImportReport& report);
 
 // Relative to `origin`. Points that are not finite are dropped and counted. Throws MAQ_ERROR_UNSUPPORTED for more than

@@ -40,7 +40,8 @@ inline std::string describe(const Dropped& dropped) {
   return std::to_string(dropped.count) + " " + dropped.reason_and_first();
 }
 
-// As part of a sentence: "3 photos that cannot be read as images (first: a.jpg), 1 photos without a camera"; "" for none.
+// As part of a sentence: "3 photos that cannot be read as images (first: a.jpg), 1 photos without a camera"; "" for
+// none.
 inline std::string describe(const std::vector<Dropped>& list) {
   std::string text;
   for (const Dropped& dropped : list) text += (text.empty() ? "" : ", ") + describe(dropped);

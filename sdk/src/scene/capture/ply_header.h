@@ -39,7 +39,8 @@ struct PlyHeader {
   std::vector<PlyElement> elements;
 };
 
-// Reads up to the first byte of the data. Throws MAQ_ERROR_UNREADABLE, and MAQ_ERROR_UNSUPPORTED for versions other than 1.0.
+// Reads up to the first byte of the data. Throws MAQ_ERROR_UNREADABLE, and MAQ_ERROR_UNSUPPORTED for versions other
+// than 1.0.
 PlyHeader read_ply_header(FileReader& file);
 
 }  // namespace maq

@@ -21,7 +21,7 @@ inline constexpr char kPhotosOutside[] = "photos whose name leads out of their f
 inline constexpr char kPhotosMissing[] = "photos that are not in their folder";
 inline constexpr char kPhotosUnreadable[] = "photos that cannot be read as images";
 
-// And those that lie in their numbers; null when there is none.
+// And those in their numbers; null when there is none.
 const char* fault_of(const Lens& lens);
 const char* fault_of_pose(const PosedPhoto& photo);
 

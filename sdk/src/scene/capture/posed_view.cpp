@@ -5,7 +5,7 @@
 
 #include "core/error.h"
 #include "image/convert.h"
-#include "image/geometry/shrink.h"
+#include "image/geometry/resize.h"
 #include "image/geometry/undistort.h"
 
 namespace maq {

@@ -19,8 +19,8 @@ struct SceneArrays {
 // block.view_dependent have linear terms. `block` has its counts. Bounds hold what is stored, however a decoder rounds.
 void encode_block(const FittedPoints& points, const uint32_t* indices, SceneBlock& block, const SceneArrays& arrays);
 
-// The points of one block as floats, in its order; linear terms are 0 where there are none. What a scene does not keep is
-// left empty: view_dependence and views. The renderer decodes what it needs itself (descriptor_decoding.h).
+// The points of one block as floats, in its order; linear terms are 0 where there are none. What a scene does not keep
+// is left empty: view_dependence and views. The renderer decodes what it needs itself (descriptor_decoding.h).
 FittedPoints decode_block(const Scene& scene, const SceneBlock& block);
 
 }  // namespace maq

@@ -8,7 +8,8 @@
 
 namespace maq {
 
-// False where a point is stored without linear terms: its view-dependence is below that (FittedPoints), or the terms are 0.
+// False where a point is stored without linear terms: its view-dependence is below that (FittedPoints), or the terms
+// are 0.
 bool is_view_dependent(const FittedPoints& points, uint32_t index, float min_view_dependence);
 
 // Indices of all points in groups, inliers first; mostly there is one group. Outliers have a constant term (from the

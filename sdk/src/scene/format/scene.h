@@ -1,9 +1,10 @@
 // A scene as it is rendered and stored: points in blocks of neighbours, with their descriptors.
 //
-// A descriptor is a constant term plus, for view-dependent points, linear coefficients of the view basis (descriptor.h).
-// Points are split into blocks of neighbours (scene_blocks.h), so that a block is a small box: it is culled whole where
-// a camera does not see it, and positions need 16 bits a coordinate. In each block the view-dependent points come first;
-// the rest have no linear terms. Arrays are owned or lie in a mapped file; the renderer does not know which.
+// A descriptor is a constant term plus, for view-dependent points, linear coefficients of the view basis
+// (descriptor.h). Points are split into blocks of neighbours (scene_blocks.h), so that a block is a small box: it is
+// culled whole where a camera does not see it, and positions need 16 bits a coordinate. In each block the
+// view-dependent points come first; the rest have no linear terms. Arrays are owned or lie in a mapped file; the
+// renderer does not know which.
 #pragma once
 
 #include <array>

@@ -13,16 +13,16 @@ namespace maq {
 struct ScenePacking {
   PositionFormat positions = PositionFormat::kUint16;
   CoefficientFormat coefficients = CoefficientFormat::kInt8;
-  // Points whose view-dependence (FittedPoints, in the features' own units) is below that keep their constant term alone.
-  // 0 keeps the linear terms of all but those that have none.
+  // Points whose view-dependence (FittedPoints, in the features' own units) is below that keep their constant term
+  // alone. 0 keeps the linear terms of all but those that have none.
   float min_view_dependence = 0.05f;
-  // At most that fraction of the points keep their linear terms: the most view-dependent ones. With 0.5 a scene of int8 and
-  // uint16 takes 39 bytes a point at most.
+  // At most that fraction of the points keep their linear terms: the most view-dependent ones. With 0.5 a scene of int8
+  // and uint16 takes 39 bytes a point at most.
   float max_view_dependent_fraction = 1;
 };
 
-// Positions are 16 bits, but floats beside coefficients in floats. Without a threshold it is the default, and with 8 bits
-// at most half of the points are view-dependent.
+// Positions are 16 bits, but floats beside coefficients in floats. Without a threshold it is the default, and with 8
+// bits at most half of the points are view-dependent.
 ScenePacking packing_of(CoefficientFormat coefficients, std::optional<float> min_view_dependence);
 
 // Larger numbers stand for something broken, and sums of them would not be finite.

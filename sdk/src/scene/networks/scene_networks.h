@@ -1,5 +1,5 @@
-// The three networks of scenes, from a bundle (docs/formats.md): the extractor makes features of photos, the view basis says
-// how descriptors depend on the viewing direction, the refiner makes images of descriptor rasters.
+// The three networks of scenes, from a bundle (docs/formats.md): the extractor makes features of photos, the view basis
+// says how descriptors depend on the viewing direction, the refiner makes images of descriptor rasters.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@ namespace maq {
 // How the refiner wants its rasters and gives its picture; channels are last everywhere.
 struct RefinerLayout {
   int levels = 0;  // it reads the rasters at 1, 1/2, …, 1 / 2^(levels - 1) of the size
-  // The finest raster and the image are space-to-depth (pixel unshuffle): pixels (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2
-  // are one, all channels of one before those of the next.
+  // The finest raster and the image are space-to-depth (pixel unshuffle): pixels (0, 0), (0, 1), (1, 0), (1, 1) of each
+  // 2x2 are one, all channels of one before those of the next.
   bool is_space_to_depth = false;
 
   // Of what a picture of that size (sides multiples of kMultiple) is made of, and of the picture.
@@ -35,8 +35,8 @@ class SceneNetworks {
   static constexpr int64_t kMaxPixels = int64_t(1) << 23;
 
   // Networks are made when they are needed first, the refiner for each size that it is needed for. Throws
-  // MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the
-  // manifest are not those of the format.
+  // MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in
+  // the manifest are not those of the format.
   SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const SessionSettings& settings);
   SceneNetworks(const SceneNetworks&) = delete;
   SceneNetworks& operator=(const SceneNetworks&) = delete;
@@ -50,14 +50,14 @@ class SceneNetworks {
   // Throws what extract() throws for a photo of that size.
   static void check_photo_size(int width_px, int height_px);
 
-  // Features [height][width][kFeatures] of a photo [height][width][3], RGB in 0..1, sides multiples of kPhotoMultiple. They
-  // stay until the next photo. Not for two threads at once. Throws MAQ_ERROR_INVALID_ARGUMENT for other sides,
+  // Features [height][width][kFeatures] of a photo [height][width][3], RGB in 0..1, sides multiples of kPhotoMultiple.
+  // They stay until the next photo. Not for two threads at once. Throws MAQ_ERROR_INVALID_ARGUMENT for other sides,
   // MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says, MAQ_ERROR_INFERENCE.
   const float* extract(const float* photo, int width_px, int height_px);
 
-  // The picture, not clamped, of rasters of kRasterChannels (features, then 1 where there is a point): as many and in the
-  // layout as refiner_layout() says, the finest first. It stays until the next. Sides are multiples of kPictureMultiple. Not
-  // for two threads at once; beside extract() is fine. Throws as extract() does.
+  // The picture, not clamped, of rasters of kRasterChannels (features, then 1 where there is a point): as many and in
+  // the layout as refiner_layout() says, the finest first. It stays until the next. Sides are multiples of
+  // kPictureMultiple. Not for two threads at once; beside extract() is fine. Throws as extract() does.
   const float* refine(const std::vector<const float*>& rasters, int width_px, int height_px);
 
   // Gives the extractor's memory back; it is made again when it is needed.

@@ -1,5 +1,5 @@
-// The functions of the viewing direction that descriptors are linear in (NPBG++, arXiv 2203.13318, section 3.3): a small
-// network that all points of all scenes share.
+// The functions of the viewing direction that descriptors are linear in (NPBG++, arXiv 2203.13318, section 3.3): a
+// small network that all points of all scenes share.
 #pragma once
 
 #include <cstddef>

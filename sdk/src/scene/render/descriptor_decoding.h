@@ -19,11 +19,13 @@ inline constexpr size_t kShadedAtOnce = 64;
 // Prefetches what the descriptors of the points need, which may lie anywhere in memory.
 void prefetch(const Scene& scene, const PointToShade* points, size_t count, bool with_linear_terms);
 
-// Unit vectors from a camera's centre to at most kShadedAtOnce points, one array for each coordinate; 0 for a point in it.
+// Unit vectors from a camera's centre to at most kShadedAtOnce points, one array for each coordinate; 0 for a point in
+// it.
 void find_directions(const Scene& scene, const std::array<double, 3>& camera_centre, const PointToShade* points,
                      size_t count, float* x, float* y, float* z);
 
-// Writes the descriptors of points: the constant term, and unless `basis` [kBasis][count] is null the linear terms times it.
+// Writes the descriptors of points: the constant term, and unless `basis` [kBasis][count] is null the linear terms
+// times it.
 void decode_descriptors(const Scene& scene, const PointToShade* points, size_t count, const float* basis);
 
 }  // namespace maq

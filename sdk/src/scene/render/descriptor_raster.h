@@ -46,9 +46,9 @@ class DescriptorRaster {
 
   static constexpr size_t kColours = 3;  // features that are red, green and blue
 
-  // The refiner's input of that number, in its layout, with features and the 1 of a pixel side by side. Where there is no
-  // point the colours are those of the next coarser level, in the coarsest the scene's background, all else is 0. All
-  // kLevels, also where the refiner reads fewer: colours come from the coarsest.
+  // The refiner's input of that number, in its layout, with features and the 1 of a pixel side by side. Where there is
+  // no point the colours are those of the next coarser level, in the coarsest the scene's background, all else is 0.
+  // All kLevels, also where the refiner reads fewer: colours come from the coarsest.
   const float* level(int level) const { return levels_[level].data(); }
   // Keys of the visible points, row by row, at each of the kLevels scales.
   const DepthKey* keys(int level) const { return keys_[level].data(); }

@@ -10,8 +10,8 @@
 
 namespace maq {
 
-// Where the picture of a window goes: rows of `columns` pixels, of which those from (left, top) on are the window's. What of
-// the window is not inside is left out.
+// Where the picture of a window goes: rows of `columns` pixels, of which those from (left, top) on are the window's.
+// What of the window is not inside is left out.
 struct PictureRows {
   uint8_t* bgr = nullptr;
   uint8_t* alpha = nullptr;

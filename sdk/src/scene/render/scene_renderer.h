@@ -18,8 +18,8 @@ namespace maq {
 struct RenderOptions {
   int threads = 1;  // of everything but the refiner, whose threads are its networks'
   double near = 0;  // depth of the nearest point that is seen, in units of the scene
-  // BGR, which the image is blended over by its alpha. Without, pixels without a point near are of the scene's background
-  // colour, and the refiner's output is left as it is elsewhere.
+  // BGR, which the image is blended over by its alpha. Without, pixels without a point near are of the scene's
+  // background colour, and the refiner's output is left as it is elsewhere.
   std::optional<std::array<uint8_t, 3>> background;
   // Work that is skipped. Neither changes a pixel with an alpha above 0.
   bool skips_unseen_blocks = true;
@@ -55,10 +55,11 @@ class SceneRenderer {
   // options out of range.
   SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options);
 
-  // Renders gravity-aligned in the smallest frame that holds the camera's picture, and rotates the result back. The same image
-  // with any number of threads. Memory of `image` is reused. Not for two threads at once, nor while another uses the
-  // networks' refiner. Throws what check_camera() and SceneNetworks::refine() throw, and MAQ_ERROR_INVALID_ARGUMENT for a
-  // camera whose principal point is over 10^6 pixels away or whose focal lengths differ by a factor over 1000.
+  // Renders gravity-aligned in the smallest frame that holds the camera's picture, and rotates the result back. The
+  // same image with any number of threads. Memory of `image` is reused. Not for two threads at once, nor while another
+  // uses the networks' refiner. Throws what check_camera() and SceneNetworks::refine() throw, and
+  // MAQ_ERROR_INVALID_ARGUMENT for a camera whose principal point is over 10^6 pixels away or whose focal lengths
+  // differ by a factor over 1000.
   void render(const PinholeCamera& camera, RenderedImage& image);
 
  private:

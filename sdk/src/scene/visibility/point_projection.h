@@ -38,8 +38,8 @@ class PointProjection {
   // Points nearer than `near` (in units of the scene, along the optical axis) are outside.
   PointProjection(const PinholeCamera& camera, double near);
 
-  // For each point its pixel, row * width + column, or width * height where it is outside of the picture or not finite; and
-  // its depth along the optical axis, which is undefined outside of the picture.
+  // For each point its pixel, row * width + column, or width * height where it is outside of the picture or not finite;
+  // and its depth along the optical axis, which is undefined outside of the picture.
   void project(const PointSpan& span, int32_t* pixels, float* depths) const;
 
  private:

@@ -12,8 +12,8 @@ class ViewFrustum {
  public:
   ViewFrustum(const PinholeCamera& camera, double near);
 
-  // False only where no point of the block can be visible, with all rounding of PointProjection; true for bounds that are
-  // not finite.
+  // False only where no point of the block can be visible, with all rounding of PointProjection; true for bounds that
+  // are not finite.
   bool may_show(const Scene& scene, const SceneBlock& block) const;
 
  private:

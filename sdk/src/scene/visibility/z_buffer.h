@@ -1,7 +1,8 @@
 // Which point is visible at each pixel: the front-most, and of equally deep ones that with the lowest index.
 //
-// A pixel is a key: the depth's bits (ordered as positive floats are), then the index; the smallest is kept, in whatever
-// order points are drawn. So each thread draws into a depth buffer of its own, and the minimum of all is the same picture.
+// A pixel is a key: the depth's bits (ordered as positive floats are), then the index; the smallest is kept, in
+// whatever order points are drawn. So each thread draws into a depth buffer of its own, and the minimum of all is the
+// same picture.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +15,8 @@
 namespace maq {
 
 using DepthKey = int64_t;
-// Relative depth tolerance: a point farther than one beside it by over that fraction is occluded (export/scenes/config.py
-// has the same).
+// Relative depth tolerance: a point farther than one beside it by over that fraction is occluded
+// (export/scenes/config.py has the same).
 inline constexpr double kDepthTolerance = 0.1;
 inline constexpr DepthKey kNoPointKey = std::numeric_limits<int64_t>::max();
 
@@ -42,9 +43,9 @@ class ZBuffer {
 
   // A side of the blocks that remove_occluded() works on, pixels.
   static constexpr int kOcclusionBlockPx = 4;
-  // Of what is finished in rows [top, bottom), removes points that bleed through holes of a nearer surface: those farther
-  // than the nearest of their block, counted from the first pixel, by over that fraction of its depth. `top` is a multiple
-  // of kOcclusionBlockPx, `bottom` too or the height. Different rows may be worked on at once.
+  // Of what is finished in rows [top, bottom), removes points that bleed through holes of a nearer surface: those
+  // farther than the nearest of their block, counted from the first pixel, by over that fraction of its depth. `top` is
+  // a multiple of kOcclusionBlockPx, `bottom` too or the height. Different rows may be worked on at once.
   void remove_occluded(int top, int bottom, double depth_tolerance);
 
   int width_px() const { return width_px_; }

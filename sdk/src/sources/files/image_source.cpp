@@ -1,5 +1,5 @@
-#include "image/convert.h"
 #include "image/files/image_file.h"
+#include "image/geometry/resize.h"
 #include "sources/files/file_sources.h"
 
 namespace maq {

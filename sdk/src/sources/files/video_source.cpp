@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
 #include "core/file.h"
 #include "image/convert.h"
 #include "image/files/file_codecs.h"
+#include "image/geometry/resize.h"
 #include "sources/files/file_sources.h"
 
 namespace maq {
@@ -85,17 +85,15 @@ class VideoSource : public Source {
   }
 
   void deliver(Frame& frame, int64_t timestamp_ns, int64_t index) {
-    if (decoded_.type() == CV_8UC1) cv::cvtColor(decoded_, decoded_, cv::COLOR_GRAY2BGR);
-    if (decoded_.type() != CV_8UC3) {
+    if (decoded_.planes[0].data == nullptr) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " has frames of an unusual format; convert it to 8-bit video.");
     }
-    check_image_size(decoded_.cols, decoded_.rows, path_);
-    ImageView view{MAQ_PIXEL_BGR8, decoded_.cols, decoded_.rows, {{decoded_.data, decoded_.step}, {}}};
-    if (decoded_.cols != info_.width_px || decoded_.rows != info_.height_px) {
-      resize_to_bgr(view, info_.width_px, info_.height_px, frame);
+    check_image_size(decoded_.width_px, decoded_.height_px, path_);
+    if (decoded_.width_px != info_.width_px || decoded_.height_px != info_.height_px) {
+      resize_to_bgr(decoded_, info_.width_px, info_.height_px, frame);
     } else {
-      uint8_t* pixels = frame.allocate_bgr(decoded_.cols, decoded_.rows);
-      decoded_.copyTo(cv::Mat(decoded_.rows, decoded_.cols, CV_8UC3, pixels));
+      uint8_t* pixels = frame.allocate_bgr(decoded_.width_px, decoded_.height_px);
+      copy_pixels(decoded_, MAQ_PIXEL_BGR8, pixels, 0, frame.storage.size());
     }
     frame.timestamp_ns = timestamp_ns;
     frame.clock = MAQ_CLOCK_MEDIA;
@@ -104,7 +102,7 @@ class VideoSource : public Source {
 
   std::string path_;
   std::unique_ptr<ClipDecoder> clip_;
-  cv::Mat decoded_;
+  ImageView decoded_;  // the decoder's memory
   SourceInfo info_;
   double clip_fps_ = 0;
   double asked_fps_ = 0;

@@ -1,0 +1,69 @@
+"""Quick figures on validation images while training; `export.evaluation` has the full ones."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import torch
+from torchvision.ops import box_iou
+
+from export.densepose import data
+from export.densepose.config import DecodeConfig
+from export.densepose.decode import Graphs, infer
+from export.densepose.losses import PixelHead
+from export.densepose.network import MobileParsingRCNN
+from export.shards import Record
+
+
+@torch.no_grad()
+def validate(net: MobileParsingRCNN, records: list[Record]) -> dict[str, float]:
+    """Quick figures on validation images: box recall and precision at IoU 0.5, part accuracy, mask IoU."""
+    device = next(net.parameters()).device
+    net = copy.deepcopy(net).cpu().eval() if device.type != "cpu" else net.eval()
+    people = found = boxes = pixels = right = both = either = 0
+    for record in records:
+        image, label = record.decoded()
+        result = infer(
+            Graphs.of_network(net),
+            np.ascontiguousarray(image[..., ::-1]),
+            net.config,
+            DecodeConfig(score_threshold=0.3, max_people=6),
+        )
+        truth = data.truth_of(label)
+        wanted = truth.box[~truth.ignore]
+        people += len(wanted)
+        boxes += len(result.boxes)
+        if len(wanted) and len(result.boxes):
+            found += int((box_iou(wanted, torch.from_numpy(result.boxes)).max(1).values > 0.5).sum())
+        body, seen = label[..., 0] > 0, result.iuv[..., 0] > 0
+        pixels += body.sum()
+        right += (body & (result.iuv[..., 0] == label[..., 0])).sum()
+        both += (body & seen).sum()
+        either += (body | seen).sum()
+    return {
+        "recall": found / max(people, 1),
+        "precision": found / max(boxes, 1),
+        "part": float(right / max(pixels, 1)),
+        "mask_iou": float(both / max(either, 1)),
+    }
+
+
+@torch.no_grad()
+def validate_surface(
+    net: MobileParsingRCNN, pixel_head: PixelHead, records: list[Record], size: int, cropping: data.Cropping
+) -> dict[str, float]:
+    """Part accuracy and mask IoU of PixelHead, on crops of `size` pixels, the same at each call."""
+    device = next(net.parameters()).device
+    rng = np.random.default_rng(0)
+    right = body = both = either = 0
+    for record in records:
+        image, label = data.augmented(record, size, rng, cropping)
+        tensor = torch.from_numpy(data.normalised(image))[None].to(device)
+        found = pixel_head.index(net.detector(tensor)[0][0])[0].argmax(0).cpu().numpy()
+        part = PixelHead.cells(label[None])[0, ..., 0]
+        right += (found == part)[part > 0].sum()
+        body += (part > 0).sum()
+        both += ((part > 0) & (found > 0)).sum()
+        either += ((part > 0) | (found > 0)).sum()
+    return {"pixel_part": float(right / max(body, 1)), "pixel_mask_iou": float(both / max(either, 1))}

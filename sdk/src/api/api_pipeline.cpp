@@ -1,0 +1,231 @@
+#include <optional>
+
+#include "api/boundary.h"
+#include "api/config_arguments.h"
+#include "pipeline/pipeline.h"
+
+using namespace maq;
+
+namespace {
+
+constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
+
+// Of the thread that asked, as with maq_get_last_error.
+thread_local std::string given_problem, given_uri;
+
+maq_pipeline_config default_config() {
+  maq_pipeline_config config{};
+  config.struct_size = sizeof config;
+  config.result_pool_size = kDefaultPoolSize;
+  return config;
+}
+
+PipelineModel model_of(const maq_densepose_config* given, const char* name) {
+  const maq_densepose_config config = read_densepose_config(given, name);
+  const DensePoseSettings settings = densepose_settings(config);
+  return {config.bundle_path, settings};
+}
+
+// The handles of results. A copy has the same pools.
+struct ResultPools {
+  explicit ResultPools(uint32_t size) : frames(size, "frames"), results(size, "results") {}
+
+  BoundedPool<maq_frame> frames;
+  BoundedPool<maq_densepose_result> results;
+};
+
+// A result of the pipeline in handles of the caller.
+struct ResultHandles {
+  explicit ResultHandles(ResultPools& pools) : frame(pools.frames.acquire()), densepose(pools.results.acquire()) {}
+
+  maq_pipeline_result hand_over(const PipelineTimes& times) {
+    list_people(*densepose);
+    maq_pipeline_result result{sizeof result, nullptr,      nullptr,     times.number,
+                               times.wait_ms, times.run_ms, times.age_ms};
+    result.frame = lend<maq_frame>(std::move(frame));
+    result.densepose = lend<maq_densepose_result>(std::move(densepose));
+    return result;
+  }
+
+  BoundedPool<maq_frame>::Pooled frame;
+  BoundedPool<maq_densepose_result>::Pooled densepose;
+};
+
+PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std::shared_ptr<ContextState>& state,
+                                   const ResultPools& pools) {
+  require_argument(config.densepose, "config.densepose");
+  require_range("config.nice", config.nice, 0, 19);
+  const maq_source_config source = read_source_config(config.source, "config.source");
+  if (source.state_callback != nullptr) {
+    throw ArgumentError("config.source.state_callback is not NULL; use config.state_callback.");
+  }
+  PipelineSettings settings;
+  settings.model = model_of(config.densepose, "config.densepose");
+  settings.source = source_settings(source, state->log());
+  // Those that the app holds, one that waits for it and one that is being mapped.
+  settings.source.pool_size = int(config.result_pool_size) + 2;
+  settings.nice = config.nice;
+  settings.runtime = [state] { return state->onnxruntime(); };
+  if (config.result_callback != nullptr) {
+    settings.on_result = [pools = ResultPools(pools), call = config.result_callback,
+                          user_data = config.result_user_data](Frame& frame, DensePoseResult& densepose,
+                                                               const PipelineTimes& times) mutable {
+      std::optional<ResultHandles> handles;
+      try {
+        handles.emplace(pools);
+      } catch (const Error&) {
+        return false;  // the app holds them all
+      }
+      std::swap(handles->frame->frame, frame);
+      std::swap(handles->densepose->result, densepose);
+      const maq_pipeline_result result = handles->hand_over(times);
+      call(user_data, &result);
+      return true;
+    };
+  }
+  if (config.state_callback != nullptr) {
+    settings.on_state = [call = config.state_callback, user_data = config.state_user_data](const PipelineStatus& now) {
+      call(user_data, now.state, now.status, now.problem.c_str());
+    };
+  }
+  return settings;
+}
+
+}  // namespace
+
+struct maq_pipeline : Handle {
+  maq_pipeline(const maq_pipeline_config& config, const std::shared_ptr<ContextState>& state)
+      : pools(config.result_pool_size),
+        has_callback(config.result_callback != nullptr),
+        pipeline(pipeline_settings(config, state, pools)) {}
+
+  ResultPools pools;
+  const bool has_callback;
+  Pipeline pipeline;
+};
+
+maq_status maq_pipeline_config_init(maq_pipeline_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_pipeline_config));
+}
+
+maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* given, maq_pipeline** pipeline) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(given, "config");
+    require_argument(pipeline, "pipeline");
+    const maq_pipeline_config config = read_config(given, "config", default_config(), sizeof(maq_pipeline_config));
+    require_range("config.result_pool_size", config.result_pool_size, 1u, kMaxPoolSize);
+    *pipeline = new maq_pipeline(config, context->state);
+    return MAQ_OK;
+  });
+}
+
+void maq_pipeline_destroy(maq_pipeline* pipeline) { delete pipeline; }
+
+maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    require_argument(uri, "uri");
+    pipeline->pipeline.set_source(uri);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_densepose_config* config) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    require_argument(config, "config");
+    pipeline->pipeline.set_model(model_of(config, "config"));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_paused) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    require_range("is_paused", is_paused, 0, 1);
+    pipeline->pipeline.set_paused(is_paused == 1);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_pipeline_set_recording(maq_pipeline* pipeline, const char* path) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    if (path != nullptr && *path == '\0') throw ArgumentError("path is empty; NULL ends a recording.");
+    pipeline->pipeline.set_recording(path == nullptr ? "" : path);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_pipeline_stop(maq_pipeline* pipeline) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    pipeline->pipeline.stop();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_ns, maq_pipeline_result* result) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    require_argument(result, "result");
+    require_struct_size("result", result->struct_size, sizeof(maq_pipeline_result), sizeof(maq_pipeline_result));
+    if (pipeline->has_callback) {
+      throw Error(MAQ_ERROR_UNSUPPORTED, "The pipeline gives its results to config.result_callback.");
+    }
+    ResultHandles handles(pipeline->pools);
+    PipelineTimes times;
+    const maq_status status =
+        pipeline->pipeline.acquire(timeout_ns, handles.frame->frame, handles.densepose->result, times);
+    if (status == MAQ_TIMEOUT) {
+      return keep_error(pipeline, status, nullptr,
+                        concatenate("No result came within ", timeout_ns / 1000000, " ms.").c_str());
+    }
+    if (status == MAQ_CANCELLED) {
+      return keep_error(pipeline, status, nullptr, "The pipeline is stopped; start it with maq_pipeline_set_source.");
+    }
+    if (status == MAQ_OK) *result = handles.hand_over(times);
+    return status;
+  });
+}
+
+void maq_pipeline_release_result(maq_pipeline_result* result) {
+  if (result == nullptr) return;
+  return_to_pool(std::exchange(result->frame, nullptr));
+  return_to_pool(std::exchange(result->densepose, nullptr));
+}
+
+maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info* info) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    PipelineStatus now = pipeline->pipeline.status();
+    given_problem = std::move(now.problem);
+    given_uri = pipeline->pipeline.source_uri();
+    write_struct(info, "info", maq_pipeline_info{0, now.state, now.status, given_problem.c_str(), given_uri.c_str()},
+                 sizeof(maq_pipeline_info));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipeline_stats* stats) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    const PipelineStats from = pipeline->pipeline.stats();
+    write_struct(stats, "stats",
+                 maq_pipeline_stats{0, from.results, from.dropped_results, from.dropped_frames, from.results_per_second,
+                                    from.latest.wait_ms, from.latest.run_ms, from.latest.age_ms},
+                 sizeof(maq_pipeline_stats));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surface* surface) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    require_argument(surface, "surface");
+    const SurfaceGrid& grid = pipeline->pipeline.surface();
+    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_densepose_surface));
+    return MAQ_OK;
+  });
+}

@@ -1,0 +1,560 @@
+#include "pipeline/pipeline.h"
+
+#include <pthread.h>
+#if defined(__linux__)
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/clock.h"
+#include "core/error.h"
+#include "nn/bundle.h"
+#include "sources/recording/recording.h"
+
+namespace maq {
+namespace {
+
+using Clock = MonotonicClock;
+
+constexpr int64_t kWaitSliceNs = 50000000;  // how long a wait for a frame may hold up a request
+constexpr std::chrono::milliseconds kOpeningPatience(50);
+constexpr int64_t kLongestTimeoutNs = int64_t(365) * 24 * 3600 * 1000000000;
+constexpr size_t kMaxReports = 1000;  // that wait for a callback that hangs
+
+double ms_between(Clock::time_point begin, Clock::time_point end) {
+  return std::chrono::duration<double, std::milli>(end - begin).count();
+}
+
+// Threads that this one starts inherit it.
+void lower_priority_of_this_thread(int nice) {
+#if defined(__linux__)
+  if (nice == 0) return;
+  const id_t thread = id_t(syscall(SYS_gettid));
+  setpriority(PRIO_PROCESS, thread, std::min(19, getpriority(PRIO_PROCESS, thread) + nice));
+#else
+  (void)nice;
+#endif
+}
+
+// How many events a second there were lately.
+class EventRate {
+ public:
+  double add(Clock::time_point time) {
+    times_[count_++ % times_.size()] = time;
+    size_t recent = 1;
+    while (recent < std::min(count_, times_.size()) && time - at(recent) <= std::chrono::seconds(1)) ++recent;
+    return recent < 2 ? 0 : double(recent - 1) * 1000 / ms_between(at(recent - 1), time);
+  }
+
+ private:
+  // `back` events before the latest.
+  Clock::time_point at(size_t back) const { return times_[(count_ - 1 - back) % times_.size()]; }
+
+  std::array<Clock::time_point, 128> times_{};
+  size_t count_ = 0;
+};
+
+// Of the same bytes: points outside of a chart are NaN.
+bool is_same(const SurfaceGrid& one, const SurfaceGrid& other) {
+  return one.nodes == other.nodes &&
+         std::memcmp(one.points_m.data(), other.points_m.data(), one.points_m.size() * sizeof one.points_m[0]) == 0;
+}
+
+// What callers ask for. The numbers count the changes.
+struct Request {
+  std::string uri;  // "": no source
+  PipelineModel model;
+  std::string recording;
+  uint64_t source_number = 0, model_number = 1, recording_number = 0;
+};
+
+}  // namespace
+
+// What the pipeline and its thread share. The thread may outlive the pipeline.
+struct Pipeline::State {
+  const PipelineSettings settings;
+
+  mutable std::mutex mutex;  // of what follows, to the next such line
+  std::condition_variable changed;
+  Request request;
+  uint64_t request_number = 0;
+  bool is_paused = false;
+  bool is_ending = false;    // the thread shall end
+  bool has_ended = false;    // it has
+  bool is_opening = false;   // it opens a source, which may hang
+  bool in_callback = false;  // it is in a callback of the app
+  bool is_photo = false;     // the source has one frame
+  // Of the thread: stopped, opening, loading, running, ended or failed; while it runs, of the camera: running, stalled or
+  // reconnecting.
+  maq_pipeline_state phase = MAQ_PIPELINE_STOPPED, camera = MAQ_PIPELINE_RUNNING;
+  maq_status failure = MAQ_OK;
+  std::string problem, camera_problem;
+  PipelineStatus noted;  // the latest that was queued
+  std::deque<PipelineStatus> reports;
+  bool has_result = false;
+  Frame newest_frame;
+  DensePoseResult newest_densepose;
+  PipelineStats counts;
+  std::shared_ptr<DensePose> model;  // none before the first is loaded; networks are run by the thread alone
+  std::list<SurfaceGrid> surfaces;   // that were asked for
+
+  // Of the thread alone. Source and model are done when their numbers are those of the request.
+  Request now;
+  uint64_t heard_number = 0;
+  std::unique_ptr<Source> source;
+  uint64_t source_number = 0;
+  uint64_t model_number = 0;
+  std::unique_ptr<RecordingWriter> recording;
+  uint64_t recording_number = 0;
+  Frame frame;
+  DensePoseResult densepose;
+  std::optional<Clock::time_point> waiting_since;
+  EventRate rate;
+
+  std::thread thread;  // of the pipeline
+
+  explicit State(PipelineSettings given) : settings(std::move(given)) { request.model = settings.model; }
+
+  // --- with the mutex locked
+
+  PipelineStatus status() const {
+    if (phase != MAQ_PIPELINE_RUNNING) return {phase, failure, problem};
+    if (is_paused) return {MAQ_PIPELINE_PAUSED, failure, problem};
+    if (camera == MAQ_PIPELINE_RUNNING) return {camera, failure, problem};
+    return {camera, camera == MAQ_PIPELINE_STALLED ? MAQ_TIMEOUT : MAQ_ERROR_DEVICE_LOST, camera_problem};
+  }
+
+  // After each change: wakes whoever waits for it, and queues a report.
+  void note_change() {
+    changed.notify_all();
+    PipelineStatus latest = status();
+    const bool same = latest.state == noted.state && latest.status == noted.status && latest.problem == noted.problem;
+    if (same) return;
+    noted = latest;
+    if (settings.on_state && reports.size() < kMaxReports) reports.push_back(std::move(latest));
+  }
+
+  void enter(maq_pipeline_state next, maq_status with = MAQ_OK, std::string sentence = {}) {
+    phase = next;
+    failure = with;
+    problem = std::move(sentence);
+    note_change();
+  }
+
+  void drop_waiting_result() {
+    has_result = false;
+    newest_frame.clear();
+  }
+
+  bool is_current() const {
+    return !is_ending && request.source_number == now.source_number && request.model_number == now.model_number;
+  }
+
+  // --- on the thread
+
+  void run() noexcept {
+    lower_priority_of_this_thread(settings.nice);
+    while (wait_for_work()) {
+      try {
+        if (!report_a_change()) step();
+      } catch (const Error& error) {
+        fail(error.status(), error.what());
+      } catch (const std::bad_alloc&) {
+        fail(MAQ_ERROR_OUT_OF_MEMORY, "There is not enough memory.");
+      } catch (const std::exception& error) {
+        fail(MAQ_ERROR_INTERNAL, error.what());
+      } catch (...) {
+        fail(MAQ_ERROR_INTERNAL, "A callback of the pipeline threw an exception; callbacks must not throw.");
+      }
+    }
+    close_source();
+    show_model(nullptr);
+    std::lock_guard<std::mutex> lock(mutex);
+    has_ended = true;
+    changed.notify_all();
+  }
+
+  // Until there is a request, a change to be reported or a frame to be mapped. False when the thread shall end.
+  bool wait_for_work() {
+    std::unique_lock<std::mutex> lock(mutex);
+    changed.wait(lock, [&] {
+      return is_ending || !reports.empty() || request_number != heard_number ||
+             (phase == MAQ_PIPELINE_RUNNING && !is_paused);
+    });
+    return !is_ending;
+  }
+
+  template <class Call>
+  void call_back(std::unique_lock<std::mutex>& lock, Call&& call) {
+    struct Guard {
+      State& state;
+      std::unique_lock<std::mutex>& lock;
+      ~Guard() {
+        lock.lock();
+        state.in_callback = false;
+        state.changed.notify_all();
+      }
+    };
+    in_callback = true;
+    lock.unlock();
+    const Guard guard{*this, lock};
+    call();
+  }
+
+  // False when there is none.
+  bool report_a_change() {
+    std::unique_lock<std::mutex> lock(mutex);
+    if (reports.empty()) return false;
+    const PipelineStatus report = std::move(reports.front());
+    reports.pop_front();
+    call_back(lock, [&] { settings.on_state(report); });
+    return true;
+  }
+
+  // What the latest request asks for, or the next frame.
+  void step() {
+    maq_pipeline_state at = MAQ_PIPELINE_STOPPED;
+    {
+      std::lock_guard<std::mutex> lock(mutex);
+      if (request_number != heard_number) now = request;
+      heard_number = request_number;
+      at = phase;
+    }
+    if (at == MAQ_PIPELINE_FAILED) return;
+    if (at == MAQ_PIPELINE_STOPPED) return close_source();
+    const bool opens = source_number != now.source_number;
+    const bool loads = model_number != now.model_number;
+    if (opens && !open_source_of_request()) return;
+    if (loads && !load_model()) return;
+    if (opens || loads) {
+      enter_if_current(MAQ_PIPELINE_RUNNING);
+    } else if (at == MAQ_PIPELINE_RUNNING) {
+      map_next_frame();
+    }
+  }
+
+  // False when another request has come meanwhile.
+  bool enter_if_current(maq_pipeline_state next) {
+    std::lock_guard<std::mutex> lock(mutex);
+    if (is_current() && (source != nullptr || next == MAQ_PIPELINE_ENDED)) enter(next, failure, problem);
+    return is_current();
+  }
+
+  void fail(maq_status with, const std::string& sentence) noexcept {
+    close_source();
+    source_number = 0;
+    if (with == MAQ_ERROR_INFERENCE) model_number = 0;
+    std::lock_guard<std::mutex> lock(mutex);
+    if (is_current()) enter(MAQ_PIPELINE_FAILED, with, sentence);
+  }
+
+  bool open_source_of_request() {
+    close_source();
+    {
+      std::lock_guard<std::mutex> lock(mutex);
+      is_opening = true;
+      camera = MAQ_PIPELINE_RUNNING;
+    }
+    SourceSettings chosen = settings.source;
+    chosen.user_data = this;
+    chosen.on_state = [](void* self, maq_source_state state, const char* reason) {
+      static_cast<State*>(self)->take_camera_state(state, reason);
+    };
+    struct Opened {
+      State& state;
+      ~Opened() {
+        std::lock_guard<std::mutex> lock(state.mutex);
+        state.is_opening = false;
+        state.changed.notify_all();
+      }
+    };
+    {
+      const Opened opened{*this};
+      source = open_source(now.uri, chosen);
+    }
+    source_number = now.source_number;
+    waiting_since.reset();
+    if (model != nullptr) model->restart();
+    std::lock_guard<std::mutex> lock(mutex);
+    is_photo = source->info().frame_count == 1 && !source->info().is_live;
+    counts.dropped_frames = 0;
+    return is_current();
+  }
+
+  // On a thread of the source.
+  void take_camera_state(maq_source_state state, const char* reason) {
+    std::lock_guard<std::mutex> lock(mutex);
+    switch (state) {
+      case MAQ_SOURCE_STARTED:
+      case MAQ_SOURCE_RECONNECTED: camera = MAQ_PIPELINE_RUNNING; break;
+      case MAQ_SOURCE_STALLED:
+        camera = MAQ_PIPELINE_STALLED;
+        camera_problem = concatenate("The camera stalled: ", reason, ".");
+        break;
+      case MAQ_SOURCE_LOST:
+        camera = MAQ_PIPELINE_RECONNECTING;
+        camera_problem = concatenate("The camera was lost: ", reason, ".");
+        break;
+      case MAQ_SOURCE_RECONNECTING: break;  // follows the above
+    }
+    note_change();
+  }
+
+  void show_model(std::shared_ptr<DensePose> next) {
+    std::lock_guard<std::mutex> lock(mutex);
+    model.swap(next);
+  }
+
+  bool load_model() {
+    if (!enter_if_current(MAQ_PIPELINE_LOADING)) return false;
+    show_model(nullptr);  // before the next one takes memory
+    const Bundle bundle = read_bundle(now.model.bundle_path);
+    const auto loaded = std::make_shared<DensePose>(settings.runtime(), bundle, now.model.settings);
+    settings.source.log.write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
+                              bundle.manifest.precision, ") loaded, ", now.model.settings.threads, " thread(s)");
+    show_model(loaded);
+    model_number = now.model_number;
+    std::lock_guard<std::mutex> lock(mutex);
+    return is_current();
+  }
+
+  void map_next_frame() {
+    if (!waiting_since) waiting_since = Clock::now();
+    frame.clear();
+    try {
+      const NextFrame next = source->next(kWaitSliceNs, frame);
+      if (next == NextFrame::kTimeout) return;
+      if (next == NextFrame::kEnd) {
+        close_source();
+        enter_if_current(MAQ_PIPELINE_ENDED);
+        return;
+      }
+    } catch (const Error& error) {
+      if (error.status() != MAQ_ERROR_UNREADABLE) throw;
+      return note_problem(error);  // later frames can be read still, or the end follows
+    }
+    record_frame();
+    const auto begin = Clock::now();
+    model->run(frame.image, densepose);
+    deliver(ms_between(*std::exchange(waiting_since, std::nullopt), begin), begin);
+  }
+
+  void deliver(double wait_ms, Clock::time_point begin) {
+    const auto end = Clock::now();
+    const uint64_t dropped_frames = source->drops();
+    std::unique_lock<std::mutex> lock(mutex);
+    if (is_ending || request.source_number != now.source_number) return;
+    PipelineTimes times{++counts.results, wait_ms, ms_between(begin, end), -1};
+    if (source->info().is_live && frame.clock == MAQ_CLOCK_MONOTONIC) {
+      times.age_ms = double(to_ns(end) - frame.timestamp_ns) * 1e-6;
+    }
+    counts.dropped_frames = dropped_frames;
+    counts.results_per_second = rate.add(end);
+    counts.latest = times;
+    if (settings.on_result) {
+      bool taken = false;
+      call_back(lock, [&] { taken = settings.on_result(frame, densepose, times); });
+      counts.dropped_results += taken ? 0 : 1;
+    } else {
+      counts.dropped_results += has_result ? 1 : 0;
+      std::swap(newest_frame, frame);
+      std::swap(newest_densepose, densepose);
+      has_result = true;
+      changed.notify_all();
+    }
+    lock.unlock();
+    frame.clear();  // of a result that was dropped
+  }
+
+  // A disk that is full ends the recording, not the results.
+  void record_frame() {
+    try {
+      if (recording_number != now.recording_number) {
+        recording_number = now.recording_number;
+        end_recording();
+        if (!now.recording.empty()) {
+          RecordingInfo info{now.uri, source->info().fps, {}};
+          if (source->calibration() != nullptr) info.calibration = *source->calibration();
+          recording = std::make_unique<RecordingWriter>(now.recording, info, 0);
+        }
+      }
+      if (recording != nullptr) recording->add(frame);
+    } catch (const Error& error) {
+      recording.reset();
+      note_problem(error);
+    }
+  }
+
+  void end_recording() {
+    const std::unique_ptr<RecordingWriter> ended = std::move(recording);
+    if (ended != nullptr) ended->finish();
+  }
+
+  void note_problem(const Error& error) {
+    std::lock_guard<std::mutex> lock(mutex);
+    if (!is_current()) return;
+    failure = error.status();
+    problem = error.what();
+    note_change();
+  }
+
+  void close_source() noexcept {
+    try {
+      end_recording();
+    } catch (const Error& error) {
+      note_problem(error);
+    }
+    frame.clear();
+    source.reset();
+  }
+};
+
+Pipeline::Pipeline(PipelineSettings settings) : state_(std::make_shared<State>(std::move(settings))) {
+  state_->thread = std::thread([state = state_] { state->run(); });
+  pthread_setname_np(state_->thread.native_handle(), "maq pipeline");  // for debuggers and `top -H`
+}
+
+Pipeline::~Pipeline() {
+  State& state = *state_;
+  stop();
+  std::unique_lock<std::mutex> lock(state.mutex);
+  state.is_ending = true;
+  state.changed.notify_all();
+  bool waits = state.thread.get_id() != std::this_thread::get_id();
+  const auto patience_ends = Clock::now() + kOpeningPatience;
+  while (waits && !state.has_ended) {
+    if (!state.is_opening) {
+      state.changed.wait(lock);
+    } else if (state.changed.wait_until(lock, patience_ends) == std::cv_status::timeout) {
+      waits = !state.is_opening;
+    }
+  }
+  lock.unlock();
+  if (waits) {
+    state.thread.join();
+  } else {
+    state.thread.detach();  // it holds the state itself, and ends after the callback or when the device answers
+  }
+}
+
+void Pipeline::set_source(const std::string& uri) {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  state_->request.uri = uri;
+  ++state_->request.source_number;
+  ++state_->request_number;
+  state_->drop_waiting_result();
+  state_->enter(MAQ_PIPELINE_OPENING);
+}
+
+void Pipeline::set_model(const PipelineModel& model) {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  State& state = *state_;
+  state.request.model = model;
+  ++state.request.model_number;
+  ++state.request_number;
+  if (state.phase == MAQ_PIPELINE_RUNNING) state.enter(MAQ_PIPELINE_LOADING, state.failure, state.problem);
+  const bool again = state.phase == MAQ_PIPELINE_FAILED || (state.phase == MAQ_PIPELINE_ENDED && state.is_photo);
+  if (!again) return;
+  ++state.request.source_number;
+  state.enter(MAQ_PIPELINE_OPENING);
+}
+
+void Pipeline::set_paused(bool is_paused) {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  state_->is_paused = is_paused;
+  state_->note_change();
+}
+
+void Pipeline::set_recording(const std::string& path) {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  state_->request.recording = path;
+  ++state_->request.recording_number;
+  ++state_->request_number;
+  state_->changed.notify_all();
+}
+
+void Pipeline::stop() {
+  State& state = *state_;
+  std::unique_lock<std::mutex> lock(state.mutex);
+  state.request.uri.clear();
+  ++state.request.source_number;
+  ++state.request_number;
+  state.drop_waiting_result();
+  state.enter(MAQ_PIPELINE_STOPPED);
+  state.reports.clear();
+  if (state.thread.get_id() == std::this_thread::get_id()) return;
+  state.changed.wait(lock, [&] { return !state.in_callback; });
+}
+
+maq_status Pipeline::acquire(int64_t timeout_ns, Frame& frame, DensePoseResult& densepose, PipelineTimes& times) {
+  const std::shared_ptr<State> state = state_;
+  std::unique_lock<std::mutex> lock(state->mutex);
+  const auto is_over = [&] {
+    return state->has_result || state->phase == MAQ_PIPELINE_STOPPED || state->phase == MAQ_PIPELINE_ENDED ||
+           state->phase == MAQ_PIPELINE_FAILED;
+  };
+  if (timeout_ns < 0) {
+    state->changed.wait(lock, is_over);
+  } else {
+    state->changed.wait_for(lock, std::chrono::nanoseconds(std::min(timeout_ns, kLongestTimeoutNs)), is_over);
+  }
+  if (state->has_result) {
+    std::swap(frame, state->newest_frame);
+    std::swap(densepose, state->newest_densepose);
+    times = state->counts.latest;
+    state->has_result = false;
+    return MAQ_OK;
+  }
+  switch (state->phase) {
+    case MAQ_PIPELINE_STOPPED: return MAQ_CANCELLED;
+    case MAQ_PIPELINE_ENDED: return MAQ_END_OF_STREAM;
+    case MAQ_PIPELINE_FAILED: throw Error(state->failure, state->problem);
+    default: return MAQ_TIMEOUT;
+  }
+}
+
+PipelineStatus Pipeline::status() const {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  return state_->status();
+}
+
+std::string Pipeline::source_uri() const {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  return state_->request.uri;
+}
+
+PipelineStats Pipeline::stats() const {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  return state_->counts;
+}
+
+const SurfaceGrid& Pipeline::surface() {
+  std::shared_ptr<DensePose> model;
+  {
+    std::lock_guard<std::mutex> lock(state_->mutex);
+    model = state_->model;
+  }
+  if (model == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "No model is loaded yet; wait for MAQ_PIPELINE_RUNNING.");
+  const SurfaceGrid& grid = model->surface();
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  for (const SurfaceGrid& known : state_->surfaces) {
+    if (is_same(known, grid)) return known;
+  }
+  return state_->surfaces.emplace_back(grid);
+}
+
+}  // namespace maq

@@ -11,7 +11,7 @@
 #include "scene/gravity_alignment.h"
 #include "scene/networks/scene_networks.h"
 #include "scene/render/coverage.h"
-#include "scene/render/refined_picture.h"
+#include "scene/render/refined_image.h"
 
 namespace maq {
 

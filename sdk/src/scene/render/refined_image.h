@@ -12,7 +12,7 @@ namespace maq {
 
 // Where the picture of a window goes: rows of `columns` pixels, of which those from (left, top) on are the window's.
 // What of the window is not inside is left out.
-struct PictureRows {
+struct ImageRows {
   uint8_t* bgr = nullptr;
   uint8_t* alpha = nullptr;
   float* depth = nullptr;
@@ -25,7 +25,7 @@ class RefinedImage {
   // `alphas` and `depths`, of the window too, are copied. The picture is blended over `background` (BGR) by `alphas`
   // times `confidence_gain`, clamped.
   void write(const float* refined, const RefinerLayout& layout, const RasterWindow& window, const uint8_t* alphas,
-             const float* depths, const std::array<uint8_t, 3>& background, int confidence_gain, const PictureRows& to,
+             const float* depths, const std::array<uint8_t, 3>& background, int confidence_gain, const ImageRows& to,
              WorkerThreads& threads);
 
  private:

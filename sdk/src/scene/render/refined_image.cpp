@@ -1,4 +1,4 @@
-#include "scene/render/refined_picture.h"
+#include "scene/render/refined_image.h"
 
 #include <algorithm>
 
@@ -24,7 +24,7 @@ inline uint8_t over(uint8_t colour, uint8_t background, uint8_t alpha) {
 
 void RefinedImage::write(const float* refined, const RefinerLayout& layout, const RasterWindow& window,
                          const uint8_t* alphas, const float* depths, const std::array<uint8_t, 3>& background,
-                         int confidence_gain, const PictureRows& to, WorkerThreads& threads) {
+                         int confidence_gain, const ImageRows& to, WorkerThreads& threads) {
   const size_t width = size_t(window.width_px);
   bytes_.resize(size_t(threads.count()));
   for (std::vector<uint8_t>& bytes : bytes_) bytes.resize(2 * width * kColours);

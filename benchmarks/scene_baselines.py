@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from export.scenes.cameras import Camera, reframed, resized
+from export.camera import Camera
 from export.scenes.captures import Capture
 from export.scenes.config import LEVELS, MULTIPLE
 from export.scenes.modelling import View
@@ -36,7 +36,7 @@ def moved_px(target: Camera, other: Camera, places: np.ndarray) -> float:
     places = places[in_frame(places, target)]
     if not len(places):
         return diagonal
-    other = resized(other, target.width_px, target.height_px)
+    other = other.resized(target.width_px, target.height_px)
     pixels = []
     for camera in (target, other):
         seen = (places - camera.centre) @ camera.rotation.T
@@ -83,7 +83,7 @@ class Cloud:
         """The five rasters that the refiner gets, here of the points' own colours: where a finer one has no point, the
         next coarser shows, bilinearly."""
         wide, high = (-(-side // MULTIPLE) * MULTIPLE for side in (camera.width_px, camera.height_px))
-        shown = pyramid(visible(self.places, reframed(camera, 0, 0, wide, high)), LEVELS)
+        shown = pyramid(visible(self.places, camera.reframed(0, 0, wide, high)), LEVELS)
         picture = self.behind[:, None, None].expand(3, high // MULTIPLE, wide // MULTIPLE)
         for raster in reversed(shown.rasters(self.colours[shown.points])):
             size = raster.shape[1:]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from export.scenes.cameras import Camera
+from export.camera import Camera
 
 PLANES = 128
 WINDOW_PX = 7
@@ -60,14 +60,14 @@ def _span(present: np.ndarray, size: int) -> slice:
 def _cost_at(view: GreyView, others: list[GreyView], depth: float, rows: slice, columns: slice, grey) -> np.ndarray:
     """1 - correlation with the half of the others that fit best, float32 [h, w]: what hides in one shows in another."""
     first = view.camera
-    to_ray = np.linalg.inv(first.intrinsics()) @ np.array([[1, 0, columns.start], [0, 1, rows.start], [0, 0, 1.0]])
+    to_ray = np.linalg.inv(first.intrinsics) @ np.array([[1, 0, columns.start], [0, 1, rows.start], [0, 0, 1.0]])
     mean, spread = _moments(grey)
     costs = []
     for other in others:
         turn = other.camera.rotation @ first.rotation.T
         shift = other.camera.rotation @ (first.centre - other.camera.centre)
         # A plane at `depth` before the first camera: x' = K' (R + t n^T / depth) K^-1 x.
-        plane = other.camera.intrinsics() @ (turn + np.outer(shift, [0, 0, 1 / depth])) @ to_ray
+        plane = other.camera.intrinsics @ (turn + np.outer(shift, [0, 0, 1 / depth])) @ to_ray
         size = grey.shape[1], grey.shape[0]
         seen = cv2.warpPerspective(other.grey, plane, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
         other_mean, other_spread = _moments(seen)

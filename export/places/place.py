@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.places.cameras import Camera
+from export.camera import Camera
 from export.point_cloud import PointCloudError, read_ply
 
 FORMAT = "maquette-place-1"
@@ -64,7 +64,9 @@ class Place:
     about: dict
 
     def camera(self, view: int) -> Camera:
-        return Camera(self.images.width, self.images.height, self.intrinsics[view], self.world_to_camera[view])
+        rotation, shift = self.world_to_camera[view, :, :3], self.world_to_camera[view, :, 3]
+        size = self.images.width, self.images.height
+        return Camera.of_intrinsics(*size, self.intrinsics[view], rotation, -rotation.T @ shift)
 
 
 def _image(file: Path, height: int, width: int) -> np.ndarray:
@@ -198,5 +200,4 @@ def _camera(file: Path, frame: dict, k: int, width: int, height: int) -> Camera:
     if not turned or np.abs(to_world[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise PlaceError(f"{file}: `transform_matrix` of camera {k} is no rotation with a shift.")
     # Files count pixels from the corner of the first one, cameras from its centre.
-    intrinsics = np.array([[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1.0]])
-    return Camera(width, height, intrinsics, np.c_[rotation.T, -rotation.T @ to_world[:3, 3]])
+    return Camera(width, height, fx, fy, cx - 0.5, cy - 0.5, rotation.T, to_world[:3, 3])

@@ -150,7 +150,7 @@ def test_runs_that_differ_are_told_apart(tmp_path, capsys):
     assert "roofline_share" in capsys.readouterr().out
 
 
-def scene(source, people, ms):
+def case(source, people, ms):
     times = {stage: {"p50": ms / 8, "p90": ms / 7, "p99": ms / 6} for stage in report.STAGES}
     times["frame"] = {"p50": ms, "p90": ms + 1, "p99": ms + 2}
     return {"source": source, "people": people, "ms": times, "fps": 1000 / ms, "cpu_ms": 2 * ms, "doubts": [],
@@ -165,7 +165,7 @@ def camera_host():
 
 
 def document():
-    scenes = {name: {"scenes": [scene("s0", 0, 8.0), scene("s1", 1, 10.0)], "doubts": ["others were busy"]}
+    frames = {name: {"cases": [case("s0", 0, 8.0), case("s1", 1, 10.0)], "doubts": ["others were busy"]}
               for name in ("people", "sizes", "one_thread", "no_spin")}  # fmt: skip
     rows = [{"setting": name, "axis": axis, "ms": ms, "error": error, "error_cm": 10 * error, "box_ap": 0.5,
              "part_accuracy": 0.6}
@@ -190,9 +190,18 @@ def document():
     unseen = {"rows": [], "places": [], "speed": {}, "speed_missing": "no <networks>", "doubts": ["0 real places"],
               "sheet": ""}  # fmt: skip
     return {"machine": MACHINE, "cameras": measured, "scenes": unseen,
-            "frames": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
+            "frames": frames, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
+
+
+@pytest.mark.parametrize("part", ["frames", "sweep", "peers", "agreement", "cameras", "scenes"])
+def test_a_report_of_one_part_shows_what_is_there(tmp_path, part):
+    whole = document()
+    report.write({name: whole[name] for name in ("machine", "threads", "quick", "gates", part)}, tmp_path)
+    headings = [line for line in (tmp_path / "report.md").read_text().splitlines() if line.startswith("## ")]
+    assert len(headings) == 2
+    assert headings[0] == "## Gates"
 
 
 def test_a_report_holds_its_figures_and_pictures(tmp_path):

@@ -204,7 +204,7 @@ def modelled(
 
 def cover(rasters: list[Tensor]) -> Tensor:
     """How much of a picture is the refiner's, the rest is background: [1, H, W], 1 where there is a point in the 16 x
-    16 pixels that a pixel is in, fading to 0 beyond (PictureCover and kOwnBackgroundGain in the SDK)."""
+    16 pixels that a pixel is in, fading to 0 beyond (Coverage and kOwnBackgroundGain in the SDK)."""
     sure = rasters[-1][None, RASTER - 1 :] * _SURENESS[-1]
     for raster, most in zip(reversed(rasters[:-1]), reversed(_SURENESS[:-1]), strict=True):
         wider = F.interpolate(sure, scale_factor=2, mode="bilinear", align_corners=False)

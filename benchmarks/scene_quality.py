@@ -92,7 +92,7 @@ def measure(
     """Rows; the places (name, real, photos, points, size, or why it is `missing`); and for each of them one photo with
     its pictures, to be looked at: name, photo, pictures by way."""
     rows, places, shown = rows_of(settings), [], []
-    folders = [(folder, False) for folder in sources.places] + [(folder, True) for folder in sources.real]
+    folders = [(folder, False) for folder in sources.positions] + [(folder, True) for folder in sources.real]
     with tqdm(total=len(folders) * (1 + len(settings)), desc="scenes", unit="setting", disable=None) as progress:
         for folder, real in folders:
             try:
@@ -144,7 +144,8 @@ class Place:
     def described(self) -> dict:
         camera = self.photos[1].cameras[0]
         return {"name": self.name, "photos": len(self.capture.sources()), "held_out": len(self.photos[1].names),
-                "points": len(self.capture.cloud.places), "size_px": [camera.width_px, camera.height_px]}  # fmt: skip
+                "points": len(self.capture.cloud.positions),
+                "size_px": [camera.width_px, camera.height_px]}  # fmt: skip
 
     def run_baselines(self) -> None:
         begin_s = time.monotonic()

@@ -92,7 +92,7 @@ def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float],
     found = {row["setting"]: row["rendered"] for row in rows}
     said = {row["setting"]: next(iter(row["missing"].values()), "there is no rendered place") for row in rows}
     figures, missing = {}, {}
-    shipped, plain, exact = "as shipped", "plain points", "fp32 networks and looks, all varying"
+    shipped, plain, exact = "as shipped", "plain points", "fp32 networks and descriptors, all varying"
     if found[shipped]:
         figures["scene_bytes_a_point"] = found[shipped]["bytes_a_point"]
     else:

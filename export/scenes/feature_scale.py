@@ -61,7 +61,7 @@ def scaled(networks: Networks, factors: Tensor) -> Networks:
     refiner = result.refiner
     back = torch.ones(RASTER)
     back[COLOURS:FEATURES] = 1 / factors
-    pixels = 5 if refiner.config.folded else 1  # four of the finest raster, and the next one's
+    pixels = 5 if refiner.config.space_to_depth else 1  # four of the finest raster, and the next one's
     _scale_inputs(refiner.start[0], back.repeat(pixels))
     for width, block in zip(refiner.config.widths, refiner.down, strict=False):
         _scale_inputs(block[0], torch.cat([torch.ones(width), back]))

@@ -287,7 +287,7 @@ def test_clouds_come_back_from_ply_and_damaged_ones_are_refused(tmp_path):
     file = tmp_path / "a.ply"
     write_ply(file, xyz, rgb)
     read = read_ply(file)
-    assert np.array_equal(read.places.astype(np.float32), xyz)
+    assert np.array_equal(read.positions.astype(np.float32), xyz)
     assert np.array_equal(np.rint(255 * read.colours), rgb)
     data = file.read_bytes()
     for damaged, sentence in (

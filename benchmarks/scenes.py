@@ -61,10 +61,10 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     wanted = settings(list(given.bundles))
     rows, places, shown = scene_quality.measure(few, wanted, perceptual, quick)
     speed, why = scene_speed.measure(given.places, given.bundles[SHIPPED], threads, quick)
-    share = others.now()
+    fraction = others.now()
     doubts = doubts_of(places, perceptual is not None)
-    if share > MAX_OTHERS:
-        doubts.append(f"other processes had {share:.0%} of the processor (scenes)")
+    if fraction > MAX_OTHERS:
+        doubts.append(f"other processes had {fraction:.0%} of the processor (scenes)")
     sheet = scene_pictures.write_sheet(shown, rows, folder)
     document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "doubts": doubts,
                 "sheet": sheet.name if sheet else ""}  # fmt: skip

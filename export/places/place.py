@@ -16,7 +16,7 @@ from export.point_cloud import PointCloudError, read_ply
 FORMAT = "maquette-place-1"
 # Cameras of files look to -z with y up (OpenGL); ours look to z with y down (OpenCV).
 AXES = np.diag([1.0, -1.0, -1.0, 1.0])
-_MOST_BYTES, _MOST_FRAMES, _MOST_SIDE = 20_000_000, 10_000, 16_384
+_MAX_BYTES, _MOST_FRAMES, _MOST_SIDE = 20_000_000, 10_000, 16_384
 
 
 class PlaceError(ValueError):
@@ -101,8 +101,8 @@ def load_place(folder: Path | str) -> Place:
     file = folder / "transforms.json"
     if not file.is_file():
         raise PlaceError(f"{folder} has no transforms.json: it is no place, or was not rendered to the end.")
-    if file.stat().st_size > _MOST_BYTES:
-        raise PlaceError(f"{file} has {file.stat().st_size} bytes; {_MOST_BYTES} at most are read.")
+    if file.stat().st_size > _MAX_BYTES:
+        raise PlaceError(f"{file} has {file.stat().st_size} bytes; {_MAX_BYTES} at most are read.")
     try:
         table = json.loads(file.read_text("utf-8"))
     except (ValueError, RecursionError) as error:

@@ -2,7 +2,7 @@
 
 Features are scaled in the extractor's last layer and back in those of the refiner that read rasters; what lies between,
 a regression for each point, is linear in them. Eight bits hold all channels of a raster with one scale: beside features
-of -5 .. 5 colours would have 25 steps. It also gives the SDK's `least_variation` one meaning for all features.
+of -5 .. 5 colours would have 25 steps. It also gives the SDK's `min_variation` one meaning for all features.
 """
 
 from __future__ import annotations

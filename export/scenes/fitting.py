@@ -37,9 +37,10 @@ class View:
 @dataclass(frozen=True)
 class Options:
     """up: of the world. visibility_scale: of the photos' sides, for finding which points are visible (1/2 in the paper
-    where points are sparse, against bleed-through). depth_tolerance: how much farther than the nearest point of its block
-    of pixels a point may be, as a fraction of that depth (see `without_occluded`; infinite in the paper). near: depth of
-    the nearest visible point, in the scene's units. alpha: of the ridge regression. precision: of the moments."""
+    where points are sparse, against bleed-through). depth_tolerance: how much farther than the nearest point of its
+    block of pixels a point may be, as a fraction of that depth (see `without_occluded`; infinite in the paper). near:
+    depth of the nearest visible point, in the scene's units. alpha: of the ridge regression. precision: of the
+    moments."""
 
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     visibility_scale: float = 1.0
@@ -218,8 +219,8 @@ def coverage(rasters: list[Tensor]) -> Tensor:
 def render(model: FittedPoints, camera: Camera, networks: Networks, options: Options) -> np.ndarray:
     """The picture of a camera of any size and roll: RGB float32 [H, W, 3] in 0..1.
 
-    Rendered upright in the smallest frame that holds it, rotated back, cropped. Frames that are rotated have sides of a few
-    sizes, so that those of a hand-held camera are mostly the same.
+    Rendered upright in the smallest frame that holds it, rotated back, cropped. Frames that are rotated have sides of a
+    few sizes, so that those of a hand-held camera are mostly the same.
     """
     turned = upright(camera, np.asarray(options.up), MULTIPLE)
     if moves(camera, turned):

@@ -7,8 +7,8 @@ Coarser levels are the smallest keys of 2x2 pixels of the next finer one. That i
 find, and exactly: a point at (x, y) is in pixel floor(x + 1/2), and half the size moves it to (x + 1/2) / 2 - 1/2, so
 to pixel floor((x + 1/2) / 2) = floor(floor(x + 1/2) / 2). It holds where all sides can be halved, hence sides are
 multiples of 16 here: the frame is wider than the picture by up to 15 pixels, with the points that are there, and
-cropped afterwards. The paper truncates sizes instead and draws the points five times. A point that is dropped as occluded
-(`without_occluded`) is never the visible one of a coarser pixel that has another point of its block.
+cropped afterwards. The paper truncates sizes instead and draws the points five times. A point that is dropped as
+occluded (`without_occluded`) is never the visible one of a coarser pixel that has another point of its block.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ def visible(points: Tensor, camera: Camera, near: float = 0.0) -> Tensor:
 
 def without_occluded(keys: Tensor, tolerance: float) -> Tensor:
     """Keys [H, W] without the points that bleed through holes of what is before them: those of a block of
-    OCCLUSION_BLOCK_PX x OCCLUSION_BLOCK_PX pixels, counted from the first one, that are farther than its nearest by more than `tolerance` of
-    that depth. Infinite: all stay."""
+    OCCLUSION_BLOCK_PX x OCCLUSION_BLOCK_PX pixels, counted from the first one, that are farther than its nearest by
+    more than `tolerance` of that depth. Infinite: all stay."""
     h, w = keys.shape
     rows, columns = -(-h // OCCLUSION_BLOCK_PX), -(-w // OCCLUSION_BLOCK_PX)
     whole = torch.full(
@@ -89,15 +89,15 @@ def depths_of(keys: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class Pyramid:
-    """points: indices int64 [V] of all that are visible in a pixel. slots: for each level, finest first, where in `points` the
-    pixel's point is, int64 [H/2^k, W/2^k]; V where there is none."""
+    """points: indices int64 [V] of all that are visible in a pixel. slots: for each level, finest first, where in
+    `points` the pixel's point is, int64 [H/2^k, W/2^k]; V where there is none."""
 
     points: Tensor
     slots: list[Tensor]
 
     def rasters(self, descriptors: Tensor) -> list[Tensor]:
-        """Descriptors [V, C] of `points` -> [C + 1, H/2^k, W/2^k] for each level, the last channel 1 where there is a point.
-        All is 0 elsewhere."""
+        """Descriptors [V, C] of `points` -> [C + 1, H/2^k, W/2^k] for each level, the last channel 1 where there is a
+        point. All is 0 elsewhere."""
         rows = torch.cat([descriptors, descriptors.new_ones(len(descriptors), 1)], 1)
         rows = torch.cat([rows, rows.new_zeros(1, rows.shape[1])])
         return [rows[slot].permute(2, 0, 1) for slot in self.slots]

@@ -34,9 +34,9 @@ class Sample:
 
 @dataclass(frozen=True)
 class Sampling:
-    """crop_px: side of the cuts, a multiple of 32. sources: photos a cut is made from, at least and at most; the paper
-    has 3. margin_px: the extractor sees of a photo a square so much wider than the cut. long_side_px: larger photos are
-    made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
+    """crop_px: side of the crops, a multiple of 32. sources: photos a crop is made from, at least and at most; the
+    paper has 3. margin_px: the extractor sees of a photo a square so much wider than the cut. long_side_px: larger
+    photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
 
     crop_px: int = 256
     sources: tuple[int, int] = (3, 3)

@@ -1,4 +1,5 @@
-"""Writes data/tiny_scene: scene networks with random weights, a captured place, and the descriptors that torch makes of them.
+"""Writes data/tiny_scene: scene networks with random weights, a captured place, and the descriptors that torch makes of
+them.
 
 `bundle`: an extractor of two convolutions with the interface of the real one, the basis network, a narrow refiner.
 `capture`: 5 photos of noise by cameras that are held at different angles, one of them held out, and a cloud in two

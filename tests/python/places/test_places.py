@@ -425,7 +425,7 @@ def _sleepy(job: tuple) -> None:
 
 def test_jobs_that_never_end_or_fail_are_given_up_and_others_done():
     jobs = [("a",), ("forever",), ("wrong",), ("b",), ("c",)]
-    found = {job[0]: error for job, error in done(_sleepy, jobs, 2, 5)}
+    found = {job[0]: error for job, error in done(_sleepy, jobs, 2, 3)}
     assert found["a"] is found["b"] is found["c"] is None
     assert isinstance(found["forever"], TimeoutError)
     assert isinstance(found["wrong"], ValueError)

@@ -210,7 +210,7 @@ def test_a_tuned_scene_differs_in_its_descriptors_alone(place, tmp_path, monkeyp
     before = read_scene_file(place / "8-bit.maqs")
     for name in ("0.5s", "1s"):
         after = read_scene_file(tmp_path / "room" / f"{name}.maqs")
-        np.testing.assert_array_equal(after.places, before.places)
+        np.testing.assert_array_equal(after.stored_positions, before.stored_positions)
         np.testing.assert_array_equal(after.slope_rows(), before.slope_rows())
         assert after.networks_sha256 == before.networks_sha256
         assert (after.means != before.means).any()

@@ -6,7 +6,7 @@
 Measured by `maquette play` in two places. The guest is a real kernel with its drivers in a virtual machine
 (tests/camera_vm, guest "figures"), with the kernel's test camera and a virtual USB camera; its clock counts
 instructions, so that its times come out alike however busy this machine is. The host is this machine, with a stub and a
-recording that are played as cameras.
+recording replayed as cameras.
 """
 
 from __future__ import annotations

@@ -187,7 +187,7 @@ def peers_section(peers: dict) -> Section:
     line_rows = [["graph", "million multiply-adds", "of these int8", "min. ms", "fraction reached"]]
     for name, graph in line["graphs"].items():
         line_rows.append([name, f"{graph['macs'] / 1e6:.1f}", f"{graph['int8_macs'] / max(graph['macs'], 1):.0%}",
-                          f"{graph['least_ms']:.2f}", f"{graph['share']:.0%}"])  # fmt: skip
+                          f"{graph['min_ms']:.2f}", f"{graph['share']:.0%}"])  # fmt: skip
     return "Other runtimes on the same graphs", [
         ("runtimes.png", "The five networks for a picture with one person."),
         rows,

@@ -24,7 +24,7 @@ from export.scenes.source_views import in_frame
 SCORED_POINTS = 2000  # of the cloud, enough to tell which photo is nearest
 BACKGROUND_PHOTOS = 3
 BACKGROUND_SIDE_PX = 160  # photos this small tell a mean colour
-SEEN_SHARE = 0.02  # of the photos' pixels: with fewer that no point covers, these tell nothing of the background
+SEEN_FRACTION = 0.02  # of the photos' pixels: with fewer that no point covers, these tell nothing of the background
 
 
 def moved_px(target: Camera, other: Camera, positions: np.ndarray) -> float:
@@ -117,5 +117,5 @@ def cloud_of(capture: Capture) -> Cloud:
         shown.append(view.image[free])
         count += free.size
     free = np.concatenate(shown)
-    behind = (free if len(free) > SEEN_SHARE * count else capture.cloud.colours).mean(0, dtype=np.float64)
+    behind = (free if len(free) > SEEN_FRACTION * count else capture.cloud.colours).mean(0, dtype=np.float64)
     return Cloud(positions, colours, torch.from_numpy(behind.astype(np.float32)))

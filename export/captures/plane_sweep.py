@@ -15,7 +15,7 @@ from export.camera import Camera
 
 PLANES = 128
 WINDOW_PX = 7
-_LEAST_SPREAD = 2.0  # grey levels: where less is to be seen, nothing matches
+_MIN_SPREAD = 2.0  # grey levels: where less is to be seen, nothing matches
 _SMALL_STEP, _LARGE_STEP = 0.08, 0.5  # costs of a depth one plane away from its neighbour's, and of more
 _WORST_COST = 0.75  # 1 - correlation
 
@@ -80,7 +80,7 @@ def _cost_at(view: GreyView, others: list[GreyView], depth: float, rows: slice, 
 def _moments(grey: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     mean = cv2.boxFilter(grey, -1, (WINDOW_PX, WINDOW_PX))
     square = cv2.boxFilter(grey * grey, -1, (WINDOW_PX, WINDOW_PX))
-    return mean, np.sqrt(np.maximum(square - mean * mean, 0) + _LEAST_SPREAD**2)
+    return mean, np.sqrt(np.maximum(square - mean * mean, 0) + _MIN_SPREAD**2)
 
 
 def _along(costs: np.ndarray, way: tuple[int, int]) -> np.ndarray:

@@ -16,7 +16,7 @@ from export.point_cloud import PointCloudError, read_ply
 FORMAT = "maquette-place-1"
 # Cameras of files look to -z with y up (OpenGL); ours look to z with y down (OpenCV).
 AXES = np.diag([1.0, -1.0, -1.0, 1.0])
-_MAX_BYTES, _MOST_FRAMES, _MOST_SIDE = 20_000_000, 10_000, 16_384
+_MAX_BYTES, _MAX_FRAMES, _MAX_SIDE = 20_000_000, 10_000, 16_384
 
 
 class PlaceError(ValueError):
@@ -113,10 +113,10 @@ def load_place(folder: Path | str) -> Place:
     frames = table.get("frames")
     if (
         not isinstance(frames, list)
-        or not 0 < len(frames) <= _MOST_FRAMES
+        or not 0 < len(frames) <= _MAX_FRAMES
         or not all(isinstance(f, dict) for f in frames)
     ):
-        raise PlaceError(f"{file} needs a list `frames` with 1 to {_MOST_FRAMES} cameras.")
+        raise PlaceError(f"{file} needs a list `frames` with 1 to {_MAX_FRAMES} cameras.")
     sizes = {(_side(file, frame, "w"), _side(file, frame, "h")) for frame in frames}
     if len(sizes) > 1:
         raise PlaceError(f"{file} has pictures of {len(sizes)} sizes; a place has one.")
@@ -168,8 +168,8 @@ def _figures(file: Path, entry: dict, key: str, count: int) -> np.ndarray:
 
 def _side(file: Path, frame: dict, key: str) -> int:
     side = _figures(file, frame, key, 1)[0]
-    if not 1 <= side <= _MOST_SIDE or side != int(side):
-        raise PlaceError(f"{file}: a picture's `{key}` is {side}; 1 to {_MOST_SIDE} pixels are possible.")
+    if not 1 <= side <= _MAX_SIDE or side != int(side):
+        raise PlaceError(f"{file}: a picture's `{key}` is {side}; 1 to {_MAX_SIDE} pixels are possible.")
     return int(side)
 
 

@@ -12,7 +12,6 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection
 
-
 START_S = 300  # to start a process, imports included, on a busy machine
 
 

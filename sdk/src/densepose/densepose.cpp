@@ -131,9 +131,9 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
     stats.proposals_ms = float(stage.lap_ms());
 
     // People who are followed come from a look at the frame before.
-    const bool looks_again = stats.key_frame && spec_.box_head.second_pass_threshold.has_value();
+    const bool has_second_pass = stats.key_frame && spec_.box_head.second_pass_threshold.has_value();
     const float least_score = settings_.score_threshold;
-    if (looks_again) {
+    if (has_second_pass) {
       run_box_head(proposals_, std::min(least_score, *spec_.box_head.second_pass_threshold), found_,
                    &stats.dropped_boxes);
       proposals_.swap(found_);

@@ -137,7 +137,7 @@ def test_the_work_of_the_shipped_heads_is_linear_in_people(graph):
 
 def test_the_roofline_is_the_slower_of_work_and_bytes():
     work = [graphs.Work("a", 1000, 10, True), graphs.Work("b", 1000, 10, False), graphs.Work("c", 1, 1000, True)]
-    assert roofline.least_seconds(work, 100, 1000, 100) == pytest.approx(1 + 10 + 10)
+    assert roofline.min_seconds(work, 100, 1000, 100) == pytest.approx(1 + 10 + 10)
 
 
 def test_runs_that_differ_are_told_apart(tmp_path, capsys):
@@ -176,7 +176,7 @@ def document():
                 {"name": "Other", "version": "", "precision": "fp32", "ms": {}, "total_ms": None,
                  "ours_int8_ratio": None, "missing": "does not load it"}]  # fmt: skip
     line = {"float32_macs_s": 1e11, "int8_macs_s": 4e11, "bytes_s": 1e11, "share": 0.4,
-            "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "least_ms": 1.6, "share": 0.4}}}  # fmt: skip
+            "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "min_ms": 1.6, "share": 0.4}}}  # fmt: skip
     gate = {
         "says": "speed",
         "value": 40.0,

@@ -65,7 +65,7 @@ def test_people_are_painted_with_their_part_and_coordinates():
     assert np.unique(result.iuv[result.instance > 0], axis=0).tolist() == [[3, 128, 64]]
 
 
-def test_the_second_look_decides():
+def test_the_second_pass_decides():
     graphs, looks = fake_graphs(), []
 
     def box_head(rois):

@@ -207,7 +207,7 @@ def fitted_to_views(
 
 def coverage(rasters: list[Tensor]) -> Tensor:
     """How much of a picture is the refiner's, the rest is background: [1, H, W], 1 where there is a point in the 16 x
-    16 pixels that a pixel is in, fading to 0 beyond (coverage and kOwnBackgroundGain in the SDK)."""
+    16 pixels that a pixel is in, fading to 0 beyond (Coverage and kOwnBackgroundGain in the SDK)."""
     found = rasters[-1][None, RASTER - 1 :] * _CONFIDENCE[-1]
     for raster, confidence in zip(reversed(rasters[:-1]), reversed(_CONFIDENCE[:-1]), strict=True):
         wider = F.interpolate(found, scale_factor=2, mode="bilinear", align_corners=False)

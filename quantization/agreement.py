@@ -141,7 +141,7 @@ def mixed(float_bundle: Path, int8_bundle: Path, in_float: list[str], folder: Pa
     manifest = read_manifest(folder)
     for name in in_float:
         if name not in manifest["graphs"]:
-            raise ValueError(f"{name} is none of the graphs {', '.join(manifest['graphs'])}")
+            raise ValueError(f"{name} is not one of the graphs {', '.join(manifest['graphs'])}")
         file = manifest["graphs"][name]["file"]
         shutil.copyfile(float_bundle / file, folder / file)
         manifest["files"][file] = signed(folder / file)

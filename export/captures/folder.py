@@ -22,7 +22,7 @@ _TO_OPENGL = np.diag([1.0, -1.0, -1.0])
 
 
 def make(original: Original, folder: Path) -> tuple[int, int, int]:
-    """Writes the folder whole or not at all; gives the numbers of photos, of those posed, and of points.
+    """Writes the folder atomically; gives the numbers of photos, of those posed, and of points.
 
     Raises PackageError and CaptureError.
     """

@@ -50,9 +50,9 @@ class DecodeConfig:
     rpn_nms_iou: float = 0.7
     score_threshold: float = 0.7
     box_nms_iou: float = 0.5
-    # Boxes with more than this score go through the box head again, from where its first pass put them (None: one pass).
-    # The second pass depends less on which proposals there were: recall .72 -> .74 at the same precision, box AP + .6 on
-    # 300 images. A third pass gained nothing.
+    # Boxes with more than this score go through the box head again, from where its first pass put them (None: one
+    # pass). The second pass depends less on which proposals there were: recall .72 -> .74 at the same precision, box
+    # AP + .6 on 300 images. A third pass gained nothing.
     second_pass_threshold: float | None = 0.3
     # Painted where the person is likelier than this. Below a half, since the best mask by IoU is the more generous the
     # less sure a network is (for Dice d, the best threshold is d / 2); this one gave the best IoU on validation.

@@ -151,7 +151,7 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
           config: DecodeConfig) -> int:  # fmt: skip
     """Writes one person's labels into the still empty pixels of its box; returns how many it wrote.
 
-    Where less than `config.min_visible_fraction` of the person's pixels is still empty, it writes nothing and returns 0.
+    Where less than `config.min_visible_fraction` of the person's pixels is still empty, it writes none and returns 0.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
     at least 1). A pixel is painted where the coarse classes other than background together have a probability above

@@ -117,7 +117,7 @@ from what `python -m export.evaluation` measured on it.
 | boxes dropped | IoU above {boxes["nms_iou"]:g} with a better one: of two people standing so, one is lost |
 | pixels painted | probability of person above {dense["mask_threshold"]:g} |
 | surface grid | {dense["output_size"]} x {dense["output_size"]} a person: finer detail in large people is interpolated |
-"""
+"""  # noqa: E501
 
 
 def _training_data(manifest: dict) -> str:
@@ -179,7 +179,7 @@ def _calibration(bins: int, calibration: dict) -> str:
             f"{k / bins:.1f} to {(k + 1) / bins:.1f}",
             str(calibration["count"][k]),
             _number(calibration["mean_score"][k], "points"),
-            _number(calibration["share_right"][k], "points"),
+            _number(calibration["fraction_right"][k], "points"),
         )
         for k in range(bins)
     ]

@@ -23,7 +23,7 @@ from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model
 
 SPLITS = {"train": 0, "val": 1, "test": 2}
-PANORAMA_SHARE = 0.2  # of the images outside rendered rooms
+PANORAMA_FRACTION = 0.2  # of the images outside rendered rooms
 TILTED_PEOPLE = 0.25  # of the tilted images: the people are, not the camera
 BODIES = {"train": 400, "val": 60, "test": 60}
 
@@ -70,7 +70,7 @@ class Studio:
 
     def sample(self, rng: np.random.Generator) -> Sample:
         stage = self.director.stage(rng)
-        if not stage.indoors and rng.random() < PANORAMA_SHARE:
+        if not stage.indoors and rng.random() < PANORAMA_FRACTION:
             panorama, yaw = self.panoramas[rng.integers(len(self.panoramas))], rng.uniform(0, 2 * np.pi)
             exposure = panorama.exposure(rng.uniform(0.35, 1.1))
             behind = panorama.seen(stage.camera, yaw, exposure)

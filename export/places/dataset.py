@@ -2,7 +2,7 @@
 
     python -m export.places.dataset --split train --scenes 100 --processes 2 --out .data/places
 
-Each place is a function of (split, seed) alone, and its folder (docs/formats.md) appears whole or not at all: what is
+Each place is a function of (split, seed) alone, and its folder (docs/formats.md) appears atomically: what is
 there already is kept, so a stopped run goes on where it was. A place that fails, or never ends, is said and left out.
 Splits share no model, texture, photo, panorama or person.
 """
@@ -172,7 +172,7 @@ def main() -> None:
     missing = [job for job in jobs if not job[2].exists()]
     lost = 0
     with tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit="place") as bar:
-        for job, error in done(_work, missing, options.processes, options.most_seconds):
+        for job, error in done(_work, missing, options.processes, options.max_seconds):
             bar.update()
             if error is not None:
                 lost += 1

@@ -137,7 +137,7 @@ def staged() -> Staged:
 
 
 def write(folder: Path) -> int:
-    """The room as a capture, whole or not at all; what was there goes. Returns the number of points."""
+    """The room as a capture, written atomically; what was there goes. Returns the number of points."""
     room = staged()
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)

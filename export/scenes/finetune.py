@@ -50,7 +50,7 @@ from export.scenes.system import Networks, load_networks
 from export.scenes.tuning import Rates, Shown, TunedScene, Tuning
 
 REFINER_RATE = 1e-4
-LEAST_SHARE = 0.1  # of the learning rates, where a save is due
+MIN_FRACTION = 0.1  # of the learning rates, where a save is due
 MAX_VIEWS = 8  # of the scene that set the ranges of an int8 refiner
 
 
@@ -78,16 +78,16 @@ def _first(channels_last: Tensor) -> Tensor:
     return channels_last.permute(0, 3, 1, 2)
 
 
-def share_of_rate(spent_s: float, saves_s: Sequence[float]) -> float:
+def rate_fraction(spent_s: float, saves_s: Sequence[float]) -> float:
     """Of the learning rates, after so many seconds: from each save to the next it falls from 1 along a cosine, so that
     every file is one that came to rest."""
     begin = 0.0
     for end in saves_s:
         if spent_s < end:
             wave = 0.5 * (1 + math.cos(math.pi * (spent_s - begin) / (end - begin)))
-            return LEAST_SHARE + (1 - LEAST_SHARE) * wave
+            return MIN_FRACTION + (1 - MIN_FRACTION) * wave
         begin = end
-    return LEAST_SHARE
+    return MIN_FRACTION
 
 
 def measured(scene: TunedScene, views: Iterable[View]) -> float:
@@ -159,7 +159,7 @@ def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argpar
         with tqdm(total=round(due_s), initial=round(spent_s), unit="s") as bar:
             while spent_s < due_s:
                 begin_s = time.monotonic()
-                loss = tuning.step(share_of_rate(spent_s, files.saves_s))
+                loss = tuning.step(rate_fraction(spent_s, files.saves_s))
                 spent_s, steps = spent_s + time.monotonic() - begin_s, steps + 1
                 bar.set_postfix(step=steps, loss=f"{loss:.4f}", refresh=False)
                 bar.update(min(round(spent_s), round(due_s)) - bar.n)

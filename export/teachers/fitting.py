@@ -53,7 +53,7 @@ _SHOULDERS, _HIPS = ([NAMES.index(f"{side} {n}") for side in ("left", "right")] 
 _ARMS = [NAMES.index(f"{side} {n}") for n in ("elbow", "wrist", "index finger") for side in ("left", "right")]
 _ARM_RADIUS_M = 0.03
 _FACE = [NAMES.index(n) for n in ("nose", "left eye", "right eye", "left ear", "right ear")]
-_HIDDEN_SHARE = 0.05  # of the mask's pull on limbs that something hides
+_HIDDEN_FRACTION = 0.05  # of the mask's pull on limbs that something hides
 
 
 class CannotFit(ValueError):
@@ -176,7 +176,7 @@ class _Problem:
         self._start()
         self._measure_landmarks()
         self._measure_mask()
-        self.vertex_weight = puppet.sample.weights @ torch.tensor(np.where(self.shown, 1, _HIDDEN_SHARE)).float()
+        self.vertex_weight = puppet.sample.weights @ torch.tensor(np.where(self.shown, 1, _HIDDEN_FRACTION)).float()
         self.loose = torch.tensor([_LOOSE[name.partition(".")[0]] for name in JOINTS])
         self.cloth = torch.tensor([_CLOTHES[name] for name in REGIONS])
 

@@ -103,7 +103,7 @@ def whole_bodies(box: np.ndarray, height: int) -> list[np.ndarray]:
     return longer
 
 
-def agrees(mask: np.ndarray, box: np.ndarray, least_iou: float = _AGREE_IOU) -> bool:
+def agrees(mask: np.ndarray, box: np.ndarray, min_iou: float = _AGREE_IOU) -> bool:
     """Whether the mask is about the person in the box, not about a neighbour, and not a fragment of it."""
     y, x = np.nonzero(mask)
     if not len(x):
@@ -112,7 +112,7 @@ def agrees(mask: np.ndarray, box: np.ndarray, least_iou: float = _AGREE_IOU) -> 
     shared = np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0, None).prod()
     union = (high - low).prod() + (box[2:] - box[:2]).prod() - shared
     inside = ((x >= box[0]) & (x < box[2]) & (y >= box[1]) & (y < box[3])).mean()
-    return bool(shared / union >= least_iou and inside >= _AGREE_INSIDE)
+    return bool(shared / union >= min_iou and inside >= _AGREE_INSIDE)
 
 
 def _covered(box: np.ndarray, others: np.ndarray) -> float:

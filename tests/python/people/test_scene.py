@@ -145,7 +145,7 @@ def test_furniture_is_under_who_uses_it_and_leaves_most_of_the_person_to_see(mod
     tops = []
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        pose = drawn_pose(rng, sitting_share=float(rests == "sits"))
+        pose = drawn_pose(rng, sitting_fraction=float(rests == "sits"))
         pose = lying(rng, pose) if rests == "lies" else pose
         actor = director.actor(rng, pose, yaw=0.0)
         body = actor.person.vertices[model.body.groups["body"]]

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from export.camera import Camera
 from export.people.animals import Animal
 from export.people.body import Shape
 from export.people.motion import Clips, PhotoPoses, Pose, clip_pose, drawn_pose, lying, photo_pose, posed
 from export.people.props import Prop, PropMaker
-from export.people.render import Camera, Person
+from export.people.render import Person
 from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model, brim, dress
 
@@ -173,8 +174,7 @@ class Director:
         distance = max(visible / (2 * tangent), 0.35)
         rotation = Rotation.from_euler("xz", [pitch, roll], degrees=True).as_matrix() @ _LOOK
         eye = target - distance * rotation[2]
-        matrix = np.concatenate([rotation, -(rotation @ eye)[:, None]], 1)
-        camera = Camera(self.width, self.height, self.height / (2 * tangent), matrix)
+        camera = Camera.centred(self.width, self.height, self.height / (2 * tangent), rotation, eye)
         return Aim(camera, eye, distance, rotation[2], rotation[0], 2 * tangent * self.width / self.height)
 
     def _spot(self, rng: np.random.Generator, aim: Aim, depth: float) -> np.ndarray:

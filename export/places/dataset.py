@@ -20,8 +20,8 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export.camera import Camera
 from export.places.assets import SPLITS
-from export.places.cameras import Camera
 from export.places.clouds import CloudFaults, CloudMaker, draw_faults
 from export.places.place import AXES, FORMAT
 from export.places.recipe import FRAMES, NothingSeenError, choose_exposure, choose_views, draw_place, generator
@@ -50,8 +50,8 @@ def frame_entry(k: int, camera: Camera) -> dict:
     return {
         "file_path": f"images/{k:03d}.jpg",
         "depth_file_path": f"depth/{k:03d}.png",
-        "w": camera.width,
-        "h": camera.height,
+        "w": camera.width_px,
+        "h": camera.height_px,
         "fl_x": float(intrinsics[0, 0]),
         "fl_y": float(intrinsics[1, 1]),
         "cx": float(intrinsics[0, 2]) + 0.5,

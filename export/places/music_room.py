@@ -18,7 +18,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.places.cameras import Camera, Lens, looking
+from export.camera import Camera
+from export.places.cameras import Lens, looking
 from export.places.dataset import frame_entry
 from export.places.free import DRAWN, FreeStock, bricks, landscape, weave
 from export.places.furnish import Heights, placed, quad

@@ -7,7 +7,7 @@
 `--weights` are those that the bundle was exported from (export.scenes.train): int8 graphs have no gradients. The scene
 written has the same points in the same blocks, and is shown with the same networks. With `--refiner` those are tuned
 too: a bundle of the same precision is written beside the scene, as `tuned-networks`, and the scene wants that one.
-With `--save-at 10 60 600`, `--out` is a folder, and gets `10s.maqs` and so on of one run; `benchmarks/scenes.py
+With `--save-at 10 60 600`, `--out` is a folder, and gets `10s.maqs` and so on of one run; `python -m benchmarks
 --fine-tuned` reads folders of such folders.
 
 It learns from the photos that the scene was built from, all of them: one kept aside would have shaped the scene

@@ -15,8 +15,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from export.camera import Camera
 from export.scenes.basis import directions
-from export.scenes.cameras import Camera, between, moves, upright
+from export.scenes.cameras import between, moves, upright
 from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, TURNED_MULTIPLE
 from export.scenes.losses import LossWeights, picture_terms
 from export.scenes.modelling import Options, View, cover, shown_in

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from export import surface
+from export.camera import Camera
 from export.people import render
 from export.people.atlas import Atlas
 from export.people.lookup import LabelLookup
@@ -104,10 +105,10 @@ class DenseTeacher:
         low = np.clip(np.floor(seen.min(0)) - 1, 0, [width - 1, height - 1]).astype(int)
         high = np.clip(np.ceil(seen.max(0)) + 1, low + 1, [width, height]).astype(int)
         side = max(high - low)
-        # A shear moves the principal point into the middle of the square that is drawn.
+        # In place of a rotation, a shear moves the principal point into the middle of the square that is drawn.
         off = (np.array([width / 2, height / 2]) - (low + side / 2)) / focal
-        shear = np.array([[1, 0, off[0], 0], [0, 1, off[1], 0], [0, 0, 1, 0]])
-        camera = render.Camera(_DRAWN, _DRAWN, focal * _DRAWN / side, shear)
+        shear = np.array([[1, 0, off[0]], [0, 1, off[1]], [0, 0, 1]])
+        camera = Camera.centred(_DRAWN, _DRAWN, focal * _DRAWN / side, shear, np.zeros(3))
         person = render.Person(fit.vertices, [Layer(self.model.range["body"])])
         picture = self.renderer.draw([person], camera, _DARK, np.random.default_rng(0))
         square = cv2.resize(picture.label, (side, side), interpolation=cv2.INTER_NEAREST)

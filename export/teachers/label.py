@@ -17,7 +17,7 @@ _AGREE_INSIDE = 0.7  # share of the mask that lies in the detector's box
 _ALONE = 0.1  # share of a box that other boxes may cover
 _MATTE_IOU = 0.6  # of the detector's box and the matte's
 _SAME_MASK_IOU = 0.75  # of BlazePose's mask and the matte
-_LEAST_VISIBLE, _LANDMARKS_INSIDE = 0.6, 0.85  # share of the visible landmarks that lie on the mask
+_MIN_VISIBLE, _LANDMARKS_INSIDE = 0.6, 0.85  # share of the visible landmarks that lie on the mask
 
 Detect = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 Find = Callable[[np.ndarray, np.ndarray], Landmarks | None]
@@ -124,7 +124,7 @@ def _covered(box: np.ndarray, others: np.ndarray) -> float:
 def _on_mask(found: Landmarks, mask: np.ndarray) -> bool:
     x, y = np.floor(found.point).astype(int).T
     inside = (x >= 0) & (x < mask.shape[1]) & (y >= 0) & (y < mask.shape[0])
-    shown = inside & (found.visible >= _LEAST_VISIBLE)
+    shown = inside & (found.visible >= _MIN_VISIBLE)
     return bool(shown.any() and mask[y[shown], x[shown]].mean() >= _LANDMARKS_INSIDE)
 
 

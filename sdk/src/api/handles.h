@@ -16,7 +16,7 @@
 #include "scene/capture/capture.h"
 #include "scene/format/scene.h"
 #include "scene/render/scene_renderer.h"
-#include "sources/source.h"
+#include "sources/registry.h"
 
 namespace maq {
 
@@ -114,7 +114,7 @@ struct maq_scene : maq::Handle {
 };
 
 struct maq_scene_image : maq::Handle {
-  maq::RenderedPicture picture;
+  maq::RenderedImage image;
   maq::BoundedPool<maq_scene_image>::Deleter deleter;
 };
 

@@ -58,8 +58,8 @@ TEST(SurfaceGrid, APointWithOneMissingCoordinateIsOutsideTheChart) {
 }
 
 TEST(SurfaceGrid, OtherBytesAreRefused) {
-  expect_refused({}, "no surface grid");
-  expect_refused(changed(7, '2'), "no surface grid");
+  expect_refused({}, "not a surface grid");
+  expect_refused(changed(7, '2'), "not a surface grid");
   expect_refused(changed(8, uint32_t(23)), "23 parts");
   expect_refused(changed(8, uint32_t(0)), "0 parts");
   // 24 * 2^31 * 2^31 * 6 is 0 in 64 bits.

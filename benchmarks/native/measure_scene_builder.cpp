@@ -72,7 +72,7 @@ void measure(int count, char** arguments) {
     const auto seconds_since_start = [&] {
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     };
-    maq::SceneNetworks networks(runtime, arguments[1], maq::SessionSettings{threads});
+    maq::SceneNetworks networks(runtime, maq::read_bundle(arguments[1]), maq::SessionSettings{threads});
     maq::FittingOptions options;
     options.threads = threads;
     maq::DescriptorFitter fitter(std::move(cloud), {0, 0, 1}, networks, options);

@@ -105,7 +105,7 @@ MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t st
  * rate; a camera takes the nearest that it offers, which maq_source_get_info tells. For cameras, "format=MJPG"
  * selects a pixel format and "exposure=10000&focus=auto" sets controls. "live=1" plays a file or stub as a camera
  * would, and faults such as "drop=0.1" or "unplug=3s@5s" can be injected into any source
- * (docs/cameras/stand-ins.md). Write a '?' of a file name as %3F and a '%' as %25. `config` may be NULL. `*source`
+ * (docs/cameras/simulated.md). Write a '?' of a file name as %3F and a '%' as %25. `config` may be NULL. `*source`
  * is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),
  * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE; for cameras MAQ_ERROR_DEVICE_LOST,

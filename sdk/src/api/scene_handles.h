@@ -21,6 +21,6 @@ struct maq_scene : maq::Handle {
 };
 
 struct maq_scene_image : maq::Handle {
-  maq::RenderedPicture picture;
+  maq::RenderedImage image;
   maq::BoundedPool<maq_scene_image>::Deleter deleter;
 };

@@ -293,7 +293,7 @@ static_assert(sizeof(void*) != 8 ||
                   (offsetof(maq_source_info, dropped_frame_count) == 48 && sizeof(maq_source_info) == 56),
               "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
-static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 72, "");
+static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 64, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 32 && offsetof(maq_person, id) == 24, "");
 static_assert(sizeof(maq_intrinsics) == 104, "");

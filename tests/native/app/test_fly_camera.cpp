@@ -70,14 +70,14 @@ void expect_rotation(const maq_pinhole_camera& camera, const std::string& when =
 }
 
 void expect_same(const maq_pinhole_camera& a, const maq_pinhole_camera& b, double tolerance = 0) {
-  EXPECT_EQ(a.width_px, b.width_px);
-  EXPECT_EQ(a.height_px, b.height_px);
+  EXPECT_EQ(a.intrinsics.width_px, b.intrinsics.width_px);
+  EXPECT_EQ(a.intrinsics.height_px, b.intrinsics.height_px);
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(a.rotation[i], b.rotation[i], tolerance) << i;
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(a.centre[i], b.centre[i], tolerance) << i;
   EXPECT_NEAR(a.intrinsics.fx_px, b.intrinsics.fx_px, tolerance);
-  EXPECT_NEAR(a.fy_px, b.fy_px, tolerance);
-  EXPECT_NEAR(a.cx_px, b.cx_px, tolerance);
-  EXPECT_NEAR(a.cy_px, b.cy_px, tolerance);
+  EXPECT_NEAR(a.intrinsics.fy_px, b.intrinsics.fy_px, tolerance);
+  EXPECT_NEAR(a.intrinsics.cx_px, b.intrinsics.cx_px, tolerance);
+  EXPECT_NEAR(a.intrinsics.cy_px, b.intrinsics.cy_px, tolerance);
 }
 
 // Where a point of the world lies in the picture; the third number is its depth.
@@ -222,7 +222,7 @@ TEST(FlyCamera, FromStraightUpOrDownItTurnsTheWayThePictureDoes) {
 
 TEST(FlyCamera, ZoomsBetween20And110Degrees) {
   maquette::FlyCamera fly(scene(), {});
-  const auto degrees = [&] { return 2 * std::atan(320 / fly.camera(640, 480).fx_px) / kDegree; };
+  const auto degrees = [&] { return 2 * std::atan(320 / fly.camera(640, 480).intrinsics.fx_px) / kDegree; };
   const double before = degrees();
   fly.zoom(1.1);
   EXPECT_LT(degrees(), before);

@@ -67,13 +67,13 @@ def settings(bundles: Sequence[str]) -> list[Setting]:
     made += [Setting("half the size, 200,000 points", "size", build=("--points", "200000"), shrink=2)]
     made += [Setting(name, "networks", name) for name in bundles if name not in (SHIPPED, FLOAT)]
     made.append(Setting("fp32 networks", "precision", FLOAT))
-    everything = (*all_points, "--coefficients", "32", "--least-variation", "0")
+    everything = (*all_points, "--coefficients", "32", "--min-variation", "0")
     made.append(Setting("fp32 networks and looks, all varying", "precision", FLOAT, everything))
     for bits in (8, 16, 32):
         made.append(Setting(f"coefficients of {bits} bits", "coefficients", build=(*all_points, "--coefficients",
                                                                                    str(bits))))  # fmt: skip
-    made.append(Setting("means alone", "view dependence", build=(*all_points, "--least-variation", CONSTANT)))
-    made.append(Setting("every look varies", "view dependence", build=(*all_points, "--least-variation", "0")))
+    made.append(Setting("means alone", "view dependence", build=(*all_points, "--min-variation", CONSTANT)))
+    made.append(Setting("every look varies", "view dependence", build=(*all_points, "--min-variation", "0")))
     made += [Setting(f"fine-tuned {said}", "fine-tuned", tuned=name) for name, said in TUNED.items()]
     return made + [setting for setting, _ in savings()]
 

@@ -26,7 +26,7 @@ int main(int argc, char** argv) try {
   options.texture = shared_file("MAQ_DEMO_OUTFIT", "demo/outfit.png");
   if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
-  options.model.spin = 0;  // a thread that stays awake takes a core from the window
+  options.model.allow_spinning = 0;  // a thread that stays awake takes a core from the window
   bool part_only = false;
   std::string path, view = "parts", compare = "none", size = "1280x800";
 
@@ -74,7 +74,7 @@ int main(int argc, char** argv) try {
     throw std::runtime_error("--size " + size + " is no size of a window, such as 1280x800.");
   }
   options.model.bundle_path = options.bundle.c_str();
-  options.model.detail = part_only ? MAQ_DETAIL_PART : MAQ_DETAIL_SURFACE;
+  options.model.detail = part_only ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
   if (options.headless && options.frames == 0) options.frames = 30;
   if (!path.empty()) options.source = path;
   return App(options).run();

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-HEADER_VERSION = 100  # MAQ_HEADER_VERSION of 0.1.0
+HEADER_VERSION = 200  # MAQ_HEADER_VERSION of 0.2.0
 LIBRARY = Path("build/release/stage/lib/libmaquette.so")
 PIXEL_RGB8 = 1
 PLANE_PART, PLANE_U, PLANE_V, PLANE_PERSON = 1, 2, 3, 4
@@ -32,9 +32,9 @@ class _DenseposeConfig(ctypes.Structure):
         ("result_pool_size", c_uint32),
         ("max_proposals", c_int32),
         ("key_frame_interval", c_int32),
-        ("least_person_px", c_int32),
+        ("min_person_height_px", c_int32),
         ("detail", c_int32),
-        ("spin", c_int32),
+        ("allow_spinning", c_int32),
     )
 
 
@@ -68,12 +68,12 @@ class _Stats(ctypes.Structure):
         ("total_ms", c_float),
         ("network_width_px", c_int32),
         ("network_height_px", c_int32),
-        ("proposals", c_int32),
-        ("people", c_int32),
-        ("dropped_boxes", c_int32),
-        ("body_pixels", c_int64),
-        ("clamped_uv", c_int64),
-        ("key_frame", c_int32),
+        ("proposal_count", c_int32),
+        ("person_count", c_int32),
+        ("dropped_box_count", c_int32),
+        ("body_pixel_count", c_int64),
+        ("clamped_pixel_count", c_int64),
+        ("is_key_frame", c_int32),
     )
 
 
@@ -90,12 +90,12 @@ class Stats:
     total_ms: float
     network_width_px: int
     network_height_px: int
-    proposals: int
-    people: int
-    dropped_boxes: int
-    body_pixels: int
-    clamped_uv: int
-    key_frame: int
+    proposal_count: int
+    person_count: int
+    dropped_box_count: int
+    body_pixel_count: int
+    clamped_pixel_count: int
+    is_key_frame: int
 
 
 @dataclass(frozen=True)
@@ -117,12 +117,12 @@ def _signatures(library: ctypes.CDLL) -> None:
         "maq_densepose_config_init": (POINTER(_DenseposeConfig), c_uint32),
         "maq_densepose_create": (Handle, POINTER(_DenseposeConfig), POINTER(Handle)),
         "maq_densepose_run": (Handle, Handle, POINTER(Handle)),
-        "maq_densepose_result_people": (Handle, POINTER(POINTER(_Person)), POINTER(c_uint32)),
-        "maq_densepose_result_plane": (Handle, c_int32, POINTER(POINTER(c_uint8)), POINTER(c_size_t)),
-        "maq_densepose_result_stats": (Handle, POINTER(_Stats)),
-        "maq_densepose_restart": (Handle,),
+        "maq_densepose_result_get_people": (Handle, POINTER(POINTER(_Person)), POINTER(c_uint32)),
+        "maq_densepose_result_get_plane": (Handle, c_int32, POINTER(POINTER(c_uint8)), POINTER(c_size_t)),
+        "maq_densepose_result_get_stats": (Handle, POINTER(_Stats)),
+        "maq_densepose_reset": (Handle,),
         "maq_frame_desc_init": (POINTER(_FrameDesc), c_uint32),
-        "maq_frame_create": (Handle, POINTER(_FrameDesc), Handle, Handle, POINTER(Handle)),
+        "maq_frame_wrap": (Handle, POINTER(_FrameDesc), Handle, Handle, POINTER(Handle)),
     }
     for name, arguments in table.items():
         function = getattr(library, name)
@@ -135,8 +135,8 @@ def _signatures(library: ctypes.CDLL) -> None:
     ):
         function = getattr(library, name)
         function.argtypes, function.restype = (Handle,), None
-    library.maq_last_error.argtypes, library.maq_last_error.restype = (Handle,), c_char_p
-    library.maq_status_name.argtypes, library.maq_status_name.restype = (c_int32,), c_char_p
+    library.maq_get_last_error.argtypes, library.maq_get_last_error.restype = (Handle,), c_char_p
+    library.maq_status_get_name.argtypes, library.maq_status_get_name.restype = (c_int32,), c_char_p
 
 
 class DensePose:
@@ -187,7 +187,7 @@ class DensePose:
 
     def restart(self) -> None:
         """The next image begins another stream (key_frame_interval above 1)."""
-        self._call(self._densepose, "maq_densepose_restart", self._densepose)
+        self._call(self._densepose, "maq_densepose_reset", self._densepose)
 
     def run(self, image: np.ndarray) -> DensePoseResult:
         """image: uint8 [H, W, 3] RGB. Raises MaquetteError."""
@@ -200,7 +200,7 @@ class DensePose:
         description.height_px, description.width_px = image.shape[:2]
         description.planes[0] = image.ctypes.data
         frame, result = Handle(), Handle()
-        self._call(self._context, "maq_frame_create", self._context, byref(description), None, None, byref(frame))
+        self._call(self._context, "maq_frame_wrap", self._context, byref(description), None, None, byref(frame))
         try:
             self._call(self._densepose, "maq_densepose_run", self._densepose, frame, byref(result))
             return self._copy(result, image.shape[0], image.shape[1])
@@ -210,17 +210,17 @@ class DensePose:
 
     def _copy(self, result: Handle, height: int, width: int) -> DensePoseResult:
         people, count = POINTER(_Person)(), c_uint32()
-        self._call(result, "maq_densepose_result_people", result, byref(people), byref(count))
+        self._call(result, "maq_densepose_result_get_people", result, byref(people), byref(count))
         found = np.array([[*people[k].box_px, people[k].score] for k in range(count.value)], np.float32)
         found = found.reshape(-1, 5)
         planes = np.empty((height, width, 4), np.uint8)
         for channel, plane in enumerate((PLANE_PART, PLANE_U, PLANE_V, PLANE_PERSON)):
             pixels, stride = POINTER(c_uint8)(), c_size_t()
-            self._call(result, "maq_densepose_result_plane", result, plane, byref(pixels), byref(stride))
+            self._call(result, "maq_densepose_result_get_plane", result, plane, byref(pixels), byref(stride))
             rows = np.ctypeslib.as_array(pixels, ((height - 1) * stride.value + width,))
             planes[..., channel] = np.lib.stride_tricks.as_strided(rows, (height, width), (stride.value, 1))
         stats = _Stats(struct_size=ctypes.sizeof(_Stats))
-        self._call(result, "maq_densepose_result_stats", result, byref(stats))
+        self._call(result, "maq_densepose_result_get_stats", result, byref(stats))
         values = Stats(**{field.name: getattr(stats, field.name) for field in fields(Stats)})
         return DensePoseResult(found[:, :4], found[:, 4], planes, values)
 
@@ -228,6 +228,6 @@ class DensePose:
         """Calls the library; a status other than MAQ_OK becomes MaquetteError with the library's text."""
         status = getattr(self._library, function)(*arguments)
         if status:
-            text = self._library.maq_last_error(handle)
-            name = self._library.maq_status_name(status).decode()
+            text = self._library.maq_get_last_error(handle)
+            name = self._library.maq_status_get_name(status).decode()
             raise MaquetteError(f"{function}: {(text or b'').decode() or name} ({name})")

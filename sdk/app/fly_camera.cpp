@@ -49,13 +49,13 @@ Rows between(const Rows& from, const Rows& to, double fraction) {
 
 }  // namespace
 
-FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_camera>& photos)
+FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_pinhole_camera>& photos)
     : up_(unit(vec3(scene.up))) {
   if (!is_finite(up_)) up_ = {0, 0, 1};
-  Vec3 middle = mix(0.5, vec3(scene.low), 0.5, vec3(scene.high));
+  Vec3 middle = mix(0.5, vec3(scene.bounds_min), 0.5, vec3(scene.bounds_max));
   if (!is_finite(middle)) middle = {};
   // A box without a size, or with one that is lost in 16 digits so far out, gets one in which one can move.
-  const double diagonal = length(mix(1, vec3(scene.high), -1, vec3(scene.low))), far_out = length(middle);
+  const double diagonal = length(mix(1, vec3(scene.bounds_max), -1, vec3(scene.bounds_min))), far_out = length(middle);
   size_ = diagonal > 1e-10 * far_out && std::isfinite(diagonal) ? diagonal : std::max(1.0, 1e-6 * far_out);
   // From a little above, 60 degrees wide: the ball about the box fills the picture.
   const Vec3 right = unit(cross(up_, std::abs(up_[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
@@ -64,7 +64,7 @@ FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_camera>&
   if (!photos.empty()) fly_to(photos[photos.size() / 2], 0, int(photos.size() / 2));
 }
 
-std::optional<FlyCamera::Pose> FlyCamera::pose_of(const maq_camera& camera) {
+std::optional<FlyCamera::Pose> FlyCamera::pose_of(const maq_pinhole_camera& camera) {
   const double w = camera.width_px, h = camera.height_px, fx = camera.fx_px, fy = camera.fy_px;
   const Rows given{vec3(camera.rotation), vec3(camera.rotation + 3), vec3(camera.rotation + 6)};
   Pose pose{rotation_of(given[0], given[2]), vec3(camera.centre), {w, h, fx, fy}};
@@ -107,7 +107,7 @@ void FlyCamera::zoom(double factor) {
   fx *= scale, pose_.lens[kFy] *= scale;
 }
 
-void FlyCamera::fly_to(const maq_camera& camera, double seconds, int photo_index) {
+void FlyCamera::fly_to(const maq_pinhole_camera& camera, double seconds, int photo_index) {
   const std::optional<Pose> to = pose_of(camera);
   if (!to || !std::isfinite(seconds)) return;
   leave();
@@ -130,10 +130,10 @@ bool FlyCamera::update(double seconds) {
   return true;
 }
 
-maq_camera FlyCamera::camera(int width_px, int height_px) const {
+maq_pinhole_camera FlyCamera::camera(int width_px, int height_px) const {
   const std::array<double, 6>& lens = pose_.lens;
   const double scale = std::min(width_px / lens[kWidth], height_px / lens[kHeight]);
-  maq_camera camera{sizeof camera, width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, 0, 0, {}, {}, {}};
+  maq_pinhole_camera camera{sizeof camera, width_px, height_px, lens[kFx] * scale, lens[kFy] * scale, 0, 0, {}, {}, {}};
   camera.cx_px = (width_px - 1) / 2.0 + lens[kOffsetX] * scale;
   camera.cy_px = (height_px - 1) / 2.0 + lens[kOffsetY] * scale;
   for (size_t i = 0; i < 9; ++i) camera.rotation[i] = pose_.rows[i / 3][i % 3];
@@ -141,7 +141,7 @@ maq_camera FlyCamera::camera(int width_px, int height_px) const {
   return camera;
 }
 
-int FlyCamera::nearest_photo(const std::vector<maq_camera>& photos) const {
+int FlyCamera::nearest_photo(const std::vector<maq_pinhole_camera>& photos) const {
   int nearest = -1;
   double smallest = HUGE_VAL;
   for (size_t i = 0; i < photos.size(); ++i) {

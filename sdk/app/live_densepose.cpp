@@ -47,15 +47,9 @@ void LiveDensePose::open(const std::string& uri, const std::string& fallback) {
 }
 
 void LiveDensePose::take_result(PipelineResult result) {
-  bool is_last = false;
-  {
-    std::lock_guard<std::mutex> lock(mutex_);
-    ++result_count_;
-    if (max_results_ != 0 && result_count_ > max_results_) return;
-    is_last = result_count_ == max_results_;
-  }
+  if (max_results_ != 0 && result_count_ >= max_results_) return;
   on_result_(std::move(result), pipeline_->stats().results_per_second);
-  if (!is_last) return;
+  if (++result_count_ != max_results_) return;
   pipeline_->set_paused(true);
   if (on_change_) on_change_();
 }

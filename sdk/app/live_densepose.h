@@ -1,5 +1,5 @@
-// A pipeline (maquette/pipeline.h) for programs with a window: options that suit one, another source where one cannot be
-// opened, and what the user is told.
+// A pipeline (maquette/pipeline.h) for programs with a window: options that suit one, another source where one cannot
+// be opened, and what the user is told.
 //
 //   maquette::TripleBuffer<Shown> shown;
 //   maquette::LiveDensePose live(context, config, [&](maquette::PipelineResult result, double) {
@@ -10,6 +10,7 @@
 //   for (;;) { if (shown.take()) draw(shown.front()); write(live.status().problem); }
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <maquette/maquette.hpp>
 #include <mutex>
@@ -62,21 +63,23 @@ class LiveDensePose {
 
   LiveDensePoseStatus status() const;
   // Nothing until a model is loaded that has one.
-  std::optional<maq_surface> surface() const { return pipeline_->surface(); }
+  std::optional<maq_densepose_surface> surface() const { return pipeline_->surface(); }
 
  private:
   void take_result(PipelineResult result);
   void take_state(maq_pipeline_state state, const char* problem);
-  bool falls_back(maq_pipeline_state now) const { return now == MAQ_PIPELINE_FAILED && !is_open_ && !fallback_.empty(); }
+  bool falls_back(maq_pipeline_state now) const {
+    return now == MAQ_PIPELINE_FAILED && !is_open_ && !fallback_.empty();
+  }
 
   const std::function<void(PipelineResult, double)> on_result_;
   const std::function<void()> on_change_;
   const uint64_t max_results_;
+  std::atomic<uint64_t> result_count_{0};
 
   mutable std::mutex mutex_;  // of what follows to the next line
   std::string uri_, fallback_, fallback_reason_;
   bool is_open_ = false;  // the source was opened
-  uint64_t result_count_ = 0;
   std::vector<maq_pipeline_state> states_;
 
   std::optional<Pipeline> pipeline_;  // last: its callbacks use the others

@@ -25,7 +25,7 @@ void lower_priority_of_this_thread() {
 #endif
 }
 
-maq_camera within_limits(maq_camera camera) {
+maq_pinhole_camera within_limits(maq_pinhole_camera camera) {
   const double scale = std::min(kMaxWidthPx / camera.width_px, kMaxHeightPx / camera.height_px);
   if (!(scale > 0 && scale < 1)) return camera;
   camera.width_px = std::max(1, int(std::lround(camera.width_px * scale)));
@@ -78,7 +78,7 @@ void LiveScene::open(const std::string& path, const std::string& capture_folder)
   wake_.notify_one();
 }
 
-void LiveScene::render(const maq_camera& camera, int photo_index) {
+void LiveScene::render(const maq_pinhole_camera& camera, int photo_index) {
   const std::lock_guard<std::mutex> lock(mutex_);
   request_.camera = camera, request_.photo_index = photo_index, request_.renders = true;
   wake_.notify_one();
@@ -143,7 +143,7 @@ void LiveScene::load(const Request& request) {
   if (builds) {
     maq_scene_build_config config = default_scene_build_config();
     config.bundle_path = bundle_path_.c_str(), config.threads = request.threads, config.progress_user_data = this;
-    config.progress = [](void* self, double done, const char* what) -> int32_t {
+    config.progress_callback = [](void* self, double done, const char* what) -> int32_t {
       return static_cast<LiveScene*>(self)->update(
           [&](LiveSceneState& state) { state.progress = done, state.text = what; });
     };
@@ -156,7 +156,7 @@ void LiveScene::load(const Request& request) {
   for (uint32_t i = 0; capture_ && i < capture_->info().view_count; ++i) {
     const maq_capture_view view = capture_->view(i);
     ready.photos.push_back(view.camera);
-    ready.photo_names.push_back(std::string(view.name) + (view.held_out == 1 ? " (held out)" : ""));
+    ready.photo_names.push_back(std::string(view.name) + (view.is_held_out == 1 ? " (held out)" : ""));
   }
   update([&](LiveSceneState& state) { state = ready; });
 }
@@ -173,9 +173,9 @@ void LiveScene::render(const Request& request) {
   LiveSceneImage& image = images_.back();
   image.camera = within_limits(*request.camera);
   const SceneImage rendered = renderer_->run(image.camera);
-  maq_frame_desc desc{sizeof desc,       MAQ_PIXEL_BGR8,       image.camera.width_px, image.camera.height_px, {}, {}, 0,
-                      MAQ_CLOCK_MEDIA, 0};
-  desc.planes[0] = static_cast<const uint8_t*>(rendered.plane(MAQ_SCENE_BGR, desc.stride_bytes));
+  maq_frame_desc desc{
+      sizeof desc, MAQ_PIXEL_BGR8, image.camera.width_px, image.camera.height_px, {}, {}, 0, MAQ_CLOCK_MEDIA, 0};
+  desc.planes[0] = static_cast<const uint8_t*>(rendered.plane(MAQ_SCENE_PLANE_BGR, desc.stride_bytes));
   image.rendering.copy_from(Frame(context_, desc));
   image.stats = rendered.stats(), image.photo_index = -1, image.psnr_db = NAN;
   image.photo.clear(), image.error.clear();
@@ -197,11 +197,8 @@ void LiveScene::render(const Request& request) {
 void LiveScene::add_photo(const Request& request, LiveSceneImage& image) {
   const std::array<int, 3> key{request.photo_index, image.camera.width_px, image.camera.height_px};
   if (photo_key_ != key) {
-    const Frame photo = capture_->load_view(uint32_t(key[0]));
-    const maq_frame_desc desc = photo.desc();
-    const bool fits = desc.width_px == key[1] && desc.height_px == key[2];
     photo_key_ = {};
-    photo_.copy_from(fits ? photo : photo.resized(key[1], key[2]));
+    photo_.copy_from(capture_->load_view(uint32_t(key[0])).resized(key[1], key[2]));
   }
   photo_key_ = key;
   image.photo = photo_;

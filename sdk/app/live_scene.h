@@ -1,5 +1,5 @@
-// A scene on a thread of its own, for programs with a window: opens it, builds it of a capture, renders what is asked for. No
-// call waits but the destructor's.
+// A scene on a thread of its own, for programs with a window: opens it, builds it of a capture, renders what is asked
+// for. No call waits but the destructor's.
 //
 //   maquette::LiveScene scene(context, "models/scenes-int8");
 //   scene.open("room.maqs");
@@ -23,10 +23,11 @@
 namespace maquette {
 
 struct LiveSceneImage {
-  RgbaImage rendering, photo, error;  // photo and error (mean of the channels) are empty unless the camera is a photo's;
-  double psnr_db = 0;                 // this is NaN then, and infinite where nothing differs
+  RgbaImage rendering, photo,
+      error;           // photo and error (mean of the channels) are empty unless the camera is a photo's;
+  double psnr_db = 0;  // this is NaN then, and infinite where nothing differs
   int photo_index = -1;
-  maq_camera camera{};  // of the rendering's size
+  maq_pinhole_camera camera{};  // of the rendering's size
   maq_scene_image_stats stats{};
   uint64_t number = 0;  // counts images from 1
 };
@@ -36,23 +37,24 @@ struct LiveSceneState {
   double progress = 0;     // 0 to 1, while opening
   std::string path, text;  // text: what is being done, what is missing or why it failed, in sentences; or nothing
   maq_scene_info info{};   // from here on: once it is ready
-  std::vector<maq_camera> photos;
+  std::vector<maq_pinhole_camera> photos;
   std::vector<std::string> photo_names;  // with " (held out)" where the capture keeps them for comparisons
 };
 
 class LiveScene {  // all calls by the thread that takes the images
  public:
-  // `threads`: 0 for the library's default. `on_change`, which may be null, is called on the scene's thread after each image
-  // and each change of state; it may not throw. The context must outlive this.
+  // `threads`: 0 for the library's default. `on_change`, which may be null, is called on the scene's thread after each
+  // image and each change of state; it may not throw. The context must outlive this.
   LiveScene(const Context& context, const std::string& bundle_path, int threads = 0,
             std::function<void()> on_change = nullptr);
   ~LiveScene();  // waits for the step that runs
-  // In place of what was open, of which no image comes any more: a scene file, with the photos of `capture_folder` unless
-  // that is empty; or a capture, which is built.
+  // In place of what was open, of which no image comes any more: a scene file, with the photos of `capture_folder`
+  // unless that is empty; or a capture, which is built.
   void open(const std::string& path, const std::string& capture_folder = {});
   void close() { open({}); }
-  // Renders an image once there is a scene, 1280 x 960 at most; the latest call wins. `photo_index`: whose camera, or -1.
-  void render(const maq_camera& camera, int photo_index);
+  // Renders an image once there is a scene, 1280 x 960 at most; the latest call wins. `photo_index`: whose camera, or
+  // -1.
+  void render(const maq_pinhole_camera& camera, int photo_index);
   void set_threads(int threads);  // renders the latest image again
   std::shared_ptr<const LiveSceneState> state() const {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -65,7 +67,7 @@ class LiveScene {  // all calls by the thread that takes the images
   struct Request {
     std::string path, capture_folder;
     int threads = 0, photo_index = -1;
-    std::optional<maq_camera> camera;
+    std::optional<maq_pinhole_camera> camera;
     bool opens = false, renders = false, ends = false;
   };
 

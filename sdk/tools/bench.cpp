@@ -84,7 +84,7 @@ class Scene {
     for (size_t i = 0; i < kStageCount; ++i) ms_[i].push_back(values[i]);
     seconds_ += total_ms / 1e3;
     cpu_s_ += own_processor_seconds() - cpu_before_s;
-    people_ += stats.people;
+    people_ += stats.person_count;
     return total_ms;
   }
 
@@ -135,7 +135,7 @@ class Scene {
             {"runs", runs()},
             {"seconds", seconds_},
             {"people", people()},
-            {"proposals", stats_.proposals},
+            {"proposals", stats_.proposal_count},
             {"drops", drops_},
             {"ms", ms},
             {"fps", 1e3 / std::max(1e-6, frame_ms())},
@@ -233,9 +233,9 @@ int run_bench(const Options& options) {
   nlohmann::ordered_json document;
   document["schema"] = kSchema;
   document["machine"] = machine;
-  document["build"] = {{"sdk", maq_sdk_version()},
-                       {"commit", maq_git_commit()},
-                       {"options", maq_build_options()},
+  document["build"] = {{"sdk", maq_get_sdk_version()},
+                       {"commit", maq_get_git_commit()},
+                       {"options", maq_get_build_options()},
                        {"onnxruntime", context.onnxruntime_version()}};
   document["bundle"] = bundle;
   document["settings"] = {{"threads", options.model.threads},
@@ -243,7 +243,7 @@ int run_bench(const Options& options) {
                           {"threshold", options.model.threshold},
                           {"max_proposals", options.model.max_proposals},
                           {"key_frames", options.model.key_frames},
-                          {"least_person", options.model.least_person},
+                          {"min_person_height_px", options.model.min_person_height_px},
                           {"surface", !options.model.no_surface},
                           {"spin", !options.model.no_spin},
                           {"warm_up", options.warm_up},

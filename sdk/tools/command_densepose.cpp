@@ -43,7 +43,7 @@ class Timings {
     const float values[] = {stats.preprocess_ms, stats.trunk_ms,  stats.proposals_ms, stats.box_head_ms,
                             stats.dense_head_ms, stats.decode_ms, stats.total_ms};
     for (size_t i = 0; i < kStages; ++i) ms_[i].push_back(values[i]);
-    people_ += stats.people;
+    people_ += stats.person_count;
   }
 
   size_t frames() const { return ms_[0].size(); }
@@ -87,9 +87,9 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
   if (options.json) {
     const nlohmann::ordered_json line = {{"frame", stem},
                                          {"timestamp_ns", desc.timestamp_ns},
-                                         {"people", stats.people},
-                                         {"key_frame", stats.key_frame != 0},
-                                         {"proposals", stats.proposals},
+                                         {"people", stats.person_count},
+                                         {"key_frame", stats.is_key_frame != 0},
+                                         {"proposals", stats.proposal_count},
                                          {"network", {stats.network_width_px, stats.network_height_px}},
                                          {"ms",
                                           {{"preprocess", stats.preprocess_ms},
@@ -101,8 +101,8 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
                                            {"total", stats.total_ms}}}};
     std::printf("%s\n", line.dump().c_str());
   } else {
-    std::printf("%s  %d x %d  %d %s  %.1f ms\n", stem.c_str(), desc.width_px, desc.height_px, stats.people,
-                stats.people == 1 ? "person" : "people", double(stats.total_ms));
+    std::printf("%s  %d x %d  %d %s  %.1f ms\n", stem.c_str(), desc.width_px, desc.height_px, stats.person_count,
+                stats.person_count == 1 ? "person" : "people", double(stats.total_ms));
   }
 }
 
@@ -141,7 +141,7 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
     timings.add(stats);
     ++done;
     if (!is_clip || options.json) print_frame(options, stem, desc, stats);
-    if (is_clip && !options.json) progress.advance(done, std::to_string(stats.people) + " people");
+    if (is_clip && !options.json) progress.advance(done, std::to_string(stats.person_count) + " people");
   }
   progress.finish();
   const fs::path overlay_path = clip.finish();

@@ -79,7 +79,7 @@ void explain_permission(const fs::path& device) {
 bool look_at(const maq_camera_list* list, uint32_t index) {
   maq_camera_info info{};
   info.struct_size = sizeof info;
-  maquette::check(maq_camera_list_get(list, index, &info), list);
+  maquette::check(maq_camera_list_get_camera(list, index, &info), list);
   const std::string uri = info.uri;
   const std::string place = uri.substr(uri.find(':') + 1);
   std::printf("\n%s  %s\n", info.uri, info.name);
@@ -93,7 +93,7 @@ bool look_at(const maq_camera_list* list, uint32_t index) {
     maq_camera_mode mode{};
     mode.struct_size = sizeof mode;
     maquette::check(maq_camera_list_get_mode(list, index, k, &mode), list);
-    usable += mode.usable == 1 ? 1 : 0;
+    usable += mode.is_usable == 1 ? 1 : 0;
   }
   well("may be opened");
   if (usable == 0) {
@@ -142,12 +142,12 @@ void look_at_parts(const maquette::Context& context) {
 }
 
 int look_at_cameras() {
-  std::printf("maquette %s (%s)\n", maq_sdk_version(), maq_build_options());
+  std::printf("maquette %s (%s)\n", maq_get_sdk_version(), maq_get_build_options());
   const maquette::Context context;
   maq_camera_list* made = nullptr;
   maquette::check(maq_camera_list_create(context.get(), &made), context.get());
   const maquette::Owner<maq_camera_list, maq_camera_list_destroy> list(made);
-  const uint32_t count = maq_camera_list_count(list.get());
+  const uint32_t count = maq_camera_list_get_count(list.get());
   uint32_t usable = 0;
   for (uint32_t i = 0; i < count; ++i) usable += look_at(list.get(), i) ? 1 : 0;
   std::printf("\nThis machine\n");

@@ -8,8 +8,8 @@
 namespace {
 
 int print_info() {
-  std::printf("Maquette       %s (commit %s)\n", maq_sdk_version(), maq_git_commit());
-  std::printf("Build          %s\n", maq_build_options());
+  std::printf("Maquette       %s (commit %s)\n", maq_get_sdk_version(), maq_get_git_commit());
+  std::printf("Build          %s\n", maq_get_build_options());
   const maquette::Context context;
   int exit_code = 0;
   try {

@@ -25,7 +25,7 @@ struct Options {
 };
 
 bool is_camera(const std::string& uri) {
-  for (uint32_t i = 0; i < maq_source_scheme_count(); ++i) {
+  for (uint32_t i = 0; i < maq_source_get_scheme_count(); ++i) {
     maq_source_scheme scheme{};
     scheme.struct_size = sizeof scheme;
     maquette::check(maq_source_get_scheme(i, &scheme), nullptr);
@@ -56,7 +56,7 @@ int play(const Options& options) {
   const maquette::Context context(log);
   maq_source_config config = maquette::default_source_config();
   config.state_callback = PlayStatistics::note_state;
-  config.user_data = &statistics;
+  config.state_user_data = &statistics;
   maquette::Source source(context, uri, &config);
   is_opening = false;
   if (options.from_s > 0) source.seek(int64_t(options.from_s * 1e9));
@@ -72,13 +72,13 @@ int play(const Options& options) {
     if (status == MAQ_TIMEOUT) continue;
     if (status == MAQ_END_OF_STREAM) break;
     if (status != MAQ_OK) {
-      failure = maq_last_error(source.get());
+      failure = maq_get_last_error(source.get());
       break;
     }
     const maquette::Frame frame(taken);
     const maq_frame_desc desc = frame.desc();
     statistics.add(desc);
-    if (shows) picture.show(frame, statistics.line(source.info().drops));
+    if (shows) picture.show(frame, statistics.line(source.info().dropped_frame_count));
   }
   const maq_source_info info = source.info();
   statistics.close(std::move(source));

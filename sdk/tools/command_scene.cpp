@@ -28,9 +28,10 @@ int show(const InfoOptions& options) {
   std::printf("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count,
               double(bytes) / double(info.point_count), info.block_count);
   std::printf("  looks      %" PRIu64 " (%.0f %%) depend on the side, the rest are constant; %d bits a number\n",
-              info.varying_count, 100.0 * double(info.varying_count) / double(info.point_count), info.coefficient_bits);
-  std::printf("  box        %g %g %g to %g %g %g\n", info.low[0], info.low[1], info.low[2], info.high[0], info.high[1],
-              info.high[2]);
+              info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
+              info.coefficient_bits);
+  std::printf("  box        %g %g %g to %g %g %g\n", info.bounds_min[0], info.bounds_min[1], info.bounds_min[2],
+              info.bounds_max[0], info.bounds_max[1], info.bounds_max[2]);
   std::printf("  up         %g %g %g\n", info.up[0], info.up[1], info.up[2]);
   if (!options.json.empty()) {
     const std::string text = describe_scene(info, bytes).dump(2) + "\n";
@@ -53,13 +54,13 @@ std::string scene_bundle_or_default(const std::string& given) {
 nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_bytes) {
   nlohmann::ordered_json document;
   document["points"] = info.point_count;
-  document["varying"] = info.varying_count;
+  document["varying"] = info.view_dependent_count;
   document["blocks"] = info.block_count;
   document["bytes"] = file_bytes;
   document["coefficient_bits"] = info.coefficient_bits;
   document["up"] = info.up;
-  document["low"] = info.low;
-  document["high"] = info.high;
+  document["low"] = info.bounds_min;
+  document["high"] = info.bounds_max;
   return document;
 }
 

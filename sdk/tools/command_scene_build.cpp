@@ -27,7 +27,7 @@ struct Options {
   int threads = 0;
   int long_side = 640;
   int coefficients = 8;
-  double least_variation = -1;
+  double min_variation = -1;
   double visibility_scale = 1;
   double near_depth = 0;
   uint64_t points = 0;
@@ -69,7 +69,7 @@ int build(const Options& options) {
   const maq_capture_info info = capture.info();
   std::fprintf(stderr, "%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count,
                info.point_count);
-  for (uint32_t i = 0; i < info.dropped_count; ++i) {
+  for (uint32_t i = 0; i < info.drop_count; ++i) {
     uint64_t count = 0;
     const char* const reason = capture.dropped(i, &count);
     std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", count, reason);
@@ -82,13 +82,13 @@ int build(const Options& options) {
   config.threads = options.threads;
   config.long_side_px = options.long_side;
   config.coefficient_bits = options.coefficients;
-  config.least_variation = options.least_variation;
+  config.min_variation = options.min_variation;
   config.visibility_scale = options.visibility_scale;
   config.near_depth = options.near_depth;
-  config.most_points = options.points;
-  config.most_views = options.views;
-  config.uses_held_out = options.all_photos ? 1 : 0;
-  config.progress = show_progress;
+  config.max_points = options.points;
+  config.max_views = options.views;
+  config.use_held_out = options.all_photos ? 1 : 0;
+  config.progress_callback = show_progress;
   config.progress_user_data = &progress;
   maq_scene_build_stats stats{};
   const maquette::Scene scene = build_or_tell(context, config, capture, &stats, options.out);
@@ -101,24 +101,24 @@ int build(const Options& options) {
   const maq_scene_info made = scene.info();
   const uint64_t bytes = std::filesystem::file_size(options.out);
   std::printf("%s: %" PRIu64 " of %" PRIu64 " points were seen by %u photos; %.1f MB, %.1f bytes a point; %.1f s\n",
-              options.out.c_str(), made.point_count, stats.cloud_points, stats.view_count, double(bytes) / 1e6,
+              options.out.c_str(), made.point_count, stats.cloud_point_count, stats.view_count, double(bytes) / 1e6,
               double(bytes) / double(made.point_count), total_s);
-  if (stats.unused_views > 0) {
-    std::printf("  %u photos could not be used: unreadable, missing, or they see no point\n", stats.unused_views);
+  if (stats.unused_view_count > 0) {
+    std::printf("  %u photos could not be used: unreadable, missing, or they see no point\n", stats.unused_view_count);
   }
   if (!options.json.empty()) {
     nlohmann::ordered_json document = describe_scene(made, bytes);
-    document["cloud_points"] = stats.cloud_points;
+    document["cloud_points"] = stats.cloud_point_count;
     document["views"] = stats.view_count;
-    document["unused_views"] = stats.unused_views;
+    document["unused_views"] = stats.unused_view_count;
     document["seconds"] = {{"total", total_s},
                            {"load", stats.load_ms / 1e3},
                            {"visibility", stats.visibility_ms / 1e3},
-                           {"turning", stats.turning_ms / 1e3},
-                           {"extractor", stats.extractor_ms / 1e3},
-                           {"moments", stats.moments_ms / 1e3},
-                           {"solving", stats.solving_ms / 1e3},
-                           {"packing", stats.packing_ms / 1e3},
+                           {"turning", stats.align_ms / 1e3},
+                           {"extractor", stats.extract_ms / 1e3},
+                           {"moments", stats.accumulate_ms / 1e3},
+                           {"solving", stats.solve_ms / 1e3},
+                           {"packing", stats.pack_ms / 1e3},
                            {"saving", total_s - before_saving_s}};
     document["peak_memory_mib"] = double(peak_memory_bytes()) / double(1 << 20);
     const std::string text = document.dump(2) + "\n";
@@ -146,7 +146,7 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
       ->check(CLI::IsMember({8, 16, 32}));
   command
       ->add_option(
-          "--least-variation", options->least_variation,
+          "--min-variation", options->min_variation,
           "Points whose look varies less keep one colour from all sides, for a smaller file; colours are 0 to 1")
       ->check(CLI::NonNegativeNumber);
   command

@@ -69,24 +69,25 @@ maquette::SceneRenderer make_renderer(const maquette::Context& context, const ma
   config.threads = options.threads;
   config.near_depth = options.near_depth;
   for (const std::string& saving : options.without) {
-    if (saving == "culling") config.draws_unseen_blocks = 1;
-    if (saving == "tiles") config.refines_empty_parts = 1;
+    if (saving == "culling") config.draw_unseen_blocks = 1;
+    if (saving == "tiles") config.refine_empty_parts = 1;
   }
   return maquette::SceneRenderer(context, config, scene);
 }
 
 // The picture as it lies in the image.
-cv::Mat picture_of(const maquette::SceneImage& image, const maq_camera& camera) {
+cv::Mat picture_of(const maquette::SceneImage& image, const maq_pinhole_camera& camera) {
   size_t stride_bytes = 0;
-  const void* pixels = image.plane(MAQ_SCENE_BGR, &stride_bytes);
+  const void* pixels = image.plane(MAQ_SCENE_PLANE_BGR, &stride_bytes);
   return cv::Mat(camera.height_px, camera.width_px, CV_8UC3, const_cast<void*>(pixels), stride_bytes);
 }
 
-void write_picture(const maquette::SceneImage& image, const maq_camera& camera, bool with_alpha, const fs::path& path) {
+void write_picture(const maquette::SceneImage& image, const maq_pinhole_camera& camera, bool with_alpha,
+                   const fs::path& path) {
   cv::Mat picture = picture_of(image, camera);
   if (with_alpha) {
     size_t stride_bytes = 0;
-    const void* alphas = image.plane(MAQ_SCENE_ALPHA, &stride_bytes);
+    const void* alphas = image.plane(MAQ_SCENE_PLANE_ALPHA, &stride_bytes);
     const cv::Mat alpha(camera.height_px, camera.width_px, CV_8UC1, const_cast<void*>(alphas), stride_bytes);
     const cv::Mat colours = picture;
     picture = cv::Mat(colours.size(), CV_8UC4);
@@ -104,7 +105,7 @@ float median(std::vector<float> values) {
 }
 
 // Renders `repeat` times; `ms` gets the medians of the times.
-maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_camera& camera, int repeat,
+maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
                            nlohmann::ordered_json& ms) {
   std::vector<float> total, project, shade, refine, turn;
   // The first prepares networks for its size; its time is nobody's who looks at more than one picture.
@@ -118,7 +119,7 @@ maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_camera& 
     project.push_back(stats.project_ms);
     shade.push_back(stats.shade_ms);
     refine.push_back(stats.refine_ms);
-    turn.push_back(stats.turn_ms);
+    turn.push_back(stats.resample_ms);
   }
   ms = {{"total", median(total)},
         {"project", median(project)},
@@ -136,7 +137,7 @@ std::vector<uint32_t> chosen_views(const maquette::Capture& capture, const std::
   std::vector<uint32_t> chosen;
   for (uint32_t i = 0; i < capture.info().view_count; ++i) {
     const maq_capture_view view = capture.view(i);
-    if (wanted == "all" || (wanted == "held-out" && view.held_out == 1) || names.erase(view.name) > 0) {
+    if (wanted == "all" || (wanted == "held-out" && view.is_held_out == 1) || names.erase(view.name) > 0) {
       chosen.push_back(i);
     }
   }
@@ -170,17 +171,17 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
   ProgressBar progress("rendering", int64_t(views.size()));
   for (size_t i = 0; i < views.size() && !interrupted(); ++i) {
     const maq_capture_view view = capture.view(views[i]);
-    const maq_camera camera = size ? with_size(view.camera, size->width_px, size->height_px) : view.camera;
+    const maq_pinhole_camera camera = size ? with_size(view.camera, size->width_px, size->height_px) : view.camera;
     nlohmann::ordered_json ms;
     const maquette::SceneImage image = timed(renderer, camera, options.repeat, ms);
     const maq_scene_image_stats stats = image.stats();
     write_picture(image, camera, !options.no_alpha, fs::path(options.out) / picture_name(view));
     document["views"].push_back({{"name", view.name},
                                  {"ms", ms},
-                                 {"blocks_drawn", stats.blocks_drawn},
-                                 {"points_drawn", stats.points_drawn},
-                                 {"points_shaded", stats.points_shaded},
-                                 {"refined_pixels", stats.refined_pixels}});
+                                 {"blocks_drawn", stats.drawn_block_count},
+                                 {"points_drawn", stats.drawn_point_count},
+                                 {"points_shaded", stats.shaded_point_count},
+                                 {"refined_pixels", stats.refined_pixel_count}});
     char note[32];
     std::snprintf(note, sizeof note, "%.1f ms", ms["total"].get<double>());
     progress.advance(int64_t(i + 1), note);
@@ -194,7 +195,8 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
   return interrupted() ? 1 : 0;
 }
 
-std::vector<maq_camera> flight(const maquette::Scene& scene, const maquette::Capture* capture, const Options& options) {
+std::vector<maq_pinhole_camera> flight(const maquette::Scene& scene, const maquette::Capture* capture,
+                                       const Options& options) {
   constexpr Size kUsual = {640, 480};
   const Size size = size_of(options.size).value_or(kUsual);
   const int frames = std::max(1, int(std::lround(options.seconds * options.fps)));
@@ -206,7 +208,7 @@ std::vector<maq_camera> flight(const maquette::Scene& scene, const maquette::Cap
   constexpr double kStopsASecond = 1.5;
   const uint32_t count = capture->info().view_count;
   const auto wanted = std::clamp(uint32_t(std::lround(options.seconds * kStopsASecond)) + 1, 2u, std::max(2u, count));
-  std::vector<maq_camera> stops;
+  std::vector<maq_pinhole_camera> stops;
   for (uint32_t i = 0; i < std::min(wanted, count); ++i) {
     stops.push_back(with_size(capture->view(uint32_t(uint64_t(i) * count / std::min(wanted, count))).camera,
                               size.width_px, size.height_px));
@@ -216,7 +218,7 @@ std::vector<maq_camera> flight(const maquette::Scene& scene, const maquette::Cap
 
 int render_clip(const maquette::Context& context, maquette::SceneRenderer& renderer, const maquette::Scene& scene,
                 const maquette::Capture* capture, const Options& options) {
-  const std::vector<maq_camera> cameras = flight(scene, capture, options);
+  const std::vector<maq_pinhole_camera> cameras = flight(scene, capture, options);
   ClipFile clip(context, options.out, options.fps);
   ProgressBar progress("rendering", int64_t(cameras.size()));
   std::vector<float> times_ms;

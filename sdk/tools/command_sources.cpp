@@ -11,12 +11,12 @@ void print_cameras() {
   maq_camera_list* made = nullptr;
   maquette::check(maq_camera_list_create(context.get(), &made), context.get());
   const maquette::Owner<maq_camera_list, maq_camera_list_destroy> list(made);
-  const uint32_t count = maq_camera_list_count(list.get());
+  const uint32_t count = maq_camera_list_get_count(list.get());
   std::printf(count == 0 ? "\nNo camera is plugged in.\n" : "\nCameras:\n");
   for (uint32_t i = 0; i < count; ++i) {
     maq_camera_info info{};
     info.struct_size = sizeof info;
-    maquette::check(maq_camera_list_get(list.get(), i, &info), list.get());
+    maquette::check(maq_camera_list_get_camera(list.get(), i, &info), list.get());
     std::printf("\n  %-24s %s%s%s%s\n", info.uri, info.name, *info.bus != 0 ? " (" : "", info.bus,
                 *info.bus != 0 ? ")" : "");
     if (info.status != MAQ_OK) std::printf("    %s\n", info.problem);
@@ -26,14 +26,14 @@ void print_cameras() {
       maquette::check(maq_camera_list_get_mode(list.get(), i, k, &mode), list.get());
       std::printf("    %-5s %5d x %-5d", mode.format, mode.width_px, mode.height_px);
       if (mode.fps > 0) std::printf(" up to %g frames a second", mode.fps);
-      std::printf("%s\n", mode.usable == 1 ? "" : "   not understood");
+      std::printf("%s\n", mode.is_usable == 1 ? "" : "   not understood");
     }
   }
 }
 
 int print_sources() {
   std::printf("Where frames can come from, with an example of each:\n\n");
-  for (uint32_t i = 0; i < maq_source_scheme_count(); ++i) {
+  for (uint32_t i = 0; i < maq_source_get_scheme_count(); ++i) {
     maq_source_scheme scheme{};
     scheme.struct_size = sizeof scheme;
     maquette::check(maq_source_get_scheme(i, &scheme), nullptr);

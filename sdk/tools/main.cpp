@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Maquette: dense pose of people in images, clips and camera pictures, and scenes from photos, on the CPU.");
   app.require_subcommand(1);
-  app.set_version_flag("--version", std::string("maquette ") + maq_sdk_version());
+  app.set_version_flag("--version", std::string("maquette ") + maq_get_sdk_version());
   app.footer(
       "Try it without a camera:\n  maquette densepose stub:people --out demo-output --overlay --max-frames 60\n"
       "Help on a command:\n  maquette densepose --help");

@@ -24,7 +24,7 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
                   "Look for new people only in every N-th frame of a stream, and follow them in between")
       ->check(CLI::Range(1, 1000));
   command
-      .add_option("--least-person", options.least_person,
+      .add_option("--min-person-height", options.min_person_height_px,
                   "Nobody who matters is less tall than so many pixels; large values are faster")
       ->check(CLI::Range(0, 100000));
   command.add_flag("--no-surface", options.no_surface, "Body parts alone: U and V stay 0");
@@ -47,8 +47,8 @@ maq_densepose_config config_of(const ModelOptions& options, const std::string& b
   config.score_threshold = options.threshold;
   config.max_proposals = options.max_proposals;
   config.key_frame_interval = options.key_frames;
-  config.least_person_px = options.least_person;
-  config.detail = options.no_surface ? MAQ_DETAIL_PART : MAQ_DETAIL_SURFACE;
-  config.spin = options.no_spin ? 0 : 1;
+  config.min_person_height_px = options.min_person_height_px;
+  config.detail = options.no_surface ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
+  config.allow_spinning = options.no_spin ? 0 : 1;
   return config;
 }

@@ -15,7 +15,7 @@ struct ModelOptions {
   int threads = 0;
   int max_proposals = 0;
   int key_frames = 1;
-  int least_person = 0;
+  int min_person_height_px = 0;
   bool no_surface = false;
   bool no_spin = false;
 };

@@ -111,7 +111,7 @@ void mix(cv::Vec3b& pixel, const std::array<uint8_t, 3>& rgb, float amount) {
 
 void paint(const Surface& surface, float line_px, cv::Mat& canvas) {
   std::array<std::array<uint8_t, 3>, kParts + 1> colours;
-  for (int p = 0; p <= kParts; ++p) maq_part_name(p, colours[size_t(p)].data());
+  for (int p = 0; p <= kParts; ++p) maq_densepose_get_part_name(p, colours[size_t(p)].data());
   constexpr std::array<uint8_t, 3> kWhite = {255, 255, 255};
   constexpr std::array<uint8_t, 3> kInk = {24, 26, 48};
   cv::Mat target = canvas(surface.area);
@@ -166,10 +166,10 @@ cv::Mat draw_overlay(const cv::Mat& image, const maquette::DensePoseResult& resu
   // The people stand out from a slightly darkened picture.
   if (!result.people().empty()) canvas.convertTo(canvas, -1, 0.82, 0);
 
-  const cv::Mat part = plane_of(result, MAQ_PLANE_PART);
-  const cv::Mat u = plane_of(result, MAQ_PLANE_U);
-  const cv::Mat v = plane_of(result, MAQ_PLANE_V);
-  const cv::Mat person = plane_of(result, MAQ_PLANE_PERSON);
+  const cv::Mat part = plane_of(result, MAQ_DENSEPOSE_PLANE_PART);
+  const cv::Mat u = plane_of(result, MAQ_DENSEPOSE_PLANE_U);
+  const cv::Mat v = plane_of(result, MAQ_DENSEPOSE_PLANE_V);
+  const cv::Mat person = plane_of(result, MAQ_DENSEPOSE_PLANE_PERSON);
   const float line_px = std::max(1.0f, float(std::max(canvas.cols, canvas.rows)) / 900.0f);
   const cv::Rect frame(cv::Point(), image.size());
   for (size_t k = result.people().size(); k-- > 0;) {

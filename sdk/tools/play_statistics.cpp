@@ -15,7 +15,7 @@ const char* name_of(maq_source_state state) {
     case MAQ_SOURCE_STALLED: return "stalled";
     case MAQ_SOURCE_LOST: return "lost";
     case MAQ_SOURCE_RECONNECTING: return "reconnecting";
-    case MAQ_SOURCE_BACK: return "back";
+    case MAQ_SOURCE_RECONNECTED: return "back";
   }
   return "unknown";
 }
@@ -101,7 +101,7 @@ nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const
       {"frames", frames()},
       {"seconds", seconds_since_first()},
       {"fps", seconds_since_first() > 0 ? double(frames() - 1) / seconds_since_first() : 0.0},
-      {"drops", info.drops},
+      {"drops", info.dropped_frame_count},
       {"missing_numbers", frames() == 0 ? 0 : int64_t(last_sequence_ - first_sequence_) + 1 - frames()},
       {"times_not_later", backwards},
       {"interval_ms", {{"median", quantile(intervals_ms, .5)}, {"p99", quantile(intervals_ms, .99)}}},
@@ -131,7 +131,7 @@ nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const
 void PlayStatistics::print(const maq_source_info& info) const {
   const auto all = report(info);
   std::printf("%" PRId64 " frames of %d x %d in %.1f s: %.2f a second, %" PRIu64 " lost\n", frames(), info.width_px,
-              info.height_px, all["seconds"].get<double>(), all["fps"].get<double>(), info.drops);
+              info.height_px, all["seconds"].get<double>(), all["fps"].get<double>(), info.dropped_frame_count);
   std::printf("  from one to the next %.2f ms (median), %.2f ms (99 %%)\n", all["interval_ms"]["median"].get<double>(),
               all["interval_ms"]["p99"].get<double>());
   if (all.contains("age_ms")) {

@@ -8,9 +8,9 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-cv::Matx33d rotation_of(const maq_camera& camera) { return cv::Matx33d(camera.rotation); }
+cv::Matx33d rotation_of(const maq_pinhole_camera& camera) { return cv::Matx33d(camera.rotation); }
 
-void set_rotation(maq_camera& camera, const cv::Matx33d& rotation) {
+void set_rotation(maq_pinhole_camera& camera, const cv::Matx33d& rotation) {
   std::copy(rotation.val, rotation.val + 9, camera.rotation);
 }
 
@@ -36,18 +36,18 @@ cv::Vec4d spline(double t) {
 
 }  // namespace
 
-std::vector<maq_camera> flight_through(const std::vector<maq_camera>& stops, int frames) {
+std::vector<maq_pinhole_camera> flight_through(const std::vector<maq_pinhole_camera>& stops, int frames) {
   const int last = int(stops.size()) - 1;
-  std::vector<maq_camera> cameras;
+  std::vector<maq_pinhole_camera> cameras;
   for (int frame = 0; frame < frames; ++frame) {
     const double at = frames > 1 ? double(last) * frame / (frames - 1) : 0;
     const int before = std::min(int(at), std::max(0, last - 1));
     const cv::Vec4d weights = spline(at - before);
-    maq_camera camera = stops[size_t(before)];
+    maq_pinhole_camera camera = stops[size_t(before)];
     cv::Matx33d rotation = cv::Matx33d::zeros();
     cv::Vec3d centre(0, 0, 0);
     for (int k = 0; k < 4; ++k) {
-      const maq_camera& stop = stops[size_t(std::clamp(before + k - 1, 0, last))];
+      const maq_pinhole_camera& stop = stops[size_t(std::clamp(before + k - 1, 0, last))];
       rotation += weights[k] * rotation_of(stop);
       centre += weights[k] * cv::Vec3d(stop.centre);
     }
@@ -58,20 +58,20 @@ std::vector<maq_camera> flight_through(const std::vector<maq_camera>& stops, int
   return cameras;
 }
 
-std::vector<maq_camera> flight_around(const maq_scene_info& scene, int width_px, int height_px, int frames) {
-  const cv::Vec3d low(scene.low), high(scene.high), middle = 0.5 * (low + high);
+std::vector<maq_pinhole_camera> flight_around(const maq_scene_info& scene, int width_px, int height_px, int frames) {
+  const cv::Vec3d low(scene.bounds_min), high(scene.bounds_max), middle = 0.5 * (low + high);
   const cv::Vec3d up = cv::normalize(cv::Vec3d(scene.up));
   const cv::Vec3d aside = std::abs(up[0]) < 0.9 ? cv::Vec3d(1, 0, 0) : cv::Vec3d(0, 1, 0);
   const cv::Vec3d first = cv::normalize(aside - up * aside.dot(up)), second = up.cross(first);
   const double half_angle = kPi / 6, focal_px = std::min(width_px, height_px) / (2 * std::tan(half_angle));
   const double radius = std::max(1e-9, 0.5 * cv::norm(high - low)) / std::sin(half_angle), elevation = kPi / 7;
-  std::vector<maq_camera> cameras;
+  std::vector<maq_pinhole_camera> cameras;
   for (int frame = 0; frame < frames; ++frame) {
     const double angle = 2 * kPi * frame / frames;
     const cv::Vec3d away =
         std::cos(elevation) * (std::cos(angle) * first + std::sin(angle) * second) + std::sin(elevation) * up;
     const cv::Vec3d forward = -away, right = cv::normalize(forward.cross(up)), down = forward.cross(right);
-    maq_camera camera{};
+    maq_pinhole_camera camera{};
     camera.struct_size = sizeof camera;
     camera.width_px = width_px;
     camera.height_px = height_px;
@@ -87,9 +87,9 @@ std::vector<maq_camera> flight_around(const maq_scene_info& scene, int width_px,
   return cameras;
 }
 
-maq_camera with_size(const maq_camera& camera, int width_px, int height_px) {
+maq_pinhole_camera with_size(const maq_pinhole_camera& camera, int width_px, int height_px) {
   const double scale = std::min(double(width_px) / camera.width_px, double(height_px) / camera.height_px);
-  maq_camera sized = camera;
+  maq_pinhole_camera sized = camera;
   sized.width_px = width_px;
   sized.height_px = height_px;
   sized.fx_px *= scale;

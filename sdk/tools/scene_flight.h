@@ -6,10 +6,10 @@
 #include <vector>
 
 // `frames` cameras that walk smoothly through `stops`, which have one size, in their order. Needs one stop at least.
-std::vector<maq_camera> flight_through(const std::vector<maq_camera>& stops, int frames);
+std::vector<maq_pinhole_camera> flight_through(const std::vector<maq_pinhole_camera>& stops, int frames);
 
 // `frames` cameras on a circle around the scene's box, a little above it, that look at its middle; 60 degrees wide.
-std::vector<maq_camera> flight_around(const maq_scene_info& scene, int width_px, int height_px, int frames);
+std::vector<maq_pinhole_camera> flight_around(const maq_scene_info& scene, int width_px, int height_px, int frames);
 
 // The same camera with a picture of another size: what it saw is in it, at least.
-maq_camera with_size(const maq_camera& camera, int width_px, int height_px);
+maq_pinhole_camera with_size(const maq_pinhole_camera& camera, int width_px, int height_px);

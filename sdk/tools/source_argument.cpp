@@ -25,7 +25,7 @@ std::string escaped(const std::string& path) {
 }
 
 bool is_known_scheme(const std::string& name) {
-  for (uint32_t i = 0; i < maq_source_scheme_count(); ++i) {
+  for (uint32_t i = 0; i < maq_source_get_scheme_count(); ++i) {
     maq_source_scheme scheme{};
     scheme.struct_size = sizeof scheme;
     if (maq_source_get_scheme(i, &scheme) == MAQ_OK && name == scheme.name) return true;

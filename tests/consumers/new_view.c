@@ -19,20 +19,20 @@ int main(int argc, char** argv) {
   maq_scene_renderer_config_init(&rendering, sizeof rendering);
   building.bundle_path = rendering.bundle_path = argv[1];
   first.struct_size = second.struct_size = sizeof(maq_capture_view);
-  first.camera.struct_size = second.camera.struct_size = sizeof(maq_camera);
+  first.camera.struct_size = second.camera.struct_size = sizeof(maq_pinhole_camera);
   failed = maq_context_create(MAQ_HEADER_VERSION, NULL, &context) != MAQ_OK ||
            maq_capture_open(context, argv[2], &capture) != MAQ_OK ||
            maq_scene_build(context, &building, capture, NULL, &scene) != MAQ_OK ||
            maq_scene_renderer_create(context, &rendering, scene, &renderer) != MAQ_OK;
-  if (failed) fprintf(stderr, "%s\n", maq_last_error(context));
+  if (failed) fprintf(stderr, "%s\n", maq_get_last_error(context));
   if (!failed) {
     /* Where nobody took a photo: halfway to the next one's place, looking as the first does. */
     maq_capture_get_view(capture, 0, &first);
     maq_capture_get_view(capture, 1, &second);
     for (x = 0; x < 3; ++x) first.camera.centre[x] = 0.5 * (first.camera.centre[x] + second.camera.centre[x]);
     failed = maq_scene_renderer_run(renderer, &first.camera, &image) != MAQ_OK ||
-             maq_scene_image_plane(image, MAQ_SCENE_BGR, (const void**)&bgr, &stride) != MAQ_OK;
-    if (failed) fprintf(stderr, "%s\n", maq_last_error(renderer));
+             maq_scene_image_get_plane(image, MAQ_SCENE_PLANE_BGR, (const void**)&bgr, &stride) != MAQ_OK;
+    if (failed) fprintf(stderr, "%s\n", maq_get_last_error(renderer));
   }
   if (!failed) {
     FILE* file = fopen(argv[3], "wb");
@@ -48,6 +48,6 @@ int main(int argc, char** argv) {
     if (file) fclose(file);
   }
   maq_scene_image_release(image), maq_scene_renderer_destroy(renderer);
-  maq_scene_destroy(scene), maq_capture_destroy(capture), maq_context_destroy(context);
+  maq_scene_close(scene), maq_capture_close(capture), maq_context_destroy(context);
   return failed;
 }

@@ -18,9 +18,9 @@ int main(int argc, char** argv) {
                maq_source_create(context, argv[2], NULL, &source) != MAQ_OK ||
                maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame) != MAQ_OK ||
                maq_densepose_run(densepose, frame, &result) != MAQ_OK ||
-               maq_densepose_result_people(result, &people, &count) != MAQ_OK;
+               maq_densepose_result_get_people(result, &people, &count) != MAQ_OK;
   if (failed)
-    fprintf(stderr, "%s\n", maq_last_error(frame ? (void*)densepose : source ? (void*)source : (void*)context));
+    fprintf(stderr, "%s\n", maq_get_last_error(frame ? (void*)densepose : source ? (void*)source : (void*)context));
   for (i = 0; i < count; ++i)
     printf("person %.2f at x %.0f y %.0f\n", people[i].score, people[i].box_px[0], people[i].box_px[1]);
   maq_densepose_result_release(result), maq_frame_release(frame);

@@ -31,7 +31,7 @@ if(WAY STREQUAL "find_package")
   endif()
 else()
   set(ENV{PKG_CONFIG_PATH} "${moved}/${LIBDIR}/pkgconfig")
-  run(pkg-config --cflags --libs "maquette >= 0.1")
+  run(pkg-config --cflags --libs "maquette >= 0.2")
   string(STRIP "${output}" flags)
   separate_arguments(flags UNIX_COMMAND "${flags}")
   run("${C_COMPILER}" -std=c99 -Wall -Werror "${CMAKE_CURRENT_LIST_DIR}/people.c" -o people ${flags}

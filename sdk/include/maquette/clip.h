@@ -24,7 +24,7 @@ MAQ_API maq_status maq_clip_create(maq_context* context, const char* path, doubl
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (another size, or the clip is finished), MAQ_ERROR_IMAGE_SIZE (too
  * small), MAQ_ERROR_UNSUPPORTED (a depth image; with the first picture also: this build cannot write that kind of file, or
  * not of that size; the other kind may do), MAQ_ERROR_UNWRITABLE (the disk is full already). Blocks while it is encoded. */
-MAQ_API maq_status maq_clip_add(maq_clip* clip, const maq_frame* frame);
+MAQ_API maq_status maq_clip_add_frame(maq_clip* clip, const maq_frame* frame);
 
 /* Completes the file. After it nothing can be added. Only here is it known whether the disk took all of it.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (nothing was added), MAQ_ERROR_UNWRITABLE (the disk is full; a file that

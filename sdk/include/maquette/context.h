@@ -49,7 +49,7 @@ MAQ_API void maq_context_destroy(maq_context* context);
 /* The version of the ONNX Runtime library in use ("1.26.0"), and the file it was opened from.
  * Both texts are the context's and live as long as it does; either pointer may be NULL.
  * Any thread. Errors: MAQ_ERROR_RUNTIME_LIBRARY. Blocks the first time, while the library is opened. */
-MAQ_API maq_status maq_context_onnxruntime(maq_context* context, const char** version, const char** library_path);
+MAQ_API maq_status maq_context_get_onnxruntime(maq_context* context, const char** version, const char** library_path);
 
 #ifdef __cplusplus
 }

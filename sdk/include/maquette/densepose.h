@@ -13,8 +13,8 @@ typedef struct maq_densepose_result maq_densepose_result;
 
 /* What is computed of each pixel of a person. */
 typedef enum maq_densepose_detail {
-  MAQ_DETAIL_SURFACE = 0, /* part, U and V */
-  MAQ_DETAIL_PART = 1     /* part alone: faster; U and V stay 0 */
+  MAQ_DENSEPOSE_DETAIL_SURFACE = 0, /* part, U and V */
+  MAQ_DENSEPOSE_DETAIL_PART = 1     /* part alone: faster; U and V stay 0 */
 } maq_densepose_detail;
 
 /* The later fields leave out work that a scene does not need. */
@@ -31,9 +31,9 @@ typedef struct maq_densepose_config {
   int32_t key_frame_interval; /* 1 (default): people are looked for in every frame. N, to 1000: in every N-th frame of a
                                  stream; in between those found are followed, nobody new is, and frames without anybody
                                  cost nothing. A frame of another size starts anew. */
-  int32_t least_person_px;    /* people less tall than this in the frame may be missed; 0 (default): nobody */
-  int32_t detail;             /* a maq_densepose_detail; default MAQ_DETAIL_SURFACE */
-  int32_t spin;               /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
+  int32_t min_person_height_px; /* people less tall than this in the frame may be missed; 0 (default): nobody */
+  maq_densepose_detail detail;  /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
+  int32_t allow_spinning;       /* 1 (default): idle threads stay awake a while; 0: they sleep, slower but frugal */
 } maq_densepose_config;
 
 /* One person. The box is in pixels of the frame: left, top, right, bottom, the latter two exclusive. */
@@ -44,16 +44,16 @@ typedef struct maq_person {
 
 /* The planes of a result: one byte a pixel of the frame. */
 typedef enum maq_densepose_plane {
-  MAQ_PLANE_PART = 1,  /* I: body part 1 to 24, 0 for background (the DensePose numbering) */
-  MAQ_PLANE_U = 2,     /* U * 255, rounded; 0 on background */
-  MAQ_PLANE_V = 3,     /* V * 255, rounded; 0 on background */
-  MAQ_PLANE_PERSON = 4 /* k for the k-th person of the result, counted from 1; 0 for nobody */
+  MAQ_DENSEPOSE_PLANE_PART = 1,  /* I: body part 1 to 24, 0 for background (the DensePose numbering) */
+  MAQ_DENSEPOSE_PLANE_U = 2,     /* U * 255, rounded; 0 on background */
+  MAQ_DENSEPOSE_PLANE_V = 3,     /* V * 255, rounded; 0 on background */
+  MAQ_DENSEPOSE_PLANE_PERSON = 4 /* k for the k-th person of the result, counted from 1; 0 for nobody */
 } maq_densepose_plane;
 
 /* A part's name ("left upper arm, outside") and a colour to paint it with: red, green, blue. 0 is "background", black; a
  * number that is no part is "unknown part", black. The text is static; `rgb` has room for three bytes, or is NULL.
  * Any thread. Does not fail or block. */
-MAQ_API const char* maq_part_name(int32_t part, uint8_t* rgb);
+MAQ_API const char* maq_densepose_get_part_name(int32_t part, uint8_t* rgb);
 
 /* What a run did and how long its stages took. Times are wall-clock milliseconds. */
 typedef struct maq_densepose_stats {
@@ -67,12 +67,12 @@ typedef struct maq_densepose_stats {
   float total_ms;
   int32_t network_width_px; /* the resized image, without padding */
   int32_t network_height_px;
-  int32_t proposals;     /* boxes that reached the box head */
-  int32_t people;        /* in the result */
-  int32_t dropped_boxes; /* boxes with NaN, or with no area inside the frame */
-  int64_t body_pixels;   /* pixels that belong to somebody */
-  int64_t clamped_uv;    /* of these, pixels where the network's U or V was outside 0 to 1 */
-  int32_t key_frame;     /* 1: people were looked for; 0: those of the frame before were followed */
+  int32_t proposal_count;      /* boxes that reached the box head */
+  int32_t person_count;        /* in the result */
+  int32_t dropped_box_count;   /* boxes with NaN, or with no area inside the frame */
+  int64_t body_pixel_count;    /* pixels that belong to somebody */
+  int64_t clamped_pixel_count; /* of these, pixels where the network's U or V was outside 0 to 1 */
+  int32_t is_key_frame;        /* 1: people were looked for; 0: those of the frame before were followed */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
@@ -97,7 +97,7 @@ MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* 
 
 /* Forgets whom it followed: the next frame is a key frame, of another stream. Only of use with key_frame_interval
  * above 1. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_restart(maq_densepose* densepose);
+MAQ_API maq_status maq_densepose_reset(maq_densepose* densepose);
 
 /* Gives the result back (NULL is fine). Pointers into it are invalid afterwards.
  * Once for each result, from any thread. Does not block. */
@@ -105,26 +105,27 @@ MAQ_API void maq_densepose_result_release(maq_densepose_result* result);
 
 /* Size of the planes: that of the frame. Either pointer may be NULL.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px);
+MAQ_API maq_status maq_densepose_result_get_size(const maq_densepose_result* result, int32_t* width_px,
+                                                 int32_t* height_px);
 
 /* The people found, best score first: `*people` points to `*count` of them, inside the result. Each has a pixel at
  * least: a box with nothing of a body left to paint in it is no person.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_people(const maq_densepose_result* result, const maq_person** people,
-                                               uint32_t* count);
+MAQ_API maq_status maq_densepose_result_get_people(const maq_densepose_result* result, const maq_person** people,
+                                                   uint32_t* count);
 
 /* A plane of the result: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one
  * with the better score is in front.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_plane(const maq_densepose_result* result, maq_densepose_plane plane,
-                                              const uint8_t** pixels, size_t* stride_bytes);
+MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
+                                                  const uint8_t** pixels, size_t* stride_bytes);
 
 /* Times and counts of the run. The caller sets stats->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
+MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
 /* Writes three files into a folder that is there ("": the current one), in the DensePose convention (docs/formats.md):
- * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png (MAQ_PLANE_PERSON) and
+ * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png (MAQ_DENSEPOSE_PLANE_PERSON) and
  * <stem>.json (size, boxes, scores). Each appears whole or not at all, in place of one that is there, and none before all
  * are written. `stem` begins their names and names no folder.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
@@ -133,18 +134,18 @@ MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result,
 
 /* Where on the body a label lies: points of the template body in its rest pose, in metres; x to the body's left, y to its
  * back, z up. */
-typedef struct maq_surface {
+typedef struct maq_densepose_surface {
   uint32_t struct_size;
   int32_t nodes;         /* along U, and along V; 2 at least */
   const float* points_m; /* [24][nodes][nodes][3]: part - 1, U * (nodes - 1), V * (nodes - 1); x, y, z. Between nodes,
                             bilinear. x, y and z are NaN where the chart does not reach. */
-} maq_surface;
+} maq_densepose_surface;
 
 /* The surface that the bundle's labels mean. The caller sets surface->struct_size; the points are the handle's and live as
  * long as it does.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has none), MAQ_ERROR_BAD_BUNDLE (it is
  * damaged). Blocks shortly the first time, while it is decoded. */
-MAQ_API maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_surface* surface);
+MAQ_API maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_densepose_surface* surface);
 
 #ifdef __cplusplus
 }

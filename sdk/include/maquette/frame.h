@@ -31,34 +31,34 @@ typedef enum maq_clock {
   MAQ_CLOCK_MONOTONIC = 2 /* the system's monotonic clock (CLOCK_MONOTONIC) at the time of capture */
 } maq_clock;
 
-/* Describes a frame: read by maq_frame_create, written by maq_frame_get_desc. */
+/* Describes a frame: read by maq_frame_wrap, written by maq_frame_get_desc. */
 typedef struct maq_frame_desc {
   uint32_t struct_size;
   maq_pixel_format format;
   int32_t width_px;
   int32_t height_px;
   const uint8_t* planes[2]; /* planes[1] only for NV12 */
-  size_t stride_bytes[2];   /* from one row to the next; 0 in maq_frame_create means rows without padding */
+  size_t stride_bytes[2];   /* from one row to the next; 0 in maq_frame_wrap means rows without padding */
   int64_t timestamp_ns;
   maq_clock clock;
   uint64_t sequence; /* number of the frame in its source, from 0; gaps are frames that were dropped */
 } maq_frame_desc;
 
-/* Called once when the library no longer needs the pixels of a frame made by maq_frame_create. */
-typedef void (*maq_frame_free_callback)(void* user_data);
+/* Called once when the library no longer needs the pixels of a frame made by maq_frame_wrap. */
+typedef void (*maq_frame_release_callback)(void* user_data);
 
 /* Fills `desc` with zeros, MAQ_CLOCK_MEDIA and struct_size. `struct_size` is sizeof(maq_frame_desc) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size);
 
 /* Makes a frame of pixels that the app holds, without a copy.
- * The pixels stay the app's: they must not change or go away until `free_callback` is called with `user_data`, or,
+ * The pixels stay the app's: they must not change or go away until `release_callback` is called with `user_data`, or,
  * with a NULL callback, until the frame was released. On failure the callback is not called.
  * `*frame` is the caller's, to be given to maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (NULL plane, stride shorter than a row), MAQ_ERROR_IMAGE_SIZE,
  * MAQ_ERROR_UNSUPPORTED (format). Does not block. */
-MAQ_API maq_status maq_frame_create(maq_context* context, const maq_frame_desc* desc,
-                                    maq_frame_free_callback free_callback, void* user_data, maq_frame** frame);
+MAQ_API maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* desc,
+                                  maq_frame_release_callback release_callback, void* user_data, maq_frame** frame);
 
 /* Gives the frame back to its pool or to the app (NULL is fine). Pointers into it are invalid afterwards.
  * Once for each frame, from any thread. Does not block. */

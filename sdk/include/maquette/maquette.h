@@ -9,7 +9,7 @@
  *
  * Rules that hold everywhere:
  * - Every call that can fail returns maq_status and writes its result through its last argument only when it returns
- *   MAQ_OK. maq_last_error() gives the sentence that says what was wrong and what to do.
+ *   MAQ_OK. maq_get_last_error() gives the sentence that says what was wrong and what to do.
  * - `_create` is answered by `_destroy`, `_acquire` and `_run` by `_release`; both accept NULL.
  * - Config and info structs begin with struct_size, which the caller sets to sizeof the struct; the `_init` functions
  *   do so for configs.

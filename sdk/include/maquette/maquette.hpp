@@ -33,7 +33,7 @@ class Error : public std::runtime_error {
 
 // Throws the error of the latest call when `status` is one; `handle` is the call's, or null for `_init` functions.
 inline void check(maq_status status, const void* handle) {
-  if (status != MAQ_OK) throw Error(status, maq_last_error(handle));
+  if (status != MAQ_OK) throw Error(status, maq_get_last_error(handle));
 }
 
 template <class Handle, void (*destroy)(Handle*)>
@@ -90,12 +90,12 @@ class Context {
 
   std::string onnxruntime_version() const {
     const char* version = "";
-    check(maq_context_onnxruntime(get(), &version, nullptr), get());
+    check(maq_context_get_onnxruntime(get(), &version, nullptr), get());
     return version;
   }
   std::string onnxruntime_path() const {
     const char* path = "";
-    check(maq_context_onnxruntime(get(), nullptr, &path), get());
+    check(maq_context_get_onnxruntime(get(), nullptr, &path), get());
     return path;
   }
 
@@ -111,7 +111,7 @@ class Frame {
   // Pixels of the app, which must stay until the frame is gone.
   Frame(const Context& context, const maq_frame_desc& desc) {
     maq_frame* made = nullptr;
-    check(maq_frame_create(context.get(), &desc, nullptr, nullptr, &made), context.get());
+    check(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &made), context.get());
     owner_.reset(made);
   }
 
@@ -169,10 +169,10 @@ class Source {
   }
 
   // Nothing when the source does not know.
-  std::optional<maq_calibration> calibration() const {
-    maq_calibration calibration{};
+  std::optional<maq_intrinsics> calibration() const {
+    maq_intrinsics calibration{};
     calibration.struct_size = sizeof calibration;
-    const maq_status status = maq_source_get_calibration(get(), &calibration);
+    const maq_status status = maq_source_get_intrinsics(get(), &calibration);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
     check(status, get());
     return calibration;
@@ -216,7 +216,7 @@ class Recorder {
   }
 
   maq_recorder* get() const { return owner_.get(); }
-  void add(const Frame& frame) { check(maq_recorder_add(get(), frame.get()), get()); }
+  void add(const Frame& frame) { check(maq_recorder_add_frame(get(), frame.get()), get()); }
   void finish() { check(maq_recorder_finish(get()), get()); }
 
   maq_recorder_info info() const {
@@ -239,7 +239,7 @@ class Clip {
   }
 
   maq_clip* get() const { return owner_.get(); }
-  void add(const Frame& frame) { check(maq_clip_add(get(), frame.get()), get()); }
+  void add(const Frame& frame) { check(maq_clip_add_frame(get(), frame.get()), get()); }
   void finish() { check(maq_clip_finish(get()), get()); }
 
  private:
@@ -250,7 +250,7 @@ class DensePoseResult {
  public:
   // Takes over a result of the C API.
   explicit DensePoseResult(maq_densepose_result* result) : owner_(result) {
-    check(maq_densepose_result_size(get(), &width_px_, &height_px_), get());
+    check(maq_densepose_result_get_size(get(), &width_px_, &height_px_), get());
   }
 
   maq_densepose_result* get() const { return owner_.get(); }
@@ -260,21 +260,21 @@ class DensePoseResult {
   Span<maq_person> people() const {
     const maq_person* people = nullptr;
     uint32_t count = 0;
-    check(maq_densepose_result_people(get(), &people, &count), get());
+    check(maq_densepose_result_get_people(get(), &people, &count), get());
     return {people, count};
   }
 
   // height_px() rows of *stride_bytes.
   const uint8_t* plane(maq_densepose_plane plane, size_t* stride_bytes) const {
     const uint8_t* pixels = nullptr;
-    check(maq_densepose_result_plane(get(), plane, &pixels, stride_bytes), get());
+    check(maq_densepose_result_get_plane(get(), plane, &pixels, stride_bytes), get());
     return pixels;
   }
 
   maq_densepose_stats stats() const {
     maq_densepose_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_densepose_result_stats(get(), &stats), get());
+    check(maq_densepose_result_get_stats(get(), &stats), get());
     return stats;
   }
 
@@ -305,11 +305,11 @@ class DensePose {
     return DensePoseResult(result);
   }
 
-  void restart() { check(maq_densepose_restart(get()), get()); }
+  void restart() { check(maq_densepose_reset(get()), get()); }
 
   // Nothing when the bundle has none. The points are this object's.
-  std::optional<maq_surface> surface() const {
-    maq_surface surface{};
+  std::optional<maq_densepose_surface> surface() const {
+    maq_densepose_surface surface{};
     surface.struct_size = sizeof surface;
     const maq_status status = maq_densepose_get_surface(get(), &surface);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
@@ -395,8 +395,8 @@ class Pipeline {
   }
 
   // Nothing before a model is loaded, or when its bundle has none. The points are this object's.
-  std::optional<maq_surface> surface() const {
-    maq_surface surface{};
+  std::optional<maq_densepose_surface> surface() const {
+    maq_densepose_surface surface{};
     surface.struct_size = sizeof surface;
     const maq_status status = maq_pipeline_get_surface(get(), &surface);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
@@ -461,7 +461,7 @@ class Capture {
   }
 
  private:
-  Owner<maq_capture, maq_capture_destroy> owner_;
+  Owner<maq_capture, maq_capture_close> owner_;
 };
 
 class Scene {
@@ -497,7 +497,7 @@ class Scene {
   }
 
  private:
-  Owner<maq_scene, maq_scene_destroy> owner_;
+  Owner<maq_scene, maq_scene_close> owner_;
 };
 
 class SceneBuilder {
@@ -511,7 +511,7 @@ class SceneBuilder {
   maq_scene_builder* get() const { return owner_.get(); }
 
   // Returns how many points the photo saw.
-  uint64_t add_view(const Frame& photo, const maq_camera& camera) {
+  uint64_t add_view(const Frame& photo, const maq_pinhole_camera& camera) {
     uint64_t seen_points = 0;
     check(maq_scene_builder_add_view(get(), photo.get(), &camera, &seen_points), get());
     return seen_points;
@@ -546,7 +546,7 @@ class SceneImage {
   // Rows of *stride_bytes.
   const void* plane(maq_scene_plane plane, size_t* stride_bytes) const {
     const void* pixels = nullptr;
-    check(maq_scene_image_plane(get(), plane, &pixels, stride_bytes), get());
+    check(maq_scene_image_get_plane(get(), plane, &pixels, stride_bytes), get());
     return pixels;
   }
 
@@ -571,7 +571,7 @@ class SceneRenderer {
 
   maq_scene_renderer* get() const { return owner_.get(); }
 
-  SceneImage run(const maq_camera& camera) {
+  SceneImage run(const maq_pinhole_camera& camera) {
     maq_scene_image* image = nullptr;
     check(maq_scene_renderer_run(get(), &camera, &image), get());
     return SceneImage(image);

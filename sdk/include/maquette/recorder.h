@@ -39,7 +39,7 @@ MAQ_API maq_status maq_recorder_create(maq_context* context, const char* path, c
 /* Writes a frame: it is in the file, whole, when the call returns. Frames may have different sizes and formats.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the frame before), MAQ_ERROR_UNWRITABLE (the disk is
  * full: the frames before are whole, and one can be added again when there is room). Blocks while it is written. */
-MAQ_API maq_status maq_recorder_add(maq_recorder* recorder, const maq_frame* frame);
+MAQ_API maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame);
 
 /* Writes the index, which saves a player from looking for the frames, and closes the file.
  * One at a time. Errors: MAQ_ERROR_UNWRITABLE. Blocks until the disk has all. */

@@ -19,7 +19,7 @@ typedef enum maq_source_state {
   MAQ_SOURCE_STALLED = 2,      /* no frame for stall_ms; it may still go on by itself */
   MAQ_SOURCE_LOST = 3,         /* unplugged or broken */
   MAQ_SOURCE_RECONNECTING = 4, /* opened anew every 100 ms, for reconnect_ms */
-  MAQ_SOURCE_BACK = 5          /* frames come again */
+  MAQ_SOURCE_RECONNECTED = 5   /* frames come again */
 } maq_source_state;
 
 /* Called from a thread of the source; it must return soon and must not destroy the source. `reason` is valid during the
@@ -28,14 +28,14 @@ typedef void (*maq_source_state_callback)(void* user_data, maq_source_state stat
 
 typedef struct maq_source_config {
   uint32_t struct_size;
-  uint32_t pool_size; /* frames the app may hold at once, 1 to 64; default 4 */
+  uint32_t frame_pool_size; /* frames the app may hold at once, 1 to 64; default 4 */
   /* The rest is for cameras (is_live). */
   uint32_t
       queue_length; /* frames that wait for the app, 1 to 64; a new one pushes out the oldest; default 1: the newest */
   int32_t stall_ms; /* without a frame for so long the camera counts as stalled, 50 to 60000; default 2000 */
   int32_t reconnect_ms;                     /* how long a lost camera is waited for, 0 to 86400000; default 30000 */
   maq_source_state_callback state_callback; /* may be NULL */
-  void* user_data;                          /* of state_callback */
+  void* state_user_data;                    /* of state_callback */
   /* The rest is for what is no camera. */
   int32_t real_time;   /* 1: clips, recordings and stubs play at their own pace, as a camera would (is_live), unless the
                           URI has live=0; 0 (default): as fast as frames are taken, unless it has live=1 */
@@ -47,24 +47,24 @@ typedef struct maq_source_info {
   uint32_t struct_size;
   int32_t width_px;
   int32_t height_px;
-  double fps;          /* frames a second; 0 for a single image */
-  int64_t frame_count; /* frames in all; -1 when it is not known or has no end */
-  int32_t is_live;     /* 1 for a camera: frames that are not fetched in time are lost */
-  maq_clock clock;     /* of the timestamps of its frames */
-  uint32_t pool_size;  /* frames the app may hold at once */
-  uint64_t drops;      /* frames of a camera that were lost so far, on their way or because nobody took them */
+  double fps;                   /* frames a second; 0 for a single image */
+  int64_t frame_count;          /* frames in all; -1 when it is not known or has no end */
+  int32_t is_live;              /* 1 for a camera: frames that are not fetched in time are lost */
+  maq_clock clock;              /* of the timestamps of its frames */
+  uint32_t frame_pool_size;     /* frames the app may hold at once */
+  uint64_t dropped_frame_count; /* frames of a camera that were lost so far, on their way or because nobody took them */
 } maq_source_info;
 
 /* How a camera maps the world into its picture, in the convention of OpenCV: x to the right, y down, z forward; the
  * centre of the top left pixel is (0, 0). With x' = x / z and y' = y / z, distorted by the rational model
  * (k1, k2, p1, p2, k3, k4, k5, k6), a point appears at (fx x' + cx, fy y' + cy). */
-typedef struct maq_calibration {
+typedef struct maq_intrinsics {
   uint32_t struct_size;
   int32_t width_px; /* of the picture that the figures are for */
   int32_t height_px;
   double fx_px, fy_px, cx_px, cy_px;
   double distortion[8]; /* 0: none */
-} maq_calibration;
+} maq_intrinsics;
 
 /* What can be set of a camera, where the device has it. */
 typedef enum maq_control {
@@ -80,9 +80,9 @@ typedef enum maq_control {
 
 typedef struct maq_control_info {
   uint32_t struct_size;
-  double least, most, step; /* values in between are rounded to the nearest step */
-  double preset;            /* what the device starts with */
-  double value;             /* now */
+  double min, max, step; /* values in between are rounded to the nearest step */
+  double default_value;  /* what the device starts with */
+  double value;          /* now */
 } maq_control_info;
 
 /* One kind of source that this build knows; all texts are static. */
@@ -133,7 +133,7 @@ MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_
 
 /* How the camera maps the world into its picture. The caller sets calibration->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the source does not know). Does not block. */
-MAQ_API maq_status maq_source_get_calibration(const maq_source* source, maq_calibration* calibration);
+MAQ_API maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* calibration);
 
 /* What a control of the camera is now and what it can be. The caller sets info->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the device does not have it), MAQ_ERROR_BUSY
@@ -153,7 +153,7 @@ MAQ_API maq_status maq_source_seek(maq_source* source, int64_t time_ns);
 
 /* The kinds of sources of this build: their number, and the one at `index`. The caller sets scheme->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Do not block. */
-MAQ_API uint32_t maq_source_scheme_count(void);
+MAQ_API uint32_t maq_source_get_scheme_count(void);
 MAQ_API maq_status maq_source_get_scheme(uint32_t index, maq_source_scheme* scheme);
 
 /* The cameras that are there when the list is made. */
@@ -173,9 +173,9 @@ typedef struct maq_camera_info {
 /* A format, size and rate that a camera offers. */
 typedef struct maq_camera_mode {
   uint32_t struct_size;
-  char format[8];   /* four letters, as the device calls it: "YUYV", "MJPG" */
-  int32_t usable;   /* 1 if this build understands the format */
-  int32_t width_px; /* with height_px the largest, where a device offers every size up to it */
+  char format[8];    /* four letters, as the device calls it: "YUYV", "MJPG" */
+  int32_t is_usable; /* 1 if this build understands the format */
+  int32_t width_px;  /* with height_px the largest, where a device offers every size up to it */
   int32_t height_px;
   double fps; /* the fastest; 0 when the device does not say */
 } maq_camera_mode;
@@ -185,10 +185,10 @@ typedef struct maq_camera_mode {
 MAQ_API maq_status maq_camera_list_create(maq_context* context, maq_camera_list** list);
 /* NULL is fine. */
 MAQ_API void maq_camera_list_destroy(maq_camera_list* list);
-MAQ_API uint32_t maq_camera_list_count(const maq_camera_list* list);
+MAQ_API uint32_t maq_camera_list_get_count(const maq_camera_list* list);
 /* The caller sets struct_size of `info` and `mode`.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (also an index out of range). Do not block. */
-MAQ_API maq_status maq_camera_list_get(const maq_camera_list* list, uint32_t index, maq_camera_info* info);
+MAQ_API maq_status maq_camera_list_get_camera(const maq_camera_list* list, uint32_t index, maq_camera_info* info);
 MAQ_API maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index, uint32_t mode_index,
                                             maq_camera_mode* mode);
 

@@ -16,7 +16,7 @@
 #endif
 
 #define MAQ_VERSION_MAJOR 0
-#define MAQ_VERSION_MINOR 1
+#define MAQ_VERSION_MINOR 2
 #define MAQ_VERSION_PATCH 0
 
 /* The version of these headers as one number, major * 10000 + minor * 100 + patch. An app passes it to
@@ -53,19 +53,19 @@ typedef enum maq_status {
 
 /* The status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.
  * The text is static. Any thread. Does not fail or block. */
-MAQ_API const char* maq_status_name(maq_status status);
+MAQ_API const char* maq_status_get_name(maq_status status);
 
 /* The text of the latest failed call on `handle` (any handle of this API), as one sentence; "" when none failed.
  * With NULL: of this thread's latest failed call that had no handle yet (a `_create`, or a NULL handle).
- * The text is the library's; it stays until this thread calls maq_last_error again. Calls that succeed do not clear it.
+ * The text is the library's; it stays until this thread calls maq_get_last_error again. Calls that succeed do not clear it.
  * Any thread, as long as `handle` is alive. Does not fail or block. */
-MAQ_API const char* maq_last_error(const void* handle);
+MAQ_API const char* maq_get_last_error(const void* handle);
 
-/* Version of the library found at run time ("0.1.0"), the git commit it was built from, and the options it was built
+/* Version of the library found at run time ("0.2.0"), the git commit it was built from, and the options it was built
  * with ("release, g++ 12.2, opencv 4.6.0"). Static text. Any thread. Do not fail or block. */
-MAQ_API const char* maq_sdk_version(void);
-MAQ_API const char* maq_git_commit(void);
-MAQ_API const char* maq_build_options(void);
+MAQ_API const char* maq_get_sdk_version(void);
+MAQ_API const char* maq_get_git_commit(void);
+MAQ_API const char* maq_get_build_options(void);
 
 #ifdef __cplusplus
 }

@@ -20,7 +20,7 @@ maq_status maq_capture_open(maq_context* context, const char* folder, maq_captur
   });
 }
 
-void maq_capture_destroy(maq_capture* capture) { delete capture; }
+void maq_capture_close(maq_capture* capture) { delete capture; }
 
 maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_info* info) {
   return guarded(capture, __func__, [&] {
@@ -28,7 +28,7 @@ maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_info* in
     maq_capture_info filled{};
     filled.view_count = uint32_t(capture->capture.views.size());
     filled.point_count = capture->capture.cloud.count();
-    filled.dropped_count = uint32_t(capture->dropped.size());
+    filled.drop_count = uint32_t(capture->dropped.size());
     std::copy_n(capture->capture.up.begin(), 3, filled.up);
     write_struct(info, "info", filled, sizeof(maq_capture_info));
     return MAQ_OK;
@@ -41,9 +41,10 @@ maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_
     require_argument(view, "view");
     require_range("index", index, 0u, uint32_t(capture->capture.views.size() - 1));
     const CaptureView& from = capture->capture.views[index];
-    require_struct_size("view->camera", view->camera.struct_size, sizeof(maq_camera), sizeof(maq_camera));
+    require_struct_size("view->camera", view->camera.struct_size, sizeof(maq_pinhole_camera),
+                        sizeof(maq_pinhole_camera));
     maq_capture_view filled{};
-    filled.held_out = from.is_held_out ? 1 : 0;
+    filled.is_held_out = from.is_held_out ? 1 : 0;
     filled.name = from.name.c_str();
     filled.camera = camera_of(from.camera);
     write_struct(view, "view", filled, sizeof(maq_capture_view));

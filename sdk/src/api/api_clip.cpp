@@ -19,7 +19,7 @@ maq_status maq_clip_create(maq_context* context, const char* path, double fps, m
   });
 }
 
-maq_status maq_clip_add(maq_clip* clip, const maq_frame* frame) {
+maq_status maq_clip_add_frame(maq_clip* clip, const maq_frame* frame) {
   return guarded(clip, __func__, [&] {
     require_argument(clip, "clip");
     require_argument(frame, "frame");

@@ -5,7 +5,7 @@ using namespace maq;
 
 namespace {
 
-// The errors of calls without a handle, and the copy that maq_last_error hands out. Of the thread, so that no call
+// The errors of calls without a handle, and the copy that maq_get_last_error hands out. Of the thread, so that no call
 // waits for another and no text is freed under its reader.
 thread_local std::string handleless_error;
 thread_local std::string handed_out_error;
@@ -46,7 +46,7 @@ maq_status keep_error(const Handle* handle, maq_status status, const char* funct
 
 }  // namespace maq
 
-const char* maq_status_name(maq_status status) {
+const char* maq_status_get_name(maq_status status) {
   switch (status) {
     case MAQ_OK: return "MAQ_OK";
     case MAQ_ERROR_INVALID_ARGUMENT: return "MAQ_ERROR_INVALID_ARGUMENT";
@@ -72,7 +72,7 @@ const char* maq_status_name(maq_status status) {
   return "unknown status";
 }
 
-const char* maq_last_error(const void* handle) {
+const char* maq_get_last_error(const void* handle) {
   try {
     handed_out_error = handle == nullptr ? handleless_error : static_cast<const Handle*>(handle)->error();
     return handed_out_error.c_str();
@@ -81,9 +81,9 @@ const char* maq_last_error(const void* handle) {
   }
 }
 
-const char* maq_sdk_version(void) { return sdk_version(); }
-const char* maq_git_commit(void) { return git_commit(); }
-const char* maq_build_options(void) { return build_options(); }
+const char* maq_get_sdk_version(void) { return sdk_version(); }
+const char* maq_get_git_commit(void) { return git_commit(); }
+const char* maq_get_build_options(void) { return build_options(); }
 
 maq_status maq_context_config_init(maq_context_config* config, uint32_t struct_size) {
   return init_config(__func__, config, struct_size, default_config(), sizeof(maq_context_config));
@@ -105,7 +105,7 @@ maq_status maq_context_create(uint32_t header_version, const maq_context_config*
 
 void maq_context_destroy(maq_context* context) { delete context; }
 
-maq_status maq_context_onnxruntime(maq_context* context, const char** version, const char** library_path) {
+maq_status maq_context_get_onnxruntime(maq_context* context, const char** version, const char** library_path) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     const auto runtime = context->state->onnxruntime();

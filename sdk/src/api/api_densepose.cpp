@@ -16,8 +16,8 @@ maq_densepose_config default_config() {
   config.score_threshold = -1;
   config.result_pool_size = 4;
   config.key_frame_interval = 1;
-  config.detail = MAQ_DETAIL_SURFACE;
-  config.spin = 1;
+  config.detail = MAQ_DENSEPOSE_DETAIL_SURFACE;
+  config.allow_spinning = 1;
   return config;
 }
 
@@ -38,9 +38,9 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config) {
   require_range("config.result_pool_size", config.result_pool_size, 1u, 64u);
   if (config.max_proposals != 0) require_range("config.max_proposals", config.max_proposals, 1, 1000);
   require_range("config.key_frame_interval", config.key_frame_interval, 1, 1000);
-  require_range("config.least_person_px", config.least_person_px, 0, 100000);
-  require_range("config.detail", config.detail, int32_t(MAQ_DETAIL_SURFACE), int32_t(MAQ_DETAIL_PART));
-  require_range("config.spin", config.spin, 0, 1);
+  require_range("config.min_person_height_px", config.min_person_height_px, 0, 100000);
+  require_range("config.detail", int(config.detail), int(MAQ_DENSEPOSE_DETAIL_SURFACE), int(MAQ_DENSEPOSE_DETAIL_PART));
+  require_range("config.allow_spinning", config.allow_spinning, 0, 1);
   DensePoseSettings settings;
   settings.threads = config.threads > 0 ? config.threads : default_threads();
   settings.long_side_px = config.long_side_px;
@@ -48,9 +48,9 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config) {
   settings.max_people = config.max_people;
   settings.max_proposals = config.max_proposals;
   settings.key_frame_interval = config.key_frame_interval;
-  settings.least_person_px = config.least_person_px;
-  settings.surface = config.detail == MAQ_DETAIL_SURFACE;
-  settings.spin = config.spin == 1;
+  settings.least_person_px = config.min_person_height_px;
+  settings.surface = config.detail == MAQ_DENSEPOSE_DETAIL_SURFACE;
+  settings.spin = config.allow_spinning == 1;
   return settings;
 }
 
@@ -63,7 +63,7 @@ void list_people(maq_densepose_result& result) {
 
 }  // namespace maq
 
-const char* maq_part_name(int32_t part, uint8_t* rgb) {
+const char* maq_densepose_get_part_name(int32_t part, uint8_t* rgb) {
   const bool known = part >= 0 && size_t(part) < kBodyParts.size();
   const BodyPart& found = known ? kBodyParts[size_t(part)] : BodyPart{"unknown part", {0, 0, 0}};
   if (rgb != nullptr) std::copy(found.rgb.begin(), found.rgb.end(), rgb);
@@ -105,7 +105,7 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
   });
 }
 
-maq_status maq_densepose_restart(maq_densepose* densepose) {
+maq_status maq_densepose_reset(maq_densepose* densepose) {
   return guarded(densepose, __func__, [&] {
     require_argument(densepose, "densepose");
     densepose->densepose->restart();
@@ -115,7 +115,7 @@ maq_status maq_densepose_restart(maq_densepose* densepose) {
 
 void maq_densepose_result_release(maq_densepose_result* result) { return_to_pool(result); }
 
-maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px) {
+maq_status maq_densepose_result_get_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
     if (width_px != nullptr) *width_px = result->result.planes.width_px;
@@ -124,7 +124,8 @@ maq_status maq_densepose_result_size(const maq_densepose_result* result, int32_t
   });
 }
 
-maq_status maq_densepose_result_people(const maq_densepose_result* result, const maq_person** people, uint32_t* count) {
+maq_status maq_densepose_result_get_people(const maq_densepose_result* result, const maq_person** people,
+                                           uint32_t* count) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
     require_argument(people, "people");
@@ -135,22 +136,22 @@ maq_status maq_densepose_result_people(const maq_densepose_result* result, const
   });
 }
 
-maq_status maq_densepose_result_plane(const maq_densepose_result* result, maq_densepose_plane plane,
-                                      const uint8_t** pixels, size_t* stride_bytes) {
+maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
+                                          const uint8_t** pixels, size_t* stride_bytes) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
     require_argument(pixels, "pixels");
     require_argument(stride_bytes, "stride_bytes");
-    require_range("plane", int(plane), int(MAQ_PLANE_PART), int(MAQ_PLANE_PERSON));
+    require_range("plane", int(plane), int(MAQ_DENSEPOSE_PLANE_PART), int(MAQ_DENSEPOSE_PLANE_PERSON));
     const DensePlanes& planes = result->result.planes;
     const std::vector<uint8_t>* all[] = {&planes.part, &planes.u, &planes.v, &planes.person};
-    *pixels = all[plane - MAQ_PLANE_PART]->data();
+    *pixels = all[plane - MAQ_DENSEPOSE_PLANE_PART]->data();
     *stride_bytes = size_t(planes.width_px);
     return MAQ_OK;
   });
 }
 
-maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_densepose_stats* stats) {
+maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, maq_densepose_stats* stats) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
     const DensePoseStats& from = result->result.stats;
@@ -164,12 +165,12 @@ maq_status maq_densepose_result_stats(const maq_densepose_result* result, maq_de
     filled.total_ms = from.total_ms;
     filled.network_width_px = from.network_width_px;
     filled.network_height_px = from.network_height_px;
-    filled.proposals = from.proposals;
-    filled.people = int32_t(result->people.size());
-    filled.dropped_boxes = from.dropped_boxes;
-    filled.body_pixels = from.decoded.body_pixels;
-    filled.clamped_uv = from.decoded.clamped_uv;
-    filled.key_frame = from.key_frame ? 1 : 0;
+    filled.proposal_count = from.proposals;
+    filled.person_count = int32_t(result->people.size());
+    filled.dropped_box_count = from.dropped_boxes;
+    filled.body_pixel_count = from.decoded.body_pixels;
+    filled.clamped_pixel_count = from.decoded.clamped_uv;
+    filled.is_key_frame = from.key_frame ? 1 : 0;
     write_struct(stats, "stats", filled, sizeof(maq_densepose_stats));
     return MAQ_OK;
   });
@@ -188,12 +189,13 @@ maq_status maq_densepose_result_save(const maq_densepose_result* result, const c
   });
 }
 
-maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_surface* surface) {
+maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_densepose_surface* surface) {
   return guarded(densepose, __func__, [&] {
     require_argument(densepose, "densepose");
     require_argument(surface, "surface");
     const SurfaceGrid& grid = densepose->densepose->surface();
-    write_struct(surface, "surface", maq_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_surface));
+    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()},
+                 sizeof(maq_densepose_surface));
     return MAQ_OK;
   });
 }

@@ -30,8 +30,8 @@ maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size) {
   return init_config(__func__, desc, struct_size, defaults, sizeof(maq_frame_desc));
 }
 
-maq_status maq_frame_create(maq_context* context, const maq_frame_desc* given, maq_frame_free_callback free_callback,
-                            void* user_data, maq_frame** frame) {
+maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
+                          maq_frame_release_callback release_callback, void* user_data, maq_frame** frame) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(given, "desc");
@@ -43,7 +43,7 @@ maq_status maq_frame_create(maq_context* context, const maq_frame_desc* given, m
     handle->frame.timestamp_ns = desc.timestamp_ns;
     handle->frame.clock = desc.clock;
     handle->frame.sequence = desc.sequence;
-    handle->free_callback = free_callback;
+    handle->release_callback = release_callback;
     handle->user_data = user_data;
     *frame = handle.release();
     return MAQ_OK;

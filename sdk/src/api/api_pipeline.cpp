@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
 
-// Of the thread that asked, as with maq_last_error.
+// Of the thread that asked, as with maq_get_last_error.
 thread_local std::string given_problem, given_uri;
 
 maq_pipeline_config default_config() {
@@ -220,12 +220,13 @@ maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipeline_sta
   });
 }
 
-maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_surface* surface) {
+maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surface* surface) {
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");
     require_argument(surface, "surface");
     const SurfaceGrid& grid = pipeline->pipeline.surface();
-    write_struct(surface, "surface", maq_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_surface));
+    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()},
+                 sizeof(maq_densepose_surface));
     return MAQ_OK;
   });
 }

@@ -31,7 +31,7 @@ maq_status maq_recorder_create(maq_context* context, const char* path, const maq
   });
 }
 
-maq_status maq_recorder_add(maq_recorder* recorder, const maq_frame* frame) {
+maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame) {
   return guarded(recorder, __func__, [&] {
     require_argument(recorder, "recorder");
     require_argument(frame, "frame");

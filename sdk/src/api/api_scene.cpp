@@ -46,15 +46,17 @@ maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
       case Coefficients::kFloat32: filled.coefficient_bits = 32; break;
     }
     filled.point_count = from.points;
-    filled.varying_count = from.varying;
+    filled.view_dependent_count = from.varying;
     filled.block_count = from.block_count;
     for (size_t axis = 0; axis < 3; ++axis) {
       filled.up[axis] = from.up[axis];
-      filled.low[axis] = std::numeric_limits<double>::infinity();
-      filled.high[axis] = -filled.low[axis];
+      filled.bounds_min[axis] = std::numeric_limits<double>::infinity();
+      filled.bounds_max[axis] = -filled.bounds_min[axis];
       for (uint32_t block = 0; block < from.block_count; ++block) {
-        filled.low[axis] = std::min(filled.low[axis], from.origin[axis] + double(from.blocks[block].low[axis]));
-        filled.high[axis] = std::max(filled.high[axis], from.origin[axis] + double(from.blocks[block].high[axis]));
+        filled.bounds_min[axis] =
+            std::min(filled.bounds_min[axis], from.origin[axis] + double(from.blocks[block].low[axis]));
+        filled.bounds_max[axis] =
+            std::max(filled.bounds_max[axis], from.origin[axis] + double(from.blocks[block].high[axis]));
       }
     }
     std::copy(from.networks_sha256.begin(), from.networks_sha256.end(), filled.networks_sha256);
@@ -63,4 +65,4 @@ maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
   });
 }
 
-void maq_scene_destroy(maq_scene* scene) { delete scene; }
+void maq_scene_close(maq_scene* scene) { delete scene; }

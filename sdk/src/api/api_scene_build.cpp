@@ -31,7 +31,7 @@ maq_scene_build_config default_config() {
   config.struct_size = sizeof config;
   config.long_side_px = 640;
   config.coefficient_bits = 8;
-  config.least_variation = -1;
+  config.min_variation = -1;
   config.visibility_scale = 1;
   return config;
 }
@@ -52,11 +52,11 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
       break;
     default: throw ArgumentError("config.coefficient_bits is ", config.coefficient_bits, ", but must be 8, 16 or 32.");
   }
-  if (std::isnan(config.least_variation)) throw ArgumentError("config.least_variation is not a number.");
+  if (std::isnan(config.min_variation)) throw ArgumentError("config.min_variation is not a number.");
   // Colours are 0 to 1, and what is over this would not fit into a float.
   constexpr double kMostVariation = 1e30;
-  if (config.least_variation >= 0) {
-    settings.packing.least_variation = float(std::min(config.least_variation, kMostVariation));
+  if (config.min_variation >= 0) {
+    settings.packing.least_variation = float(std::min(config.min_variation, kMostVariation));
   } else if (config.coefficient_bits == 8) {
     // At most 40 bytes a point, also where every look varies: the other half varies less.
     constexpr float kMostVarying = 0.5f;
@@ -65,12 +65,12 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
   settings.points.visibility_scale = config.visibility_scale;
   settings.points.near = config.near_depth;
   settings.points.threads = settings.threads;
-  if (config.most_bytes != 0) settings.points.most_bytes = config.most_bytes;
-  settings.most_points = config.most_points;
-  require_range("config.uses_held_out", config.uses_held_out, 0, 1);
-  if (config.progress != nullptr) {
-    settings.progress = [callback = config.progress, user_data = config.progress_user_data](double done,
-                                                                                            const std::string& what) {
+  if (config.max_memory_bytes != 0) settings.points.most_bytes = config.max_memory_bytes;
+  settings.most_points = config.max_points;
+  require_range("config.use_held_out", config.use_held_out, 0, 1);
+  if (config.progress_callback != nullptr) {
+    settings.progress = [callback = config.progress_callback, user_data = config.progress_user_data](
+                            double done, const std::string& what) {
       return callback(user_data, done, what.c_str()) != 0;
     };
   }
@@ -79,10 +79,10 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
 
 void fill(maq_scene_build_stats& stats, const BuildTimes& times) {
   stats.visibility_ms = times.visibility_ms;
-  stats.turning_ms = times.turning_ms;
-  stats.extractor_ms = times.extractor_ms;
-  stats.moments_ms = times.moments_ms;
-  stats.solving_ms = times.solving_ms;
+  stats.align_ms = times.turning_ms;
+  stats.extract_ms = times.extractor_ms;
+  stats.accumulate_ms = times.moments_ms;
+  stats.solve_ms = times.solving_ms;
 }
 
 // As it is where it has no length; the builder refuses that.
@@ -138,22 +138,22 @@ maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* g
     CaptureBuildOptions options;
     options.points = settings.points;
     options.long_side_px = settings.long_side_px;
-    options.most_views = config.most_views;
-    options.uses_held_out = config.uses_held_out == 1;
+    options.most_views = config.max_views;
+    options.uses_held_out = config.use_held_out == 1;
     Capture copy = capture->capture;
     thin_out(copy.cloud, settings.most_points);
-    filled.cloud_points = copy.cloud.count();
+    filled.cloud_point_count = copy.cloud.count();
     const std::optional<BuiltCapture> built =
         build_from_capture(std::move(copy), *networks, options, settings.progress);
     if (!built) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback ended the building.");
     networks->forget_extractor();
     const Stopwatch watch;
     auto made = std::make_unique<maq_scene>(packed(built->points, settings.packing, *networks));
-    filled.packing_ms = watch.elapsed_ms();
+    filled.pack_ms = watch.elapsed_ms();
     if (stats != nullptr) {
       filled.view_count = uint32_t(built->views);
-      for (const Dropped& dropped : built->dropped) filled.unused_views += uint32_t(dropped.count);
-      filled.seen_points = built->points.count();
+      for (const Dropped& dropped : built->dropped) filled.unused_view_count += uint32_t(dropped.count);
+      filled.seen_point_count = built->points.count();
       filled.load_ms = built->loading_ms;
       fill(filled, built->times);
       write_struct(stats, "stats", filled, sizeof filled);
@@ -171,10 +171,10 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     require_argument(cloud, "cloud");
     require_argument(builder, "builder");
     require_struct_size("cloud", cloud->struct_size, sizeof(maq_point_cloud), sizeof(maq_point_cloud));
-    if (cloud->count > 0) require_argument(cloud->xyz, "cloud.xyz");
-    if (cloud->count > kMostPoints) {
-      throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", cloud->count, " points, over the limit of ", kMostPoints,
-                  "; make it thinner.");
+    if (cloud->point_count > 0) require_argument(cloud->xyz, "cloud.xyz");
+    if (cloud->point_count > kMostPoints) {
+      throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", cloud->point_count, " points, over the limit of ",
+                  kMostPoints, "; make it thinner.");
     }
     const maq_scene_build_config config =
         read_config(given, "config", default_config(), sizeof(maq_scene_build_config));
@@ -182,8 +182,8 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     auto networks = open_scene_networks(context, settings.bundle_path.c_str(), settings.threads, true);
     PointCloud points;
     std::copy_n(cloud->origin, 3, points.origin.begin());
-    points.reserve(cloud->count, false);
-    for (uint64_t i = 0; i < cloud->count; ++i) {
+    points.reserve(cloud->point_count, false);
+    for (uint64_t i = 0; i < cloud->point_count; ++i) {
       points.x.push_back(cloud->xyz[3 * i]);
       points.y.push_back(cloud->xyz[3 * i + 1]);
       points.z.push_back(cloud->xyz[3 * i + 2]);
@@ -197,13 +197,13 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
 
 void maq_scene_builder_destroy(maq_scene_builder* builder) { delete builder; }
 
-maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo, const maq_camera* camera,
-                                      uint64_t* seen_points) {
+maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
+                                      const maq_pinhole_camera* camera, uint64_t* seen_points) {
   return guarded(builder, __func__, [&] {
     require_argument(builder, "builder");
     require_argument(photo, "photo");
     require_argument(camera, "camera");
-    require_struct_size("camera", camera->struct_size, sizeof(maq_camera), sizeof(maq_camera));
+    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
     check_camera(pinhole_of(*camera), "The photo's camera");
     check_distortion(*camera);
     const Stopwatch watch;
@@ -232,12 +232,12 @@ maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_sce
     require_argument(builder, "builder");
     maq_scene_build_stats filled{};
     filled.view_count = uint32_t(builder->builder.views());
-    filled.unused_views = builder->unused_views;
-    filled.cloud_points = builder->cloud_points;
-    filled.seen_points = builder->builder.seen_points();
+    filled.unused_view_count = builder->unused_views;
+    filled.cloud_point_count = builder->cloud_points;
+    filled.seen_point_count = builder->builder.seen_points();
     fill(filled, builder->builder.times());
     filled.load_ms = builder->load_ms;
-    filled.packing_ms = builder->packing_ms;
+    filled.pack_ms = builder->packing_ms;
     write_struct(stats, "stats", filled, sizeof filled);
     return MAQ_OK;
   });

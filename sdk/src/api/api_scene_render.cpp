@@ -14,7 +14,7 @@ maq_scene_renderer_config default_config() {
   maq_scene_renderer_config config{};
   config.struct_size = sizeof config;
   config.image_pool_size = 4;
-  config.spin = 1;
+  config.allow_spinning = 1;
   return config;
 }
 
@@ -43,21 +43,21 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
         read_config(given, "config", default_config(), sizeof(maq_scene_renderer_config));
     require_argument(config.bundle_path, "config.bundle_path");
     require_range("config.image_pool_size", config.image_pool_size, 1u, 64u);
-    require_range("config.spin", config.spin, 0, 1);
+    require_range("config.allow_spinning", config.allow_spinning, 0, 1);
     require_range("config.near_depth", config.near_depth, 0.0, std::numeric_limits<double>::max());
-    require_range("config.has_background", int(config.has_background), 0, 1);
-    require_range("config.draws_unseen_blocks", int(config.draws_unseen_blocks), 0, 1);
-    require_range("config.refines_empty_parts", int(config.refines_empty_parts), 0, 1);
+    require_range("config.use_background", int(config.use_background), 0, 1);
+    require_range("config.draw_unseen_blocks", int(config.draw_unseen_blocks), 0, 1);
+    require_range("config.refine_empty_parts", int(config.refine_empty_parts), 0, 1);
     RenderOptions options;
     options.threads = scene_threads(config.threads);
     options.near = config.near_depth;
-    require_range("config.has_background", int(config.has_background), 0, 1);
-    if (config.has_background == 1) {
+    require_range("config.use_background", int(config.use_background), 0, 1);
+    if (config.use_background == 1) {
       options.background = {config.background[2], config.background[1], config.background[0]};
     }
-    options.skips_unseen_blocks = config.draws_unseen_blocks == 0;
-    options.skips_empty_parts = config.refines_empty_parts == 0;
-    auto networks = open_scene_networks(context, config.bundle_path, options.threads, config.spin == 1);
+    options.skips_unseen_blocks = config.draw_unseen_blocks == 0;
+    options.skips_empty_parts = config.refine_empty_parts == 0;
+    auto networks = open_scene_networks(context, config.bundle_path, options.threads, config.allow_spinning == 1);
     if (scene->scene.networks_sha256 != networks->sha256()) {
       throw Error(MAQ_ERROR_BAD_BUNDLE, "The scene was made with other networks than those in ", config.bundle_path,
                   "; give the bundle that it was built with, or build it anew.");
@@ -69,12 +69,13 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
 
 void maq_scene_renderer_destroy(maq_scene_renderer* renderer) { delete renderer; }
 
-maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_camera* camera, maq_scene_image** image) {
+maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhole_camera* camera,
+                                  maq_scene_image** image) {
   return guarded(renderer, __func__, [&] {
     require_argument(renderer, "renderer");
     require_argument(camera, "camera");
     require_argument(image, "image");
-    require_struct_size("camera", camera->struct_size, sizeof(maq_camera), sizeof(maq_camera));
+    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
     if (is_distorted(*camera)) {
       throw ArgumentError("camera.distortion is not 0; pictures are rendered without distortion.");
     }
@@ -87,8 +88,8 @@ maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_camera
 
 void maq_scene_image_release(maq_scene_image* image) { return_to_pool(image); }
 
-maq_status maq_scene_image_plane(const maq_scene_image* image, maq_scene_plane plane, const void** pixels,
-                                 size_t* stride_bytes) {
+maq_status maq_scene_image_get_plane(const maq_scene_image* image, maq_scene_plane plane, const void** pixels,
+                                     size_t* stride_bytes) {
   return guarded(image, __func__, [&] {
     require_argument(image, "image");
     require_argument(pixels, "pixels");
@@ -97,19 +98,19 @@ maq_status maq_scene_image_plane(const maq_scene_image* image, maq_scene_plane p
     int32_t wanted;
     static_assert(sizeof wanted == sizeof plane);
     std::memcpy(&wanted, &plane, sizeof wanted);
-    require_range("plane", wanted, int32_t(MAQ_SCENE_BGR), int32_t(MAQ_SCENE_DEPTH));
+    require_range("plane", wanted, int32_t(MAQ_SCENE_PLANE_BGR), int32_t(MAQ_SCENE_PLANE_DEPTH));
     const RenderedPicture& picture = image->picture;
     const size_t width = size_t(picture.width_px);
     switch (wanted) {
-      case MAQ_SCENE_BGR:
+      case MAQ_SCENE_PLANE_BGR:
         *pixels = picture.bgr.data();
         *stride_bytes = 3 * width;
         break;
-      case MAQ_SCENE_ALPHA:
+      case MAQ_SCENE_PLANE_ALPHA:
         *pixels = picture.alpha.data();
         *stride_bytes = width;
         break;
-      case MAQ_SCENE_DEPTH:
+      case MAQ_SCENE_PLANE_DEPTH:
         *pixels = picture.depth.data();
         *stride_bytes = sizeof(float) * width;
         break;
@@ -126,12 +127,12 @@ maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_ima
     filled.project_ms = float(from.project_ms);
     filled.shade_ms = float(from.shade_ms + from.reduce_ms);
     filled.refine_ms = float(from.refine_ms);
-    filled.turn_ms = float(from.cover_ms + from.turn_ms);
+    filled.resample_ms = float(from.cover_ms + from.turn_ms);
     filled.total_ms = float(from.all_ms);
-    filled.blocks_drawn = from.projected_blocks;
-    filled.points_drawn = from.projected_points;
-    filled.points_shaded = from.shaded_points;
-    filled.refined_pixels = int64_t(from.refined_pixels);
+    filled.drawn_block_count = from.projected_blocks;
+    filled.drawn_point_count = from.projected_points;
+    filled.shaded_point_count = from.shaded_points;
+    filled.refined_pixel_count = int64_t(from.refined_pixels);
     write_struct(stats, "stats", filled, sizeof filled);
     return MAQ_OK;
   });

@@ -9,16 +9,16 @@ using namespace maq;
 namespace {
 
 constexpr uint32_t kLargestPoolSize = 64;
-// Of the structs of version 0.1, which had no cameras.
+// Of the structs without what is for cameras.
 constexpr size_t kFirstConfigSize = offsetof(maq_source_config, queue_length);
-constexpr size_t kFirstInfoSize = offsetof(maq_source_info, drops);
+constexpr size_t kFirstInfoSize = offsetof(maq_source_info, dropped_frame_count);
 constexpr size_t kFirstSchemeSize = offsetof(maq_source_scheme, is_camera);
 
 maq_source_config default_config() {
   maq_source_config config{};
   config.struct_size = sizeof config;
   const SourceSettings defaults;
-  config.pool_size = uint32_t(defaults.pool_size);
+  config.frame_pool_size = uint32_t(defaults.pool_size);
   config.queue_length = uint32_t(defaults.queue_length);
   config.stall_ms = defaults.stall_ms;
   config.reconnect_ms = defaults.reconnect_ms;
@@ -38,7 +38,7 @@ maq_source_config read_source_config(const maq_source_config* given, const char*
 }
 
 SourceSettings source_settings(const maq_source_config& config, const Log& log) {
-  require_range("config.pool_size", config.pool_size, 1u, kLargestPoolSize);
+  require_range("config.frame_pool_size", config.frame_pool_size, 1u, kLargestPoolSize);
   require_range("config.queue_length", config.queue_length, 1u, kLargestPoolSize);
   require_range("config.stall_ms", config.stall_ms, 50, 60000);
   require_range("config.reconnect_ms", config.reconnect_ms, 0, 86400000);
@@ -46,7 +46,7 @@ SourceSettings source_settings(const maq_source_config& config, const Log& log) 
   require_range("config.loop", config.loop, 0, 1);
   if (config.max_side_px != 0) require_range("config.max_side_px", config.max_side_px, 1, MAQ_MAX_SIDE_PX);
   SourceSettings settings;
-  settings.pool_size = int(config.pool_size);
+  settings.pool_size = int(config.frame_pool_size);
   settings.queue_length = int(config.queue_length);
   settings.stall_ms = config.stall_ms;
   settings.reconnect_ms = config.reconnect_ms;
@@ -54,7 +54,7 @@ SourceSettings source_settings(const maq_source_config& config, const Log& log) 
   settings.loop = config.loop == 1;
   settings.max_side_px = config.max_side_px;
   settings.on_state = config.state_callback;
-  settings.user_data = config.user_data;
+  settings.user_data = config.state_user_data;
   settings.log = log;
   return settings;
 }
@@ -73,7 +73,7 @@ maq_status maq_source_create(maq_context* context, const char* uri, const maq_so
     require_argument(source, "source");
     const maq_source_config config = read_source_config(given, "config");
     const SourceSettings settings = source_settings(config, context->state->log());
-    *source = new maq_source(uri, open_source(uri, settings), config.pool_size);
+    *source = new maq_source(uri, open_source(uri, settings), config.frame_pool_size);
     return MAQ_OK;
   });
 }
@@ -91,8 +91,8 @@ maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) 
     filled.frame_count = from.frame_count;
     filled.is_live = from.is_live ? 1 : 0;
     filled.clock = from.clock;
-    filled.pool_size = uint32_t(source->frames.capacity());
-    filled.drops = source->source->drops();
+    filled.frame_pool_size = uint32_t(source->frames.capacity());
+    filled.dropped_frame_count = source->source->drops();
     write_struct(info, "info", filled, kFirstInfoSize);
     return MAQ_OK;
   });
@@ -115,12 +115,12 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
   });
 }
 
-maq_status maq_source_get_calibration(const maq_source* source, maq_calibration* calibration) {
+maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* calibration) {
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
-    const maq_calibration* found = source->source->calibration();
+    const maq_intrinsics* found = source->source->calibration();
     if (found == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The source does not know its calibration.");
-    write_struct(calibration, "calibration", *found, sizeof(maq_calibration));
+    write_struct(calibration, "calibration", *found, sizeof(maq_intrinsics));
     return MAQ_OK;
   });
 }
@@ -154,7 +154,7 @@ maq_status maq_source_seek(maq_source* source, int64_t time_ns) {
   });
 }
 
-uint32_t maq_source_scheme_count(void) {
+uint32_t maq_source_get_scheme_count(void) {
   try {
     return uint32_t(source_schemes().size());
   } catch (...) {
@@ -186,11 +186,11 @@ maq_status maq_camera_list_create(maq_context* context, maq_camera_list** list) 
 
 void maq_camera_list_destroy(maq_camera_list* list) { delete list; }
 
-uint32_t maq_camera_list_count(const maq_camera_list* list) {
+uint32_t maq_camera_list_get_count(const maq_camera_list* list) {
   return list == nullptr ? 0 : uint32_t(list->cameras.size());
 }
 
-maq_status maq_camera_list_get(const maq_camera_list* list, uint32_t index, maq_camera_info* info) {
+maq_status maq_camera_list_get_camera(const maq_camera_list* list, uint32_t index, maq_camera_info* info) {
   return guarded(list, __func__, [&] {
     require_argument(list, "list");
     if (index >= list->cameras.size()) throw ArgumentError("index is ", index, " of ", list->cameras.size(), ".");
@@ -213,7 +213,7 @@ maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index,
     const CameraMode& from = modes[mode_index];
     maq_camera_mode filled{};
     from.format.copy(filled.format, sizeof filled.format - 1);
-    filled.usable = from.usable ? 1 : 0;
+    filled.is_usable = from.usable ? 1 : 0;
     filled.width_px = from.width_px;
     filled.height_px = from.height_px;
     filled.fps = from.fps;

@@ -20,7 +20,7 @@
 
 namespace maq {
 
-// Every handle begins with this, so that maq_last_error works on each of them.
+// Every handle begins with this, so that maq_get_last_error works on each of them.
 class Handle {
  public:
   void set_error(std::string text) const {
@@ -68,10 +68,10 @@ struct maq_context : maq::Handle {
 // Frames of sources and results are whole handles from pools, so that lending one allocates nothing.
 struct maq_frame : maq::Handle {
   ~maq_frame() {
-    if (free_callback != nullptr) free_callback(user_data);
+    if (release_callback != nullptr) release_callback(user_data);
   }
   maq::Frame frame;
-  maq_frame_free_callback free_callback = nullptr;
+  maq_frame_release_callback release_callback = nullptr;
   void* user_data = nullptr;
   maq::BoundedPool<maq_frame>::Deleter deleter;  // empty: the app's own memory
 };

@@ -29,7 +29,7 @@ inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, 
 }
 
 // The camera without its distortion.
-inline PinholeCamera pinhole_of(const maq_camera& given) {
+inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
   PinholeCamera camera;
   camera.width_px = given.width_px;
   camera.height_px = given.height_px;
@@ -42,8 +42,8 @@ inline PinholeCamera pinhole_of(const maq_camera& given) {
   return camera;
 }
 
-inline maq_camera camera_of(const PinholeCamera& camera) {
-  maq_camera filled{};
+inline maq_pinhole_camera camera_of(const PinholeCamera& camera) {
+  maq_pinhole_camera filled{};
   filled.struct_size = sizeof filled;
   filled.width_px = camera.width_px;
   filled.height_px = camera.height_px;
@@ -56,11 +56,11 @@ inline maq_camera camera_of(const PinholeCamera& camera) {
   return filled;
 }
 
-inline bool is_distorted(const maq_camera& camera) {
+inline bool is_distorted(const maq_pinhole_camera& camera) {
   return std::any_of(std::begin(camera.distortion), std::end(camera.distortion), [](double k) { return k != 0; });
 }
 
-inline void check_distortion(const maq_camera& camera) {
+inline void check_distortion(const maq_pinhole_camera& camera) {
   for (size_t i = 0; i < std::size(camera.distortion); ++i) {
     if (!std::isfinite(camera.distortion[i])) {
       throw ArgumentError("camera.distortion[", i, "] is ", camera.distortion[i], ", but must be finite.");
@@ -69,7 +69,7 @@ inline void check_distortion(const maq_camera& camera) {
 }
 
 // How it maps directions into its picture.
-inline Lens lens_of(const maq_camera& camera) {
+inline Lens lens_of(const maq_pinhole_camera& camera) {
   Lens lens;
   lens.width_px = camera.width_px;
   lens.height_px = camera.height_px;

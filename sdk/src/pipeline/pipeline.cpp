@@ -98,8 +98,8 @@ struct Pipeline::State {
   bool is_opening = false;   // it opens a source, which may hang
   bool in_callback = false;  // it is in a callback of the app
   bool is_photo = false;     // the source has one frame
-  // Of the thread: stopped, opening, loading, running, ended or failed; while it runs, of the camera: running, stalled or
-  // reconnecting.
+  // Of the thread: stopped, opening, loading, running, ended or failed; while it runs, of the camera: running, stalled
+  // or reconnecting.
   maq_pipeline_state phase = MAQ_PIPELINE_STOPPED, camera = MAQ_PIPELINE_RUNNING;
   maq_status failure = MAQ_OK;
   std::string problem, camera_problem;
@@ -300,7 +300,7 @@ struct Pipeline::State {
     std::lock_guard<std::mutex> lock(mutex);
     switch (state) {
       case MAQ_SOURCE_STARTED:
-      case MAQ_SOURCE_BACK: camera = MAQ_PIPELINE_RUNNING; break;
+      case MAQ_SOURCE_RECONNECTED: camera = MAQ_PIPELINE_RUNNING; break;
       case MAQ_SOURCE_STALLED:
         camera = MAQ_PIPELINE_STALLED;
         camera_problem = concatenate("The camera stalled: ", reason, ".");

@@ -69,8 +69,8 @@ struct LiveSource::State {
   std::vector<ControlSetting> set_controls;  // the latest last
 
   void report(maq_source_state state, const std::string& reason) {
-    settings.log.write(state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_BACK ? MAQ_LOG_INFO : MAQ_LOG_WARNING, name,
-                       ": ", reason);
+    settings.log.write(state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_RECONNECTED ? MAQ_LOG_INFO : MAQ_LOG_WARNING,
+                       name, ": ", reason);
     if (settings.on_state != nullptr && !stop_asked()) settings.on_state(settings.user_data, state, reason.c_str());
   }
 
@@ -97,7 +97,7 @@ struct LiveSource::State {
     if (camera != nullptr) return camera;
     if (failure) throw Error(MAQ_ERROR_DEVICE_LOST, *failure, ".");
     throw Error(MAQ_ERROR_DEVICE_LOST, name,
-                " is not there at the moment; try again when its state is MAQ_SOURCE_BACK.");
+                " is not there at the moment; try again when its state is MAQ_SOURCE_RECONNECTED.");
   }
 
   void show(const std::shared_ptr<Camera>& camera) {
@@ -209,7 +209,7 @@ struct LiveSource::State {
         last_number = buffer.sequence;
         is_first = false;
         last_frame = Clock::now();
-        if (stalled) report(MAQ_SOURCE_BACK, "frames come again");
+        if (stalled) report(MAQ_SOURCE_RECONNECTED, "frames come again");
         stalled = false;
         PixelLease lease(camera, buffer.slot);
         if (buffer.damaged || buffer.timestamp_ns <= last_time_ns) {
@@ -270,7 +270,7 @@ struct LiveSource::State {
         std::shared_ptr<Camera> camera = open();
         restore_controls(*camera);
         show(camera);
-        report(MAQ_SOURCE_BACK, "the device is back");
+        report(MAQ_SOURCE_RECONNECTED, "the device is back");
         return camera;
       } catch (const std::exception& error) {
         reason = error.what();

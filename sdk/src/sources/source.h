@@ -31,7 +31,7 @@ class Source {
   // Frames that were lost so far, on their way or because nobody took them.
   virtual uint64_t drops() const { return 0; }
   // Null when the source does not know.
-  virtual const maq_calibration* calibration() const { return nullptr; }
+  virtual const maq_intrinsics* calibration() const { return nullptr; }
   // As those of a camera; every other source throws MAQ_ERROR_UNSUPPORTED.
   virtual maq_control_info control(maq_control which);
   virtual void set_control(maq_control which, double value);

@@ -14,8 +14,8 @@ class ApiArguments : public ::testing::Test {
   ~ApiArguments() override { maq_context_destroy(context_); }
 
   static void expect_error(maq_status actual, maq_status expected, const void* handle, const std::string& text) {
-    EXPECT_EQ(actual, expected) << maq_last_error(handle);
-    EXPECT_NE(std::string(maq_last_error(handle)).find(text), std::string::npos) << maq_last_error(handle);
+    EXPECT_EQ(actual, expected) << maq_get_last_error(handle);
+    EXPECT_NE(std::string(maq_get_last_error(handle)).find(text), std::string::npos) << maq_get_last_error(handle);
   }
 
   maq_context* context_ = nullptr;
@@ -48,25 +48,26 @@ TEST_F(ApiArguments, NullHandlesAreRefusedByName) {
   uint8_t byte = 0;
   expect_error(maq_context_create(MAQ_HEADER_VERSION, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "maq_context_create: context is NULL");
-  expect_error(maq_context_onnxruntime(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "context");
+  expect_error(maq_context_get_onnxruntime(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "context");
   expect_error(maq_source_create(nullptr, "stub:people", nullptr, &source), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "maq_source_create: context is NULL");
   expect_error(maq_source_get_info(nullptr, &info), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "source is NULL");
   expect_error(maq_source_acquire_frame(nullptr, 0, &frame), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "source is NULL");
-  expect_error(maq_frame_create(nullptr, &desc, nullptr, nullptr, &frame), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+  expect_error(maq_frame_wrap(nullptr, &desc, nullptr, nullptr, &frame), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "context is NULL");
   expect_error(maq_frame_get_desc(nullptr, &desc), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "frame is NULL");
   expect_error(maq_frame_copy_pixels(nullptr, MAQ_PIXEL_RGB8, &byte, 0, 1), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "frame is NULL");
   expect_error(maq_densepose_create(nullptr, &config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "context is NULL");
-  expect_error(maq_densepose_restart(nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
+  expect_error(maq_densepose_reset(nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
   expect_error(maq_densepose_run(nullptr, nullptr, &result), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
-  expect_error(maq_densepose_result_size(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
-  expect_error(maq_densepose_result_people(nullptr, &people, &count), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
-  expect_error(maq_densepose_result_plane(nullptr, MAQ_PLANE_PART, &pixels, &stride), MAQ_ERROR_INVALID_ARGUMENT,
-               nullptr, "result");
-  expect_error(maq_densepose_result_stats(nullptr, &stats), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
+  expect_error(maq_densepose_result_get_size(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
+  expect_error(maq_densepose_result_get_people(nullptr, &people, &count), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "result");
+  expect_error(maq_densepose_result_get_plane(nullptr, MAQ_DENSEPOSE_PLANE_PART, &pixels, &stride),
+               MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
+  expect_error(maq_densepose_result_get_stats(nullptr, &stats), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
   EXPECT_EQ(source, nullptr);
   EXPECT_EQ(densepose, nullptr);
   EXPECT_EQ(frame, nullptr);
@@ -78,9 +79,9 @@ TEST_F(ApiArguments, NullOutputsAreRefusedAndTheTextIsTheHandles) {
   expect_error(maq_source_create(context_, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "uri");
   expect_error(maq_source_create(context_, "stub:people", nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
                "source is NULL");
-  expect_error(maq_frame_create(context_, nullptr, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
+  expect_error(maq_frame_wrap(context_, nullptr, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
                "desc is NULL");
-  expect_error(maq_frame_create(context_, &desc, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
+  expect_error(maq_frame_wrap(context_, &desc, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_,
                "frame is NULL");
   expect_error(maq_densepose_create(context_, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "config");
   expect_error(maq_densepose_create(context_, &config, nullptr), MAQ_ERROR_INVALID_ARGUMENT, context_, "densepose");
@@ -102,7 +103,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
   ASSERT_EQ(maq_source_acquire_frame(source, 0, &frame), MAQ_OK);
   maq_control_info control{};
   control.struct_size = sizeof control;
-  maq_calibration calibration{};
+  maq_intrinsics calibration{};
   calibration.struct_size = sizeof calibration;
   maq_frame_desc desc{};
   desc.struct_size = sizeof desc;
@@ -113,7 +114,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
                "value");
   expect_error(maq_source_set_control(source, maq_control(0), 1), MAQ_ERROR_INVALID_ARGUMENT, source, "control is 0");
   expect_error(maq_source_get_control(source, MAQ_CONTROL_GAIN, nullptr), MAQ_ERROR_INVALID_ARGUMENT, source, "info");
-  expect_error(maq_source_get_calibration(source, &calibration), MAQ_ERROR_UNSUPPORTED, source, "calibration");
+  expect_error(maq_source_get_intrinsics(source, &calibration), MAQ_ERROR_UNSUPPORTED, source, "calibration");
   expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, source, "negative");
   expect_error(maq_frame_get_depth(frame, &desc), MAQ_ERROR_UNSUPPORTED, frame, "without depth");
   expect_error(maq_frame_get_dma_buf(frame, &fd), MAQ_ERROR_UNSUPPORTED, frame, "dma-buf");
@@ -128,7 +129,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
   maq_source_destroy(source);
   for (const maq_status status :
        {maq_source_get_control(nullptr, MAQ_CONTROL_GAIN, &control),
-        maq_source_set_control(nullptr, MAQ_CONTROL_GAIN, 1), maq_source_get_calibration(nullptr, &calibration),
+        maq_source_set_control(nullptr, MAQ_CONTROL_GAIN, 1), maq_source_get_intrinsics(nullptr, &calibration),
         maq_source_seek(nullptr, 0), maq_frame_get_depth(nullptr, &desc), maq_frame_get_dma_buf(nullptr, &fd)}) {
     EXPECT_EQ(status, MAQ_ERROR_INVALID_ARGUMENT);
   }
@@ -150,7 +151,7 @@ TEST_F(ApiArguments, ARecorderSaysWhatIsWrong) {
   expect_error(maq_recorder_create(nullptr, "/tmp", nullptr, nullptr, &recorder), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "context is NULL");
   EXPECT_EQ(recorder, nullptr);
-  expect_error(maq_recorder_add(nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "recorder is NULL");
+  expect_error(maq_recorder_add_frame(nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "recorder is NULL");
   expect_error(maq_recorder_finish(nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "recorder is NULL");
   expect_error(maq_recorder_get_info(nullptr, &info), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "recorder is NULL");
 }
@@ -212,9 +213,9 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   maq_source_config_init(&source_config, sizeof source_config);
   maq_source* source = nullptr;
   for (const uint32_t pool : {0u, 65u}) {
-    source_config.pool_size = pool;
+    source_config.frame_pool_size = pool;
     expect_error(maq_source_create(context_, "stub:people", &source_config, &source), MAQ_ERROR_INVALID_ARGUMENT,
-                 context_, "config.pool_size is " + std::to_string(pool));
+                 context_, "config.frame_pool_size is " + std::to_string(pool));
   }
   const auto expect_refused = [&](const char* name, auto change) {
     maq_densepose_config config;
@@ -235,44 +236,47 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   expect_refused("result_pool_size", [](auto& config) { config.result_pool_size = 0; });
   expect_refused("max_proposals", [](auto& config) { config.max_proposals = 1001; });
   expect_refused("key_frame_interval", [](auto& config) { config.key_frame_interval = 0; });
-  expect_refused("least_person_px", [](auto& config) { config.least_person_px = -1; });
-  expect_refused("detail", [](auto& config) { config.detail = 2; });
-  expect_refused("spin", [](auto& config) { config.spin = 2; });
+  expect_refused("min_person_height_px", [](auto& config) { config.min_person_height_px = -1; });
+  expect_refused("detail", [](auto& config) { reinterpret_cast<int32_t&>(config.detail) = 2; });
+  expect_refused("allow_spinning", [](auto& config) { config.allow_spinning = 2; });
 }
 
 TEST_F(ApiArguments, ErrorsWithoutAHandleAreOfTheThread) {
   maq_context_create(0, nullptr, nullptr);
-  EXPECT_NE(std::string(maq_last_error(nullptr)), "");
-  std::thread([] { EXPECT_STREQ(maq_last_error(nullptr), ""); }).join();
+  EXPECT_NE(std::string(maq_get_last_error(nullptr)), "");
+  std::thread([] { EXPECT_STREQ(maq_get_last_error(nullptr), ""); }).join();
 }
 
 TEST_F(ApiArguments, EveryStatusHasItsName) {
   for (int status = MAQ_OK; status <= MAQ_CANCELLED; ++status) {
-    EXPECT_EQ(std::string(maq_status_name(maq_status(status))).rfind("MAQ_", 0), 0u) << status;
+    EXPECT_EQ(std::string(maq_status_get_name(maq_status(status))).rfind("MAQ_", 0), 0u) << status;
   }
-  EXPECT_STREQ(maq_status_name(maq_status(MAQ_CANCELLED + 1)), "unknown status");
+  EXPECT_STREQ(maq_status_get_name(maq_status(MAQ_CANCELLED + 1)), "unknown status");
 }
 
 TEST_F(ApiArguments, TheVersionOfHeadersAndLibraryAgree) {
   const std::string header = std::to_string(MAQ_VERSION_MAJOR) + "." + std::to_string(MAQ_VERSION_MINOR) + "." +
                              std::to_string(MAQ_VERSION_PATCH);
-  EXPECT_EQ(maq_sdk_version(), header);
-  EXPECT_STRNE(maq_git_commit(), "");
-  EXPECT_STRNE(maq_build_options(), "");
+  EXPECT_EQ(maq_get_sdk_version(), header);
+  EXPECT_STRNE(maq_get_git_commit(), "");
+  EXPECT_STRNE(maq_get_build_options(), "");
 }
 
-// Layouts of version 0.1: an app built with it relies on them.
+// Layouts of version 0.2: an app built with it relies on them.
 static_assert(sizeof(void*) != 8 || sizeof(maq_context_config) == 32, "");
 static_assert(offsetof(maq_source_config, queue_length) == 8, "");
-static_assert(sizeof(void*) != 8 || (offsetof(maq_source_config, real_time) == 40 && sizeof(maq_source_config) == 56), "");
-static_assert(sizeof(void*) != 8 || (offsetof(maq_source_info, drops) == 48 && sizeof(maq_source_info) == 56), "");
+static_assert(sizeof(void*) != 8 || (offsetof(maq_source_config, real_time) == 40 && sizeof(maq_source_config) == 56),
+              "");
+static_assert(sizeof(void*) != 8 ||
+                  (offsetof(maq_source_info, dropped_frame_count) == 48 && sizeof(maq_source_info) == 56),
+              "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 56, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 20, "");
 static_assert(sizeof(maq_densepose_stats) == 80, "");
-static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_BACK == 5 && MAQ_PIXEL_DEPTH16 == 7 &&
-                  MAQ_PLANE_PERSON == 4,
+static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_RECONNECTED == 5 &&
+                  MAQ_PIXEL_DEPTH16 == 7 && MAQ_DENSEPOSE_PLANE_PERSON == 4,
               "");
 
 }  // namespace

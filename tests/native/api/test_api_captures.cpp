@@ -27,15 +27,15 @@ class ApiCaptures : public ::testing::Test {
 
   void expect_refused(maq_status status, const std::string& text) const {
     maq_capture* capture = nullptr;
-    EXPECT_EQ(maq_capture_open(context_.get(), copy().c_str(), &capture), status) << maq_last_error(context_.get());
-    EXPECT_NE(std::string(maq_last_error(context_.get())).find(text), std::string::npos)
-        << maq_last_error(context_.get());
+    EXPECT_EQ(maq_capture_open(context_.get(), copy().c_str(), &capture), status) << maq_get_last_error(context_.get());
+    EXPECT_NE(std::string(maq_get_last_error(context_.get())).find(text), std::string::npos)
+        << maq_get_last_error(context_.get());
     EXPECT_EQ(capture, nullptr);
   }
 
   // The only thing dropped begins with `reason`.
   static void expect_dropped(const maquette::Capture& capture, const std::string& reason, uint64_t expected) {
-    ASSERT_EQ(capture.info().dropped_count, 1u);
+    ASSERT_EQ(capture.info().drop_count, 1u);
     uint64_t count = 0;
     EXPECT_EQ(std::string(capture.dropped(0, &count)).rfind(reason, 0), 0u) << capture.dropped(0, &count);
     EXPECT_EQ(count, expected);
@@ -50,13 +50,13 @@ TEST_F(ApiCaptures, TellsWhatIsInTheFolder) {
   const maq_capture_info info = capture.info();
   EXPECT_EQ(info.view_count, 5u);
   EXPECT_EQ(info.point_count, api_tiny_scene::capture_places().size() / 3);
-  EXPECT_EQ(info.dropped_count, 0u);
+  EXPECT_EQ(info.drop_count, 0u);
   EXPECT_EQ(info.up[2], 1);
   for (uint32_t i = 0; i < info.view_count; ++i) {
     const maq_capture_view view = capture.view(i);
     EXPECT_EQ(view.name, "images/" + std::to_string(i) + ".png");
-    EXPECT_EQ(view.held_out, i == 3);
-    EXPECT_EQ(view.camera.struct_size, sizeof(maq_camera));
+    EXPECT_EQ(view.is_held_out, i == 3);
+    EXPECT_EQ(view.camera.struct_size, sizeof(maq_pinhole_camera));
     EXPECT_EQ(view.camera.width_px, 72);
     EXPECT_EQ(view.camera.height_px, 56);
     EXPECT_EQ(view.camera.fx_px, 80);
@@ -143,13 +143,13 @@ TEST_F(ApiCaptures, PhotosOfAnotherShapeThanTheirCameraAreDropped) {
   write(document);
   const maquette::Capture capture(context_, copy());
   EXPECT_EQ(capture.info().view_count, 4u);
-  EXPECT_EQ(capture.info().dropped_count, 1u);
+  EXPECT_EQ(capture.info().drop_count, 1u);
 }
 
 TEST_F(ApiCaptures, FoldersWithoutACaptureAreAStatus) {
   maq_capture* capture = nullptr;
   EXPECT_EQ(maq_capture_open(context_.get(), "/no/such/folder", &capture), MAQ_ERROR_NOT_FOUND);
-  EXPECT_NE(std::string(maq_last_error(context_.get())).find("/no/such/folder"), std::string::npos);
+  EXPECT_NE(std::string(maq_get_last_error(context_.get())).find("/no/such/folder"), std::string::npos);
   EXPECT_EQ(maq_capture_open(context_.get(), folder_.path().c_str(), &capture), MAQ_ERROR_NOT_FOUND);
   std::filesystem::remove(copy() + "/cloud.ply");
   expect_refused(MAQ_ERROR_NOT_FOUND, "cloud");
@@ -169,7 +169,7 @@ TEST_F(ApiCaptures, APhotoThatIsGoneOrDamagedSinceIsAStatusOfTheCapture) {
   maq_frame* frame = nullptr;
   std::filesystem::remove(copy() + "/images/0.png");
   EXPECT_EQ(maq_capture_load_view(capture.get(), 0, &frame), MAQ_ERROR_NOT_FOUND);
-  EXPECT_NE(std::string(maq_last_error(capture.get())).find("0.png"), std::string::npos);
+  EXPECT_NE(std::string(maq_get_last_error(capture.get())).find("0.png"), std::string::npos);
   write_text(copy() + "/images/1.png", "no picture");
   EXPECT_EQ(maq_capture_load_view(capture.get(), 1, &frame), MAQ_ERROR_UNREADABLE);
   EXPECT_EQ(frame, nullptr);
@@ -190,7 +190,7 @@ TEST_F(ApiCaptures, IndicesOutOfRangeAreRefused) {
   }
   view.camera.struct_size = 8;
   EXPECT_EQ(maq_capture_get_view(capture.get(), 0, &view), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_NE(std::string(maq_last_error(capture.get())).find("view->camera.struct_size"), std::string::npos);
+  EXPECT_NE(std::string(maq_get_last_error(capture.get())).find("view->camera.struct_size"), std::string::npos);
 }
 
 }  // namespace

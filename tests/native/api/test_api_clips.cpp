@@ -142,10 +142,10 @@ TEST_F(ApiClips, AFullDiskIsToldAndLeavesTheOldFile) {
       maq_status first = MAQ_OK;
       for (int k = 0; k < 20 && first == MAQ_OK; ++k) {
         const maquette::Frame frame = noise(k);
-        first = maq_clip_add(clip.get(), frame.get());
+        first = maq_clip_add_frame(clip.get(), frame.get());
       }
       if (first == MAQ_OK) first = maq_clip_finish(clip.get());
-      EXPECT_EQ(first, MAQ_ERROR_UNWRITABLE) << name << ' ' << most << ": " << maq_last_error(clip.get());
+      EXPECT_EQ(first, MAQ_ERROR_UNWRITABLE) << name << ' ' << most << ": " << maq_get_last_error(clip.get());
       EXPECT_NE(maq_clip_finish(clip.get()), MAQ_OK) << "nor the second time";
     }
     EXPECT_EQ(frames_of(path), 2) << name;
@@ -182,7 +182,7 @@ TEST_F(ApiClips, WhatIsNoClipIsRefusedAndLeavesNoFile) {
   EXPECT_EQ(maq_clip_create(nullptr, "a.mp4", 25, &clip), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_clip_create(context_.get(), nullptr, 25, &clip), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_clip_create(context_.get(), "a.mp4", 25, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_clip_add(nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_clip_add_frame(nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_clip_finish(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(clip, nullptr);
   maq_clip_destroy(nullptr);
@@ -190,7 +190,7 @@ TEST_F(ApiClips, WhatIsNoClipIsRefusedAndLeavesNoFile) {
 
 TEST_F(ApiClips, PicturesThatFitNoClipAreRefusedByName) {
   maquette::Clip clip(context_, folder_.file("a.mp4"), 10);
-  EXPECT_EQ(maq_clip_add(clip.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_clip_add_frame(clip.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   const std::vector<uint8_t> depth(8 * 8 * 2);
   EXPECT_EQ(status_of([&] { clip.add(maquette::Frame(context_, describe(MAQ_PIXEL_DEPTH16, depth, 8, 8))); }),
             MAQ_ERROR_UNSUPPORTED);

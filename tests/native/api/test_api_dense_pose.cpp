@@ -37,19 +37,19 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
   EXPECT_NEAR(result.people()[0].box_px[0], 67.2, 1e-3);
   size_t stride = 0;
   int64_t body = 0;
-  const uint8_t* person = result.plane(MAQ_PLANE_PERSON, &stride);
+  const uint8_t* person = result.plane(MAQ_DENSEPOSE_PLANE_PERSON, &stride);
   for (int y = 0; y < 256; ++y) {
     for (int x = 0; x < 320; ++x) body += person[size_t(y) * stride + size_t(x)] == 1;
   }
   const maq_densepose_stats stats = result.stats();
   EXPECT_GT(body, 500);
-  EXPECT_EQ(stats.body_pixels, body);
-  EXPECT_EQ(stats.people, 1);
+  EXPECT_EQ(stats.body_pixel_count, body);
+  EXPECT_EQ(stats.person_count, 1);
   EXPECT_EQ(stats.network_width_px, 320);
   EXPECT_GT(stats.total_ms, 0);
   EXPECT_GE(stats.total_ms, stats.trunk_ms);
   const uint8_t* pixels = nullptr;
-  EXPECT_EQ(maq_densepose_result_plane(result.get(), maq_densepose_plane(5), &pixels, &stride),
+  EXPECT_EQ(maq_densepose_result_get_plane(result.get(), maq_densepose_plane(5), &pixels, &stride),
             MAQ_ERROR_INVALID_ARGUMENT);
 }
 
@@ -80,7 +80,7 @@ TEST(ApiDensePose, EachThreadCanHaveItsOwnAndShareTheContext) {
       for (int i = 0; i < 5; ++i) EXPECT_EQ(densepose.run(frame).people().size(), 1u);
       maq_source* source = nullptr;
       EXPECT_EQ(maq_source_create(context.get(), "nothing", nullptr, &source), MAQ_ERROR_INVALID_ARGUMENT);
-      EXPECT_NE(std::string(maq_last_error(context.get())), "");
+      EXPECT_NE(std::string(maq_get_last_error(context.get())), "");
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -95,7 +95,7 @@ TEST(ApiDensePose, ADamagedBundleIsAStatusOfTheContext) {
   config.bundle_path = path.c_str();
   maq_densepose* densepose = nullptr;
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_BAD_BUNDLE);
-  EXPECT_NE(std::string(maq_last_error(context.get())).find("trunk.onnx"), std::string::npos);
+  EXPECT_NE(std::string(maq_get_last_error(context.get())).find("trunk.onnx"), std::string::npos);
   config.bundle_path = "/no/such/bundle";
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_NOT_FOUND);
   EXPECT_EQ(densepose, nullptr);
@@ -106,13 +106,13 @@ TEST(ApiDensePose, AMissingRuntimeLibraryIsAStatusAndCanBeMended) {
   config.onnxruntime_library = "/no/such/libonnxruntime.so.1";
   const maquette::Context named(config);
   const char* version = nullptr;
-  EXPECT_EQ(maq_context_onnxruntime(named.get(), &version, nullptr), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_EQ(maq_context_get_onnxruntime(named.get(), &version, nullptr), MAQ_ERROR_RUNTIME_LIBRARY);
   EXPECT_EQ(version, nullptr);
 
   const maquette::Context context;
   setenv("MAQ_ONNXRUNTIME_LIB", "/no/such/libonnxruntime.so.1", 1);
-  EXPECT_EQ(maq_context_onnxruntime(context.get(), &version, nullptr), MAQ_ERROR_RUNTIME_LIBRARY);
-  EXPECT_NE(std::string(maq_last_error(context.get())).find("MAQ_ONNXRUNTIME_LIB"), std::string::npos);
+  EXPECT_EQ(maq_context_get_onnxruntime(context.get(), &version, nullptr), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_NE(std::string(maq_get_last_error(context.get())).find("MAQ_ONNXRUNTIME_LIB"), std::string::npos);
   unsetenv("MAQ_ONNXRUNTIME_LIB");
   EXPECT_EQ(context.onnxruntime_version().rfind("1.", 0), 0u);
 }

@@ -16,17 +16,17 @@ class ApiLibcamera : public ::testing::Test {
     maq_source_destroy(source);
     return status;
   }
-  std::string error() const { return maq_last_error(context_.get()); }
+  std::string error() const { return maq_get_last_error(context_.get()); }
 
   // The cameras of libcamera in the list: none on most machines that run tests.
   int listed() {
     maq_camera_list* list = nullptr;
     EXPECT_EQ(maq_camera_list_create(context_.get(), &list), MAQ_OK) << error();
     int found = 0;
-    for (uint32_t i = 0; i < maq_camera_list_count(list); ++i) {
+    for (uint32_t i = 0; i < maq_camera_list_get_count(list); ++i) {
       maq_camera_info info{};
       info.struct_size = sizeof info;
-      EXPECT_EQ(maq_camera_list_get(list, i, &info), MAQ_OK);
+      EXPECT_EQ(maq_camera_list_get_camera(list, i, &info), MAQ_OK);
       found += std::string(info.uri).rfind("libcamera:", 0) == 0 ? 1 : 0;
     }
     maq_camera_list_destroy(list);

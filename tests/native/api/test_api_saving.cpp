@@ -104,7 +104,7 @@ TEST_F(ApiSaving, OtherEndingsAreRefusedAndNothingIsWritten) {
   expect_refused(frame, "", MAQ_ERROR_INVALID_ARGUMENT, "ends neither in .png nor in .jpg");
   EXPECT_EQ(files_in(folder_.path()), 0u);
   EXPECT_EQ(maq_frame_save(frame.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(maq_last_error(frame.get()), "maq_frame_save: path is NULL.");
+  EXPECT_STREQ(maq_get_last_error(frame.get()), "maq_frame_save: path is NULL.");
   EXPECT_EQ(maq_frame_save(nullptr, "a.png"), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
@@ -167,8 +167,9 @@ TEST_F(ApiSaving, AResultIsThreeFilesInTheDensePoseConvention) {
   const std::vector<uint8_t> inds = read_rgb(context_, folder_.file("a 50_INDS.png"));
   EXPECT_EQ(colour_type(folder_.file("a 50_INDS.png")), 0);
   size_t stride = 0;
-  const uint8_t* planes[] = {result.plane(MAQ_PLANE_V, &stride), result.plane(MAQ_PLANE_U, &stride),
-                             result.plane(MAQ_PLANE_PART, &stride), result.plane(MAQ_PLANE_PERSON, &stride)};
+  const uint8_t* planes[] = {result.plane(MAQ_DENSEPOSE_PLANE_V, &stride), result.plane(MAQ_DENSEPOSE_PLANE_U, &stride),
+                             result.plane(MAQ_DENSEPOSE_PLANE_PART, &stride),
+                             result.plane(MAQ_DENSEPOSE_PLANE_PERSON, &stride)};
   int64_t painted = 0;
   for (size_t y = 0; y < 256; ++y) {
     for (size_t x = 0; x < 320; ++x) {
@@ -194,7 +195,7 @@ TEST_F(ApiSaving, AStemIsTheBeginningOfANameAndNoFolder) {
   std::filesystem::create_directory(folder_.file("in"));
   for (const char* stem : {"", "in/a", "/a", "../a"}) {
     EXPECT_EQ(status_of([&] { result.save(folder_.path().string(), stem); }), MAQ_ERROR_INVALID_ARGUMENT) << stem;
-    EXPECT_NE(std::string(maq_last_error(result.get())).find("stem"), std::string::npos);
+    EXPECT_NE(std::string(maq_get_last_error(result.get())).find("stem"), std::string::npos);
   }
   EXPECT_EQ(files_in(folder_.path()), 1u);
   EXPECT_EQ(maq_densepose_result_save(nullptr, "a", "a"), MAQ_ERROR_INVALID_ARGUMENT);

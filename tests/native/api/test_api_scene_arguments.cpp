@@ -12,8 +12,8 @@ class ApiSceneArguments : public ::testing::Test {
   // On `handle` (NULL: of this thread) there is a sentence with `text`.
   static void expect_invalid(maq_status actual, const void* handle, const std::string& text) {
     EXPECT_EQ(actual, MAQ_ERROR_INVALID_ARGUMENT) << text;
-    EXPECT_NE(std::string(maq_last_error(handle)).find(text), std::string::npos)
-        << text << ": " << maq_last_error(handle);
+    EXPECT_NE(std::string(maq_get_last_error(handle)).find(text), std::string::npos)
+        << text << ": " << maq_get_last_error(handle);
   }
 
   maquette::Context context_;
@@ -21,7 +21,7 @@ class ApiSceneArguments : public ::testing::Test {
   maquette::Scene scene_ = api_tiny_scene::ball_scene(context_);
   std::vector<float> places_ = api_tiny_scene::ball(100);
   maq_point_cloud cloud_ = api_tiny_scene::cloud_of(places_);
-  maq_camera camera_ = api_tiny_scene::camera_at(0);
+  maq_pinhole_camera camera_ = api_tiny_scene::camera_at(0);
   maq_scene_build_config building_ = api_tiny_scene::build_config();
   maq_scene_renderer_config rendering_ = api_tiny_scene::renderer_config();
 };
@@ -65,8 +65,8 @@ TEST_F(ApiSceneArguments, NullHandlesAreRefusedByName) {
                  "maq_scene_renderer_create: context is NULL");
   expect_invalid(maq_scene_renderer_run(nullptr, &camera_, &image), nullptr,
                  "maq_scene_renderer_run: renderer is NULL");
-  expect_invalid(maq_scene_image_plane(nullptr, MAQ_SCENE_BGR, &pixels, &stride), nullptr,
-                 "maq_scene_image_plane: image is NULL");
+  expect_invalid(maq_scene_image_get_plane(nullptr, MAQ_SCENE_PLANE_BGR, &pixels, &stride), nullptr,
+                 "maq_scene_image_get_plane: image is NULL");
   expect_invalid(maq_scene_image_get_stats(nullptr, &image_stats), nullptr, "maq_scene_image_get_stats: image is NULL");
   EXPECT_TRUE(capture == nullptr && scene == nullptr && builder == nullptr && renderer == nullptr && image == nullptr);
 }
@@ -115,9 +115,9 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   expect_invalid(maq_scene_renderer_run(renderer.get(), nullptr, &image), renderer.get(), "camera is NULL");
   expect_invalid(maq_scene_renderer_run(renderer.get(), &camera_, nullptr), renderer.get(), "image is NULL");
   const maquette::SceneImage rendered = renderer.run(camera_);
-  expect_invalid(maq_scene_image_plane(rendered.get(), MAQ_SCENE_BGR, nullptr, &stride), rendered.get(),
+  expect_invalid(maq_scene_image_get_plane(rendered.get(), MAQ_SCENE_PLANE_BGR, nullptr, &stride), rendered.get(),
                  "pixels is NULL");
-  expect_invalid(maq_scene_image_plane(rendered.get(), MAQ_SCENE_BGR, &pixels, nullptr), rendered.get(),
+  expect_invalid(maq_scene_image_get_plane(rendered.get(), MAQ_SCENE_PLANE_BGR, &pixels, nullptr), rendered.get(),
                  "stride_bytes is NULL");
   expect_invalid(maq_scene_image_get_stats(rendered.get(), nullptr), rendered.get(), "stats is NULL");
 }
@@ -152,7 +152,7 @@ TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
     maq_point_cloud cloud = cloud_;
     cloud.struct_size = wrong;
     expect_invalid(maq_scene_builder_create(context_.get(), &building_, &cloud, &none), context_.get(), "cloud" + is);
-    maq_camera camera = camera_;
+    maq_pinhole_camera camera = camera_;
     camera.struct_size = wrong;
     maq_scene_image* no_image = nullptr;
     expect_invalid(maq_scene_builder_add_view(builder.get(), photo.get(), &camera, nullptr), builder.get(),
@@ -182,18 +182,18 @@ TEST_F(ApiSceneArguments, DefaultsAreThoseOfTheHeader) {
   EXPECT_EQ(building.struct_size, sizeof building);
   EXPECT_EQ(building.long_side_px, 640);
   EXPECT_EQ(building.coefficient_bits, 8);
-  EXPECT_LT(building.least_variation, 0);
+  EXPECT_LT(building.min_variation, 0);
   EXPECT_EQ(building.visibility_scale, 1);
-  EXPECT_TRUE(building.bundle_path == nullptr && building.progress == nullptr);
+  EXPECT_TRUE(building.bundle_path == nullptr && building.progress_callback == nullptr);
   const maq_scene_renderer_config rendering = maquette::default_scene_renderer_config();
   EXPECT_EQ(rendering.struct_size, sizeof rendering);
   EXPECT_EQ(rendering.image_pool_size, 4u);
-  EXPECT_EQ(rendering.spin, 1);
+  EXPECT_EQ(rendering.allow_spinning, 1);
 }
 
 TEST_F(ApiSceneArguments, DestroyingNullIsFine) {
-  maq_capture_destroy(nullptr);
-  maq_scene_destroy(nullptr);
+  maq_capture_close(nullptr);
+  maq_scene_close(nullptr);
   maq_scene_builder_destroy(nullptr);
   maq_scene_renderer_destroy(nullptr);
   maq_scene_image_release(nullptr);
@@ -209,6 +209,8 @@ TEST_F(ApiSceneArguments, FoldersAndPathsThatAreEmptyAreAStatus) {
 }
 
 // Layouts that apps rely on.
-static_assert(sizeof(void*) != 8 || (sizeof(maq_camera) == 208 && offsetof(maq_camera, distortion) == 144), "");
+static_assert(sizeof(void*) != 8 ||
+                  (sizeof(maq_pinhole_camera) == 208 && offsetof(maq_pinhole_camera, distortion) == 144),
+              "");
 
 }  // namespace

@@ -18,8 +18,8 @@ using api_tiny_scene::Photo;
 class ApiSceneBuilding : public ::testing::Test {
  protected:
   void expect_error(maq_status actual, maq_status expected, const void* handle, const std::string& text) {
-    EXPECT_EQ(actual, expected) << maq_last_error(handle);
-    EXPECT_NE(std::string(maq_last_error(handle)).find(text), std::string::npos) << maq_last_error(handle);
+    EXPECT_EQ(actual, expected) << maq_get_last_error(handle);
+    EXPECT_NE(std::string(maq_get_last_error(handle)).find(text), std::string::npos) << maq_get_last_error(handle);
   }
 
   void expect_refused(const maq_point_cloud& cloud, const maq_scene_build_config& config, maq_status status,
@@ -50,17 +50,17 @@ TEST_F(ApiSceneBuilding, ACaptureBecomesASceneAndTellsHowItGoes) {
   const maquette::Capture capture(context_, kCapture);
   Progress progress;
   maq_scene_build_config config = build_config();
-  config.progress = Progress::call;
+  config.progress_callback = Progress::call;
   config.progress_user_data = &progress;
   maq_scene_build_stats stats{};
   const maquette::Scene scene(context_, config, capture, &stats);
   EXPECT_EQ(stats.view_count, 4u) << "one is held out";
-  EXPECT_EQ(stats.unused_views, 0u);
-  EXPECT_EQ(stats.cloud_points, capture.info().point_count);
-  EXPECT_EQ(stats.seen_points, scene.info().point_count);
-  EXPECT_GT(stats.seen_points, stats.cloud_points / 4);
+  EXPECT_EQ(stats.unused_view_count, 0u);
+  EXPECT_EQ(stats.cloud_point_count, capture.info().point_count);
+  EXPECT_EQ(stats.seen_point_count, scene.info().point_count);
+  EXPECT_GT(stats.seen_point_count, stats.cloud_point_count / 4);
   for (const double ms :
-       {stats.load_ms, stats.visibility_ms, stats.extractor_ms, stats.moments_ms, stats.solving_ms, stats.packing_ms}) {
+       {stats.load_ms, stats.visibility_ms, stats.extract_ms, stats.accumulate_ms, stats.solve_ms, stats.pack_ms}) {
     EXPECT_GT(ms, 0);
   }
   ASSERT_GT(progress.done.size(), 4u);
@@ -68,14 +68,14 @@ TEST_F(ApiSceneBuilding, ACaptureBecomesASceneAndTellsHowItGoes) {
   EXPECT_EQ(progress.done.back(), 1);
   EXPECT_EQ(progress.what[0].rfind("Photo 1 of 4", 0), 0u) << progress.what[0];
 
-  config.uses_held_out = 1;
+  config.use_held_out = 1;
   maquette::Scene(context_, config, capture, &stats);
   EXPECT_EQ(stats.view_count, 5u);
-  config.most_views = 2;
-  config.most_points = 100;
+  config.max_views = 2;
+  config.max_points = 100;
   const maquette::Scene small(context_, config, capture, &stats);
   EXPECT_EQ(stats.view_count, 2u);
-  EXPECT_EQ(stats.cloud_points, 100u);
+  EXPECT_EQ(stats.cloud_point_count, 100u);
   EXPECT_LE(small.info().point_count, 100u);
 }
 
@@ -83,7 +83,7 @@ TEST_F(ApiSceneBuilding, TheCallbackCancelsAtEveryCall) {
   const maquette::Capture capture(context_, kCapture);
   Progress whole;
   maq_scene_build_config config = build_config();
-  config.progress = Progress::call;
+  config.progress_callback = Progress::call;
   config.progress_user_data = &whole;
   maquette::Scene(context_, config, capture);
   for (size_t calls = 0; calls + 1 < whole.done.size(); ++calls) {
@@ -95,7 +95,7 @@ TEST_F(ApiSceneBuilding, TheCallbackCancelsAtEveryCall) {
     stats.struct_size = sizeof stats;
     EXPECT_EQ(maq_scene_build(context_.get(), &config, capture.get(), &stats, &scene), MAQ_CANCELLED) << calls;
     EXPECT_EQ(scene, nullptr);
-    EXPECT_EQ(stats.cloud_points, 0u) << "as before";
+    EXPECT_EQ(stats.cloud_point_count, 0u) << "as before";
     EXPECT_EQ(progress.done.size(), calls + 1) << "it is not asked again";
   }
 }
@@ -108,16 +108,16 @@ TEST_F(ApiSceneBuilding, AnAppsOwnCloudAndPhotosGiveTheSceneOfTheCapture) {
   for (const uint32_t i : {0u, 1u, 2u, 4u}) builder.add_view(capture.load_view(i), capture.view(i).camera);
   const maq_scene_info found = builder.finish().info();
   EXPECT_EQ(found.point_count, expected.point_count);
-  EXPECT_NEAR(double(found.varying_count), double(expected.varying_count), 2);
+  EXPECT_NEAR(double(found.view_dependent_count), double(expected.view_dependent_count), 2);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(found.low[axis], expected.low[axis], 1e-4);
-    EXPECT_NEAR(found.high[axis], expected.high[axis], 1e-4);
+    EXPECT_NEAR(found.bounds_min[axis], expected.bounds_min[axis], 1e-4);
+    EXPECT_NEAR(found.bounds_max[axis], expected.bounds_max[axis], 1e-4);
   }
   EXPECT_EQ(std::memcmp(found.networks_sha256, expected.networks_sha256, 32), 0);
   const maq_scene_build_stats stats = builder.stats();
   EXPECT_EQ(stats.view_count, 4u);
-  EXPECT_EQ(stats.seen_points, found.point_count);
-  EXPECT_EQ(stats.cloud_points, places.size() / 3);
+  EXPECT_EQ(stats.seen_point_count, found.point_count);
+  EXPECT_EQ(stats.cloud_point_count, places.size() / 3);
   EXPECT_GT(stats.load_ms, 0);
 }
 
@@ -134,7 +134,7 @@ TEST_F(ApiSceneBuilding, PhotosOfEveryPixelFormatSeeTheSame) {
   EXPECT_GT(expected, 300u);
   const Photo depth(MAQ_PIXEL_DEPTH16);
   const maquette::Frame frame(context_, depth.desc);
-  const maq_camera camera = camera_at(0);
+  const maq_pinhole_camera camera = camera_at(0);
   expect_error(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr), MAQ_ERROR_UNSUPPORTED,
                builder.get(), "depth image");
   EXPECT_EQ(builder.stats().view_count, 6u);
@@ -144,7 +144,7 @@ TEST_F(ApiSceneBuilding, DistortedCamerasAreUndistorted) {
   maquette::SceneBuilder builder(context_, build_config(), cloud_of(places_));
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
-  maq_camera camera = camera_at(0);
+  maq_pinhole_camera camera = camera_at(0);
   camera.distortion[0] = -0.1;
   EXPECT_GT(builder.add_view(frame, camera), 300u);
   camera.distortion[0] = -1000;
@@ -165,7 +165,7 @@ TEST_F(ApiSceneBuilding, ViewsCanBeAddedAfterAScene) {
   const uint64_t seen = builder.add_view(maquette::Frame(context_, photo.desc), camera_at(0));
   const maquette::Scene first = builder.finish();
   EXPECT_EQ(first.info().point_count, seen);
-  EXPECT_EQ(first.info().varying_count, 0u) << "one photo says nothing of other sides";
+  EXPECT_EQ(first.info().view_dependent_count, 0u) << "one photo says nothing of other sides";
   builder.add_view(maquette::Frame(context_, photo.desc), camera_at(3));
   const maquette::Scene second = builder.finish();
   EXPECT_GT(second.info().point_count, seen + 300);
@@ -175,11 +175,11 @@ TEST_F(ApiSceneBuilding, ViewsCanBeAddedAfterAScene) {
 TEST_F(ApiSceneBuilding, AViewThatSeesNothingIsNoErrorAndASceneOfSuchIsOne) {
   maquette::SceneBuilder builder(context_, build_config(), cloud_of(places_));
   const Photo photo;
-  maq_camera away = camera_at(0);
+  maq_pinhole_camera away = camera_at(0);
   away.centre[0] = -3;
   EXPECT_EQ(builder.add_view(maquette::Frame(context_, photo.desc), away), 0u);
   EXPECT_EQ(builder.stats().view_count, 0u);
-  EXPECT_EQ(builder.stats().unused_views, 1u);
+  EXPECT_EQ(builder.stats().unused_view_count, 1u);
   maq_scene* scene = nullptr;
   expect_error(maq_scene_builder_finish(builder.get(), &scene), MAQ_ERROR_INVALID_ARGUMENT, builder.get(),
                "None of the photos sees a point");
@@ -202,16 +202,16 @@ TEST_F(ApiSceneBuilding, UpMayBeAlongTheViewAndOfAnyLength) {
 
 TEST_F(ApiSceneBuilding, CloudsThatAreNoneAreRefused) {
   maq_point_cloud cloud = cloud_of(places_);
-  cloud.count = 0;
+  cloud.point_count = 0;
   expect_refused(cloud, build_config(), MAQ_ERROR_INVALID_ARGUMENT, "no points");
   cloud.xyz = nullptr;
   expect_refused(cloud, build_config(), MAQ_ERROR_INVALID_ARGUMENT, "no points");
-  cloud.count = 1;
+  cloud.point_count = 1;
   expect_refused(cloud, build_config(), MAQ_ERROR_INVALID_ARGUMENT, "cloud.xyz is NULL");
   cloud = cloud_of(places_);
-  cloud.count = 30'000'001;
+  cloud.point_count = 30'000'001;
   expect_refused(cloud, build_config(), MAQ_ERROR_UNSUPPORTED, "30000001 points, over the limit");
-  cloud.count = UINT64_MAX;
+  cloud.point_count = UINT64_MAX;
   expect_refused(cloud, build_config(), MAQ_ERROR_UNSUPPORTED, "over the limit");
   cloud = cloud_of(places_);
   cloud.up[2] = 0;
@@ -238,12 +238,12 @@ TEST_F(ApiSceneBuilding, SettingsOutOfRangeAreRefusedByName) {
   expect("config.long_side_px", [](auto& config) { config.long_side_px = -1; });
   expect("config.long_side_px", [](auto& config) { config.long_side_px = 16385; });
   expect("config.coefficient_bits is 9", [](auto& config) { config.coefficient_bits = 9; });
-  expect("config.least_variation", [=](auto& config) { config.least_variation = nan; });
+  expect("config.min_variation", [=](auto& config) { config.min_variation = nan; });
   expect("visibility scale is 1.01", [](auto& config) { config.visibility_scale = 1.01; });
   expect("visibility scale", [=](auto& config) { config.visibility_scale = nan; });
   expect("nearest point", [](auto& config) { config.near_depth = -1; });
   expect("nearest point", [=](auto& config) { config.near_depth = nan; });
-  expect("config.uses_held_out", [](auto& config) { config.uses_held_out = 2; });
+  expect("config.use_held_out", [](auto& config) { config.use_held_out = 2; });
   expect("config.struct_size is 5", [](auto& config) { config.struct_size = 5; });
 }
 
@@ -252,14 +252,14 @@ TEST_F(ApiSceneBuilding, CoefficientsAreOfTheBitsAskedForAndMayAllVaryOrNone) {
   for (const int32_t bits : {8, 16, 32}) {
     maq_scene_build_config config = build_config();
     config.coefficient_bits = bits;
-    config.least_variation = 0;
+    config.min_variation = 0;
     const maq_scene_info all = maquette::Scene(context_, config, capture).info();
     EXPECT_EQ(all.coefficient_bits, bits);
-    EXPECT_GT(all.varying_count, 0u);
+    EXPECT_GT(all.view_dependent_count, 0u);
     for (const double least : {1e3, std::numeric_limits<double>::infinity()}) {
-      config.least_variation = least;
+      config.min_variation = least;
       const maq_scene_info none = maquette::Scene(context_, config, capture).info();
-      EXPECT_EQ(none.varying_count, 0u);
+      EXPECT_EQ(none.view_dependent_count, 0u);
       EXPECT_EQ(none.point_count, all.point_count);
     }
   }
@@ -270,7 +270,7 @@ TEST_F(ApiSceneBuilding, CamerasAndPhotosThatDoNotFitAreRefusedAndChangeNothing)
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
   const auto expect = [&](maq_status status, const std::string& text, auto change) {
-    maq_camera camera = camera_at(0);
+    maq_pinhole_camera camera = camera_at(0);
     change(camera);
     uint64_t seen = 77;
     expect_error(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, &seen), status, builder.get(), text);
@@ -293,7 +293,7 @@ TEST_F(ApiSceneBuilding, CamerasAndPhotosThatDoNotFitAreRefusedAndChangeNothing)
     camera.distortion[0] = 0.1;
   });
   EXPECT_EQ(builder.stats().view_count, 0u);
-  EXPECT_EQ(builder.stats().seen_points, 0u);
+  EXPECT_EQ(builder.stats().seen_point_count, 0u);
 }
 
 TEST_F(ApiSceneBuilding, PhotosOverTheNetworksLimitNeedALongSide) {
@@ -301,7 +301,7 @@ TEST_F(ApiSceneBuilding, PhotosOverTheNetworksLimitNeedALongSide) {
   config.long_side_px = 0;
   const Photo large(MAQ_PIXEL_GREY8, 4096, 2112);
   const maquette::Frame frame(context_, large.desc);
-  const maq_camera camera = camera_at(0, 4096, 2112);
+  const maq_pinhole_camera camera = camera_at(0, 4096, 2112);
   maquette::SceneBuilder whole(context_, config, cloud_of(places_));
   expect_error(maq_scene_builder_add_view(whole.get(), frame.get(), &camera, nullptr), MAQ_ERROR_IMAGE_SIZE,
                whole.get(), "4096");
@@ -312,13 +312,13 @@ TEST_F(ApiSceneBuilding, PhotosOverTheNetworksLimitNeedALongSide) {
 
 TEST_F(ApiSceneBuilding, TheLimitOfMemoryIsAStatus) {
   maq_scene_build_config config = build_config();
-  config.most_bytes = 1000;
+  config.max_memory_bytes = 1000;
   expect_refused(cloud_of(places_), config, MAQ_ERROR_OUT_OF_MEMORY, "over the limit");
-  config.most_bytes = 4 * 2000 + 100;
+  config.max_memory_bytes = 4 * 2000 + 100;
   maquette::SceneBuilder builder(context_, config, cloud_of(places_));
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
-  const maq_camera camera = camera_at(0);
+  const maq_pinhole_camera camera = camera_at(0);
   expect_error(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr), MAQ_ERROR_OUT_OF_MEMORY,
                builder.get(), "thinner");
 }
@@ -347,7 +347,7 @@ TEST_F(ApiSceneBuilding, CapturesOfWhichNoPhotoIsLeftAreAStatus) {
   maq_scene_build_stats stats{};
   maquette::Scene(context_, config, capture, &stats);
   EXPECT_EQ(stats.view_count, 3u);
-  EXPECT_EQ(stats.unused_views, 1u);
+  EXPECT_EQ(stats.unused_view_count, 1u);
   for (const int i : {1, 2, 4}) write_text(folder.file("c/images/" + std::to_string(i) + ".png"), "no picture");
   maq_scene* scene = nullptr;
   expect_error(maq_scene_build(context_.get(), &config, capture.get(), nullptr, &scene), MAQ_ERROR_UNREADABLE,
@@ -360,7 +360,7 @@ TEST_F(ApiSceneBuilding, AnotherThreadCancelsTheViewThatRuns) {
     std::atomic<bool> is_inside{false}, may_go_on{false};
   } waiting;
   maq_scene_build_config config = build_config();
-  config.progress = [](void* user_data, double, const char*) -> int32_t {
+  config.progress_callback = [](void* user_data, double, const char*) -> int32_t {
     Waiting& self = *static_cast<Waiting*>(user_data);
     self.is_inside = true;
     while (!self.may_go_on) std::this_thread::yield();
@@ -370,7 +370,7 @@ TEST_F(ApiSceneBuilding, AnotherThreadCancelsTheViewThatRuns) {
   maquette::SceneBuilder builder(context_, config, cloud_of(places_));
   const Photo photo;
   const maquette::Frame frame(context_, photo.desc);
-  const maq_camera camera = camera_at(0);
+  const maq_pinhole_camera camera = camera_at(0);
   maq_status status = MAQ_OK;
   std::thread adding([&] { status = maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr); });
   while (!waiting.is_inside) std::this_thread::yield();
@@ -378,7 +378,7 @@ TEST_F(ApiSceneBuilding, AnotherThreadCancelsTheViewThatRuns) {
   waiting.may_go_on = true;
   adding.join();
   EXPECT_EQ(status, MAQ_CANCELLED);
-  EXPECT_EQ(builder.stats().seen_points, 0u);
+  EXPECT_EQ(builder.stats().seen_point_count, 0u);
   EXPECT_GT(builder.add_view(frame, camera), 300u) << "the next is not cancelled";
   builder.cancel();
   EXPECT_EQ(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr), MAQ_CANCELLED)

@@ -29,10 +29,10 @@ TEST(ApiSceneLimits, TwentyMillionPointsOfAnAppTakeLittleMoreThanACopyOfThem) {
     maquette::SceneBuilder builder(context, build_config(), cloud_of(places));
     EXPECT_GT(builder.add_view(maquette::Frame(context, photo.desc), camera_at(0)), 300u);
     const maquette::Scene scene = builder.finish();
-    EXPECT_EQ(builder.stats().cloud_points, kPoints);
+    EXPECT_EQ(builder.stats().cloud_point_count, kPoints);
     EXPECT_LT(scene.info().point_count, 5000u);
     maquette::SceneRenderer renderer(context, renderer_config(), scene);
-    EXPECT_GT(renderer.run(camera_at(0.1)).stats().points_shaded, 300u);
+    EXPECT_GT(renderer.run(camera_at(0.1)).stats().shaded_point_count, 300u);
   });
   RecordProperty("grown_mib", std::to_string(grown_mib));
   // 229 MiB for the copy, 76 for what is known of points that nobody saw.
@@ -43,17 +43,17 @@ TEST(ApiSceneLimits, MostPointsThinsThemOut) {
   const std::vector<float> places = ball(100'000);
   const maquette::Context context;
   maq_scene_build_config config = build_config();
-  config.most_points = 999;
+  config.max_points = 999;
   maquette::SceneBuilder builder(context, config, cloud_of(places));
-  EXPECT_EQ(builder.stats().cloud_points, 999u);
+  EXPECT_EQ(builder.stats().cloud_point_count, 999u);
   const Photo photo;
   for (const double angle : {0.0, 2.1, 4.2}) {
     builder.add_view(maquette::Frame(context, photo.desc), camera_at(angle));
   }
   const maq_scene_info info = builder.finish().info();
   EXPECT_LE(info.point_count, 999u);
-  EXPECT_LT(info.low[2], -0.8) << "evenly: from all of the ball";
-  EXPECT_GT(info.high[2], 0.8);
+  EXPECT_LT(info.bounds_min[2], -0.8) << "evenly: from all of the ball";
+  EXPECT_GT(info.bounds_max[2], 0.8);
 }
 
 }  // namespace

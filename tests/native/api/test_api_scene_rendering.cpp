@@ -17,8 +17,8 @@ using api_tiny_scene::renderer_config;
 class ApiSceneRendering : public ::testing::Test {
  protected:
   template <class T>
-  static std::vector<T> plane_of(const maquette::SceneImage& image, maq_scene_plane plane, const maq_camera& camera,
-                                 int channels = 1) {
+  static std::vector<T> plane_of(const maquette::SceneImage& image, maq_scene_plane plane,
+                                 const maq_pinhole_camera& camera, int channels = 1) {
     size_t stride = 0;
     const auto* const rows = static_cast<const uint8_t*>(image.plane(plane, &stride));
     std::vector<T> values;
@@ -28,15 +28,15 @@ class ApiSceneRendering : public ::testing::Test {
     }
     return values;
   }
-  static std::vector<uint8_t> bgr_of(const maquette::SceneImage& image, const maq_camera& camera) {
-    return plane_of<uint8_t>(image, MAQ_SCENE_BGR, camera, 3);
+  static std::vector<uint8_t> bgr_of(const maquette::SceneImage& image, const maq_pinhole_camera& camera) {
+    return plane_of<uint8_t>(image, MAQ_SCENE_PLANE_BGR, camera, 3);
   }
 
   void expect_refused(const maq_scene_renderer_config& config, maq_status status, const std::string& text) const {
     maq_scene_renderer* renderer = nullptr;
     EXPECT_EQ(maq_scene_renderer_create(context_.get(), &config, scene_.get(), &renderer), status) << text;
-    EXPECT_NE(std::string(maq_last_error(context_.get())).find(text), std::string::npos)
-        << maq_last_error(context_.get());
+    EXPECT_NE(std::string(maq_get_last_error(context_.get())).find(text), std::string::npos)
+        << maq_get_last_error(context_.get());
     EXPECT_EQ(renderer, nullptr);
   }
 
@@ -46,33 +46,34 @@ class ApiSceneRendering : public ::testing::Test {
 
 TEST_F(ApiSceneRendering, GivesPlanesAndStats) {
   maquette::SceneRenderer renderer(context_, renderer_config(), scene_);
-  const maq_camera camera = camera_at(0.3, 100, 80);
+  const maq_pinhole_camera camera = camera_at(0.3, 100, 80);
   const maquette::SceneImage image = renderer.run(camera);
-  const std::vector<uint8_t> alpha = plane_of<uint8_t>(image, MAQ_SCENE_ALPHA, camera);
-  const std::vector<float> depth = plane_of<float>(image, MAQ_SCENE_DEPTH, camera);
+  const std::vector<uint8_t> alpha = plane_of<uint8_t>(image, MAQ_SCENE_PLANE_ALPHA, camera);
+  const std::vector<float> depth = plane_of<float>(image, MAQ_SCENE_PLANE_DEPTH, camera);
   const size_t middle = 40 * 100 + 50;
   EXPECT_EQ(alpha[middle], 255);
   EXPECT_NEAR(depth[middle], 2, 0.1) << "a ball of radius 1, seen from 3 away";
   EXPECT_EQ(alpha[0], 0);
   EXPECT_EQ(depth[0], 0);
   const maq_scene_image_stats stats = image.stats();
-  EXPECT_GT(stats.points_drawn, 1000u);
-  EXPECT_GT(stats.points_shaded, 300u);
-  EXPECT_LE(stats.points_shaded, stats.points_drawn);
-  EXPECT_GE(stats.blocks_drawn, 1u);
-  EXPECT_GT(stats.refined_pixels, 1000);
+  EXPECT_GT(stats.drawn_point_count, 1000u);
+  EXPECT_GT(stats.shaded_point_count, 300u);
+  EXPECT_LE(stats.shaded_point_count, stats.drawn_point_count);
+  EXPECT_GE(stats.drawn_block_count, 1u);
+  EXPECT_GT(stats.refined_pixel_count, 1000);
   EXPECT_GT(stats.total_ms, 0);
-  EXPECT_GE(stats.total_ms * 1.01f, stats.project_ms + stats.shade_ms + stats.refine_ms + stats.turn_ms);
+  EXPECT_GE(stats.total_ms * 1.01f, stats.project_ms + stats.shade_ms + stats.refine_ms + stats.resample_ms);
   const void* pixels = nullptr;
   size_t stride = 0;
   for (const int wrong : {0, 4}) {
-    EXPECT_EQ(maq_scene_image_plane(image.get(), maq_scene_plane(wrong), &pixels, &stride), MAQ_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(maq_scene_image_get_plane(image.get(), maq_scene_plane(wrong), &pixels, &stride),
+              MAQ_ERROR_INVALID_ARGUMENT);
   }
 }
 
 TEST_F(ApiSceneRendering, ImagesAreBoundedReusedAndOutliveEverything) {
   std::vector<maquette::SceneImage> held;
-  const maq_camera camera = camera_at(0);
+  const maq_pinhole_camera camera = camera_at(0);
   std::vector<uint8_t> expected;
   {
     const maquette::Context context;
@@ -97,32 +98,32 @@ TEST_F(ApiSceneRendering, WhereNothingIsSeenThereIsTheBackgroundAndNoNetworkRuns
   config.background[0] = 200;
   config.background[1] = 100;
   config.background[2] = 50;
-  config.has_background = 1;
+  config.use_background = 1;
   maquette::SceneRenderer renderer(context_, config, scene_);
-  maq_camera camera = camera_at(0);
+  maq_pinhole_camera camera = camera_at(0);
   camera.centre[0] = -3;
   const maquette::SceneImage image = renderer.run(camera);
   const std::vector<uint8_t> bgr = bgr_of(image, camera);
   for (size_t i = 0; i < bgr.size(); i += 3) {
     ASSERT_TRUE(bgr[i] == 50 && bgr[i + 1] == 100 && bgr[i + 2] == 200) << i;
   }
-  for (const float depth : plane_of<float>(image, MAQ_SCENE_DEPTH, camera)) ASSERT_EQ(depth, 0);
-  EXPECT_EQ(image.stats().refined_pixels, 0);
-  EXPECT_EQ(image.stats().points_shaded, 0u);
+  for (const float depth : plane_of<float>(image, MAQ_SCENE_PLANE_DEPTH, camera)) ASSERT_EQ(depth, 0);
+  EXPECT_EQ(image.stats().refined_pixel_count, 0);
+  EXPECT_EQ(image.stats().shaded_point_count, 0u);
 }
 
 TEST_F(ApiSceneRendering, OverTheBackgroundItIsMixedByAlpha) {
-  const maq_camera camera = camera_at(0);
+  const maq_pinhole_camera camera = camera_at(0);
   std::array<std::vector<uint8_t>, 2> pictures;
   std::vector<uint8_t> alpha;
   for (const uint8_t over : {uint8_t(0), uint8_t(1)}) {
     maq_scene_renderer_config config = renderer_config();
     config.background[1] = 255;
-    config.has_background = over;
+    config.use_background = over;
     maquette::SceneRenderer renderer(context_, config, scene_);
     const maquette::SceneImage image = renderer.run(camera);
     pictures[over] = bgr_of(image, camera);
-    alpha = plane_of<uint8_t>(image, MAQ_SCENE_ALPHA, camera);
+    alpha = plane_of<uint8_t>(image, MAQ_SCENE_PLANE_ALPHA, camera);
   }
   size_t between = 0;
   for (size_t i = 0; i < alpha.size(); ++i) {
@@ -139,12 +140,12 @@ TEST_F(ApiSceneRendering, PicturesHaveAnySizeUpToTheLimit) {
   maquette::SceneRenderer renderer(context_, renderer_config(), scene_);
   const std::pair<int, int> sizes[] = {{1, 1}, {333, 17}, {16, 300}, {64, 48}};
   for (const auto& [width, height] : sizes) {
-    const maq_camera camera = camera_at(0, width, height);
+    const maq_pinhole_camera camera = camera_at(0, width, height);
     EXPECT_EQ(bgr_of(renderer.run(camera), camera).size(), size_t(3 * width * height));
   }
   const std::pair<int, int> wrong[] = {{0, 10}, {10, -1}, {20000, 10}, {16000, 16000}, {INT32_MAX, INT32_MAX}};
   for (const auto& [width, height] : wrong) {
-    const maq_camera camera = camera_at(0, width, height);
+    const maq_pinhole_camera camera = camera_at(0, width, height);
     maq_scene_image* image = nullptr;
     EXPECT_EQ(maq_scene_renderer_run(renderer.get(), &camera, &image), MAQ_ERROR_IMAGE_SIZE) << width;
     EXPECT_EQ(image, nullptr);
@@ -156,12 +157,12 @@ TEST_F(ApiSceneRendering, CamerasThatAreNoneAreRefusedAndCostNoImage) {
   config.image_pool_size = 1;
   maquette::SceneRenderer renderer(context_, config, scene_);
   const auto expect = [&](const std::string& text, auto change) {
-    maq_camera camera = camera_at(0);
+    maq_pinhole_camera camera = camera_at(0);
     change(camera);
     maq_scene_image* image = nullptr;
     EXPECT_EQ(maq_scene_renderer_run(renderer.get(), &camera, &image), MAQ_ERROR_INVALID_ARGUMENT);
-    EXPECT_NE(std::string(maq_last_error(renderer.get())).find(text), std::string::npos)
-        << maq_last_error(renderer.get());
+    EXPECT_NE(std::string(maq_get_last_error(renderer.get())).find(text), std::string::npos)
+        << maq_get_last_error(renderer.get());
     EXPECT_EQ(image, nullptr);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -173,30 +174,30 @@ TEST_F(ApiSceneRendering, CamerasThatAreNoneAreRefusedAndCostNoImage) {
   expect("not finite", [=](auto& camera) { camera.rotation[4] = nan; });
   expect("rotation", [](auto& camera) { camera.rotation[5] = 0; });
   expect("camera.struct_size", [](auto& camera) { camera.struct_size += 8; });
-  EXPECT_GT(renderer.run(camera_at(0)).stats().points_shaded, 0u);
+  EXPECT_GT(renderer.run(camera_at(0)).stats().shaded_point_count, 0u);
 }
 
 TEST_F(ApiSceneRendering, PointsNearerThanTheNearDepthAreNotDrawn) {
   maq_scene_renderer_config config = renderer_config();
   config.near_depth = 2.5;
   maquette::SceneRenderer renderer(context_, config, scene_);
-  const maq_camera camera = camera_at(0);
-  for (const float depth : plane_of<float>(renderer.run(camera), MAQ_SCENE_DEPTH, camera)) {
+  const maq_pinhole_camera camera = camera_at(0);
+  for (const float depth : plane_of<float>(renderer.run(camera), MAQ_SCENE_PLANE_DEPTH, camera)) {
     ASSERT_TRUE(depth == 0 || depth >= 2.49f) << depth;
   }
 }
 
 TEST_F(ApiSceneRendering, WorkThatCanBeLeftOutChangesNoCoveredPixel) {
-  const maq_camera camera = camera_at(0.4, 200, 160);
+  const maq_pinhole_camera camera = camera_at(0.4, 200, 160);
   maquette::SceneRenderer usual(context_, renderer_config(), scene_);
   const maquette::SceneImage expected = usual.run(camera);
-  const std::vector<uint8_t> alpha = plane_of<uint8_t>(expected, MAQ_SCENE_ALPHA, camera);
+  const std::vector<uint8_t> alpha = plane_of<uint8_t>(expected, MAQ_SCENE_PLANE_ALPHA, camera);
   maq_scene_renderer_config config = renderer_config();
-  config.draws_unseen_blocks = config.refines_empty_parts = 1;
+  config.draw_unseen_blocks = config.refine_empty_parts = 1;
   maquette::SceneRenderer thorough(context_, config, scene_);
   const maquette::SceneImage found = thorough.run(camera);
-  EXPECT_GE(found.stats().refined_pixels, expected.stats().refined_pixels);
-  EXPECT_EQ(found.stats().points_shaded, expected.stats().points_shaded);
+  EXPECT_GE(found.stats().refined_pixel_count, expected.stats().refined_pixel_count);
+  EXPECT_EQ(found.stats().shaded_point_count, expected.stats().shaded_point_count);
   const std::vector<uint8_t> a = bgr_of(expected, camera), b = bgr_of(found, camera);
   for (size_t i = 0; i < alpha.size(); ++i) {
     if (alpha[i] == 0) continue;
@@ -205,7 +206,7 @@ TEST_F(ApiSceneRendering, WorkThatCanBeLeftOutChangesNoCoveredPixel) {
 }
 
 TEST_F(ApiSceneRendering, SeveralRenderersOfOneSceneRunAtOnce) {
-  const maq_camera camera = camera_at(1);
+  const maq_pinhole_camera camera = camera_at(1);
   maquette::SceneRenderer first(context_, renderer_config(), scene_);
   const std::vector<uint8_t> expected = bgr_of(first.run(camera), camera);
   std::vector<std::thread> threads;
@@ -230,12 +231,12 @@ TEST_F(ApiSceneRendering, SettingsOutOfRangeAreRefusedByName) {
   expect("config.threads", [](auto& config) { config.threads = 65; });
   expect("config.image_pool_size is 0", [](auto& config) { config.image_pool_size = 0; });
   expect("config.image_pool_size is 65", [](auto& config) { config.image_pool_size = 65; });
-  expect("config.spin is 2", [](auto& config) { config.spin = 2; });
+  expect("config.allow_spinning is 2", [](auto& config) { config.allow_spinning = 2; });
   expect("config.near_depth", [](auto& config) { config.near_depth = -1; });
   expect("config.near_depth", [](auto& config) { config.near_depth = std::numeric_limits<double>::quiet_NaN(); });
-  expect("config.has_background is 2", [](auto& config) { config.has_background = 2; });
-  expect("config.draws_unseen_blocks", [](auto& config) { config.draws_unseen_blocks = 2; });
-  expect("config.refines_empty_parts", [](auto& config) { config.refines_empty_parts = 2; });
+  expect("config.use_background is 2", [](auto& config) { config.use_background = 2; });
+  expect("config.draw_unseen_blocks", [](auto& config) { config.draw_unseen_blocks = 2; });
+  expect("config.refine_empty_parts", [](auto& config) { config.refine_empty_parts = 2; });
   expect("config.struct_size is 3", [](auto& config) { config.struct_size = 3; });
 }
 

@@ -19,7 +19,7 @@ class ApiScenes : public ::testing::Test {
     maq_scene* scene = nullptr;
     const maq_status status = maq_scene_open(context_.get(), path.c_str(), &scene);
     EXPECT_EQ(scene != nullptr, status == MAQ_OK);
-    maq_scene_destroy(scene);
+    maq_scene_close(scene);
     return status;
   }
 
@@ -32,12 +32,12 @@ TEST_F(ApiScenes, AFileIsTheSceneThatWasSaved) {
   const maquette::Scene opened(context_, path());
   const maq_scene_info expected = scene_.info(), found = opened.info();
   EXPECT_GT(found.point_count, 1000u);
-  EXPECT_LE(found.varying_count, found.point_count);
+  EXPECT_LE(found.view_dependent_count, found.point_count);
   EXPECT_GE(found.block_count, 1u);
   EXPECT_EQ(std::memcmp(&expected, &found, sizeof found), 0);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(found.low[axis], -1, 0.2);
-    EXPECT_NEAR(found.high[axis], 1, 0.2);
+    EXPECT_NEAR(found.bounds_min[axis], -1, 0.2);
+    EXPECT_NEAR(found.bounds_max[axis], 1, 0.2);
   }
   opened.save(folder_.file("again.maqs"));
   EXPECT_EQ(read_text(folder_.file("again.maqs")), read_text(path()));
@@ -79,7 +79,7 @@ TEST_F(ApiScenes, PlyHasEveryPointAndItsColour) {
 TEST_F(ApiScenes, WhatCannotBeWrittenIsAStatusAndTheOldFileStays) {
   for (const auto save : {maq_scene_save, maq_scene_save_ply}) {
     EXPECT_EQ(save(scene_.get(), "/no/such/folder/ball.maqs"), MAQ_ERROR_UNWRITABLE);
-    EXPECT_NE(std::string(maq_last_error(scene_.get())).find("/no/such/folder"), std::string::npos);
+    EXPECT_NE(std::string(maq_get_last_error(scene_.get())).find("/no/such/folder"), std::string::npos);
     EXPECT_EQ(save(scene_.get(), folder_.path().c_str()), MAQ_ERROR_UNWRITABLE);
     EXPECT_EQ(save(scene_.get(), ""), MAQ_ERROR_UNWRITABLE);
   }
@@ -89,7 +89,7 @@ TEST_F(ApiScenes, WhatCannotBeWrittenIsAStatusAndTheOldFileStays) {
 
 TEST_F(ApiScenes, FilesThatAreNoneAreAStatus) {
   EXPECT_EQ(open(folder_.file("none.maqs")), MAQ_ERROR_NOT_FOUND);
-  EXPECT_NE(std::string(maq_last_error(context_.get())).find("none.maqs"), std::string::npos);
+  EXPECT_NE(std::string(maq_get_last_error(context_.get())).find("none.maqs"), std::string::npos);
   EXPECT_EQ(open(folder_.path().string()), MAQ_ERROR_UNREADABLE);
   write_text(folder_.file("text.maqs"), "no scene");
   EXPECT_EQ(open(folder_.file("text.maqs")), MAQ_ERROR_UNREADABLE);

@@ -15,21 +15,21 @@ namespace {
 TEST(ApiSources, EverySchemeOfTheListHasAnExampleThatIsKnown) {
   const maquette::Context context;
   std::set<std::string> names;
-  for (uint32_t i = 0; i < maq_source_scheme_count(); ++i) {
+  for (uint32_t i = 0; i < maq_source_get_scheme_count(); ++i) {
     maq_source_scheme scheme{};
     scheme.struct_size = sizeof scheme;
     ASSERT_EQ(maq_source_get_scheme(i, &scheme), MAQ_OK);
     names.insert(scheme.name);
     maq_source* source = nullptr;
     const maq_status status = maq_source_create(context.get(), scheme.example, nullptr, &source);
-    EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_last_error(context.get());
+    EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_get_last_error(context.get());
     maq_source_destroy(source);
   }
   EXPECT_EQ(names,
             (std::set<std::string>{"camera", "depthai", "file", "image", "libcamera", "rec", "stub", "v4l2", "video"}));
   maq_source_scheme scheme{};
   scheme.struct_size = sizeof scheme;
-  EXPECT_EQ(maq_source_get_scheme(maq_source_scheme_count(), &scheme), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_source_get_scheme(maq_source_get_scheme_count(), &scheme), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST(ApiSources, CamerasAreListedAndWrongIndicesRefused) {
@@ -38,18 +38,18 @@ TEST(ApiSources, CamerasAreListedAndWrongIndicesRefused) {
   ASSERT_EQ(maq_camera_list_create(context.get(), &list), MAQ_OK);
   maq_camera_info info{};
   info.struct_size = sizeof info;
-  const uint32_t count = maq_camera_list_count(list);  // none on most machines that run tests
+  const uint32_t count = maq_camera_list_get_count(list);  // none on most machines that run tests
   for (uint32_t i = 0; i < count; ++i) {
-    ASSERT_EQ(maq_camera_list_get(list, i, &info), MAQ_OK);
+    ASSERT_EQ(maq_camera_list_get_camera(list, i, &info), MAQ_OK);
     const std::string uri = info.uri;
     EXPECT_TRUE(uri.rfind("v4l2:/dev/video", 0) == 0 || uri.rfind("libcamera:", 0) == 0) << uri;
   }
-  EXPECT_EQ(maq_camera_list_get(list, count, &info), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_camera_list_get_camera(list, count, &info), MAQ_ERROR_INVALID_ARGUMENT);
   maq_camera_mode mode{};
   mode.struct_size = sizeof mode;
   EXPECT_EQ(maq_camera_list_get_mode(list, count, 0, &mode), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_camera_list_create(context.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_camera_list_count(nullptr), 0u);
+  EXPECT_EQ(maq_camera_list_get_count(nullptr), 0u);
   maq_camera_list_destroy(list);
   maq_camera_list_destroy(nullptr);
 }
@@ -63,7 +63,7 @@ TEST(ApiSources, DescribeThemselvesAndDeliverUntilTheEnd) {
   EXPECT_DOUBLE_EQ(info.fps, 10);
   EXPECT_EQ(info.is_live, 0);
   EXPECT_EQ(info.clock, MAQ_CLOCK_MEDIA);
-  EXPECT_EQ(info.pool_size, 4u);
+  EXPECT_EQ(info.frame_pool_size, 4u);
   EXPECT_TRUE(source.next().has_value());
   EXPECT_EQ(source.next()->desc().timestamp_ns, 100000000);
   EXPECT_FALSE(source.next().has_value());
@@ -79,11 +79,11 @@ TEST(ApiSources, SayWhenEveryFrameIsHeldAndAFrameGivenBackIsNewToTheNext) {
   EXPECT_EQ(frame, nullptr);
   maq_frame_desc wrong{};
   EXPECT_EQ(maq_frame_get_desc(held.back().get(), &wrong), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_STRNE(maq_last_error(held.back().get()), "");
+  EXPECT_STRNE(maq_get_last_error(held.back().get()), "");
   held.pop_back();
   const std::optional<maquette::Frame> next = source.next();
   EXPECT_EQ(next->desc().sequence, 4u) << "a refused call takes no frame";
-  EXPECT_STREQ(maq_last_error(next->get()), "");
+  EXPECT_STREQ(maq_get_last_error(next->get()), "");
 }
 
 TEST(ApiSources, WhatIsRecordedIsPlayedAgain) {
@@ -160,7 +160,7 @@ TEST(ApiSources, OnlyCamerasHaveControls) {
   }
   maq_source* camera = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "v4l2:/no/such?gain=loud", nullptr, &camera), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(maq_last_error(context.get()), "gain=loud in v4l2:/no/such?gain=loud must be a number or auto.");
+  EXPECT_STREQ(maq_get_last_error(context.get()), "gain=loud in v4l2:/no/such?gain=loud must be a number or auto.");
 }
 
 // A copy of the SDK that lies alone.
@@ -209,16 +209,16 @@ class LoneCopy {
     maq_camera_list* list = nullptr;
     EXPECT_EQ(function<decltype(maq_camera_list_create)>("maq_camera_list_create")(context_, &list), MAQ_OK);
     std::vector<maq_status> found;
-    for (uint32_t i = 0; i < function<decltype(maq_camera_list_count)>("maq_camera_list_count")(list); ++i) {
+    for (uint32_t i = 0; i < function<decltype(maq_camera_list_get_count)>("maq_camera_list_get_count")(list); ++i) {
       maq_camera_info info{};
       info.struct_size = sizeof info;
-      EXPECT_EQ(function<decltype(maq_camera_list_get)>("maq_camera_list_get")(list, i, &info), MAQ_OK);
+      EXPECT_EQ(function<decltype(maq_camera_list_get_camera)>("maq_camera_list_get_camera")(list, i, &info), MAQ_OK);
       if (std::string(info.uri).rfind("depthai:", 0) == 0) found.push_back(info.status);
     }
     function<decltype(maq_camera_list_destroy)>("maq_camera_list_destroy")(list);
     return found;
   }
-  std::string last_error() { return function<decltype(maq_last_error)>("maq_last_error")(context_); }
+  std::string last_error() { return function<decltype(maq_get_last_error)>("maq_get_last_error")(context_); }
   template <typename Function>
   Function* function(const char* name) const {
     return reinterpret_cast<Function*>(dlsym(library_, name));
@@ -292,9 +292,9 @@ TEST(ApiSources, DepthAiDeliversDepthAndCalibrationAcrossItsLibrary) {
   EXPECT_EQ(sdk.open("depthai:10.0.0.1"), MAQ_ERROR_NO_PERMISSION)
       << "an exception of the library: " << sdk.last_error();
   sdk.use("depthai:?size=64x48&fps=100", [&](maq_source* source) {
-    maq_calibration calibration{};
+    maq_intrinsics calibration{};
     calibration.struct_size = sizeof calibration;
-    EXPECT_EQ(sdk.function<decltype(maq_source_get_calibration)>("maq_source_get_calibration")(source, &calibration),
+    EXPECT_EQ(sdk.function<decltype(maq_source_get_intrinsics)>("maq_source_get_intrinsics")(source, &calibration),
               MAQ_OK);
     EXPECT_EQ(calibration.width_px, 64);
     EXPECT_EQ(calibration.fx_px, 500);
@@ -320,11 +320,11 @@ TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {
   maq_source* source = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "rtsp:camera", nullptr, &source), MAQ_ERROR_UNSUPPORTED);
   EXPECT_STREQ(
-      maq_last_error(context.get()),
+      maq_get_last_error(context.get()),
       "\"rtsp:\" is not a kind of source of this build; there are file:, camera:, image:, video:, rec:, stub:, v4l2:, "
       "libcamera:, depthai:.");
   EXPECT_EQ(maq_source_create(context.get(), "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND);
-  EXPECT_STREQ(maq_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
+  EXPECT_STREQ(maq_get_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
   EXPECT_EQ(source, nullptr);
 }
 

@@ -16,7 +16,7 @@ struct Point {
 };
 
 // The middle of what a part reaches; parts count from 1.
-Point middle_of(const maq_surface& surface, int part) {
+Point middle_of(const maq_densepose_surface& surface, int part) {
   const size_t nodes = size_t(surface.nodes) * size_t(surface.nodes);
   Point sum;
   double count = 0;
@@ -101,8 +101,8 @@ TEST(ApiSurface, ABundleWithoutOneSaysSo) {
   const maquette::Context context;
   const maquette::DensePose densepose(context, MAQ_TEST_DATA "/tiny_bundle");
   EXPECT_FALSE(densepose.surface());
-  EXPECT_NE(std::string(maq_last_error(densepose.get())).find("no surface grid"), std::string::npos);
-  maq_surface surface{};
+  EXPECT_NE(std::string(maq_get_last_error(densepose.get())).find("no surface grid"), std::string::npos);
+  maq_densepose_surface surface{};
   EXPECT_EQ(maq_densepose_get_surface(nullptr, &surface), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_densepose_get_surface(densepose.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
@@ -111,7 +111,7 @@ TEST(ApiSurface, StructsOfUnknownSizeAreRefused) {
   const maquette::Context context;
   const maquette::DensePose densepose(context, kShipped);
   for (const uint32_t wrong : {0u, 3u, 100000u}) {
-    maq_surface surface{wrong, -1, nullptr};
+    maq_densepose_surface surface{wrong, -1, nullptr};
     EXPECT_EQ(maq_densepose_get_surface(densepose.get(), &surface), MAQ_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(surface.nodes, -1);
   }

@@ -179,7 +179,8 @@ TEST(SteadyState, FramesOfLiveSourcesTakeNothingFromTheHeap) {
     const auto take = [&](int frames) {
       for (int i = 0; i < frames; ++i) {
         maq_frame* frame = nullptr;
-        ASSERT_EQ(maq_source_acquire_frame(source.get(), 10000000000, &frame), MAQ_OK) << maq_last_error(source.get());
+        ASSERT_EQ(maq_source_acquire_frame(source.get(), 10000000000, &frame), MAQ_OK)
+            << maq_get_last_error(source.get());
         maq_frame_release(frame);
       }
     };
@@ -206,7 +207,7 @@ TEST(SteadyState, AFrameTakesNothingFromTheHeap) {
       uint32_t count = 0;
       ASSERT_EQ(maq_source_acquire_frame(source.get(), MAQ_WAIT_FOREVER, &frame), MAQ_OK);
       ASSERT_EQ(maq_densepose_run(densepose.get(), frame, &result), MAQ_OK);
-      ASSERT_EQ(maq_densepose_result_people(result, &found, &count), MAQ_OK);
+      ASSERT_EQ(maq_densepose_result_get_people(result, &found, &count), MAQ_OK);
       people += int(count);
       maq_densepose_result_release(result);
       maq_frame_release(frame);

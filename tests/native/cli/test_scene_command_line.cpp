@@ -98,7 +98,7 @@ TEST_F(SceneCommandLine, EveryOptionOfBuildingDoesWhatItSays) {
   EXPECT_EQ(built("--all-photos").at("views"), 5);
   EXPECT_EQ(built("--coefficients 16").at("coefficient_bits"), 16);
   EXPECT_EQ(built("--coefficients 32").at("coefficient_bits"), 32);
-  EXPECT_EQ(built("--least-variation 100").at("varying"), 0);
+  EXPECT_EQ(built("--min-variation 100").at("varying"), 0);
   EXPECT_LT(built("--visibility-scale 0.25").at("points"), usual.at("points"));
   // Who is too near hides nobody.
   EXPECT_NE(built("--near 3").at("points"), usual.at("points"));

@@ -9,10 +9,10 @@
 #include <thread>
 #include <tuple>
 
-#include "support/expect_error.h"
-#include "support/fake_depthai.h"
 #include "sources/depthai/depthai_camera.h"
 #include "sources/live_source.h"
+#include "support/expect_error.h"
+#include "support/fake_depthai.h"
 
 namespace {
 
@@ -487,7 +487,7 @@ TEST_F(DepthaiCameras, ALinkThatBreaksIsReportedAndTheSameDeviceComesBack) {
   EXPECT_EQ(frame.image.planes[0].data[100], 1) << "held frames stay readable";
   fake_.devices = {{"another", "1.2", "RVC2", MAQ_OK, ""}, {"18443010A1", "5.6", "RVC2", MAQ_OK, ""}};
   fake_.plug();
-  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
   EXPECT_EQ(fake_.opened_device(), "18443010A1");
   const int64_t time = FakeDepthAi::now_ns();
   fake_.send_colour(fake_.colour(2, 0, time));
@@ -522,7 +522,7 @@ TEST_F(DepthaiCameras, EveryFaultOfAStreamLosesTheCameraAndBringsItBack) {
     fake_.break_call(Call::kClose, fault);
     ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_LOST));
     fake_.mend();
-    ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_BACK));
+    ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_RECONNECTED));
   }
 }
 
@@ -625,7 +625,7 @@ TEST_F(DepthaiCameras, CalibrationIsThatOfTheAgreedSize) {
   fake_.lens = maq::DepthAiLens{501, 502, 31, 25, {1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0}, true};
   auto opened = camera({64, 48, 30, false});
   ASSERT_NE(opened->calibration(), nullptr);
-  const maq_calibration found = *opened->calibration();
+  const maq_intrinsics found = *opened->calibration();
   EXPECT_EQ(found.width_px, 64);
   EXPECT_EQ(found.height_px, 48);
   EXPECT_EQ(found.fx_px, 501);
@@ -672,7 +672,7 @@ TEST_F(DepthaiCameras, ControlsReachTheDeviceAndValuesOutOfRangeDoNot) {
   fake_.send_colour(std::move(colour));
   take_and_return(*opened);
   EXPECT_EQ(opened->control(MAQ_CONTROL_EXPOSURE).value, 8000) << "what the automatic chose";
-  EXPECT_EQ(opened->control(MAQ_CONTROL_EXPOSURE).most, 33333) << "a frame's time";
+  EXPECT_EQ(opened->control(MAQ_CONTROL_EXPOSURE).max, 33333) << "a frame's time";
   EXPECT_EQ(opened->control(MAQ_CONTROL_WHITE_BALANCE).value, 4300);
   EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).value, 1);
   opened->set_control(MAQ_CONTROL_EXPOSURE, 5000.4);
@@ -695,10 +695,10 @@ TEST_F(DepthaiCameras, ControlsReachTheDeviceAndValuesOutOfRangeDoNot) {
 
   for (int which = MAQ_CONTROL_AUTO_EXPOSURE; which <= MAQ_CONTROL_BRIGHTNESS; ++which) {
     const maq_control_info info = opened->control(maq_control(which));
-    EXPECT_TRUE(info.least < info.most && info.value >= info.least && info.value <= info.most &&
-                info.preset >= info.least && info.preset <= info.most && info.step == 1)
+    EXPECT_TRUE(info.min < info.max && info.value >= info.min && info.value <= info.max &&
+                info.default_value >= info.min && info.default_value <= info.max && info.step == 1)
         << which;
-    for (const double value : {info.least - 1, info.most + 1, 1e300, std::numeric_limits<double>::quiet_NaN()}) {
+    for (const double value : {info.min - 1, info.max + 1, 1e300, std::numeric_limits<double>::quiet_NaN()}) {
       expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from", [&] { opened->set_control(maq_control(which), value); });
     }
   }
@@ -716,7 +716,7 @@ TEST_F(DepthaiCameras, AControlThatFailsChangesNothing) {
     for (int which = MAQ_CONTROL_AUTO_EXPOSURE; which <= MAQ_CONTROL_BRIGHTNESS; ++which) {
       const maq_control_info before = opened->control(maq_control(which));
       expect_error(fault == Fault::kError ? MAQ_ERROR_BUSY : MAQ_ERROR_DEVICE_LOST, "does not take a control",
-                   [&] { opened->set_control(maq_control(which), before.least); });
+                   [&] { opened->set_control(maq_control(which), before.min); });
       EXPECT_EQ(opened->control(maq_control(which)).value, before.value);
     }
   }

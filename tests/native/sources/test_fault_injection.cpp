@@ -8,11 +8,11 @@
 #include <set>
 #include <thread>
 
-#include "support/expect_error.h"
-#include "support/source_threads.h"
-#include "sources/synthetic/fault_injection.h"
 #include "sources/recording/recording.h"
 #include "sources/source.h"
+#include "sources/synthetic/fault_injection.h"
+#include "support/expect_error.h"
+#include "support/source_threads.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -153,7 +153,7 @@ TEST_F(FaultInjection, StallsAreReportedAndEnd) {
   maq::Frame frame;
   EXPECT_EQ(source->next(kSecond / 5, frame), NextFrame::kTimeout);
   EXPECT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
-  EXPECT_EQ(states(), (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_STALLED, MAQ_SOURCE_BACK}));
+  EXPECT_EQ(states(), (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_STALLED, MAQ_SOURCE_RECONNECTED}));
 }
 
 TEST_F(FaultInjection, AnUnpluggedOneComesBack) {
@@ -165,14 +165,14 @@ TEST_F(FaultInjection, AnUnpluggedOneComesBack) {
     frame.clear();
     ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
     const auto seen = states();
-    came_back = !seen.empty() && seen.back() == MAQ_SOURCE_BACK;
+    came_back = !seen.empty() && seen.back() == MAQ_SOURCE_RECONNECTED;
     EXPECT_TRUE(last == 0 || frame.sequence > last);
     last = frame.sequence;
   }
   EXPECT_GE(Clock::now() - begin, 400ms);
   EXPECT_GT(frame.timestamp_ns, lost_ns_ + 290000000) << "what came meanwhile is lost";
   EXPECT_EQ(states(), (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_LOST, MAQ_SOURCE_RECONNECTING,
-                                                     MAQ_SOURCE_BACK}));
+                                                     MAQ_SOURCE_RECONNECTED}));
 }
 
 TEST_F(FaultInjection, AnUnpluggedOneThatStaysAwayIsLost) {

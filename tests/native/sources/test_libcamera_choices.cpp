@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "support/expect_error.h"
 #include "sources/libcamera/controls.h"
 #include "sources/libcamera/formats.h"
+#include "support/expect_error.h"
 
 namespace {
 
@@ -144,13 +144,13 @@ std::string next_setting(maq::LibcameraControls& book) {
 TEST(LibcameraChoices, ControlsHaveTheRangesOfTheCamera) {
   const maq::LibcameraControls book(board_controls(), "0");
   const maq_control_info exposure = book.get(MAQ_CONTROL_EXPOSURE);
-  EXPECT_EQ(exposure.least, 100);
-  EXPECT_EQ(exposure.most, 66666);
-  EXPECT_EQ(exposure.preset, 20000);
+  EXPECT_EQ(exposure.min, 100);
+  EXPECT_EQ(exposure.max, 66666);
+  EXPECT_EQ(exposure.default_value, 20000);
   EXPECT_EQ(exposure.value, 20000);
   EXPECT_EQ(exposure.step, 1);
-  EXPECT_EQ(book.get(MAQ_CONTROL_BRIGHTNESS).least, -1);
-  EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_FOCUS).most, 1) << "libcamera has three ways to focus, and we two";
+  EXPECT_EQ(book.get(MAQ_CONTROL_BRIGHTNESS).min, -1);
+  EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_FOCUS).max, 1) << "libcamera has three ways to focus, and we two";
   EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_FOCUS).value, 0);
   expect_error(MAQ_ERROR_UNSUPPORTED, "libcamera:0 has no control 7", [&] { book.get(MAQ_CONTROL_WHITE_BALANCE); });
 }

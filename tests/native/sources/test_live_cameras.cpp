@@ -258,13 +258,13 @@ TEST_F(LiveCameras, ALostCameraIsReportedAndComesBackWithNumbersThatGoOn) {
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
   EXPECT_EQ(live->next(0, frame), NextFrame::kTimeout);
   fake_.plug();
-  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
   ASSERT_TRUE(fake_.deliver(2));
   ASSERT_EQ(live->next(5 * kSecond, frame), NextFrame::kFrame);
   EXPECT_EQ(frame.image.planes[0].data[0], 2);
   EXPECT_EQ(frame.sequence, 1u);
   EXPECT_EQ(reports_.states(), (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_LOST,
-                                                              MAQ_SOURCE_RECONNECTING, MAQ_SOURCE_BACK}));
+                                                              MAQ_SOURCE_RECONNECTING, MAQ_SOURCE_RECONNECTED}));
   EXPECT_EQ(fake_.opened(), 2);
 }
 
@@ -277,7 +277,7 @@ TEST_F(LiveCameras, ACameraThatComesBackUnderAnotherNumberIsFound) {
   fake_.unplug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
   fake_.plug("/dev/video3");
-  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
   ASSERT_TRUE(fake_.deliver(2));
   maq::Frame frame;
   ASSERT_EQ(live->next(5 * kSecond, frame), NextFrame::kFrame);
@@ -307,9 +307,9 @@ TEST_F(LiveCameras, AStallIsReportedOnceAndSoIsItsEnd) {
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_STALLED));
   std::this_thread::sleep_for(500ms);
   ASSERT_TRUE(fake_.deliver(1));
-  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
   EXPECT_EQ(reports_.states(),
-            (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_STALLED, MAQ_SOURCE_BACK}));
+            (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_STALLED, MAQ_SOURCE_RECONNECTED}));
 }
 
 TEST_F(LiveCameras, ACallbackThatThrowsEndsTheSourceAndNotTheApp) {

@@ -4,11 +4,11 @@
 
 #include <cstring>
 
-#include "support/expect_error.h"
-#include "support/file_size_limit.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
 #include "sources/source.h"
+#include "support/expect_error.h"
+#include "support/file_size_limit.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -78,7 +78,7 @@ TEST_F(Recordings, GiveBackEachFrameAsItWas) {
 }
 
 TEST_F(Recordings, KeepEveryFormatDepthAndCalibration) {
-  maq::RecordingInfo info{"a source\xff", 30, maq_calibration{}};
+  maq::RecordingInfo info{"a source\xff", 30, maq_intrinsics{}};
   info.calibration->width_px = 64;
   info.calibration->height_px = 48;
   info.calibration->fx_px = 50.25;

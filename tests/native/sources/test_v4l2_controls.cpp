@@ -6,9 +6,9 @@
 #include <cmath>
 #include <tuple>
 
-#include "support/live_camera_test.h"
 #include "sources/control_options.h"
 #include "sources/source.h"
+#include "support/live_camera_test.h"
 
 namespace {
 
@@ -45,10 +45,10 @@ TEST_F(V4l2Controls, AreReadInUnitsOfTheApi) {
   control(V4L2_CID_BRIGHTNESS).value = 33;
   for (const auto& [which, least, most, step, preset] : expected) {
     const maq_control_info info = opened->control(which);
-    EXPECT_EQ(info.least, least) << which;
-    EXPECT_EQ(info.most, most) << which;
+    EXPECT_EQ(info.min, least) << which;
+    EXPECT_EQ(info.max, most) << which;
     EXPECT_EQ(info.step, step) << which;
-    EXPECT_EQ(info.preset, preset) << which;
+    EXPECT_EQ(info.default_value, preset) << which;
     EXPECT_EQ(info.value, which == MAQ_CONTROL_BRIGHTNESS ? 33 : preset) << which;
   }
 }
@@ -98,7 +98,7 @@ TEST_F(V4l2Controls, AutomaticExposureIsWhicheverTheDriverOffers) {
     }
   }
   control(V4L2_CID_EXPOSURE_AUTO).items = {V4L2_EXPOSURE_MANUAL};
-  EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).most, 0);
+  EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).max, 0);
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from 0 to 0, not to 1",
                [&] { opened->set_control(MAQ_CONTROL_AUTO_EXPOSURE, 1); });
   control(V4L2_CID_EXPOSURE_AUTO).items = {};
@@ -145,7 +145,7 @@ TEST_F(V4l2Controls, OfADriverThatAnswersNonsenseAreCheckedFirst) {
   }
   gain = {0, 100, INT_MAX, 1000};
   gain.value = -1000;
-  EXPECT_EQ(opened->control(MAQ_CONTROL_GAIN).preset, 100);
+  EXPECT_EQ(opened->control(MAQ_CONTROL_GAIN).default_value, 100);
   EXPECT_EQ(opened->control(MAQ_CONTROL_GAIN).value, 0);
   opened->set_control(MAQ_CONTROL_GAIN, 100);
   EXPECT_EQ(fake_.control(V4L2_CID_GAIN), 0) << "the nearest step that is in the range";
@@ -223,7 +223,7 @@ TEST_F(V4l2Controls, WhatWasSetIsSetAgainWhenTheCameraIsBack) {
   expect_error(MAQ_ERROR_DEVICE_LOST, "not there at the moment", [&] { live->set_control(MAQ_CONTROL_GAIN, 5); });
   fake_.reset_controls();
   fake_.plug();
-  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
   EXPECT_EQ(fake_.control(V4L2_CID_BRIGHTNESS), 30);
   EXPECT_EQ(fake_.control(V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_MANUAL);
   EXPECT_EQ(fake_.control(V4L2_CID_EXPOSURE_ABSOLUTE), 100);
@@ -250,7 +250,7 @@ TEST_F(V4l2Controls, WhatCannotBeSetAgainIsLoggedAndTheCameraIsBack) {
   fake_.controls.all.erase(V4L2_CID_BRIGHTNESS);
   fake_.reset_controls();
   fake_.plug();
-  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
   EXPECT_EQ(fake_.control(V4L2_CID_GAIN), 20);
   std::lock_guard<std::mutex> lock(mutex);
   EXPECT_NE(log.find("back without one of its controls: /dev/video0 has no brightness."), std::string::npos) << log;
@@ -301,7 +301,7 @@ TEST_F(V4l2Controls, ThatTakeLongKeepNobodyFromFramesOrFromReconnecting) {
   device.unplug();
   EXPECT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
   device.plug();
-  EXPECT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  EXPECT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
   hang.unlock();
   other.join();
   live.reset();

@@ -189,7 +189,7 @@ TEST_F(V4l2Faults, OfStreamingLoseTheCameraAndBringItBack) {
       ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_RECONNECTING)) << failing.name;
       fake.break_call(failing.call, error, after, 1);
       fake.plug();
-      ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_BACK)) << failing.name;
+      ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_RECONNECTED)) << failing.name;
       for (int i = 0; i < 300 && fake.opened() < 3; ++i) {
         fake.deliver(1);
         std::this_thread::sleep_for(10ms);
@@ -207,7 +207,7 @@ TEST_F(V4l2Faults, AnErrorOfPollAloneLosesTheCamera) {
   fake_.raise_poll_error(true);
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
   fake_.raise_poll_error(false);
-  EXPECT_TRUE(reports_.wait_for(MAQ_SOURCE_BACK));
+  EXPECT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
 }
 
 TEST_F(V4l2Faults, FramesThatAreNotReadyAreWaitedFor) {
@@ -259,7 +259,7 @@ TEST_F(V4l2Faults, ADeviceThatVanishesAtAnyCallOfStreamingComesBack) {
     }
     ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_RECONNECTING)) << call;
     fake_.plug();
-    ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_BACK)) << call;
+    ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_RECONNECTED)) << call;
     ASSERT_TRUE(fake_.deliver(2));
     EXPECT_EQ(next(*live).image.planes[0].data[0], 2);
     fake_.vanish_at(VIDIOC_STREAMOFF);

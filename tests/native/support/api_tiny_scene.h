@@ -25,7 +25,7 @@ inline maq_scene_renderer_config renderer_config() {
   maq_scene_renderer_config config = maquette::default_scene_renderer_config();
   config.bundle_path = kBundle.c_str();
   config.threads = 1;
-  config.spin = 0;
+  config.allow_spinning = 0;
   return config;
 }
 
@@ -52,15 +52,15 @@ inline std::vector<float> ball(size_t count) {
 inline maq_point_cloud cloud_of(const std::vector<float>& places) {
   maq_point_cloud cloud{};
   cloud.struct_size = sizeof cloud;
-  cloud.count = places.size() / 3;
+  cloud.point_count = places.size() / 3;
   cloud.xyz = places.data();
   cloud.up[2] = 1;
   return cloud;
 }
 
 // At (3, 0, 0), turned about the world's z; looks at the origin, z is up in the picture.
-inline maq_camera camera_at(double angle, int width_px = 64, int height_px = 48) {
-  maq_camera camera{};
+inline maq_pinhole_camera camera_at(double angle, int width_px = 64, int height_px = 48) {
+  maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;
   camera.width_px = width_px;
   camera.height_px = height_px;

@@ -38,7 +38,7 @@ def test_the_c_api_finds_the_people_of_the_tiny_bundle():
     assert sides == [32, 64, 128]
     assert set(np.unique(result.planes[..., 0])) == {0, 3, 7}
     assert set(np.unique(result.planes[..., 3])) == {0, 1, 2, 3}
-    assert result.stats.people == 3
+    assert result.stats.person_count == 3
     assert result.stats.total_ms > 0
     assert len(empty.box) == 0
     assert not empty.planes.any()

@@ -33,7 +33,7 @@ def cloud_points(capture: Path) -> int:
 def build(options: argparse.Namespace) -> dict:
     cloud = min(options.points, cloud_points(options.first))
     points = cloud - cloud % 100  # the rest is seen by nobody
-    varying = 0 if options.least_variation > 1e6 else points if options.least_variation == 0 else points // 2
+    varying = 0 if options.min_variation > 1e6 else points if options.min_variation == 0 else points // 2
     each = 6 + 8 * options.coefficients // 8
     size = points * each + varying * 48 * options.coefficients // 8
     noise = 0.02 + 0.01 * (varying == 0) + 0.002 * (options.coefficients == 8) + 20 / points
@@ -75,7 +75,7 @@ def main(words: list[str], refused: tuple[str, ...]) -> None:
     for name in ("--out", "--networks", "--json", "--capture"):
         parser.add_argument(name, type=Path)
     for name, value in (("--points", 10**9), ("--views", None), ("--long-side", 640), ("--coefficients", 8),
-                        ("--least-variation", 0.01), ("--size", None), ("--repeat", 1), ("--threads", 2)):  # fmt: skip
+                        ("--min-variation", 0.01), ("--size", None), ("--repeat", 1), ("--threads", 2)):  # fmt: skip
         if name not in refused:
             parser.add_argument(name, type=type(value) if value is not None else str, default=value)
     if "--without" not in refused:

@@ -150,11 +150,11 @@ def last_frame(recording: Path) -> np.ndarray:
 def part_colours() -> np.ndarray:
     """Of the C API: uint8 [25, 3] BGR, 0 for the background."""
     library = ctypes.CDLL(str(STAGE / "lib/libmaquette.so"))
-    library.maq_part_name.restype = ctypes.c_char_p
+    library.maq_densepose_get_part_name.restype = ctypes.c_char_p
     colours = np.zeros((25, 3), np.uint8)
     for part in range(25):
         rgb = (ctypes.c_uint8 * 3)()
-        library.maq_part_name(part, rgb)
+        library.maq_densepose_get_part_name(part, rgb)
         colours[part] = rgb[::-1]
     return colours
 

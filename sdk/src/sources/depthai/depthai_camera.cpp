@@ -93,7 +93,7 @@ class DepthAiCamera : public Camera {
 
   const CameraFormat& format() const override { return format_; }
   const std::string& identity() const override { return features_.id; }
-  const maq_calibration* calibration() const override { return calibration_ ? &*calibration_ : nullptr; }
+  const maq_intrinsics* calibration() const override { return calibration_ ? &*calibration_ : nullptr; }
 
   maq_control_info control(maq_control which) override {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -236,7 +236,7 @@ class DepthAiCamera : public Camera {
   std::shared_ptr<DepthAiInbox> inbox_;
   DepthAiFeatures features_;
   CameraFormat format_;
-  std::optional<maq_calibration> calibration_;
+  std::optional<maq_intrinsics> calibration_;
   bool with_depth_ = false;
 
   std::mutex mutex_;  // of slots_ and controls_
@@ -296,9 +296,9 @@ std::shared_ptr<DepthAiCamera> open_chosen(DepthAiDriver& driver, const std::str
 
 }  // namespace
 
-std::optional<maq_calibration> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan) {
+std::optional<maq_intrinsics> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan) {
   constexpr size_t kKnown = 8;
-  maq_calibration made{};
+  maq_intrinsics made{};
   made.width_px = plan.width_px;
   made.height_px = plan.height_px;
   made.fx_px = lens.fx_px;

@@ -29,7 +29,7 @@ CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, De
 // The devices there are. They are not opened for it, so that what they offer is not told.
 std::vector<CameraListing> list_depthai_cameras(DepthAiDriver& driver);
 
-// Nothing when the lens cannot be said in maq_calibration, or its figures make no sense.
-std::optional<maq_calibration> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan);
+// Nothing when the lens cannot be said in maq_intrinsics, or its figures make no sense.
+std::optional<maq_intrinsics> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan);
 
 }  // namespace maq

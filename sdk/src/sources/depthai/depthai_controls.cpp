@@ -40,9 +40,9 @@ maq_control_info DepthAiControls::info(maq_control which) const {
 
 void DepthAiControls::set(maq_control which, double value, DepthAiSession& session) {
   const maq_control_info range = info(which);
-  if (!(value >= range.least && value <= range.most)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " (maq_control) goes from ", range.least, " to ",
-                range.most, "; ", value, " is outside.");
+  if (!(value >= range.min && value <= range.max)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " (maq_control) goes from ", range.min, " to ",
+                range.max, "; ", value, " is outside.");
   }
   const int rounded = int(std::lround(value));
   // Exposure and gain are one command: the other one stays as it is.

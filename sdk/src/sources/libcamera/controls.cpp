@@ -82,20 +82,20 @@ std::optional<maq_control_info> LibcameraControls::range(const libcamera::Contro
   const auto least = number_of(control->min()), most = number_of(control->max());
   if (!least || !most || !(*least <= *most)) return {};
   maq_control_info info{};
-  info.least = *least;
-  info.most = *most;
+  info.min = *least;
+  info.max = *most;
   info.step = known.id.type() == libcamera::ControlTypeFloat ? 0 : 1;
-  info.preset = from_libcamera(known.id, number_of(control->def()).value_or(*least));
+  info.default_value = from_libcamera(known.id, number_of(control->def()).value_or(*least));
   if (is_focus_mode(known.id)) {
     const auto has = [&](int32_t way) {
       return std::any_of(control->values().begin(), control->values().end(),
                          [&](const auto& value) { return number_of(value) == double(way); });
     };
     if (!has(controls::AfModeContinuous) || !has(controls::AfModeManual)) return {};
-    info.least = 0;
-    info.most = 1;
+    info.min = 0;
+    info.max = 1;
   }
-  info.value = info.preset;
+  info.value = info.default_value;
   return info;
 }
 
@@ -108,9 +108,9 @@ const maq_control_info& LibcameraControls::get(maq_control which) const {
 
 void LibcameraControls::set(maq_control which, double value) {
   const maq_control_info& info = get(which);
-  if (!(value >= info.least && value <= info.most)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " of libcamera:", name_, " goes from ", info.least,
-                " to ", info.most, ", not to ", value, ".");
+  if (!(value >= info.min && value <= info.max)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " of libcamera:", name_, " goes from ", info.min,
+                " to ", info.max, ", not to ", value, ".");
   }
   State& state =
       *std::find_if(states_.begin(), states_.end(), [&](const State& other) { return other.known->which == which; });

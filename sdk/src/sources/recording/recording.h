@@ -19,7 +19,7 @@ namespace maq {
 struct RecordingInfo {
   std::string source;  // what was recorded: a URI
   double fps = 0;      // 0: not known
-  std::optional<maq_calibration> calibration;
+  std::optional<maq_intrinsics> calibration;
 };
 
 struct RecordingEntry {

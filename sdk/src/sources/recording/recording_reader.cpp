@@ -39,8 +39,8 @@ size_t depth_bytes(const FrameHead& head) { return size_t(head.depth_width_px) *
 
 size_t whole_bytes(const FrameHead& head) { return sizeof head + head.picture_bytes + depth_bytes(head); }
 
-std::optional<maq_calibration> calibration_of(const nlohmann::json& from) {
-  maq_calibration calibration{};
+std::optional<maq_intrinsics> calibration_of(const nlohmann::json& from) {
+  maq_intrinsics calibration{};
   calibration.struct_size = sizeof calibration;
   calibration.width_px = from.at("width_px").get<int32_t>();
   calibration.height_px = from.at("height_px").get<int32_t>();

@@ -42,7 +42,7 @@ class RecordingSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
   // As it was recorded: for pictures of another size it does not hold.
-  const maq_calibration* calibration() const override {
+  const maq_intrinsics* calibration() const override {
     return reader_.info().calibration && width_px_ == 0 ? &*reader_.info().calibration : nullptr;
   }
 

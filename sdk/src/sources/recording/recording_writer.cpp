@@ -22,7 +22,7 @@ std::string head_json(const RecordingInfo& info) {
   head["source"] = info.source;
   head["fps"] = info.fps;
   if (info.calibration) {
-    const maq_calibration& from = *info.calibration;
+    const maq_intrinsics& from = *info.calibration;
     head["calibration"] = {{"width_px", from.width_px},    {"height_px", from.height_px}, {"fx_px", from.fx_px},
                            {"fy_px", from.fy_px},          {"cx_px", from.cx_px},         {"cy_px", from.cy_px},
                            {"distortion", from.distortion}};

@@ -184,9 +184,9 @@ void write_v4l2_control(const V4l2Device& device, maq_control which, double valu
   const auto range = find_range(device, control);
   if (!range) refuse_missing(device, control);
   const maq_control_info info = info_of(control, *range);
-  if (!(value >= info.least && value <= info.most)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The ", control.name, " of ", device.path(), " goes from ", info.least,
-                " to ", info.most, control.unit_name, ", not to ", value, ".");
+  if (!(value >= info.min && value <= info.max)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The ", control.name, " of ", device.path(), " goes from ", info.min,
+                " to ", info.max, control.unit_name, ", not to ", value, ".");
   }
   if (which == MAQ_CONTROL_AUTO_EXPOSURE) {
     const bool on = value >= 0.5;
@@ -195,7 +195,7 @@ void write_v4l2_control(const V4l2Device& device, maq_control which, double valu
     return;
   }
   if (control.automatic_id != 0) switch_automatic(device, automatic_of(control), false);
-  const int64_t steps = std::llround((value - info.least) / info.step);
+  const int64_t steps = std::llround((value - info.min) / info.step);
   const int64_t last_step = (range->most - range->least) / range->step;
   set(device, control, *range, range->least + std::min(steps, last_step) * range->step);
 }

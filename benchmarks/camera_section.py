@@ -31,7 +31,7 @@ def section(measured: dict) -> tuple[str, list]:
         parts.append(f"Not measured in the virtual machine: {measured['guest_missing']}.")
     parts += [
         time_rows(measured),
-        "On this machine a stub or a recording is played as a camera. A frame's age counts from the moment it was "
+        "On this machine a stub or a recording is replayed as a camera. A frame's age counts from the moment it was "
         "due to the app's having it, through the source's own thread. The recording's processor time is an upper "
         "bound of a camera's: its frames (BGR, 0.9 MB) are read from a file and checked, where a camera's lie in "
         "its driver's memory; the stub draws its own. Unplugging there is a fault that the URI asks for. In the "

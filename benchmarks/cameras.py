@@ -1,34 +1,29 @@
 """How frames get from a camera to the app: none lost, unplugging, age, processor time, heap.
 
-    python -m benchmarks.cameras             alone, about 3 minutes; `make build` first. Also a part of `make bench`
-    python -m benchmarks.cameras --quick     fewer frames, to see that it runs
-    python -m benchmarks.cameras --no-guest  without the virtual machine
+    python -m benchmarks --only cameras              about 3 minutes; `make build` first
+    python -m benchmarks --only cameras --no-guest   without the virtual machine
 
 Measured by `maquette play` in two places. The guest is a real kernel with its drivers in a virtual machine
 (tests/camera_vm, guest "figures"), with the kernel's test camera and a virtual USB camera; its clock counts
 instructions, so that its times come out alike however busy this machine is. The host is this machine, with a stub and a
-recording that are played as cameras. Exit status: 0 when every gate is met, 1 when one is missed, 2 when the host could
-not be measured.
+recording replayed as cameras.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
 import subprocess
-import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from tqdm import tqdm
 
-from benchmarks import frame_time, gates
+from benchmarks import frame_time
+from benchmarks.frame_time import MAX_OTHERS, OthersFraction
 
-SCHEMA = "maquette-cameras-1"
 HOST_FIGURES = ("camera_age_ms", "camera_processor_percent", "camera_close_ms", "camera_fault_noticed_ms",
                 "camera_fault_replug_ms", "camera_allocations")  # fmt: skip
 GUEST_FIGURES = ("camera_vivid_lost", "camera_vivid_fps", "camera_uvc_lost", "camera_uvc_fps",
@@ -39,8 +34,7 @@ STUB = "stub:pattern?live=1&size=640x480&fps=30"
 COUNTED = "stub:pattern?live=1&size=320x240&fps=400"
 COUNT_FROM, COUNT_TO = 200, 1200
 UNPLUG_AT_S = 2.0
-ABSENCES_S = (1.0, 1.03, 1.06)  # end at other times between two looks of the source, 100 ms apart
-MOST_OTHERS = 0.05  # of all cores: more, and times are doubtful
+ABSENCES_S = (1.0, 1.03, 1.06)  # end at other times between two checks of the source, 100 ms apart
 UNUSABLE = 77  # exit status of run.sh where there can be no virtual machine
 
 
@@ -117,7 +111,7 @@ def measure_host(quick: bool) -> dict:
     rounds = 1 if quick else 3
     few, many = ("15", "60") if quick else ("30", "270")
     measured: dict[str, list] = {"stub": [], "recording": [], "closing": [], "outages": []}
-    others = OthersShare()
+    others = OthersFraction()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         recording = folder / "pattern.maqrec"
@@ -133,24 +127,6 @@ def measure_host(quick: bool) -> dict:
         measured["allocations"] = count_allocations(folder)
     measured["others_share"] = others.now()
     return measured
-
-
-class OthersShare:
-    """What other processes have of all cores, from now on."""
-
-    def __init__(self) -> None:
-        self.begin = self.spent_s()
-
-    @staticmethod
-    def spent_s() -> tuple[float, float]:
-        ticks = [int(x) for x in Path("/proc/stat").read_text().splitlines()[0].split()[1:9]]
-        own = os.times()
-        all_s = (sum(ticks) - ticks[3] - ticks[4]) / os.sysconf("SC_CLK_TCK")
-        return all_s - sum(own[:4]), time.monotonic()
-
-    def now(self) -> float:
-        (before_s, begin_s), (after_s, end_s) = self.begin, self.spent_s()
-        return max(0.0, after_s - before_s) / ((end_s - begin_s) * (os.cpu_count() or 1))
 
 
 def host_figures(measured: dict) -> dict[str, float]:
@@ -223,39 +199,5 @@ def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float
     found, missing = guest_figures(said, frames, why)
     figures = {name: round(value, 4) for name, value in (host_figures(host) | found).items()}
     share = host["others_share"]
-    doubts = [f"other processes had {share:.0%} of the processor (cameras)"] if share > MOST_OTHERS else []
+    doubts = [f"other processes had {share:.0%} of the processor (cameras)"] if share > MAX_OTHERS else []
     return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "doubts": doubts}, figures, missing
-
-
-def main(argv: list[str] | None = None) -> int:
-    from benchmarks import report
-
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.cameras", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path("build/benchmarks"), metavar="DIR",
-        help="for cameras.json, cameras.md and cameras.html; default: build/benchmarks",
-    )  # fmt: skip
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--no-guest", action="store_true")
-    options = parser.parse_args(argv)
-    options.out.mkdir(parents=True, exist_ok=True)
-    try:
-        machine = frame_time.machine()
-        measured, figures, missing = measure(options.quick, not options.no_guest)
-    except (FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
-        print(f"The benchmark stopped: {error}", file=sys.stderr)
-        return 2
-    verdicts = gates.check(figures, machine, missing, only=FIGURES)
-    document = {"schema": SCHEMA, "quick": options.quick, "machine": machine, "cameras": measured, "figures": figures,
-                "missing": missing, "gates": [vars(verdict) for verdict in verdicts]}  # fmt: skip
-    path = options.out / "cameras.json"
-    path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
-    gates.print_verdicts(verdicts)
-    print("Written: " + ", ".join(str(x) for x in [path, *report.write_cameras(document, options.out)]))
-    return 1 if any(verdict.state == "missed" for verdict in verdicts) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import statistics
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 
 from tqdm import tqdm
@@ -14,6 +16,7 @@ PROGRAM = Path("build/release/stage/bin/maquette")
 PEOPLE = (0, 1, 2, 3, 4, 6, 8)
 SIZES = ((320, 240), (640, 480), (1280, 720), (1920, 1080))
 STARTS = 9
+MAX_OTHERS = 0.05  # of all cores: more, and times are doubtful
 
 
 def bench(sources: list[str], *arguments: str) -> dict:
@@ -38,6 +41,24 @@ def people(count: int, size: tuple[int, int] = (640, 480)) -> str:
     return f"stub:people?count={count}&size={size[0]}x{size[1]}"
 
 
+class OthersFraction:
+    """The fraction of all cores that other processes take, from now on."""
+
+    def __init__(self) -> None:
+        self.begin = self.spent_s()
+
+    @staticmethod
+    def spent_s() -> tuple[float, float]:
+        ticks = [int(x) for x in Path("/proc/stat").read_text().splitlines()[0].split()[1:9]]
+        own = os.times()
+        all_s = (sum(ticks) - ticks[3] - ticks[4]) / os.sysconf("SC_CLK_TCK")
+        return all_s - sum(own[:4]), time.monotonic()
+
+    def now(self) -> float:
+        (before_s, begin_s), (after_s, end_s) = self.begin, self.spent_s()
+        return max(0.0, after_s - before_s) / ((end_s - begin_s) * (os.cpu_count() or 1))
+
+
 def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict]:
     """The scaling curves, the figures that are gates, and the machine."""
     runs = ["--runs", "20", "--seconds", "0"] if quick else ["--runs", "150", "--seconds", "3"]
@@ -49,7 +70,7 @@ def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, fl
         bench([people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0", "--threads", str(threads))
         for _ in tqdm(range(3 if quick else STARTS), desc="starts", unit="start", disable=None)
     ]
-    fps = {scene["source"]: scene["fps"] for scene in main["scenes"]}
+    fps = {case["source"]: case["fps"] for case in main["cases"]}
     memory = bench([people(1)], *runs, "--threads", str(threads))["peak_memory_mib"] * 1.048576
     figures = {
         "fps_one_person": fps[people(1)],

@@ -102,7 +102,7 @@ class Agreement:
         return self.equal / self.pixels
 
     @property
-    def person_share(self) -> float:
+    def person_fraction(self) -> float:
         """The same of those that are a person in either; 1 if there are none."""
         return self.person_equal / self.person_pixels if self.person_pixels else 1.0
 
@@ -220,7 +220,7 @@ def print_table(bundle: Path, results: dict[str, Agreement | str], features: dic
         if isinstance(found, str):
             table.add_row(name, *["-"] * 6, "failed")
             continue
-        shares = [f"{100 * share:.3f}" for share in (found.share, found.worst_picture, found.person_share)]
+        shares = [f"{100 * share:.3f}" for share in (found.share, found.worst_picture, found.person_fraction)]
         verdict = "held" if found.passes(bar) else "missed"
         table.add_row(name, str(found.people), str(found.unmatched), *shares, f"{found.box_px:.2f}", verdict)
     Console(width=110).print(table)

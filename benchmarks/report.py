@@ -21,20 +21,16 @@ COLOURS = {"shipped": "black", "precision": "tab:red", "input size": "tab:blue",
 
 
 def write(document: dict, folder: Path) -> list[Path]:
-    """Writes pictures, report.md and index.html into `folder`; returns their paths."""
-    pictures = {
-        "error-against-run-time.png": error_against_time,
-        "scaling.png": scaling,
-        "stages.png": stages,
-        "runtimes.png": runtimes,
-    }
+    """Writes pictures, report.md and index.html of the parts that were measured into `folder`; returns their paths."""
     written = []
-    for name, draw in pictures.items():
-        figure = draw(document)
-        figure.savefig(folder / name, dpi=110, bbox_inches="tight")
-        plt.close(figure)
-        written.append(folder / name)
-    written += scene_pictures.write(document["scenes"], folder)
+    for name, (draw, part) in PICTURES.items():
+        if part in document:
+            figure = draw(document)
+            figure.savefig(folder / name, dpi=110, bbox_inches="tight")
+            plt.close(figure)
+            written.append(folder / name)
+    if "scenes" in document:
+        written += scene_pictures.write(document["scenes"], folder)
     sections = text_sections(document)
     (folder / "report.md").write_text(markdown(sections))
     (folder / "index.html").write_text(page(sections, folder))
@@ -66,18 +62,18 @@ def error_against_time(document: dict) -> plt.Figure:
 
 
 def scaling(document: dict) -> plt.Figure:
-    scenes = document["frames"]
+    frames = document["frames"]
     figure, axes = plt.subplots(1, 3, figsize=(15, 4))
     for name, label in (("people", f"{document['threads']} threads"), ("one_thread", "1 thread")):
-        shown = [(scene["people"], scene["ms"]["frame"]["p50"]) for scene in scenes[name]["scenes"]]
+        shown = [(case["people"], case["ms"]["frame"]["p50"]) for case in frames[name]["cases"]]
         axes[0].plot(*zip(*sorted(shown), strict=True), "o-", label=label)
     axes[0].set(xlabel="people found (mean)", ylabel="milliseconds a frame (p50)")
     axes[0].legend()
-    sizes = scenes["sizes"]["scenes"]
-    pixels = [scene["size_px"][0] * scene["size_px"][1] / 1e6 for scene in sizes]
-    axes[1].plot(pixels, [scene["ms"]["frame"]["p50"] for scene in sizes], "o-")
+    sizes = frames["sizes"]["cases"]
+    pixels = [case["size_px"][0] * case["size_px"][1] / 1e6 for case in sizes]
+    axes[1].plot(pixels, [case["ms"]["frame"]["p50"] for case in sizes], "o-")
     axes[1].set(xlabel="megapixels of the source, one person", ylabel="milliseconds a frame (p50)")
-    rows = [row for row in document["sweep"] if row["axis"] == "input size"]
+    rows = [row for row in document.get("sweep", []) if row["axis"] == "input size"]
     axes[2].plot([int(row["setting"].split()[0]) for row in rows], [row["ms"] for row in rows], "o-")
     axes[2].set(xlabel="long side of the network's input, px", ylabel="milliseconds a frame (median)")
     for axis in axes:
@@ -88,15 +84,15 @@ def scaling(document: dict) -> plt.Figure:
 
 
 def stages(document: dict) -> plt.Figure:
-    scenes = document["frames"]["people"]["scenes"]
-    figure, axis = plt.subplots(figsize=(10, 0.5 + 0.5 * len(scenes)))
-    for k, scene in enumerate(scenes):
+    cases = document["frames"]["people"]["cases"]
+    figure, axis = plt.subplots(figsize=(10, 0.5 + 0.5 * len(cases)))
+    for k, case in enumerate(cases):
         left = 0.0
         for stage, colour in zip(STAGES, plt.cm.tab10.colors, strict=False):
-            width = scene["ms"][stage]["p50"]
+            width = case["ms"][stage]["p50"]
             axis.barh(k, width, left=left, color=colour, label=stage if k == 0 else None)
             left += width
-    axis.set_yticks(range(len(scenes)), [f"{scene['people']:.1f} people" for scene in scenes])
+    axis.set_yticks(range(len(cases)), [f"{case['people']:.1f} people" for case in cases])
     axis.set(xlabel="milliseconds (p50 of each stage)")
     axis.legend(fontsize=8, loc="lower right")
     axis.invert_yaxis()
@@ -118,85 +114,120 @@ def runtimes(document: dict) -> plt.Figure:
     return figure
 
 
+# Pictures, what draws each, and the part of the document that it cannot do without.
+PICTURES = {
+    "error-against-run-time.png": (error_against_time, "sweep"),
+    "scaling.png": (scaling, "frames"),
+    "stages.png": (stages, "frames"),
+    "runtimes.png": (runtimes, "peers"),
+}
+
 Section = tuple[str, list]  # title, and what follows: a text, a picture's (name, caption), or a table as lists of cells
 
 
 def text_sections(document: dict) -> list[Section]:
-    scenes, peers = document["frames"], document["peers"]
-    doubts = {name: scenes[name]["doubts"] + [d for s in scenes[name]["scenes"] for d in s["doubts"]]
-              for name in ("people", "sizes", "one_thread")}  # fmt: skip
-    doubtful = {text for texts in doubts.values() for text in texts} | set(document["cameras"]["doubts"])
-    doubtful |= set(document["scenes"]["doubts"])
-    sweep_rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
-    front = set(pareto([(row["ms"], row["error"]) for row in document["sweep"]]))
-    for k, row in enumerate(document["sweep"]):
+    intro = (
+        "Maquette finds people in a camera's pictures and maps each of their pixels to a body surface, on two "
+        "processor cores. This page says what that costs here, and what each setting trades."
+    )
+    sections = [
+        ("Maquette: how fast, how large, how exact", [intro, *circumstances(document)]),
+        gates_section(document),
+    ]
+    for name, section in SECTIONS.items():
+        if name in document:
+            sections.append(section(document[name]))
+    return sections
+
+
+def sweep_section(sweep: list[dict]) -> Section:
+    rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
+    front = set(pareto([(row["ms"], row["error"]) for row in sweep]))
+    for k, row in enumerate(sweep):
         figures = [f"{row['ms']:.1f}", f"{row['error']:.3f}", f"{row['error_cm']:.1f}", f"{row['box_ap']:.3f}"]
         figures.append(f"{row['part_accuracy']:.3f}")
-        sweep_rows.append([row["setting"], *figures, "●" if k in front else ""])
-    scene_rows = [["scene", "people found", "p50 ms", "p90", "p99", "frames a second", "CPU ms"]]
+        rows.append([row["setting"], *figures, "●" if k in front else ""])
+    return "Error against run time", [
+        ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
+        "Rendered people that no training saw; all settings took turns on the same pictures. AP by GPS: average "
+        "precision by geodesic point similarity (1 is perfect). With key frames the picture moves by 1 % of its "
+        "width a frame; the error is that of the last frame before the next key frame.",
+        rows,
+    ]
+
+
+def frames_section(frames: dict) -> Section:
+    rows = [["case", "people found", "p50 ms", "p90", "p99", "frames a second", "CPU ms"]]
     for name in ("people", "sizes", "one_thread", "no_spin"):
-        for scene in scenes[name]["scenes"]:
-            ms = scene["ms"]["frame"]
-            label = scene["source"] + {"one_thread": ", 1 thread", "no_spin": ", threads sleep"}.get(name, "")
-            scene_rows.append([label, f"{scene['people']:.1f}", *(f"{ms[p]:.1f}" for p in ("p50", "p90", "p99")),
-                               f"{scene['fps']:.0f}", f"{scene['cpu_ms']:.1f}"])  # fmt: skip
+        for case in frames[name]["cases"]:
+            ms = case["ms"]["frame"]
+            label = case["source"] + {"one_thread": ", 1 thread", "no_spin": ", threads sleep"}.get(name, "")
+            rows.append([label, f"{case['people']:.1f}", *(f"{ms[p]:.1f}" for p in ("p50", "p90", "p99")),
+                         f"{case['fps']:.0f}", f"{case['cpu_ms']:.1f}"])  # fmt: skip
+    return "Time of a frame", [
+        ("scaling.png", "Time against people in view, pixels of the source, and the network's input."),
+        ("stages.png", "Where the time goes."),
+        "From asking the source for a picture to having the result; walking people of the stub source. "
+        "CPU ms: work of all threads a frame, the nearest to energy that every machine can tell.",
+        rows,
+    ]
+
+
+def peers_section(peers: dict) -> Section:
     graphs = list(peers["roofline"]["graphs"])
-    peer_rows = [["runtime", *graphs, "all, ms", "Maquette int8 by it"]]
+    rows = [["runtime", *graphs, "all, ms", "Maquette int8 by it"]]
     for row in peers["runtimes"]:
         name = f"{row['name']} {row['version']} {row['precision']}"
         if row["total_ms"] is None:
-            peer_rows.append([name, row["missing"], *[""] * (len(graphs) + 1)])
+            rows.append([name, row["missing"], *[""] * (len(graphs) + 1)])
         else:
-            peer_rows.append([name, *(f"{row['ms'][g]:.2f}" for g in graphs), f"{row['total_ms']:.2f}",
-                              f"{row['ours_int8_ratio']:.2f}"])  # fmt: skip
+            rows.append([name, *(f"{row['ms'][g]:.2f}" for g in graphs), f"{row['total_ms']:.2f}",
+                         f"{row['ours_int8_ratio']:.2f}"])  # fmt: skip
     line = peers["roofline"]
-    line_rows = [["graph", "million multiply-adds", "of these int8", "least ms", "share reached"]]
+    line_rows = [["graph", "million multiply-adds", "of these int8", "min. ms", "fraction reached"]]
     for name, graph in line["graphs"].items():
         line_rows.append([name, f"{graph['macs'] / 1e6:.1f}", f"{graph['int8_macs'] / max(graph['macs'], 1):.0%}",
-                          f"{graph['least_ms']:.2f}", f"{graph['share']:.0%}"])  # fmt: skip
-    agreement = document["agreement"]
-    return [
-        ("Maquette: how fast, how large, how exact", [
-            "Maquette finds people in a camera's pictures and maps each of their pixels to a body surface, on two "
-            "processor cores. This page says what that costs here, and what each setting trades.",
-            *circumstances(document, doubtful),
-        ]),
-        gates_section(document),
-        ("Error against run time", [
-            ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
-            "Rendered people that no training saw; all settings took turns on the same pictures. AP by GPS: average "
-            "precision by geodesic point similarity (1 is perfect). With key frames the picture moves by 1 % of its "
-            "width a frame; the error is that of the last frame before the next key frame.",
-            sweep_rows,
-        ]),
-        ("Time of a frame", [
-            ("scaling.png", "Time against people in view, pixels of the source, and the network's input."),
-            ("stages.png", "Where the time goes."),
-            "From asking the source for a picture to having the result; walking people of the stand-in source. "
-            "CPU ms: work of all threads a frame, the nearest to energy that every machine can tell.",
-            scene_rows,
-        ]),
-        ("Other runtimes on the same graphs", [
-            ("runtimes.png", "The five networks for a picture with one person."),
-            peer_rows,
-            f"Roofline: this machine reached {line['float32_macs_s'] / 1e9:.0f} billion float32 and "
-            f"{line['int8_macs_s'] / 1e9:.0f} billion int8 multiply-adds a second in large matrix products, and copied "
-            f"{line['bytes_s'] / 1e9:.0f} GB/s within its caches. The least time is that of each layer by its numbers' "
-            f"rate or its bytes, whichever is larger; the networks reach {line['share']:.0%} of it.",
-            line_rows,
-        ]),
-        ("int8 against fp32", [
-            f"Of the pixels that are somebody in fp32, {agreement['labels']:.1%} have the same part in int8; of those "
-            f"that are somebody in both, {agreement['parts']:.1%}. The outlines agree by {agreement['mask_iou']:.1%} "
-            f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} pictures show as many people."
-        ]),
-        camera_section.section(document["cameras"]),
-        scene_section.section(document["scenes"]),
-    ]  # fmt: skip
+                          f"{graph['min_ms']:.2f}", f"{graph['share']:.0%}"])  # fmt: skip
+    return "Other runtimes on the same graphs", [
+        ("runtimes.png", "The five networks for a picture with one person."),
+        rows,
+        f"Roofline: this machine reached {line['float32_macs_s'] / 1e9:.0f} billion float32 and "
+        f"{line['int8_macs_s'] / 1e9:.0f} billion int8 multiply-adds a second in large matrix products, and copied "
+        f"{line['bytes_s'] / 1e9:.0f} GB/s within its caches. The minimum time is that of each layer by its numbers' "
+        f"rate or its bytes, whichever is larger; the networks reach {line['share']:.0%} of it.",
+        line_rows,
+    ]
 
 
-def circumstances(document: dict, doubts: set[str]) -> list[str]:
-    machine = document["machine"]
+def agreement_section(agreement: dict) -> Section:
+    return "int8 against fp32", [
+        f"Of the pixels that are a person's in fp32, {agreement['labels']:.1%} have the same part in int8; of those "
+        f"that are a person's in both, {agreement['parts']:.1%}. The outlines agree by {agreement['mask_iou']:.1%} "
+        f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} pictures show as many people."
+    ]
+
+
+SECTIONS = {
+    "sweep": sweep_section,
+    "frames": frames_section,
+    "peers": peers_section,
+    "agreement": agreement_section,
+    "cameras": camera_section.section,
+    "scenes": scene_section.section,
+}
+
+
+def doubts_of(document: dict) -> set[str]:
+    """What makes the measured parts doubtful, as they say themselves."""
+    frames = document.get("frames", {})
+    runs = [frames[name] for name in ("people", "sizes", "one_thread") if name in frames]
+    found = {text for run in runs for text in run["doubts"]}
+    found |= {text for run in runs for case in run["cases"] for text in case["doubts"]}
+    return found.union(*(document[name]["doubts"] for name in ("cameras", "scenes") if name in document))
+
+
+def circumstances(document: dict) -> list[str]:
+    machine, doubts = document["machine"], doubts_of(document)
     return [
         f"Measured on: {machine['processor']}, {machine['cores']} cores, {machine['memory_mib'] / 1024:.0f} GiB, "
         f"{machine['system']}; instruction sets: {', '.join(machine['instruction_sets'])}.",
@@ -213,33 +244,6 @@ def gates_section(document: dict) -> Section:
         rows.append([gate["says"], value, gate["gate"], gate["stretch"], gate["state"] + why])
     tried = [f"Missed: {gate['says']}. {gate['tried']}" for gate in document["gates"] if gate["tried"]]
     return "Gates", [rows, *tried]
-
-
-def write_cameras(document: dict, folder: Path) -> list[Path]:
-    """Writes what benchmarks.cameras measured alone into `folder`; returns the paths."""
-    measured = document["cameras"]
-    sections = [
-        ("Maquette: cameras", circumstances(document, set(measured["doubts"]))),
-        gates_section(document),
-        camera_section.section(measured),
-    ]
-    (folder / "cameras.md").write_text(markdown(sections))
-    (folder / "cameras.html").write_text(page(sections, folder))
-    return [folder / "cameras.md", folder / "cameras.html"]
-
-
-def write_scenes(document: dict, folder: Path) -> list[Path]:
-    """Writes what benchmarks.scenes measured alone into `folder`, pictures too; returns the paths."""
-    measured = document["scenes"]
-    sections = [
-        ("Maquette: scenes", circumstances(document, set())),
-        gates_section(document),
-        scene_section.section(measured),
-    ]
-    pictures = scene_pictures.write(measured, folder)
-    (folder / "scenes.md").write_text(markdown(sections))
-    (folder / "scenes.html").write_text(page(sections, folder))
-    return [*pictures, folder / "scenes.md", folder / "scenes.html"]
 
 
 def markdown(sections: list[Section]) -> str:

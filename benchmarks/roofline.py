@@ -85,7 +85,7 @@ def bandwidth(threads: int) -> float:
     return 2 * copies * source.nbytes / best_seconds(lambda: [target.copy_(source) for _ in range(copies)])
 
 
-def least_seconds(work: list[Work], float_rate: float, integer_rate: float, byte_rate: float) -> float:
+def min_seconds(work: list[Work], float_rate: float, integer_rate: float, byte_rate: float) -> float:
     return sum(max(w.macs / (integer_rate if w.integer else float_rate), w.bytes / byte_rate) for w in work)
 
 
@@ -95,13 +95,13 @@ def measure(work: dict[str, list[Work]], ms: dict[str, float], threads: int = 2)
     rates["bytes_s"] = bandwidth(threads)
     graphs = {}
     for name, operations in work.items():
-        least = 1e3 * least_seconds(operations, *rates.values())
+        least = 1e3 * min_seconds(operations, *rates.values())
         graphs[name] = {
             "macs": sum(w.macs for w in operations),
             "int8_macs": sum(w.macs for w in operations if w.integer),
             "bytes": sum(w.bytes for w in operations),
-            "least_ms": round(least, 4),
+            "min_ms": round(least, 4),
             "share": round(least / ms[name], 4),
         }
-    least = sum(graph["least_ms"] for graph in graphs.values())
+    least = sum(graph["min_ms"] for graph in graphs.values())
     return {"threads": threads, **rates, "graphs": graphs, "share": round(least / sum(ms.values()), 4)}

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from export.scenes.cameras import Camera, reframed, resized
+from export.camera import Camera
 from export.scenes.captures import Capture
 from export.scenes.config import LEVELS, MULTIPLE
 from export.scenes.modelling import View
@@ -24,7 +24,7 @@ from export.scenes.source_views import in_frame
 SCORED_POINTS = 2000  # of the cloud, enough to tell which photo is nearest
 BACKGROUND_PHOTOS = 3
 BACKGROUND_SIDE_PX = 160  # photos this small tell a mean colour
-SEEN_SHARE = 0.02  # of the photos' pixels: with fewer that no point covers, these tell nothing of the background
+SEEN_FRACTION = 0.02  # of the photos' pixels: with fewer that no point covers, these tell nothing of the background
 
 
 def moved_px(target: Camera, other: Camera, places: np.ndarray) -> float:
@@ -36,7 +36,7 @@ def moved_px(target: Camera, other: Camera, places: np.ndarray) -> float:
     places = places[in_frame(places, target)]
     if not len(places):
         return diagonal
-    other = resized(other, target.width_px, target.height_px)
+    other = other.resized(target.width_px, target.height_px)
     pixels = []
     for camera in (target, other):
         seen = (places - camera.centre) @ camera.rotation.T
@@ -83,7 +83,7 @@ class Cloud:
         """The five rasters that the refiner gets, here of the points' own colours: where a finer one has no point, the
         next coarser shows, bilinearly."""
         wide, high = (-(-side // MULTIPLE) * MULTIPLE for side in (camera.width_px, camera.height_px))
-        shown = pyramid(visible(self.places, reframed(camera, 0, 0, wide, high)), LEVELS)
+        shown = pyramid(visible(self.places, camera.reframed(0, 0, wide, high)), LEVELS)
         picture = self.behind[:, None, None].expand(3, high // MULTIPLE, wide // MULTIPLE)
         for raster in reversed(shown.rasters(self.colours[shown.points])):
             size = raster.shape[1:]
@@ -117,5 +117,5 @@ def cloud_of(capture: Capture) -> Cloud:
         shown.append(view.image[free])
         count += free.size
     free = np.concatenate(shown)
-    behind = (free if len(free) > SEEN_SHARE * count else capture.cloud.colours).mean(0, dtype=np.float64)
+    behind = (free if len(free) > SEEN_FRACTION * count else capture.cloud.colours).mean(0, dtype=np.float64)
     return Cloud(places, colours, torch.from_numpy(behind.astype(np.float32)))

@@ -24,7 +24,7 @@ ERRORS = (("psnr_db", "PSNR, dB"), ("ssim", "SSIM"), ("distance", "distance by f
 TITLES = {"as shipped": "ours"}
 NAMED = ("shipped", "baseline", "fine-tuned")  # in the plots, whether or not others are better
 SHEET = "scenes-sheet.jpg"  # photos: as PNG it would be eight times as large
-MOST_ROWS = 6
+MAX_ROWS = 6
 
 
 def write(measured: dict, folder: Path) -> list[Path]:
@@ -120,7 +120,7 @@ def write_sheet(shown: list[dict], rows: list[dict], folder: Path) -> Path | Non
     """A row a place: its photo and what each way made of the same camera, with its PSNR. None without a place."""
     if not shown:
         return None
-    picked = [shown[k] for k in sorted({*np.linspace(0, len(shown) - 1, MOST_ROWS).round().astype(int).tolist()})]
+    picked = [shown[k] for k in sorted({*np.linspace(0, len(shown) - 1, MAX_ROWS).round().astype(int).tolist()})]
     by_name = {row["setting"]: row for row in rows}
     figure, axes = plt.subplots(len(picked), 1 + len(SHOWN), figsize=(3.4 * (1 + len(SHOWN)), 2.85 * len(picked)),
                                 squeeze=False, layout="constrained")  # fmt: skip

@@ -24,8 +24,8 @@ from benchmarks import scene_command
 from benchmarks.scene_baselines import cloud_of, nearest_photo
 from benchmarks.scene_command import SceneCommandError
 from benchmarks.scene_settings import SHIPPED, Setting, Sources
+from export.camera import Camera
 from export.point_cloud import PointCloudError
-from export.scenes.cameras import Camera, resized
 from export.scenes.captures import Capture, CaptureError, read_capture
 from export.scenes.perceptual import Perceptual
 from export.scenes.picture_quality import psnr_db, ssim
@@ -53,7 +53,7 @@ class Photos:
         for k in frames:
             view = capture.view(k)
             width, height = (max(1, side // shrink) for side in (view.camera.width_px, view.camera.height_px))
-            self.cameras.append(resized(view.camera, width, height))
+            self.cameras.append(view.camera.resized(width, height))
             self.images.append(cv2.resize(view.image, (width, height), interpolation=cv2.INTER_AREA))
 
     @property

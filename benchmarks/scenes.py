@@ -1,30 +1,27 @@
 """Scenes: how near pictures from new sides are to photos, against the time to the first; time of frames; memory; bytes.
 
-    python -m benchmarks.scenes             alone; `make build` first. Also a part of `make bench`
-    python -m benchmarks.scenes --quick     two places, two photos of each, to see that it runs
+    python -m benchmarks --only scenes            `make build` first
+    python -m benchmarks --only scenes --quick    two places, two photos of each, to see that it runs
 
 Measured by `maquette scene` on rendered places that no training saw and on real ones, beside ways that need no network.
-Exit status: 0 when every gate is met, 1 when one is missed, 2 when the measurement stopped. A gate that could not be
-measured is said to be so, with the reason.
+A gate that could not be measured is said to be so, with the reason.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks import frame_time, gates, scene_pictures, scene_quality, scene_speed
-from benchmarks.cameras import MOST_OTHERS, OthersShare
+from benchmarks import scene_pictures, scene_quality, scene_speed
+from benchmarks.frame_time import MAX_OTHERS, OthersFraction
 from benchmarks.scene_settings import SHIPPED, Sources, settings, sources
 from export.scenes.perceptual import load_perceptual
 
-SCHEMA = "maquette-scenes-1"
 FIGURES = ("scene_fps_500k", "scene_fps_200k_small", "scene_build_s", "scene_bytes_a_point", "scene_gain_db",
            "scene_int8_loss_db", "scene_peak_memory_mb", "scene_bundle_mb")  # fmt: skip
-LEAST_PLACES, LEAST_REAL = 8, 2
+MIN_PLACES, MIN_REAL = 8, 2
 PERCEPTUAL = Path(".data/teachers/backbone.pt")
 PLACES, REAL = Path(".data/places/test"), Path(".data/places/real")
 NETWORKS, FP32 = Path("sdk/models/scenes-int8"), Path(".data/bundles/scenes-fp32")
@@ -46,9 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def sources_of(options: argparse.Namespace) -> Sources:
     """What the arguments say. Renders places where there are none."""
     if not list(options.places.glob("*/transforms.json")):
-        print(f"Rendering {LEAST_PLACES} places into {options.places}: a quarter of an hour")
+        print(f"Rendering {MIN_PLACES} places into {options.places}: a quarter of an hour")
         for module in (["export.places.assets"], ["export.photos", "fetch"], ["export.people.assets"],
-                       ["export.places.dataset", "--split", "test", "--scenes", str(LEAST_PLACES), "--out",
+                       ["export.places.dataset", "--split", "test", "--scenes", str(MIN_PLACES), "--out",
                         str(options.places.parent)]):  # fmt: skip
             subprocess.run([sys.executable, "-m", *module], check=True)
     real = options.real if options.real is not None else [p.parent for p in sorted(REAL.glob("*/transforms.json"))]
@@ -59,14 +56,14 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     """What was measured, the figures that are gates, and why others are missing. The sheet of pictures is written into
     `folder`: pictures are in no JSON."""
     few = Sources(given.places[:2], given.real[:1], given.bundles, given.tuned) if quick else given
-    others = OthersShare()
+    others = OthersFraction()
     perceptual = load_perceptual(PERCEPTUAL) if PERCEPTUAL.exists() else None
     wanted = settings(list(given.bundles))
     rows, places, shown = scene_quality.measure(few, wanted, perceptual, quick)
     speed, why = scene_speed.measure(given.places, given.bundles[SHIPPED], threads, quick)
     share = others.now()
     doubts = doubts_of(places, perceptual is not None)
-    if share > MOST_OTHERS:
+    if share > MAX_OTHERS:
         doubts.append(f"other processes had {share:.0%} of the processor (scenes)")
     sheet = scene_pictures.write_sheet(shown, rows, folder)
     document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "doubts": doubts,
@@ -81,10 +78,10 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
 def doubts_of(places: list[dict], has_distance: bool) -> list[str]:
     """What this run should have had and has not."""
     doubts = [f"{place['name']} was left out: {place['missing']}" for place in places if "missing" in place]
-    for real, least, kind in ((False, LEAST_PLACES, "rendered"), (True, LEAST_REAL, "real")):
+    for real, wanted, kind in ((False, MIN_PLACES, "rendered"), (True, MIN_REAL, "real")):
         count = sum(place["real"] == real and "missing" not in place for place in places)
-        if count < least:
-            doubts.append(f"{count} {kind} places, {least} are wanted")
+        if count < wanted:
+            doubts.append(f"{count} {kind} places, {wanted} are wanted")
     if not has_distance:
         doubts.append(f"no distance by features: {PERCEPTUAL} is not there (python -m export.teachers.backbone)")
     return doubts
@@ -112,38 +109,3 @@ def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float],
     else:
         missing["scene_bundle_mb"] = f"no networks in {bundle}"
     return figures, missing
-
-
-def main(argv: list[str] | None = None) -> int:
-    from benchmarks import report
-
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.scenes", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path("build/benchmarks"), metavar="DIR",
-        help="for scenes.json, scenes.md, scenes.html and pictures; default: build/benchmarks",
-    )  # fmt: skip
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--quick", action="store_true")
-    add_arguments(parser)
-    options = parser.parse_args(argv)
-    options.out.mkdir(parents=True, exist_ok=True)
-    try:
-        machine = frame_time.machine()
-        measured, figures, missing = measure(sources_of(options), options.out, options.threads, options.quick)
-    except (FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
-        print(f"The benchmark stopped: {error}", file=sys.stderr)
-        return 2
-    verdicts = gates.check(figures, machine, missing, only=FIGURES)
-    document = {"schema": SCHEMA, "quick": options.quick, "machine": machine, "scenes": measured, "figures": figures,
-                "missing": missing, "gates": [vars(verdict) for verdict in verdicts]}  # fmt: skip
-    path = options.out / "scenes.json"
-    path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
-    gates.print_verdicts(verdicts)
-    print("Written: " + ", ".join(str(x) for x in [path, *report.write_scenes(document, options.out)]))
-    return 1 if any(verdict.state == "missed" for verdict in verdicts) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

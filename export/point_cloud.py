@@ -15,8 +15,8 @@ _TYPES = {
     "double": "<f8", "float64": "<f8",
 }  # fmt: skip
 _FORMATS = ("ascii", "binary_little_endian")
-MOST_HEADER_BYTES = 65536
-MOST_POINTS = 50_000_000
+MAX_HEADER_BYTES = 65536
+MAX_POINTS = 50_000_000
 
 
 class PointCloudError(ValueError):
@@ -72,7 +72,7 @@ def read_ply(path: Path) -> PointCloud:
         data = path.read_bytes()
     except OSError as error:
         raise PointCloudError(f"{path} cannot be read: {error}.") from None
-    end = data.find(b"end_header", 0, MOST_HEADER_BYTES)
+    end = data.find(b"end_header", 0, MAX_HEADER_BYTES)
     start = data.find(b"\n", end) + 1
     if not data.startswith(b"ply") or end < 0 or not start:
         raise PointCloudError(f"{path} is not a PLY file: it has no header.")
@@ -112,7 +112,7 @@ def _header(text: str, path: Path) -> tuple[str, int, list[tuple[str, str]]]:
                     raise PointCloudError(f"{path} begins with the element {name}; only clouds are read.")
                 element = name
                 if name == "vertex":
-                    count = int(number) if number.isdecimal() and len(number) < 10 else MOST_POINTS + 1
+                    count = int(number) if number.isdecimal() and len(number) < 10 else MAX_POINTS + 1
             case ["property", name, title] if element == "vertex":
                 if name not in _TYPES or title in dict(fields):
                     raise PointCloudError(f"{path}: a point's property {name} {title} is unknown or there twice.")
@@ -121,8 +121,8 @@ def _header(text: str, path: Path) -> tuple[str, int, list[tuple[str, str]]]:
                 raise PointCloudError(f"{path}: points have a property that is a list.")
     if kind not in _FORMATS:
         raise PointCloudError(f"{path} has the format {kind!r}; {' and '.join(_FORMATS)} are read.")
-    if not 0 <= count <= MOST_POINTS:
-        raise PointCloudError(f"{path} has no number of points that can be read; at most {MOST_POINTS} are.")
+    if not 0 <= count <= MAX_POINTS:
+        raise PointCloudError(f"{path} has no number of points that can be read; at most {MAX_POINTS} are.")
     if not {"x", "y", "z"} <= set(dict(fields)):
         raise PointCloudError(f"{path}: points have no x, y and z.")
     return kind, count, fields

@@ -7,7 +7,6 @@ int8 result. Both bundles run on the same pictures at the bundle's own threshold
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import shutil
 import sys
@@ -21,6 +20,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from export.bundle import MANIFEST, read_manifest, signed
 from export.evaluation.backends import DEFAULT_PATHS, Backend, Prediction, open_backend
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
@@ -138,15 +138,14 @@ def mixed(float_bundle: Path, int8_bundle: Path, in_float: list[str], folder: Pa
     """A copy of the int8 bundle in `folder` whose graphs `in_float` are the fp32 ones. Raises ValueError for a graph
     that neither has."""
     shutil.copytree(int8_bundle, folder, dirs_exist_ok=True)
-    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest = read_manifest(folder)
     for name in in_float:
         if name not in manifest["graphs"]:
-            raise ValueError(f"{name} is none of the graphs {', '.join(manifest['graphs'])}")
+            raise ValueError(f"{name} is not one of the graphs {', '.join(manifest['graphs'])}")
         file = manifest["graphs"][name]["file"]
-        data = (float_bundle / file).read_bytes()
-        (folder / file).write_bytes(data)
-        manifest["files"][file] = {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
-    (folder / "manifest.json").write_text(json.dumps(manifest))
+        shutil.copyfile(float_bundle / file, folder / file)
+        manifest["files"][file] = signed(folder / file)
+    (folder / MANIFEST).write_text(json.dumps(manifest))
     return folder
 
 

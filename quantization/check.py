@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import onnx
 
+from export.bundle import BundleInfo
 from export.densepose import bundle as bundle_format
 from export.densepose.config import DecodeConfig
 from export.densepose.graphs import Bundle, open_bundle
@@ -47,7 +48,7 @@ def fp32_bundle(weights: Path, folder: Path) -> Bundle:
 
     net = load_network(weights)
     export_graphs(net, folder)
-    bundle_format.write_manifest(folder, bundle_format.BundleInfo(folder.name, "fp32"), net.config, DecodeConfig())
+    bundle_format.write_manifest(folder, BundleInfo(folder.name, "fp32"), net.config, DecodeConfig())
     return open_bundle(folder)
 
 

@@ -27,6 +27,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from export.bundle import BundleInfo, bytes_of
 from export.densepose import bundle as bundle_format
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.maquette_api import MaquetteError
@@ -187,7 +188,7 @@ def write_bundle(target: Path, source: Bundle, graphs: Callable[[str, Path], Non
     shutil.copy(source.folder / bundle_format.CHARTS, target)
     for name in bundle_format.GRAPHS:
         graphs(name, target / f"{name}.onnx")
-    bundle_format.write_manifest(target, bundle_format.BundleInfo(target.name, "int8"), source.network, source.decode)
+    bundle_format.write_manifest(target, BundleInfo(target.name, "int8"), source.network, source.decode)
     return target
 
 
@@ -263,11 +264,11 @@ def run(arguments: argparse.Namespace) -> int:
             found = agreement.open_bundle(target, arguments.backend)
             figures = agreement.compare(expected, agreement.predictions(found, images))
             last = f"{taken[-1].graph}: {taken[-1].pattern}" if taken else "as the settings are"
-            megabytes = bundle_format.bytes_of(target) / 1e6
+            megabytes = bytes_of(target) / 1e6
             console.print(f"{100 * figures.labels:6.2f} %  {megabytes:.2f} MB  {last}", highlight=False)
             return figures.labels
 
-        size = bundle_format.bytes_of(made([]))
+        size = bytes_of(made([]))
         taken, measured = pick(ranked, size, int(1e6 * arguments.budget), measure, arguments.gate)
     print_candidates(ranked, taken, console)
     chosen = {}

@@ -22,6 +22,7 @@ from onnxruntime.quantization.calibrate import TensorsData, create_calibrator
 from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
 from onnxruntime.quantization.registry import QDQRegistry, QLinearOpsRegistry
 
+from export.bundle import BundleInfo, bytes_of
 from export.densepose import bundle as bundle_format
 from export.densepose.graphs import open_bundle
 from export.shards import load_records
@@ -194,7 +195,7 @@ def main() -> None:
     shutil.copy(source.folder / bundle_format.CHARTS, options.out)  # chart weights stay float
     samples = [collect(source, records, settings.people_per_image) for records in (calibration, held_out)]
     quality = quantize_graphs(source.folder, options.out, settings.graphs, *samples)
-    info = bundle_format.BundleInfo(
+    info = BundleInfo(
         name=options.name or options.out.name,
         precision="int8",
         version=source.manifest["version"],
@@ -202,7 +203,7 @@ def main() -> None:
         measured={"sqnr_db": as_measured(quality)},
     )
     bundle_format.write_manifest(options.out, info, source.network, source.decode)
-    sizes = [bundle_format.bytes_of(folder) / 1e6 for folder in (options.bundle, options.out)]
+    sizes = [bytes_of(folder) / 1e6 for folder in (options.bundle, options.out)]
     print(f"{options.out}: {sizes[0]:.2f} -> {sizes[1]:.2f} MB")
 
 

@@ -10,13 +10,12 @@ no training and no calibration saw those.
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 
-from export.densepose.bundle import BundleInfo
+from export.bundle import BundleInfo, read_manifest
 from export.scenes.bundle import BASIS, write_manifest
 from export.scenes.captures import read_captures
 from quantization.bundle_networks import BundleNetworks
@@ -44,7 +43,7 @@ def main() -> None:
     before = float(np.mean(psnrs_db(fp32, held_out, "fp32")))
     after = float(np.mean(psnrs_db(BundleNetworks(options.out), held_out, "int8")))
     print(f"PSNR of {len(held_out)} held-out photos: fp32 {before:.2f} dB, int8 {after:.2f} dB")
-    manifest = json.loads((options.fp32 / "manifest.json").read_text())
+    manifest = read_manifest(options.fp32)
     info = BundleInfo(
         name=options.name or options.out.name,
         precision="int8",

@@ -83,5 +83,5 @@ def _graph_settings(table: dict[str, object], where: str) -> GraphSettings:
     except TypeError as error:
         raise ValueError(f"{where}: {error}") from error
     if settings.method not in METHODS:
-        raise ValueError(f"{where}: method {settings.method!r} is none of {', '.join(METHODS)}")
+        raise ValueError(f"{where}: method {settings.method!r} is not one of {', '.join(METHODS)}")
     return settings

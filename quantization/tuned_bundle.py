@@ -9,13 +9,12 @@ samples, `*.npz` files of what its graph is given. What FOLDER held before is re
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 
-from export.densepose.bundle import BundleInfo
+from export.bundle import BundleInfo, read_manifest
 from export.scenes.bundle import BASIS, write_manifest
 from quantization.quantize import quantize_graph
 from quantization.settings import SCENES, SceneSettings, read_settings
@@ -28,7 +27,7 @@ def main() -> None:
     parser.add_argument("--shipped", type=Path, required=True, metavar="DIR", help="bundle that was tuned")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
     options = parser.parse_args()
-    manifest = json.loads((options.shipped / "manifest.json").read_text())
+    manifest = read_manifest(options.shipped)
     options.out.mkdir(parents=True, exist_ok=True)
     for name in ("extractor.onnx", BASIS):
         shutil.copyfile(options.shipped / name, options.out / name)

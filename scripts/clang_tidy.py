@@ -2,9 +2,9 @@
 
     python scripts/clang_tidy.py [--build build/release] FILE...
 
-A file is checked again when it, a header it includes, its compile command, .clang-tidy or clang-tidy itself changed: the
-stamps under BUILD/clang-tidy hold the hashes of a clean run. Files that the build does not compile are named and left out.
-Exit status 1 when clang-tidy has something to say.
+A file is checked again when it, a header it includes, its compile command, .clang-tidy or clang-tidy itself changed:
+the stamps under BUILD/clang-tidy hold the hashes of a clean run. Files that the build does not compile are named and
+left out. Exit status 1 when clang-tidy has something to say.
 """
 
 from __future__ import annotations
@@ -66,11 +66,11 @@ class Checker:
     def __init__(self, build: Path, stamps: Path):
         self.build, self.stamps = build, stamps
         stamps.mkdir(parents=True, exist_ok=True)
-        version = subprocess.run(["clang-tidy", "--version"], capture_output=True, text=True, check=True).stdout
-        self.salt = version + Path(".clang-tidy").read_text()
+        self.version = subprocess.run(["clang-tidy", "--version"], capture_output=True, text=True, check=True).stdout
 
     def stamp(self, compilation: Compilation) -> Path:
-        key = "\0".join([self.salt, str(compilation.source), *compilation.words])
+        settings = [hash_of(folder / ".clang-tidy") for folder in compilation.source.parents]
+        key = "\0".join([self.version, *settings, str(compilation.source), *compilation.words])
         return self.stamps / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
 
     def is_known_clean(self, compilation: Compilation) -> bool:

@@ -26,7 +26,7 @@ if ! command -v dpkg-query >/dev/null; then
 fi
 
 missing=()
-# needs_command COMMAND PACKAGE: a tool counts as present whoever installed it.
+# needs_command COMMAND PACKAGE: a tool counts as present however it was installed.
 needs_command() { command -v "$1" >/dev/null || missing+=("$2"); }
 needs_package() {
     [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null || true)" = installed ] || missing+=("$1")

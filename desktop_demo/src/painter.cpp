@@ -134,7 +134,7 @@ void Painter::set_body(const maquette::DensePoseMesh& body) {
   for (unsigned k = 0; k < 3; ++k) {
     glEnableVertexAttribArray(k);
     glVertexAttribPointer(k, 3, GL_FLOAT, GL_FALSE, kVertexBytes,
-                          static_cast<const char*>(nullptr) + k * 3 * sizeof(float));
+                          reinterpret_cast<const void*>(k * 3 * sizeof(float)));  // NOLINT(performance-no-int-to-ptr)
   }
 }
 

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export.camera import Camera
 from export.captures.plane_sweep import GreyView, depth_of
 from export.captures.structure import CaptureError
 from export.point_cloud import evenly_spread
-from export.scenes.cameras import Camera
 
 POINTS = 200_000
 NEIGHBOURS = 4

@@ -10,19 +10,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from export.camera import Camera
 from export.captures.dense import dense_cloud
 from export.captures.originals import Original
 from export.captures.structure import pose, up_of_cameras, write_photos
 from export.photos.packages import load_packages
 from export.point_cloud import write_ply
-from export.scenes.cameras import Camera
 
 HELD_OUT_EVERY = 8
 _TO_OPENGL = np.diag([1.0, -1.0, -1.0])
 
 
 def make(original: Original, folder: Path) -> tuple[int, int, int]:
-    """Writes the folder whole or not at all; gives the numbers of photos, of those posed, and of points.
+    """Writes the folder atomically; gives the numbers of photos, of those posed, and of points.
 
     Raises PackageError and CaptureError.
     """
@@ -114,7 +114,7 @@ def _flat_mask(colmap: Path, model, name: str, camera: Camera) -> np.ndarray:
     focal, cx, cy, bend = lens.params  # SIMPLE_RADIAL
     old = np.array([[focal, 0, cx - 0.5], [0, focal, cy - 0.5], [0, 0, 1]])
     size = camera.width_px, camera.height_px
-    to_old = cv2.initUndistortRectifyMap(old, np.array([bend, 0, 0, 0]), None, camera.intrinsics(), size, cv2.CV_32FC1)
+    to_old = cv2.initUndistortRectifyMap(old, np.array([bend, 0, 0, 0]), None, camera.intrinsics, size, cv2.CV_32FC1)
     return cv2.erode(cv2.remap(mask, *to_old, cv2.INTER_NEAREST), np.ones((5, 5))) > 0
 
 

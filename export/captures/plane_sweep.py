@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from export.scenes.cameras import Camera
+from export.camera import Camera
 
 PLANES = 128
 WINDOW_PX = 7
-_LEAST_SPREAD = 2.0  # grey levels: where less is to be seen, nothing matches
+_MIN_SPREAD = 2.0  # grey levels: where less is to be seen, nothing matches
 _SMALL_STEP, _LARGE_STEP = 0.08, 0.5  # costs of a depth one plane away from its neighbour's, and of more
 _WORST_COST = 0.75  # 1 - correlation
 
@@ -60,14 +60,14 @@ def _span(present: np.ndarray, size: int) -> slice:
 def _cost_at(view: GreyView, others: list[GreyView], depth: float, rows: slice, columns: slice, grey) -> np.ndarray:
     """1 - correlation with the half of the others that fit best, float32 [h, w]: what hides in one shows in another."""
     first = view.camera
-    to_ray = np.linalg.inv(first.intrinsics()) @ np.array([[1, 0, columns.start], [0, 1, rows.start], [0, 0, 1.0]])
+    to_ray = np.linalg.inv(first.intrinsics) @ np.array([[1, 0, columns.start], [0, 1, rows.start], [0, 0, 1.0]])
     mean, spread = _moments(grey)
     costs = []
     for other in others:
         turn = other.camera.rotation @ first.rotation.T
         shift = other.camera.rotation @ (first.centre - other.camera.centre)
         # A plane at `depth` before the first camera: x' = K' (R + t n^T / depth) K^-1 x.
-        plane = other.camera.intrinsics() @ (turn + np.outer(shift, [0, 0, 1 / depth])) @ to_ray
+        plane = other.camera.intrinsics @ (turn + np.outer(shift, [0, 0, 1 / depth])) @ to_ray
         size = grey.shape[1], grey.shape[0]
         seen = cv2.warpPerspective(other.grey, plane, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
         other_mean, other_spread = _moments(seen)
@@ -80,7 +80,7 @@ def _cost_at(view: GreyView, others: list[GreyView], depth: float, rows: slice, 
 def _moments(grey: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     mean = cv2.boxFilter(grey, -1, (WINDOW_PX, WINDOW_PX))
     square = cv2.boxFilter(grey * grey, -1, (WINDOW_PX, WINDOW_PX))
-    return mean, np.sqrt(np.maximum(square - mean * mean, 0) + _LEAST_SPREAD**2)
+    return mean, np.sqrt(np.maximum(square - mean * mean, 0) + _MIN_SPREAD**2)
 
 
 def _along(costs: np.ndarray, way: tuple[int, int]) -> np.ndarray:

@@ -1,24 +1,18 @@
-"""Writes a model bundle: ONNX graphs, chart weights, the surface grid and the manifest that describes them
-(docs/formats.md)."""
+"""The manifest of a dense pose bundle (docs/formats.md): five graphs, the chart weights and the surface grid."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from dataclasses import dataclass, field
 from pathlib import Path
 
-import onnx
-
+from export.bundle import BundleInfo, Signature
+from export.bundle import write_manifest as write_bundle_manifest
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import MEAN, STD
 from export.surface_grid import FILE as SURFACE_GRID
 
-OPSET = 17
 GRAPHS = ("trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head")
 CHARTS = "charts.f32"
 LEVELS = (2, 3, 4, 5, 6)
-LICENCE = "Apache-2.0"
 # What the pictures are rendered from; the packages are named in export/people/assets.py and export/photos.
 TRAINING_DATA = (
     {"name": "Maquette rendered people", "licence": "Apache-2.0", "used_for": "training, calibration"},
@@ -50,19 +44,8 @@ TRAINING_DATA = (
 )
 
 
-@dataclass(frozen=True)
-class BundleInfo:
-    """What a bundle says about itself. measured: figures with their conditions, e.g. the error."""
-
-    name: str
-    precision: str  # "fp32" or "int8"
-    version: str = "0.1.0"
-    training_data: tuple[dict[str, str], ...] = TRAINING_DATA
-    measured: dict[str, object] = field(default_factory=dict)
-
-
-def signatures(network: NetworkConfig) -> dict[str, dict[str, dict[str, list[int | str]]]]:
-    """Names and shapes of each graph's inputs and outputs, in order. A text is a size known at run time."""
+def signatures(network: NetworkConfig) -> dict[str, Signature]:
+    """Of each graph."""
     width, anchors = network.width, len(network.aspect_ratios)
     sizes = {k: [f"height/{2**k}", f"width/{2**k}"] for k in LEVELS}
     # P6 is every second cell of P5, rounded up; that is no plain quotient of the input.
@@ -71,7 +54,7 @@ def signatures(network: NetworkConfig) -> dict[str, dict[str, dict[str, list[int
     def maps(name: str, levels: tuple[int, ...], channels: int) -> dict[str, list[int | str]]:
         return {f"{name}{k}": [1, *sizes[k], channels] for k in levels}
 
-    def rpn(levels: tuple[int, ...]) -> dict[str, dict[str, list[int | str]]]:
+    def rpn(levels: tuple[int, ...]) -> Signature:
         return {"inputs": maps("p", levels, width), "outputs": maps("rpn", levels, 5 * anchors)}
 
     def rois(pool: int) -> dict[str, list[int | str]]:
@@ -95,104 +78,64 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
 
     Raises ValueError when a graph's inputs and outputs are not those of the format.
     """
-    files, graphs = {}, {}
-    for name, tensors in signatures(network).items():
-        path = folder / f"{name}.onnx"
-        _check_names(path, tensors)
-        files[path.name] = signed(path)
-        entry: dict[str, object] = {"file": path.name, "opset": OPSET}
-        for side, shapes in tensors.items():
-            entry[side] = [{"name": n, "type": "float32", "shape": s} for n, s in shapes.items()]
-        graphs[name] = entry
     grid = (Path(__file__).parent / SURFACE_GRID).read_bytes()
     (folder / SURFACE_GRID).write_bytes(grid)
-    for name in (CHARTS, SURFACE_GRID):
-        files[name] = signed(folder / name)
-    manifest = {
-        "format": "maquette-bundle",
-        "format_version": 3,
-        "name": info.name,
-        "version": info.version,
-        "task": "densepose",
-        "precision": info.precision,
-        "files": files,
-        "graphs": graphs,
+    task_keys = {
         "input": {
             "color": "RGB",
             "mean": [round(float(x), 3) for x in MEAN],
             "std": [round(float(x), 3) for x in STD],
             "multiple_of": 32,
-            "long_side": decode.long_side,
+            "long_side_px": decode.long_side,
         },
         "rpn": {
             "strides": list(network.rpn_strides),
-            "anchor_sizes": list(network.anchor_sizes),
+            "anchor_sizes_px": list(network.anchor_sizes),
             "aspect_ratios": list(network.aspect_ratios),
             "pre_nms_top_k": decode.pre_nms_top_k,
             "post_nms_top_k": decode.post_nms_top_k,
             "nms_iou": decode.rpn_nms_iou,
         },
         "box_head": {
-            "pool": network.box_pool,
+            "pool_size": network.box_pool,
             "strides": list(network.tap_strides),
             "canonical_level": network.canonical_level,
-            "canonical_size": network.canonical_size,
+            "canonical_size_px": network.canonical_size,
             "delta_weights": list(network.delta_weights),
             "score_threshold": decode.score_threshold,
             "nms_iou": decode.box_nms_iou,
             "max_people": decode.max_people,
         }
-        | ({} if decode.second_look_score is None else {"second_look_score": decode.second_look_score}),
+        | ({} if decode.second_pass_threshold is None else {"second_pass_threshold": decode.second_pass_threshold}),
         "dense_head": {
-            "pool": network.dense_pool,
+            "pool_size": network.dense_pool,
             "stride": network.tap_strides[0],
-            "charts": CHARTS,
-            "output": 2 * network.dense_pool,
+            "output_size": 2 * network.dense_pool,
             "coarse_classes": network.coarse_classes,
             "index_classes": network.index_classes,
             "mask_threshold": decode.mask_threshold,
-            "least_own_share": decode.least_own_share,
+            "min_visible_fraction": decode.min_visible_fraction,
         },
+        "charts": {"file": CHARTS},
         "surface": {"file": SURFACE_GRID},
-        "licence": LICENCE,
-        "training_data": list(info.training_data),
-        "measured": info.measured,
     }
-    (folder / "manifest.json").write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n")
-    return manifest
+    return write_bundle_manifest(
+        folder, "densepose", info, signatures(network), files=(CHARTS, SURFACE_GRID), task_keys=task_keys
+    )
 
 
 def decode_config(manifest: dict) -> DecodeConfig:
     """Thresholds and limits that a manifest asks for."""
     rpn, head = manifest["rpn"], manifest["box_head"]
     return DecodeConfig(
-        long_side=manifest["input"]["long_side"],
+        long_side=manifest["input"]["long_side_px"],
         pre_nms_top_k=rpn["pre_nms_top_k"],
         post_nms_top_k=rpn["post_nms_top_k"],
         rpn_nms_iou=rpn["nms_iou"],
         score_threshold=head["score_threshold"],
         box_nms_iou=head["nms_iou"],
-        second_look_score=head.get("second_look_score"),
+        second_pass_threshold=head.get("second_pass_threshold"),
         max_people=head["max_people"],
         mask_threshold=manifest["dense_head"]["mask_threshold"],
-        least_own_share=manifest["dense_head"]["least_own_share"],
+        min_visible_fraction=manifest["dense_head"]["min_visible_fraction"],
     )
-
-
-def signed(path: Path) -> dict[str, object]:
-    """What a manifest says of a file."""
-    data = path.read_bytes()
-    return {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
-
-
-def bytes_of(folder: Path) -> int:
-    """Size of a bundle on disk in bytes."""
-    return sum(path.stat().st_size for path in folder.iterdir())
-
-
-def _check_names(path: Path, tensors: dict[str, dict[str, list[int | str]]]) -> None:
-    graph = onnx.load(path).graph
-    for side, found in (("inputs", graph.input), ("outputs", graph.output)):
-        names = [value.name for value in found]
-        if names != list(tensors[side]):
-            raise ValueError(f"{path} has the {side} {names}; the bundle format asks for {list(tensors[side])}")

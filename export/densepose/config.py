@@ -50,13 +50,13 @@ class DecodeConfig:
     rpn_nms_iou: float = 0.7
     score_threshold: float = 0.7
     box_nms_iou: float = 0.5
-    # Boxes with more than this score are looked at again, from where the first look put them (None: they are not). The
-    # second look depends less on which proposals there were: recall .72 -> .74 at the same precision, box AP + .6 on
-    # 300 images. A third look gained nothing.
-    second_look_score: float | None = 0.3
+    # Boxes with more than this score go through the box head again, from where its first pass put them (None: one
+    # pass). The second pass depends less on which proposals there were: recall .72 -> .74 at the same precision, box
+    # AP + .6 on 300 images. A third pass gained nothing.
+    second_pass_threshold: float | None = 0.3
     # Painted where the person is likelier than this. Below a half, since the best mask by IoU is the more generous the
     # less sure a network is (for Dice d, the best threshold is d / 2); this one gave the best IoU on validation.
     mask_threshold: float = 0.42
-    # Somebody of whose pixels fewer than this share are not yet those of better scored people is a second box on one.
-    least_own_share: float = 0.3
+    # A person of whose pixels a smaller fraction is visible past better scored people is a second box on one of them.
+    min_visible_fraction: float = 0.3
     max_people: int = 20

@@ -128,14 +128,14 @@ def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: N
     """Box head, threshold and NMS, twice if the config asks for it: boxes [K, 4] in input pixels and scores [K], best
     first."""
     threshold = config.score_threshold
-    if config.second_look_score is not None:
-        least = min(config.second_look_score, threshold)
-        proposed, _ = _look(graphs, features, proposed, network, config, inner, least)
-    return _look(graphs, features, proposed, network, config, inner, threshold)
+    if config.second_pass_threshold is not None:
+        first_threshold = min(config.second_pass_threshold, threshold)
+        proposed, _ = _box_pass(graphs, features, proposed, network, config, inner, first_threshold)
+    return _box_pass(graphs, features, proposed, network, config, inner, threshold)
 
 
-def _look(graphs: Graphs, features: list[Tensor], boxes: Tensor, network: NetworkConfig, config: DecodeConfig,
-          inner: tuple[int, int], threshold: float) -> tuple[Tensor, Tensor]:  # fmt: skip
+def _box_pass(graphs: Graphs, features: list[Tensor], boxes: Tensor, network: NetworkConfig, config: DecodeConfig,
+              inner: tuple[int, int], threshold: float) -> tuple[Tensor, Tensor]:  # fmt: skip
     if not len(boxes):
         return boxes, boxes.new_zeros(0)
     logits, deltas = graphs.box_head(tg.pooled(features, [boxes], network, network.box_pool))
@@ -151,7 +151,7 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
           config: DecodeConfig) -> int:  # fmt: skip
     """Writes one person's labels into the still empty pixels of its box; returns how many it wrote.
 
-    Where fewer than `config.least_own_share` of the person's pixels are still empty, it writes nothing and returns 0.
+    Where less than `config.min_visible_fraction` of the person's pixels is still empty, it writes none and returns 0.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
     at least 1). A pixel is painted where the coarse classes other than background together have a probability above
@@ -174,7 +174,7 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     label = torch.stack([part.float(), *chart], -1).byte().numpy()[: y1 - y0, : x1 - x0]
     body = label[..., 0] > 0
     empty = (instance[y0:y1, x0:x1] == 0) & body
-    if empty.sum() < config.least_own_share * body.sum():
+    if empty.sum() < config.min_visible_fraction * body.sum():
         return 0
     iuv[y0:y1, x0:x1][empty] = label[empty]
     instance[y0:y1, x0:x1][empty] = number

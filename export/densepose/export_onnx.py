@@ -24,6 +24,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+from export.bundle import OPSET, BundleInfo, bytes_of
 from export.densepose import bundle
 from export.densepose import targets as tg
 from export.densepose.config import DecodeConfig, NetworkConfig
@@ -271,7 +272,7 @@ def export_graphs(net: MobileParsingRCNN, folder: Path) -> None:
                 input_names=list(tensors["inputs"]),
                 output_names=list(tensors["outputs"]),
                 dynamic_axes=axes,
-                opset_version=bundle.OPSET,
+                opset_version=OPSET,
                 dynamo=False,
             )
         _finish(path, name)
@@ -366,7 +367,7 @@ def main() -> None:
     errors = parity(net, options.out, images)
     for name, error in errors.items():
         print(f"{name:24} largest error {error:.1e}")
-    info = bundle.BundleInfo(
+    info = BundleInfo(
         name=options.name or options.out.name,
         precision="fp32",
         training_data=() if options.random else bundle.TRAINING_DATA,
@@ -378,7 +379,7 @@ def main() -> None:
         },
     )
     bundle.write_manifest(options.out, info, net.config, DecodeConfig())
-    print(f"{options.out}: {bundle.bytes_of(options.out) / 1e6:.2f} MB")
+    print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
     if max(errors.values()) > TOLERANCE:
         raise SystemExit(f"the graphs differ from the network by more than {TOLERANCE:g}")
 

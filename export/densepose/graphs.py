@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from export.bundle import read_manifest
 from export.densepose.bundle import decode_config
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.decode import Graphs
@@ -37,21 +37,18 @@ class Bundle:
 
 
 def open_bundle(folder: Path, threads: int = 1) -> Bundle:
-    """Raises FileNotFoundError where there is no manifest."""
-    path = folder / "manifest.json"
-    if not path.exists():
-        raise FileNotFoundError(f"{folder} is not a model bundle: it has no manifest.json.")
-    manifest = json.loads(path.read_text())
+    """Raises what `export.bundle.read_manifest` raises."""
+    manifest = read_manifest(folder)
     rpn, head, dense = manifest["rpn"], manifest["box_head"], manifest["dense_head"]
     network = NetworkConfig(
         width=manifest["graphs"]["box_head"]["inputs"][0]["shape"][3],
-        anchor_sizes=tuple(rpn["anchor_sizes"]),
+        anchor_sizes=tuple(rpn["anchor_sizes_px"]),
         aspect_ratios=tuple(rpn["aspect_ratios"]),
         rpn_strides=tuple(rpn["strides"]),
         delta_weights=tuple(head["delta_weights"]),
     )
     sessions = {name: session(folder / entry["file"], threads) for name, entry in manifest["graphs"].items()}
-    charts = read_charts(folder / dense["charts"], dense["index_classes"] - 1)
+    charts = read_charts(folder / manifest["charts"]["file"], dense["index_classes"] - 1)
 
     def run(name: str, *given: Tensor) -> list[Tensor]:
         entry = manifest["graphs"][name]

@@ -10,13 +10,14 @@ A backend is written `kind` or `kind=path`:
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+
+from export.bundle import MANIFEST, read_manifest
 
 DEFAULT_PATHS = {
     "torch": Path("export/weights/densepose-b.pt"),
@@ -134,13 +135,6 @@ class CApiBackend:
         return Prediction(result.box, result.score, result.planes[..., :3], result.planes[..., 3])
 
 
-def read_manifest(bundle: Path) -> dict:
-    path = bundle / "manifest.json"
-    if not path.exists():
-        raise FileNotFoundError(f"{bundle} is not a model bundle: it has no manifest.json.")
-    return json.loads(path.read_text())
-
-
 def open_backend(text: str, score_floor: float) -> Backend:
     """text: `kind` or `kind=path`. score_floor: people with lower scores are not asked for."""
     os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -156,6 +150,6 @@ def open_backend(text: str, score_floor: float) -> Backend:
 
 def fingerprint(path: Path) -> str:
     """First 12 digits of the SHA-256 of a file, or of a bundle's manifest (which holds the others')."""
-    file = path / "manifest.json" if path.is_dir() else path
+    file = path / MANIFEST if path.is_dir() else path
     with open(file, "rb") as data:
         return hashlib.file_digest(data, "sha256").hexdigest()[:12]

@@ -20,13 +20,13 @@ RIGHT_IOU = 0.5
 class Calibration:
     """Detections in BINS bins of equal width over scores 0..1.
 
-    count: detections in each bin. mean_score, share_right: of each bin, NaN where it is empty. expected_error: mean of
-    |share_right - mean_score|, weighted by count; NaN without detections.
+    count: detections in each bin. mean_score, fraction_right: of each bin, NaN where it is empty. expected_error: mean
+    of |fraction_right - mean_score|, weighted by count; NaN without detections.
     """
 
     count: list[int]
     mean_score: list[float]
-    share_right: list[float]
+    fraction_right: list[float]
     expected_error: float
 
 
@@ -37,6 +37,6 @@ def calibrate(images: list[ImageMatches]) -> Calibration:
     count = np.bincount(place, minlength=BINS)
     full = np.maximum(count, 1)
     mean_score = np.where(count, np.bincount(place, score, minlength=BINS) / full, np.nan)
-    share_right = np.where(count, np.bincount(place, right, minlength=BINS) / full, np.nan)
-    error = np.nansum(count * np.abs(share_right - mean_score)) / count.sum() if len(score) else np.nan
-    return Calibration(count.tolist(), mean_score.tolist(), share_right.tolist(), float(error))
+    fraction_right = np.where(count, np.bincount(place, right, minlength=BINS) / full, np.nan)
+    error = np.nansum(count * np.abs(fraction_right - mean_score)) / count.sum() if len(score) else np.nan
+    return Calibration(count.tolist(), mean_score.tolist(), fraction_right.tolist(), float(error))

@@ -12,7 +12,8 @@ import os
 import sys
 from pathlib import Path
 
-from export.evaluation.backends import fingerprint, read_manifest
+from export.bundle import read_manifest
+from export.evaluation.backends import fingerprint
 from export.evaluation.failures import KINDS
 from export.evaluation.gallery import CAPTIONS
 from export.evaluation.report import FORMATS, ROWS, column_of
@@ -110,13 +111,13 @@ from what `python -m export.evaluation` measured on it.
 | --- | --- |
 | task, precision, size | {manifest["task"]}, {manifest["precision"]}, {megabytes:.2f} MB |
 | licence | {manifest["licence"]} |
-| in | an image ({source["color"]} inside; the SDK converts), resized to a long side of {source["long_side"]} px |
+| in | an image ({source["color"]} inside; the SDK converts), resized to a long side of {source["long_side_px"]} px |
 | out | for each person box and score; for each pixel I, U, V and which person is in front |
 | people shown | score {boxes["score_threshold"]:g} or better, at most {boxes["max_people"]} an image |
 | boxes dropped | IoU above {boxes["nms_iou"]:g} with a better one: of two people standing so, one is lost |
 | pixels painted | probability of person above {dense["mask_threshold"]:g} |
-| surface grid | {dense["output"]} x {dense["output"]} a person: finer detail in large people is interpolated |
-"""
+| surface grid | {dense["output_size"]} x {dense["output_size"]} a person: finer detail in large people is interpolated |
+"""  # noqa: E501
 
 
 def _training_data(manifest: dict) -> str:
@@ -178,7 +179,7 @@ def _calibration(bins: int, calibration: dict) -> str:
             f"{k / bins:.1f} to {(k + 1) / bins:.1f}",
             str(calibration["count"][k]),
             _number(calibration["mean_score"][k], "points"),
-            _number(calibration["share_right"][k], "points"),
+            _number(calibration["fraction_right"][k], "points"),
         )
         for k in range(bins)
     ]

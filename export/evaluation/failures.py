@@ -13,7 +13,7 @@ KINDS = {
     "mask": "people with a box, the lowest mask IoU first",
     "side": "left and right confused, the smallest correct share first",
 }
-LEAST_HEIGHT_PX = 64  # of people whose mask is judged: in smaller ones a pixel more or less decides
+MIN_HEIGHT_PX = 64  # of people whose mask is judged: in smaller ones a pixel more or less decides
 CASES = 6
 
 
@@ -28,15 +28,15 @@ class Case:
 
 
 def worst_cases(
-    people: list[PersonRecord], alarms: list[FalseAlarm], least_limb: int, count: int = CASES
+    people: list[PersonRecord], alarms: list[FalseAlarm], min_limb: int, count: int = CASES
 ) -> dict[str, list[Case]]:
     """At most `count` cases of each of KINDS, worst first, not more than one an image.
 
-    least_limb: pixels (or landmarks) of limbs that a person must have to be judged by left and right. Masks and sides
+    min_limb: pixels (or landmarks) of limbs that a person must have to be judged by left and right. Masks and sides
     that are more right than wrong are no failures.
     """
-    masks = [p for p in people if p.found and p.height_px >= LEAST_HEIGHT_PX and p.mask_iou < 0.5]
-    sides = [p for p in people if p.limb >= least_limb and p.same_side < 0.5 * p.limb]
+    masks = [p for p in people if p.found and p.height_px >= MIN_HEIGHT_PX and p.mask_iou < 0.5]
+    sides = [p for p in people if p.limb >= min_limb and p.same_side < 0.5 * p.limb]
     return {
         "missed": _first((-p.height_px, Case(p.image, p.box, p.height_px)) for p in people if not p.found)[:count],
         "false": _first((-a.score, Case(a.image, a.box, a.score)) for a in alarms)[:count],

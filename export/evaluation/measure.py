@@ -20,7 +20,7 @@ from export.shards import LabelledImage
 
 # Under GPS a detection that overlaps somebody too small or too hidden by this much counts neither way.
 IGNORE_IOU = 0.5
-LEAST_LIMB_PX = 200  # of a person who is judged by left and right
+MIN_LIMB_PX = 200  # of a person who is judged by left and right
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def measure(
         part_error_cm=surface.part_error_cm(visible),
         calibration=calibrate(matches),
         groups=breakdown(people),
-        failures=worst_cases(people, alarms, LEAST_LIMB_PX),
+        failures=worst_cases(people, alarms, MIN_LIMB_PX),
     )
 
 

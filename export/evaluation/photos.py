@@ -38,10 +38,10 @@ from export.evaluation.surface_accuracy import share
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
 
-LEAST_HEIGHT_PX = 64
-LEAST_TEACHER_SCORE = 0.5
-LEAST_VISIBLE = 0.6
-LEAST_LIMB_LANDMARKS = 4  # of a person who is judged by left and right
+MIN_HEIGHT_PX = 64
+MIN_TEACHER_SCORE = 0.5
+MIN_VISIBLE = 0.6
+MIN_LIMB_LANDMARKS = 4  # of a person who is judged by left and right
 PRECISION = 0.9
 # Which parts may be painted at a landmark of BlazePose. A landmark lies inside the body, so front and back both count.
 _ALLOWED = {
@@ -123,7 +123,7 @@ class Tally:
     def add(self, name: str, found: Prediction, labels: PhotoLabels) -> None:
         self.photos += 1
         heights = labels.box[:, 3] - labels.box[:, 1]
-        wanted = (heights > LEAST_HEIGHT_PX) & (labels.score >= LEAST_TEACHER_SCORE)
+        wanted = (heights > MIN_HEIGHT_PX) & (labels.score >= MIN_TEACHER_SCORE)
         comparison = compare(found, labels.box, wanted, self.threshold)
         self.matches.append(comparison.matches)
         self.alarms += comparison.false_alarms(name)
@@ -159,7 +159,7 @@ class Tally:
             index = NAMES.index(name)
             x, y = np.floor(labels.point[k, index]).astype(int)
             inside = 0 <= x < width and 0 <= y < height
-            if not inside or labels.visible[k, index] < LEAST_VISIBLE or not labels.mask[k, y, x]:
+            if not inside or labels.visible[k, index] < MIN_VISIBLE or not labels.mask[k, y, x]:
                 continue
             hits.append(int(part[y, x]) in allowed)
             self.landmarks[name].append(hits[-1])
@@ -191,7 +191,7 @@ class Tally:
             landmark={name: share(sum(hits), len(hits)) for name, hits in self.landmarks.items()},
             calibration=calibrate(self.matches),
             groups=breakdown(self.people),
-            failures=worst_cases(self.people, self.alarms + self.in_empty, LEAST_LIMB_LANDMARKS),
+            failures=worst_cases(self.people, self.alarms + self.in_empty, MIN_LIMB_LANDMARKS),
         )
 
 

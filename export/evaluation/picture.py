@@ -61,7 +61,7 @@ def _draw_calibration(axes: Axes, results: dict[str, Figures]) -> None:
     for k, (name, figures) in enumerate(results.items()):
         table = figures.calibration
         label = f"{name}: expected error {table.expected_error:.3f}"
-        axes.plot(table.mean_score, table.share_right, "o-", color=f"C{k}", label=label)
+        axes.plot(table.mean_score, table.fraction_right, "o-", color=f"C{k}", label=label)
     counts = axes.twinx()
     counts.bar((np.arange(BINS) + 0.5) / BINS, table.count, 0.9 / BINS, color=f"C{k}", alpha=0.2)
     counts.set_ylim(0, 4 * max(table.count))

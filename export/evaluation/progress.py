@@ -25,7 +25,7 @@ RENDERED = {
     "mask_iou": ("mask IoU", None),
 }
 ERROR = "error_cm_painted"  # of rendered people, median
-MOST_ERROR_CM = 6.0
+MAX_ERROR_CM = 6.0
 PHOTOS = {
     "recall_at_precision": ("recall at precision .9", 0.85),
     "mask_iou": ("mask IoU", 0.78),
@@ -70,7 +70,7 @@ def draw(rows: list[dict], path: Path) -> None:
         axis.legend(fontsize=8, loc="upper left")
     known = [row for row in rows if row["rendered"].get(ERROR) is not None]
     centimetres.plot([row["hours"] for row in known], [row["rendered"][ERROR] for row in known], "o-")
-    centimetres.axhline(MOST_ERROR_CM, linestyle="--", linewidth=1)
+    centimetres.axhline(MAX_ERROR_CM, linestyle="--", linewidth=1)
     centimetres.set(title="rendered people: median surface error", ylabel="cm", ylim=(0, None))
     for axis in (*axes, centimetres):
         axis.set_xlabel("hours of training on two cores")

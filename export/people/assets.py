@@ -87,7 +87,7 @@ def cache_dir() -> Path:
 
 
 def save_cache(path: Path, **arrays: np.ndarray) -> None:
-    """Writes an .npz whole or not at all: several processes may compute the same cache at once."""
+    """Writes an .npz atomically: several processes may compute the same cache at once."""
     temporary = path.with_suffix(f".{os.getpid()}.tmp.npz")
     np.savez(temporary, **arrays)
     temporary.rename(path)

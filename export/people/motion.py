@@ -227,12 +227,12 @@ def lying(rng: np.random.Generator, pose: Pose) -> Pose:
     return Pose(turn @ pose.root, turn @ pose.chest, turn @ pose.head, pose.limbs @ turn.T, "lies")
 
 
-def drawn_pose(rng: np.random.Generator, sitting_share: float = 0.25) -> Pose:
+def drawn_pose(rng: np.random.Generator, sitting_fraction: float = 0.25) -> Pose:
     """An everyday pose drawn at random: standing or sitting, arms hanging, bent or raised."""
     u = rng.uniform
     root = _euler(u(-6, 8), u(-4, 4), 0)
     chest = root @ _euler(rng.normal(4, 8), rng.normal(0, 5), rng.normal(0, 9))
-    sitting = u() < sitting_share
+    sitting = u() < sitting_fraction
     arms, legs = [], []
     for side in (1, -1):
         if u() < 0.8:

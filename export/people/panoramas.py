@@ -7,7 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.people.render import Camera, Light
+from export.camera import Camera
+from export.people.render import Light
 
 _CONE = np.cos(np.radians(20))  # half angle of what counts as one lamp
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -48,10 +49,10 @@ class Panorama:
 
     def seen(self, camera: Camera, yaw: float, exposure: float) -> np.ndarray:
         """What lies behind the people: float32 [H, W, 3] BGR, 0..255. yaw: radians that the place is turned by."""
-        x = (np.arange(camera.width) + 0.5 - camera.width / 2) / camera.focal_px
-        y = (np.arange(camera.height) + 0.5 - camera.height / 2) / camera.focal_px
-        ray = np.stack([*np.meshgrid(x, y), np.ones((camera.height, camera.width))], -1)
-        ray = ray @ camera.world_to_camera[:, :3]
+        x = (np.arange(camera.width_px) + 0.5 - camera.width_px / 2) / camera.fx_px
+        y = (np.arange(camera.height_px) + 0.5 - camera.height_px / 2) / camera.fx_px
+        ray = np.stack([*np.meshgrid(x, y), np.ones((camera.height_px, camera.width_px))], -1)
+        ray = ray @ camera.rotation
         ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
         height, width = self.radiance.shape[:2]
         column = ((np.arctan2(ray[..., 1], ray[..., 0]) - yaw) / (2 * np.pi) % 1) * width - 0.5
@@ -61,15 +62,15 @@ class Panorama:
             np.minimum(self.radiance * exposure, 1.5), column.astype(np.float32),
             np.clip(row, 0, height - 1).astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP,
         )  # fmt: skip
-        linear = cv2.GaussianBlur(linear, (0, 0), 0.3 * camera.focal_px * 2 * np.pi / width)
+        linear = cv2.GaussianBlur(linear, (0, 0), 0.3 * camera.fx_px * 2 * np.pi / width)
         return 255 * np.clip(linear[..., ::-1], 0, 1) ** (1 / 2.2)
 
     def light(self, camera: Camera, yaw: float, exposure: float, rng: np.random.Generator) -> Light:
         """The same light on people: the upper and lower half as a mean each, the two brightest spots as lamps."""
         turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
-        into = camera.world_to_camera[:, :3] @ turn
+        into = camera.rotation @ turn
         return Light(
-            camera.world_to_camera[:, :3] @ [0, 0, 1.0],
+            camera.rotation @ [0, 0, 1.0],
             softened(self.sky * exposure),
             softened(self.ground * exposure),
             np.stack([into @ towards for towards, _ in self.lamps]),

@@ -7,7 +7,7 @@ and averaged; labels are taken from one of the samples, since labels must not be
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 os.environ.setdefault("LP_NUM_THREADS", "1")  # the software rasteriser; processes are the parallelism here
 
@@ -15,8 +15,8 @@ import cv2
 import moderngl
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial.transform import Rotation
 
+from export.camera import Camera
 from export.people.lookup import LabelLookup
 from export.people.props import Prop
 from export.people.wardrobe import Layer, Model
@@ -100,23 +100,6 @@ void main() { gl_Position = shadow_matrix * vec4(position, 1); }"""
 
 _SHADOW_FRAGMENT = """#version 330
 void main() {}"""
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Pinhole: focal length and size in pixels, principal point in the middle; world_to_camera [3, 4]."""
-
-    width: int
-    height: int
-    focal_px: float
-    world_to_camera: np.ndarray
-
-    def rolled(self, degrees: float) -> Camera:
-        """The camera rolled about its axis, so that what it shows turns clockwise by a positive angle."""
-        if not degrees:
-            return self
-        turn = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
-        return replace(self, world_to_camera=turn @ self.world_to_camera)
 
 
 @dataclass(frozen=True)
@@ -253,7 +236,8 @@ class Renderer:
         rng: np.random.Generator,
         props: list[Prop] = (),
     ) -> Picture:
-        """Instances are numbered 1.. in the order of `people`; props are background that can hide them."""
+        """Instances are numbered 1.. in the order of `people`; props are background that can occlude them. camera: its
+        principal point is taken to be in the middle."""
         # OpenGL works on the context that was made or entered last, in which names mean other objects.
         self.context.__enter__()
         rotation, shift = camera.world_to_camera[:, :3], camera.world_to_camera[:, 3]
@@ -277,7 +261,7 @@ class Renderer:
             self._set("instance", float(number))
             near = max(float(np.quantile(seen[number - 1][::50, 2], 0.1)), 0.2)
             for layer in reversed(person.layers):  # the outermost first: what it hides need not be shaded
-                self._layer(layer, self.moving[number - 1], SUPERSAMPLING * camera.focal_px / near, rng)
+                self._layer(layer, self.moving[number - 1], SUPERSAMPLING * camera.fx_px / near, rng)
         for prop, buffer in things:
             self._prop(prop, buffer, 0)
         for prop, number, buffer in worn:
@@ -289,7 +273,7 @@ class Renderer:
     def _set_view(self, camera: Camera, light: Light, shadow_matrix: np.ndarray) -> None:
         self.target.use()
         self.target.clear(0, 0, 0, 0)
-        x, y = 2 * camera.focal_px / camera.width, 2 * camera.focal_px / camera.height
+        x, y = 2 * camera.fx_px / camera.width_px, 2 * camera.fy_px / camera.height_px
         a, b = (_FAR + _NEAR) / (_FAR - _NEAR), -2 * _FAR * _NEAR / (_FAR - _NEAR)
         # y stays "down", so that the first row read back is the top row.
         matrix = np.array([[x, 0, 0, 0], [0, y, 0, 0], [0, 0, a, b], [0, 0, 1, 0]], np.float32)
@@ -452,7 +436,7 @@ class Renderer:
         if light.occlusion:
             stored = np.frombuffer(self.depth.read(alignment=1), np.float32).reshape(height, width)[pick]
             depth = 2 * _FAR * _NEAR / (_FAR + _NEAR - (2 * stored - 1) * (_FAR - _NEAR))
-            left = 1 - light.occlusion * neighbour_shade(np.where(stored < 1, depth, np.inf), camera.focal_px)
+            left = 1 - light.occlusion * neighbour_shade(np.where(stored < 1, depth, np.inf), camera.fx_px)
             # On the ground of the photo, darker means that more of the photo is covered by black.
             alpha = np.where(surface_point[..., 3] < 0, 1 - (1 - alpha) * left, alpha)
             rgb = rgb * left[..., None]

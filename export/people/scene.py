@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from export.camera import Camera
 from export.people import assets
 from export.people.animals import load_animals
 from export.people.atlas import Atlas
@@ -17,13 +18,13 @@ from export.people.imaging import camera_faults, lens_map, through_lens
 from export.people.lookup import LabelLookup
 from export.people.motion import load_clips, load_photo_poses
 from export.people.panoramas import load_panoramas
-from export.people.render import Camera, Light, Picture, Renderer
+from export.people.render import Light, Picture, Renderer
 from export.people.staging import Director
 from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model
 
 SPLITS = {"train": 0, "val": 1, "test": 2}
-PANORAMA_SHARE = 0.2  # of the images outside rendered rooms
+PANORAMA_FRACTION = 0.2  # of the images outside rendered rooms
 TILTED_PEOPLE = 0.25  # of the tilted images: the people are, not the camera
 BODIES = {"train": 400, "val": 60, "test": 60}
 
@@ -70,7 +71,7 @@ class Studio:
 
     def sample(self, rng: np.random.Generator) -> Sample:
         stage = self.director.stage(rng)
-        if not stage.indoors and rng.random() < PANORAMA_SHARE:
+        if not stage.indoors and rng.random() < PANORAMA_FRACTION:
             panorama, yaw = self.panoramas[rng.integers(len(self.panoramas))], rng.uniform(0, 2 * np.pi)
             exposure = panorama.exposure(rng.uniform(0.35, 1.1))
             behind = panorama.seen(stage.camera, yaw, exposure)
@@ -146,7 +147,7 @@ def _light(rng: np.random.Generator, camera: Camera, photo: np.ndarray, indoors:
     photo: BGR float32 [H, W, 3].
     """
     u = rng.uniform
-    up = camera.world_to_camera[:, :3] @ [0, 0, 1.0]
+    up = camera.rotation @ [0, 0, 1.0]
     key = np.array([rng.normal(0, 1), -abs(rng.normal(0.6, 0.6)), -abs(rng.normal(0.7, 0.5))])
     sky, ground, sun = (1 + rng.normal(0, spread, 3) for spread in (0.08, 0.08, 0.06))
     brightness = 1.0

@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from export.camera import Camera
 from export.people import assets, motion
-from export.people.render import Camera, Light, Person
+from export.people.render import Light, Person
 from export.people.scene import Studio
 from export.people.wardrobe import dress
 
@@ -57,7 +58,7 @@ def main() -> None:
         tall = float(shape.vertices[studio.body.groups["body"], 2].max())
         distance = focal * tall * 1.06 / TILE_HEIGHT
         eye = np.array([0, -distance, 0.51 * tall])
-        camera = Camera(TILE_WIDTH, TILE_HEIGHT, focal, np.concatenate([look, -(look @ eye)[:, None]], 1))
+        camera = Camera.centred(TILE_WIDTH, TILE_HEIGHT, focal, look, eye)
         tiles = []
         for pose in cycle:
             # One stream of random numbers a person keeps hands, feet and fabric still from frame to frame.

@@ -11,17 +11,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from export.camera import Camera
 from export.people.animals import Animal
 from export.people.body import Shape
 from export.people.motion import Clips, PhotoPoses, Pose, clip_pose, drawn_pose, lying, photo_pose, posed
 from export.people.props import Prop, PropMaker
-from export.people.render import Camera, Person
+from export.people.render import Person
 from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model, brim, dress
 
-PHOTO_POSE_SHARE = 0.25  # of the people scattered or before a webcam, where there are poses of photographs
+PHOTO_POSE_FRACTION = 0.25  # of the people scattered or before a webcam, where there are poses of photographs
 _LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])  # camera axes in the world before pitch and roll
-_MIN_DEPTH = 0.9  # metres from the camera to whoever is not framed
+_MIN_DEPTH = 0.9  # metres from the camera to a person who is not framed
 
 
 @dataclass
@@ -114,7 +115,7 @@ class Director:
         roll = self.variety.draw_roll(rng)
         return Stage([a.person for a in actors], props, aim.camera.rolled(roll), indoors, roll)
 
-    def actor(self, rng: np.random.Generator, pose: Pose, yaw: float, table_share: float = 0.0) -> Actor:
+    def actor(self, rng: np.random.Generator, pose: Pose, yaw: float, table_fraction: float = 0.0) -> Actor:
         """Dresses a body in a pose, feet (or whatever is lowest) on z = 0, turned by `yaw` radians."""
         model, u = self.model, rng.uniform
         layers = dress(model, self.fabrics, rng, self.variety)
@@ -131,7 +132,7 @@ class Director:
             if height > 0.1 and u() < 0.85:
                 back = float(vertices[model.torso, 1].max() - y) + 0.01
                 props += [p.moved(x, y) for p in self.maker.seat(rng, height, back)]
-            if u() < table_share:
+            if u() < table_fraction:
                 props += self.maker.table(rng, max(height + u(0.18, 0.32), 0.3), front - u(0.02, 0.15))
         elif pose.rests == "lies":
             if u() < 0.6:
@@ -139,7 +140,7 @@ class Director:
             lowest = vertices[body, 2].min() + 0.02  # the body sinks in a little
             low, high = vertices[body].min(0), vertices[body].max(0)
             props += self.maker.bed(rng, (low[0], low[1], lowest), high)
-        elif u() < table_share * 0.4:
+        elif u() < table_fraction * 0.4:
             props += self.maker.table(rng, u(0.7, 1.1), front - u(0.02, 0.3))
         if u() < 0.18:
             side = rng.integers(2)
@@ -154,7 +155,7 @@ class Director:
 
     def _photographed(self, rng: np.random.Generator) -> bool:
         """Whether the next pose is one of a photograph; only the split to train on has any."""
-        return len(self.photo_poses.root) > 0 and rng.random() < PHOTO_POSE_SHARE
+        return len(self.photo_poses.root) > 0 and rng.random() < PHOTO_POSE_FRACTION
 
     def _anybody(self, rng: np.random.Generator) -> Actor:
         if self._photographed(rng):
@@ -165,7 +166,7 @@ class Director:
             pose = lying(rng, pose)
             return self.actor(rng, pose, rng.uniform(-np.pi, np.pi))
         yaw = np.radians(rng.normal(0, 40) if rng.random() < 0.6 else rng.uniform(-180, 180))
-        return self.actor(rng, pose, yaw, table_share=0.25)
+        return self.actor(rng, pose, yaw, table_fraction=0.25)
 
     def _aim(self, target: np.ndarray, visible: float, degrees: float, pitch: float, roll: float) -> Aim:
         """A camera that shows `visible` metres of height at `target` [3]; angles in degrees, pitch > 0 looks down."""
@@ -173,8 +174,7 @@ class Director:
         distance = max(visible / (2 * tangent), 0.35)
         rotation = Rotation.from_euler("xz", [pitch, roll], degrees=True).as_matrix() @ _LOOK
         eye = target - distance * rotation[2]
-        matrix = np.concatenate([rotation, -(rotation @ eye)[:, None]], 1)
-        camera = Camera(self.width, self.height, self.height / (2 * tangent), matrix)
+        camera = Camera.centred(self.width, self.height, self.height / (2 * tangent), rotation, eye)
         return Aim(camera, eye, distance, rotation[2], rotation[0], 2 * tangent * self.width / self.height)
 
     def _spot(self, rng: np.random.Generator, aim: Aim, depth: float) -> np.ndarray:
@@ -256,7 +256,7 @@ class Director:
             else:
                 pose = drawn_pose(rng, 1.0 if sits else 0.0)
             yaw = np.radians(rng.normal(0, 22)) if k == 0 or u() < 0.7 else u(-np.pi, np.pi)
-            actors.append(self.actor(rng, pose, yaw, table_share=0.35 if k == 0 else 0.05))
+            actors.append(self.actor(rng, pose, yaw, table_fraction=0.35 if k == 0 else 0.05))
         head = float(np.median(actors[0].person.vertices[self.model.skull, 2]))
         visible = u(0.36, 0.95) * (1 if count == 1 else u(1.0, 1.4))
         target = np.array([u(-0.22, 0.22) * visible, 0, head - u(-0.02, 0.3) * visible])

@@ -1,4 +1,4 @@
-"""Pinhole cameras in the axes of OpenCV, and paths of cameras around a thing or through a room."""
+"""Cameras that look at something, and paths of cameras around a thing or through a room."""
 
 from __future__ import annotations
 
@@ -7,42 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """intrinsics [3, 3] in pixels, the centre of the top left pixel is (0, 0); world_to_camera [3, 4]: x right, y down,
-    z forward, metres; both float64."""
-
-    width: int
-    height: int
-    intrinsics: np.ndarray
-    world_to_camera: np.ndarray
-
-    @property
-    def centre(self) -> np.ndarray:
-        """Where the camera is, in the world [3]."""
-        return -self.world_to_camera[:, :3].T @ self.world_to_camera[:, 3]
-
-    def projected(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """World points [N, 3] -> pixels [N, 2] and depth along the optical axis [N], metres."""
-        seen = (np.asarray(points, np.float64) - self.centre) @ self.world_to_camera[:, :3].T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pixel = (seen / seen[:, 2:]) @ self.intrinsics.T
-        return pixel[:, :2], seen[:, 2]
-
-    def lifted(self, pixels: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Pixels [N, 2] at depths [N] along the optical axis -> world points float64 [N, 3]."""
-        rays = np.concatenate([pixels, np.ones((len(pixels), 1))], 1) @ np.linalg.inv(self.intrinsics).T
-        return (rays * np.asarray(depth, np.float64)[:, None]) @ self.world_to_camera[:, :3] + self.centre
-
-    def resized(self, width: int, height: int) -> Camera:
-        """A smaller or larger picture of the same view."""
-        scale = np.array([width / self.width, height / self.height])
-        intrinsics = self.intrinsics.copy()
-        intrinsics[:2, 2] += 0.5
-        intrinsics[:2] *= scale[:, None]
-        intrinsics[:2, 2] -= 0.5
-        return Camera(width, height, intrinsics, self.world_to_camera)
+from export.camera import Camera
 
 
 @dataclass(frozen=True)
@@ -71,7 +36,7 @@ def looking(lens: Lens, eye: np.ndarray, target: np.ndarray, roll_degrees: float
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(forward, right), forward])
     rotation = Rotation.from_euler("z", roll_degrees, degrees=True).as_matrix() @ rotation
-    return Camera(lens.width, lens.height, lens.intrinsics(zoom), np.c_[rotation, -rotation @ eye])
+    return Camera.of_intrinsics(lens.width, lens.height, lens.intrinsics(zoom), rotation, eye)
 
 
 def draw_lens(rng: np.random.Generator, small: bool) -> Lens:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from export.places.cameras import Camera
+from export.camera import Camera
 
 
 @dataclass(frozen=True)

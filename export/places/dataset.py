@@ -2,7 +2,7 @@
 
     python -m export.places.dataset --split train --scenes 100 --processes 2 --out .data/places
 
-Each place is a function of (split, seed) alone, and its folder (docs/formats.md) appears whole or not at all: what is
+Each place is a function of (split, seed) alone, and its folder (docs/formats.md) appears atomically: what is
 there already is kept, so a stopped run goes on where it was. A place that fails, or never ends, is said and left out.
 Splits share no model, texture, photo, panorama or person.
 """
@@ -20,8 +20,8 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export.camera import Camera
 from export.places.assets import SPLITS
-from export.places.cameras import Camera
 from export.places.clouds import CloudFaults, CloudMaker, draw_faults
 from export.places.place import AXES, FORMAT
 from export.places.recipe import FRAMES, NothingSeenError, choose_exposure, choose_views, draw_place, generator
@@ -50,8 +50,8 @@ def frame_entry(k: int, camera: Camera) -> dict:
     return {
         "file_path": f"images/{k:03d}.jpg",
         "depth_file_path": f"depth/{k:03d}.png",
-        "w": camera.width,
-        "h": camera.height,
+        "w": camera.width_px,
+        "h": camera.height_px,
         "fl_x": float(intrinsics[0, 0]),
         "fl_y": float(intrinsics[1, 1]),
         "cx": float(intrinsics[0, 2]) + 0.5,
@@ -172,7 +172,7 @@ def main() -> None:
     missing = [job for job in jobs if not job[2].exists()]
     lost = 0
     with tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit="place") as bar:
-        for job, error in done(_work, missing, options.processes, options.most_seconds):
+        for job, error in done(_work, missing, options.processes, options.max_seconds):
             bar.update()
             if error is not None:
                 lost += 1

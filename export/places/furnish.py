@@ -27,7 +27,7 @@ def quad(centre, right, up, width: float, height: float) -> Solid:
     return Solid(np.array([[a, b, c], [a, c, d]]), uv)
 
 
-def finished(parts: list[Part], rng: np.random.Generator, shiny_share: float = 0.35) -> list[Part]:
+def finished(parts: list[Part], rng: np.random.Generator, shiny_fraction: float = 0.35) -> list[Part]:
     """The same surfaces with drawn shine and, here and there, another colour, one draw a material.
 
     Most materials of the models have their modeller's default highlight, which would make everything plastic.
@@ -40,7 +40,7 @@ def finished(parts: list[Part], rng: np.random.Generator, shiny_share: float = 0
         if id(own) in drawn:
             continue
         specular, shininess, mirror = own.specular * rng.uniform(0, 0.5), own.shininess, own.mirror
-        if rng.random() < shiny_share:
+        if rng.random() < shiny_fraction:
             specular = rng.uniform(0.1, 0.7)
             shininess = float(np.exp(rng.uniform(np.log(12), np.log(250))))
             mirror = rng.uniform(0.02, 0.3) if rng.random() < 0.5 else 0.0

@@ -18,7 +18,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.places.cameras import Camera, Lens, looking
+from export.camera import Camera
+from export.places.cameras import Lens, looking
 from export.places.dataset import frame_entry
 from export.places.free import DRAWN, FreeStock, bricks, landscape, weave
 from export.places.furnish import Heights, placed, quad
@@ -137,7 +138,7 @@ def staged() -> Staged:
 
 
 def write(folder: Path) -> int:
-    """The room as a capture, whole or not at all; what was there goes. Returns the number of points."""
+    """The room as a capture, written atomically; what was there goes. Returns the number of points."""
     room = staged()
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)

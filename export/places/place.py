@@ -10,13 +10,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.places.cameras import Camera
+from export.camera import Camera
 from export.point_cloud import PointCloudError, read_ply
 
 FORMAT = "maquette-place-1"
 # Cameras of files look to -z with y up (OpenGL); ours look to z with y down (OpenCV).
 AXES = np.diag([1.0, -1.0, -1.0, 1.0])
-_MOST_BYTES, _MOST_FRAMES, _MOST_SIDE = 20_000_000, 10_000, 16_384
+_MAX_BYTES, _MAX_FRAMES, _MAX_SIDE = 20_000_000, 10_000, 16_384
 
 
 class PlaceError(ValueError):
@@ -64,7 +64,9 @@ class Place:
     about: dict
 
     def camera(self, view: int) -> Camera:
-        return Camera(self.images.width, self.images.height, self.intrinsics[view], self.world_to_camera[view])
+        rotation, shift = self.world_to_camera[view, :, :3], self.world_to_camera[view, :, 3]
+        size = self.images.width, self.images.height
+        return Camera.of_intrinsics(*size, self.intrinsics[view], rotation, -rotation.T @ shift)
 
 
 def _image(file: Path, height: int, width: int) -> np.ndarray:
@@ -99,8 +101,8 @@ def load_place(folder: Path | str) -> Place:
     file = folder / "transforms.json"
     if not file.is_file():
         raise PlaceError(f"{folder} has no transforms.json: it is no place, or was not rendered to the end.")
-    if file.stat().st_size > _MOST_BYTES:
-        raise PlaceError(f"{file} has {file.stat().st_size} bytes; {_MOST_BYTES} at most are read.")
+    if file.stat().st_size > _MAX_BYTES:
+        raise PlaceError(f"{file} has {file.stat().st_size} bytes; {_MAX_BYTES} at most are read.")
     try:
         table = json.loads(file.read_text("utf-8"))
     except (ValueError, RecursionError) as error:
@@ -111,10 +113,10 @@ def load_place(folder: Path | str) -> Place:
     frames = table.get("frames")
     if (
         not isinstance(frames, list)
-        or not 0 < len(frames) <= _MOST_FRAMES
+        or not 0 < len(frames) <= _MAX_FRAMES
         or not all(isinstance(f, dict) for f in frames)
     ):
-        raise PlaceError(f"{file} needs a list `frames` with 1 to {_MOST_FRAMES} cameras.")
+        raise PlaceError(f"{file} needs a list `frames` with 1 to {_MAX_FRAMES} cameras.")
     sizes = {(_side(file, frame, "w"), _side(file, frame, "h")) for frame in frames}
     if len(sizes) > 1:
         raise PlaceError(f"{file} has pictures of {len(sizes)} sizes; a place has one.")
@@ -166,8 +168,8 @@ def _figures(file: Path, entry: dict, key: str, count: int) -> np.ndarray:
 
 def _side(file: Path, frame: dict, key: str) -> int:
     side = _figures(file, frame, key, 1)[0]
-    if not 1 <= side <= _MOST_SIDE or side != int(side):
-        raise PlaceError(f"{file}: a picture's `{key}` is {side}; 1 to {_MOST_SIDE} pixels are possible.")
+    if not 1 <= side <= _MAX_SIDE or side != int(side):
+        raise PlaceError(f"{file}: a picture's `{key}` is {side}; 1 to {_MAX_SIDE} pixels are possible.")
     return int(side)
 
 
@@ -198,5 +200,4 @@ def _camera(file: Path, frame: dict, k: int, width: int, height: int) -> Camera:
     if not turned or np.abs(to_world[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise PlaceError(f"{file}: `transform_matrix` of camera {k} is no rotation with a shift.")
     # Files count pixels from the corner of the first one, cameras from its centre.
-    intrinsics = np.array([[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1.0]])
-    return Camera(width, height, intrinsics, np.c_[rotation.T, -rotation.T @ to_world[:3, 3]])
+    return Camera(width, height, fx, fy, cx - 0.5, cy - 0.5, rotation.T, to_world[:3, 3])

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from export.camera import Camera
 from export.places.assets import SPLITS
-from export.places.cameras import Camera, Lens, draw_lens
+from export.places.cameras import Lens, draw_lens
 from export.places.render import Renderer
 from export.places.rooms import Staged, draw_room
 from export.places.subjects import draw_still_life, draw_subject
@@ -47,7 +50,7 @@ def sound(depth: np.ndarray, near: float) -> bool:
 
 def choose_views(renderer: Renderer, staged: Staged, rng: np.random.Generator) -> list[Camera]:
     """The place's cameras; each that stands in a thing is replaced by its neighbour, moved a little."""
-    small = [c.resized(max(c.width // 8, 8), max(c.height // 8, 8)) for c in staged.cameras]
+    small = [c.shrunk(8, 8) for c in staged.cameras]
     good = [sound(renderer.depth(c), staged.near) for c in small]
     kept = [k for k, ok in enumerate(good) if ok]
     if not kept:
@@ -64,10 +67,8 @@ def _moved_until_sound(renderer: Renderer, staged: Staged, rng: np.random.Genera
     start = staged.cameras[source]
     for attempt in range(_TRIES):
         size = 3 * staged.near / (1 + 0.3 * attempt)
-        centre = start.centre + rng.normal(0, size, 3)
-        rotation = start.world_to_camera[:, :3]
-        moved = Camera(start.width, start.height, start.intrinsics, np.c_[rotation, -rotation @ centre])
-        if sound(renderer.depth(moved.resized(max(start.width // 8, 8), max(start.height // 8, 8))), staged.near):
+        moved = replace(start, centre=start.centre + rng.normal(0, size, 3))
+        if sound(renderer.depth(moved.shrunk(8, 8)), staged.near):
             return moved
     return start
 
@@ -75,7 +76,7 @@ def _moved_until_sound(renderer: Renderer, staged: Staged, rng: np.random.Genera
 def choose_exposure(renderer: Renderer, cameras: list[Camera], rng: np.random.Generator) -> float:
     """One exposure for all views: their mean is about that of a photograph. A plain background has no say."""
     wanted = rng.uniform(0.36, 0.56)
-    views = [c.resized(max(c.width // 8, 8), max(c.height // 8, 8)) for c in cameras[:: max(len(cameras) // 6, 1)]]
+    views = [c.shrunk(8, 8) for c in cameras[:: max(len(cameras) // 6, 1)]]
     first = 0.7
     light = []
     for view in views:

@@ -14,7 +14,7 @@ os.environ.setdefault("LP_NUM_THREADS", "1")  # the software rasteriser; process
 import moderngl
 import numpy as np
 
-from export.places.cameras import Camera
+from export.camera import Camera
 from export.places.mesh import Part
 
 _FAR = 4000.0  # times the distance before which nothing is seen
@@ -353,8 +353,8 @@ class Renderer:
         return self.targets[width, height]
 
     def _set_view(self, kind: str, camera: Camera) -> None:
-        fx, fy, cx, cy = camera.intrinsics[[0, 1, 0, 1], [0, 1, 2, 2]]
-        w, h = camera.width, camera.height
+        fx, fy, cx, cy = camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
+        w, h = camera.width_px, camera.height_px
         far = _FAR * self.near
         a, b = (far + self.near) / (far - self.near), -2 * far * self.near / (far - self.near)
         # y stays "down", so that the first row read back is the top row.
@@ -385,7 +385,7 @@ class Renderer:
         Glass is looked through.
         """
         self.context.__enter__()
-        target = self._target(camera.width, camera.height)[2]
+        target = self._target(camera.width_px, camera.height_px)[2]
         target.use()
         target.clear(0, 0, 0, 0, depth=1.0)
         self.context.enable_only(moderngl.DEPTH_TEST)
@@ -395,12 +395,12 @@ class Renderer:
                 drawn.texture.use(0)
                 drawn.arrays["depth"].render()
         raw = target.read(components=1, dtype="f4", alignment=1)
-        return np.frombuffer(raw, np.float32).reshape(camera.height, camera.width).copy()
+        return np.frombuffer(raw, np.float32).reshape(camera.height_px, camera.width_px).copy()
 
     def colour(self, camera: Camera, exposure: float) -> np.ndarray:
         """uint8 [H, W, 3] RGB."""
         self.context.__enter__()
-        many, one, _ = self._target(camera.width, camera.height)
+        many, one, _ = self._target(camera.width_px, camera.height_px)
         many.use()
         many.clear(0, 0, 0, 1, depth=1.0)
         self.context.enable_only(moderngl.DEPTH_TEST)
@@ -421,7 +421,9 @@ class Renderer:
         many.depth_mask = True
         self.context.copy_framebuffer(one, many)
         return (
-            np.frombuffer(one.read(components=3, alignment=1), np.uint8).reshape(camera.height, camera.width, 3).copy()
+            np.frombuffer(one.read(components=3, alignment=1), np.uint8)
+            .reshape(camera.height_px, camera.width_px, 3)
+            .copy()
         )
 
     def _draw(self, drawn: _Drawn, exposure: float) -> None:
@@ -434,12 +436,12 @@ class Renderer:
         drawn.arrays["colour"].render()
 
     def _draw_behind(self, camera: Camera, exposure: float) -> None:
-        fx, fy, cx, cy = camera.intrinsics[[0, 1, 0, 1], [0, 1, 2, 2]]
-        w, h = camera.width, camera.height
+        fx, fy, cx, cy = camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
+        w, h = camera.width_px, camera.height_px
         to_ray = np.array(
             [[w / 2 / fx, 0, ((w - 1) / 2 - cx) / fx], [0, h / 2 / fy, ((h - 1) / 2 - cy) / fy], [0, 0, 1]]
         )
-        self._set(self.behind, "unproject", (camera.world_to_camera[:, :3].T @ to_ray).T)
+        self._set(self.behind, "unproject", (camera.rotation.T @ to_ray).T)
         self._set(self.behind, "exposure", float(exposure))
         plain = self.lighting.plain
         self._set(self.behind, "plain", (0.0, 0, 0, 0) if plain is None else (*map(float, plain), 1.0))

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from export.camera import Camera
 from export.people.props import PropMaker, Solid, box, cylinder, joined
-from export.places.cameras import Camera, Lens, looking
+from export.places.cameras import Lens, looking
 from export.places.catalogue import Asset, people_assets
 from export.places.furnish import Heights, finished, placed, quad
 from export.places.mesh import Material, Part, part_of, part_of_prop

@@ -32,15 +32,15 @@ def painted_depth(depth: np.ndarray) -> np.ndarray:
 def splatted(place: Place, view: int, shrink: int = 1) -> np.ndarray:
     """The cloud as a camera sees it, one pixel a point, the nearest wins: uint8 [H, W, 3]; grey where no point is."""
     camera = place.camera(view)
-    camera = camera.resized(max(camera.width // shrink, 1), max(camera.height // shrink, 1))
+    camera = camera.shrunk(shrink)
     pixel, depth = camera.projected(place.xyz)
     with np.errstate(invalid="ignore"):
         at = np.round(pixel)
-        inside = (depth > 1e-6) & (at >= 0).all(1) & (at < [camera.width, camera.height]).all(1)
+        inside = (depth > 1e-6) & (at >= 0).all(1) & (at < [camera.width_px, camera.height_px]).all(1)
     order = np.flatnonzero(inside)
     order = order[np.argsort(-depth[order], kind="stable")]
     x, y = at[order].astype(int).T
-    image = np.full((camera.height, camera.width, 3), 128, np.uint8)
+    image = np.full((camera.height_px, camera.width_px, 3), 128, np.uint8)
     image[y, x] = place.rgb[order]
     return image
 

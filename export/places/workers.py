@@ -1,6 +1,6 @@
 """Jobs in processes of their own that are given up when they take too long.
 
-Software renderers now and then never come back from a picture (Mesa's llvmpipe draws some views for ever); a place lost
+Software renderers now and then never come back from a picture (Mesa's llvmpipe never finishes some views); a place lost
 is better than a set that never ends.
 """
 
@@ -34,10 +34,10 @@ class _Worker:
         self._process.start()
         theirs.close()
 
-    def run(self, job: tuple, most_s: float) -> Exception | None:
+    def run(self, job: tuple, max_s: float) -> Exception | None:
         self._connection.send(job)
-        if not self._connection.poll(most_s):
-            return TimeoutError(f"given up after {most_s:g} s")
+        if not self._connection.poll(max_s):
+            return TimeoutError(f"given up after {max_s:g} s")
         try:
             return self._connection.recv()
         except EOFError:
@@ -50,7 +50,7 @@ class _Worker:
 
 
 def done(
-    work: Callable[[tuple], object], jobs: Sequence[tuple], processes: int, most_s: float
+    work: Callable[[tuple], object], jobs: Sequence[tuple], processes: int, max_s: float
 ) -> Iterator[tuple[tuple, Exception | None]]:
     """Each job when it is done, and what went wrong with it, if something did. work: a function of a module."""
     waiting: queue.SimpleQueue[tuple] = queue.SimpleQueue()
@@ -66,7 +66,7 @@ def done(
             except queue.Empty:
                 break
             worker = worker or _Worker(work)
-            error = worker.run(job, most_s)
+            error = worker.run(job, max_s)
             if error is not None:
                 worker.end()
                 worker = None

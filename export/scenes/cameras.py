@@ -1,54 +1,16 @@
-"""Cameras without lens distortion, in the convention of OpenCV and of the SDK (sdk/src/scene/pinhole_camera.h): x to
-the right, y down, z forward; the centre of the top left pixel is (0, 0)."""
+"""Cameras rotated upright, and pictures warped from one to another that differs by frame and roll."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
+from export.camera import Camera
+
 FAINTEST = 0.05  # where the world's up is nearly along the axis, the turn fades out (pinhole_camera.cpp)
-
-
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """rotation: float64 [3, 3], world to camera. centre: float64 [3], in the world."""
-
-    width_px: int
-    height_px: int
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
-    rotation: np.ndarray
-    centre: np.ndarray
-
-    def intrinsics(self) -> np.ndarray:
-        """[3, 3]: from the camera's coordinates to pixels times depth."""
-        return np.array([[self.fx_px, 0, self.cx_px], [0, self.fy_px, self.cy_px], [0, 0, 1]])
-
-
-def resized(camera: Camera, width_px: int, height_px: int) -> Camera:
-    """A smaller or larger picture of the same field of view."""
-    across, down = width_px / camera.width_px, height_px / camera.height_px
-    return replace(
-        camera,
-        width_px=width_px,
-        height_px=height_px,
-        fx_px=camera.fx_px * across,
-        fy_px=camera.fy_px * down,
-        cx_px=(camera.cx_px + 0.5) * across - 0.5,
-        cy_px=(camera.cy_px + 0.5) * down - 0.5,
-    )
-
-
-def reframed(camera: Camera, left_px: int, top_px: int, width_px: int, height_px: int) -> Camera:
-    """The same camera with another frame, whose first pixel was (left, top): a cut, or more than there was."""
-    return replace(
-        camera, width_px=width_px, height_px=height_px, cx_px=camera.cx_px - left_px, cy_px=camera.cy_px - top_px
-    )
 
 
 def turned_upright(camera: Camera, up: np.ndarray) -> Camera:
@@ -78,12 +40,12 @@ def upright(camera: Camera, up: np.ndarray, multiple: int) -> Camera:
     first = np.floor(seen.min(0) + 0.5 + 1e-6).astype(int)
     size = np.ceil(seen.max(0) + 0.5 - 1e-6).astype(int) - first
     width, height = (-(-int(side) // multiple) * multiple for side in size)
-    return reframed(turned, int(first[0]), int(first[1]), width, height)
+    return turned.reframed(int(first[0]), int(first[1]), width, height)
 
 
 def between(source: Camera, target: Camera) -> np.ndarray:
     """[2, 3]: pixels of `source` to pixels of `target`, two cameras that differ by frame and turn about the axis."""
-    whole = target.intrinsics() @ target.rotation @ source.rotation.T @ np.linalg.inv(source.intrinsics())
+    whole = target.intrinsics @ target.rotation @ source.rotation.T @ np.linalg.inv(source.intrinsics)
     return (whole / whole[2, 2])[:2]
 
 

@@ -18,8 +18,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+from export.camera import Camera
 from export.point_cloud import PointCloud, read_ply
-from export.scenes.cameras import Camera, resized
 from export.scenes.modelling import View
 
 LARGEST_SIDE_PX = 16384
@@ -59,7 +59,7 @@ class Capture:
             raise CaptureError(f"Photo {k} of {self.name} {found}; transforms.json says {wanted}.")
         share = min(1.0, (long_side_px or math.inf) / max(camera.width_px, camera.height_px))
         if share < 1:
-            camera = resized(camera, max(1, round(camera.width_px * share)), max(1, round(camera.height_px * share)))
+            camera = camera.resized(max(1, round(camera.width_px * share)), max(1, round(camera.height_px * share)))
             image = cv2.resize(image, (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA)
         return View(np.ascontiguousarray(image[..., ::-1], np.float32) / 255, camera)
 

@@ -30,12 +30,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from export.densepose.bundle import BundleInfo
+from export.bundle import OPSET, BundleInfo
 from export.densepose.export_onnx import Doubled, channels_first, channels_last
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
 from export.scenes.basis import Basis
-from export.scenes.bundle import OPSET, training_data, write_manifest
+from export.scenes.bundle import training_data, write_manifest
 from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture, read_captures
 from export.scenes.config import FEATURES, RASTER, SIZES

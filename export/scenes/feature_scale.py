@@ -18,7 +18,7 @@ from export.scenes.light_refiner import LightRefiner
 from export.scenes.system import Networks
 
 SHARE = 0.999  # of a feature's values are within -0.5 .. 0.5 afterwards
-MOST_APART = 0.1  # of a feature's variance may differ between a bundle and its weights; 8 bits are about 0.001
+MAX_DIFFERENCE = 0.1  # of a feature's variance may differ between a bundle and its weights; 8 bits are about 0.001
 
 
 @torch.no_grad()
@@ -41,7 +41,7 @@ def factors_between(networks: Networks, image: Tensor, features: Tensor) -> Tens
     own, theirs = (x[0, COLOURS:].flatten(1).double() for x in (networks.extractor(image), features))
     factors = (own * theirs).sum(1) / own.square().sum(1).clamp_min(1e-12)
     apart = (theirs - factors[:, None] * own).square().sum(1) / theirs.square().sum(1).clamp_min(1e-12)
-    if not (factors > 0).all() or not float(apart.max()) <= MOST_APART:
+    if not (factors > 0).all() or not float(apart.max()) <= MAX_DIFFERENCE:
         raise ValueError(
             f"the bundle's extractor is not made of these weights: {float(apart.max()):.0%} of a feature differ"
         )

@@ -7,7 +7,7 @@
 `--weights` are those that the bundle was exported from (export.scenes.train): int8 graphs have no gradients. The scene
 written has the same points in the same blocks, and is shown with the same networks. With `--refiner` those are tuned
 too: a bundle of the same precision is written beside the scene, as `tuned-networks`, and the scene wants that one.
-With `--save-at 10 60 600`, `--out` is a folder, and gets `10s.maqs` and so on of one run; `benchmarks/scenes.py
+With `--save-at 10 60 600`, `--out` is a folder, and gets `10s.maqs` and so on of one run; `python -m benchmarks
 --fine-tuned` reads folders of such folders.
 
 It learns from the photos that the scene was built from, all of them: one kept aside would have shaped the scene
@@ -18,7 +18,6 @@ learning; what is found once, saving and measuring come on top and are said apar
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import subprocess
 import sys
@@ -32,6 +31,7 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
+from export.bundle import read_manifest
 from export.densepose.graphs import session
 from export.point_cloud import PointCloudError
 from export.scenes.bundle import BASIS, identity
@@ -50,7 +50,7 @@ from export.scenes.system import Networks, load_networks
 from export.scenes.tuning import Rates, Shown, TunedScene, Tuning
 
 REFINER_RATE = 1e-4
-LEAST_SHARE = 0.1  # of the learning rates, where a save is due
+MIN_FRACTION = 0.1  # of the learning rates, where a save is due
 MAX_VIEWS = 8  # of the scene that set the ranges of an int8 refiner
 
 
@@ -78,16 +78,16 @@ def _first(channels_last: Tensor) -> Tensor:
     return channels_last.permute(0, 3, 1, 2)
 
 
-def share_of_rate(spent_s: float, saves_s: Sequence[float]) -> float:
+def rate_fraction(spent_s: float, saves_s: Sequence[float]) -> float:
     """Of the learning rates, after so many seconds: from each save to the next it falls from 1 along a cosine, so that
     every file is one that came to rest."""
     begin = 0.0
     for end in saves_s:
         if spent_s < end:
             wave = 0.5 * (1 + math.cos(math.pi * (spent_s - begin) / (end - begin)))
-            return LEAST_SHARE + (1 - LEAST_SHARE) * wave
+            return MIN_FRACTION + (1 - MIN_FRACTION) * wave
         begin = end
-    return LEAST_SHARE
+    return MIN_FRACTION
 
 
 def measured(scene: TunedScene, views: Iterable[View]) -> float:
@@ -106,7 +106,7 @@ def write_tuned_networks(scene: TunedScene, views: list[Shown], shipped: Path, f
         # A program of its own: calibration builds on this package, not the other way round.
         command = [sys.executable, "-m", "quantization.tuned_bundle", "--refiner", refiner, "--samples", work]
         subprocess.run([*command, "--shipped", shipped, "--out", folder], check=True)
-    return identity(json.loads((folder / "manifest.json").read_text()))
+    return identity(read_manifest(folder))
 
 
 @torch.no_grad()
@@ -159,7 +159,7 @@ def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argpar
         with tqdm(total=round(due_s), initial=round(spent_s), unit="s") as bar:
             while spent_s < due_s:
                 begin_s = time.monotonic()
-                loss = tuning.step(share_of_rate(spent_s, files.saves_s))
+                loss = tuning.step(rate_fraction(spent_s, files.saves_s))
                 spent_s, steps = spent_s + time.monotonic() - begin_s, steps + 1
                 bar.set_postfix(step=steps, loss=f"{loss:.4f}", refresh=False)
                 bar.update(min(round(spent_s), round(due_s)) - bar.n)
@@ -202,7 +202,7 @@ def main() -> None:
     torch.manual_seed(0)
     try:
         capture, scene = read_capture(options.capture), read_scene_file(options.scene)
-        manifest = json.loads((options.networks / "manifest.json").read_text())
+        manifest = read_manifest(options.networks)
         if not capture.sources():
             raise CaptureError(f"All photos of {options.capture} are held out; there is none to learn from.")
         if identity(manifest) != scene.networks_sha256:

@@ -1,4 +1,4 @@
-"""Builds and fine-tunes the scenes of several places, for `benchmarks/scenes.py --fine-tuned`.
+"""Builds and fine-tunes the scenes of several places, for `python -m benchmarks --fine-tuned`.
 
     python -m export.scenes.finetune_places .data/places/test/* --networks sdk/models/scenes-int8 \\
         --weights RUN/weights.pt --save-at 10 60 --out .data/tuned

@@ -14,8 +14,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from export.camera import Camera
 from export.scenes.basis import directions
-from export.scenes.cameras import Camera, moves, reframed, resized, upright, warped
+from export.scenes.cameras import moves, upright, warped
 from export.scenes.config import ALPHA, BACKGROUND_PX, HIDING, LEVELS, MULTIPLE, RASTER, TURNED_MULTIPLE
 from export.scenes.extractor import STRIDE
 from export.scenes.looks import Looks, Moments
@@ -64,7 +65,7 @@ def shown_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
 def visibility_camera(camera: Camera, options: Options) -> Camera:
     """The camera in whose picture it is found who is seen."""
     scale = options.visibility_scale
-    return resized(camera, max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
+    return camera.resized(max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
 
 
 def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
@@ -167,7 +168,7 @@ def gathered(
         if window_px is not None:
             middle = [float(at[sees].median()) if sees.any() else 0.0 for at in (columns, rows)]
             left, top = (round(at - window_px / 2) for at in middle)
-            camera = reframed(camera, left, top, window_px, window_px)
+            camera = camera.reframed(left, top, window_px, window_px)
             columns, rows = columns - left, rows - top
             for at in (columns, rows):
                 sees = sees & (at >= 0) & (at <= window_px - 1)

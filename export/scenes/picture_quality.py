@@ -5,14 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-LEAST_SQUARE = 1e-10  # so that equal pictures have a PSNR, 100 dB
+MIN_SQUARED_ERROR = 1e-10  # so that equal pictures have a PSNR, 100 dB
 WINDOW_PX, SIGMA_PX = 11, 1.5
 C1, C2 = 0.01**2, 0.03**2
 
 
 def psnr_db(picture: np.ndarray, target: np.ndarray) -> float:
     """Of RGB in 0..1, any equal shapes: -10 log10 of the mean squared difference."""
-    return float(-10 * np.log10(max(np.square(picture.astype(np.float64) - target).mean(), LEAST_SQUARE)))
+    return float(-10 * np.log10(max(np.square(picture.astype(np.float64) - target).mean(), MIN_SQUARED_ERROR)))
 
 
 def ssim(picture: np.ndarray, target: np.ndarray) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from export.scenes.cameras import Camera
+from export.camera import Camera
 from export.scenes.config import COLOURS
 
 NOTHING = torch.iinfo(torch.int64).max

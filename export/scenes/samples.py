@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 from torchvision.transforms import functional as colour
 
-from export.scenes.cameras import Camera, reframed, upright, warped
+from export.camera import Camera
+from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture
 from export.scenes.modelling import Options, Sources, gathered, seen_in
 from export.scenes.source_views import drawn
@@ -60,7 +61,7 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     # Anywhere inside, or in the middle where the photo is smaller than a cut.
     free = np.array([turned.width_px, turned.height_px]) - sampling.crop_px
     left, top = (int(rng.integers(room + 1)) if room > 0 else room // 2 for room in free)
-    camera = reframed(turned, left, top, sampling.crop_px, sampling.crop_px)
+    camera = turned.reframed(left, top, sampling.crop_px, sampling.crop_px)
     there = np.ones(photo.image.shape[:2], np.float32)
     mask = warped(there, photo.camera, camera, cv2.BORDER_CONSTANT) > 0.999
     cut = warped(photo.image, photo.camera, camera)

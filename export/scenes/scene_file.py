@@ -19,7 +19,7 @@ import numpy as np
 from export.scenes.config import BASIS, FEATURES
 
 MAGIC, VERSION, ALIGNMENT = b"MAQSCN\r\n", 1, 64
-MOST_POINTS, MOST_BLOCK_POINTS = 30_000_000, 1024
+MAX_POINTS, MAX_BLOCK_POINTS = 30_000_000, 1024
 LARGEST_STORED = 2e30
 SLOPES = BASIS * FEATURES
 PLACES = {0: np.dtype("<f4"), 1: np.dtype("<u2")}
@@ -239,7 +239,7 @@ def _checked_head(raw: bytes, size: int, path: Path) -> np.ndarray:
     if kinds[0] not in PLACES or kinds[1] not in COEFFICIENTS:
         raise SceneFileError(f"{path} stores its numbers in kinds {kinds}, which version {VERSION} does not have.")
     points, varying, blocks = (int(head[name]) for name in ("points", "varying", "blocks"))
-    if not (0 < blocks <= points <= MOST_POINTS and varying <= points):
+    if not (0 < blocks <= points <= MAX_POINTS and varying <= points):
         raise SceneFileError(f"{path} claims {points} points, {varying} that vary, in {blocks} blocks: that cannot be.")
     if not ((head["background"] >= 0) & (head["background"] <= 1)).all():
         raise SceneFileError(f"{path} has a background colour of {head['background']}, which is not 0 to 1.")
@@ -269,8 +269,8 @@ def _check_blocks(scene: SceneFile, path: Path) -> None:
         if ends[-1] != head[whole] or (blocks[first] != ends - blocks[count]).any():
             raise SceneFileError(f"{path}: its blocks do not follow each other, or do not hold {head[whole]} points.")
     counts = blocks["count"]
-    if (counts < 1).any() or (counts > MOST_BLOCK_POINTS).any() or (blocks["varying"] > counts).any():
-        raise SceneFileError(f"{path} has a block of 0, or of over {MOST_BLOCK_POINTS} points, or more that vary.")
+    if (counts < 1).any() or (counts > MAX_BLOCK_POINTS).any() or (blocks["varying"] > counts).any():
+        raise SceneFileError(f"{path} has a block of 0, or of over {MAX_BLOCK_POINTS} points, or more that vary.")
     floats = [blocks[n] for n in ("low", "high", "place_step", "mean_middle", "mean_step", "slope_step")]
     floats += [x for x in (scene.places, scene.means, scene.slopes) if x.dtype.kind == "f"]
     if not all(_sound(values) for values in floats):

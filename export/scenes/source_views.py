@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from export.scenes.cameras import Camera
+from export.camera import Camera
 
 # The angle between two views of a point that suits best, and how fast it gets worse below and above it, in degrees
 # (after MVSNet, arXiv 1804.02505).

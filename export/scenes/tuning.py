@@ -15,8 +15,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from export.camera import Camera
 from export.scenes.basis import directions
-from export.scenes.cameras import Camera, between, moves, upright
+from export.scenes.cameras import between, moves, upright
 from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, TURNED_MULTIPLE
 from export.scenes.losses import LossWeights, picture_terms
 from export.scenes.modelling import Options, View, cover, shown_in
@@ -149,8 +150,8 @@ class Tuning:
             refiner = scene.networks.refiner.requires_grad_(True)
             self._optimisers.append(torch.optim.Adam([{"params": list(refiner.parameters()), "whole": rates.refiner}]))
 
-    def step(self, share_of_rate: float = 1.0) -> float:
-        """Renders one photo and goes a step; the loss before it. share_of_rate: of the learning rates."""
+    def step(self, rate_fraction: float = 1.0) -> float:
+        """Renders one photo and goes a step; the loss before it. rate_fraction: of the learning rates."""
         if not self._queue:
             self._queue = self._random.permutation(len(self._photos)).tolist()
         k = self._queue.pop()
@@ -162,7 +163,7 @@ class Tuning:
         for optimiser in self._optimisers:
             optimiser.zero_grad(set_to_none=True)
             for group in optimiser.param_groups:
-                group["lr"] = group["whole"] * share_of_rate
+                group["lr"] = group["whole"] * rate_fraction
         loss.backward()
         if torch.isfinite(loss):
             for optimiser in self._optimisers:

@@ -11,7 +11,7 @@ import numpy as np
 from export.teachers.landmarks import NAMES
 
 BACKGROUND, SOMEWHERE = 0, 255  # label values beside the coarse regions 1..14
-_LEAST_VISIBLE = 0.6
+_MIN_VISIBLE = 0.6
 # Coarse region: (bones as pairs of landmarks, radius as a share of the torso's length)
 _LEFT = {
     3: ((("left wrist", "left index finger"), ("left wrist", "left little finger")), 0.12),
@@ -56,10 +56,10 @@ def coarse_labels(point: np.ndarray, visible: np.ndarray, mask: np.ndarray) -> n
     length = max(float(np.linalg.norm(shoulders.mean(0) - hips.mean(0))), 1.2 * across)
     distance = {}
     for region, (pairs, radius) in BONES.items():
-        shown = [pair for pair in pairs if (visible[list(pair)] >= _LEAST_VISIBLE).all()]
+        shown = [pair for pair in pairs if (visible[list(pair)] >= _MIN_VISIBLE).all()]
         if shown:
             distance[region] = np.min([_to_segment(at, *point[list(pair)]) for pair in shown], 0) / (radius * length)
-    if (visible[_SHOULDERS] >= _LEAST_VISIBLE).all():
+    if (visible[_SHOULDERS] >= _MIN_VISIBLE).all():
         # The torso is a band around the line from neck to hips, as wide as the shoulders (at least half its length).
         wide = max(across / 2, 0.22 * length)
         neck = shoulders.mean(0)

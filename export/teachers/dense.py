@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from export import surface
+from export.camera import Camera
 from export.people import render
 from export.people.atlas import Atlas
 from export.people.lookup import LabelLookup
@@ -21,12 +22,12 @@ from export.teachers.puppet import JOINT, Puppet
 
 LONGEST_SIDE = 1024
 UNKNOWN = 255  # in channel I: this person, but no telling which part
-LEAST_IOU = 0.85
-MOST_LANDMARK_ERROR = 0.12  # median, in torsos
-MOST_NECK_DEGREES = 100.0
+MIN_IOU = 0.85
+MAX_LANDMARK_ERROR = 0.12  # median, in torsos
+MAX_NECK_DEGREES = 100.0
 _DRAWN = 512  # side of the square that a person is drawn in, pixels
 _NEAR = 0.06  # torsos beside the body that take its label
-MOST_JOINT_ERROR = 0.35  # of the worst shoulder, elbow, wrist, knee or ankle, torsos
+MAX_JOINT_ERROR = 0.35  # of the worst shoulder, elbow, wrist, knee or ankle, torsos
 _SEEN_WITHIN_M = 0.03
 _NOSE = NAMES.index("nose")
 _FACE_SURE_M = 0.05  # a face seen from the side is neither towards the camera nor away from it
@@ -104,10 +105,10 @@ class DenseTeacher:
         low = np.clip(np.floor(seen.min(0)) - 1, 0, [width - 1, height - 1]).astype(int)
         high = np.clip(np.ceil(seen.max(0)) + 1, low + 1, [width, height]).astype(int)
         side = max(high - low)
-        # A shear moves the principal point into the middle of the square that is drawn.
+        # In place of a rotation, a shear moves the principal point into the middle of the square that is drawn.
         off = (np.array([width / 2, height / 2]) - (low + side / 2)) / focal
-        shear = np.array([[1, 0, off[0], 0], [0, 1, off[1], 0], [0, 0, 1, 0]])
-        camera = render.Camera(_DRAWN, _DRAWN, focal * _DRAWN / side, shear)
+        shear = np.array([[1, 0, off[0]], [0, 1, off[1]], [0, 0, 1]])
+        camera = Camera.centred(_DRAWN, _DRAWN, focal * _DRAWN / side, shear, np.zeros(3))
         person = render.Person(fit.vertices, [Layer(self.model.range["body"])])
         picture = self.renderer.draw([person], camera, _DARK, np.random.default_rng(0))
         square = cv2.resize(picture.label, (side, side), interpolation=cv2.INTER_NEAREST)
@@ -138,15 +139,15 @@ def judged(fit: Fit, target: Target, drawn: np.ndarray, point: np.ndarray, nose:
     sure = (target.visible >= SHOWN) & inside(target.point, target.mask.shape) & np.isfinite(error)
     median = float(np.median(error[sure]))
     reasons = []
-    if iou < LEAST_IOU:
-        reasons.append(f"IoU {iou:.2f}, {LEAST_IOU} needed")
-    if median > MOST_LANDMARK_ERROR:
-        reasons.append(f"landmarks {median:.2f} torsos off, {MOST_LANDMARK_ERROR} allowed")
+    if iou < MIN_IOU:
+        reasons.append(f"IoU {iou:.2f}, {MIN_IOU} needed")
+    if median > MAX_LANDMARK_ERROR:
+        reasons.append(f"landmarks {median:.2f} torsos off, {MAX_LANDMARK_ERROR} allowed")
     farthest = int(np.where(sure & _JOINT_LANDMARK, error, 0).argmax())
-    if sure[farthest] and _JOINT_LANDMARK[farthest] and error[farthest] > MOST_JOINT_ERROR:
-        reasons.append(f"{NAMES[farthest]} {error[farthest]:.2f} torsos off, {MOST_JOINT_ERROR} allowed")
-    if neck_angle(fit.rotations) > MOST_NECK_DEGREES:
-        reasons.append(f"head turned by {neck_angle(fit.rotations):.0f} degrees, {MOST_NECK_DEGREES:.0f} possible")
+    if sure[farthest] and _JOINT_LANDMARK[farthest] and error[farthest] > MAX_JOINT_ERROR:
+        reasons.append(f"{NAMES[farthest]} {error[farthest]:.2f} torsos off, {MAX_JOINT_ERROR} allowed")
+    if neck_angle(fit.rotations) > MAX_NECK_DEGREES:
+        reasons.append(f"head turned by {neck_angle(fit.rotations):.0f} degrees, {MAX_NECK_DEGREES:.0f} possible")
     if inside(target.point[[_NOSE]], target.mask.shape)[0]:
         with np.errstate(invalid="ignore"):
             shown = bool((np.linalg.norm(point - nose, axis=-1) < _SEEN_WITHIN_M).any())

@@ -23,9 +23,9 @@ FOCAL = 1.2  # of the photo's longer side: about 45 degrees
 ITERATIONS = 240
 _FIELD_SIDE = 256  # longer side of the map of distances from the mask
 _BORDER_POINTS = 250
-_LEAST_LANDMARKS = 6  # of the body, seen and inside the photo: with fewer there is no pose to start from
-_LEAST_MASK_PX = 400
-_MOST_FACE = 0.6  # face by torso; of head shots the landmark network squeezes a torso into the photo
+_MIN_LANDMARKS = 6  # of the body, seen and inside the photo: with fewer there is no pose to start from
+_MIN_MASK_PX = 400
+_MAX_FACE = 0.6  # face by torso; of head shots the landmark network squeezes a torso into the photo
 
 # How far a joint turns from its start, radians (standard deviations about x, y, z of its bones at rest).
 _LOOSE = {
@@ -53,7 +53,7 @@ _SHOULDERS, _HIPS = ([NAMES.index(f"{side} {n}") for side in ("left", "right")] 
 _ARMS = [NAMES.index(f"{side} {n}") for n in ("elbow", "wrist", "index finger") for side in ("left", "right")]
 _ARM_RADIUS_M = 0.03
 _FACE = [NAMES.index(n) for n in ("nose", "left eye", "right eye", "left ear", "right ear")]
-_HIDDEN_SHARE = 0.05  # of the mask's pull on limbs that something hides
+_HIDDEN_FRACTION = 0.05  # of the mask's pull on limbs that something hides
 
 
 class CannotFit(ValueError):
@@ -127,14 +127,14 @@ def fit_person(puppet: Puppet, target: Target, iterations: int = ITERATIONS) -> 
     if not (np.isfinite(target.point).all() and np.isfinite(target.world).all()):
         raise CannotFit("landmarks are not numbers")
     counted = puppet.has_landmark & (target.visible >= SHOWN) & inside(target.point, target.mask.shape)
-    if counted.sum() < _LEAST_LANDMARKS:
-        raise CannotFit(f"{counted.sum()} landmarks visible, {_LEAST_LANDMARKS} needed")
-    if target.mask.sum() < _LEAST_MASK_PX:
-        raise CannotFit(f"mask of {target.mask.sum()} pixels, {_LEAST_MASK_PX} needed")
+    if counted.sum() < _MIN_LANDMARKS:
+        raise CannotFit(f"{counted.sum()} landmarks visible, {_MIN_LANDMARKS} needed")
+    if target.mask.sum() < _MIN_MASK_PX:
+        raise CannotFit(f"mask of {target.mask.sum()} pixels, {_MIN_MASK_PX} needed")
     torso = torso_px(target.point)
     if torso < 8:
         raise CannotFit(f"torso of {torso:.0f} pixels, 8 needed")
-    if face_by_torso(target.point) > _MOST_FACE:
+    if face_by_torso(target.point) > _MAX_FACE:
         raise CannotFit(f"face {face_by_torso(target.point):.1f} times as long as the torso: head and shoulders only")
     return _Problem(puppet, target, torso).solve(iterations)
 
@@ -176,7 +176,7 @@ class _Problem:
         self._start()
         self._measure_landmarks()
         self._measure_mask()
-        self.vertex_weight = puppet.sample.weights @ torch.tensor(np.where(self.shown, 1, _HIDDEN_SHARE)).float()
+        self.vertex_weight = puppet.sample.weights @ torch.tensor(np.where(self.shown, 1, _HIDDEN_FRACTION)).float()
         self.loose = torch.tensor([_LOOSE[name.partition(".")[0]] for name in JOINTS])
         self.cloth = torch.tensor([_CLOTHES[name] for name in REGIONS])
 

@@ -17,7 +17,7 @@ _AGREE_INSIDE = 0.7  # share of the mask that lies in the detector's box
 _ALONE = 0.1  # share of a box that other boxes may cover
 _MATTE_IOU = 0.6  # of the detector's box and the matte's
 _SAME_MASK_IOU = 0.75  # of BlazePose's mask and the matte
-_LEAST_VISIBLE, _LANDMARKS_INSIDE = 0.6, 0.85  # share of the visible landmarks that lie on the mask
+_MIN_VISIBLE, _LANDMARKS_INSIDE = 0.6, 0.85  # share of the visible landmarks that lie on the mask
 
 Detect = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 Find = Callable[[np.ndarray, np.ndarray], Landmarks | None]
@@ -103,7 +103,7 @@ def whole_bodies(box: np.ndarray, height: int) -> list[np.ndarray]:
     return longer
 
 
-def agrees(mask: np.ndarray, box: np.ndarray, least_iou: float = _AGREE_IOU) -> bool:
+def agrees(mask: np.ndarray, box: np.ndarray, min_iou: float = _AGREE_IOU) -> bool:
     """Whether the mask is about the person in the box, not about a neighbour, and not a fragment of it."""
     y, x = np.nonzero(mask)
     if not len(x):
@@ -112,7 +112,7 @@ def agrees(mask: np.ndarray, box: np.ndarray, least_iou: float = _AGREE_IOU) -> 
     shared = np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0, None).prod()
     union = (high - low).prod() + (box[2:] - box[:2]).prod() - shared
     inside = ((x >= box[0]) & (x < box[2]) & (y >= box[1]) & (y < box[3])).mean()
-    return bool(shared / union >= least_iou and inside >= _AGREE_INSIDE)
+    return bool(shared / union >= min_iou and inside >= _AGREE_INSIDE)
 
 
 def _covered(box: np.ndarray, others: np.ndarray) -> float:
@@ -124,7 +124,7 @@ def _covered(box: np.ndarray, others: np.ndarray) -> float:
 def _on_mask(found: Landmarks, mask: np.ndarray) -> bool:
     x, y = np.floor(found.point).astype(int).T
     inside = (x >= 0) & (x < mask.shape[1]) & (y >= 0) & (y < mask.shape[0])
-    shown = inside & (found.visible >= _LEAST_VISIBLE)
+    shown = inside & (found.visible >= _MIN_VISIBLE)
     return bool(shown.any() and mask[y[shown], x[shown]].mean() >= _LANDMARKS_INSIDE)
 
 

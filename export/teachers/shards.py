@@ -27,9 +27,9 @@ from export.teachers.fit import PhotoFits
 from export.teachers.label import PhotoLabels
 
 LONG_SIDE = 512
-LEAST_SCORE = 0.5  # of the detector; less sure boxes are regions that training leaves out
+MIN_SCORE = 0.5  # of the detector; less sure boxes are regions that training leaves out
 _BORDER = 0.012  # of the person's height: this close to the mask's edge a pixel may be the person or not
-LEAST_CUT_OUT_PX = 60  # height of people worth cutting out
+MIN_CROP_PX = 60  # height of people worth cutting out
 PER_SHARD = 100
 JPEG_QUALITY = 92
 _SIZES_APART = (0.5, 0.3, 0.15, 0.05, 0.0, 0.0)  # of 1, 2, ... 6 people
@@ -49,7 +49,7 @@ def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | No
     dense = {} if fits is None else dict(zip(fits.person[fits.accepted], fits.label[fits.accepted], strict=True))
     for k in sorted(np.flatnonzero(~labels.outlined), key=lambda k: labels.score[k]):
         x0, y0, x1, y1 = np.round(labels.box[k]).astype(int)
-        first = BOX_ALONE if labels.score[k] >= LEAST_SCORE else UNCERTAIN
+        first = BOX_ALONE if labels.score[k] >= MIN_SCORE else UNCERTAIN
         out[max(y0, 0) : y1, max(x0, 0) : x1] = (UNSURE, 0, 0, first + k % (UNCERTAIN - BOX_ALONE))
     for k in sorted(outlined, key=lambda k: -labels.mask[k].sum()):
         mask = labels.mask[k]
@@ -95,7 +95,7 @@ def cut_outs(image: np.ndarray, label: np.ndarray) -> list[CutOut]:
             y, x = np.nonzero(own)
             x0, y0, x1, y1 = x.min(), y.min(), x.max() + 1, y.max() + 1
             cut = (x0 < 3, y0 < 3, x1 > width - 3, y1 > height - 3)
-            if y1 - y0 >= LEAST_CUT_OUT_PX and not (cut[0] and cut[2]) and not (cut[1] and cut[3]):
+            if y1 - y0 >= MIN_CROP_PX and not (cut[0] and cut[2]) and not (cut[1] and cut[3]):
                 place = np.s_[y0:y1, x0:x1]
                 this = label[place].copy()
                 this[~own[place]] = 0

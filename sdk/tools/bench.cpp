@@ -20,7 +20,7 @@
 
 namespace {
 
-constexpr const char* kSchema = "maquette-bench-1";
+constexpr const char* kSchema = "maquette-bench-2";
 // Sources take turns in blocks of so many frames, so that a busy moment of the machine meets all of them.
 constexpr int kBlock = 10;
 constexpr double kMostOthers = 0.05;  // of all cores: more, and the figures are others' too
@@ -48,9 +48,9 @@ constexpr const char* kStages[] = {"capture",  "preprocess", "trunk",  "proposal
 constexpr size_t kStageCount = std::size(kStages);
 
 // One source with the times of its frames.
-class Scene {
+class Case {
  public:
-  Scene(const maquette::Context& context, std::string uri) : context_(context), uri_(std::move(uri)) { open(); }
+  Case(const maquette::Context& context, std::string uri) : context_(context), uri_(std::move(uri)) { open(); }
 
   const std::string& uri() const { return uri_; }
   size_t runs() const { return ms_[0].size(); }
@@ -164,18 +164,18 @@ class Scene {
   uint64_t drops_ = 0;
 };
 
-void print_table(const std::vector<std::unique_ptr<Scene>>& scenes) {
+void print_table(const std::vector<std::unique_ptr<Case>>& cases) {
   size_t widest = 6;
-  for (const auto& scene : scenes) widest = std::max(widest, scene->uri().size());
+  for (const auto& timed : cases) widest = std::max(widest, timed->uri().size());
   std::printf("%-*s  people    FPS    p50    p90    p99 ms   CPU ms |", int(widest), "source");
   for (size_t i = 0; i + 1 < kStageCount; ++i) std::printf(" %s", kStages[i]);
   std::printf("\n");
-  for (const auto& scene : scenes) {
-    std::printf("%-*s  %6.2f %6.1f %6.1f %6.1f %6.1f %11.1f |", int(widest), scene->uri().c_str(), scene->people(),
-                1e3 / std::max(1e-6, scene->frame_ms()), scene->frame_ms(), scene->percentile(kStageCount - 1, 90),
-                scene->percentile(kStageCount - 1, 99), scene->cpu_ms());
+  for (const auto& timed : cases) {
+    std::printf("%-*s  %6.2f %6.1f %6.1f %6.1f %6.1f %11.1f |", int(widest), timed->uri().c_str(), timed->people(),
+                1e3 / std::max(1e-6, timed->frame_ms()), timed->frame_ms(), timed->percentile(kStageCount - 1, 90),
+                timed->percentile(kStageCount - 1, 99), timed->cpu_ms());
     for (size_t i = 0; i + 1 < kStageCount; ++i) {
-      std::printf(" %*.1f", int(std::char_traits<char>::length(kStages[i])), scene->percentile(i, 50));
+      std::printf(" %*.1f", int(std::char_traits<char>::length(kStages[i])), timed->percentile(i, 50));
     }
     std::printf("\n");
   }
@@ -188,34 +188,34 @@ int run_bench(const Options& options) {
   maquette::DensePose densepose(context, config_of(options.model, bundle));
   const double create_ms = ms_between(start, Clock::now());
 
-  std::vector<std::unique_ptr<Scene>> scenes;
+  std::vector<std::unique_ptr<Case>> cases;
   for (const std::string& text : options.sources) {
-    scenes.push_back(std::make_unique<Scene>(context, parse_source_argument(text).uri));
+    cases.push_back(std::make_unique<Case>(context, parse_source_argument(text).uri));
   }
-  const double first_frame_ms = scenes[0]->run(densepose, false);
+  const double first_frame_ms = cases[0]->run(densepose, false);
   const double first_result_ms = 1e3 * seconds_since_start();
 
   catch_interrupts();
-  for (const auto& scene : scenes) {
-    for (int i = 0; i < options.warm_up && !interrupted(); ++i) scene->run(densepose, false);
+  for (const auto& timed : cases) {
+    for (int i = 0; i < options.warm_up && !interrupted(); ++i) timed->run(densepose, false);
   }
   const double others_before_s = others_processor_seconds();
   const auto measured_from = Clock::now();
-  ProgressBar progress("measuring", int64_t(scenes.size()) * options.runs);
-  const auto unfinished = [&](const Scene& scene) {
-    return scene.runs() < size_t(options.runs) || scene.seconds() < options.seconds;
+  ProgressBar progress("measuring", int64_t(cases.size()) * options.runs);
+  const auto unfinished = [&](const Case& timed) {
+    return timed.runs() < size_t(options.runs) || timed.seconds() < options.seconds;
   };
   int64_t done = 0;
   for (bool any = true; any && !interrupted();) {
     any = false;
-    for (const auto& scene : scenes) {
-      if (!unfinished(*scene)) continue;
+    for (const auto& timed : cases) {
+      if (!unfinished(*timed)) continue;
       any = true;
-      scene->pause();
+      timed->pause();
       densepose.restart();
-      for (int i = 0; i < kBlock && !interrupted(); ++i) scene->run(densepose, true);
+      for (int i = 0; i < kBlock && !interrupted(); ++i) timed->run(densepose, true);
       done += kBlock;
-      progress.advance(done, scene->uri());
+      progress.advance(done, timed->uri());
     }
   }
   progress.finish();
@@ -256,16 +256,16 @@ int run_bench(const Options& options) {
   document["others_share"] = others;
   document["valid"] = reasons.empty();
   document["doubts"] = reasons;
-  document["scenes"] = nlohmann::ordered_json::array();
-  for (const auto& scene : scenes) document["scenes"].push_back(scene->json(options));
+  document["cases"] = nlohmann::ordered_json::array();
+  for (const auto& timed : cases) document["cases"].push_back(timed->json(options));
 
-  print_table(scenes);
+  print_table(cases);
   std::printf("create %.0f ms, first frame %.0f ms, program start to first result %.0f ms, peak memory %.0f MiB\n",
               create_ms, first_frame_ms, first_result_ms, double(peak_memory_bytes()) / kMibibyte);
   for (const std::string& reason : reasons) std::printf("Doubtful: %s\n", reason.c_str());
-  for (const auto& scene : scenes) {
-    for (const std::string& reason : scene->doubts(options)) {
-      std::printf("Doubtful: %s: %s\n", scene->uri().c_str(), reason.c_str());
+  for (const auto& timed : cases) {
+    for (const std::string& reason : timed->doubts(options)) {
+      std::printf("Doubtful: %s: %s\n", timed->uri().c_str(), reason.c_str());
     }
   }
   if (!options.json.empty()) {

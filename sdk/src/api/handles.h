@@ -16,7 +16,7 @@
 #include "scene/capture/capture.h"
 #include "scene/format/scene.h"
 #include "scene/render/scene_renderer.h"
-#include "sources/source.h"
+#include "sources/registry.h"
 
 namespace maq {
 

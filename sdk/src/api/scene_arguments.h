@@ -28,15 +28,14 @@ inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, 
   return std::make_shared<SceneNetworks>(context->state->onnxruntime(), read_bundle(folder), settings);
 }
 
+inline Intrinsics intrinsics_of(const maq_pinhole_camera& camera) {
+  return {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px};
+}
+
 // The camera without its distortion.
 inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
   PinholeCamera camera;
-  camera.width_px = given.width_px;
-  camera.height_px = given.height_px;
-  camera.fx_px = given.fx_px;
-  camera.fy_px = given.fy_px;
-  camera.cx_px = given.cx_px;
-  camera.cy_px = given.cy_px;
+  camera.intrinsics() = intrinsics_of(given);
   std::copy_n(given.rotation, 9, camera.rotation.begin());
   std::copy_n(given.centre, 3, camera.centre.begin());
   return camera;
@@ -71,12 +70,7 @@ inline void check_distortion(const maq_pinhole_camera& camera) {
 // How it maps directions into its picture.
 inline Lens lens_of(const maq_pinhole_camera& camera) {
   Lens lens;
-  lens.width_px = camera.width_px;
-  lens.height_px = camera.height_px;
-  lens.fx_px = camera.fx_px;
-  lens.fy_px = camera.fy_px;
-  lens.cx_px = camera.cx_px;
-  lens.cy_px = camera.cy_px;
+  lens.intrinsics() = intrinsics_of(camera);
   if (is_distorted(camera)) {
     lens.distortion = Distortion::kRational;
     std::copy_n(camera.distortion, lens.coefficients.size(), lens.coefficients.begin());

@@ -16,7 +16,7 @@ struct PlaneView {
   size_t stride_bytes = 0;
 };
 
-// Pixels that somebody else owns.
+// Pixels in memory of another owner.
 struct ImageView {
   maq_pixel_format format = MAQ_PIXEL_BGR8;
   int width_px = 0;
@@ -24,17 +24,17 @@ struct ImageView {
   PlaneView planes[2];
 };
 
-// Who owns the pixels of a frame that are not its own: buffers of a camera.
+// The owner of pixels that a frame only borrows: a camera, of its buffers.
 class FrameOwner {
  public:
   virtual ~FrameOwner() = default;
-  // From any thread, once for each buffer.
+  // Returns a buffer. From any thread, once for each time it was lent.
   virtual void give_back(int slot) = 0;
   // The buffer as a dma-buf, which stays the owner's; -1 when there is none. From any thread, for a buffer that is held.
   virtual int dma_buf(int) { return -1; }
 };
 
-// Holds a buffer of an owner, and gives it back.
+// Holds a buffer of an owner, and returns it.
 class PixelLease {
  public:
   PixelLease() = default;
@@ -71,10 +71,10 @@ struct Frame {
   // Memory of the pixels when the library owns them; kept between uses of a pooled frame.
   std::vector<uint8_t> storage;
   std::vector<uint8_t> depth_storage;
-  // The JPEG image that `image` was decoded from, in the camera's memory; null when it came otherwise.
+  // The JPEG image that `image` was decoded from, in the camera's memory; null when it was not a JPEG image.
   const uint8_t* jpeg = nullptr;
   size_t jpeg_bytes = 0;
-  // Of what is a camera's; empty for pixels in memory of the frame, or of an app.
+  // Of a camera's buffer; empty for pixels in memory of the frame, or of an app.
   PixelLease lease;
 
   // Keeps the memory of the frame itself, for the next image.
@@ -104,7 +104,7 @@ void copy_packed(const ImageView& image, uint8_t* pixels);
 // `what` begins the sentence: "photo.jpg" or "The frame".
 void check_image_size(int64_t width_px, int64_t height_px, const std::string& what);
 
-// Throws when the description is not one of a readable image; fills in strides that are 0.
+// Throws when the description is not of a readable image; fills in strides that are 0.
 ImageView checked_image_view(const maq_frame_desc& desc);
 
 }  // namespace maq

@@ -1,5 +1,5 @@
-// A few threads that stay and share out the tasks of one piece of work after another: starting threads takes longer than
-// many of those take.
+// A pool of threads that share the tasks of one piece of work after another. They stay, because starting a thread takes
+// longer than many of the tasks.
 #pragma once
 
 #include <atomic>
@@ -12,10 +12,10 @@
 
 namespace maq {
 
-// Of a network or a piece of work; what asks for more is refused.
+// The limit for a network or a piece of work; more is refused.
 inline constexpr int kMaxThreads = 64;
 
-// For who does not say: the processor's cores, but at most 4. More do not pay for networks of this size.
+// The default: as many as the processor has cores, but at most 4. More do not pay for networks of this size.
 int default_threads();
 
 class WorkerThreads {

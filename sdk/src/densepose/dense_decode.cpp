@@ -218,7 +218,7 @@ PixelRect pixel_rect(const Box& box) {
 }
 
 MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person,
-                                          float mask_threshold, float least_own_share, DecodeMemory& memory,
+                                          float mask_threshold, float min_visible_fraction, DecodeMemory& memory,
                                           DensePlanes& planes) {
   DecodeCounts counts;
   int64_t taken = 0;  // pixels of the person that are somebody else's already
@@ -271,7 +271,7 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
       counts.clamped_uv += clamped ? 1 : 0;
     }
   }
-  if (float(counts.body_pixels) >= least_own_share * float(counts.body_pixels + taken)) return counts;
+  if (float(counts.body_pixels) >= min_visible_fraction * float(counts.body_pixels + taken)) return counts;
   for (int y = first_row; y < last_row; ++y) {
     const size_t start = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x);
     for (size_t pixel = start + size_t(first_col); pixel < start + size_t(last_col); ++pixel) {

@@ -64,9 +64,9 @@ PixelRect pixel_rect(const Box& box);
 // Paints where the coarse classes other than background together have a probability above `mask_threshold` (log-odds of
 // each cell, resized bilinearly with half-pixel centres to the box's pixels): the best part of the index logits, resized
 // alike (of equal ones the lowest; background is not asked), with its U and V, resized alike and clamped to [0, 1]. Pixels that already
-// belong to somebody, and those outside the image, are left alone; where fewer than `least_own_share` of the person's
+// belong to somebody, and those outside the image, are left alone; where fewer than `min_visible_fraction` of the person's
 // pixels remain, nothing is painted. `person` counts from 1.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
-                          float least_own_share, DecodeMemory& memory, DensePlanes& planes);
+                          float min_visible_fraction, DecodeMemory& memory, DensePlanes& planes);
 
 }  // namespace maq

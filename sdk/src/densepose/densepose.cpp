@@ -72,8 +72,8 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
                      const DensePoseSettings& settings)
     : spec_(read_densepose_spec(bundle.manifest)),
       settings_(resolved(settings, spec_)),
-      charts_(bundle.files.at(spec_.dense_head.charts_file), spec_.dense_head.index_classes - 1,
-              bundle.path_of(spec_.dense_head.charts_file)),
+      charts_(bundle.files.at(spec_.charts_file), spec_.dense_head.index_classes - 1,
+              bundle.path_of(spec_.charts_file)),
       surface_(spec_.surface_file.empty() ? std::vector<uint8_t>() : bundle.files.at(spec_.surface_file),
                bundle.path_of(spec_.surface_file)) {
   const Manifest& manifest = bundle.manifest;
@@ -90,9 +90,9 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
       make(graph_with(manifest, "rpn_coarse", at_levels("p", first + 1, last), at_levels("rpn", first + 1, last)));
   box_head_ = make(graph_with(manifest, "box_head", {"rois"}, {"boxes"}));
   dense_head_ = make(graph_with(manifest, "dense_head", {"rois"}, {"labels", "surface"}));
-  if (spec_.dense_head.output != 2 * spec_.dense_head.pool) {
+  if (spec_.dense_head.output_size != 2 * spec_.dense_head.pool_size) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": the dense head's output is ",
-                spec_.dense_head.output, " cells wide, but must be twice its pool of ", spec_.dense_head.pool,
+                spec_.dense_head.output_size, " cells wide, but must be twice its pool of ", spec_.dense_head.pool_size,
                 ". Export the bundle again.");
   }
 }
@@ -131,10 +131,11 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
     stats.proposals_ms = float(stage.lap_ms());
 
     // People who are followed come from a look at the frame before.
-    const bool looks_again = stats.key_frame && spec_.box_head.second_look_score.has_value();
+    const bool has_second_pass = stats.key_frame && spec_.box_head.second_pass_threshold.has_value();
     const float least_score = settings_.score_threshold;
-    if (looks_again) {
-      run_box_head(proposals_, std::min(least_score, *spec_.box_head.second_look_score), found_, &stats.dropped_boxes);
+    if (has_second_pass) {
+      run_box_head(proposals_, std::min(least_score, *spec_.box_head.second_pass_threshold), found_,
+                   &stats.dropped_boxes);
       proposals_.swap(found_);
     }
     run_box_head(proposals_, least_score, found_, &stats.dropped_boxes);
@@ -205,13 +206,13 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float least_sc
   if (boxes.empty()) return;
   const BoxHeadSpec& spec = spec_.box_head;
   const int64_t count = int64_t(boxes.size());
-  const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
+  const size_t roi_size = size_t(channels_) * size_t(spec.pool_size) * size_t(spec.pool_size);
   rois_.resize(size_t(count) * roi_size);
   for (size_t i = 0; i < boxes.size(); ++i) {
-    roi_align_.run(level_for(boxes[i].box), boxes[i].box, spec.pool, rois_.data() + i * roi_size);
+    roi_align_.run(level_for(boxes[i].box), boxes[i].box, spec.pool_size, rois_.data() + i * roi_size);
   }
   // Of each: logits of person and background, then dx, dy, dw, dh.
-  inputs_.assign(1, {rois_.data(), {count, spec.pool, spec.pool, channels_}});
+  inputs_.assign(1, {rois_.data(), {count, spec.pool_size, spec.pool_size, channels_}});
   shapes_.assign(1, {count, 6});
   const TensorView& outputs = box_head_->run(inputs_, shapes_).front();
 
@@ -231,30 +232,30 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
   Stopwatch stage;
   const DenseHeadSpec& spec = spec_.dense_head;
   const int64_t count = int64_t(people.size());
-  const size_t roi_size = size_t(channels_) * size_t(spec.pool) * size_t(spec.pool);
+  const size_t roi_size = size_t(channels_) * size_t(spec.pool_size) * size_t(spec.pool_size);
   rois_.resize(size_t(count) * roi_size);
   for (size_t i = 0; i < people.size(); ++i) {
-    roi_align_.run(features_[0], people[i].box, spec.pool, rois_.data() + i * roi_size);
+    roi_align_.run(features_[0], people[i].box, spec.pool_size, rois_.data() + i * roi_size);
   }
   const int classes = spec.coarse_classes + spec.index_classes;
-  inputs_.assign(1, {rois_.data(), {count, spec.pool, spec.pool, channels_}});
-  shapes_.assign(2, {count, spec.pool, spec.pool, 4 * classes});
+  inputs_.assign(1, {rois_.data(), {count, spec.pool_size, spec.pool_size, channels_}});
+  shapes_.assign(2, {count, spec.pool_size, spec.pool_size, 4 * classes});
   shapes_[1][3] = charts_.channels();
   const std::vector<TensorView>& outputs = dense_head_->run(inputs_, shapes_);
   result.stats.dense_head_ms = float(stage.lap_ms());
 
   const float scale_x = float(result.planes.width_px) / float(input_.width_px);
   const float scale_y = float(result.planes.height_px) / float(input_.height_px);
-  const size_t labels_size = size_t(spec.output) * size_t(spec.output) * size_t(classes);
-  const size_t surface_size = size_t(charts_.channels()) * size_t(spec.pool) * size_t(spec.pool);
+  const size_t labels_size = size_t(spec.output_size) * size_t(spec.output_size) * size_t(classes);
+  const size_t surface_size = size_t(charts_.channels()) * size_t(spec.pool_size) * size_t(spec.pool_size);
   for (size_t i = 0; i < people.size(); ++i) {
-    if (settings_.surface) charts_.begin(outputs[1].data + i * surface_size, spec.pool);
+    if (settings_.surface) charts_.begin(outputs[1].data + i * surface_size, spec.pool_size);
     const DenseLogits logits{outputs[0].data + i * labels_size, settings_.surface ? &charts_ : nullptr,
-                             spec.coarse_classes, spec.index_classes, spec.output};
+                             spec.coarse_classes, spec.index_classes, spec.output_size};
     Box box = scaled(people[i].box, scale_x, scale_y);
     clip_box(box, float(result.planes.width_px), float(result.planes.height_px));
     const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold,
-                                             spec.least_own_share, decode_memory_, result.planes);
+                                             spec.min_visible_fraction, decode_memory_, result.planes);
     // A box without a body is a false alarm; one whose body is somebody else's already shows that person again.
     if (counts.body_pixels > 0) {
       result.people.push_back({box, people[i].score});

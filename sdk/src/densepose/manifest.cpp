@@ -16,20 +16,21 @@ InputSpec read_input(const ManifestNode& node) {
   input.mean = node.at("mean").numbers<3>(-1e6, 1e6);
   input.std = node.at("std").numbers<3>(1e-6, 1e6);
   input.multiple_of = node.at("multiple_of").integer(1, 256);
-  input.long_side_px = node.at("long_side").integer(32, 2048);
+  input.long_side_px = node.at("long_side_px").integer(32, 2048);
   return input;
 }
 
 RpnSpec read_rpn(const ManifestNode& node) {
   RpnSpec rpn;
   rpn.strides = read_strides(node.at("strides"), 5);
-  for (const ManifestNode& size : node.at("anchor_sizes").elements()) {
+  for (const ManifestNode& size : node.at("anchor_sizes_px").elements()) {
     rpn.anchor_sizes_px.push_back(size.number(1, 1e5));
   }
   for (const ManifestNode& ratio : node.at("aspect_ratios").elements()) {
     rpn.aspect_ratios.push_back(ratio.number(1e-3, 1e3));
   }
-  if (rpn.anchor_sizes_px.size() != rpn.strides.size()) node.at("anchor_sizes").fail("needs one size for each stride");
+  if (rpn.anchor_sizes_px.size() != rpn.strides.size())
+    node.at("anchor_sizes_px").fail("needs one size for each stride");
   if (rpn.aspect_ratios.size() != 3) node.at("aspect_ratios").fail("must have 3 entries");
   rpn.pre_nms_top_k = node.at("pre_nms_top_k").integer(1, 100000);
   rpn.post_nms_top_k = node.at("post_nms_top_k").integer(1, 10000);
@@ -39,28 +40,27 @@ RpnSpec read_rpn(const ManifestNode& node) {
 
 BoxHeadSpec read_box_head(const ManifestNode& node) {
   BoxHeadSpec head;
-  head.pool = node.at("pool").integer(1, 64);
+  head.pool_size = node.at("pool_size").integer(1, 64);
   head.strides = read_strides(node.at("strides"), 4);
   head.canonical_level = node.at("canonical_level").integer(0, 16);
-  head.canonical_size_px = node.at("canonical_size").number(1, 1e5);
+  head.canonical_size_px = node.at("canonical_size_px").number(1, 1e5);
   head.delta_weights = node.at("delta_weights").numbers<4>(1e-3, 1e3);
   head.score_threshold = node.at("score_threshold").number(0, 1);
   head.nms_iou = node.at("nms_iou").number(0, 1);
-  if (const auto score = node.find("second_look_score")) head.second_look_score = score->number(0, 1);
+  if (const auto threshold = node.find("second_pass_threshold")) head.second_pass_threshold = threshold->number(0, 1);
   head.max_people = node.at("max_people").integer(1, 255);
   return head;
 }
 
-DenseHeadSpec read_dense_head(const ManifestNode& node, const Manifest& manifest) {
+DenseHeadSpec read_dense_head(const ManifestNode& node) {
   DenseHeadSpec head;
-  head.charts_file = manifest.listed_file(node.at("charts"));
-  head.pool = node.at("pool").integer(1, 128);
+  head.pool_size = node.at("pool_size").integer(1, 128);
   head.stride = node.at("stride").integer(1, 1024);
-  head.output = node.at("output").integer(1, 512);
+  head.output_size = node.at("output_size").integer(1, 512);
   head.coarse_classes = node.at("coarse_classes").integer(2, 64);
   head.index_classes = node.at("index_classes").integer(2, 64);
   head.mask_threshold = node.at("mask_threshold").number(0.001, 0.999);
-  head.least_own_share = node.at("least_own_share").number(0, 1);
+  head.min_visible_fraction = node.at("min_visible_fraction").number(0, 1);
   return head;
 }
 
@@ -73,7 +73,8 @@ DensePoseSpec read_densepose_spec(const Manifest& manifest) {
   spec.input = read_input(manifest.root.at("input"));
   spec.rpn = read_rpn(manifest.root.at("rpn"));
   spec.box_head = read_box_head(manifest.root.at("box_head"));
-  spec.dense_head = read_dense_head(manifest.root.at("dense_head"), manifest);
+  spec.dense_head = read_dense_head(manifest.root.at("dense_head"));
+  spec.charts_file = manifest.listed_file(manifest.root.at("charts").at("file"));
   if (const auto surface = manifest.root.find("surface")) {
     spec.surface_file = manifest.listed_file(surface->at("file"));
   }

@@ -27,26 +27,26 @@ struct RpnSpec {
 };
 
 struct BoxHeadSpec {
-  int pool = 0;
+  int pool_size = 0;  // cells of a RoI each way
   std::vector<int> strides;
   int canonical_level = 0;
   float canonical_size_px = 0;
   std::array<float, 4> delta_weights{};
   float score_threshold = 0;
   float nms_iou = 0;
-  std::optional<float> second_look_score;  // boxes with more go through the box head again; none: one pass
+  // Boxes with a higher score go through the box head again, from where its first pass put them; none: one pass.
+  std::optional<float> second_pass_threshold;
   int max_people = 0;
 };
 
 struct DenseHeadSpec {
-  std::string charts_file;
-  int pool = 0;
+  int pool_size = 0;
   int stride = 0;
-  int output = 0;
+  int output_size = 0;
   int coarse_classes = 0;
   int index_classes = 0;
   float mask_threshold = 0;
-  float least_own_share = 0;
+  float min_visible_fraction = 0;  // a person of whom less is in front of better scored ones is dropped
 };
 
 struct DensePoseSpec {
@@ -54,6 +54,7 @@ struct DensePoseSpec {
   RpnSpec rpn;
   BoxHeadSpec box_head;
   DenseHeadSpec dense_head;
+  std::string charts_file;
   std::string surface_file;  // "" when the bundle has none
 };
 

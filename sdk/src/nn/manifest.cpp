@@ -6,7 +6,7 @@
 namespace maq {
 namespace {
 
-constexpr int kFormatVersion = 3;
+constexpr int kFormatVersion = 4;
 
 void check_format(const ManifestNode& root) {
   if (root.at("format").text() != "maquette-bundle") root.at("format").fail("must be maquette-bundle");

@@ -24,6 +24,7 @@
 #include "core/error.h"
 #include "nn/bundle.h"
 #include "sources/recording/recording.h"
+#include "sources/registry.h"
 
 namespace maq {
 namespace {

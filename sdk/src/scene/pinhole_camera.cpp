@@ -8,19 +8,6 @@
 
 namespace maq {
 
-PinholeCamera resized(const PinholeCamera& camera, int width_px, int height_px) {
-  PinholeCamera made = camera;
-  const double across = double(width_px) / camera.width_px, down = double(height_px) / camera.height_px;
-  made.width_px = width_px;
-  made.height_px = height_px;
-  made.fx_px *= across;
-  made.fy_px *= down;
-  // The picture's edge, half a pixel outside of the first centre, stays where it is.
-  made.cx_px = (camera.cx_px + 0.5) * across - 0.5;
-  made.cy_px = (camera.cy_px + 0.5) * down - 0.5;
-  return made;
-}
-
 PinholeCamera turned_upright(const PinholeCamera& camera, const std::array<double, 3>& up) {
   const auto& r = camera.rotation;
   const double length = std::sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]);

@@ -1,22 +1,17 @@
-// A camera without lens distortion, in the convention of OpenCV: x to the right, y down, z forward; the centre of the top
-// left pixel is (0, 0).
+// A camera without lens distortion, in the convention of OpenCV: x to the right, y down, z forward.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
+#include "image/geometry/intrinsics.h"
+
 namespace maq {
 
-struct PinholeCamera {
-  int width_px = 0;
-  int height_px = 0;
-  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
+struct PinholeCamera : Intrinsics {
   std::array<double, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row by row: world to camera
   std::array<double, 3> centre = {0, 0, 0};                      // in the world
 };
-
-// A smaller or larger picture of the same camera: its field of view stays.
-PinholeCamera resized(const PinholeCamera& camera, int width_px, int height_px);
 
 // Where the camera is and looks, turned about its optical axis so that `up` of the world points up in the picture
 // (NPBG++, section 3.2). As it is where the world's up is along the optical axis, and continuous near that.

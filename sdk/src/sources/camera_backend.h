@@ -12,8 +12,8 @@
 
 namespace maq {
 
-// What the app asks for; 0 or empty: as the device has it. The nearest that the device offers is taken.
-struct CameraWish {
+// What the app asks for; 0 or empty: the device's default. The nearest that the device offers is taken.
+struct CameraRequest {
   std::string format;  // four letters, as the device calls it: "MJPG"
   int width_px = 0;
   int height_px = 0;
@@ -21,7 +21,7 @@ struct CameraWish {
 };
 
 struct CameraFormat {
-  // Pixels as they come, or JPEG images, which are decoded to BGR8 when somebody takes the frame.
+  // Raw pixels, or JPEG images, which are decoded to BGR8 when the frame is taken.
   maq_pixel_format pixels = MAQ_PIXEL_YUYV;
   bool jpeg = false;
   int width_px = 0;
@@ -29,7 +29,7 @@ struct CameraFormat {
   double fps = 0;  // 0: the device does not say
 };
 
-// A filled buffer of the device. It belongs to whoever got it until it is given back.
+// A filled buffer of the device, held until give_back().
 struct CameraBuffer {
   ImageView image;                // of pixels as they come; of a JPEG image the size agreed on, or none
   const uint8_t* jpeg = nullptr;  // of a JPEG image
@@ -39,7 +39,7 @@ struct CameraBuffer {
   int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the picture was taken; no later than the one before: it is dropped
   uint32_t sequence = 0;     // counts the device's frames, those that were lost included
   bool damaged = false;      // the device says that pixels are missing
-  uint32_t seeks = 0;        // how often Camera::seek was heeded before this frame
+  uint32_t seeks = 0;        // how often Camera::seek took effect before this frame
 };
 
 // A control and what it was set to.
@@ -61,22 +61,22 @@ class Camera : public FrameOwner {
   // out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
   virtual maq_control_info control(maq_control which);
   virtual void set_control(maq_control which, double value);
-  // From any thread, of what plays a camera: the next frame is the first at that time or later.
+  // From any thread, of a replay: the next frame is the first at that time or later.
   virtual void seek(int64_t time_ns);
-  // Waits until a buffer is filled, `timeout_ms` are over, `wake_fd` can be read, the device is gone (`reason` says how),
-  // or what plays a camera has no more frames. Only one thread at a time.
+  // Waits until a buffer is filled, `timeout_ms` have passed, `wake_fd` is readable, the device is lost (`reason` says
+  // how), or a replay has no more frames. Only one thread at a time.
   virtual Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) = 0;
   // Ends streaming and closes the device. Buffers that are held stay readable until the camera is destroyed.
   virtual void close() = 0;
 };
 
-// A camera that is there, and what it offers.
+// A connected camera, and what it offers.
 struct CameraMode {
   std::string format;   // four letters: "YUYV"
   bool usable = false;  // whether this build understands the format
   int width_px = 0;
   int height_px = 0;
-  double fps = 0;  // the fastest; 0: not told
+  double fps = 0;  // the fastest; 0: not known
 };
 struct CameraListing {
   std::string uri;             // "v4l2:/dev/video0"

@@ -23,12 +23,12 @@ using Clock = MonotonicClock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kReconnectPause(100);
-constexpr milliseconds kStopPatience(40);     // of the 50 ms that closing may take
-constexpr uint32_t kMostLostAtOnce = 100000;  // minutes of frames
-constexpr int kLongestWaitMs = 200;           // whether the camera stalls is looked at between two waits
+constexpr milliseconds kStopTimeout(40);     // of the 50 ms that closing may take
+constexpr uint32_t kMaxLostAtOnce = 100000;  // minutes of frames
+constexpr int kMaxWaitMs = 200;              // a stall is noticed between two waits
 
-// Of a JPEG image for which a size was agreed on: cameras send smaller ones too, and ones of whole blocks.
-int64_t most_pixels(const ImageView& agreed) {
+// The largest JPEG image accepted for an agreed size: cameras also send smaller ones, and ones padded to whole blocks.
+int64_t max_jpeg_pixels(const ImageView& agreed) {
   constexpr int64_t kBlock = 16;
   if (agreed.width_px == 0) return MAQ_MAX_PIXELS;
   return round_up<int64_t>(agreed.width_px, kBlock) * round_up<int64_t>(agreed.height_px, kBlock);
@@ -36,7 +36,7 @@ int64_t most_pixels(const ImageView& agreed) {
 
 }  // namespace
 
-// What the source and its thread share. The thread may outlive the source, when the device hangs.
+// Shared by the source and its thread. The thread may outlive the source when the device hangs.
 struct LiveSource::State {
   struct Entry {
     PixelLease lease;
@@ -51,31 +51,31 @@ struct LiveSource::State {
 
   std::mutex mutex;
   std::condition_variable changed;
-  // A ring of at most `capacity` frames: the newest pushes out the oldest.
+  // A ring of queue_length frames: the newest replaces the oldest.
   std::vector<Entry> ring;
   size_t first = 0, count = 0;
   uint64_t dropped = 0;
   std::optional<std::string> failure;
   bool at_end = false;  // after the frames that wait
-  uint32_t seeks = 0;   // asked for; frames of before are not handed out
+  uint32_t seeks = 0;   // asked for; frames from before them are dropped
   bool stopping = false;
   bool ended = false;  // the thread
   std::thread thread;
   JpegDecoder jpeg;  // of next() alone
-  bool told_of_bad_jpeg = false;
+  bool warned_of_bad_jpeg = false;
 
   std::mutex control_mutex;                  // one call at a time; before `mutex`, and never taken by the thread
-  std::weak_ptr<Camera> present;             // nobody but the thread keeps the camera; none while it is lost
+  std::weak_ptr<Camera> present;             // the thread owns the camera; empty while it is lost
   std::vector<ControlSetting> set_controls;  // the latest last
 
   void report(maq_source_state state, const std::string& reason) {
     settings.log.write(state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_RECONNECTED ? MAQ_LOG_INFO : MAQ_LOG_WARNING,
                        name, ": ", reason);
-    if (settings.on_state != nullptr && !stop_asked()) settings.on_state(settings.user_data, state, reason.c_str());
+    if (settings.on_state != nullptr && !is_stopping()) settings.on_state(settings.user_data, state, reason.c_str());
   }
 
   void push(Entry entry) {
-    Entry old;  // given back after the lock is released
+    Entry old;  // returned to the camera after the lock is released
     {
       std::lock_guard<std::mutex> lock(mutex);
       if (count == ring.size()) {
@@ -90,14 +90,14 @@ struct LiveSource::State {
     changed.notify_all();
   }
 
-  // The camera, for as long as a call takes. Throws while it is lost.
+  // The camera, for the length of a call. Throws while it is lost.
   std::shared_ptr<Camera> present_camera() {
     std::lock_guard<std::mutex> lock(mutex);
     std::shared_ptr<Camera> camera = present.lock();
     if (camera != nullptr) return camera;
     if (failure) throw Error(MAQ_ERROR_DEVICE_LOST, *failure, ".");
     throw Error(MAQ_ERROR_DEVICE_LOST, name,
-                " is not there at the moment; try again when its state is MAQ_SOURCE_RECONNECTED.");
+                " is not connected at the moment; try again when its state is MAQ_SOURCE_RECONNECTED.");
   }
 
   void show(const std::shared_ptr<Camera>& camera) {
@@ -115,7 +115,7 @@ struct LiveSource::State {
     return true;
   }
 
-  // What was set of the camera before it was lost.
+  // Sets what was set before the camera was lost.
   void restore_controls(Camera& camera) {
     std::vector<ControlSetting> before;
     {
@@ -131,18 +131,18 @@ struct LiveSource::State {
     }
   }
 
-  bool stop_asked() {
+  bool is_stopping() {
     std::lock_guard<std::mutex> lock(mutex);
     return stopping;
   }
 
-  // Waits, but not for longer than until somebody asks to stop. True if so.
+  // Waits, at most until the source is destroyed; true then.
   bool pause(milliseconds time) {
     std::unique_lock<std::mutex> lock(mutex);
     return changed.wait_for(lock, time, [&] { return stopping; });
   }
 
-  // What the thread does. Nothing gets past it: an exception would end the app.
+  // The body of the thread. No exception leaves it: that would end the app.
   void run(std::shared_ptr<Camera> camera) noexcept {
     try {
       stream(camera);
@@ -165,15 +165,15 @@ struct LiveSource::State {
     changed.notify_all();
   }
 
-  // Cut short on its way, most often; the next one follows soon.
+  // Most often the image was truncated on its way, and the next one is whole.
   void drop_jpeg(const CameraBuffer& buffer) {
     add_drops(1);
-    if (std::exchange(told_of_bad_jpeg, true)) return;
+    if (std::exchange(warned_of_bad_jpeg, true)) return;
     settings.log.write(MAQ_LOG_WARNING, name, ": a JPEG image is damaged, or larger than the ", buffer.image.width_px,
                        " x ", buffer.image.height_px, " pixels agreed on; it is dropped, and so are others like it.");
   }
 
-  // Waits at the end until somebody seeks. False when nobody will.
+  // Waits at the end for a seek; false when the source is destroyed instead.
   bool wait_at_end() {
     std::unique_lock<std::mutex> lock(mutex);
     at_end = true;
@@ -182,28 +182,28 @@ struct LiveSource::State {
     return !stopping;
   }
 
-  // Until somebody asks to stop, or the camera stays away; `camera` is null then.
+  // Runs until the source is destroyed or a lost camera stays away; `camera` is null then.
   void stream(std::shared_ptr<Camera>& camera) {
-    uint64_t next_sequence = 0;  // goes on where it was when the camera is opened anew
+    uint64_t next_sequence = 0;  // continues when the camera is opened again
     uint32_t last_number = 0;    // the device's own
     bool is_first = true;        // of the camera as it was opened last
     int64_t last_time_ns = INT64_MIN;
     auto last_frame = Clock::now();
     bool stalled = false;
-    const int wait_ms = std::min(kLongestWaitMs, settings.stall_ms);
+    const int wait_ms = std::min(kMaxWaitMs, settings.stall_ms);
     report(MAQ_SOURCE_STARTED, "started");
     for (;;) {
       CameraBuffer buffer;
       std::string reason;
       const Camera::Event event = camera->wait(wake.get(), wait_ms, buffer, reason);
-      if (event == Camera::Event::kWoken || stop_asked()) {
+      if (event == Camera::Event::kWoken || is_stopping()) {
         if (event == Camera::Event::kFrame) camera->give_back(buffer.slot);
         break;
       }
       if (event == Camera::Event::kFrame) {
         const uint32_t lost_before = is_first ? 0 : buffer.sequence - last_number - 1;
         // A number that repeats, goes back or leaps says nothing of frames that were lost.
-        const uint64_t sequence = next_sequence + (lost_before < kMostLostAtOnce ? lost_before : 0);
+        const uint64_t sequence = next_sequence + (lost_before < kMaxLostAtOnce ? lost_before : 0);
         add_drops(sequence - next_sequence);
         next_sequence = sequence + 1;
         last_number = buffer.sequence;
@@ -231,7 +231,7 @@ struct LiveSource::State {
         camera->close();
         // As long as anything of it is mapped, the device keeps its number, and comes back under another.
         camera.reset();
-        forget_frames();
+        drop_waiting_frames();
         report(MAQ_SOURCE_LOST, reason);
         camera = reconnect();
         if (camera == nullptr) break;
@@ -242,9 +242,9 @@ struct LiveSource::State {
     }
   }
 
-  // Those that nobody took.
-  void forget_frames() {
-    std::vector<Entry> left;  // given back after the lock is released
+  // Drops the frames that wait.
+  void drop_waiting_frames() {
+    std::vector<Entry> left;  // returned to the camera after the lock is released
     {
       std::lock_guard<std::mutex> lock(mutex);
       left.resize(ring.size());
@@ -262,7 +262,7 @@ struct LiveSource::State {
   // The camera again, or null when it did not come back in time or the source is closed.
   std::shared_ptr<Camera> reconnect() {
     const auto deadline = Clock::now() + milliseconds(settings.reconnect_ms);
-    std::string reason = "the device is gone";
+    std::string reason = "the device is not connected";
     if (settings.reconnect_ms > 0) report(MAQ_SOURCE_RECONNECTING, "waiting for the device to come back");
     while (Clock::now() < deadline) {
       if (pause(kReconnectPause)) return nullptr;
@@ -313,7 +313,7 @@ LiveSource::~LiveSource() {
     state.stopping = true;
     state.changed.notify_all();
     state.wake.signal();
-    ended = state.changed.wait_for(lock, kStopPatience, [&] { return state.ended; });
+    ended = state.changed.wait_for(lock, kStopTimeout, [&] { return state.ended; });
     left.swap(state.ring);
     state.ring.resize(1);
     state.first = state.count = 0;
@@ -321,7 +321,7 @@ LiveSource::~LiveSource() {
   if (ended) {
     state.thread.join();
   } else {
-    state.thread.detach();  // it hangs in the device, holds the state itself, and ends when the device answers
+    state.thread.detach();  // it hangs in the device, keeps the state alive, and ends when the device answers
   }
 }
 
@@ -378,7 +378,7 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
     if (buffer.seeks != seeks) continue;
     if (buffer.jpeg == nullptr) {
       frame.image = buffer.image;
-    } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, most_pixels(buffer.image), frame)) {
+    } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, max_jpeg_pixels(buffer.image), frame)) {
       state_->drop_jpeg(buffer);
       continue;
     }

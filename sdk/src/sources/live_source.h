@@ -1,5 +1,4 @@
-// A camera as a source: a thread of its own takes the camera's frames, keeps the newest, and opens the camera anew when it
-// was lost.
+// A camera as a source: a thread takes the camera's frames, keeps the newest, and opens the camera again when it was lost.
 #pragma once
 
 #include <memory>
@@ -17,17 +16,17 @@ class LiveSource : public Source {
   // Opens the camera at once and sets `controls`, and throws what they throw. `name` begins error texts.
   LiveSource(CameraOpener open, std::string name, const SourceSettings& settings,
              const std::vector<ControlSetting>& controls = {});
-  // Returns within 50 ms, also when the device hangs in a system call: the thread then ends by itself later.
+  // Blocks at most 50 ms, also when the device hangs in a system call: the thread then ends by itself later.
   ~LiveSource() override;
 
   const SourceInfo& info() const override { return info_; }
   uint64_t drops() const override;
   const maq_intrinsics* calibration() const override { return calibration_ ? &*calibration_ : nullptr; }
-  // Of the camera, from any thread. Throw MAQ_ERROR_DEVICE_LOST while it is lost. What was set is set again when it is
+  // Of the camera, from any thread. Throw MAQ_ERROR_DEVICE_LOST while it is lost. What was set is restored when it is
   // back.
   maq_control_info control(maq_control which) override;
   void set_control(maq_control which, double value) override;
-  // Of what plays a camera: frames of before are not handed out any more.
+  // Of a replayed source: frames from before are dropped.
   void seek(int64_t time_ns) override;
   // Throws MAQ_ERROR_DEVICE_LOST when the camera was lost and did not come back in time.
   NextFrame next(int64_t timeout_ns, Frame& frame) override;

@@ -1,19 +1,19 @@
+#include "sources/registry.h"
+
 #include <algorithm>
 
 #include "core/error.h"
 #include "sources/control_options.h"
-#include "sources/depthai/depthai_source.h"
-#include "sources/files/file_kind.h"
+#include "sources/depthai/depthai_backend.h"
 #include "sources/files/file_sources.h"
 #include "sources/libcamera/module_client.h"
 #include "sources/live_source.h"
-#include "sources/source.h"
+#include "sources/recording/recording.h"
 #include "sources/synthetic/fault_injection.h"
 #include "sources/synthetic/replay_camera.h"
-#include "sources/synthetic/stub_sources.h"
+#include "sources/synthetic/stub_source.h"
 #include "sources/uri.h"
 #include "sources/v4l2/v4l2_camera.h"
-#include "sources/v4l2/v4l2_source.h"
 
 namespace maq {
 namespace {
@@ -23,15 +23,15 @@ std::unique_ptr<Source> without_log(SourceUri uri, const Log&) {
   return open(std::move(uri));
 }
 
-// Of one kind of sources: either opens one, or makes what opens its cameras.
+// A kind of source: opens one itself, or makes what opens its cameras.
 struct Entry {
   SourceScheme scheme;
   std::unique_ptr<Source> (*open)(SourceUri uri, const Log& log);
   CameraOpener (*camera)(SourceUri uri, int buffers, const Log& log);
-  bool needs_target = true;  // otherwise nothing after the scheme means the first there is
+  bool needs_target = true;  // false: without a target, the first one that is found
 };
 
-// Those that find out which of the others is meant.
+// Entries that stand for one of the others.
 constexpr char kFile[] = "file", kCamera[] = "camera";
 
 const Entry kEntries[] = {
@@ -51,21 +51,28 @@ const Entry kEntries[] = {
      without_log<open_stub_source>,
      nullptr},
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
-      "a camera of Linux; the nearest size and rate that it offers; ?format=MJPG&exposure=10000 (microseconds)"},
+      "a camera of Linux (Video4Linux2); the nearest size and rate that it offers; ?format=MJPG&exposure=10000 "
+      "(microseconds)"},
      nullptr,
-     v4l2_camera_opener},
+     v4l2_uri_opener},
     {{"libcamera", "libcamera:0?size=640x480&fps=30",
       "a camera of libcamera, by number or id: those of the Raspberry Pi and other boards; ?format=NV12"},
      nullptr,
-     libcamera_camera_opener},
+     libcamera_uri_opener},
     {{"depthai", "depthai:?size=640x480&fps=30",
       "an OAK camera with depth, the first or depthai:<id or IP>; ?depth=0 for colour alone"},
      nullptr,
-     depthai_camera_opener,
+     depthai_uri_opener,
      false},
 };
 
-// Opens a source that is not a camera; pictures larger than the settings want are made smaller, which is kept in `uri`.
+const Entry* find_entry(const std::string& scheme) {
+  const auto found = std::find_if(std::begin(kEntries), std::end(kEntries),
+                                  [&](const Entry& entry) { return scheme == entry.scheme.name; });
+  return found == std::end(kEntries) ? nullptr : found;
+}
+
+// Opens a source that is not a camera. Pictures larger than the settings allow are made smaller, which is kept in `uri`.
 std::unique_ptr<Source> open_within(const Entry& entry, SourceUri& uri, const SourceSettings& settings) {
   std::unique_ptr<Source> source = entry.open(uri, settings.log);
   const SourceInfo& info = source->info();
@@ -78,26 +85,28 @@ std::unique_ptr<Source> open_within(const Entry& entry, SourceUri& uri, const So
   return entry.open(uri, settings.log);
 }
 
-// Of a source that is played as if it were a camera. `opened`: that source, which is played first, or null.
-CameraOpener played(const Entry& entry, SourceUri uri, std::unique_ptr<Source> opened, const PlayOptions& play,
-                    const Log& log) {
-  std::string name = uri.scheme + ":" + uri.target;
+// A camera that replays a source. `opened`: that source, for the first time that it is needed.
+CameraOpener replay_opener(const Entry& entry, SourceUri uri, std::unique_ptr<Source> opened,
+                           const ReplayOptions& options, const Log& log) {
+  std::string identity = uri.scheme + ":" + uri.target;
   const auto first = std::make_shared<std::unique_ptr<Source>>(std::move(opened));
-  return played_as_camera([&entry, uri = std::move(uri), log,
-                           first] { return *first != nullptr ? std::move(*first) : entry.open(uri, log); },
-                          std::move(name), play);
+  const auto open = [&entry, uri = std::move(uri), log, first] {
+    return *first != nullptr ? std::move(*first) : entry.open(uri, log);
+  };
+  return replay_as_camera(open, std::move(identity), options);
 }
 
-// Faults happen in time, so that a file or a stub with faults runs as a camera does.
+// Faults happen in time, so that a file or a stub with faults is replayed as a camera.
 bool takes_live(SourceUri& uri, const SourceSettings& settings, bool has_faults) {
-  const bool is_asked = uri.options.count("live") > 0;
+  const bool is_given = uri.options.count("live") > 0;
   const bool is_live = uri.take_integer("live", has_faults || settings.real_time ? 1 : 0, 0, 1) == 1;
-  if (is_asked && !is_live && has_faults) {
+  if (is_given && !is_live && has_faults) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "live=0 in ", uri.text, " does not go with ", kFaultOptions, ".");
   }
   return is_live;
 }
 
+// Of a scheme that does not stand for another.
 std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
   const FaultPlan faults = take_faults(uri);
   const bool is_path = entry.camera != nullptr && uri.target.rfind("/", 0) == 0;
@@ -112,28 +121,42 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
   } else {
     const bool must_be_live = !faults.is_empty() || uri.options.count("live") > 0;
     if (!takes_live(uri, settings, !faults.is_empty())) return open_within(entry, uri, settings);
-    PlayOptions play;
-    play.buffers = buffers;
-    play.speed = uri.take_number("speed", 1, 0.01, 100);
-    play.loop = uri.take_integer("loop", settings.loop ? 1 : 0, 0, 1) == 1;
+    ReplayOptions options;
+    options.buffers = buffers;
+    options.speed = uri.take_number("speed", 1, 0.01, 100);
+    options.loop = uri.take_integer("loop", settings.loop ? 1 : 0, 0, 1) == 1;
     std::unique_ptr<Source> opened = open_within(entry, uri, settings);
-    if (!must_be_live && opened->info().fps <= 0) return opened;  // a photo has no pace
-    opener = played(entry, std::move(uri), std::move(opened), play, settings.log);
+    if (!must_be_live && opened->info().fps <= 0) return opened;  // a photo has no rate
+    opener = replay_opener(entry, std::move(uri), std::move(opened), options, settings.log);
   }
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
   return std::make_unique<LiveSource>(std::move(opener), name, settings, controls);
 }
 
-// `options`: "?size=640x480" or nothing.
-std::unique_ptr<Source> open_first_camera(const std::string& options, const SourceSettings& settings) {
+// The file of `uri`, with its options.
+std::unique_ptr<Source> open_file(SourceUri uri, const SourceSettings& settings) {
+  uri.scheme = scheme_of_file(uri.target);
+  const Entry& entry = *find_entry(uri.scheme);
+  return open_entry(entry, std::move(uri), settings);
+}
+
+// With the options of `uri`.
+std::unique_ptr<Source> open_first_camera(const SourceUri& uri, const SourceSettings& settings) {
   std::string problems;
   for (const CameraListing& camera : list_cameras()) {
-    try {
-      if (camera.status == MAQ_OK) return open_source(camera.uri + options, settings);
-      problems += " " + camera.uri + ": " + camera.problem;
-    } catch (const Error& error) {
-      problems += " " + camera.uri + ": " + error.what();
+    std::string problem = camera.problem;
+    if (camera.status == MAQ_OK) {
+      try {
+        SourceUri same = uri;
+        const SourceUri listed = parse_source_uri(camera.uri);
+        same.scheme = listed.scheme;
+        same.target = listed.target;
+        return open_entry(*find_entry(same.scheme), std::move(same), settings);
+      } catch (const Error& error) {
+        problem = error.what();
+      }
     }
+    problems += " " + camera.uri + ": " + problem;
   }
   if (problems.empty()) throw Error(MAQ_ERROR_NOT_FOUND, "No camera was found; is one plugged in?");
   throw Error(MAQ_ERROR_NOT_FOUND, "No camera can be opened.", problems);
@@ -156,27 +179,26 @@ const std::vector<SourceScheme>& source_schemes() {
 std::vector<CameraListing> list_cameras() {
   std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
   for (CameraListing& camera : list_libcamera_cameras()) all.push_back(std::move(camera));
-  for (CameraListing& listing : list_depthai_sources()) all.push_back(std::move(listing));
+  for (CameraListing& camera : list_depthai_cameras()) all.push_back(std::move(camera));
   return all;
 }
 
 std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {
   SourceUri uri = parse_source_uri(text);
-  for (const Entry& entry : kEntries) {
-    if (uri.scheme == entry.scheme.name) {
-      if (entry.needs_target && uri.target.empty()) {
-        throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
-                    entry.scheme.example, ".");
-      }
-      if (uri.scheme == kFile) return open_source(scheme_of_file(uri.target) + text.substr(sizeof kFile - 1), settings);
-      if (uri.scheme == kCamera) return open_first_camera(text.substr(std::min(text.find('?'), text.size())), settings);
-      return open_entry(entry, std::move(uri), settings);
-    }
+  const Entry* entry = find_entry(uri.scheme);
+  if (entry == nullptr) {
+    std::string known;
+    for (const Entry& other : kEntries) known += std::string(known.empty() ? "" : ", ") + other.scheme.name + ":";
+    throw Error(MAQ_ERROR_UNSUPPORTED, "\"", uri.scheme, ":\" is not a kind of source of this build; there are ", known,
+                ".");
   }
-  std::string known;
-  for (const Entry& entry : kEntries) known += std::string(known.empty() ? "" : ", ") + entry.scheme.name + ":";
-  throw Error(MAQ_ERROR_UNSUPPORTED, "\"", uri.scheme, ":\" is not a kind of source of this build; there are ", known,
-              ".");
+  if (entry->needs_target && uri.target.empty()) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
+                entry->scheme.example, ".");
+  }
+  if (uri.scheme == kFile) return open_file(std::move(uri), settings);
+  if (uri.scheme == kCamera) return open_first_camera(uri, settings);
+  return open_entry(*entry, std::move(uri), settings);
 }
 
 }  // namespace maq

@@ -1,6 +1,7 @@
 #include "sources/source.h"
 
 #include "core/error.h"
+#include "sources/camera_backend.h"
 
 namespace maq {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 
 }  // namespace
 
-// What a camera or another source can do unless it says otherwise: nothing.
+// By default a camera or another source can do none of these.
 maq_control_info Camera::control(maq_control which) { refuse_control(which); }
 void Camera::set_control(maq_control which, double) { refuse_control(which); }
 void Camera::seek(int64_t) { refuse_to_seek(); }

@@ -2,14 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "core/frame.h"
 #include "core/log.h"
 #include "maquette/source.h"
-#include "sources/camera_backend.h"
 
 namespace maq {
 
@@ -28,7 +24,7 @@ class Source {
  public:
   virtual ~Source() = default;
   virtual const SourceInfo& info() const = 0;
-  // Frames that were lost so far, on their way or because nobody took them.
+  // Frames lost so far, on their way or because the app did not take them.
   virtual uint64_t drops() const { return 0; }
   // Null when the source does not know.
   virtual const maq_intrinsics* calibration() const { return nullptr; }
@@ -56,21 +52,5 @@ struct SourceSettings {
   void* user_data = nullptr;
   Log log;
 };
-
-struct SourceScheme {
-  const char* name;
-  const char* example;
-  const char* summary;
-  bool is_camera = false;
-};
-
-// Every scheme of this build.
-const std::vector<SourceScheme>& source_schemes();
-
-// The cameras that are there now.
-std::vector<CameraListing> list_cameras();
-
-// Throws MAQ_ERROR_UNSUPPORTED for a scheme that is not in the list, and what the source throws.
-std::unique_ptr<Source> open_source(const std::string& uri, const SourceSettings& settings = {});
 
 }  // namespace maq

@@ -19,7 +19,7 @@ int hex_digit(char c) {
   return -1;
 }
 
-// A '%' that no two hexadecimal digits follow stands for itself, so that most file names need no escapes.
+// A '%' without two hexadecimal digits after it is kept, so that most file names need no escapes.
 std::string percent_decoded(const std::string& text) {
   std::string decoded;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -92,24 +92,24 @@ std::optional<std::string> SourceUri::take(const std::string& key) {
   return value;
 }
 
-int64_t SourceUri::take_integer(const std::string& key, int64_t otherwise, int64_t least, int64_t most) {
+int64_t SourceUri::take_integer(const std::string& key, int64_t fallback, int64_t min, int64_t max) {
   const auto value = take(key);
-  if (!value) return otherwise;
+  if (!value) return fallback;
   int64_t number = 0;
-  if (!read_integer(*value, &number) || number < least || number > most) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a whole number from ", least,
-                " to ", most, ".");
+  if (!read_integer(*value, &number) || number < min || number > max) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a whole number from ", min,
+                " to ", max, ".");
   }
   return number;
 }
 
-double SourceUri::take_number(const std::string& key, double otherwise, double least, double most) {
+double SourceUri::take_number(const std::string& key, double fallback, double min, double max) {
   const auto value = take(key);
-  if (!value) return otherwise;
+  if (!value) return fallback;
   const auto number = read_number(*value);
-  if (!number || *number < least || *number > most) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a number from ", least, " to ",
-                most, ".");
+  if (!number || *number < min || *number > max) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, "=", *value, " in ", text, " must be a number from ", min, " to ", max,
+                ".");
   }
   return *number;
 }

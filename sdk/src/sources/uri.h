@@ -19,20 +19,20 @@ struct SourceUri {
   int height_px = 0;
   double fps = 0;  // 0: as the source comes
 
-  // Reads an option of this source and takes it off the list; `otherwise` when it was not given.
-  // Throws MAQ_ERROR_INVALID_ARGUMENT when it is no number, or not within `least` and `most`.
-  int64_t take_integer(const std::string& key, int64_t otherwise, int64_t least, int64_t most);
-  double take_number(const std::string& key, double otherwise, double least, double most);
+  // Reads an option of this source and removes it from the list; `fallback` when it was not given.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT when it is not a number from `min` to `max`.
+  int64_t take_integer(const std::string& key, int64_t fallback, int64_t min, int64_t max);
+  double take_number(const std::string& key, double fallback, double min, double max);
   // "" when it was not given.
   std::string take_text(const std::string& key) { return take(key).value_or(""); }
-  // Throws MAQ_ERROR_INVALID_ARGUMENT when an option is left that nobody took. `known` names those there are.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT when an option is left over. `known` lists those that the source has.
   void expect_no_more_options(const std::string& known) const;
 
  private:
   std::optional<std::string> take(const std::string& key);
 };
 
-// Nothing when the text is no finite number. Independent of the process's locale, which may want a comma.
+// Nothing when the text is not a finite number. Independent of the process's locale, which may expect a comma.
 std::optional<double> read_number(const std::string& text);
 
 // Throws MAQ_ERROR_INVALID_ARGUMENT for an ill-formed text and MAQ_ERROR_IMAGE_SIZE for a size outside the limits.

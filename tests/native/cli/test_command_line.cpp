@@ -198,27 +198,27 @@ TEST_F(CommandLine, MeasuresItsSourcesAndWritesDownEverything) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("image:two.png"), std::string::npos) << result.out;
   const auto document = nlohmann::json::parse(read_text(folder_.file("o/bench.json")));
-  EXPECT_EQ(document.at("schema"), "maquette-bench-1");
+  EXPECT_EQ(document.at("schema"), "maquette-bench-2");
   EXPECT_GE(document.at("machine").at("cores"), 1);
   EXPECT_GT(document.at("machine").at("memory_mib"), 100);
   EXPECT_GT(document.at("start_to_first_result_ms"), document.at("first_frame_ms"));
   EXPECT_GT(document.at("peak_memory_mib"), 1);
   EXPECT_EQ(document.at("valid"), document.at("doubts").empty());
-  ASSERT_EQ(document.at("scenes").size(), 2U);
-  for (const auto& scene : document.at("scenes")) {
-    EXPECT_GE(scene.at("runs"), 12);  // the clip of four frames is begun anew
-    EXPECT_EQ(scene.at("drops"), 0);
-    EXPECT_GT(scene.at("cpu_ms"), 0);
+  ASSERT_EQ(document.at("cases").size(), 2U);
+  for (const auto& timed : document.at("cases")) {
+    EXPECT_GE(timed.at("runs"), 12);  // the clip of four frames is begun anew
+    EXPECT_EQ(timed.at("drops"), 0);
+    EXPECT_GT(timed.at("cpu_ms"), 0);
     double stages = 0;
-    for (const auto& [name, ms] : scene.at("ms").items()) {
+    for (const auto& [name, ms] : timed.at("ms").items()) {
       EXPECT_LE(ms.at("p50"), ms.at("p90")) << name;
       EXPECT_LE(ms.at("p90"), ms.at("p99")) << name;
       if (name != "frame") stages += ms.at("p50").get<double>();
     }
-    EXPECT_LT(stages, 1.5 * scene.at("ms").at("frame").at("p90").get<double>());
+    EXPECT_LT(stages, 1.5 * timed.at("ms").at("frame").at("p90").get<double>());
   }
-  EXPECT_EQ(document.at("scenes")[0].at("people"), 2);
-  EXPECT_EQ(document.at("scenes")[1].at("size_px"), (nlohmann::json{64, 48}));
+  EXPECT_EQ(document.at("cases")[0].at("people"), 2);
+  EXPECT_EQ(document.at("cases")[1].at("size_px"), (nlohmann::json{64, 48}));
 }
 
 TEST_F(CommandLine, WhatCannotBeMeasuredIsOneSentence) {

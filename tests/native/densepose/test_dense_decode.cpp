@@ -59,10 +59,10 @@ struct Logits {
 };
 
 maq::DecodeCounts paint(Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
-                        float mask_threshold = 0.5f, float least_own_share = 0) {
+                        float mask_threshold = 0.5f, float min_visible_fraction = 0) {
   Planes charts(logits.u, logits.v, logits.size);
   maq::DecodeMemory memory;
-  return paint_person(logits.view(&charts), box, person, mask_threshold, least_own_share, memory, planes);
+  return paint_person(logits.view(&charts), box, person, mask_threshold, min_visible_fraction, memory, planes);
 }
 
 // The value of a bilinearly resized plane (half-pixel centres, edges repeated) in double.

@@ -129,9 +129,9 @@ TEST_F(DensePose, ASecondLookStartsWhereTheFirstEnded) {
   cv::Mat image = black(320, 256);
   image(cv::Rect(80, 100, 4, 4)) = kRed;
   const BundleCopy bundle;
-  const auto box_of = [&](std::optional<float> second_look_score, maq::DensePoseSettings settings) {
+  const auto box_of = [&](std::optional<float> second_pass_threshold, maq::DensePoseSettings settings) {
     nlohmann::json manifest = bundle.manifest();
-    if (second_look_score) manifest["box_head"]["second_look_score"] = *second_look_score;
+    if (second_pass_threshold) manifest["box_head"]["second_pass_threshold"] = *second_pass_threshold;
     bundle.write_manifest(manifest);
     maq::DensePoseResult result;
     make(settings, bundle.path()).run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);

@@ -23,9 +23,9 @@ TEST(DensePoseManifest, ReadsEveryField) {
   EXPECT_EQ(spec.rpn.strides, (std::vector<int>{4, 8, 16, 32, 64}));
   EXPECT_EQ(spec.rpn.post_nms_top_k, 100);
   EXPECT_FLOAT_EQ(spec.box_head.delta_weights[2], 5);
-  EXPECT_FALSE(spec.box_head.second_look_score.has_value());
-  EXPECT_EQ(spec.dense_head.charts_file, "charts.f32");
-  EXPECT_EQ(spec.dense_head.output, 64);
+  EXPECT_FALSE(spec.box_head.second_pass_threshold.has_value());
+  EXPECT_EQ(spec.charts_file, "charts.f32");
+  EXPECT_EQ(spec.dense_head.output_size, 64);
   EXPECT_EQ(spec.surface_file, "");
 }
 
@@ -47,7 +47,7 @@ void expect_each_key_needed(const json& node, const json::json_pointer& at) {
 }
 
 TEST(DensePoseManifest, NeedsEachOfItsKeysWithTheRightType) {
-  for (const char* part : {"input", "rpn", "box_head", "dense_head"}) {
+  for (const char* part : {"input", "rpn", "box_head", "dense_head", "charts"}) {
     expect_each_key_needed(tiny()[part], json::json_pointer(std::string("/") + part));
     json changed = tiny();
     changed.erase(part);
@@ -71,7 +71,7 @@ TEST(DensePoseManifest, NamesTheKeyOfAMistake) {
 
 TEST(DensePoseManifest, RefusesValuesOutOfRange) {
   const std::pair<const char*, json> wrong[] = {{"/input/std/1", 0},
-                                                {"/input/long_side", 100000},
+                                                {"/input/long_side_px", 100000},
                                                 {"/input/color", "BGR"},
                                                 {"/rpn/nms_iou", 1.5},
                                                 {"/rpn/pre_nms_top_k", 0},
@@ -79,11 +79,11 @@ TEST(DensePoseManifest, RefusesValuesOutOfRange) {
                                                 {"/rpn/aspect_ratios", {1}},
                                                 {"/box_head/max_people", 256},
                                                 {"/box_head/score_threshold", -1},
-                                                {"/box_head/second_look_score", 2},
+                                                {"/box_head/second_pass_threshold", 2},
                                                 {"/dense_head/index_classes", 1000},
                                                 {"/dense_head/mask_threshold", 1},
-                                                {"/dense_head/least_own_share", 1.5},
-                                                {"/dense_head/charts", "charts.f64"},
+                                                {"/dense_head/min_visible_fraction", 1.5},
+                                                {"/charts/file", "charts.f64"},
                                                 {"/surface/file", "surface.grid"}};
   for (const auto& [place, value] : wrong) {
     json changed = tiny();

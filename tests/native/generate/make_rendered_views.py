@@ -17,7 +17,8 @@ import cv2
 import numpy as np
 import torch
 
-from export.scenes.cameras import Camera, upright
+from export.camera import Camera
+from export.scenes.cameras import upright
 from export.scenes.captures import read_capture
 from export.scenes.config import BASIS, FEATURES, TURNED_MULTIPLE
 from export.scenes.looks import Looks

@@ -6,16 +6,16 @@ each in the square anchor of that cell, shifted right by a tenth of its width (b
 The dense head answers the same for everybody: the upper quarter of the box is background; of the rest the left half is
 part 3 and the right half part 7; U rises from -0.11 at the left to 1.11 at the right, V from 0 at the top to 1.
 
-    python tests/native/generate/make_tiny_bundle.py      needs onnx and numpy
+    python -m tests.native.generate.make_tiny_bundle      from the root; needs onnx and numpy
 """
 
-import hashlib
-import json
 from pathlib import Path
 
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
+
+from export.bundle import OPSET, BundleInfo, write_manifest
 
 CHANNELS = 3
 POOL, DENSE_POOL, OUTPUT = 7, 32, 64
@@ -32,7 +32,7 @@ def graph(name, nodes, inputs, outputs, constants):
 
     model = helper.make_model(
         helper.make_graph(nodes, name, infos(inputs), infos(outputs), constants),
-        opset_imports=[helper.make_opsetid("", 17)],
+        opset_imports=[helper.make_opsetid("", OPSET)],
         ir_version=8,
         producer_name="maquette-tests",
     )
@@ -147,7 +147,7 @@ def charts():
 def main():
     folder = Path(__file__).parents[1] / "data" / "tiny_bundle"
     folder.mkdir(parents=True, exist_ok=True)
-    files, graphs = {}, {}
+    graphs = {}
     for name, (model, inputs, outputs) in (
         ("trunk", trunk()),
         ("rpn_fine", rpn("rpn_fine", range(2, 3))),
@@ -155,60 +155,41 @@ def main():
         ("box_head", box_head()),
         ("dense_head", dense_head()),
     ):
-        content = model.SerializeToString()
-        (folder / f"{name}.onnx").write_bytes(content)
-        files[f"{name}.onnx"] = {"sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}
-        graphs[name] = {
-            "file": f"{name}.onnx",
-            "opset": 17,
-            "inputs": [{"name": n, "type": "float32", "shape": s} for n, s in inputs],
-            "outputs": [{"name": n, "type": "float32", "shape": s} for n, s in outputs],
-        }
+        (folder / f"{name}.onnx").write_bytes(model.SerializeToString())
+        graphs[name] = {"inputs": dict(inputs), "outputs": dict(outputs)}
     (folder / "charts.f32").write_bytes(charts())
-    files["charts.f32"] = {"sha256": hashlib.sha256(charts()).hexdigest(), "bytes": len(charts())}
-    manifest = {
-        "format": "maquette-bundle",
-        "format_version": 3,
-        "name": "tiny",
-        "version": "1",
-        "task": "densepose",
-        "precision": "float32",
-        "files": files,
-        "graphs": graphs,
-        "input": {"color": "RGB", "mean": [0, 0, 0], "std": [255, 255, 255], "multiple_of": 32, "long_side": 320},
+    task_keys = {
+        "input": {"color": "RGB", "mean": [0, 0, 0], "std": [255, 255, 255], "multiple_of": 32, "long_side_px": 320},
         "rpn": {
             "strides": [4, 8, 16, 32, 64],
-            "anchor_sizes": [32, 64, 128, 256, 512],
+            "anchor_sizes_px": [32, 64, 128, 256, 512],
             "aspect_ratios": [0.5, 1, 2],
             "pre_nms_top_k": 1000,
             "post_nms_top_k": 100,
             "nms_iou": 0.7,
         },
         "box_head": {
-            "pool": POOL,
+            "pool_size": POOL,
             "strides": [4, 8, 16, 32],
             "canonical_level": 4,
-            "canonical_size": 224,
+            "canonical_size_px": 224,
             "delta_weights": [10, 10, 5, 5],
             "score_threshold": 0.5,
             "nms_iou": 0.5,
             "max_people": 20,
         },
         "dense_head": {
-            "pool": DENSE_POOL,
+            "pool_size": DENSE_POOL,
             "stride": 4,
-            "charts": "charts.f32",
-            "output": OUTPUT,
+            "output_size": OUTPUT,
             "coarse_classes": COARSE,
             "index_classes": INDEX,
             "mask_threshold": 0.5,
-            "least_own_share": 0.3,
+            "min_visible_fraction": 0.3,
         },
-        "licence": "Apache-2.0",
-        "training_data": [],
-        "measured": {},
+        "charts": {"file": "charts.f32"},
     }
-    (folder / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
+    write_manifest(folder, "densepose", BundleInfo("tiny", "fp32", version="1"), graphs, ["charts.f32"], task_keys)
 
 
 if __name__ == "__main__":

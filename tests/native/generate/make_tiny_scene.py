@@ -21,7 +21,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from export.densepose.bundle import BundleInfo
+from export.bundle import BundleInfo
 from export.scenes.basis import directions
 from export.scenes.bundle import write_manifest
 from export.scenes.captures import read_capture

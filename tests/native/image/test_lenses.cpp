@@ -17,9 +17,10 @@ using maq::Distortion;
 using maq::Lens;
 
 Lens rational() {
-  return {640, 480, 520, 498, 331.5, 228.25, Distortion::kRational, {-.21, .07, .0013, -.0021, .011, .05, -.02, .004}};
+  return {
+      {640, 480, 520, 498, 331.5, 228.25}, Distortion::kRational, {-.21, .07, .0013, -.0021, .011, .05, -.02, .004}};
 }
-Lens fisheye() { return {640, 480, 520, 498, 331.5, 228.25, Distortion::kFisheye, {.03, -.011, .004, -.0009}}; }
+Lens fisheye() { return {{640, 480, 520, 498, 331.5, 228.25}, Distortion::kFisheye, {.03, -.011, .004, -.0009}}; }
 
 struct Ray {
   double x, y, column_px, row_px;
@@ -56,7 +57,7 @@ TEST(Lenses, TheFisheyeModelIsThatOfOpenCv) {
 }
 
 TEST(Lenses, WithoutDistortionItIsThePinhole) {
-  expect_rays({100, 50, 80, 90, 10, 20}, {{0, 0, 10, 20}, {1, 2, 90, 200}, {-300, 0, -23990, 20}});
+  expect_rays({{100, 50, 80, 90, 10, 20}}, {{0, 0, 10, 20}, {1, 2, 90, 200}, {-300, 0, -23990, 20}});
 }
 
 TEST(Lenses, WhereTheDistortionFoldsBackThereIsNoPlace) {
@@ -71,8 +72,8 @@ TEST(Lenses, WhereTheDistortionFoldsBackThereIsNoPlace) {
 
 // The least focal length with which nothing is blank: all pixels have a place, and with a hundredth less some have none.
 TEST(Lenses, TheUndistortedPictureIsAsWideAsItCanBeWithoutABlank) {
-  for (Lens lens : {rational(), fisheye(), Lens{300, 200, 150, 150, 149.5, 99.5, Distortion::kRational, {0.2}},
-                    Lens{300, 200, 100, 100, 120, 110, Distortion::kFisheye}}) {
+  for (Lens lens : {rational(), fisheye(), Lens{{300, 200, 150, 150, 149.5, 99.5}, Distortion::kRational, {0.2}},
+                    Lens{{300, 200, 100, 100, 120, 110}, Distortion::kFisheye}}) {
     const auto found = maq::without_distortion(lens);
     ASSERT_TRUE(found);
     EXPECT_EQ(found->distortion, Distortion::kNone);
@@ -164,7 +165,7 @@ TEST(Lenses, ARowOfDirectionsFallsToTheBitWhereEachDoes) {
   for (int i = -500; i <= 500; ++i) x.push_back(i * 0.0041 + 1e-7);
   Lens folding = rational();
   folding.coefficients = {-0.6};
-  for (const Lens& lens : {rational(), fisheye(), folding, Lens{100, 50, 80, 90, 10, 20}}) {
+  for (const Lens& lens : {rational(), fisheye(), folding, Lens{{100, 50, 80, 90, 10, 20}}}) {
     const maq::LensProjection projection(lens);
     int places = 0;
     for (const double y : {0.0, -0.3, 0.77, 1.9}) {
@@ -246,8 +247,8 @@ TEST(Lenses, RandomFiguresNeverCrash) {
   std::vector<uint8_t> valid;
   int found = 0;
   for (int i = 0; i < 300; ++i) {
-    Lens lens{
-        20, 15, std::abs(any()), std::abs(any()), any(), any(), i % 2 ? Distortion::kRational : Distortion::kFisheye};
+    Lens lens{{20, 15, std::abs(any()), std::abs(any()), any(), any()},
+              i % 2 ? Distortion::kRational : Distortion::kFisheye};
     for (double& value : lens.coefficients) value = any() * (i % 3 ? 1e-4 : 1);
     if (i % 5 == 0) lens.cx_px = 9, lens.cy_px = 7;
     const auto undistorted = maq::without_distortion(lens);

@@ -17,7 +17,7 @@ TEST(Manifest, ReadsEveryField) {
   const maq::Manifest manifest = parse(tiny());
   EXPECT_EQ(manifest.name, "tiny");
   EXPECT_EQ(manifest.task, "densepose");
-  EXPECT_EQ(manifest.precision, "float32");
+  EXPECT_EQ(manifest.precision, "fp32");
   EXPECT_EQ(manifest.files.size(), 6u);
   EXPECT_EQ(manifest.graphs.at("trunk").outputs.size(), 5u);
   EXPECT_EQ(manifest.graphs.at("rpn_coarse").inputs.size(), 4u);
@@ -37,7 +37,7 @@ TEST(Manifest, RefusesWhatIsNoJsonObject) {
 void expect_each_key_needed(const json& node, const json::json_pointer& at) {
   // What a person reads, and what belongs to the task.
   const std::vector<std::string> free = {"licence", "training_data", "measured", "opset"};
-  const std::vector<std::string> of_task = {"input", "rpn", "box_head", "dense_head"};
+  const std::vector<std::string> of_task = {"input", "rpn", "box_head", "dense_head", "charts"};
   for (const auto& [key, value] : node.items()) {
     if (std::find(free.begin(), free.end(), key) != free.end()) continue;
     if (at.empty() && std::find(of_task.begin(), of_task.end(), key) != of_task.end()) continue;

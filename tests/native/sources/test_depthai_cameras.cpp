@@ -59,9 +59,9 @@ struct Picture {
 
 class DepthaiCameras : public ::testing::Test {
  protected:
-  std::shared_ptr<Camera> camera(const maq::DepthAiWish& wish = {64, 48, 30, {}}, int buffers = 6,
+  std::shared_ptr<Camera> camera(const maq::DepthAiRequest& request = {64, 48, 30, {}}, int buffers = 6,
                                  const std::string& device = "") {
-    return maq::depthai_opener(fake_, device, wish, buffers, {})();
+    return maq::depthai_opener(fake_, device, request, buffers, {})();
   }
   maq::SourceSettings settings() {
     maq::SourceSettings settings;
@@ -436,7 +436,7 @@ TEST_F(DepthaiCameras, TheFirstThatIsFreeOrTheOneThatIsNamedIsOpened) {
 }
 
 TEST_F(DepthaiCameras, EveryCallThatFailsIsNamedAndLeavesNothingOpen) {
-  const std::pair<Call, const char*> calls[] = {{Call::kList, "cannot look for devices"},
+  const std::pair<Call, const char*> calls[] = {{Call::kList, "cannot search for devices"},
                                                 {Call::kOpen, "cannot be opened"},
                                                 {Call::kFeatures, "does not say what it is"},
                                                 {Call::kLens, "does not give its calibration"},

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "sources/recording/recording.h"
-#include "sources/source.h"
+#include "sources/registry.h"
 #include "sources/synthetic/fault_injection.h"
 #include "support/expect_error.h"
 #include "support/source_threads.h"

@@ -46,9 +46,9 @@ class OfferedConfiguration : public libcamera::CameraConfiguration {
   Offer offer_;
 };
 
-std::string chosen(const Offer& offer, const maq::CameraWish& wish) {
+std::string chosen(const Offer& offer, const maq::CameraRequest& request) {
   OfferedConfiguration configuration(offer);
-  maq::choose_libcamera_format(configuration, wish, 5, "0");
+  maq::choose_libcamera_format(configuration, request, 5, "libcamera:0");
   const libcamera::StreamConfiguration& stream = configuration.at(0);
   EXPECT_EQ(stream.bufferCount, 5u);
   return stream.pixelFormat.toString() + " " + stream.size.toString();
@@ -77,7 +77,7 @@ TEST(LibcameraChoices, ACameraThatTakesNothingOfItsOfferIsRefused) {
   OfferedConfiguration configuration({{formats::YUYV, {SizeRange(Size(640, 480))}}});
   configuration.is_invalid = true;
   expect_error(MAQ_ERROR_UNSUPPORTED, "libcamera:0 offers YUYV, but",
-               [&] { maq::choose_libcamera_format(configuration, {}, 4, "0"); });
+               [&] { maq::choose_libcamera_format(configuration, {}, 4, "libcamera:0"); });
 }
 
 TEST(LibcameraChoices, ListsEveryFormatAndSize) {
@@ -98,18 +98,18 @@ TEST(LibcameraChoices, WhatTheCameraAgreedToIsChecked) {
   agreed.pixelFormat = formats::RGB888;
   agreed.size = Size(640, 480);
   agreed.stride = 2048;
-  const maq::LibcameraFormat found = maq::agreed_libcamera_format(agreed, "0");
+  const maq::LibcameraFormat found = maq::agreed_libcamera_format(agreed, "libcamera:0");
   EXPECT_EQ(found.format.pixels, MAQ_PIXEL_BGR8) << "libcamera's RGB888 is B, G, R in memory";
   EXPECT_EQ(found.stride_bytes, 2048u);
   const auto refused = [&](const char* text) {
-    expect_error(MAQ_ERROR_UNSUPPORTED, text, [&] { maq::agreed_libcamera_format(agreed, "0"); });
+    expect_error(MAQ_ERROR_UNSUPPORTED, text, [&] { maq::agreed_libcamera_format(agreed, "libcamera:0"); });
   };
   agreed.stride = 639;
   refused("lines of 639 bytes for 640 pixels");
   agreed.stride = 1u << 30;
   refused("lines of 1073741824 bytes");
   agreed.stride = 0;
-  EXPECT_EQ(maq::agreed_libcamera_format(agreed, "0").stride_bytes, 1920u);
+  EXPECT_EQ(maq::agreed_libcamera_format(agreed, "libcamera:0").stride_bytes, 1920u);
   agreed.size = Size(100000, 2);
   refused("(100000 x 2)");
   agreed.size = Size(0, 480);
@@ -142,7 +142,7 @@ std::string next_setting(maq::LibcameraControls& book) {
 }
 
 TEST(LibcameraChoices, ControlsHaveTheRangesOfTheCamera) {
-  const maq::LibcameraControls book(board_controls(), "0");
+  const maq::LibcameraControls book(board_controls(), "libcamera:0");
   const maq_control_info exposure = book.get(MAQ_CONTROL_EXPOSURE);
   EXPECT_EQ(exposure.min, 100);
   EXPECT_EQ(exposure.max, 66666);
@@ -156,12 +156,12 @@ TEST(LibcameraChoices, ControlsHaveTheRangesOfTheCamera) {
 }
 
 TEST(LibcameraChoices, ACameraWithoutAnyControlHasNone) {
-  const maq::LibcameraControls book(ControlInfoMap(), "0");
+  const maq::LibcameraControls book(ControlInfoMap(), "libcamera:0");
   expect_error(MAQ_ERROR_UNSUPPORTED, "has no control 2", [&] { book.get(MAQ_CONTROL_EXPOSURE); });
 }
 
 TEST(LibcameraChoices, AValueSetByHandSwitchesItsAutomaticOffWithARequestBeforeIt) {
-  maq::LibcameraControls book(board_controls(), "0");
+  maq::LibcameraControls book(board_controls(), "libcamera:0");
   EXPECT_EQ(next_setting(book), "");
   book.set(MAQ_CONTROL_EXPOSURE, 12345.4);
   EXPECT_EQ(book.get(MAQ_CONTROL_EXPOSURE).value, 12345);
@@ -176,7 +176,7 @@ TEST(LibcameraChoices, AValueSetByHandSwitchesItsAutomaticOffWithARequestBeforeI
 }
 
 TEST(LibcameraChoices, SettingsThatNoFrameTakesAwayDoNotPileUp) {
-  maq::LibcameraControls book(board_controls(), "0");
+  maq::LibcameraControls book(board_controls(), "libcamera:0");
   for (int value = 100; value < 10000; ++value) book.set(MAQ_CONTROL_EXPOSURE, value);
   for (const char* setting : {"AeEnable=false", "ExposureTime=9999", ""}) EXPECT_EQ(next_setting(book), setting);
   expect_error(MAQ_ERROR_BUSY, "settings waiting for its next frames", [&] {
@@ -188,7 +188,7 @@ TEST(LibcameraChoices, SettingsThatNoFrameTakesAwayDoNotPileUp) {
 }
 
 TEST(LibcameraChoices, ValuesOutOfRangeAreRefusedAndSetNothing) {
-  maq::LibcameraControls book(board_controls(), "0");
+  maq::LibcameraControls book(board_controls(), "libcamera:0");
   for (const double value : {99.0, 66667.0, -1.0, std::nan("")}) {
     expect_error(MAQ_ERROR_INVALID_ARGUMENT, "Control 2 of libcamera:0 goes from 100 to 66666, not to",
                  [&] { book.set(MAQ_CONTROL_EXPOSURE, value); });
@@ -197,7 +197,7 @@ TEST(LibcameraChoices, ValuesOutOfRangeAreRefusedAndSetNothing) {
 }
 
 TEST(LibcameraChoices, FramesSayWhatTheControlsAreUnlessSomethingIsOnItsWay) {
-  maq::LibcameraControls book(board_controls(), "0");
+  maq::LibcameraControls book(board_controls(), "libcamera:0");
   ControlList reported(controls::controls);
   reported.set(controls::ExposureTime, 5000);
   reported.set(controls::AfMode, int32_t(controls::AfModeContinuous));
@@ -218,7 +218,7 @@ TEST(LibcameraChoices, TheRateIsTheNearestThatTheCameraCan) {
   EXPECT_EQ((*limits)[1], 40000);
   EXPECT_NEAR(maq::set_libcamera_rate(board_controls(), 1000, at_start), 60, 0.01);
   EXPECT_NEAR(maq::set_libcamera_rate(board_controls(), 0.5, at_start), 1, 1e-9);
-  EXPECT_EQ(maq::set_libcamera_rate(board_controls(), 0, at_start), 0) << "no wish";
+  EXPECT_EQ(maq::set_libcamera_rate(board_controls(), 0, at_start), 0) << "no rate requested";
   EXPECT_EQ(maq::set_libcamera_rate({}, 25, at_start), 0) << "no such control";
 }
 

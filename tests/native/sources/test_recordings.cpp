@@ -6,7 +6,7 @@
 
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
-#include "sources/source.h"
+#include "sources/registry.h"
 #include "support/expect_error.h"
 #include "support/file_size_limit.h"
 #include "support/temp_folder.h"

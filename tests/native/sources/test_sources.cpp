@@ -3,9 +3,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/bounded_pool.h"
-#include "support/expect_error.h"
 #include "sources/recording/recording.h"
-#include "sources/source.h"
+#include "sources/registry.h"
+#include "support/expect_error.h"
 #include "support/temp_folder.h"
 
 namespace {

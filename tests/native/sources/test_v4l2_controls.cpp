@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "sources/control_options.h"
-#include "sources/source.h"
+#include "sources/registry.h"
 #include "support/live_camera_test.h"
 
 namespace {
@@ -219,8 +219,8 @@ TEST_F(V4l2Controls, WhatWasSetIsSetAgainWhenTheCameraIsBack) {
   const maq::Frame held = next(*live);  // keeps the camera of before
   fake_.unplug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
-  expect_error(MAQ_ERROR_DEVICE_LOST, "not there at the moment", [&] { live->control(MAQ_CONTROL_GAIN); });
-  expect_error(MAQ_ERROR_DEVICE_LOST, "not there at the moment", [&] { live->set_control(MAQ_CONTROL_GAIN, 5); });
+  expect_error(MAQ_ERROR_DEVICE_LOST, "not connected at the moment", [&] { live->control(MAQ_CONTROL_GAIN); });
+  expect_error(MAQ_ERROR_DEVICE_LOST, "not connected at the moment", [&] { live->set_control(MAQ_CONTROL_GAIN, 5); });
   fake_.reset_controls();
   fake_.plug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));

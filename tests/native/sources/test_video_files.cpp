@@ -2,8 +2,8 @@
 
 #include <opencv2/videoio.hpp>
 
+#include "sources/registry.h"
 #include "support/expect_error.h"
-#include "sources/source.h"
 #include "support/temp_folder.h"
 
 namespace {

@@ -10,11 +10,11 @@
 #include <thread>
 #include <vector>
 
+#include "sources/live_source.h"
+#include "sources/v4l2/v4l2_camera.h"
 #include "support/expect_error.h"
 #include "support/fake_v4l2.h"
 #include "support/source_threads.h"
-#include "sources/live_source.h"
-#include "sources/v4l2/v4l2_camera.h"
 
 using namespace std::chrono_literals;
 using maq::NextFrame;
@@ -48,8 +48,8 @@ class Reports {
 
 class LiveCameraTest : public ::testing::Test {
  protected:
-  std::shared_ptr<maq::Camera> camera(const maq::CameraWish& wish = {}) {
-    return maq::open_v4l2_camera(fake_, "/dev/video0", wish, 4);
+  std::shared_ptr<maq::Camera> camera(const maq::CameraRequest& request = {}) {
+    return maq::open_v4l2_camera(fake_, "/dev/video0", request, 4);
   }
   maq::SourceSettings settings() {
     maq::SourceSettings settings;
@@ -57,9 +57,9 @@ class LiveCameraTest : public ::testing::Test {
     settings.user_data = &reports_;
     return settings;
   }
-  std::unique_ptr<maq::LiveSource> source(const maq::SourceSettings& settings, const maq::CameraWish& wish = {},
+  std::unique_ptr<maq::LiveSource> source(const maq::SourceSettings& settings, const maq::CameraRequest& request = {},
                                           const std::vector<maq::ControlSetting>& controls = {}) {
-    const auto open = [this, wish] { return maq::open_v4l2_camera(fake_, "/dev/video0", wish, 6); };
+    const auto open = [this, request] { return maq::open_v4l2_camera(fake_, "/dev/video0", request, 6); };
     return std::make_unique<maq::LiveSource>(open, "/dev/video0", settings, controls);
   }
   void TearDown() override { wait_until_closed(fake_); }

@@ -137,7 +137,7 @@ def test_the_work_of_the_shipped_heads_is_linear_in_people(graph):
 
 def test_the_roofline_is_the_slower_of_work_and_bytes():
     work = [graphs.Work("a", 1000, 10, True), graphs.Work("b", 1000, 10, False), graphs.Work("c", 1, 1000, True)]
-    assert roofline.least_seconds(work, 100, 1000, 100) == pytest.approx(1 + 10 + 10)
+    assert roofline.min_seconds(work, 100, 1000, 100) == pytest.approx(1 + 10 + 10)
 
 
 def test_runs_that_differ_are_told_apart(tmp_path, capsys):
@@ -150,7 +150,7 @@ def test_runs_that_differ_are_told_apart(tmp_path, capsys):
     assert "roofline_share" in capsys.readouterr().out
 
 
-def scene(source, people, ms):
+def case(source, people, ms):
     times = {stage: {"p50": ms / 8, "p90": ms / 7, "p99": ms / 6} for stage in report.STAGES}
     times["frame"] = {"p50": ms, "p90": ms + 1, "p99": ms + 2}
     return {"source": source, "people": people, "ms": times, "fps": 1000 / ms, "cpu_ms": 2 * ms, "doubts": [],
@@ -165,7 +165,7 @@ def camera_host():
 
 
 def document():
-    scenes = {name: {"scenes": [scene("s0", 0, 8.0), scene("s1", 1, 10.0)], "doubts": ["others were busy"]}
+    frames = {name: {"cases": [case("s0", 0, 8.0), case("s1", 1, 10.0)], "doubts": ["others were busy"]}
               for name in ("people", "sizes", "one_thread", "no_spin")}  # fmt: skip
     rows = [{"setting": name, "axis": axis, "ms": ms, "error": error, "error_cm": 10 * error, "box_ap": 0.5,
              "part_accuracy": 0.6}
@@ -176,7 +176,7 @@ def document():
                 {"name": "Other", "version": "", "precision": "fp32", "ms": {}, "total_ms": None,
                  "ours_int8_ratio": None, "missing": "does not load it"}]  # fmt: skip
     line = {"float32_macs_s": 1e11, "int8_macs_s": 4e11, "bytes_s": 1e11, "share": 0.4,
-            "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "least_ms": 1.6, "share": 0.4}}}  # fmt: skip
+            "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "min_ms": 1.6, "share": 0.4}}}  # fmt: skip
     gate = {
         "says": "speed",
         "value": 40.0,
@@ -190,9 +190,18 @@ def document():
     unseen = {"rows": [], "places": [], "speed": {}, "speed_missing": "no <networks>", "doubts": ["0 real places"],
               "sheet": ""}  # fmt: skip
     return {"machine": MACHINE, "cameras": measured, "scenes": unseen,
-            "frames": scenes, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
+            "frames": frames, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
+
+
+@pytest.mark.parametrize("part", ["frames", "sweep", "peers", "agreement", "cameras", "scenes"])
+def test_a_report_of_one_part_shows_what_is_there(tmp_path, part):
+    whole = document()
+    report.write({name: whole[name] for name in ("machine", "threads", "quick", "gates", part)}, tmp_path)
+    headings = [line for line in (tmp_path / "report.md").read_text().splitlines() if line.startswith("## ")]
+    assert len(headings) == 2
+    assert headings[0] == "## Gates"
 
 
 def test_a_report_holds_its_figures_and_pictures(tmp_path):

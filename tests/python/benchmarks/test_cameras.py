@@ -152,11 +152,11 @@ def test_the_section_shows_what_was_lost_and_the_pages_are_written(tmp_path):
     assert (usb[4], usb[7]) == ("2", "0.05")
     verdicts = gates.check(cameras.host_figures(host()), MACHINE, {}, only=cameras.HOST_FIGURES)
     document = {"machine": MACHINE, "quick": True, "cameras": measured, "gates": [vars(v) for v in verdicts]}
-    report.write_cameras(document, tmp_path)
-    text = (tmp_path / "cameras.md").read_text()
+    report.write(document, tmp_path)
+    text = (tmp_path / "report.md").read_text()
     for shown in ("others were busy", "quick run", "| unplugged, to the app's being told | stub | 4 ms | 9 ms | 3 |"):
         assert shown in text
-    assert "others were busy" in (tmp_path / "cameras.html").read_text()
+    assert "others were busy" in (tmp_path / "index.html").read_text()
 
 
 PROGRAM = """

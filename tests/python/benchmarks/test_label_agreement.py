@@ -38,7 +38,7 @@ def test_equal_results_agree_wholly(tmp_path, parts):
     a, b = (write_results(tmp_path / name, parts, [BOX]) for name in "ab")
     found = label_agreement.compare(a, b)
     assert (found.pictures, found.people, found.unmatched) == (1, 1, 0)
-    assert (found.share, found.person_share, found.worst_picture, found.box_px) == (1, 1, 1, 0)
+    assert (found.share, found.person_fraction, found.worst_picture, found.box_px) == (1, 1, 1, 0)
     assert found.passes(1)
 
 
@@ -50,7 +50,7 @@ def test_another_part_and_another_outline_count_as_different(tmp_path, parts):
         write_results(tmp_path / "a", parts, [BOX]), write_results(tmp_path / "b", changed, [(20, 10, 30, 31.5)])
     )
     assert found.share == pytest.approx(1 - 50 / 10000)
-    assert found.person_share == pytest.approx(1 - 50 / 210)
+    assert found.person_fraction == pytest.approx(1 - 50 / 210)
     assert found.box_px == 1.5
     assert found.passes(0.995)
     assert not found.passes(0.9951)

@@ -9,6 +9,7 @@ import torch
 from box_scene import BoxScene, ring, write_ply
 from fake_maquette import install
 
+from benchmarks import __main__ as benchmark
 from benchmarks import frame_time, gates, scene_command, scene_pictures, scene_quality, scene_speed, scenes
 from benchmarks.scene_settings import FLOAT, SHIPPED, Sources, settings, sources
 from export.densepose.network import MobileNetV2
@@ -234,9 +235,9 @@ def arguments(given, out):
 
 def test_the_report_of_scenes_alone(given, tmp_path, capsys):
     # The stand-in's scenes are larger and slower than none of the gates allows.
-    status = scenes.main(arguments(given, tmp_path / "out"))
+    status = benchmark.main(["--only", "scenes", *arguments(given, tmp_path / "out")])
     out = tmp_path / "out"
-    document = json.loads((out / "scenes.json").read_text())
+    document = json.loads((out / "benchmark.json").read_text())
     states = {gate["figure"]: gate["state"] for gate in document["gates"]}
     assert set(states) == set(scenes.FIGURES)
     assert states["scene_gain_db"] == "stretch"
@@ -250,7 +251,7 @@ def test_the_report_of_scenes_alone(given, tmp_path, capsys):
     loss = exact - rows["as shipped"]["rendered"]["psnr_db"]
     assert document["figures"]["scene_int8_loss_db"] == pytest.approx(loss, abs=1e-3)
     pyramid = rows["as shipped"]["rendered"]["psnr_db"] - rows["pyramid of points"]["rendered"]["psnr_db"]
-    text, page = (out / "scenes.md").read_text(), (out / "scenes.html").read_text()
+    text, page = (out / "report.md").read_text(), (out / "index.html").read_text()
     for said in ("2 rendered places, 8 are wanted", "1 real places, 2 are wanted", "not LPIPS", "On the real places",
                  "never stored: 1% of the clouds'", "fine-tuned 10 s, fine-tuned 1 min, fine-tuned 10 min (no folder",
                  "Each point of the cloud adds", f"the networks gain {pyramid:+.2f} dB",

@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
+from export.camera import Camera
 from export.captures.dense import dense_cloud, neighbours_of
 from export.captures.originals import ORIGINALS, Photo, box_mask
 from export.captures.plane_sweep import GreyView, depth_of
 from export.captures.structure import CaptureError, up_of_cameras
 from export.photos.packages import load_packages
-from export.scenes.cameras import Camera
 from export.scenes.captures import read_capture
 
 ROOM = Path(__file__).parents[2] / "media" / "room"
@@ -31,7 +31,7 @@ def looking(eye, target=(0, 0, 0)) -> Camera:
 def seen_wall(camera: Camera, pattern: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What a camera sees of the wall y = 0 with `pattern` from -1 to 1, and its depth."""
     x, y = np.meshgrid(*(np.arange(n) for n in SIZE))
-    rays = np.stack([x, y, np.ones_like(x)], -1) @ np.linalg.inv(camera.intrinsics()).T @ camera.rotation
+    rays = np.stack([x, y, np.ones_like(x)], -1) @ np.linalg.inv(camera.intrinsics).T @ camera.rotation
     depth = -camera.centre[1] / rays[..., 1]
     at = camera.centre + rays * depth[..., None]
     across, down = ((at[..., k] * s + 1) / 2 * (len(pattern) - 1) for k, s in ((0, 1), (2, -1)))

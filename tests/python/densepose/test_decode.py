@@ -65,7 +65,7 @@ def test_people_are_painted_with_their_part_and_coordinates():
     assert np.unique(result.iuv[result.instance > 0], axis=0).tolist() == [[3, 128, 64]]
 
 
-def test_the_second_look_decides():
+def test_the_second_pass_decides():
     graphs, looks = fake_graphs(), []
 
     def box_head(rois):
@@ -74,11 +74,11 @@ def test_the_second_look_decides():
         return logits, torch.zeros(len(rois), 4)
 
     unsure = dataclasses.replace(graphs, box_head=box_head)
-    once = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_look_score=None))
+    once = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_pass_threshold=None))
     assert len(once.boxes) == 0
     assert len(looks) == 1
     looks.clear()
-    twice = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_look_score=0.3))
+    twice = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_pass_threshold=0.3))
     assert len(twice.boxes) > 0
     assert len(looks) == 2
     assert looks[1] < looks[0], "only boxes that survived the first look's suppression"
@@ -155,10 +155,10 @@ def test_who_lies_mostly_on_others_leaves_no_trace():
     paint(maps, [0, 0, 20, 40], 1, iuv, instance, HALF)
     before = iuv.copy()
     second = [maps, [10, 0, 30, 40], 2, iuv, instance]  # half of its pixels are free
-    assert paint(*second, DecodeConfig(least_own_share=0.51)) == 0
+    assert paint(*second, DecodeConfig(min_visible_fraction=0.51)) == 0
     assert instance.max() == 1
     assert np.array_equal(iuv, before)
-    assert paint(*second, DecodeConfig(least_own_share=0.5)) == 400
+    assert paint(*second, DecodeConfig(min_visible_fraction=0.5)) == 400
 
 
 def test_coarse_background_wins_over_a_part():

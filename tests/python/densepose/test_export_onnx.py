@@ -8,6 +8,7 @@ import onnx
 import pytest
 import torch
 
+from export.bundle import BundleInfo
 from export.densepose import bundle, export_onnx, graphs
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.network import MobileParsingRCNN
@@ -36,7 +37,7 @@ def net():
 def folder(net, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bundle")
     export_onnx.export_graphs(net, folder)
-    bundle.write_manifest(folder, bundle.BundleInfo("tiny", "fp32"), net.config, DecodeConfig())
+    bundle.write_manifest(folder, BundleInfo("tiny", "fp32"), net.config, DecodeConfig())
     return folder
 
 
@@ -121,7 +122,7 @@ def test_no_batch_normalisation_is_left(folder):
 
 def test_manifest_signs_the_files_and_lists_their_tensors(folder):
     manifest = json.loads((folder / "manifest.json").read_text())
-    others = {manifest["surface"]["file"], manifest["dense_head"]["charts"]}
+    others = {manifest["surface"]["file"], manifest["charts"]["file"]}
     assert set(manifest["files"]) == {f"{name}.onnx" for name in bundle.GRAPHS} | others
     for name, entry in manifest["files"].items():
         data = (folder / name).read_bytes()
@@ -145,6 +146,6 @@ def test_a_manifest_is_refused_for_graphs_with_other_names(folder, tmp_path):
         if name == "box_head":
             model.graph.output[0].name = "scores"
         onnx.save(model, tmp_path / f"{name}.onnx")
-    info = bundle.BundleInfo("tiny", "fp32")
+    info = BundleInfo("tiny", "fp32")
     with pytest.raises(ValueError, match="scores"):
         bundle.write_manifest(tmp_path, info, NetworkConfig(width=WIDTH), DecodeConfig())

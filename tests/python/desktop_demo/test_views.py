@@ -160,7 +160,7 @@ def worn_shades(at_pixels, mapped, texture, where):
     return factor, np.linalg.norm(got - factor[:, None] * wanted, axis=1)
 
 
-def share_worn(at_pixels, mapped, texture, where) -> float:
+def fraction_worn(at_pixels, mapped, texture, where) -> float:
     factor, off = worn_shades(at_pixels, mapped, texture, where)
     return float(((factor > 0.5) & (factor < 1.4) & (off < 25)).mean())
 
@@ -169,12 +169,12 @@ def test_people_wear_the_outfit_where_their_u_v_say(shown, mapped):
     picture = shown("try-on", "--no-mesh")
     at_pixels, inside = picture.at_frame_pixels(*mapped.size), mapped.inside()
     texture = cv2.imread(str(outfit.OUTFIT))
-    right = share_worn(at_pixels, mapped, texture, inside)
+    right = fraction_worn(at_pixels, mapped, texture, inside)
     assert right > 0.8
     # The same tiles upside down or left to right are not what is shown.
     tiles = texture.reshape(6, outfit.TILE_PX, 4, outfit.TILE_PX, 3)
     for wrong in (tiles[:, ::-1], tiles[:, :, :, ::-1]):
-        assert share_worn(at_pixels, mapped, wrong.reshape(texture.shape), inside) < right - 0.1
+        assert fraction_worn(at_pixels, mapped, wrong.reshape(texture.shape), inside) < right - 0.1
     darkening(at_pixels, mapped, mapped.far_from_people())
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from export.bundle import read_manifest
 from export.evaluation import maquette_api
-from export.evaluation.backends import CApiBackend, OnnxBackend, read_manifest
+from export.evaluation.backends import CApiBackend, OnnxBackend
 
 BUNDLE = Path("tests/native/data/tiny_bundle")
 

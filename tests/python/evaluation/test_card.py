@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from export.bundle import read_manifest
 from export.evaluation import gallery
-from export.evaluation.backends import Prediction, fingerprint, read_manifest
+from export.evaluation.backends import Prediction, fingerprint
 from export.evaluation.breakdown import GroupFigures
 from export.evaluation.calibration import BINS
 from export.evaluation.card import card, main
@@ -32,39 +33,39 @@ def document(start: float, step: float) -> dict:
     """An evaluation.json in which every figure is another number: start, start + step, ..."""
     count = iter(range(10000))
 
-    def next_share() -> float:
+    def next_fraction() -> float:
         return start + step * next(count)
 
     def next_count() -> int:
-        return 1000 + round(1e5 * next_share())
+        return 1000 + round(1e5 * next_fraction())
 
     groups = [
         {"by": "size", "name": name, "people": next_count()}
-        | {f.name: next_share() for f in fields(GroupFigures) if f.name not in ("by", "name", "people")}
+        | {f.name: next_fraction() for f in fields(GroupFigures) if f.name not in ("by", "name", "people")}
         for name in ("small", "tall")
     ]
 
     def own(kind: type) -> dict:
-        values = {f.name: next_count() if f.type == "int" else next_share() for f in fields(kind)}
+        values = {f.name: next_count() if f.type == "int" else next_fraction() for f in fields(kind)}
         values["groups"] = groups
         values["calibration"] = {
             "count": [next_count() for _ in range(BINS)],
-            "mean_score": [next_share() for _ in range(BINS)],
-            "share_right": [next_share() for _ in range(BINS)],
-            "expected_error": next_share(),
+            "mean_score": [next_fraction() for _ in range(BINS)],
+            "fraction_right": [next_fraction() for _ in range(BINS)],
+            "expected_error": next_fraction(),
         }
         values["failures"] = {
-            kind: [{"image": f"{kind}.jpg", "box": [1, 1, 9, 9], "figure": next_share()}] for kind in KINDS
+            kind: [{"image": f"{kind}.jpg", "box": [1, 1, 9, 9], "figure": next_fraction()}] for kind in KINDS
         }
         return values
 
     figures = own(Figures) | {"model": "somewhere", "fingerprint": DIGEST, "photos": own(PhotoFigures)}
-    figures["pixel_fates"] = {name: next_share() for name in FATES}
+    figures["pixel_fates"] = {name: next_fraction() for name in FATES}
     for field in ("part_recall", "part_precision", "part_error_cm"):
-        figures[field] = [next_share() for _ in range(PART_COUNT + 1)]
+        figures[field] = [next_fraction() for _ in range(PART_COUNT + 1)]
     return {
         "schema": SCHEMA,
-        "data": {"limit": next_count(), "score_floor": next_share()},
+        "data": {"limit": next_count(), "score_floor": next_fraction()},
         "part_names": PART_NAMES,
         "calibration_bins": BINS,
         "results": {"int8 capi": figures},

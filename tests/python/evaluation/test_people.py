@@ -28,8 +28,8 @@ def detections(score, right):
 def test_scores_that_are_the_share_of_right_boxes_have_no_calibration_error():
     table = calibrate([detections([0.75] * 4, [1, 1, 1, 0]), detections([0.25] * 4, [0, 0, 1, 0])])
     assert table.expected_error == pytest.approx(0)
-    assert (table.count[7], table.share_right[7], table.mean_score[7]) == (4, 0.75, 0.75)
-    assert np.isnan(table.share_right[0])
+    assert (table.count[7], table.fraction_right[7], table.mean_score[7]) == (4, 0.75, 0.75)
+    assert np.isnan(table.fraction_right[0])
 
 
 def test_calibration_error_is_the_gap_weighted_by_the_detections_of_a_bin():
@@ -128,7 +128,7 @@ def test_failures_are_the_worst_first_and_one_an_image():
         replace(SOMEBODY, image="one finger", limb=3, same_side=0),
     ]
     alarms = [FalseAlarm("lamp", (0, 0, 1, 1), 0.6), FalseAlarm("tree", (0, 0, 1, 1), 0.9)]
-    cases = worst_cases(people, alarms, least_limb=50)
+    cases = worst_cases(people, alarms, min_limb=50)
     assert {kind: [case.image for case in found] for kind, found in cases.items()} == {
         "missed": ["tall", "small"], "false": ["tree", "lamp"], "mask": ["bad", "poor"], "side": ["mirrored"],
     }  # fmt: skip

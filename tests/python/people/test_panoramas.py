@@ -5,8 +5,8 @@ import base64
 import numpy as np
 import pytest
 
+from export.camera import Camera
 from export.people.panoramas import Panorama
-from export.people.render import Camera
 from export.photos.packages import PackageError
 from export.photos.panoramas import NAMES, decoded
 
@@ -19,7 +19,7 @@ def camera(towards: np.ndarray) -> Camera:
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)
     rows = np.stack([right, np.cross(forward, right), forward])
-    return Camera(80, 60, 60.0, np.concatenate([rows, np.zeros((3, 1))], 1))
+    return Camera.centred(80, 60, 60.0, rows, np.zeros(3))
 
 
 def with_lamp(azimuth: float, height: float, colour=(50.0, 50.0, 50.0)) -> Panorama:

@@ -16,12 +16,13 @@ WIDTH, HEIGHT = 160, 256  # of the renderer in conftest.py
 
 def picture(renderer, model, shifts=(0.0,), turned=False):
     """People in rest pose, the k-th moved by shifts[k] metres to the right and away by k metres."""
-    from export.people.render import Camera, Light, Person
+    from export.camera import Camera
+    from export.people.render import Light, Person
     from export.people.wardrobe import Layer
 
     look = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])
     eye = np.array([0, -6.0, 0.9])
-    camera = Camera(WIDTH, HEIGHT, 700.0, np.concatenate([look, -(look @ eye)[:, None]], 1))
+    camera = Camera.centred(WIDTH, HEIGHT, 700.0, look, eye)
     light = Light(np.array([0, -1.0, 0]), np.ones(3), np.ones(3), np.array([[0, 0, -1.0]] * 2), np.zeros((2, 3)))
     turn = np.diag([-1.0, -1, 1]) if turned else np.eye(3)
     vertices = model.body.template.vertices @ turn.T

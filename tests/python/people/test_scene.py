@@ -18,11 +18,12 @@ LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])
 
 def picture(renderer, model, props=(), layers=None, **light_options):
     """A body at rest, 6 m before the camera, in light that falls from above and in front."""
-    from export.people.render import Camera, Light, Person
+    from export.camera import Camera
+    from export.people.render import Light, Person
     from export.people.wardrobe import Layer
 
     eye = np.array([0, -6.0, 0.9])
-    camera = Camera(WIDTH, HEIGHT, 700.0, np.concatenate([LOOK, -(LOOK @ eye)[:, None]], 1))
+    camera = Camera.centred(WIDTH, HEIGHT, 700.0, LOOK, eye)
     towards = np.array([0.6, -0.6, -0.52])
     light = Light(
         np.array([0, -1.0, 0]), np.full(3, 0.2), np.full(3, 0.2), np.stack([towards, towards]),
@@ -56,14 +57,15 @@ def test_a_thing_in_front_is_background_and_one_behind_changes_no_label(renderer
 def test_what_is_worn_carries_the_labels_of_its_wearer(renderer, model):
     from dataclasses import replace
 
-    from export.people.render import Camera, Light, Person
+    from export.camera import Camera
+    from export.people.render import Light, Person
     from export.people.wardrobe import Layer
 
     solid = sphere((0.2, 0.2, 0.05), (0, model.head_y, model.eye_z + model.head_radius))
     point = model.rest[model.skull[0]].astype(float)
     worn = replace(plain(solid), points=np.broadcast_to(point, solid.corners.shape))
     eye = np.array([0, -6.0, 0.9])
-    camera = Camera(WIDTH, HEIGHT, 700.0, np.concatenate([LOOK, -(LOOK @ eye)[:, None]], 1))
+    camera = Camera.centred(WIDTH, HEIGHT, 700.0, LOOK, eye)
     light = Light(np.array([0, -1.0, 0]), np.ones(3), np.ones(3), np.array([[0, 0, -1.0]] * 2), np.zeros((2, 3)))
     bare = Person(model.body.template.vertices, [Layer(model.range["body"])])
     hatted = replace(bare, worn=(worn,))
@@ -145,7 +147,7 @@ def test_furniture_is_under_who_uses_it_and_leaves_most_of_the_person_to_see(mod
     tops = []
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        pose = drawn_pose(rng, sitting_share=float(rests == "sits"))
+        pose = drawn_pose(rng, sitting_fraction=float(rests == "sits"))
         pose = lying(rng, pose) if rests == "lies" else pose
         actor = director.actor(rng, pose, yaw=0.0)
         body = actor.person.vertices[model.body.groups["body"]]
@@ -282,8 +284,8 @@ def test_a_rolled_camera_turns_labels_and_background_clockwise(studio, monkeypat
         upright = studio.director.stage(np.random.default_rng(seed)).camera
         monkeypatch.setattr(studio.director, "variety", quarter)
         stage = studio.director.stage(np.random.default_rng(seed))
-        up = stage.camera.world_to_camera[:, :3] @ [0, 0, 1.0]
-        before = upright.world_to_camera[:, :3] @ [0, 0, 1.0]  # points to -y of the picture, which is up
+        up = stage.camera.rotation @ [0, 0, 1.0]
+        before = upright.rotation @ [0, 0, 1.0]  # points to -y of the picture, which is up
         sign = np.sign(stage.roll_degrees)
         assert up[0] == pytest.approx(-sign * before[1], abs=1e-9)
         behind = studio._background_behind(np.random.default_rng(seed), stage.roll_degrees)

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from export.densepose.bundle import BundleInfo
+from export.bundle import BundleInfo
 from export.scenes.bundle import write_manifest
 from export.scenes.config import SIZES
 from export.scenes.export_onnx import export

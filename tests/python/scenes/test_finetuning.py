@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from small_scene import scene_of
 
 from benchmarks.frame_time import PROGRAM
-from export.densepose.bundle import BundleInfo
+from export.bundle import BundleInfo
 from export.scenes import finetune
 from export.scenes.bundle import identity, write_manifest
 from export.scenes.captures import Capture, read_capture
@@ -191,7 +191,7 @@ def test_weights_of_other_networks_are_refused(place, tmp_path):
     ("saves", "spent", "share"), [([10], 0, 1), ([10], 5, 0.55), ([10], 11, 0.1), ([1, 9], 5, 0.55)]
 )
 def test_rates_fall_towards_every_save(saves, spent, share):
-    assert finetune.share_of_rate(spent, saves) == pytest.approx(share)
+    assert finetune.rate_fraction(spent, saves) == pytest.approx(share)
 
 
 def test_held_out_photos_are_never_decoded_while_tuning(place, tmp_path, monkeypatch, capsys):

@@ -8,7 +8,8 @@ import pytest
 import torch
 from box_scene import BoxScene, looking, ring
 
-from export.scenes.cameras import Camera, between, reframed, resized, turned_upright, upright, warped
+from export.camera import Camera
+from export.scenes.cameras import between, turned_upright, upright, warped
 from export.scenes.config import SIZES
 from export.scenes.looks import Moments
 from export.scenes.modelling import Options, View, background_of, modelled, painted, render, sampled, seen_in
@@ -21,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 
 def pixels_of(camera: Camera, places: np.ndarray) -> np.ndarray:
     seen = (places - camera.centre) @ camera.rotation.T
-    at = seen @ camera.intrinsics().T
+    at = seen @ camera.intrinsics.T
     return at[:, :2] / at[:, 2:]
 
 
@@ -136,7 +137,7 @@ def test_a_coarser_level_is_what_a_smaller_camera_finds(principal):
     points, keys = torch.from_numpy(places), visible(torch.from_numpy(places), camera)
     for level in range(1, 5):
         keys = halved(keys)
-        direct = visible(points, resized(camera, 64 >> level, 48 >> level))
+        direct = visible(points, camera.resized(64 >> level, 48 >> level))
         assert torch.equal(keys, direct)
     assert (keys != NOTHING).any()
 
@@ -333,7 +334,7 @@ def test_a_picture_of_any_size_and_turn_is_what_the_camera_sees(room, roll):
 def test_a_gradient_reaches_extractor_basis_and_refiner(room):
     points, _, views = room
     networks = Networks(SIZES["tiny"]).train()
-    camera = reframed(upright(views[1].camera, np.array([0, 1.0, 0]), 1), 8, 8, 32, 32)
+    camera = upright(views[1].camera, np.array([0, 1.0, 0]), 1).reframed(8, 8, 32, 32)
     model = modelled(points, [views[0], views[2], views[3]], networks, Options(), camera)
     rasters = model.rasters(camera, networks, Options())
     networks.refiner([r[None] for r in rasters]).square().mean().backward()

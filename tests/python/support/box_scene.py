@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from export.scenes.cameras import Camera
+from export.camera import Camera
 
 
 class BoxScene:

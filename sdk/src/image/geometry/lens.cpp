@@ -115,19 +115,6 @@ void LensProjection::find_row(const std::vector<double>& x, double y, double* co
   }
 }
 
-Lens resized(const Lens& lens, int width_px, int height_px) {
-  Lens made = lens;
-  const double across = double(width_px) / lens.width_px, down = double(height_px) / lens.height_px;
-  made.width_px = width_px;
-  made.height_px = height_px;
-  made.fx_px *= across;
-  made.fy_px *= down;
-  // The picture's edge, half a pixel outside of the first centre, stays where it is.
-  made.cx_px = (lens.cx_px + 0.5) * across - 0.5;
-  made.cy_px = (lens.cy_px + 0.5) * down - 0.5;
-  return made;
-}
-
 std::optional<Lens> without_distortion(const Lens& lens) {
   if (lens.distortion == Distortion::kNone) return lens;
   const LensProjection projection(lens);

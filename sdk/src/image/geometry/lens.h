@@ -5,23 +5,20 @@
 #include <optional>
 #include <vector>
 
+#include "image/geometry/intrinsics.h"
+
 namespace maq {
 
 enum class Distortion { kNone, kRational, kFisheye };
 
-// The centre of the top left pixel is (0, 0).
-struct Lens {
-  int width_px = 0;
-  int height_px = 0;
-  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
+struct Lens : Intrinsics {
   Distortion distortion = Distortion::kNone;
   // kRational: k1, k2, p1, p2, k3, k4, k5, k6; kFisheye: k1, k2, k3, k4.
   std::array<double, 8> coefficients{};
 };
 
 inline bool operator==(const Lens& a, const Lens& b) {
-  return a.width_px == b.width_px && a.height_px == b.height_px && a.fx_px == b.fx_px && a.fy_px == b.fy_px &&
-         a.cx_px == b.cx_px && a.cy_px == b.cy_px && a.distortion == b.distortion && a.coefficients == b.coefficients;
+  return a.intrinsics() == b.intrinsics() && a.distortion == b.distortion && a.coefficients == b.coefficients;
 }
 
 struct PlaceInPicture {
@@ -44,9 +41,6 @@ class LensProjection {
   Lens lens_;
   double widest_ = 0;  // tangent of the largest angle to the axis
 };
-
-// The same lens with a larger or smaller picture: its field of view stays.
-Lens resized(const Lens& lens, int width_px, int height_px);
 
 // The lens without distortion for an undistorted picture of the same size and principal point. Its focal lengths are
 // multiplied by the least number with which every pixel of the new picture has its place in the old one: nothing is

@@ -12,8 +12,8 @@
 #include "scene/capture/colmap_model.h"
 #include "scene/capture/ply_reader.h"
 #include "scene/capture/posed_photo.h"
-#include "scene/capture/transforms_file.h"
 #include "scene/capture/scene_up.h"
+#include "scene/capture/transforms_file.h"
 
 namespace maq {
 namespace {
@@ -39,12 +39,7 @@ std::string folder_of_photos(const std::string& folder, const std::vector<PosedP
 
 PinholeCamera camera_of(const Lens& undistorted, const PosedPhoto& photo) {
   PinholeCamera camera;
-  camera.width_px = undistorted.width_px;
-  camera.height_px = undistorted.height_px;
-  camera.fx_px = undistorted.fx_px;
-  camera.fy_px = undistorted.fy_px;
-  camera.cx_px = undistorted.cx_px;
-  camera.cy_px = undistorted.cy_px;
+  camera.intrinsics() = undistorted.intrinsics();
   camera.rotation = photo.rotation;
   camera.centre = photo.centre;
   make_exact_rotation(camera.rotation);
@@ -223,12 +218,8 @@ void load_view(const CaptureView& view, Frame& picture, std::vector<uint8_t>& va
     valid.assign(size_t(view.camera.width_px) * size_t(view.camera.height_px), 255);
     return;
   }
-  Lens undistorted = view.lens;
-  undistorted.distortion = Distortion::kNone;
-  undistorted.fx_px = view.camera.fx_px;
-  undistorted.fy_px = view.camera.fy_px;
-  undistorted.cx_px = view.camera.cx_px;
-  undistorted.cy_px = view.camera.cy_px;
+  Lens undistorted;
+  undistorted.intrinsics() = view.camera.intrinsics();
   undistort(photo.image, view.lens, undistorted, picture, valid);
 }
 

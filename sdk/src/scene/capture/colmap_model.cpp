@@ -15,16 +15,12 @@ int size_of(uint64_t pixels) { return int(std::min<uint64_t>(pixels, INT32_MAX))
 Lens lens_of(const ColmapCamera& camera) {
   const auto& p = camera.parameters;
   Lens lens;
-  lens.width_px = size_of(camera.width_px);
-  lens.height_px = size_of(camera.height_px);
   // Where the figures before the distortion end: one focal length, or two.
   const bool has_one_focal_length = camera.model == ColmapModel::kSimplePinhole ||
                                     camera.model == ColmapModel::kSimpleRadial || camera.model == ColmapModel::kRadial;
   const size_t centre = has_one_focal_length ? 1 : 2, distortion = centre + 2;
-  lens.fx_px = p[0];
-  lens.fy_px = p[centre - 1];
-  lens.cx_px = p[centre] - 0.5;
-  lens.cy_px = p[centre + 1] - 0.5;
+  lens.intrinsics() = {size_of(camera.width_px), size_of(camera.height_px), p[0], p[centre - 1],
+                       p[centre] - 0.5,          p[centre + 1] - 0.5};
   auto& k = lens.coefficients;
   switch (camera.model) {
     case ColmapModel::kSimplePinhole:

@@ -39,12 +39,7 @@ void PosedView::load(const ImageView& image, const Lens& lens, const PinholeCame
     undistort(*image_, lens, *straight, smaller_, valid_);
     std::swap(whole_, smaller_);
     image_ = &whole_.image;
-    camera_.width_px = straight->width_px;
-    camera_.height_px = straight->height_px;
-    camera_.fx_px = straight->fx_px;
-    camera_.fy_px = straight->fy_px;
-    camera_.cx_px = straight->cx_px;
-    camera_.cy_px = straight->cy_px;
+    camera_.intrinsics() = straight->intrinsics();
   }
   shrink_to(long_side_px);
 }

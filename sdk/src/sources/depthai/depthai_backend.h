@@ -1,15 +1,19 @@
-// Opens libmaquette_depthai.so, which brings the vendor's library along.
+// depthai: URIs, and the module libmaquette_depthai.so, which brings the vendor's library along.
 #pragma once
 
-#include "sources/depthai/depthai_session.h"
+#include <vector>
+
+#include "core/log.h"
+#include "sources/camera_backend.h"
+#include "sources/uri.h"
 
 namespace maq {
 
-// Opens it at the first call. Throws MAQ_ERROR_RUNTIME_LIBRARY where it is missing, cannot be opened, or is of another
-// build.
-DepthAiDriver& depthai_driver();
+// For "depthai:" or "depthai:<id or address>", with size, fps and depth as requests. Throws for unknown options, and
+// MAQ_ERROR_RUNTIME_LIBRARY where the module is missing, cannot be opened, or is of another build.
+CameraOpener depthai_uri_opener(SourceUri uri, int buffers, const Log& log);
 
-// Whether it is installed at all.
-bool has_depthai_library();
+// The devices that are connected; empty where the module is not installed.
+std::vector<CameraListing> list_depthai_cameras();
 
 }  // namespace maq

@@ -10,6 +10,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "sources/camera_errors.h"
 #include "sources/depthai/depthai_controls.h"
 #include "sources/depthai/depthai_inbox.h"
 
@@ -19,13 +20,13 @@ namespace {
 constexpr int kDefaultWidthPx = 640;
 constexpr int kDefaultHeightPx = 480;
 constexpr double kDefaultFps = 30;
-constexpr double kLeastFps = 0.01;
-constexpr int64_t kMostLostInARow = 1000;
+constexpr double kMinFps = 0.01;
+constexpr int64_t kMaxLostInARow = 1000;
 
 bool contains(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
 // The vendor's library says what went wrong in its texts alone.
-maq_status status_of(const std::string& text, maq_status otherwise) {
+maq_status status_of(const std::string& text, maq_status fallback) {
   if (contains(text, "ermission")) return MAQ_ERROR_NO_PERMISSION;
   if (contains(text, "in use") || contains(text, "IN_USE")) return MAQ_ERROR_BUSY;
   if (contains(text, "No available devices") || contains(text, "Cannot find any device") ||
@@ -33,24 +34,23 @@ maq_status status_of(const std::string& text, maq_status otherwise) {
     return MAQ_ERROR_NOT_FOUND;
   }
   if (contains(text, "X_LINK") || contains(text, "already closed")) return MAQ_ERROR_DEVICE_LOST;
-  return otherwise;
+  return fallback;
 }
 
 const char* remedy_for(maq_status status) {
   switch (status) {
     case MAQ_ERROR_NO_PERMISSION: return " The user needs a udev rule for the device: see docs/cameras/depthai.md.";
-    case MAQ_ERROR_BUSY: return " Another program uses the device; close it.";
     case MAQ_ERROR_NOT_FOUND: return " Is the device plugged in, powered, and free?";
     case MAQ_ERROR_DEVICE_LOST: return " The link to the device broke: check cable and power.";
-    default: return "";
+    default: return camera_remedy(status);
   }
 }
 
-// Runs a call of the session. Whatever it throws becomes an Error that names the device.
+// Runs a call of the session. What it throws becomes an Error that names the device.
 template <class Body>
-auto guarded(const std::string& device, const char* what, maq_status otherwise, Body&& body) {
-  std::string text = "an exception that is none of the standard library";
-  maq_status status = otherwise;
+auto guarded(const std::string& device, const char* what, maq_status fallback, Body&& body) {
+  std::string text = "an exception of an unknown type";
+  maq_status status = fallback;
   try {
     return body();
   } catch (const Error& error) {
@@ -58,7 +58,7 @@ auto guarded(const std::string& device, const char* what, maq_status otherwise, 
     status = error.status();
   } catch (const std::exception& error) {
     text = error.what();
-    status = status_of(text, otherwise);
+    status = status_of(text, fallback);
   } catch (...) {
   }
   throw Error(status, device, " ", what, ": ", text, text.empty() || text.back() != '.' ? "." : "", remedy_for(status));
@@ -77,10 +77,10 @@ class DepthAiCamera : public Camera {
       : handle_(handle), log_(log), session_(std::move(session)), slots_(size_t(std::max(1, buffers))) {}
   ~DepthAiCamera() override { close(); }
 
-  void start(const DepthAiWish& wish) {
+  void start(const DepthAiRequest& request) {
     features_ = guarded(name_, "does not say what it is", MAQ_ERROR_UNSUPPORTED, [&] { return session_->features(); });
     if (features_.id.empty()) features_.id = handle_;
-    const DepthAiPlan plan = agree(wish);
+    const DepthAiPlan plan = agree(request);
     format_ = {MAQ_PIXEL_NV12, false, plan.width_px, plan.height_px, plan.fps};
     controls_ = DepthAiControls(features_, plan.fps);
     with_depth_ = plan.with_depth;
@@ -152,7 +152,7 @@ class DepthAiCamera : public Camera {
     if (inbox_ != nullptr) inbox_->close();
     try {
       session_->close();
-    } catch (...) {  // it is given up anyway
+    } catch (...) {  // the session is destroyed anyway
     }
     session_.reset();
     if (with_depth_ && without_depth_ > 0) {
@@ -166,19 +166,17 @@ class DepthAiCamera : public Camera {
     DepthAiFrame colour, depth;
   };
 
-  // The nearest to the wish that the device can do.
-  DepthAiPlan agree(const DepthAiWish& wish) const {
-    const bool has_wish = wish.width_px > 0 && wish.height_px > 0;
+  // The nearest to the request that the device can do.
+  DepthAiPlan agree(const DepthAiRequest& request) const {
+    const bool has_size = request.width_px > 0 && request.height_px > 0;
     // Of NV12, four pixels share a colour, and the link takes depth images of even size only.
-    const auto side = [](int wished, int most) {
-      return std::max(2, (most > 0 ? std::min(wished, most) : wished) & ~1);
-    };
+    const auto side = [](int wanted, int max) { return std::max(2, (max > 0 ? std::min(wanted, max) : wanted) & ~1); };
     DepthAiPlan plan;
-    plan.width_px = side(has_wish ? wish.width_px : kDefaultWidthPx, features_.width_px);
-    plan.height_px = side(has_wish ? wish.height_px : kDefaultHeightPx, features_.height_px);
-    plan.fps = wish.fps > 0 ? wish.fps : kDefaultFps;
-    if (features_.fps >= kLeastFps) plan.fps = std::min(plan.fps, features_.fps);
-    plan.with_depth = wish.depth.value_or(features_.has_stereo);
+    plan.width_px = side(has_size ? request.width_px : kDefaultWidthPx, features_.width_px);
+    plan.height_px = side(has_size ? request.height_px : kDefaultHeightPx, features_.height_px);
+    plan.fps = request.fps > 0 ? request.fps : kDefaultFps;
+    if (features_.fps >= kMinFps) plan.fps = std::min(plan.fps, features_.fps);
+    plan.with_depth = request.depth.value_or(features_.has_stereo);
     if (plan.with_depth && !features_.has_stereo) {
       throw Error(MAQ_ERROR_UNSUPPORTED, name_, " has no pair of cameras to see depth with; open it with depth=0.");
     }
@@ -196,8 +194,8 @@ class DepthAiCamera : public Camera {
   bool fill(int slot, DepthAiPair pair, CameraBuffer& buffer) {
     const auto step = int64_t(uint64_t(pair.colour.sequence) - uint64_t(last_device_sequence_));
     if (pictures_ > 0 && step <= 0 && pair.colour.timestamp_ns <= last_timestamp_ns_) return false;
-    // A device that counts anew, or leaps, has lost no frames that can be counted.
-    sequence_ += pictures_ == 0 ? 0 : (step >= 1 && step <= kMostLostInARow ? uint32_t(step) : 1);
+    // Where a device restarts its count, or leaps, the lost frames cannot be counted.
+    sequence_ += pictures_ == 0 ? 0 : (step >= 1 && step <= kMaxLostInARow ? uint32_t(step) : 1);
     last_device_sequence_ = pair.colour.sequence;
     // The device's clock is fitted to ours again and again, and may step back.
     last_timestamp_ns_ = std::max(last_timestamp_ns_, pair.colour.timestamp_ns);
@@ -224,14 +222,14 @@ class DepthAiCamera : public Camera {
     } catch (const std::exception& error) {
       return error.what();
     } catch (...) {
-      return "an exception that is none of the standard library";
+      return "an exception of an unknown type";
     }
   }
 
   const std::string handle_;
   const std::string name_ = "DepthAI device " + handle_;
   const Log log_;
-  std::mutex session_mutex_;  // of session_ between wait's thread and those who set controls
+  std::mutex session_mutex_;  // of session_, between the thread of wait() and those that set controls
   std::unique_ptr<DepthAiSession> session_;
   std::shared_ptr<DepthAiInbox> inbox_;
   DepthAiFeatures features_;
@@ -250,7 +248,7 @@ class DepthAiCamera : public Camera {
 };
 
 std::vector<DepthAiDevice> devices_of(DepthAiDriver& driver) {
-  return guarded("DepthAI", "cannot look for devices", MAQ_ERROR_NOT_FOUND, [&] { return driver.list(); });
+  return guarded("DepthAI", "cannot search for devices", MAQ_ERROR_NOT_FOUND, [&] { return driver.list(); });
 }
 
 const std::string& handle_of(const DepthAiDevice& device) { return device.id.empty() ? device.address : device.id; }
@@ -283,14 +281,14 @@ std::string choose(DepthAiDriver& driver, const std::string& device, const std::
               there.empty() ? "" : " There are: " + there + ".");
 }
 
-std::shared_ptr<DepthAiCamera> open_chosen(DepthAiDriver& driver, const std::string& chosen, const DepthAiWish& wish,
-                                           int buffers, const Log& log) {
+std::shared_ptr<DepthAiCamera> open_chosen(DepthAiDriver& driver, const std::string& chosen,
+                                           const DepthAiRequest& request, int buffers, const Log& log) {
   const std::string name = "DepthAI device " + chosen;
   std::unique_ptr<DepthAiSession> session =
       guarded(name, "cannot be opened", MAQ_ERROR_DEVICE_LOST, [&] { return driver.open(chosen); });
   if (session == nullptr) throw Error(MAQ_ERROR_DEVICE_LOST, name, " cannot be opened.");
   auto camera = std::make_shared<DepthAiCamera>(chosen, std::move(session), buffers, log);
-  camera->start(wish);
+  camera->start(request);
   return camera;
 }
 
@@ -318,9 +316,11 @@ std::optional<maq_intrinsics> depthai_calibration(const DepthAiLens& lens, const
   return made;
 }
 
-CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, DepthAiWish wish, int buffers, Log log) {
-  return [&driver, device, wish, buffers, log, identity = std::string()]() mutable {
-    std::shared_ptr<DepthAiCamera> camera = open_chosen(driver, choose(driver, device, identity), wish, buffers, log);
+CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, DepthAiRequest request, int buffers,
+                            Log log) {
+  return [&driver, device, request, buffers, log, identity = std::string()]() mutable {
+    std::shared_ptr<DepthAiCamera> camera =
+        open_chosen(driver, choose(driver, device, identity), request, buffers, log);
     if (!identity.empty() && camera->identity() != identity) {
       camera->close();
       throw Error(MAQ_ERROR_DEVICE_LOST, "At ", device, " is DepthAI device ", camera->identity(), " now, but it was ",

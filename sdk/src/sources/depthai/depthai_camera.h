@@ -12,8 +12,8 @@
 
 namespace maq {
 
-// 0 and nothing: as the device has it. The nearest that the device offers is taken.
-struct DepthAiWish {
+// 0 and nothing: the device's default. The nearest that the device offers is taken.
+struct DepthAiRequest {
   int width_px = 0;
   int height_px = 0;
   double fps = 0;
@@ -23,13 +23,14 @@ struct DepthAiWish {
 // Opens the device whose id or address (USB path, IP) `device` is, or the first that is free when it is empty, and after
 // that the same device wherever it is plugged in; frames lie in `buffers` buffers at most. The opener throws
 // MAQ_ERROR_NOT_FOUND, MAQ_ERROR_NO_PERMISSION, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST, and MAQ_ERROR_UNSUPPORTED for a
-// device without what is wished. `driver` must outlive it and the cameras.
-CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, DepthAiWish wish, int buffers, Log log);
+// device that lacks what is requested. `driver` must outlive it and the cameras.
+CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, DepthAiRequest request, int buffers,
+                            Log log);
 
-// The devices there are. They are not opened for it, so that what they offer is not told.
+// The connected devices. They are not opened for it, so that their modes are not known.
 std::vector<CameraListing> list_depthai_cameras(DepthAiDriver& driver);
 
-// Nothing when the lens cannot be said in maq_intrinsics, or its figures make no sense.
+// Nothing when maq_intrinsics cannot express the lens, or its values make no sense.
 std::optional<maq_intrinsics> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan);
 
 }  // namespace maq

@@ -18,9 +18,9 @@ void DepthAiControls::note(const DepthAiFrame& newest) {
 }
 
 maq_control_info DepthAiControls::info(maq_control which) const {
-  // The ranges are those that the vendor documents; the device starts with its automatics, which have no preset value.
-  const auto made = [](double least, double most, double preset, double value) {
-    return maq_control_info{0, least, most, 1, std::clamp(preset, least, most), std::clamp(value, least, most)};
+  // The ranges are those that the vendor documents; the device starts with its automatics, which have no default value.
+  const auto made = [](double min, double max, double default_value, double value) {
+    return maq_control_info{0, min, max, 1, std::clamp(default_value, min, max), std::clamp(value, min, max)};
   };
   if (!has_autofocus_ && (which == MAQ_CONTROL_AUTO_FOCUS || which == MAQ_CONTROL_FOCUS)) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "The lens of this camera cannot be focused.");

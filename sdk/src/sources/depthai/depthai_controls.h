@@ -23,7 +23,7 @@ class DepthAiControls {
   bool has_autofocus_ = false;
   double longest_exposure_us_ = 0;
   bool auto_exposure_ = true, auto_focus_ = true, auto_white_balance_ = true;
-  // Until a picture tells.
+  // Until a frame reports them.
   int exposure_us_ = 10000, gain_iso_ = 400, focus_ = 128, white_balance_k_ = 5000, brightness_ = 0;
 };
 

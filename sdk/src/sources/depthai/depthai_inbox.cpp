@@ -9,14 +9,14 @@
 namespace maq {
 namespace {
 
-constexpr size_t kMostStrideRows = 16;  // a line longer than so many rows of pixels is nonsense
+constexpr size_t kMaxStrideRows = 16;  // a longer stride, in rows of pixels, is an error of the device
 
 // Whether the frame has the bytes that it claims to have. Its size is one that is allowed.
 bool has_its_bytes(const DepthAiFrame& frame) {
   const maq_pixel_format format = *frame.format;
   const int width_px = int(frame.width_px), height_px = int(frame.height_px);
   const size_t row = row_bytes(format, 0, width_px);
-  if (frame.data == nullptr || frame.stride_bytes < row || frame.stride_bytes > kMostStrideRows * row) return false;
+  if (frame.data == nullptr || frame.stride_bytes < row || frame.stride_bytes > kMaxStrideRows * row) return false;
   // The padding behind the last row may be missing.
   const auto plane_bytes = [&](int plane) {
     return frame.stride_bytes * size_t(plane_rows(format, plane, height_px) - 1) + row_bytes(format, plane, width_px);

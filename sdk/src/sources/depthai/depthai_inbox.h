@@ -1,4 +1,4 @@
-// Where the frames of a DepthAI device arrive, from threads of the vendor's library, and wait for the camera.
+// The queue of a DepthAI device's frames, from threads of the vendor's library to the camera.
 #pragma once
 
 #include <mutex>
@@ -15,7 +15,7 @@ class DepthAiInbox : public DepthAiReceiver {
  public:
   explicit DepthAiInbox(const DepthAiPlan& plan) : plan_(plan), pairing_(plan.fps, plan.with_depth) {}
 
-  // A frame that is not as agreed, or has fewer bytes than it claims, is dropped: the gap in the numbers tells.
+  // A frame that is not as agreed, or has fewer bytes than it claims, is dropped: the gap in the numbers shows it.
   void receive_colour(DepthAiFrame frame) noexcept override;
   void receive_depth(DepthAiFrame frame) noexcept override;
 

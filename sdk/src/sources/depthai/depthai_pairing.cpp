@@ -9,20 +9,20 @@ namespace maq {
 namespace {
 
 // Depth comes some tens of milliseconds after its picture: the device computes it.
-constexpr int64_t kLeastPatienceNs = 100'000'000;
-constexpr int kPatiencePeriods = 3;
-constexpr size_t kMostWaiting = 16;
-// What a time can be: a frame is not older than this when it arrives, and younger only by the error of clock syncing.
-constexpr int64_t kOldestNs = 10'000'000'000;
-constexpr int64_t kYoungestNs = 100'000'000;
+constexpr int64_t kMinWaitNs = 100'000'000;
+constexpr int kMaxWaitPeriods = 3;
+constexpr size_t kMaxWaiting = 16;
+// Bounds of a believable time: how old a frame can be when it arrives, and how far the clocks can be apart.
+constexpr int64_t kMaxAgeNs = 10'000'000'000;
+constexpr int64_t kMaxFutureNs = 100'000'000;
 
 }  // namespace
 
 DepthAiPairing::DepthAiPairing(double fps, bool with_depth) : with_depth_(with_depth) {
   const double period_ns = 1e9 / std::clamp(fps, 0.01, 1000.0);
   half_period_ns_ = int64_t(period_ns / 2);
-  patience_ns_ = std::max(kLeastPatienceNs, int64_t(kPatiencePeriods * period_ns));
-  capacity_ = std::min(kMostWaiting, 2 + size_t(std::ceil(double(patience_ns_) / period_ns)));
+  max_wait_ns_ = std::max(kMinWaitNs, int64_t(kMaxWaitPeriods * period_ns));
+  capacity_ = std::min(kMaxWaiting, 2 + size_t(std::ceil(double(max_wait_ns_) / period_ns)));
 }
 
 void DepthAiPairing::add_colour(DepthAiFrame frame, int64_t now_ns) {
@@ -43,7 +43,7 @@ std::optional<DepthAiPair> DepthAiPairing::next(int64_t now_ns) {
                       depth.frame.sequence != colour.frame.sequence);
   };
   auto nearest = depth_.end();
-  bool can_still_come = with_depth_ && now_ns < colour.arrived_ns + patience_ns_;
+  bool can_still_come = with_depth_ && now_ns < colour.arrived_ns + max_wait_ns_;
   for (auto depth = depth_.begin(); depth != depth_.end(); ++depth) {
     if (is_past(*depth, colour)) {
       can_still_come = false;
@@ -63,7 +63,7 @@ std::optional<DepthAiPair> DepthAiPairing::next(int64_t now_ns) {
 }
 
 int64_t DepthAiPairing::due_ns() const {
-  return colour_.empty() ? INT64_MAX : colour_.front().arrived_ns + (with_depth_ ? patience_ns_ : 0);
+  return colour_.empty() ? INT64_MAX : colour_.front().arrived_ns + (with_depth_ ? max_wait_ns_ : 0);
 }
 
 void DepthAiPairing::clear() {
@@ -72,7 +72,7 @@ void DepthAiPairing::clear() {
 }
 
 DepthAiPairing::Waiting DepthAiPairing::waiting(DepthAiFrame frame, int64_t now_ns) {
-  const bool has_time = frame.timestamp_ns >= now_ns - kOldestNs && frame.timestamp_ns <= now_ns + kYoungestNs;
+  const bool has_time = frame.timestamp_ns >= now_ns - kMaxAgeNs && frame.timestamp_ns <= now_ns + kMaxFutureNs;
   if (!has_time) frame.timestamp_ns = now_ns;
   return {std::move(frame), now_ns, has_time};
 }

@@ -1,4 +1,4 @@
-// Which depth image belongs to which picture of a DepthAI device: two streams that arrive apart become one.
+// Pairs the pictures of a DepthAI device with their depth images: two streams that arrive apart become one.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct DepthAiPair {
 
 // Time decides, not the number: the cameras of a device count from where each of them began. The nearest depth image that
 // is at most half a frame period away is the picture's; of two that are as near, the one of the same number. Where a
-// device tells no time, equal numbers pair. All times are CLOCK_MONOTONIC.
+// device gives no times, equal numbers pair. All times are CLOCK_MONOTONIC.
 class DepthAiPairing {
  public:
   DepthAiPairing(double fps, bool with_depth);
@@ -48,7 +48,7 @@ class DepthAiPairing {
 
   bool with_depth_;
   int64_t half_period_ns_;
-  int64_t patience_ns_;
+  int64_t max_wait_ns_;
   size_t capacity_;
   std::deque<Waiting> colour_, depth_;
 };

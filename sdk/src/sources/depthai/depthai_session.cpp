@@ -1,5 +1,5 @@
 // DepthAI devices by the vendor's library, depthai-core 3: the only file that includes it. It is built into
-// libmaquette_depthai.so, which depthai_library.cpp opens.
+// libmaquette_depthai.so, which depthai_backend.cpp opens.
 #include "sources/depthai/depthai_session.h"
 
 #include <algorithm>
@@ -76,7 +76,7 @@ void forward(dai::MessageQueue& queue, std::shared_ptr<DepthAiReceiver> receiver
         try {
           const auto frame = std::dynamic_pointer_cast<const dai::ImgFrame>(message);
           if (frame != nullptr) (*receiver.*receive)(frame_of(frame));
-        } catch (...) {  // no memory: the frame is lost, the library's thread must not be
+        } catch (...) {  // no memory: the frame is lost, but the library's thread goes on
         }
       };
   queue.addCallback(callback);
@@ -85,12 +85,12 @@ void forward(dai::MessageQueue& queue, std::shared_ptr<DepthAiReceiver> receiver
 class Session : public DepthAiSession {
  public:
   explicit Session(const std::string& device) : device_(std::make_shared<dai::Device>(dai::DeviceInfo(device))) {
-    device_->setMaxReconnectionAttempts(0);  // a lost link is told, and the source opens the device anew
+    device_->setMaxReconnectionAttempts(0);  // LiveSource opens a lost device again
   }
   ~Session() override {
     try {
       close();
-    } catch (...) {  // it is given up anyway
+    } catch (...) {  // the device is destroyed anyway
     }
   }
 

@@ -1,4 +1,4 @@
-// What is needed of a DepthAI device (an OAK camera of Luxonis), in our own types. depthai_session.cpp does it with the
+// What the SDK needs of a DepthAI device (an OAK camera of Luxonis), in its own types. depthai_session.cpp does it with the
 // vendor's library, in a library of its own, libmaquette_depthai.so; tests do it in memory.
 //
 // Everything a device says is a claim: DepthAiCamera checks it. Every call may throw a std::exception with a text.
@@ -27,7 +27,7 @@ struct DepthAiDevice {
 
 struct DepthAiFeatures {
   std::string id;
-  // Of the colour camera; 0: not told.
+  // Of the colour camera; 0: not known.
   int width_px = 0;
   int height_px = 0;
   double fps = 0;  // the fastest
@@ -48,7 +48,7 @@ struct DepthAiLens {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   // In OpenCV's order: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, taux, tauy.
   std::vector<double> distortion;
-  bool is_perspective = true;  // otherwise the coefficients are those of another model (fisheye)
+  bool is_perspective = true;  // false: the coefficients are those of another model (fisheye)
 };
 
 // A picture or a depth image as it came, without a copy.
@@ -63,14 +63,14 @@ struct DepthAiFrame {
   size_t uv_offset_bytes = 0;  // where the second plane of NV12 begins
   int64_t timestamp_ns = 0;    // CLOCK_MONOTONIC
   int64_t sequence = 0;
-  // What the camera was set to for this picture; 0: not told.
+  // What the camera was set to for this picture; 0: not known.
   int exposure_us = 0;
   int gain_iso = 0;
   int focus = 0;
   int white_balance_k = 0;
 };
 
-// Who gets the frames, from threads of the session.
+// Receives the frames, on threads of the session.
 class DepthAiReceiver {
  public:
   virtual ~DepthAiReceiver() = default;

@@ -1,4 +1,4 @@
-#include "sources/files/file_kind.h"
+#include "sources/files/file_sources.h"
 
 #include <algorithm>
 #include <array>

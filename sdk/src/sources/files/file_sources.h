@@ -1,4 +1,4 @@
-// Sources that read image and video files, and recordings.
+// Sources that read image and video files.
 #pragma once
 
 #include <memory>
@@ -15,8 +15,8 @@ std::unique_ptr<Source> open_image_source(SourceUri uri);
 // MAQ_ERROR_IMAGE_SIZE; next() throws MAQ_ERROR_UNREADABLE when the clip ends before its header says.
 std::unique_ptr<Source> open_video_source(SourceUri uri);
 
-// The frames of a recording at their times, from `from` to `to` seconds; they are gone to by seek(). next() throws
-// MAQ_ERROR_UNREADABLE for a damaged frame, and goes on after it. Throws what RecordingReader throws.
-std::unique_ptr<Source> open_recording_source(SourceUri uri, const Log& log);
+// The scheme for a file: "image", "video" or "rec", by how the file begins, else by its extension. A file that is missing
+// or cannot be read is an "image": opening it says what is wrong. Throws MAQ_ERROR_INVALID_ARGUMENT for a folder.
+const char* scheme_of_file(const std::string& path);
 
 }  // namespace maq

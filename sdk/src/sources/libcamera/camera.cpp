@@ -14,14 +14,15 @@
 
 #include "core/clock.h"
 #include "core/error.h"
-#include "sources/libcamera/failure.h"
+#include "sources/camera_errors.h"
 #include "sources/libcamera/formats.h"
 
 namespace maq {
 namespace {
 
-constexpr int kFencePatienceMs = 100;
-constexpr int64_t kOldestFrameNs = 10000000000;
+constexpr char kLogHint[] = " LIBCAMERA_LOG_LEVELS=*:INFO in the environment shows what libcamera says to it.";
+constexpr int kFenceTimeoutMs = 100;
+constexpr int64_t kMaxFrameAgeNs = 10000000000;
 
 }  // namespace
 
@@ -32,46 +33,48 @@ LibcameraCamera::~LibcameraCamera() {
   }
 }
 
-void LibcameraCamera::start(const CameraWish& wish, int buffers) {
+void LibcameraCamera::fail(const std::string& what, int error) const { fail_camera(label_, what, error, kLogHint); }
+
+void LibcameraCamera::start(const CameraRequest& request, int buffers) {
   manager_ = std::make_unique<LibcameraManagerUse>();
   const std::shared_ptr<libcamera::Camera> found = find_libcamera_camera(**manager_, name_);
-  if (const int error = found->acquire(); error < 0) fail_libcamera(name_, "cannot be acquired", error);
+  if (const int error = found->acquire(); error < 0) fail("cannot be acquired", error);
   camera_ = found;
   identity_ = found->id();
 
-  const auto configuration = libcamera_configuration(*camera_, name_);
-  choose_libcamera_format(*configuration, wish, buffers, name_);
+  const auto configuration = libcamera_configuration(*camera_, label_);
+  choose_libcamera_format(*configuration, request, buffers, label_);
   if (const int error = camera_->configure(configuration.get()); error < 0) {
-    fail_libcamera(name_, "does not take its own format", error);
+    fail("does not take its own format", error);
   }
-  const LibcameraFormat agreed = agreed_libcamera_format(configuration->at(0), name_);
+  const LibcameraFormat agreed = agreed_libcamera_format(configuration->at(0), label_);
   format_ = agreed.format;
   stride_bytes_ = agreed.stride_bytes;
 
   libcamera::Stream* const stream = configuration->at(0).stream();
   allocator_ = std::make_unique<libcamera::FrameBufferAllocator>(camera_);
-  if (const int error = allocator_->allocate(stream); error < 0) fail_libcamera(name_, "gives no buffers", error);
+  if (const int error = allocator_->allocate(stream); error < 0) fail("gives no buffers", error);
   const auto& made = allocator_->buffers(stream);
   if (made.size() < 2 || made.size() > 256) {
-    refuse_libcamera(name_, concatenate("gives ", made.size(), " buffers, of which at least 2 are needed"));
+    refuse_camera(label_, concatenate("gives ", made.size(), " buffers, of which at least 2 are needed"));
   }
   slots_.reserve(made.size());
   for (const auto& buffer : made) make_slot(*buffer);
 
   device_entries_ = device_entries(**manager_, *camera_);
-  controls_ = LibcameraControls(camera_->controls(), name_);
+  controls_ = LibcameraControls(camera_->controls(), label_);
   libcamera::ControlList at_start(libcamera::controls::controls);
-  format_.fps = set_libcamera_rate(camera_->controls(), wish.fps, at_start);
+  format_.fps = set_libcamera_rate(camera_->controls(), request.fps, at_start);
   receiver_ = new LibcameraReceiver(camera_, mailbox_);
   if (const int error = camera_->start(at_start.empty() ? nullptr : &at_start); error < 0)
-    fail_libcamera(name_, "does not start", error);
+    fail("does not start", error);
   started_ = true;
   for (size_t index = 0; index < slots_.size(); ++index) {
     Slot& slot = slots_[index];
     slot.request = camera_->createRequest(index);
     int error = slot.request == nullptr ? -ENOMEM : slot.request->addBuffer(stream, slot.buffer);
     if (error == 0) error = camera_->queueRequest(slot.request.get());
-    if (error < 0) fail_libcamera(name_, "takes no requests", error);
+    if (error < 0) fail("takes no requests", error);
   }
   streaming_ = true;
 }
@@ -81,7 +84,7 @@ void LibcameraCamera::make_slot(libcamera::FrameBuffer& buffer) {
   Slot& slot = slots_.back();
   slot.buffer = &buffer;
   const auto& planes = buffer.planes();
-  if (planes.empty()) refuse_libcamera(name_, "has buffers without memory");
+  if (planes.empty()) refuse_camera(label_, "has buffers without memory");
   if (format_.jpeg) {
     slot.planes[0].data = map(slot, planes[0]);
     slot.size_bytes = planes[0].length;
@@ -95,8 +98,8 @@ void LibcameraCamera::make_slot(libcamera::FrameBuffer& buffer) {
     const size_t needed = stride_bytes_ * (rows - 1) + row;
     const size_t length = index < planes.size() ? planes[index].length : 0;
     if (row > stride_bytes_ || length < before + needed) {
-      refuse_libcamera(name_, concatenate("has ", length, " bytes in plane ", index, " of its buffers, and ",
-                                          before + needed, " are needed"));
+      refuse_camera(label_, concatenate("has ", length, " bytes in plane ", index, " of its buffers, and ",
+                                        before + needed, " are needed"));
     }
     slot.planes[plane] = {map(slot, planes[index]) + before, stride_bytes_};
     slot.size_bytes += needed;
@@ -111,22 +114,22 @@ const uint8_t* LibcameraCamera::map(Slot& slot, const libcamera::FrameBuffer::Pl
                               [&](const Mapping& other) { return other.fd.get() == plane.fd.get(); });
   if (mapping == slot.mappings.end()) {
     const off_t size = lseek(plane.fd.get(), 0, SEEK_END);
-    if (size <= 0) fail_libcamera(name_, "does not say how large its buffers are", size < 0 ? errno : EINVAL);
+    if (size <= 0) fail("does not say how large its buffers are", size < 0 ? errno : EINVAL);
     void* data = mmap(nullptr, size_t(size), PROT_READ, MAP_SHARED, plane.fd.get(), 0);
-    if (data == MAP_FAILED) fail_libcamera(name_, "does not map its buffers into memory", errno);
+    if (data == MAP_FAILED) fail("does not map its buffers into memory", errno);
     slot.mappings.push_back({plane.fd, data, size_t(size)});
     mapping = slot.mappings.end() - 1;
   }
   if (plane.offset == libcamera::FrameBuffer::Plane::kInvalidOffset ||
       size_t(plane.offset) + plane.length > mapping->size_bytes) {
-    refuse_libcamera(
-        name_, concatenate("has ", plane.length, " bytes at ", plane.offset, " of a buffer of ", mapping->size_bytes));
+    refuse_camera(
+        label_, concatenate("has ", plane.length, " bytes at ", plane.offset, " of a buffer of ", mapping->size_bytes));
   }
   return static_cast<const uint8_t*>(mapping->data) + plane.offset;
 }
 
 void LibcameraCamera::close() {
-  if (is_closed_) return;  // whoever releases the last frame waits for nobody
+  if (is_closed_) return;  // releasing the last frame must not block
   const auto lock = lock_libcamera_to_close();
   tear_down();
 }
@@ -136,8 +139,8 @@ void LibcameraCamera::tear_down() {
     std::lock_guard<std::mutex> lock(mutex_);
     streaming_ = false;
   }
-  // Stopping brings every request back. With a device that is gone libcamera (0.0.3 to 0.7.2) cannot stop, and aborts the
-  // program because requests are missing; so they go away with the camera then.
+  // Stopping brings every request back. With an unplugged device libcamera (0.0.3 to 0.7.2) cannot stop, and aborts the
+  // program because requests are missing; so they are destroyed with the camera then.
   if (started_ && !lost_ && !is_unplugged()) camera_->stop();
   started_ = false;
   if (receiver_ != nullptr) receiver_->retire();
@@ -171,7 +174,7 @@ bool LibcameraCamera::is_filled(Slot& slot) const {
   const std::unique_ptr<libcamera::Fence> fence = slot.buffer->releaseFence();
   if (fence == nullptr || !fence->isValid()) return true;
   pollfd signalled{fence->fd().get(), POLLIN, 0};
-  return ::poll(&signalled, 1, kFencePatienceMs) == 1 && (signalled.revents & POLLIN) != 0;
+  return ::poll(&signalled, 1, kFenceTimeoutMs) == 1 && (signalled.revents & POLLIN) != 0;
 }
 
 Camera::Event LibcameraCamera::wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) {
@@ -185,13 +188,13 @@ Camera::Event LibcameraCamera::wait(int wake_fd, int timeout_ms, CameraBuffer& b
   if (ready < 0 && errno != EINTR) return lost(std::strerror(errno));
   if (ready > 0 && (fds[1].revents & POLLIN) != 0) return Event::kWoken;
   const std::optional<LibcameraMailbox::Item> item = mailbox_.take();
-  if (!item) return is_unplugged() ? lost("the camera's device is gone") : Event::kTimeout;
+  if (!item) return is_unplugged() ? lost("the camera was unplugged") : Event::kTimeout;
   if (item->slot < 0) return lost(item->lost);
 
   Slot& slot = slots_[size_t(item->slot)];
   if (slot.request->status() == libcamera::Request::RequestCancelled) {
     // One is cancelled when the camera refuses its setting; when all of them are, nothing will come any more.
-    if (is_unplugged()) return lost("the camera's device is gone");
+    if (is_unplugged()) return lost("the camera was unplugged");
     if (++cancelled_in_a_row_ > 2 * int(slots_.size())) return lost("libcamera cancels every request");
     give_back(item->slot);
     return Event::kTimeout;
@@ -218,7 +221,7 @@ Camera::Event LibcameraCamera::wait(int wake_fd, int timeout_ms, CameraBuffer& b
   // libcamera does not say of which clock its times are; on most cameras it is this one.
   const int64_t now_ns = monotonic_ns();
   const int64_t taken_ns = int64_t(std::min<uint64_t>(metadata.timestamp, INT64_MAX));
-  const bool is_monotonic = taken_ns <= now_ns && taken_ns >= now_ns - kOldestFrameNs;
+  const bool is_monotonic = taken_ns <= now_ns && taken_ns >= now_ns - kMaxFrameAgeNs;
   buffer.timestamp_ns = is_monotonic ? taken_ns : now_ns;
   return Event::kFrame;
 }
@@ -234,7 +237,7 @@ void LibcameraCamera::give_back(int index) {
 }
 
 void LibcameraCamera::require_streaming() const {
-  if (!streaming_) throw Error(MAQ_ERROR_DEVICE_LOST, "libcamera:", name_, " is not open any more.");
+  if (!streaming_) throw Error(MAQ_ERROR_DEVICE_LOST, label_, " is not open any more.");
 }
 
 maq_control_info LibcameraCamera::control(maq_control which) {

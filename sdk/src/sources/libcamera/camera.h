@@ -19,11 +19,12 @@ namespace maq {
 
 class LibcameraCamera final : public Camera {
  public:
+  // `name`: an id of libcamera, or a number in its list.
   explicit LibcameraCamera(std::string name) : name_(std::move(name)) {}
   ~LibcameraCamera() override;
 
   // Both while lock_libcamera's mutex is held. tear_down() also after a start() that threw.
-  void start(const CameraWish& wish, int buffers);
+  void start(const CameraRequest& request, int buffers);
   void tear_down();
 
   const CameraFormat& format() const override { return format_; }
@@ -37,7 +38,7 @@ class LibcameraCamera final : public Camera {
 
  private:
   struct Mapping {
-    libcamera::SharedFD fd;  // open as long as somebody may hold the frame, also when libcamera has let it go
+    libcamera::SharedFD fd;  // open as long as a frame may be held, also when libcamera has closed its own
     void* data;
     size_t size_bytes;
   };
@@ -57,8 +58,10 @@ class LibcameraCamera final : public Camera {
   bool is_filled(Slot& slot) const;
   bool is_unplugged() const;
   void require_streaming() const;
+  [[noreturn]] void fail(const std::string& what, int error) const;
 
   std::string name_, identity_;
+  const std::string label_ = "libcamera:" + name_;
   CameraFormat format_;
   size_t stride_bytes_ = 0;
   int cancelled_in_a_row_ = 0;

@@ -12,7 +12,7 @@ namespace {
 
 namespace controls = libcamera::controls;
 
-constexpr size_t kMostWaiting = 64;
+constexpr size_t kMaxWaiting = 64;
 
 std::optional<double> number_of(const libcamera::ControlValue& value) {
   if (value.isArray()) return {};
@@ -32,7 +32,7 @@ const libcamera::ControlInfo* find(const libcamera::ControlInfoMap& offered, con
   return found == offered.end() ? nullptr : &found->second;
 }
 
-// Focus is the one automatic that is no switch, but one of several ways: we use that of always, and that of never.
+// Automatic focus is not a switch but one of several modes, of which two are used: continuous and manual.
 bool is_focus_mode(const libcamera::ControlId& id) { return id.id() == controls::AfMode.id(); }
 
 double from_libcamera(const libcamera::ControlId& id, double value) {
@@ -68,8 +68,8 @@ const LibcameraControls::Known LibcameraControls::kKnown[] = {
     {MAQ_CONTROL_BRIGHTNESS, controls::Brightness, nullptr},
 };
 
-LibcameraControls::LibcameraControls(const libcamera::ControlInfoMap& offered, std::string name)
-    : name_(std::move(name)) {
+LibcameraControls::LibcameraControls(const libcamera::ControlInfoMap& offered, std::string label)
+    : label_(std::move(label)) {
   for (const Known& known : kKnown) {
     if (const auto found = range(offered, known)) states_.push_back({&known, *found});
   }
@@ -79,13 +79,13 @@ LibcameraControls::LibcameraControls(const libcamera::ControlInfoMap& offered, s
 std::optional<maq_control_info> LibcameraControls::range(const libcamera::ControlInfoMap& offered, const Known& known) {
   const libcamera::ControlInfo* const control = find(offered, known.id);
   if (control == nullptr) return {};
-  const auto least = number_of(control->min()), most = number_of(control->max());
-  if (!least || !most || !(*least <= *most)) return {};
+  const auto min = number_of(control->min()), max = number_of(control->max());
+  if (!min || !max || !(*min <= *max)) return {};
   maq_control_info info{};
-  info.min = *least;
-  info.max = *most;
+  info.min = *min;
+  info.max = *max;
   info.step = known.id.type() == libcamera::ControlTypeFloat ? 0 : 1;
-  info.default_value = from_libcamera(known.id, number_of(control->def()).value_or(*least));
+  info.default_value = from_libcamera(known.id, number_of(control->def()).value_or(*min));
   if (is_focus_mode(known.id)) {
     const auto has = [&](int32_t way) {
       return std::any_of(control->values().begin(), control->values().end(),
@@ -103,26 +103,26 @@ const maq_control_info& LibcameraControls::get(maq_control which) const {
   for (const State& state : states_) {
     if (state.known->which == which) return state.info;
   }
-  throw Error(MAQ_ERROR_UNSUPPORTED, "libcamera:", name_, " has no control ", int(which), " (maq_control).");
+  throw Error(MAQ_ERROR_UNSUPPORTED, label_, " has no control ", int(which), " (maq_control).");
 }
 
 void LibcameraControls::set(maq_control which, double value) {
   const maq_control_info& info = get(which);
   if (!(value >= info.min && value <= info.max)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " of libcamera:", name_, " goes from ", info.min,
-                " to ", info.max, ", not to ", value, ".");
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " of ", label_, " goes from ", info.min, " to ",
+                info.max, ", not to ", value, ".");
   }
   State& state =
       *std::find_if(states_.begin(), states_.end(), [&](const State& other) { return other.known->which == which; });
   value = info.step > 0 ? std::round(value) : value;
-  // Somebody who moves a slider sets values faster than frames come.
+  // A slider that is moved sets values faster than frames come.
   if (!settings_.empty() && settings_.back().id == state.known->id.id()) {
     settings_.pop_back();
     return push(state, value);
   }
-  if (settings_.size() >= kMostWaiting) {
-    throw Error(MAQ_ERROR_BUSY, "libcamera:", name_, " has ", settings_.size(),
-                " settings waiting for its next frames; give frames back, and set this one later.");
+  if (settings_.size() >= kMaxWaiting) {
+    throw Error(MAQ_ERROR_BUSY, label_, " has ", settings_.size(),
+                " settings waiting for its next frames; release frames, and set this one later.");
   }
   for (State& other : states_) {
     if (&other.known->id == state.known->automatic) push(other, 0);
@@ -153,10 +153,10 @@ void LibcameraControls::note(const libcamera::ControlList& reported) {
 double set_libcamera_rate(const libcamera::ControlInfoMap& offered, double fps, libcamera::ControlList& at_start) {
   const libcamera::ControlInfo* const limits_us = find(offered, controls::FrameDurationLimits);
   if (fps <= 0 || limits_us == nullptr) return 0;
-  const double least_us = number_of(limits_us->min()).value_or(1);
-  const double most_us = number_of(limits_us->max()).value_or(1e9);
-  if (!(least_us >= 1) || !(least_us <= most_us)) return 0;
-  const int64_t duration_us = std::llround(std::clamp(1e6 / fps, least_us, most_us));
+  const double min_us = number_of(limits_us->min()).value_or(1);
+  const double max_us = number_of(limits_us->max()).value_or(1e9);
+  if (!(min_us >= 1) || !(min_us <= max_us)) return 0;
+  const int64_t duration_us = std::llround(std::clamp(1e6 / fps, min_us, max_us));
   const int64_t limits[2] = {duration_us, duration_us};
   at_start.set(controls::FrameDurationLimits.id(), libcamera::ControlValue(libcamera::Span<const int64_t, 2>(limits)));
   return 1e6 / double(duration_us);

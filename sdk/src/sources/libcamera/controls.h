@@ -16,8 +16,8 @@ namespace maq {
 class LibcameraControls {
  public:
   LibcameraControls() = default;
-  // Of those that the camera offers. `name` begins error texts.
-  LibcameraControls(const libcamera::ControlInfoMap& offered, std::string name);
+  // Of those that the camera offers. `label` begins error texts.
+  LibcameraControls(const libcamera::ControlInfoMap& offered, std::string label);
 
   // As those of maq::Camera.
   const maq_control_info& get(maq_control which) const;
@@ -43,7 +43,7 @@ class LibcameraControls {
   static std::optional<maq_control_info> range(const libcamera::ControlInfoMap& offered, const Known& known);
   void push(State& state, double value);
 
-  std::string name_;
+  std::string label_;
   std::vector<State> states_;
   std::deque<Setting> settings_;
 };

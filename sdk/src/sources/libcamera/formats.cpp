@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "core/error.h"
-#include "sources/libcamera/failure.h"
+#include "sources/camera_errors.h"
 
 namespace maq {
 namespace {
@@ -45,9 +45,9 @@ std::string four_letters(const libcamera::PixelFormat& format) {
   return letters.substr(0, letters.find_last_not_of(' ') + 1);
 }
 
-double size_error(const libcamera::Size& size, const libcamera::Size& wished) {
-  return std::abs(std::log(double(std::max(size.width, 1u)) / wished.width)) +
-         std::abs(std::log(double(std::max(size.height, 1u)) / wished.height));
+double size_error(const libcamera::Size& size, const libcamera::Size& wanted) {
+  return std::abs(std::log(double(std::max(size.width, 1u)) / wanted.width)) +
+         std::abs(std::log(double(std::max(size.height, 1u)) / wanted.height));
 }
 
 // False when the camera takes another format instead, or nothing.
@@ -68,9 +68,9 @@ bool propose(libcamera::CameraConfiguration& configuration, const KnownFormat& k
 }  // namespace
 
 std::unique_ptr<libcamera::CameraConfiguration> libcamera_configuration(libcamera::Camera& camera,
-                                                                        const std::string& name) {
+                                                                        const std::string& label) {
   auto configuration = camera.generateConfiguration({libcamera::StreamRole::Viewfinder});
-  if (configuration == nullptr || configuration->empty()) refuse_libcamera(name, "offers no stream of pictures");
+  if (configuration == nullptr || configuration->empty()) refuse_camera(label, "offers no stream of pictures");
   return configuration;
 }
 
@@ -85,10 +85,10 @@ std::vector<CameraMode> libcamera_modes(const libcamera::CameraConfiguration& co
   return modes;
 }
 
-void choose_libcamera_format(libcamera::CameraConfiguration& configuration, const CameraWish& wish, int buffers,
-                             const std::string& name) {
-  const libcamera::Size wished(wish.width_px > 0 ? unsigned(wish.width_px) : kDefaultWidthPx,
-                               wish.height_px > 0 ? unsigned(wish.height_px) : kDefaultHeightPx);
+void choose_libcamera_format(libcamera::CameraConfiguration& configuration, const CameraRequest& request, int buffers,
+                             const std::string& label) {
+  const libcamera::Size wanted(request.width_px > 0 ? unsigned(request.width_px) : kDefaultWidthPx,
+                               request.height_px > 0 ? unsigned(request.height_px) : kDefaultHeightPx);
   const libcamera::StreamConfiguration& stream = configuration.at(0);
   const libcamera::StreamFormats offered = stream.formats();
   const std::vector<libcamera::PixelFormat> pixel_formats = offered.pixelformats();
@@ -100,17 +100,18 @@ void choose_libcamera_format(libcamera::CameraConfiguration& configuration, cons
   std::optional<Choice> best;
   for (const KnownFormat& known : kKnownFormats) {
     if (std::find(pixel_formats.begin(), pixel_formats.end(), known.format) == pixel_formats.end()) continue;
-    if (!wish.format.empty() && wish.format != four_letters(known.format) && wish.format != known.format.toString()) {
+    if (!request.format.empty() && request.format != four_letters(known.format) &&
+        request.format != known.format.toString()) {
       continue;
     }
-    // What was wished for, and the nearest of the list: some cameras take any size, some the next smaller of the list.
+    // The size that was asked for, and the nearest of the list: some cameras take any size, some the next smaller of the list.
     std::vector<libcamera::Size> sizes = offered.sizes(known.format);
     const auto nearest = std::min_element(sizes.begin(), sizes.end(), [&](const auto& a, const auto& b) {
-      return size_error(a, wished) < size_error(b, wished);
+      return size_error(a, wanted) < size_error(b, wanted);
     });
-    for (const libcamera::Size& size : {wished, nearest == sizes.end() ? wished : *nearest}) {
+    for (const libcamera::Size& size : {wanted, nearest == sizes.end() ? wanted : *nearest}) {
       if (!propose(configuration, known, size, buffers)) continue;
-      const double error = size_error(stream.size, wished);
+      const double error = size_error(stream.size, wanted);
       if (!best || error < best->error) best = Choice{error, &known, stream.size};
     }
   }
@@ -119,19 +120,18 @@ void choose_libcamera_format(libcamera::CameraConfiguration& configuration, cons
     for (const libcamera::PixelFormat& format : pixel_formats) {
       names += (names.empty() ? "" : ", ") + four_letters(format);
     }
-    refuse_libcamera(name, concatenate("offers ", names.empty() ? "no format" : names, ", but ",
-                                       wish.format.empty() ? "none of them is understood" : "not " + wish.format));
+    refuse_camera(label, concatenate("offers ", names.empty() ? "no format" : names, ", but ",
+                                     request.format.empty() ? "none of them is understood" : "not " + request.format));
   }
-  if (!propose(configuration, *best->known, best->size, buffers))
-    refuse_libcamera(name, "does not take its own format");
+  if (!propose(configuration, *best->known, best->size, buffers)) refuse_camera(label, "does not take its own format");
 }
 
-LibcameraFormat agreed_libcamera_format(const libcamera::StreamConfiguration& agreed, const std::string& name) {
+LibcameraFormat agreed_libcamera_format(const libcamera::StreamConfiguration& agreed, const std::string& label) {
   const KnownFormat* known = known_format(agreed.pixelFormat);
   const uint64_t width = agreed.size.width, height = agreed.size.height;
   if (known == nullptr || agreed.stream() == nullptr || width < 1 || height < 1 || width > MAQ_MAX_SIDE_PX ||
       height > MAQ_MAX_SIDE_PX || width * height > MAQ_MAX_PIXELS) {
-    refuse_libcamera(name, concatenate("answered with a format that cannot be used (", width, " x ", height, ")"));
+    refuse_camera(label, concatenate("answered with a format that cannot be used (", width, " x ", height, ")"));
   }
   LibcameraFormat found;
   found.format.pixels = known->pixels;
@@ -142,7 +142,7 @@ LibcameraFormat agreed_libcamera_format(const libcamera::StreamConfiguration& ag
   const size_t row = row_bytes(known->pixels, 0, found.format.width_px);
   found.stride_bytes = agreed.stride == 0 ? row : agreed.stride;
   if (found.stride_bytes < row || found.stride_bytes > 16 * row) {
-    refuse_libcamera(name, concatenate("answered with lines of ", found.stride_bytes, " bytes for ", width, " pixels"));
+    refuse_camera(label, concatenate("answered with lines of ", found.stride_bytes, " bytes for ", width, " pixels"));
   }
   return found;
 }

@@ -12,23 +12,23 @@
 
 namespace maq {
 
-// Acquired or not. Throws MAQ_ERROR_UNSUPPORTED for a camera that offers no pictures; `name` begins the sentence.
+// Acquired or not. Throws MAQ_ERROR_UNSUPPORTED for a camera that offers no pictures; `label` ("libcamera:0") begins the sentence.
 std::unique_ptr<libcamera::CameraConfiguration> libcamera_configuration(libcamera::Camera& camera,
-                                                                        const std::string& name);
+                                                                        const std::string& label);
 
 // Every format and size of the camera.
 std::vector<CameraMode> libcamera_modes(const libcamera::CameraConfiguration& configuration);
 
-// Makes the configuration the nearest to the wish: of all formats that both sides know, the one nearest in size, then the
+// Makes the configuration the nearest to the request: of all formats that both sides know, the one nearest in size, then the
 // cheapest to use. Throws MAQ_ERROR_UNSUPPORTED.
-void choose_libcamera_format(libcamera::CameraConfiguration& configuration, const CameraWish& wish, int buffers,
-                             const std::string& name);
+void choose_libcamera_format(libcamera::CameraConfiguration& configuration, const CameraRequest& request, int buffers,
+                             const std::string& label);
 
 // What the camera agreed to, checked before it is believed, and the bytes of a line.
 struct LibcameraFormat {
   CameraFormat format;
   size_t stride_bytes = 0;
 };
-LibcameraFormat agreed_libcamera_format(const libcamera::StreamConfiguration& agreed, const std::string& name);
+LibcameraFormat agreed_libcamera_format(const libcamera::StreamConfiguration& agreed, const std::string& label);
 
 }  // namespace maq

@@ -13,17 +13,17 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "sources/libcamera/failure.h"
+#include "sources/camera_errors.h"
 
-// Private in libcamera's header, but a symbol of its library: whoever makes a second manager in a process is aborted.
+// Private in libcamera's header, but a symbol of its library: making a second manager in a process aborts it.
 extern libcamera::CameraManager* running_manager __asm__("_ZN9libcamera13CameraManager5self_E") __attribute__((weak));
 
 namespace maq {
 namespace {
 
-constexpr int kMostDevices = 64;
-constexpr std::chrono::seconds kPatience(5);
-constexpr std::chrono::seconds kPatienceAtExit(2);
+constexpr int kMaxDevices = 64;
+constexpr std::chrono::seconds kLockTimeout(5);
+constexpr std::chrono::seconds kExitTimeout(2);
 
 struct Library {
   std::timed_mutex mutex;
@@ -38,9 +38,9 @@ Library& library() {
 }
 
 // The thread of the source that was destroyed last may still be closing its camera when the program ends. libcamera's own
-// static objects, which are destroyed after this one, must not go away under it; so nobody gets the mutex any more.
+// static objects, which are destroyed after this one, must not go away under it; so the mutex is taken for good.
 struct ExitGuard {
-  ~ExitGuard() { [[maybe_unused]] const bool kept = library().mutex.try_lock_for(kPatienceAtExit); }
+  ~ExitGuard() { [[maybe_unused]] const bool kept = library().mutex.try_lock_for(kExitTimeout); }
 } exit_guard;
 
 std::unique_ptr<libcamera::CameraManager> start_manager() {
@@ -62,7 +62,7 @@ std::unique_ptr<libcamera::CameraManager> start_manager() {
 
 // libcamera leaves out the devices that it may not open.
 bool may_open_media_devices() {
-  for (int number = 0; number < kMostDevices; ++number) {
+  for (int number = 0; number < kMaxDevices; ++number) {
     const std::string path = "/dev/media" + std::to_string(number);
     if (access(path.c_str(), R_OK | W_OK) != 0 && errno == EACCES) return false;
   }
@@ -72,9 +72,9 @@ bool may_open_media_devices() {
 }  // namespace
 
 std::unique_lock<std::timed_mutex> lock_libcamera() {
-  std::unique_lock<std::timed_mutex> lock(library().mutex, kPatience);
+  std::unique_lock<std::timed_mutex> lock(library().mutex, kLockTimeout);
   if (!lock) {
-    throw Error(MAQ_ERROR_BUSY, "libcamera has been opening or closing another camera for ", kPatience.count(),
+    throw Error(MAQ_ERROR_BUSY, "libcamera has been opening or closing another camera for ", kLockTimeout.count(),
                 " s; does that one hang?");
   }
   return lock;
@@ -102,7 +102,7 @@ std::shared_ptr<libcamera::Camera> find_libcamera_camera(libcamera::CameraManage
   for (const std::shared_ptr<libcamera::Camera>& camera : cameras) {
     if (camera->id() == name) return camera;
   }
-  if (!may_open_media_devices()) fail_libcamera(name, "is not there, or out of reach", EACCES);
+  if (!may_open_media_devices()) fail_camera("libcamera:" + name, "is not there, or may not be opened", EACCES);
   throw Error(MAQ_ERROR_NOT_FOUND, "libcamera:", name, " is not there: libcamera sees ",
               cameras.empty() ? "no camera" : concatenate(cameras.size(), cameras.size() == 1 ? " camera" : " cameras"),
               ". Is it plugged in, and is this its id? `maquette sources` lists them.");
@@ -112,7 +112,7 @@ std::vector<std::string> device_entries([[maybe_unused]] libcamera::CameraManage
                                         const libcamera::Camera& camera) {
   std::vector<dev_t> numbers;
 #if LIBCAMERA_VERSION_MAJOR == 0 && LIBCAMERA_VERSION_MINOR == 0
-  for (int number = 0; number < kMostDevices; ++number) {
+  for (int number = 0; number < kMaxDevices; ++number) {
     const std::string path = "/dev/video" + std::to_string(number);
     struct stat found {};
     if (stat(path.c_str(), &found) == 0 && manager.get(found.st_rdev).get() == &camera) {

@@ -1,4 +1,4 @@
-// libcamera as a whole: a process may have one camera manager at a time. It runs as long as somebody uses it.
+// libcamera as a whole: a process may have one camera manager at a time. It runs as long as a camera uses it.
 #pragma once
 
 #include <libcamera/camera.h>
@@ -11,7 +11,7 @@
 
 namespace maq {
 
-// Held while cameras are opened, closed and listed: a manager must be gone before the next starts, and a camera released
+// Held while cameras are opened, closed and listed: a manager must be destroyed before the next starts, and a camera released
 // before it is acquired again. Throws MAQ_ERROR_BUSY when another camera hangs in it.
 std::unique_lock<std::timed_mutex> lock_libcamera();
 // The same, for as long as it takes.

@@ -30,7 +30,7 @@ CameraListing describe(libcamera::Camera& camera) {
   const auto model = camera.properties().get(libcamera::properties::Model);
   listing.name = model ? std::string(*model) : camera.id();
   try {
-    listing.modes = libcamera_modes(*libcamera_configuration(camera, camera.id()));
+    listing.modes = libcamera_modes(*libcamera_configuration(camera, "libcamera:" + camera.id()));
   } catch (const Error& error) {
     listing.status = error.status();
     listing.problem = error.what();
@@ -40,11 +40,11 @@ CameraListing describe(libcamera::Camera& camera) {
 
 class Cameras : public LibcameraCameras {
  public:
-  std::shared_ptr<Camera> open(const std::string& name, const CameraWish& wish, int buffers) const override {
+  std::shared_ptr<Camera> open(const std::string& name, const CameraRequest& request, int buffers) const override {
     const auto camera = std::make_shared<LibcameraCamera>(name);  // before the lock: destroyed after it
     const auto lock = lock_libcamera();
     try {
-      camera->start(wish, buffers);
+      camera->start(request, buffers);
     } catch (...) {
       camera->tear_down();
       throw;

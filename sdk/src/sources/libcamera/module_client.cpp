@@ -1,6 +1,6 @@
+#include "sources/libcamera/module_client.h"
 #include "core/module.h"
 #include "sources/control_options.h"
-#include "sources/libcamera/module_client.h"
 
 namespace maq {
 namespace {
@@ -15,11 +15,11 @@ const LibcameraCameras& cameras() {
 
 }  // namespace
 
-CameraOpener libcamera_camera_opener(SourceUri uri, int buffers, const Log&) {
-  CameraWish wish{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
+CameraOpener libcamera_uri_opener(SourceUri uri, int buffers, const Log&) {
+  CameraRequest request{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
   uri.expect_no_more_options(std::string("size, fps, format, ") + kControlOptions);
-  return [name = uri.target, wish = std::move(wish), buffers]() mutable {
-    std::shared_ptr<Camera> camera = cameras().open(name, wish, buffers);
+  return [name = uri.target, request = std::move(request), buffers]() mutable {
+    std::shared_ptr<Camera> camera = cameras().open(name, request, buffers);
     name = camera->identity();
     return camera;
   };

@@ -1,5 +1,5 @@
-// Cameras of libcamera. What includes its headers is a library of its own, libmaquette_libcamera.so (core/module.h):
-// libcamera brings some twenty shared libraries, and most machines do without.
+// Cameras of libcamera. The code that includes its headers is a module, libmaquette_libcamera.so (core/module.h):
+// libcamera brings some twenty shared libraries, which most machines do without.
 #pragma once
 
 #include <memory>
@@ -12,24 +12,24 @@
 
 namespace maq {
 
-// What that library exports.
+// What the module exports.
 class LibcameraCameras {
  public:
   virtual ~LibcameraCameras() = default;
   // Opens the camera `name`, an id of libcamera or a number in its list, and starts it. Throws what
-  // libcamera_camera_opener throws.
-  virtual std::shared_ptr<Camera> open(const std::string& name, const CameraWish& wish, int buffers) const = 0;
+  // libcamera_uri_opener throws.
+  virtual std::shared_ptr<Camera> open(const std::string& name, const CameraRequest& request, int buffers) const = 0;
   virtual std::vector<CameraListing> list() const = 0;
 };
 constexpr char kLibcameraSymbol[] = "maquette_libcamera";
 
-// For "libcamera:0" or "libcamera:<id>", with size, fps and format as wishes. Throws for options that are none.
+// For "libcamera:0" or "libcamera:<id>", with size, fps and format as requests. Throws for unknown options.
 // Opening throws MAQ_ERROR_RUNTIME_LIBRARY without libmaquette_libcamera.so, and MAQ_ERROR_NOT_FOUND, _NO_PERMISSION,
 // _BUSY, _DEVICE_LOST, _OUT_OF_MEMORY, and _UNSUPPORTED for a camera without a format that this build knows. Opened again,
 // it is the camera of the same id, whatever number it has then.
-CameraOpener libcamera_camera_opener(SourceUri uri, int buffers, const Log& log);
+CameraOpener libcamera_uri_opener(SourceUri uri, int buffers, const Log& log);
 
-// Those that are there; none without the library.
+// The cameras that are connected; empty without the module.
 std::vector<CameraListing> list_libcamera_cameras();
 
 }  // namespace maq

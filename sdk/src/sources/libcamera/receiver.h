@@ -1,4 +1,4 @@
-// From libcamera's thread to that of a source: what happened to a camera.
+// Events of a camera, from libcamera's thread to that of a source.
 #pragma once
 
 #include <libcamera/base/object.h>
@@ -31,8 +31,8 @@ class LibcameraMailbox {
   std::vector<Item> items_;
 };
 
-// Gets what libcamera tells of a camera. It lives in libcamera's thread, the only one in which signals can be connected
-// and disconnected while they may be sent.
+// Receives libcamera's signals of a camera. It lives in libcamera's thread, the only one in which signals can be
+// connected and disconnected while they may be sent.
 class LibcameraReceiver : public libcamera::Object {
  public:
   LibcameraReceiver(std::shared_ptr<libcamera::Camera> camera, LibcameraMailbox& mailbox);

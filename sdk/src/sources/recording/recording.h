@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,8 @@
 #include "core/unique_fd.h"
 #include "image/files/jpeg.h"
 #include "maquette/source.h"
+#include "sources/source.h"
+#include "sources/uri.h"
 
 namespace maq {
 
@@ -64,8 +67,8 @@ struct RecordedFrame {
 
 class RecordingReader {
  public:
-  // Throws MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (no recording, or no whole frame in it), MAQ_ERROR_UNSUPPORTED (of a
-  // newer version). A recording without a sound index is looked through; the log says so.
+  // Throws MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (not a recording, or no whole frame in it), MAQ_ERROR_UNSUPPORTED (of
+  // a newer version). A recording without a valid index is searched for frames; the log says so.
   RecordingReader(std::string path, const Log& log);
 
   const RecordingInfo& info() const { return info_; }
@@ -83,7 +86,7 @@ class RecordingReader {
   bool read_at(uint64_t offset, void* bytes, size_t size_bytes) const;
   void read_head();
   bool read_index();
-  void look_for_frames();
+  void scan_for_frames();
 
   std::string path_;
   UniqueFd file_;
@@ -95,5 +98,9 @@ class RecordingReader {
   std::vector<uint8_t> payload_;
   JpegDecoder jpeg_;
 };
+
+// For "rec:take.maqrec": the frames at their times, from `from` to `to` seconds, with seek(). next() throws
+// MAQ_ERROR_UNREADABLE for a damaged frame, and goes on after it. Throws what RecordingReader throws.
+std::unique_ptr<Source> open_recording_source(SourceUri uri, const Log& log);
 
 }  // namespace maq

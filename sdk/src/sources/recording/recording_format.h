@@ -10,7 +10,7 @@ inline constexpr char kRecordingEnd[8] = {'M', 'A', 'Q', 'E', 'N', 'D', '\r', '\
 inline constexpr uint32_t kRecordingVersion = 1;
 inline constexpr uint32_t kFrameMagic = 0x4651414d;  // "MAQF"
 inline constexpr uint32_t kJpegEncoding = 100;       // beside the values of maq_pixel_format
-inline constexpr uint32_t kMostHeadBytes = 1 << 20;
+inline constexpr uint32_t kMaxHeadBytes = 1 << 20;
 
 // Checks are the 64-bit XXH3 hash of https://xxhash.com, or its lower half.
 

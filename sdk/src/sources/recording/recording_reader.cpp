@@ -22,8 +22,8 @@ bool is_allowed_size(int64_t width_px, int64_t height_px) {
          width_px * height_px <= MAQ_MAX_PIXELS;
 }
 
-// Whether the head is one, and all its figures go together.
-bool is_sound(const FrameHead& head) {
+// Whether this is the head of a frame, and its values agree.
+bool is_valid(const FrameHead& head) {
   constexpr size_t kChecked = offsetof(FrameHead, timestamp_ns);
   if (head.magic != kFrameMagic) return false;
   if (head.head_check != uint32_t(XXH3_64bits(&head.timestamp_ns, sizeof head - kChecked))) return false;
@@ -73,8 +73,8 @@ RecordingReader::RecordingReader(std::string path, const Log& log)
   read_head();
   has_index_ = read_index();
   if (!has_index_) {
-    look_for_frames();
-    log.write(MAQ_LOG_WARNING, path_, " has no sound index, as after a crash or a change: ", entries_.size(),
+    scan_for_frames();
+    log.write(MAQ_LOG_WARNING, path_, " has no valid index, as after a crash or a change: ", entries_.size(),
               " whole frames were found in it.");
   }
   if (entries_.empty()) throw Error(MAQ_ERROR_UNREADABLE, path_, " holds no whole frame.");
@@ -103,8 +103,8 @@ void RecordingReader::read_head() {
     throw Error(MAQ_ERROR_UNSUPPORTED, path_, " is a recording of version ", head.version, ", but this SDK reads ",
                 kRecordingVersion, "; use a newer one.");
   }
-  std::string json(std::min(head.json_bytes, kMostHeadBytes), '\0');
-  if (head.json_bytes > kMostHeadBytes || !read_at(sizeof head, json.data(), json.size()) ||
+  std::string json(std::min(head.json_bytes, kMaxHeadBytes), '\0');
+  if (head.json_bytes > kMaxHeadBytes || !read_at(sizeof head, json.data(), json.size()) ||
       head.json_check != XXH3_64bits(json.data(), json.size())) {
     throw Error(MAQ_ERROR_UNREADABLE, path_, " is damaged: its head is not what was written; copy it again.");
   }
@@ -141,14 +141,14 @@ bool RecordingReader::read_index() {
   return true;
 }
 
-// From head to head; where there is none, at the next place that looks like one.
-void RecordingReader::look_for_frames() {
+// Goes from head to head; where there is none, searches for the next.
+void RecordingReader::scan_for_frames() {
   std::vector<uint8_t> window(1 << 20);
   uint64_t offset = first_offset_;
   while (offset + sizeof(FrameHead) <= size_bytes_) {
     FrameHead head{};
     if (!read_at(offset, &head, sizeof head)) return;
-    if (is_sound(head) && whole_bytes(head) <= size_bytes_ - offset) {
+    if (is_valid(head) && whole_bytes(head) <= size_bytes_ - offset) {
       if (entries_.empty() || head.timestamp_ns > entries_.back().timestamp_ns) {
         entries_.push_back({offset, head.timestamp_ns});
       }
@@ -168,14 +168,14 @@ void RecordingReader::look_for_frames() {
 
 std::optional<RecordedFrame> RecordingReader::describe(size_t index) const {
   FrameHead head{};
-  if (!read_at(entries_[index].offset, &head, sizeof head) || !is_sound(head)) return {};
+  if (!read_at(entries_[index].offset, &head, sizeof head) || !is_valid(head)) return {};
   return RecordedFrame{head.width_px, head.height_px, head.sequence};
 }
 
 void RecordingReader::read(size_t index, Frame& frame) {
   const uint64_t offset = entries_[index].offset;
   FrameHead head{};
-  bool is_whole = read_at(offset, &head, sizeof head) && is_sound(head) && whole_bytes(head) <= size_bytes_ - offset;
+  bool is_whole = read_at(offset, &head, sizeof head) && is_valid(head) && whole_bytes(head) <= size_bytes_ - offset;
   if (is_whole) {
     payload_.resize(head.picture_bytes + depth_bytes(head));
     is_whole = read_at(offset + sizeof head, payload_.data(), payload_.size()) &&

@@ -3,7 +3,6 @@
 
 #include "core/error.h"
 #include "image/geometry/resize.h"
-#include "sources/files/file_sources.h"
 #include "sources/recording/recording.h"
 
 namespace maq {

@@ -18,18 +18,20 @@ namespace {
 using Clock = MonotonicClock;
 using std::chrono::nanoseconds;
 
-constexpr int64_t kForEver = INT64_MAX;
+constexpr int64_t kIndefinitely = INT64_MAX;
 
-// What goes on while cameras are opened and lost: events happen once, and random numbers do not begin anew.
-struct Course {
-  explicit Course(const FaultPlan& of) : plan(of), random(of.seed) {}
+// What outlives a camera that is lost and opened again: each event happens once, and the random numbers continue.
+struct FaultTimeline {
+  explicit FaultTimeline(const FaultPlan& of) : plan(of), random(of.seed) {}
 
-  // Whether the event is due now; it then never is again.
-  bool comes(std::optional<FaultEvent>& event) const {
+  // Whether the event is due now.
+  bool is_due(std::optional<FaultEvent>& event) const {
     if (!event) return false;
     return event->frame >= 0 ? frames >= event->frame : Clock::now() - begin >= nanoseconds(event->at_ns);
   }
-  bool chance(double share) { return share > 0 && std::uniform_real_distribution<>(0, 1)(random) < share; }
+  bool chance(double probability) {
+    return probability > 0 && std::uniform_real_distribution<>(0, 1)(random) < probability;
+  }
 
   FaultPlan plan;
   std::mt19937_64 random;
@@ -39,13 +41,13 @@ struct Course {
 };
 
 Clock::time_point after(int64_t lasts_ns) {
-  return lasts_ns == kForEver ? Clock::time_point::max() : Clock::now() + nanoseconds(lasts_ns);
+  return lasts_ns == kIndefinitely ? Clock::time_point::max() : Clock::now() + nanoseconds(lasts_ns);
 }
 
 class FaultyCamera : public Camera {
  public:
-  FaultyCamera(std::shared_ptr<Camera> camera, std::shared_ptr<Course> course)
-      : camera_(std::move(camera)), course_(std::move(course)) {}
+  FaultyCamera(std::shared_ptr<Camera> camera, std::shared_ptr<FaultTimeline> timeline)
+      : camera_(std::move(camera)), timeline_(std::move(timeline)) {}
 
   const CameraFormat& format() const override { return camera_->format(); }
   const std::string& identity() const override { return camera_->identity(); }
@@ -64,32 +66,32 @@ class FaultyCamera : public Camera {
 
   Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) override {
     const auto deadline = Clock::now() + std::chrono::milliseconds(timeout_ms);
-    Course& course = *course_;
+    FaultTimeline& timeline = *timeline_;
     for (;;) {
-      if (const auto lasts_ns = due(course.plan.hang)) {
+      if (const auto lasts_ns = due(timeline.plan.hang)) {
         std::this_thread::sleep_for(nanoseconds(*lasts_ns));
       }
-      if (const auto lasts_ns = due(course.plan.unplug)) {
-        course.absent_until = after(*lasts_ns);
+      if (const auto lasts_ns = due(timeline.plan.unplug)) {
+        timeline.absent_until = after(*lasts_ns);
         reason = "unplugged, as its URI asks";
         return Event::kLost;
       }
-      if (const auto lasts_ns = due(course.plan.stall)) stalled_until_ = after(*lasts_ns);
+      if (const auto lasts_ns = due(timeline.plan.stall)) stalled_until_ = after(*lasts_ns);
 
-      // Looks again at what is due after a few milliseconds, also when no frame comes.
+      // Checks what is due every few milliseconds, also when no frame comes.
       const auto now = Clock::now();
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - now).count();
-      const Event event = camera_->wait(wake_fd, int(std::clamp<int64_t>(left, 0, kLookEveryMs)), buffer, reason);
+      const Event event = camera_->wait(wake_fd, int(std::clamp<int64_t>(left, 0, kCheckEveryMs)), buffer, reason);
       if (event == Event::kTimeout && Clock::now() < deadline) continue;
       if (event != Event::kFrame) return event;
-      ++course.frames;
-      if (Clock::now() < stalled_until_ || course.chance(course.plan.drop)) {
+      ++timeline.frames;
+      if (Clock::now() < stalled_until_ || timeline.chance(timeline.plan.drop)) {
         camera_->give_back(buffer.slot);
         buffer = {};
         continue;
       }
-      if (course.chance(course.plan.corrupt)) damage(buffer);
-      if (course.plan.jitter_ns > 0 && delay(wake_fd)) {
+      if (timeline.chance(timeline.plan.corrupt)) damage(buffer);
+      if (timeline.plan.jitter_ns > 0 && delay(wake_fd)) {
         give_back(buffer.slot);
         return Event::kWoken;
       }
@@ -99,22 +101,22 @@ class FaultyCamera : public Camera {
 
  private:
   static constexpr int kOwnSlots = 1 << 16;
-  static constexpr int kLookEveryMs = 5;
+  static constexpr int kCheckEveryMs = 5;
   struct Copy {
     std::vector<uint8_t> pixels;
     bool is_free = true;
   };
 
   std::optional<int64_t> due(std::optional<FaultEvent>& event) {
-    if (!course_->comes(event)) return {};
+    if (!timeline_->is_due(event)) return {};
     const int64_t lasts_ns = event->lasts_ns;
     event.reset();
     return lasts_ns;
   }
 
-  // Late by a random time; true when the wait was cut short.
+  // Delays by a random time; true when woken before.
   bool delay(int wake_fd) {
-    const int64_t late_ns = std::uniform_int_distribution<int64_t>(0, course_->plan.jitter_ns)(course_->random);
+    const int64_t late_ns = std::uniform_int_distribution<int64_t>(0, timeline_->plan.jitter_ns)(timeline_->random);
     pollfd wake{wake_fd, POLLIN, 0};
     const timespec time{late_ns / 1000000000, late_ns % 1000000000};
     return ::ppoll(&wake, 1, &time, nullptr) > 0;
@@ -134,9 +136,9 @@ class FaultyCamera : public Camera {
     copy.pixels.resize(packed_bytes(image.format, image.width_px, image.height_px));
     copy_packed(image, copy.pixels.data());
     const size_t slot = size_t(&copy - copies_.data());
-    const size_t begin = std::uniform_int_distribution<size_t>(0, copy.pixels.size() / 2)(course_->random);
+    const size_t begin = std::uniform_int_distribution<size_t>(0, copy.pixels.size() / 2)(timeline_->random);
     const size_t end = begin + copy.pixels.size() / 4;
-    for (size_t i = begin; i < end; ++i) copy.pixels[i] = uint8_t(course_->random());
+    for (size_t i = begin; i < end; ++i) copy.pixels[i] = uint8_t(timeline_->random());
     camera_->give_back(buffer.slot);
     buffer.depth.width_px = 0;
     buffer.image = packed_view(image.format, image.width_px, image.height_px, copy.pixels.data());
@@ -144,13 +146,13 @@ class FaultyCamera : public Camera {
   }
 
   std::shared_ptr<Camera> camera_;
-  std::shared_ptr<Course> course_;
+  std::shared_ptr<FaultTimeline> timeline_;
   Clock::time_point stalled_until_ = Clock::time_point::min();
   std::mutex mutex_;  // of copies_
   std::vector<Copy> copies_;
 };
 
-// "2s", "20ms"; "" is for ever where that has a meaning.
+// Of "2s" or "20ms".
 std::optional<int64_t> duration_ns(const std::string& text) {
   size_t digits = text.find_first_not_of("0123456789.");
   if (digits == 0 || digits == std::string::npos) return {};
@@ -160,14 +162,14 @@ std::optional<int64_t> duration_ns(const std::string& text) {
   return int64_t(*number * (unit == "s" ? 1e9 : 1e6));
 }
 
-std::optional<FaultEvent> take_event(SourceUri& uri, const std::string& key, bool may_last_for_ever) {
+std::optional<FaultEvent> take_event(SourceUri& uri, const std::string& key, bool may_be_endless) {
   if (uri.options.count(key) == 0) return {};
   const std::string text = uri.take_text(key);
   const size_t at = text.find('@');
   FaultEvent event;
   if (at != std::string::npos) {
     const std::string lasts = text.substr(0, at), when = text.substr(at + 1);
-    const auto lasts_ns = lasts.empty() && may_last_for_ever ? kForEver : duration_ns(lasts);
+    const auto lasts_ns = lasts.empty() && may_be_endless ? kIndefinitely : duration_ns(lasts);
     const auto at_ns = duration_ns(when);
     const auto frame = read_number(when);
     if (at_ns) event.at_ns = *at_ns;
@@ -179,7 +181,7 @@ std::optional<FaultEvent> take_event(SourceUri& uri, const std::string& key, boo
   }
   throw Error(MAQ_ERROR_INVALID_ARGUMENT, key, " in ", uri.text, " is not understood; write ", key,
               "=2s@10s (for 2 s after 10 s), or ", key, "=2s@100 (at frame 100)",
-              may_last_for_ever ? concatenate(", or ", key, "@10s (for ever).") : ".");
+              may_be_endless ? concatenate(", or ", key, "@10s (indefinitely).") : ".");
 }
 
 }  // namespace
@@ -207,13 +209,14 @@ FaultPlan take_faults(SourceUri& uri) {
 }
 
 CameraOpener with_faults(CameraOpener open, const FaultPlan& plan) {
-  return [open = std::move(open), plan, course = std::shared_ptr<Course>()]() mutable -> std::shared_ptr<Camera> {
-    if (course == nullptr) course = std::make_shared<Course>(plan);
-    if (course->absent_until && Clock::now() < *course->absent_until) {
-      throw Error(MAQ_ERROR_NOT_FOUND, "It is unplugged, as its URI asks.");
-    }
-    return std::make_shared<FaultyCamera>(open(), course);
-  };
+  return
+      [open = std::move(open), plan, timeline = std::shared_ptr<FaultTimeline>()]() mutable -> std::shared_ptr<Camera> {
+        if (timeline == nullptr) timeline = std::make_shared<FaultTimeline>(plan);
+        if (timeline->absent_until && Clock::now() < *timeline->absent_until) {
+          throw Error(MAQ_ERROR_NOT_FOUND, "It is unplugged, as its URI asks.");
+        }
+        return std::make_shared<FaultyCamera>(open(), timeline);
+      };
 }
 
 }  // namespace maq

@@ -16,12 +16,12 @@ namespace {
 using Clock = MonotonicClock;
 using std::chrono::nanoseconds;
 
-constexpr double kStillFps = 30;  // of one picture that is shown for ever
+constexpr double kStillFps = 30;  // of a single image, which is repeated
 
-// The source and where in it time has got to.
-class Reel {
+// The source, and when each of its frames is due.
+class ReplaySchedule {
  public:
-  Reel(std::function<std::unique_ptr<Source>()> open, PlayOptions options)
+  ReplaySchedule(std::function<std::unique_ptr<Source>()> open, ReplayOptions options)
       : open_(std::move(open)), options_(options), source_(open_()), can_seek_(source_->can_seek()) {}
 
   const SourceInfo& info() const { return source_->info(); }
@@ -43,7 +43,7 @@ class Reel {
         if (source_->next(0, frame) == NextFrame::kFrame) break;
       } catch (const Error& error) {
         if (error.status() != MAQ_ERROR_UNREADABLE || readable_ == 0) throw;
-        damaged = true;  // a camera would leave the frame out
+        damaged = true;  // a camera would drop the frame
         break;
       }
       if (!options_.loop || again) return {};
@@ -75,7 +75,7 @@ class Reel {
 
  private:
   std::function<std::unique_ptr<Source>()> open_;
-  PlayOptions options_;
+  ReplayOptions options_;
   std::unique_ptr<Source> source_;
   const bool can_seek_;
   std::optional<Clock::time_point> begin_;  // when time 0 of the source was, or would have been
@@ -85,21 +85,21 @@ class Reel {
   uint64_t last_sequence_ = 0, lap_sequence_ = 0;
 };
 
-class PlayedCamera : public Camera {
+class ReplayCamera : public Camera {
  public:
-  PlayedCamera(std::shared_ptr<Reel> reel, std::string identity, int buffers)
-      : reel_(std::move(reel)), identity_(std::move(identity)), slots_(size_t(buffers)) {
-    next_ = reel_->read(ahead_);
+  ReplayCamera(std::shared_ptr<ReplaySchedule> schedule, std::string identity, int buffers)
+      : schedule_(std::move(schedule)), identity_(std::move(identity)), slots_(size_t(buffers)) {
+    next_ = schedule_->read(ahead_);
     format_.pixels = ahead_.image.format;
-    format_.width_px = reel_->info().width_px;
-    format_.height_px = reel_->info().height_px;
-    format_.fps = reel_->fps();
-    patience_ = nanoseconds(int64_t(buffers * 1e9 / format_.fps));
+    format_.width_px = schedule_->info().width_px;
+    format_.height_px = schedule_->info().height_px;
+    format_.fps = schedule_->fps();
+    max_delay_ = nanoseconds(int64_t(buffers * 1e9 / format_.fps));
   }
 
   const CameraFormat& format() const override { return format_; }
   const std::string& identity() const override { return identity_; }
-  const maq_intrinsics* calibration() const override { return reel_->calibration(); }
+  const maq_intrinsics* calibration() const override { return schedule_->calibration(); }
   void close() override {}
 
   void give_back(int slot) override {
@@ -108,7 +108,7 @@ class PlayedCamera : public Camera {
   }
 
   void seek(int64_t time_ns) override {
-    if (!reel_->can_seek()) Camera::seek(time_ns);  // throws
+    if (!schedule_->can_seek()) Camera::seek(time_ns);  // throws
     std::lock_guard<std::mutex> lock(mutex_);
     seek_to_ns_ = time_ns;
   }
@@ -118,15 +118,15 @@ class PlayedCamera : public Camera {
     for (;;) {
       seek_if_asked();
       if (!next_) {
-        next_ = reel_->read(ahead_);
+        next_ = schedule_->read(ahead_);
         if (!next_) return Event::kEnd;
       }
       if (const bool woken = sleep_until(wake_fd, std::min(next_->due, deadline)); woken) return Event::kWoken;
       if (Clock::now() < next_->due) return Event::kTimeout;
-      const Reel::Next now = *next_;
+      const ReplaySchedule::Next now = *next_;
       next_.reset();
-      // A device would have been away, or would have had no buffer left for it.
-      if (now.due < opened_ || Clock::now() - now.due > patience_) continue;
+      // Frames of before the camera was opened, and those for which a device would have had no buffer left.
+      if (now.due < opened_ || Clock::now() - now.due > max_delay_) continue;
       const int slot = free_slot();
       if (slot < 0) continue;  // the app holds all: the frame is lost
       Frame& frame = slots_[size_t(slot)].frame;
@@ -137,7 +137,7 @@ class PlayedCamera : public Camera {
       buffer.timestamp_ns = to_ns(now.due);
       buffer.sequence = now.sequence;
       buffer.damaged = now.damaged;
-      buffer.seeks = reel_->seeks();
+      buffer.seeks = schedule_->seeks();
       return Event::kFrame;
     }
   }
@@ -148,7 +148,7 @@ class PlayedCamera : public Camera {
     bool is_free = true;
   };
 
-  // True when it was woken before.
+  // True when woken before.
   static bool sleep_until(int wake_fd, Clock::time_point time) {
     const int64_t left_ns = std::max<int64_t>(0, nanoseconds(time - Clock::now()).count());
     pollfd wake{wake_fd, POLLIN, 0};
@@ -159,7 +159,7 @@ class PlayedCamera : public Camera {
   int free_slot() {
     std::lock_guard<std::mutex> lock(mutex_);
     for (size_t i = 0; i < slots_.size(); ++i) {
-      last_slot_ = (last_slot_ + 1) % slots_.size();  // in turns, so that each has its memory soon
+      last_slot_ = (last_slot_ + 1) % slots_.size();  // round robin, so that each gets its memory early
       if (!slots_[last_slot_].is_free) continue;
       slots_[last_slot_].is_free = false;
       return int(last_slot_);
@@ -174,17 +174,17 @@ class PlayedCamera : public Camera {
       time_ns.swap(seek_to_ns_);
     }
     if (!time_ns) return;
-    reel_->seek(*time_ns);
+    schedule_->seek(*time_ns);
     next_.reset();
   }
 
-  std::shared_ptr<Reel> reel_;
+  std::shared_ptr<ReplaySchedule> schedule_;
   std::string identity_;
   const Clock::time_point opened_ = Clock::now();
   CameraFormat format_;
-  nanoseconds patience_;
-  Frame ahead_;  // read before its time
-  std::optional<Reel::Next> next_;
+  nanoseconds max_delay_;
+  Frame ahead_;  // read before it is due
+  std::optional<ReplaySchedule::Next> next_;
   std::mutex mutex_;  // of the rest
   std::vector<Slot> slots_;
   size_t last_slot_ = 0;
@@ -193,11 +193,11 @@ class PlayedCamera : public Camera {
 
 }  // namespace
 
-CameraOpener played_as_camera(std::function<std::unique_ptr<Source>()> open, std::string identity,
-                              PlayOptions options) {
-  auto reel = std::make_shared<Reel>(std::move(open), options);
-  return [reel, identity = std::move(identity), options] {
-    return std::make_shared<PlayedCamera>(reel, identity, options.buffers);
+CameraOpener replay_as_camera(std::function<std::unique_ptr<Source>()> open, std::string identity,
+                              ReplayOptions options) {
+  auto schedule = std::make_shared<ReplaySchedule>(std::move(open), options);
+  return [schedule, identity = std::move(identity), options] {
+    return std::make_shared<ReplayCamera>(schedule, identity, options.buffers);
   };
 }
 

@@ -1,5 +1,4 @@
-// A file, a recording or a stub as if it were a camera: its frames come at their times, whether or not somebody takes
-// them.
+// Replays a file, a recording or a stub as a camera: its frames come at their times, whether or not they are taken.
 #pragma once
 
 #include <functional>
@@ -11,14 +10,15 @@
 
 namespace maq {
 
-struct PlayOptions {
+struct ReplayOptions {
   double speed = 1;
   bool loop = false;
   int buffers = 4;
 };
 
-// Opens the source at once, and again each time it is to begin anew. Cameras of the opener that follow one another go on
-// in the same source: what came while none was open is lost, as with a camera that was unplugged. `identity` is theirs.
-CameraOpener played_as_camera(std::function<std::unique_ptr<Source>()> open, std::string identity, PlayOptions options);
+// Opens the source at once, and again for each loop. The cameras of the opener, one after another, continue in the same
+// source: frames due while none was open are lost, as with a camera that was unplugged. `identity` is Camera::identity().
+CameraOpener replay_as_camera(std::function<std::unique_ptr<Source>()> open, std::string identity,
+                              ReplayOptions options);
 
 }  // namespace maq

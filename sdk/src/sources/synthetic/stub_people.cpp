@@ -6,7 +6,6 @@
 
 #include "core/error.h"
 #include "image/sprite.h"
-#include "sources/synthetic/stub_people_sheet.h"
 
 namespace maq {
 namespace {
@@ -113,7 +112,7 @@ void StubPeople::draw(double time_s, Frame& frame) const {
     const int cycle_frame =
         int(std::floor(walker.phase_frames + time_s * walker.cycles_s * kCycleFrames)) % kCycleFrames;
     const BgraImage& tile = walker.tiles[size_t(cycle_frame)];
-    // Whoever leaves on one side comes back on the other.
+    // A walker who leaves on one side comes back on the other.
     const double lap_px = width_px_ + tile.width_px;
     double x = std::fmod(walker.start_x_px + walker.speed_px_s * time_s + 0.5 * tile.width_px, lap_px);
     if (x < 0) x += lap_px;

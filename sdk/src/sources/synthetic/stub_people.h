@@ -1,6 +1,7 @@
 // The people of stub:people: sprites of rendered people in a walk cycle, moving through a plain room.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -9,9 +10,16 @@
 
 namespace maq {
 
+// The sprite sheet that CMake puts into the library (cmake/EmbedFile.cmake).
+struct EmbeddedFile {
+  const uint8_t* bytes = nullptr;
+  size_t size_bytes = 0;  // 0: this build has none
+};
+EmbeddedFile stub_people_sheet();
+
 class StubPeople {
  public:
-  // `count` people whose looks, sizes, paths and speeds follow from `seed`.
+  // `count` people whose appearance, sizes, paths and speeds follow from `seed`.
   // Throws MAQ_ERROR_UNSUPPORTED when this build has no sprites.
   StubPeople(int count, uint64_t seed, int width_px, int height_px);
 

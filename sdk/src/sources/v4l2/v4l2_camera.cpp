@@ -16,6 +16,8 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "sources/camera_errors.h"
+#include "sources/control_options.h"
 #include "sources/v4l2/v4l2_controls.h"
 #include "sources/v4l2/v4l2_device.h"
 
@@ -25,7 +27,7 @@ namespace {
 constexpr int kDefaultWidthPx = 640;
 constexpr int kDefaultHeightPx = 480;
 constexpr int64_t kSecondNs = 1000000000;
-constexpr int64_t kOldestStampNs = 10 * kSecondNs;
+constexpr int64_t kMaxStampAgeNs = 10 * kSecondNs;
 
 // When the driver says that the picture was taken. When it arrived, where that cannot be: a stamp of another clock, in
 // the future, or older than frames in a queue become.
@@ -36,7 +38,7 @@ int64_t time_of(const v4l2_buffer& filled) {
   if (!is_monotonic || seconds < 0 || seconds > now / kSecondNs || microseconds < 0 || microseconds > 999999)
     return now;
   const int64_t stamp = seconds * kSecondNs + microseconds * 1000;
-  return stamp > now || stamp < now - kOldestStampNs ? now : stamp;
+  return stamp > now || stamp < now - kMaxStampAgeNs ? now : stamp;
 }
 
 class V4l2Camera : public Camera {
@@ -54,8 +56,8 @@ class V4l2Camera : public Camera {
     }
   }
 
-  void start(const CameraWish& wish, int buffers) {
-    negotiate(wish);
+  void start(const CameraRequest& request, int buffers) {
+    negotiate(request);
     make_buffers(buffers);
     int type = int(device_->buffer_type());
     if (device_->call(VIDIOC_STREAMON, &type) != 0) device_->fail("does not start", errno);
@@ -87,7 +89,7 @@ class V4l2Camera : public Camera {
       if (error == EAGAIN && (fds[0].revents & (POLLERR | POLLHUP | POLLNVAL)) == 0) return Event::kTimeout;
       return lost("VIDIOC_DQBUF", error, reason);
     }
-    if (filled.index >= slots_.size() || !hand_out(slots_[filled.index])) {
+    if (filled.index >= slots_.size() || !take(slots_[filled.index])) {
       return lost("VIDIOC_DQBUF gave a buffer that does not exist or is held;", EIO, reason);
     }
     buffer.slot = int(filled.index);
@@ -106,14 +108,14 @@ class V4l2Camera : public Camera {
     v4l2_plane planes[VIDEO_MAX_PLANES] = {};
     prepare(buffer, planes);
     buffer.index = uint32_t(slot);
-    // A camera that loses its buffers one by one would end up without any; the next wait() reports it.
+    // Reported by the next wait(): a camera that loses its buffers one by one would end up without any.
     if (device_->call(VIDIOC_QBUF, &buffer) != 0) queue_error_ = errno;
   }
 
   int dma_buf(int index) override {
     std::lock_guard<std::mutex> lock(mutex_);
     Slot& slot = slots_[size_t(index)];
-    // Nobody could know where in a dma-buf the picture begins, or which is the other one.
+    // The app could not know where in a dma-buf the picture begins, or which is the other one.
     if (known_->memory_planes != 1 || slot.begins_at != 0) return -1;
     if (slot.dma_buf < 0 && device_ != nullptr) {
       v4l2_exportbuffer request{};
@@ -146,7 +148,7 @@ class V4l2Camera : public Camera {
     Mapping planes[2];
     size_t begins_at = 0;  // the picture that it holds, in bytes from its beginning
     int dma_buf = -1;
-    bool is_held = false;  // by somebody who will give it back
+    bool is_held = false;  // until give_back()
   };
 
   static Event lost(const char* call, int error, std::string& reason) {
@@ -154,14 +156,13 @@ class V4l2Camera : public Camera {
     return Event::kLost;
   }
 
-  // False when it is held already.
-  bool hand_out(Slot& slot) {
+  // Marks the buffer as held; false when it is already.
+  bool take(Slot& slot) {
     std::lock_guard<std::mutex> lock(mutex_);
     return !std::exchange(slot.is_held, true);
   }
 
-  // Who has it may call it without the lock, which a control that takes long would keep from those who give frames back:
-  // the last of them closes it.
+  // Shared, so that a slow control does not hold the lock, which returning a frame needs: the last owner closes the device.
   std::shared_ptr<const V4l2Device> open_device() {
     std::lock_guard<std::mutex> lock(mutex_);
     if (device_ == nullptr) throw Error(MAQ_ERROR_DEVICE_LOST, identity_, " is closed; plug it in again.");
@@ -206,10 +207,10 @@ class V4l2Camera : public Camera {
     return {int(pix.width), int(pix.height), pix.pixelformat, 1, {pix.bytesperline, pix.bytesperline}};
   }
 
-  // Of all formats that both sides know, the one nearest to the wished size, then fast enough, then cheapest to use.
-  void negotiate(const CameraWish& wish) {
-    const int width = wish.width_px > 0 ? wish.width_px : kDefaultWidthPx;
-    const int height = wish.height_px > 0 ? wish.height_px : kDefaultHeightPx;
+  // Of all formats that both sides know, the one nearest to the wanted size, then fast enough, then cheapest to use.
+  void negotiate(const CameraRequest& request) {
+    const int width = request.width_px > 0 ? request.width_px : kDefaultWidthPx;
+    const int height = request.height_px > 0 ? request.height_px : kDefaultHeightPx;
     struct Choice {
       double size_error, fps_missing;
       const V4l2Format* format;
@@ -220,31 +221,31 @@ class V4l2Camera : public Camera {
       const std::string name = fourcc_name(fourcc);
       offered += (offered.empty() ? "" : ", ") + name;
       const V4l2Format* known = known_v4l2_format(fourcc);
-      if (known == nullptr || (!wish.format.empty() && wish.format != name)) continue;
-      v4l2_format request = format_request(*known, width, height);
-      if (device_->call(VIDIOC_TRY_FMT, &request) != 0) {
-        if (V4l2Device::is_lost(errno)) device_->fail("was lost while its formats were read", errno);
+      if (known == nullptr || (!request.format.empty() && request.format != name)) continue;
+      v4l2_format tried = format_request(*known, width, height);
+      if (device_->call(VIDIOC_TRY_FMT, &tried) != 0) {
+        if (is_device_lost(errno)) device_->fail("was lost while its formats were read", errno);
         continue;
       }
-      const Answer found = answer(request);
+      const Answer found = answer(tried);
       if (found.fourcc != fourcc || found.memory_planes != known->memory_planes) continue;
       const double size_error = std::abs(std::log(double(std::max(found.width_px, 1)) / width)) +
                                 std::abs(std::log(double(std::max(found.height_px, 1)) / height));
       const double fps = device_->fastest_rate(fourcc, found.width_px, found.height_px).value_or(1000);
-      choices.push_back({size_error, std::max(0.0, (wish.fps > 0 ? wish.fps : 30) - fps), known});
+      choices.push_back({size_error, std::max(0.0, (request.fps > 0 ? request.fps : 30) - fps), known});
     }
     if (choices.empty()) {
       device_->fail(concatenate("offers ", offered.empty() ? "no format" : offered, ", but ",
-                                wish.format.empty() ? "none of them is understood" : "not " + wish.format),
+                                request.format.empty() ? "none of them is understood" : "not " + request.format),
                     EINVAL);
     }
     const Choice best = *std::min_element(choices.begin(), choices.end(), [](const Choice& a, const Choice& b) {
       return std::tie(a.size_error, a.fps_missing, a.format) < std::tie(b.size_error, b.fps_missing, b.format);
     });
-    v4l2_format request = format_request(*best.format, width, height);
-    if (device_->call(VIDIOC_S_FMT, &request) != 0) device_->fail("does not take its own format", errno);
-    adopt(answer(request));
-    set_rate(wish.fps);
+    v4l2_format chosen = format_request(*best.format, width, height);
+    if (device_->call(VIDIOC_S_FMT, &chosen) != 0) device_->fail("does not take its own format", errno);
+    adopt(answer(chosen));
+    set_rate(request.fps);
   }
 
   // The driver has the last word, and what it says is checked before it is believed.
@@ -285,9 +286,9 @@ class V4l2Camera : public Camera {
     found.type = device_->buffer_type();
     if (device_->call(VIDIOC_G_PARM, &found) != 0) return;  // not every device has a rate
     if (fps > 0) {
-      v4l2_streamparm wished = found;
-      wished.parm.capture.timeperframe = {1000, uint32_t(std::lround(fps * 1000))};
-      if (device_->call(VIDIOC_S_PARM, &wished) == 0) found = wished;
+      v4l2_streamparm wanted = found;
+      wanted.parm.capture.timeperframe = {1000, uint32_t(std::lround(fps * 1000))};
+      if (device_->call(VIDIOC_S_PARM, &wanted) == 0) found = wanted;
     }
     const v4l2_fract& period = found.parm.capture.timeperframe;
     if (period.numerator > 0) format_.fps = double(period.denominator) / period.numerator;
@@ -381,15 +382,21 @@ class V4l2Camera : public Camera {
 
 }  // namespace
 
-CameraOpener v4l2_opener(SystemCalls& calls, const std::string& path, CameraWish wish, int buffers) {
-  return [&calls, path, wish = std::move(wish), buffers, identity = std::string()]() mutable {
-    std::string place = path;
+CameraOpener v4l2_uri_opener(SourceUri uri, int buffers, const Log&) {
+  CameraRequest request{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
+  uri.expect_no_more_options(std::string("size, fps, format, ") + kControlOptions);
+  return v4l2_opener(SystemCalls::real(), uri.target, std::move(request), buffers);
+}
+
+CameraOpener v4l2_opener(SystemCalls& calls, const std::string& path, CameraRequest request, int buffers) {
+  return [&calls, path, request = std::move(request), buffers, identity = std::string()]() mutable {
+    std::string path_now = path;
     if (!identity.empty()) {
       for (const CameraListing& listing : list_v4l2_cameras(calls)) {
-        if (listing.identity == identity) place = listing.uri.substr(listing.uri.find(':') + 1);
+        if (listing.identity == identity) path_now = listing.uri.substr(listing.uri.find(':') + 1);
       }
     }
-    std::shared_ptr<Camera> camera = open_v4l2_camera(calls, place, wish, buffers);
+    std::shared_ptr<Camera> camera = open_v4l2_camera(calls, path_now, request, buffers);
     if (!identity.empty() && camera->identity() != identity) {
       camera->close();
       throw Error(MAQ_ERROR_DEVICE_LOST, path, " is ", camera->identity(), " now, but was ", identity, ".");
@@ -400,9 +407,9 @@ CameraOpener v4l2_opener(SystemCalls& calls, const std::string& path, CameraWish
 }
 
 std::vector<CameraListing> list_v4l2_cameras(SystemCalls& calls) {
-  constexpr int kMostDevices = 64;
+  constexpr int kMaxDevices = 64;
   std::vector<CameraListing> found;
-  for (int number = 0; number < kMostDevices; ++number) {
+  for (int number = 0; number < kMaxDevices; ++number) {
     const std::string path = "/dev/video" + std::to_string(number);
     CameraListing listing;
     listing.uri = "v4l2:" + path;
@@ -423,10 +430,10 @@ std::vector<CameraListing> list_v4l2_cameras(SystemCalls& calls) {
   return found;
 }
 
-std::shared_ptr<Camera> open_v4l2_camera(SystemCalls& calls, const std::string& path, const CameraWish& wish,
+std::shared_ptr<Camera> open_v4l2_camera(SystemCalls& calls, const std::string& path, const CameraRequest& request,
                                          int buffers) {
   auto camera = std::make_shared<V4l2Camera>(calls, path);
-  camera->start(wish, buffers);
+  camera->start(request, buffers);
   return camera;
 }
 

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "sources/camera_errors.h"
 
 namespace maq {
 namespace {
@@ -35,7 +36,7 @@ constexpr Control kAutomaticGain{MAQ_CONTROL_GAIN, "automatic gain", V4L2_CID_AU
 
 // What the driver says of a control, checked.
 struct Range {
-  int64_t least, most, step, preset;
+  int64_t min, max, step, default_value;
   bool is_read_only;
   // Of an automatic: what switches it on and off.
   int64_t on, off;
@@ -43,20 +44,20 @@ struct Range {
 
 [[noreturn]] void refuse(const V4l2Device& device, const Control& control, int error, bool is_read_only = false) {
   maq_status status = MAQ_ERROR_BUSY;
-  const char* remedy = "Try again, or plug the camera in anew.";
+  const char* remedy = " Try again, or plug the camera in again.";
   switch (error) {
     case ENODEV:
     case ENXIO:
     case EBADF:
       status = MAQ_ERROR_DEVICE_LOST;
-      remedy = "The device is gone; plug it in again.";
+      remedy = camera_remedy(status);
       break;
     case EACCES:
     case EBUSY:
-      remedy = is_read_only ? "The device lets it be read only."
-                            : "Something else holds it: switch its automatic off, or close the other program.";
+      remedy = is_read_only ? " The device lets it be read only."
+                            : " It is locked: switch its automatic off, or close the other program.";
   }
-  throw Error(status, device.path(), " does not give access to its ", control.name, " (", std::strerror(error), "). ",
+  throw Error(status, device.path(), " does not give access to its ", control.name, " (", std::strerror(error), ").",
               remedy);
 }
 
@@ -118,7 +119,7 @@ int64_t get(const V4l2Device& device, const Control& control, const Range& range
     if (errno == EINVAL) refuse_missing(device, control);
     refuse(device, control, errno, range.is_read_only);
   }
-  return std::clamp<int64_t>(asked.value, range.least, range.most);
+  return std::clamp<int64_t>(asked.value, range.min, range.max);
 }
 
 void set(const V4l2Device& device, const Control& control, const Range& range, int64_t value) {
@@ -156,14 +157,18 @@ const Control& automatic_of(const Control& control) {
 // In the units of the API, all but the value.
 maq_control_info info_of(const Control& control, const Range& range) {
   if (control.which == MAQ_CONTROL_AUTO_EXPOSURE) {
-    return {0, range.off < 0 ? 1.0 : 0.0, range.on < 0 ? 0.0 : 1.0, 1, is_automatic_exposure(range.preset) ? 1.0 : 0.0,
+    return {0,
+            range.off < 0 ? 1.0 : 0.0,
+            range.on < 0 ? 0.0 : 1.0,
+            1,
+            is_automatic_exposure(range.default_value) ? 1.0 : 0.0,
             0};
   }
   return {0,
-          double(range.least) * control.unit,
-          double(range.most) * control.unit,
+          double(range.min) * control.unit,
+          double(range.max) * control.unit,
           double(range.step) * control.unit,
-          double(range.preset) * control.unit,
+          double(range.default_value) * control.unit,
           0};
 }
 
@@ -196,8 +201,8 @@ void write_v4l2_control(const V4l2Device& device, maq_control which, double valu
   }
   if (control.automatic_id != 0) switch_automatic(device, automatic_of(control), false);
   const int64_t steps = std::llround((value - info.min) / info.step);
-  const int64_t last_step = (range->most - range->least) / range->step;
-  set(device, control, *range, range->least + std::min(steps, last_step) * range->step);
+  const int64_t last_step = (range->max - range->min) / range->step;
+  set(device, control, *range, range->min + std::min(steps, last_step) * range->step);
 }
 
 }  // namespace maq

@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "core/error.h"
+#include "sources/camera_errors.h"
 
 namespace maq {
 namespace {
@@ -18,9 +18,9 @@ constexpr V4l2Format kKnownFormats[] = {
     {V4L2_PIX_FMT_RGB24, MAQ_PIXEL_RGB8, false, 1}, {V4L2_PIX_FMT_GREY, MAQ_PIXEL_GREY8, false, 1},
     {V4L2_PIX_FMT_MJPEG, MAQ_PIXEL_BGR8, true, 1},  {V4L2_PIX_FMT_JPEG, MAQ_PIXEL_BGR8, true, 1},
 };
-// A driver that never ends its lists, or is interrupted for ever, must not hold us.
-constexpr int kMostEnumerated = 256;
-constexpr int kMostInterruptions = 1000;
+// Against a driver whose lists never end, or whose calls are interrupted again and again.
+constexpr int kMaxEnumerated = 256;
+constexpr int kMaxInterruptions = 1000;
 
 // Of a field of fixed size, which may lack the zero at its end.
 std::string text_of(const uint8_t* bytes, size_t size) {
@@ -32,7 +32,7 @@ template <class Call>
 int repeated(Call call) {
   for (int interruptions = 0;; ++interruptions) {
     const int result = call();
-    if (result >= 0 || errno != EINTR || interruptions == kMostInterruptions) return result;
+    if (result >= 0 || errno != EINTR || interruptions == kMaxInterruptions) return result;
   }
 }
 
@@ -55,7 +55,7 @@ V4l2Device::V4l2Device(SystemCalls& calls, std::string path) : calls_(calls), pa
   fd_ = repeated([&] { return calls_.open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC); });
   if (fd_ < 0) fail("cannot be opened", errno);
   try {
-    look();
+    query_capabilities();
   } catch (...) {
     calls_.close(fd_);
     throw;
@@ -64,11 +64,11 @@ V4l2Device::V4l2Device(SystemCalls& calls, std::string path) : calls_(calls), pa
 
 V4l2Device::~V4l2Device() { calls_.close(fd_); }
 
-void V4l2Device::look() {
+void V4l2Device::query_capabilities() {
   v4l2_capability found{};
   if (call(VIDIOC_QUERYCAP, &found) != 0) {
     if (errno == ENOTTY || errno == EINVAL) fail("is not a video device", errno);
-    fail("does not tell what it can do", errno);
+    fail("does not report its capabilities", errno);
   }
   name_ = text_of(found.card, sizeof found.card);
   bus_ = text_of(found.bus_info, sizeof found.bus_info);
@@ -86,54 +86,16 @@ int V4l2Device::call(unsigned long request, void* argument) const {
   return repeated([&] { return calls_.ioctl(fd_, request, argument); });
 }
 
-bool V4l2Device::is_lost(int error) { return error == ENODEV || error == ENXIO || error == EIO || error == EBADF; }
-
-void V4l2Device::fail(const std::string& what, int error) const {
-  maq_status status = MAQ_ERROR_UNSUPPORTED;
-  const char* remedy = "";
-  switch (error) {
-    case ENOENT:
-      status = MAQ_ERROR_NOT_FOUND;
-      remedy = " Is the camera plugged in, and is this its name?";
-      break;
-    case EACCES:
-    case EPERM:
-      status = MAQ_ERROR_NO_PERMISSION;
-      remedy =
-          " Cameras belong to the group \"video\": add the user to it (sudo usermod -aG video $USER), log in again.";
-      break;
-    case EBUSY:
-      status = MAQ_ERROR_BUSY;
-      remedy = " Another program uses the camera; close it.";
-      break;
-    case ENOSPC:
-      status = MAQ_ERROR_BUSY;
-      remedy = " The USB bus has no room left: ask for a smaller size or rate, or plug the camera in elsewhere.";
-      break;
-    case ENOMEM:
-    case EAGAIN:
-    case EMFILE:
-    case ENFILE:
-      status = MAQ_ERROR_OUT_OF_MEMORY;
-      remedy = " Ask for a smaller size or fewer frames, or close other files.";
-      break;
-    default:
-      if (is_lost(error)) {
-        status = MAQ_ERROR_DEVICE_LOST;
-        remedy = " The device is gone; plug it in again.";
-      }
-  }
-  throw Error(status, path_, " ", what, ": ", std::strerror(error), ".", remedy);
-}
+void V4l2Device::fail(const std::string& what, int error) const { fail_camera(path_, what, error); }
 
 std::vector<uint32_t> V4l2Device::formats() const {
   std::vector<uint32_t> found;
-  for (uint32_t index = 0; index < kMostEnumerated; ++index) {
+  for (uint32_t index = 0; index < kMaxEnumerated; ++index) {
     v4l2_fmtdesc described{};
     described.index = index;
     described.type = buffer_type_;
     if (call(VIDIOC_ENUM_FMT, &described) != 0) {
-      if (is_lost(errno)) fail("was lost while its formats were read", errno);
+      if (is_device_lost(errno)) fail("was lost while its formats were read", errno);
       break;
     }
     found.push_back(described.pixelformat);
@@ -148,7 +110,7 @@ std::vector<CameraMode> V4l2Device::modes() const {
 }
 
 void V4l2Device::list_sizes(uint32_t fourcc, std::vector<CameraMode>& modes) const {
-  for (uint32_t index = 0; index < kMostEnumerated && modes.size() < kMostEnumerated; ++index) {
+  for (uint32_t index = 0; index < kMaxEnumerated && modes.size() < kMaxEnumerated; ++index) {
     v4l2_frmsizeenum size{};
     size.index = index;
     size.pixel_format = fourcc;
@@ -166,7 +128,7 @@ void V4l2Device::list_sizes(uint32_t fourcc, std::vector<CameraMode>& modes) con
 
 std::optional<double> V4l2Device::fastest_rate(uint32_t fourcc, int width_px, int height_px) const {
   std::optional<double> best;
-  for (uint32_t index = 0; index < kMostEnumerated; ++index) {
+  for (uint32_t index = 0; index < kMaxEnumerated; ++index) {
     v4l2_frmivalenum interval{};
     interval.index = index;
     interval.pixel_format = fourcc;

@@ -11,7 +11,7 @@
 
 namespace maq {
 
-// What this build understands, the cheapest to use first.
+// A pixel format that this build understands.
 struct V4l2Format {
   uint32_t fourcc;
   maq_pixel_format pixels;
@@ -23,7 +23,7 @@ const V4l2Format* known_v4l2_format(uint32_t fourcc);
 
 class V4l2Device {
  public:
-  // Opens it and looks whether it is a camera that can stream. Throws what open_v4l2_camera throws.
+  // Opens the device and checks that it is a camera that can stream. Throws what open_v4l2_camera throws.
   V4l2Device(SystemCalls& calls, std::string path);
   ~V4l2Device();
   V4l2Device(const V4l2Device&) = delete;
@@ -41,18 +41,16 @@ class V4l2Device {
   int call(unsigned long request, void* argument) const;
   // Throws what the error number means; `what` goes on after the path: "gives no buffers".
   [[noreturn]] void fail(const std::string& what, int error) const;
-  // Whether an error means that only opening the device anew can help.
-  static bool is_lost(int error);
 
   // The fourcc of each format that it offers. Throws MAQ_ERROR_DEVICE_LOST.
   std::vector<uint32_t> formats() const;
-  // The fastest rate at a size; nothing when the driver does not tell.
+  // The fastest rate at a size; nothing when the driver does not say.
   std::optional<double> fastest_rate(uint32_t fourcc, int width_px, int height_px) const;
   // Every format with its sizes. Throws MAQ_ERROR_DEVICE_LOST.
   std::vector<CameraMode> modes() const;
 
  private:
-  void look();
+  void query_capabilities();
   void list_sizes(uint32_t fourcc, std::vector<CameraMode>& modes) const;
 
   SystemCalls& calls_;

@@ -29,8 +29,8 @@ ALLOWED = {
     "export.scenes": {"export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
-        "export.densepose", "export.people", "export.photos", "export.shards", "export.surface", "export.teachers",
-        "export.training",
+        "export.bundle", "export.densepose", "export.people", "export.photos", "export.shards", "export.surface",
+        "export.teachers", "export.training",
     },
     "quantization": {"export"},
     "benchmarks": {"export", "quantization"},

@@ -1,6 +1,6 @@
-// Seconds and memory of making a scene of noise photos and a made-up room, step by step:
-// `measure_scene_builder BUNDLE [points [views [width height [threads [roll in degrees]]]]]`. Each photo is turned by an
-// angle of its own, up to `roll`, as cameras in hands are; with 0 all are of one size.
+// Seconds and memory of making a scene of noise photos and a made-up room, step by step: `measure_scene_builder BUNDLE
+// [points [views [width height [threads [roll in degrees]]]]]`. Each photo is rolled by an angle of its own, up to
+// `roll`, as cameras in hands are; with 0 all are of one size.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <random>
 
 #include "core/error.h"
+#include "scene/build/descriptor_fitter.h"
 #include "support/peak_memory.h"
-#include "scene/build/scene_builder.h"
 
 namespace {
 
@@ -41,7 +41,7 @@ maq::PinholeCamera camera_of(int width, int height, double angle, double roll) {
   camera.cx_px = (width - 1) / 2.0;
   camera.cy_px = (height - 1) / 2.0;
   const double c = std::cos(angle), s = std::sin(angle), u = std::cos(roll), v = std::sin(roll);
-  // Level: right (s, -c, 0), down (0, 0, -1), ahead (c, s, 0); then turned about ahead.
+  // Level: right (s, -c, 0), down (0, 0, -1), ahead (c, s, 0); then rotated about ahead.
   camera.rotation = {s * u, -c * u, -v, -s * v, c * v, -u, c, s, 0};
   camera.centre = {-2.5 * c, -1.8 * s, 0};
   return camera;
@@ -63,8 +63,8 @@ void measure(int count, char** arguments) {
   for (int i = 0; i < 3 * width * height; ++i) pixels[i] = uint8_t(random());
 
   double seconds = 0, first_ms = 0;
-  maq::BuildTimes times;
-  size_t seen = 0, looks = 0;
+  maq::FittingTimes times;
+  size_t seen = 0, observations = 0;
   uint64_t never_seen = 0;
   const double grown_mib = peak_memory_growth_mib([&] {
     maq::PointCloud cloud = room(size_t(points));
@@ -73,28 +73,30 @@ void measure(int count, char** arguments) {
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     };
     maq::SceneNetworks networks(runtime, arguments[1], maq::SessionSettings{threads});
-    maq::BuildOptions options;
+    maq::FittingOptions options;
     options.threads = threads;
-    maq::SceneBuilder builder(std::move(cloud), {0, 0, 1}, networks, options);
+    maq::DescriptorFitter fitter(std::move(cloud), {0, 0, 1}, networks, options);
     for (int view = 0; view < views; ++view) {
       const double roll = roll_deg * kPi / 180 * std::sin(2.4 * view);
-      looks += builder.add_view(photo.image, nullptr, camera_of(width, height, 2 * kPi * view / views, roll)).value();
+      observations +=
+          fitter.add_view(photo.image, nullptr, camera_of(width, height, 2 * kPi * view / views, roll)).value();
       if (view == 0) first_ms = 1000 * seconds_since_start();
     }
-    const maq::ModelledPoints made = builder.finish_and_forget();
+    networks.forget_extractor();
+    const maq::FittedPoints made = fitter.finish_and_forget();
     seconds = seconds_since_start();
     seen = made.count();
     never_seen = made.never_seen;
-    times = builder.times();
+    times = fitter.times();
   });
-  std::printf("%d points, %d photos of %d x %d turned by up to %d degrees, %d threads\n", points, views, width, height,
+  std::printf("%d points, %d photos of %d x %d rolled by up to %d degrees, %d threads\n", points, views, width, height,
               roll_deg, threads);
-  std::printf("%zu points seen %.1f times, %llu never\n", seen, double(looks) / double(seen),
+  std::printf("%zu points seen %.1f times, %llu never\n", seen, double(observations) / double(seen),
               static_cast<unsigned long long>(never_seen));
-  std::printf("seconds in all %.2f, until after the first photo %.2f, visibility %.2f, turning %.2f, extractor %.2f, ",
-              seconds, first_ms / 1000, times.visibility_ms / 1000, times.turning_ms / 1000, times.extractor_ms / 1000);
-  std::printf("moments %.2f, solving %.2f; peak memory %.0f MiB\n", times.moments_ms / 1000, times.solving_ms / 1000,
-              grown_mib);
+  std::printf("seconds in all %.2f, until after the first photo %.2f, visibility %.2f, rotation %.2f, extractor %.2f, ",
+              seconds, first_ms / 1000, times.visibility_ms / 1000, times.align_ms / 1000, times.extract_ms / 1000);
+  std::printf("regression %.2f, solving %.2f; peak memory %.0f MiB\n", times.accumulate_ms / 1000,
+              times.solve_ms / 1000, grown_mib);
 }
 
 }  // namespace

@@ -1,19 +1,20 @@
 // Bytes a point of a scene against what packing changes: `measure_scene_packing CAPTURE BUNDLE`.
 //
-// The scene is built of the capture's photos with the networks of the bundle. Then, for each way to store coefficients and
-// some thresholds of ScenePacking::least_variation: the share of points that vary; bytes a point of the file; the error
-// against looks as they were solved, over the photos that saw each point and all features, in shares of a feature's standard
-// deviation over the points: RMS over all points, what 99 % of points stay below of, and the worst point's; and, where the
-// capture holds photos out, PSNR of their views against the photos, and against views of the scene in floats.
+// The scene is built of the capture's photos with the networks of the bundle. Then, for each way to store coefficients
+// and some thresholds of ScenePacking::min_view_dependence: the fraction of view-dependent points; bytes a point of the
+// file; the error against the fitted descriptors, over the photos that saw each point and all features, in fractions of
+// a feature's standard deviation over the points: RMS over all points, what 99 % of points stay below of, and the worst
+// point's; and, where the capture holds photos out, PSNR of their views against the photos, and against views of the
+// scene in floats.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "core/error.h"
-#include "scene/build/scene_builder.h"
+#include "scene/build/descriptor_fitter.h"
 #include "scene/capture/posed_view.h"
-#include "scene/format/block_decoding.h"
-#include "scene/format/scene_layout.h"
+#include "scene/format/block_codec.h"
+#include "scene/format/scene.h"
 #include "scene/format/scene_packing.h"
 #include "scene/render/scene_renderer.h"
 
@@ -23,30 +24,31 @@ using maq::kBasis;
 using maq::kFeatures;
 
 // The root of the mean square, over features and the photos that a point was seen in, of what an error of its mean and
-// slopes makes of its look: known from the mean and the scatter R^T R of the basis values, without the photos.
-double error_over_photos(const maq::ViewMoments& moments, const double* mean, const double* slope) {
+// linear_terms makes of its descriptor: known from the mean and the scatter R^T R of the basis values, without the
+// photos.
+double error_over_photos(const maq::DescriptorRegression& regression, const double* constant, const double* linear) {
   double sum = 0;
-  const float* row = moments.triangle;
+  const float* row = regression.triangle;
   for (int c = 0; c < kFeatures; ++c) {
-    double off = mean[c];
-    for (int j = 0; j < kBasis; ++j) off += double(moments.mean_h[j]) * slope[j * kFeatures + c];
-    sum += off * off * moments.views;
+    double off = constant[c];
+    for (int j = 0; j < kBasis; ++j) off += double(regression.mean_h[j]) * linear[j * kFeatures + c];
+    sum += off * off * regression.views;
   }
   for (int i = 0; i < kBasis; row += kBasis - i, ++i) {
     for (int c = 0; c < kFeatures; ++c) {
       double value = 0;
-      for (int j = i; j < kBasis; ++j) value += double(row[j - i]) * slope[j * kFeatures + c];
+      for (int j = i; j < kBasis; ++j) value += double(row[j - i]) * linear[j * kFeatures + c];
       sum += value * value;
     }
   }
-  return std::sqrt(sum / moments.views / kFeatures);
+  return std::sqrt(sum / regression.views / kFeatures);
 }
 
-std::array<double, kFeatures> deviations(const maq::ModelledPoints& points) {
+std::array<double, kFeatures> deviations(const maq::FittedPoints& points) {
   std::array<double, kFeatures> sums{}, squares{}, found{};
-  for (size_t i = 0; i < points.means.size(); ++i) {
-    sums[i % kFeatures] += points.means[i];
-    squares[i % kFeatures] += double(points.means[i]) * points.means[i];
+  for (size_t i = 0; i < points.constant_terms.size(); ++i) {
+    sums[i % kFeatures] += points.constant_terms[i];
+    squares[i % kFeatures] += double(points.constant_terms[i]) * points.constant_terms[i];
   }
   const auto count = double(points.count());
   for (size_t c = 0; c < kFeatures; ++c) {
@@ -55,26 +57,28 @@ std::array<double, kFeatures> deviations(const maq::ModelledPoints& points) {
   return found;
 }
 
-// `order`: of the scene's points among the given, which are in the order of the moments.
-void print_errors(const maq::ModelledPoints& points, const maq::MomentStore& moments, const maq::Scene& scene,
+// `order`: of the scene's points among the given, which are in the order of the regressions.
+void print_errors(const maq::FittedPoints& points, const maq::RegressionStore& regressions, const maq::Scene& scene,
                   const std::vector<uint32_t>& order) {
   const std::array<double, kFeatures> deviation = deviations(points);
   std::vector<double> errors;
   double squares = 0;
   for (uint32_t b = 0; b < scene.block_count; ++b) {
     const maq::SceneBlock& block = scene.blocks[b];
-    const maq::ModelledPoints part = unpack_block(scene, block);
+    const maq::FittedPoints part = decode_block(scene, block);
     for (uint32_t k = 0; k < block.count; ++k) {
       const size_t point = order[block.first + k];
-      double mean[kFeatures], slope[maq::kSlopes];
+      double constant[kFeatures], linear[maq::kLinearTerms];
       for (size_t c = 0; c < kFeatures; ++c) {
-        mean[c] = (double(part.means[k * kFeatures + c]) - points.means[point * kFeatures + c]) / deviation[c];
+        constant[c] = (double(part.constant_terms[k * kFeatures + c]) - points.constant_terms[point * kFeatures + c]) /
+                      deviation[c];
       }
-      for (size_t c = 0; c < maq::kSlopes; ++c) {
-        const double off = double(part.slopes[k * maq::kSlopes + c]) - points.slopes[point * maq::kSlopes + c];
-        slope[c] = off / deviation[c % kFeatures];
+      for (size_t c = 0; c < maq::kLinearTerms; ++c) {
+        const double off =
+            double(part.linear_terms[k * maq::kLinearTerms + c]) - points.linear_terms[point * maq::kLinearTerms + c];
+        linear[c] = off / deviation[c % kFeatures];
       }
-      errors.push_back(error_over_photos(moments.at(point), mean, slope));
+      errors.push_back(error_over_photos(regressions.at(point), constant, linear));
       squares += errors.back() * errors.back();
     }
   }
@@ -106,7 +110,7 @@ class Psnr {
 void print_views(const maq::Scene& scene, const std::shared_ptr<maq::SceneNetworks>& networks,
                  std::vector<HeldOut>& views) {
   maq::SceneRenderer renderer(scene, networks, {});
-  maq::RenderedPicture picture;
+  maq::RenderedImage picture;
   Psnr to_photo, to_floats;
   for (HeldOut& view : views) {
     renderer.render(view.camera, picture);
@@ -121,7 +125,7 @@ int measure(const char* capture_folder, const char* bundle) {
   const auto runtime = std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());
   const auto networks = std::make_shared<maq::SceneNetworks>(runtime, maq::read_bundle(bundle), maq::SessionSettings());
   const maq::Capture capture = maq::open_capture(capture_folder);
-  maq::SceneBuilder builder(capture.cloud, capture.up, *networks, {});
+  maq::DescriptorFitter fitter(capture.cloud, capture.up, *networks, {});
   std::vector<HeldOut> views;
   for (const maq::CaptureView& view : capture.views) {
     maq::PosedView photo;
@@ -132,31 +136,35 @@ int measure(const char* capture_folder, const char* bundle) {
           {photo.camera(), std::vector<uint8_t>(maq::packed_bytes(image.format, image.width_px, image.height_px)), {}});
       maq::copy_packed(image, views.back().photo.data());
     } else {
-      builder.add_view(photo.image(), photo.valid(), photo.camera());
+      fitter.add_view(photo.image(), photo.valid(), photo.camera());
     }
   }
-  const maq::ModelledPoints points = builder.finish();
-  std::vector<float> variations = points.variations;
-  std::sort(variations.begin(), variations.end());
-  const auto quantile = [&](double share) { return double(variations[size_t(share * double(variations.size() - 1))]); };
+  const maq::FittedPoints points = fitter.finish();
+  std::vector<float> view_dependence = points.view_dependence;
+  std::sort(view_dependence.begin(), view_dependence.end());
+  const auto quantile = [&](double fraction) {
+    return double(view_dependence[size_t(fraction * double(view_dependence.size() - 1))]);
+  };
   double photos = 0;
   for (const uint32_t count : points.views) photos += count;
-  std::printf("%zu points, %.1f photos a point; variations: median %.4f, 90 %% %.4f, 99 %% %.4f\n", points.count(),
+  std::printf("%zu points, %.1f photos a point; view_dependence: median %.4f, 90 %% %.4f, 99 %% %.4f\n", points.count(),
               photos / double(points.count()), quantile(0.5), quantile(0.9), quantile(0.99));
-  std::printf("means' standard deviation:");
+  std::printf("constant_terms' standard deviation:");
   for (const double deviation : deviations(points)) std::printf(" %.3f", deviation);
-  std::printf("\nstored threshold varying  bytes       RMS      99 %%     worst  photos dB floats dB\n");
-  for (const auto& [name, kind] : {std::pair("float", maq::Coefficients::kFloat32),
-                                   {"int16", maq::Coefficients::kInt16},
-                                   {"int8", maq::Coefficients::kInt8}}) {
-    for (const float least : {0.0f, 0.005f, 0.011f, 0.02f, 0.03f, 0.05f, 0.08f, 0.12f, 0.2f, 1e9f}) {
-      const auto places = kind == maq::Coefficients::kFloat32 ? maq::Places::kFloat32 : maq::Places::kUint16;
-      const maq::ScenePacking packing = {places, kind, least};
+  std::printf("\nstored threshold view_dependent  bytes       RMS      99 %%     worst  photos dB floats dB\n");
+  for (const auto& [name, kind] : {std::pair("float", maq::CoefficientFormat::kFloat32),
+                                   {"int16", maq::CoefficientFormat::kInt16},
+                                   {"int8", maq::CoefficientFormat::kInt8}}) {
+    for (const float min : {0.0f, 0.005f, 0.011f, 0.02f, 0.03f, 0.05f, 0.08f, 0.12f, 0.2f, 1e9f}) {
+      const auto positions =
+          kind == maq::CoefficientFormat::kFloat32 ? maq::PositionFormat::kFloat32 : maq::PositionFormat::kUint16;
+      const maq::ScenePacking packing = {positions, kind, min};
       const maq::Scene scene = make_scene(points, packing);
-      const size_t bytes = blocks_bytes(scene) + places_bytes(scene) + means_bytes(scene) + slopes_bytes(scene);
-      std::printf("%-6s %9.3g %7.3f %6.1f ", name, double(least), double(scene.varying) / scene.points,
+      const size_t bytes =
+          blocks_bytes(scene) + positions_bytes(scene) + constant_terms_bytes(scene) + linear_terms_bytes(scene);
+      std::printf("%-6s %9.3g %7.3f %6.1f ", name, double(min), double(scene.view_dependent) / scene.points,
                   double(bytes) / scene.points);
-      print_errors(points, builder.moments(), scene, order_points(points, packing).points);
+      print_errors(points, fitter.regressions(), scene, order_points(points, packing).points);
       print_views(scene, networks, views);
       std::printf("\n");
     }

@@ -1,6 +1,6 @@
-// Milliseconds of each step of rendering, on made-up scenes: `measure_scene_renderer BUNDLE [points [width height [threads
-// [frames]]]]`. Medians over the frames of an orbit, and the work of the last one; the first frame, which prepares the
-// refiner, is apart.
+// Milliseconds of each step of rendering, on made-up scenes: `measure_scene_renderer BUNDLE [points [width height
+// [threads [frames]]]]`. Medians over the frames of an orbit, and the work of the last one; the first frame, which
+// prepares the refiner, is apart.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -19,11 +19,11 @@ using maq::kFeatures;
 enum class Kind { kRoom, kObject };
 
 // A room is seen from within, a part of it at a time; of an object nothing is outside of the picture.
-maq::ModelledPoints points_of(Kind kind, size_t count) {
+maq::FittedPoints points_of(Kind kind, size_t count) {
   std::mt19937 random(1);
   std::normal_distribution<float> normal;
   std::uniform_real_distribution<float> across(-1, 1);
-  maq::ModelledPoints points;
+  maq::FittedPoints points;
   points.up = {0, 0, 1};
   for (size_t i = 0; i < count; ++i) {
     float at[3];
@@ -41,11 +41,12 @@ maq::ModelledPoints points_of(Kind kind, size_t count) {
     points.x.push_back(at[0]);
     points.y.push_back(at[1]);
     points.z.push_back(at[2]);
-    // Half of the points' looks do not depend on the side.
-    points.variations.push_back(random() % 2 == 0 ? 0.0f : 1.0f);
+    // Half of the points are view-dependent.
+    points.view_dependence.push_back(random() % 2 == 0 ? 0.0f : 1.0f);
     points.views.push_back(1);
-    for (int c = 0; c < kFeatures; ++c) points.means.push_back(0.5f + 0.3f * std::sin(5 * at[c % 3] + float(c)));
-    for (int k = 0; k < kBasis * kFeatures; ++k) points.slopes.push_back(0.05f * normal(random));
+    for (int c = 0; c < kFeatures; ++c)
+      points.constant_terms.push_back(0.5f + 0.3f * std::sin(5 * at[c % 3] + float(c)));
+    for (int k = 0; k < kBasis * kFeatures; ++k) points.linear_terms.push_back(0.05f * normal(random));
   }
   return points;
 }
@@ -71,12 +72,14 @@ maq::PinholeCamera camera_of(Kind kind, int width, int height, double angle, dou
 void measure(const char* name, maq::SceneRenderer& renderer, Kind kind, int width, int height, double roll,
              int frames) {
   using Figure = double maq::RenderCounts::*;
-  const std::pair<const char*, Figure> figures[] = {
-      {"project", &maq::RenderCounts::project_ms}, {"shade", &maq::RenderCounts::shade_ms},
-      {"reduce", &maq::RenderCounts::reduce_ms},   {"refine", &maq::RenderCounts::refine_ms},
-      {"cover", &maq::RenderCounts::cover_ms},     {"turn", &maq::RenderCounts::turn_ms},
-      {"all", &maq::RenderCounts::all_ms}};
-  maq::RenderedPicture picture;
+  const std::pair<const char*, Figure> figures[] = {{"project", &maq::RenderCounts::project_ms},
+                                                    {"shade", &maq::RenderCounts::shade_ms},
+                                                    {"reduce", &maq::RenderCounts::reduce_ms},
+                                                    {"refine", &maq::RenderCounts::refine_ms},
+                                                    {"coverage", &maq::RenderCounts::coverage_ms},
+                                                    {"rotate", &maq::RenderCounts::rotate_ms},
+                                                    {"all", &maq::RenderCounts::all_ms}};
+  maq::RenderedImage picture;
   std::vector<maq::RenderCounts> all;
   for (int frame = 0; frame <= frames; ++frame) {
     renderer.render(camera_of(kind, width, height, 0.05 * frame, roll), picture);
@@ -90,10 +93,10 @@ void measure(const char* name, maq::SceneRenderer& renderer, Kind kind, int widt
     std::printf(" %s %5.2f", title, values[values.size() / 2]);
   }
   const maq::RenderCounts& last = all.back();
-  std::printf(" ms | blocks %u/%u points %llu shaded %llu varying %llu refined %llu/%llu px\n", last.projected_blocks,
-              last.blocks, (unsigned long long)last.projected_points, (unsigned long long)last.shaded_points,
-              (unsigned long long)last.varying_points, (unsigned long long)last.refined_pixels,
-              (unsigned long long)last.frame_pixels);
+  std::printf(" ms | blocks %u/%u points %llu shaded %llu view_dependent %llu refined %llu/%llu px\n",
+              last.projected_blocks, last.blocks, (unsigned long long)last.projected_points,
+              (unsigned long long)last.shaded_points, (unsigned long long)last.view_dependent_points,
+              (unsigned long long)last.refined_pixels, (unsigned long long)last.frame_pixels);
 }
 
 }  // namespace
@@ -108,13 +111,13 @@ int main(int argc, char** argv) {
     settings.threads = threads;
     const auto networks = std::make_shared<maq::SceneNetworks>(runtime, maq::read_bundle(argv[1]), settings);
     for (const Kind kind : {Kind::kRoom, Kind::kObject}) {
-      const maq::ModelledPoints points = points_of(kind, size_t(count));
-      for (const auto coefficients : {maq::Coefficients::kInt8, maq::Coefficients::kFloat32}) {
-        const bool is_int8 = coefficients == maq::Coefficients::kInt8;
+      const maq::FittedPoints points = points_of(kind, size_t(count));
+      for (const auto coefficients : {maq::CoefficientFormat::kInt8, maq::CoefficientFormat::kFloat32}) {
+        const bool is_int8 = coefficients == maq::CoefficientFormat::kInt8;
         maq::ScenePacking packing;
-        packing.places = is_int8 ? maq::Places::kUint16 : maq::Places::kFloat32;
+        packing.positions = is_int8 ? maq::PositionFormat::kUint16 : maq::PositionFormat::kFloat32;
         packing.coefficients = coefficients;
-        packing.least_variation = is_int8 ? 0.5f : 0;
+        packing.min_view_dependence = is_int8 ? 0.5f : 0;
         maq::RenderOptions options;
         options.threads = threads;
         maq::SceneRenderer renderer(make_scene(points, packing), networks, options);

@@ -12,8 +12,7 @@ maq_status maq_capture_open(maq_context* context, const char* folder, maq_captur
     require_argument(capture, "capture");
     auto opened = std::make_unique<maq_capture>(open_capture(folder));
     for (const Dropped& dropped : opened->capture.dropped) {
-      opened->dropped.push_back(dropped.first.empty() ? dropped.reason
-                                                      : dropped.reason + " (first: " + dropped.first + ")");
+      opened->dropped.push_back(dropped.reason_and_first());
     }
     *capture = opened.release();
     return MAQ_OK;

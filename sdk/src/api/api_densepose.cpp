@@ -48,7 +48,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config) {
   settings.max_people = config.max_people;
   settings.max_proposals = config.max_proposals;
   settings.key_frame_interval = config.key_frame_interval;
-  settings.least_person_px = config.min_person_height_px;
+  settings.min_person_height_px = config.min_person_height_px;
   settings.surface = config.detail == MAQ_DENSEPOSE_DETAIL_SURFACE;
   settings.spin = config.allow_spinning == 1;
   return settings;
@@ -108,7 +108,7 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
 maq_status maq_densepose_reset(maq_densepose* densepose) {
   return guarded(densepose, __func__, [&] {
     require_argument(densepose, "densepose");
-    densepose->densepose->restart();
+    densepose->densepose->reset();
     return MAQ_OK;
   });
 }

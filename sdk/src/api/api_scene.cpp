@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <limits>
 
 #include "api/boundary.h"
 #include "scene/format/ply_writer.h"
@@ -40,25 +39,18 @@ maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
     require_argument(scene, "scene");
     const Scene& from = scene->scene;
     maq_scene_info filled{};
-    switch (from.coefficient_kind) {
-      case Coefficients::kInt8: filled.coefficient_bits = 8; break;
-      case Coefficients::kInt16: filled.coefficient_bits = 16; break;
-      case Coefficients::kFloat32: filled.coefficient_bits = 32; break;
+    switch (from.coefficient_format) {
+      case CoefficientFormat::kInt8: filled.coefficient_bits = 8; break;
+      case CoefficientFormat::kInt16: filled.coefficient_bits = 16; break;
+      case CoefficientFormat::kFloat32: filled.coefficient_bits = 32; break;
     }
     filled.point_count = from.points;
-    filled.view_dependent_count = from.varying;
+    filled.view_dependent_count = from.view_dependent;
     filled.block_count = from.block_count;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      filled.up[axis] = from.up[axis];
-      filled.bounds_min[axis] = std::numeric_limits<double>::infinity();
-      filled.bounds_max[axis] = -filled.bounds_min[axis];
-      for (uint32_t block = 0; block < from.block_count; ++block) {
-        filled.bounds_min[axis] =
-            std::min(filled.bounds_min[axis], from.origin[axis] + double(from.blocks[block].low[axis]));
-        filled.bounds_max[axis] =
-            std::max(filled.bounds_max[axis], from.origin[axis] + double(from.blocks[block].high[axis]));
-      }
-    }
+    const SceneBounds bounds = bounds_of(from);
+    std::copy_n(from.up.begin(), 3, filled.up);
+    std::copy_n(bounds.low.begin(), 3, filled.bounds_min);
+    std::copy_n(bounds.high.begin(), 3, filled.bounds_max);
     std::copy(from.networks_sha256.begin(), from.networks_sha256.end(), filled.networks_sha256);
     write_struct(info, "info", filled, sizeof filled);
     return MAQ_OK;

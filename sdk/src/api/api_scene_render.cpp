@@ -51,7 +51,6 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     RenderOptions options;
     options.threads = scene_threads(config.threads);
     options.near = config.near_depth;
-    require_range("config.use_background", int(config.use_background), 0, 1);
     if (config.use_background == 1) {
       options.background = {config.background[2], config.background[1], config.background[0]};
     }
@@ -59,8 +58,8 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     options.skips_empty_parts = config.refine_empty_parts == 0;
     auto networks = open_scene_networks(context, config.bundle_path, options.threads, config.allow_spinning == 1);
     if (scene->scene.networks_sha256 != networks->sha256()) {
-      throw Error(MAQ_ERROR_BAD_BUNDLE, "The scene was made with other networks than those in ", config.bundle_path,
-                  "; give the bundle that it was built with, or build it anew.");
+      throw Error(MAQ_ERROR_BAD_BUNDLE, "The scene was built with other networks than bundle ", config.bundle_path,
+                  " has; give the bundle that it was built with, or build the scene again.");
     }
     *renderer = new maq_scene_renderer(scene->scene, std::move(networks), options, config.image_pool_size);
     return MAQ_OK;
@@ -80,7 +79,7 @@ maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhol
       throw ArgumentError("camera.distortion is not 0; pictures are rendered without distortion.");
     }
     BoundedPool<maq_scene_image>::Pooled handle = renderer->images.acquire();
-    renderer->renderer.render(pinhole_of(*camera), handle->picture);
+    renderer->renderer.render(pinhole_of(*camera), handle->image);
     *image = lend<maq_scene_image>(std::move(handle));
     return MAQ_OK;
   });
@@ -99,19 +98,19 @@ maq_status maq_scene_image_get_plane(const maq_scene_image* image, maq_scene_pla
     static_assert(sizeof wanted == sizeof plane);
     std::memcpy(&wanted, &plane, sizeof wanted);
     require_range("plane", wanted, int32_t(MAQ_SCENE_PLANE_BGR), int32_t(MAQ_SCENE_PLANE_DEPTH));
-    const RenderedPicture& picture = image->picture;
-    const size_t width = size_t(picture.width_px);
+    const RenderedImage& from = image->image;
+    const size_t width = size_t(from.width_px);
     switch (wanted) {
       case MAQ_SCENE_PLANE_BGR:
-        *pixels = picture.bgr.data();
+        *pixels = from.bgr.data();
         *stride_bytes = 3 * width;
         break;
       case MAQ_SCENE_PLANE_ALPHA:
-        *pixels = picture.alpha.data();
+        *pixels = from.alpha.data();
         *stride_bytes = width;
         break;
       case MAQ_SCENE_PLANE_DEPTH:
-        *pixels = picture.depth.data();
+        *pixels = from.depth.data();
         *stride_bytes = sizeof(float) * width;
         break;
     }
@@ -122,12 +121,12 @@ maq_status maq_scene_image_get_plane(const maq_scene_image* image, maq_scene_pla
 maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_image_stats* stats) {
   return guarded(image, __func__, [&] {
     require_argument(image, "image");
-    const RenderCounts& from = image->picture.counts;
+    const RenderCounts& from = image->image.counts;
     maq_scene_image_stats filled{};
     filled.project_ms = float(from.project_ms);
     filled.shade_ms = float(from.shade_ms + from.reduce_ms);
     filled.refine_ms = float(from.refine_ms);
-    filled.resample_ms = float(from.cover_ms + from.turn_ms);
+    filled.resample_ms = float(from.coverage_ms + from.rotate_ms);
     filled.total_ms = float(from.all_ms);
     filled.drawn_block_count = from.projected_blocks;
     filled.drawn_point_count = from.projected_points;

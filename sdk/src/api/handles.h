@@ -114,7 +114,7 @@ struct maq_scene : maq::Handle {
 };
 
 struct maq_scene_image : maq::Handle {
-  maq::RenderedPicture picture;
+  maq::RenderedImage image;
   maq::BoundedPool<maq_scene_image>::Deleter deleter;
 };
 

@@ -2,11 +2,16 @@
 
 #include <algorithm>
 
+#include "core/error.h"
+
 namespace maq {
 
 int default_threads() { return int(std::clamp(std::thread::hardware_concurrency(), 1u, 4u)); }
 
 WorkerThreads::WorkerThreads(int count) {
+  if (count < 1 || count > kMaxThreads) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Threads are ", count, ", but must be 1 to ", kMaxThreads, ".");
+  }
   try {
     for (int worker = 1; worker < count; ++worker) threads_.emplace_back([this, worker] { stay(worker); });
   } catch (...) {

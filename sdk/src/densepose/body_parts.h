@@ -11,8 +11,8 @@ struct BodyPart {
   std::array<uint8_t, 3> rgb;
 };
 
-// So that a body can be read at a glance: torso gold, head rose, right limbs warm, left limbs cool; the front and the outer
-// side of a limb are lighter than its back.
+// So that a body can be read at a glance: torso gold, head rose, right limbs warm, left limbs cool; the front and the
+// outer side of a limb are lighter than its back.
 constexpr std::array<BodyPart, 25> kBodyParts = {{
     {"background", {0, 0, 0}},
     {"torso, back", {214, 158, 46}},

@@ -37,8 +37,8 @@ struct ScoredBox {
 // Best score first, then lowest index: the order of everything that follows.
 bool comes_before(const ScoredBox& a, const ScoredBox& b);
 
-// Greedy non-maximum suppression, in place: keeps a box unless it overlaps a kept one by more than `iou`, at most `limit`
-// boxes, in order. `boxes` need not be sorted.
+// Greedy non-maximum suppression, in place: keeps a box unless it overlaps a kept one by more than `iou`, at most
+// `limit` boxes, in order. `boxes` need not be sorted.
 void non_maximum_suppression(std::vector<ScoredBox>& boxes, float iou, size_t limit);
 
 }  // namespace maq

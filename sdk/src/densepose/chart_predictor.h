@@ -1,4 +1,4 @@
-// U and V of a person, computed only for the cells and parts that somebody asks for.
+// U and V of a person, computed only for the cells and parts that decoding reads.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ class ChartPredictor : public ChartValues {
   ChartPredictor(const std::vector<uint8_t>& bytes, int parts, const std::string& name);
 
   int channels() const { return channels_; }
-  // Looks at another person from now on: `surface` [size, size, channels], which must stay until the next.
+  // Turns to another person: `surface` [size, size, channels], which must stay until the next call.
   void begin(const float* surface, int size);
   // Of the output [2 * size, 2 * size].
   ChartPoint at(int part, int row, int column) override;

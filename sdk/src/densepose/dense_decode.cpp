@@ -12,9 +12,10 @@
 namespace maq {
 namespace {
 
-constexpr int kMostClasses = 64;
-// Below every logit, yet finite, so that it survives interpolation; -kNever bounds them from above.
-constexpr float kNever = -1e30f;
+constexpr int kMaxClasses = 64;
+// Sentinel below every logit of a network: stands for a missing class. Finite, so that interpolating it gives no NaN;
+// logits are clamped to [kSentinelLogit, -kSentinelLogit].
+constexpr float kSentinelLogit = -1e30f;
 constexpr int kLanes = 8;
 
 using Tap = ResizeTap;
@@ -30,11 +31,11 @@ void fill_taps(int from, int to, std::vector<Tap>& taps) {
   }
 }
 
-// The first of `count` values (of `padded`, a multiple of kLanes, the rest kNever) that is the largest. NaN never wins; -1
-// if all are NaN or kNever.
+// The first of `count` values (of `padded`, a multiple of kLanes, the rest kSentinelLogit) that is the largest. NaN
+// never wins; -1 if all are NaN or kSentinelLogit.
 inline int best_of(const float* values, int count, int padded) {
   std::array<float, kLanes> lane_best;
-  lane_best.fill(kNever);
+  lane_best.fill(kSentinelLogit);
   for (int c = 0; c < padded; c += kLanes) {
     for (int lane = 0; lane < kLanes; ++lane) {
       const float value = values[c + lane];
@@ -50,12 +51,12 @@ inline int best_of(const float* values, int count, int padded) {
 }
 
 // One row of the resized logits before its columns are resized, with the classes innermost, so that comparing the
-// classes of a pixel runs over neighbouring memory. Padded with kNever to whole lanes.
+// classes of a pixel runs over neighbouring memory. Padded with kSentinelLogit to whole lanes.
 class ClassRow {
  public:
   ClassRow(int classes, int size, std::vector<float>& values)
       : classes_(classes), size_(size), padded_(round_up(classes, kLanes)), values_(values) {
-    values_.assign(size_t(size) * size_t(padded_), kNever);
+    values_.assign(size_t(size) * size_t(padded_), kSentinelLogit);
   }
 
   // The classes from `first` on of each cell.
@@ -70,7 +71,7 @@ class ClassRow {
 
   // The class with the largest resized logit at a pixel; of equal ones the lowest. NaN never wins; -1 if all are NaN.
   int best(const Tap& col) const {
-    alignas(32) std::array<float, kMostClasses> mixed;
+    alignas(32) std::array<float, kMaxClasses> mixed;
     const float* low = values_.data() + size_t(col.low) * size_t(padded_);
     const float* high = values_.data() + size_t(col.high) * size_t(padded_);
     for (int c = 0; c < padded_; ++c) mixed[size_t(c)] = low[c] + (high[c] - low[c]) * col.fraction;
@@ -105,26 +106,26 @@ inline float exp_of_negative(float x) {
 MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<float>& odds) {
   const int parts = logits.coarse_classes - 1;
   const int padded = round_up(parts, kLanes);
-  alignas(64) std::array<float, kMostClasses> values;
-  values.fill(kNever);
-  const auto finite = [](float logit) {
-    const float low = logit > kNever ? logit : kNever;  // also where it is NaN
-    return low < -kNever ? low : -kNever;
+  alignas(64) std::array<float, kMaxClasses> values;
+  values.fill(kSentinelLogit);
+  const auto clamped = [](float logit) {
+    const float low = logit > kSentinelLogit ? logit : kSentinelLogit;  // also where it is NaN
+    return low < -kSentinelLogit ? low : -kSentinelLogit;
   };
   odds.resize(size_t(logits.size) * size_t(logits.size));
   for (int y = 0; y < logits.size; ++y) {
     for (int x = 0; x < logits.size; ++x) {
       const float* classes = logits.cell(y, x);
-      for (int c = 0; c < parts; ++c) values[size_t(c)] = finite(classes[1 + c]);
-      std::array<float, kLanes> most;
-      most.fill(kNever);
+      for (int c = 0; c < parts; ++c) values[size_t(c)] = clamped(classes[1 + c]);
+      std::array<float, kLanes> lane_max;
+      lane_max.fill(kSentinelLogit);
       for (int c = 0; c < padded; c += kLanes) {
         for (int lane = 0; lane < kLanes; ++lane) {
           const float value = values[size_t(c + lane)];
-          most[size_t(lane)] = value > most[size_t(lane)] ? value : most[size_t(lane)];
+          lane_max[size_t(lane)] = value > lane_max[size_t(lane)] ? value : lane_max[size_t(lane)];
         }
       }
-      const float best = *std::max_element(most.begin(), most.end());
+      const float best = *std::max_element(lane_max.begin(), lane_max.end());
       std::array<float, kLanes> sums{};
       for (int c = 0; c < padded; c += kLanes) {
         for (int lane = 0; lane < kLanes; ++lane) {
@@ -135,7 +136,7 @@ MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<floa
       float sum = 0;
       for (const float part_sum : sums) sum += part_sum;
       odds[size_t(y) * size_t(logits.size) + size_t(x)] =
-          best == kNever ? kNever : best + std::log(sum) - finite(classes[0]);
+          best == kSentinelLogit ? kSentinelLogit : best + std::log(sum) - clamped(classes[0]);
     }
   }
 }
@@ -144,8 +145,8 @@ MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<floa
 MAQ_SIMD_CLONES void best_parts(const DenseLogits& logits, std::vector<int8_t>& best) {
   const int parts = logits.index_classes - 1;
   const int padded = round_up(parts, kLanes);
-  std::array<float, kMostClasses> values;
-  values.fill(kNever);
+  std::array<float, kMaxClasses> values;
+  values.fill(kSentinelLogit);
   best.resize(size_t(logits.size) * size_t(logits.size));
   for (int y = 0; y < logits.size; ++y) {
     for (int x = 0; x < logits.size; ++x) {
@@ -221,13 +222,13 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
                                           float mask_threshold, float min_visible_fraction, DecodeMemory& memory,
                                           DensePlanes& planes) {
   DecodeCounts counts;
-  int64_t taken = 0;  // pixels of the person that are somebody else's already
+  int64_t taken = 0;  // pixels of the person that belong to people in front
   const PixelRect rect = pixel_rect(box);
   auto& [rows, cols, odds, best, mixed_row] = memory;
   fill_taps(logits.size, rect.height, rows);
   fill_taps(logits.size, rect.width, cols);
   person_log_odds(logits, odds);
-  const float least_odds = std::log(mask_threshold / (1 - mask_threshold));
+  const float min_odds = std::log(mask_threshold / (1 - mask_threshold));
   ClassRow parts(logits.index_classes - 1, logits.size, mixed_row);  // all but the background
   best_parts(logits, best);
 
@@ -245,7 +246,7 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
     for (int x = first_col; x < last_col; ++x) {
       const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
       const Tap& col = cols[size_t(x)];
-      if (!(bilinear(odds.data(), logits.size, row, col) > least_odds)) continue;
+      if (!(bilinear(odds.data(), logits.size, row, col) > min_odds)) continue;
       if (planes.person[pixel] != 0) {
         ++taken;
         continue;

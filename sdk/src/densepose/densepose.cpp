@@ -9,7 +9,7 @@
 namespace maq {
 namespace {
 
-constexpr size_t kFeatureLevels = 4;  // P2 to P5, which the heads draw on
+constexpr size_t kFeatureLevels = 4;  // P2 to P5, which the heads read
 constexpr size_t kRpnLevels = 5;      // P2 to P6
 constexpr int kFirstLevel = 2;
 
@@ -52,9 +52,9 @@ int feature_channels(const GraphSpec& trunk, const std::string& bundle_name) {
   return int(*channels);
 }
 
-// Settings with the bundle's values where they were left open.
+// Settings with the bundle's values in place of zeros.
 DensePoseSettings resolved(DensePoseSettings settings, const DensePoseSpec& spec) {
-  if (settings.long_side_px == 0) settings.long_side_px = spec.input.long_side_px;
+  if (settings.long_side_px == 0) settings.long_side_px = spec.long_side_px;
   if (settings.score_threshold < 0) settings.score_threshold = spec.box_head.score_threshold;
   if (settings.max_people == 0) settings.max_people = spec.box_head.max_people;
   if (settings.max_proposals == 0) settings.max_proposals = spec.rpn.post_nms_top_k;
@@ -104,18 +104,16 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
   result.people.clear();
   result.planes.reset(image.width_px, image.height_px);
 
-  const int width_before = input_.width_px;
-  const int height_before = input_.height_px;
-  network_size(image.width_px, image.height_px, settings_.long_side_px, &stats.network_width_px,
-               &stats.network_height_px);
-  const bool same_stream = stats.network_width_px == width_before && stats.network_height_px == height_before;
-  stats.key_frame = !same_stream || frames_since_key_ == 0;
+  const NetworkSize size = network_size(image.width_px, image.height_px, settings_.long_side_px);
+  stats.network_width_px = size.width_px;
+  stats.network_height_px = size.height_px;
+  const bool is_same_stream = size.width_px == input_.width_px && size.height_px == input_.height_px;
+  stats.key_frame = !is_same_stream || frames_since_key_ == 0;
   frames_since_key_ = stats.key_frame ? 1 : frames_since_key_ + 1;
   if (frames_since_key_ >= settings_.key_frame_interval) frames_since_key_ = 0;
-  if (stats.key_frame ||
-      !followed_.empty()) {  // else nobody was there, and nobody is looked for until the next key frame
-    make_network_input(image, {settings_.long_side_px, spec_.input.multiple_of, spec_.input.mean, spec_.input.std},
-                       input_);
+  // Without boxes to propagate nothing runs until the next key frame.
+  if (stats.key_frame || !tracked_.empty()) {
+    make_network_input(image, size, spec_.input, input_);
     stats.preprocess_ms = float(stage.lap_ms());
 
     run_trunk();
@@ -124,21 +122,20 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
     if (stats.key_frame) {
       propose(image.height_px, proposals_, &stats.dropped_boxes);
     } else {
-      proposals_ = followed_;
+      proposals_ = tracked_;
     }
-    followed_.clear();
+    tracked_.clear();
     stats.proposals = int(proposals_.size());
     stats.proposals_ms = float(stage.lap_ms());
 
-    // People who are followed come from a look at the frame before.
-    const bool has_second_pass = stats.key_frame && spec_.box_head.second_pass_threshold.has_value();
-    const float least_score = settings_.score_threshold;
-    if (has_second_pass) {
-      run_box_head(proposals_, std::min(least_score, *spec_.box_head.second_pass_threshold), found_,
+    // Propagated boxes went through the box head in the frame before, so that this is their second pass.
+    const float min_score = settings_.score_threshold;
+    if (stats.key_frame && spec_.box_head.second_pass_threshold) {
+      run_box_head(proposals_, std::min(min_score, *spec_.box_head.second_pass_threshold), found_,
                    &stats.dropped_boxes);
       proposals_.swap(found_);
     }
-    run_box_head(proposals_, least_score, found_, &stats.dropped_boxes);
+    run_box_head(proposals_, min_score, found_, &stats.dropped_boxes);
     stats.box_head_ms = float(stage.lap_ms());
 
     if (!found_.empty()) run_dense_head(found_, result);
@@ -146,9 +143,9 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
   stats.total_ms = float(total.lap_ms());
 }
 
-void DensePose::restart() {
+void DensePose::reset() {
   frames_since_key_ = 0;
-  followed_.clear();
+  tracked_.clear();
 }
 
 void DensePose::run_trunk() {
@@ -170,8 +167,8 @@ void DensePose::run_trunk() {
 
 void DensePose::propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped) {
   rpn_levels_.assign(kRpnLevels, {});
-  // Runs a graph of the RPN on the levels from `first` on.
-  const auto ask = [&](Session& rpn, size_t first, size_t count) {
+  // Runs a graph of the RPN on `count` levels from `first` on.
+  const auto run_rpn = [&](Session& rpn, size_t first, size_t count) {
     inputs_.assign(pyramid_.begin() + std::ptrdiff_t(first), pyramid_.begin() + std::ptrdiff_t(first + count));
     const int64_t anchors = int64_t(spec_.rpn.aspect_ratios.size());
     shapes_.clear();
@@ -181,12 +178,12 @@ void DensePose::propose(int image_height_px, std::vector<ScoredBox>& found, int*
       rpn_levels_[first + l] = {outputs[l].data, int(inputs_[l].shape[2]), int(inputs_[l].shape[1])};
     }
   };
-  ask(*rpn_coarse_, 1, kRpnLevels - 1);
-  // The finest anchors are for boxes smaller than the geometric mean of their side and the next level's. Somebody who
-  // stands is about three times as high as wide, so that the box's side (root of its area) is height / sqrt(3).
+  run_rpn(*rpn_coarse_, 1, kRpnLevels - 1);
+  // The finest anchors are for boxes smaller than the geometric mean of their side and the next level's. A standing
+  // person is about three times as high as wide, so that the box's side (root of its area) is height / sqrt(3).
   const float scale = float(input_.height_px) / float(image_height_px);
   const std::vector<float>& sizes = spec_.rpn.anchor_sizes_px;
-  if (float(settings_.least_person_px) * scale < std::sqrt(3.0f * sizes[0] * sizes[1])) ask(*rpn_fine_, 0, 1);
+  if (float(settings_.min_person_height_px) * scale < std::sqrt(3.0f * sizes[0] * sizes[1])) run_rpn(*rpn_fine_, 0, 1);
   select_proposals(rpn_levels_, spec_.rpn, settings_.max_proposals, float(input_.width_px), float(input_.height_px),
                    candidates_, found, dropped);
 }
@@ -200,7 +197,7 @@ const FeatureMap& DensePose::level_for(const Box& box) const {
   return features_[size_t(slot)];
 }
 
-void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float least_score, std::vector<ScoredBox>& found,
+void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_score, std::vector<ScoredBox>& found,
                              int* dropped) {
   found.clear();
   if (boxes.empty()) return;
@@ -221,7 +218,7 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float least_sc
     Box box = apply_deltas(boxes[i].box, outputs.data + 6 * i + 2, spec.delta_weights);
     if (std::isnan(score) || !clip_box(box, float(input_.width_px), float(input_.height_px))) {
       ++*dropped;
-    } else if (score > least_score) {
+    } else if (score > min_score) {
       found.push_back({box, score, int64_t(i)});
     }
   }
@@ -256,10 +253,10 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
     clip_box(box, float(result.planes.width_px), float(result.planes.height_px));
     const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold,
                                              spec.min_visible_fraction, decode_memory_, result.planes);
-    // A box without a body is a false alarm; one whose body is somebody else's already shows that person again.
+    // A box without a body is a false alarm; one whose body is painted already shows the same person again.
     if (counts.body_pixels > 0) {
       result.people.push_back({box, people[i].score});
-      followed_.push_back(people[i]);
+      tracked_.push_back(people[i]);
     }
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;

@@ -19,7 +19,7 @@
 
 namespace maq {
 
-// Of maq_densepose_config, whose comments say what they mean; 0 (a negative threshold): the bundle's.
+// As in maq_densepose_config, whose comments say what they mean; 0 (a negative threshold): the bundle's value.
 struct DensePoseSettings {
   int threads = 1;
   int long_side_px = 0;
@@ -27,7 +27,7 @@ struct DensePoseSettings {
   int max_people = 0;
   int max_proposals = 0;
   int key_frame_interval = 1;
-  int least_person_px = 0;
+  int min_person_height_px = 0;
   bool surface = true;
   bool spin = true;
 };
@@ -39,7 +39,7 @@ struct Person {
 
 struct DensePoseStats {
   float preprocess_ms = 0;
-  float trunk_ms = 0;
+  float trunk_ms = 0;  // backbone and FPN neck
   float proposals_ms = 0;
   float box_head_ms = 0;
   float dense_head_ms = 0;
@@ -61,32 +61,31 @@ struct DensePoseResult {
 
 class DensePose {
  public:
-  // Makes the networks of `bundle`, which is not needed afterwards. Throws MAQ_ERROR_BAD_BUNDLE, and MAQ_ERROR_UNSUPPORTED
-  // for a bundle of another task.
+  // Makes the networks of `bundle`, which is not needed afterwards. Throws MAQ_ERROR_BAD_BUNDLE, and
+  // MAQ_ERROR_UNSUPPORTED for a bundle of another task.
   DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, const DensePoseSettings& settings);
 
   // Memory of `result` is reused. Not for two threads at once. With key_frame_interval above 1 images are frames of one
-  // stream: in between key frames people are followed from where they were. Throws MAQ_ERROR_INFERENCE.
+  // stream: between key frames the boxes of the frame before take the place of proposals. Throws MAQ_ERROR_INFERENCE.
   void run(const ImageView& image, DensePoseResult& result);
   // The next image begins another stream.
-  void restart();
+  void reset();
 
   // Where on the body labels lie; from any thread, also during run(). Throws what BodySurface::grid() throws.
   const SurfaceGrid& surface() { return surface_.grid(); }
 
  private:
   void run_trunk();
-  // The best boxes of the RPN. The finest level is asked only if somebody may be that small.
+  // The best boxes of the RPN. Its finest level runs only where people of min_person_height_px may be that small.
   void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
-  // Those of `boxes` that show somebody with more than `least_score`, moved to where they are.
-  void run_box_head(const std::vector<ScoredBox>& boxes, float least_score, std::vector<ScoredBox>& found,
-                    int* dropped);
+  // One pass of the box head: scores and refines `boxes`, keeps those of a score above `min_score`, then NMS.
+  void run_box_head(const std::vector<ScoredBox>& boxes, float min_score, std::vector<ScoredBox>& found, int* dropped);
   // Paints the people, whose boxes are in pixels of the network's input, and adds those that got a pixel to `result`.
   void run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result);
   const FeatureMap& level_for(const Box& box) const;
 
   DensePoseSpec spec_;
-  DensePoseSettings settings_;  // with the bundle's values where they were left open
+  DensePoseSettings settings_;  // none is 0 that stands for the bundle's value
   int channels_ = 0;
   std::unique_ptr<Session> trunk_;
   std::unique_ptr<Session> rpn_fine_;
@@ -99,7 +98,7 @@ class DensePose {
   std::vector<TensorView> pyramid_;   // P2 to P6, in memory of the trunk
   std::vector<FeatureMap> features_;  // P2 to P5, the same
   std::vector<float> rois_;
-  // What a frame needs in between, kept so that the next one takes nothing from the heap.
+  // Scratch of a frame, kept so that the next one takes nothing from the heap.
   RoiAlign roi_align_;
   DecodeMemory decode_memory_;
   std::vector<RpnCandidate> candidates_;
@@ -107,8 +106,8 @@ class DensePose {
   std::vector<ScoredBox> proposals_, found_;
   std::vector<TensorView> inputs_;
   std::vector<Shape> shapes_;
-  // People of the frame before, in pixels of the network's input, and frames since the RPN was asked last.
-  std::vector<ScoredBox> followed_;
+  // Boxes of the frame before, in pixels of the network's input, to be propagated; and frames since the last key frame.
+  std::vector<ScoredBox> tracked_;
   int frames_since_key_ = 0;
 };
 

@@ -10,13 +10,12 @@ std::vector<int> read_strides(const ManifestNode& node, size_t count) {
   return strides;
 }
 
-InputSpec read_input(const ManifestNode& node) {
+NetworkInputSpec read_input(const ManifestNode& node) {
   if (node.at("color").text() != "RGB") node.at("color").fail("must be RGB");
-  InputSpec input;
+  NetworkInputSpec input;
   input.mean = node.at("mean").numbers<3>(-1e6, 1e6);
   input.std = node.at("std").numbers<3>(1e-6, 1e6);
   input.multiple_of = node.at("multiple_of").integer(1, 256);
-  input.long_side_px = node.at("long_side_px").integer(32, 2048);
   return input;
 }
 
@@ -71,6 +70,7 @@ DensePoseSpec read_densepose_spec(const Manifest& manifest) {
   manifest.require_graphs({"trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head"});
   DensePoseSpec spec;
   spec.input = read_input(manifest.root.at("input"));
+  spec.long_side_px = manifest.root.at("input").at("long_side_px").integer(32, 2048);
   spec.rpn = read_rpn(manifest.root.at("rpn"));
   spec.box_head = read_box_head(manifest.root.at("box_head"));
   spec.dense_head = read_dense_head(manifest.root.at("dense_head"));

@@ -6,16 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "image/network_input.h"
 #include "nn/manifest.h"
 
 namespace maq {
-
-struct InputSpec {
-  std::array<float, 3> mean{};  // of R, G, B, in 0..255
-  std::array<float, 3> std{};
-  int multiple_of = 32;
-  int long_side_px = 0;
-};
 
 struct RpnSpec {
   std::vector<int> strides;
@@ -50,7 +44,8 @@ struct DenseHeadSpec {
 };
 
 struct DensePoseSpec {
-  InputSpec input;
+  NetworkInputSpec input;
+  int long_side_px = 0;  // of an image as it enters the network
   RpnSpec rpn;
   BoxHeadSpec box_head;
   DenseHeadSpec dense_head;

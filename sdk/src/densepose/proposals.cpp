@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::array<float, 4> kUnitWeights = {1, 1, 1, 1};
 
-// The `count` best logits of a level in order; NaN and infinities never get in.
+// The `count` best logits of a level in order; without NaN and infinities.
 void best_candidates(const RpnLevel& level, int anchors, int count, std::vector<RpnCandidate>& candidates,
                      int* dropped) {
   const int cells = level.width * level.height;

@@ -7,9 +7,8 @@
 
 namespace maq {
 
-// Writes <stem>_IUV.png, <stem>_INDS.png and <stem>.json into a folder that is there. Each is whole or not at all, and none
-// takes its place before all are written.
-// Throws MAQ_ERROR_UNWRITABLE, and what encode_image() throws.
+// Writes <stem>_IUV.png, <stem>_INDS.png and <stem>.json into an existing folder. Each appears atomically, and none
+// before all are written. Throws MAQ_ERROR_UNWRITABLE, and what encode_image() throws.
 void write_result_files(const DensePoseResult& result, const std::string& folder, const std::string& stem);
 
 }  // namespace maq

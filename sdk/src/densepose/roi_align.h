@@ -22,8 +22,9 @@ class RoiAlign {
   // The box must be finite. Memory is kept from call to call.
   void run(const FeatureMap& map, const Box& box, int pool, float* output);
 
-  // Bilinear samples, their mean over a bin and the zero outside of the map all separate into rows and columns, so a RoI
-  // is A_y F A_x^T with two sparse matrices. This is one of them: for each bin, the cells it draws on and their weights.
+  // Bilinear samples, their mean over a bin and the zero outside of the map all separate into rows and columns, so a
+  // RoI is A_y F A_x^T with two sparse matrices. This is one of them: for each bin, the cells it draws on and their
+  // weights.
   struct AxisWeights {
     struct Bin {
       int first_cell = 0;

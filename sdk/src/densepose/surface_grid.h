@@ -16,7 +16,7 @@ struct SurfaceGrid {
 // `name` names the bytes in errors. Throws MAQ_ERROR_BAD_BUNDLE.
 SurfaceGrid decode_surface_grid(const std::vector<uint8_t>& bytes, const std::string& name);
 
-// The grid of a bundle, decoded when somebody asks first: most never do.
+// The grid of a bundle, decoded at the first call of grid(): most programs never make one.
 class BodySurface {
  public:
   // The file's verified bytes; none where the bundle has no such file.

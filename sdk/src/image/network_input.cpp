@@ -50,19 +50,21 @@ void ResizeAxis::prepare(int from, int to, bool shrinks) {
   }
 }
 
-void network_size(int width_px, int height_px, int long_side_px, int* network_width_px, int* network_height_px) {
+NetworkSize network_size(int width_px, int height_px, int long_side_px) {
   const double scale = double(long_side_px) / std::max(width_px, height_px);
-  *network_width_px = std::max(1, int(std::nearbyint(width_px * scale)));
-  *network_height_px = std::max(1, int(std::nearbyint(height_px * scale)));
+  const auto scaled = [&](int side_px) { return std::max(1, int(std::nearbyint(side_px * scale))); };
+  return {scaled(width_px), scaled(height_px)};
 }
 
-void make_network_input(const ImageView& image, const NetworkInputSpec& spec, NetworkInput& input) {
-  network_size(image.width_px, image.height_px, spec.long_side_px, &input.width_px, &input.height_px);
+void make_network_input(const ImageView& image, const NetworkSize& size, const NetworkInputSpec& spec,
+                        NetworkInput& input) {
+  input.width_px = size.width_px;
+  input.height_px = size.height_px;
   input.padded_width_px = round_up(input.width_px, spec.multiple_of);
   input.padded_height_px = round_up(input.height_px, spec.multiple_of);
 
   const ImageView bgr = as_bgr(image, input.converted);
-  const bool shrinks = spec.long_side_px < std::max(image.width_px, image.height_px);
+  const bool shrinks = std::max(size.width_px, size.height_px) < std::max(image.width_px, image.height_px);
   input.across.prepare(image.width_px, input.width_px, shrinks);
   input.down.prepare(image.height_px, input.height_px, shrinks);
   const size_t row_values = size_t(image.width_px) * kChannels;

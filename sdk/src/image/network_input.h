@@ -9,14 +9,20 @@
 
 namespace maq {
 
+// The size at which an image enters the network, without padding.
+struct NetworkSize {
+  int width_px = 0;
+  int height_px = 0;
+};
+
 struct NetworkInputSpec {
-  int long_side_px = 0;
   int multiple_of = 1;          // the padded sides are multiples of it
   std::array<float, 3> mean{};  // of R, G, B, in 0..255
   std::array<float, 3> std{};
 };
 
-// How one side of an image is resized: for each new pixel the first of the old ones that it draws on, and their weights.
+// How one side of an image is resized: for each new pixel the first of the old ones that it draws on, and their
+// weights.
 struct ResizeAxis {
   int from_px = 0;
   int to_px = 0;
@@ -43,12 +49,13 @@ struct NetworkInput {
   std::vector<uint8_t> converted;  // the image as BGR, where it comes in another format
 };
 
-// The size at which an image enters the network: its long side becomes `long_side_px`, the other follows (halves are
-// rounded to even, as in Python), no side less than 1.
-void network_size(int width_px, int height_px, int long_side_px, int* network_width_px, int* network_height_px);
+// Of an image of `width_px` x `height_px`: its long side becomes `long_side_px`, the other is scaled alike (halves are
+// rounded to even, as in Python), no side is less than 1.
+NetworkSize network_size(int width_px, int height_px, int long_side_px);
 
-// Resizes (area when shrinking, bilinear when growing), normalises and pads, in one pass and without rounding to bytes
-// in between. Memory of `input` is reused.
-void make_network_input(const ImageView& image, const NetworkInputSpec& spec, NetworkInput& input);
+// Resizes to `size` (area when shrinking, bilinear when growing), normalises and pads, in one pass and without rounding
+// to bytes in between. Memory of `input` is reused.
+void make_network_input(const ImageView& image, const NetworkSize& size, const NetworkInputSpec& spec,
+                        NetworkInput& input);
 
 }  // namespace maq

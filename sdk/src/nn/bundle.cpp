@@ -19,8 +19,8 @@ using FileReading = std::function<std::optional<Bytes>(const std::string& name)>
 constexpr char kManifest[] = "manifest.json";
 constexpr char kRemedy[] = "Fetch or export the bundle again.";
 
-// Whether an ONNX file keeps weights in other files, which the manifest would not cover. Such a tensor has an entry with
-// the key "location": field 1 of a protobuf message, 8 bytes long.
+// Whether an ONNX file keeps weights in other files, which the manifest would not cover. Such a tensor has an entry
+// with the key "location": field 1 of a protobuf message, 8 bytes long.
 bool refers_to_other_files(const Bytes& onnx) {
   constexpr uint8_t kEntry[] = {0x0a, 8, 'l', 'o', 'c', 'a', 't', 'i', 'o', 'n'};
   return std::search(onnx.begin(), onnx.end(), std::begin(kEntry), std::end(kEntry)) != onnx.end();

@@ -29,8 +29,8 @@ struct NamedBuffer {
 };
 
 // Throws MAQ_ERROR_NOT_FOUND when the folder or its manifest is not there, MAQ_ERROR_UNSUPPORTED for another format
-// version, and MAQ_ERROR_BAD_BUNDLE when a file is missing, its size or SHA-256 is not the manifest's, or it keeps weights
-// in another file. Files that the manifest does not list are not read.
+// version, and MAQ_ERROR_BAD_BUNDLE when a file is missing, its size or SHA-256 is not the manifest's, or it keeps
+// weights in another file. Files that the manifest does not list are not read.
 Bundle read_bundle(const std::string& folder);
 
 // The same of buffers in any order, which are copied. Throws MAQ_ERROR_INVALID_ARGUMENT for a buffer without a name or

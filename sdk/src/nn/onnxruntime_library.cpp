@@ -43,7 +43,7 @@ void* open_library(const std::string& explicit_path, std::string* opened_path) {
               folder, " or on the system's search path.", kRemedy);
 }
 
-// ONNX Runtime has one environment for a process, whose logger is that of whoever came first and may be gone by the
+// ONNX Runtime has one environment for a process, whose logger is the one of the first caller and may be gone by the
 // time it is called; sessions have loggers of their own (session.cpp), so this one only keeps it from printing.
 void ORT_API_CALL discard_log(void*, OrtLoggingLevel, const char*, const char*, const char*, const char*) {}
 

@@ -14,7 +14,7 @@
 
 namespace maq {
 
-// The sizes of a tensor, at most four, without memory of their own.
+// The sizes of a tensor, at most four, without heap memory.
 class Shape {
  public:
   Shape() = default;
@@ -35,7 +35,7 @@ class Shape {
   size_t rank_ = 0;
 };
 
-// A float tensor, row-major, that somebody else owns.
+// A float tensor, row-major, in memory of another owner.
 struct TensorView {
   const float* data = nullptr;
   Shape shape;
@@ -44,10 +44,11 @@ struct TensorView {
 struct SessionSettings {
   int threads = 1;
   bool spin = true;  // idle threads wait for work awake for a while: faster, and dearer in energy
-  // Sizes that the graph leaves open, by the names it has for them: fixed, it runs faster, for inputs of these sizes only.
+  // Sizes that the graph leaves open, by the names it has for them: fixed, it runs faster, for inputs of these sizes
+  // only.
   std::vector<std::pair<std::string, int64_t>> fixed_sizes = {};
-  // Whether memory is planned for each size of input after its first run. With inputs of many sizes, or large ones, that takes
-  // more than it saves.
+  // Whether memory is planned for each size of input after its first run. With inputs of many sizes, or large ones,
+  // that takes more than it saves.
   bool plans_memory = true;
 };
 
@@ -73,7 +74,7 @@ class Session {
   // Throws unless the graph has each of `expected` with its type and shape; returns how many it has in all.
   size_t compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const;
 
-  // A tensor as ONNX Runtime wants it, made anew only when its place or shape changes.
+  // A tensor as ONNX Runtime wants it, made anew only when its address or shape changes.
   struct Binding {
     OrtValue* value = nullptr;
     const float* data = nullptr;

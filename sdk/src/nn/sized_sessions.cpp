@@ -21,13 +21,13 @@ std::optional<int64_t> size_of(const std::string& name, int width_px, int height
 }  // namespace
 
 SizedSessions::SizedSessions(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes,
-                             GraphSpec spec, std::string name, SessionSettings settings, size_t most_kept)
+                             GraphSpec spec, std::string name, SessionSettings settings, size_t max_kept)
     : runtime_(std::move(runtime)),
       bytes_(bytes),
       spec_(std::move(spec)),
       name_(std::move(name)),
       settings_(std::move(settings)),
-      most_kept_(most_kept) {}
+      max_kept_(max_kept) {}
 
 Session& SizedSessions::at(int width_px, int height_px) {
   const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& kept) {
@@ -38,7 +38,7 @@ Session& SizedSessions::at(int width_px, int height_px) {
     return *kept_.front().session;
   }
   // Before the new one is made: its memory is the larger part.
-  while (!kept_.empty() && kept_.size() >= most_kept_) kept_.pop_back();
+  while (!kept_.empty() && kept_.size() >= max_kept_) kept_.pop_back();
   SessionSettings settings = settings_;
   for (const TensorSpec& input : spec_.inputs) {
     for (const Dimension& dimension : input.shape) {

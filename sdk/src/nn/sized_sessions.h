@@ -16,10 +16,10 @@ class SizedSessions {
  public:
   // `bytes` and what is behind `runtime` as of Session; `bytes` must outlive this. Nothing is opened yet.
   SizedSessions(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
-                std::string name, SessionSettings settings, size_t most_kept);
+                std::string name, SessionSettings settings, size_t max_kept);
 
-  // The session for a picture of that size: the sizes that the graph's inputs call "height", "width", "height/2" and so on
-  // are fixed. Stays until `most_kept` others were asked for. Throws what Session throws.
+  // The session for a picture of that size: the sizes that the graph's inputs call "height", "width", "height/2" and so
+  // on are fixed. Stays until `max_kept` others were asked for. Throws what Session throws.
   Session& at(int width_px, int height_px);
 
  private:
@@ -33,7 +33,7 @@ class SizedSessions {
   GraphSpec spec_;
   std::string name_;
   SessionSettings settings_;
-  size_t most_kept_;
+  size_t max_kept_;
   std::list<Kept> kept_;  // the one that was used last is first
 };
 

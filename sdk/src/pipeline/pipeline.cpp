@@ -289,7 +289,7 @@ struct Pipeline::State {
     }
     source_number = now.source_number;
     waiting_since.reset();
-    if (model != nullptr) model->restart();
+    if (model != nullptr) model->reset();
     std::lock_guard<std::mutex> lock(mutex);
     is_photo = source->info().frame_count == 1 && !source->info().is_live;
     counts.dropped_frames = 0;

@@ -8,27 +8,27 @@
 
 namespace maq {
 
-PixelMap pixels_between(const PinholeCamera& source, const PinholeCamera& target) {
-  // The turn: target.rotation * source.rotation^T, of which only the part across the axis is not trivial.
-  double turn[2][2] = {};
+PixelMap pixel_map_between(const PinholeCamera& source, const PinholeCamera& target) {
+  // The rotation: target.rotation * source.rotation^T, of which only the part across the axis is not trivial.
+  double rotation[2][2] = {};
   for (size_t i = 0; i < 2; ++i) {
     for (size_t j = 0; j < 2; ++j) {
-      for (size_t k = 0; k < 3; ++k) turn[i][j] += target.rotation[3 * i + k] * source.rotation[3 * j + k];
+      for (size_t k = 0; k < 3; ++k) rotation[i][j] += target.rotation[3 * i + k] * source.rotation[3 * j + k];
     }
   }
   const double focal[2] = {target.fx_px, target.fy_px}, centre[2] = {target.cx_px, target.cy_px};
   PixelMap map{};
   for (size_t i = 0; i < 2; ++i) {
-    map[3 * i] = focal[i] * turn[i][0] / source.fx_px;
-    map[3 * i + 1] = focal[i] * turn[i][1] / source.fy_px;
+    map[3 * i] = focal[i] * rotation[i][0] / source.fx_px;
+    map[3 * i + 1] = focal[i] * rotation[i][1] / source.fy_px;
     map[3 * i + 2] = centre[i] - map[3 * i] * source.cx_px - map[3 * i + 1] * source.cy_px;
   }
   return map;
 }
 
-PinholeCamera upright_frame(const PinholeCamera& camera, const std::array<double, 3>& up, int multiple) {
-  PinholeCamera turned = turned_upright(camera, up);
-  const PixelMap map = pixels_between(camera, turned);
+PinholeCamera gravity_aligned_frame(const PinholeCamera& camera, const std::array<double, 3>& up, int multiple) {
+  PinholeCamera aligned = gravity_aligned(camera, up);
+  const PixelMap map = pixel_map_between(camera, aligned);
   const double sides[2] = {double(camera.width_px), double(camera.height_px)};
   int first[2], size[2];
   for (size_t i = 0; i < 2; ++i) {
@@ -42,21 +42,21 @@ PinholeCamera upright_frame(const PinholeCamera& camera, const std::array<double
     }
     constexpr double kFarthest = 1 << 20;
     if (!(std::abs(low) <= kFarthest && std::abs(high) <= kFarthest)) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A picture turned upright would reach from pixel ", low, " to ", high,
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A gravity-aligned picture would reach from pixel ", low, " to ", high,
                   ": the camera's focal lengths (", camera.fx_px, " and ", camera.fy_px, ") or its principal point (",
                   camera.cx_px, ", ", camera.cy_px, ") cannot be right.");
     }
-    // A turn by an angle of rounding size must not widen the frame by a pixel.
+    // A rotation by an angle of rounding size must not widen the frame by a pixel.
     constexpr double kRounding = 1e-6;
     first[i] = int(std::floor(low + 0.5 + kRounding));
     const int whole = int(std::ceil(high + 0.5 - kRounding)) - first[i];
     size[i] = round_up(whole, multiple);
   }
-  turned.width_px = size[0];
-  turned.height_px = size[1];
-  turned.cx_px -= first[0];
-  turned.cy_px -= first[1];
-  return turned;
+  aligned.width_px = size[0];
+  aligned.height_px = size[1];
+  aligned.cx_px -= first[0];
+  aligned.cy_px -= first[1];
+  return aligned;
 }
 
 }  // namespace maq

@@ -1,5 +1,5 @@
-// Frames in which the world's up is up: photos are turned into them before the extractor sees them, pictures are rendered in
-// them and turned back (NPBG++, section 3.2).
+// Gravity-aligned frames, in which the world's up is up (NPBG++, arXiv 2203.13318, section 3.2): photos are rotated
+// into them for the extractor, images are rendered in them and rotated back.
 #pragma once
 
 #include <array>
@@ -8,14 +8,15 @@
 
 namespace maq {
 
-// The camera turned upright, with the smallest frame that holds its whole picture and has sides that are multiples of
-// `multiple`. Throws MAQ_ERROR_INVALID_ARGUMENT where that is a million pixels away from the first one.
-PinholeCamera upright_frame(const PinholeCamera& camera, const std::array<double, 3>& up, int multiple);
+// The camera rotated about its axis until up is up, with the smallest frame that holds its whole picture and has sides
+// that are multiples of `multiple`. Throws MAQ_ERROR_INVALID_ARGUMENT where that is a million pixels away from the
+// first one.
+PinholeCamera gravity_aligned_frame(const PinholeCamera& camera, const std::array<double, 3>& up, int multiple);
 
-// Takes a pixel of one picture to another picture's: x' = m[0] x + m[1] y + m[2], y' = m[3] x + m[4] y + m[5].
+// Maps a pixel of one picture to another picture's: x' = m[0] x + m[1] y + m[2], y' = m[3] x + m[4] y + m[5].
 using PixelMap = std::array<double, 6>;
 
-// From `source` to `target`, two cameras that differ by their frames and a turn about the axis.
-PixelMap pixels_between(const PinholeCamera& source, const PinholeCamera& target);
+// From `source` to `target`, two cameras that differ by their frames and a rotation about the axis.
+PixelMap pixel_map_between(const PinholeCamera& source, const PinholeCamera& target);
 
 }  // namespace maq

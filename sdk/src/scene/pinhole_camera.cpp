@@ -8,7 +8,7 @@
 
 namespace maq {
 
-PinholeCamera turned_upright(const PinholeCamera& camera, const std::array<double, 3>& up) {
+PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<double, 3>& up) {
   const auto& r = camera.rotation;
   const double length = std::sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]);
   if (!(length > 0) || !std::isfinite(length)) return camera;
@@ -16,7 +16,7 @@ PinholeCamera turned_upright(const PinholeCamera& camera, const std::array<doubl
   const double across = (r[0] * up[0] + r[1] * up[1] + r[2] * up[2]) / length;
   const double down = (r[3] * up[0] + r[4] * up[1] + r[5] * up[2]) / length;
   const double seen = std::hypot(across, down);
-  // Nearly along the axis its direction in the picture says less and less; the turn fades out.
+  // Nearly along the axis its direction in the picture says less and less; the rotation fades out.
   constexpr double kFaintest = 0.05;
   const double angle = std::atan2(across, -down) * std::min(1.0, seen / kFaintest);
   const double cosine = std::cos(angle), sine = std::sin(angle);
@@ -36,7 +36,7 @@ void check_camera(const PinholeCamera& camera, const char* what) {
   }
   for (const double value : camera.rotation) is_finite = is_finite && std::isfinite(value);
   for (const double value : camera.centre) is_finite = is_finite && std::isfinite(value);
-  if (!is_finite) throw Error(MAQ_ERROR_INVALID_ARGUMENT, what, " has figures that are not finite.");
+  if (!is_finite) throw Error(MAQ_ERROR_INVALID_ARGUMENT, what, " has numbers that are not finite.");
   if (!(camera.fx_px > 0 && camera.fy_px > 0)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, what, " has focal lengths ", camera.fx_px, " and ", camera.fy_px,
                 " pixels, but they must be positive.");

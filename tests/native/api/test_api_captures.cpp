@@ -113,7 +113,7 @@ TEST_F(ApiCaptures, PointsThatAreNotFiniteAreDroppedAndACloudOfThemIsRefused) {
   {
     const maquette::Capture capture(context_, copy());
     EXPECT_EQ(capture.info().point_count, count - 2);
-    expect_dropped(capture, "points whose place is not finite", 2);
+    expect_dropped(capture, "points whose position is not finite", 2);
   }
   write_cloud(std::vector<float>(30, std::numeric_limits<float>::quiet_NaN()));
   expect_refused(MAQ_ERROR_UNREADABLE, "point");

@@ -149,7 +149,7 @@ TEST_F(ApiSceneBuilding, DistortedCamerasAreUndistorted) {
   EXPECT_GT(builder.add_view(frame, camera), 300u);
   camera.distortion[0] = -1000;
   expect_error(maq_scene_builder_add_view(builder.get(), frame.get(), &camera, nullptr), MAQ_ERROR_INVALID_ARGUMENT,
-               builder.get(), "folds the picture");
+               builder.get(), "not invertible");
   camera.distortion[0] = 0;
   for (const double value : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     camera.distortion[7] = value;

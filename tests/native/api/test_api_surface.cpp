@@ -143,7 +143,7 @@ TEST(ApiSurface, AFileThatIsNoGridIsRefusedAtEachCall) {
   for (int call = 0; call < 2; ++call) {
     std::string text;
     EXPECT_EQ(status_of([&] { densepose.surface(); }, &text), MAQ_ERROR_BAD_BUNDLE);
-    EXPECT_NE(text.find("charts.f32 is no surface grid"), std::string::npos) << text;
+    EXPECT_NE(text.find("charts.f32 is not a surface grid"), std::string::npos) << text;
   }
 }
 

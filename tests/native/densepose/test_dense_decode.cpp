@@ -259,7 +259,7 @@ TEST(DenseDecode, NanLogitsNeverWin) {
   EXPECT_EQ(paint(logits, {0, 0, 4, 4}, 1, planes).body_pixels, 0);
 }
 
-TEST(DenseDecode, WhoIsPaintedFirstStaysInFront) {
+TEST(DenseDecode, ThePersonPaintedFirstStaysInFront) {
   Logits logits(8);
   make_everybody_part(logits, 2);
   DensePlanes planes;
@@ -270,7 +270,7 @@ TEST(DenseDecode, WhoIsPaintedFirstStaysInFront) {
   EXPECT_EQ(planes.person[12], 2);
 }
 
-TEST(DenseDecode, WhoLiesMostlyOnOthersLeavesNoTrace) {
+TEST(DenseDecode, APersonMostlyHiddenByOthersLeavesNoTrace) {
   Logits logits(8);
   make_everybody_part(logits, 2);
   DensePlanes planes;

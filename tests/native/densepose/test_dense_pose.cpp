@@ -125,7 +125,7 @@ TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {
   EXPECT_EQ(result.stats.decoded.clamped_uv, clamped);
 }
 
-TEST_F(DensePose, ASecondLookStartsWhereTheFirstEnded) {
+TEST_F(DensePose, ASecondPassStartsWhereTheFirstEnded) {
   cv::Mat image = black(320, 256);
   image(cv::Rect(80, 100, 4, 4)) = kRed;
   const BundleCopy bundle;
@@ -140,12 +140,12 @@ TEST_F(DensePose, ASecondLookStartsWhereTheFirstEnded) {
   const maq::Box once = box_of(std::nullopt, {});
   const maq::Box twice = box_of(0.3f, {});
   EXPECT_NEAR(once.width(), 32, 1e-3);
-  EXPECT_NEAR(twice.x0, once.x0 + 3.2f, 1e-3) << "each look moves the box by a tenth of its width";
+  EXPECT_NEAR(twice.x0, once.x0 + 3.2f, 1e-3) << "each pass moves the box by a tenth of its width";
   EXPECT_NEAR(twice.width(), once.width(), 1e-3);
-  EXPECT_NEAR(box_of(1.0f, {}).x0, twice.x0, 1e-3) << "who is sure enough to be shown is always looked at again";
+  EXPECT_NEAR(box_of(1.0f, {}).x0, twice.x0, 1e-3) << "a box above the score threshold always gets a second pass";
 }
 
-TEST_F(DensePose, ABoxHiddenBehindAnotherIsNoPerson) {
+TEST_F(DensePose, ABoxHiddenBehindAnotherIsDropped) {
   cv::Mat image = black(320, 256);
   image(cv::Rect(160, 96, 16, 16)) = kBlue;  // a person of 128 px
   const maq::DensePoseResult alone = run(image);
@@ -154,7 +154,7 @@ TEST_F(DensePose, ABoxHiddenBehindAnotherIsNoPerson) {
   EXPECT_EQ(result.people.size(), 1u);
   EXPECT_EQ(result.planes.person, alone.planes.person);
   image(cv::Rect(160, 96, 16, 16)) = cv::Scalar::all(0);
-  EXPECT_EQ(run(image).people.size(), 1u);  // it is seen when nobody is in front
+  EXPECT_EQ(run(image).people.size(), 1u);  // it is seen when no person is in front
 }
 
 TEST_F(DensePose, BoxesComeBackInPixelsOfTheFrame) {
@@ -198,7 +198,7 @@ TEST_F(DensePose, ExtremeFramesGiveSaneResults) {
   }
 }
 
-TEST_F(DensePose, BetweenKeyFramesPeopleAreFollowedAndNobodyNewIsFound) {
+TEST_F(DensePose, BetweenKeyFramesBoxesArePropagatedAndNoNewPeopleAreFound) {
   maq::DensePoseSettings settings;
   settings.key_frame_interval = 3;
   maq::DensePose densepose = make(settings);
@@ -224,29 +224,29 @@ TEST_F(DensePose, BetweenKeyFramesPeopleAreFollowedAndNobodyNewIsFound) {
   EXPECT_EQ(see(black(160, 256)), 0u);
   EXPECT_TRUE(result.stats.key_frame) << "another size is another stream";
   EXPECT_EQ(see(black(160, 256)), 0u);
-  EXPECT_EQ(result.stats.trunk_ms, 0) << "with nobody to follow nothing runs";
+  EXPECT_EQ(result.stats.trunk_ms, 0) << "without boxes to propagate nothing runs";
   expect_sane(result, 160, 256);
-  densepose.restart();
+  densepose.reset();
   EXPECT_EQ(see(black(160, 256)), 0u);
   EXPECT_TRUE(result.stats.key_frame);
 }
 
-TEST_F(DensePose, PeopleBelowTheLeastHeightMayBeMissedAndNobodyElse) {
+TEST_F(DensePose, OnlyPeopleBelowTheMinHeightMayBeMissed) {
   cv::Mat image = black(320, 256);
   image(cv::Rect(80, 100, 4, 4)) = kRed;     // 32 px, found at the finest level
   image(cv::Rect(200, 128, 8, 8)) = kGreen;  // 64 px
   maq::DensePoseSettings settings;
-  settings.least_person_px = 70;  // sqrt(3 * 32 * 64) = 78 px
+  settings.min_person_height_px = 70;  // sqrt(3 * 32 * 64) = 78 px
   EXPECT_EQ(run(image, settings).people.size(), 2u);
-  settings.least_person_px = 90;
+  settings.min_person_height_px = 90;
   const maq::DensePoseResult result = run(image, settings);
   ASSERT_EQ(result.people.size(), 1u);
   EXPECT_NEAR(result.people[0].box.width(), 64, 1e-3);
   cv::Mat small = black(160, 128);  // the same people, now 90 px count as 180
   small(cv::Rect(40, 50, 2, 2)) = kRed;
-  settings.least_person_px = 45;
+  settings.min_person_height_px = 45;
   EXPECT_EQ(run(small, settings).people.size(), 0u);
-  settings.least_person_px = 35;
+  settings.min_person_height_px = 35;
   EXPECT_GT(run(small, settings).people.size(), 0u);
 }
 

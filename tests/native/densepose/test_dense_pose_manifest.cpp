@@ -18,7 +18,7 @@ maq::DensePoseSpec read(const json& document) {
 
 TEST(DensePoseManifest, ReadsEveryField) {
   const maq::DensePoseSpec spec = read(tiny());
-  EXPECT_EQ(spec.input.long_side_px, 320);
+  EXPECT_EQ(spec.long_side_px, 320);
   EXPECT_EQ(spec.input.std[2], 255);
   EXPECT_EQ(spec.rpn.strides, (std::vector<int>{4, 8, 16, 32, 64}));
   EXPECT_EQ(spec.rpn.post_nms_top_k, 100);

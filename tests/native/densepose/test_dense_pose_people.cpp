@@ -35,7 +35,7 @@ std::shared_ptr<const maq::OnnxRuntimeLibrary> DensePosePeople::runtime_;
 
 cv::Mat black(int width, int height) { return cv::Mat::zeros(height, width, CV_8UC3); }
 
-TEST_F(DensePosePeople, EachOfNoneOneTwoAndThirtyIsFoundInItsPlaceAndPainted) {
+TEST_F(DensePosePeople, EachOfNoneOneTwoAndThirtyIsFoundWhereItIsAndPainted) {
   for (const int count : {0, 1, 2, 30}) {
     cv::Mat image = black(320, 256);
     std::vector<cv::Point> cells;
@@ -45,7 +45,7 @@ TEST_F(DensePosePeople, EachOfNoneOneTwoAndThirtyIsFoundInItsPlaceAndPainted) {
     settings.max_people = 30;
     const maq::DensePoseResult result = run(image, settings);
     ASSERT_EQ(result.people.size(), size_t(count));
-    EXPECT_EQ(result.stats.dense_head_ms > 0, count > 0) << "the dense head runs for somebody only";
+    EXPECT_EQ(result.stats.dense_head_ms > 0, count > 0) << "the dense head runs only where there are people";
     for (const cv::Point& cell : cells) {
       size_t found = 0;
       for (size_t k = 0; k < result.people.size(); ++k) {
@@ -71,7 +71,7 @@ TEST_F(DensePosePeople, OneOf12PixelsIsFoundInASmallFrame) {
   EXPECT_NEAR(double(pixels_of(result, 1)), 0.75 * 12 * 12, 20);
 }
 
-TEST_F(DensePosePeople, OneCutByABorderStaysInsideTheFrame) {
+TEST_F(DensePosePeople, OneTruncatedByABorderStaysInsideTheFrame) {
   for (const cv::Point& cell : {cv::Point(8, 120), {308, 120}, {160, 8}, {160, 244}, {8, 8}, {308, 244}}) {
     cv::Mat image = black(320, 256);
     image(cv::Rect(cell, cv::Size(4, 4))) = kRed;
@@ -90,7 +90,7 @@ TEST_F(DensePosePeople, OneCutByABorderStaysInsideTheFrame) {
   }
 }
 
-TEST_F(DensePosePeople, OneWhoFillsTheFrameIsPaintedToItsEdges) {
+TEST_F(DensePosePeople, OneFillingTheFrameIsPaintedToItsEdges) {
   cv::Mat image = black(128, 128);
   image(cv::Rect(64, 64, 16, 16)) = kBlue;  // a person of 128 px
   maq::DensePoseSettings settings;

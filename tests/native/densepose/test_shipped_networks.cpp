@@ -174,9 +174,9 @@ class ShippedNetworks : public ::testing::Test {
 
   // The photo as the trunk takes it, [1, 3, kSide, kSide].
   static std::vector<float> trunk_input() {
-    const maq::InputSpec spec = maq::read_densepose_spec(bundle_->manifest).input;
     maq::NetworkInput input;
-    maq::make_network_input(view_of(photo_), {int(kSide), spec.multiple_of, spec.mean, spec.std}, input);
+    maq::make_network_input(view_of(photo_), maq::network_size(photo_.cols, photo_.rows, int(kSide)),
+                            maq::read_densepose_spec(bundle_->manifest).input, input);
     EXPECT_EQ(input.values.size(), size_t(3 * kSide * kSide));
     return input.values;
   }
@@ -232,9 +232,9 @@ std::unique_ptr<maq::Bundle> ShippedNetworks::bundle_;
 cv::Mat ShippedNetworks::photo_;
 
 // Relative root mean squares. Unoptimised, each layer computes in float between two roundings to 8 bits; optimised, in
-// integers with one rounding. Where they round to different sides a value moves by one step of 8 bits, and the layers that
-// follow make more of it. Measured on an AVX-512 machine: 0.034 for the trunk, whose first blocks are float and whose
-// fifty layers pass it on; 0 for the RPN and the heads.
+// integers with one rounding. Where they round to different sides a value moves by one step of 8 bits, and the layers
+// that follow make more of it. Measured on an AVX-512 machine: 0.034 for the trunk, whose first blocks are float and
+// whose fifty layers pass it on; 0 for the RPN and the heads.
 constexpr double kMostOfOptimisingTrunk = 0.05, kMostOfOptimising = 0.01;
 
 TEST_F(ShippedNetworks, TheOptimisedTrunkAnswersAsTheUnoptimisedOne) {
@@ -293,8 +293,8 @@ TEST_F(ShippedNetworks, OneThreadAndTwoGiveTheSameResult) {
   EXPECT_EQ(a.planes.v, b.planes.v);
 }
 
-// The size of a batch chooses how matrices are cut into blocks, which may change the order of float sums: a few units in
-// the last place of the largest value.
+// The size of a batch chooses how matrices are cut into blocks, which may change the order of float sums: a few units
+// in the last place of the largest value.
 TEST_F(ShippedNetworks, ABatchOfPeopleIsAnsweredAsOneByOne) {
   constexpr int kPeople = 3;
   const std::vector<float> features = finest_features();
@@ -320,25 +320,25 @@ TEST_F(ShippedNetworks, ABatchOfPeopleIsAnsweredAsOneByOne) {
   }
 }
 
-TEST_F(ShippedNetworks, FramesOfOneColourAndCheckerboardsShowNobody) {
+TEST_F(ShippedNetworks, FramesOfOneColourAndCheckerboardsShowNoPeople) {
   maq::DensePose densepose = make();
   maq::DensePoseResult result;
-  const auto expect_nobody = [&](const cv::Mat& image, const char* what) {
+  const auto expect_no_people = [&](const cv::Mat& image, const char* what) {
     densepose.run(view_of(image), result);
     EXPECT_EQ(result.people.size(), 0u) << what;
     expect_sane(result, image);
   };
-  expect_nobody(one_colour(320, 256, cv::Scalar::all(0)), "black");
-  expect_nobody(one_colour(320, 256, cv::Scalar::all(255)), "white");
-  expect_nobody(one_colour(256, 320, cv::Scalar::all(128)), "grey");
-  expect_nobody(one_colour(320, 256, cv::Scalar(0, 0, 255)), "red");
-  expect_nobody(one_colour(256, 320, cv::Scalar(110, 140, 210)), "skin");
-  expect_nobody(checkerboard(288, 256, 0), "checkerboard at the network's own size");
-  expect_nobody(checkerboard(256, 288, 1), "the other one");
-  expect_nobody(checkerboard(640, 480, 0), "a checkerboard that is shrunk");
+  expect_no_people(one_colour(320, 256, cv::Scalar::all(0)), "black");
+  expect_no_people(one_colour(320, 256, cv::Scalar::all(255)), "white");
+  expect_no_people(one_colour(256, 320, cv::Scalar::all(128)), "grey");
+  expect_no_people(one_colour(320, 256, cv::Scalar(0, 0, 255)), "red");
+  expect_no_people(one_colour(256, 320, cv::Scalar(110, 140, 210)), "skin");
+  expect_no_people(checkerboard(288, 256, 0), "checkerboard at the network's own size");
+  expect_no_people(checkerboard(256, 288, 1), "the other one");
+  expect_no_people(checkerboard(640, 480, 0), "a checkerboard that is shrunk");
 }
 
-TEST_F(ShippedNetworks, NoiseShowsSomebodyInAtMostOneFrameOfAHundred) {
+TEST_F(ShippedNetworks, NoiseShowsAPersonInAtMostOneFrameOfAHundred) {
   maq::DensePose densepose = make();
   maq::DensePoseResult result;
   cv::RNG random(1);
@@ -388,7 +388,7 @@ TEST_F(ShippedNetworks, AFrameOf33MegapixelsTakesLittleMoreMemoryThanItsResult) 
 #endif
 }
 
-TEST_F(ShippedNetworks, ThePersonIsFoundWhenCutByEachBorderAndWhenFillingTheFrame) {
+TEST_F(ShippedNetworks, ThePersonIsFoundWhenTruncatedByEachBorderAndWhenFillingTheFrame) {
   // The astronaut: head at the top, cut by the lower and left borders already.
   const maq::DensePoseResult whole = run(photo_);
   ASSERT_EQ(whole.people.size(), 1u);

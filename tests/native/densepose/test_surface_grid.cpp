@@ -48,7 +48,7 @@ TEST(SurfaceGrid, PointsLieBetweenTheCornersOfItsBox) {
   EXPECT_FLOAT_EQ(full.points_m[0], 1) << "the largest value is the highest corner";
 }
 
-TEST(SurfaceGrid, APointOfWhichOneNumberIsNoneIsNone) {
+TEST(SurfaceGrid, APointWithOneMissingCoordinateIsOutsideTheChart) {
   for (const size_t axis : {0u, 1u, 2u}) {
     const maq::SurfaceGrid grid = maq::decode_surface_grid(changed(40 + 6 + 2 * axis, uint16_t(65535)), "a.grid");
     EXPECT_FALSE(std::isnan(grid.points_m[2]));
@@ -57,9 +57,9 @@ TEST(SurfaceGrid, APointOfWhichOneNumberIsNoneIsNone) {
   }
 }
 
-TEST(SurfaceGrid, WhatIsNoneIsRefused) {
-  expect_refused({}, "no surface grid");
-  expect_refused(changed(7, '2'), "no surface grid");
+TEST(SurfaceGrid, OtherBytesAreRefused) {
+  expect_refused({}, "not a surface grid");
+  expect_refused(changed(7, '2'), "not a surface grid");
   expect_refused(changed(8, uint32_t(23)), "23 parts");
   expect_refused(changed(8, uint32_t(0)), "0 parts");
   // 24 * 2^31 * 2^31 * 6 is 0 in 64 bits.
@@ -72,7 +72,7 @@ TEST(SurfaceGrid, WhatIsNoneIsRefused) {
   expect_refused(changed(16, -HUGE_VALF), "reaches from");
 }
 
-TEST(SurfaceGrid, CutAnywhereOrLongerItIsRefused) {
+TEST(SurfaceGrid, TruncatedAnywhereOrLongerItIsRefused) {
   const std::vector<uint8_t> whole = made_up();
   for (size_t length = 0; length < whole.size(); ++length) {
     expect_refused({whole.begin(), whole.begin() + std::ptrdiff_t(length)}, "surface grid");

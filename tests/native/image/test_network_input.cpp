@@ -8,16 +8,20 @@ namespace {
 
 maq::ImageView view_of(const cv::Mat& bgr) { return {MAQ_PIXEL_BGR8, bgr.cols, bgr.rows, {{bgr.data, bgr.step}, {}}}; }
 
-const maq::NetworkInputSpec kSpec = {320, 32, {123.675f, 116.28f, 103.53f}, {58.395f, 57.12f, 57.375f}};
+const maq::NetworkInputSpec kSpec = {32, {123.675f, 116.28f, 103.53f}, {58.395f, 57.12f, 57.375f}};
+
+void make(const cv::Mat& bgr, maq::NetworkInput& input) {
+  make_network_input(view_of(bgr), maq::network_size(bgr.cols, bgr.rows, 320), kSpec, input);
+}
 
 // The definition in Python: cv2.resize of the bytes, then (value - mean) / std in float32, RGB planes, zeros around.
 // The library does not round to bytes in between, which is half a grey level at most, and OpenCV's bilinear weights are
 // fixed-point numbers.
 void expect_definition(const cv::Mat& bgr, int width, int height, int interpolation) {
-  const float most_grey_levels = interpolation < 0 ? 1e-4f : interpolation == cv::INTER_AREA ? 0.502f : 0.9f;
+  const float max_grey_levels = interpolation < 0 ? 1e-4f : interpolation == cv::INTER_AREA ? 0.502f : 0.9f;
   maq::NetworkInput input;
   input.values.assign(1 << 20, 1e9f);  // what an earlier image left
-  make_network_input(view_of(bgr), kSpec, input);
+  make(bgr, input);
   ASSERT_EQ(input.width_px, width);
   ASSERT_EQ(input.height_px, height);
   ASSERT_EQ(input.padded_width_px % 32, 0);
@@ -33,7 +37,7 @@ void expect_definition(const cv::Mat& bgr, int width, int height, int interpolat
         const bool inside = x < width && y < height;
         const float expected =
             inside ? (float(resized.at<cv::Vec3b>(y, x)[2 - c]) - kSpec.mean[size_t(c)]) / kSpec.std[size_t(c)] : 0;
-        ASSERT_NEAR(value, expected, most_grey_levels / kSpec.std[size_t(c)]) << c << " " << x << " " << y;
+        ASSERT_NEAR(value, expected, max_grey_levels / kSpec.std[size_t(c)]) << c << " " << x << " " << y;
         ASSERT_TRUE(inside || value == 0) << "padding";
       }
     }
@@ -62,19 +66,16 @@ TEST(NetworkInput, TakesOddSizesDownToOnePixel) {
 }
 
 TEST(NetworkInput, RoundsHalvesToEvenLikeTheReference) {
-  int width = 0, height = 0;
-  maq::network_size(640, 125, 320, &width, &height);  // 62.5
-  EXPECT_EQ(height, 62);
-  maq::network_size(127, 640, 320, &width, &height);  // 63.5
-  EXPECT_EQ(width, 64);
+  EXPECT_EQ(maq::network_size(640, 125, 320).height_px, 62);  // of 62.5
+  EXPECT_EQ(maq::network_size(127, 640, 320).width_px, 64);   // of 63.5
 }
 
 TEST(NetworkInput, WhatAnEarlierFrameOfAnotherSizeLeftDoesNotMatter) {
   maq::NetworkInput used, fresh;
   for (const cv::Mat& image : {noise(640, 480), noise(333, 500), noise(640, 480)}) {
-    make_network_input(view_of(image), kSpec, used);
+    make(image, used);
   }
-  make_network_input(view_of(noise(640, 480)), kSpec, fresh);
+  make(noise(640, 480), fresh);
   EXPECT_EQ(used.values, fresh.values);
 }
 

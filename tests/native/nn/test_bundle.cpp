@@ -48,7 +48,7 @@ void replace_file(const BundleCopy& bundle, const std::string& name, const std::
   bundle.write_manifest(manifest);
 }
 
-TEST(Bundle, AWholeOneLoads) { EXPECT_NO_THROW(load(BundleCopy())); }
+TEST(Bundle, AnIntactBundleLoads) { EXPECT_NO_THROW(load(BundleCopy())); }
 
 TEST(Bundle, AMissingFolderOrManifestIsNotFound) {
   const TempFolder empty;
@@ -56,7 +56,7 @@ TEST(Bundle, AMissingFolderOrManifestIsNotFound) {
   expect_error(MAQ_ERROR_NOT_FOUND, "no manifest.json", [&] { maq::read_bundle(empty.path().string()); });
 }
 
-TEST(Bundle, AChangedByteIsSeen) {
+TEST(Bundle, AChangedByteIsRefused) {
   for (const char* name : {"trunk.onnx", "box_head.onnx", "dense_head.onnx"}) {
     const BundleCopy bundle;
     bundle.flip_byte(name);
@@ -64,7 +64,7 @@ TEST(Bundle, AChangedByteIsSeen) {
   }
 }
 
-TEST(Bundle, ACutOrMissingFileIsSeen) {
+TEST(Bundle, ATruncatedOrMissingFileIsRefused) {
   const BundleCopy cut, missing;
   const std::string bytes = read_text(cut.file("trunk.onnx"));
   write_text(cut.file("trunk.onnx"), bytes.substr(0, bytes.size() - 1));
@@ -73,7 +73,7 @@ TEST(Bundle, ACutOrMissingFileIsSeen) {
   expect_error(MAQ_ERROR_BAD_BUNDLE, "box_head.onnx is missing", [&] { load(missing); });
 }
 
-TEST(Bundle, AFileThatIsNoNetworkIsSeen) {
+TEST(Bundle, AFileThatIsNotANetworkIsRefused) {
   const BundleCopy bundle;
   replace_file(bundle, "trunk.onnx", "no network, but its hash is right");
   expect_error(MAQ_ERROR_BAD_BUNDLE, "trunk.onnx cannot be loaded", [&] { load(bundle); });
@@ -89,13 +89,13 @@ TEST(Bundle, WeightsInAnotherFileAreRefused) {
   expect_error(MAQ_ERROR_BAD_BUNDLE, "box_head.onnx keeps weights in another file", [&] { load(bundle); });
 }
 
-TEST(Bundle, ANetworkInTheWrongPlaceIsSeen) {
+TEST(Bundle, ANetworkUnderTheNameOfAnotherIsRefused) {
   const BundleCopy bundle;
   replace_file(bundle, "box_head.onnx", read_text(bundle.file("dense_head.onnx")));
   expect_error(MAQ_ERROR_BAD_BUNDLE, "box_head.onnx", [&] { load(bundle); });
 }
 
-TEST(Bundle, AShapeThatIsNotTheManifestsIsSeen) {
+TEST(Bundle, AShapeOtherThanTheManifestsIsRefused) {
   const BundleCopy bundle;
   nlohmann::json manifest = bundle.manifest();
   manifest["graphs"]["dense_head"]["outputs"][0]["shape"][3] = 2;
@@ -103,7 +103,7 @@ TEST(Bundle, AShapeThatIsNotTheManifestsIsSeen) {
   expect_error(MAQ_ERROR_BAD_BUNDLE, "output labels has shape [?, 32, 32, 160] in the graph", [&] { load(bundle); });
 }
 
-TEST(Bundle, AMissingTensorIsSeen) {
+TEST(Bundle, AMissingTensorIsRefused) {
   const BundleCopy bundle;
   nlohmann::json manifest = bundle.manifest();
   manifest["graphs"]["trunk"]["outputs"][0]["name"] = "p7";
@@ -111,7 +111,7 @@ TEST(Bundle, AMissingTensorIsSeen) {
   expect_error(MAQ_ERROR_BAD_BUNDLE, "trunk.onnx has no output p7", [&] { load(bundle); });
 }
 
-TEST(Bundle, ATypeOtherThanFloatIsSeen) {
+TEST(Bundle, ATypeOtherThanFloatIsRefused) {
   const BundleCopy bundle;
   nlohmann::json manifest = bundle.manifest();
   manifest["graphs"]["trunk"]["inputs"][0]["type"] = "uint8";

@@ -27,7 +27,7 @@ TEST(Manifest, ReadsEveryField) {
   EXPECT_EQ(manifest.root.at("rpn").at("nms_iou").number(0, 1), 0.7f);
 }
 
-TEST(Manifest, RefusesWhatIsNoJsonObject) {
+TEST(Manifest, RefusesWhatIsNotAJsonObject) {
   for (const char* text : {"", "[]", "{", "nonsense", "\"text\""}) {
     expect_error(MAQ_ERROR_BAD_BUNDLE, "not a JSON object", [&] { maq::parse_manifest(text, "m"); });
   }

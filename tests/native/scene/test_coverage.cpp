@@ -9,28 +9,29 @@
 namespace {
 
 using maq::DepthKey;
+using maq::DescriptorRaster;
 using maq::kNoPointKey;
-using maq::LookRaster;
 
 constexpr size_t kWidth = 112, kHeight = 80;
 
-void shade(LookRaster& raster, size_t count, maq::WorkerThreads& threads) {
-  const maq::Scene scene = make_scene(made_up_points(count), {});
+void shade(DescriptorRaster& raster, size_t count, maq::WorkerThreads& threads) {
+  const maq::Scene scene = make_scene(synthetic_points(count), {});
   const maq::PinholeCamera camera = camera_of(int(kWidth), int(kHeight), 70);
   maq::ZBuffer buffer;
   buffer.begin(camera, 0.01, 1);
   for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
   buffer.finish(0, int(kHeight));
   const maq::ViewBasis basis(std::vector<float>(maq::ViewBasis::kWeights, 0.0f));
-  raster.shade(scene, maq::BlockIndex(scene), buffer, {0, 0, int(kWidth), int(kHeight)}, camera.centre, basis,
-               {5, true}, threads);
+  const maq::BlockIndex blocks(scene);
+  const maq::RefinerLayout layout{5, true};
+  raster.shade({scene, blocks, buffer, camera.centre, {0, 0, int(kWidth), int(kHeight)}, basis, layout}, threads);
 }
 
 // Of the pixel (x, y) at a level, in double.
-double alpha_at(const LookRaster& raster, int level, int x, int y) {
-  const double sureness[] = {255, 255, 255, 128, 64};
+double alpha_at(const DescriptorRaster& raster, int level, int x, int y) {
+  const double confidence[] = {255, 255, 255, 128, 64};
   const int width = int(kWidth) >> level, height = int(kHeight) >> level;
-  const double own = raster.keys(level)[y * width + x] == kNoPointKey ? 0 : sureness[level];
+  const double own = raster.keys(level)[y * width + x] == kNoPointKey ? 0 : confidence[level];
   if (level == 4) return own;
   const auto coarser = [&](int at_x, int at_y) {
     return alpha_at(raster, level + 1, std::clamp(at_x, 0, width / 2 - 1), std::clamp(at_y, 0, height / 2 - 1));
@@ -44,20 +45,20 @@ double alpha_at(const LookRaster& raster, int level, int x, int y) {
 TEST(Coverage, IsAsItsDefinitionSays) {
   for (const size_t count : {1u, 40u, 3000u}) {
     maq::WorkerThreads threads(2);
-    LookRaster raster;
+    DescriptorRaster raster;
     shade(raster, count, threads);
-    maq::PictureCover cover;
-    cover.find(raster, int(kWidth), int(kHeight), threads);
+    maq::Coverage coverage;
+    coverage.find(raster, int(kWidth), int(kHeight), threads);
     for (size_t y = 0; y < kHeight; ++y) {
       for (size_t x = 0; x < kWidth; ++x) {
         // Each of four scales rounds.
-        ASSERT_NEAR(cover.alphas()[y * kWidth + x], alpha_at(raster, 0, int(x), int(y)), 2.01) << x << " " << y;
+        ASSERT_NEAR(coverage.alphas()[y * kWidth + x], alpha_at(raster, 0, int(x), int(y)), 2.01) << x << " " << y;
         float depth = 0;
         for (int level = 4; level >= 0; --level) {
           const DepthKey key = raster.keys(level)[(y >> level) * (kWidth >> level) + (x >> level)];
           if (key != kNoPointKey) depth = maq::depth_of(key);
         }
-        ASSERT_EQ(cover.depths()[y * kWidth + x], depth);
+        ASSERT_EQ(coverage.depths()[y * kWidth + x], depth);
       }
     }
   }
@@ -65,17 +66,17 @@ TEST(Coverage, IsAsItsDefinitionSays) {
 
 TEST(Coverage, IsWholeWhereThereIsAPointAndNothingFarFromAll) {
   maq::WorkerThreads threads(1);
-  LookRaster raster;
+  DescriptorRaster raster;
   shade(raster, 1, threads);
-  maq::PictureCover cover;
-  cover.find(raster, int(kWidth), int(kHeight), threads);
+  maq::Coverage coverage;
+  coverage.find(raster, int(kWidth), int(kHeight), threads);
   size_t covered = 0, nothing = 0;
   for (size_t i = 0; i < kWidth * kHeight; ++i) {
     if (raster.keys(0)[i] != kNoPointKey) {
-      EXPECT_EQ(cover.alphas()[i], 255);
+      EXPECT_EQ(coverage.alphas()[i], 255);
       ++covered;
     }
-    nothing += cover.alphas()[i] == 0 ? 1 : 0;
+    nothing += coverage.alphas()[i] == 0 ? 1 : 0;
   }
   EXPECT_EQ(covered, 1u);
   EXPECT_GT(nothing, kWidth * kHeight * 3 / 4);

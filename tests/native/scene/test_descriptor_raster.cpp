@@ -3,21 +3,21 @@
 
 #include <gtest/gtest.h>
 
+#include "scene/format/scene_packing.h"
 #include "support/expect_error.h"
 #include "support/synthetic_scene.h"
-#include "scene/format/scene_packing.h"
 
 namespace {
 
 using maq::DepthKey;
+using maq::DescriptorRaster;
 using maq::kBasis;
 using maq::kFeatures;
 using maq::kNoPointKey;
-using maq::LookRaster;
 using maq::RasterWindow;
 using maq::Scene;
 
-constexpr size_t kChannels = LookRaster::kChannels;
+constexpr size_t kChannels = DescriptorRaster::kChannels;
 
 const maq::ViewBasis& basis() {
   static const maq::ViewBasis made([] {
@@ -35,46 +35,48 @@ double stored(const void* values, size_t at) {
   return double(static_cast<const Stored*>(values)[at]);
 }
 double coefficient(const Scene& scene, const void* values, size_t at) {
-  switch (scene.coefficient_kind) {
-    case maq::Coefficients::kFloat32: return stored<float>(values, at);
-    case maq::Coefficients::kInt16: return stored<int16_t>(values, at);
+  switch (scene.coefficient_format) {
+    case maq::CoefficientFormat::kFloat32: return stored<float>(values, at);
+    case maq::CoefficientFormat::kInt16: return stored<int16_t>(values, at);
     default: return stored<int8_t>(values, at);
   }
 }
-double place(const Scene& scene, size_t at) {
-  return scene.place_kind == maq::Places::kFloat32 ? stored<float>(scene.places, at)
-                                                   : stored<uint16_t>(scene.places, at);
+double coordinate(const Scene& scene, size_t at) {
+  return scene.position_format == maq::PositionFormat::kFloat32 ? stored<float>(scene.positions, at)
+                                                                : stored<uint16_t>(scene.positions, at);
 }
 
-// The look of a point from a camera's centre, by its formula, from what the scene's header says of stored numbers.
+// The descriptor of a point from a camera's centre, by its formula, from what the scene's header says of stored
+// numbers.
 std::array<double, kFeatures> look_of(const Scene& scene, uint32_t point, const maq::PinholeCamera& camera) {
   const maq::SceneBlock* block = scene.blocks;
   while (point >= block->first + block->count) ++block;
   const size_t in_block = point - block->first;
-  const bool is_float = scene.coefficient_kind == maq::Coefficients::kFloat32;
+  const bool is_float = scene.coefficient_format == maq::CoefficientFormat::kFloat32;
   double d[3], length = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
-    d[axis] = place(scene, 3 * size_t(block->first) + axis * block->count + in_block);
-    if (scene.place_kind == maq::Places::kUint16) d[axis] = block->low[axis] + d[axis] * block->place_step[axis];
+    d[axis] = coordinate(scene, 3 * size_t(block->first) + axis * block->count + in_block);
+    if (scene.position_format == maq::PositionFormat::kUint16)
+      d[axis] = block->low[axis] + d[axis] * block->position_step[axis];
     d[axis] += scene.origin[axis] - camera.centre[axis];
     length += d[axis] * d[axis];
   }
   float unit[3], h[kBasis];
   for (size_t axis = 0; axis < 3; ++axis) unit[axis] = float(d[axis] / std::sqrt(length));
   basis().evaluate(&unit[0], &unit[1], &unit[2], 1, h);
-  std::array<double, kFeatures> look;
+  std::array<double, kFeatures> descriptor;
   for (size_t c = 0; c < size_t(kFeatures); ++c) {
-    look[c] = coefficient(scene, scene.means, point * size_t(kFeatures) + c);
-    if (!is_float) look[c] = block->mean_middle[c] + look[c] * block->mean_step[c];
-    if (in_block >= block->varying) continue;
+    descriptor[c] = coefficient(scene, scene.constant_terms, point * size_t(kFeatures) + c);
+    if (!is_float) descriptor[c] = block->constant_middle[c] + descriptor[c] * block->constant_step[c];
+    if (in_block >= block->view_dependent) continue;
     for (size_t k = 0; k < size_t(kBasis); ++k) {
       const size_t at = k * kFeatures + c;
-      const double slope =
-          coefficient(scene, scene.slopes, (block->first_varying + in_block) * kBasis * kFeatures + at);
-      look[c] += h[k] * slope * (is_float ? 1 : double(block->slope_step[at]));
+      const double linear =
+          coefficient(scene, scene.linear_terms, (block->first_view_dependent + in_block) * kBasis * kFeatures + at);
+      descriptor[c] += h[k] * linear * (is_float ? 1 : double(block->linear_step[at]));
     }
   }
-  return look;
+  return descriptor;
 }
 
 struct View {
@@ -84,27 +86,29 @@ struct View {
     buffer.begin(camera, 0.01, 1);
     for (uint32_t i = 0; i < scene.block_count; ++i) buffer.draw(span_of(scene, scene.blocks[i], camera.centre), 0);
     buffer.finish(0, camera.height_px);
-    raster.shade(scene, maq::BlockIndex(scene), buffer, window, camera.centre, basis(), layout, workers);
+    const maq::BlockIndex blocks(scene);
+    raster.shade({scene, blocks, buffer, camera.centre, window, basis(), layout}, workers);
   }
   // Of a pixel of the window at a level.
   const float* at(int level, size_t x, size_t y) const {
     const size_t width = size_t(window_.width_px) >> level;
     const size_t pixel =
-        level == 0 && layout_.is_folded ? 4 * (y / 2 * (width / 2) + x / 2) + y % 2 * 2 + x % 2 : y * width + x;
+        level == 0 && layout_.is_space_to_depth ? 4 * (y / 2 * (width / 2) + x / 2) + y % 2 * 2 + x % 2 : y * width + x;
     return raster.level(level) + kChannels * pixel;
   }
   maq::RefinerLayout layout_;
   RasterWindow window_;
   maq::WorkerThreads workers;
   maq::ZBuffer buffer;
-  LookRaster raster;
+  DescriptorRaster raster;
 };
 
-Scene packed(size_t count, maq::Coefficients coefficients, size_t copies = 1) {
+Scene packed(size_t count, maq::CoefficientFormat coefficients, size_t copies = 1) {
   maq::ScenePacking packing;
   packing.coefficients = coefficients;
-  packing.places = coefficients == maq::Coefficients::kFloat32 ? maq::Places::kFloat32 : maq::Places::kUint16;
-  return make_scene(made_up_points(count, 1, 1, {1, 2, 3}, copies), packing);
+  packing.positions =
+      coefficients == maq::CoefficientFormat::kFloat32 ? maq::PositionFormat::kFloat32 : maq::PositionFormat::kUint16;
+  return make_scene(synthetic_points(count, 1, 1, {1, 2, 3}, copies), packing);
 }
 
 maq::PinholeCamera camera_near(int width, int height) {
@@ -114,7 +118,8 @@ maq::PinholeCamera camera_near(int width, int height) {
 }
 
 TEST(DescriptorRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
-  for (const auto kind : {maq::Coefficients::kFloat32, maq::Coefficients::kInt16, maq::Coefficients::kInt8}) {
+  for (const auto kind :
+       {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt16, maq::CoefficientFormat::kInt8}) {
     for (const size_t count : {1u, 300u, 20000u}) {
       const Scene scene = packed(count, kind, count > 1 ? 3 : 1);
       const maq::PinholeCamera camera = camera_near(96, 64);
@@ -123,8 +128,8 @@ TEST(DescriptorRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
         const auto seen = std::count_if(view.buffer.keys(), view.buffer.keys() + 96 * 64,
                                         [](DepthKey key) { return key != kNoPointKey; });
         EXPECT_EQ(view.raster.shaded(), size_t(seen));
-        EXPECT_LE(view.raster.varying(), view.raster.shaded());
-        for (int level = 0; level < LookRaster::kLevels; ++level) {
+        EXPECT_LE(view.raster.view_dependent(), view.raster.shaded());
+        for (int level = 0; level < DescriptorRaster::kLevels; ++level) {
           const size_t width = 96u >> level, height = 64u >> level;
           maq::ZBuffer small;
           small.begin(maq::resized(camera, int(width), int(height)), 0.01, 1);
@@ -140,10 +145,10 @@ TEST(DescriptorRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
               std::array<double, kFeatures> expected{};
               if (key != kNoPointKey) {
                 expected = look_of(scene, maq::point_of(key), camera);
-              } else if (level + 1 < LookRaster::kLevels) {
-                std::copy_n(view.at(level + 1, x / 2, y / 2), LookRaster::kColours, expected.begin());
+              } else if (level + 1 < DescriptorRaster::kLevels) {
+                std::copy_n(view.at(level + 1, x / 2, y / 2), DescriptorRaster::kColours, expected.begin());
               } else {
-                std::copy_n(scene.background.begin(), LookRaster::kColours, expected.begin());
+                std::copy_n(scene.background.begin(), DescriptorRaster::kColours, expected.begin());
               }
               for (size_t c = 0; c < size_t(kFeatures); ++c) ASSERT_NEAR(found[c], expected[c], 1e-4) << level;
             }
@@ -154,31 +159,31 @@ TEST(DescriptorRaster, EveryScaleIsWhatACameraOfThatSizeSees) {
   }
 }
 
-TEST(DescriptorRaster, WithoutSlopesALookIsItsMean) {
-  maq::ModelledPoints points = made_up_points(500);
-  std::fill(points.slopes.begin(), points.slopes.end(), 0.0f);
+TEST(DescriptorRaster, WithoutLinearTermsADescriptorIsItsConstantTerm) {
+  maq::FittedPoints points = synthetic_points(500);
+  std::fill(points.linear_terms.begin(), points.linear_terms.end(), 0.0f);
   maq::ScenePacking packing;
-  packing.coefficients = maq::Coefficients::kFloat32;
+  packing.coefficients = maq::CoefficientFormat::kFloat32;
   const Scene scene = make_scene(points, packing);
   const View view(scene, camera_of(32, 32, 60), {0, 0, 32, 32}, {5, false});
   EXPECT_GT(view.raster.shaded(), 100u);
-  EXPECT_EQ(view.raster.varying(), 0u);
+  EXPECT_EQ(view.raster.view_dependent(), 0u);
   for (size_t pixel = 0; pixel < 32 * 32; ++pixel) {
     const DepthKey key = view.raster.keys(0)[pixel];
     if (key == kNoPointKey) continue;
     EXPECT_EQ(view.at(0, pixel % 32, pixel / 32)[0],
-              static_cast<const float*>(scene.means)[maq::point_of(key) * kFeatures]);
+              static_cast<const float*>(scene.constant_terms)[maq::point_of(key) * kFeatures]);
   }
 }
 
 TEST(DescriptorRaster, AWindowHasThatPartOfThePictureWithAnyNumberOfThreads) {
-  const Scene scene = packed(20000, maq::Coefficients::kInt8);
+  const Scene scene = packed(20000, maq::CoefficientFormat::kInt8);
   const maq::PinholeCamera camera = camera_near(160, 128);
-  for (const bool is_folded : {true, false}) {
-    const View whole(scene, camera, {0, 0, 160, 128}, {5, is_folded}, 1);
+  for (const bool is_space_to_depth : {true, false}) {
+    const View whole(scene, camera, {0, 0, 160, 128}, {5, is_space_to_depth}, 1);
     for (const int threads : {1, 2, 3}) {
-      const View part(scene, camera, {48, 16, 96, 64}, {5, is_folded}, threads);
-      for (int level = 0; level < LookRaster::kLevels; ++level) {
+      const View part(scene, camera, {48, 16, 96, 64}, {5, is_space_to_depth}, threads);
+      for (int level = 0; level < DescriptorRaster::kLevels; ++level) {
         for (size_t y = 0; y < 64u >> level; ++y) {
           for (size_t x = 0; x < 96u >> level; ++x) {
             const float* expected = whole.at(level, x + (48u >> level), y + (16u >> level));
@@ -190,22 +195,23 @@ TEST(DescriptorRaster, AWindowHasThatPartOfThePictureWithAnyNumberOfThreads) {
   }
 }
 
-TEST(DescriptorRaster, MemoryOfAnEarlierPictureDoesNotShine) {
-  const Scene scene = packed(5000, maq::Coefficients::kInt8);
+TEST(DescriptorRaster, MemoryOfAnEarlierPictureIsNotSeen) {
+  const Scene scene = packed(5000, maq::CoefficientFormat::kInt8);
   View view(scene, camera_near(96, 64), {0, 0, 96, 64}, {5, true});
   ASSERT_GT(view.raster.shaded(), 0u);
   maq::PinholeCamera away = camera_near(96, 64);
   away.rotation = {-1, 0, 0, 0, 1, 0, 0, 0, -1};
   view.buffer.begin(away, 0.01, 1);
   view.buffer.finish(0, 64);
-  view.raster.shade(scene, maq::BlockIndex(scene), view.buffer, {0, 0, 96, 64}, away.centre, basis(), {5, true},
-                    view.workers);
+  const maq::BlockIndex blocks(scene);
+  const maq::RefinerLayout layout{5, true};
+  view.raster.shade({scene, blocks, view.buffer, away.centre, {0, 0, 96, 64}, basis(), layout}, view.workers);
   EXPECT_EQ(view.raster.shaded(), 0u);
-  for (int level = 0; level < LookRaster::kLevels; ++level) {
+  for (int level = 0; level < DescriptorRaster::kLevels; ++level) {
     const float* values = view.raster.level(level);
     for (size_t pixel = 0; pixel < size_t((96 * 64) >> (2 * level)); ++pixel) {
       for (size_t c = 0; c < kChannels; ++c) {
-        const float expected = c < LookRaster::kColours ? scene.background[c] : 0;
+        const float expected = c < DescriptorRaster::kColours ? scene.background[c] : 0;
         ASSERT_EQ(values[pixel * kChannels + c], expected) << level << " " << pixel;
       }
     }
@@ -213,7 +219,7 @@ TEST(DescriptorRaster, MemoryOfAnEarlierPictureDoesNotShine) {
 }
 
 TEST(DescriptorRaster, WindowsThatCannotBeHalvedOrAreOutsideAreRefused) {
-  const Scene scene = packed(5, maq::Coefficients::kInt8);
+  const Scene scene = packed(5, maq::CoefficientFormat::kInt8);
   const maq::PinholeCamera camera = camera_of(48, 32, 60);
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "40 x 32 pixels cannot be halved four times", [&] {
     View(scene, camera, {0, 0, 40, 32}, {5, true});

@@ -11,9 +11,9 @@
 
 namespace {
 
+using maq::DescriptorKind;
 using maq::kBasis;
 using maq::kFeatures;
-using maq::LookKind;
 using Feature = std::array<float, kFeatures>;
 using Basis = std::array<float, kBasis>;
 struct View {
@@ -67,7 +67,7 @@ class Reference {
     }
   }
 
-  double look(const Basis& h, int c) const {
+  double fitted(const Basis& h, int c) const {
     long double value = sum_y_[c] / views_;
     for (int i = 0; i < kBasis; ++i) value += beta_[i][c] * h[size_t(i)];
     return double(value);
@@ -78,25 +78,25 @@ class Reference {
   long double sum_hy_[kBasis][kFeatures] = {}, beta_[kBasis][kFeatures] = {};
 };
 
-struct Look {
-  explicit Look(const std::vector<View>& views, double alpha = 1) {
-    for (const View& view : views) moments.add(view.y.data(), view.h.data());
-    outcome = maq::solve_look(moments, alpha, beta);
+struct Fit {
+  explicit Fit(const std::vector<View>& views, double alpha = 1) {
+    for (const View& view : views) regression.add(view.y.data(), view.h.data());
+    outcome = maq::solve_descriptor(regression, alpha, beta);
   }
   double at(const Basis& h, int c) const {
-    double value = moments.mean_y[c];
+    double value = regression.mean_y[c];
     for (int i = 0; i < kBasis; ++i) value += double(beta[i][c]) * h[size_t(i)];
     return value;
   }
   bool is_constant() const {
     return std::all_of(&beta[0][0], &beta[0][0] + kBasis * kFeatures, [](float value) { return value == 0; });
   }
-  maq::ViewMoments moments{};
+  maq::DescriptorRegression regression{};
   float beta[kBasis][kFeatures];
-  LookKind outcome;
+  DescriptorKind outcome;
 };
 
-// Views from within `spread` of one direction, of a look that depends on the direction, with noise.
+// Views from within `spread` of one direction, of a view-dependent descriptor, with noise.
 std::vector<View> views_around(int count, double spread, unsigned seed, double scale = 1, double noise = 0.02) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -118,29 +118,29 @@ double error_of(const std::vector<View>& views, double alpha = 1) {
   Reference reference;
   for (const View& view : views) reference.add(view);
   reference.solve(alpha);
-  const Look look(views, alpha);
+  const Fit fitted(views, alpha);
   double largest = 0, error = 0;
   for (size_t k = 0; k < views.size(); k += 1 + views.size() / 1000) {
     for (int c = 0; c < kFeatures; ++c) {
       largest = std::max(largest, std::abs(double(views[k].y[size_t(c)])));
-      error = std::max(error, std::abs(look.at(views[k].h, c) - reference.look(views[k].h, c)));
+      error = std::max(error, std::abs(fitted.at(views[k].h, c) - reference.fitted(views[k].h, c)));
     }
   }
   return error / largest;
 }
 
-TEST(DescriptorRegression, APointThatNobodySawHasNoLook) { EXPECT_EQ(Look({}).outcome, LookKind::kUnseen); }
+TEST(DescriptorRegression, AnUnseenPointHasNoDescriptor) { EXPECT_EQ(Fit({}).outcome, DescriptorKind::kUnseen); }
 
-TEST(DescriptorRegression, SeenOnceOrAlwaysFromTheSameSideTheLookIsTheMean) {
+TEST(DescriptorRegression, SeenOnceOrAlwaysFromOneDirectionTheDescriptorIsTheMean) {
   const std::vector<View> some = views_around(50, 0.3, 1);
-  const Look once({some[0]});
-  EXPECT_EQ(once.outcome, LookKind::kConstant);
+  const Fit once({some[0]});
+  EXPECT_EQ(once.outcome, DescriptorKind::kConstant);
   EXPECT_TRUE(once.is_constant());
-  EXPECT_TRUE(std::equal(some[0].y.begin(), some[0].y.end(), once.moments.mean_y));
+  EXPECT_TRUE(std::equal(some[0].y.begin(), some[0].y.end(), once.regression.mean_y));
   std::vector<View> same = some;
   for (View& view : same) view.h = some[0].h;
-  const Look constant(same);
-  EXPECT_EQ(constant.outcome, LookKind::kConstant);
+  const Fit constant(same);
+  EXPECT_EQ(constant.outcome, DescriptorKind::kConstant);
   EXPECT_TRUE(constant.is_constant()) << "exactly, although the features differ";
 }
 
@@ -177,11 +177,11 @@ TEST(DescriptorRegression, BadlyConditionedSystems) {
 }
 
 TEST(DescriptorRegression, WithoutRegularisationASingularSystemFallsBackToTheMean) {
-  const Look few(views_around(3, 0.4, 2), 0);
-  EXPECT_EQ(few.outcome, LookKind::kSingular);
+  const Fit few(views_around(3, 0.4, 2), 0);
+  EXPECT_EQ(few.outcome, DescriptorKind::kSingular);
   EXPECT_TRUE(few.is_constant());
   const std::vector<View> enough = views_around(300, 0.4, 3);
-  EXPECT_EQ(Look(enough, 0).outcome, LookKind::kVarying);
+  EXPECT_EQ(Fit(enough, 0).outcome, DescriptorKind::kViewDependent);
   EXPECT_LE(error_of(enough, 0), 1e-4);
 }
 
@@ -189,11 +189,11 @@ TEST(DescriptorRegression, ManyViewsInAnyOrder) {
   for (const int count : {10, 1000, 100000}) {
     std::vector<View> views = views_around(count, 0.4, 5);
     EXPECT_LE(error_of(views), 1e-4) << count;
-    const Look forwards(views);
+    const Fit forwards(views);
     std::reverse(views.begin(), views.end());
-    const Look backwards(views);
+    const Fit backwards(views);
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.h[0] < b.h[0]; });
-    const Look sorted(views);
+    const Fit sorted(views);
     for (size_t k = 0; k < views.size(); k += 1 + views.size() / 100) {
       for (int c = 0; c < kFeatures; ++c) {
         EXPECT_NEAR(backwards.at(views[k].h, c), forwards.at(views[k].h, c), 1e-4);
@@ -213,12 +213,12 @@ TEST(DescriptorRegression, FeaturesOfAnySize) {
   EXPECT_LE(error_of(views), 1e-6);
 }
 
-TEST(DescriptorRegression, OutsideTheSeenDirectionsTheLookStaysBounded) {
+TEST(DescriptorRegression, OutsideTheSeenDirectionsTheDescriptorStaysBounded) {
   for (const double spread : {1e-3, 1e-6}) {
-    const Look look(views_around(100, spread, 8));
+    const Fit fitted(views_around(100, spread, 8));
     for (double angle = 0; angle < 6.3; angle += 0.1) {
       for (int c = 0; c < kFeatures; ++c) {
-        EXPECT_LT(std::abs(look.at(basis_of(std::cos(angle), std::sin(angle), 0), c)), 10) << spread;
+        EXPECT_LT(std::abs(fitted.at(basis_of(std::cos(angle), std::sin(angle), 0), c)), 10) << spread;
       }
     }
   }

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "scene/capture/ply_reader.h"
 #include "support/capture_files.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "scene/capture/ply_reader.h"
 
 namespace {
 
@@ -17,15 +17,15 @@ class PlyFiles : public ::testing::Test {
  protected:
   maq::PointCloud read(const std::string& text, const std::array<double, 3>& origin = kOrigin) {
     write_text(folder_.file("cloud.ply"), text);
-    drops_ = {};
-    return maq::read_ply_file(folder_.file("cloud.ply"), origin, drops_);
+    report_ = {};
+    return maq::read_ply_file(folder_.file("cloud.ply"), origin, report_);
   }
   void expect_refused(const std::string& text, const std::string& part, maq_status status = MAQ_ERROR_UNREADABLE) {
     expect_error(status, part, [&] { read(text); });
   }
 
   const TempFolder folder_;
-  maq::DropCounts drops_;
+  maq::ImportReport report_;
 };
 
 // One that has a vertex element of these properties, as text.
@@ -49,7 +49,7 @@ TEST_F(PlyFiles, EveryFormGivesTheSamePoints) {
       EXPECT_EQ(cloud.rgb[3 * i + 1], point.green);
       EXPECT_EQ(cloud.rgb[3 * i + 2], point.blue);
     }
-    EXPECT_TRUE(drops_.list().empty());
+    EXPECT_TRUE(report_.list().empty());
   }
 }
 
@@ -74,13 +74,13 @@ TEST_F(PlyFiles, EveryTypeIsReadInBothByteOrders) {
   }
 }
 
-TEST_F(PlyFiles, PlacesFarFromTheWorldsOriginKeepTheirPrecision) {
+TEST_F(PlyFiles, PositionsFarFromTheWorldsOriginKeepTheirPrecision) {
   const maq::PointCloud cloud =
       read(ascii("property double x\nproperty double y\nproperty double z\n", "1000000.123456 -2000000.5 3e6"),
            {1e6, -2e6, 3e6});
   EXPECT_NEAR(cloud.x[0], 0.123456, 1e-7);
   EXPECT_EQ(cloud.y[0], -0.5f);
-  EXPECT_EQ(cloud.places().origin[0], 1e6);
+  EXPECT_EQ(cloud.positions().origin[0], 1e6);
 }
 
 TEST_F(PlyFiles, ColoursOfEveryKindBecomeBytes) {
@@ -108,23 +108,23 @@ TEST_F(PlyFiles, PointsThatAreNotFiniteAreDroppedAndCounted) {
   ASSERT_EQ(cloud.count(), 1u);
   EXPECT_EQ(cloud.x[0], 3.5f);
   EXPECT_EQ(cloud.rgb, (std::vector<uint8_t>{0, 0, 255}));
-  ASSERT_EQ(drops_.list().size(), 2u);
-  EXPECT_EQ(maq::sentence_part(drops_.list()[0]), "4 points whose place is not finite");
-  EXPECT_EQ(maq::sentence_part(drops_.list()[1]), "1 points whose colour is not finite");
+  ASSERT_EQ(report_.list().size(), 2u);
+  EXPECT_EQ(maq::describe(report_.list()[0]), "4 points whose position is not finite");
+  EXPECT_EQ(maq::describe(report_.list()[1]), "1 points whose colour is not finite");
 }
 
 TEST_F(PlyFiles, AFileWithoutPointsIsAnEmptyCloud) { EXPECT_EQ(read(ascii(kXyz, "", 0)).count(), 0u); }
 
 TEST_F(PlyFiles, WhatIsNoCloudIsRefusedWithASentence) {
   expect_error(MAQ_ERROR_NOT_FOUND, "does not exist",
-               [&] { maq::read_ply_file(folder_.file("no.ply"), kOrigin, drops_); });
+               [&] { maq::read_ply_file(folder_.file("no.ply"), kOrigin, report_); });
   expect_error(MAQ_ERROR_UNREADABLE, "is not a file",
-               [&] { maq::read_ply_file(folder_.path().string(), kOrigin, drops_); });
+               [&] { maq::read_ply_file(folder_.path().string(), kOrigin, report_); });
   expect_refused("", "its first line is not \"ply\"");
   expect_refused("solid\n", "its first line is not \"ply\"");
   expect_refused("ply\nformat ascii 1.0\n", "no end of its head");
   expect_refused("ply\nelement vertex 0\nend_header\n", "does not say its format");
-  expect_refused("ply\nformat morse 1.0\nend_header\n", "\"morse\" is no format");
+  expect_refused("ply\nformat morse 1.0\nend_header\n", "\"morse\" is not a format");
   expect_refused("ply\nformat ascii\nend_header\n", "needs a name and a version");
   expect_refused("ply\nformat ascii 2.0\nend_header\n", "of version 2.0", MAQ_ERROR_UNSUPPORTED);
   expect_refused("ply\nformat ascii 1.0\nend_header\n", "no vertices");
@@ -133,7 +133,7 @@ TEST_F(PlyFiles, WhatIsNoCloudIsRefusedWithASentence) {
   expect_refused("ply\nformat ascii 1.0\nelement vertex 1e3000\nend_header\n", "how many there are");
   expect_refused("ply\nformat ascii 1.0\nelement vertex 1.5\nend_header\n", "how many there are");
   expect_refused("ply\nformat ascii 1.0\nvertex 3\nend_header\n", "line 3: \"vertex\" is nothing");
-  expect_refused(ascii("property half x\n", ""), "line 4: \"half\" is no type");
+  expect_refused(ascii("property half x\n", ""), "line 4: \"half\" is not a type");
   expect_refused(ascii("property list float int x\n", ""), "must be of a whole one");
   expect_refused(ascii("property float x\nproperty float y\n", "1 2"), "without \"z\"");
   expect_refused(ascii(kXyz, "1 2"), "has bytes for 0 at most");
@@ -184,12 +184,12 @@ TEST_F(PlyFiles, MoreThan30MillionPointsAreUnsupported) {
   std::filesystem::resize_file(path, 95'000'000);  // a hole: it takes no disk
   const double growth_mib = peak_memory_growth_mib([&] {
     expect_error(MAQ_ERROR_UNSUPPORTED, "30000001 points, over the limit of 30000000",
-                 [&] { maq::read_ply_file(path, kOrigin, drops_); });
+                 [&] { maq::read_ply_file(path, kOrigin, report_); });
   });
   EXPECT_LT(growth_mib, 8);
 }
 
-TEST_F(PlyFiles, TwoMillionPointsTakeTheirPlacesAndColoursAndLittleMore) {
+TEST_F(PlyFiles, TwoMillionPointsTakeTheirPositionsAndColoursAndLittleMore) {
   constexpr size_t kCount = 2'000'000;
   const std::string path = folder_.file("large.ply");
   {
@@ -202,7 +202,7 @@ TEST_F(PlyFiles, TwoMillionPointsTakeTheirPlacesAndColoursAndLittleMore) {
     write_text(path, file);
   }
   const double growth_mib = peak_memory_growth_mib([&] {
-    const maq::PointCloud cloud = maq::read_ply_file(path, kOrigin, drops_);
+    const maq::PointCloud cloud = maq::read_ply_file(path, kOrigin, report_);
     ASSERT_EQ(cloud.count(), kCount);
     EXPECT_EQ(cloud.x[kCount - 1], float(kCount - 1) - 0.5f);
     EXPECT_EQ(cloud.rgb[3 * kCount - 1], uint8_t(kCount - 1));

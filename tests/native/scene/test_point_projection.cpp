@@ -12,18 +12,18 @@
 namespace {
 
 using maq::PinholeCamera;
-using Place = std::array<double, 3>;
+using Position = std::array<double, 3>;
 
 struct Cloud {
   std::vector<float> x, y, z;
-  Place origin = {0, 0, 0};
+  Position origin = {0, 0, 0};
   // In the world: what float keeps of it.
-  void add(const Place& place) {
-    x.push_back(float(place[0] - origin[0]));
-    y.push_back(float(place[1] - origin[1]));
-    z.push_back(float(place[2] - origin[2]));
+  void add(const Position& position) {
+    x.push_back(float(position[0] - origin[0]));
+    y.push_back(float(position[1] - origin[1]));
+    z.push_back(float(position[2] - origin[2]));
   }
-  maq::PointPlaces places() const { return {x.data(), y.data(), z.data(), x.size(), origin}; }
+  maq::PointPositions positions() const { return {x.data(), y.data(), z.data(), x.size(), origin}; }
 };
 
 struct Projected {
@@ -40,9 +40,9 @@ Projected reference(const Cloud& cloud, size_t i, const PinholeCamera& camera) {
   return {seen[0] / seen[2] * camera.fx_px + camera.cx_px, seen[1] / seen[2] * camera.fy_px + camera.cy_px, seen[2]};
 }
 
-// Every point that the reference sees well inside of a pixel is its winner or behind it; nobody else wins.
+// Every point that the reference sees well inside of a pixel is visible there or behind the one that is; no other is.
 void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double near, double least_px = 0.01) {
-  const FrontPoints visible(cloud.places(), camera, near);
+  const FrontPoints visible(cloud.positions(), camera, near);
   ASSERT_EQ(visible.points.size(), size_t(camera.width_px) * size_t(camera.height_px));
   for (size_t i = 0; i < cloud.x.size(); ++i) {
     const Projected at = reference(cloud, i, camera);
@@ -56,13 +56,13 @@ void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double
     EXPECT_LE(visible.depths[pixel], at.depth * 1.00001L) << "point " << i;
   }
   for (size_t pixel = 0; pixel < visible.points.size(); ++pixel) {
-    const uint32_t winner = visible.points[pixel];
-    if (winner == kNoPoint) {
+    const uint32_t front = visible.points[pixel];
+    if (front == kNoPoint) {
       EXPECT_TRUE(std::isinf(visible.depths[pixel]));
       continue;
     }
-    ASSERT_LT(winner, cloud.x.size());
-    const Projected at = reference(cloud, winner, camera);
+    ASSERT_LT(front, cloud.x.size());
+    const Projected at = reference(cloud, front, camera);
     EXPECT_NEAR(double(at.column), double(pixel % size_t(camera.width_px)), 0.5 + least_px);
     EXPECT_NEAR(double(at.row), double(pixel / size_t(camera.width_px)), 0.5 + least_px);
     EXPECT_NEAR(double(visible.depths[pixel] / at.depth), 1, 1e-5);
@@ -70,18 +70,18 @@ void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double
 }
 
 // Points around the camera, most of them ahead.
-Cloud cloud_around(const PinholeCamera& camera, double units, const Place& origin, int count, unsigned seed) {
+Cloud cloud_around(const PinholeCamera& camera, double units, const Position& origin, int count, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   Cloud cloud;
   cloud.origin = origin;
   for (int i = 0; i < count; ++i) {
     const double seen[3] = {normal(random), normal(random), 3 + normal(random) * 1.5};
-    Place place = camera.centre;
+    Position position = camera.centre;
     for (size_t k = 0; k < 3; ++k) {
-      for (size_t j = 0; j < 3; ++j) place[k] += units * camera.rotation[3 * j + k] * seen[j];
+      for (size_t j = 0; j < 3; ++j) position[k] += units * camera.rotation[3 * j + k] * seen[j];
     }
-    cloud.add(place);
+    cloud.add(position);
   }
   return cloud;
 }
@@ -123,10 +123,10 @@ TEST(PointProjection, AtBehindAndBesideTheCamera) {
     cloud.add({1, 0, depth});
     cloud.add({1e30, 1e30, depth});
   }
-  FrontPoints visible(cloud.places(), camera, 0.01);
-  for (const uint32_t winner : visible.points) EXPECT_EQ(winner, kNoPoint);
-  visible = FrontPoints(cloud.places(), camera, 0);
-  for (const uint32_t winner : visible.points) EXPECT_TRUE(winner == kNoPoint || cloud.z[winner] > 0);
+  FrontPoints visible(cloud.positions(), camera, 0.01);
+  for (const uint32_t front : visible.points) EXPECT_EQ(front, kNoPoint);
+  visible = FrontPoints(cloud.positions(), camera, 0);
+  for (const uint32_t front : visible.points) EXPECT_TRUE(front == kNoPoint || cloud.z[front] > 0);
 }
 
 TEST(PointProjection, OnTheEdgesOfThePicture) {
@@ -140,24 +140,24 @@ TEST(PointProjection, OnTheEdgesOfThePicture) {
     for (const float at : {-0.5f, std::nextafter(-0.5f, -1.0f), std::nextafter(last, 0.0f), last}) {
       cloud.add({at, at, 1});
     }
-    const FrontPoints visible(cloud.places(), camera, 0.1);
-    const auto& winners = visible.points;
-    EXPECT_EQ(winners.front(), 0u) << side;
-    EXPECT_EQ(winners.back(), side == 1 ? 0u : 2u) << side;
-    EXPECT_EQ(std::count(winners.begin(), winners.end(), kNoPoint), int64_t(side) * side - (side == 1 ? 1 : 2));
+    const FrontPoints visible(cloud.positions(), camera, 0.1);
+    const auto& fronts = visible.points;
+    EXPECT_EQ(fronts.front(), 0u) << side;
+    EXPECT_EQ(fronts.back(), side == 1 ? 0u : 2u) << side;
+    EXPECT_EQ(std::count(fronts.begin(), fronts.end(), kNoPoint), int64_t(side) * side - (side == 1 ? 1 : 2));
   }
 }
 
-TEST(PointProjection, TheNearestWinsAndOfEqualsTheFirst) {
+TEST(PointProjection, TheNearestIsVisibleAndOfEqualsTheFirst) {
   const PinholeCamera camera = camera_of(3, 3, 60);
   Cloud cloud;
   for (const double depth : {5.0, 2.0, 2.0, 3.0, 2.0}) cloud.add({0, 0, depth});
-  FrontPoints visible(cloud.places(), camera, 0.1);
+  FrontPoints visible(cloud.positions(), camera, 0.1);
   EXPECT_EQ(visible.points[4], 1u);
   EXPECT_EQ(visible.depths[4], 2);
   for (int i = 0; i < 100000; ++i) cloud.add({0, 0, 2});
   cloud.add({0, 0, 1.9999});
-  visible = FrontPoints(cloud.places(), camera, 0.1);
+  visible = FrontPoints(cloud.positions(), camera, 0.1);
   EXPECT_EQ(visible.points[4], cloud.x.size() - 1);
 }
 
@@ -166,16 +166,16 @@ TEST(PointProjection, WhatIsNotFiniteIsNotSeen) {
   Cloud cloud;
   for (const float bad : {nan, infinite, -infinite, std::numeric_limits<float>::max()}) {
     for (int k = 0; k < 3; ++k) {
-      float place[3] = {0, 0, 2};
-      place[k] = bad;
-      cloud.x.push_back(place[0]);
-      cloud.y.push_back(place[1]);
-      cloud.z.push_back(place[2]);
+      float position[3] = {0, 0, 2};
+      position[k] = bad;
+      cloud.x.push_back(position[0]);
+      cloud.y.push_back(position[1]);
+      cloud.z.push_back(position[2]);
     }
   }
-  const FrontPoints visible(cloud.places(), camera_of(16, 16, 60), 0.1);
-  for (const uint32_t winner : visible.points) {
-    EXPECT_TRUE(winner == kNoPoint || cloud.z[winner] == std::numeric_limits<float>::max()) << winner;
+  const FrontPoints visible(cloud.positions(), camera_of(16, 16, 60), 0.1);
+  for (const uint32_t front : visible.points) {
+    EXPECT_TRUE(front == kNoPoint || cloud.z[front] == std::numeric_limits<float>::max()) << front;
   }
 }
 

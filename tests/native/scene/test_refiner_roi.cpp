@@ -8,7 +8,7 @@
 
 namespace {
 
-using maq::kRefinerReach_px;
+using maq::kReceptiveFieldRadius_px;
 using maq::RasterWindow;
 
 TEST(RefinerRoi, HoldsAllThatTheRefinerSeesOfThePointsInAFewSizes) {
@@ -34,10 +34,10 @@ TEST(RefinerRoi, HoldsAllThatTheRefinerSeesOfThePointsInAFewSizes) {
       ASSERT_GE(window.top_px, 0);
       ASSERT_LE(right, width);
       ASSERT_LE(bottom, height);
-      ASSERT_LE(window.left_px, std::max(0, seen.left_px - kRefinerReach_px));
-      ASSERT_LE(window.top_px, std::max(0, seen.top_px - kRefinerReach_px));
-      ASSERT_GE(right, std::min(width, seen.left_px + seen.width_px + kRefinerReach_px));
-      ASSERT_GE(bottom, std::min(height, seen.top_px + seen.height_px + kRefinerReach_px));
+      ASSERT_LE(window.left_px, std::max(0, seen.left_px - kReceptiveFieldRadius_px));
+      ASSERT_LE(window.top_px, std::max(0, seen.top_px - kReceptiveFieldRadius_px));
+      ASSERT_GE(right, std::min(width, seen.left_px + seen.width_px + kReceptiveFieldRadius_px));
+      ASSERT_GE(bottom, std::min(height, seen.top_px + seen.height_px + kReceptiveFieldRadius_px));
       sizes.insert({window.width_px, window.height_px});
       smaller += window.width_px < width || window.height_px < height ? 1 : 0;
     }

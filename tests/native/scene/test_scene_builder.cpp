@@ -1,462 +1,144 @@
-// Photos and a cloud to points that know how they look: against torch, in any order, cancelled, and with what is wrong.
+// Captures to scenes: which photos are used, how large, and what is reported.
+#include "scene/build/build_scene.h"
+
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
-#include <thread>
+#include <cstring>
 
-#include "scene/build/build_scene.h"
-#include "scene/build/scene_builder.h"
 #include "scene/capture/posed_photo.h"
 #include "support/expect_error.h"
-#include "support/peak_memory.h"
 #include "support/tiny_scene.h"
 
 namespace {
 
-using maq::kBasis;
-using maq::kFeatures;
-using maq::ModelledPoints;
-
-maq::BuildOptions as_in_the_reference() {
-  maq::BuildOptions options;
-  options.visibility_scale = 0.5;
-  return options;
-}
-
-struct Photo {
-  maq::Frame frame;
-  std::vector<uint8_t> valid;
-  maq::PinholeCamera camera;
-};
+using maq::Scene;
 
 class SceneBuilder : public testing::Test {
  protected:
   SceneBuilder() : capture_(tiny_scene::capture()), networks_(tiny_scene::networks()) {
-    for (const maq::CaptureView& view : capture_.views) {
-      if (view.is_held_out) continue;
-      photos_.emplace_back();
-      maq::load_view(view, photos_.back().frame, photos_.back().valid);
-      photos_.back().camera = view.camera;
-    }
+    options_.fitting.visibility_scale = 0.5;
+    options_.packing = {maq::PositionFormat::kFloat32, maq::CoefficientFormat::kFloat32, 0};
   }
 
-  maq::SceneBuilder builder(const maq::BuildOptions& options = as_in_the_reference()) {
-    return {capture_.cloud, capture_.up, *networks_, options};
-  }
-  size_t add(maq::SceneBuilder& builder, size_t photo) {
-    return builder.add_view(photos_[photo].frame.image, photos_[photo].valid.data(), photos_[photo].camera).value();
-  }
-  ModelledPoints built(const std::vector<size_t>& order, const maq::BuildOptions& options = as_in_the_reference()) {
-    maq::SceneBuilder made = builder(options);
-    for (const size_t photo : order) add(made, photo);
-    return made.finish();
-  }
-
-  // Where in `points` each point of the cloud is.
-  std::vector<size_t> places_in(const ModelledPoints& points) const {
-    std::vector<size_t> places(capture_.cloud.count(), SIZE_MAX);
-    for (size_t i = 0; i < points.count(); ++i) {
-      for (size_t k = 0; k < capture_.cloud.count(); ++k) {
-        if (points.x[i] == capture_.cloud.x[k] && points.y[i] == capture_.cloud.y[k] &&
-            points.z[i] == capture_.cloud.z[k]) {
-          places[k] = i;
-        }
-      }
+  maq::BuiltScene built(const maq::Capture& capture) { return maq::build_scene(capture, networks_, options_).value(); }
+  // Of these views of the capture, held out or not.
+  Scene built_of(const std::vector<size_t>& views) {
+    maq::DescriptorFitter fitter(capture_.cloud, capture_.up, *networks_, options_.fitting);
+    for (const size_t view : views) {
+      maq::PosedView photo;
+      photo.load(capture_.views[view], options_.long_side_px);
+      fitter.add_view(photo.image(), photo.valid(), photo.camera());
     }
-    return places;
+    return make_scene(fitter.finish(), options_.packing);
   }
-
-  void expect_the_same(const ModelledPoints& a, const ModelledPoints& b, float tolerance) {
-    ASSERT_EQ(a.count(), b.count());
-    EXPECT_EQ(a.never_seen, b.never_seen);
-    const std::vector<size_t> in_a = places_in(a), in_b = places_in(b);
-    for (size_t k = 0; k < in_a.size(); ++k) {
-      ASSERT_EQ(in_a[k] == SIZE_MAX, in_b[k] == SIZE_MAX);
-      if (in_a[k] == SIZE_MAX) continue;
-      EXPECT_EQ(a.views[in_a[k]], b.views[in_b[k]]);
-      EXPECT_NEAR(a.variations[in_a[k]], b.variations[in_b[k]], tolerance);
-      for (size_t c = 0; c < kFeatures; ++c) {
-        EXPECT_NEAR(a.means[in_a[k] * kFeatures + c], b.means[in_b[k] * kFeatures + c], tolerance);
-      }
-      for (size_t c = 0; c < kBasis * kFeatures; ++c) {
-        EXPECT_NEAR(a.slopes[in_a[k] * kBasis * kFeatures + c], b.slopes[in_b[k] * kBasis * kFeatures + c], tolerance);
-      }
+  // The views that are not held out.
+  std::vector<size_t> usable() const {
+    std::vector<size_t> views;
+    for (size_t i = 0; i < capture_.views.size(); ++i) {
+      if (!capture_.views[i].is_held_out) views.push_back(i);
     }
+    return views;
+  }
+  void expect_refused(maq_status status, const char* text, const maq::Capture& capture) {
+    expect_error(status, text, [&] { maq::build_scene(capture, networks_, options_); });
   }
 
   maq::Capture capture_;
-  std::unique_ptr<maq::SceneNetworks> networks_;
-  std::vector<Photo> photos_;
+  std::shared_ptr<maq::SceneNetworks> networks_;
+  maq::SceneBuildOptions options_;
 };
 
-// Features are some 1 large. Photos are turned and sampled in float on both sides, in another order.
-TEST_F(SceneBuilder, AgreesWithTorch) {
-  const ModelledPoints points = built({0, 1, 2, 3});
-  const auto expected = tiny_scene::expected_looks();
-  const std::vector<size_t> places = places_in(points);
-  ASSERT_EQ(points.count(), expected.size());
-  EXPECT_EQ(points.never_seen, capture_.cloud.count() - expected.size());
-  EXPECT_EQ(points.singular, 0u);
-  constexpr float kTolerance = 1e-5f;
-  size_t varying = 0;
-  for (const tiny_scene::Look& look : expected) {
-    const size_t at = places[look.index];
-    ASSERT_NE(at, SIZE_MAX) << "point " << look.index << " is seen";
-    EXPECT_EQ(points.views[at], look.views);
-    for (size_t c = 0; c < kFeatures; ++c) EXPECT_NEAR(points.means[at * kFeatures + c], look.mean[c], kTolerance);
-    for (size_t c = 0; c < kBasis * kFeatures; ++c) {
-      EXPECT_NEAR(points.slopes[at * kBasis * kFeatures + c], look.slope[c], kTolerance);
-    }
-    EXPECT_NEAR(points.variations[at], look.variation, kTolerance);
-    varying += look.variation > 0.01f ? 1 : 0;
-  }
-  EXPECT_GT(varying, expected.size() / 4) << "the reference must be one whose looks depend on the side";
-  const std::array<float, 3> background = tiny_scene::expected_background();
-  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(points.background[c], background[c], kTolerance);
-}
-
-TEST_F(SceneBuilder, TheOrderOfPhotosChangesRoundingAlone) {
-  expect_the_same(built({0, 1, 2, 3}), built({3, 1, 0, 2}), 1e-5f);
-}
-
-TEST_F(SceneBuilder, PhotosCanBeAddedAfterLookingAtWhatIsThere) {
-  maq::SceneBuilder made = builder();
-  add(made, 0);
-  add(made, 1);
-  const ModelledPoints first = made.finish();
-  expect_the_same(first, built({0, 1}), 0);
-  add(made, 2);
-  add(made, 3);
-  expect_the_same(made.finish(), built({0, 1, 2, 3}), 0);
-  EXPECT_EQ(made.views(), 4u);
-}
-
-TEST_F(SceneBuilder, FinishingInLessMemoryGivesTheSameAndABuilderThatKnowsNothing) {
-  maq::SceneBuilder made = builder();
-  add(made, 0);
-  add(made, 2);
-  expect_the_same(made.finish_and_forget(), built({0, 2}), 0);
-  EXPECT_EQ(made.views(), 0u);
-  EXPECT_EQ(made.seen_points(), 0u);
-  add(made, 1);
-  expect_the_same(made.finish(), built({1}), 0);
-}
-
-TEST_F(SceneBuilder, PixelsThatAreNotValidSayNothing) {
-  maq::SceneBuilder whole = builder(), half = builder(), none = builder();
-  const size_t all = add(whole, 0);
-  std::vector<uint8_t> left(photos_[0].valid.size());
-  for (size_t i = 0; i < left.size(); ++i) left[i] = i % 72 < 36 ? 255 : 0;
-  const auto seen = half.add_view(photos_[0].frame.image, left.data(), photos_[0].camera);
-  EXPECT_GT(seen.value(), all / 5);
-  EXPECT_LT(seen.value(), all * 4 / 5);
-  const ModelledPoints points = half.finish();
-  for (size_t i = 0; i < points.count(); ++i) {
-    const double place[3] = {points.x[i] + points.origin[0], points.y[i] + points.origin[1],
-                             points.z[i] + points.origin[2]};
-    double seen_as[3] = {};
-    for (size_t row = 0; row < 3; ++row) {
-      for (size_t k = 0; k < 3; ++k) {
-        seen_as[row] += photos_[0].camera.rotation[3 * row + k] * (place[k] - photos_[0].camera.centre[k]);
-      }
-    }
-    EXPECT_LT(photos_[0].camera.fx_px * seen_as[0] / seen_as[2] + photos_[0].camera.cx_px, 35.5);
-  }
-  const std::vector<uint8_t> blank(left.size(), 0);
-  EXPECT_EQ(none.add_view(photos_[0].frame.image, blank.data(), photos_[0].camera).value(), 0u);
-}
-
-// Whenever it is cancelled, and whoever does, the builder is as it was.
-TEST_F(SceneBuilder, ACancelledPhotoChangesNothing) {
-  const ModelledPoints before = built({0, 1});
-  std::vector<double> steps;
-  {
-    maq::SceneBuilder made = builder();
-    made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera, [&](double done, const std::string& what) {
-      EXPECT_FALSE(what.empty());
-      steps.push_back(done);
-      return true;
-    });
-  }
-  ASSERT_GE(steps.size(), 3u);
-  EXPECT_TRUE(std::is_sorted(steps.begin(), steps.end()));
-  for (size_t last = 1; last <= steps.size(); ++last) {
-    for (const bool by_flag : {false, true}) {
-      maq::SceneBuilder made = builder();
-      add(made, 0);
-      add(made, 1);
-      size_t step = 0;
-      const auto cancelling = [&](double, const std::string&) {
-        if (++step < last) return true;
-        if (!by_flag) return false;
-        std::thread([&] { made.cancel(); }).join();
-        return true;
-      };
-      EXPECT_FALSE(made.add_view(photos_[2].frame.image, nullptr, photos_[2].camera, cancelling).has_value());
-      EXPECT_EQ(step, last);
-      EXPECT_EQ(made.views(), 2u);
-      expect_the_same(made.finish(), before, 0);
-      add(made, 2);
-      expect_the_same(made.finish(), built({0, 1, 2}), 0);
-    }
-  }
-}
-
-TEST_F(SceneBuilder, ACancelBeforeAPhotoIsOfThatPhotoAlone) {
-  maq::SceneBuilder made = builder();
-  made.cancel();
-  EXPECT_FALSE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
-  EXPECT_TRUE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
-}
-
-TEST_F(SceneBuilder, CloudsThatAreNoneAreRefused) {
-  const auto refused = [&](maq_status status, const char* text, const maq::PointCloud& cloud) {
-    expect_error(status, text, [&] { maq::SceneBuilder(cloud, capture_.up, *networks_, {}); });
-  };
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "has no points", {});
-  for (const float value : {std::nanf(""), INFINITY, -INFINITY}) {
-    maq::PointCloud cloud = capture_.cloud;
-    cloud.y[7] = value;
-    refused(MAQ_ERROR_INVALID_ARGUMENT, "Point 7 of the cloud", cloud);
-  }
-  maq::PointCloud uneven = capture_.cloud;
-  uneven.z.pop_back();
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "as many of each", uneven);
-  maq::PointCloud nowhere = capture_.cloud;
-  nowhere.origin[1] = INFINITY;
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "origin", nowhere);
-}
-
-TEST_F(SceneBuilder, OptionsOutOfRangeAreRefused) {
-  const auto refused = [&](const char* text, auto change) {
-    maq::BuildOptions options;
-    std::array<double, 3> up = capture_.up;
-    change(options, up);
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { maq::SceneBuilder(capture_.cloud, up, *networks_, options); });
-  };
-  refused("no direction", [](auto&, auto& up) { up = {0, 0, 0}; });
-  refused("no direction", [](auto&, auto& up) { up = {0, std::nan(""), 1}; });
-  refused("visibility scale is 0", [](auto& options, auto&) { options.visibility_scale = 0; });
-  refused("visibility scale is 2", [](auto& options, auto&) { options.visibility_scale = 2; });
-  refused("visibility scale is nan", [](auto& options, auto&) { options.visibility_scale = std::nan(""); });
-  refused("nearest point is -1", [](auto& options, auto&) { options.near = -1; });
-  refused("Threads are 0", [](auto& options, auto&) { options.threads = 0; });
-}
-
-TEST_F(SceneBuilder, PhotosThatDoNotFitAreRefusedAndChangeNothing) {
-  maq::SceneBuilder made = builder();
-  add(made, 0);
-  const Photo& photo = photos_[1];
-  const auto refused = [&](const char* text, const maq::ImageView& image, const maq::PinholeCamera& camera) {
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { made.add_view(image, nullptr, camera); });
-  };
-  maq::PinholeCamera camera = photo.camera;
-  camera.width_px += 1;
-  refused("72 x 56 pixels, but its camera is for 73 x 56", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.centre[0] = std::nan("");
-  refused("not finite", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.rotation[0] = 3;
-  refused("rotation", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.cx_px = 1e12;
-  refused("cannot be right", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.fy_px = 1e-12;
-  refused("cannot be right", photo.frame.image, camera);
-  maq::ImageView grey = photo.frame.image;
-  grey.format = MAQ_PIXEL_GREY8;
-  refused("must be BGR", grey, photo.camera);
-  expect_the_same(made.finish(), built({0}), 0);
-}
-
-TEST_F(SceneBuilder, PhotosOverTheLimitOfTheNetworksAreRefused) {
-  maq::Frame large;
-  maq::PinholeCamera camera = maq::resized(photos_[0].camera, 4000, 3000);
-  large.allocate_bgr(4000, 3000);
-  maq::SceneBuilder made = builder();
-  expect_error(MAQ_ERROR_IMAGE_SIZE, "over the limit", [&] { made.add_view(large.image, nullptr, camera); });
-  EXPECT_EQ(made.views(), 0u);
-}
-
-TEST_F(SceneBuilder, APhotoThatSeesNothingIsCountedAsNone) {
-  maq::SceneBuilder made = builder();
-  maq::PinholeCamera away = photos_[0].camera;
-  for (size_t i = 0; i < 3; ++i) {  // turned by half a circle about its vertical
-    away.rotation[i] = -away.rotation[i];
-    away.rotation[6 + i] = -away.rotation[6 + i];
-  }
-  EXPECT_EQ(made.add_view(photos_[0].frame.image, nullptr, away).value(), 0u);
-  EXPECT_EQ(made.views(), 0u);
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "None of the photos sees a point", [&] { made.finish(); });
-  add(made, 1);
-  expect_the_same(made.finish(), built({1}), 0);
-}
-
-TEST_F(SceneBuilder, UpAlongTheViewIsLikeNoTurn) {
-  maq::PinholeCamera down = photos_[0].camera;
-  down.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1};
-  down.centre = {0, 0, 3};
-  maq::SceneBuilder along(capture_.cloud, {0, 0, 1}, *networks_, as_in_the_reference());
-  maq::SceneBuilder across(capture_.cloud, {0, 1, 0}, *networks_, as_in_the_reference());
-  EXPECT_GT(along.add_view(photos_[0].frame.image, nullptr, down).value(), 50u);
-  across.add_view(photos_[0].frame.image, nullptr, down);
-  expect_the_same(along.finish(), across.finish(), 0);
-}
-
-TEST_F(SceneBuilder, TheLimitOfMemoryIsKept) {
-  maq::BuildOptions options = as_in_the_reference();
-  options.most_bytes = capture_.cloud.count() * 4 - 1;
-  expect_error(MAQ_ERROR_OUT_OF_MEMORY, "over the limit", [&] { builder(options); });
-  options.most_bytes = capture_.cloud.count() * 4 + built({0}).count() * 340;
-  maq::SceneBuilder made = builder(options);
-  add(made, 0);
-  expect_error(MAQ_ERROR_OUT_OF_MEMORY, "seen points", [&] { add(made, 2); });
-  add(made, 0);
-  expect_the_same(made.finish(), built({0, 0}, options), 0);
+void expect_same(const Scene& a, const Scene& b) {
+  ASSERT_EQ(a.points, b.points);
+  ASSERT_EQ(a.view_dependent, b.view_dependent);
+  EXPECT_EQ(a.background, b.background);
+  EXPECT_EQ(std::memcmp(a.positions, b.positions, positions_bytes(a)), 0);
+  EXPECT_EQ(std::memcmp(a.constant_terms, b.constant_terms, constant_terms_bytes(a)), 0);
+  EXPECT_EQ(std::memcmp(a.linear_terms, b.linear_terms, linear_terms_bytes(a)), 0);
 }
 
 TEST_F(SceneBuilder, CapturesAreBuiltWithoutWhatIsHeldOut) {
-  maq::CaptureBuildOptions options;
-  options.points = as_in_the_reference();
   double last = -1;
   const auto progress = [&](double done, const std::string&) {
     EXPECT_GE(done, last);
     last = done;
     return true;
   };
-  const auto all = maq::build_from_capture(capture_, *networks_, options, progress).value();
+  const maq::BuiltScene all = maq::build_scene(capture_, networks_, options_, progress).value();
   EXPECT_EQ(last, 1);
-  EXPECT_EQ(all.views, 4u);
+  EXPECT_EQ(all.stats.views, 4u);
+  EXPECT_EQ(all.stats.unused_views, 0u);
+  EXPECT_EQ(all.stats.cloud_points, capture_.cloud.count());
+  EXPECT_EQ(all.stats.seen_points, all.scene.points);
+  EXPECT_GT(all.stats.load_ms, 0);
+  EXPECT_GT(all.stats.fitting.extract_ms, 0);
+  EXPECT_GT(all.stats.pack_ms, 0);
   EXPECT_TRUE(all.dropped.empty());
-  expect_the_same(all.points, built({0, 1, 2, 3}), 0);
-  options.most_views = 2;
-  expect_the_same(maq::build_from_capture(capture_, *networks_, options)->points, built({0, 2}), 0);
-  options.most_views = 0;
-  options.uses_held_out = true;
-  EXPECT_EQ(maq::build_from_capture(capture_, *networks_, options)->views, 5u);
+  EXPECT_EQ(all.scene.networks_sha256, networks_->sha256());
+  const std::vector<size_t> views = usable();
+  ASSERT_EQ(views.size(), 4u);
+  expect_same(all.scene, built_of(views));
+  options_.max_views = 2;
+  expect_same(built(capture_).scene, built_of({views[0], views[2]}));
+  options_.max_views = 0;
+  options_.uses_held_out = true;
+  EXPECT_EQ(built(capture_).stats.views, 5u);
+}
+
+TEST_F(SceneBuilder, PhotoByPhotoTheSceneIsTheSameAndCanGrow) {
+  const std::vector<size_t> views = usable();
+  maq::SceneBuilder builder(capture_.cloud, capture_.up, networks_, options_);
+  for (const size_t view : {views[0], views[1]}) EXPECT_GT(builder.add_view(capture_.views[view]).value(), 0u);
+  expect_same(builder.finish(), built_of({views[0], views[1]}));
+  for (const size_t view : {views[2], views[3]}) builder.add_view(capture_.views[view]);
+  EXPECT_EQ(builder.stats().views, 4u);
+  expect_same(builder.finish(), built_of(views));
+  expect_same(builder.finish_and_forget(), built_of(views));
+  EXPECT_EQ(builder.stats().views, 0u);
+}
+
+TEST_F(SceneBuilder, LargerCloudsAreThinnedOut) {
+  options_.max_points = capture_.cloud.count() / 2;
+  const maq::BuiltScene half = built(capture_);
+  EXPECT_EQ(half.stats.cloud_points, options_.max_points);
+  thin_out(capture_.cloud, options_.max_points);
+  expect_same(half.scene, built_of(usable()));
 }
 
 TEST_F(SceneBuilder, PhotosOfACaptureAreShrunkToALongSide) {
-  maq::CaptureBuildOptions options;
-  options.points = as_in_the_reference();
-  options.long_side_px = 36;
-  const auto small = maq::build_from_capture(capture_, *networks_, options).value();
-  EXPECT_GT(small.points.count(), 50u);
-  EXPECT_LT(small.points.count(), built({0, 1, 2, 3}).count());
+  const uint32_t whole = built(capture_).scene.points;
+  options_.long_side_px = 36;
+  const maq::BuiltScene small = built(capture_);
+  EXPECT_GT(small.scene.points, 50u);
+  EXPECT_LT(small.scene.points, whole);
 }
 
 TEST_F(SceneBuilder, PhotosOfACaptureThatCannotBeReadAreDroppedAndCounted) {
-  maq::CaptureBuildOptions options;
-  options.points = as_in_the_reference();
   maq::Capture capture = capture_;
-  capture.views[0].image_path = "nowhere.png";
-  const auto left = maq::build_from_capture(capture, *networks_, options).value();
-  EXPECT_EQ(left.views, 3u);
+  const std::vector<size_t> views = usable();
+  capture.views[views[0]].image_path = "nowhere.png";
+  const maq::BuiltScene left = built(capture);
+  EXPECT_EQ(left.stats.views, 3u);
+  EXPECT_EQ(left.stats.unused_views, 1u);
   ASSERT_EQ(left.dropped.size(), 1u);
   EXPECT_EQ(left.dropped[0].reason, maq::kPhotosMissing);
-  expect_the_same(left.points, built({1, 2, 3}), 0);
+  expect_same(left.scene, built_of({views[1], views[2], views[3]}));
   for (maq::CaptureView& view : capture.views) view.image_path = "nowhere.png";
-  expect_error(MAQ_ERROR_UNREADABLE, "None of the photos can be used: 4 photos that are not in their folder",
-               [&] { maq::build_from_capture(capture, *networks_, options); });
+  expect_refused(MAQ_ERROR_UNREADABLE, "None of the photos can be used: 4 photos that are not in their folder",
+                 capture);
 }
 
 TEST_F(SceneBuilder, ChoicesThatLeaveNoPhotoAreASentence) {
-  maq::CaptureBuildOptions options;
   maq::Capture held_out = capture_;
   for (maq::CaptureView& view : held_out.views) view.is_held_out = true;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "All of the capture's 5 photos",
-               [&] { maq::build_from_capture(held_out, *networks_, options); });
-  options.long_side_px = -1;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "long side",
-               [&] { maq::build_from_capture(capture_, *networks_, options); });
+  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "All of the capture's 5 photos are held out", held_out);
+  options_.long_side_px = -1;
+  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "long side", capture_);
 }
 
 TEST_F(SceneBuilder, ACancelledCaptureIsNothing) {
   const auto cancelling = [](double done, const std::string&) { return done < 0.5; };
-  EXPECT_FALSE(maq::build_from_capture(capture_, *networks_, {}, cancelling).has_value());
-}
-
-// A wall of points that fills the photos of cameras side by side: each photo sees other ones.
-maq::PointCloud wall(size_t across, size_t down) {
-  maq::PointCloud cloud;
-  cloud.reserve(across * down, false);
-  for (size_t row = 0; row < down; ++row) {
-    for (size_t column = 0; column < across; ++column) cloud.add(double(column), double(row), 100);
-  }
-  return cloud;
-}
-
-// As many points as all threads get a share of.
-TEST_F(SceneBuilder, ThreadsChangeNothing) {
-  constexpr int kSide = 224;
-  maq::Frame photo;
-  uint8_t* pixels = photo.allocate_bgr(kSide, kSide);
-  for (int i = 0; i < 3 * kSide * kSide; ++i) pixels[i] = uint8_t(i * 7919 % 251);
-  const auto built_by = [&](int threads) {
-    maq::BuildOptions options;
-    options.threads = threads;
-    maq::SceneBuilder made(wall(300, 300), {0, -1, 0}, *networks_, options);
-    maq::PinholeCamera camera;
-    camera.width_px = camera.height_px = kSide;
-    camera.fx_px = camera.fy_px = 110;
-    for (const double left : {0.0, 10.0, 35.0}) {
-      camera.centre = {left, left / 2, 0};
-      made.add_view(photo.image, nullptr, camera);
-    }
-    return made.finish();
-  };
-  const ModelledPoints one = built_by(1), three = built_by(3);
-  EXPECT_GT(one.count(), 40000u);
-  EXPECT_EQ(one.x, three.x);
-  EXPECT_EQ(one.views, three.views);
-  EXPECT_EQ(one.means, three.means);
-  EXPECT_EQ(one.slopes, three.slopes);
-  EXPECT_EQ(one.variations, three.variations);
-}
-
-// The extractor of this bundle is small; what the real one takes is in docs/scenes.md.
-TEST_F(SceneBuilder, AMillionSeenPointsTakeLessThan450MB) {
-  constexpr int kWidth = 500, kHeight = 500;
-  maq::PinholeCamera camera;
-  camera.width_px = kWidth;
-  camera.height_px = kHeight;
-  camera.fx_px = camera.fy_px = 100;
-  maq::Frame photo;
-  std::fill_n(photo.allocate_bgr(kWidth, kHeight), 3 * kWidth * kHeight, uint8_t(90));
-  constexpr size_t kAcross = 2 * kWidth, kDown = 2 * kHeight;
-  size_t seen = 0;
-  const double grown_mib = peak_memory_growth_mib([&] {
-    maq::SceneBuilder made(wall(kAcross, kDown), {0, -1, 0}, *networks_, {});
-    for (int view = 0; view < 8; ++view) {
-      camera.centre = {double(view % 2 * kWidth), double(view / 2 % 2 * kHeight), 0};
-      made.add_view(photo.image, nullptr, camera);
-    }
-    const ModelledPoints points = made.finish_and_forget();
-    seen = points.count();
-  });
-  EXPECT_EQ(seen, kAcross * kDown);
-  std::printf("%.0f MiB for %zu points\n", grown_mib, seen);
-  EXPECT_LT(grown_mib * 1048576, 450e6);
-}
-
-TEST_F(SceneBuilder, TwentyMillionPointsOfWhichFewAreSeenTakeLittleMoreThanTheCloud) {
-  maq::PinholeCamera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 100;
-  maq::Frame photo;
-  std::fill_n(photo.allocate_bgr(640, 480), 3 * 640 * 480, uint8_t(90));
-  size_t seen = 0;
-  const double grown_mib = peak_memory_growth_mib([&] {
-    maq::SceneBuilder made(wall(5000, 4000), {0, -1, 0}, *networks_, {});
-    seen = made.add_view(photo.image, nullptr, camera).value();
-  });
-  EXPECT_EQ(seen, 640u * 480u);
-  std::printf("%.0f MiB\n", grown_mib);
-  EXPECT_LT(grown_mib, 20e6 * (12 + 4) / 1048576 + 200);
+  EXPECT_FALSE(maq::build_scene(capture_, networks_, options_, cancelling).has_value());
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include "scene/format/block_decoding.h"
+#include "scene/format/block_codec.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
 #include "scene/format/scene_packing.h"
@@ -25,8 +25,8 @@ using maq::SceneFileHead;
 
 // A scene of two blocks, a few kilobytes.
 std::string small_file(const TempFolder& folder,
-                       maq::ScenePacking packing = {maq::Places::kUint16, maq::Coefficients::kInt8, 0}) {
-  maq::ModelledPoints points = made_up_points(7);
+                       maq::ScenePacking packing = {maq::PositionFormat::kUint16, maq::CoefficientFormat::kInt8, 0}) {
+  maq::FittedPoints points = synthetic_points(7);
   points.x[3] = 1e6f;
   const maq::Scene scene = make_scene(points, packing);
   EXPECT_EQ(scene.block_count, 2u);
@@ -38,9 +38,9 @@ std::string small_file(const TempFolder& folder,
 void use(const maq::Scene& scene) {
   uint32_t points = 0;
   for (uint32_t b = 0; b < scene.block_count; ++b) {
-    const maq::ModelledPoints part = unpack_block(scene, scene.blocks[b]);
+    const maq::FittedPoints part = decode_block(scene, scene.blocks[b]);
     points += uint32_t(part.count());
-    for (const auto* values : {&part.x, &part.y, &part.z, &part.means, &part.slopes}) {
+    for (const auto* values : {&part.x, &part.y, &part.z, &part.constant_terms, &part.linear_terms}) {
       for (const float value : *values) EXPECT_TRUE(std::isfinite(value));
     }
   }
@@ -178,21 +178,21 @@ void expect_refused(const Attack& attack, maq::ScenePacking packing, maq_status 
 }
 
 TEST(SceneFileDamage, HeadsThatLieAreRefusedThoughTheirChecksAreRight) {
-  constexpr maq::ScenePacking kPacked = {maq::Places::kUint16, maq::Coefficients::kInt8, 0};
+  constexpr maq::ScenePacking kPacked = {maq::PositionFormat::kUint16, maq::CoefficientFormat::kInt8, 0};
   const Attack attacks[] = {
       {"claims 0 points", [](auto& head, auto*) { head.points = 0; }},
       {"section 1", [](auto& head, auto*) { head.points = 8; }},
       {"section 1", [](auto& head, auto*) { head.points = 30'000'000; }},
-      {"claims", [](auto& head, auto*) { head.varying = 8; }},
-      {"section 3", [](auto& head, auto*) { head.varying = 6; }},
+      {"claims", [](auto& head, auto*) { head.view_dependent = 8; }},
+      {"section 3", [](auto& head, auto*) { head.view_dependent = 6; }},
       {"claims", [](auto& head, auto*) { head.blocks = 0; }},
       {"claims", [](auto& head, auto*) { head.blocks = 0xffffffff; }},
       {"section 0", [](auto& head, auto*) { head.blocks = 1; }},
       {"section 0", [](auto& head, auto*) { head.blocks = 7; }},
-      {"in a way", [](auto& head, auto*) { head.place_kind = 2; }},
-      {"section 1", [](auto& head, auto*) { head.place_kind = 0; }},
-      {"in a way", [](auto& head, auto*) { head.coefficient_kind = 255; }},
-      {"section 2", [](auto& head, auto*) { head.coefficient_kind = 1; }},
+      {"in a way", [](auto& head, auto*) { head.position_format = 2; }},
+      {"section 1", [](auto& head, auto*) { head.position_format = 0; }},
+      {"in a way", [](auto& head, auto*) { head.coefficient_format = 255; }},
+      {"section 2", [](auto& head, auto*) { head.coefficient_format = 1; }},
       {"in a way", [](auto& head, auto*) { head.zero[1] = 1; }},
       {"in a way", [](auto& head, auto*) { head.more_zeros[19] = 1; }},
       {"not finite", [](auto& head, auto*) { head.origin[1] = NAN; }},
@@ -219,35 +219,37 @@ TEST(SceneFileDamage, BlocksThatLieAreRefusedThoughTheirChecksAreRight) {
       {"block 0", [](auto&, auto* blocks) { blocks[0].count = ~0u; }},
       {"block 1", [](auto&, auto* blocks) { blocks[0].count += 1; }},
       {"has blocks of", [](auto&, auto* blocks) { blocks[1].count += 1; }},
-      {"has blocks of", [](auto&, auto* blocks) { blocks[1].varying -= 1; }},
-      {"block 0", [](auto&, auto* blocks) { blocks[0].varying = blocks[0].count + 1; }},
-      {"block 1", [](auto&, auto* blocks) { blocks[0].varying -= 1; }},
-      {"block 0", [](auto&, auto* blocks) { blocks[0].first_varying = ~0u; }},
+      {"has blocks of", [](auto&, auto* blocks) { blocks[1].view_dependent -= 1; }},
+      {"block 0", [](auto&, auto* blocks) { blocks[0].view_dependent = blocks[0].count + 1; }},
+      {"block 1", [](auto&, auto* blocks) { blocks[0].view_dependent -= 1; }},
+      {"block 0", [](auto&, auto* blocks) { blocks[0].first_view_dependent = ~0u; }},
       {"block 1", [](auto&, auto* blocks) { blocks[1].first = 0; }},
-      {"block 1", [](auto&, auto* blocks) { blocks[1].first_varying += 1; }},
+      {"block 1", [](auto&, auto* blocks) { blocks[1].first_view_dependent += 1; }},
       {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].low[2] = NAN; }},
       {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].high[0] = INFINITY; }},
       {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].low[0] = blocks[0].high[0] + 1; }},
       {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].low[1] = -3e30f; }},
-      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].place_step[0] = NAN; }},
-      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].place_step[0] = -1; }},
-      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].place_step[0] *= 2; }},
-      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].mean_middle[7] = NAN; }},
-      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].mean_step[0] = INFINITY; }},
-      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].mean_step[0] = -1; }},
-      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].mean_step[0] = 3e28f; }},
-      {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].slope_step[47] = NAN; }},
-      {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].slope_step[46] = 1e35f; }},
-      {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].slope_step[45] = -1; }},
+      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].position_step[0] = NAN; }},
+      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].position_step[0] = -1; }},
+      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].position_step[0] *= 2; }},
+      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].constant_middle[7] = NAN; }},
+      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].constant_step[0] = INFINITY; }},
+      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].constant_step[0] = -1; }},
+      {"block 0: its bounds", [](auto&, auto* blocks) { blocks[0].constant_step[0] = 3e28f; }},
+      {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].linear_step[47] = NAN; }},
+      {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].linear_step[46] = 1e35f; }},
+      {"block 1: its bounds", [](auto&, auto* blocks) { blocks[1].linear_step[45] = -1; }},
   };
-  for (const Attack& attack : attacks) expect_refused(attack, {maq::Places::kUint16, maq::Coefficients::kInt8, 0});
+  for (const Attack& attack : attacks)
+    expect_refused(attack, {maq::PositionFormat::kUint16, maq::CoefficientFormat::kInt8, 0});
 }
 
 TEST(SceneFileDamage, NumbersThatAreNotFiniteAreRefused) {
-  for (const maq::SceneFileSection section : {maq::kPlacesSection, maq::kMeansSection, maq::kSlopesSection}) {
+  for (const maq::SceneFileSection section :
+       {maq::kPositionsSection, maq::kConstantTermsSection, maq::kLinearTermsSection}) {
     for (const float value : {float(NAN), INFINITY, -3e30f}) {
       TempFolder folder;
-      std::string bytes = small_file(folder, {maq::Places::kFloat32, maq::Coefficients::kFloat32, 0});
+      std::string bytes = small_file(folder, {maq::PositionFormat::kFloat32, maq::CoefficientFormat::kFloat32, 0});
       const maq::SceneFileSpan span = head_of(bytes).sections[section];
       std::memcpy(bytes.data() + span.offset + span.bytes - sizeof value, &value, sizeof value);
       repair(bytes);
@@ -264,10 +266,11 @@ TEST(SceneFileDamage, RandomChangesWithRightChecksAreRefusedOrHarmless) {
                             0xff,       1024,       1025,       65535,      0x7fffffff, 0x80000000, 0xffffffff,
                             0x7f800000, 0xff800000, 0x7fc00000, 0x7f7fffff, 0x00000001, 0x7149f2ca};
   int refused = 0, opened = 0;
-  for (const auto places : {maq::Places::kFloat32, maq::Places::kUint16}) {
-    for (const auto kind : {maq::Coefficients::kFloat32, maq::Coefficients::kInt16, maq::Coefficients::kInt8}) {
+  for (const auto positions : {maq::PositionFormat::kFloat32, maq::PositionFormat::kUint16}) {
+    for (const auto kind :
+         {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt16, maq::CoefficientFormat::kInt8}) {
       TempFolder folder;
-      const std::string path = folder.file("small.maqs"), whole = small_file(folder, {places, kind, 0});
+      const std::string path = folder.file("small.maqs"), whole = small_file(folder, {positions, kind, 0});
       for (int round = 0; round < 2'000; ++round) {
         std::string bytes = whole;
         for (uint32_t change = 0; change <= random() % 3; ++change) {
@@ -279,7 +282,7 @@ TEST(SceneFileDamage, RandomChangesWithRightChecksAreRefusedOrHarmless) {
         }
         if (random() % 8 == 0) bytes.resize(random() % (bytes.size() + 1));
         if (bytes.size() >= sizeof(SceneFileHead)) {
-          // The size too, so that more than the size is looked at.
+          // The size too, so that more than the size is checked.
           const uint64_t size = bytes.size();
           if (random() % 2 == 0) std::memcpy(bytes.data() + offsetof(SceneFileHead, file_bytes), &size, sizeof size);
           repair(bytes);

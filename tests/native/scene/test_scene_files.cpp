@@ -9,7 +9,7 @@
 #include <iostream>
 
 #include "scene/capture/ply_reader.h"
-#include "scene/format/block_decoding.h"
+#include "scene/format/block_codec.h"
 #include "scene/format/ply_writer.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_packing.h"
@@ -21,8 +21,8 @@
 
 namespace {
 
-using maq::Coefficients;
-using maq::Places;
+using maq::CoefficientFormat;
+using maq::PositionFormat;
 using maq::Scene;
 
 bool are_same(const void* a, const void* b, size_t bytes) { return bytes == 0 || std::memcmp(a, b, bytes) == 0; }
@@ -31,15 +31,15 @@ void expect_same(const Scene& a, const Scene& b) {
   EXPECT_EQ(a.origin, b.origin);
   EXPECT_EQ(a.up, b.up);
   EXPECT_EQ(a.networks_sha256, b.networks_sha256);
-  ASSERT_EQ(a.place_kind, b.place_kind);
-  ASSERT_EQ(a.coefficient_kind, b.coefficient_kind);
+  ASSERT_EQ(a.position_format, b.position_format);
+  ASSERT_EQ(a.coefficient_format, b.coefficient_format);
   ASSERT_EQ(a.points, b.points);
-  ASSERT_EQ(a.varying, b.varying);
+  ASSERT_EQ(a.view_dependent, b.view_dependent);
   ASSERT_EQ(a.block_count, b.block_count);
   EXPECT_TRUE(are_same(a.blocks, b.blocks, blocks_bytes(a)));
-  EXPECT_TRUE(are_same(a.places, b.places, places_bytes(a)));
-  EXPECT_TRUE(are_same(a.means, b.means, means_bytes(a)));
-  EXPECT_TRUE(are_same(a.slopes, b.slopes, slopes_bytes(a)));
+  EXPECT_TRUE(are_same(a.positions, b.positions, positions_bytes(a)));
+  EXPECT_TRUE(are_same(a.constant_terms, b.constant_terms, constant_terms_bytes(a)));
+  EXPECT_TRUE(are_same(a.linear_terms, b.linear_terms, linear_terms_bytes(a)));
 }
 
 size_t files_in(const TempFolder& folder) {
@@ -48,11 +48,12 @@ size_t files_in(const TempFolder& folder) {
 
 TEST(SceneFiles, KeepScenesOfEveryKind) {
   TempFolder folder;
-  const maq::ModelledPoints points = made_up_points(3'000);
-  for (const Places places : {Places::kFloat32, Places::kUint16}) {
-    for (const Coefficients kind : {Coefficients::kFloat32, Coefficients::kInt16, Coefficients::kInt8}) {
-      for (const float least : {0.0f, 0.1f, 100.0f}) {
-        Scene scene = make_scene(points, {places, kind, least});
+  const maq::FittedPoints points = synthetic_points(3'000);
+  for (const PositionFormat positions : {PositionFormat::kFloat32, PositionFormat::kUint16}) {
+    for (const CoefficientFormat kind :
+         {CoefficientFormat::kFloat32, CoefficientFormat::kInt16, CoefficientFormat::kInt8}) {
+      for (const float min : {0.0f, 0.1f, 100.0f}) {
+        Scene scene = make_scene(points, {positions, kind, min});
         for (size_t i = 0; i < 32; ++i) scene.networks_sha256[i] = uint8_t(200 + i);
         write_scene_file(scene, folder.file("a.maqs"));
         expect_same(maq::open_scene_file(folder.file("a.maqs")), scene);
@@ -66,7 +67,7 @@ TEST(SceneFiles, KeepScenesOfEveryKind) {
 
 TEST(SceneFiles, ASceneOfOnePointIsOne) {
   TempFolder folder;
-  const Scene scene = make_scene(made_up_points(1), {});
+  const Scene scene = make_scene(synthetic_points(1), {});
   write_scene_file(scene, folder.file("a.maqs"));
   expect_same(maq::open_scene_file(folder.file("a.maqs")), scene);
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "no points", [&] { write_scene_file(Scene(), folder.file("b.maqs")); });
@@ -76,7 +77,7 @@ TEST(SceneFiles, ASceneOfOnePointIsOne) {
 TEST(SceneFiles, AnOpenSceneStaysWhenItsFileIsWrittenAnewOrRemoved) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs");
-  const Scene first = make_scene(made_up_points(2'000, 1), {}), second = make_scene(made_up_points(500, 2), {});
+  const Scene first = make_scene(synthetic_points(2'000, 1), {}), second = make_scene(synthetic_points(500, 2), {});
   write_scene_file(first, path);
   const Scene opened = maq::open_scene_file(path);
   write_scene_file(second, path);
@@ -89,7 +90,7 @@ TEST(SceneFiles, AnOpenSceneStaysWhenItsFileIsWrittenAnewOrRemoved) {
 
 TEST(SceneFiles, ASceneFromMemoryKeepsNothingOfItAndNeedsNoAlignment) {
   TempFolder folder;
-  const Scene scene = make_scene(made_up_points(2'000), {Places::kFloat32, Coefficients::kFloat32, 0});
+  const Scene scene = make_scene(synthetic_points(2'000), {PositionFormat::kFloat32, CoefficientFormat::kFloat32, 0});
   write_scene_file(scene, folder.file("a.maqs"));
   for (size_t shift = 0; shift < 4; ++shift) {
     std::string bytes = std::string(shift, 'x') + read_text(folder.file("a.maqs"));
@@ -103,18 +104,18 @@ TEST(SceneFiles, ASceneFromMemoryKeepsNothingOfItAndNeedsNoAlignment) {
 TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs"), ply = folder.file("a.ply");
-  const Scene small = make_scene(made_up_points(100), {}), large = make_scene(made_up_points(20'000), {});
+  const Scene small = make_scene(synthetic_points(100), {}), large = make_scene(synthetic_points(20'000), {});
   write_scene_file(small, path);
   write_scene_ply(small, ply);
   const std::string old_ply = read_text(ply);
   write_scene_file(large, folder.file("large.maqs"));
   const rlim_t whole = std::filesystem::file_size(folder.file("large.maqs"));
   std::filesystem::remove(folder.file("large.maqs"));
-  // At the head, in the blocks, the places, the looks, and at the last byte.
-  for (const rlim_t most : {rlim_t(0), rlim_t(100), rlim_t(5'000), rlim_t(20'000), rlim_t(200'000), whole - 1}) {
-    const FileSizeLimit limit(most);
+  // At the head, in the blocks, the positions, the coefficients, and at the last byte.
+  for (const rlim_t max : {rlim_t(0), rlim_t(100), rlim_t(5'000), rlim_t(20'000), rlim_t(200'000), whole - 1}) {
+    const FileSizeLimit limit(max);
     expect_error(MAQ_ERROR_UNWRITABLE, "cannot be written", [&] { write_scene_file(large, path); });
-    if (most < 300'000) {
+    if (max < 300'000) {
       expect_error(MAQ_ERROR_UNWRITABLE, "cannot be written", [&] { write_scene_ply(large, ply); });
     }
   }
@@ -128,7 +129,7 @@ TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
 TEST(SceneFiles, AProcessThatDiesWhileItWritesLeavesTheOldFile) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs");
-  const Scene small = make_scene(made_up_points(100), {}), large = make_scene(made_up_points(20'000), {});
+  const Scene small = make_scene(synthetic_points(100), {}), large = make_scene(synthetic_points(20'000), {});
   write_scene_file(small, path);
   const pid_t child = fork();
   if (child == 0) {
@@ -151,7 +152,7 @@ TEST(SceneFiles, AProcessThatDiesWhileItWritesLeavesTheOldFile) {
 
 TEST(SceneFiles, WhereNoneCanBeWrittenIsOneSentence) {
   TempFolder folder;
-  const Scene scene = make_scene(made_up_points(10), {});
+  const Scene scene = make_scene(synthetic_points(10), {});
   std::filesystem::create_directory(folder.file("folder"));
   expect_error(MAQ_ERROR_UNWRITABLE, "is not a file", [&] { write_scene_file(scene, folder.file("folder")); });
   expect_error(MAQ_ERROR_UNWRITABLE, "cannot be made",
@@ -175,32 +176,32 @@ TEST(SceneFiles, WhatIsNoSceneIsOneSentence) {
 
 TEST(SceneFiles, ThePlyHasTheScenesPointsAndColours) {
   TempFolder folder;
-  maq::ModelledPoints points = made_up_points(5'000);
-  points.means[0] = -0.5f;  // darker than black
-  points.means[1] = 7;
+  maq::FittedPoints points = synthetic_points(5'000);
+  points.constant_terms[0] = -0.5f;  // darker than black
+  points.constant_terms[1] = 7;
   for (const bool is_far : {false, true}) {
     if (is_far) points.origin = {4e6, -5e5, 1e7};
-    for (const Places places : {Places::kFloat32, Places::kUint16}) {
-      const Scene scene = make_scene(points, {places, Coefficients::kInt8, 0});
+    for (const PositionFormat positions : {PositionFormat::kFloat32, PositionFormat::kUint16}) {
+      const Scene scene = make_scene(points, {positions, CoefficientFormat::kInt8, 0});
       write_scene_ply(scene, folder.file("a.ply"));
       EXPECT_EQ(
           read_text(folder.file("a.ply")).find(is_far ? "property double x" : "property float x") != std::string::npos,
           true);
-      maq::DropCounts drops;
-      const maq::PointCloud cloud = maq::read_ply_file(folder.file("a.ply"), points.origin, drops);
-      EXPECT_TRUE(drops.list().empty());
+      maq::ImportReport report;
+      const maq::PointCloud cloud = maq::read_ply_file(folder.file("a.ply"), points.origin, report);
+      EXPECT_TRUE(report.list().empty());
       ASSERT_EQ(cloud.count(), 5'000u);
       const float tolerance = is_far ? 1e-6f : 1e-5f;
       for (uint32_t b = 0; b < scene.block_count; ++b) {
         const maq::SceneBlock& block = scene.blocks[b];
-        const maq::ModelledPoints part = unpack_block(scene, block);
+        const maq::FittedPoints part = decode_block(scene, block);
         for (uint32_t k = 0; k < block.count; ++k) {
           const size_t i = block.first + k;
           ASSERT_NEAR(cloud.x[i], part.x[k], tolerance);
           ASSERT_NEAR(cloud.y[i], part.y[k], tolerance);
           ASSERT_NEAR(cloud.z[i], part.z[k], tolerance);
           for (size_t c = 0; c < 3; ++c) {
-            const float wanted = 255 * std::clamp(part.means[k * size_t(maq::kFeatures) + c], 0.0f, 1.0f);
+            const float wanted = 255 * std::clamp(part.constant_terms[k * size_t(maq::kFeatures) + c], 0.0f, 1.0f);
             ASSERT_NEAR(cloud.rgb[3 * i + c], wanted, 0.501f);
           }
         }
@@ -212,7 +213,7 @@ TEST(SceneFiles, ThePlyHasTheScenesPointsAndColours) {
 TEST(SceneFiles, AMillionPointsAreOpenedWithoutBeingCopied) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs");
-  write_scene_file(make_scene(made_up_points(1'000'000), {}), path);
+  write_scene_file(make_scene(synthetic_points(1'000'000), {}), path);
   const double file_mib = double(std::filesystem::file_size(path)) / 1048576;
   const std::string bytes = read_text(path);
   for (const bool is_mapped : {true, false}) {

@@ -1,13 +1,13 @@
-// Captured places from disk: COLMAP models and transforms.json, with their photos and clouds.
+// Captures from disk: COLMAP models and transforms.json, with their photos and clouds.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "scene/capture/capture.h"
 #include "support/capture_files.h"
 #include "support/expect_error.h"
-#include "scene/capture/capture.h"
 
 namespace {
 
@@ -18,7 +18,7 @@ using nlohmann::json;
 
 std::string texts_of(const std::vector<maq::Dropped>& dropped) {
   std::string text;
-  for (const maq::Dropped& one : dropped) text += maq::sentence_part(one) + "\n";
+  for (const maq::Dropped& one : dropped) text += maq::describe(one) + "\n";
   return text;
 }
 
@@ -126,7 +126,7 @@ TEST_F(SceneImport, CamerasOfColmapAreThoseOfOpenCvHalfAPixelOff) {
   }
 }
 
-// x' = R x + t, R of the quaternion, as COLMAP's documentation has it; the quaternion turned here by hand.
+// x' = R x + t, R of the quaternion, as COLMAP's documentation has it; the quaternion rotated here by hand.
 TEST_F(SceneImport, PosesOfColmapAreWorldToCamera) {
   const MadeCapture made = of_every_model();
   const Capture capture = open_colmap(made);
@@ -308,9 +308,9 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
               "1 photos without a camera (first: orphan.png)\n"
               "1 cameras without a photo (first: 14)\n"
               "2 photos whose camera has no positive focal length (first: camera8.png)\n"
-              "1 photos whose camera has figures that are not finite (first: camera10.png)\n"
+              "1 photos whose camera has numbers that are not finite (first: camera10.png)\n"
               "2 photos whose camera has no size, or one over the limit (first: camera11.png)\n"
-              "1 photos whose distortion folds the picture, or whose axis is outside of it (first: camera13.png)\n"
+              "1 photos whose distortion is not invertible, or whose axis is outside of them (first: camera13.png)\n"
               "1 photos that are named twice (first: a.png)\n"
               "2 photos whose rotation is not of length 1, or mirrors (first: zero.png)\n"
               "3 photos whose pose is not finite (first: nan.png)\n"
@@ -318,7 +318,7 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
               "3 photos whose name leads out of their folder (first: ../up.png)\n"
               "2 photos that cannot be read as images (first: text.png)\n"
               "1 photos without pixels, or over the limit of size (first: huge.png)\n"
-              "2 points whose place is not finite\n");
+              "2 points whose position is not finite\n");
   }
   std::filesystem::remove(folder_.path().parent_path() / "up.png");
 }
@@ -365,7 +365,7 @@ TEST_F(SceneImport, FoldersWithoutACaptureAreASentence) {
   expect_refused(MAQ_ERROR_UNREADABLE, "without a point that can be used.");
   made.points = {{std::nan(""), 0, 0, 0, 0, 0}};
   made.write_colmap(folder_, false);
-  expect_refused(MAQ_ERROR_UNREADABLE, "used: 1 points whose place is not finite.");
+  expect_refused(MAQ_ERROR_UNREADABLE, "used: 1 points whose position is not finite.");
   made.images.clear();
   made.write_colmap(folder_, false);
   expect_refused(MAQ_ERROR_UNREADABLE, "no photo that can be used: 1 cameras without a photo (first: 7)");
@@ -437,7 +437,7 @@ TEST_F(SceneImport, TransformsThatSayNothingOfUseAreASentence) {
   expect(std::string(1 << 20, '['), "is not a JSON object");
 }
 
-TEST_F(SceneImport, PhotosAreTakenAsTheyAreStoredNotTurnedByExif) {
+TEST_F(SceneImport, PhotosAreTakenAsTheyAreStoredNotRotatedByExif) {
   MadeCapture made;
   for (MadeImage& image : made.images) image.name[1] = '.', image.name.replace(2, 3, "jpg");
   made.write_photos(folder_);
@@ -465,7 +465,8 @@ TEST_F(SceneImport, PhotosAreTakenAsTheyAreStoredNotTurnedByExif) {
   EXPECT_EQ(picture.image.height_px, 24);
 }
 
-// A picture that tells the place of each pixel, seen by a distorted camera, tells after loading where each came from.
+// A picture that encodes the coordinates of each pixel, seen by a distorted camera, tells after loading where each came
+// from.
 TEST_F(SceneImport, ViewsAreLoadedUndistorted) {
   MadeCapture made = of_every_model();
   const Capture capture = open_colmap(made);
@@ -501,7 +502,7 @@ TEST_F(SceneImport, APhotoThatChangedSinceIsASentence) {
   expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { maq::load_view(capture.views[1], picture, valid); });
 }
 
-TEST_F(SceneImport, TheCloudsOriginIsAmidTheCamerasSoThatPlacesFarAwayAreExact) {
+TEST_F(SceneImport, TheCloudsOriginIsAmidTheCamerasSoThatPositionsFarAwayAreExact) {
   MadeCapture made;
   made.images.resize(2);
   for (MadeImage& image : made.images) image.pose = {1, 0, 0, 0, -1e7, 2e7, 0};

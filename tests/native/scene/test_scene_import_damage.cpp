@@ -1,12 +1,13 @@
-// Captures cut at every byte, with every byte changed, and with counts that no file holds: a status or a smaller capture.
+// Captures cut at every byte, with every byte changed, and with counts that no file holds: a status or a smaller
+// capture.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "scene/capture/capture.h"
 #include "support/capture_files.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "scene/capture/capture.h"
 
 namespace {
 
@@ -134,7 +135,7 @@ TEST_F(SceneImportDamage, BytesBehindTheLastRecordAreRefused) {
   for (const char* name : {"cameras", "images", "points3D"}) {
     const std::string path = folder_.file(std::string("sparse/0/") + name + ".bin"), whole = read_text(path);
     write_text(path, whole + "x");
-    expect_error(MAQ_ERROR_UNREADABLE, "1 bytes behind the last", [&] { maq::open_capture(folder_.path().string()); });
+    expect_error(MAQ_ERROR_UNREADABLE, "1 bytes after the last", [&] { maq::open_capture(folder_.path().string()); });
     write_text(path, whole);
   }
 }

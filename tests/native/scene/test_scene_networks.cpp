@@ -38,7 +38,7 @@ TEST_F(SceneNetworks, SayWhatTheRefinerReads) {
   const auto networks = tiny_scene::networks();
   EXPECT_EQ(networks->name(), "tiny-scenes");
   EXPECT_EQ(networks->refiner_layout().levels, 5);
-  EXPECT_TRUE(networks->refiner_layout().is_folded);
+  EXPECT_TRUE(networks->refiner_layout().is_space_to_depth);
   EXPECT_EQ(networks->refiner_layout().raster_shape(0, 96, 64), (maq::Shape{1, 32, 48, 36}));
   EXPECT_EQ(networks->refiner_layout().raster_shape(2, 96, 64), (maq::Shape{1, 16, 24, 9}));
   EXPECT_EQ(networks->refiner_layout().picture_shape(96, 64), (maq::Shape{1, 32, 48, 12}));

@@ -14,7 +14,7 @@
 namespace {
 
 using maq::PinholeCamera;
-using maq::RenderedPicture;
+using maq::RenderedImage;
 using maq::RenderOptions;
 using maq::Scene;
 using maq::SceneRenderer;
@@ -25,29 +25,32 @@ std::shared_ptr<maq::SceneNetworks> networks() {
 }
 
 // The points of the tiny scene as torch modelled them.
-maq::ModelledPoints tiny_points() {
+maq::FittedPoints tiny_points() {
   const maq::Capture capture = tiny_scene::capture();
-  maq::ModelledPoints points;
+  maq::FittedPoints points;
   points.origin = capture.cloud.origin;
   points.up = capture.up;
   points.background = tiny_scene::expected_background();
-  for (const tiny_scene::Look& look : tiny_scene::expected_looks()) {
-    points.x.push_back(capture.cloud.x[look.index]);
-    points.y.push_back(capture.cloud.y[look.index]);
-    points.z.push_back(capture.cloud.z[look.index]);
-    points.views.push_back(look.views);
-    points.variations.push_back(look.variation);
-    points.means.insert(points.means.end(), std::begin(look.mean), std::end(look.mean));
-    points.slopes.insert(points.slopes.end(), std::begin(look.slope), std::end(look.slope));
+  for (const tiny_scene::Descriptor& expected : tiny_scene::expected_descriptors()) {
+    points.x.push_back(capture.cloud.x[expected.index]);
+    points.y.push_back(capture.cloud.y[expected.index]);
+    points.z.push_back(capture.cloud.z[expected.index]);
+    points.views.push_back(expected.views);
+    points.view_dependence.push_back(expected.view_dependence);
+    points.constant_terms.insert(points.constant_terms.end(), std::begin(expected.constant_terms),
+                                 std::end(expected.constant_terms));
+    points.linear_terms.insert(points.linear_terms.end(), std::begin(expected.linear_terms),
+                               std::end(expected.linear_terms));
   }
   return points;
 }
 
-Scene packed(const maq::ModelledPoints& points, maq::Coefficients coefficients) {
+Scene packed(const maq::FittedPoints& points, maq::CoefficientFormat coefficients) {
   maq::ScenePacking packing;
   packing.coefficients = coefficients;
-  packing.least_variation = 0;
-  packing.places = coefficients == maq::Coefficients::kFloat32 ? maq::Places::kFloat32 : maq::Places::kUint16;
+  packing.min_view_dependence = 0;
+  packing.positions =
+      coefficients == maq::CoefficientFormat::kFloat32 ? maq::PositionFormat::kFloat32 : maq::PositionFormat::kUint16;
   return make_scene(points, packing);
 }
 
@@ -81,15 +84,15 @@ double psnr(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
   return sum == 0 ? 99 : 10 * std::log10(255 * 255 * double(a.size()) / sum);
 }
 
-RenderedPicture render(const Scene& scene, const PinholeCamera& camera, const RenderOptions& options = {}) {
+RenderedImage render(const Scene& scene, const PinholeCamera& camera, const RenderOptions& options = {}) {
   SceneRenderer renderer(scene, networks(), options);
-  RenderedPicture picture;
+  RenderedImage picture;
   renderer.render(camera, picture);
   return picture;
 }
 
 // Everything that a picture promises whatever the camera is.
-void expect_sound(const RenderedPicture& picture, const PinholeCamera& camera) {
+void expect_sound(const RenderedImage& picture, const PinholeCamera& camera) {
   ASSERT_EQ(picture.width_px, camera.width_px);
   ASSERT_EQ(picture.height_px, camera.height_px);
   const size_t pixels = size_t(camera.width_px) * size_t(camera.height_px);
@@ -99,40 +102,40 @@ void expect_sound(const RenderedPicture& picture, const PinholeCamera& camera) {
   for (const float depth : picture.depth) ASSERT_TRUE(depth >= 0 && std::isfinite(depth));
 }
 
-void expect_same(const RenderedPicture& a, const RenderedPicture& b) {
+void expect_same(const RenderedImage& a, const RenderedImage& b) {
   EXPECT_EQ(a.bgr, b.bgr);
   EXPECT_EQ(a.alpha, b.alpha);
   EXPECT_EQ(a.depth, b.depth);
 }
 
 TEST(SceneRenderer, RendersWhatTorchRenders) {
-  const Scene scene = packed(tiny_points(), maq::Coefficients::kFloat32);
+  const Scene scene = packed(tiny_points(), maq::CoefficientFormat::kFloat32);
   const std::vector<ExpectedView> views = views_by_torch();
   ASSERT_GE(views.size(), 5u);
-  size_t turned = 0;
+  size_t rotated = 0;
   for (size_t i = 0; i < views.size(); ++i) {
-    const RenderedPicture picture = render(scene, views[i].camera);
+    const RenderedImage picture = render(scene, views[i].camera);
     expect_sound(picture, views[i].camera);
-    turned += picture.counts.is_turned ? 1 : 0;
+    rotated += picture.counts.is_rotated ? 1 : 0;
     const double found = psnr(picture.bgr, views[i].bgr);
-    std::printf("view %zu: %.1f dB%s\n", i, found, picture.counts.is_turned ? ", turned" : "");
+    std::printf("view %zu: %.1f dB%s\n", i, found, picture.counts.is_rotated ? ", rotated" : "");
     EXPECT_GE(found, 45) << i;
-    // So that the bar means something: a picture of one colour is far below it.
+    // So that the bar constant_terms something: a picture of one colour is far below it.
     double mean = 0;
     for (const uint8_t value : views[i].bgr) mean += value / double(views[i].bgr.size());
     EXPECT_LE(psnr(std::vector<uint8_t>(views[i].bgr.size(), uint8_t(mean)), views[i].bgr), 25) << i;
   }
-  EXPECT_EQ(turned, views.size() - 1);
+  EXPECT_EQ(rotated, views.size() - 1);
 }
 
 TEST(SceneRenderer, StoredIn8BitsItShowsNearlyTheSame) {
-  const Scene exact = packed(tiny_points(), maq::Coefficients::kFloat32);
-  const Scene in_16 = packed(tiny_points(), maq::Coefficients::kInt16),
-              in_8 = packed(tiny_points(), maq::Coefficients::kInt8);
+  const Scene exact = packed(tiny_points(), maq::CoefficientFormat::kFloat32);
+  const Scene in_16 = packed(tiny_points(), maq::CoefficientFormat::kInt16),
+              in_8 = packed(tiny_points(), maq::CoefficientFormat::kInt8);
   double squares_16 = 0, squares_8 = 0;
   const std::vector<ExpectedView> views = views_by_torch();
   for (const ExpectedView& view : views) {
-    const RenderedPicture expected = render(exact, view.camera);
+    const RenderedImage expected = render(exact, view.camera);
     const double found_16 = psnr(render(in_16, view.camera).bgr, expected.bgr);
     const double found_8 = psnr(render(in_8, view.camera).bgr, expected.bgr);
     std::printf("against float: int16 %.1f dB, int8 %.1f dB\n", found_16, found_8);
@@ -144,20 +147,20 @@ TEST(SceneRenderer, StoredIn8BitsItShowsNearlyTheSame) {
 }
 
 TEST(SceneRenderer, AnyNumberOfThreadsRendersTheSamePicture) {
-  // Four points at each place: ties everywhere.
-  const Scene scene = packed(made_up_points(30000, 3, 1, {0, 0, 0}, 4), maq::Coefficients::kInt8);
+  // Four points at each position: ties everywhere.
+  const Scene scene = packed(synthetic_points(30000, 3, 1, {0, 0, 0}, 4), maq::CoefficientFormat::kInt8);
   for (const double roll : {0.0, 0.6}) {
     PinholeCamera camera = camera_of(200, 150, 70);
     camera.rotation = rotation_of(1, 0, 0, roll);
-    const RenderedPicture expected = render(scene, camera);
-    EXPECT_EQ(expected.counts.is_turned, roll != 0);
+    const RenderedImage expected = render(scene, camera);
+    EXPECT_EQ(expected.counts.is_rotated, roll != 0);
     EXPECT_GT(expected.counts.shaded_points, 2000u);
     for (const int threads : {2, 3}) {
       RenderOptions options;
       options.threads = threads;
       SceneRenderer renderer(scene, networks(), options);
       for (int again = 0; again < 3; ++again) {
-        RenderedPicture picture;
+        RenderedImage picture;
         renderer.render(camera, picture);
         expect_same(picture, expected);
       }
@@ -166,11 +169,11 @@ TEST(SceneRenderer, AnyNumberOfThreadsRendersTheSamePicture) {
 }
 
 TEST(SceneRenderer, OneRendererShowsOneViewAfterAnotherAsNewOnesDo) {
-  const Scene scene = packed(made_up_points(20000), maq::Coefficients::kInt8);
+  const Scene scene = packed(synthetic_points(20000), maq::CoefficientFormat::kInt8);
   RenderOptions options;
   options.threads = 2;
   SceneRenderer renderer(scene, networks(), options);
-  RenderedPicture picture;
+  RenderedImage picture;
   std::mt19937 random(8);
   for (int i = 0; i < 10; ++i) {
     const PinholeCamera camera = random_camera(random);
@@ -180,7 +183,7 @@ TEST(SceneRenderer, OneRendererShowsOneViewAfterAnotherAsNewOnesDo) {
 }
 
 TEST(SceneRenderer, BlocksLeftOutChangeNothing) {
-  const Scene scene = packed(made_up_points(30000, 4), maq::Coefficients::kInt8);
+  const Scene scene = packed(synthetic_points(30000, 4), maq::CoefficientFormat::kInt8);
   RenderOptions all;
   all.skips_unseen_blocks = false;
   SceneRenderer skips(scene, networks(), {}), draws(scene, networks(), all);
@@ -188,7 +191,7 @@ TEST(SceneRenderer, BlocksLeftOutChangeNothing) {
   uint64_t projected = 0, blocks = 0;
   for (int i = 0; i < 60; ++i) {
     const PinholeCamera camera = random_camera(random);
-    RenderedPicture found, expected;
+    RenderedImage found, expected;
     skips.render(camera, found);
     draws.render(camera, expected);
     expect_same(found, expected);
@@ -200,14 +203,14 @@ TEST(SceneRenderer, BlocksLeftOutChangeNothing) {
 }
 
 TEST(SceneRenderer, EmptyPartsLeftOutChangeNothingThatIsCovered) {
-  maq::ModelledPoints points = made_up_points(400);
+  maq::FittedPoints points = synthetic_points(400);
   // Two groups: one right of the middle and above it, the other left and below.
   for (size_t i = 0; i < points.count(); ++i) {
     const float side = i % 2 == 0 ? points.z[i] : -points.z[i];
     points.x[i] = 0.1f * points.x[i] + 0.15f * side;
     points.y[i] = 0.1f * points.y[i] - 0.1f * side;
   }
-  const Scene scene = packed(points, maq::Coefficients::kFloat32);
+  const Scene scene = packed(points, maq::CoefficientFormat::kFloat32);
   RenderOptions all, some;
   all.skips_empty_parts = false;
   all.background = some.background = std::array<uint8_t, 3>{10, 200, 30};
@@ -215,7 +218,7 @@ TEST(SceneRenderer, EmptyPartsLeftOutChangeNothingThatIsCovered) {
     for (const double off : {0.0, 0.12, -0.25}) {
       PinholeCamera camera = camera_of(640, 480, 60);
       camera.rotation = rotation_of(1, 0, off, roll);
-      const RenderedPicture found = render(scene, camera, some), expected = render(scene, camera, all);
+      const RenderedImage found = render(scene, camera, some), expected = render(scene, camera, all);
       EXPECT_LE(found.counts.refined_pixels, 3 * expected.counts.refined_pixels / 4);
       EXPECT_EQ(expected.counts.refined_pixels, expected.counts.frame_pixels);
       EXPECT_EQ(found.alpha, expected.alpha);
@@ -234,11 +237,11 @@ TEST(SceneRenderer, EmptyPartsLeftOutChangeNothingThatIsCovered) {
 }
 
 TEST(SceneRenderer, OverABackgroundItIsBlendedByAlpha) {
-  const Scene scene = packed(made_up_points(300), maq::Coefficients::kFloat32);
+  const Scene scene = packed(synthetic_points(300), maq::CoefficientFormat::kFloat32);
   RenderOptions over;
   over.background = std::array<uint8_t, 3>{255, 0, 100};
   const PinholeCamera camera = camera_of(160, 112, 100);
-  const RenderedPicture plain = render(scene, camera), found = render(scene, camera, over);
+  const RenderedImage plain = render(scene, camera), found = render(scene, camera, over);
   EXPECT_EQ(found.alpha, plain.alpha);
   size_t partly = 0;
   for (size_t i = 0; i < plain.alpha.size(); ++i) {
@@ -254,14 +257,14 @@ TEST(SceneRenderer, OverABackgroundItIsBlendedByAlpha) {
 }
 
 TEST(SceneRenderer, WhereNothingIsSeenThereIsBackgroundAndNoNetworkRuns) {
-  const Scene scene = packed(made_up_points(1000), maq::Coefficients::kInt8);
+  const Scene scene = packed(synthetic_points(1000), maq::CoefficientFormat::kInt8);
   RenderOptions options;
   options.background = std::array<uint8_t, 3>{1, 2, 3};
   for (const double roll : {0.0, 0.5}) {
     PinholeCamera camera = camera_of(50, 40, 60);
     camera.rotation = rotation_of(std::cos(roll), std::sin(roll), 0, 0);
     camera.centre = {0, 0, 100};
-    const RenderedPicture picture = render(scene, camera, options);
+    const RenderedImage picture = render(scene, camera, options);
     expect_sound(picture, camera);
     EXPECT_EQ(picture.counts.refined_pixels, 0u);
     EXPECT_EQ(picture.counts.shaded_points, 0u);
@@ -272,38 +275,39 @@ TEST(SceneRenderer, WhereNothingIsSeenThereIsBackgroundAndNoNetworkRuns) {
     // Without one of the app's own it is the scene's.
     Scene other = scene;
     other.background = {0.2f, 0.4f, 1.0f};
-    const RenderedPicture plain = render(other, camera);
+    const RenderedImage plain = render(other, camera);
     const std::array<uint8_t, 3> expected = {255, 102, 51};
     for (size_t i = 0; i < plain.bgr.size(); ++i) ASSERT_EQ(plain.bgr[i], expected[i % 3]);
   }
 }
 
-TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenTurned) {
+TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenRotated) {
   // A wall across the axis, 2 away, wider than the picture.
-  maq::ModelledPoints points = made_up_points(20000);
+  maq::FittedPoints points = synthetic_points(20000);
   for (float& z : points.z) z = 2;
-  const Scene scene = packed(points, maq::Coefficients::kInt8);
+  const Scene scene = packed(points, maq::CoefficientFormat::kInt8);
   for (const double roll : {0.0, 0.4, M_PI / 2}) {
     PinholeCamera camera = camera_of(101, 77, 50);
     camera.rotation = rotation_of(std::cos(roll / 2), 0, 0, std::sin(roll / 2));
-    const RenderedPicture picture = render(scene, camera);
-    EXPECT_EQ(picture.counts.is_turned, roll != 0);
+    const RenderedImage picture = render(scene, camera);
+    EXPECT_EQ(picture.counts.is_rotated, roll != 0);
     for (const float depth : picture.depth) ASSERT_NEAR(depth, 2, 1e-4);
     for (const uint8_t alpha : picture.alpha) ASSERT_EQ(alpha, 255);
   }
 }
 
-// A camera that is held otherwise takes the same picture, turned.
-TEST(SceneRenderer, ATurnedCameraTakesTheTurnedPicture) {
-  const Scene scene = packed(made_up_points(20000), maq::Coefficients::kFloat32);
-  const PinholeCamera upright = camera_of(96, 64, 60);
+// A rolled camera takes the same picture, rotated.
+TEST(SceneRenderer, ARolledCameraTakesTheRotatedPicture) {
+  const Scene scene = packed(synthetic_points(20000), maq::CoefficientFormat::kFloat32);
+  const PinholeCamera level = camera_of(96, 64, 60);
   PinholeCamera portrait = camera_of(64, 96, 60);
-  portrait.fx_px = portrait.fy_px = upright.fx_px;
+  portrait.fx_px = portrait.fy_px = level.fx_px;
   portrait.rotation = {0, 1, 0, -1, 0, 0, 0, 0, 1};  // its right is down in the world
-  const RenderedPicture expected = render(scene, upright), found = render(scene, portrait);
-  EXPECT_TRUE(found.counts.is_turned);
-  EXPECT_FALSE(expected.counts.is_turned);
-  // At the frame's right and lower edges the turned one sees more around the picture: the refiner knows better there.
+  const RenderedImage expected = render(scene, level), found = render(scene, portrait);
+  EXPECT_TRUE(found.counts.is_rotated);
+  EXPECT_FALSE(expected.counts.is_rotated);
+  // At the frame's right and lower edges the rotated one sees more around the picture, and the refiner more of the
+  // scene.
   size_t same = 0;
   for (size_t y = 0; y < 64; ++y) {
     for (size_t x = 0; x < 96; ++x) {
@@ -317,9 +321,9 @@ TEST(SceneRenderer, ATurnedCameraTakesTheTurnedPicture) {
 }
 
 TEST(SceneRenderer, CamerasOfEveryKind) {
-  const Scene scene = packed(made_up_points(3000), maq::Coefficients::kInt8);
+  const Scene scene = packed(synthetic_points(3000), maq::CoefficientFormat::kInt8);
   SceneRenderer renderer(scene, networks(), {});
-  RenderedPicture picture;
+  RenderedImage picture;
   uint64_t shaded = 0;
   for (const double degrees : {1.0, 60.0, 170.0}) {
     for (const auto& [width, height] : {std::pair(33, 61), std::pair(1, 1), std::pair(1, 50), std::pair(64, 48)}) {
@@ -344,11 +348,11 @@ TEST(SceneRenderer, CamerasOfEveryKind) {
 }
 
 TEST(SceneRenderer, OnePointIsOnePoint) {
-  maq::ModelledPoints points = made_up_points(1);
+  maq::FittedPoints points = synthetic_points(1);
   points.x[0] = points.y[0] = 0;
-  for (const auto kind : {maq::Coefficients::kFloat32, maq::Coefficients::kInt8}) {
+  for (const auto kind : {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt8}) {
     const PinholeCamera camera = camera_of(65, 33, 60);
-    const RenderedPicture picture = render(packed(points, kind), camera);
+    const RenderedImage picture = render(packed(points, kind), camera);
     EXPECT_EQ(picture.counts.shaded_points, 1u);
     EXPECT_EQ(picture.alpha[16 * 65 + 32], 255);
     EXPECT_NEAR(picture.depth[16 * 65 + 32], points.z[0], 1e-5);
@@ -358,18 +362,18 @@ TEST(SceneRenderer, OnePointIsOnePoint) {
 
 TEST(SceneRenderer, ScenesInAnyUnitLookTheSame) {
   const auto rendered = [](double unit, const std::array<double, 3>& origin) {
-    maq::ModelledPoints points = made_up_points(5000, 6, 1, origin);
+    maq::FittedPoints points = synthetic_points(5000, 6, 1, origin);
     for (std::vector<float>* axis : {&points.x, &points.y, &points.z}) {
       for (float& value : *axis) value = float(value * unit);  // by a power of two: exact
     }
     PinholeCamera camera = camera_of(96, 80, 60);
     camera.centre = origin;
-    return render(packed(points, maq::Coefficients::kFloat32), camera);
+    return render(packed(points, maq::CoefficientFormat::kFloat32), camera);
   };
-  const RenderedPicture expected = rendered(1, {0, 0, 0});
+  const RenderedImage expected = rendered(1, {0, 0, 0});
   for (const double unit : {std::ldexp(1.0, -10), std::ldexp(1.0, 20)}) {
     for (const double away : {0.0, 1e6}) {
-      const RenderedPicture found = rendered(unit, {away * unit, 0, -away * unit});
+      const RenderedImage found = rendered(unit, {away * unit, 0, -away * unit});
       EXPECT_EQ(found.alpha, expected.alpha);
       EXPECT_GE(psnr(found.bgr, expected.bgr), 55);
     }
@@ -377,7 +381,7 @@ TEST(SceneRenderer, ScenesInAnyUnitLookTheSame) {
 }
 
 TEST(SceneRenderer, WhatCannotBeRenderedIsASentence) {
-  const Scene scene = packed(made_up_points(10), maq::Coefficients::kInt8);
+  const Scene scene = packed(synthetic_points(10), maq::CoefficientFormat::kInt8);
   const auto refuses = [&](maq_status status, const char* text, auto change) {
     PinholeCamera camera = camera_of(64, 48, 60);
     change(camera);
@@ -393,7 +397,7 @@ TEST(SceneRenderer, WhatCannotBeRenderedIsASentence) {
           [](PinholeCamera& camera) { camera.width_px = camera.height_px = 4000; });
   RenderOptions options;
   options.threads = 0;
-  expect_error(wrong, "1 to 64 threads, not by 0", [&] { SceneRenderer(scene, networks(), options); });
+  expect_error(wrong, "Threads are 0, but must be 1 to 64", [&] { SceneRenderer(scene, networks(), options); });
   options.threads = 1;
   options.near = INFINITY;
   expect_error(wrong, "must be a finite number", [&] { SceneRenderer(scene, networks(), options); });

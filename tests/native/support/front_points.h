@@ -15,16 +15,16 @@ struct FrontPoints {
   std::vector<uint32_t> points;
   std::vector<float> depths;
 
-  FrontPoints(const maq::PointPlaces& cloud, const maq::PinholeCamera& camera, double near) {
+  FrontPoints(const maq::PointPositions& cloud, const maq::PinholeCamera& camera, double near) {
     static maq::ZBuffer buffer;  // with what an earlier picture left
     buffer.begin(camera, near, 1);
     maq::PointSpan span;
     for (size_t i = 0; i < 3; ++i) span.base[i] = cloud.origin[i] - camera.centre[i];
-    for (size_t begin = 0; begin < cloud.count; begin += maq::PointSpan::kMostPoints) {
+    for (size_t begin = 0; begin < cloud.count; begin += maq::PointSpan::kMaxPoints) {
       span.x = cloud.x + begin;
       span.y = cloud.y + begin;
       span.z = cloud.z + begin;
-      span.count = uint32_t(std::min<size_t>(maq::PointSpan::kMostPoints, cloud.count - begin));
+      span.count = uint32_t(std::min<size_t>(maq::PointSpan::kMaxPoints, cloud.count - begin));
       span.first = uint32_t(begin);
       buffer.draw(span, 0);
     }

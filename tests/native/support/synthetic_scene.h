@@ -1,4 +1,4 @@
-// Points with made-up looks, and cameras, for tests of rendering.
+// Synthetic fitted points, and cameras, for tests of rendering.
 #pragma once
 
 #include <cmath>
@@ -7,13 +7,13 @@
 #include "scene/format/fitted_points.h"
 #include "scene/pinhole_camera.h"
 
-// Around (0, 0, 3) in units of `unit`, moved by `origin`; all depths differ but where `copies` says that each place is taken
-// by so many.
-inline maq::ModelledPoints made_up_points(size_t count, unsigned seed = 1, double unit = 1,
+// Around (0, 0, 3) in units of `unit`, moved by `origin`; all depths differ unless `copies` points
+// are to be at each position.
+inline maq::FittedPoints synthetic_points(size_t count, unsigned seed = 1, double unit = 1,
                                           const std::array<double, 3>& origin = {0, 0, 0}, size_t copies = 1) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> across(-1.5f, 1.5f), depth(1.5f, 5.0f);
-  maq::ModelledPoints points;
+  maq::FittedPoints points;
   points.origin = origin;
   points.up = {0, -1, 0};
   points.background = {0.25f, 0.5f, 0.75f};
@@ -27,12 +27,12 @@ inline maq::ModelledPoints made_up_points(size_t count, unsigned seed = 1, doubl
       points.y.push_back(points.y.back());
       points.z.push_back(points.z.back());
     }
-    const bool is_varying = random() % 3 != 0;
+    const bool is_view_dependent = random() % 3 != 0;
     points.views.push_back(4);
-    points.variations.push_back(is_varying ? 1.0f : 0.0f);
-    for (int c = 0; c < maq::kFeatures; ++c) points.means.push_back(0.5f + 0.3f * across(random));
+    points.view_dependence.push_back(is_view_dependent ? 1.0f : 0.0f);
+    for (int c = 0; c < maq::kFeatures; ++c) points.constant_terms.push_back(0.5f + 0.3f * across(random));
     for (int k = 0; k < maq::kBasis * maq::kFeatures; ++k) {
-      points.slopes.push_back(is_varying ? 0.1f * across(random) : 0.0f);
+      points.linear_terms.push_back(is_view_dependent ? 0.1f * across(random) : 0.0f);
     }
   }
   return points;
@@ -59,13 +59,13 @@ inline std::array<double, 9> rotation_of(double w, double x, double y, double z)
 }
 
 inline maq::PinholeCamera random_camera(std::mt19937& random, double unit = 1) {
-  std::uniform_real_distribution<double> share(0, 1);
+  std::uniform_real_distribution<double> fraction(0, 1);
   std::normal_distribution<double> normal;
-  maq::PinholeCamera camera = camera_of(1 + int(random() % 90), 1 + int(random() % 70), 1 + 169 * share(random));
+  maq::PinholeCamera camera = camera_of(1 + int(random() % 90), 1 + int(random() % 70), 1 + 169 * fraction(random));
   camera.rotation = rotation_of(normal(random), normal(random), normal(random), normal(random));
   for (double& value : camera.centre) value = 2 * unit * normal(random);
   camera.centre[2] += 3 * unit;  // where the points are
-  camera.fy_px *= 0.5 + share(random);
+  camera.fy_px *= 0.5 + fraction(random);
   camera.cx_px += camera.width_px * normal(random);
   return camera;
 }

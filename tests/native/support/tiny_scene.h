@@ -1,4 +1,4 @@
-// The scene networks, capture and looks of data/tiny_scene (make_tiny_scene.py).
+// The scene networks, capture and descriptors of data/tiny_scene (make_tiny_scene.py).
 #pragma once
 
 #include <algorithm>
@@ -24,22 +24,23 @@ inline std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime() {
 }
 
 inline std::unique_ptr<maq::SceneNetworks> networks(int threads = 1) {
-  return std::make_unique<maq::SceneNetworks>(runtime(), maq::read_bundle(kFolder + "/bundle"), maq::SessionSettings{threads, false});
+  return std::make_unique<maq::SceneNetworks>(runtime(), maq::read_bundle(kFolder + "/bundle"),
+                                              maq::SessionSettings{threads, false});
 }
 
 inline maq::Capture capture() { return maq::open_capture(kFolder + "/capture"); }
 
-struct Look {
+struct Descriptor {
   uint32_t index, views;
-  float mean[maq::kFeatures], slope[maq::kBasis * maq::kFeatures], variation;
+  float constant_terms[maq::kFeatures], linear_terms[maq::kLinearTerms], view_dependence;
 };
 
 // What torch found.
-inline std::vector<Look> expected_looks() {
+inline std::vector<Descriptor> expected_descriptors() {
   const std::string bytes = read_text(kFolder + "/looks.bin");
-  std::vector<Look> looks(bytes.size() / sizeof(Look));
-  std::memcpy(looks.data(), bytes.data(), looks.size() * sizeof(Look));
-  return looks;
+  std::vector<Descriptor> descriptors(bytes.size() / sizeof(Descriptor));
+  std::memcpy(descriptors.data(), bytes.data(), descriptors.size() * sizeof(Descriptor));
+  return descriptors;
 }
 
 inline std::array<float, 3> expected_background() {

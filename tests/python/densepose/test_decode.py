@@ -66,22 +66,22 @@ def test_people_are_painted_with_their_part_and_coordinates():
 
 
 def test_the_second_pass_decides():
-    graphs, looks = fake_graphs(), []
+    graphs, passes = fake_graphs(), []
 
     def box_head(rois):
-        looks.append(len(rois))
-        logits = torch.tensor([0.0 if len(looks) == 1 else 3.0, 0.0]).expand(len(rois), 2)
+        passes.append(len(rois))
+        logits = torch.tensor([0.0 if len(passes) == 1 else 3.0, 0.0]).expand(len(rois), 2)
         return logits, torch.zeros(len(rois), 4)
 
     unsure = dataclasses.replace(graphs, box_head=box_head)
     once = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_pass_threshold=None))
     assert len(once.boxes) == 0
-    assert len(looks) == 1
-    looks.clear()
+    assert len(passes) == 1
+    passes.clear()
     twice = infer(unsure, IMAGE, CONFIG, dataclasses.replace(DECODE, score_threshold=0.7, second_pass_threshold=0.3))
     assert len(twice.boxes) > 0
-    assert len(looks) == 2
-    assert looks[1] < looks[0], "only boxes that survived the first look's suppression"
+    assert len(passes) == 2
+    assert passes[1] < passes[0], "only boxes that survived the first pass's suppression"
 
 
 @pytest.mark.parametrize("size", [(1, 1), (16, 16), (31, 33), (1, 400), (400, 1), (97, 640)])

@@ -15,8 +15,8 @@ class BackgroundColour {
   // A side of the blocks of the z-buffer's pixels that without a point are background.
   static constexpr int kBlockPx = 16;
 
-  // A BGR photo, and who is seen in it, in a picture of it of any size. `valid`: 0 for pixels that say nothing; null when
-  // all do.
+  // A BGR photo, and the points visible in it, in a z-buffer of any size. `valid`: the validity mask, 0 for pixels that
+  // are not of the photo; null when all are.
   void add(const ImageView& photo, const uint8_t* valid, const ZBuffer& seen);
   void add(const BackgroundColour& other);
 

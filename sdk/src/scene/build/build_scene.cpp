@@ -1,20 +1,23 @@
 #include "scene/build/build_scene.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/clock.h"
 #include "core/error.h"
 #include "scene/capture/posed_photo.h"
-#include "scene/capture/posed_view.h"
 
 namespace maq {
 namespace {
 
-// The share of the work that is left when all photos have been looked at.
-constexpr double kSolvingShare = 0.05;
+// The fraction of the work that is left when all photos are added.
+constexpr double kSolvingFraction = 0.05;
 
-std::vector<const CaptureView*> chosen_views(const Capture& capture, const CaptureBuildOptions& options) {
+PointCloud thinned(PointCloud cloud, uint64_t max_points) {
+  thin_out(cloud, max_points);
+  return cloud;
+}
+
+std::vector<const CaptureView*> chosen_views(const Capture& capture, const SceneBuildOptions& options) {
   std::vector<const CaptureView*> views;
   for (const CaptureView& view : capture.views) {
     if (!view.is_held_out || options.uses_held_out) views.push_back(&view);
@@ -23,7 +26,7 @@ std::vector<const CaptureView*> chosen_views(const Capture& capture, const Captu
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "All of the capture's ", capture.views.size(),
                 " photos are held out; a scene needs one.");
   }
-  const size_t count = options.most_views == 0 ? views.size() : std::min(views.size(), options.most_views);
+  const size_t count = options.max_views == 0 ? views.size() : std::min(views.size(), options.max_views);
   std::vector<const CaptureView*> even;
   for (size_t i = 0; i < count; ++i) even.push_back(views[i * views.size() / count]);
   return even;
@@ -41,48 +44,99 @@ const char* fault_of_photo(maq_status status) {
 
 }  // namespace
 
-std::optional<BuiltCapture> build_from_capture(Capture capture, SceneNetworks& networks,
-                                               const CaptureBuildOptions& options, const BuildProgress& progress) {
+SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, std::shared_ptr<SceneNetworks> networks,
+                           const SceneBuildOptions& options)
+    : networks_(std::move(networks)),
+      options_(options),
+      fitter_(thinned(std::move(cloud), options.max_points), up, *networks_, options.fitting) {
   if (options.long_side_px < 0) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The photos' long side is to be ", options.long_side_px,
                 " pixels; it must be positive, or 0 for photos as they are.");
   }
+  stats_.cloud_points = fitter_.cloud_points();
+}
+
+std::optional<size_t> SceneBuilder::add_view(const CaptureView& view, const BuildProgress& progress) {
+  {
+    const ScopedTimer timer(stats_.load_ms);
+    photo_.load(view, options_.long_side_px);
+  }
+  return add_loaded(progress);
+}
+
+std::optional<size_t> SceneBuilder::add_view(const ImageView& image, const Lens& lens, const PinholeCamera& pose,
+                                             const BuildProgress& progress) {
+  {
+    const ScopedTimer timer(stats_.load_ms);
+    photo_.load(image, lens, pose, options_.long_side_px);
+  }
+  return add_loaded(progress);
+}
+
+std::optional<size_t> SceneBuilder::add_loaded(const BuildProgress& progress) {
+  const std::optional<size_t> seen = fitter_.add_view(photo_.image(), photo_.valid(), photo_.camera(), progress);
+  if (seen && *seen == 0) ++stats_.unused_views;
+  return seen;
+}
+
+Scene SceneBuilder::packed(const FittedPoints& points) {
+  const ScopedTimer timer(stats_.pack_ms);
+  Scene scene = make_scene(points, options_.packing);
+  scene.networks_sha256 = networks_->sha256();
+  return scene;
+}
+
+Scene SceneBuilder::finish_and_forget() {
+  networks_->forget_extractor();
+  return packed(fitter_.finish_and_forget());
+}
+
+SceneBuildStats SceneBuilder::stats() const {
+  SceneBuildStats stats = stats_;
+  stats.views = fitter_.views();
+  stats.seen_points = fitter_.seen_points();
+  stats.fitting = fitter_.times();
+  return stats;
+}
+
+std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_ptr<SceneNetworks>& networks,
+                                      const SceneBuildOptions& options, const BuildProgress& progress) {
   const std::vector<const CaptureView*> views = chosen_views(capture, options);
-  SceneBuilder builder(std::move(capture.cloud), capture.up, networks, options.points);
-  BuiltCapture built;
-  DropCounts drops;
-  PosedView photo;
+  SceneBuilder builder(capture.cloud, capture.up, networks, options);
+  ImportReport report;
+  size_t unusable = 0;
   for (size_t i = 0; i < views.size(); ++i) {
     const CaptureView& view = *views[i];
-    const auto in_all = [&](double done, const std::string& what) {
-      const double share = (1 - kSolvingShare) * (double(i) + done) / double(views.size());
+    const auto of_all = [&](double done, const std::string& what) {
+      const double fraction = (1 - kSolvingFraction) * (double(i) + done) / double(views.size());
       return !progress ||
-             progress(share, "Photo " + std::to_string(i + 1) + " of " + std::to_string(views.size()) + ": " + what);
+             progress(fraction, "Photo " + std::to_string(i + 1) + " of " + std::to_string(views.size()) + ": " + what);
     };
     try {
-      const Stopwatch watch;
-      photo.load(view, options.long_side_px);
-      built.loading_ms += watch.elapsed_ms();
-      const auto seen = builder.add_view(photo.image(), photo.valid(), photo.camera(), in_all);
+      const std::optional<size_t> seen = builder.add_view(view, of_all);
       if (!seen) return {};
-      if (*seen == 0) drops.add("photos that see no point of the cloud", view.name);
+      if (*seen == 0) report.add("photos that see no point of the cloud", view.name);
     } catch (const Error& error) {
       const char* reason = fault_of_photo(error.status());
       if (reason == nullptr) throw;
-      drops.add(reason, view.name);
+      report.add(reason, view.name);
+      ++unusable;
     }
   }
-  built.dropped = drops.list();
-  built.views = builder.views();
-  if (built.views == 0) {
-    std::string text;
-    for (const Dropped& dropped : built.dropped) text += (text.empty() ? "" : ", ") + sentence_part(dropped);
-    throw Error(MAQ_ERROR_UNREADABLE, "None of the photos can be used: ", text, ".");
+  BuiltScene built;
+  built.dropped = report.list();
+  built.stats = builder.stats();
+  built.stats.unused_views += unusable;
+  if (built.stats.views == 0) {
+    throw Error(MAQ_ERROR_UNREADABLE, "None of the photos can be used: ", describe(built.dropped), ".");
   }
-  if (progress && !progress(1 - kSolvingShare, "Solving for how the points look.")) return {};
-  built.points = builder.finish_and_forget();
-  built.times = builder.times();
-  if (progress) progress(1, "The points know how they look.");
+  if (progress && !progress(1 - kSolvingFraction, "Solving for the descriptors.")) return {};
+  built.scene = builder.finish_and_forget();
+  // Views and points were counted before they were forgotten.
+  const SceneBuildStats after = builder.stats();
+  built.stats.fitting = after.fitting;
+  built.stats.pack_ms = after.pack_ms;
+  if (progress) progress(1, "The scene is built.");
   return built;
 }
 

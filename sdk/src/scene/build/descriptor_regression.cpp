@@ -7,12 +7,13 @@
 namespace maq {
 namespace {
 
-// A diagonal element below this share of the largest is rounding: the directions do not span the basis.
-constexpr double kLeastDiagonal = 1e-12;
+// A diagonal element below this fraction of the largest is rounding: the directions do not span the basis.
+constexpr double kMinDiagonal = 1e-12;
 
-// Turns `row` (values of the basis, then of the features) into the triangle, whose rows it is orthogonal to afterwards.
+// Rotates a row of the system (values of the basis, of the features) into R and Q^T y, one Givens rotation for each row
+// of R, after which the row's values of the basis are 0.
 template <class Value>
-void turn_in(Value* triangle, Value (*turned)[kFeatures], Value* row, Value* features) {
+void givens_rotate(Value* triangle, Value (*rotated)[kFeatures], Value* row, Value* features) {
   Value* diagonal = triangle;
   for (int i = 0; i < kBasis; diagonal += kBasis - i, ++i) {
     const Value length = std::sqrt(diagonal[0] * diagonal[0] + row[i] * row[i]);
@@ -26,8 +27,8 @@ void turn_in(Value* triangle, Value (*turned)[kFeatures], Value* row, Value* fea
       row[j] -= less * row[j] + sine * kept;
     }
     for (int c = 0; c < kFeatures; ++c) {
-      const Value kept = turned[i][c];
-      turned[i][c] += sine * features[c] - less * kept;
+      const Value kept = rotated[i][c];
+      rotated[i][c] += sine * features[c] - less * kept;
       features[c] -= less * features[c] + sine * kept;
     }
   }
@@ -35,36 +36,36 @@ void turn_in(Value* triangle, Value (*turned)[kFeatures], Value* row, Value* fea
 
 }  // namespace
 
-void ViewMoments::add(const float y[kFeatures], const float h[kBasis]) {
+void DescriptorRegression::add(const float y[kFeatures], const float h[kBasis]) {
   ++views;
-  const float share = 1.0f / float(views);
-  const float root = std::sqrt(float(views - 1) * share);  // the scatter grows by (K - 1) / K of the products
+  const float fraction = 1.0f / float(views);
+  const float root = std::sqrt(float(views - 1) * fraction);  // the scatter grows by (K - 1) / K of the products
   float dy[kFeatures], dh[kBasis];
   for (int c = 0; c < kFeatures; ++c) {
     const float off = y[c] - mean_y[c];
-    mean_y[c] += off * share;
+    mean_y[c] += off * fraction;
     dy[c] = root * off;
   }
   for (int i = 0; i < kBasis; ++i) {
     const float off = h[i] - mean_h[i];
-    mean_h[i] += off * share;
+    mean_h[i] += off * fraction;
     dh[i] = root * off;
   }
-  turn_in(triangle, turned, dh, dy);
+  givens_rotate(triangle, rotated, dh, dy);
 }
 
-LookKind solve_look(const ViewMoments& moments, double alpha, float beta[kBasis][kFeatures]) {
+DescriptorKind solve_descriptor(const DescriptorRegression& regression, double alpha, float beta[kBasis][kFeatures]) {
   std::memset(beta, 0, sizeof(float) * kBasis * kFeatures);
-  if (moments.views == 0) return LookKind::kUnseen;
-  double triangle[kBasis * (kBasis + 1) / 2], turned[kBasis][kFeatures];
+  if (regression.views == 0) return DescriptorKind::kUnseen;
+  double triangle[kBasis * (kBasis + 1) / 2], rotated[kBasis][kFeatures];
   bool is_constant = true;
   for (int i = 0; i < kBasis * (kBasis + 1) / 2; ++i) {
-    triangle[i] = moments.triangle[i];
+    triangle[i] = regression.triangle[i];
     is_constant = is_constant && triangle[i] == 0;
   }
-  if (is_constant) return LookKind::kConstant;
+  if (is_constant) return DescriptorKind::kConstant;
   for (int i = 0; i < kBasis; ++i) {
-    for (int c = 0; c < kFeatures; ++c) turned[i][c] = moments.turned[i][c];
+    for (int c = 0; c < kFeatures; ++c) rotated[i][c] = regression.rotated[i][c];
   }
 
   // What the centred values leave out, and the regulariser, as rows whose features are 0.
@@ -73,9 +74,9 @@ LookKind solve_look(const ViewMoments& moments, double alpha, float beta[kBasis]
     if (extra >= 0) {
       row[extra] = std::sqrt(alpha);
     } else {
-      for (int i = 0; i < kBasis; ++i) row[i] = std::sqrt(double(moments.views)) * moments.mean_h[i];
+      for (int i = 0; i < kBasis; ++i) row[i] = std::sqrt(double(regression.views)) * regression.mean_h[i];
     }
-    turn_in(triangle, turned, row, features);
+    givens_rotate(triangle, rotated, row, features);
   }
 
   const double* diagonals[kBasis];
@@ -87,18 +88,18 @@ LookKind solve_look(const ViewMoments& moments, double alpha, float beta[kBasis]
   }
   double solution[kBasis][kFeatures];
   for (int i = kBasis - 1; i >= 0; --i) {
-    if (!(std::abs(*diagonals[i]) > kLeastDiagonal * largest)) return LookKind::kSingular;
+    if (!(std::abs(*diagonals[i]) > kMinDiagonal * largest)) return DescriptorKind::kSingular;
     for (int c = 0; c < kFeatures; ++c) {
-      double value = turned[i][c];
+      double value = rotated[i][c];
       for (int j = i + 1; j < kBasis; ++j) value -= diagonals[i][j - i] * solution[j][c];
       solution[i][c] = value / *diagonals[i];
-      if (!std::isfinite(float(solution[i][c]))) return LookKind::kSingular;
+      if (!std::isfinite(float(solution[i][c]))) return DescriptorKind::kSingular;
     }
   }
   for (int i = 0; i < kBasis; ++i) {
     for (int c = 0; c < kFeatures; ++c) beta[i][c] = float(solution[i][c]);
   }
-  return LookKind::kVarying;
+  return DescriptorKind::kViewDependent;
 }
 
 }  // namespace maq

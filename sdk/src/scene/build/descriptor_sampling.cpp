@@ -6,7 +6,7 @@
 namespace maq {
 namespace {
 
-// Points of a photo may lie anywhere in memory, so that each is asked for before its turn.
+// Regressions of points may lie anywhere in memory, so that each is prefetched.
 constexpr size_t kAhead = 8, kCacheLine = 64;
 
 // In the arithmetic of PointProjection: the first two rows are times the focal lengths.
@@ -22,10 +22,10 @@ struct Away {
   double x, y, z;  // from the camera's centre
 };
 
-inline Away away_of(const PointPlaces& places, const PinholeCamera& camera, uint32_t point) {
-  return {double(places.x[point]) + (places.origin[0] - camera.centre[0]),
-          double(places.y[point]) + (places.origin[1] - camera.centre[1]),
-          double(places.z[point]) + (places.origin[2] - camera.centre[2])};
+inline Away away_of(const PointPositions& positions, const PinholeCamera& camera, uint32_t point) {
+  return {double(positions.x[point]) + (positions.origin[0] - camera.centre[0]),
+          double(positions.y[point]) + (positions.origin[1] - camera.centre[1]),
+          double(positions.z[point]) + (positions.origin[2] - camera.centre[2])};
 }
 
 struct Pixel {
@@ -44,12 +44,12 @@ inline float within(float value, int size) { return std::min(std::max(value, 0.0
 
 }  // namespace
 
-void keep_valid(const PointPlaces& places, const PinholeCamera& camera, const uint8_t* valid,
+void keep_valid(const PointPositions& positions, const PinholeCamera& camera, const uint8_t* valid,
                 std::vector<uint32_t>& points) {
   float rotation[9];
   scaled_rotation(camera, rotation);
   const auto is_blank = [&](uint32_t point) {
-    const Pixel at = pixel_of(rotation, camera, away_of(places, camera, point));
+    const Pixel at = pixel_of(rotation, camera, away_of(positions, camera, point));
     const auto column = size_t(within(at.column, camera.width_px) + 0.5f);
     const auto row = size_t(within(at.row, camera.height_px) + 0.5f);
     return valid[row * size_t(camera.width_px) + column] == 0;
@@ -57,19 +57,19 @@ void keep_valid(const PointPlaces& places, const PinholeCamera& camera, const ui
   points.erase(std::remove_if(points.begin(), points.end(), is_blank), points.end());
 }
 
-LookSampling::LookSampling(const PointPlaces& places, const PinholeCamera& camera, const float* features,
-                           const ViewBasis& basis)
-    : places_(places), camera_(camera), features_(features), basis_(basis) {
+DescriptorSampling::DescriptorSampling(const PointPositions& positions, const PinholeCamera& camera,
+                                       const float* features, const ViewBasis& basis)
+    : places_(positions), camera_(camera), features_(features), basis_(basis) {
   scaled_rotation(camera, rotation_);
 }
 
-void LookSampling::add(const uint32_t* points, size_t count, MomentStore& moments) const {
-  Pixel pixels[kMostPoints];
-  float directions[3][kMostPoints] = {}, basis_values[kBasis * kMostPoints];
+void DescriptorSampling::add(const uint32_t* points, size_t count, RegressionStore& regressions) const {
+  Pixel pixels[kMaxPoints];
+  float directions[3][kMaxPoints] = {}, basis_values[kBasis * kMaxPoints];
   for (size_t i = 0; i < count; ++i) {
     const Away away = away_of(places_, camera_, points[i]);
     pixels[i] = pixel_of(rotation_, camera_, away);
-    // A point in the camera itself is seen from nowhere.
+    // A point in the camera's centre has no direction.
     constexpr double kShortest = 1e-7;
     const double scale = 1 / (std::sqrt(away.x * away.x + away.y * away.y + away.z * away.z) + kShortest);
     directions[0][i] = float(away.x * scale);
@@ -81,8 +81,9 @@ void LookSampling::add(const uint32_t* points, size_t count, MomentStore& moment
   const int width = camera_.width_px, height = camera_.height_px;
   for (size_t i = 0; i < count; ++i) {
     if (i + kAhead < count) {
-      const char* later = reinterpret_cast<const char*>(&moments.of(points[i + kAhead]));
-      for (size_t offset = 0; offset < sizeof(ViewMoments); offset += kCacheLine) __builtin_prefetch(later + offset, 1);
+      const char* later = reinterpret_cast<const char*>(&regressions.of(points[i + kAhead]));
+      for (size_t offset = 0; offset < sizeof(DescriptorRegression); offset += kCacheLine)
+        __builtin_prefetch(later + offset, 1);
     }
     const float x = within(pixels[i].column, width), y = within(pixels[i].row, height);
     const int left = int(x), above = int(y);
@@ -98,7 +99,7 @@ void LookSampling::add(const uint32_t* points, size_t count, MomentStore& moment
       feature[k] = upper + down * (lower - upper);
     }
     for (int k = 0; k < kBasis; ++k) h[k] = basis_values[size_t(k) * count + i];
-    moments.of(points[i]).add(feature, h);
+    regressions.of(points[i]).add(feature, h);
   }
 }
 

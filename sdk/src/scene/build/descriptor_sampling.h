@@ -1,4 +1,4 @@
-// What one photo says of the points that it sees: a feature of each, and from which side.
+// Samples one photo at the points that it sees: the feature of each, and the direction from which it is seen.
 #pragma once
 
 #include <cstdint>
@@ -12,22 +12,23 @@
 namespace maq {
 
 // Leaves those of `points` (indices) whose pixel of the photo is valid: not 0 in `valid`, row by row.
-void keep_valid(const PointPlaces& places, const PinholeCamera& camera, const uint8_t* valid,
+void keep_valid(const PointPositions& positions, const PinholeCamera& camera, const uint8_t* valid,
                 std::vector<uint32_t>& points);
 
-class LookSampling {
+class DescriptorSampling {
  public:
   // `features` [height][width][kFeatures] of the photo as `camera` shows it. All must outlive this.
-  LookSampling(const PointPlaces& places, const PinholeCamera& camera, const float* features, const ViewBasis& basis);
+  DescriptorSampling(const PointPositions& positions, const PinholeCamera& camera, const float* features,
+                     const ViewBasis& basis);
 
-  static constexpr size_t kMostPoints = 256;
+  static constexpr size_t kMaxPoints = 256;
 
-  // Adds the photo to what is known of `count` points, at most kMostPoints, of which none is there twice. The feature is
-  // bilinear, the border repeated outside. Several threads may do so for different points.
-  void add(const uint32_t* points, size_t count, MomentStore& moments) const;
+  // Adds the photo to the regressions of `count` points, at most kMaxPoints and each once. The feature is bilinear, the
+  // border repeated outside. Several threads may do so for different points.
+  void add(const uint32_t* points, size_t count, RegressionStore& regressions) const;
 
  private:
-  PointPlaces places_;
+  PointPositions places_;
   const PinholeCamera& camera_;
   const float* features_;
   const ViewBasis& basis_;

@@ -1,4 +1,4 @@
-// From what is known of points to their looks.
+// From the regressions of points to their descriptors.
 #pragma once
 
 #include "core/worker_threads.h"
@@ -8,9 +8,9 @@
 
 namespace maq {
 
-// Appends all points of `moments` to the arrays of `made`, in their order, and counts who is singular. With `forgets`,
-// what is known of them is given back on the way.
-void solve_looks(MomentStore& moments, const PointPlaces& places, WorkerThreads& threads, bool forgets,
-                 ModelledPoints& made);
+// Appends all points of `regressions` to the arrays of `made`, in their order, and counts singular ones. With
+// `forgets`, the regressions are freed on the way.
+void solve_descriptors(RegressionStore& regressions, const PointPositions& positions, WorkerThreads& threads,
+                       bool forgets, FittedPoints& made);
 
 }  // namespace maq

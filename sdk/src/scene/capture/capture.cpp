@@ -49,10 +49,10 @@ PinholeCamera camera_of(const Lens& undistorted, const PosedPhoto& photo) {
 // Makes views of photos, one after the other, or drops them.
 class ViewMaker {
  public:
-  ViewMaker(std::string folder, DropCounts& drops) : folder_(std::move(folder)), drops_(drops) {}
+  ViewMaker(std::string folder, ImportReport& report) : folder_(std::move(folder)), report_(report) {}
 
   void add(const PosedPhoto& photo) {
-    if (const char* reason = try_to_add(photo)) drops_.add(reason, photo.name);
+    if (const char* reason = try_to_add(photo)) report_.add(reason, photo.name);
   }
 
   std::vector<CaptureView> views;
@@ -85,14 +85,14 @@ class ViewMaker {
       made_ = true;
       undistorted_ = without_distortion(view.lens);
     }
-    if (!undistorted_) return "photos whose distortion folds the picture, or whose axis is outside of it";
+    if (!undistorted_) return "photos whose distortion is not invertible, or whose axis is outside of them";
     view.camera = camera_of(*undistorted_, photo);
     views.push_back(std::move(view));
     return nullptr;
   }
 
   std::string folder_;
-  DropCounts& drops_;
+  ImportReport& report_;
   std::set<std::string> names_;
   // Many photos are of one camera.
   bool made_ = false;
@@ -100,18 +100,17 @@ class ViewMaker {
   std::optional<Lens> undistorted_;
 };
 
-std::string text_of(const DropCounts& drops) {
-  std::string text;
-  for (const Dropped& dropped : drops.list()) text += (text.empty() ? "" : ", ") + sentence_part(dropped);
+std::string text_of(const ImportReport& report) {
+  const std::string text = describe(report.list());
   return text.empty() ? "there are none" : text;
 }
 
 std::vector<CaptureView> views_of(const std::string& folder, const std::vector<PosedPhoto>& photos,
-                                  const std::string& capture, DropCounts& drops) {
-  ViewMaker maker(folder, drops);
+                                  const std::string& capture, ImportReport& report) {
+  ViewMaker maker(folder, report);
   for (const PosedPhoto& photo : photos) maker.add(photo);
   if (maker.views.empty()) {
-    throw Error(MAQ_ERROR_UNREADABLE, capture, " has no photo that can be used: ", text_of(drops), ".");
+    throw Error(MAQ_ERROR_UNREADABLE, capture, " has no photo that can be used: ", text_of(report), ".");
   }
   return std::move(maker.views);
 }
@@ -122,7 +121,8 @@ std::vector<std::array<double, 9>> rotations_of(const std::vector<CaptureView>& 
   return rotations;
 }
 
-// The medians of the cameras' coordinates, so that points that they see are near, whatever a stray camera or point does.
+// The medians of the cameras' coordinates, so that points that they see are near, whatever a stray camera or point
+// does.
 std::array<double, 3> middle_of(const std::vector<CaptureView>& views) {
   std::array<double, 3> middle{};
   for (size_t i = 0; i < 3; ++i) {
@@ -135,22 +135,22 @@ std::array<double, 3> middle_of(const std::vector<CaptureView>& views) {
 }
 
 Capture open_colmap(const std::string& folder, const ColmapFiles& files) {
-  DropCounts drops;
+  ImportReport report;
   Capture capture;
-  const std::vector<PosedPhoto> photos = read_colmap_photos(files, drops);
-  capture.views = views_of(folder_of_photos(folder, photos), photos, folder, drops);
+  const std::vector<PosedPhoto> photos = read_colmap_photos(files, report);
+  capture.views = views_of(folder_of_photos(folder, photos), photos, folder, report);
   capture.up = up_of_cameras(rotations_of(capture.views));
   const std::string dense = folder + "/fused.ply";
-  capture.cloud = file_exists(dense) ? read_ply_file(dense, middle_of(capture.views), drops)
-                                     : read_colmap_points(files, middle_of(capture.views), drops);
-  capture.dropped = drops.list();
+  capture.cloud = file_exists(dense) ? read_ply_file(dense, middle_of(capture.views), report)
+                                     : read_colmap_points(files, middle_of(capture.views), report);
+  capture.dropped = report.list();
   return capture;
 }
 
 Capture open_transforms(const std::string& folder, const std::string& file_name) {
-  DropCounts drops;
+  ImportReport report;
   Capture capture;
-  const TransformsFile file = read_transforms_file(folder, file_name, drops);
+  const TransformsFile file = read_transforms_file(folder, file_name, report);
   std::string cloud;
   if (!file.cloud.empty()) {
     if (!stays_inside(file.cloud)) {
@@ -167,10 +167,10 @@ Capture open_transforms(const std::string& folder, const std::string& file_name)
         " names no point cloud (\"ply_file_path\"), and there is no sparse_pc.ply, points3d.ply, pointcloud.ply or "
         "cloud.ply beside it; a scene needs one.");
   }
-  capture.views = views_of(folder, file.photos, folder, drops);
+  capture.views = views_of(folder, file.photos, folder, report);
   capture.up = up_by_convention({0, 0, 1}, rotations_of(capture.views));
-  capture.cloud = read_ply_file(cloud, middle_of(capture.views), drops);
-  capture.dropped = drops.list();
+  capture.cloud = read_ply_file(cloud, middle_of(capture.views), report);
+  capture.dropped = report.list();
   return capture;
 }
 
@@ -196,7 +196,7 @@ Capture open_capture(const std::string& folder) {
     std::string text;
     for (const Dropped& dropped : capture.dropped) {
       if (dropped.reason == kPointsNotFinite || dropped.reason == kColoursNotFinite) {
-        text += (text.empty() ? ": " : ", ") + sentence_part(dropped);
+        text += (text.empty() ? ": " : ", ") + describe(dropped);
       }
     }
     throw Error(MAQ_ERROR_UNREADABLE, folder, " has a cloud without a point that can be used", text, ".");

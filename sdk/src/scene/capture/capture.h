@@ -1,4 +1,4 @@
-// A captured place, read from disk and checked: photos with their cameras, and a point cloud.
+// A capture, read from disk and checked: photos with their cameras, and a point cloud.
 #pragma once
 
 #include <array>
@@ -29,24 +29,24 @@ struct Capture {
   std::vector<Dropped> dropped;
 };
 
-// Opens what is in a folder: a COLMAP model in sparse/0, sparse, colmap/sparse/0 or the folder itself, with the photos in
-// images, photos, rgb, input or the folder itself, and the dense fused.ply in place of the model's points where there is
-// one; or transforms.json (or transforms_train.json) with the PLY cloud that it names, or sparse_pc.ply, points3d.ply,
-// points3D.ply, pointcloud.ply or cloud.ply. The first of these that is there is taken.
+// Opens what is in a folder: a COLMAP model in sparse/0, sparse, colmap/sparse/0 or the folder itself, with the photos
+// in images, photos, rgb, input or the folder itself, and the dense fused.ply in place of the model's points where
+// there is one; or transforms.json (or transforms_train.json) with the PLY cloud that it names, or sparse_pc.ply,
+// points3d.ply, points3D.ply, pointcloud.ply or cloud.ply. The first of these that is there is taken.
 //
-// A photo of another size than its camera stands for it when both have the same shape to within 1 %. Photos are looked at as
-// they are stored, not turned by EXIF, as the programs do that find the cameras. What cannot be used of the rest is
-// dropped and counted. Up is the cameras' for COLMAP (up_axis.h); +z for transforms.json, unless the cameras say otherwise
-// by over 45 degrees.
+// A photo of another size than its camera stands for it when both have the same shape to within 1 %. Photos are read as
+// they are stored, not rotated by EXIF, as by the programs that find the cameras. What cannot be used of the rest is
+// dropped and counted. Up is the cameras' for COLMAP (scene_up.h); +z for transforms.json, unless the cameras say
+// otherwise by over 45 degrees.
 //
-// Throws MAQ_ERROR_NOT_FOUND when there is no such folder, no capture in it or no cloud, MAQ_ERROR_UNREADABLE for damaged
-// files and when no photo or no point is left, MAQ_ERROR_UNSUPPORTED for camera models, versions and numbers of points that
-// are not read.
+// Throws MAQ_ERROR_NOT_FOUND when there is no such folder, no capture in it or no cloud, MAQ_ERROR_UNREADABLE for
+// damaged files and when no photo or no point is left, MAQ_ERROR_UNSUPPORTED for camera models, versions and numbers of
+// points that are not read.
 Capture open_capture(const std::string& folder);
 
-// Reads a view's photo and undistorts it: `picture` is BGR of the size of view.camera; `valid` has 255 for pixels that the
-// photo has, 0 for others. Throws what read_image_file() throws, MAQ_ERROR_UNREADABLE also when the photo's size changed
-// since the capture was opened.
+// Reads a view's photo and undistorts it: `picture` is BGR of the size of view.camera; `valid` has 255 for pixels that
+// the photo has, 0 for others. Throws what read_image_file() throws, MAQ_ERROR_UNREADABLE also when the photo's size
+// changed since the capture was opened.
 void load_view(const CaptureView& view, Frame& picture, std::vector<uint8_t>& valid);
 
 }  // namespace maq

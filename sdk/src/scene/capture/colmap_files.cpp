@@ -4,13 +4,25 @@
 
 #include "core/file.h"
 #include "core/file_reader.h"
-#include "scene/capture/colmap_camera_models.h"
 
 namespace maq {
 namespace {
 
-constexpr size_t kMostLineBytes = 4096;
-constexpr size_t kMostNameBytes = 1024;
+struct ColmapModelInfo {
+  const char* name;
+  int number;
+  size_t parameters;
+};
+
+// In the order of ColmapModel; numbers are those of binary files.
+constexpr ColmapModelInfo kColmapModels[] = {{"SIMPLE_PINHOLE", 0, 3}, {"PINHOLE", 1, 4}, {"SIMPLE_RADIAL", 2, 4},
+                                             {"RADIAL", 3, 5},         {"OPENCV", 4, 8},  {"OPENCV_FISHEYE", 5, 8},
+                                             {"FULL_OPENCV", 6, 12}};
+
+const ColmapModelInfo& info_of(ColmapModel model) { return kColmapModels[size_t(model)]; }
+
+constexpr size_t kMaxLineBytes = 4096;
+constexpr size_t kMaxNameBytes = 1024;
 constexpr char kKnownModels[] =
     "; the models that are read are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV and "
     "OPENCV_FISHEYE. Let COLMAP's image_undistorter make pinhole cameras of it.";
@@ -21,7 +33,7 @@ class Line {
   explicit Line(FileReader& file) : file_(file) {}
 
   bool next() {
-    while (file_.next_line(text_, kMostLineBytes)) {
+    while (file_.next_line(text_, kMaxLineBytes)) {
       at_ = 0;
       skip_spaces();
       if (at_ < text_.size() && text_[at_] != '#') return true;
@@ -46,11 +58,11 @@ class Line {
     return number;
   }
 
-  uint64_t whole(const char* what, double most) {
+  uint64_t whole(const char* what, double max) {
     const double value = number(what);
-    if (!(value >= 0 && value <= most) || value != std::floor(value)) {
-      file_.fail(", line ", file_.line(), ": the ", what, " is ", value, ", but must be a whole number from 0 to ",
-                 most, ".");
+    if (!(value >= 0 && value <= max) || value != std::floor(value)) {
+      file_.fail(", line ", file_.line(), ": the ", what, " is ", value, ", but must be a whole number from 0 to ", max,
+                 ".");
     }
     return uint64_t(value);
   }
@@ -74,19 +86,19 @@ class Line {
   size_t at_ = 0;
 };
 
-// How many there are, of which each takes `least_bytes` or more.
-uint64_t read_count(FileReader& file, uint64_t least_bytes, const char* what) {
+// How many there are, of which each takes `min_bytes` or more.
+uint64_t read_count(FileReader& file, uint64_t min_bytes, const char* what) {
   const auto count = file.number<uint64_t>();
-  if (count > file.remaining() / least_bytes) {
-    file.fail(" claims ", count, " ", what, ", but has bytes for ", file.remaining() / least_bytes,
-              " at most: it is cut off or damaged; copy it again.");
+  if (count > file.remaining() / min_bytes) {
+    file.fail(" claims ", count, " ", what, ", but has bytes for ", file.remaining() / min_bytes,
+              " at most: it is truncated or damaged; copy it again.");
   }
   return count;
 }
 
 void expect_end(const FileReader& file, const char* what) {
   if (file.remaining() > 0) {
-    file.fail(" has ", file.remaining(), " bytes behind the last of its ", what, ": it is damaged; copy it again.");
+    file.fail(" has ", file.remaining(), " bytes after the last of its ", what, ": it is damaged; copy it again.");
   }
 }
 
@@ -115,8 +127,8 @@ ColmapModel model_of(const FileReader& file, std::string_view name) {
 }
 
 void check_image_count(const FileReader& file, uint64_t count) {
-  if (count > ColmapFiles::kMostImages) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, file.path(), " has over ", ColmapFiles::kMostImages, " images; leave some out.");
+  if (count > ColmapFiles::kMaxImages) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, file.path(), " has over ", ColmapFiles::kMaxImages, " images; leave some out.");
   }
 }
 
@@ -135,8 +147,8 @@ std::vector<ColmapCamera> read_camera_lines(FileReader& file) {
 }
 
 std::vector<ColmapCamera> read_camera_records(FileReader& file) {
-  constexpr uint64_t kLeastBytes = 4 + 4 + 8 + 8 + 3 * 8;
-  std::vector<ColmapCamera> cameras(read_count(file, kLeastBytes, "cameras"));
+  constexpr uint64_t kMinBytes = 4 + 4 + 8 + 8 + 3 * 8;
+  std::vector<ColmapCamera> cameras(read_count(file, kMinBytes, "cameras"));
   for (ColmapCamera& camera : cameras) {
     camera.id = file.number<uint32_t>();
     camera.model = model_of(file, file.number<int32_t>());
@@ -167,8 +179,8 @@ std::vector<ColmapImage> read_image_lines(FileReader& file) {
 }
 
 std::vector<ColmapImage> read_image_records(FileReader& file) {
-  constexpr uint64_t kLeastBytes = 4 + 7 * 8 + 4 + 1 + 8, kSeenPointBytes = 24;
-  const uint64_t count = read_count(file, kLeastBytes, "images");
+  constexpr uint64_t kMinBytes = 4 + 7 * 8 + 4 + 1 + 8, kSeenPointBytes = 24;
+  const uint64_t count = read_count(file, kMinBytes, "images");
   check_image_count(file, count);
   std::vector<ColmapImage> images(count);
   for (ColmapImage& image : images) {
@@ -177,8 +189,8 @@ std::vector<ColmapImage> read_image_records(FileReader& file) {
     read_numbers(file, image.translation);
     image.camera_id = file.number<uint32_t>();
     while (const char letter = file.number<char>()) {
-      if (image.name.size() == kMostNameBytes) {
-        file.fail(" has an image whose name is over ", kMostNameBytes, " letters: it is damaged; copy it again.");
+      if (image.name.size() == kMaxNameBytes) {
+        file.fail(" has an image whose name is over ", kMaxNameBytes, " letters: it is damaged; copy it again.");
       }
       image.name.push_back(letter);
     }
@@ -219,19 +231,19 @@ void ColmapFiles::points(const std::function<void(uint64_t)>& announce,
     announce(0);
     for (Line line(file); line.next();) {
       line.whole("point's number", double(UINT64_MAX));
-      read_numbers(line, point.place, "place");
+      read_numbers(line, point.position, "position");
       for (uint8_t& value : point.rgb) value = uint8_t(line.whole("colour", 255));
       line.number("error");
       take(point);
     }
     return;
   }
-  constexpr uint64_t kLeastBytes = 8 + 3 * 8 + 3 + 8 + 8, kTrackEntryBytes = 8;
-  const uint64_t count = read_count(file, kLeastBytes, "points");
+  constexpr uint64_t kMinBytes = 8 + 3 * 8 + 3 + 8 + 8, kTrackEntryBytes = 8;
+  const uint64_t count = read_count(file, kMinBytes, "points");
   announce(count);
   for (uint64_t i = 0; i < count; ++i) {
     file.number<uint64_t>();  // its number
-    read_numbers(file, point.place);
+    read_numbers(file, point.position);
     file.read(point.rgb.data(), 3);
     file.number<double>();  // its error
     file.skip(read_count(file, kTrackEntryBytes, "images of a point") * kTrackEntryBytes);

@@ -1,4 +1,4 @@
-// What the three files of a COLMAP model hold, as it lies there, unjudged: as text or binary
+// What the three files of a COLMAP model hold, unchecked: as text or binary
 // (https://colmap.github.io/format.html).
 #pragma once
 
@@ -29,7 +29,7 @@ struct ColmapImage {
 };
 
 struct ColmapPoint {
-  std::array<double, 3> place{};
+  std::array<double, 3> position{};
   std::array<uint8_t, 3> rgb{};
 };
 
@@ -39,7 +39,7 @@ class ColmapFiles {
   static std::optional<ColmapFiles> find(const std::string& folder);
 
   // All throw MAQ_ERROR_UNREADABLE for files that are damaged or claim more than they hold, cameras()
-  // MAQ_ERROR_UNSUPPORTED for camera models other than those above, images() for more than kMostImages.
+  // MAQ_ERROR_UNSUPPORTED for camera models other than those above, images() for more than kMaxImages.
   std::vector<ColmapCamera> cameras() const;
   std::vector<ColmapImage> images() const;
   // `take` gets one after the other; `announce` before how many there are, 0 when the file does not say.
@@ -47,7 +47,7 @@ class ColmapFiles {
 
   std::string points_path() const { return path("points3D"); }
 
-  static constexpr size_t kMostImages = 100'000;
+  static constexpr size_t kMaxImages = 100'000;
 
  private:
   ColmapFiles(std::string folder, bool is_text) : folder_(std::move(folder)), is_text_(is_text) {}

@@ -15,7 +15,7 @@ int size_of(uint64_t pixels) { return int(std::min<uint64_t>(pixels, INT32_MAX))
 Lens lens_of(const ColmapCamera& camera) {
   const auto& p = camera.parameters;
   Lens lens;
-  // Where the figures before the distortion end: one focal length, or two.
+  // Where the parameters before the distortion end: one focal length, or two.
   const bool has_one_focal_length = camera.model == ColmapModel::kSimplePinhole ||
                                     camera.model == ColmapModel::kSimpleRadial || camera.model == ColmapModel::kRadial;
   const size_t centre = has_one_focal_length ? 1 : 2, distortion = centre + 2;
@@ -37,7 +37,7 @@ Lens lens_of(const ColmapCamera& camera) {
   return lens;
 }
 
-// A quaternion that is of length 1 to within 1 % becomes a rotation; others stay the zero matrix, which is none.
+// A quaternion that is of length 1 to within 1 % becomes a rotation; others give the zero matrix, which is not one.
 std::array<double, 9> rotation_of(const std::array<double, 4>& quaternion) {
   const double length = std::sqrt(quaternion[0] * quaternion[0] + quaternion[1] * quaternion[1] +
                                   quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3]);
@@ -52,11 +52,11 @@ std::array<double, 9> rotation_of(const std::array<double, 4>& quaternion) {
 
 }  // namespace
 
-std::vector<PosedPhoto> read_colmap_photos(const ColmapFiles& files, DropCounts& drops) {
+std::vector<PosedPhoto> read_colmap_photos(const ColmapFiles& files, ImportReport& report) {
   std::map<uint32_t, Lens> lenses;
   for (const ColmapCamera& camera : files.cameras()) {
     if (!lenses.emplace(camera.id, lens_of(camera)).second) {
-      drops.add("cameras whose number was there before", std::to_string(camera.id));
+      report.add("cameras whose number was there before", std::to_string(camera.id));
     }
   }
   std::vector<PosedPhoto> photos;
@@ -64,12 +64,12 @@ std::vector<PosedPhoto> read_colmap_photos(const ColmapFiles& files, DropCounts&
   for (ColmapImage& image : files.images()) {
     const auto lens = lenses.find(image.camera_id);
     if (lens == lenses.end()) {
-      drops.add("photos without a camera", image.name);
+      report.add("photos without a camera", image.name);
       continue;
     }
     used_cameras.insert(image.camera_id);
     if (!image_ids.insert(image.id).second) {
-      drops.add("photos whose number was there before", image.name);
+      report.add("photos whose number was there before", image.name);
       continue;
     }
     PosedPhoto photo;
@@ -82,17 +82,17 @@ std::vector<PosedPhoto> read_colmap_photos(const ColmapFiles& files, DropCounts&
     photos.push_back(std::move(photo));
   }
   for (const auto& [id, lens] : lenses) {
-    if (used_cameras.count(id) == 0) drops.add("cameras without a photo", std::to_string(id));
+    if (used_cameras.count(id) == 0) report.add("cameras without a photo", std::to_string(id));
   }
   return photos;
 }
 
-PointCloud read_colmap_points(const ColmapFiles& files, const std::array<double, 3>& origin, DropCounts& drops) {
+PointCloud read_colmap_points(const ColmapFiles& files, const std::array<double, 3>& origin, ImportReport& report) {
   PointCloud cloud;
   cloud.origin = origin;
   const auto check_count = [&](uint64_t count) {
-    if (count > kMostPoints) {
-      throw Error(MAQ_ERROR_UNSUPPORTED, files.points_path(), " has over ", kMostPoints, " points; thin it out.");
+    if (count > kMaxPoints) {
+      throw Error(MAQ_ERROR_UNSUPPORTED, files.points_path(), " has over ", kMaxPoints, " points; thin it out.");
     }
   };
   size_t not_finite = 0;
@@ -103,13 +103,13 @@ PointCloud read_colmap_points(const ColmapFiles& files, const std::array<double,
       },
       [&](const ColmapPoint& point) {
         check_count(cloud.count() + 1);
-        if (!cloud.add(point.place[0], point.place[1], point.place[2])) {
+        if (!cloud.add(point.position[0], point.position[1], point.position[2])) {
           ++not_finite;
           return;
         }
         cloud.rgb.insert(cloud.rgb.end(), point.rgb.begin(), point.rgb.end());
       });
-  drops.add(kPointsNotFinite, "", not_finite);
+  report.add(kPointsNotFinite, "", not_finite);
   return cloud;
 }
 

@@ -1,4 +1,4 @@
-// What an import left out, and why.
+// What an import dropped, and why.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,11 @@ struct Dropped {
   std::string reason;
   size_t count = 0;
   std::string first;  // name of the first one; "" for things without names
+
+  std::string reason_and_first() const { return first.empty() ? reason : reason + " (first: " + first + ")"; }
 };
 
-class DropCounts {
+class ImportReport {
  public:
   void add(const std::string& reason, const std::string& name = "", size_t count = 1) {
     if (count == 0) return;
@@ -23,8 +25,8 @@ class DropCounts {
       dropped.count += count;
       return;
     }
-    constexpr size_t kMostNameBytes = 200;
-    list_.push_back({reason, count, name.substr(0, kMostNameBytes)});
+    constexpr size_t kMaxNameBytes = 200;
+    list_.push_back({reason, count, name.substr(0, kMaxNameBytes)});
   }
 
   // In the order in which the reasons came up first.
@@ -34,9 +36,16 @@ class DropCounts {
   std::vector<Dropped> list_;
 };
 
-inline std::string sentence_part(const Dropped& dropped) {
-  const std::string text = std::to_string(dropped.count) + " " + dropped.reason;
-  return dropped.first.empty() ? text : text + " (first: " + dropped.first + ")";
+inline std::string describe(const Dropped& dropped) {
+  return std::to_string(dropped.count) + " " + dropped.reason_and_first();
+}
+
+// As part of a sentence: "3 photos that cannot be read as images (first: a.jpg), 1 photos without a camera"; "" for
+// none.
+inline std::string describe(const std::vector<Dropped>& list) {
+  std::string text;
+  for (const Dropped& dropped : list) text += (text.empty() ? "" : ", ") + describe(dropped);
+  return text;
 }
 
 }  // namespace maq

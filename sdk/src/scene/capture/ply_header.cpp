@@ -7,9 +7,9 @@
 namespace maq {
 namespace {
 
-constexpr size_t kMostLineBytes = 4096;
-constexpr int kMostLines = 10000;
-constexpr size_t kMostElements = 64, kMostProperties = 512;
+constexpr size_t kMaxLineBytes = 4096;
+constexpr int kMaxLines = 10000;
+constexpr size_t kMaxElements = 64, kMaxProperties = 512;
 
 struct TypeName {
   const char* name;
@@ -25,7 +25,7 @@ PlyType type_of(const std::string& name, const FileReader& file) {
   for (size_t i = 0; i < std::size(kTypes); ++i) {
     if (name == kTypes[i].name || name == kTypes[i].sized_name) return PlyType(i);
   }
-  file.fail(", line ", file.line(), ": \"", name.substr(0, 40), "\" is no type of PLY files.");
+  file.fail(", line ", file.line(), ": \"", name.substr(0, 40), "\" is not a type of PLY files.");
 }
 
 PlyForm form_of(const std::string& name, const std::string& version, const FileReader& file) {
@@ -37,7 +37,7 @@ PlyForm form_of(const std::string& name, const std::string& version, const FileR
   if (name == "ascii") return PlyForm::kAscii;
   if (name == "binary_little_endian") return PlyForm::kLittleEndian;
   if (name == "binary_big_endian") return PlyForm::kBigEndian;
-  file.fail(", line ", file.line(), ": \"", name.substr(0, 40), "\" is no format of PLY files.");
+  file.fail(", line ", file.line(), ": \"", name.substr(0, 40), "\" is not a format of PLY files.");
 }
 
 PlyElement element_of(std::istream& words, const FileReader& file) {
@@ -79,7 +79,7 @@ size_t size_bytes(PlyType type) { return kTypes[size_t(type)].bytes; }
 
 bool is_float(PlyType type) { return type == PlyType::kFloat32 || type == PlyType::kFloat64; }
 
-uint64_t PlyElement::least_bytes(PlyForm form) const {
+uint64_t PlyElement::min_bytes(PlyForm form) const {
   if (form == PlyForm::kAscii) return 2 * properties.size();
   uint64_t bytes = 0;
   for (const PlyProperty& property : properties) {
@@ -97,13 +97,13 @@ int PlyElement::index_of(const std::string& property) const {
 
 PlyHeader read_ply_header(FileReader& file) {
   std::string line;
-  if (!file.next_line(line, kMostLineBytes) || line != "ply") {
-    file.fail(" is no PLY file: its first line is not \"ply\".");
+  if (!file.next_line(line, kMaxLineBytes) || line != "ply") {
+    file.fail(" is not a PLY file: its first line is not \"ply\".");
   }
   PlyHeader header;
   std::optional<PlyForm> form;
-  for (int i = 0; i < kMostLines; ++i) {
-    if (!file.next_line(line, kMostLineBytes)) break;
+  for (int i = 0; i < kMaxLines; ++i) {
+    if (!file.next_line(line, kMaxLineBytes)) break;
     std::istringstream words(line);
     std::string keyword;
     words >> keyword;
@@ -117,19 +117,19 @@ PlyHeader read_ply_header(FileReader& file) {
       words >> name >> version;
       form = form_of(name, version, file);
     } else if (keyword == "element") {
-      if (header.elements.size() == kMostElements) file.fail(" has over ", kMostElements, " kinds of elements.");
+      if (header.elements.size() == kMaxElements) file.fail(" has over ", kMaxElements, " kinds of elements.");
       header.elements.push_back(element_of(words, file));
     } else if (keyword == "property") {
       if (header.elements.empty()) file.fail(", line ", file.line(), ": a property comes before the first element.");
       auto& properties = header.elements.back().properties;
-      if (properties.size() == kMostProperties) file.fail(" has over ", kMostProperties, " properties in an element.");
+      if (properties.size() == kMaxProperties) file.fail(" has over ", kMaxProperties, " properties in an element.");
       properties.push_back(property_of(words, file));
     } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
       file.fail(", line ", file.line(), ": \"", keyword.substr(0, 40),
                 "\" is nothing that the head of a PLY file has.");
     }
   }
-  file.fail(" has no end of its head (\"end_header\"): it is cut off or damaged; copy it again.");
+  file.fail(" has no end of its head (\"end_header\"): it is truncated or damaged; copy it again.");
 }
 
 }  // namespace maq

@@ -29,8 +29,8 @@ struct PlyElement {
   uint64_t header_line = 0;
 
   // What one of them takes in the file at least: lists may be empty; in text, a digit and a space for each property.
-  uint64_t least_bytes(PlyForm form) const;
-  // Of the property of that name that is no list; -1 when there is none.
+  uint64_t min_bytes(PlyForm form) const;
+  // Of the property of that name that is not a list; -1 when there is none.
   int index_of(const std::string& property) const;
 };
 
@@ -39,7 +39,8 @@ struct PlyHeader {
   std::vector<PlyElement> elements;
 };
 
-// Reads up to the first byte of the data. Throws MAQ_ERROR_UNREADABLE, and MAQ_ERROR_UNSUPPORTED for versions other than 1.0.
+// Reads up to the first byte of the data. Throws MAQ_ERROR_UNREADABLE, and MAQ_ERROR_UNSUPPORTED for versions other
+// than 1.0.
 PlyHeader read_ply_header(FileReader& file);
 
 }  // namespace maq

@@ -20,7 +20,7 @@ double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] 
 const char* fault_of(const Lens& lens) {
   if (!all_finite(std::array<double, 4>{lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px}) ||
       !all_finite(lens.coefficients)) {
-    return "photos whose camera has figures that are not finite";
+    return "photos whose camera has numbers that are not finite";
   }
   if (!(lens.fx_px > 0 && lens.fy_px > 0)) return "photos whose camera has no positive focal length";
   if (lens.width_px < 1 || lens.height_px < 1 || lens.width_px > MAQ_MAX_SIDE_PX || lens.height_px > MAQ_MAX_SIDE_PX) {

@@ -1,4 +1,4 @@
-// A photo as a capture's files describe it, before anything was looked at on disk.
+// A photo as a capture's files describe it, before anything is read from disk.
 #pragma once
 
 #include <array>
@@ -16,17 +16,17 @@ struct PosedPhoto {
   bool is_held_out = false;  // kept to compare with: no scene is made of it
 };
 
-// Reasons why photos are dropped (drop_counts.h).
+// Reasons why photos are dropped (import_report.h).
 inline constexpr char kPhotosOutside[] = "photos whose name leads out of their folder";
 inline constexpr char kPhotosMissing[] = "photos that are not in their folder";
 inline constexpr char kPhotosUnreadable[] = "photos that cannot be read as images";
 
-// And those that lie in their figures; null when there is none.
+// And those in their numbers; null when there is none.
 const char* fault_of(const Lens& lens);
 const char* fault_of_pose(const PosedPhoto& photo);
 
-// Makes the rows of a rotation that is one to within 1 % exactly of length 1 and at right angles. False, and nothing is
-// changed, for other matrices, mirrors among them.
+// Orthonormalises a rotation matrix (Gram-Schmidt) that is one to within 1 %. False, and nothing is changed, for other
+// matrices, reflections among them.
 bool make_exact_rotation(std::array<double, 9>& rotation);
 
 }  // namespace maq

@@ -34,7 +34,8 @@ void PosedView::load(const ImageView& image, const Lens& lens, const PinholeCame
   if (lens.distortion != Distortion::kNone) {
     const std::optional<Lens> straight = without_distortion(lens);
     if (!straight) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The camera's distortion folds the picture; check its coefficients.");
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT,
+                  "The camera's distortion is not invertible within its picture; check its coefficients.");
     }
     undistort(*image_, lens, *straight, smaller_, valid_);
     std::swap(whole_, smaller_);

@@ -1,4 +1,4 @@
-// A photo ready to be looked at: BGR, without distortion, no larger than asked for; what is valid in it, and its camera.
+// A photo ready for fitting: BGR, without distortion, no larger than asked for; its validity mask and its camera.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,15 @@ class PosedView {
   // A capture's photo from disk. `long_side_px`: larger ones are made smaller; 0: none. Throws as load_view() does.
   void load(const CaptureView& view, int long_side_px);
 
-  // An app's picture of any format, taken with `lens`, whose picture has the size of `image`; `pose` says where the camera is
-  // and looks. What it points to must stay while this is used. Throws MAQ_ERROR_INVALID_ARGUMENT for another size and for a
-  // distortion that cannot be undone, and what copy_pixels() throws.
+  // An app's picture of any format, taken with `lens`, whose picture has the size of `image`; `pose` is its camera
+  // without distortion. What it points to must stay while this is used. Throws MAQ_ERROR_INVALID_ARGUMENT for another
+  // size and for a distortion that is not invertible, and what copy_pixels() throws.
   void load(const ImageView& image, const Lens& lens, const PinholeCamera& pose, int long_side_px);
 
   const ImageView& image() const { return *image_; }
-  const uint8_t* valid() const { return valid_.empty() ? nullptr : valid_.data(); }  // null: all is
+  const uint8_t* valid() const {
+    return valid_.empty() ? nullptr : valid_.data();
+  }  // validity mask, 0: not of the photo; null: all is
   const PinholeCamera& camera() const { return camera_; }
 
  private:

@@ -17,7 +17,7 @@ namespace {
 using nlohmann::json;
 
 // Some 25,000 frames. Parsed, a hostile file takes twenty times as much.
-constexpr uint64_t kMostBytes = 16 << 20;
+constexpr uint64_t kMaxBytes = 16 << 20;
 
 // What is said of a frame: by itself, or by the file for all.
 class Facts {
@@ -43,7 +43,7 @@ class Facts {
     if (!value->is_number()) fail("\"", key, "\" is not a number");
     return value->get<double>();
   }
-  double number_or(const char* key, double otherwise) const { return number(key).value_or(otherwise); }
+  double number_or(const char* key, double fallback) const { return number(key).value_or(fallback); }
   bool flag(const char* key) const {
     const json* value = find(key);
     if (value == nullptr) return false;
@@ -65,14 +65,14 @@ class Facts {
 
 json parse(const std::string& path) {
   FileReader file(path);
-  if (file.remaining() > kMostBytes) {
-    file.fail(" has ", file.remaining(), " bytes, over the limit of ", kMostBytes, "; leave some frames out.");
+  if (file.remaining() > kMaxBytes) {
+    file.fail(" has ", file.remaining(), " bytes, over the limit of ", kMaxBytes, "; leave some frames out.");
   }
   std::string text(size_t(file.remaining()), '\0');
   file.read(text.data(), text.size());
   json document = json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (document.is_discarded() || !document.is_object()) {
-    file.fail(" is not a JSON object: it is cut off or damaged, or has NaN in it.");
+    file.fail(" is not a JSON object: it is truncated or damaged, or has NaN in it.");
   }
   return document;
 }
@@ -100,7 +100,7 @@ void read_distortion(const Facts& facts, Lens& lens) {
   }
   // There k4 belongs to the eighth power of the radius, which the model of OpenCV does not have.
   if (facts.number_or("k4", 0) != 0) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "A camera that is no fisheye has \"k4\" ", facts.number_or("k4", 0),
+    throw Error(MAQ_ERROR_UNSUPPORTED, "A camera that is not a fisheye has \"k4\" ", facts.number_or("k4", 0),
                 ", but k1, k2, k3, p1 and p2 are what is read. Undistort the photos first.");
   }
   k = {facts.number_or("k1", 0), facts.number_or("k2", 0), facts.number_or("p1", 0), facts.number_or("p2", 0),
@@ -148,10 +148,10 @@ void read_pose(const Facts& facts, PosedPhoto& photo) {
   }
 }
 
-std::string with_ending(const std::string& folder, const std::string& name) {
+std::string with_extension(const std::string& folder, const std::string& name) {
   if (file_exists(folder + "/" + name)) return name;
-  for (const char* ending : {".png", ".jpg", ".jpeg"}) {
-    if (file_exists(folder + "/" + name + ending)) return name + ending;
+  for (const char* extension : {".png", ".jpg", ".jpeg"}) {
+    if (file_exists(folder + "/" + name + extension)) return name + extension;
   }
   return name;
 }
@@ -172,7 +172,7 @@ std::set<std::string> held_out_names(const json& document, const std::string& pa
 
 }  // namespace
 
-TransformsFile read_transforms_file(const std::string& folder, const std::string& file_name, DropCounts& drops) {
+TransformsFile read_transforms_file(const std::string& folder, const std::string& file_name, ImportReport& report) {
   const std::string path = folder + "/" + file_name;
   const json document = parse(path);
   const json none = json::object();
@@ -194,10 +194,10 @@ TransformsFile read_transforms_file(const std::string& folder, const std::string
     photo.is_held_out = held_out.count(photo.name) != 0;
     read_pose(facts, photo);
     if (!stays_inside(photo.name)) {
-      drops.add(kPhotosOutside, photo.name);
+      report.add(kPhotosOutside, photo.name);
       continue;
     }
-    photo.name = with_ending(folder, photo.name);
+    photo.name = with_extension(folder, photo.name);
     if (facts.find("w") != nullptr && facts.find("h") != nullptr) {
       photo.lens.width_px = whole_pixels(facts.number_or("w", 0));
       photo.lens.height_px = whole_pixels(facts.number_or("h", 0));
@@ -207,7 +207,7 @@ TransformsFile read_transforms_file(const std::string& folder, const std::string
         photo.lens.width_px = whole_pixels(double(size.width));
         photo.lens.height_px = whole_pixels(double(size.height));
       } catch (const Error& error) {
-        drops.add(error.status() == MAQ_ERROR_NOT_FOUND ? kPhotosMissing : kPhotosUnreadable, photo.name);
+        report.add(error.status() == MAQ_ERROR_NOT_FOUND ? kPhotosMissing : kPhotosUnreadable, photo.name);
         continue;
       }
     }

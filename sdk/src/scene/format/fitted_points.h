@@ -1,4 +1,4 @@
-// What is left of a cloud after all photos were looked at: the points that some photo saw, and how they look.
+// What is left of a cloud once its descriptors are fitted: the points that some photo saw.
 #pragma once
 
 #include <array>
@@ -6,22 +6,21 @@
 #include <cstdint>
 #include <vector>
 
-#include "scene/build/descriptor_regression.h"
+#include "scene/descriptor.h"
 
 namespace maq {
 
-struct ModelledPoints {
-  std::array<double, 3> origin = {0, 0, 0};  // of the places, in the world
+struct FittedPoints {
+  std::array<double, 3> origin = {0, 0, 0};  // of the positions, in the world
   std::array<double, 3> up = {0, 0, 1};
-  std::array<float, 3> background = {0, 0, 0};  // red, green, blue of what has no points, 0..1
+  std::array<float, 3> background = {0, 0, 0};  // red, green, blue of pixels without points, 0..1
   std::vector<float> x, y, z;
-  std::vector<float> means;   // [count][kFeatures]: beta0; the first three are red, green, blue in 0..1
-  std::vector<float> slopes;  // [count][kBasis][kFeatures]: beta
-  std::vector<float>
-      variations;               // [count]: how far the look moves from its mean over the photos that saw the point, RMS
-  std::vector<uint32_t> views;  // [count]: photos that saw the point, at least 1
-  uint64_t never_seen = 0;      // points that were dropped
-  uint64_t singular = 0;        // looks kept constant since their system could not be solved
+  std::vector<float> constant_terms;   // [count][kFeatures]: beta0
+  std::vector<float> linear_terms;     // [count][kBasis][kFeatures]: beta
+  std::vector<float> view_dependence;  // [count]: RMS change of the descriptor over the photos that saw the point
+  std::vector<uint32_t> views;         // [count]: photos that saw the point, at least 1
+  uint64_t never_seen = 0;             // points that were dropped
+  uint64_t singular = 0;               // points kept constant since their system could not be solved
 
   size_t count() const { return x.size(); }
 };

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "core/atomic_file.h"
-#include "scene/format/block_decoding.h"
+#include "scene/format/block_codec.h"
 
 namespace maq {
 namespace {
@@ -13,16 +13,10 @@ namespace {
 constexpr double kFarOrigin = 100;
 
 bool needs_doubles(const Scene& scene) {
-  double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  const SceneBounds bounds = bounds_of(scene);
   double size = 0, away = 0;
-  for (uint32_t b = 0; b < scene.block_count; ++b) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], double(scene.blocks[b].low[axis]));
-      high[axis] = std::max(high[axis], double(scene.blocks[b].high[axis]));
-    }
-  }
   for (size_t axis = 0; axis < 3; ++axis) {
-    size = std::max(size, high[axis] - low[axis]);
+    size = std::max(size, bounds.high[axis] - bounds.low[axis]);
     away = std::max(away, std::abs(scene.origin[axis]));
   }
   return away > kFarOrigin * size;
@@ -50,7 +44,7 @@ void write_scene_ply(const Scene& scene, const std::string& path) {
   file.append(header.data(), header.size());
   std::vector<uint8_t> bytes;
   for (uint32_t b = 0; b < scene.block_count; ++b) {
-    const ModelledPoints points = unpack_block(scene, scene.blocks[b]);
+    const FittedPoints points = decode_block(scene, scene.blocks[b]);
     bytes.clear();
     for (size_t i = 0; i < points.count(); ++i) {
       const float at[3] = {points.x[i], points.y[i], points.z[i]};
@@ -62,7 +56,7 @@ void write_scene_ply(const Scene& scene, const std::string& path) {
           put(bytes, float(world));
         }
       }
-      for (size_t c = 0; c < 3; ++c) put(bytes, colour(points.means[i * kFeatures + c]));
+      for (size_t c = 0; c < 3; ++c) put(bytes, colour(points.constant_terms[i * kFeatures + c]));
     }
     file.append(bytes.data(), bytes.size());
   }

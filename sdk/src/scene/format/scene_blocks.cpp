@@ -11,27 +11,27 @@ struct Entry {
   uint32_t index;
 };
 
-// A gap of that share of a block's length is cut.
+// A gap of that fraction of a block's length splits it.
 constexpr double kWideGap = 0.75;
-constexpr int kMostGapCuts = 2;  // one after the other: four blocks of one
+constexpr int kMaxGapSplits = 2;  // one after the other: four blocks of one
 
-class Cutter {
+class BlockSplitter {
  public:
-  Cutter(uint32_t most_points, BlockOrder& blocks) : most_points_(most_points), blocks_(blocks) {}
+  BlockSplitter(uint32_t max_points, BlockOrder& blocks) : most_points_(max_points), blocks_(blocks) {}
 
-  void cut(Entry* begin, Entry* end) {
+  void split(Entry* begin, Entry* end) {
     const size_t count = size_t(end - begin);
-    if (count <= most_points_) return cut_gaps(begin, end, kMostGapCuts);
+    if (count <= most_points_) return split_gaps(begin, end, kMaxGapSplits);
     const size_t blocks = (count + most_points_ - 1) / most_points_;
     Entry* middle = begin + blocks / 2 * most_points_;
-    std::nth_element(begin, middle, end, Before{longest_axis(begin, end)});
-    cut(begin, middle);
-    cut(middle, end);
+    std::nth_element(begin, middle, end, LessAlongAxis{longest_axis(begin, end)});
+    split(begin, middle);
+    split(middle, end);
   }
 
  private:
-  // Of points in the same place the first comes first, so that every library cuts them alike.
-  struct Before {
+  // Of points at the same position the first comes first, so that every standard library splits them alike.
+  struct LessAlongAxis {
     int axis;
     bool operator()(const Entry& a, const Entry& b) const {
       return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis] : a.index < b.index;
@@ -56,10 +56,10 @@ class Cutter {
     return found;
   }
 
-  void cut_gaps(Entry* begin, Entry* end, int cuts_left) {
-    if (cuts_left > 0 && end - begin > 1) {
+  void split_gaps(Entry* begin, Entry* end, int splits_left) {
+    if (splits_left > 0 && end - begin > 1) {
       const int axis = longest_axis(begin, end);
-      std::sort(begin, end, Before{axis});
+      std::sort(begin, end, LessAlongAxis{axis});
       double widest = 0;
       Entry* behind = begin;
       for (Entry* entry = begin + 1; entry < end; ++entry) {
@@ -70,8 +70,8 @@ class Cutter {
         }
       }
       if (widest > kWideGap * (double(end[-1].at[axis]) - begin->at[axis])) {
-        cut_gaps(begin, behind, cuts_left - 1);
-        return cut_gaps(behind, end, cuts_left - 1);
+        split_gaps(begin, behind, splits_left - 1);
+        return split_gaps(behind, end, splits_left - 1);
       }
     }
     const size_t first = blocks_.order.size();
@@ -86,13 +86,13 @@ class Cutter {
 
 }  // namespace
 
-void cut_into_blocks(const PointPlaces& places, const std::vector<uint32_t>& chosen, uint32_t most_points,
-                     BlockOrder& blocks) {
+void split_into_blocks(const PointPositions& positions, const std::vector<uint32_t>& chosen, uint32_t max_points,
+                       BlockOrder& blocks) {
   if (chosen.empty()) return;
   std::vector<Entry> entries;
   entries.reserve(chosen.size());
-  for (const uint32_t i : chosen) entries.push_back({{places.x[i], places.y[i], places.z[i]}, i});
-  Cutter(most_points, blocks).cut(entries.data(), entries.data() + entries.size());
+  for (const uint32_t i : chosen) entries.push_back({{positions.x[i], positions.y[i], positions.z[i]}, i});
+  BlockSplitter(max_points, blocks).split(entries.data(), entries.data() + entries.size());
 }
 
 }  // namespace maq

@@ -13,12 +13,12 @@ inline constexpr char kSceneFileMagic[8] = {'M', 'A', 'Q', 'S', 'C', 'N', '\r', 
 inline constexpr uint32_t kSceneFileVersion = 1;
 inline constexpr uint64_t kSceneFileAlignment = 64;
 
-// In this order, one behind the other, each at a multiple of 64 bytes and filled up to one with zeros.
+// In this order, one after the other, each at a multiple of 64 bytes and filled up to one with zeros.
 enum SceneFileSection {
-  kBlocksSection,  // SceneBlock [blocks]
-  kPlacesSection,  // as Scene::places
-  kMeansSection,   // as Scene::means
-  kSlopesSection,  // as Scene::slopes
+  kBlocksSection,         // SceneBlock [blocks]
+  kPositionsSection,      // as Scene::positions
+  kConstantTermsSection,  // as Scene::constant_terms
+  kLinearTermsSection,    // as Scene::linear_terms
   kSceneFileSections
 };
 
@@ -35,8 +35,8 @@ struct SceneFileHead {
   uint64_t head_check;  // 64-bit XXH3 of what follows in this struct
   uint64_t file_bytes;
   double origin[3], up[3];
-  uint32_t points, varying, blocks;
-  uint8_t place_kind, coefficient_kind;
+  uint32_t points, view_dependent, blocks;
+  uint8_t position_format, coefficient_format;
   uint8_t zero[2];
   uint8_t networks_sha256[32];
   float background[3];
@@ -45,7 +45,7 @@ struct SceneFileHead {
 };
 static_assert(sizeof(SceneFileHead) == 256 && offsetof(SceneFileHead, file_bytes) == 24);
 static_assert(sizeof(SceneFileHead) % kSceneFileAlignment == 0);
-static_assert(sizeof(SceneBlock) == 308 && offsetof(SceneBlock, mean_middle) == 52,
+static_assert(sizeof(SceneBlock) == 308 && offsetof(SceneBlock, constant_middle) == 52,
               "version 1 stores blocks like that");
 
 constexpr uint64_t filled_up(uint64_t bytes) { return round_up<uint64_t>(bytes, kSceneFileAlignment); }

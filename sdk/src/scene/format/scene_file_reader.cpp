@@ -13,9 +13,9 @@
 
 #include "core/error.h"
 #include "core/unique_fd.h"
+#include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
-#include "scene/format/scene_layout.h"
 #include "scene/point_cloud.h"
 
 namespace maq {
@@ -23,9 +23,9 @@ namespace {
 
 constexpr size_t kReadAtOnce = 1 << 20;  // a multiple of the alignment, and of a float
 // A little over what make_scene takes, since steps are rounded.
-constexpr double kLargestStored = 2e30;
+constexpr double kMaxStored = 2e30;
 
-bool is_sound(double value) { return std::abs(value) <= kLargestStored; }  // false for NaN
+bool is_sound(double value) { return std::abs(value) <= kMaxStored; }  // false for NaN
 bool are_sound(const float* values, size_t count) {
   return std::all_of(values, values + count, [](float value) { return is_sound(value); });
 }
@@ -144,19 +144,18 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
   }
   if (head_.file_bytes != size_bytes) {
     fail(" has ", size_bytes, " bytes, but should have ", head_.file_bytes,
-         ": it is cut off or damaged; copy it again.");
+         ": it is truncated or damaged; copy it again.");
   }
-  // From here on only who makes wrong files on purpose, or has a defect, is met.
-  const bool has_kinds = head_.place_kind <= uint8_t(Places::kUint16) &&
-                         head_.coefficient_kind <= uint8_t(Coefficients::kInt8) &&
+  // What follows only fails for files made to do harm, or by a defective writer.
+  const bool has_kinds = head_.position_format <= uint8_t(PositionFormat::kUint16) &&
+                         head_.coefficient_format <= uint8_t(CoefficientFormat::kInt8) &&
                          are_zero(head_.zero, sizeof head_.zero) && are_zero(head_.more_zeros, sizeof head_.more_zeros);
   if (!has_kinds) fail(" stores its numbers in a way that version ", kSceneFileVersion, " does not have.");
-  if (head_.points > kMostPoints) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " has ", head_.points, " points; at most ", kMostPoints,
-                " can be shown.");
+  if (head_.points > kMaxPoints) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, path_, " has ", head_.points, " points; at most ", kMaxPoints, " can be shown.");
   }
-  if (head_.points == 0 || head_.blocks == 0 || head_.blocks > head_.points || head_.varying > head_.points) {
-    fail(" claims ", head_.points, " points, ", head_.varying, " of which vary, in ", head_.blocks,
+  if (head_.points == 0 || head_.blocks == 0 || head_.blocks > head_.points || head_.view_dependent > head_.points) {
+    fail(" claims ", head_.points, " points, ", head_.view_dependent, " of them view-dependent, in ", head_.blocks,
          " blocks: that cannot be.");
   }
   for (const double* vector : {head_.origin, head_.up}) {
@@ -167,11 +166,11 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
   for (const float part : head_.background) {
     if (!(part >= 0 && part <= 1)) fail(" has a background colour of ", part, ", which is not 0 to 1.");
   }
-  const uint64_t place = size_bytes_of(Places(head_.place_kind));
-  const uint64_t coefficient = size_bytes_of(Coefficients(head_.coefficient_kind));
-  const uint64_t bytes[kSceneFileSections] = {head_.blocks * uint64_t(sizeof(SceneBlock)), head_.points * 3 * place,
-                                              head_.points * kFeatures * coefficient,
-                                              head_.varying * kSlopes * coefficient};
+  const uint64_t coordinate = size_bytes_of(PositionFormat(head_.position_format));
+  const uint64_t coefficient = size_bytes_of(CoefficientFormat(head_.coefficient_format));
+  const uint64_t bytes[kSceneFileSections] = {head_.blocks * uint64_t(sizeof(SceneBlock)),
+                                              head_.points * 3 * coordinate, head_.points * kFeatures * coefficient,
+                                              head_.view_dependent * kLinearTerms * coefficient};
   uint64_t offset = sizeof head_;
   for (int s = 0; s < kSceneFileSections; ++s) {
     if (head_.sections[s].offset != offset || head_.sections[s].bytes != bytes[s]) {
@@ -194,44 +193,45 @@ std::shared_ptr<const uint8_t> SceneFileReader::map() const {
           [bytes](const uint8_t* from) { ::munmap(const_cast<uint8_t*>(from), bytes); }};
 }
 
-// What the renderer takes for granted: blocks follow each other without gaps, and decoded numbers are finite.
+// What the renderer relies on: blocks follow each other without gaps, and decoded numbers are finite.
 void check_blocks(const SceneFileReader& file, const std::vector<SceneBlock>& blocks) {
   const SceneFileHead& head = file.head();
-  const double most_mean = head.coefficient_kind == uint8_t(Coefficients::kInt8)    ? 128
-                           : head.coefficient_kind == uint8_t(Coefficients::kInt16) ? 32768
-                                                                                    : 1;
-  const double most_place = head.place_kind == uint8_t(Places::kUint16) ? 65535 : 0;
-  uint64_t points = 0, varying = 0;
+  const double max_constant = head.coefficient_format == uint8_t(CoefficientFormat::kInt8)    ? 128
+                              : head.coefficient_format == uint8_t(CoefficientFormat::kInt16) ? 32768
+                                                                                              : 1;
+  const double max_position = head.position_format == uint8_t(PositionFormat::kUint16) ? 65535 : 0;
+  uint64_t points = 0, view_dependent = 0;
   for (size_t b = 0; b < blocks.size(); ++b) {
     const SceneBlock& block = blocks[b];
-    if (block.first != points || block.first_varying != varying || block.count == 0 ||
-        block.count > SceneBlock::kMostPoints || block.varying > block.count) {
-      file.fail(", block ", b, ": ", block.count, " points from ", block.first, " on, ", block.varying,
-                " that vary from ", block.first_varying, " on, after ", points, " and ", varying, ".");
+    if (block.first != points || block.first_view_dependent != view_dependent || block.count == 0 ||
+        block.count > SceneBlock::kMaxPoints || block.view_dependent > block.count) {
+      file.fail(", block ", b, ": ", block.count, " points from ", block.first, " on, ", block.view_dependent,
+                " view-dependent from ", block.first_view_dependent, " on, after ", points, " and ", view_dependent,
+                ".");
     }
     points += block.count;
-    varying += block.varying;
+    view_dependent += block.view_dependent;
     bool is_right = true;
     for (int axis = 0; axis < 3; ++axis) {
-      const double reached = block.low[axis] + most_place * block.place_step[axis];
-      is_right &= is_sound(block.low[axis]) && is_sound(block.high[axis]) && block.place_step[axis] >= 0 &&
-                  is_sound(block.place_step[axis]) && reached <= block.high[axis];
+      const double reached = block.low[axis] + max_position * block.position_step[axis];
+      is_right &= is_sound(block.low[axis]) && is_sound(block.high[axis]) && block.position_step[axis] >= 0 &&
+                  is_sound(block.position_step[axis]) && reached <= block.high[axis];
     }
     for (int c = 0; c < kFeatures; ++c) {
-      is_right &=
-          is_sound(std::abs(double(block.mean_middle[c])) + most_mean * block.mean_step[c]) && block.mean_step[c] >= 0;
+      is_right &= is_sound(std::abs(double(block.constant_middle[c])) + max_constant * block.constant_step[c]) &&
+                  block.constant_step[c] >= 0;
     }
-    for (const float step : block.slope_step) is_right &= step >= 0 && is_sound(most_mean * step);
+    for (const float step : block.linear_step) is_right &= step >= 0 && is_sound(max_constant * step);
     if (!is_right) file.fail(", block ", b, ": its bounds or steps are not finite, or do not hold its points.");
   }
-  if (points != head.points || varying != head.varying) {
-    file.fail(" has blocks of ", points, " points, ", varying, " of which vary, but claims ", head.points, " and ",
-              head.varying, ".");
+  if (points != head.points || view_dependent != head.view_dependent) {
+    file.fail(" has blocks of ", points, " points, ", view_dependent, " of them view-dependent, but claims ",
+              head.points, " and ", head.view_dependent, ".");
   }
 }
 
 struct StoredArrays {
-  std::vector<SceneBlock> blocks;  // never mapped: what they say was checked and must stay so
+  std::vector<SceneBlock> blocks;  // copied: what was checked must stay so
   std::shared_ptr<const uint8_t> mapping;
   std::vector<uint8_t> memory;
 };
@@ -244,15 +244,16 @@ Scene open_checked(const SceneFileReader& file) {
   file.read_to(kBlocksSection, arrays->blocks.data());
   check_blocks(file, arrays->blocks);
 
-  constexpr SceneFileSection kArrays[3] = {kPlacesSection, kMeansSection, kSlopesSection};
-  const uint64_t begin = head.sections[kPlacesSection].offset;
+  constexpr SceneFileSection kArrays[3] = {kPositionsSection, kConstantTermsSection, kLinearTermsSection};
+  const uint64_t begin = head.sections[kPositionsSection].offset;
   if (!file.is_file()) arrays->memory.resize(size_t(head.file_bytes - begin));
   for (const SceneFileSection section : kArrays) {
-    const bool are_floats = section == kPlacesSection ? Places(head.place_kind) == Places::kFloat32
-                                                      : Coefficients(head.coefficient_kind) == Coefficients::kFloat32;
+    const bool are_floats = section == kPositionsSection
+                                ? PositionFormat(head.position_format) == PositionFormat::kFloat32
+                                : CoefficientFormat(head.coefficient_format) == CoefficientFormat::kFloat32;
     file.read(section, [&](const float* part, size_t bytes, size_t done) {
       if (are_floats && !are_sound(part, bytes / sizeof(float))) {
-        file.fail(" has places or looks that are not finite; build the scene again.");
+        file.fail(" has positions or coefficients that are not finite; build the scene again.");
       }
       // The part that was checked, whatever happens to the caller's bytes meanwhile.
       if (!file.is_file()) {
@@ -270,15 +271,15 @@ Scene open_checked(const SceneFileReader& file) {
   std::copy_n(head.origin, 3, scene.origin.begin());
   std::copy_n(head.up, 3, scene.up.begin());
   std::copy_n(head.background, 3, scene.background.begin());
-  scene.place_kind = Places(head.place_kind);
-  scene.coefficient_kind = Coefficients(head.coefficient_kind);
+  scene.position_format = PositionFormat(head.position_format);
+  scene.coefficient_format = CoefficientFormat(head.coefficient_format);
   scene.points = head.points;
-  scene.varying = head.varying;
+  scene.view_dependent = head.view_dependent;
   scene.block_count = head.blocks;
   scene.blocks = arrays->blocks.data();
-  scene.places = at(kPlacesSection);
-  scene.means = at(kMeansSection);
-  scene.slopes = at(kSlopesSection);
+  scene.positions = at(kPositionsSection);
+  scene.constant_terms = at(kConstantTermsSection);
+  scene.linear_terms = at(kLinearTermsSection);
   std::copy_n(head.networks_sha256, scene.networks_sha256.size(), scene.networks_sha256.begin());
   scene.owner = arrays;
   return scene;

@@ -5,9 +5,9 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
-#include "scene/format/scene_layout.h"
 
 namespace maq {
 namespace {
@@ -62,19 +62,19 @@ void write_scene_file(const Scene& scene, const std::string& path) {
   std::copy_n(scene.up.begin(), 3, head.up);
   std::copy_n(scene.background.begin(), 3, head.background);
   head.points = scene.points;
-  head.varying = scene.varying;
+  head.view_dependent = scene.view_dependent;
   head.blocks = scene.block_count;
-  head.place_kind = uint8_t(scene.place_kind);
-  head.coefficient_kind = uint8_t(scene.coefficient_kind);
+  head.position_format = uint8_t(scene.position_format);
+  head.coefficient_format = uint8_t(scene.coefficient_format);
   std::copy_n(scene.networks_sha256.begin(), sizeof head.networks_sha256, head.networks_sha256);
 
   AtomicFile file(path);
   file.append(&head, sizeof head);  // is written again when its checks are known
   SectionWriter sections(file, head);
   sections.write(kBlocksSection, scene.blocks, blocks_bytes(scene));
-  sections.write(kPlacesSection, scene.places, places_bytes(scene));
-  sections.write(kMeansSection, scene.means, means_bytes(scene));
-  sections.write(kSlopesSection, scene.slopes, slopes_bytes(scene));
+  sections.write(kPositionsSection, scene.positions, positions_bytes(scene));
+  sections.write(kConstantTermsSection, scene.constant_terms, constant_terms_bytes(scene));
+  sections.write(kLinearTermsSection, scene.linear_terms, linear_terms_bytes(scene));
   head.file_bytes = file.size_bytes();
   constexpr size_t kChecked = offsetof(SceneFileHead, file_bytes);
   head.head_check = XXH3_64bits(&head.file_bytes, sizeof head - kChecked);

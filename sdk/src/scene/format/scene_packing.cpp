@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "scene/format/block_encoding.h"
+#include "scene/format/block_codec.h"
 #include "scene/format/descriptor_outliers.h"
+#include "scene/format/scene.h"
 #include "scene/format/scene_blocks.h"
-#include "scene/format/scene_layout.h"
 #include "scene/point_cloud.h"
 
 namespace maq {
@@ -23,19 +23,19 @@ Bytes zeros(size_t bytes) { return Bytes((bytes + sizeof(CacheLine) - 1) / sizeo
 
 struct OwnedArrays {
   std::vector<SceneBlock> blocks;
-  Bytes places, means, slopes;
+  Bytes positions, constant_terms, linear_terms;
 };
 
-bool is_sound(float value) { return std::abs(value) <= kLargestInScene; }  // false for NaN
+bool is_sound(float value) { return std::abs(value) <= kMaxMagnitude; }  // false for NaN
 
-void check(const ModelledPoints& points) {
+void check(const FittedPoints& points) {
   const size_t count = points.count();
   if (count == 0) throw Error(MAQ_ERROR_INVALID_ARGUMENT, "There is no point to make a scene of: no photo saw any.");
-  if (count > kMostPoints) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, count, " points are too many: a scene has at most ", kMostPoints, ".");
+  if (count > kMaxPoints) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, count, " points are too many: a scene has at most ", kMaxPoints, ".");
   }
-  if (points.y.size() != count || points.z.size() != count || points.means.size() != count * kFeatures ||
-      points.slopes.size() != count * kSlopes || points.variations.size() != count) {
+  if (points.y.size() != count || points.z.size() != count || points.constant_terms.size() != count * kFeatures ||
+      points.linear_terms.size() != count * kLinearTerms || points.view_dependence.size() != count) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "There are ", count, " points, but their lists are not of that length.");
   }
   for (const auto& vector : {points.origin, points.up}) {
@@ -53,84 +53,98 @@ void check(const ModelledPoints& points) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Point ", i, " is at (", points.x[i], ", ", points.y[i], ", ",
                   points.z[i], "): not finite, or too far away.");
     }
-    const float* mean = &points.means[i * kFeatures];
-    const float* slope = &points.slopes[i * kSlopes];
-    if (!std::all_of(mean, mean + kFeatures, is_sound) || !std::all_of(slope, slope + kSlopes, is_sound) ||
-        std::isnan(points.variations[i])) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The look of point ", i,
+    const float* constant = &points.constant_terms[i * kFeatures];
+    const float* linear = &points.linear_terms[i * kLinearTerms];
+    if (!std::all_of(constant, constant + kFeatures, is_sound) ||
+        !std::all_of(linear, linear + kLinearTerms, is_sound) || std::isnan(points.view_dependence[i])) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The descriptor of point ", i,
                   " is not finite or too large; the networks may be damaged.");
     }
   }
 }
 
-// Of the variation, where both limits are kept.
-float least_variation(const ModelledPoints& points, const ScenePacking& packing) {
-  if (!(packing.most_varying >= 0 && packing.most_varying <= 1)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The share of points that may vary is ", packing.most_varying,
-                ", but must be 0 to 1.");
+// The threshold of view-dependence that keeps both limits.
+float threshold_of(const FittedPoints& points, const ScenePacking& packing) {
+  if (!(packing.max_view_dependent_fraction >= 0 && packing.max_view_dependent_fraction <= 1)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The fraction of view-dependent points is ",
+                packing.max_view_dependent_fraction, ", but must be 0 to 1.");
   }
-  const auto kept = size_t(double(packing.most_varying) * double(points.count()));
-  if (kept == points.count()) return packing.least_variation;
-  std::vector<float> variations = points.variations;
-  const auto last_left_out = variations.end() - std::ptrdiff_t(kept) - 1;
-  std::nth_element(variations.begin(), last_left_out, variations.end());
-  return std::max(packing.least_variation, std::nextafter(*last_left_out, HUGE_VALF));
+  const auto kept = size_t(double(packing.max_view_dependent_fraction) * double(points.count()));
+  if (kept == points.count()) return packing.min_view_dependence;
+  std::vector<float> view_dependence = points.view_dependence;
+  const auto last_left_out = view_dependence.end() - std::ptrdiff_t(kept) - 1;
+  std::nth_element(view_dependence.begin(), last_left_out, view_dependence.end());
+  return std::max(packing.min_view_dependence, std::nextafter(*last_left_out, HUGE_VALF));
 }
 
 }  // namespace
 
-PointOrder order_points(const ModelledPoints& points, const ScenePacking& packing) {
+ScenePacking packing_of(CoefficientFormat coefficients, std::optional<float> min_view_dependence) {
+  ScenePacking packing;
+  packing.coefficients = coefficients;
+  if (coefficients == CoefficientFormat::kFloat32) packing.positions = PositionFormat::kFloat32;
+  if (min_view_dependence) {
+    packing.min_view_dependence = *min_view_dependence;
+  } else if (coefficients == CoefficientFormat::kInt8) {
+    // At most 40 bytes a point, also where every point is view-dependent.
+    packing.max_view_dependent_fraction = 0.5f;
+  }
+  return packing;
+}
+
+PointOrder order_points(const FittedPoints& points, const ScenePacking& packing) {
   check(points);
-  const float least = least_variation(points, packing);
-  const PointPlaces places = {points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin};
+  const float threshold = threshold_of(points, packing);
+  const PointPositions positions = {points.x.data(), points.y.data(), points.z.data(), points.count(), points.origin};
   // Without steps one group will do.
-  const bool has_steps = packing.coefficients != Coefficients::kFloat32;
-  BlockOrder cut;
-  for (const auto& group : set_wild_apart(points, least, has_steps)) {
-    cut_into_blocks(places, group, SceneBlock::kMostPoints, cut);
+  const bool has_steps = packing.coefficients != CoefficientFormat::kFloat32;
+  BlockOrder split;
+  for (const auto& group : separate_outliers(points, threshold, has_steps)) {
+    split_into_blocks(positions, group, SceneBlock::kMaxPoints, split);
   }
   PointOrder order;
-  order.blocks.reserve(cut.ends.size());
-  auto begin = cut.order.begin();
-  for (const uint32_t last : cut.ends) {
-    const auto end = cut.order.begin() + last;
-    const auto constant = std::stable_partition(begin, end, [&](uint32_t i) { return look_varies(points, i, least); });
+  order.blocks.reserve(split.ends.size());
+  auto begin = split.order.begin();
+  for (const uint32_t last : split.ends) {
+    const auto end = split.order.begin() + last;
+    const auto constant =
+        std::stable_partition(begin, end, [&](uint32_t i) { return is_view_dependent(points, i, threshold); });
     order.blocks.push_back({uint32_t(end - begin), uint32_t(constant - begin)});
     begin = end;
   }
-  order.points = std::move(cut.order);
+  order.points = std::move(split.order);
   return order;
 }
 
-Scene make_scene(const ModelledPoints& points, const ScenePacking& packing) {
+Scene make_scene(const FittedPoints& points, const ScenePacking& packing) {
   const PointOrder order = order_points(points, packing);
   const auto owned = std::make_shared<OwnedArrays>();
   Scene scene;
   scene.origin = points.origin;
   scene.up = points.up;
   scene.background = points.background;
-  scene.place_kind = packing.places;
-  scene.coefficient_kind = packing.coefficients;
+  scene.position_format = packing.positions;
+  scene.coefficient_format = packing.coefficients;
   owned->blocks.resize(order.blocks.size());
   for (size_t b = 0; b < order.blocks.size(); ++b) {
     SceneBlock& block = owned->blocks[b];
     block.first = scene.points;
     block.count = order.blocks[b].count;
-    block.varying = order.blocks[b].varying;
-    block.first_varying = scene.varying;
+    block.view_dependent = order.blocks[b].view_dependent;
+    block.first_view_dependent = scene.view_dependent;
     scene.points += block.count;
-    scene.varying += block.varying;
+    scene.view_dependent += block.view_dependent;
   }
   scene.block_count = uint32_t(owned->blocks.size());
   scene.blocks = owned->blocks.data();
-  owned->places = zeros(places_bytes(scene));
-  owned->means = zeros(means_bytes(scene));
-  owned->slopes = zeros(slopes_bytes(scene));
-  scene.places = owned->places.data();
-  scene.means = owned->means.data();
-  scene.slopes = owned->slopes.data();
-  const SceneArrays arrays = {packing.places, packing.coefficients, owned->places.data(), owned->means.data(),
-                              owned->slopes.data()};
+  owned->positions = zeros(positions_bytes(scene));
+  owned->constant_terms = zeros(constant_terms_bytes(scene));
+  owned->linear_terms = zeros(linear_terms_bytes(scene));
+  scene.positions = owned->positions.data();
+  scene.constant_terms = owned->constant_terms.data();
+  scene.linear_terms = owned->linear_terms.data();
+  const SceneArrays arrays = {packing.positions, packing.coefficients, owned->positions.data(),
+                              owned->constant_terms.data(), owned->linear_terms.data()};
   for (SceneBlock& block : owned->blocks) encode_block(points, &order.points[block.first], block, arrays);
   scene.owner = owned;
   return scene;

@@ -12,7 +12,7 @@ namespace {
 constexpr size_t kRefinersKept = 3;
 // Of the basis: what comes out stays a float when it is squared.
 constexpr float kLargestWeight = 1000;
-constexpr int kMostLevels = 5, kFoldedPixels = 4, kColours = 3;
+constexpr int kMaxLevels = 5, kSpaceToDepthPixels = 4, kColours = 3;
 
 template <class... Parts>
 [[noreturn]] void fail(const std::string& name, const Parts&... parts) {
@@ -40,22 +40,22 @@ RefinerLayout layout_of(const Manifest& manifest) {
   const GraphSpec& spec = manifest.graphs.at("refiner");
   RefinerLayout layout;
   layout.levels = int(spec.inputs.size());
-  if (layout.levels < 1 || layout.levels > kMostLevels) {
-    fail(manifest.name, "graph refiner has ", spec.inputs.size(), " inputs, but must have 1 to ", kMostLevels);
+  if (layout.levels < 1 || layout.levels > kMaxLevels) {
+    fail(manifest.name, "graph refiner has ", spec.inputs.size(), " inputs, but must have 1 to ", kMaxLevels);
   }
   for (int level = 0; level < layout.levels; ++level) {
     const TensorSpec& raster = spec.inputs[size_t(level)];
     const int64_t channels = channels_of(raster);
-    if (level == 0) layout.is_folded = channels == kFoldedPixels * SceneNetworks::kRasterChannels;
+    if (level == 0) layout.is_space_to_depth = channels == kSpaceToDepthPixels * SceneNetworks::kRasterChannels;
     const bool is_right =
-        channels == SceneNetworks::kRasterChannels * (level == 0 && layout.is_folded ? kFoldedPixels : 1);
+        channels == SceneNetworks::kRasterChannels * (level == 0 && layout.is_space_to_depth ? kSpaceToDepthPixels : 1);
     if (raster.name != "raster" + std::to_string(level) || !is_right) {
       fail(manifest.name, "input ", level, " of graph refiner is ", raster.name, " with ", channels,
            " channels, but must be raster", level, " with ", SceneNetworks::kRasterChannels,
-           " (four times as many for a folded raster0)");
+           " (four times as many for a space-to-depth raster0)");
     }
   }
-  const int64_t wanted = kColours * (layout.is_folded ? kFoldedPixels : 1);
+  const int64_t wanted = kColours * (layout.is_space_to_depth ? kSpaceToDepthPixels : 1);
   if (spec.outputs.size() != 1 || spec.outputs[0].name != "rgb" || channels_of(spec.outputs[0]) != wanted) {
     fail(manifest.name, "graph refiner must have one output, rgb with ", wanted, " channels");
   }
@@ -103,23 +103,23 @@ void check_size(int width_px, int height_px, int multiple, const char* what) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, what, " is ", width_px, " x ", height_px,
                 " pixels, but its sides must be multiples of ", multiple, ".");
   }
-  if (int64_t(width_px) * height_px > SceneNetworks::kMostPixels) {
+  if (int64_t(width_px) * height_px > SceneNetworks::kMaxPixels) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, what, " is ", width_px, " x ", height_px, " pixels, over the limit of ",
-                SceneNetworks::kMostPixels, " for the networks; use a smaller one.");
+                SceneNetworks::kMaxPixels, " for the networks; use a smaller one.");
   }
 }
 
 }  // namespace
 
 Shape RefinerLayout::raster_shape(int level, int width_px, int height_px) const {
-  if (level == 0 && is_folded) {
-    return {1, height_px / 2, width_px / 2, kFoldedPixels * SceneNetworks::kRasterChannels};
+  if (level == 0 && is_space_to_depth) {
+    return {1, height_px / 2, width_px / 2, kSpaceToDepthPixels * SceneNetworks::kRasterChannels};
   }
   return {1, height_px >> level, width_px >> level, SceneNetworks::kRasterChannels};
 }
 
 Shape RefinerLayout::picture_shape(int width_px, int height_px) const {
-  if (is_folded) return {1, height_px / 2, width_px / 2, kFoldedPixels * kColours};
+  if (is_space_to_depth) return {1, height_px / 2, width_px / 2, kSpaceToDepthPixels * kColours};
   return {1, height_px, width_px, kColours};
 }
 

@@ -1,5 +1,5 @@
-// The three networks of scenes, from a bundle (docs/formats.md): what photos are turned into features with, how looks depend
-// on the side, and what makes pictures of rasters.
+// The three networks of scenes, from a bundle (docs/formats.md): the extractor makes features of photos, the view basis
+// says how descriptors depend on the viewing direction, the refiner makes images of descriptor rasters.
 #pragma once
 
 #include <array>
@@ -17,9 +17,9 @@ namespace maq {
 // How the refiner wants its rasters and gives its picture; channels are last everywhere.
 struct RefinerLayout {
   int levels = 0;  // it reads the rasters at 1, 1/2, …, 1 / 2^(levels - 1) of the size
-  // Four pixels of the finest raster, and of the picture, are one: (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2, all channels
-  // of one before those of the next.
-  bool is_folded = false;
+  // The finest raster and the image are space-to-depth (pixel unshuffle): pixels (0, 0), (0, 1), (1, 0), (1, 1) of each
+  // 2x2 are one, all channels of one before those of the next.
+  bool is_space_to_depth = false;
 
   // Of what a picture of that size (sides multiples of kMultiple) is made of, and of the picture.
   Shape raster_shape(int level, int width_px, int height_px) const;
@@ -32,11 +32,11 @@ class SceneNetworks {
   static constexpr int kPictureMultiple = 16;  // of the sides of pictures that are rendered
   static constexpr int kRasterChannels = kFeatures + 1;
   // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
-  static constexpr int64_t kMostPixels = int64_t(1) << 23;
+  static constexpr int64_t kMaxPixels = int64_t(1) << 23;
 
   // Networks are made when they are needed first, the refiner for each size that it is needed for. Throws
-  // MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in the
-  // manifest are not those of the format.
+  // MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE where a graph's inputs or outputs in
+  // the manifest are not those of the format.
   SceneNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const SessionSettings& settings);
   SceneNetworks(const SceneNetworks&) = delete;
   SceneNetworks& operator=(const SceneNetworks&) = delete;
@@ -50,14 +50,14 @@ class SceneNetworks {
   // Throws what extract() throws for a photo of that size.
   static void check_photo_size(int width_px, int height_px);
 
-  // Features [height][width][kFeatures] of a photo [height][width][3], RGB in 0..1, sides multiples of kPhotoMultiple. They
-  // stay until the next photo. Not for two threads at once. Throws MAQ_ERROR_INVALID_ARGUMENT for other sides,
+  // Features [height][width][kFeatures] of a photo [height][width][3], RGB in 0..1, sides multiples of kPhotoMultiple.
+  // They stay until the next photo. Not for two threads at once. Throws MAQ_ERROR_INVALID_ARGUMENT for other sides,
   // MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says, MAQ_ERROR_INFERENCE.
   const float* extract(const float* photo, int width_px, int height_px);
 
-  // The picture, not clamped, of rasters of kRasterChannels (features, then 1 where there is a point): as many and in the
-  // layout as refiner_layout() says, the finest first. It stays until the next. Sides are multiples of kPictureMultiple. Not
-  // for two threads at once; beside extract() is fine. Throws as extract() does.
+  // The picture, not clamped, of rasters of kRasterChannels (features, then 1 where there is a point): as many and in
+  // the layout as refiner_layout() says, the finest first. It stays until the next. Sides are multiples of
+  // kPictureMultiple. Not for two threads at once; beside extract() is fine. Throws as extract() does.
   const float* refine(const std::vector<const float*>& rasters, int width_px, int height_px);
 
   // Gives the extractor's memory back; it is made again when it is needed.
@@ -70,7 +70,7 @@ class SceneNetworks {
   std::array<uint8_t, 32> sha256_{};
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   SessionSettings settings_;
-  // With open sizes: photos turned upright are of many, and a session for each takes longer to make than it saves.
+  // With open sizes: gravity-aligned photos are of many, and a session for each takes longer to make than it saves.
   std::unique_ptr<Session> extractor_;
   SizedSessions refiner_;
   std::vector<TensorView> inputs_;

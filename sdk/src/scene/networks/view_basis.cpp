@@ -19,7 +19,7 @@ inline void sine_and_cosine(float x, float& sine, float& cosine) {
 }
 
 // A block of one layer: `in` [inputs][kBlock] to `out` [outputs][kBlock]. Returns what follows the layer's weights.
-template <int inputs, int outputs, bool bends>
+template <int inputs, int outputs, bool is_activated>
 inline const float* layer(const float* weights, const float* in, float* out) {
   const float* bias = weights + inputs * outputs;
   for (int o = 0; o < outputs; ++o) {
@@ -30,7 +30,7 @@ inline const float* layer(const float* weights, const float* in, float* out) {
       const float* from = in + size_t(k) * kBlock;
       for (size_t i = 0; i < kBlock; ++i) to[i] += weight * from[i];
     }
-    if (bends) {
+    if (is_activated) {
       for (size_t i = 0; i < kBlock; ++i) to[i] = std::max(to[i], kSlope * to[i]);
     }
   }

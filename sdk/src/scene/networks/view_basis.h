@@ -1,11 +1,11 @@
-// The functions of the viewing direction that looks are combinations of (NPBG++, arXiv 2203.13318, section 3.3): a small
-// network that all points of all scenes share.
+// The functions of the viewing direction that descriptors are linear in (NPBG++, arXiv 2203.13318, section 3.3): a
+// small network that all points of all scenes share.
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
-#include "scene/build/descriptor_regression.h"
+#include "scene/descriptor.h"
 
 namespace maq {
 

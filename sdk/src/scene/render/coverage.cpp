@@ -7,11 +7,11 @@
 namespace maq {
 namespace {
 
-constexpr int kCoarsest = LookRaster::kLevels - 1;
-constexpr uint8_t kSureness[LookRaster::kLevels] = {255, 255, 255, 128, 64};
+constexpr int kCoarsest = DescriptorRaster::kLevels - 1;
+constexpr uint8_t kConfidence[DescriptorRaster::kLevels] = {255, 255, 255, 128, 64};
 
-// One row of a level, `width` pixels, from the next coarser one's rows: that which it is in and the other nearest one.
-MAQ_SIMD_CLONES void alpha_row(const DepthKey* __restrict keys, size_t width, uint8_t sureness,
+// One row of a level, `width` pixels, from the next coarser one's rows: that which it is in and the nearest beside it.
+MAQ_SIMD_CLONES void alpha_row(const DepthKey* __restrict keys, size_t width, uint8_t confidence,
                                const uint8_t* __restrict in, const uint8_t* __restrict beside,
                                uint16_t* __restrict blended, uint8_t* __restrict alphas) {
   const size_t half = width / 2;
@@ -22,8 +22,8 @@ MAQ_SIMD_CLONES void alpha_row(const DepthKey* __restrict keys, size_t width, ui
   for (size_t i = 0; i < half; ++i) {
     const int left = (3 * blended[i + 1] + blended[i] + 8) >> 4;
     const int right = (3 * blended[i + 1] + blended[i + 2] + 8) >> 4;
-    alphas[2 * i] = uint8_t(std::max(left, keys[2 * i] == kNoPointKey ? 0 : int(sureness)));
-    alphas[2 * i + 1] = uint8_t(std::max(right, keys[2 * i + 1] == kNoPointKey ? 0 : int(sureness)));
+    alphas[2 * i] = uint8_t(std::max(left, keys[2 * i] == kNoPointKey ? 0 : int(confidence)));
+    alphas[2 * i + 1] = uint8_t(std::max(right, keys[2 * i + 1] == kNoPointKey ? 0 : int(confidence)));
   }
 }
 
@@ -34,7 +34,7 @@ MAQ_SIMD_CLONES void depth_row(const DepthKey* __restrict keys, size_t width, co
 
 }  // namespace
 
-void PictureCover::find(const LookRaster& raster, int width_px, int height_px, WorkerThreads& threads) {
+void Coverage::find(const DescriptorRaster& raster, int width_px, int height_px, WorkerThreads& threads) {
   rows_.resize(size_t(threads.count()));
   for (std::vector<uint16_t>& row : rows_) row.resize(size_t(width_px / 2) + 2);
   for (int level = kCoarsest; level >= 0; --level) {
@@ -46,7 +46,7 @@ void PictureCover::find(const LookRaster& raster, int width_px, int height_px, W
     depths.resize(width * height);
     if (level == kCoarsest) {
       for (size_t i = 0; i < alphas.size(); ++i) {
-        alphas[i] = keys[i] == kNoPointKey ? 0 : kSureness[level];
+        alphas[i] = keys[i] == kNoPointKey ? 0 : kConfidence[level];
         depths[i] = keys[i] == kNoPointKey ? 0 : depth_of(keys[i]);
       }
       continue;
@@ -58,7 +58,7 @@ void PictureCover::find(const LookRaster& raster, int width_px, int height_px, W
       for (size_t y = strip * kRowsAtOnce; y < std::min(height, (strip + 1) * kRowsAtOnce); ++y) {
         const size_t in = y / 2, last = height / 2 - 1;
         const size_t beside = y % 2 == 0 ? (in == 0 ? 0 : in - 1) : std::min(in + 1, last);
-        alpha_row(keys + y * width, width, kSureness[level], coarser + in * half, coarser + beside * half,
+        alpha_row(keys + y * width, width, kConfidence[level], coarser + in * half, coarser + beside * half,
                   rows_[size_t(worker)].data(), alphas.data() + y * width);
         depth_row(keys + y * width, width, depths_[level + 1].data() + in * half, depths.data() + y * width);
       }

@@ -1,5 +1,5 @@
-// Which of a rendered picture's pixels are covered by points, and how far away what they show is: both from the nearest
-// points at five scales, since a surface seen from near has holes between its points.
+// Coverage of a rendered image's pixels by points, and their depth: both from the nearest points at five scales, since
+// a surface seen from near has holes between its points.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +10,21 @@
 
 namespace maq {
 
-class PictureCover {
+class Coverage {
  public:
   // Of the raster's window, which has that size.
-  void find(const LookRaster& raster, int width_px, int height_px, WorkerThreads& threads);
+  void find(const DescriptorRaster& raster, int width_px, int height_px, WorkerThreads& threads);
 
-  // How sure it is that a pixel shows the scene, 0..255, row by row: 255 where there is a point in the 4x4 pixels (2x2, 1)
-  // that it is in, half of it in the 8x8, a quarter in the 16x16; from each scale to the next finer one bilinearly, so that
-  // it has no steps, and the most of all scales counts.
+  // Confidence that a pixel shows the scene, 0..255, row by row: 255 where there is a point in the 4x4 pixels (2x2, 1)
+  // that it is in, half of it in the 8x8, a quarter in the 16x16; from each scale to the next finer one bilinearly, so
+  // that it has no steps, and the maximum of all scales counts.
   const uint8_t* alphas() const { return alphas_[0].data(); }
   // Depth of the nearest point at the finest scale that has one there, along the optical axis; 0 where there is none.
   const float* depths() const { return depths_[0].data(); }
 
  private:
-  std::vector<uint8_t> alphas_[LookRaster::kLevels];
-  std::vector<float> depths_[LookRaster::kLevels];
+  std::vector<uint8_t> alphas_[DescriptorRaster::kLevels];
+  std::vector<float> depths_[DescriptorRaster::kLevels];
   std::vector<std::vector<uint16_t>> rows_;  // one for each worker
 };
 

@@ -9,14 +9,8 @@
 namespace maq {
 namespace {
 
-constexpr size_t kSlopes = size_t(kBasis) * kFeatures;
-
-size_t bytes_of(Coefficients kind) {
-  return kind == Coefficients::kFloat32 ? sizeof(float) : kind == Coefficients::kInt16 ? sizeof(int16_t) : 1;
-}
-
 // From the first to the last byte, at most a cache line between two requests.
-inline void fetch_bytes(const char* from, size_t bytes) {
+inline void prefetch_bytes(const char* from, size_t bytes) {
   constexpr size_t kCacheLine = 64;
   for (size_t offset = 0; offset < bytes; offset += kCacheLine) __builtin_prefetch(from + offset);
   __builtin_prefetch(from + bytes - 1);
@@ -26,32 +20,33 @@ template <class Stored>
 inline void decode_all(const Scene& scene, const PointToShade* points, size_t count, const float* basis) {
   for (size_t i = 0; i < count; ++i) {
     const SceneBlock& block = scene.blocks[points[i].block];
-    const Stored* mean = static_cast<const Stored*>(scene.means) + (block.first + points[i].point) * size_t(kFeatures);
-    float look[kFeatures];
+    const Stored* constant =
+        static_cast<const Stored*>(scene.constant_terms) + (block.first + points[i].point) * size_t(kFeatures);
+    float descriptor[kFeatures];
     for (int c = 0; c < kFeatures; ++c) {
       if constexpr (std::is_same_v<Stored, float>) {
-        look[c] = mean[c];
+        descriptor[c] = constant[c];
       } else {
-        look[c] = block.mean_middle[c] + float(mean[c]) * block.mean_step[c];
+        descriptor[c] = block.constant_middle[c] + float(constant[c]) * block.constant_step[c];
       }
     }
     if (basis != nullptr) {
-      const Stored* slope =
-          static_cast<const Stored*>(scene.slopes) + (block.first_varying + points[i].point) * kSlopes;
+      const Stored* linear = static_cast<const Stored*>(scene.linear_terms) +
+                             (block.first_view_dependent + points[i].point) * kLinearTerms;
       for (size_t k = 0; k < size_t(kBasis); ++k) {
         const float h = basis[k * count + i];
         for (size_t c = 0; c < size_t(kFeatures); ++c) {
           const size_t at = k * kFeatures + c;
           if constexpr (std::is_same_v<Stored, float>) {
-            look[c] += h * slope[at];
+            descriptor[c] += h * linear[at];
           } else {
-            look[c] += h * (float(slope[at]) * block.slope_step[at]);
+            descriptor[c] += h * (float(linear[at]) * block.linear_step[at]);
           }
         }
       }
     }
     float* to = points[i].to;
-    for (int c = 0; c < kFeatures; ++c) to[c] = look[c];
+    for (int c = 0; c < kFeatures; ++c) to[c] = descriptor[c];
     to[kFeatures] = 1;
   }
 }
@@ -90,27 +85,28 @@ void find_offsets(const Scene& scene, const std::array<double, 3>& centre, const
 
 }  // namespace
 
-void fetch(const Scene& scene, const PointToShade* points, size_t count, bool with_slopes) {
-  const size_t place = scene.place_kind == Places::kFloat32 ? sizeof(float) : sizeof(uint16_t);
-  const size_t coefficient = bytes_of(scene.coefficient_kind);
-  const char* const places = static_cast<const char*>(scene.places);
-  const char* const means = static_cast<const char*>(scene.means);
-  const char* const slopes = static_cast<const char*>(scene.slopes);
+void prefetch(const Scene& scene, const PointToShade* points, size_t count, bool with_linear_terms) {
+  const size_t coordinate = size_bytes_of(scene.position_format);
+  const size_t coefficient = size_bytes_of(scene.coefficient_format);
+  const char* const positions = static_cast<const char*>(scene.positions);
+  const char* const constant_terms = static_cast<const char*>(scene.constant_terms);
+  const char* const linear_terms = static_cast<const char*>(scene.linear_terms);
   for (size_t i = 0; i < count; ++i) {
     const SceneBlock& block = scene.blocks[points[i].block];
     const size_t point = block.first + points[i].point;
-    fetch_bytes(means + point * kFeatures * coefficient, kFeatures * coefficient);
-    if (!with_slopes) continue;
+    prefetch_bytes(constant_terms + point * kFeatures * coefficient, kFeatures * coefficient);
+    if (!with_linear_terms) continue;
     for (size_t axis = 0; axis < 3; ++axis) {
-      __builtin_prefetch(places + (3 * size_t(block.first) + axis * block.count + points[i].point) * place);
+      __builtin_prefetch(positions + (3 * size_t(block.first) + axis * block.count + points[i].point) * coordinate);
     }
-    fetch_bytes(slopes + (block.first_varying + points[i].point) * kSlopes * coefficient, kSlopes * coefficient);
+    prefetch_bytes(linear_terms + (block.first_view_dependent + points[i].point) * kLinearTerms * coefficient,
+                   kLinearTerms * coefficient);
   }
 }
 
 void find_directions(const Scene& scene, const std::array<double, 3>& camera_centre, const PointToShade* points,
                      size_t count, float* x, float* y, float* z) {
-  if (scene.place_kind == Places::kFloat32) {
+  if (scene.position_format == PositionFormat::kFloat32) {
     find_offsets<float>(scene, camera_centre, points, count, x, y, z);
   } else {
     find_offsets<uint16_t>(scene, camera_centre, points, count, x, y, z);
@@ -118,11 +114,11 @@ void find_directions(const Scene& scene, const std::array<double, 3>& camera_cen
   make_unit(x, y, z, count);
 }
 
-void decode_looks(const Scene& scene, const PointToShade* points, size_t count, const float* basis) {
-  switch (scene.coefficient_kind) {
-    case Coefficients::kFloat32: return decode_floats(scene, points, count, basis);
-    case Coefficients::kInt16: return decode_int16(scene, points, count, basis);
-    case Coefficients::kInt8: return decode_int8(scene, points, count, basis);
+void decode_descriptors(const Scene& scene, const PointToShade* points, size_t count, const float* basis) {
+  switch (scene.coefficient_format) {
+    case CoefficientFormat::kFloat32: return decode_floats(scene, points, count, basis);
+    case CoefficientFormat::kInt16: return decode_int16(scene, points, count, basis);
+    case CoefficientFormat::kInt8: return decode_int8(scene, points, count, basis);
   }
 }
 

@@ -7,14 +7,15 @@
 namespace maq {
 namespace {
 
-constexpr int kMultiple = LookRaster::kMultiple;
+constexpr int kMultiple = DescriptorRaster::kMultiple;
 
 struct Part {
   int begin, size;
 };
 
 Part part_of(int begin, int size, int whole) {
-  const int first = std::max(0, begin - kRefinerReach_px), end = std::min(whole, begin + size + kRefinerReach_px);
+  const int first = std::max(0, begin - kReceptiveFieldRadius_px),
+            end = std::min(whole, begin + size + kReceptiveFieldRadius_px);
   for (int quarters = 1; quarters < 4; ++quarters) {
     const int side = round_up(whole * quarters / 4, kMultiple);
     if (side < end - first) continue;

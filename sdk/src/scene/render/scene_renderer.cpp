@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <utility>
 
 #include "core/clock.h"
 #include "core/error.h"
@@ -16,15 +15,15 @@
 namespace maq {
 namespace {
 
-constexpr int kMultiple = LookRaster::kMultiple;
-// The frames of a camera that is turned a little otherwise every time have a few sizes: of every size is a network prepared
-// anew (export/scenes/config.py has the same).
-constexpr int kTurnedMultiple = 64;
-// The scene's background shows where no point is within 16 x 16 pixels, and fades towards there: within them the picture is
-// the refiner's (export/scenes/modelling.py has the same). An app's own shows by alpha.
+constexpr int kMultiple = DescriptorRaster::kMultiple;
+// So that the frames of a camera that rolls a little have few sizes: for every size a session is prepared
+// (export/scenes/config.py has the same).
+constexpr int kRotatedMultiple = 64;
+// The scene's background shows where no point is within 16 x 16 pixels, and fades towards there: within them the image
+// is the refiner's (export/scenes/modelling.py has the same). An app's own is blended by alpha.
 constexpr int kOwnBackgroundGain = 4;
 
-void check_figures(const PinholeCamera& camera) {
+void check_render_camera(const PinholeCamera& camera) {
   check_camera(camera, "The camera");
   constexpr double kFarthest_px = 1e6, kLargestRatio = 1e3;
   if (std::max(std::abs(camera.cx_px), std::abs(camera.cy_px)) > kFarthest_px) {
@@ -39,24 +38,24 @@ void check_figures(const PinholeCamera& camera) {
 }
 
 // Whether a corner of the picture moves by as much as interpolation, of 1/32 pixel, can show.
-bool is_turn(const PixelMap& map, const PinholeCamera& camera) {
-  constexpr double kLeast_px = 1.0 / 64;
+bool is_visible_rotation(const PixelMap& map, const PinholeCamera& camera) {
+  constexpr double kMinMove_px = 1.0 / 64;
   for (const double x : {0.0, double(camera.width_px)}) {
     for (const double y : {0.0, double(camera.height_px)}) {
       const double moved_x = map[0] * x + map[1] * y + map[2] - x, moved_y = map[3] * x + map[4] * y + map[5] - y;
-      if (std::max(std::abs(moved_x), std::abs(moved_y)) > kLeast_px) return true;
+      if (std::max(std::abs(moved_x), std::abs(moved_y)) > kMinMove_px) return true;
     }
   }
   return false;
 }
 
-void set_size(RenderedPicture& picture, int width_px, int height_px) {
+void set_size(RenderedImage& image, int width_px, int height_px) {
   const size_t pixels = size_t(width_px) * size_t(height_px);
-  picture.width_px = width_px;
-  picture.height_px = height_px;
-  picture.bgr.resize(3 * pixels);
-  picture.alpha.resize(pixels);
-  picture.depth.resize(pixels);
+  image.width_px = width_px;
+  image.height_px = height_px;
+  image.bgr.resize(3 * pixels);
+  image.alpha.resize(pixels);
+  image.depth.resize(pixels);
 }
 
 // BGR of red, green, blue in 0..1.
@@ -65,10 +64,10 @@ std::array<uint8_t, 3> bytes_of(const std::array<float, 3>& colour) {
   return {byte(colour[2]), byte(colour[1]), byte(colour[0])};
 }
 
-void clear(RenderedPicture& picture, const std::array<uint8_t, 3>& background) {
-  for (size_t i = 0; i < picture.bgr.size(); i += 3) std::copy_n(background.data(), 3, picture.bgr.data() + i);
-  std::fill(picture.alpha.begin(), picture.alpha.end(), uint8_t(0));
-  std::fill(picture.depth.begin(), picture.depth.end(), 0.0f);
+void clear(RenderedImage& image, const std::array<uint8_t, 3>& background) {
+  for (size_t i = 0; i < image.bgr.size(); i += 3) std::copy_n(background.data(), 3, image.bgr.data() + i);
+  std::fill(image.alpha.begin(), image.alpha.end(), uint8_t(0));
+  std::fill(image.depth.begin(), image.depth.end(), 0.0f);
 }
 
 }  // namespace
@@ -77,12 +76,8 @@ SceneRenderer::SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> network
     : scene_(std::move(scene)),
       networks_(std::move(networks)),
       options_(options),
-      threads_(std::clamp(options.threads, 1, kMaxThreads)),
+      threads_(options.threads),
       blocks_(scene_) {
-  if (options.threads < 1 || options.threads > kMaxThreads) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A scene is rendered by 1 to ", kMaxThreads, " threads, not by ",
-                options.threads, ".");
-  }
   if (!std::isfinite(options.near)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The depth of the nearest point that is seen must be a finite number.");
   }
@@ -114,7 +109,7 @@ RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
   threads_.run(occupied_.size(), [&](size_t strip, int) {
     const int top = int(strip) * kMultiple;
     buffer_.finish(top, top + kMultiple);
-    buffer_.hide(top, top + kMultiple, kHidingShare);
+    buffer_.remove_occluded(top, top + kMultiple, kDepthTolerance);
     int first = cells, last = -1;
     for (int y = top; y < top + kMultiple; ++y) {
       const DepthKey* const row = buffer_.keys() + size_t(y) * size_t(frame.width_px);
@@ -146,85 +141,100 @@ RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
   return all;
 }
 
-void SceneRenderer::render(const PinholeCamera& camera, RenderedPicture& picture) {
-  check_figures(camera);
-  Stopwatch whole, watch;
+SceneRenderer::Frame SceneRenderer::frame_of(const PinholeCamera& camera) const {
+  Frame frame;
+  frame.camera = gravity_aligned_frame(camera, scene_.up, kRotatedMultiple);
+  frame.to_frame = pixel_map_between(camera, frame.camera);
+  frame.is_rotated = is_visible_rotation(frame.to_frame, camera);
+  if (!frame.is_rotated) {
+    frame.camera = camera;
+    frame.camera.width_px = round_up(camera.width_px, kMultiple);
+    frame.camera.height_px = round_up(camera.height_px, kMultiple);
+  }
+  if (int64_t(frame.camera.width_px) * frame.camera.height_px > SceneNetworks::kMaxPixels) {
+    throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of ", camera.width_px, " x ", camera.height_px,
+                " pixels is rendered in a frame of ", frame.camera.width_px, " x ", frame.camera.height_px,
+                ", over the limit of ", SceneNetworks::kMaxPixels, " pixels; use a smaller one.");
+  }
+  return frame;
+}
+
+void SceneRenderer::refine(const PinholeCamera& frame, const RasterWindow& occupied,
+                           const std::array<uint8_t, 3>& background, RenderedImage& image, RenderCounts& counts) {
+  Stopwatch watch;
+  const RasterWindow window = options_.skips_empty_parts ? window_to_refine(occupied, frame.width_px, frame.height_px)
+                                                         : RasterWindow{0, 0, frame.width_px, frame.height_px};
+  const RefinerLayout& layout = networks_->refiner_layout();
+  raster_.shade({scene_, blocks_, buffer_, frame.centre, window, networks_->basis(), layout}, threads_);
+  counts.shaded_points = raster_.shaded();
+  counts.view_dependent_points = raster_.view_dependent();
+  counts.refined_pixels = uint64_t(window.width_px) * uint64_t(window.height_px);
+  if (counts.refined_pixels < counts.frame_pixels) clear(image, background);
+  counts.reduce_ms = double(raster_.reduce_ns()) * 1e-6;
+  counts.shade_ms = watch.lap_ms() - counts.reduce_ms;
+
+  inputs_.clear();
+  for (int level = 0; level < layout.levels; ++level) inputs_.push_back(raster_.level(level));
+  const float* const refined = networks_->refine(inputs_, window.width_px, window.height_px);
+  counts.refine_ms = watch.lap_ms();
+
+  coverage_.find(raster_, window.width_px, window.height_px, threads_);
+  refined_.write(refined, layout, window, coverage_.alphas(), coverage_.depths(), background,
+                 options_.background ? 1 : kOwnBackgroundGain,
+                 {image.bgr.data(), image.alpha.data(), image.depth.data(), image.width_px, image.height_px}, threads_);
+  counts.coverage_ms = watch.lap_ms();
+}
+
+void SceneRenderer::rotate_back(RenderedImage& from, const PixelMap& to_frame, RenderedImage& image) {
+  constexpr int kRowsAtOnce = 64;
+  threads_.run(size_t((image.height_px + kRowsAtOnce - 1) / kRowsAtOnce), [&](size_t strip, int) {
+    const int top = int(strip) * kRowsAtOnce, bottom = std::min(image.height_px, top + kRowsAtOnce);
+    const auto raster = [](auto& of, auto* pixels) {
+      return Raster<std::remove_pointer_t<decltype(pixels)>>{pixels, of.width_px, of.height_px};
+    };
+    const RenderedImage& source = from;
+    turn_bytes(raster(source, source.bgr.data()), 3, to_frame, raster(image, image.bgr.data()), top, bottom);
+    turn_bytes(raster(source, source.alpha.data()), 1, to_frame, raster(image, image.alpha.data()), top, bottom);
+    turn_depths(raster(source, source.depth.data()), to_frame, raster(image, image.depth.data()), top, bottom);
+  });
+}
+
+void SceneRenderer::render(const PinholeCamera& camera, RenderedImage& image) {
+  check_render_camera(camera);
+  const Stopwatch whole;
+  Stopwatch watch;
+  const Frame frame = frame_of(camera);
   RenderCounts counts;
   counts.blocks = scene_.block_count;
-  PinholeCamera frame = upright_frame(camera, scene_.up, kMultiple);
-  const PixelMap back = pixels_between(camera, frame);
-  counts.is_turned = is_turn(back, camera);
-  if (counts.is_turned) {
-    frame = upright_frame(camera, scene_.up, kTurnedMultiple);
-  } else {
-    frame = camera;
-    frame.width_px = round_up(camera.width_px, kMultiple);
-    frame.height_px = round_up(camera.height_px, kMultiple);
-  }
-  counts.frame_pixels = uint64_t(frame.width_px) * uint64_t(frame.height_px);
-  if (counts.frame_pixels > uint64_t(SceneNetworks::kMostPixels)) {
-    throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of ", camera.width_px, " x ", camera.height_px,
-                " pixels is rendered in a frame of ", frame.width_px, " x ", frame.height_px, ", over the limit of ",
-                SceneNetworks::kMostPixels, " pixels; use a smaller one.");
-  }
+  counts.is_rotated = frame.is_rotated;
+  counts.frame_pixels = uint64_t(frame.camera.width_px) * uint64_t(frame.camera.height_px);
 
-  const std::array<uint8_t, 3> background = options_.background.value_or(bytes_of(scene_.background));
-  project(frame, counts);
-  const RasterWindow occupied = finish(frame);
+  project(frame.camera, counts);
+  const RasterWindow occupied = finish(frame.camera);
   counts.project_ms = watch.lap_ms();
 
-  RenderedPicture& upright = counts.is_turned ? upright_ : picture;
-  const PinholeCamera& shown = counts.is_turned ? frame : camera;
-  set_size(upright, shown.width_px, shown.height_px);
-  if (occupied.width_px == 0) {
-    clear(upright, background);
+  const std::array<uint8_t, 3> background = options_.background.value_or(bytes_of(scene_.background));
+  const bool is_empty = occupied.width_px == 0;
+  RenderedImage& aligned = frame.is_rotated ? aligned_image_ : image;
+  const PinholeCamera& shown = frame.is_rotated ? frame.camera : camera;
+  set_size(aligned, shown.width_px, shown.height_px);
+  if (is_empty) {
+    clear(aligned, background);
   } else {
-    const RasterWindow window = options_.skips_empty_parts ? window_to_refine(occupied, frame.width_px, frame.height_px)
-                                                           : RasterWindow{0, 0, frame.width_px, frame.height_px};
-    const RefinerLayout& layout = networks_->refiner_layout();
-    raster_.shade(scene_, blocks_, buffer_, window, frame.centre, networks_->basis(), layout, threads_);
-    counts.shaded_points = raster_.shaded();
-    counts.varying_points = raster_.varying();
-    counts.refined_pixels = uint64_t(window.width_px) * uint64_t(window.height_px);
-    if (counts.refined_pixels < counts.frame_pixels) clear(upright, background);
-    counts.reduce_ms = double(raster_.reduce_ns()) * 1e-6;
-    counts.shade_ms = watch.lap_ms() - counts.reduce_ms;
-
-    inputs_.clear();
-    for (int level = 0; level < layout.levels; ++level) inputs_.push_back(raster_.level(level));
-    const float* const refined = networks_->refine(inputs_, window.width_px, window.height_px);
-    counts.refine_ms = watch.lap_ms();
-
-    cover_.find(raster_, window.width_px, window.height_px, threads_);
-    refined_.write(
-        refined, layout, window, cover_.alphas(), cover_.depths(), background,
-        options_.background ? 1 : kOwnBackgroundGain,
-        {upright.bgr.data(), upright.alpha.data(), upright.depth.data(), upright.width_px, upright.height_px},
-        threads_);
-    counts.cover_ms = watch.lap_ms();
+    refine(frame.camera, occupied, background, aligned, counts);
   }
-
-  if (counts.is_turned) {
-    set_size(picture, camera.width_px, camera.height_px);
-    if (occupied.width_px == 0) {
-      clear(picture, background);
+  if (frame.is_rotated) {
+    watch = Stopwatch();
+    set_size(image, camera.width_px, camera.height_px);
+    if (is_empty) {
+      clear(image, background);
     } else {
-      constexpr int kRowsAtOnce = 64;
-      threads_.run(size_t((camera.height_px + kRowsAtOnce - 1) / kRowsAtOnce), [&](size_t strip, int) {
-        const int top = int(strip) * kRowsAtOnce, bottom = std::min(camera.height_px, top + kRowsAtOnce);
-        const auto raster = [](auto& of, auto* pixels) {
-          return Raster<std::remove_pointer_t<decltype(pixels)>>{pixels, of.width_px, of.height_px};
-        };
-        const RenderedPicture& from = upright;
-        turn_bytes(raster(from, from.bgr.data()), 3, back, raster(picture, picture.bgr.data()), top, bottom);
-        turn_bytes(raster(from, from.alpha.data()), 1, back, raster(picture, picture.alpha.data()), top, bottom);
-        turn_depths(raster(from, from.depth.data()), back, raster(picture, picture.depth.data()), top, bottom);
-      });
+      rotate_back(aligned, frame.to_frame, image);
     }
-    counts.turn_ms = watch.lap_ms();
+    counts.rotate_ms = watch.lap_ms();
   }
-  counts.all_ms = whole.lap_ms();
-  picture.counts = counts;
+  counts.all_ms = whole.elapsed_ms();
+  image.counts = counts;
 }
 
 }  // namespace maq

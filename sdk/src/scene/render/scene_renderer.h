@@ -1,4 +1,4 @@
-// New views of a scene (NPBG++, arXiv 2203.13318): points, rasters of their looks, the refiner's picture.
+// New views of a scene (NPBG++, arXiv 2203.13318): visible points, rasters of their descriptors, the refiner's image.
 #pragma once
 
 #include <array>
@@ -8,19 +8,20 @@
 #include <vector>
 
 #include "core/worker_threads.h"
+#include "scene/gravity_alignment.h"
 #include "scene/networks/scene_networks.h"
 #include "scene/render/coverage.h"
-#include "scene/render/refined_picture.h"
+#include "scene/render/refined_image.h"
 
 namespace maq {
 
 struct RenderOptions {
   int threads = 1;  // of everything but the refiner, whose threads are its networks'
   double near = 0;  // depth of the nearest point that is seen, in units of the scene
-  // BGR, which the picture is drawn over by its alpha. Without, what has no point near is of the scene's background
-  // colour, and the refiner's picture is left as it is elsewhere.
+  // BGR, which the image is blended over by its alpha. Without, pixels without a point near are of the scene's
+  // background colour, and the refiner's output is left as it is elsewhere.
   std::optional<std::array<uint8_t, 3>> background;
-  // Work that is left out. Neither changes a pixel with an alpha above 0.
+  // Work that is skipped. Neither changes a pixel with an alpha above 0.
   bool skips_unseen_blocks = true;
   bool skips_empty_parts = true;
 };
@@ -28,21 +29,21 @@ struct RenderOptions {
 // Work and time of one picture.
 struct RenderCounts {
   uint32_t blocks = 0;            // of the scene
-  uint32_t projected_blocks = 0;  // of those, not left out
+  uint32_t projected_blocks = 0;  // of those, not culled
   uint64_t projected_points = 0;
-  uint64_t shaded_points = 0;   // that win a pixel
-  uint64_t varying_points = 0;  // of those, whose look depends on the side
-  uint64_t frame_pixels = 0;    // of the upright frame
-  uint64_t refined_pixels = 0;  // of those, seen by the refiner
-  bool is_turned = false;
-  double project_ms = 0, shade_ms = 0, reduce_ms = 0, refine_ms = 0, cover_ms = 0, turn_ms = 0, all_ms = 0;
+  uint64_t shaded_points = 0;          // visible ones
+  uint64_t view_dependent_points = 0;  // of those
+  uint64_t frame_pixels = 0;           // of the gravity-aligned frame
+  uint64_t refined_pixels = 0;         // of those, seen by the refiner
+  bool is_rotated = false;
+  double project_ms = 0, shade_ms = 0, reduce_ms = 0, refine_ms = 0, coverage_ms = 0, rotate_ms = 0, all_ms = 0;
 };
 
-// All without padding, row by row.
-struct RenderedPicture {
+// Planes without padding, row by row.
+struct RenderedImage {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> bgr;
-  std::vector<uint8_t> alpha;  // as of PictureCover: 0 nothing near, 255 surely covered
+  std::vector<uint8_t> alpha;  // as of Coverage: 0 nothing near, 255 surely covered
   // Depth of the nearest point, along the optical axis in units of the scene; 0 where no point is near.
   std::vector<float> depth;
   RenderCounts counts;
@@ -51,19 +52,31 @@ struct RenderedPicture {
 class SceneRenderer {
  public:
   // The networks must be those that the scene was made with, in any precision. Throws MAQ_ERROR_INVALID_ARGUMENT for
-  // options that are none.
+  // options out of range.
   SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options);
 
-  // Renders upright in the smallest frame that holds the camera's picture, and turns the result back. The same picture with
-  // any number of threads. Memory of `picture` is reused. Not for two threads at once, nor while another uses the
-  // networks' refiner. Throws what check_camera() and SceneNetworks::refine() throw, and MAQ_ERROR_INVALID_ARGUMENT for a
-  // camera whose principal point is over 10^6 pixels away or whose focal lengths differ by a factor over 1000.
-  void render(const PinholeCamera& camera, RenderedPicture& picture);
+  // Renders gravity-aligned in the smallest frame that holds the camera's picture, and rotates the result back. The
+  // same image with any number of threads. Memory of `image` is reused. Not for two threads at once, nor while another
+  // uses the networks' refiner. Throws what check_camera() and SceneNetworks::refine() throw, and
+  // MAQ_ERROR_INVALID_ARGUMENT for a camera whose principal point is over 10^6 pixels away or whose focal lengths
+  // differ by a factor over 1000.
+  void render(const PinholeCamera& camera, RenderedImage& image);
 
  private:
+  // The frame to render in, and how the camera's pixels map to its.
+  struct Frame {
+    PinholeCamera camera;
+    PixelMap to_frame{};
+    bool is_rotated = false;
+  };
+  Frame frame_of(const PinholeCamera& camera) const;
   void project(const PinholeCamera& frame, RenderCounts& counts);
-  // Brings the workers' sheets together and finds the part that has points; no sides when there are none.
+  // Merges the workers' depth buffers and finds the part that has points; of size 0 when there are none.
   RasterWindow finish(const PinholeCamera& frame);
+  // Shades and refines what is in the depth buffer.
+  void refine(const PinholeCamera& frame, const RasterWindow& occupied, const std::array<uint8_t, 3>& background,
+              RenderedImage& image, RenderCounts& counts);
+  void rotate_back(RenderedImage& from, const PixelMap& to_frame, RenderedImage& image);
 
   Scene scene_;
   std::shared_ptr<SceneNetworks> networks_;
@@ -71,12 +84,12 @@ class SceneRenderer {
   WorkerThreads threads_;
   BlockIndex blocks_;
   ZBuffer buffer_;
-  LookRaster raster_;
-  PictureCover cover_;
-  RefinedPicture refined_;
+  DescriptorRaster raster_;
+  Coverage coverage_;
+  RefinedImage refined_;
   std::vector<const float*> inputs_;
   std::vector<RasterWindow> occupied_;  // one for each strip
-  RenderedPicture upright_;
+  RenderedImage aligned_image_;
 };
 
 }  // namespace maq

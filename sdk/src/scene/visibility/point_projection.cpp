@@ -8,14 +8,14 @@
 namespace maq {
 namespace {
 
-struct Figures {
+struct Parameters {
   float rotation[9];
   float cx, cy, near;
   int width, height;
 };
 
 template <class Stored>
-inline void project_all(const Figures& by, const PointSpan& span, int32_t* __restrict pixels,
+inline void project_all(const Parameters& by, const PointSpan& span, int32_t* __restrict pixels,
                         float* __restrict depths) {
   const Stored* const x = static_cast<const Stored*>(span.x);
   const Stored* const y = static_cast<const Stored*>(span.y);
@@ -35,7 +35,7 @@ inline void project_all(const Figures& by, const PointSpan& span, int32_t* __res
     const float forward = r[6] * dx + r[7] * dy + r[8] * dz;
     const float across = r[0] * dx + r[1] * dy + r[2] * dz;
     const float down = r[3] * dx + r[4] * dy + r[5] * dz;
-    // Where it is not ahead of the camera the pixel does not matter; the division must only be one.
+    // Behind the camera the pixel does not matter; the division must only not be by 0.
     const float safe = forward >= near ? forward : 1.0f;
     const float column = across / safe + cx, row = down / safe + cy;
     // Comparisons with what is not finite are false. All are made, so that there are no jumps.
@@ -49,10 +49,10 @@ inline void project_all(const Figures& by, const PointSpan& span, int32_t* __res
   }
 }
 
-MAQ_SIMD_CLONES void project_floats(const Figures& by, const PointSpan& span, int32_t* pixels, float* depths) {
+MAQ_SIMD_CLONES void project_floats(const Parameters& by, const PointSpan& span, int32_t* pixels, float* depths) {
   project_all<float>(by, span, pixels, depths);
 }
-MAQ_SIMD_CLONES void project_integers(const Figures& by, const PointSpan& span, int32_t* pixels, float* depths) {
+MAQ_SIMD_CLONES void project_integers(const Parameters& by, const PointSpan& span, int32_t* pixels, float* depths) {
   project_all<uint16_t>(by, span, pixels, depths);
 }
 
@@ -60,19 +60,19 @@ MAQ_SIMD_CLONES void project_integers(const Figures& by, const PointSpan& span, 
 
 PointSpan span_of(const Scene& scene, const SceneBlock& block, const std::array<double, 3>& camera_centre) {
   PointSpan span;
-  span.kind = scene.place_kind;
+  span.kind = scene.position_format;
   span.count = block.count;
   span.first = block.first;
-  const size_t size = scene.place_kind == Places::kFloat32 ? sizeof(float) : sizeof(uint16_t);
-  const char* const begin = static_cast<const char*>(scene.places) + 3 * size_t(block.first) * size;
+  const size_t size = size_bytes_of(scene.position_format);
+  const char* const begin = static_cast<const char*>(scene.positions) + 3 * size_t(block.first) * size;
   span.x = begin;
   span.y = begin + block.count * size;
   span.z = begin + 2 * block.count * size;
   for (size_t axis = 0; axis < 3; ++axis) {
     span.base[axis] = scene.origin[axis] - camera_centre[axis];
-    if (scene.place_kind == Places::kUint16) {
+    if (scene.position_format == PositionFormat::kUint16) {
       span.base[axis] += double(block.low[axis]);
-      span.step[axis] = double(block.place_step[axis]);
+      span.step[axis] = double(block.position_step[axis]);
     }
   }
   return span;
@@ -92,9 +92,9 @@ PointProjection::PointProjection(const PinholeCamera& camera, double near)
 }
 
 void PointProjection::project(const PointSpan& span, int32_t* pixels, float* depths) const {
-  Figures by{{}, cx_, cy_, near_, width_px_, height_px_};
+  Parameters by{{}, cx_, cy_, near_, width_px_, height_px_};
   std::copy_n(rotation_, 9, by.rotation);
-  if (span.kind == Places::kFloat32) {
+  if (span.kind == PositionFormat::kFloat32) {
     project_floats(by, span, pixels, depths);
   } else {
     project_integers(by, span, pixels, depths);

@@ -3,20 +3,20 @@
 
 #include <cstdint>
 
-#include "scene/pinhole_camera.h"
 #include "scene/format/scene.h"
+#include "scene/pinhole_camera.h"
 
 namespace maq {
 
-// Points that are neighbours in memory, as one camera sees them: a place, with the camera's centre as origin and the axes
-// of the world, is base + step * what is stored, one array for each coordinate.
+// Points that are neighbours in memory, as one camera sees them: a position, with the camera's centre as origin and the
+// axes of the world, is base + step * what is stored, one array for each coordinate.
 struct PointSpan {
-  static constexpr uint32_t kMostPoints = SceneBlock::kMostPoints;
-  Places kind = Places::kFloat32;
+  static constexpr uint32_t kMaxPoints = SceneBlock::kMaxPoints;
+  PositionFormat kind = PositionFormat::kFloat32;
   const void* x = nullptr;
   const void* y = nullptr;
   const void* z = nullptr;
-  uint32_t count = 0;  // at most kMostPoints
+  uint32_t count = 0;  // at most kMaxPoints
   uint32_t first = 0;  // index of the first point
   double base[3] = {0, 0, 0}, step[3] = {1, 1, 1};
 
@@ -35,11 +35,11 @@ PointSpan span_of(const Scene& scene, const SceneBlock& block, const std::array<
 class PointProjection {
  public:
   PointProjection() = default;
-  // Points nearer than `near` (in units of the scene, along the optical axis) are not seen.
+  // Points nearer than `near` (in units of the scene, along the optical axis) are outside.
   PointProjection(const PinholeCamera& camera, double near);
 
-  // For each point its pixel, row * width + column, or width * height where it is not seen, which what is not finite never
-  // is; and its depth along the optical axis, which is anything where it is not seen.
+  // For each point its pixel, row * width + column, or width * height where it is outside of the picture or not finite;
+  // and its depth along the optical axis, which is undefined outside of the picture.
   void project(const PointSpan& span, int32_t* pixels, float* depths) const;
 
  private:

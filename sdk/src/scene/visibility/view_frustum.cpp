@@ -12,8 +12,8 @@ constexpr double kRounding = 1e-6, kMargin_px = 1;
 
 ViewFrustum::ViewFrustum(const PinholeCamera& camera, double near) : centre_(camera.centre) {
   // For depths above 0, across / forward + cx >= -0.5 is across + (cx + 0.5) forward >= 0; so with the other edges.
-  const auto plane = [&](double across, double down, double forward, double least) {
-    Plane made{{}, {}, least};
+  const auto plane = [&](double across, double down, double forward, double min_distance) {
+    Plane made{{}, {}, min_distance};
     for (size_t i = 0; i < 3; ++i) {
       const double terms[3] = {across * camera.fx_px * camera.rotation[i], down * camera.fy_px * camera.rotation[3 + i],
                                forward * camera.rotation[6 + i]};
@@ -33,18 +33,19 @@ bool ViewFrustum::may_show(const Scene& scene, const SceneBlock& block) const {
   double middle[3], half[3];
   for (size_t i = 0; i < 3; ++i) {
     const double low = block.low[i];
-    // As far as stored places reach, whatever the bounds say.
-    const double high = scene.place_kind == Places::kUint16 ? low + 65535.0 * block.place_step[i] : block.high[i];
+    // As far as stored positions reach, whatever the bounds say.
+    const double high =
+        scene.position_format == PositionFormat::kUint16 ? low + 65535.0 * block.position_step[i] : block.high[i];
     middle[i] = scene.origin[i] - centre_[i] + (low + high) / 2;
     half[i] = (high - low) / 2;
   }
   for (const Plane& plane : planes_) {
-    double most = 0, rounding = 0;
+    double farthest = 0, rounding = 0;
     for (size_t i = 0; i < 3; ++i) {
-      most += plane.along[i] * middle[i] + std::abs(plane.along[i]) * half[i];
+      farthest += plane.along[i] * middle[i] + std::abs(plane.along[i]) * half[i];
       rounding += plane.rounding[i] * (std::abs(middle[i]) + half[i]);
     }
-    if (most < plane.least - rounding - kRounding * std::abs(plane.least)) return false;
+    if (farthest < plane.min_distance - rounding - kRounding * std::abs(plane.min_distance)) return false;
   }
   return true;
 }

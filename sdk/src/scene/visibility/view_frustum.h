@@ -1,10 +1,10 @@
-// What part of space a camera's picture shows, to leave out blocks of points that cannot be in it.
+// The view frustum of a camera, to cull blocks of points that cannot be in its picture.
 #pragma once
 
 #include <array>
 
-#include "scene/pinhole_camera.h"
 #include "scene/format/scene.h"
+#include "scene/pinhole_camera.h"
 
 namespace maq {
 
@@ -12,16 +12,16 @@ class ViewFrustum {
  public:
   ViewFrustum(const PinholeCamera& camera, double near);
 
-  // False only where no point of the block can win a pixel, with all rounding of PointProjection; true for bounds that are
-  // not finite.
+  // False only where no point of the block can be visible, with all rounding of PointProjection; true for bounds that
+  // are not finite.
   bool may_show(const Scene& scene, const SceneBlock& block) const;
 
  private:
-  // Points d from the camera's centre are in front of a plane where along . d >= least.
+  // Points d from the camera's centre are in front of a plane where along . d >= min_distance.
   struct Plane {
     double along[3];
     double rounding[3];  // what a coordinate of 1 may add by rounding
-    double least;
+    double min_distance;
   };
   std::array<double, 3> centre_;
   Plane planes_[5];

@@ -1,4 +1,4 @@
-#include "scene/build/scene_builder.h"
+#include "scene/build/descriptor_fitter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,9 +13,9 @@
 namespace maq {
 namespace {
 
-// Of the builder's memory: what is kept of each point of the cloud, and of each that was seen.
-constexpr uint64_t kBytesAPoint = sizeof(uint32_t), kBytesASeenPoint = sizeof(ViewMoments) + sizeof(uint32_t);
-// What networks make of photos is near 1; squares of these are still floats.
+// Memory of the regressions: for each point of the cloud, and for each that was seen.
+constexpr uint64_t kBytesAPoint = sizeof(uint32_t), kBytesASeenPoint = sizeof(DescriptorRegression) + sizeof(uint32_t);
+// Features are near 1; squares of these are still floats.
 constexpr float kLargestFeature = 1e15f;
 constexpr size_t kTaskSpans = 16;
 
@@ -27,8 +27,8 @@ template <class... Parts>
 void check_cloud(const PointCloud& cloud) {
   const size_t count = cloud.count();
   if (count == 0) refuse("The cloud has no points; a scene needs one at least.");
-  if (count > kMostPoints) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", count, " points, over the limit of ", kMostPoints,
+  if (count > kMaxPoints) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", count, " points, over the limit of ", kMaxPoints,
                 "; make it thinner.");
   }
   if (cloud.y.size() != count || cloud.z.size() != count) {
@@ -46,19 +46,16 @@ void check_cloud(const PointCloud& cloud) {
   }
 }
 
-const BuildOptions& checked(const std::array<double, 3>& up, const BuildOptions& options) {
+const FittingOptions& checked(const std::array<double, 3>& up, const FittingOptions& options) {
   const double length = std::hypot(up[0], up[1], up[2]);
   if (!(length > 0) || !std::isfinite(length)) {
-    refuse("Up is (", up[0], ", ", up[1], ", ", up[2], "), which is no direction.");
+    refuse("Up is (", up[0], ", ", up[1], ", ", up[2], "), which has no direction.");
   }
   if (!(options.visibility_scale >= 1.0 / 16 && options.visibility_scale <= 1)) {
     refuse("The visibility scale is ", options.visibility_scale, ", but must be 1/16 to 1.");
   }
   if (!(options.near >= 0) || !std::isfinite(options.near)) {
     refuse("The depth of the nearest point is ", options.near, ", but must be finite and not negative.");
-  }
-  if (options.threads < 1 || options.threads > kMaxThreads) {
-    refuse("Threads are ", options.threads, ", but must be 1 to ", kMaxThreads, ".");
   }
   return options;
 }
@@ -67,8 +64,8 @@ int scaled(int side_px, double scale) { return std::max(1, int(std::nearbyint(si
 
 }  // namespace
 
-SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks,
-                           const BuildOptions& options)
+DescriptorFitter::DescriptorFitter(PointCloud cloud, const std::array<double, 3>& up, SceneNetworks& networks,
+                                   const FittingOptions& options)
     : cloud_(std::move(cloud)),
       up_(up),
       networks_(networks),
@@ -77,57 +74,57 @@ SceneBuilder::SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, Sc
   check_cloud(cloud_);
   cloud_.rgb = {};
   check_memory(0);
-  moments_.begin(cloud_.count());
+  regressions_.begin(cloud_.count());
 }
 
-void SceneBuilder::check_memory(size_t new_points) const {
-  const uint64_t wanted = cloud_.count() * kBytesAPoint + (moments_.count() + new_points) * kBytesASeenPoint;
-  if (wanted <= options_.most_bytes) return;
-  throw Error(MAQ_ERROR_OUT_OF_MEMORY, "What is known of ", moments_.count() + new_points, " seen points of ",
-              cloud_.count(), " would take ", wanted >> 20, " MiB, over the limit of ", options_.most_bytes >> 20,
-              "; make the cloud thinner, or allow more.");
+void DescriptorFitter::check_memory(size_t new_points) const {
+  const uint64_t wanted = cloud_.count() * kBytesAPoint + (regressions_.count() + new_points) * kBytesASeenPoint;
+  if (wanted <= options_.max_bytes) return;
+  throw Error(MAQ_ERROR_OUT_OF_MEMORY, "Fitting ", regressions_.count() + new_points, " seen points of a cloud of ",
+              cloud_.count(), " would take ", wanted >> 20, " MiB, over the limit of ", options_.max_bytes >> 20,
+              "; make the cloud thinner, or raise the limit.");
 }
 
-size_t SceneBuilder::find_seen_points(const uint8_t* valid, const PinholeCamera& camera) {
+size_t DescriptorFitter::find_seen_points(const uint8_t* valid, const PinholeCamera& camera) {
   const PinholeCamera scaled_camera = resized(camera, scaled(camera.width_px, options_.visibility_scale),
                                               scaled(camera.height_px, options_.visibility_scale));
   visible_.begin(scaled_camera, options_.near, threads_.count());
   PointSpan whole;
   for (size_t i = 0; i < 3; ++i) whole.base[i] = cloud_.origin[i] - camera.centre[i];
-  constexpr size_t kTask = kTaskSpans * PointSpan::kMostPoints;
+  constexpr size_t kTask = kTaskSpans * PointSpan::kMaxPoints;
   threads_.run((cloud_.count() + kTask - 1) / kTask, [&](size_t task, int worker) {
     const size_t end = std::min(cloud_.count(), (task + 1) * kTask);
     PointSpan span = whole;
-    for (size_t begin = task * kTask; begin < end; begin += PointSpan::kMostPoints) {
+    for (size_t begin = task * kTask; begin < end; begin += PointSpan::kMaxPoints) {
       span.x = cloud_.x.data() + begin;
       span.y = cloud_.y.data() + begin;
       span.z = cloud_.z.data() + begin;
-      span.count = uint32_t(std::min<size_t>(PointSpan::kMostPoints, end - begin));
+      span.count = uint32_t(std::min<size_t>(PointSpan::kMaxPoints, end - begin));
       span.first = uint32_t(begin);
       visible_.draw(span, worker);
     }
   });
   visible_.finish(0, scaled_camera.height_px);
-  visible_.hide(0, scaled_camera.height_px, kHidingShare);
+  visible_.remove_occluded(0, scaled_camera.height_px, kDepthTolerance);
 
   const size_t pixels = size_t(scaled_camera.width_px) * size_t(scaled_camera.height_px);
   seen_.clear();
   for (size_t pixel = 0; pixel < pixels; ++pixel) {
     if (visible_.keys()[pixel] != kNoPointKey) seen_.push_back(point_of(visible_.keys()[pixel]));
   }
-  if (valid != nullptr) keep_valid(cloud_.places(), camera, valid, seen_);
-  return size_t(std::count_if(seen_.begin(), seen_.end(), [&](uint32_t point) { return !moments_.has(point); }));
+  if (valid != nullptr) keep_valid(cloud_.positions(), camera, valid, seen_);
+  return size_t(std::count_if(seen_.begin(), seen_.end(), [&](uint32_t point) { return !regressions_.has(point); }));
 }
 
-const float* SceneBuilder::find_features(const ImageView& photo, const PinholeCamera& camera,
-                                         const PinholeCamera& upright) {
+const float* DescriptorFitter::find_features(const ImageView& photo, const PinholeCamera& camera,
+                                             const PinholeCamera& aligned) {
   {
-    const ScopedTimer timer(times_.turning_ms);
-    turn_photo(photo, pixels_between(upright, camera), upright.width_px, upright.height_px, turned_);
+    const ScopedTimer timer(times_.align_ms);
+    turn_photo(photo, pixel_map_between(aligned, camera), aligned.width_px, aligned.height_px, aligned_photo_);
   }
-  const ScopedTimer timer(times_.extractor_ms);
-  const float* features = networks_.extract(turned_.data(), upright.width_px, upright.height_px);
-  const size_t count = size_t(upright.width_px) * size_t(upright.height_px) * kFeatures;
+  const ScopedTimer timer(times_.extract_ms);
+  const float* features = networks_.extract(aligned_photo_.data(), aligned.width_px, aligned.height_px);
+  const size_t count = size_t(aligned.width_px) * size_t(aligned.height_px) * kFeatures;
   for (size_t i = 0; i < count; ++i) {
     if (!(std::abs(features[i]) <= kLargestFeature)) {
       throw Error(MAQ_ERROR_INFERENCE, "The extractor of bundle ", networks_.name(), " gives the feature ", features[i],
@@ -137,8 +134,8 @@ const float* SceneBuilder::find_features(const ImageView& photo, const PinholeCa
   return features;
 }
 
-std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8_t* valid, const PinholeCamera& camera,
-                                             const BuildProgress& progress) {
+std::optional<size_t> DescriptorFitter::add_view(const ImageView& photo, const uint8_t* valid,
+                                                 const PinholeCamera& camera, const BuildProgress& progress) {
   check_camera(camera, "The photo's camera");
   if (photo.format != MAQ_PIXEL_BGR8) {
     refuse("The photo is in ", pixel_format_name(photo.format), ", but must be BGR.");
@@ -147,70 +144,69 @@ std::optional<size_t> SceneBuilder::add_view(const ImageView& photo, const uint8
     refuse("The photo is ", photo.width_px, " x ", photo.height_px, " pixels, but its camera is for ", camera.width_px,
            " x ", camera.height_px, ".");
   }
-  const PinholeCamera upright = upright_frame(camera, up_, SceneNetworks::kPhotoMultiple);
-  SceneNetworks::check_photo_size(upright.width_px, upright.height_px);
+  const PinholeCamera aligned = gravity_aligned_frame(camera, up_, SceneNetworks::kPhotoMultiple);
+  SceneNetworks::check_photo_size(aligned.width_px, aligned.height_px);
   const auto goes_on = [&](double done, const char* what) {
     const bool wanted = !progress || progress(done, what);
     return wanted && !is_cancelled_;
   };
-  // Whichever way this ends, a later photo is not cancelled by what was said of this one.
+  // However this ends, a cancel of this photo does not cancel a later one.
   struct Reset {
     std::atomic<bool>& flag;
     ~Reset() { flag = false; }
   } const reset{is_cancelled_};
 
-  if (!goes_on(0, "Finding the points that the photo sees.")) return {};
+  if (!goes_on(0, "Finding visible points.")) return {};
   {
     const ScopedTimer timer(times_.visibility_ms);
     const size_t new_points = find_seen_points(valid, camera);
     check_memory(new_points);
-    moments_.reserve(new_points);
+    regressions_.reserve(new_points);
   }
   if (seen_.empty()) return 0;
   BackgroundColour background;
   background.add(photo, valid, visible_);
-  if (!goes_on(0.1, "Turning the photo into features.")) return {};
-  const float* features = find_features(photo, camera, upright);
-  if (!goes_on(0.9, "Telling the points how they look.")) return {};
+  if (!goes_on(0.1, "Extracting features.")) return {};
+  const float* features = find_features(photo, camera, aligned);
+  if (!goes_on(0.9, "Fitting descriptors.")) return {};
 
-  // From here on nothing fails, and nothing is asked.
+  // From here on nothing fails or is cancelled.
   background_.add(background);
-  const ScopedTimer timer(times_.moments_ms);
+  const ScopedTimer timer(times_.accumulate_ms);
   for (const uint32_t point : seen_) {
-    if (!moments_.has(point)) moments_.add(point);
+    if (!regressions_.has(point)) regressions_.add(point);
   }
-  const LookSampling sampling(cloud_.places(), upright, features, networks_.basis());
-  constexpr size_t kTask = kTaskSpans * LookSampling::kMostPoints;
+  const DescriptorSampling sampling(cloud_.positions(), aligned, features, networks_.basis());
+  constexpr size_t kTask = kTaskSpans * DescriptorSampling::kMaxPoints;
   threads_.run((seen_.size() + kTask - 1) / kTask, [&](size_t task, int) {
     const size_t end = std::min(seen_.size(), (task + 1) * kTask);
-    for (size_t begin = task * kTask; begin < end; begin += LookSampling::kMostPoints) {
-      sampling.add(seen_.data() + begin, std::min(LookSampling::kMostPoints, end - begin), moments_);
+    for (size_t begin = task * kTask; begin < end; begin += DescriptorSampling::kMaxPoints) {
+      sampling.add(seen_.data() + begin, std::min(DescriptorSampling::kMaxPoints, end - begin), regressions_);
     }
   });
   ++views_;
   return seen_.size();
 }
 
-ModelledPoints SceneBuilder::solve(bool forgets) {
-  if (moments_.count() == 0) {
+FittedPoints DescriptorFitter::solve(bool forgets) {
+  if (regressions_.count() == 0) {
     refuse("None of the photos sees a point of the cloud, which has ", cloud_.count(),
-           ", so there is no scene; check that photos and cloud are of one place, in the same unit.");
+           ", so there is no scene; check that photos and cloud are of the same scene, in the same unit.");
   }
-  const ScopedTimer timer(times_.solving_ms);
-  ModelledPoints made;
+  const ScopedTimer timer(times_.solve_ms);
+  FittedPoints made;
   made.origin = cloud_.origin;
   made.up = up_;
   made.background = background_.mean();
-  made.never_seen = cloud_.count() - moments_.count();
-  solve_looks(moments_, cloud_.places(), threads_, forgets, made);
+  made.never_seen = cloud_.count() - regressions_.count();
+  solve_descriptors(regressions_, cloud_.positions(), threads_, forgets, made);
   return made;
 }
 
-ModelledPoints SceneBuilder::finish_and_forget() {
-  networks_.forget_extractor();
-  ModelledPoints made = solve(true);
-  moments_ = MomentStore();
-  moments_.begin(cloud_.count());
+FittedPoints DescriptorFitter::finish_and_forget() {
+  FittedPoints made = solve(true);
+  regressions_ = RegressionStore();
+  regressions_.begin(cloud_.count());
   background_ = {};
   views_ = 0;
   return made;

@@ -1,4 +1,4 @@
-#include "scene/render/refined_picture.h"
+#include "scene/render/refined_image.h"
 
 #include <algorithm>
 
@@ -11,7 +11,7 @@ constexpr size_t kColours = 3;
 
 MAQ_SIMD_CLONES void to_bytes(const float* __restrict values, size_t count, uint8_t* __restrict bytes) {
   for (size_t i = 0; i < count; ++i) {
-    const float above = values[i] > 0 ? values[i] : 0;  // also where it is no number
+    const float above = values[i] > 0 ? values[i] : 0;  // also where it is NaN
     bytes[i] = uint8_t(int(std::min(above, 1.0f) * 255 + 0.5f));
   }
 }
@@ -22,17 +22,17 @@ inline uint8_t over(uint8_t colour, uint8_t background, uint8_t alpha) {
 
 }  // namespace
 
-void RefinedPicture::write(const float* refined, const RefinerLayout& layout, const RasterWindow& window,
-                           const uint8_t* alphas, const float* depths, const std::array<uint8_t, 3>& background,
-                           int sureness_gain, const PictureRows& to, WorkerThreads& threads) {
+void RefinedImage::write(const float* refined, const RefinerLayout& layout, const RasterWindow& window,
+                         const uint8_t* alphas, const float* depths, const std::array<uint8_t, 3>& background,
+                         int confidence_gain, const ImageRows& to, WorkerThreads& threads) {
   const size_t width = size_t(window.width_px);
   bytes_.resize(size_t(threads.count()));
   for (std::vector<uint8_t>& bytes : bytes_) bytes.resize(2 * width * kColours);
   const int rows = std::min(window.height_px, to.rows - window.top_px);
   const size_t columns = size_t(std::max(0, std::min(window.width_px, to.columns - window.left_px)));
   // From one of two pixels of a row to the other, from one pair to the next, and from the first row's to the second's.
-  const size_t beside = kColours, pair = layout.is_folded ? 4 * kColours : 2 * kColours;
-  const size_t below = layout.is_folded ? 2 * kColours : width * kColours;
+  const size_t beside = kColours, pair = layout.is_space_to_depth ? 4 * kColours : 2 * kColours;
+  const size_t below = layout.is_space_to_depth ? 2 * kColours : width * kColours;
   constexpr int kRowsAtOnce = 32;
   threads.run(size_t(std::max(0, (rows + kRowsAtOnce - 1) / kRowsAtOnce)), [&](size_t strip, int worker) {
     uint8_t* const bytes = bytes_[size_t(worker)].data();
@@ -45,8 +45,8 @@ void RefinedPicture::write(const float* refined, const RefinerLayout& layout, co
       const uint8_t* const alpha = alphas + size_t(y) * width;
       for (size_t x = 0; x < columns; ++x) {
         const uint8_t* const rgb = from + x / 2 * pair + x % 2 * beside;
-        const auto share = uint8_t(std::min(255, sureness_gain * alpha[x]));
-        for (size_t c = 0; c < kColours; ++c) bgr[x * kColours + c] = over(rgb[2 - c], background[c], share);
+        const auto opacity = uint8_t(std::min(255, confidence_gain * alpha[x]));
+        for (size_t c = 0; c < kColours; ++c) bgr[x * kColours + c] = over(rgb[2 - c], background[c], opacity);
       }
       std::copy_n(alpha, columns, to.alpha + first);
       std::copy_n(depths + size_t(y) * width, columns, to.depth + first);

@@ -125,7 +125,7 @@ def measure_host(quick: bool) -> dict:
             measured["closing"].append(play(f"{STUB}&hang=5s@1s", "--seconds", "2")["close_ms"])
             measured["outages"].append(vars(fault_outage(ABSENCES_S[k])))
         measured["allocations"] = count_allocations(folder)
-    measured["others_share"] = others.now()
+    measured["others_fraction"] = others.now()
     return measured
 
 
@@ -198,6 +198,6 @@ def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float
     said, why = measure_guest(frames) if with_guest else ({}, "left out by --no-guest")
     found, missing = guest_figures(said, frames, why)
     figures = {name: round(value, 4) for name, value in (host_figures(host) | found).items()}
-    share = host["others_share"]
-    doubts = [f"other processes had {share:.0%} of the processor (cameras)"] if share > MAX_OTHERS else []
+    others = host["others_fraction"]
+    doubts = [f"other processes had {others:.0%} of the processor (cameras)"] if others > MAX_OTHERS else []
     return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "doubts": doubts}, figures, missing

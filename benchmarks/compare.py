@@ -13,7 +13,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-MOST = 0.05
+MAX_DIFFERENCE = 0.05
 RATIOS = ("time_by_openvino_int8", "time_by_pytorch_fp32", "roofline_share")
 
 
@@ -36,8 +36,9 @@ def main(argv: list[str] | None = None) -> int:
         mark = " (gate)" if name in RATIOS else ""
         table.add_row(name + mark, f"{first[name]:.4g}", f"{second[name]:.4g}", f"{difference:.1%}")
     Console().print(table)
-    far = [name for name in RATIOS if found.get(name, float("inf")) > MOST]
-    print(f"Further apart than {MOST:.0%}: {', '.join(far)}" if far else f"All ratios within {MOST:.0%}")
+    far = [name for name in RATIOS if found.get(name, float("inf")) > MAX_DIFFERENCE]
+    apart = f"Further apart than {MAX_DIFFERENCE:.0%}: {', '.join(far)}"
+    print(apart if far else f"All ratios within {MAX_DIFFERENCE:.0%}")
     return 1 if far else 0
 
 

@@ -35,7 +35,7 @@ def feeds_of(bundle: Bundle, image: np.ndarray) -> dict[str, Feed]:
     network = bundle.network
     found = detect(bundle.graphs, image, network, bundle.decode)
     if not len(found.boxes):
-        raise ValueError("the bundle finds nobody in the picture that the graphs are measured with")
+        raise ValueError("the bundle finds no person in the picture that the graphs are measured with")
     given = {
         "trunk": [found.tensor],
         "rpn_fine": found.features[:1],

@@ -93,11 +93,11 @@ class Agreement:
     equal: int = 0
     person_pixels: int = 0  # painted in either
     person_equal: int = 0
-    worst_picture: float = 1.0  # the least share of equal pixels
+    worst_picture: float = 1.0  # the smallest fraction of equal pixels
     box_px: float = 0.0  # largest difference of a coordinate of a matched box, pixels of the picture
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """Pixels with the same part (background counts), of all."""
         return self.equal / self.pixels
 
@@ -110,7 +110,7 @@ class Agreement:
         """Enough of all pixels are the same, and nobody is lost or new. The worst picture is reported, not barred:
         one value that float sums of another order push over a rounding step changes a picture of small people.
         """
-        return self.share >= bar and self.unmatched == 0
+        return self.fraction >= bar and self.unmatched == 0
 
 
 def read_parts(path: Path) -> np.ndarray:
@@ -220,9 +220,10 @@ def print_table(bundle: Path, results: dict[str, Agreement | str], features: dic
         if isinstance(found, str):
             table.add_row(name, *["-"] * 6, "failed")
             continue
-        shares = [f"{100 * share:.3f}" for share in (found.share, found.worst_picture, found.person_fraction)]
+        found_fractions = (found.fraction, found.worst_picture, found.person_fraction)
+        fractions = [f"{100 * x:.3f}" for x in found_fractions]
         verdict = "held" if found.passes(bar) else "missed"
-        table.add_row(name, str(found.people), str(found.unmatched), *shares, f"{found.box_px:.2f}", verdict)
+        table.add_row(name, str(found.people), str(found.unmatched), *fractions, f"{found.box_px:.2f}", verdict)
     Console(width=110).print(table)
     print(
         f"same: pixels with the same part, of all (bar: {100 * bar:g} %); worst: of the worst picture; on people: of "
@@ -242,7 +243,7 @@ def failure_of(found: Agreement | str, bar: float) -> str | None:
     if found.passes(bar):
         return None
     return (
-        f"The same label on {100 * found.share:.3f} % of the pixels, where {100 * bar:g} % are asked for; "
+        f"The same label on {100 * found.fraction:.3f} % of the pixels, where {100 * bar:g} % are asked for; "
         f"{found.unmatched} people lost or new."
     )
 
@@ -274,7 +275,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--only", action="append", choices=[processor.name for processor in OTHERS])
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processors at a time (default: the cores)")
     parser.add_argument(
-        "--bar", type=float, default=BAR, help="least share of equal pixels, of all pictures (default %(default)s)"
+        "--bar", type=float, default=BAR, help="min. fraction of equal pixels, of all pictures (default %(default)s)"
     )
     parser.add_argument("--junit", type=Path, help="also write the outcome as JUnit XML")
     options = parser.parse_args(argv)

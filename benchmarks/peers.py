@@ -226,12 +226,12 @@ def compare_outputs(peers: list[Peer]) -> None:
     ours = {peer.precision: {name: results(runner) for name, runner in peer.runs.items()} for peer in peers[:2]}
     for peer in peers[2:]:
         # int8 sums are exact, but each runtime rounds scales and fuses in its own way.
-        most = TOLERANCE if peer.precision == "fp32" else 10 * TOLERANCE
+        limit = TOLERANCE if peer.precision == "fp32" else 10 * TOLERANCE
         for name, runner in peer.runs.items():
             for expected, actual in zip(ours[peer.precision][name], results(runner), strict=True):
                 same_size = expected.size == actual.size
                 error = np.abs(expected - actual).max() / max(np.abs(expected).max(), 1e-6) if same_size else np.inf
-                if error > most:
+                if error > limit:
                     peer.missing = f"{name} differs from ours by {error:.2f} of its largest value"
         if peer.missing:
             peer.runs = {}

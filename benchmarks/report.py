@@ -16,7 +16,7 @@ from benchmarks.sweep import pareto
 
 STAGES = ("capture", "preprocess", "trunk", "proposals", "box_head", "dense_head", "decode")
 COLOURS = {"shipped": "black", "precision": "tab:red", "input size": "tab:blue", "proposals": "tab:green",
-           "key frames": "tab:orange", "least person": "tab:purple", "detail": "tab:brown",
+           "key frames": "tab:orange", "min. person": "tab:purple", "detail": "tab:brown",
            "together": "tab:cyan"}  # fmt: skip
 
 

@@ -36,17 +36,17 @@ ERRORS = ("psnr_db", "ssim", "distance")
 
 
 class Photos:
-    """The held-out photos of a place, `most` at most, their sides divided by `shrink`.
+    """The held-out photos of a place, `count` at most, their sides divided by `shrink`.
 
     Raises CaptureError where there is none.
     """
 
-    def __init__(self, capture: Capture, shrink: int, most: int | None) -> None:
+    def __init__(self, capture: Capture, shrink: int, count: int | None) -> None:
         frames = sorted(capture.held_out)
         if not frames:
             raise CaptureError(f"{capture.name} holds no photo out; name some in test_filenames.")
-        if most:
-            frames = [frames[k] for k in np.linspace(0, len(frames) - 1, min(most, len(frames))).round().astype(int)]
+        if count:
+            frames = [frames[k] for k in np.linspace(0, len(frames) - 1, min(count, len(frames))).round().astype(int)]
         self.names = [capture.names[k] for k in frames]
         self.cameras: list[Camera] = []
         self.images: list[np.ndarray] = []
@@ -92,7 +92,7 @@ def measure(
     """Rows; the places (name, real, photos, points, size, or why it is `missing`); and for each of them one photo with
     its pictures, to be looked at: name, photo, pictures by way."""
     rows, places, shown = rows_of(settings), [], []
-    folders = [(folder, False) for folder in sources.places] + [(folder, True) for folder in sources.real]
+    folders = [(folder, False) for folder in sources.positions] + [(folder, True) for folder in sources.real]
     with tqdm(total=len(folders) * (1 + len(settings)), desc="scenes", unit="setting", disable=None) as progress:
         for folder, real in folders:
             try:
@@ -134,8 +134,8 @@ class Place:
         begin_s = time.monotonic()
         self.capture = read_capture(folder)
         self.read_s = time.monotonic() - begin_s
-        most = 2 if quick else None
-        self.photos = {shrink: Photos(self.capture, shrink, most) for shrink in (1, 2)}
+        count = 2 if quick else None
+        self.photos = {shrink: Photos(self.capture, shrink, count) for shrink in (1, 2)}
         self.middle = len(self.photos[1].images) // 2
         self.found: dict[str, dict] = {}
         self.missing: dict[str, str] = {}
@@ -144,7 +144,8 @@ class Place:
     def described(self) -> dict:
         camera = self.photos[1].cameras[0]
         return {"name": self.name, "photos": len(self.capture.sources()), "held_out": len(self.photos[1].names),
-                "points": len(self.capture.cloud.places), "size_px": [camera.width_px, camera.height_px]}  # fmt: skip
+                "points": len(self.capture.cloud.positions),
+                "size_px": [camera.width_px, camera.height_px]}  # fmt: skip
 
     def run_baselines(self) -> None:
         begin_s = time.monotonic()

@@ -54,7 +54,8 @@ def section(measured: dict) -> tuple[str, list]:
             saved,
             "Work that a scene does not need, and what it costs to do it all the same: differences to the scene as "
             "shipped, means over the rendered places. Error: the PSNR that leaving it out costs.",
-            f"Points that no photo sees have no look and are never stored: {unseen_share(rows):.0%} of the clouds'.",
+            "Points that no photo sees have no descriptor and are never stored: "
+            f"{unseen_fraction(rows):.0%} of the clouds'.",
         ]
     if speed:
         parts += speed_parts(speed)
@@ -101,7 +102,7 @@ def missing_lines(rows: list[dict]) -> list[str]:
     return [f"{', '.join(names)} ({reason})" for reason, names in by_reason.items()]
 
 
-def unseen_share(rows: list[dict]) -> float:
+def unseen_fraction(rows: list[dict]) -> float:
     """Of the points of the clouds of the rendered places, as shipped."""
     figures = next(row["rendered"] for row in rows if row["setting"] == SHIPPED)
     return 1 - figures["points"] / figures["cloud_points"]
@@ -123,7 +124,7 @@ def saving_rows(rows: list[dict]) -> list[list[str]]:
     table = [["saving", "bytes a point", "a frame, ms", "error, dB"]]
     shipped = found.get(SHIPPED)
     named = [(setting.name, said) for setting, said in savings()]
-    named[0:0] = [("every look varies", "looks that do not vary keep their mean"),
+    named[0:0] = [("every descriptor varies", "descriptors that do not vary keep their mean"),
                   ("coefficients of 32 bits", "coefficients of few bits")]  # fmt: skip
     for setting, said in named:
         figures = found.get(setting)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 SHIPPED, FLOAT = "shipped", "float"
 POINTS = 500_000  # as shipped
-CONSTANT = "1e9"  # least variation that no look reaches: all keep their mean
+CONSTANT = "1e9"  # min. variation that no descriptor reaches: all keep their mean
 TUNED = {"10s": "10 s", "60s": "1 min", "600s": "10 min"}
 
 
@@ -68,19 +68,19 @@ def settings(bundles: Sequence[str]) -> list[Setting]:
     made += [Setting(name, "networks", name) for name in bundles if name not in (SHIPPED, FLOAT)]
     made.append(Setting("fp32 networks", "precision", FLOAT))
     everything = (*all_points, "--coefficients", "32", "--min-variation", "0")
-    made.append(Setting("fp32 networks and looks, all varying", "precision", FLOAT, everything))
+    made.append(Setting("fp32 networks and descriptors, all varying", "precision", FLOAT, everything))
     for bits in (8, 16, 32):
         made.append(Setting(f"coefficients of {bits} bits", "coefficients", build=(*all_points, "--coefficients",
                                                                                    str(bits))))  # fmt: skip
     made.append(Setting("means alone", "view dependence", build=(*all_points, "--min-variation", CONSTANT)))
-    made.append(Setting("every look varies", "view dependence", build=(*all_points, "--min-variation", "0")))
+    made.append(Setting("every descriptor varies", "view dependence", build=(*all_points, "--min-variation", "0")))
     made += [Setting(f"fine-tuned {said}", "fine-tuned", tuned=name) for name, said in TUNED.items()]
     return made + [setting for setting, _ in savings()]
 
 
 def savings() -> list[tuple[Setting, str]]:
     """Work that a scene does not need, each done all the same; and what it is when it is not done. Two more are among
-    `settings`: "every look varies" and "coefficients of 32 bits"."""
+    `settings`: "every descriptor varies" and "coefficients of 32 bits"."""
     axis = "not needed"
     return [
         (Setting("no block is culled", axis, render=("--without", "culling")), "blocks out of sight are left out"),

@@ -34,21 +34,21 @@ def dense_cloud(place: Place, points: int, seed: int = 0) -> tuple[np.ndarray, n
     No pixel comes twice. Raises ValueError where there are fewer.
     """
     rng = np.random.default_rng(seed)
-    places, colours, share = [], [], points // len(place.source) + 1
+    places, colours, per_view = [], [], points // len(place.source) + 1
     for view in place.source:
         depth = place.depth[int(view)]
         rows, columns = np.nonzero(depth)
-        if len(rows) < share:
+        if len(rows) < per_view:
             continue
-        chosen = rng.choice(len(rows), share, replace=False)
+        chosen = rng.choice(len(rows), per_view, replace=False)
         rows, columns = rows[chosen], columns[chosen]
         rays = np.linalg.inv(place.intrinsics[view]) @ np.stack([columns, rows, np.ones(len(rows))])
         pose = place.world_to_camera[view]
         places.append(((rays * depth[rows, columns]).T - pose[:, 3]) @ pose[:, :3])
         colours.append(place.images[int(view)][rows, columns])
-    if len(places) * share < points:
+    if len(places) * per_view < points:
         raise ValueError(f"{place.folder} has too few pixels with depth for {points} points")
-    keep = rng.permutation(len(places) * share)[:points]
+    keep = rng.permutation(len(places) * per_view)[:points]
     return np.concatenate(places)[keep].astype(np.float32), np.concatenate(colours)[keep]
 
 

@@ -61,10 +61,10 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     wanted = settings(list(given.bundles))
     rows, places, shown = scene_quality.measure(few, wanted, perceptual, quick)
     speed, why = scene_speed.measure(given.places, given.bundles[SHIPPED], threads, quick)
-    share = others.now()
+    fraction = others.now()
     doubts = doubts_of(places, perceptual is not None)
-    if share > MAX_OTHERS:
-        doubts.append(f"other processes had {share:.0%} of the processor (scenes)")
+    if fraction > MAX_OTHERS:
+        doubts.append(f"other processes had {fraction:.0%} of the processor (scenes)")
     sheet = scene_pictures.write_sheet(shown, rows, folder)
     document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "doubts": doubts,
                 "sheet": sheet.name if sheet else ""}  # fmt: skip
@@ -92,7 +92,7 @@ def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float],
     found = {row["setting"]: row["rendered"] for row in rows}
     said = {row["setting"]: next(iter(row["missing"].values()), "there is no rendered place") for row in rows}
     figures, missing = {}, {}
-    shipped, plain, exact = "as shipped", "plain points", "fp32 networks and looks, all varying"
+    shipped, plain, exact = "as shipped", "plain points", "fp32 networks and descriptors, all varying"
     if found[shipped]:
         figures["scene_bytes_a_point"] = found[shipped]["bytes_a_point"]
     else:

@@ -45,7 +45,7 @@ def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 320, 384)) -> li
     made += [Setting(f"fp32, {side} px", "precision", "fp32", {"long_side_px": side}) for side in (192, 384)]
     made += [Setting(f"{n} proposals", "proposals", options={"max_proposals": n}) for n in (10, 25, 100)]
     made += [Setting(f"key frame every {n}", "key frames", options={"key_frame_interval": n}) for n in (2, 4, 8)]
-    made += [Setting(f"nobody below {n} px", "least person", options={"min_person_height_px": n}) for n in (64, 128)]
+    made += [Setting(f"no person below {n} px", "min. person", options={"min_person_height_px": n}) for n in (64, 128)]
     made.append(Setting("parts alone", "detail", options={"detail": 1}))
     for side, proposals in ((224, 25), (192, 25), (160, 10)):
         options = {"long_side_px": side, "max_proposals": proposals, "key_frame_interval": 4}

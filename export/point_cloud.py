@@ -25,10 +25,10 @@ class PointCloudError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """places: float64 [P, 3]. colours: float32 [P, 3] in 0..1, grey where the file has none. dropped: how many points
-    of the file were not finite."""
+    """positions: float64 [P, 3]. colours: float32 [P, 3] in 0..1, grey where the file has none. dropped: how many
+    points of the file were not finite."""
 
-    places: np.ndarray
+    positions: np.ndarray
     colours: np.ndarray
     dropped: int = 0
 
@@ -88,13 +88,13 @@ def read_ply(path: Path) -> PointCloud:
         raise PointCloudError(f"{path} does not hold the {count} points its header promises: {error}.") from None
     if len(table) != count:
         raise PointCloudError(f"{path} has {len(table)} points, but its header promises {count}.")
-    places = np.stack([table[axis].astype(np.float64) for axis in "xyz"], 1)
+    positions = np.stack([table[axis].astype(np.float64) for axis in "xyz"], 1)
     colours = np.full((count, 3), 0.5, np.float32)
     if {"red", "green", "blue"} <= set(row.names):
         whole = 1.0 if row["red"].kind == "f" else float(np.iinfo(row["red"]).max)
         colours = np.stack([table[name].astype(np.float32) / whole for name in ("red", "green", "blue")], 1)
-    finite = np.isfinite(places).all(1) & np.isfinite(colours).all(1)
-    return PointCloud(places[finite], colours[finite], int((~finite).sum()))
+    finite = np.isfinite(positions).all(1) & np.isfinite(colours).all(1)
+    return PointCloud(positions[finite], colours[finite], int((~finite).sum()))
 
 
 def _header(text: str, path: Path) -> tuple[str, int, list[tuple[str, str]]]:

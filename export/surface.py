@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-PART_NAMES = (
-    "background",
-    "torso back", "torso front", "right hand", "left hand", "left foot", "right foot",
-    "right upper leg back", "left upper leg back", "right upper leg front", "left upper leg front",
-    "right lower leg back", "left lower leg back", "right lower leg front", "left lower leg front",
-    "left upper arm inner", "right upper arm inner", "left upper arm outer", "right upper arm outer",
-    "left lower arm inner", "right lower arm inner", "left lower arm outer", "right lower arm outer",
-    "right head", "left head",
+PART_NAMES = (  # as in sdk/src/densepose/body_parts.h
+    "background", "torso, back", "torso, front", "right hand", "left hand", "left foot", "right foot",
+    "right upper leg, back", "left upper leg, back", "right upper leg, front", "left upper leg, front",
+    "right lower leg, back", "left lower leg, back", "right lower leg, front", "left lower leg, front",
+    "left upper arm, inside", "right upper arm, inside", "left upper arm, outside", "right upper arm, outside",
+    "left lower arm, inside", "right lower arm, inside", "left lower arm, outside", "right lower arm, outside",
+    "head, right", "head, left",
 )  # fmt: skip
 PART_COUNT = 24
 

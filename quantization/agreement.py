@@ -1,6 +1,6 @@
 """Do the int8 networks say the same as the fp32 ones? Labels of both, pixel by pixel, through the C API.
 
-The gate is label agreement: of the pixels that are somebody in the fp32 result, the share that has the same part in the
+The gate is label agreement: of the pixels of people in the fp32 result, the share that has the same part in the
 int8 result. Both bundles run on the same pictures at the bundle's own threshold, as in an app.
 """
 
@@ -25,7 +25,7 @@ from export.evaluation.backends import DEFAULT_PATHS, Backend, Prediction, open_
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
 from export.evaluation.sheet import pictures
-from export.evaluation.surface_accuracy import share
+from export.evaluation.surface_accuracy import fraction
 from export.shards import count_images, read_images, shard_paths
 
 GATE, STRETCH = 0.98, 0.99
@@ -38,9 +38,9 @@ examples:
   python -m quantization.agreement --images tests/media/clip.mp4 --backend onnx
   python -m quantization.agreement --in-float trunk       what would be left if the trunk were not int8?
 
-label agreement   of the pixels that are somebody in fp32, the share with the same part in int8 (gate: 98 %)
-where both paint  the same over the pixels that are somebody in both: parts alone, without outlines
-mask IoU          pixels that are somebody, fp32 against int8
+label agreement   of the pixels of people in fp32, the fraction with the same part in int8 (gate: 98 %)
+where both paint  the same over the pixels of people in both: parts alone, without outlines
+mask IoU          pixels of people, fp32 against int8
 |dU|, |dV|        mean difference, 0..1, where the part is the same
 The exit status is 1 when label agreement is below the gate.
 """
@@ -48,10 +48,10 @@ The exit status is 1 when label agreement is below the gate.
 
 @dataclass(frozen=True)
 class Agreement:
-    """Shares are 0..1, NaN where there was nobody. images: how many; people: found by (fp32, int8); pixels: somebody's
-    in fp32; labels: of these, the share with the same part in int8; parts: the same over pixels that are somebody's
-    in both; mask_iou: of somebody's pixels; same_count: share of images with as many people; du, dv: mean
-    difference where the part is the same."""
+    """Fractions are 0..1, NaN where there was no person. images: how many; people: found by (fp32, int8); pixels:
+    people's in fp32; labels: of these, the fraction with the same part in int8; parts: the same over pixels of people
+    in both; mask_iou: of people's pixels; same_count: fraction of images with as many people; du, dv: mean difference
+    where the part is the same."""
 
     images: int
     people: tuple[int, int]
@@ -91,15 +91,15 @@ class Tally:
         self._difference += gap.sum(0) / 255
 
     def figures(self) -> Agreement:
-        du, dv = (share(value, self._same) for value in self._difference)
+        du, dv = (fraction(value, self._same) for value in self._difference)
         return Agreement(
             images=self._images,
             people=(int(self._people[0]), int(self._people[1])),
             pixels=self._pixels,
-            labels=share(self._same, self._pixels),
-            parts=share(self._same, self._both),
-            mask_iou=share(self._both, self._either),
-            same_count=share(self._same_count, self._images),
+            labels=fraction(self._same, self._pixels),
+            parts=fraction(self._same, self._both),
+            mask_iou=fraction(self._both, self._either),
+            same_count=fraction(self._same_count, self._images),
             du=du,
             dv=dv,
         )

@@ -1,4 +1,4 @@
-"""The networks of a bundle of scenes, of any precision, in place of those in torch: for `export.scenes.modelling`."""
+"""The networks of a bundle of scenes, of any precision, in place of those in torch: for `export.scenes.fitting`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from export.densepose.graphs import session
 from export.scenes.basis import Basis
 from export.scenes.bundle import BASIS
 from export.scenes.config import RASTER
-from export.scenes.light_refiner import folded, unfolded
+from export.scenes.light_refiner import depth_to_space, space_to_depth
 from quantization.samples import Sample
 
 
@@ -46,7 +46,7 @@ class _Refiner(_Graph):
         used = rasters[: len(inputs)]
         if inputs[0].shape[-1] == RASTER:
             return self.run(used)
-        return unfolded(self.run([folded(used[0]), *used[1:]]))
+        return depth_to_space(self.run([space_to_depth(used[0]), *used[1:]]))
 
 
 class BundleNetworks(nn.Module):

@@ -33,8 +33,8 @@ from quantization.settings import GraphSettings
 
 CANDIDATES = {
     "gated (paper)": RefinerConfig("gated"),
-    "plain, paper's widths": RefinerConfig(folded=False, widths=(16, 32, 48, 64, 80)),
-    "plain, full size, narrow": RefinerConfig(folded=False, widths=(8, 16, 24, 32, 48)),
+    "plain, paper's widths": RefinerConfig(space_to_depth=False, widths=(16, 32, 48, 64, 80)),
+    "plain, full size, narrow": RefinerConfig(space_to_depth=False, widths=(8, 16, 24, 32, 48)),
     "light L": RefinerConfig(widths=(48, 64, 80, 96)),
     "light M": RefinerConfig(widths=(32, 48, 64, 80)),
     "light S": RefinerConfig(widths=(24, 32, 48, 64)),

@@ -57,7 +57,7 @@ class Samples(CalibrationDataReader):
 def quantize_graph(source: Path, target: Path, samples: list[Sample], settings: GraphSettings) -> None:
     """Writes the int8 form (QDQ) of one graph. Raises ValueError for a pattern that matches nothing."""
     if not samples:
-        raise ValueError(f"nothing to calibrate {source.name} with: the bundle finds nobody in the images")
+        raise ValueError(f"nothing to calibrate {source.name} with: the bundle finds no person in the images")
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
         prepare(source, prepared)

@@ -127,7 +127,7 @@ def print_saturation(title: str, layers: list[Saturation], console: Console) -> 
         console.print(f"{title}: none of {len(layers)} layers can overflow 16 bits (largest bound {largest} of 32767)")
         return
     table = Table(title=f"{title}: {len(found)} of {len(layers)} layers could overflow 16 bits", title_justify="left")
-    for column in ("layer", "bound", "share of pairs", "worst error"):
+    for column in ("layer", "bound", "fraction of pairs", "worst error"):
         table.add_column(column, justify="left" if column == "layer" else "right")
     for layer in sorted(found, key=lambda x: -x.clamped / max(x.pairs, 1)):
         share = layer.clamped / max(layer.pairs, 1)

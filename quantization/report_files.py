@@ -72,7 +72,7 @@ def markdown(document: dict) -> str:
     lines += [_saturation_sentence("With 8-bit weights everywhere", document["saturation_8_bit"]), ""]
     unsafe = [x for x in document["saturation_8_bit"] if not x["exempt"] and x["bound"] > 32767]
     lines += _table(
-        ("layer, with 8-bit weights", "bound", "share of pairs", "worst error of an output"),
+        ("layer, with 8-bit weights", "bound", "fraction of pairs", "worst error of an output"),
         [(f"{x['graph']}: `{x['layer']}`", x["bound"], f"{x['clamped'] / max(x['pairs'], 1):.1e}",
           f"{x['worst_error']:.3g}") for x in sorted(unsafe, key=lambda x: -x["clamped"] / max(x["pairs"], 1))],
     )  # fmt: skip

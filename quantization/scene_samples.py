@@ -14,7 +14,7 @@ from export.scenes.bundle import GRAPHS
 from export.scenes.cameras import upright
 from export.scenes.captures import Capture
 from export.scenes.config import MULTIPLE
-from export.scenes.modelling import Options, gathered, modelled, render
+from export.scenes.fitting import Options, fitted_to_views, gathered, render
 from export.scenes.picture_quality import psnr_db
 from export.scenes.source_views import scores
 from quantization.bundle_networks import BundleNetworks
@@ -41,7 +41,7 @@ def shots(captures: Sequence[Capture], count: int, held_out: bool) -> list[Shot]
         rounds = -(-count // len(captures))
         target = candidates[(2 * (k // len(captures)) + 1) * len(candidates) // (2 * rounds)]
         others = [j for j in capture.sources() if j != target]
-        score = scores(capture.cameras[target], [capture.cameras[j] for j in others], capture.cloud.places[::37])
+        score = scores(capture.cameras[target], [capture.cameras[j] for j in others], capture.cloud.positions[::37])
         chosen.append(Shot(capture, target, [others[j] for j in np.argsort(-score, kind="stable")[:SOURCES]]))
     return chosen
 
@@ -53,7 +53,7 @@ def psnrs_db(networks: nn.Module, wanted: Sequence[Shot], what: str) -> list[flo
     for shot in tqdm(wanted, desc=what, unit="picture", leave=False):
         options = Options(up=shot.capture.up)
         views = [shot.capture.view(k) for k in shot.sources]
-        model = modelled(torch.from_numpy(shot.capture.cloud.places), views, networks, options)
+        model = fitted_to_views(torch.from_numpy(shot.capture.cloud.positions), views, networks, options)
         photo = shot.capture.view(shot.target)
         figures.append(psnr_db(render(model, photo.camera, networks, options), photo.image))
     return figures
@@ -66,8 +66,8 @@ def collect(networks: BundleNetworks, wanted: Sequence[Shot]) -> dict[str, list[
     for shot in tqdm(wanted, desc="running the fp32 bundle", unit="picture", leave=False):
         options = Options(up=shot.capture.up)
         views = [shot.capture.view(k) for k in shot.sources]
-        points = torch.from_numpy(shot.capture.cloud.places)
-        model = modelled(points, views, networks, options)
+        points = torch.from_numpy(shot.capture.cloud.positions)
+        model = fitted_to_views(points, views, networks, options)
         camera = upright(shot.capture.view(shot.target).camera, np.asarray(options.up), MULTIPLE)
         networks.refiner.seen = samples["refiner"]
         networks.refiner([raster[None] for raster in model.rasters(camera, networks, options)])

@@ -44,7 +44,7 @@ class Graphs:
 @dataclass(frozen=True)
 class Result:
     """boxes float32 [K, 4] in source pixels, scores float32 [K] (falling), iuv uint8 [H, W, 3] = (I, U*255,
-    V*255), instance uint8 [H, W] (k + 1 for person k, 0 for nobody). Everybody has at least one pixel."""
+    V*255), instance uint8 [H, W] (k + 1 for person k, 0 for none). Each person has at least one pixel."""
 
     boxes: np.ndarray
     scores: np.ndarray
@@ -117,7 +117,7 @@ def infer(
     boxes = found.boxes * found.boxes.new_tensor(found.scale * 2)
     painted: list[int] = []
     for k, box in enumerate(boxes):
-        # A box without a body is a false alarm; one whose body is somebody else's already shows that person again.
+        # A box without a body is a false alarm; one whose body is another person's already shows that person again.
         if paint([m[k] for m in maps], box.tolist(), len(painted) + 1, iuv, instance, config):
             painted.append(k)
     return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance)

@@ -113,8 +113,8 @@ class Trunk(nn.Module):
 
 
 class Rpn(nn.Module):
-    """The RPN on some levels, objectness and deltas by one convolution. The finest level, which is as dear as all the
-    others and more, has a graph of its own, so that it can be left out where nobody is small."""
+    """The RPN on some levels, objectness and deltas by one convolution. The finest level, which is as expensive as all
+    the others and more, has a graph of its own, so that it can be left out where no person is small."""
 
     def __init__(self, net: MobileParsingRCNN) -> None:
         super().__init__()

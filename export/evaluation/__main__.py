@@ -31,14 +31,14 @@ figures:
   GPS AP            the same with geodesic point similarity on the body surface (kappa 0.255 m,
                     196 pixels a person)
   GPSm AP           the same with sqrt(GPS * mask IoU)
-  recall, precision share of the people found, share of the shown boxes that are right, at IoU .50
-  part accuracy     share of all people's visible pixels painted with the right one of 24 parts;
+  recall, precision fraction of the people found, fraction of the shown boxes that are right, at IoU .50
+  part accuracy     fraction of all people's visible pixels painted with the right one of 24 parts;
                     missed people count
   left/right        of the limb pixels painted as a limb, those with the right side
   mask IoU          person pixels, all images together; in groups the mean over people
   median |dU| |dV|  where the part is right
   surface error     median geodesic distance of the painted point from the true one
-  calibration error mean gap between score and share of right boxes, over ten bins of score
+  calibration error mean gap between score and fraction of right boxes, over ten bins of score
 real photographs: python -m export.evaluation.photos --help
 """
 

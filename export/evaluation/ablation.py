@@ -86,9 +86,9 @@ VARIATIONS = {
     "fewer": Variation("1,000 rendered images", count=1000),
     "bare": Variation("3,000 rendered images without clothes", rendered="people-bare", count=3000),
     "plain": Variation("one colour in place of the background", plain=True),
-    "alone": Variation("only images of one person or nobody", keep=lambda label: label[..., 3].max() < 2),
-    "any-framing": Variation("people of a third to 1.3 times the crop", cropping=data.ANY_CROPPING),
-    "small-cuts": Variation("crops of 96 pixels", size=96),
+    "alone": Variation("only images of at most one person", keep=lambda label: label[..., 3].max() < 2),
+    "any-cropping": Variation("people of a third to 1.3 times the crop", cropping=data.ANY_CROPPING),
+    "small-crops": Variation("crops of 96 pixels", size=96),
     "wide": Variation("neck and heads 112 channels wide", width=112),
 }
 

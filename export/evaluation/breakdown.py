@@ -1,4 +1,4 @@
-"""Figures by size, truncation, crowding and visible share of the person."""
+"""Figures by size, truncation, crowding and visible fraction of the person."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from export.evaluation.people import PersonRecord
-from export.evaluation.surface_accuracy import share
+from export.evaluation.surface_accuracy import fraction
 
 # What people are told apart by, the group's name, and who belongs to it. A person about whom something is not known
 # (NaN) belongs to no group of that kind.
@@ -31,8 +31,8 @@ GROUPS: tuple[tuple[str, str, Callable[[PersonRecord], bool]], ...] = (
 class GroupFigures:
     """Shares 0..1; NaN: nothing to measure.
 
-    recall: share found at box IoU .5. part_accuracy: share of these people's visible pixels (in photographs: landmarks)
-    with the right part. mask_iou: mean over the people. Missed people count as wrong everywhere.
+    recall: fraction found at box IoU .5. part_accuracy: fraction of these people's visible pixels (in photographs:
+    landmarks) with the right part. mask_iou: mean over the people. Missed people count as wrong everywhere.
     """
 
     by: str
@@ -63,12 +63,12 @@ def breakdown(people: list[PersonRecord]) -> list[GroupFigures]:
 
 
 def part_accuracy(people: list[PersonRecord]) -> float:
-    return share(sum(p.right for p in people), sum(p.asked for p in people))
+    return fraction(sum(p.right for p in people), sum(p.asked for p in people))
 
 
 def left_right(people: list[PersonRecord]) -> float:
-    """Of the limb pixels (or landmarks) painted as a limb, the share with the right side."""
-    return share(sum(p.same_side for p in people), sum(p.limb for p in people))
+    """Of the limb pixels (or landmarks) painted as a limb, the fraction with the right side."""
+    return fraction(sum(p.same_side for p in people), sum(p.limb for p in people))
 
 
 def mean_mask_iou(people: list[PersonRecord]) -> float:

@@ -166,8 +166,8 @@ def _parts(names: list[str], figures: dict) -> str:
         for part in range(1, len(names))
     ]
     text = (
-        "Recall: share of the part's visible pixels painted with it. "
-        "Precision: share of the pixels painted with it that show it. "
+        "Recall: fraction of the part's visible pixels painted with it. "
+        "Precision: fraction of the pixels painted with it that show it. "
         "Surface error: of the part's painted pixels, whatever they are painted with.\n\n"
     )
     return f"### By body part\n\n{text}" + _table(("part", "recall", "precision", "median surface error"), rows)

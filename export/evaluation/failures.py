@@ -19,7 +19,7 @@ CASES = 6
 
 @dataclass(frozen=True)
 class Case:
-    """image: name. box: x0, y0, x1, y1 pixels. figure: height in px, score, mask IoU, or share of limb pixels
+    """image: name. box: x0, y0, x1, y1 pixels. figure: height in px, score, mask IoU, or fraction of limb pixels
     (landmarks) of the correct side."""
 
     image: str

@@ -15,7 +15,7 @@ from export.evaluation.breakdown import GroupFigures, breakdown, left_right
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
 from export.evaluation.people import FalseAlarm, PersonRecord, compare, rendered_people
-from export.evaluation.surface_accuracy import PixelAccuracy, PointAccuracy, SurfaceTable, mask_overlap, share
+from export.evaluation.surface_accuracy import PixelAccuracy, PointAccuracy, SurfaceTable, fraction, mask_overlap
 from export.shards import LabelledImage
 
 # Under GPS a detection that overlaps somebody too small or too hidden by this much counts neither way.
@@ -117,8 +117,8 @@ def measure(
         ap_gps_50=ap_gps[0],
         ap_gpsm=float(np.mean(ap_gpsm)),
         ap_gpsm_50=ap_gpsm[0],
-        recall_shown=share(right, len(people)),
-        precision_shown=share(right, right + len(alarms)),
+        recall_shown=fraction(right, len(people)),
+        precision_shown=fraction(right, right + len(alarms)),
         part_accuracy=pixels.part_accuracy(),
         left_right=left_right(people),
         mask_iou=pixels.mask_iou(),

@@ -30,7 +30,7 @@ class PersonRecord:
 
     image: its name. box: x0, y0, x1, y1 in pixels of the image. height_px: the box's, with the image resized to a long
     side of 320. cut: whether the box touches the frame. crowding: largest IoU of the box with another person's.
-    groups_seen: share of the 14 body groups (coarse parts) with a visible pixel, NaN where that is not known.
+    groups_seen: fraction of the 14 body groups (coarse parts) with a visible pixel, NaN where that is not known.
     found: whether a shown detection has box IoU >= .5 and is matched to this person. mask_iou: of that detection's
     pixels, 0 when missed; NaN when the mask is not known. asked, right: visible pixels (in photographs: landmarks), and
     those painted with the right part. limb, same_side: pixels or landmarks of limbs where a limb is painted, and those

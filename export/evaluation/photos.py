@@ -34,7 +34,7 @@ from export.evaluation.people import (
     touches_frame,
 )
 from export.evaluation.plain import plain
-from export.evaluation.surface_accuracy import share
+from export.evaluation.surface_accuracy import fraction
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
 
@@ -61,7 +61,7 @@ figures:
   recall at precision .9   of people taller than 64 px whom the teacher's detector gives a score of .5 or more;
                            smaller and less sure ones count neither way
   mask IoU                 mean over people with a teacher's mask; nobody found there counts as 0
-  part at landmark         share of visible landmarks of those people with one of the parts painted there that belong
+  part at landmark         fraction of visible landmarks of those people with one of the parts painted there that belong
                            there; nothing painted is wrong
   left/right               of the landmarks of limbs with a limb painted, those with the right side
   false people             shown per photo without people
@@ -181,14 +181,14 @@ class Tally:
             people=len(self.people),
             masks=sum(not np.isnan(person.mask_iou) for person in self.people),
             recall_at_precision=recall_at_precision(self.matches, PRECISION),
-            recall_shown=share(right, len(self.people)),
-            precision_shown=share(right, right + len(self.alarms)),
+            recall_shown=fraction(right, len(self.people)),
+            precision_shown=fraction(right, right + len(self.alarms)),
             mask_iou=mean_mask_iou(self.people),
             part_at_landmark=part_accuracy(self.people),
             left_right=left_right(self.people),
             empty_photos=self.empty,
-            false_people=share(len(self.in_empty), self.empty),
-            landmark={name: share(sum(hits), len(hits)) for name, hits in self.landmarks.items()},
+            false_people=fraction(len(self.in_empty), self.empty),
+            landmark={name: fraction(sum(hits), len(hits)) for name, hits in self.landmarks.items()},
             calibration=calibrate(self.matches),
             groups=breakdown(self.people),
             failures=worst_cases(self.people, self.alarms + self.in_empty, MIN_LIMB_LANDMARKS),
@@ -196,7 +196,8 @@ class Tally:
 
 
 def recall_at_precision(matches: list[ImageMatches], precision: float) -> float:
-    """The largest recall at any score at which at least this share of the detections is right; NaN without people."""
+    """The largest recall at any score at which at least this fraction of the detections is right; NaN without
+    people."""
     wanted = sum(image.similarity.shape[1] for image in matches)
     if not wanted:
         return float("nan")

@@ -68,7 +68,7 @@ def _draw_calibration(axes: Axes, results: dict[str, Figures]) -> None:
     counts.set_yticks([0, max(table.count)])
     counts.tick_params(labelsize=8)
     counts.set_ylabel(f"bars: detections, {name}", fontsize=8, loc="bottom")
-    axes.set(title="calibration", xlabel="score", ylabel="share of right boxes, IoU .5", xlim=(0, 1), ylim=(0, 1))
+    axes.set(title="calibration", xlabel="score", ylabel="fraction of right boxes, IoU .5", xlim=(0, 1), ylim=(0, 1))
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="upper left")
 
@@ -118,7 +118,7 @@ def _draw_parts(above: Axes, below: Axes, results: dict[str, Figures]) -> None:
         above.plot(place, figures.part_precision[1:], "o", color=f"C{k}", markeredgecolor="k", markersize=5,
                    label=f"{name}: precision")  # fmt: skip
         below.bar(place, figures.part_error_cm[1:], width, color=f"C{k}", alpha=0.7)
-    above.set(title="body parts", ylabel="share of pixels", ylim=(0, 1))
+    above.set(title="body parts", ylabel="fraction of pixels", ylim=(0, 1))
     below.set_ylabel("median surface error, cm")
     above.legend(fontsize=8, ncols=len(results))
     below.set_xlim(0.4, PART_COUNT + 0.6)

@@ -82,24 +82,24 @@ class PixelAccuracy:
             self.difference[axis] += np.bincount(gap, minlength=256)
 
     def part_accuracy(self) -> float:
-        return share(np.trace(self.confusion[1:, 1:]), self.confusion[1:].sum())
+        return fraction(np.trace(self.confusion[1:, 1:]), self.confusion[1:].sum())
 
     def mask_iou(self) -> float:
         both = self.confusion[1:, 1:].sum()
-        return share(both, self.confusion.sum() - self.confusion[0, 0])
+        return fraction(both, self.confusion.sum() - self.confusion[0, 0])
 
     def part_recall(self) -> np.ndarray:
-        """float64 [25]: share of each true part's pixels painted with that part; NaN for unseen parts."""
+        """float64 [25]: fraction of each true part's pixels painted with that part; NaN for unseen parts."""
         return self._diagonal_over(self.confusion.sum(1))
 
     def part_precision(self) -> np.ndarray:
-        """float64 [25]: share of the pixels painted with each part that show it; NaN for unpainted parts."""
+        """float64 [25]: fraction of the pixels painted with each part that show it; NaN for unpainted parts."""
         return self._diagonal_over(self.confusion.sum(0))
 
     def fates(self) -> dict[str, float]:
         """What people's pixels are painted with: shares of all, by the names of `FATES`."""
         total = self.confusion[1:].sum()
-        return {name: share(self.confusion[1:][_FATE[1:] == k].sum(), total) for k, name in enumerate(FATES)}
+        return {name: fraction(self.confusion[1:][_FATE[1:] == k].sum(), total) for k, name in enumerate(FATES)}
 
     def _diagonal_over(self, total: np.ndarray) -> np.ndarray:
         return np.where(total > 0, np.diag(self.confusion) / np.maximum(total, 1), np.nan)
@@ -201,6 +201,6 @@ def mask_overlap(inds: np.ndarray, detections: int, instance: np.ndarray, number
     return (shared / np.maximum(union, 1))[1 : detections + 1, numbers]
 
 
-def share(part: int, whole: int) -> float:
+def fraction(part: int, whole: int) -> float:
     """part / whole; NaN of nothing."""
     return float(part / whole) if whole else float("nan")

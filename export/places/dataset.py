@@ -61,7 +61,7 @@ def frame_entry(k: int, camera: Camera) -> dict:
 
 
 def render_place(stock, split: str, seed: int, folder: Path, small=False, exact=False, frames: int = FRAMES) -> None:
-    """Draws one place and writes its folder whole (temporary name, then rename). exact: a cloud without faults."""
+    """Draws one place and writes its folder atomically (temporary name, then rename). exact: a cloud without faults."""
     for attempt in range(_ATTEMPTS):
         staged, _ = draw_place(stock, split, seed, small, frames, attempt)
         try:
@@ -157,7 +157,7 @@ def main() -> None:
     parser.add_argument("--plain", action="store_true", help="boxes instead of furniture: needs no package")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument(
-        "--most-seconds", type=float, default=600, help="a place that takes longer is left out (default %(default)s)"
+        "--max-seconds", type=float, default=600, help="a place that takes longer is left out (default %(default)s)"
     )
     parser.add_argument("--out", type=Path, default=Path(".data/places"))
     parser.add_argument("--data", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")

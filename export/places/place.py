@@ -137,9 +137,9 @@ def load_place(folder: Path | str) -> Place:
         cloud = read_ply(folder / _inside(file, table, "ply_file_path"))
     except PointCloudError as error:
         raise PlaceError(f"The cloud of {folder} cannot be read: {error}") from None
-    if cloud.dropped or not len(cloud.places):
+    if cloud.dropped or not len(cloud.positions):
         raise PlaceError(
-            f"The cloud of {folder} has {len(cloud.places)} points, and {cloud.dropped} that are not finite."
+            f"The cloud of {folder} has {len(cloud.positions)} points, and {cloud.dropped} that are not finite."
         )
     return Place(
         folder,
@@ -147,7 +147,7 @@ def load_place(folder: Path | str) -> Place:
         Pictures([folder / n for n in depths], height, width, _depth_reader(unit)),
         np.stack([c.intrinsics for c in cameras]),
         np.stack([c.world_to_camera for c in cameras]),
-        cloud.places.astype(np.float32),
+        cloud.positions.astype(np.float32),
         np.rint(255 * cloud.colours).astype(np.uint8),
         np.array(source, np.int64),
         np.array(held_out, np.int64),

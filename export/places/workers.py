@@ -12,8 +12,11 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection
 
+START_S = 300  # to start a process, imports included, on a busy machine
+
 
 def _serve(connection: Connection, work: Callable[[tuple], object]) -> None:
+    connection.send(None)  # started
     while True:
         try:
             job = connection.recv()
@@ -22,7 +25,7 @@ def _serve(connection: Connection, work: Callable[[tuple], object]) -> None:
         try:
             work(job)
             connection.send(None)
-        except Exception as error:  # the one who waits says it
+        except Exception as error:  # the waiting thread reports it
             connection.send(error)
 
 
@@ -33,12 +36,19 @@ class _Worker:
         self._process = context.Process(target=_serve, args=(theirs, work), daemon=True)
         self._process.start()
         theirs.close()
+        self._has_started = False
 
     def run(self, job: tuple, max_s: float) -> Exception | None:
-        self._connection.send(job)
-        if not self._connection.poll(max_s):
-            return TimeoutError(f"given up after {max_s:g} s")
+        """Runs a job; starting the process is not counted in `max_s`."""
         try:
+            if not self._has_started:
+                if not self._connection.poll(START_S):
+                    return TimeoutError(f"its process did not start within {START_S} s")
+                self._connection.recv()
+                self._has_started = True
+            self._connection.send(job)
+            if not self._connection.poll(max_s):
+                return TimeoutError(f"given up after {max_s:g} s")
             return self._connection.recv()
         except EOFError:
             return RuntimeError(f"its process ended with status {self._process.exitcode}")

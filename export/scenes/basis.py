@@ -1,4 +1,4 @@
-"""The functions of the viewing direction that looks are combinations of (NPBG++, arXiv 2203.13318, section 3.3)."""
+"""The functions of the viewing direction that descriptors combine (NPBG++, arXiv 2203.13318, section 3.3)."""
 
 from __future__ import annotations
 

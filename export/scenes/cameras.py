@@ -13,10 +13,10 @@ from export.camera import Camera
 FAINTEST = 0.05  # where the world's up is nearly along the axis, the turn fades out (pinhole_camera.cpp)
 
 
-def turned_upright(camera: Camera, up: np.ndarray) -> Camera:
+def rotated_upright(camera: Camera, up: np.ndarray) -> Camera:
     """The camera turned about its optical axis so that `up` [3] of the world points up in the picture.
 
-    Section 3.2 of NPBG++ (arXiv 2203.13318), as the SDK's `turned_upright`: as it is where up is along the axis, and
+    Section 3.2 of NPBG++ (arXiv 2203.13318), as the SDK's `rotated_upright`: as it is where up is along the axis, and
     continuous near that.
     """
     length = float(np.linalg.norm(up))
@@ -32,7 +32,7 @@ def turned_upright(camera: Camera, up: np.ndarray) -> Camera:
 def upright(camera: Camera, up: np.ndarray, multiple: int) -> Camera:
     """The camera turned upright, with the smallest frame that holds its whole picture and has sides that are multiples
     of `multiple`. The paper turns inside of a square as wide as the diagonal: up to twice the pixels."""
-    turned = turned_upright(camera, up)
+    turned = rotated_upright(camera, up)
     right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
     corners = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [-0.5, bottom, 1], [right, bottom, 1]])
     seen = corners @ between(camera, turned).T

@@ -20,7 +20,7 @@ import numpy as np
 
 from export.camera import Camera
 from export.point_cloud import PointCloud, read_ply
-from export.scenes.modelling import View
+from export.scenes.fitting import View
 
 LARGEST_SIDE_PX = 16384
 DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
@@ -120,7 +120,7 @@ def read_captures(folder: Path) -> list[Capture]:
     if not found:
         raise CaptureError(f"{folder} has no folders with a transforms.json in them.")
     for capture in found:
-        photos, points = len(capture.sources()), len(capture.cloud.places)
+        photos, points = len(capture.sources()), len(capture.cloud.positions)
         if photos < 2 or not points:
             raise CaptureError(
                 f"{folder / capture.name} has {photos} photos to learn from and {points} points; it needs 2 and 1."

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-FEATURES = 8  # values of a point's look
+FEATURES = 8  # values of a point's descriptor
 COLOURS = 3  # of them that are the photo's red, green, blue
-BASIS = 6  # functions of the direction that the look is a combination of
+BASIS = 6  # functions of the direction that the descriptor is a combination of
 RASTER = FEATURES + 1  # with the occupancy
 LEVELS = 5  # rasters at 1, 1/2, 1/4, 1/8, 1/16
 MULTIPLE = 2 ** (LEVELS - 1)  # sides of rendered pictures, pixels
-HIDING = 0.1  # a point so much farther than one beside it is behind it (export.scenes.raster.unhidden)
-TURNED_MULTIPLE = 64  # sides of those that are turned afterwards: of every size is a network prepared anew (SDK)
+DEPTH_TOLERANCE = 0.1  # a point so much farther than one beside it is occluded (export.scenes.raster)
+ROTATED_MULTIPLE = 64  # sides of those that are rotated afterwards: of every size is a network prepared anew (SDK)
 BACKGROUND_PX = 16  # side of blocks of a photo that without a point in them are background
 ALPHA = 1.0  # of the ridge regression, as in the paper
 
@@ -32,15 +32,16 @@ class RefinerConfig:
     """kind: `gated`, as in the paper (the rest is not used then), or `light`.
 
     block: of the light one, `conv` (3x3) or `separable` (depthwise 3x3, then 1x1). join: how a skip meets what comes
-    from below, `add` or `concat`. folded: whether it begins and ends at half resolution, 2x2 pixels as channels.
-    widths: channels at 1/2, 1/4, ... of the picture where it is folded, else at 1, 1/2, ...; rasters coarser than the
+    from below, `add` or `concat`. space_to_depth: whether it begins and ends at half
+    resolution, 2x2 pixels as channels.
+    widths: channels at 1/2, 1/4, ... of the picture with space_to_depth, else at 1, 1/2, ...; rasters coarser than the
     last are not read.
     """
 
     kind: str = "light"
     block: str = "conv"
     join: str = "concat"
-    folded: bool = True
+    space_to_depth: bool = True
     widths: tuple[int, ...] = (24, 32, 48, 64)
 
     def __post_init__(self) -> None:
@@ -57,7 +58,7 @@ class RefinerConfig:
     @property
     def levels(self) -> int:
         """How many rasters it reads, the finest first."""
-        return LEVELS if self.kind == "gated" else len(self.widths) + self.folded
+        return LEVELS if self.kind == "gated" else len(self.widths) + self.space_to_depth
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@
 
 All tensors have channels last, as int8 kernels want them and as the SDK, which writes and reads a whole pixel at a
 time, does. `extractor`: image [1, H, W, 3], RGB in 0..1, H and W multiples of 32 -> features [1, H, W, 8]. `refiner`:
-raster0, raster1, ... [1, H/2^k, W/2^k, 9] -> rgb [1, H, W, 3], not clamped; a folded refiner (config.folded) takes
+raster0, raster1, ... [1, H/2^k, W/2^k, 9] -> rgb [1, H, W, 3], not clamped; a refiner with config.space_to_depth takes
 raster0 as [1, H/2, W/2, 4 * 9] and gives rgb as [1, H/2, W/2, 4 * 3], pixels (0, 0), (0, 1), (1, 0), (1, 1) of each
 2x2. H and W are open: photos and windows have any size, and a runtime that knows its size fixes the axes named
 `height` and `width` when it loads a graph, which is then as fast as one exported for that size.
@@ -86,7 +86,7 @@ class ExtractorGraph(nn.Module):
 
 
 class RefinerGraph(nn.Module):
-    """Channels last at both ends, folded where the refiner is."""
+    """Channels last at both ends, rearranged by space_to_depth where the refiner is."""
 
     def __init__(self, refiner: Refiner) -> None:
         super().__init__()
@@ -97,14 +97,15 @@ class RefinerGraph(nn.Module):
 
     def forward(self, *rasters: Tensor) -> Tensor:
         given = [channels_first(raster) for raster in rasters]
-        return channels_last(self.refiner.of_folded(given) if self.light else self.refiner(given))
+        return channels_last(self.refiner.of_rearranged(given) if self.light else self.refiner(given))
 
 
 def raster_shapes(refiner: Refiner, height: int, width: int) -> dict[str, list[int]]:
     """What a refiner's graph is given for a picture of that size."""
-    is_folded, levels = (refiner.config.folded, refiner.config.levels) if isinstance(refiner, LightRefiner) else (0, 5)
+    is_light = isinstance(refiner, LightRefiner)
+    rearranged, levels = (refiner.config.space_to_depth, refiner.config.levels) if is_light else (False, 5)
     shapes = {f"raster{k}": [1, height >> k, width >> k, RASTER] for k in range(levels)}
-    if is_folded:
+    if rearranged:
         shapes["raster0"] = [1, height // 2, width // 2, 4 * RASTER]
     return shapes
 

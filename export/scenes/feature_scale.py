@@ -2,7 +2,7 @@
 
 Features are scaled in the extractor's last layer and back in those of the refiner that read rasters; what lies between,
 a regression for each point, is linear in them. Eight bits hold all channels of a raster with one scale: beside features
-of -5 .. 5 colours would have 25 steps. It also gives the SDK's `least_variation` one meaning for all features.
+of -5 .. 5 colours would have 25 steps. It also gives the SDK's `min_variation` one meaning for all features.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def scaled(networks: Networks, factors: Tensor) -> Networks:
     refiner = result.refiner
     back = torch.ones(RASTER)
     back[COLOURS:FEATURES] = 1 / factors
-    pixels = 5 if refiner.config.folded else 1  # four of the finest raster, and the next one's
+    pixels = 5 if refiner.config.space_to_depth else 1  # four of the finest raster, and the next one's
     _scale_inputs(refiner.start[0], back.repeat(pixels))
     for width, block in zip(refiner.config.widths, refiner.down, strict=False):
         _scale_inputs(block[0], torch.cat([torch.ones(width), back]))

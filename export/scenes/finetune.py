@@ -1,4 +1,4 @@
-"""Fine-tunes one scene to its photos: the looks of its points and, if wanted, the refiner.
+"""Fine-tunes one scene to its photos: the descriptors of its points and, if wanted, the refiner.
 
     maquette scene build PLACE --networks BUNDLE --out place.maqs
     python -m export.scenes.finetune PLACE --scene place.maqs --networks BUNDLE --weights RUN/weights.pt \\
@@ -10,8 +10,8 @@ too: a bundle of the same precision is written beside the scene, as `tuned-netwo
 With `--save-at 10 60 600`, `--out` is a folder, and gets `10s.maqs` and so on of one run; `python -m benchmarks
 --fine-tuned` reads folders of such folders.
 
-It learns from the photos that the scene was built from, all of them: one kept aside would have shaped the scene
-already. Held-out photos are looked at before and after, to print how well they are met. Seconds are wall-clock time of
+It learns from the photos that the scene was built from, all of them: one held out now would have shaped the scene
+already. PSNR on held-out photos is printed before and after. Seconds are wall-clock time of
 learning; what is found once, saving and measuring come on top and are said apart.
 """
 
@@ -40,9 +40,9 @@ from export.scenes.captures import Capture, CaptureError, read_capture
 from export.scenes.export_onnx import export_refiner
 from export.scenes.extractor import STRIDE
 from export.scenes.feature_scale import factors_between, scaled
-from export.scenes.light_refiner import LightRefiner, folded
+from export.scenes.fitting import View
+from export.scenes.light_refiner import LightRefiner, space_to_depth
 from export.scenes.losses import LossWeights
-from export.scenes.modelling import View
 from export.scenes.perceptual import load_perceptual
 from export.scenes.picture_quality import psnr_db
 from export.scenes.scene_file import SceneFile, SceneFileError, read_scene_file, write_scene_file
@@ -100,7 +100,7 @@ def write_tuned_networks(scene: TunedScene, views: list[Shown], shipped: Path, f
     with tempfile.TemporaryDirectory() as work:
         refiner = Path(work) / "refiner.onnx"
         export_refiner(scene.networks.refiner.cpu(), refiner)
-        scene.networks.refiner.to(scene.places.device)
+        scene.networks.refiner.to(scene.positions.device)
         for k, view in enumerate(views[:: -(-len(views) // MAX_VIEWS)]):
             np.savez(Path(work) / f"{k}.npz", **_refiner_inputs(scene, view))
         # A program of its own: calibration builds on this package, not the other way round.
@@ -115,8 +115,8 @@ def _refiner_inputs(scene: TunedScene, view: Shown) -> dict[str, np.ndarray]:
     rasters, refiner = scene.rasters(view), scene.networks.refiner
     if isinstance(refiner, LightRefiner):
         rasters = rasters[: refiner.config.levels]
-        if refiner.config.folded:
-            rasters = [folded(rasters[0]), *rasters[1:]]
+        if refiner.config.space_to_depth:
+            rasters = [space_to_depth(rasters[0]), *rasters[1:]]
     return {f"raster{k}": x.permute(0, 2, 3, 1).contiguous().cpu().numpy() for k, x in enumerate(rasters)}
 
 
@@ -164,7 +164,7 @@ def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argpar
                 bar.set_postfix(step=steps, loss=f"{loss:.4f}", refresh=False)
                 bar.update(min(round(spent_s), round(due_s)) - bar.n)
         begin_s = time.monotonic()
-        tuned = scene.with_looks(*model.looks())
+        tuned = scene.with_descriptors(*model.descriptors())
         if options.refiner:
             sha256 = write_tuned_networks(model, tuning.shown, options.networks, files.networks(due_s))
             tuned = tuned.with_networks(sha256)
@@ -187,7 +187,7 @@ def parsed() -> argparse.Namespace:
         "--pretrained", type=Path, help="compare pictures by these features too (export.teachers.backbone)"
     )
     parser.add_argument("--long-side", type=int, default=640, help="larger photos are made smaller, pixels")
-    parser.add_argument("--unmeasured", action="store_true", help="do not look at held-out photos")
+    parser.add_argument("--unmeasured", action="store_true", help="do not measure on held-out photos")
     options = parser.parse_args()
     saves = options.save_at or [options.seconds]
     if not all(0 < a < math.inf for a in saves) or sorted(set(saves)) != saves:

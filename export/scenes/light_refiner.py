@@ -21,15 +21,15 @@ from torch.nn import functional as F
 from export.scenes.config import COLOURS, RASTER, RefinerConfig
 
 
-def folded(x: Tensor) -> Tensor:
+def space_to_depth(x: Tensor) -> Tensor:
     """[N, C, H, W] -> [N, 4 C, H/2, W/2]: the pixels (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2, all channels of the
     first before those of the next, so that a pixel is one piece of memory where channels are last."""
     n, c, h, w = x.shape
     return x.reshape(n, c, h // 2, 2, w // 2, 2).permute(0, 3, 5, 1, 2, 4).reshape(n, 4 * c, h // 2, w // 2)
 
 
-def unfolded(x: Tensor) -> Tensor:
-    """What `folded` was made of."""
+def depth_to_space(x: Tensor) -> Tensor:
+    """The inverse of `space_to_depth`."""
     n, c, h, w = x.shape
     return x.reshape(n, 2, 2, c // 4, h, w).permute(0, 3, 4, 1, 5, 2).reshape(n, c // 4, 2 * h, 2 * w)
 
@@ -61,9 +61,9 @@ class LightRefiner(nn.Module):
         super().__init__()
         self.config = config
         w, block = config.widths, config.block
-        inputs, outputs = (5 * RASTER, 12) if config.folded else (RASTER, 3)
+        inputs, outputs = (5 * RASTER, 12) if config.space_to_depth else (RASTER, 3)
         # Many channels meet first in a 1x1 convolution, which is a ninth of the work.
-        entry = [nn.Conv2d(inputs, w[0], 1), nn.ReLU(inplace=True)] if config.folded else []
+        entry = [nn.Conv2d(inputs, w[0], 1), nn.ReLU(inplace=True)] if config.space_to_depth else []
         self.start = nn.Sequential(*entry, *_block(w[0] if entry else inputs, w[0], block))
         self.down = nn.ModuleList(_block(w[k - 1] + RASTER, w[k], block) for k in range(1, len(w)))
         self.centre = _block(w[-1], w[-1], block)
@@ -75,13 +75,13 @@ class LightRefiner(nn.Module):
         nn.init.zeros_(self.final.bias)
 
     def forward(self, rasters: list[Tensor]) -> Tensor:
-        if self.config.folded:
-            return unfolded(self.of_folded([folded(rasters[0]), *rasters[1:]]))
-        return self.of_folded(rasters)
+        if self.config.space_to_depth:
+            return depth_to_space(self.of_rearranged([space_to_depth(rasters[0]), *rasters[1:]]))
+        return self.of_rearranged(rasters)
 
-    def of_folded(self, rasters: list[Tensor]) -> Tensor:
-        """As `forward`, but where the network is folded the first raster is `folded` already and the picture still."""
-        count = 2 if self.config.folded else 1
+    def of_rearranged(self, rasters: list[Tensor]) -> Tensor:
+        """As `forward`, but with space_to_depth the first raster comes and the picture leaves rearranged."""
+        count = 2 if self.config.space_to_depth else 1
         skips = [self.start(torch.cat(rasters[:count], 1) if count > 1 else rasters[0])]
         for block, raster in zip(self.down, rasters[count : self.config.levels], strict=True):
             skips.append(block(torch.cat([F.max_pool2d(skips[-1], 2), raster], 1)))

@@ -1,14 +1,14 @@
-"""Which point each pixel shows, and rasters of their looks: NPBG++ (arXiv 2203.13318), section 3.4.
+"""Which point each pixel shows, and rasters of their descriptors: NPBG++ (arXiv 2203.13318), section 3.4.
 
-One pixel a point; the nearest wins, of equal depths the lowest index, by the same arithmetic as the SDK's
-`ZBuffer` (sdk/src/scene/visibility/z_buffer.h). A key is the depth's bits, then the index: the least wins.
+One pixel a point; the nearest is visible, of equal depths the lowest index, by the same arithmetic as the SDK's
+`ZBuffer` (sdk/src/scene/visibility/z_buffer.h). A key is the depth's bits, then the index: the smallest is visible.
 
-Coarser levels are the least keys of 2x2 pixels of the next finer one. That is what a camera of half the size would
+Coarser levels are the smallest keys of 2x2 pixels of the next finer one. That is what a camera of half the size would
 find, and exactly: a point at (x, y) is in pixel floor(x + 1/2), and half the size moves it to (x + 1/2) / 2 - 1/2, so
 to pixel floor((x + 1/2) / 2) = floor(floor(x + 1/2) / 2). It holds where all sides can be halved, hence sides are
-multiples of 16 here: the frame is wider than the picture by up to 15 pixels, with the points that are there, and cut
-afterwards. The paper truncates sizes instead and draws the points five times. A winner that is hidden (`unhidden`) is
-never the winner of a coarser pixel that has another point of its block.
+multiples of 16 here: the frame is wider than the picture by up to 15 pixels, with the points that are there, and
+cropped afterwards. The paper truncates sizes instead and draws the points five times. A point that is dropped as
+occluded (`without_occluded`) is never the visible one of a coarser pixel that has another point of its block.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from export.camera import Camera
 from export.scenes.config import COLOURS
 
 NOTHING = torch.iinfo(torch.int64).max
-HIDING_PX = 4
+OCCLUSION_BLOCK_PX = 4
 _INDEX = (1 << 32) - 1
 
 
@@ -55,17 +55,21 @@ def visible(points: Tensor, camera: Camera, near: float = 0.0) -> Tensor:
     return keys.scatter_reduce(0, at, key, "amin").view(h, w)
 
 
-def unhidden(keys: Tensor, share: float) -> Tensor:
-    """Keys [H, W] without the points that shine through holes of what is before them: those of a block of
-    HIDING_PX x HIDING_PX pixels, counted from the first one, that are farther than its nearest by more than `share` of
-    that depth. Infinite: all stay."""
+def without_occluded(keys: Tensor, tolerance: float) -> Tensor:
+    """Keys [H, W] without the points that bleed through holes of what is before them: those of a block of
+    OCCLUSION_BLOCK_PX x OCCLUSION_BLOCK_PX pixels, counted from the first one, that are farther than its nearest by
+    more than `tolerance` of that depth. Infinite: all stay."""
     h, w = keys.shape
-    rows, columns = -(-h // HIDING_PX), -(-w // HIDING_PX)
-    whole = torch.full((rows * HIDING_PX, columns * HIDING_PX), NOTHING, dtype=keys.dtype, device=keys.device)
+    rows, columns = -(-h // OCCLUSION_BLOCK_PX), -(-w // OCCLUSION_BLOCK_PX)
+    whole = torch.full(
+        (rows * OCCLUSION_BLOCK_PX, columns * OCCLUSION_BLOCK_PX), NOTHING, dtype=keys.dtype, device=keys.device
+    )
     whole[:h, :w] = keys
-    blocks = whole.view(rows, HIDING_PX, columns, HIDING_PX)
+    blocks = whole.view(rows, OCCLUSION_BLOCK_PX, columns, OCCLUSION_BLOCK_PX)
     nearest = depths_of(blocks.amin((1, 3)))
-    limit = (nearest * (1 + share)).repeat_interleave(HIDING_PX, 0).repeat_interleave(HIDING_PX, 1)
+    limit = (
+        (nearest * (1 + tolerance)).repeat_interleave(OCCLUSION_BLOCK_PX, 0).repeat_interleave(OCCLUSION_BLOCK_PX, 1)
+    )
     return torch.where(depths_of(keys) > limit[:h, :w], NOTHING, keys)
 
 
@@ -85,23 +89,23 @@ def depths_of(keys: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class Pyramid:
-    """points: indices int64 [V] of all that win a pixel. slots: for each level, finest first, where in `points` the
-    pixel's point is, int64 [H/2^k, W/2^k]; V where there is none."""
+    """points: indices int64 [V] of all that are visible in a pixel. slots: for each level, finest first, where in
+    `points` the pixel's point is, int64 [H/2^k, W/2^k]; V where there is none."""
 
     points: Tensor
     slots: list[Tensor]
 
-    def rasters(self, looks: Tensor) -> list[Tensor]:
-        """Looks [V, C] of `points` -> [C + 1, H/2^k, W/2^k] for each level, the last channel 1 where there is a point.
-        All is 0 elsewhere."""
-        rows = torch.cat([looks, looks.new_ones(len(looks), 1)], 1)
+    def rasters(self, descriptors: Tensor) -> list[Tensor]:
+        """Descriptors [V, C] of `points` -> [C + 1, H/2^k, W/2^k] for each level, the last channel 1 where there is a
+        point. All is 0 elsewhere."""
+        rows = torch.cat([descriptors, descriptors.new_ones(len(descriptors), 1)], 1)
         rows = torch.cat([rows, rows.new_zeros(1, rows.shape[1])])
         return [rows[slot].permute(2, 0, 1) for slot in self.slots]
 
 
 def pyramid(keys: Tensor, levels: int) -> Pyramid:
     """Of `visible` keys [H, W], sides multiples of 2^(levels - 1)."""
-    # A point has one pixel, so no index comes twice; and who wins a coarser pixel has won a finer one.
+    # A point has one pixel, so no index comes twice; and what is visible in a coarser pixel is visible in a finer one.
     points = torch.sort(keys[keys != NOTHING] & _INDEX).values
     slots = []
     for level in range(levels):

@@ -1,4 +1,4 @@
-"""What one step of training looks at: a cut of a photo, the photos it is to be made from, and their cloud."""
+"""What one step of training is given: a crop of a photo, the photos it is to be made from, and their cloud."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from torchvision.transforms import functional as colour
 from export.camera import Camera
 from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture
-from export.scenes.modelling import Options, Sources, gathered, seen_in
+from export.scenes.fitting import Options, Sources, gathered, seen_in
 from export.scenes.source_views import drawn
 
 SCORED_POINTS = 512  # of the cloud, enough to tell which photos see the same
@@ -34,9 +34,9 @@ class Sample:
 
 @dataclass(frozen=True)
 class Sampling:
-    """crop_px: side of the cuts, a multiple of 32. sources: photos a cut is made from, at least and at most; the paper
-    has 3. margin_px: the extractor sees of a photo a square so much wider than the cut. long_side_px: larger photos are
-    made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
+    """crop_px: side of the crops, a multiple of 32. sources: photos a crop is made from, at least and at most; the
+    paper has 3. margin_px: the extractor sees of a photo a square so much wider than the cut. long_side_px: larger
+    photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
 
     crop_px: int = 256
     sources: tuple[int, int] = (3, 3)
@@ -48,7 +48,7 @@ class Sampling:
 def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.Generator) -> Sample:
     """Depends on the generator alone. Raises CaptureError where a photo cannot be decoded."""
     capture = captures[rng.integers(len(captures))]
-    places = capture.cloud.places
+    places = capture.cloud.positions
     target = int(rng.integers(len(capture.cameras)))
     scored = places[rng.integers(len(places), size=min(SCORED_POINTS, len(places)))]
     count = int(rng.integers(sampling.sources[0], sampling.sources[1] + 1))

@@ -1,8 +1,8 @@
-"""Scene files (.maqs) in numpy: read, checked, and written again with other looks.
+"""Scene files (.maqs) in numpy: read, checked, and written again with other descriptors.
 
-The layout is that of sdk/src/scene/format/scene_file_format.h and scene.h, version 1. Points, blocks and kinds of numbers
-stay as `maquette scene build` chose them: what is written differs in coefficients, their steps, and the networks'
-identity. Checks are 64-bit XXH3 hashes by libxxhash, which comes with the header that the SDK is built with
+The layout is that of sdk/src/scene/format/scene_file_format.h and scene.h, version 1. Points, blocks and kinds of
+numbers stay as `maquette scene build` chose them: what is written differs in coefficients, their steps, and the
+networks' identity. Checks are 64-bit XXH3 hashes by libxxhash, which comes with the header that the SDK is built with
 (scripts/install-packages.sh).
 """
 
@@ -38,7 +38,7 @@ HEAD = np.dtype(
         ("points", "<u4"),
         ("varying", "<u4"),
         ("blocks", "<u4"),
-        ("place_kind", "u1"),
+        ("position_kind", "u1"),
         ("coefficient_kind", "u1"),
         ("zero", "u1", 2),
         ("networks_sha256", "u1", 32),
@@ -70,12 +70,12 @@ class SceneFileError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class SceneFile:
-    """head: one HEAD. blocks: BLOCK [B]. places: [3 P] as stored, block by block x of all, then y, then z. means: [P,
-    8] and slopes: [V, 48] as stored."""
+    """head: one HEAD. blocks: BLOCK [B]. stored_positions: [3 P] as stored, block by block x of all, then y, then z.
+    means: [P, 8] and slopes: [V, 48] as stored."""
 
     head: np.ndarray
     blocks: np.ndarray
-    places: np.ndarray
+    stored_positions: np.ndarray
     means: np.ndarray
     slopes: np.ndarray
 
@@ -86,16 +86,16 @@ class SceneFile:
 
     @property
     def networks_sha256(self) -> str:
-        """Of the networks that the looks were made with (`identity` of export.scenes.bundle)."""
+        """Of the networks that the descriptors were made with (`identity` of export.scenes.bundle)."""
         return self.head["networks_sha256"].tobytes().hex()
 
     def positions(self) -> np.ndarray:
         """Where the points are in the world, float64 [P, 3]."""
         found = np.empty((len(self.means), 3), np.float32)
-        quantized = self.head["place_kind"] == 1
+        quantized = self.head["position_kind"] == 1
         for block in self.blocks:
             first, count = int(block["first"]), int(block["count"])
-            stored = self.places[3 * first : 3 * (first + count)].reshape(3, count).T.astype(np.float32)
+            stored = self.stored_positions[3 * first : 3 * (first + count)].reshape(3, count).T.astype(np.float32)
             found[first : first + count] = block["low"] + stored * block["place_step"] if quantized else stored
         return found + self.head["origin"]
 
@@ -104,13 +104,13 @@ class SceneFile:
         return self.head["background"].copy()
 
     def slope_rows(self) -> np.ndarray:
-        """For each point, int64 [P], which row of the slopes is its own; -1 for those that look the same from all
-        sides."""
+        """For each point, int64 [P], which row of the slopes is its own; -1 for those whose descriptor is the same from
+        all sides."""
         block = np.repeat(np.arange(len(self.blocks)), self.blocks["count"])
         own = np.arange(len(self.means)) - self.blocks["first"][block]
         return np.where(own < self.blocks["varying"][block], self.blocks["first_varying"][block] + own, -1)
 
-    def looks(self) -> tuple[np.ndarray, np.ndarray]:
+    def descriptors(self) -> tuple[np.ndarray, np.ndarray]:
         """Means [P, 8] and slopes [V, 48], float32."""
         if self.head["coefficient_kind"] == 0:
             return self.means.astype(np.float32), self.slopes.astype(np.float32)
@@ -119,17 +119,17 @@ class SceneFile:
         steps = np.repeat(self.blocks["slope_step"], self.blocks["varying"], axis=0)
         return means, self.slopes.astype(np.float32) * steps
 
-    def with_looks(self, means: np.ndarray, slopes: np.ndarray) -> SceneFile:
+    def with_descriptors(self, means: np.ndarray, slopes: np.ndarray) -> SceneFile:
         """The same points with other means [P, 8] and slopes [V, 48], stored in the same kind of numbers. Raises
         ValueError for other shapes or numbers too large."""
         if means.shape != self.means.shape or slopes.shape != self.slopes.shape:
-            raise ValueError(f"looks of shapes {means.shape} and {slopes.shape} are not of this scene's points")
+            raise ValueError(f"descriptors of shapes {means.shape} and {slopes.shape} are not of this scene's points")
         if not all(_sound(values) for values in (means, slopes)):
-            raise ValueError("the looks are not finite, or too large for a scene file")
+            raise ValueError("the descriptors are not finite, or too large for a scene file")
         blocks, head = self.blocks.copy(), self.head.copy()
         kind = COEFFICIENTS[int(head["coefficient_kind"])]
         if kind.kind == "f":
-            return SceneFile(head, blocks, self.places, means.astype(kind), slopes.astype(kind))
+            return SceneFile(head, blocks, self.stored_positions, means.astype(kind), slopes.astype(kind))
         most = np.iinfo(kind).max
         low, high = (f.reduceat(means.astype(np.float64), blocks["first"], axis=0) for f in (np.minimum, np.maximum))
         blocks["mean_middle"] = (low + high) / 2
@@ -145,7 +145,7 @@ class SceneFile:
             _in_steps(means.astype(np.float64) - of_point["mean_middle"], of_point["mean_step"], most),
             _in_steps(slopes, steps, most),
         )
-        return SceneFile(head, blocks, self.places, *(values.astype(kind) for values in stored))
+        return SceneFile(head, blocks, self.stored_positions, *(values.astype(kind) for values in stored))
 
     def with_networks(self, sha256: str) -> SceneFile:
         """The same scene, said to be made with the networks of that identity."""
@@ -178,7 +178,7 @@ def read_scene_file(path: Path) -> SceneFile:
     scene = SceneFile(
         head,
         np.frombuffer(sections[0], BLOCK),
-        np.frombuffer(sections[1], PLACES[int(head["place_kind"])]),
+        np.frombuffer(sections[1], PLACES[int(head["position_kind"])]),
         np.frombuffer(sections[2], coefficient).reshape(-1, FEATURES),
         np.frombuffer(sections[3], coefficient).reshape(-1, SLOPES),
     )
@@ -189,7 +189,7 @@ def read_scene_file(path: Path) -> SceneFile:
 def write_scene_file(scene: SceneFile, path: Path) -> None:
     """Beside its place first: a crash leaves the old file whole."""
     head = scene.head.copy()
-    arrays = (scene.blocks, scene.places, scene.means, scene.slopes)
+    arrays = (scene.blocks, scene.stored_positions, scene.means, scene.slopes)
     sections, offset = [np.ascontiguousarray(x).tobytes() for x in arrays], HEAD.itemsize
     for k, data in enumerate(sections):
         sections[k] = data + bytes(_filled_up(len(data)) - len(data))
@@ -235,7 +235,7 @@ def _checked_head(raw: bytes, size: int, path: Path) -> np.ndarray:
         raise SceneFileError(f"{path} is damaged in its first {HEAD.itemsize} bytes; copy it again.")
     if head["file_bytes"] != size:
         raise SceneFileError(f"{path} has {size} bytes, but should have {head['file_bytes']}: it is cut off; copy it.")
-    kinds = int(head["place_kind"]), int(head["coefficient_kind"])
+    kinds = int(head["position_kind"]), int(head["coefficient_kind"])
     if kinds[0] not in PLACES or kinds[1] not in COEFFICIENTS:
         raise SceneFileError(f"{path} stores its numbers in kinds {kinds}, which version {VERSION} does not have.")
     points, varying, blocks = (int(head[name]) for name in ("points", "varying", "blocks"))
@@ -272,6 +272,6 @@ def _check_blocks(scene: SceneFile, path: Path) -> None:
     if (counts < 1).any() or (counts > MAX_BLOCK_POINTS).any() or (blocks["varying"] > counts).any():
         raise SceneFileError(f"{path} has a block of 0, or of over {MAX_BLOCK_POINTS} points, or more that vary.")
     floats = [blocks[n] for n in ("low", "high", "place_step", "mean_middle", "mean_step", "slope_step")]
-    floats += [x for x in (scene.places, scene.means, scene.slopes) if x.dtype.kind == "f"]
+    floats += [x for x in (scene.stored_positions, scene.means, scene.slopes) if x.dtype.kind == "f"]
     if not all(_sound(values) for values in floats):
-        raise SceneFileError(f"{path} has places or looks that are not finite; build the scene again.")
+        raise SceneFileError(f"{path} has positions or descriptors that are not finite; build the scene again.")

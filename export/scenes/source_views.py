@@ -13,9 +13,9 @@ from export.camera import Camera
 BEST_DEG, BELOW_DEG, ABOVE_DEG = 15.0, 5.0, 15.0
 
 
-def in_frame(places: np.ndarray, camera: Camera) -> np.ndarray:
+def in_frame(positions: np.ndarray, camera: Camera) -> np.ndarray:
     """Whether points [P, 3] are ahead of a camera and within its frame, bool [P]; whatever may hide them."""
-    seen = (places - camera.centre) @ camera.rotation.T
+    seen = (positions - camera.centre) @ camera.rotation.T
     with np.errstate(divide="ignore", invalid="ignore"):
         x = camera.fx_px * seen[:, 0] / seen[:, 2] + camera.cx_px
         y = camera.fy_px * seen[:, 1] / seen[:, 2] + camera.cy_px
@@ -23,12 +23,12 @@ def in_frame(places: np.ndarray, camera: Camera) -> np.ndarray:
     return inside & (seen[:, 2] > 0)
 
 
-def scores(target: Camera, others: Sequence[Camera], places: np.ndarray) -> np.ndarray:
+def scores(target: Camera, others: Sequence[Camera], positions: np.ndarray) -> np.ndarray:
     """How well each of the others suits, [N]: the sum over points [P, 3] that both have in their frame.
 
-    The target's own place (angle 0) scores nearly nothing, somebody who looks elsewhere nothing.
+    The target's own position (angle 0) scores nearly nothing, a camera that points elsewhere nothing.
     """
-    both = places[in_frame(places, target)]
+    both = positions[in_frame(positions, target)]
     found = np.zeros(len(others))
     for k, other in enumerate(others):
         common = both[in_frame(both, other)]
@@ -43,12 +43,12 @@ def drawn(
     target: int,
     cameras: Sequence[Camera],
     allowed: Sequence[int],
-    places: np.ndarray,
+    positions: np.ndarray,
     count: int,
     rng: np.random.Generator,
 ) -> list[int]:
     """`count` of the allowed indices but the target's (fewer where there are fewer), drawn by scores, no repetition."""
     others = [k for k in allowed if k != target]
-    weight = scores(cameras[target], [cameras[k] for k in others], places) + 1e-9
+    weight = scores(cameras[target], [cameras[k] for k in others], positions) + 1e-9
     picked = rng.choice(len(others), min(count, len(others)), replace=False, p=weight / weight.sum())
     return [others[k] for k in picked]

@@ -28,10 +28,10 @@ class Networks(nn.Module):
 
 def config_of(saved: dict[str, Any]) -> SceneConfig:
     """What `asdict(SceneConfig)` made, after a way through a file."""
-    extractor, refiner = saved["extractor"], saved["refiner"]
-    return SceneConfig(
-        ExtractorConfig(tuple(extractor["widths"])), RefinerConfig(**refiner | {"widths": tuple(refiner["widths"])})
-    )
+    extractor, refiner = saved["extractor"], saved["refiner"] | {"widths": tuple(saved["refiner"]["widths"])}
+    if "folded" in refiner:  # the name in weights of before
+        refiner["space_to_depth"] = refiner.pop("folded")
+    return SceneConfig(ExtractorConfig(tuple(extractor["widths"])), RefinerConfig(**refiner))
 
 
 def save_networks(networks: Networks, path: Path) -> None:

@@ -29,8 +29,8 @@ from export.point_cloud import PointCloudError
 from export.scenes.captures import Capture, CaptureError, read_captures
 from export.scenes.config import SIZES
 from export.scenes.extractor import STRIDE
+from export.scenes.fitting import Options, fitted_to_features, fitted_to_views, painted, render
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
-from export.scenes.modelling import Options, fitted, modelled, painted, render
 from export.scenes.perceptual import Perceptual, load_perceptual
 from export.scenes.picture_quality import psnr_db
 from export.scenes.samples import Sample, Sampling, draw_sample
@@ -72,7 +72,9 @@ def batch_terms(
         features = iter(networks.extractor(images.contiguous(memory_format=torch.channels_last)).float())
     rasters: list[list[Tensor]] = []
     for sample in samples:
-        model = fitted(sample.sources, islice(features, len(sample.sources.images)), networks, sample.options)
+        model = fitted_to_features(
+            sample.sources, islice(features, len(sample.sources.images)), networks, sample.options
+        )
         rasters.append(model.rasters(sample.camera, networks, sample.options))
     target = torch.stack([sample.target for sample in samples]).to(device)
     mask = torch.stack([sample.mask for sample in samples]).to(device)
@@ -97,17 +99,17 @@ def validate(
     device, rows, figures = next(networks.parameters()).device, [], []
     networks.eval()
     for capture in captures:
-        points = torch.from_numpy(capture.cloud.places).to(device)
+        points = torch.from_numpy(capture.cloud.positions).to(device)
         colours = torch.from_numpy(capture.cloud.colours).to(device)
         options = Options(up=capture.up)
         candidates = sorted(capture.held_out) or range(len(capture.cameras))
         for at in np.linspace(0, len(candidates) - 1, targets + 2).round().astype(int)[1:-1]:
             target = candidates[at]
             others = [k for k in capture.sources() if k != target]
-            score = scores(capture.cameras[target], [capture.cameras[k] for k in others], capture.cloud.places[::37])
+            score = scores(capture.cameras[target], [capture.cameras[k] for k in others], capture.cloud.positions[::37])
             best = [others[k] for k in np.argsort(-score, kind="stable")[:sources]]
             photo = capture.view(target, long_side_px)
-            model = modelled(points, [capture.view(k, long_side_px) for k in best], networks, options)
+            model = fitted_to_views(points, [capture.view(k, long_side_px) for k in best], networks, options)
             made = render(model, photo.camera, networks, options)
             plain = painted(points, colours, photo.camera)
             figures.append((psnr_db(made, photo.image), psnr_db(plain, photo.image)))

@@ -1,7 +1,7 @@
-"""How the points of one scene look, learnt from its photos: what is left of NPBG++ (arXiv 2203.13318) after modelling.
+"""The descriptors of one scene's points, learnt from its photos: NPBG++ (arXiv 2203.13318) after fitting.
 
 Which point a pixel of a photo shows never changes, so it is found once. A step then renders one whole photo: each of
-its points has one pixel there, and a cut would show some of them and save nothing a pixel. Optimisers are lazy, since
+its points has one pixel there, and a crop would show some of them and save nothing a pixel. Optimisers are lazy, since
 a step touches the points of one photo.
 """
 
@@ -18,9 +18,9 @@ from torch.nn import functional as F
 from export.camera import Camera
 from export.scenes.basis import directions
 from export.scenes.cameras import between, moves, upright
-from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, TURNED_MULTIPLE
+from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, ROTATED_MULTIPLE
+from export.scenes.fitting import Options, View, coverage, shown_in
 from export.scenes.losses import LossWeights, picture_terms
-from export.scenes.modelling import Options, View, cover, shown_in
 from export.scenes.perceptual import Perceptual
 from export.scenes.raster import Pyramid, filled, pyramid
 from export.scenes.scene_file import SceneFile
@@ -31,8 +31,8 @@ BETAS = 0.9, 0.99  # a point that is met for the first time then moves by the ra
 
 @dataclass(frozen=True)
 class Rates:
-    """Learning rates of Adam. mean, slope: of looks, whose features have the range of colours, 0..1. refiner: of its
-    weights, 1e-4 in the paper; 0: they stay."""
+    """Learning rates of Adam. mean, slope: of descriptors, whose features have the range of colours, 0..1. refiner: of
+    its weights, 1e-4 in the paper; 0: they stay."""
 
     mean: float = 1e-2
     slope: float = 3e-4
@@ -41,7 +41,7 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a camera shows of a scene, whatever its points look like. frame: the upright picture that is rendered,
+    """What a camera shows of a scene, whatever its descriptors are. frame: the upright picture that is rendered,
     turned: whether the camera's own differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis: [V,
     6]."""
 
@@ -54,16 +54,16 @@ class Shown:
 
 
 class TunedScene(nn.Module):
-    """The looks of a scene's points as parameters, and the networks that draw them."""
+    """The descriptors of a scene's points as parameters, and the networks that draw them."""
 
     def __init__(self, scene: SceneFile, networks: Networks, device: torch.device) -> None:
         super().__init__()
         self.networks = networks.to(device).eval().requires_grad_(False)
         self.options = Options(up=scene.up)
-        self.places = torch.from_numpy(scene.positions()).to(device)
+        self.positions = torch.from_numpy(scene.positions()).to(device)
         self.rows = torch.from_numpy(scene.slope_rows()).to(device)
         self.background = torch.from_numpy(scene.background()).to(device)
-        means, slopes = (torch.from_numpy(values).to(device) for values in scene.looks())
+        means, slopes = (torch.from_numpy(values).to(device) for values in scene.descriptors())
         self.mean, self.slope = nn.Parameter(means), nn.Parameter(slopes)
 
     @torch.no_grad()
@@ -73,22 +73,22 @@ class TunedScene(nn.Module):
         frame = upright(camera, up, MULTIPLE)
         turned = moves(camera, frame)
         if turned:
-            frame = upright(camera, up, TURNED_MULTIPLE)
-        found = pyramid(shown_in(self.places, frame, self.options), LEVELS)
-        centre = torch.from_numpy(frame.centre).to(self.places)
-        basis = self.networks.basis(directions(self.places[found.points], centre).float())
+            frame = upright(camera, up, ROTATED_MULTIPLE)
+        found = pyramid(shown_in(self.positions, frame, self.options), LEVELS)
+        centre = torch.from_numpy(frame.centre).to(self.positions)
+        basis = self.networks.basis(directions(self.positions[found.points], centre).float())
         slots = [slot.int() for slot in found.slots]
         return Shown(camera, frame, turned, found.points, slots, basis)
 
     def rasters(self, shown: Shown) -> list[Tensor]:
         """[1, 9, H/2^k, W/2^k] for each level, of the frame."""
-        looks = F.embedding(shown.points, self.mean, sparse=True)
+        descriptors = F.embedding(shown.points, self.mean, sparse=True)
         rows = self.rows[shown.points]
         (varying,) = torch.where(rows >= 0)
         if len(varying):
             slopes = F.embedding(rows[varying], self.slope, sparse=True).view(-1, BASIS, FEATURES)
-            looks = looks.index_add(0, varying, torch.einsum("pb,pbf->pf", shown.basis[varying], slopes))
-        levels = Pyramid(shown.points, [slot.long() for slot in shown.slots]).rasters(looks)
+            descriptors = descriptors.index_add(0, varying, torch.einsum("pb,pbf->pf", shown.basis[varying], slopes))
+        levels = Pyramid(shown.points, [slot.long() for slot in shown.slots]).rasters(descriptors)
         return filled([level[None] for level in levels], self.background)
 
     def picture(self, shown: Shown) -> Tensor:
@@ -96,7 +96,7 @@ class TunedScene(nn.Module):
         rasters = self.rasters(shown)
         background = self.background[:, None, None]
         # Not clamped, so that what is too bright can be learnt to be darker; the SDK clamps before it blends.
-        picture = background + cover([level[0] for level in rasters]) * (self.networks.refiner(rasters) - background)
+        picture = background + coverage([level[0] for level in rasters]) * (self.networks.refiner(rasters) - background)
         camera, frame = shown.camera, shown.frame
         if not shown.turned:
             left, top = np.rint(between(camera, frame)[:, 2]).astype(int)
@@ -109,7 +109,7 @@ class TunedScene(nn.Module):
         picture = self.picture(self.shown(camera))[0].clamp(0, 1)
         return np.ascontiguousarray(picture.permute(1, 2, 0).cpu().numpy())
 
-    def looks(self) -> tuple[np.ndarray, np.ndarray]:
+    def descriptors(self) -> tuple[np.ndarray, np.ndarray]:
         """Means [P, 8] and slopes [V, 48], float32, as they are now."""
         return tuple(values.detach().cpu().numpy().copy() for values in (self.mean, self.slope))
 
@@ -125,7 +125,7 @@ def _turned(picture: Tensor, camera: Camera, frame: Camera) -> Tensor:
 
 
 class Tuning:
-    """Goes on with the looks of a scene, photo after photo, in an order drawn anew every round."""
+    """Goes on with the descriptors of a scene, photo after photo, in an order drawn anew every round."""
 
     def __init__(
         self,
@@ -141,7 +141,7 @@ class Tuning:
         self.scene, self.weights, self.perceptual = scene, weights, perceptual
         self._rates, self._random = rates, np.random.default_rng(seed)
         self._queue: list[int] = []
-        device = scene.places.device
+        device = scene.positions.device
         self.shown = [scene.shown(view.camera) for view in views]
         self._photos = [torch.from_numpy(view.image).permute(2, 0, 1)[None].to(device) for view in views]
         groups = [{"params": [scene.mean], "whole": rates.mean}, {"params": [scene.slope], "whole": rates.slope}]

@@ -39,7 +39,7 @@ _GROUP_SIZES = (0.0, 0.4, 0.25, 0.15, 0.1, 0.1)
 def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | None = None) -> np.ndarray:
     """uint8 [H, W, 4] = (I, U, V, instance) of a photo of `shape` pixels, with I as in `export.shards`.
 
-    Whose body was fitted well has the fit's labels, others the coarse regions of their landmarks.
+    People with a good fit of the body have its labels, others the coarse regions of their landmarks.
 
     Boxes without a mask are filled with UNSURE; masks lie over them. Instances: 1.. with a mask, BOX_ALONE.. with a
     box alone, UNCERTAIN.. where the detector itself is not sure.
@@ -84,7 +84,7 @@ class CutOut:
 
 
 def cut_outs(image: np.ndarray, label: np.ndarray) -> list[CutOut]:
-    """People with a mask whom nobody else's label touches; who is cut on opposite sides cannot be put elsewhere."""
+    """People with a mask that no other label touches; people truncated on opposite sides cannot be put elsewhere."""
     out = []
     height, width = label.shape[:2]
     others = label[..., 3]
@@ -111,7 +111,7 @@ def composed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """One to six people, the later ones in front, on a piece of a photo without people: image and label.
 
-    Half of the images show a group: people of about one size side by side, each hiding a part of the one before.
+    Half of the images show a group: people of about one size side by side, each occluding a part of the one before.
     size: width, height of the result. Borders that cut a person in the photo cut them here too.
     """
     width, height = size

@@ -13,7 +13,7 @@ class Stored:
     """A dataclass of arrays that is kept as a compressed .npz file, one entry a field."""
 
     def save(self, path: Path) -> None:
-        """Writes it whole (temporary name, then rename); folders are made."""
+        """Writes it atomically (temporary name, then rename); folders are made."""
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(path.name + ".partial")
         with open(partial, "wb") as file:

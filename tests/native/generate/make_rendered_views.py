@@ -20,9 +20,9 @@ import torch
 from export.camera import Camera
 from export.scenes.cameras import upright
 from export.scenes.captures import read_capture
-from export.scenes.config import BASIS, FEATURES, TURNED_MULTIPLE
-from export.scenes.looks import Looks
-from export.scenes.modelling import Model, Options, render
+from export.scenes.config import BASIS, FEATURES, ROTATED_MULTIPLE
+from export.scenes.descriptors import FittedDescriptors
+from export.scenes.fitting import FittedPoints, Options, render
 from export.scenes.raster import NOTHING, depths_of, visible
 from export.scenes.system import Networks
 from tests.native.generate.make_tiny_scene import FOLDER as SCENE
@@ -39,27 +39,29 @@ def networks_of_the_bundle() -> Networks:
         networks = write_bundle(Path(folder))
         for name in ("refiner.onnx", "basis.bin"):
             if (Path(folder) / name).read_bytes() != (SCENE / "bundle" / name).read_bytes():
-                raise ValueError(f"{SCENE}/bundle/{name} has other weights; run tests.native.generate.make_tiny_scene first")
+                raise ValueError(
+                    f"{SCENE}/bundle/{name} has other weights; run tests.native.generate.make_tiny_scene first"
+                )
     return networks
 
 
-def model() -> Model:
+def model() -> FittedPoints:
     """Of `looks.bin`, as make_tiny_scene.py describes it."""
     numbers = FEATURES + BASIS * FEATURES + 1
     row = np.dtype([("index", "<u4"), ("views", "<u4"), ("look", "<f4", numbers)])
     table = np.fromfile(SCENE / "looks.bin", row)
     look = torch.from_numpy(table["look"].copy())
-    places = torch.from_numpy(read_capture(SCENE / "capture").cloud.places[table["index"]])
+    places = torch.from_numpy(read_capture(SCENE / "capture").cloud.positions[table["index"]])
     slope = look[:, FEATURES:-1].reshape(-1, BASIS, FEATURES)
     views, singular = torch.from_numpy(table["views"].astype(np.float32)), torch.zeros(len(look), dtype=torch.bool)
     background = torch.from_numpy(np.fromfile(SCENE / "background.bin", "<f4"))
-    return Model(places, Looks(look[:, :FEATURES], slope, views, singular), background)
+    return FittedPoints(places, FittedDescriptors(look[:, :FEATURES], slope, views, singular), background)
 
 
 def camera(
     size: tuple[int, int], focal: tuple[float, float], centre: tuple[float, float, float], roll: float
 ) -> Camera:
-    """Looks at the world's origin, turned by `roll`; the principal point is right and low of the middle."""
+    """FittedDescriptors at the world's origin, turned by `roll`; the principal point is right and low of the middle."""
     to_world = pose(np.array(centre), roll) * [1, -1, -1, 1]
     return Camera(*size, *focal, 0.55 * size[0], 0.6 * size[1], to_world[:3, :3].T, np.array(centre))
 
@@ -75,9 +77,9 @@ def cameras() -> list[Camera]:
     ]
 
 
-def check_depths(scene: Model, view: Camera) -> None:
+def check_depths(scene: FittedPoints, view: Camera) -> None:
     """Raises ValueError where two points are equally deep: who wins depends on their order, and a scene has its own."""
-    keys = visible(scene.places, upright(view, np.asarray(UP), TURNED_MULTIPLE))
+    keys = visible(scene.positions, upright(view, np.asarray(UP), ROTATED_MULTIPLE))
     depths = depths_of(keys[keys != NOTHING]).numpy()
     if len(np.unique(depths)) < len(depths):
         raise ValueError(f"Two points have the same depth as seen from {view.centre}; move the camera a little.")

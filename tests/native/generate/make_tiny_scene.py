@@ -1,4 +1,5 @@
-"""Writes data/tiny_scene: scene networks with random weights, a captured place, and the looks that torch makes of them.
+"""Writes data/tiny_scene: scene networks with random weights, a captured place, and the descriptors that torch makes of
+them.
 
 `bundle`: an extractor of two convolutions with the interface of the real one, the basis network, a narrow refiner.
 `capture`: 5 photos of noise by cameras that are held at different angles, one of them held out, and a cloud in two
@@ -27,7 +28,7 @@ from export.scenes.bundle import write_manifest
 from export.scenes.captures import read_capture
 from export.scenes.config import FEATURES, ExtractorConfig, RefinerConfig, SceneConfig
 from export.scenes.export_onnx import export
-from export.scenes.modelling import Options, modelled, seen_in
+from export.scenes.fitting import Options, fitted_to_views, seen_in
 from export.scenes.system import Networks
 
 FOLDER = Path(__file__).parents[1] / "data" / "tiny_scene"
@@ -55,7 +56,7 @@ def write_bundle(folder: Path) -> Networks:
     networks = Networks(SceneConfig(ExtractorConfig(), RefinerConfig(widths=(4, 4, 4, 4))))
     networks.extractor = TinyExtractor()
     for parameter in networks.basis.parameters():
-        parameter.data *= 2  # so that looks depend on the side more than by rounding
+        parameter.data *= 2  # so that descriptors depend on the view more than by rounding
     for name, parameter in networks.refiner.named_parameters():
         if name.endswith("weight"):  # so that pictures have more than one colour
             parameter.data *= 6 if name.startswith("final") else 1.4
@@ -103,13 +104,13 @@ def write_capture(folder: Path) -> None:
 
 
 @torch.no_grad()
-def write_looks(folder: Path, networks: Networks) -> None:
+def write_descriptors(folder: Path, networks: Networks) -> None:
     capture = read_capture(folder / "capture")
     options = Options(up=capture.up, visibility_scale=0.5, precision=torch.float64)
-    points = torch.from_numpy(capture.cloud.places)
+    points = torch.from_numpy(capture.cloud.positions)
     views = [capture.view(k) for k in capture.sources()]
-    model = modelled(points, views, networks, options)
-    looks = model.looks
+    model = fitted_to_views(points, views, networks, options)
+    fit = model.fit
     model.background.numpy().astype("<f4").tofile(folder / "background.bin")
     sees = torch.stack([seen_in(points, view.camera, options) for view in views])
     (chosen,) = torch.where(sees.any(0))
@@ -118,10 +119,10 @@ def write_looks(folder: Path, networks: Networks) -> None:
             centres = [v.camera.centre for v, seen in zip(views, sees[:, index], strict=True) if seen]
             away = [directions(points[index, None], torch.from_numpy(centre)) for centre in centres]
             h = networks.basis(torch.cat(away).float()).double()
-            moves = (h - h.mean(0)) @ looks.slope[at]
+            moves = (h - h.mean(0)) @ fit.slope[at]
             variation = moves.square().sum(1).mean().sqrt()
             file.write(np.array([index, len(centres)], "<u4").tobytes())
-            values = [looks.mean[at], looks.slope[at].flatten(), variation[None]]
+            values = [fit.mean[at], fit.slope[at].flatten(), variation[None]]
             file.write(torch.cat(values).numpy().astype("<f4").tobytes())
     print(f"{len(chosen)} of {len(points)} points are seen, {int((sees.sum(0) > 1).sum())} of them more than once")
 
@@ -130,7 +131,7 @@ def main() -> None:
     torch.manual_seed(11)
     networks = write_bundle(FOLDER / "bundle")
     write_capture(FOLDER / "capture")
-    write_looks(FOLDER, networks)
+    write_descriptors(FOLDER, networks)
 
 
 if __name__ == "__main__":

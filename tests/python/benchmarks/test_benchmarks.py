@@ -161,7 +161,7 @@ def camera_host():
     run = {"age_ms": {"median": 0.1, "p99": 0.4}, "lost": 0, "processor_share": 0.01}
     return {"stub": [run, run | {"age_ms": {"median": 0.3, "p99": 0.9}}, run], "recording": [run],
             "closing": [40.0, 44.0, 41.0], "outages": [{"noticed_ms": 4.0, "replug_ms": 90.0, "reopen_ms": 90.0}],
-            "allocations": {"frames": 1000, "allocations": 5}, "others_share": 0.0}  # fmt: skip
+            "allocations": {"frames": 1000, "allocations": 5}, "others_fraction": 0.0}  # fmt: skip
 
 
 def document():

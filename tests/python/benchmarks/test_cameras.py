@@ -120,7 +120,7 @@ def host(**changes):
     return {"stub": [run(0.1, 0.02), run(0.9, 0.02), run(0.15, 0.02)],
             "recording": [run(0.1, 0.004), run(0.1, 0.02), run(0.1, 0.005)], "closing": [40.0, 80.0, 41.0],
             "outages": away, "allocations": {"frames": 1000, "allocations": 0},
-            "others_share": 0.0} | changes  # fmt: skip
+            "others_fraction": 0.0} | changes  # fmt: skip
 
 
 def test_figures_of_the_host_are_medians_of_its_runs():

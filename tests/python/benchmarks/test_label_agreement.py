@@ -38,7 +38,7 @@ def test_equal_results_agree_wholly(tmp_path, parts):
     a, b = (write_results(tmp_path / name, parts, [BOX]) for name in "ab")
     found = label_agreement.compare(a, b)
     assert (found.pictures, found.people, found.unmatched) == (1, 1, 0)
-    assert (found.share, found.person_fraction, found.worst_picture, found.box_px) == (1, 1, 1, 0)
+    assert (found.fraction, found.person_fraction, found.worst_picture, found.box_px) == (1, 1, 1, 0)
     assert found.passes(1)
 
 
@@ -49,7 +49,7 @@ def test_another_part_and_another_outline_count_as_different(tmp_path, parts):
     found = label_agreement.compare(
         write_results(tmp_path / "a", parts, [BOX]), write_results(tmp_path / "b", changed, [(20, 10, 30, 31.5)])
     )
-    assert found.share == pytest.approx(1 - 50 / 10000)
+    assert found.fraction == pytest.approx(1 - 50 / 10000)
     assert found.person_fraction == pytest.approx(1 - 50 / 210)
     assert found.box_px == 1.5
     assert found.passes(0.995)
@@ -63,7 +63,7 @@ def test_the_bar_is_about_all_pixels_and_the_worst_picture_is_told(tmp_path, par
     write_results(tmp_path / "a", parts, [BOX], "worst")
     write_results(tmp_path / "b", parts * 2, [BOX], "worst")
     found = label_agreement.compare(tmp_path / "a", tmp_path / "b")
-    assert found.share == pytest.approx(0.996)
+    assert found.fraction == pytest.approx(0.996)
     assert found.worst_picture == 0.98
     assert found.passes(0.995)
     assert not found.passes(0.997)

@@ -74,16 +74,16 @@ def test_the_nearest_photo_is_a_source_photo_at_the_size_asked_for(tmp_path):
 def test_behind_the_points_is_what_photos_show_where_no_point_is(tmp_path):
     write_capture(tmp_path / "room", seed=1, views=3)
     capture = read_capture(tmp_path / "room")
-    none = replace(capture, cloud=replace(capture.cloud, places=np.array([[0.0, 1e6, 0.0]])))
+    none = replace(capture, cloud=replace(capture.cloud, positions=np.array([[0.0, 1e6, 0.0]])))
     mean = np.mean([capture.view(k).image.mean((0, 1)) for k in range(3)], 0)
     np.testing.assert_allclose(cloud_of(none).behind.numpy(), mean, atol=1e-5)
-    assert cloud_of(capture).places.shape == capture.cloud.places.shape
+    assert cloud_of(capture).positions.shape == capture.cloud.positions.shape
 
 
 def test_filling_holes_helps(tmp_path):
     write_capture(tmp_path / "room", seed=2, views=6)
     capture = read_capture(tmp_path / "room")
-    sparse = replace(capture.cloud, places=capture.cloud.places[::20], colours=capture.cloud.colours[::20])
+    sparse = replace(capture.cloud, positions=capture.cloud.positions[::20], colours=capture.cloud.colours[::20])
     made, view = cloud_of(replace(capture, cloud=sparse)), capture.view(2)
     plain, squares, pyramid = (psnr_db(make(view.camera), view.image) for make in (made.points, made.squares,
                                                                                    made.pyramid))  # fmt: skip

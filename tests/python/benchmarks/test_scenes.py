@@ -247,7 +247,7 @@ def test_the_report_of_scenes_alone(given, tmp_path, capsys):
     rows = by_setting(document["scenes"]["rows"])
     gain = rows["as shipped"]["rendered"]["psnr_db"] - rows["plain points"]["rendered"]["psnr_db"]
     assert document["figures"]["scene_gain_db"] == pytest.approx(gain, abs=1e-3)
-    exact = rows["fp32 networks and looks, all varying"]["rendered"]["psnr_db"]
+    exact = rows["fp32 networks and descriptors, all varying"]["rendered"]["psnr_db"]
     loss = exact - rows["as shipped"]["rendered"]["psnr_db"]
     assert document["figures"]["scene_int8_loss_db"] == pytest.approx(loss, abs=1e-3)
     pyramid = rows["as shipped"]["rendered"]["psnr_db"] - rows["pyramid of points"]["rendered"]["psnr_db"]

@@ -21,7 +21,7 @@ def test_it_is_a_capture_with_photos_held_out(room):
     assert len(room.cameras) == 30
     assert len(room.held_out) == 5
     assert {(camera.width_px, camera.height_px) for camera in room.cameras} == {(640, 480)}
-    assert len(room.cloud.places) > 300_000
+    assert len(room.cloud.positions) > 300_000
     assert room.cloud.dropped == 0
     assert room.up == (0, 0, 1)
 
@@ -43,7 +43,7 @@ def colour_error(capture, k: int, turned_degrees: float = 0.0) -> float:
     camera = view.camera
     turn = np.radians(turned_degrees)
     aside = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
-    seen = (capture.cloud.places - camera.centre) @ camera.rotation.T @ aside.T
+    seen = (capture.cloud.positions - camera.centre) @ camera.rotation.T @ aside.T
     seen, colours = seen[seen[:, 2] > 50], capture.cloud.colours[seen[:, 2] > 50]  # millimetres
     at = np.round(seen[:, :2] / seen[:, 2:] * (camera.fx_px, camera.fy_px) + (camera.cx_px, camera.cy_px)).astype(int)
     inside = ((at >= 0) & (at < (camera.width_px, camera.height_px))).all(1)
@@ -66,7 +66,7 @@ def test_clouds_of_short_coordinates_come_back_in_nine_bytes_a_point(tmp_path):
     colours = np.array([[1, 2, 3], [255, 0, 7]], np.uint8)
     write_ply(tmp_path / "a.ply", places, colours)
     cloud = read_ply(tmp_path / "a.ply")
-    assert np.array_equal(cloud.places, places)
+    assert np.array_equal(cloud.positions, places)
     assert np.allclose(cloud.colours * 255, colours)
     write_ply(tmp_path / "b.ply", np.tile(places, (50, 1)), np.tile(colours, (50, 1)))
     assert (tmp_path / "b.ply").stat().st_size - (tmp_path / "a.ply").stat().st_size == 98 * 9 + 2  # "100" for "2"

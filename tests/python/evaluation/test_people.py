@@ -75,8 +75,8 @@ def test_crowding_is_the_largest_overlap_with_anybody_else():
 
 def test_every_limb_has_a_side_and_torso_and_head_have_none():
     sides = {name: int(side) for name, side in zip(PART_NAMES, LIMB_SIDE, strict=True)}
-    assert (sides["left hand"], sides["right lower leg back"]) == (1, 2)
-    assert {sides[name] for name in ("background", "torso front", "left head", "right head")} == {0}
+    assert (sides["left hand"], sides["right lower leg, back"]) == (1, 2)
+    assert {sides[name] for name in ("background", "torso, front", "head, left", "head, right")} == {0}
     assert (LIMB_SIDE == 1).sum() == (LIMB_SIDE == 2).sum() == 10
 
 

@@ -287,7 +287,7 @@ def test_clouds_come_back_from_ply_and_damaged_ones_are_refused(tmp_path):
     file = tmp_path / "a.ply"
     write_ply(file, xyz, rgb)
     read = read_ply(file)
-    assert np.array_equal(read.places.astype(np.float32), xyz)
+    assert np.array_equal(read.positions.astype(np.float32), xyz)
     assert np.array_equal(np.rint(255 * read.colours), rgb)
     data = file.read_bytes()
     for damaged, sentence in (
@@ -425,7 +425,7 @@ def _sleepy(job: tuple) -> None:
 
 def test_jobs_that_never_end_or_fail_are_given_up_and_others_done():
     jobs = [("a",), ("forever",), ("wrong",), ("b",), ("c",)]
-    found = {job[0]: error for job, error in done(_sleepy, jobs, 2, 5)}
+    found = {job[0]: error for job, error in done(_sleepy, jobs, 2, 3)}
     assert found["a"] is found["b"] is found["c"] is None
     assert isinstance(found["forever"], TimeoutError)
     assert isinstance(found["wrong"], ValueError)

@@ -1,5 +1,6 @@
 """The quantization report names every tensor, sees a broken scale, and finds layers that overflow 16 bits."""
 
+import functools
 import hashlib
 import json
 import shutil
@@ -149,23 +150,35 @@ def test_the_shipped_bundle_is_the_one_in_the_report_and_passes_its_check(rebuil
     assert complaints(rebuilt, SHIPPED) == []
 
 
-@pytest.mark.parametrize(
-    ("graph", "tensor", "channel"),
-    [
-        ("trunk", "/backbone/blocks.7/depthwise/Clip_output_0", None),
-        ("trunk", "/backbone/blocks.12/expand/Clip_output_0", None),
-        ("trunk", "backbone.blocks.9.project.conv.weight", 3),
-        ("dense_head", "/body/body.2/body.2.2/Relu_output_0", None),
-        ("box_head", "convs.2.weight", 0),
-    ],
+BROKEN = (
+    ("trunk", "/backbone/blocks.7/depthwise/Clip_output_0", None),
+    ("trunk", "/backbone/blocks.12/expand/Clip_output_0", None),
+    ("trunk", "backbone.blocks.9.project.conv.weight", 3),
+    ("dense_head", "/body/body.2/body.2.2/Relu_output_0", None),
+    ("box_head", "convs.2.weight", 0),
 )
+
+
+@pytest.fixture(scope="module")
+def complaints_about(rebuilt, tmp_path_factory):
+    """Complaints about a graph in which all of its tensors in BROKEN are; each tensor's own error is found apart."""
+
+    @functools.cache
+    def found(graph: str, factor: float) -> list[str]:
+        bundle = shutil.copytree(SHIPPED, tmp_path_factory.mktemp("broken") / "bundle")
+        for _, tensor, channel in (row for row in BROKEN if row[0] == graph):
+            break_scale(bundle / f"{graph}.onnx", tensor, factor, channel)
+        return complaints(rebuilt, bundle, (graph,))
+
+    return found
+
+
+@pytest.mark.parametrize(("graph", "tensor", "channel"), BROKEN)
 @pytest.mark.parametrize("factor", [4.0, 0.25])
-def test_a_scale_broken_by_hand_is_named(rebuilt, tmp_path, graph, tensor, channel, factor):
-    bundle = shutil.copytree(SHIPPED, tmp_path / "bundle")
-    break_scale(bundle / f"{graph}.onnx", tensor, factor, channel)
-    found = complaints(rebuilt, bundle, (graph,))
-    assert len(found) == 1
-    assert found[0].startswith(f"{graph}: {tensor} has")
+def test_a_scale_broken_by_hand_is_named(complaints_about, graph, tensor, channel, factor):
+    found = complaints_about(graph, factor)
+    assert len(found) == sum(row[0] == graph for row in BROKEN)
+    assert sum(sentence.startswith(f"{graph}: {tensor} has") for sentence in found) == 1
 
 
 def test_missing_and_new_tensors_are_named():
@@ -311,7 +324,7 @@ def test_a_mixed_bundle_is_whole_and_has_the_graphs_asked_for(tmp_path):
     manifest = json.loads((folder / "manifest.json").read_text())
     for name, entry in manifest["files"].items():
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == entry["sha256"], name
-    with pytest.raises(ValueError, match="none of the graphs"):
+    with pytest.raises(ValueError, match="not one of the graphs"):
         report.agreement.mixed(tmp_path, SHIPPED, ["head"], tmp_path / "other")
 
 

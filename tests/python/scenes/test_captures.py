@@ -33,7 +33,7 @@ def test_a_capture_is_read_as_it_was_written(folder):
     assert view.image.shape == (32, 48, 3)
     picture = cv2.imread(str(folder / "1.png"))[..., ::-1]
     np.testing.assert_allclose(view.image, picture / 255, atol=1e-6)
-    assert len(capture.cloud.places) == 3 * 24 * 16
+    assert len(capture.cloud.positions) == 3 * 24 * 16
 
 
 def test_held_out_photos_and_the_worlds_up_are_found(folder):
@@ -117,7 +117,7 @@ def test_clouds_in_text_and_binary_are_the_same(tmp_path):
     (tmp_path / "text.ply").write_text(text)
     for name in ("binary", "text"):
         cloud = read_ply(tmp_path / f"{name}.ply")
-        np.testing.assert_allclose(cloud.places, places, rtol=1e-6)
+        np.testing.assert_allclose(cloud.positions, places, rtol=1e-6)
         np.testing.assert_allclose(cloud.colours, colours, atol=0.5 / 255 + 1e-6)
 
 
@@ -126,7 +126,7 @@ def test_points_that_are_not_finite_are_dropped_and_counted(tmp_path):
     places[1, 2], places[3, 0] = np.nan, np.inf
     write_ply(tmp_path / "cloud.ply", places, np.zeros((4, 3)))
     cloud = read_ply(tmp_path / "cloud.ply")
-    assert (len(cloud.places), cloud.dropped) == (2, 2)
+    assert (len(cloud.positions), cloud.dropped) == (2, 2)
 
 
 HEADER = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n"

@@ -20,8 +20,8 @@ from export.scenes.captures import Capture, read_capture
 from export.scenes.config import SIZES
 from export.scenes.export_onnx import export
 from export.scenes.feature_scale import scaled
+from export.scenes.fitting import Options, fitted_to_views, render
 from export.scenes.losses import LossWeights
-from export.scenes.modelling import Options, modelled, render
 from export.scenes.picture_quality import psnr_db
 from export.scenes.scene_file import HEAD, SceneFileError, read_scene_file, write_scene_file, xxh3
 from export.scenes.system import Networks, load_networks, save_networks
@@ -45,7 +45,7 @@ def place(tmp_path_factory):
     capture = read_capture(folder / "room")
     views = [capture.view(k) for k in capture.sources()]
     with torch.no_grad():
-        model = modelled(torch.from_numpy(capture.cloud.places), views, networks, Options())
+        model = fitted_to_views(torch.from_numpy(capture.cloud.positions), views, networks, Options())
     for kind, name in enumerate(("float", "16-bit", "8-bit")):
         write_scene_file(scene_of(model, identity(manifest), kind, min(kind, 1)), folder / f"{name}.maqs")
     return folder
@@ -77,7 +77,7 @@ def test_looks_are_stored_to_half_a_step(place, name, steps):
     rng = np.random.default_rng(0)
     means = rng.uniform(-1, 2, scene.means.shape).astype(np.float32)
     slopes = rng.normal(0, 0.1, scene.slopes.shape).astype(np.float32)
-    found = scene.with_looks(means, slopes).looks()
+    found = scene.with_descriptors(means, slopes).descriptors()
     if not steps:
         np.testing.assert_array_equal(found[0], means)
         np.testing.assert_array_equal(found[1], slopes)
@@ -132,14 +132,14 @@ def test_a_scene_is_drawn_as_the_model_that_it_was_made_of(place):
     networks = finetune.networks_of_bundle(place / "weights.pt", place / "bundle", view, scene.up)
     tuned = TunedScene(scene, networks, torch.device("cpu"))
     views = [capture.view(k) for k in capture.sources()]
-    model = modelled(torch.from_numpy(capture.cloud.places), views, networks, Options())
-    slopes = np.zeros((len(model.places), 48), np.float32)
+    model = fitted_to_views(torch.from_numpy(capture.cloud.positions), views, networks, Options())
+    slopes = np.zeros((len(model.positions), 48), np.float32)
     rows = scene.slope_rows()
     # The scene has its points in another order, and a third of them without slopes: give the model the same.
-    _, nearest = cKDTree(model.places.numpy()).query(scene.positions())
-    slopes[nearest[rows >= 0]] = scene.looks()[1][rows[rows >= 0]]
+    _, nearest = cKDTree(model.positions.numpy()).query(scene.positions())
+    slopes[nearest[rows >= 0]] = scene.descriptors()[1][rows[rows >= 0]]
     with torch.no_grad():
-        model.looks.slope.copy_(torch.from_numpy(slopes).view(-1, 6, 8))
+        model.fit.slope.copy_(torch.from_numpy(slopes).view(-1, 6, 8))
     for k in (1, 2):
         camera = capture.view(k).camera
         assert psnr_db(tuned.rendered(camera), render(model, camera, networks, Options())) > 45
@@ -204,13 +204,13 @@ def test_held_out_photos_are_never_decoded_while_tuning(place, tmp_path, monkeyp
     assert "held-out" not in capsys.readouterr().out
 
 
-def test_a_tuned_scene_differs_in_its_looks_alone(place, tmp_path, monkeypatch, capsys):
+def test_a_tuned_scene_differs_in_its_descriptors_alone(place, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", arguments(place, "--save-at", "0.5", "1", "--out", tmp_path / "room"))
     finetune.main()
     before = read_scene_file(place / "8-bit.maqs")
     for name in ("0.5s", "1s"):
         after = read_scene_file(tmp_path / "room" / f"{name}.maqs")
-        np.testing.assert_array_equal(after.places, before.places)
+        np.testing.assert_array_equal(after.stored_positions, before.stored_positions)
         np.testing.assert_array_equal(after.slope_rows(), before.slope_rows())
         assert after.networks_sha256 == before.networks_sha256
         assert (after.means != before.means).any()
@@ -246,8 +246,8 @@ def test_a_scene_of_other_networks_is_refused(place, tmp_path, monkeypatch):
 def test_the_sdk_opens_a_tuned_scene(place, tmp_path, name):
     scene = read_scene_file(place / f"{name}.maqs")
     rng = np.random.default_rng(0)
-    means, slopes = (x + rng.normal(0, 0.05, x.shape).astype(np.float32) for x in scene.looks())
-    write_scene_file(scene.with_looks(means, slopes), tmp_path / "tuned.maqs")
+    means, slopes = (x + rng.normal(0, 0.05, x.shape).astype(np.float32) for x in scene.descriptors())
+    write_scene_file(scene.with_descriptors(means, slopes), tmp_path / "tuned.maqs")
     made = subprocess.run(
         [PROGRAM, "scene", "info", tmp_path / "tuned.maqs", "--json", tmp_path / "info.json"],
         capture_output=True,

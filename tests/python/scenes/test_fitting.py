@@ -9,11 +9,21 @@ import torch
 from box_scene import BoxScene, looking, ring
 
 from export.camera import Camera
-from export.scenes.cameras import between, turned_upright, upright, warped
+from export.scenes.cameras import between, rotated_upright, upright, warped
 from export.scenes.config import SIZES
-from export.scenes.looks import Moments
-from export.scenes.modelling import Options, View, background_of, modelled, painted, render, sampled, seen_in
-from export.scenes.raster import HIDING_PX, NOTHING, depths_of, filled, halved, projected, pyramid, unhidden, visible
+from export.scenes.descriptors import Moments
+from export.scenes.fitting import Options, View, background_of, fitted_to_views, painted, render, sampled, seen_in
+from export.scenes.raster import (
+    NOTHING,
+    OCCLUSION_BLOCK_PX,
+    depths_of,
+    filled,
+    halved,
+    projected,
+    pyramid,
+    visible,
+    without_occluded,
+)
 from export.scenes.source_views import drawn, scores
 from export.scenes.system import Networks
 
@@ -32,7 +42,7 @@ def pixels_of(camera: Camera, places: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("roll", [0.0, 0.3, -1.2, np.pi / 2, 3.0])
 def test_an_upright_camera_has_the_worlds_up_above(roll):
     camera = looking((1, 0.7, 2), (0, 0, 0), roll=roll)
-    turned = turned_upright(camera, np.array([0, 1.0, 0]))
+    turned = rotated_upright(camera, np.array([0, 1.0, 0]))
     foot = np.array([[0, 0, 0], [0, 0.1, 0.0]])
     low, high = pixels_of(turned, foot)
     centre = (turned.rotation @ (0, 1, 0))[0]
@@ -44,12 +54,12 @@ def test_an_upright_camera_has_the_worlds_up_above(roll):
 
 def test_a_camera_that_looks_along_up_stays_as_it_is():
     camera = replace(looking((1, 0, 2), (0, 0, 0)), rotation=np.array([[0.6, 0, 0.8], [-0.8, 0, 0.6], [0, -1.0, 0]]))
-    np.testing.assert_allclose(turned_upright(camera, np.array([0, 1.0, 0])).rotation, camera.rotation, atol=1e-12)
-    np.testing.assert_array_equal(turned_upright(camera, np.zeros(3)).rotation, camera.rotation)
+    np.testing.assert_allclose(rotated_upright(camera, np.array([0, 1.0, 0])).rotation, camera.rotation, atol=1e-12)
+    np.testing.assert_array_equal(rotated_upright(camera, np.zeros(3)).rotation, camera.rotation)
 
 
 @pytest.mark.parametrize("roll", [0.0, 0.2, 0.8, np.pi / 2])
-def test_the_upright_frame_holds_the_whole_photo_and_little_more(roll):
+def test_the_aligned_frame_holds_the_whole_photo_and_little_more(roll):
     camera = looking((1, 0.7, 2), (0, 0, 0), 100, 60, roll)
     turned = upright(camera, np.array([0, 1.0, 0]), 16)
     assert turned.width_px % 16 == turned.height_px % 16 == 0
@@ -152,9 +162,9 @@ def test_rasters_hold_the_looks_of_winners_and_nothing_elsewhere():
     camera = looking((0.3, 0.4, 3.0), (0, 0, 0), 32, 16)
     keys = visible(torch.from_numpy(places), camera)
     shown = pyramid(keys, 5)
-    looks = torch.randn(len(shown.points), 8)
-    rows = dict(zip(shown.points.tolist(), looks, strict=True))
-    for level, raster in enumerate(shown.rasters(looks)):
+    found_descriptors = torch.randn(len(shown.points), 8)
+    rows = dict(zip(shown.points.tolist(), found_descriptors, strict=True))
+    for level, raster in enumerate(shown.rasters(found_descriptors)):
         assert raster.shape == (9, 16 >> level, 32 >> level)
         for y, x in np.ndindex(*keys.shape):
             if keys[y, x] == NOTHING:
@@ -179,7 +189,7 @@ def test_only_the_front_is_seen_and_coarser_photos_see_through_less():
     points, front = torch.from_numpy(wall), torch.from_numpy(wall[:, 2] == 0)
     through = []
     for scale in (1.0, 0.4):
-        seen = seen_in(points, camera, Options(visibility_scale=scale, hiding=np.inf))
+        seen = seen_in(points, camera, Options(visibility_scale=scale, depth_tolerance=np.inf))
         through.append(int(seen[~front].sum()))
     assert through[1] < through[0]
     assert not seen_in(points, camera, Options())[~front].any()
@@ -203,12 +213,12 @@ def numpy_look(ys: np.ndarray, hs: np.ndarray, alpha: float) -> tuple[np.ndarray
     return mean, np.linalg.solve(matrix, hs.T @ ys - np.outer(hs.sum(0), mean))
 
 
-def looks_of(ys: np.ndarray, hs: np.ndarray, seen: np.ndarray, alpha: float, precision=torch.float64):
+def descriptors_of(ys: np.ndarray, hs: np.ndarray, seen: np.ndarray, alpha: float, precision=torch.float64):
     """ys [K, P, 8], hs [K, P, 6], seen [K, P]."""
     moments = Moments.zeros(ys.shape[1], torch.zeros((), dtype=precision))
     for y, h, s in zip(ys, hs, seen, strict=True):
         moments = moments.with_view(*(torch.from_numpy(x) for x in (y, h, s)))
-    return moments.looks(alpha)
+    return moments.solved(alpha)
 
 
 @pytest.mark.parametrize("alpha", [1.0, 1e-2, 1e-6])
@@ -217,9 +227,9 @@ def test_the_regression_is_numpys(alpha, scale):
     rng = np.random.default_rng(4)
     ys, hs = scale * rng.normal(size=(9, 20, 8)), rng.normal(size=(9, 20, 6))
     seen = rng.random((9, 20)) < 0.6
-    looks = looks_of(ys, hs, seen, alpha)
+    found_descriptors = descriptors_of(ys, hs, seen, alpha)
     target = torch.from_numpy(rng.normal(size=(20, 6)))
-    found = looks.seen_from(target).numpy()
+    found = found_descriptors.seen_from(target).numpy()
     for p in range(20):
         mean, slope = numpy_look(ys[seen[:, p], p], hs[seen[:, p], p], alpha)
         np.testing.assert_allclose(found[p], mean + target[p].numpy() @ slope, rtol=1e-7, atol=1e-7 * scale)
@@ -229,11 +239,11 @@ def test_the_regression_in_float_is_near_enough():
     rng = np.random.default_rng(5)
     ys = rng.normal(size=(1000, 5, 8)) + 3
     hs = rng.normal(size=(1000, 5, 6)) * 0.01 + rng.normal(size=(5, 6))  # nearly one direction
-    looks = looks_of(ys, hs, np.ones((1000, 5), bool), 1.0, torch.float32)
+    found_descriptors = descriptors_of(ys, hs, np.ones((1000, 5), bool), 1.0, torch.float32)
     for p in range(5):
         mean, slope = numpy_look(ys[:, p], hs[:, p], 1.0)
         expected = mean + hs[0, p] @ slope
-        found = looks.seen_from(torch.from_numpy(hs[0]).float())[p].numpy()
+        found = found_descriptors.seen_from(torch.from_numpy(hs[0]).float())[p].numpy()
         np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4)
 
 
@@ -242,11 +252,11 @@ def test_points_never_seen_and_seen_once_or_from_one_side_have_no_slope():
     ys, hs = rng.normal(size=(4, 3, 8)), np.repeat(rng.normal(size=(1, 3, 6)), 4, 0)
     seen = np.array([[False, True, True], [False, False, True], [False, False, True], [False, False, True]])
     for precision in (torch.float32, torch.float64):
-        looks = looks_of(ys, hs, seen, 1.0, precision)
-        assert looks.views.tolist() == [0, 1, 4]
-        assert not looks.slope.any()  # exactly
-        assert not looks.mean[0].any()
-        assert torch.equal(looks.mean[1], torch.from_numpy(ys[0, 1]).to(precision))
+        found_descriptors = descriptors_of(ys, hs, seen, 1.0, precision)
+        assert found_descriptors.views.tolist() == [0, 1, 4]
+        assert not found_descriptors.slope.any()  # exactly
+        assert not found_descriptors.mean[0].any()
+        assert torch.equal(found_descriptors.mean[1], torch.from_numpy(ys[0, 1]).to(precision))
 
 
 def test_without_a_regulariser_what_cannot_be_solved_is_counted_and_constant():
@@ -255,19 +265,19 @@ def test_without_a_regulariser_what_cannot_be_solved_is_counted_and_constant():
     seen = np.ones((8, 3), bool)
     seen[3:, 0] = False  # three views for six unknowns
     hs[:, 1, 5] = hs[:, 1, 4]  # two basis functions that are one
-    looks = looks_of(ys, hs, seen, 0.0)
-    assert looks.singular.tolist() == [True, True, False]
-    assert not looks.slope[:2].any()
+    found_descriptors = descriptors_of(ys, hs, seen, 0.0)
+    assert found_descriptors.singular.tolist() == [True, True, False]
+    assert not found_descriptors.slope[:2].any()
     _, slope = numpy_look(ys[:, 2], hs[:, 2], 0.0)
-    np.testing.assert_allclose(looks.slope[2], slope, rtol=1e-8)
+    np.testing.assert_allclose(found_descriptors.slope[2], slope, rtol=1e-8)
 
 
 def test_the_order_of_views_hardly_matters():
     rng = np.random.default_rng(8)
     ys, hs, seen = rng.normal(size=(500, 4, 8)), rng.normal(size=(500, 4, 6)), np.ones((500, 4), bool)
     order = rng.permutation(500)
-    first = looks_of(ys, hs, seen, 1.0, torch.float32)
-    other = looks_of(ys[order], hs[order], seen, 1.0, torch.float32)
+    first = descriptors_of(ys, hs, seen, 1.0, torch.float32)
+    other = descriptors_of(ys[order], hs[order], seen, 1.0, torch.float32)
     direction = torch.from_numpy(hs[7]).float()
     torch.testing.assert_close(first.seen_from(direction), other.seen_from(direction), rtol=1e-4, atol=1e-5)
 
@@ -288,9 +298,9 @@ def test_a_model_for_one_picture_is_as_good_as_the_whole_one(room):
     networks, options = Networks(SIZES["tiny"]).eval(), Options()
     camera = upright(views[1].camera, np.array([0, 1.0, 0]), 16)
     with torch.no_grad():
-        whole = modelled(points, [views[0], views[2]], networks, options)
-        part = modelled(points, [views[0], views[2]], networks, options, camera)
-        assert len(part.places) < len(whole.places) < len(points)
+        whole = fitted_to_views(points, [views[0], views[2]], networks, options)
+        part = fitted_to_views(points, [views[0], views[2]], networks, options, camera)
+        assert len(part.positions) < len(whole.positions) < len(points)
         expected, found = (m.rasters(camera, networks, options) for m in (whole, part))
     for a, b in zip(expected, found, strict=True):
         assert torch.equal(a, b)
@@ -303,12 +313,12 @@ def test_features_are_those_of_the_pixel_a_point_is_in(room):
     view = View(BoxScene(3).photo(camera, 1)[0], camera)
     networks.extractor.forward = lambda image: torch.cat([image, image, image[:, :2]], 1)
     with torch.no_grad():
-        model = modelled(points, [view], networks, Options())
+        model = fitted_to_views(points, [view], networks, Options())
     (seen,) = torch.where(seen_in(points, camera, Options()))
     columns, rows, _ = (x.numpy() for x in projected(points[seen], camera))
     at = columns[:, None], rows[:, None]
     photo = cv2.remap(view.image, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0]
-    np.testing.assert_allclose(model.looks.mean[:, :3], photo, atol=0.05)  # OpenCV blends in steps of 1/32
+    np.testing.assert_allclose(model.fit.mean[:, :3], photo, atol=0.05)  # OpenCV blends in steps of 1/32
     assert np.abs(photo - colours[seen].numpy()).mean() < 0.1  # what blending at the squares' edges does
 
 
@@ -321,7 +331,7 @@ def test_a_picture_of_any_size_and_turn_is_what_the_camera_sees(room, roll):
     networks.extractor.forward = lambda image: torch.cat([image, image, image[:, :2]], 1)
     networks.refiner.forward = lambda rasters: rasters[0][:, :3]
     with torch.no_grad():
-        picture = render(modelled(points, views, networks, options), camera, networks, options)
+        picture = render(fitted_to_views(points, views, networks, options), camera, networks, options)
     assert picture.shape == (45, 61, 3)
     photo, _ = BoxScene(3).photo(camera, 2)
     plain = painted(points, colours, camera)
@@ -335,7 +345,7 @@ def test_a_gradient_reaches_extractor_basis_and_refiner(room):
     points, _, views = room
     networks = Networks(SIZES["tiny"]).train()
     camera = upright(views[1].camera, np.array([0, 1.0, 0]), 1).reframed(8, 8, 32, 32)
-    model = modelled(points, [views[0], views[2], views[3]], networks, Options(), camera)
+    model = fitted_to_views(points, [views[0], views[2], views[3]], networks, Options(), camera)
     rasters = model.rasters(camera, networks, Options())
     networks.refiner([r[None] for r in rasters]).square().mean().backward()
     for name, parameter in networks.named_parameters():
@@ -390,21 +400,24 @@ def test_points_behind_a_sparse_surface_are_hidden_and_a_slope_is_not():
     points = torch.from_numpy(np.concatenate([behind, wall]))
     camera = Camera(66, 46, 60.0, 60.0, 33.0, 23.0, np.eye(3), np.zeros(3))
     keys = visible(points, camera)
-    left = unhidden(keys, 0.1)
+    left = without_occluded(keys, 0.1)
     behind_before, behind_after = (((k != NOTHING) & (depths_of(k) > 3))[8:36, 8:56].sum() for k in (keys, left))
     assert behind_before > 300
     assert behind_after < behind_before / 4
     assert torch.equal(left[depths_of(keys) < 3], keys[depths_of(keys) < 3])
-    assert torch.equal(unhidden(keys, torch.inf), keys)
+    assert torch.equal(without_occluded(keys, torch.inf), keys)
     # What remains is the nearest of its block, or near it: by hand.
     depth = depths_of(keys).numpy()
     for row, column in np.argwhere(left.numpy() != NOTHING)[::17]:
-        top, first = row - row % HIDING_PX, column - column % HIDING_PX
-        assert depth[row, column] <= depth[top : top + HIDING_PX, first : first + HIDING_PX].min() * 1.1001
+        top, first = row - row % OCCLUSION_BLOCK_PX, column - column % OCCLUSION_BLOCK_PX
+        assert (
+            depth[row, column]
+            <= depth[top : top + OCCLUSION_BLOCK_PX, first : first + OCCLUSION_BLOCK_PX].min() * 1.1001
+        )
     columns, rows = (x.ravel() for x in np.meshgrid(np.linspace(-3, 3, 200), np.linspace(-2, 2, 200)))
     slope = torch.from_numpy(np.c_[columns, rows, 4 + columns])
     keys = visible(slope, camera)
-    assert torch.equal(unhidden(keys, 0.2), keys)
+    assert torch.equal(without_occluded(keys, 0.2), keys)
 
 
 def test_the_background_is_what_photos_show_where_no_point_is():

@@ -11,7 +11,7 @@ from export.scenes.export_onnx import ExtractorGraph, RefinerGraph, export, expo
 from export.scenes.extractor import Extractor
 from export.scenes.feature_scale import measured, scaled
 from export.scenes.gated_refiner import GatedRefiner
-from export.scenes.light_refiner import LightRefiner, folded, unfolded
+from export.scenes.light_refiner import LightRefiner, depth_to_space, space_to_depth
 from export.scenes.refiner import make_refiner
 from export.scenes.system import Networks, load_networks, save_networks
 from quantization import compare_refiners
@@ -72,9 +72,9 @@ def test_a_refiner_that_cannot_be_is_refused(settings):
 
 def test_folding_puts_whole_pixels_one_after_the_other():
     picture = torch.arange(2 * 4 * 6).reshape(1, 2, 4, 6)
-    cell = folded(picture)[0, :, 1, 2]
+    cell = space_to_depth(picture)[0, :, 1, 2]
     assert cell.tolist() == [picture[0, c, y, x] for y, x in ((2, 4), (2, 5), (3, 4), (3, 5)) for c in range(2)]
-    assert torch.equal(unfolded(folded(picture)), picture)
+    assert torch.equal(depth_to_space(space_to_depth(picture)), picture)
 
 
 def test_a_light_refiner_sees_every_raster_that_it_reads():
@@ -123,7 +123,7 @@ def test_the_extractors_graph_is_the_network_at_any_size(tmp_path):
 
 @pytest.mark.parametrize(
     "config",
-    [LIGHT, RefinerConfig(join="add", widths=(8, 8, 8, 8)), RefinerConfig(folded=False, widths=(8, 8)),
+    [LIGHT, RefinerConfig(join="add", widths=(8, 8, 8, 8)), RefinerConfig(space_to_depth=False, widths=(8, 8)),
      RefinerConfig(block="separable", widths=(8, 12)), RefinerConfig("gated")],
 )  # fmt: skip
 def test_a_refiners_graph_is_the_network_at_any_size(tmp_path, config):
@@ -138,9 +138,9 @@ def test_a_refiners_graph_is_the_network_at_any_size(tmp_path, config):
 def test_the_graph_of_a_folded_refiner_takes_and_gives_folded_pictures():
     net = LightRefiner(LIGHT).eval()
     given = rasters(32, 48, LIGHT.levels)
-    first = folded(given[0]).permute(0, 2, 3, 1)
+    first = space_to_depth(given[0]).permute(0, 2, 3, 1)
     found = RefinerGraph(net)(first, *(r.permute(0, 2, 3, 1) for r in given[1:]))
-    torch.testing.assert_close(unfolded(found.permute(0, 3, 1, 2)), net(given))
+    torch.testing.assert_close(depth_to_space(found.permute(0, 3, 1, 2)), net(given))
 
 
 def test_weights_and_sizes_survive_the_way_through_a_file(tmp_path):
@@ -172,7 +172,7 @@ def test_another_file_is_not_taken_for_weights(tmp_path):
         load_networks(tmp_path / "weights.pt")
 
 
-@pytest.mark.parametrize("refiner", [LIGHT, RefinerConfig(block="separable", folded=False, widths=(8, 8, 12))])
+@pytest.mark.parametrize("refiner", [LIGHT, RefinerConfig(block="separable", space_to_depth=False, widths=(8, 8, 12))])
 def test_features_of_another_scale_make_the_same_picture(refiner):
     networks = Networks(SceneConfig(SIZES["tiny"].extractor, refiner)).eval()
     torch.nn.init.normal_(networks.refiner.final.weight)

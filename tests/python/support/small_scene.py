@@ -3,21 +3,21 @@
 import numpy as np
 
 from export.scenes.config import FEATURES
-from export.scenes.modelling import Model
+from export.scenes.fitting import FittedPoints
 from export.scenes.scene_file import BLOCK, COEFFICIENTS, HEAD, MAGIC, PLACES, SLOPES, VERSION, SceneFile
 
 BLOCK_POINTS = 700
 
 
-def scene_of(model: Model, networks_sha256: str, coefficients: int = 2, places: int = 1) -> SceneFile:
+def scene_of(model: FittedPoints, networks_sha256: str, coefficients: int = 2, places: int = 1) -> SceneFile:
     """coefficients, places: kinds of numbers, as in the file. A third of the points keep their mean alone. Up is y."""
-    at = model.places.numpy()
+    at = model.positions.numpy()
     rng = np.random.default_rng(0)
     varies = rng.random(len(at)) > 1 / 3
     head = np.zeros((), HEAD)
     head["magic"], head["version"], head["head_bytes"] = MAGIC, VERSION, HEAD.itemsize
     head["origin"], head["up"] = (0.5, -0.25, 1), (0, 1, 0)
-    head["place_kind"], head["coefficient_kind"] = places, coefficients
+    head["position_kind"], head["coefficient_kind"] = places, coefficients
     head["networks_sha256"] = np.frombuffer(bytes.fromhex(networks_sha256), np.uint8)
     order = np.argsort(at[:, 0], kind="stable")
     blocks, stored, kept, varying, first_varying = [], [], [], [], 0
@@ -50,5 +50,5 @@ def scene_of(model: Model, networks_sha256: str, coefficients: int = 2, places: 
         np.zeros((len(kept), FEATURES), kind),
         np.zeros((len(varying), SLOPES), kind),
     )
-    means, slopes = (x.detach().float().numpy() for x in (model.looks.mean, model.looks.slope))
-    return empty.with_looks(means[kept], slopes[varying].reshape(-1, SLOPES))
+    means, slopes = (x.detach().float().numpy() for x in (model.fit.mean, model.fit.slope))
+    return empty.with_descriptors(means[kept], slopes[varying].reshape(-1, SLOPES))

@@ -1,11 +1,11 @@
-"""How points look from different sides: the ridge regression of NPBG++ (arXiv 2203.13318, section 3.3), for all points
-of a cloud at once and differentiable.
+"""View-dependent descriptors: the ridge regression of NPBG++ (arXiv 2203.13318, section 3.3), for all points of a cloud
+at once and differentiable.
 
 The reference for the SDK's `DescriptorRegression` (sdk/src/scene/build/descriptor_regression.h). From K views, features
-y and basis values h: (sum h^T h + alpha I) beta = sum h^T y - (sum h)^T beta0, beta0 = mean y; the look is y(h) = beta0
-+ h beta. What is kept are means and the scatter around them, not sums, so that the right side of a point seen once, or
-always from the same side, is exactly 0. The SDK keeps the scatter's Cholesky factor, which is more exact in float; here
-is float64.
+y and basis values h: (sum h^T h + alpha I) beta = sum h^T y - (sum h)^T beta0, beta0 = mean y; the descriptor is y(h) =
+beta0 + h beta. What is kept are means and the scatter around them, not sums, so that the right side of a point seen
+once, or always from the same side, is exactly 0. The SDK keeps the scatter's Cholesky factor, which is more exact in
+float; here is float64.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from export.scenes.config import BASIS, FEATURES
 
 
 @dataclass(frozen=True)
-class Looks:
-    """mean: beta0 [P, 8]. slope: beta [P, 6, 8]. views: K, [P]; who has none has no look. singular: [P], whose
-    directions do not tell at alpha = 0, so that beta is 0."""
+class FittedDescriptors:
+    """mean: beta0 [P, 8]. slope: beta [P, 6, 8]. views: K, [P]; a point without views has no descriptor.
+    singular: [P], the directions do not determine beta at alpha = 0, so that it is 0."""
 
     mean: Tensor
     slope: Tensor
@@ -53,18 +53,18 @@ class Moments:
         """One more view: features [P, 8], basis values [P, 6], whether it sees the point [P]."""
         seen = seen.to(self.views)[:, None]
         y, h, views = y.to(self.views), h.to(self.views), self.views + seen
-        share = seen / views.clamp_min(1)
+        fraction = seen / views.clamp_min(1)
         off_y, off_h = y - self.mean_y, h - self.mean_h
-        grows = (share * self.views)[:, :, None] * off_h[:, :, None]  # (K - 1) / K where it is seen
+        grows = (fraction * self.views)[:, :, None] * off_h[:, :, None]  # (K - 1) / K where it is seen
         return Moments(
             views,
-            self.mean_y + share * off_y,
-            self.mean_h + share * off_h,
+            self.mean_y + fraction * off_y,
+            self.mean_h + fraction * off_h,
             self.scatter_hh + grows * off_h[:, None],
             self.scatter_hy + grows * off_y[:, None],
         )
 
-    def looks(self, alpha: float, precision: torch.dtype = torch.float64) -> Looks:
+    def solved(self, alpha: float, precision: torch.dtype = torch.float64) -> FittedDescriptors:
         """Solves all systems by Cholesky, in the given precision; the result has the type of the moments."""
         h = self.mean_h.to(precision)
         matrix = self.scatter_hh.to(precision) + self.views.to(precision)[:, :, None] * h[:, :, None] * h[:, None]
@@ -75,10 +75,10 @@ class Moments:
             factor, failed = torch.linalg.cholesky_ex(matrix)
             diagonal = factor.diagonal(dim1=1, dim2=2)
             # Below this the last figure of the matrix is all there is of the smallest direction.
-            least = 4 * torch.finfo(precision).eps ** 0.5 * diagonal.amax(1)
-            singular = (failed > 0) | ~(diagonal.amin(1) > least) if alpha == 0 else failed > 0
+            smallest = 4 * torch.finfo(precision).eps ** 0.5 * diagonal.amax(1)
+            singular = (failed > 0) | ~(diagonal.amin(1) > smallest) if alpha == 0 else failed > 0
         matrix = torch.where(singular[:, None, None], one, matrix)
         right = torch.where(singular[:, None, None], 0, right)
         slope = torch.cholesky_solve(right, torch.linalg.cholesky(matrix)).to(self.mean_y)
         views = self.views[:, 0]
-        return Looks(self.mean_y, slope, views, singular & (views > 0))
+        return FittedDescriptors(self.mean_y, slope, views, singular & (views > 0))

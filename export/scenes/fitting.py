@@ -1,4 +1,4 @@
-"""From photos and a cloud to looks, and from looks to a picture: all of NPBG++ (arXiv 2203.13318) in torch.
+"""From photos and a cloud to descriptors, and from descriptors to a picture: all of NPBG++ (arXiv 2203.13318) in torch.
 
 The reference for the SDK and what training differentiates through. Points are float64 [P, 3], photos RGB in 0..1
 [H, W, 3] (numpy float32), features and rasters float32.
@@ -17,13 +17,13 @@ from torch.nn import functional as F
 from export.camera import Camera
 from export.scenes.basis import directions
 from export.scenes.cameras import moves, upright, warped
-from export.scenes.config import ALPHA, BACKGROUND_PX, HIDING, LEVELS, MULTIPLE, RASTER, TURNED_MULTIPLE
+from export.scenes.config import ALPHA, BACKGROUND_PX, DEPTH_TOLERANCE, LEVELS, MULTIPLE, RASTER, ROTATED_MULTIPLE
+from export.scenes.descriptors import FittedDescriptors, Moments
 from export.scenes.extractor import STRIDE
-from export.scenes.looks import Looks, Moments
-from export.scenes.raster import filled, projected, pyramid, unhidden, visible
+from export.scenes.raster import filled, projected, pyramid, visible, without_occluded
 from export.scenes.system import Networks
 
-_SURENESS = (1.0, 1.0, 1.0, 0.5, 0.25)  # that a pixel is covered by points, by the scale that has one there
+_CONFIDENCE = (1.0, 1.0, 1.0, 0.5, 0.25)  # that a pixel is covered by points, by the scale that has one there
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +36,15 @@ class View:
 
 @dataclass(frozen=True)
 class Options:
-    """up: of the world. visibility_scale: of the photos' sides, for finding who is seen (1/2 in the paper where points
-    are sparse, so that what is behind does not shine through). hiding: how much farther than the nearest point of its
-    block of pixels a point may be, as a share of that depth (see `unhidden`; infinite in the paper). near: depth of the
-    nearest visible point, in the scene's units. alpha: of the ridge regression. precision: of the moments."""
+    """up: of the world. visibility_scale: of the photos' sides, for finding which points are visible (1/2 in the paper
+    where points are sparse, against bleed-through). depth_tolerance: how much farther than the nearest point of its
+    block of pixels a point may be, as a fraction of that depth (see `without_occluded`; infinite in the paper). near:
+    depth of the nearest visible point, in the scene's units. alpha: of the ridge regression. precision: of the
+    moments."""
 
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     visibility_scale: float = 1.0
-    hiding: float = HIDING
+    depth_tolerance: float = DEPTH_TOLERANCE
     near: float = 0.0
     alpha: float = ALPHA
     precision: torch.dtype = torch.float32
@@ -59,17 +60,17 @@ def sampled(features: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
 
 def shown_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
     """Keys, int64 [H, W], of the points [P, 3] that a camera sees."""
-    return unhidden(visible(points, camera, options.near), options.hiding)
+    return without_occluded(visible(points, camera, options.near), options.depth_tolerance)
 
 
 def visibility_camera(camera: Camera, options: Options) -> Camera:
-    """The camera in whose picture it is found who is seen."""
+    """The camera in whose picture visibility is decided."""
     scale = options.visibility_scale
     return camera.resized(max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
 
 
 def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
-    """Which points win a pixel of the photo, bool [P]. Asked of the camera as it is: its pixels are the photo's."""
+    """Which points are visible in the photo, bool [P]. Asked of the camera as it is: its pixels are the photo's."""
     keys = shown_in(points, visibility_camera(camera, options), options)
     seen = torch.zeros(len(points), dtype=torch.bool, device=points.device)
     seen[pyramid(keys, 1).points] = True
@@ -77,38 +78,38 @@ def seen_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
 
 
 @dataclass(frozen=True)
-class Model:
-    """What is left of a cloud: the points that some photo sees, float64 [P, 3], how they look, and the colour of what
-    has no points, [3] in 0..1."""
+class FittedPoints:
+    """The points of a cloud that some photo sees, float64 [P, 3], their descriptors, and the colour of what has no
+    points, [3] in 0..1."""
 
-    places: Tensor
-    looks: Looks
+    positions: Tensor
+    fit: FittedDescriptors
     background: Tensor
 
-    def descriptors(self, chosen: Tensor, centre: np.ndarray, networks: Networks) -> Tensor:
-        """How the points with indices `chosen` [V] look from a camera's centre [3]: float32 [V, 8].
+    def descriptors_from(self, chosen: Tensor, centre: np.ndarray, networks: Networks) -> Tensor:
+        """Descriptors of the points with indices `chosen` [V] as seen from a camera's centre [3]: float32 [V, 8].
 
         As in the paper the target's basis values have no gradient; the basis learns from the sources'.
         """
-        places, looks = self.places[chosen], self.looks
+        positions, fit = self.positions[chosen], self.fit
         with torch.no_grad():
-            basis = networks.basis(directions(places, torch.from_numpy(centre).to(places)).float())
-        mean, slope = looks.mean[chosen], looks.slope[chosen]
-        return Looks(mean, slope, looks.views[chosen], looks.singular[chosen]).seen_from(basis.to(mean)).float()
+            basis = networks.basis(directions(positions, torch.from_numpy(centre).to(positions)).float())
+        mean, slope = fit.mean[chosen], fit.slope[chosen]
+        return FittedDescriptors(mean, slope, fit.views[chosen], fit.singular[chosen]).seen_from(basis.to(mean)).float()
 
     def rasters(self, camera: Camera, networks: Networks, options: Options) -> list[Tensor]:
         """[9, H/2^k, W/2^k] for k = 0..4 of what a camera sees, whose sides are multiples of 16; `filled`."""
-        shown = pyramid(shown_in(self.places, camera, options), LEVELS)
-        return filled(shown.rasters(self.descriptors(shown.points, camera.centre, networks)), self.background)
+        shown = pyramid(shown_in(self.positions, camera, options), LEVELS)
+        return filled(shown.rasters(self.descriptors_from(shown.points, camera.centre, networks)), self.background)
 
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """What some photos see of a cloud, before any network. places: float64 [P, 3], points that at least one sees.
-    images: for each photo RGB float32 [3, h, w], turned upright. columns, rows: where the points are in it, [P].
+    """What some photos see of a cloud, before any network. positions: float64 [P, 3], points that at least one sees.
+    images: for each photo RGB float32 [3, h, w], rotated upright. columns, rows: where the points are in it, [P].
     seen: bool [P]. centres: of the cameras, [3]. background: the colour of what has no points, [3]."""
 
-    places: Tensor
+    positions: Tensor
     images: list[Tensor]
     columns: list[Tensor]
     rows: list[Tensor]
@@ -147,9 +148,9 @@ def gathered(
     window_px: int | None = None,
     seen: Sequence[Tensor] | None = None,
 ) -> Sources:
-    """The cloud [P, 3] after all views; with a `target`, only what wins a pixel of that camera: enough to render it.
+    """The cloud [P, 3] after all views; with a `target`, only what is visible to that camera: enough to render it.
 
-    A photo is turned by bilinear interpolation before the extractor sees it, in the smallest frame that holds it, or,
+    A photo is rotated by bilinear interpolation before the extractor sees it, in the smallest frame that holds it, or,
     with `window_px`, in a square of that side about the points; what is outside of it is then not seen. seen: of all
     points, if it is known (`seen_in`). Raises ValueError without views.
     """
@@ -160,11 +161,11 @@ def gathered(
     (chosen,) = torch.where(found.any(0))
     if target is not None:
         chosen = chosen[pyramid(shown_in(points[chosen], target, options), 1).points]
-    places, found = points[chosen], found[:, chosen]
-    sources = Sources(places, [], [], [], [], [view.camera.centre for view in views], background)
+    positions, found = points[chosen], found[:, chosen]
+    sources = Sources(positions, [], [], [], [], [view.camera.centre for view in views], background)
     for view, sees in zip(views, found, strict=True):
         camera = upright(view.camera, np.asarray(options.up), STRIDE)
-        columns, rows, _ = projected(places, camera)
+        columns, rows, _ = projected(positions, camera)
         if window_px is not None:
             middle = [float(at[sees].median()) if sees.any() else 0.0 for at in (columns, rows)]
             left, top = (round(at - window_px / 2) for at in middle)
@@ -181,51 +182,53 @@ def gathered(
     return sources
 
 
-def fitted(sources: Sources, features: Iterable[Tensor], networks: Networks, options: Options) -> Model:
-    """How the points look, from the features [8, h, w] of each photo's image."""
-    places = sources.places
-    moments = Moments.zeros(len(places), torch.zeros((), dtype=options.precision, device=places.device))
+def fitted_to_features(
+    sources: Sources, features: Iterable[Tensor], networks: Networks, options: Options
+) -> FittedPoints:
+    """The points with their descriptors, from the features [8, h, w] of each photo's image."""
+    positions = sources.positions
+    moments = Moments.zeros(len(positions), torch.zeros((), dtype=options.precision, device=positions.device))
     each = zip(features, sources.columns, sources.rows, sources.seen, sources.centres, strict=True)
     for maps, columns, rows, sees, centre in each:
-        basis = networks.basis(directions(places, torch.from_numpy(centre).to(places)).float())
+        basis = networks.basis(directions(positions, torch.from_numpy(centre).to(positions)).float())
         moments = moments.with_view(sampled(maps, columns, rows), basis, sees)
-    return Model(places, moments.looks(options.alpha), sources.background.to(places.device))
+    return FittedPoints(positions, moments.solved(options.alpha), sources.background.to(positions.device))
 
 
-def modelled(
+def fitted_to_views(
     points: Tensor, views: Sequence[View], networks: Networks, options: Options, target: Camera | None = None
-) -> Model:
+) -> FittedPoints:
     """The cloud after all views (see `gathered`)."""
     sources = gathered(points, views, options, target)
-    return fitted(
+    return fitted_to_features(
         sources, (networks.extractor(x[None].to(points.device))[0] for x in sources.images), networks, options
     )
 
 
-def cover(rasters: list[Tensor]) -> Tensor:
+def coverage(rasters: list[Tensor]) -> Tensor:
     """How much of a picture is the refiner's, the rest is background: [1, H, W], 1 where there is a point in the 16 x
     16 pixels that a pixel is in, fading to 0 beyond (Coverage and kOwnBackgroundGain in the SDK)."""
-    sure = rasters[-1][None, RASTER - 1 :] * _SURENESS[-1]
-    for raster, most in zip(reversed(rasters[:-1]), reversed(_SURENESS[:-1]), strict=True):
-        wider = F.interpolate(sure, scale_factor=2, mode="bilinear", align_corners=False)
-        sure = torch.maximum(wider, raster[None, RASTER - 1 :] * most)
-    return (sure[0] / _SURENESS[-1]).clamp_max(1)
+    found = rasters[-1][None, RASTER - 1 :] * _CONFIDENCE[-1]
+    for raster, confidence in zip(reversed(rasters[:-1]), reversed(_CONFIDENCE[:-1]), strict=True):
+        wider = F.interpolate(found, scale_factor=2, mode="bilinear", align_corners=False)
+        found = torch.maximum(wider, raster[None, RASTER - 1 :] * confidence)
+    return (found[0] / _CONFIDENCE[-1]).clamp_max(1)
 
 
 @torch.no_grad()
-def render(model: Model, camera: Camera, networks: Networks, options: Options) -> np.ndarray:
-    """The picture of a camera of any size and turn: RGB float32 [H, W, 3] in 0..1.
+def render(model: FittedPoints, camera: Camera, networks: Networks, options: Options) -> np.ndarray:
+    """The picture of a camera of any size and roll: RGB float32 [H, W, 3] in 0..1.
 
-    Rendered upright in the smallest frame that holds it, turned back, cut. Frames that are turned have sides of a few
-    sizes, so that those of a hand-held camera are mostly the same.
+    Rendered upright in the smallest frame that holds it, rotated back, cropped. Frames that are rotated have sides of a
+    few sizes, so that those of a hand-held camera are mostly the same.
     """
     turned = upright(camera, np.asarray(options.up), MULTIPLE)
     if moves(camera, turned):
-        turned = upright(camera, np.asarray(options.up), TURNED_MULTIPLE)
+        turned = upright(camera, np.asarray(options.up), ROTATED_MULTIPLE)
     rasters = model.rasters(turned, networks, options)
     picture = networks.refiner([raster[None] for raster in rasters])[0].clamp(0, 1)
     background = model.background[:, None, None].to(picture)
-    picture = background + cover(rasters) * (picture - background)
+    picture = background + coverage(rasters) * (picture - background)
     picture = np.ascontiguousarray(picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy())
     return warped(picture, turned, camera)
 

@@ -23,8 +23,8 @@
 namespace maquette {
 
 struct LiveSceneImage {
-  RgbaImage rendering, photo,
-      error;           // photo and error (mean of the channels) are empty unless the camera is a photo's;
+  // Photo and error (mean of the channels) are empty unless the camera is a photo's;
+  RgbaImage rendering, photo, error;
   double psnr_db = 0;  // this is NaN then, and infinite where nothing differs
   int photo_index = -1;
   maq_pinhole_camera camera{};  // of the rendering's size

@@ -47,8 +47,8 @@ maq::PinholeCamera camera_of(int width, int height, double angle, double roll) {
   return camera;
 }
 
-int number(int count, char** arguments, int index, int otherwise) {
-  return index < count ? std::atoi(arguments[index]) : otherwise;
+int number(int count, char** arguments, int index, int fallback) {
+  return index < count ? std::atoi(arguments[index]) : fallback;
 }
 
 void measure(int count, char** arguments) {
@@ -72,7 +72,7 @@ void measure(int count, char** arguments) {
     const auto seconds_since_start = [&] {
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     };
-    maq::SceneNetworks networks(runtime, arguments[1], maq::SessionSettings{threads});
+    maq::SceneNetworks networks(runtime, maq::read_bundle(arguments[1]), maq::SessionSettings{threads});
     maq::FittingOptions options;
     options.threads = threads;
     maq::DescriptorFitter fitter(std::move(cloud), {0, 0, 1}, networks, options);

@@ -17,7 +17,7 @@ static void must(const char* what, maq_status status, const void* handle) {
   exit(1);
 }
 
-/* Maps the dma-buf of a frame anew and returns how many of its bytes were compared. */
+/* Maps the dma-buf of a frame again and returns how many of its bytes were compared. */
 static size_t compare(const maq_frame* frame) {
   maq_frame_desc desc;
   const uint8_t* memory;

@@ -4,7 +4,7 @@
 #   tests/camera_vm/fetch-guest.sh
 #
 # Needs no root and changes nothing of the system. About 70 MB are fetched, once, by apt, which checks them against
-# Debian's signatures; remove the folder to fetch them anew. Exit status 1 when the kernel cannot be had.
+# Debian's signatures; remove the folder to fetch them again. Exit status 1 when the kernel cannot be had.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 case "${1:-}" in

@@ -1,5 +1,5 @@
 # Runs in the virtual machine: libcamera, and the SDK on top of it, with a virtual USB camera. First without udev, as in a
-# container: nobody tells libcamera that a camera comes or goes. Then with udev.
+# container: nothing tells libcamera that a camera comes or goes. Then with udev.
 
 export LD_LIBRARY_PATH=/opt/maquette/lib
 maquette=/opt/maquette/bin/maquette
@@ -104,7 +104,7 @@ check "brightness reaches the camera" brightness_reaches_the_camera
 check "another id says what there is" says "libcamera sees 1 camera." libcamera:/another
 check "a format that it has not says which it has" says "offers MJPG, YUYV, but not NV12" 'libcamera:0?format=NV12'
 check "busy while another program has it" busy_while_another_program_has_it
-check "the gradient at 320x240 shows nobody" dense_pose "libcamera:0?size=320x240" 3 ", 0 people"
+check "the gradient at 320x240 shows no people" dense_pose "libcamera:0?size=320x240" 3 ", 0 people"
 check "dense pose finds the people of the picture" dense_pose "libcamera:0?format=MJPG" 3 ", [1-9][0-9]* p"
 check "without udev: survives being unplugged and plugged in again" survives_unplugging
 check "without udev: a camera that stays away is lost" lost_for_good

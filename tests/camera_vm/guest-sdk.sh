@@ -96,7 +96,7 @@ doctor_names_who_uses_it() {
     wait $other
     return $status
 }
-# What was recorded is played again, frame by frame.
+# What was recorded is replayed, frame by frame.
 records_and_plays() {
     $maquette record "v4l2:/dev/video0?size=320x240&format=YUYV" /tmp/take.maqrec --frames 20 && \
         $maquette play /tmp/take.maqrec --speed 4 && $maquette play /tmp/take.maqrec --frames 3 | grep "^3 frames of 320 x 180"
@@ -105,7 +105,7 @@ records_and_plays() {
 check "vivid loads" modprobe vivid n_devs=1 node_types=0x1
 check "vivid is listed" lists "v4l2:/dev/video0" "vivid"
 for size in 320x240 640x480 1280x720; do
-    check "vivid $size: colour bars show nobody" dense_pose "v4l2:/dev/video0?size=$size" 3 ", 0 people"
+    check "vivid $size: colour bars show no people" dense_pose "v4l2:/dev/video0?size=$size" 3 ", 0 people"
 done
 check "vivid: controls arrive, and switch their automatic off" \
     controls_arrive "brightness=77&gain=33" brightness=77 gain_automatic=0 gain=33
@@ -114,13 +114,13 @@ check "vivid: what it does not have is refused" refuses focus=3 "has no focus"
 check "the doctor finds it well" doctor_says 0 "may be opened" "1 of 1 cameras can be used"
 check "the doctor says who may not open it" doctor_says_to_nobody
 check "the doctor says who uses it" doctor_names_who_uses_it
-check "vivid is recorded, and played" records_and_plays
+check "vivid is recorded and replayed" records_and_plays
 check "vivid YUYV: frames are dma-bufs" dma_buf "v4l2:/dev/video0?size=640x480&format=YUYV" 5
 check "vivid NV12: frames are dma-bufs" dma_buf "v4l2:/dev/video0?size=640x480&format=NV12" 5
 rmmod vivid
 
 check "vivid of two planes loads" modprobe vivid n_devs=1 node_types=0x1 multiplanar=2
-check "vivid of two planes shows nobody" dense_pose "v4l2:/dev/video0?size=640x480&format=NM12" 1 ", 0 people"
+check "vivid of two planes shows no people" dense_pose "v4l2:/dev/video0?size=640x480&format=NM12" 1 ", 0 people"
 check "vivid NV12: frames are dma-bufs by the multi-planar interface" \
     dma_buf "v4l2:/dev/video0?size=640x480&format=NV12" 5
 rmmod vivid
@@ -128,7 +128,7 @@ rmmod vivid
 check "drivers of USB cameras load" sh -c 'modprobe vhci-hcd && modprobe uvcvideo'
 check "the camera appears" plug_in --jpeg /photo.jpg
 check "the camera is listed" lists "v4l2:/dev/video0" "MJPG"
-check "the gradient at 320x240 shows nobody" dense_pose "v4l2:/dev/video0?size=320x240" 3 ", 0 people"
+check "the gradient at 320x240 shows no people" dense_pose "v4l2:/dev/video0?size=320x240" 3 ", 0 people"
 unplug
 check "a camera that shows a picture appears" plug_in --jpeg /photo.jpg
 check "dense pose finds the people of the picture" dense_pose "v4l2:/dev/video0?format=MJPG" 3 ", [1-9][0-9]* p"

@@ -104,7 +104,7 @@ MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t st
  * "?size=640x480&fps=15" works on each: frames are scaled to that size, and a clip is thinned out to that rate; a camera
  * takes the nearest that it offers, which maq_source_get_info tells. Of a camera, "format=MJPG" names the format and
  * "exposure=10000&focus=auto" sets controls. "live=1" plays what is no camera as if it were one, and faults such as
- * "drop=0.1" or "unplug=3s@5s" are put into any source (docs/cameras/stand-ins.md).
+ * "drop=0.1" or "unplug=3s@5s" are put into any source (docs/cameras/simulated.md).
  * A '?' that is part of a file name is written %3F, '%' is written %25. `config` may be NULL.
  * `*source` is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),

@@ -1,11 +1,11 @@
 #include "api/boundary.h"
-#include "image/files/clip_file.h"
+#include "image/files/clip_writer.h"
 
 using namespace maq;
 
 struct maq_clip : Handle {
   maq_clip(const char* path, double fps) : file(path, fps) {}
-  ClipFile file;
+  ClipWriter file;
 };
 
 maq_status maq_clip_create(maq_context* context, const char* path, double fps, maq_clip** clip) {
@@ -13,7 +13,7 @@ maq_status maq_clip_create(maq_context* context, const char* path, double fps, m
     require_argument(context, "context");
     require_argument(path, "path");
     require_argument(clip, "clip");
-    require_range("fps", fps, kLeastClipFps, kMostClipFps);
+    require_range("fps", fps, kMinClipFps, kMaxClipFps);
     *clip = new maq_clip(path, fps);
     return MAQ_OK;
   });

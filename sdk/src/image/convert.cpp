@@ -9,7 +9,8 @@
 namespace maq {
 namespace {
 
-// --- YUV: BT.601 in video range, coefficients of 20 fractional bits ----------------------------------------------------
+// --- YUV: BT.601 in video range, coefficients of 20 fractional bits
+// ----------------------------------------------------
 
 constexpr int kYuvBits = 20;
 constexpr int kLuma = 1220542;      // 1.164
@@ -89,7 +90,8 @@ void nv12_to_bgr(const ImageView& image, uint8_t* bgr) {
   }
 }
 
-// --- packed formats, row by row ---------------------------------------------------------------------------------------
+// --- packed formats, row by row
+// ---------------------------------------------------------------------------------------
 
 // RGB to BGR and back.
 MAQ_SIMD_CLONES void swap_red_and_blue(const uint8_t* from, int width, uint8_t* to) {

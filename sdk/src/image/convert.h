@@ -9,9 +9,9 @@
 
 namespace maq {
 
-// The image as BGR8: of the same memory when it is BGR8 already, otherwise a converted copy in `memory`, which the caller
-// keeps so that the next image takes nothing from the heap. YUV is that of BT.601 in video range, in the fixed-point
-// arithmetic of OpenCV's cvtColor. Throws MAQ_ERROR_UNSUPPORTED for a depth image.
+// The image as BGR8: of the same memory when it is BGR8 already, otherwise a converted copy in `memory`, which the
+// caller keeps so that the next image takes nothing from the heap. YUV is that of BT.601 in video range, in the
+// fixed-point arithmetic of OpenCV's cvtColor. Throws MAQ_ERROR_UNSUPPORTED for a depth image.
 ImageView as_bgr(const ImageView& image, std::vector<uint8_t>& memory);
 
 // Writes the image to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8); `stride_bytes` 0 means rows without padding.

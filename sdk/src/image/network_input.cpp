@@ -34,7 +34,7 @@ void ResizeAxis::prepare(int from, int to, bool shrinks) {
   first.assign(size_t(to), 0);
   weight.assign(size_t(to) * size_t(taps), 0);
   for (int i = 0; i < to; ++i) {
-    float* own = weight.data() + size_t(i) * size_t(taps);
+    float* weights = weight.data() + size_t(i) * size_t(taps);
     // The interval of old pixels, or the point between two, that the new pixel covers.
     const double low = shrinks ? i * scale : std::clamp((i + 0.5) * scale - 0.5, 0.0, double(from - 1));
     const double high = shrinks ? std::min((i + 1) * scale, double(from)) : low + 1;
@@ -43,10 +43,10 @@ void ResizeAxis::prepare(int from, int to, bool shrinks) {
     for (int k = 0; k < taps; ++k) {
       const double cell = first[size_t(i)] + k;
       const double covered = std::max(0.0, std::min(high, cell + 1) - std::max(low, cell));
-      own[k] = float(covered);
+      weights[k] = float(covered);
       sum += covered;
     }
-    for (int k = 0; k < taps; ++k) own[k] = float(own[k] / sum);
+    for (int k = 0; k < taps; ++k) weights[k] = float(weights[k] / sum);
   }
 }
 
@@ -65,8 +65,8 @@ void make_network_input(const ImageView& image, const NetworkSize& size, const N
 
   const ImageView bgr = as_bgr(image, input.converted);
   const bool shrinks = std::max(size.width_px, size.height_px) < std::max(image.width_px, image.height_px);
-  input.across.prepare(image.width_px, input.width_px, shrinks);
-  input.down.prepare(image.height_px, input.height_px, shrinks);
+  input.columns.prepare(image.width_px, input.width_px, shrinks);
+  input.rows.prepare(image.height_px, input.height_px, shrinks);
   const size_t row_values = size_t(image.width_px) * kChannels;
   input.row.resize(row_values);
 
@@ -77,7 +77,7 @@ void make_network_input(const ImageView& image, const NetworkSize& size, const N
     scale[c] = 1 / spec.std[c];
     shift[c] = -spec.mean[c] / spec.std[c];
   }
-  const int taps = input.across.taps;
+  const int taps = input.columns.taps;
   for (int y = 0; y < input.padded_height_px; ++y) {
     float* red = input.values.data() + size_t(y) * size_t(input.padded_width_px);
     float* green = red + plane;
@@ -85,12 +85,12 @@ void make_network_input(const ImageView& image, const NetworkSize& size, const N
     const int used = y < input.height_px ? input.width_px : 0;
     for (float* line : {red, green, blue}) std::fill(line + used, line + input.padded_width_px, 0.0f);
     if (used == 0) continue;
-    weighted_lines(bgr.planes[0].data + size_t(input.down.first[size_t(y)]) * bgr.planes[0].stride_bytes,
-                   bgr.planes[0].stride_bytes, input.down.weight.data() + size_t(y) * size_t(input.down.taps),
-                   input.down.taps, row_values, input.row.data());
-    const float* weight = input.across.weight.data();
+    weighted_lines(bgr.planes[0].data + size_t(input.rows.first[size_t(y)]) * bgr.planes[0].stride_bytes,
+                   bgr.planes[0].stride_bytes, input.rows.weight.data() + size_t(y) * size_t(input.rows.taps),
+                   input.rows.taps, row_values, input.row.data());
+    const float* weight = input.columns.weight.data();
     for (int x = 0; x < used; ++x, weight += taps) {
-      const float* pixel = input.row.data() + kChannels * input.across.first[size_t(x)];
+      const float* pixel = input.row.data() + kChannels * input.columns.first[size_t(x)];
       float b = 0, g = 0, r = 0;
       for (int k = 0; k < taps; ++k, pixel += kChannels) {
         b += weight[k] * pixel[0];

@@ -1,4 +1,4 @@
-// A frame as the detector wants it.
+// A frame as the input of a network: resized, normalised, padded.
 #pragma once
 
 #include <array>
@@ -43,8 +43,8 @@ struct NetworkInput {
   int padded_height_px = 0;
 
   // Scratch, kept so that frames of one size allocate nothing.
-  ResizeAxis across;
-  ResizeAxis down;
+  ResizeAxis columns;
+  ResizeAxis rows;
   std::vector<float> row;
   std::vector<uint8_t> converted;  // the image as BGR, where it comes in another format
 };

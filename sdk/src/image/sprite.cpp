@@ -12,7 +12,7 @@ namespace maq {
 BgraImage decode_webp(const uint8_t* bytes, size_t size_bytes, const std::string& what) {
   BgraImage image;
   if (WebPGetInfo(bytes, size_bytes, &image.width_px, &image.height_px) == 0) {
-    throw Error(MAQ_ERROR_UNREADABLE, what, " is no WebP image.");
+    throw Error(MAQ_ERROR_UNREADABLE, what, " is not a WebP image.");
   }
   const int stride_bytes = image.width_px * 4;
   image.pixels.resize(size_t(stride_bytes) * size_t(image.height_px));
@@ -22,8 +22,8 @@ BgraImage decode_webp(const uint8_t* bytes, size_t size_bytes, const std::string
   return image;
 }
 
-BgraImage cut_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
-                     bool mirrored) {
+BgraImage crop_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
+                      bool mirrored) {
   // Multiplied before scaling: otherwise the colour of transparent pixels bleeds into the edges.
   std::vector<uint8_t> tile;
   tile.reserve(size_t(width) * size_t(height) * 4);

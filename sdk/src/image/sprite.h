@@ -1,4 +1,4 @@
-// Cutting sprites from a sheet and drawing them into a frame.
+// Crops sprites from a sheet and draws them into a frame.
 #pragma once
 
 #include <cstdint>
@@ -21,10 +21,10 @@ BgraImage decode_webp(const uint8_t* bytes, size_t size_bytes, const std::string
 
 // The part of `sheet` at (x, y), scaled to `to_width` x `to_height` and mirrored left to right if asked.
 // Its colours come out multiplied by alpha, as draw_sprite wants them.
-BgraImage cut_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
-                     bool mirrored);
+BgraImage crop_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
+                      bool mirrored);
 
-// Draws a sprite with its top left corner at (x, y) over a BGR frame; what lies outside is cut off.
+// Draws a sprite with its top left corner at (x, y) over a BGR frame; clipped to the frame.
 void draw_sprite(const BgraImage& sprite, int x, int y, Frame& frame);
 
 }  // namespace maq

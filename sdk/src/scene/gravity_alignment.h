@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "image/geometry/warp.h"
 #include "scene/pinhole_camera.h"
 
 namespace maq {
@@ -12,9 +13,6 @@ namespace maq {
 // that are multiples of `multiple`. Throws MAQ_ERROR_INVALID_ARGUMENT where that is a million pixels away from the
 // first one.
 PinholeCamera gravity_aligned_frame(const PinholeCamera& camera, const std::array<double, 3>& up, int multiple);
-
-// Maps a pixel of one picture to another picture's: x' = m[0] x + m[1] y + m[2], y' = m[3] x + m[4] y + m[5].
-using PixelMap = std::array<double, 6>;
 
 // From `source` to `target`, two cameras that differ by their frames and a rotation about the axis.
 PixelMap pixel_map_between(const PinholeCamera& source, const PinholeCamera& target);

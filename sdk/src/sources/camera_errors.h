@@ -13,7 +13,7 @@ maq_status camera_status(int error);
 // A sentence with a leading space; "" where nothing is known to help.
 const char* camera_remedy(maq_status status);
 
-// Whether the device is gone, so that only opening it anew can help.
+// Whether the device is gone, so that only opening it again can help.
 bool is_device_lost(int error);
 
 // Throws camera_status(error): "`name` `what`: the system's text.", then the remedy, or `hint` where there is none.

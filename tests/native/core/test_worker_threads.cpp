@@ -36,7 +36,7 @@ TEST(WorkerThreads, RunReturnsWhenTheSlowestIsDone) {
   WorkerThreads threads(2);
   for (int round = 0; round < 5; ++round) {
     std::atomic<int> done{0};
-    // Whoever has the other task is done long before.
+    // The other task is done long before.
     threads.run(2, [&](size_t task, int) {
       std::this_thread::sleep_for(std::chrono::milliseconds(int(task) == round % 2 ? 40 : 5));
       ++done;

@@ -70,7 +70,8 @@ TEST(Lenses, WhereTheDistortionFoldsBackThereIsNoPlace) {
   EXPECT_FALSE(projection.find(std::numeric_limits<double>::quiet_NaN(), 0));
 }
 
-// The least focal length with which nothing is blank: all pixels have a place, and with a hundredth less some have none.
+// The least focal length with which nothing is blank: all pixels have a place, and with a hundredth less some have
+// none.
 TEST(Lenses, TheUndistortedPictureIsAsWideAsItCanBeWithoutABlank) {
   for (Lens lens : {rational(), fisheye(), Lens{{300, 200, 150, 150, 149.5, 99.5}, Distortion::kRational, {0.2}},
                     Lens{{300, 200, 100, 100, 120, 110}, Distortion::kFisheye}}) {

@@ -13,6 +13,7 @@
 #include "sources/live_source.h"
 #include "support/expect_error.h"
 #include "support/fake_depthai.h"
+#include "support/wait_until.h"
 
 namespace {
 
@@ -25,6 +26,7 @@ using Fault = FakeDepthAi::Fault;
 constexpr int64_t kSecond = 1000000000;
 constexpr int64_t kMillisecond = 1000000;
 constexpr int64_t kPeriod = kSecond / 30;
+constexpr int kLimitMs = 60000;  // for a defect, not for speed
 
 // What was reported, in order.
 class Reports {
@@ -35,14 +37,10 @@ class Reports {
     reports->states_.push_back(state);
   }
   bool wait_for(maq_source_state state) const {
-    for (int i = 0; i < 500; ++i) {
-      {
-        std::lock_guard<std::mutex> lock(mutex_);
-        if (std::find(states_.begin(), states_.end(), state) != states_.end()) return true;
-      }
-      std::this_thread::sleep_for(10ms);
-    }
-    return false;
+    return wait_until([&] {
+      std::lock_guard<std::mutex> lock(mutex_);
+      return std::find(states_.begin(), states_.end(), state) != states_.end();
+    });
   }
 
  private:
@@ -74,7 +72,7 @@ class DepthaiCameras : public ::testing::Test {
                                              settings);
   }
 
-  static Picture take(Camera& camera, int timeout_ms = 2000) {
+  static Picture take(Camera& camera, int timeout_ms = kLimitMs) {
     Picture picture;
     std::string reason;
     picture.event = camera.wait(-1, timeout_ms, picture.buffer, reason);
@@ -87,14 +85,14 @@ class DepthaiCameras : public ::testing::Test {
     return picture;
   }
   // And gives it back at once.
-  static Picture take_and_return(Camera& camera, int timeout_ms = 2000) {
+  static Picture take_and_return(Camera& camera, int timeout_ms = kLimitMs) {
     const Picture picture = take(camera, timeout_ms);
     if (picture.event == Camera::Event::kFrame) camera.give_back(picture.buffer.slot);
     return picture;
   }
 
   void TearDown() override {
-    for (int i = 0; i < 500 && fake_.sessions() > 0; ++i) std::this_thread::sleep_for(10ms);
+    wait_until([&] { return fake_.sessions() == 0; });
     EXPECT_EQ(fake_.sessions(), 0);
     EXPECT_EQ(fake_.frames_alive(), 0);
   }
@@ -118,7 +116,7 @@ TEST_F(DepthaiCameras, TakeTheNearestThatTheDeviceCanDo) {
   EXPECT_FALSE(fake_.plan().with_depth);
   fake_.features.has_stereo = false;
   opened = camera();
-  EXPECT_FALSE(fake_.plan().with_depth) << "nobody asked for it";
+  EXPECT_FALSE(fake_.plan().with_depth) << "it was not asked for";
   expect_error(MAQ_ERROR_UNSUPPORTED, "no pair of cameras to see depth with; open it with depth=0", [&] {
     camera({64, 48, 30, true});
   });
@@ -206,20 +204,19 @@ TEST_F(DepthaiCameras, DepthThatIsLateIsWaitedForAndThenDoneWithout) {
   EXPECT_EQ(picture.value, 1);
   EXPECT_EQ(picture.depth_mm, -1);
   EXPECT_GT(waited, 60ms);
-  EXPECT_LT(waited, 1s);
-  EXPECT_EQ(fake_.frames_alive(), 0) << "what is given back is freed";
+  EXPECT_EQ(fake_.frames_alive(), 0) << "what is returned is freed";
   fake_.send_depth(fake_.depth(1, 1));
   EXPECT_EQ(take_and_return(*opened, 50).event, Camera::Event::kTimeout) << "too late: the picture is gone";
 }
 
 TEST_F(DepthaiCameras, DepthOfALaterPictureEndsTheWait) {
-  const auto opened = camera({64, 48, 1, {}});  // at this rate the patience is three seconds
-  const int64_t time = FakeDepthAi::now_ns() - 3 * kSecond;
+  const auto opened = camera({64, 48, 0.2, {}});  // at this rate a picture waits for its depth for 15 seconds
+  const int64_t time = FakeDepthAi::now_ns() - 6 * kSecond;
   fake_.send_colour(fake_.colour(1, 1, time));
-  fake_.send_colour(fake_.colour(2, 2, time + kSecond));
-  fake_.send_depth(fake_.depth(222, 2, time + kSecond));
-  EXPECT_EQ(take_and_return(*opened, 500).depth_mm, -1);
-  EXPECT_EQ(take_and_return(*opened, 500).depth_mm, 222);
+  fake_.send_colour(fake_.colour(2, 2, time + 5 * kSecond));
+  fake_.send_depth(fake_.depth(222, 2, time + 5 * kSecond));
+  EXPECT_EQ(take_and_return(*opened, 10000).depth_mm, -1);
+  EXPECT_EQ(take_and_return(*opened, 10000).depth_mm, 222);
 }
 
 TEST_F(DepthaiCameras, DepthOfAnotherRateGoesToThePicturesItFits) {
@@ -278,7 +275,7 @@ TEST_F(DepthaiCameras, DepthThatDoesNotFitThePictureIsDropped) {
   EXPECT_EQ(picture.buffer.depth.width_px, 32);
 }
 
-TEST_F(DepthaiCameras, DepthThatNobodyAskedForIsNotHandedOut) {
+TEST_F(DepthaiCameras, DepthThatWasNotAskedForIsNotDelivered) {
   const auto opened = camera({64, 48, 30, false});
   const int64_t time = FakeDepthAi::now_ns();
   fake_.send_depth(fake_.depth(500, 1, time));
@@ -333,7 +330,7 @@ TEST_F(DepthaiCameras, StragglersAreDroppedAndNumbersAndTimesOnlyGrow) {
   const Sent all[] = {{100, 0, true, 0, 0},           {101, 33, true, 1, 33}, {100, 0, false, 0, 0},  // late
                       {105, 166, true, 5, 166},                                                       // four were lost
                       {106, 150, true, 6, 166},        // the clock stepped back
-                      {3, 233, true, 7, 233},          // counts anew
+                      {3, 233, true, 7, 233},          // restarts its count
                       {INT64_MAX, 266, true, 8, 266},  // leaps
                       {INT64_MIN, 300, true, 9, 300}};
   for (const Sent& sent : all) {
@@ -361,9 +358,8 @@ TEST_F(DepthaiCameras, WhoHoldsEveryBufferGetsTheNewestFramesLater) {
     std::this_thread::sleep_for(50ms);
     opened->give_back(held[1].buffer.slot);
   });
-  const auto before = std::chrono::steady_clock::now();
-  const Picture next = take_and_return(*opened, 10000);
-  EXPECT_LT(std::chrono::steady_clock::now() - before, 5s) << "a buffer that comes back ends the wait";
+  const Picture next = take_and_return(*opened);
+  ASSERT_EQ(next.event, Camera::Event::kFrame) << "a buffer that comes back ends the wait";
   giver.join();
   EXPECT_GT(next.value, 90);
   EXPECT_EQ(next.buffer.slot, held[1].buffer.slot);
@@ -373,23 +369,21 @@ TEST_F(DepthaiCameras, WhoHoldsEveryBufferGetsTheNewestFramesLater) {
   opened->give_back(held[2].buffer.slot);
 }
 
-TEST_F(DepthaiCameras, AWaitEndsWhenSomebodyWakesItOrAFrameComes) {
+TEST_F(DepthaiCameras, AWaitEndsWhenItIsWokenOrAFrameComes) {
   const auto opened = camera({64, 48, 30, false});
   int fds[2];
   ASSERT_EQ(pipe(fds), 0);
   ASSERT_EQ(write(fds[1], "x", 1), 1);
   Picture picture;
   std::string reason;
-  EXPECT_EQ(opened->wait(fds[0], 5000, picture.buffer, reason), Camera::Event::kWoken);
+  EXPECT_EQ(opened->wait(fds[0], kLimitMs, picture.buffer, reason), Camera::Event::kWoken);
   close(fds[0]);
   close(fds[1]);
   std::thread sender([&] {
     std::this_thread::sleep_for(50ms);
     fake_.send_colour(fake_.colour(1, 1));
   });
-  const auto before = std::chrono::steady_clock::now();
-  EXPECT_EQ(take_and_return(*opened, 10000).value, 1);
-  EXPECT_LT(std::chrono::steady_clock::now() - before, 5s);
+  EXPECT_EQ(take_and_return(*opened).value, 1);
   sender.join();
 }
 
@@ -531,13 +525,12 @@ TEST_F(DepthaiCameras, ClosingDoesNotWaitForACallThatHangs) {
     auto live = source({});
     {
       std::unique_lock<std::mutex> hang(fake_.hang(call));
-      std::this_thread::sleep_for(300ms);  // until the thread is in the call
-      const auto before = std::chrono::steady_clock::now();
-      live.reset();
-      EXPECT_LT(std::chrono::steady_clock::now() - before, 500ms);
+      // The close comes from the reset itself.
+      ASSERT_TRUE(call == Call::kClose || wait_until([&] { return fake_.is_waiting(call); }));
+      live.reset();  // would never return if it waited for the device
       EXPECT_EQ(fake_.sessions(), 1);
     }
-    for (int i = 0; i < 500 && fake_.sessions() > 0; ++i) std::this_thread::sleep_for(10ms);
+    wait_until([&] { return fake_.sessions() == 0; });
     EXPECT_EQ(fake_.sessions(), 0) << "the thread closes the device when it answers";
   }
   auto live = source(settings());
@@ -545,13 +538,11 @@ TEST_F(DepthaiCameras, ClosingDoesNotWaitForACallThatHangs) {
   fake_.unplug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
   fake_.plug();
-  std::this_thread::sleep_for(300ms);
-  const auto before = std::chrono::steady_clock::now();
+  ASSERT_TRUE(wait_until([&] { return fake_.is_waiting(Call::kOpen); }));
   live.reset();
-  EXPECT_LT(std::chrono::steady_clock::now() - before, 500ms);
   const int opened = fake_.opened();
   hang.unlock();
-  for (int i = 0; i < 500 && fake_.opened() == opened; ++i) std::this_thread::sleep_for(10ms);
+  wait_until([&] { return fake_.opened() != opened; });
   EXPECT_EQ(fake_.opened(), opened + 1) << "it was opening, and is closed when it answers";
 }
 

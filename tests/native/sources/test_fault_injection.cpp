@@ -1,4 +1,4 @@
-// Files and stubs played as cameras, and the faults that a URI asks for.
+// Files and stubs replayed as cameras, and the faults that a URI asks for.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,6 +14,7 @@
 #include "support/expect_error.h"
 #include "support/source_threads.h"
 #include "support/temp_folder.h"
+#include "support/wait_until.h"
 
 namespace {
 
@@ -21,15 +22,15 @@ using maq::NextFrame;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr int64_t kSecond = 1000000000;
+constexpr int64_t kLimit = 60000000000;  // for a defect, not for speed
 
 class FaultInjection : public ::testing::Test {
  protected:
-  std::unique_ptr<maq::Source> open(const std::string& uri, int queue_length = 1) {
+  std::unique_ptr<maq::Source> open(const std::string& uri, int queue_length = 1, int stall_ms = 60000) {
     maq::SourceSettings settings;
     settings.queue_length = queue_length;
-    settings.stall_ms = 100;
-    settings.reconnect_ms = 10000;
+    settings.stall_ms = stall_ms;
+    settings.reconnect_ms = 60000;
     settings.user_data = this;
     settings.on_state = [](void* self, maq_source_state state, const char*) {
       auto* test = static_cast<FaultInjection*>(self);
@@ -43,7 +44,7 @@ class FaultInjection : public ::testing::Test {
   static std::vector<uint64_t> numbers(maq::Source& source, size_t most = SIZE_MAX) {
     std::vector<uint64_t> all;
     maq::Frame frame;
-    while (all.size() < most && source.next(10 * kSecond, frame) == NextFrame::kFrame) all.push_back(frame.sequence);
+    while (all.size() < most && source.next(kLimit, frame) == NextFrame::kFrame) all.push_back(frame.sequence);
     return all;
   }
   std::vector<maq_source_state> states() {
@@ -62,21 +63,21 @@ TEST_F(FaultInjection, AStubAsACameraComesAtItsTimesAndEnds) {
   EXPECT_EQ(source->info().clock, MAQ_CLOCK_MONOTONIC);
   std::vector<int64_t> times;
   maq::Frame frame;
-  while (source->next(10 * kSecond, frame) == NextFrame::kFrame) {
+  while (source->next(kLimit, frame) == NextFrame::kFrame) {
     times.push_back(frame.timestamp_ns);
     EXPECT_LE(frame.timestamp_ns, Clock::now().time_since_epoch().count()) << "not before its time";
     frame.clear();
   }
-  ASSERT_GE(times.size(), 10u) << "a busy machine may lose some";
+  ASSERT_GE(times.size(), 2u) << "a busy machine may lose some";
   EXPECT_EQ((times.back() - times.front()) % 10000000, 0) << "times are those of the stub, whenever it gets to run";
   EXPECT_EQ(source->next(0, frame), NextFrame::kEnd);
 }
 
-TEST_F(FaultInjection, TheNewestFrameWinsWhenNobodyTakesThem) {
+TEST_F(FaultInjection, TheNewestFrameIsKeptWhenNoneAreTaken) {
   const auto source = open("stub:pattern?live=1&fps=100&size=32x24");
-  std::this_thread::sleep_for(300ms);
+  ASSERT_TRUE(wait_until([&] { return source->drops() > 5; }));
   maq::Frame frame;
-  ASSERT_EQ(source->next(0, frame), NextFrame::kFrame);
+  ASSERT_EQ(source->next(kLimit, frame), NextFrame::kFrame);
   EXPECT_GT(frame.sequence, 5u);
   EXPECT_GE(source->drops(), frame.sequence - 1);
 }
@@ -89,7 +90,7 @@ TEST_F(FaultInjection, SpeedAndLoopAreHeeded) {
   uint64_t last = 0;
   for (int i = 0; i < 9; ++i) {
     frame.clear();
-    ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
+    ASSERT_EQ(source->next(kLimit, frame), NextFrame::kFrame);
     if (i == 0) first_ns = frame.timestamp_ns - int64_t(frame.sequence) * 10000000;
     EXPECT_NEAR(double(frame.timestamp_ns - first_ns), double(frame.sequence) * 1e7, 1e3) << "10 ms each, laps too";
     EXPECT_TRUE(i == 0 || frame.sequence > last);
@@ -97,14 +98,14 @@ TEST_F(FaultInjection, SpeedAndLoopAreHeeded) {
   }
 }
 
-TEST_F(FaultInjection, WhatIsPlayedCanBeSoughtAlsoFromItsEnd) {
+TEST_F(FaultInjection, AReplayCanSeekAlsoFromItsEnd) {
   const auto source = open("stub:pattern?live=1&frames=20&fps=100&size=32x24", 5);
   maq::Frame frame;
-  ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
+  ASSERT_EQ(source->next(kLimit, frame), NextFrame::kFrame);
   int64_t last_ns = frame.timestamp_ns;
   for (const uint64_t number : {15u, 3u, 18u}) {
     source->seek(int64_t(number) * 10000000);
-    ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
+    ASSERT_EQ(source->next(kLimit, frame), NextFrame::kFrame);
     const auto shown = open("stub:pattern?size=32x24");
     shown->seek(int64_t(number) * 10000000);
     maq::Frame expected;
@@ -112,7 +113,7 @@ TEST_F(FaultInjection, WhatIsPlayedCanBeSoughtAlsoFromItsEnd) {
     EXPECT_EQ(std::memcmp(frame.image.planes[0].data, expected.storage.data(), expected.storage.size()), 0) << number;
     EXPECT_GT(frame.timestamp_ns, last_ns) << "the clock goes on";
     last_ns = frame.timestamp_ns;
-    while (source->next(10 * kSecond, frame) == NextFrame::kFrame) last_ns = frame.timestamp_ns;
+    while (source->next(kLimit, frame) == NextFrame::kFrame) last_ns = frame.timestamp_ns;
   }
   const auto image = open("stub:people?drop=0.1");
   EXPECT_NO_THROW(image->seek(0));
@@ -122,12 +123,12 @@ TEST_F(FaultInjection, DroppedFramesAreCountedAndTheSameForASeed) {
   const std::string uri = "stub:pattern?frames=40&fps=200&size=32x24&drop=0.5&fault_seed=";
   const auto first = open(uri + "3", 40), again = open(uri + "3", 40), other = open(uri + "4", 40);
   const auto taken = numbers(*first);
-  EXPECT_GT(taken.size(), 5u);
+  ASSERT_GT(taken.size(), 0u);
   EXPECT_LT(taken.size(), 35u);
   if (first->drops() + taken.size() == 40 && again->drops() + numbers(*again).size() == 40) {
     EXPECT_NE(taken, numbers(*other));
   }
-  EXPECT_GE(first->drops(), 40 - taken.size() - 5) << "but for those after the last that came";
+  EXPECT_GE(first->drops(), taken.back() + 1 - taken.size()) << "those after the last that came are not known";
 }
 
 TEST_F(FaultInjection, CorruptFramesHaveNoiseAndTheirMemoryIsTheirOwn) {
@@ -137,7 +138,7 @@ TEST_F(FaultInjection, CorruptFramesHaveNoiseAndTheirMemoryIsTheirOwn) {
   ASSERT_EQ(clean->next(0, good), NextFrame::kFrame);
   std::vector<maq::Frame> held(4);
   for (maq::Frame& frame : held) {
-    ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
+    ASSERT_EQ(source->next(kLimit, frame), NextFrame::kFrame);
     int different = 0;
     for (int i = 0; i < 64 * 48 * 3; ++i) different += frame.image.planes[0].data[i] != good.storage[size_t(i)];
     EXPECT_GT(different, 64 * 48 / 2) << "a quarter of the bytes";
@@ -148,12 +149,20 @@ TEST_F(FaultInjection, CorruptFramesHaveNoiseAndTheirMemoryIsTheirOwn) {
 }
 
 TEST_F(FaultInjection, StallsAreReportedAndEnd) {
-  const auto source = open("stub:pattern?fps=100&size=32x24&stall=400ms@5", 10);
-  numbers(*source, 5);
+  const auto source = open("stub:pattern?fps=100&size=32x24&stall=400ms@5", 10, 100);
   maq::Frame frame;
-  EXPECT_EQ(source->next(kSecond / 5, frame), NextFrame::kTimeout);
-  EXPECT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
-  EXPECT_EQ(states(), (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_STALLED, MAQ_SOURCE_RECONNECTED}));
+  int64_t longest_ns = 0, last_ns = 0;
+  for (int i = 0; i < 1000 && longest_ns < 390000000; ++i) {
+    frame.clear();
+    ASSERT_EQ(source->next(kLimit, frame), NextFrame::kFrame);
+    if (i > 0) longest_ns = std::max(longest_ns, frame.timestamp_ns - last_ns);
+    last_ns = frame.timestamp_ns;
+  }
+  EXPECT_GE(longest_ns, 390000000) << "no frame comes for 400 ms";
+  ASSERT_TRUE(wait_until([&] { return states().size() >= 3; }));
+  auto seen = states();
+  seen.resize(3);  // on a busy machine it may stall again by now
+  EXPECT_EQ(seen, (std::vector<maq_source_state>{MAQ_SOURCE_STARTED, MAQ_SOURCE_STALLED, MAQ_SOURCE_RECONNECTED}));
 }
 
 TEST_F(FaultInjection, AnUnpluggedOneComesBack) {
@@ -163,7 +172,7 @@ TEST_F(FaultInjection, AnUnpluggedOneComesBack) {
   uint64_t last = 0;
   for (bool came_back = false; !came_back;) {
     frame.clear();
-    ASSERT_EQ(source->next(10 * kSecond, frame), NextFrame::kFrame);
+    ASSERT_EQ(source->next(kLimit, frame), NextFrame::kFrame);
     const auto seen = states();
     came_back = !seen.empty() && seen.back() == MAQ_SOURCE_RECONNECTED;
     EXPECT_TRUE(last == 0 || frame.sequence > last);
@@ -183,18 +192,16 @@ TEST_F(FaultInjection, AnUnpluggedOneThatStaysAwayIsLost) {
 }
 
 TEST_F(FaultInjection, ClosingDoesNotWaitForOneThatHangs) {
-  auto source = open("stub:pattern?fps=100&size=32x24&hang=2s@100ms");
-  std::this_thread::sleep_for(300ms);
-  const auto begin = Clock::now();
+  auto source = open("stub:pattern?fps=100&size=32x24&hang=6s@0");
   source.reset();
-  EXPECT_LT(Clock::now() - begin, 1s);
+  EXPECT_TRUE(SourceThreads::any()) << "the thread still hangs";
 }
 
 TEST_F(FaultInjection, LateFramesKeepTheirTimes) {
   const auto source = open("stub:pattern?frames=20&fps=100&size=32x24&jitter=30ms", 20);
   maq::Frame frame;
   double latest_ms = 0;
-  while (source->next(10 * kSecond, frame) == NextFrame::kFrame) {
+  while (source->next(kLimit, frame) == NextFrame::kFrame) {
     latest_ms = std::max(latest_ms, double(Clock::now().time_since_epoch().count() - frame.timestamp_ns) / 1e6);
     frame.clear();
   }

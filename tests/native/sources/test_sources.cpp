@@ -36,7 +36,7 @@ TEST(Sources, PeopleMoveAndFillPartOfThePicture) {
   const auto empty = frame_of("stub:people?count=0&seed=3&size=160x120", 0);
   const auto first = frame_of(uri, 0), later = frame_of(uri, 10);
   const size_t pixels = first.size() / 3;
-  EXPECT_GT(different_pixels(first, empty), pixels / 50) << "there is somebody";
+  EXPECT_GT(different_pixels(first, empty), pixels / 50) << "there are people";
   EXPECT_LT(different_pixels(first, empty), pixels * 3 / 4) << "there is room around them";
   EXPECT_GT(different_pixels(first, later), pixels / 100) << "they move";
 }

@@ -190,11 +190,11 @@ TEST_F(V4l2Faults, OfStreamingLoseTheCameraAndBringItBack) {
       fake.break_call(failing.call, error, after, 1);
       fake.plug();
       ASSERT_TRUE(reports.wait_for(MAQ_SOURCE_RECONNECTED)) << failing.name;
-      for (int i = 0; i < 300 && fake.opened() < 3; ++i) {
+      EXPECT_TRUE(wait_until([&] {
         fake.deliver(1);
-        std::this_thread::sleep_for(10ms);
-      }
-      EXPECT_GE(fake.opened(), 3) << failing.name << " " << std::strerror(error);
+        return fake.opened() >= 3;
+      })) << failing.name
+          << " " << std::strerror(error);
       fake.mend();
       live.reset();
       wait_until_closed(fake);
@@ -232,7 +232,7 @@ TEST_F(V4l2Faults, ADeviceThatVanishesAtAnyCallOfStartingIsLost) {
   for (const Failing& failing : kStarting) {
     for (const int after : {0, 1, 2, 3}) {
       fake_.vanish_at(failing.call, after);
-      // mmap is no call to the device, and whoever is not told notices with the next one.
+      // mmap is not a call to the device: the loss is noticed with the next one.
       try {
         camera({"", 0, 0, 15});
       } catch (const maq::Error& failure) {

@@ -59,6 +59,8 @@ class FakeDepthAi : public maq::DepthAiDriver {
   }
   // While it is held, that call hangs.
   std::mutex& hang(Call call) { return hangs_[size_t(call)]; }
+  // Whether a thread is in that call and has not been let go on.
+  bool is_waiting(Call call) const { return waiting_[size_t(call)] > 0; }
 
   static int64_t now_ns() {
     timespec now{};
@@ -89,7 +91,7 @@ class FakeDepthAi : public maq::DepthAiDriver {
     frame.timestamp_ns = timestamp_ns;
     return frame;
   }
-  // False when nobody listens.
+  // False without a receiver.
   bool send_colour(maq::DepthAiFrame frame) {
     const auto to = receiver();
     if (to != nullptr) to->receive_colour(std::move(frame));
@@ -113,7 +115,7 @@ class FakeDepthAi : public maq::DepthAiDriver {
     std::lock_guard<std::mutex> lock(mutex_);
     return opened_device_;
   }
-  // Under the lock, so that whoever sees a session closed may destroy this.
+  // Under the lock, so that a test that sees a session closed may destroy this.
   int opened() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return opened_;
@@ -122,8 +124,8 @@ class FakeDepthAi : public maq::DepthAiDriver {
     std::lock_guard<std::mutex> lock(mutex_);
     return sessions_;
   }
-  int frames_alive() const { return *alive_; }  // that somebody keeps
-  // Null when nobody listens.
+  int frames_alive() const { return *alive_; }  // not yet freed
+  // Null without one.
   std::shared_ptr<maq::DepthAiReceiver> receiver() {
     std::lock_guard<std::mutex> lock(mutex_);
     return receiver_;
@@ -190,7 +192,9 @@ class FakeDepthAi : public maq::DepthAiDriver {
   };
 
   void enter(Call call) {
+    ++waiting_[size_t(call)];
     const std::lock_guard<std::mutex> hang(hangs_[size_t(call)]);
+    --waiting_[size_t(call)];
     Fault fault = Fault::kNone;
     {
       std::lock_guard<std::mutex> lock(mutex_);
@@ -223,6 +227,7 @@ class FakeDepthAi : public maq::DepthAiDriver {
 
   mutable std::mutex mutex_;
   std::mutex hangs_[8];
+  std::atomic<int> waiting_[8] = {};
   std::map<Call, Fault> faults_;
   bool plugged_ = true;
   maq::DepthAiPlan plan_;

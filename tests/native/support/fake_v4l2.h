@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
-#include "support/fake_v4l2_controls.h"
 #include "sources/v4l2/system_calls.h"
+#include "support/fake_v4l2_controls.h"
 
 class FakeV4l2 : public maq::SystemCalls {
  public:
@@ -112,7 +112,7 @@ class FakeV4l2 : public maq::SystemCalls {
     plugged_ = true;
     path_ = path;
   }
-  // Files and mappings that somebody has not closed.
+  // Files and mappings that are still open.
   int open_files() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return int(files_.size());
@@ -327,7 +327,7 @@ class FakeV4l2 : public maq::SystemCalls {
     const bool jpeg = fourcc == V4L2_PIX_FMT_MJPEG;
     const auto width_px = uint32_t(best->width), height_px = uint32_t(best->height);
     const size_t row = jpeg ? 0 : stride_bytes != 0 ? stride_bytes : row_of(fourcc, best->width);
-    // Of NV12M the second plane has longer lines, so that nobody takes one stride for both.
+    // Of NV12M the second plane has longer lines, so that using one stride for both is noticed.
     const size_t rows[2] = {row, row + 32};
     size_t bytes[2] = {(jpeg ? 2 * width_px : row) * height_px, rows[1] * height_px / 2};
     if (fourcc == V4L2_PIX_FMT_NV12) bytes[0] += row * height_px / 2;

@@ -15,10 +15,12 @@
 #include "support/expect_error.h"
 #include "support/fake_v4l2.h"
 #include "support/source_threads.h"
+#include "support/wait_until.h"
 
 using namespace std::chrono_literals;
 using maq::NextFrame;
 constexpr int64_t kSecond = 1000000000;
+constexpr int64_t kLimit = 60 * kSecond;  // for a defect, not for speed
 
 // What was reported, in order.
 class Reports {
@@ -33,12 +35,10 @@ class Reports {
     return states_;
   }
   bool wait_for(maq_source_state state) const {
-    for (int i = 0; i < 500; ++i) {
+    return wait_until([&] {
       const auto all = states();
-      if (std::find(all.begin(), all.end(), state) != all.end()) return true;
-      std::this_thread::sleep_for(10ms);
-    }
-    return false;
+      return std::find(all.begin(), all.end(), state) != all.end();
+    });
   }
 
  private:
@@ -66,7 +66,7 @@ class LiveCameraTest : public ::testing::Test {
 
   // On a busy machine a source's thread may need longer to end than its source waits.
   static void wait_until_closed(const FakeV4l2& fake) {
-    for (int i = 0; i < 500 && fake.mappings() > 0; ++i) std::this_thread::sleep_for(10ms);
+    wait_until([&] { return fake.mappings() == 0; });
     EXPECT_EQ(fake.open_files(), 0);
     EXPECT_EQ(fake.mappings(), 0);
     EXPECT_EQ(fake.exported(), 0u);
@@ -80,7 +80,7 @@ class LiveCameraTest : public ::testing::Test {
   // The next frame, which must come.
   maq::Frame next(maq::LiveSource& live) {
     maq::Frame frame;
-    EXPECT_EQ(live.next(5 * kSecond, frame), NextFrame::kFrame);
+    EXPECT_EQ(live.next(kLimit, frame), NextFrame::kFrame);
     return frame;
   }
 

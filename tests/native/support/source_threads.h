@@ -10,15 +10,15 @@
 #include <string>
 #include <thread>
 
+#include "support/wait_until.h"
+
 class SourceThreads : public ::testing::Environment {
  public:
   void TearDown() override {
-    for (int i = 0; i < 1000 && any(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    EXPECT_FALSE(any()) << "a source's thread goes on 10 s after the last test";
+    EXPECT_TRUE(wait_until([] { return !any(); })) << "a source's thread goes on a minute after the last test";
     std::this_thread::sleep_for(std::chrono::milliseconds(50));  // its last steps, which have no name any more
   }
 
- private:
   static bool any() {
     std::error_code error;
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", error)) {

@@ -24,7 +24,7 @@ struct DecodedImage {
   std::shared_ptr<const void> memory;
 };
 
-// A clip that is read. Numbers are as its file says and may be anything.
+// Reads a clip. Its numbers are as the file says, unchecked.
 class ClipDecoder {
  public:
   virtual ~ClipDecoder() = default;
@@ -41,7 +41,7 @@ class ClipDecoder {
 
 enum class ClipFormat { kMpeg4, kMotionJpeg };
 
-// A clip that is written; its file is complete when this is gone. Nobody tells whether the disk took it all.
+// Writes a clip; its file is complete when this is destroyed. A full disk is not reported.
 class ClipEncoder {
  public:
   virtual ~ClipEncoder() = default;
@@ -49,18 +49,18 @@ class ClipEncoder {
   virtual bool write(const ImageView& image) = 0;
 };
 
-// No function of these throws: they are called across libraries.
+// None of these functions throws (core/module.h has the rule): damage is told by an empty result.
 class FileCodecs {
  public:
   virtual ~FileCodecs() = default;
-  // BGR8; nothing for what is damaged or no image.
+  // BGR8; no width for what is damaged or no image.
   virtual DecodedImage decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const = 0;
   // `extension`: ".png" or ".jpg"; the image is BGR8 or GREY8. False where it cannot be encoded.
   virtual bool encode_image(const std::string& extension, const ImageView& image,
                             std::vector<uint8_t>& bytes) const = 0;
-  // Nothing for what is damaged or no video.
+  // Null for what is damaged or no video.
   virtual std::unique_ptr<ClipDecoder> open_clip(const std::string& path) const = 0;
-  // `path` ends in .mp4 or .avi, like the format; sides are even. Nothing where this OpenCV does not write such clips.
+  // `path` ends in .mp4 or .avi, like the format; sides are even. Null where this OpenCV does not write such clips.
   virtual std::unique_ptr<ClipEncoder> begin_clip(const std::string& path, ClipFormat format, double fps, int width_px,
                                                   int height_px) const = 0;
 };

@@ -56,12 +56,12 @@ std::vector<uint8_t> encode_image(const ImageView& image, const std::string& ext
 }
 
 void write_image_file(const ImageView& image, const std::string& path) {
-  const std::string ending = lower_case_extension(path);
-  if (ending != ".png" && ending != ".jpg" && ending != ".jpeg") {
+  const std::string extension = lower_case_extension(path);
+  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .png nor in .jpg, by which its format is chosen.");
   }
   AtomicFile file(path);
-  const std::vector<uint8_t> bytes = encode_image(image, ending == ".png" ? ending : ".jpg");
+  const std::vector<uint8_t> bytes = encode_image(image, extension == ".png" ? extension : ".jpg");
   file.append(bytes.data(), bytes.size());
   file.commit();
 }

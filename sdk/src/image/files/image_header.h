@@ -12,7 +12,7 @@ struct SizePx {
   int64_t height = 0;
 };
 
-// Knows PNG, JPEG, WebP, BMP and GIF; nothing for other formats and for headers that are cut off.
+// Of PNG, JPEG, WebP, BMP and GIF; nothing for other formats and for truncated headers.
 std::optional<SizePx> read_image_size(const std::vector<uint8_t>& bytes);
 
 }  // namespace maq

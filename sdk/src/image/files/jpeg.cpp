@@ -13,23 +13,23 @@ JpegDecoder::~JpegDecoder() {
   if (decoder_ != nullptr) tjDestroy(decoder_);
 }
 
-bool JpegDecoder::decode(const uint8_t* bytes, size_t size_bytes, int64_t most_pixels, Frame& frame) {
+bool JpegDecoder::decode(const uint8_t* bytes, size_t size_bytes, int64_t max_pixels, Frame& frame) {
   if (decoder_ == nullptr) decoder_ = tjInitDecompress();
   if (decoder_ == nullptr) return false;
-  if (decode_by_library(bytes, size_bytes, most_pixels, frame)) return true;
-  // After some headers that are cut short it takes no other image any more.
+  if (decode_by_library(bytes, size_bytes, max_pixels, frame)) return true;
+  // After some truncated headers it decodes no other image.
   tjDestroy(decoder_);
   decoder_ = nullptr;
   return false;
 }
 
-bool JpegDecoder::decode_by_library(const uint8_t* bytes, size_t size_bytes, int64_t most_pixels, Frame& frame) {
+bool JpegDecoder::decode_by_library(const uint8_t* bytes, size_t size_bytes, int64_t max_pixels, Frame& frame) {
   int width = 0, height = 0, subsampling = 0, colours = 0;
   if (tjDecompressHeader3(decoder_, bytes, size_bytes, &width, &height, &subsampling, &colours) != 0) return false;
   if (width < 1 || height < 1 || width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX) return false;
-  if (int64_t(width) * height > std::min<int64_t>(most_pixels, MAQ_MAX_PIXELS)) return false;
+  if (int64_t(width) * height > std::min<int64_t>(max_pixels, MAQ_MAX_PIXELS)) return false;
   uint8_t* pixels = frame.allocate_bgr(width, height);
-  // A frame that was cut short is only a warning to the library, which fills the rest with grey.
+  // A truncated frame is only a warning to the library, which fills the rest with grey.
   return tjDecompress2(decoder_, bytes, size_bytes, pixels, width, width * 3, height, TJPF_BGR, TJFLAG_FASTDCT) == 0;
 }
 

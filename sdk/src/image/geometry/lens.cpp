@@ -8,9 +8,9 @@
 namespace maq {
 namespace {
 
-constexpr double kWidestAngle = 60 * 3.14159265358979323846 / 180;
+constexpr double kMaxAngle = 60 * 3.14159265358979323846 / 180;
 
-// What a distance from the axis (a tangent, squared: `r2`) is multiplied by.
+// What the distance from the axis, a tangent, is multiplied by; `r2` is its square.
 double radial_factor(const Lens& lens, double r2) {
   const auto& k = lens.coefficients;
   if (lens.distortion == Distortion::kFisheye) {
@@ -22,23 +22,23 @@ double radial_factor(const Lens& lens, double r2) {
   return (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));
 }
 
-// Up to where farther from the axis is farther in the picture too.
-double widest_of(const Lens& lens) {
+// The distance from the axis up to which the distorted distance grows with it.
+double max_radius_of(const Lens& lens) {
   if (lens.distortion == Distortion::kNone) return std::numeric_limits<double>::infinity();
   constexpr int kSteps = 2000;
-  double widest = 0, at = 0;
+  double max_radius = 0, at = 0;
   for (int i = 1; i <= kSteps; ++i) {
-    const double radius = std::tan(kWidestAngle * i / kSteps);
+    const double radius = std::tan(kMaxAngle * i / kSteps);
     const double next = radius * radial_factor(lens, radius * radius);
     if (!(next > at) || !std::isfinite(next)) break;
     at = next;
-    widest = radius;
+    max_radius = radius;
   }
-  return widest;
+  return max_radius;
 }
 
 // find() for the rational model, in a loop that compilers make vectors of.
-MAQ_SIMD_CLONES void find_row_rational(const Lens& lens, double widest2, const double* x, double y, size_t count,
+MAQ_SIMD_CLONES void find_row_rational(const Lens& lens, double max_radius2, const double* x, double y, size_t count,
                                        double* column_px, double* row_px) {
   const double fx = lens.fx_px, fy = lens.fy_px, cx = lens.cx_px, cy = lens.cy_px;
   const double k1 = lens.coefficients[0], k2 = lens.coefficients[1], p1 = lens.coefficients[2],
@@ -50,8 +50,8 @@ MAQ_SIMD_CLONES void find_row_rational(const Lens& lens, double widest2, const d
     const double factor = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)));
     const double column = x[i] * factor + (2 * p1 * x[i] * y + p2 * (r2 + 2 * x[i] * x[i]));
     const double row = y * factor + (p1 * (r2 + 2 * y * y) + 2 * p2 * x[i] * y);
-    column_px[i] = r2 <= widest2 ? column * fx + cx : kNowhere;
-    row_px[i] = r2 <= widest2 ? row * fy + cy : kNowhere;
+    column_px[i] = r2 <= max_radius2 ? column * fx + cx : kNowhere;
+    row_px[i] = r2 <= max_radius2 ? row * fy + cy : kNowhere;
   }
 }
 
@@ -64,31 +64,31 @@ Lens with_focal_lengths_times(const Lens& lens, double factor) {
   return made;
 }
 
-// Whether every pixel on the edge of an undistorted picture, and so all inside, has its place in the distorted one.
+// Whether every pixel on the edge of an undistorted picture, and so all inside, comes from inside of the distorted one.
 bool is_filled(const Lens& lens, const LensProjection& projection, const Lens& undistorted) {
-  const auto has_place = [&](int column, int row) {
-    const auto place = projection.find((column - undistorted.cx_px) / undistorted.fx_px,
-                                       (row - undistorted.cy_px) / undistorted.fy_px);
-    return place && place->column_px >= -0.5 && place->column_px <= lens.width_px - 0.5 && place->row_px >= -0.5 &&
-           place->row_px <= lens.height_px - 0.5;
+  const auto has_source = [&](int column, int row) {
+    const auto at = projection.find((column - undistorted.cx_px) / undistorted.fx_px,
+                                    (row - undistorted.cy_px) / undistorted.fy_px);
+    return at && at->column_px >= -0.5 && at->column_px <= lens.width_px - 0.5 && at->row_px >= -0.5 &&
+           at->row_px <= lens.height_px - 0.5;
   };
   const int right = undistorted.width_px - 1, bottom = undistorted.height_px - 1;
   for (int column = 0; column <= right; ++column) {
-    if (!has_place(column, 0) || !has_place(column, bottom)) return false;
+    if (!has_source(column, 0) || !has_source(column, bottom)) return false;
   }
   for (int row = 0; row <= bottom; ++row) {
-    if (!has_place(0, row) || !has_place(right, row)) return false;
+    if (!has_source(0, row) || !has_source(right, row)) return false;
   }
   return true;
 }
 
 }  // namespace
 
-LensProjection::LensProjection(const Lens& lens) : lens_(lens), widest_(widest_of(lens)) {}
+LensProjection::LensProjection(const Lens& lens) : lens_(lens), max_radius_(max_radius_of(lens)) {}
 
-std::optional<PlaceInPicture> LensProjection::find(double x, double y) const {
+std::optional<PixelPosition> LensProjection::find(double x, double y) const {
   const double r2 = x * x + y * y;
-  if (!(r2 <= widest_ * widest_)) return {};
+  if (!(r2 <= max_radius_ * max_radius_)) return {};
   double column = x, row = y;
   if (lens_.distortion != Distortion::kNone) {
     const double factor = radial_factor(lens_, r2);
@@ -100,16 +100,16 @@ std::optional<PlaceInPicture> LensProjection::find(double x, double y) const {
     column += 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
     row += p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
   }
-  return PlaceInPicture{column * lens_.fx_px + lens_.cx_px, row * lens_.fy_px + lens_.cy_px};
+  return PixelPosition{column * lens_.fx_px + lens_.cx_px, row * lens_.fy_px + lens_.cy_px};
 }
 
 void LensProjection::find_row(const std::vector<double>& x, double y, double* column_px, double* row_px) const {
   if (lens_.distortion == Distortion::kRational) {
-    return find_row_rational(lens_, widest_ * widest_, x.data(), y, x.size(), column_px, row_px);
+    return find_row_rational(lens_, max_radius_ * max_radius_, x.data(), y, x.size(), column_px, row_px);
   }
   constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
   for (size_t i = 0; i < x.size(); ++i) {
-    const PlaceInPicture at = find(x[i], y).value_or(PlaceInPicture{kNowhere, kNowhere});
+    const PixelPosition at = find(x[i], y).value_or(PixelPosition{kNowhere, kNowhere});
     column_px[i] = at.column_px;
     row_px[i] = at.row_px;
   }
@@ -121,18 +121,18 @@ std::optional<Lens> without_distortion(const Lens& lens) {
   const auto is_enough = [&](double factor) {
     return is_filled(lens, projection, with_focal_lengths_times(lens, factor));
   };
-  constexpr double kLeast = 1.0 / 16, kMost = 16;
+  constexpr double kMin = 1.0 / 16, kMax = 16;
   double enough = 1;
   while (!is_enough(enough)) {
     enough *= 2;
-    if (enough > kMost) return {};
+    if (enough > kMax) return {};
   }
   double short_of = enough / 2;
-  while (short_of >= kLeast && is_enough(short_of)) {
+  while (short_of >= kMin && is_enough(short_of)) {
     enough = short_of;
     short_of /= 2;
   }
-  // Whoever looks at a narrower picture around the axis sees a part of the wider one, so that halving finds the least.
+  // A narrower picture around the axis is a part of the wider one, so that bisection finds the smallest factor.
   for (int i = 0; i < 30; ++i) {
     const double middle = (enough + short_of) / 2;
     (is_enough(middle) ? enough : short_of) = middle;

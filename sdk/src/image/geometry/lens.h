@@ -21,7 +21,7 @@ inline bool operator==(const Lens& a, const Lens& b) {
   return a.intrinsics() == b.intrinsics() && a.distortion == b.distortion && a.coefficients == b.coefficients;
 }
 
-struct PlaceInPicture {
+struct PixelPosition {
   double column_px = 0, row_px = 0;
 };
 
@@ -29,24 +29,23 @@ class LensProjection {
  public:
   explicit LensProjection(const Lens& lens);
 
-  // Where the direction (x, y, 1) falls; outside of the picture too. Nothing where the formula does not hold: farther
-  // from the axis than the widest angle that undistorted pictures have, or than where the distortion folds back.
-  std::optional<PlaceInPicture> find(double x, double y) const;
+  // Where the direction (x, y, 1) falls; outside of the picture too. Nothing where the model does not hold: farther
+  // from the axis than the widest angle of undistorted pictures, or than where the distortion stops growing.
+  std::optional<PixelPosition> find(double x, double y) const;
 
-  // Likewise for the directions (x[i], y, 1) of a row of pixels: where they fall, to the bit as find() says; NaN where it says
-  // nothing.
+  // Likewise for the directions (x[i], y, 1) of a row of pixels, to the bit; NaN for nothing.
   void find_row(const std::vector<double>& x, double y, double* column_px, double* row_px) const;
 
  private:
   Lens lens_;
-  double widest_ = 0;  // tangent of the largest angle to the axis
+  double max_radius_ = 0;  // tangent of the largest angle to the axis
 };
 
 // The lens without distortion for an undistorted picture of the same size and principal point. Its focal lengths are
-// multiplied by the least number with which every pixel of the new picture has its place in the old one: nothing is
-// blank, what is seen at the edges only in part is lost (as OpenCV's getOptimalNewCameraMatrix with alpha 0). It reaches
-// at most 60 degrees from the axis. Nothing where there is no such number up to 16: the axis is outside of the picture,
-// or the distortion folds it.
+// multiplied by the smallest factor with which every pixel of the new picture comes from inside of the old one: nothing
+// is blank, what is seen at the edges only in part is lost (as OpenCV's getOptimalNewCameraMatrix with alpha 0). It
+// reaches at most 60 degrees from the axis. Nothing where there is no such factor up to 16: the principal point is
+// outside of the picture, or the distortion is not invertible in it.
 std::optional<Lens> without_distortion(const Lens& lens);
 
 }  // namespace maq

@@ -26,7 +26,8 @@ inline uint8_t rounded(float value) {
   return uint8_t(int(value + kNoFraction) - int(kNoFraction));
 }
 
-// --- bilinear: weights of 11 fractional bits, the vertical sum of rows that lost 4 of them ------------------------------
+// --- bilinear: weights of 11 fractional bits, the vertical sum of rows that lost 4 of them
+// ------------------------------
 
 constexpr int kWeightBits = 11;
 
@@ -38,7 +39,8 @@ struct LinearAxis {
   };
   std::vector<Between> at;
 
-  // Before the first centre OpenCV lets the weights of rows be, which both fall to the first row, but not those of columns.
+  // Before the first centre OpenCV lets the weights of rows be, which both fall to the first row, but not those of
+  // columns.
   LinearAxis(int from_px, int to_px, bool are_columns) : at(size_t(to_px)) {
     const double scale = pixels_per_pixel(from_px, to_px);
     for (int i = 0; i < to_px; ++i) {
@@ -93,7 +95,8 @@ void resize_bilinear(const Source& from, const Target& to) {
   }
 }
 
-// --- area, where each new pixel covers a whole number of old ones: exact sums -------------------------------------------
+// --- area, where each new pixel covers a whole number of old ones: exact sums
+// -------------------------------------------
 
 MAQ_SIMD_CLONES void add_row(const uint8_t* from, size_t count, int* sums) {
   for (size_t i = 0; i < count; ++i) sums[i] += from[i];
@@ -126,7 +129,8 @@ void shrink_by_whole_factors(const Source& from, const Target& to) {
   }
 }
 
-// --- area otherwise: sums of floats, first along a row, then of rows ----------------------------------------------------
+// --- area otherwise: sums of floats, first along a row, then of rows
+// ----------------------------------------------------
 
 // The old pixels that each new one covers: whole ones between a first and a last of which it may cover a part.
 struct AreaAxis {

@@ -27,23 +27,23 @@ inline uint64_t blend(uint64_t first, uint64_t second, unsigned weight) {
   return first * kOne + (second - first) * weight;
 }
 
-// A row of pixels that are read at places in another picture.
-struct Places {
-  explicit Places(int width)
+// Where the pixels of a row are read in another picture.
+struct Positions {
+  explicit Positions(int width)
       : column_px(size_t(width)), row_px(size_t(width)), column(size_t(width)), row(size_t(width)) {}
 
   std::vector<double> column_px, row_px;  // NaN: nowhere
   std::vector<int> column, row;           // the same in fractions of a pixel, where they are in the picture
 };
 
-// `valid` becomes 255 for places inside of the picture, 0 for others.
-MAQ_SIMD_CLONES void to_fractions(Places& places, int width, int height, uint8_t* valid) {
+// `valid` becomes 255 for positions inside of the picture, 0 for others.
+MAQ_SIMD_CLONES void to_fractions(Positions& positions, int width, int height, uint8_t* valid) {
   const double right = width - 0.5, bottom = height - 0.5;
-  const size_t count = places.column.size();
-  const double* const column_px = places.column_px.data();
-  const double* const row_px = places.row_px.data();
-  int* const column = places.column.data();
-  int* const row = places.row.data();
+  const size_t count = positions.column.size();
+  const double* const column_px = positions.column_px.data();
+  const double* const row_px = positions.row_px.data();
+  int* const column = positions.column.data();
+  int* const row = positions.row.data();
   for (size_t i = 0; i < count; ++i) {
     const bool is_inside =
         (column_px[i] >= -0.5) & (column_px[i] <= right) & (row_px[i] >= -0.5) & (row_px[i] <= bottom);
@@ -55,18 +55,18 @@ MAQ_SIMD_CLONES void to_fractions(Places& places, int width, int height, uint8_t
 
 // A row of pixels of the BGR picture, bilinear, to the bit as OpenCV's remap reads it: at the nearest 1/32 of a pixel.
 // Beyond the border the last pixels are repeated. What is not valid is black.
-void read_row(const ImageView& bgr, const Places& places, const uint8_t* valid, uint8_t* to) {
+void read_row(const ImageView& bgr, const Positions& positions, const uint8_t* valid, uint8_t* to) {
   const uint8_t* const pixels = bgr.planes[0].data;
   const size_t stride = bgr.planes[0].stride_bytes;
   const int last_column = bgr.width_px - 1, last_row = bgr.height_px - 1;
-  const size_t count = places.column.size();
+  const size_t count = positions.column.size();
   for (size_t i = 0; i < count; ++i, to += 3) {
     if (valid[i] == 0) {
       to[0] = to[1] = to[2] = 0;
       continue;
     }
-    const int x = places.column[i] >> kFractionBits, y = places.row[i] >> kFractionBits;
-    const unsigned right = unsigned(places.column[i] & (kOne - 1)), below = unsigned(places.row[i] & (kOne - 1));
+    const int x = positions.column[i] >> kFractionBits, y = positions.row[i] >> kFractionBits;
+    const unsigned right = unsigned(positions.column[i] & (kOne - 1)), below = unsigned(positions.row[i] & (kOne - 1));
     const uint8_t* const upper = pixels + size_t(std::max(y, 0)) * stride + 3 * size_t(std::max(x, 0));
     const size_t next = x >= 0 && x < last_column ? 3 : 0;
     const uint8_t* const lower = y >= 0 && y < last_row ? upper + stride : upper;
@@ -82,8 +82,8 @@ void read_row(const ImageView& bgr, const Places& places, const uint8_t* valid, 
 
 }  // namespace
 
-// The way from the undistorted picture into the distorted one is a formula, which is written out in lens.cpp: OpenCV's says
-// nothing of places where it folds back into the picture.
+// The way from the undistorted picture into the distorted one is a formula, which is written out in lens.cpp: OpenCV's
+// says nothing of directions where it folds back into the picture.
 void undistort(const ImageView& distorted, const Lens& lens, const Lens& undistorted, Frame& frame,
                std::vector<uint8_t>& valid) {
   if (distorted.format != MAQ_PIXEL_BGR8 || distorted.width_px != lens.width_px ||
@@ -103,12 +103,12 @@ void undistort(const ImageView& distorted, const Lens& lens, const Lens& undisto
   for (int column = 0; column < width; ++column) {
     x[size_t(column)] = (column - undistorted.cx_px) / undistorted.fx_px;
   }
-  Places places(width);
+  Positions positions(width);
   for (int row = 0; row < height; ++row, pixels += 3 * size_t(width), row_valid += width) {
     const double y = (row - undistorted.cy_px) / undistorted.fy_px;
-    projection.find_row(x, y, places.column_px.data(), places.row_px.data());
-    to_fractions(places, lens.width_px, lens.height_px, row_valid);
-    read_row(distorted, places, row_valid, pixels);
+    projection.find_row(x, y, positions.column_px.data(), positions.row_px.data());
+    to_fractions(positions, lens.width_px, lens.height_px, row_valid);
+    read_row(distorted, positions, row_valid, pixels);
   }
 }
 

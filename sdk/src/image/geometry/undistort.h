@@ -10,8 +10,8 @@
 namespace maq {
 
 // The BGR picture `distorted`, taken with `lens`, as `undistorted` (a lens without distortion, of any size) shows it,
-// into `frame`, bilinear. `valid` gets 255 for each pixel that has its place in the picture, 0 for others, which are
-// black; row by row. Throws MAQ_ERROR_INVALID_ARGUMENT unless `distorted` is BGR and of the lens' size.
+// into `frame`, bilinear. `valid` gets, row by row, 255 for each pixel that comes from inside of `distorted`, 0 for
+// others, which are black. Throws MAQ_ERROR_INVALID_ARGUMENT unless `distorted` is BGR and of the lens' size.
 void undistort(const ImageView& distorted, const Lens& lens, const Lens& undistorted, Frame& frame,
                std::vector<uint8_t>& valid);
 

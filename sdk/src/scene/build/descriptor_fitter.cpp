@@ -5,7 +5,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
-#include "image/geometry/turned_photo.h"
+#include "image/geometry/warp.h"
 #include "scene/build/descriptor_sampling.h"
 #include "scene/build/descriptor_solving.h"
 #include "scene/gravity_alignment.h"
@@ -120,7 +120,7 @@ const float* DescriptorFitter::find_features(const ImageView& photo, const Pinho
                                              const PinholeCamera& aligned) {
   {
     const ScopedTimer timer(times_.align_ms);
-    turn_photo(photo, pixel_map_between(aligned, camera), aligned.width_px, aligned.height_px, aligned_photo_);
+    warp_to_rgb(photo, pixel_map_between(aligned, camera), aligned.width_px, aligned.height_px, aligned_photo_);
   }
   const ScopedTimer timer(times_.extract_ms);
   const float* features = networks_.extract(aligned_photo_.data(), aligned.width_px, aligned.height_px);

@@ -7,7 +7,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/rounding.h"
-#include "image/geometry/turned_picture.h"
+#include "image/geometry/warp.h"
 #include "scene/gravity_alignment.h"
 #include "scene/render/refiner_roi.h"
 #include "scene/visibility/view_frustum.h"
@@ -193,9 +193,9 @@ void SceneRenderer::rotate_back(RenderedImage& from, const PixelMap& to_frame, R
       return Raster<std::remove_pointer_t<decltype(pixels)>>{pixels, of.width_px, of.height_px};
     };
     const RenderedImage& source = from;
-    turn_bytes(raster(source, source.bgr.data()), 3, to_frame, raster(image, image.bgr.data()), top, bottom);
-    turn_bytes(raster(source, source.alpha.data()), 1, to_frame, raster(image, image.alpha.data()), top, bottom);
-    turn_depths(raster(source, source.depth.data()), to_frame, raster(image, image.depth.data()), top, bottom);
+    warp_bytes(raster(source, source.bgr.data()), 3, to_frame, raster(image, image.bgr.data()), top, bottom);
+    warp_bytes(raster(source, source.alpha.data()), 1, to_frame, raster(image, image.alpha.data()), top, bottom);
+    warp_depths(raster(source, source.depth.data()), to_frame, raster(image, image.depth.data()), top, bottom);
   });
 }
 

@@ -1,4 +1,4 @@
-#include "image/files/clip_file.h"
+#include "image/files/clip_writer.h"
 
 #include <cmath>
 
@@ -11,13 +11,13 @@ namespace maq {
 namespace {
 
 ClipFormat format_of(const std::string& path) {
-  const std::string ending = lower_case_extension(path);
-  if (ending == ".mp4") return ClipFormat::kMpeg4;
-  if (ending == ".avi") return ClipFormat::kMotionJpeg;
+  const std::string extension = lower_case_extension(path);
+  if (extension == ".mp4") return ClipFormat::kMpeg4;
+  if (extension == ".avi") return ClipFormat::kMotionJpeg;
   throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .mp4 nor in .avi, by which its format is chosen.");
 }
 
-const char* ending_of(ClipFormat format) { return format == ClipFormat::kMpeg4 ? ".mp4" : ".avi"; }
+const char* extension_of(ClipFormat format) { return format == ClipFormat::kMpeg4 ? ".mp4" : ".avi"; }
 
 // MPEG-4 counts time in at most 65535 steps a second, and OpenCV makes them of three decimals of the rate.
 double representable(double fps) {
@@ -30,7 +30,8 @@ constexpr uint32_t four_characters(const char (&text)[5]) {
          uint32_t(uint8_t(text[3])) << 24;
 }
 
-// Whether the boxes of an MP4 file (ISO/IEC 14496-12, 4.2) fill it, and its index, which is written last, is among them.
+// Whether the boxes of an MP4 file (ISO/IEC 14496-12, 4.2) fill it, and its index, which is written last, is among
+// them.
 bool is_whole_mp4(FileReader& file) {
   bool has_index = false;
   while (file.remaining() >= 8) {
@@ -60,7 +61,7 @@ bool is_whole_avi(FileReader& file) {
   return has_chunk && file.remaining() == 0;
 }
 
-// The encoder does not tell of a full disk, so the file is asked.
+// The encoder does not report a full disk, so the file is checked.
 bool is_whole(const std::string& path, ClipFormat format) {
   FileReader file(path);
   return format == ClipFormat::kMpeg4 ? is_whole_mp4(file) : is_whole_avi(file);
@@ -68,12 +69,12 @@ bool is_whole(const std::string& path, ClipFormat format) {
 
 }  // namespace
 
-ClipFile::ClipFile(const std::string& path, double fps)
-    : format_(format_of(path)), fps_(representable(fps)), file_(path, ending_of(format_)) {
-  file_codecs();  // where it is missing, better said before the first image
+ClipWriter::ClipWriter(const std::string& path, double fps)
+    : format_(format_of(path)), fps_(representable(fps)), file_(path, extension_of(format_)) {
+  file_codecs();  // where it is missing, an error before the first image
 }
 
-void ClipFile::begin(const ImageView& first) {
+void ClipWriter::begin(const ImageView& first) {
   // FFmpeg takes what is before a colon for a protocol, but not behind a slash.
   const std::string& path = file_.temporary_path();
   const int width = first.width_px / 2 * 2, height = first.height_px / 2 * 2;
@@ -91,7 +92,7 @@ void ClipFile::begin(const ImageView& first) {
   height_px_ = first.height_px;
 }
 
-void ClipFile::add(const ImageView& image) {
+void ClipWriter::add(const ImageView& image) {
   if (is_finished_ || (images_ > 0 && encoder_ == nullptr)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, file_.path(), " is finished: nothing can be added.");
   }
@@ -114,7 +115,7 @@ void ClipFile::add(const ImageView& image) {
   ++images_;
 }
 
-void ClipFile::finish() {
+void ClipWriter::finish() {
   if (is_finished_) return;
   if (images_ == 0) throw Error(MAQ_ERROR_INVALID_ARGUMENT, file_.path(), " has no picture yet: add one.");
   encoder_.reset();

@@ -15,11 +15,10 @@ typedef struct maq_capture maq_capture;
  * scene"). */
 typedef struct maq_pinhole_camera {
   uint32_t struct_size;
-  maq_intrinsics
-      intrinsics;     /* of the photo, or of the picture to render; photos are undistorted by the library, pictures
-                                are rendered without distortion */
-  double rotation[9]; /* world to camera, row-major; right-handed and orthonormal (to 0.001) */
-  double centre[3];   /* the camera's position in the world */
+  maq_intrinsics intrinsics; /* of the photo, or of the picture to render; photos are undistorted by the library,
+                                pictures are rendered without distortion */
+  double rotation[9];        /* world to camera, row-major; right-handed and orthonormal (to 0.001) */
+  double centre[3];          /* the camera's position in the world */
 } maq_pinhole_camera;
 
 typedef struct maq_capture_info {

@@ -128,9 +128,9 @@ MAQ_API maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_pa
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_recording(maq_pipeline* pipeline, const char* path);
 
-/* Closes the source; the model stays loaded, and maq_pipeline_set_source starts again. After the call no callback
- * runs or begins, and waiting calls of maq_pipeline_acquire_result return MAQ_CANCELLED. From a callback: no other
- * one begins.
+/* Closes the source; the model stays loaded, and maq_pipeline_set_source starts again. After the call no callback runs
+ * or begins, and waiting calls of maq_pipeline_acquire_result return MAQ_CANCELLED. From a callback: no other one
+ * begins.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Blocks only while a callback of the app runs: the run of the model
  * that is under way is finished by the pipeline's thread. */
 MAQ_API maq_status maq_pipeline_stop(maq_pipeline* pipeline);

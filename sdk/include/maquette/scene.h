@@ -190,9 +190,8 @@ typedef struct maq_scene_renderer_config {
   double near_depth;     /* points nearer to the camera, along its axis, are not drawn; units of the scene, default 0 */
   uint8_t background[3]; /* red, green, blue; with use_background */
   uint32_t image_pool_size; /* images the app may hold at once, 1 to 64; default 4 */
-  int32_t
-      allow_spinning; /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy and costs some
-                               speed */
+  int32_t allow_spinning;   /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy and costs
+                               some   speed */
   /* For measuring what is saved; pictures stay the same where alpha is above 0. Default 0: */
   int32_t draw_unseen_blocks; /* 1: no frustum culling */
   int32_t refine_empty_parts; /* 1: the network also runs where no points are */
@@ -202,9 +201,8 @@ typedef struct maq_scene_renderer_config {
 typedef enum maq_scene_plane {
   MAQ_SCENE_PLANE_BGR = 1,   /* three bytes a pixel: blue, green, red */
   MAQ_SCENE_PLANE_ALPHA = 2, /* one byte a pixel: coverage by points, 0 (none near) to 255 */
-  MAQ_SCENE_PLANE_DEPTH =
-      3 /* a float a pixel: depth of the nearest point along the optical axis, in units of the scene;
-                                0 where no point is near */
+  MAQ_SCENE_PLANE_DEPTH = 3  /* a float a pixel: depth of the nearest point along the optical axis, in units of the
+                                scene;  0 where no point is near */
 } maq_scene_plane;
 
 /* Times in wall-clock milliseconds, and counts. */

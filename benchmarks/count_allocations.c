@@ -4,9 +4,9 @@
  *   LD_PRELOAD=./count_allocations.so COUNT_FROM=200 COUNT_TO=1200 COUNT_FILE=count.json \
  *       maquette play 'stub:pattern?live=1&fps=400' --frames 1200 --no-picture
  *
- * writes {"frames": 1000, "allocations": 0} when frame 1200 is taken: allocations of all threads since frame 200 was. The
- * first ones are shown on standard error by their stacks, to be read by `addr2line -Cfe` of a library that has its symbols.
- * Needs glibc.
+ * writes {"frames": 1000, "allocations": 0} when frame 1200 is taken: allocations of all threads since frame 200 was.
+ * The first ones are shown on standard error by their stacks, to be read by `addr2line -Cfe` of a library that has its
+ * symbols. Needs glibc.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>

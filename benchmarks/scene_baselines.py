@@ -76,7 +76,7 @@ class Cloud:
         """A square of `side_px` (odd) a point, the nearest wins. Points outside of the frame do not reach into it."""
         keys = visible(self.positions, camera)
         for axis in (0, 1):
-            keys = _least_around(keys, side_px // 2, axis)
+            keys = _min_around(keys, side_px // 2, axis)
         return self._painted(keys)
 
     def pyramid(self, camera: Camera) -> np.ndarray:
@@ -96,9 +96,9 @@ class Cloud:
         return colours[torch.where(keys == NOTHING, len(self.positions), keys & 0xFFFFFFFF)].numpy()
 
 
-def _least_around(keys: Tensor, reach_px: int, axis: int) -> Tensor:
+def _min_around(keys: Tensor, radius_px: int, axis: int) -> Tensor:
     found = keys.clone()
-    for off in range(1, reach_px + 1):
+    for off in range(1, radius_px + 1):
         low, high = keys.narrow(axis, 0, keys.shape[axis] - off), keys.narrow(axis, off, keys.shape[axis] - off)
         for into, given in ((off, low), (0, high)):
             part = found.narrow(axis, into, given.shape[axis])

@@ -1,10 +1,10 @@
-// Lets oneDNN use AMX on virtual machines that announce it (CPUID leaf 7) and run it, but leave the leaves that describe
-// its tiles (0x1D, 0x1E) empty. There oneDNN configures no tiles, and the first bfloat16 matrix product ends with an
-// illegal instruction.
+// Lets oneDNN use AMX on virtual machines that announce it (CPUID leaf 7) and run it, but leave the leaves that
+// describe its tiles (0x1D, 0x1E) empty. There oneDNN configures no tiles, and the first bfloat16 matrix product ends
+// with an illegal instruction.
 //
 // Preloaded by scripts/with-amx.sh. The kernel is asked to trap CPUID (arch_prctl ARCH_SET_CPUID); the handler runs the
-// instruction and fills in the two leaves with what all processors with AMX have so far: palette 1, 8 tiles of 16 rows of
-// 64 bytes (Intel 64 and IA-32 Architectures Software Developer's Manual, volume 1, chapter 18).
+// instruction and fills in the two leaves with what all processors with AMX have so far: palette 1, 8 tiles of 16 rows
+// of 64 bytes (Intel 64 and IA-32 Architectures Software Developer's Manual, volume 1, chapter 18).
 #define _GNU_SOURCE
 #include <cpuid.h>
 #include <dlfcn.h>

@@ -30,8 +30,8 @@ def shown(source: str, frames: int, folder: Path, *options: str) -> np.ndarray:
     command = ["xvfb-run", "-a", "-s", "-screen 0 1600x1200x24", DEMO, source, "--headless", "--frames", str(frames),
                "--size", "1280x800", "--screenshot", picture, *options]  # fmt: skip
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    told = json.loads(ran.stdout)
-    print(" ".join([Path(source).name, *options]), told["ui"])
+    report = json.loads(ran.stdout)
+    print(" ".join([Path(source).name, *options]), report["ui"])
     return cv2.imread(str(picture))
 
 

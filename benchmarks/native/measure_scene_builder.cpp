@@ -47,8 +47,8 @@ maq::PinholeCamera camera_of(int width, int height, double angle, double roll) {
   return camera;
 }
 
-int number(int count, char** arguments, int index, int otherwise) {
-  return index < count ? std::atoi(arguments[index]) : otherwise;
+int number(int count, char** arguments, int index, int fallback) {
+  return index < count ? std::atoi(arguments[index]) : fallback;
 }
 
 void measure(int count, char** arguments) {

@@ -103,7 +103,7 @@ void measure(const char* name, maq::SceneRenderer& renderer, Kind kind, int widt
 
 int main(int argc, char** argv) {
   if (argc < 2) return std::puts("measure_scene_renderer BUNDLE [points [width height [threads [frames]]]]"), 2;
-  const auto number = [&](int i, int otherwise) { return argc > i ? std::atoi(argv[i]) : otherwise; };
+  const auto number = [&](int i, int fallback) { return argc > i ? std::atoi(argv[i]) : fallback; };
   const int count = number(2, 500000), width = number(3, 640), height = number(4, 480), threads = number(5, 2);
   try {
     const auto runtime = std::make_shared<maq::OnnxRuntimeLibrary>(MAQ_TEST_ONNXRUNTIME, maq::Log());

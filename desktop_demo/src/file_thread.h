@@ -11,7 +11,7 @@
 
 class FileThread {
  public:
-  using Job = std::function<std::string()>;  // does it, and says what it did
+  using Job = std::function<std::string()>;  // returns what it did, for the user; "": nothing to say
 
   FileThread() : thread_([this] { run(); }) {}
   ~FileThread() {
@@ -24,15 +24,15 @@ class FileThread {
     jobs_.push_back(std::move(job));
     wake_.notify_one();
   }
-  // So many jobs wait that what can be left out should be.
+  // Many jobs wait: leave out what can be left out.
   bool is_busy() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return jobs_.size() >= 30;
   }
-  // What was done last, "" before anything was; or why not.
-  std::string told() const {
+  // Of the latest job that had one; or why it failed.
+  std::string message() const {
     std::lock_guard<std::mutex> lock(mutex_);
-    return told_;
+    return message_;
   }
 
  private:
@@ -44,20 +44,20 @@ class FileThread {
       jobs_.pop_front();
       lock.unlock();
       if (!job) return;
-      std::string told;
+      std::string message;
       try {
-        told = job();
+        message = job();
       } catch (const std::exception& error) {
-        told = error.what();
+        message = error.what();
       }
       lock.lock();
-      if (!told.empty()) told_ = told;
+      if (!message.empty()) message_ = message;
     }
   }
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Job> jobs_;
-  std::string told_;
+  std::string message_;
   std::thread thread_;
 };

@@ -31,7 +31,7 @@ int main(int argc, char** argv) try {
   std::string path, view = "parts", compare = "none", size = "1280x800";
 
   CLI::App cli(
-      "Shows the body surface of whoever is before the camera, live, on the processor alone.\n\n"
+      "Shows the body surface of the people before the camera, live, on the processor alone.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"

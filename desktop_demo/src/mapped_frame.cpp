@@ -1,14 +1,18 @@
 #include "mapped_frame.h"
 
-void MappedFrame::take_over(const maquette::LiveFrame& mapped, std::vector<uint8_t>* seen_before) {
-  const double before_s = maquette::monotonic_s();
-  camera.take(mapped.frame);
+#include <utility>
+
+#include "window.h"
+
+void MappedFrame::copy_from(maquette::PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before) {
+  const double before_s = monotonic_s();
+  camera.copy_from(mapped.frame);
   iuv.resize(camera.rgba.size());
   const maq_densepose_plane planes[] = {MAQ_DENSEPOSE_PLANE_PART, MAQ_DENSEPOSE_PLANE_U, MAQ_DENSEPOSE_PLANE_V,
                                         MAQ_DENSEPOSE_PLANE_PERSON};
   for (size_t channel = 0; channel < 4; ++channel) {
     size_t stride_bytes = 0;
-    const uint8_t* from = mapped.result->plane(planes[channel], &stride_bytes);
+    const uint8_t* from = mapped.densepose.plane(planes[channel], &stride_bytes);
     uint8_t* to = iuv.data() + channel;
     for (int y = 0; y < camera.height_px; ++y, from += stride_bytes) {
       for (int x = 0; x < camera.width_px; ++x, to += 4) *to = from[x];
@@ -23,12 +27,12 @@ void MappedFrame::take_over(const maquette::LiveFrame& mapped, std::vector<uint8
     (*seen_before)[(chart * kSeenCells + v) * kSeenCells + u] = 255;
   }
   seen = *seen_before;
-  people.assign(mapped.result->people().begin(), mapped.result->people().end());
-  result = mapped.result;
+  people.assign(mapped.densepose.people().begin(), mapped.densepose.people().end());
+  result = std::make_shared<maquette::DensePoseResult>(std::move(mapped.densepose));
   stats = result->stats();
   number = mapped.number;
-  fps = mapped.fps;
+  results_per_second = rate;
   age_ms = mapped.age_ms;
-  waiting_ms = mapped.waiting_ms;
-  copying_ms = (maquette::monotonic_s() - before_s) * 1000;
+  waiting_ms = mapped.wait_ms;
+  copying_ms = (monotonic_s() - before_s) * 1000;
 }

@@ -72,7 +72,7 @@ Painter::Painter(const Window& window) : window_(window) {
   people_program_ = linked(kPictureVertexShader, kPeopleShader);
   scene_program_ = linked(kPictureVertexShader, kSceneShader);
   body_program_ = linked(kBodyVertexShader, kBodyShader);
-  set_body(maquette::BodyMesh(std::vector<float>(24 * 2 * 2 * 3), 2));
+  set_body(maquette::DensePoseMesh(std::vector<float>(24 * 2 * 2 * 3), 2));
 }
 
 Painter::~Painter() {
@@ -111,24 +111,24 @@ void Painter::set_frame(const MappedFrame& frame) {
                GL_UNSIGNED_BYTE, frame.seen.data());
 }
 
-void Painter::set_outfit(const maquette::Picture& outfit) {
+void Painter::set_outfit(const maquette::RgbaImage& outfit) {
   upload(kOutfitTexture, outfit.width_px, outfit.height_px, outfit.rgba.data());
   outfit_is_atlas_ = outfit.width_px * 3 == outfit.height_px * 2;
 }
 
-void Painter::set_scene(const maquette::Picture& rendering, const maquette::Picture& photo) {
+void Painter::set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo) {
   upload(kRenderingTexture, rendering.width_px, rendering.height_px, rendering.rgba.data());
   if (!photo.empty()) upload(kPhotoTexture, photo.width_px, photo.height_px, photo.rgba.data());
 }
 
-void Painter::set_body(const maquette::BodyMesh& body) {
+void Painter::set_body(const maquette::DensePoseMesh& body) {
   glActiveTexture(GL_TEXTURE0 + kSurfaceTexture);
   glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGB32F, body.nodes, body.nodes, 24, 0, GL_RGB, GL_FLOAT,
                body.filled_points_m.data());
   body_vertex_count_ = int(body.triangles.size());
   glBindVertexArray(body_vertices_);
   glBindBuffer(GL_ARRAY_BUFFER, body_buffer_);
-  constexpr int kVertexBytes = sizeof(maquette::BodyMesh::Vertex);
+  constexpr int kVertexBytes = sizeof(maquette::DensePoseMesh::Vertex);
   glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(body.triangles.size()) * kVertexBytes, body.triangles.data(),
                GL_STATIC_DRAW);
   for (unsigned k = 0; k < 3; ++k) {

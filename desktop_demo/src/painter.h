@@ -1,14 +1,11 @@
 // Draws pictures of people, of scenes and of the body into the window, from textures that it keeps.
 #pragma once
 
-#include <array>
 #include <maquette/densepose_mesh.hpp>
 
 #include "mapped_frame.h"
+#include "options.h"
 #include "window.h"
-
-enum class View { kCamera, kParts, kContours, kMask, kBoxes, kTryOn };
-constexpr std::array<const char*, 6> kViewNames = {"camera", "parts", "contours", "mask", "boxes", "try-on"};
 
 class Painter {
  public:
@@ -16,14 +13,14 @@ class Painter {
   ~Painter();
 
   void set_frame(const MappedFrame& frame);
-  // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any picture, which is repeated
-  // over the body's front and back.
-  void set_outfit(const maquette::Picture& outfit);
-  void set_body(const maquette::BodyMesh& body);
-  void set_scene(const maquette::Picture& rendering, const maquette::Picture& photo);
+  // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any picture, which is
+  // repeated over the body's front and back.
+  void set_outfit(const maquette::RgbaImage& outfit);
+  void set_body(const maquette::DensePoseMesh& body);
+  void set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo);
 
   void draw_people(View view, const Rect& rect);
-  // `slider`: the part of the width that shows the photo.
+  // `slider`: the fraction of the width that shows the photo.
   void draw_scene(const Rect& rect, float slider);
   // The body from a direction, in radians, with what was seen of it in colour.
   void draw_body(const Rect& rect, float yaw, float pitch);

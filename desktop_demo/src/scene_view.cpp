@@ -1,125 +1,202 @@
-// The scene part of the demo: flying, photos beside the rendering, its panel.
+#include "scene_view.h"
+
 #include <GLFW/glfw3.h>
 #include <imgui.h>
 #include <algorithm>
 #include <cmath>
-
-#include "app.h"
+#include <iterator>
 
 namespace {
 
-constexpr int kMovingSidePx = 640, kStillSidePx = 1280;  // of pictures while flying, and after
+constexpr int kMovingSidePx = 640, kStillSidePx = 1280;  // of images while flying, and after
 constexpr double kFlightSpeed = 0.12;                    // diagonals of the scene a second
 constexpr double kToPhotoS = 0.6;
 constexpr const char* kCompareNames[] = {"off", "slider", "error"};
-constexpr const char* kStages[] = {"project", "shade", "refine", "turn"};
+constexpr const char* kStages[] = {"project", "shade", "refine", "resample"};
 
 }  // namespace
 
-void App::set_scene_pictures() {
-  const maquette::LiveScenePicture& shown = scenes_.shown().front();
-  if (pictures_ > 0)
-    painter_.set_scene(shown.rendering, options_.compare == Compare::kError ? shown.error : shown.photo);
+SceneView::SceneView(const maquette::Context& context, const Window& window, Painter& painter, const Options& options)
+    : window_(window),
+      painter_(painter),
+      capture_(options.capture),
+      to_photo_s_(options.headless ? 0 : kToPhotoS),
+      compare_(options.compare),
+      live_(context, options.scene_bundle, options.model.threads, Window::wake) {
+  painter_.draw_scene({0, 0, 8, 8}, 0);  // software OpenGL compiles a shader when it draws with it first
 }
 
-void App::set_compare(Compare compare) {
-  options_.compare = compare;
-  const auto state = scenes_.state();
-  if (compare != Compare::kNone && flight_ && flight_->at_photo() < 0) {
-    go_to_photo(flight_->nearest_photo(state->photos));
-  }
-  set_scene_pictures();
+void SceneView::open(const std::string& path) {
+  camera_.reset();
+  image_count_ = 0;
+  stages_.clear();
+  live_.open(path, capture_);
 }
 
-void App::go_to_photo(int index) {
-  const auto state = scenes_.state();
-  const int count = int(state->photos.size());
-  if (!flight_ || count == 0) return;
+void SceneView::close() {
+  live_.close();
+  camera_.reset();
+  image_count_ = 0;
+}
+
+bool SceneView::update() {
+  if (!live_.images().take()) return false;
+  ++image_count_;
+  set_images();
+  const maq_scene_image_stats& s = image().stats;
+  stages_.add({s.project_ms, s.shade_ms, s.refine_ms, s.resample_ms});
+  return true;
+}
+
+void SceneView::set_images() {
+  if (image_count_ == 0) return;
+  painter_.set_scene(image().rendering, compare_ == Compare::kError ? image().error : image().photo);
+}
+
+void SceneView::press(int key) {
+  if (key == GLFW_KEY_C) set_compare(Compare((int(compare_) + 1) % 3));
+  if (key == GLFW_KEY_N) fly_to_nearest_photo();
+  if (key == GLFW_KEY_COMMA) fly_to_photo(photo_ - 1);
+  if (key == GLFW_KEY_PERIOD) fly_to_photo(photo_ + 1);
+}
+
+void SceneView::set_compare(Compare compare) {
+  compare_ = compare;
+  if (compare != Compare::kNone && camera_ && camera_->photo_index() < 0) fly_to_nearest_photo();
+  set_images();
+}
+
+void SceneView::rotate(double yaw) {
+  if (!camera_) return;
+  camera_->rotate(yaw, 0);
+  needs_image_ = true;
+}
+
+void SceneView::fly_to_nearest_photo() {
+  if (camera_) fly_to_photo(camera_->nearest_photo(state()->photos));
+}
+
+void SceneView::fly_to_photo(int index) {
+  const auto scene = state();
+  const int count = int(scene->photos.size());
+  if (!camera_ || count == 0) return;
   photo_ = (index + count) % count;
-  flight_->go_to(state->photos[size_t(photo_)], options_.headless ? 0 : kToPhotoS, photo_);
-  turned_ = true;
+  camera_->fly_to(scene->photos[size_t(photo_)], to_photo_s_, photo_);
+  needs_image_ = true;
 }
 
-void App::fly(float look_right, float look_down, float seconds) {
-  const auto state = scenes_.state();
-  if (state->what != maquette::LiveSceneState::kReady) return;
-  bool moves = !flight_;
-  if (!flight_) flight_.emplace(state->info, state->photos);
-  const float right = window_.held(GLFW_KEY_D, GLFW_KEY_A), up = window_.held(GLFW_KEY_E, GLFW_KEY_Q);
-  const float forward = window_.held(GLFW_KEY_W, GLFW_KEY_S);
-  const float wheel = ImGui::GetIO().WantCaptureMouse ? 0 : ImGui::GetIO().MouseWheel;
-  if (look_right != 0 || look_down != 0 || right != 0 || up != 0 || forward != 0 || wheel != 0) {
-    flight_->turn(double(look_right), double(-look_down));
-    flight_->zoom(std::pow(1.1, double(wheel)));
-    flight_->move(double(right), double(up), double(forward), double(seconds), kFlightSpeed);
-    moves = true;
+void SceneView::steer(const Steering& steering, const Rect& area) {
+  if (steering.has_begun) {
+    drags_slider_ = compare_ == Compare::kSlider && std::abs(steering.pointer_x - slider_x()) < 14 * window_.scale();
   }
-  moves |= flight_->update(double(seconds));
-  const bool resized = picture_area_.width != looked_at_.width || picture_area_.height != looked_at_.height;
-  const bool looks = moves || moving_ || resized || turned_;
-  moving_ = moves;
-  turned_ = false;
-  if (!looks) return;
-  looked_at_ = picture_area_;
-  const int photo = flight_->at_photo();
-  if (photo >= 0) {
-    photo_ = photo;
-    scenes_.look(state->photos[size_t(photo)], photo);
+  if (steering.is_dragging && drags_slider_) {
+    slider_ = std::clamp(slider_ + steering.drag_x / float(std::max(1, image_rect_.width)), 0.0f, 1.0f);
     return;
   }
-  // In motion smaller pictures, for the sake of their number.
-  const int side_px = std::max(picture_area_.width, picture_area_.height);
-  const double scale = std::min(1.0, double(moves ? kMovingSidePx : kStillSidePx) / side_px);
-  const auto scaled = [&](int px) { return std::max(16, int(px * scale)); };
-  scenes_.look(flight_->camera(scaled(picture_area_.width), scaled(picture_area_.height)), -1);
+  const auto scene = state();
+  if (scene->phase != maquette::LiveSceneState::kReady) return;
+  const bool is_new = !camera_;
+  if (is_new) camera_.emplace(scene->info, scene->photos);
+  const bool moves = fly(steering) || is_new;
+  const bool resized = area.width != requested_area_.width || area.height != requested_area_.height;
+  const bool needs_image = moves || is_moving_ || resized || needs_image_;
+  is_moving_ = moves;
+  needs_image_ = false;
+  if (needs_image) request_image(moves, area);
 }
 
-float App::slider_x() const { return float(picture_rect_.x) + slider_ * float(picture_rect_.width); }
+bool SceneView::fly(const Steering& steering) {
+  const double right = double(window_.held(GLFW_KEY_D, GLFW_KEY_A)), up = double(window_.held(GLFW_KEY_E, GLFW_KEY_Q));
+  const double forward = double(window_.held(GLFW_KEY_W, GLFW_KEY_S)), seconds = double(steering.seconds);
+  const float wheel = ImGui::GetIO().WantCaptureMouse ? 0 : ImGui::GetIO().MouseWheel;
+  const bool is_steered =
+      steering.right() != 0 || steering.down() != 0 || right != 0 || up != 0 || forward != 0 || wheel != 0;
+  if (is_steered) {
+    camera_->rotate(double(steering.right()), double(-steering.down()));
+    camera_->zoom(std::pow(1.1, double(wheel)));
+    camera_->move(right, up, forward, seconds, kFlightSpeed);
+  }
+  return camera_->update(seconds) || is_steered;
+}
 
-void App::draw_slider() {
+void SceneView::request_image(bool is_flying, const Rect& area) {
+  requested_area_ = area;
+  const int photo = camera_->photo_index();
+  if (photo >= 0) {
+    photo_ = photo;
+    return live_.render(*camera_->photo_camera(), photo);
+  }
+  // In motion smaller images, for the sake of their number.
+  const int side_px = std::max(area.width, area.height);
+  const double scale = std::min(1.0, double(is_flying ? kMovingSidePx : kStillSidePx) / side_px);
+  const auto scaled = [&](int px) { return std::max(16, int(px * scale)); };
+  live_.render(camera_->camera(scaled(area.width), scaled(area.height)), -1);
+}
+
+void SceneView::draw(const Rect& area) {
+  if (image_count_ == 0) return;
+  image_rect_ = area.fit(image().rendering.width_px, image().rendering.height_px);
+  const bool compares = compare_ != Compare::kNone && image().photo_index >= 0;
+  painter_.draw_scene(image_rect_, !compares ? 0 : compare_ == Compare::kError ? 1 : slider_);
+  if (compares && compare_ == Compare::kSlider) draw_slider();
+}
+
+void SceneView::draw_slider() const {
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  const float x = slider_x(), top = float(picture_rect_.y);
+  const float x = slider_x(), top = float(image_rect_.y);
   const ImVec2 photo = ImGui::CalcTextSize("photo");
-  list->AddLine({x, top}, {x, top + float(picture_rect_.height)}, IM_COL32_WHITE, 2 * window_.scale());
+  list->AddLine({x, top}, {x, top + float(image_rect_.height)}, IM_COL32_WHITE, 2 * window_.scale());
   list->AddRectFilled({x - photo.x - 14, top}, {x + ImGui::CalcTextSize("rendering").x + 14, top + photo.y + 6},
                       IM_COL32(0, 0, 0, 150));
   list->AddText({x - photo.x - 8, top + 3}, IM_COL32_WHITE, "photo");
   list->AddText({x + 8, top + 3}, IM_COL32_WHITE, "rendering");
 }
 
-void App::draw_scene_panel() {
-  const auto state = scenes_.state();
-  const maquette::LiveScenePicture& shown = scenes_.shown().front();
-  ImGui::TextWrapped("%s", state->path.c_str());
-  if (state->what == maquette::LiveSceneState::kOpening)
-    ImGui::ProgressBar(float(state->done), {-1, 0}, state->text.c_str());
-  // Until its first picture is there the one that is shown may be of another scene.
-  if (state->what == maquette::LiveSceneState::kReady && pictures_ > 0) {
-    ImGui::Text("%llu points, %zu photos", static_cast<unsigned long long>(state->info.point_count),
-                state->photos.size());
-    ImGui::Text("%d x %d in %.1f ms, %llu points seen", shown.rendering.width_px, shown.rendering.height_px,
-                double(shown.stats.total_ms), static_cast<unsigned long long>(shown.stats.shaded_point_count));
-    if (shown.photo_index >= 0) {
-      ImGui::TextWrapped("%s: PSNR %.1f dB", state->photo_names[size_t(shown.photo_index)].c_str(), shown.psnr_db);
-    } else {
-      ImGui::TextUnformatted("");
-    }
-    if (!state->text.empty()) ImGui::TextWrapped("%s", state->text.c_str());
+std::string SceneView::message() const {
+  const auto scene = state();
+  if (scene->phase == maquette::LiveSceneState::kReady) return "";
+  if (scene->phase != maquette::LiveSceneState::kOpening) return scene->text;
+  return scene->text + " " + std::to_string(int(scene->progress * 100)) + " %";
+}
+
+Action SceneView::draw_panel() {
+  const auto scene = state();
+  ImGui::TextWrapped("%s", scene->path.c_str());
+  if (scene->phase == maquette::LiveSceneState::kOpening) {
+    ImGui::ProgressBar(float(scene->progress), {-1, 0}, scene->text.c_str());
   }
-  draw_stages(kStages, std::size(kStages));
-  if (!state->photos.empty()) {
-    ImGui::TextUnformatted("Photo against rendering (C)");
-    for (size_t which = 0; which < std::size(kCompareNames); ++which) {
-      if (which != 0) ImGui::SameLine();
-      if (ImGui::RadioButton(kCompareNames[which], options_.compare == Compare(which))) set_compare(Compare(which));
-    }
-    if (options_.compare == Compare::kSlider) ImGui::SliderFloat("photo", &slider_, 0, 1, "");
-    if (ImGui::Button("Nearest photo (N)") && flight_) go_to_photo(flight_->nearest_photo(state->photos));
-    ImGui::SameLine();
-    if (ImGui::Button("<")) go_to_photo(photo_ - 1);
-    ImGui::SameLine();
-    if (ImGui::Button(">")) go_to_photo(photo_ + 1);
-  }
+  // Until its first image is there the one that is shown may be of another scene.
+  if (scene->phase == maquette::LiveSceneState::kReady && image_count_ > 0) draw_facts();
+  stages_.draw(kStages, std::size(kStages), window_.scale());
+  if (!scene->photos.empty()) draw_photo_buttons();
   ImGui::TextWrapped("Fly: W A S D, Q E down and up, mouse or arrows to look, wheel to zoom.");
-  if (ImGui::Button("Back to people (X)")) open_people();
+  return ImGui::Button("Back to people (X)") ? Action::kLeaveScene : Action::kNone;
+}
+
+void SceneView::draw_facts() const {
+  const auto scene = state();
+  ImGui::Text("%llu points, %zu photos", static_cast<unsigned long long>(scene->info.point_count),
+              scene->photos.size());
+  ImGui::Text("%d x %d in %.1f ms, %llu points visible", image().rendering.width_px, image().rendering.height_px,
+              double(image().stats.total_ms), static_cast<unsigned long long>(image().stats.shaded_point_count));
+  if (image().photo_index >= 0) {
+    ImGui::TextWrapped("%s: PSNR %.1f dB", scene->photo_names[size_t(image().photo_index)].c_str(), image().psnr_db);
+  } else {
+    ImGui::TextUnformatted("");
+  }
+  if (!scene->text.empty()) ImGui::TextWrapped("%s", scene->text.c_str());
+}
+
+void SceneView::draw_photo_buttons() {
+  ImGui::TextUnformatted("Photo against rendering (C)");
+  for (size_t which = 0; which < std::size(kCompareNames); ++which) {
+    if (which != 0) ImGui::SameLine();
+    if (ImGui::RadioButton(kCompareNames[which], compare_ == Compare(which))) set_compare(Compare(which));
+  }
+  if (compare_ == Compare::kSlider) ImGui::SliderFloat("photo", &slider_, 0, 1, "");
+  if (ImGui::Button("Nearest photo (N)")) fly_to_nearest_photo();
+  ImGui::SameLine();
+  if (ImGui::Button("<")) fly_to_photo(photo_ - 1);
+  ImGui::SameLine();
+  if (ImGui::Button(">")) fly_to_photo(photo_ + 1);
 }

@@ -10,8 +10,8 @@ void main() {
   gl_Position = vec4(corner * 2.0 - 1.0, 0.0, 1.0);
 })";
 
-// `view` counts as View in painter.h. Part, U, V are the label that most of the four nearest pixels have, and of these the
-// bilinear mean, so that nothing bleeds from one chart into the next and edges are smooth at any size.
+// `view` counts as View in painter.h. Part, U, V are the label that most of the four nearest pixels have, and of these
+// the bilinear mean, so that nothing bleeds from one chart into the next and edges are smooth at any size.
 constexpr char kPeopleShader[] = R"(#version 330 core
 in vec2 at;
 out vec4 colour;

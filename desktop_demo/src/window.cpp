@@ -7,6 +7,7 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
@@ -14,6 +15,10 @@
 
 namespace {
 std::string glfw_problem;
+}
+
+double monotonic_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 Rect Rect::fit(int of_width, int of_height) const {
@@ -100,7 +105,7 @@ void Window::set_scale(float content_scale) {
 bool Window::is_closing() const { return glfwWindowShouldClose(window_) != 0; }
 void Window::hide() { glfwHideWindow(window_); }
 void Window::close() { glfwSetWindowShouldClose(window_, GLFW_TRUE); }
-void Window::wait(double most_s) { most_s > 0 ? glfwWaitEventsTimeout(most_s) : glfwPollEvents(); }
+void Window::wait(double max_s) { max_s > 0 ? glfwWaitEventsTimeout(max_s) : glfwPollEvents(); }
 void Window::wake() { glfwPostEmptyEvent(); }
 
 void Window::begin_drawing() {
@@ -120,9 +125,9 @@ void Window::end_drawing() {
 
 void Window::show() { glfwSwapBuffers(window_); }
 
-maquette::Picture Window::read_pixels(const Rect& rect) const {
+maquette::RgbaImage Window::read_pixels(const Rect& rect) const {
   const Rect pixels = in_pixels(rect), all = in_pixels(this->rect());
-  maquette::Picture picture;
+  maquette::RgbaImage picture;
   picture.resize(pixels.width, pixels.height);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(pixels.x, all.height - pixels.y - pixels.height, pixels.width, pixels.height, GL_RGBA, GL_UNSIGNED_BYTE,

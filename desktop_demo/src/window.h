@@ -1,11 +1,13 @@
-// A window with an OpenGL 3.3 core context and Dear ImGui in it, and what a person does to it.
+// A window with an OpenGL 3.3 core context and Dear ImGui in it, and its input.
 #pragma once
 
-#include <app/rgba_image.hpp>
+#include <app/rgba_image.h>
 #include <string>
 #include <vector>
 
 struct GLFWwindow;
+
+double monotonic_s();  // since some time in the past
 
 // In units of the window, from its top left corner.
 struct Rect {
@@ -25,15 +27,14 @@ class Window {
   bool is_closing() const;
   void close();
   void hide();
-  // Lets the picture stay as it is until something happens, or for `most_s`.
-  void wait(double most_s);
+  // Returns when there is input, after wake(), or after `max_s`.
+  void wait(double max_s);
   // From any thread: ends a wait.
   static void wake();
   void begin_drawing();
   void end_drawing();
-  // What was drawn, on the screen.
-  void show();
-  maquette::Picture read_pixels(const Rect& rect) const;
+  void show();  // what was drawn, on the screen
+  maquette::RgbaImage read_pixels(const Rect& rect) const;
   void toggle_full_screen();
 
   // Layout is in the units of the window system, which may be several pixels each.

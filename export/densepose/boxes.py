@@ -49,7 +49,7 @@ def decode(deltas: Tensor, reference: Tensor, weights: tuple[float, ...] = (1, 1
 
 
 def clip(boxes: Tensor, height: int, width: int) -> Tensor:
-    """Boxes cut at the image's border."""
+    """Boxes clipped at the image's border."""
     return torch.stack(
         [
             boxes[:, 0].clamp(0, width),

@@ -10,11 +10,11 @@ import numpy as np
 
 from export.camera import Camera
 
-FAINTEST = 0.05  # where the world's up is nearly along the axis, the turn fades out (pinhole_camera.cpp)
+FAINTEST = 0.05  # where the world's up is nearly along the axis, the rotation fades out (pinhole_camera.cpp)
 
 
 def rotated_upright(camera: Camera, up: np.ndarray) -> Camera:
-    """The camera turned about its optical axis so that `up` [3] of the world points up in the picture.
+    """The camera rotated about its optical axis so that `up` [3] of the world points up in the picture.
 
     Section 3.2 of NPBG++ (arXiv 2203.13318), as the SDK's `rotated_upright`: as it is where up is along the axis, and
     continuous near that.
@@ -25,26 +25,26 @@ def rotated_upright(camera: Camera, up: np.ndarray) -> Camera:
     across, down, _ = camera.rotation @ (np.asarray(up, np.float64) / length)
     angle = math.atan2(across, -down) * min(1.0, math.hypot(across, down) / FAINTEST)
     cosine, sine = math.cos(angle), math.sin(angle)
-    turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
-    return replace(camera, rotation=turn @ camera.rotation)
+    roll = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    return replace(camera, rotation=roll @ camera.rotation)
 
 
 def upright(camera: Camera, up: np.ndarray, multiple: int) -> Camera:
-    """The camera turned upright, with the smallest frame that holds its whole picture and has sides that are multiples
-    of `multiple`. The paper turns inside of a square as wide as the diagonal: up to twice the pixels."""
-    turned = rotated_upright(camera, up)
+    """The camera rotated upright, with the smallest frame that holds its whole picture and has sides that are multiples
+    of `multiple`. The paper rotates inside of a square as wide as the diagonal: up to twice the pixels."""
+    rotated = rotated_upright(camera, up)
     right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
     corners = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [-0.5, bottom, 1], [right, bottom, 1]])
-    seen = corners @ between(camera, turned).T
-    # A turn by an angle of rounding size must not widen the frame by a pixel.
+    seen = corners @ between(camera, rotated).T
+    # A rotation by an angle of rounding size must not widen the frame by a pixel.
     first = np.floor(seen.min(0) + 0.5 + 1e-6).astype(int)
     size = np.ceil(seen.max(0) + 0.5 - 1e-6).astype(int) - first
     width, height = (-(-int(side) // multiple) * multiple for side in size)
-    return turned.reframed(int(first[0]), int(first[1]), width, height)
+    return rotated.reframed(int(first[0]), int(first[1]), width, height)
 
 
 def between(source: Camera, target: Camera) -> np.ndarray:
-    """[2, 3]: pixels of `source` to pixels of `target`, two cameras that differ by frame and turn about the axis."""
+    """[2, 3]: pixels of `source` to pixels of `target`, two cameras that differ by frame and roll."""
     whole = target.intrinsics @ target.rotation @ source.rotation.T @ np.linalg.inv(source.intrinsics)
     return (whole / whole[2, 2])[:2]
 

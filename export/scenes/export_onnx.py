@@ -190,7 +190,7 @@ def export(networks: Networks, folder: Path) -> dict[str, float]:
 
 
 def _photos(captures: list[Capture]) -> Iterator[Tensor]:
-    """One of each capture, turned upright."""
+    """One of each capture, rotated upright."""
     for capture in captures:
         view = capture.view(capture.sources()[0])
         camera = upright(view.camera, np.asarray(capture.up), STRIDE)

@@ -222,15 +222,15 @@ def render(model: FittedPoints, camera: Camera, networks: Networks, options: Opt
     Rendered upright in the smallest frame that holds it, rotated back, cropped. Frames that are rotated have sides of a
     few sizes, so that those of a hand-held camera are mostly the same.
     """
-    turned = upright(camera, np.asarray(options.up), MULTIPLE)
-    if moves(camera, turned):
-        turned = upright(camera, np.asarray(options.up), ROTATED_MULTIPLE)
-    rasters = model.rasters(turned, networks, options)
+    rotated = upright(camera, np.asarray(options.up), MULTIPLE)
+    if moves(camera, rotated):
+        rotated = upright(camera, np.asarray(options.up), ROTATED_MULTIPLE)
+    rasters = model.rasters(rotated, networks, options)
     picture = networks.refiner([raster[None] for raster in rasters])[0].clamp(0, 1)
     background = model.background[:, None, None].to(picture)
     picture = background + coverage(rasters) * (picture - background)
     picture = np.ascontiguousarray(picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy())
-    return warped(picture, turned, camera)
+    return warped(picture, rotated, camera)
 
 
 def painted(points: Tensor, colours: Tensor, camera: Camera, near: float = 0.0) -> np.ndarray:

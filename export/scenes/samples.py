@@ -22,8 +22,8 @@ SCORED_POINTS = 512  # of the cloud, enough to tell which photos see the same
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """camera: of the cut, upright. target: RGB float32 [3, S, S]; mask [1, S, S] is 1 where the photo is. sources: the
-    photos, and what they see of the cut."""
+    """camera: of the crop, upright. target: RGB float32 [3, S, S]; mask [1, S, S] is 1 where the photo is. sources: the
+    photos, and what they see of the crop."""
 
     camera: Camera
     target: Tensor
@@ -35,7 +35,7 @@ class Sample:
 @dataclass(frozen=True)
 class Sampling:
     """crop_px: side of the crops, a multiple of 32. sources: photos a crop is made from, at least and at most; the
-    paper has 3. margin_px: the extractor sees of a photo a square so much wider than the cut. long_side_px: larger
+    paper has 3. margin_px: the extractor sees of a photo a square so much wider than the crop. long_side_px: larger
     photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
 
     crop_px: int = 256
@@ -57,19 +57,19 @@ def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.
     views = [capture.view(k, sampling.long_side_px) for k in (target, *chosen)]
     views = [replace(view, image=change(view.image)) for view in views]
     photo = views[0]
-    turned = upright(photo.camera, np.asarray(capture.up), 1)
-    # Anywhere inside, or in the middle where the photo is smaller than a cut.
-    free = np.array([turned.width_px, turned.height_px]) - sampling.crop_px
+    rotated = upright(photo.camera, np.asarray(capture.up), 1)
+    # Anywhere inside, or in the middle where the photo is smaller than a crop.
+    free = np.array([rotated.width_px, rotated.height_px]) - sampling.crop_px
     left, top = (int(rng.integers(room + 1)) if room > 0 else room // 2 for room in free)
-    camera = turned.reframed(left, top, sampling.crop_px, sampling.crop_px)
+    camera = rotated.reframed(left, top, sampling.crop_px, sampling.crop_px)
     there = np.ones(photo.image.shape[:2], np.float32)
     mask = warped(there, photo.camera, camera, cv2.BORDER_CONSTANT) > 0.999
-    cut = warped(photo.image, photo.camera, camera)
+    crop = warped(photo.image, photo.camera, camera)
     points, options = torch.from_numpy(places), Options(up=capture.up)
     seen = [_seen(capture, k, points, view.camera, options) for k, view in zip(chosen, views[1:], strict=True)]
     sources = gathered(points, views[1:], options, camera, sampling.crop_px + sampling.margin_px, seen)
     return Sample(
-        camera, torch.from_numpy(cut).permute(2, 0, 1), torch.from_numpy(mask)[None].float(), sources, options
+        camera, torch.from_numpy(crop).permute(2, 0, 1), torch.from_numpy(mask)[None].float(), sources, options
     )
 
 

@@ -38,7 +38,7 @@ HEAD = np.dtype(
         ("points", "<u4"),
         ("varying", "<u4"),
         ("blocks", "<u4"),
-        ("place_kind", "u1"),
+        ("position_kind", "u1"),
         ("coefficient_kind", "u1"),
         ("zero", "u1", 2),
         ("networks_sha256", "u1", 32),
@@ -92,7 +92,7 @@ class SceneFile:
     def positions(self) -> np.ndarray:
         """Where the points are in the world, float64 [P, 3]."""
         found = np.empty((len(self.means), 3), np.float32)
-        quantized = self.head["place_kind"] == 1
+        quantized = self.head["position_kind"] == 1
         for block in self.blocks:
             first, count = int(block["first"]), int(block["count"])
             stored = self.stored_positions[3 * first : 3 * (first + count)].reshape(3, count).T.astype(np.float32)
@@ -178,7 +178,7 @@ def read_scene_file(path: Path) -> SceneFile:
     scene = SceneFile(
         head,
         np.frombuffer(sections[0], BLOCK),
-        np.frombuffer(sections[1], PLACES[int(head["place_kind"])]),
+        np.frombuffer(sections[1], PLACES[int(head["position_kind"])]),
         np.frombuffer(sections[2], coefficient).reshape(-1, FEATURES),
         np.frombuffer(sections[3], coefficient).reshape(-1, SLOPES),
     )
@@ -235,7 +235,7 @@ def _checked_head(raw: bytes, size: int, path: Path) -> np.ndarray:
         raise SceneFileError(f"{path} is damaged in its first {HEAD.itemsize} bytes; copy it again.")
     if head["file_bytes"] != size:
         raise SceneFileError(f"{path} has {size} bytes, but should have {head['file_bytes']}: it is cut off; copy it.")
-    kinds = int(head["place_kind"]), int(head["coefficient_kind"])
+    kinds = int(head["position_kind"]), int(head["coefficient_kind"])
     if kinds[0] not in PLACES or kinds[1] not in COEFFICIENTS:
         raise SceneFileError(f"{path} stores its numbers in kinds {kinds}, which version {VERSION} does not have.")
     points, varying, blocks = (int(head[name]) for name in ("points", "varying", "blocks"))

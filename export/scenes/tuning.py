@@ -42,12 +42,12 @@ class Rates:
 @dataclass(frozen=True, eq=False)
 class Shown:
     """What a camera shows of a scene, whatever its descriptors are. frame: the upright picture that is rendered,
-    turned: whether the camera's own differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis: [V,
+    rotated: whether the camera's own differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis: [V,
     6]."""
 
     camera: Camera
     frame: Camera
-    turned: bool
+    rotated: bool
     points: Tensor
     slots: list[Tensor]
     basis: Tensor
@@ -68,17 +68,17 @@ class TunedScene(nn.Module):
 
     @torch.no_grad()
     def shown(self, camera: Camera) -> Shown:
-        """What a camera of any size and turn shows."""
+        """What a camera of any size and roll shows."""
         up = np.asarray(self.options.up)
         frame = upright(camera, up, MULTIPLE)
-        turned = moves(camera, frame)
-        if turned:
+        rotated = moves(camera, frame)
+        if rotated:
             frame = upright(camera, up, ROTATED_MULTIPLE)
         found = pyramid(shown_in(self.positions, frame, self.options), LEVELS)
         centre = torch.from_numpy(frame.centre).to(self.positions)
         basis = self.networks.basis(directions(self.positions[found.points], centre).float())
         slots = [slot.int() for slot in found.slots]
-        return Shown(camera, frame, turned, found.points, slots, basis)
+        return Shown(camera, frame, rotated, found.points, slots, basis)
 
     def rasters(self, shown: Shown) -> list[Tensor]:
         """[1, 9, H/2^k, W/2^k] for each level, of the frame."""
@@ -98,10 +98,10 @@ class TunedScene(nn.Module):
         # Not clamped, so that what is too bright can be learnt to be darker; the SDK clamps before it blends.
         picture = background + coverage([level[0] for level in rasters]) * (self.networks.refiner(rasters) - background)
         camera, frame = shown.camera, shown.frame
-        if not shown.turned:
+        if not shown.rotated:
             left, top = np.rint(between(camera, frame)[:, 2]).astype(int)
             return picture[..., top : top + camera.height_px, left : left + camera.width_px]
-        return _turned(picture, camera, frame)
+        return _rotated(picture, camera, frame)
 
     @torch.no_grad()
     def rendered(self, camera: Camera) -> np.ndarray:
@@ -114,7 +114,7 @@ class TunedScene(nn.Module):
         return tuple(values.detach().cpu().numpy().copy() for values in (self.mean, self.slope))
 
 
-def _turned(picture: Tensor, camera: Camera, frame: Camera) -> Tensor:
+def _rotated(picture: Tensor, camera: Camera, frame: Camera) -> Tensor:
     """The frame's picture [1, 3, h, w] as the camera has it [1, 3, H, W]; bilinear, borders repeated."""
     rows, columns = torch.meshgrid(torch.arange(camera.height_px), torch.arange(camera.width_px), indexing="ij")
     pixels = torch.stack([columns, rows, torch.ones_like(rows)], -1).double()

@@ -10,13 +10,13 @@ namespace fs = std::filesystem;
 namespace {
 
 // Of a clip in the SDK.
-constexpr double kLeastFps = 0.01;
-constexpr double kMostFps = 1000;
+constexpr double kMinFps = 0.01;
+constexpr double kMaxFps = 1000;
 
 }  // namespace
 
 ClipFile::ClipFile(const maquette::Context& context, fs::path path, double fps)
-    : context_(context), path_(std::move(path)), fps_(fps > 0 ? std::clamp(fps, kLeastFps, kMostFps) : 25) {}
+    : context_(context), path_(std::move(path)), fps_(fps > 0 ? std::clamp(fps, kMinFps, kMaxFps) : 25) {}
 
 void ClipFile::begin(const maquette::Frame& first, const char* extension) {
   path_.replace_extension(extension);

@@ -8,8 +8,8 @@
 
 class ClipFile {
  public:
-  // `path` ends in .mp4; where this build cannot write that, the file is .avi (Motion JPEG) instead. Its folder is made when
-  // it is not there. An `fps` of 0 or less is not known.
+  // `path` ends in .mp4; where this build cannot write that, the file is .avi (Motion JPEG) instead. Its folder is made
+  // when it is not there. An `fps` of 0 or less is not known.
   ClipFile(const maquette::Context& context, std::filesystem::path path, double fps);
 
   // BGR, all of the size of the first.

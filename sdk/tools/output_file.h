@@ -1,4 +1,4 @@
-// Files that appear whole or not at all: written under another name and renamed when complete.
+// Files that appear atomically: written under another name and renamed when complete.
 #pragma once
 
 #include <cstddef>

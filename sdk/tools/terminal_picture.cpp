@@ -10,7 +10,7 @@
 
 namespace {
 
-constexpr int kMostColumns = 100;
+constexpr int kMaxColumns = 100;
 
 winsize terminal_size() {
   winsize size{};
@@ -35,7 +35,7 @@ void TerminalPicture::show(const maquette::Frame& frame, const std::string& line
 
   // Characters are about twice as high as they are wide, so that half of one is a square pixel.
   const winsize size = terminal_size();
-  const double scale = std::min({double(std::min<int>(size.ws_col, kMostColumns)) / desc.width_px,
+  const double scale = std::min({double(std::min<int>(size.ws_col, kMaxColumns)) / desc.width_px,
                                  2.0 * std::max(1, size.ws_row - 2) / desc.height_px, 1.0});
   const int columns = std::max(1, int(desc.width_px * scale));
   const int rows = std::max(1, int(desc.height_px * scale / 2));

@@ -5,9 +5,9 @@
  *   source_check URI FRAMES back         ... FRAMES of them after it went away and came back
  *   source_check URI VALUE  brightness   the control is set, and some frames are taken for it to reach the camera
  *
- * While a camera streams it is listed, and no other program can open it. Numbers and times of frames must rise, and times be of the monotonic clock. A frame's dma-buf must show the same bytes as
- * its planes, and the last frame stay readable when the source is gone.
- * Prints one line: what was taken (exit status 0), or what was wrong (1).
+ * While a camera streams it is listed, and no other program can open it. Numbers and times of frames must rise, and
+ * times be of the monotonic clock. A frame's dma-buf must show the same bytes as its planes, and the last frame stay
+ * readable when the source is gone. Prints one line: what was taken (exit status 0), or what was wrong (1).
  */
 #define _GNU_SOURCE
 #include <maquette/maquette.h>

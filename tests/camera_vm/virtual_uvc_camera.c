@@ -3,12 +3,12 @@
  *   virtual_uvc_camera [--port N] [--seconds N] [--picture FILE] [--jpeg FILE]
  *
  * vhci-hcd is the client side of USB/IP: it takes a connected socket and speaks of each USB transfer over it. Here the
- * other end of a socket pair answers, so no network is needed, and the camera is unplugged the moment this process ends,
- * for whatever reason. Started again, it is plugged in again.
+ * other end of a socket pair answers, so no network is needed, and the camera is unplugged the moment this process
+ * ends, for whatever reason. Started again, it is plugged in again.
  *
- * Frames are YUYV of 640x480 or 320x240 at 30 per second. Without --picture they are a moving gradient: Y is
- * (x + 2 y + 4 frame) mod 256, U is 90, V is 160, and frames count from 0 at each start of the stream. --picture is a raw
- * YUYV picture of 640x480. --jpeg adds the format MJPEG, 640x480, whose every frame is that file.
+ * Frames are YUYV of 640x480 or 320x240 at 30 per second. Without --picture they are a moving gradient: Y is (x + 2 y +
+ * 4 frame) mod 256, U is 90, V is 160, and frames count from 0 at each start of the stream. --picture is a raw YUYV
+ * picture of 640x480. --jpeg adds the format MJPEG, 640x480, whose every frame is that file.
  *
  * Sources: USB 2.0, chapter 9; USB Device Class Definition for Video Devices 1.0a ("UVC" below); Linux,
  * Documentation/usb/usbip_protocol.rst. Runs on little-endian machines only, as USB numbers are little-endian.

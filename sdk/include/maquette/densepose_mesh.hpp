@@ -1,6 +1,6 @@
 // The body that labels lie on (maq_densepose_surface), as triangles to draw and as a texture to sample. For C++17, in this header alone.
-#ifndef MAQUETTE_BODY_MESH_HPP_
-#define MAQUETTE_BODY_MESH_HPP_
+#ifndef MAQUETTE_DENSEPOSE_MESH_HPP_
+#define MAQUETTE_DENSEPOSE_MESH_HPP_
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace maquette {
 
-struct BodyMesh {
+struct DensePoseMesh {
   struct Vertex {
     std::array<float, 3> point_m;  // x to the body's left, y to its back, z up
     std::array<float, 3> normal;   // of any length and either side, not 0
@@ -25,7 +25,7 @@ struct BodyMesh {
   int nodes = 0;
 
   // `points_m` [24][nodes along U][nodes along V][3], as in maq_densepose_surface.
-  BodyMesh(const std::vector<float>& points_m, int nodes_a_side) : nodes(nodes_a_side) {
+  DensePoseMesh(const std::vector<float>& points_m, int nodes_a_side) : nodes(nodes_a_side) {
     const Grid grid{points_m, nodes};
     for (int part = 0; part < 24; ++part) {
       fill(grid, part);
@@ -91,4 +91,4 @@ struct BodyMesh {
 
 }  // namespace maquette
 
-#endif  // MAQUETTE_BODY_MESH_HPP_
+#endif  // MAQUETTE_DENSEPOSE_MESH_HPP_

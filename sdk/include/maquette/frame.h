@@ -86,6 +86,13 @@ MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
                                          size_t stride_bytes, size_t size_bytes);
 
+/* Makes a copy of the frame in another size, as MAQ_PIXEL_BGR8: the mean of what each pixel covers where it gets smaller,
+ * bilinear where it gets larger. Time and number stay, depth is left out. `*resized` is the caller's, to be given to
+ * maq_frame_release.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_UNSUPPORTED (a depth image).
+ * Does not block. */
+MAQ_API maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, int32_t height_px, maq_frame** resized);
+
 /* Writes the frame's picture to a file, by the path's ending: PNG (.png), without loss, or JPEG (.jpg, .jpeg) at quality 95.
  * Grey pictures stay grey, others are written as RGB, without alpha. The file appears whole or not at all, in place of one
  * that is there; its folder must be there.

@@ -138,6 +138,13 @@ class Frame {
     check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes), get());
   }
 
+  // In BGR.
+  Frame resized(int32_t width_px, int32_t height_px) const {
+    maq_frame* made = nullptr;
+    check(maq_frame_resize(get(), width_px, height_px, &made), get());
+    return Frame(made);
+  }
+
   void save(const std::string& path) const { check(maq_frame_save(get(), path.c_str()), get()); }
 
  private:

@@ -1,5 +1,6 @@
-/* Pipeline: a source and a dense pose model on a thread of the library's, for apps that must not block. The newest frame
- * wins: frames that come while the model is busy are dropped. Source, model and recording can be changed while it runs.
+/* Pipeline: a source and a dense pose model on a thread of the library's, for apps that must not block. The newest
+ * frame wins: frames that come while the model is busy are dropped. Source, model and recording can be changed while
+ * it runs.
  *
  *   maq_pipeline_create(context, &config, &pipeline);
  *   maq_pipeline_set_source(pipeline, "camera:");
@@ -100,9 +101,9 @@ MAQ_API maq_status maq_pipeline_config_init(maq_pipeline_config* config, uint32_
 MAQ_API maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* config,
                                        maq_pipeline** pipeline);
 
-/* Stops the pipeline as maq_pipeline_stop does and frees it (NULL is fine). Results still held stay valid until they are
- * released. Once for each pipeline, from any thread, also from its callbacks. Blocks until the run of the model that is
- * under way is done, or the loading; a device that hangs is not waited for. */
+/* Stops the pipeline as maq_pipeline_stop does and frees it (NULL is fine). Results still held stay valid until they
+ * are released. Once for each pipeline, from any thread, also from its callbacks. Blocks until the run of the model
+ * that is under way is done, or the loading; a device that hangs is not waited for. */
 MAQ_API void maq_pipeline_destroy(maq_pipeline* pipeline);
 
 /* Opens a source, by a URI as for maq_source_create, in place of the one there is; the state becomes
@@ -122,22 +123,23 @@ MAQ_API maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_
 MAQ_API maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_paused);
 
 /* Records the frames that are mapped from now on to a file (recorder.h), which must not be there yet; NULL ends the
- * recording, and so does the end or change of the source, which gives the file its index. When a recording cannot go on,
- * results still come; maq_pipeline_info says why.
+ * recording, and so does the end or change of the source, which gives the file its index. When a recording cannot go
+ * on, results still come; maq_pipeline_info says why.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_recording(maq_pipeline* pipeline, const char* path);
 
-/* Closes the source; the model stays loaded, and maq_pipeline_set_source starts again. After the call no callback runs or
- * begins, and waiting calls of maq_pipeline_acquire_result return MAQ_CANCELLED. From a callback: no other one begins.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Blocks only while a callback of the app runs: the run of the model that
- * is under way is finished by the pipeline's thread. */
+/* Closes the source; the model stays loaded, and maq_pipeline_set_source starts again. After the call no callback runs
+ * or begins, and waiting calls of maq_pipeline_acquire_result return MAQ_CANCELLED. From a callback: no other one
+ * begins.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Blocks only while a callback of the app runs: the run of the model
+ * that is under way is finished by the pipeline's thread. */
 MAQ_API maq_status maq_pipeline_stop(maq_pipeline* pipeline);
 
-/* Takes the newest result that was not taken yet, or waits for the next, at most `timeout_ns` (MAQ_WAIT_FOREVER: no bound).
- * The caller sets result->struct_size; frame and densepose are the caller's afterwards.
- * Any thread. Errors: MAQ_TIMEOUT, MAQ_END_OF_STREAM, MAQ_CANCELLED (the pipeline is stopped), MAQ_ERROR_POOL_EMPTY (all
- * results are held), MAQ_ERROR_UNSUPPORTED (it has a result_callback), MAQ_ERROR_INVALID_ARGUMENT; when the pipeline failed,
- * the status of maq_pipeline_info. Blocks until there is a result. */
+/* Takes the newest result that was not taken yet, or waits for the next, at most `timeout_ns` (MAQ_WAIT_FOREVER: no
+ * bound). The caller sets result->struct_size; frame and densepose are the caller's afterwards.
+ * Any thread. Errors: MAQ_TIMEOUT, MAQ_END_OF_STREAM, MAQ_CANCELLED (the pipeline is stopped), MAQ_ERROR_POOL_EMPTY
+ * (all results are held), MAQ_ERROR_UNSUPPORTED (it has a result_callback), MAQ_ERROR_INVALID_ARGUMENT; when the
+ * pipeline failed, the status of maq_pipeline_info. Blocks until there is a result. */
 MAQ_API maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_ns, maq_pipeline_result* result);
 
 /* Releases frame and densepose and sets them to NULL; those that are NULL already are left (and NULL is fine).
@@ -152,8 +154,8 @@ MAQ_API maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipel
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipeline_stats* stats);
 
-/* The surface that the model's labels mean, once a model is loaded; as maq_densepose_get_surface. The points live as long
- * as the pipeline, also when the model is replaced.
+/* The surface that the model's labels mean, once a model is loaded; as maq_densepose_get_surface. The points live as
+ * long as the pipeline, also when the model is replaced.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (no model is loaded, or it has none),
  * MAQ_ERROR_BAD_BUNDLE (it is damaged). Blocks briefly the first time, while it is decoded. */
 MAQ_API maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surface* surface);

@@ -1,6 +1,7 @@
 #include "api/boundary.h"
 #include "image/convert.h"
 #include "image/files/image_file.h"
+#include "image/geometry/resize.h"
 
 using namespace maq;
 
@@ -85,6 +86,21 @@ maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format
     require_argument(frame, "frame");
     require_argument(pixels, "pixels");
     copy_pixels(frame->frame.image, format, pixels, stride_bytes, size_bytes);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, int32_t height_px, maq_frame** resized) {
+  return guarded(frame, __func__, [&] {
+    require_argument(frame, "frame");
+    require_argument(resized, "resized");
+    check_image_size(width_px, height_px, "The size asked for");
+    auto handle = std::make_unique<maq_frame>();
+    resize_to_bgr(frame->frame.image, width_px, height_px, handle->frame);
+    handle->frame.timestamp_ns = frame->frame.timestamp_ns;
+    handle->frame.clock = frame->frame.clock;
+    handle->frame.sequence = frame->frame.sequence;
+    *resized = handle.release();
     return MAQ_OK;
   });
 }

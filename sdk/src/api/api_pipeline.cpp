@@ -225,7 +225,8 @@ maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surfac
     require_argument(pipeline, "pipeline");
     require_argument(surface, "surface");
     const SurfaceGrid& grid = pipeline->pipeline.surface();
-    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()}, sizeof(maq_densepose_surface));
+    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()},
+                 sizeof(maq_densepose_surface));
     return MAQ_OK;
   });
 }

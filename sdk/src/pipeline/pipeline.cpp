@@ -99,8 +99,8 @@ struct Pipeline::State {
   bool is_opening = false;   // it opens a source, which may hang
   bool in_callback = false;  // it is in a callback of the app
   bool is_photo = false;     // the source has one frame
-  // Of the thread: stopped, opening, loading, running, ended or failed; while it runs, of the camera: running, stalled or
-  // reconnecting.
+  // Of the thread: stopped, opening, loading, running, ended or failed; while it runs, of the camera: running, stalled
+  // or reconnecting.
   maq_pipeline_state phase = MAQ_PIPELINE_STOPPED, camera = MAQ_PIPELINE_RUNNING;
   maq_status failure = MAQ_OK;
   std::string problem, camera_problem;
@@ -139,7 +139,7 @@ struct Pipeline::State {
     return {camera, camera == MAQ_PIPELINE_STALLED ? MAQ_TIMEOUT : MAQ_ERROR_DEVICE_LOST, camera_problem};
   }
 
-  // After each change: wakes whoever waits for it, and queues a report.
+  // After each change: wakes the calls that wait for it, and queues a report.
   void note_change() {
     changed.notify_all();
     PipelineStatus latest = status();

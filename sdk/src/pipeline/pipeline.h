@@ -69,14 +69,15 @@ class Pipeline {
   // Returns when no callback runs, unless it is called by one.
   void stop();
 
-  // Swaps the newest result with the arguments. MAQ_OK, MAQ_TIMEOUT, MAQ_END_OF_STREAM or MAQ_CANCELLED; throws the failure
-  // of the pipeline.
+  // Swaps the newest result with the arguments. MAQ_OK, MAQ_TIMEOUT, MAQ_END_OF_STREAM or MAQ_CANCELLED; throws the
+  // failure of the pipeline.
   maq_status acquire(int64_t timeout_ns, Frame& frame, DensePoseResult& densepose, PipelineTimes& times);
 
   PipelineStatus status() const;
   std::string source_uri() const;
   PipelineStats stats() const;
-  // Of the model that was loaded last; stays as long as the pipeline. Throws MAQ_ERROR_UNSUPPORTED, MAQ_ERROR_BAD_BUNDLE.
+  // Of the model that was loaded last; stays as long as the pipeline. Throws MAQ_ERROR_UNSUPPORTED,
+  // MAQ_ERROR_BAD_BUNDLE.
   const SurfaceGrid& surface();
 
  private:

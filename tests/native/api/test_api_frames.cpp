@@ -85,4 +85,29 @@ TEST(ApiFrames, WrongDescriptionsAreStatusesOfTheContext) {
   EXPECT_EQ(status_of([](auto& desc) { desc.struct_size = 0; }), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
+TEST(ApiFrames, AreResized) {
+  const maquette::Context context;
+  maquette::Source source(context, "stub:pattern?size=60x40&frames=2&fps=10");
+  source.next();
+  const std::optional<maquette::Frame> frame = source.next();
+  std::vector<uint8_t> pixels(60 * 40 * 3), small(20 * 10 * 3);
+  frame->copy_pixels(MAQ_PIXEL_BGR8, pixels.data(), 0, pixels.size());
+  const maquette::Frame resized = frame->resized(20, 10);
+  EXPECT_EQ(resized.desc().format, MAQ_PIXEL_BGR8);
+  EXPECT_EQ(resized.desc().timestamp_ns, frame->desc().timestamp_ns);
+  EXPECT_EQ(resized.desc().sequence, 1u);
+  resized.copy_pixels(MAQ_PIXEL_BGR8, small.data(), 0, small.size());
+  for (size_t i = 0; i < small.size(); ++i) {
+    const size_t c = i % 3, x = i / 3 % 20 * 3, y = i / 60 * 4;
+    int sum = 0;
+    for (size_t k = 0; k < 12; ++k) sum += pixels[((y + k / 3) * 60 + x + k % 3) * 3 + c];
+    ASSERT_NEAR(small[i], sum / 12.0, 1) << i;
+  }
+  EXPECT_EQ(frame->resized(120, 90).desc().width_px, 120);
+  maq_frame* none = nullptr;
+  EXPECT_EQ(maq_frame_resize(frame->get(), 0, 10, &none), MAQ_ERROR_IMAGE_SIZE);
+  EXPECT_EQ(maq_frame_resize(frame->get(), 10, 10, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_frame_resize(nullptr, 10, 10, &none), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
 }  // namespace

@@ -213,7 +213,7 @@ TEST(SteadyState, AFrameTakesNothingFromTheHeap) {
       maq_frame_release(frame);
     }
   };
-  // Twice the same frames: whoever is larger than everybody before may take more memory, but only once.
+  // Twice the same frames: a person larger than all before may take more memory, but only once.
   maquette::Source source(context, "stub:people?count=3"), again(context, "stub:people?count=3");
   run(source, kFrames);
   run(again, 1);  // makes the one frame of its pool that is needed

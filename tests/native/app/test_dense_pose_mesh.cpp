@@ -23,7 +23,7 @@ float* node(std::vector<float>& points, int part, int u, int v) {
 }
 
 TEST(DensePoseMesh, EveryCellOfAWholeChartIsTwoTriangles) {
-  const maquette::BodyMesh mesh(squares(), kNodes);
+  const maquette::DensePoseMesh mesh(squares(), kNodes);
   EXPECT_EQ(mesh.triangles.size(), size_t(24 * 3 * 3 * 2 * 3));
   double area = 0;
   for (size_t i = 0; i < mesh.triangles.size(); i += 3) {
@@ -34,7 +34,7 @@ TEST(DensePoseMesh, EveryCellOfAWholeChartIsTwoTriangles) {
 }
 
 TEST(DensePoseMesh, VerticesKnowTheirLabelAndNormal) {
-  for (const maquette::BodyMesh::Vertex& vertex : maquette::BodyMesh(squares(), kNodes).triangles) {
+  for (const maquette::DensePoseMesh::Vertex& vertex : maquette::DensePoseMesh(squares(), kNodes).triangles) {
     EXPECT_EQ(vertex.part, vertex.point_m[1]);
     EXPECT_FLOAT_EQ(vertex.u * (kNodes - 1), vertex.point_m[0]);
     EXPECT_FLOAT_EQ(vertex.v * (kNodes - 1), vertex.point_m[2]);
@@ -45,12 +45,12 @@ TEST(DensePoseMesh, VerticesKnowTheirLabelAndNormal) {
 }
 
 TEST(DensePoseMesh, AMissingCornerLeavesOneTriangleOfItsCell) {
-  const size_t whole = maquette::BodyMesh(squares(), kNodes).triangles.size();
+  const size_t whole = maquette::DensePoseMesh(squares(), kNodes).triangles.size();
   for (const int u : {0, kNodes - 1}) {
     for (const int v : {0, kNodes - 1}) {
       std::vector<float> points = squares();
       std::fill_n(node(points, 5, u, v), 3, kUnknown);
-      const maquette::BodyMesh mesh(points, kNodes);
+      const maquette::DensePoseMesh mesh(points, kNodes);
       EXPECT_EQ(mesh.triangles.size(), whole - 3) << u << " " << v;
       for (const auto& vertex : mesh.triangles) {
         for (const float number : vertex.point_m) ASSERT_TRUE(std::isfinite(number));
@@ -64,7 +64,7 @@ TEST(DensePoseMesh, WhereAChartEndsItsNearestPointGoesOn) {
   std::vector<float> points = squares();
   std::fill_n(node(points, 2, 3, 1), 3, kUnknown);
   std::fill_n(node(points, 2, 2, 1), 3, kUnknown);
-  const maquette::BodyMesh mesh(points, kNodes);
+  const maquette::DensePoseMesh mesh(points, kNodes);
   const auto filled = [&](int part, int u, int v) {
     return &mesh.filled_points_m[size_t(((part * kNodes + v) * kNodes + u) * 3)];
   };
@@ -80,7 +80,7 @@ TEST(DensePoseMesh, AChartOfNothingHasNoTriangles) {
   for (int u = 0; u < kNodes; ++u) {
     for (int v = 0; v < kNodes; ++v) std::fill_n(node(points, 7, u, v), 3, kUnknown);
   }
-  for (const auto& vertex : maquette::BodyMesh(points, kNodes).triangles) EXPECT_NE(vertex.part, 7);
+  for (const auto& vertex : maquette::DensePoseMesh(points, kNodes).triangles) EXPECT_NE(vertex.part, 7);
 }
 
 TEST(DensePoseMesh, TheShippedBodyIsWholeAndStandsUpright) {
@@ -88,7 +88,7 @@ TEST(DensePoseMesh, TheShippedBodyIsWholeAndStandsUpright) {
   const maquette::DensePose densepose(context, MAQ_TEST_MODELS "/densepose-b-int8");
   const maq_densepose_surface surface = *densepose.surface();
   const size_t count = size_t(24 * surface.nodes * surface.nodes * 3);
-  const maquette::BodyMesh mesh({surface.points_m, surface.points_m + count}, surface.nodes);
+  const maquette::DensePoseMesh mesh({surface.points_m, surface.points_m + count}, surface.nodes);
   float low = 10, high = -10;
   for (const auto& vertex : mesh.triangles) {
     low = std::min(low, vertex.point_m[2]);

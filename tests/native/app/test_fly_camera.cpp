@@ -1,5 +1,5 @@
 // Where the camera of a flight begins, what steering does to it, flights to photos, poses at the edge of numbers.
-#include <app/fly_camera.hpp>
+#include <app/fly_camera.h>
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ Vec3 row(const maq_pinhole_camera& camera, int index) {
   const double* const r = camera.rotation + 3 * index;
   return {r[0], r[1], r[2]};
 }
-Vec3 place(const maq_pinhole_camera& camera) { return {camera.centre[0], camera.centre[1], camera.centre[2]}; }
+Vec3 position(const maq_pinhole_camera& camera) { return {camera.centre[0], camera.centre[1], camera.centre[2]}; }
 double distance(const Vec3& a, const Vec3& b) {
   const Vec3 d = sum(a, scaled(b, -1));
   return std::sqrt(dot(d, d));
@@ -37,8 +37,8 @@ maq_scene_info scene(const Vec3& up = {0, 0, 1}, const Vec3& low = {-1, -2, -3},
   return info;
 }
 
-// Looks along `forward`; the right is level for an upright camera, then turned about `forward` by `lean`.
-maq_pinhole_camera photo(const Vec3& at, const Vec3& forward, double lean = 0, const Vec3& up = {0, 0, 1}) {
+// Faces along `forward`; the right is level for an upright camera, then rotated about `forward` by `roll`.
+maq_pinhole_camera photo(const Vec3& at, const Vec3& forward, double roll = 0, const Vec3& up = {0, 0, 1}) {
   maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;
   camera.width_px = 640;
@@ -52,7 +52,7 @@ maq_pinhole_camera photo(const Vec3& at, const Vec3& forward, double lean = 0, c
   if (dot(right, right) < 1e-12) right = cross(f, {f[1], f[2], f[0]});
   right = unit(right);
   const Vec3 down = cross(f, right);
-  const Vec3 x = sum(scaled(right, std::cos(lean)), scaled(down, std::sin(lean)));
+  const Vec3 x = sum(scaled(right, std::cos(roll)), scaled(down, std::sin(roll)));
   const Vec3 rows[3] = {x, cross(f, x), f};
   for (int i = 0; i < 9; ++i) camera.rotation[i] = rows[i / 3][size_t(i % 3)];
   for (size_t i = 0; i < 3; ++i) camera.centre[i] = at[i];
@@ -81,7 +81,7 @@ void expect_same(const maq_pinhole_camera& a, const maq_pinhole_camera& b, doubl
 
 // Where a point of the world lies in the picture; the third number is its depth.
 Vec3 seen(const maq_pinhole_camera& camera, const Vec3& point) {
-  const Vec3 away = sum(point, scaled(place(camera), -1));
+  const Vec3 away = sum(point, scaled(position(camera), -1));
   const double x = dot(row(camera, 0), away), y = dot(row(camera, 1), away), z = dot(row(camera, 2), away);
   return {camera.fx_px * x / z + camera.cx_px, camera.fy_px * y / z + camera.cy_px, z};
 }
@@ -95,7 +95,7 @@ TEST(FlyCamera, BeginsAtTheMiddlePhotoExactly) {
                                                photo({4, 0, 0}, {1, 0, 0})};
   const maquette::FlyCamera fly(scene(), photos);
   expect_same(fly.camera(640, 480), photos[1]);
-  EXPECT_EQ(fly.at_photo(), 1);
+  EXPECT_EQ(fly.photo_index(), 1);
   ASSERT_TRUE(fly.photo_camera().has_value());
   expect_same(*fly.photo_camera(), photos[1]);
 }
@@ -103,7 +103,7 @@ TEST(FlyCamera, BeginsAtTheMiddlePhotoExactly) {
 TEST(FlyCamera, WithoutPhotosItSeesTheWholeBoxFromOutsideUpright) {
   for (const Vec3& up : {Vec3{0, 0, 1}, Vec3{1, 0, 0}, unit({1, -2, 0.5}), Vec3{0, -1, 0}}) {
     const maquette::FlyCamera fly(scene(up), {});
-    EXPECT_EQ(fly.at_photo(), -1);
+    EXPECT_EQ(fly.photo_index(), -1);
     EXPECT_FALSE(fly.photo_camera().has_value());
     for (const auto& [width, height] : {std::pair<int, int>{640, 480}, {300, 900}, {1000, 200}}) {
       const maq_pinhole_camera camera = fly.camera(width, height);
@@ -114,7 +114,7 @@ TEST(FlyCamera, WithoutPhotosItSeesTheWholeBoxFromOutsideUpright) {
         EXPECT_TRUE(pixel[0] > 0 && pixel[0] < width && pixel[1] > 0 && pixel[1] < height)
             << pixel[0] << " " << pixel[1];
       }
-      EXPECT_NEAR(dot(row(camera, 0), up), 0, 1e-9) << "it does not lean";
+      EXPECT_NEAR(dot(row(camera, 0), up), 0, 1e-9) << "it is level";
       EXPECT_LT(dot(row(camera, 1), up), -0.5) << "the world's up is up in the picture";
       EXPECT_LT(dot(row(camera, 2), up), 0) << "from above";
     }
@@ -126,22 +126,22 @@ TEST(FlyCamera, MovesByItsOwnAxesAndTheWorldsUp) {
   maquette::FlyCamera fly(scene(), {start});
   const double diagonal = std::sqrt(4.0 + 16 + 36);
   fly.move(1, 0, 0, 2, 0.1);
-  Vec3 expected = sum(place(start), scaled(row(start, 0), 0.2 * diagonal));
-  EXPECT_NEAR(distance(place(fly.camera(64, 48)), expected), 0, 1e-12);
-  EXPECT_EQ(fly.at_photo(), -1) << "it has left the photo";
+  Vec3 expected = sum(position(start), scaled(row(start, 0), 0.2 * diagonal));
+  EXPECT_NEAR(distance(position(fly.camera(64, 48)), expected), 0, 1e-12);
+  EXPECT_EQ(fly.photo_index(), -1) << "it has left the photo";
   EXPECT_FALSE(fly.photo_camera().has_value());
   fly.move(0, -0.5, 7, 1, 0.1);
   expected = sum(expected, sum(scaled({0, 0, 1}, -0.05 * diagonal), scaled(row(start, 2), 0.1 * diagonal)));
-  EXPECT_NEAR(distance(place(fly.camera(64, 48)), expected), 0, 1e-12) << "no faster than 1";
+  EXPECT_NEAR(distance(position(fly.camera(64, 48)), expected), 0, 1e-12) << "no faster than 1";
 }
 
 TEST(FlyCamera, WhatChangesNothingLeavesItAtThePhoto) {
   maquette::FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5})});
   fly.move(0, 0, 0, 1, 0.1);
-  fly.turn(0, 0);
+  fly.rotate(0, 0);
   fly.zoom(1);
   EXPECT_FALSE(fly.update(1));
-  EXPECT_EQ(fly.at_photo(), 0);
+  EXPECT_EQ(fly.photo_index(), 0);
 }
 
 TEST(FlyCamera, TurnsRightAboutTheWorldsUpAndUpwards) {
@@ -149,17 +149,17 @@ TEST(FlyCamera, TurnsRightAboutTheWorldsUpAndUpwards) {
     const maquette::FlyCamera start(scene(up), {});
     const maq_pinhole_camera before = start.camera(64, 48);
     maquette::FlyCamera fly = start;
-    fly.turn(0.2, 0);
+    fly.rotate(0.2, 0);
     maq_pinhole_camera after = fly.camera(64, 48);
     EXPECT_GT(dot(row(after, 2), row(before, 0)), 0.1) << "to the right";
     EXPECT_NEAR(pitch_of(after, up), pitch_of(before, up), 1e-12);
     fly = start;
-    fly.turn(0, 0.2);
+    fly.rotate(0, 0.2);
     after = fly.camera(64, 48);
     EXPECT_NEAR(pitch_of(after, up), pitch_of(before, up) + 0.2, 1e-12);
     EXPECT_NEAR(dot(row(after, 0), row(before, 0)), 1, 1e-12) << "upwards alone";
-    fly.turn(2, 0.3);
-    fly.turn(-2, -0.5);
+    fly.rotate(2, 0.3);
+    fly.rotate(-2, -0.5);
     expect_same(fly.camera(64, 48), before, 1e-12);
   }
 }
@@ -169,46 +169,46 @@ TEST(FlyCamera, NeverFlipsOver) {
     for (const double pitch : {10.0, 1e6, -10.0, -1e300}) {
       maquette::FlyCamera fly(scene(up), {});
       for (int i = 0; i < 5; ++i) {
-        fly.turn(0.4, pitch);
+        fly.rotate(0.4, pitch);
         const maq_pinhole_camera camera = fly.camera(64, 48);
         expect_rotation(camera);
         EXPECT_NEAR(pitch_of(camera, up), std::copysign(89 * kDegree, pitch), 1e-6);
         EXPECT_LT(dot(row(camera, 1), up), 0) << "the world's up is up in the picture";
-        EXPECT_NEAR(dot(row(camera, 0), up), 0, 1e-9) << "it does not lean";
+        EXPECT_NEAR(dot(row(camera, 0), up), 0, 1e-9) << "it is level";
       }
-      fly.turn(0, -std::copysign(89 * kDegree, pitch));
+      fly.rotate(0, -std::copysign(89 * kDegree, pitch));
       EXPECT_NEAR(pitch_of(fly.camera(64, 48), up), 0, 1e-9) << "back at once";
     }
   }
 }
 
 TEST(FlyCamera, ALeaningCameraTurnsWithoutAJumpAndGetsUpright) {
-  for (const double lean : {0.5, -1.5, 3.0, 3.14159265358979}) {
-    const maq_pinhole_camera start = photo({1, 2, 3}, {1, 1, -0.5}, lean);
+  for (const double roll : {0.5, -1.5, 3.0, 3.14159265358979}) {
+    const maq_pinhole_camera start = photo({1, 2, 3}, {1, 1, -0.5}, roll);
     maquette::FlyCamera fly(scene(), {start});
-    fly.turn(1e-6, -1e-6);
+    fly.rotate(1e-6, -1e-6);
     for (int i = 0; i < 9; ++i) EXPECT_NEAR(fly.camera(640, 480).rotation[i], start.rotation[i], 1e-5);
-    double leaned = std::abs(lean);
+    double rolled = std::abs(roll);
     for (int i = 0; i < 200; ++i) {
-      fly.turn(0.05, i % 2 == 0 ? 0.02 : -0.02);
+      fly.rotate(0.05, i % 2 == 0 ? 0.02 : -0.02);
       const maq_pinhole_camera camera = fly.camera(640, 480);
       expect_rotation(camera);
       const Vec3 level = unit(cross(row(camera, 2), {0, 0, 1}));
       const double now = std::acos(std::clamp(dot(row(camera, 0), level), -1.0, 1.0));
-      EXPECT_LT(now, leaned + 1e-6);
-      leaned = now;
+      EXPECT_LT(now, rolled + 1e-6);
+      rolled = now;
     }
-    EXPECT_LT(leaned, 1e-3);
+    EXPECT_LT(rolled, 1e-3);
   }
 }
 
 TEST(FlyCamera, FromStraightUpOrDownItTurnsTheWayThePictureDoes) {
   for (const double forward : {1.0, -1.0}) {
-    for (const double lean : {0.0, 0.7, 2.5}) {
-      const maq_pinhole_camera start = photo({0, 0, 0}, {1e-17, 0, forward}, lean);
+    for (const double roll : {0.0, 0.7, 2.5}) {
+      const maq_pinhole_camera start = photo({0, 0, 0}, {1e-17, 0, forward}, roll);
       maquette::FlyCamera fly(scene(), {start});
       expect_same(fly.camera(640, 480), start);
-      fly.turn(0, -forward * 0.5);
+      fly.rotate(0, -forward * 0.5);
       const maq_pinhole_camera camera = fly.camera(640, 480);
       expect_rotation(camera);
       // From straight down upwards goes to the picture's upper edge, from straight up downwards to its lower one.
@@ -240,7 +240,7 @@ TEST(FlyCamera, AnyPictureShowsAllOfThePhoto) {
   for (const auto& [width, height] : {std::pair<int, int>{1280, 960}, {1000, 480}, {320, 700}}) {
     const maq_pinhole_camera camera = fly.camera(width, height);
     const double scale = std::min(width / 640.0, height / 480.0);
-    const Vec3 point = sum(place(start), sum(row(start, 2), scaled(row(start, 0), 0.3)));
+    const Vec3 point = sum(position(start), sum(row(start, 2), scaled(row(start, 0), 0.3)));
     const Vec3 there = seen(start, point), here = seen(camera, point);
     EXPECT_NEAR(here[0] - 0.5 * (width - 1), scale * (there[0] - 319.5), 1e-9);
     EXPECT_NEAR(here[1] - 0.5 * (height - 1), scale * (there[1] - 239.5), 1e-9);
@@ -252,16 +252,16 @@ TEST(FlyCamera, FliesSmoothlyAndEndsExactlyAtThePhoto) {
   target.width_px = 480, target.height_px = 640, target.fx_px = 900, target.cx_px = 200;
   maquette::FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5}, 0.2)});
   const maq_pinhole_camera start = fly.camera(800, 600);
-  fly.go_to(target, 2, 7);
+  fly.fly_to(target, 2, 7);
   expect_same(fly.camera(800, 600), start, 1e-9);
-  EXPECT_EQ(fly.at_photo(), -1);
+  EXPECT_EQ(fly.photo_index(), -1);
   maq_pinhole_camera before = start;
   double way = 0, longest = 0, turned = 0;
   int steps = 0;
   while (fly.update(0.01)) {
     const maq_pinhole_camera now = fly.camera(800, 600);
     expect_rotation(now);
-    const double step = distance(place(before), place(now));
+    const double step = distance(position(before), position(now));
     way += step, longest = std::max(longest, step);
     turned += std::acos(std::min(1.0, dot(row(before, 2), row(now, 2))));
     EXPECT_LT(std::abs(now.fx_px - before.fx_px), 20);
@@ -270,11 +270,11 @@ TEST(FlyCamera, FliesSmoothlyAndEndsExactlyAtThePhoto) {
     ASSERT_LE(++steps, 202);
   }
   EXPECT_GE(steps, 199);
-  EXPECT_NEAR(way, distance(place(start), place(target)), 1e-9) << "straight";
+  EXPECT_NEAR(way, distance(position(start), position(target)), 1e-9) << "straight";
   EXPECT_LT(longest, 1.6 * way / 200) << "no step is much longer than the mean";
   EXPECT_LT(turned, 3.2);
   expect_same(fly.camera(480, 640), target);
-  EXPECT_EQ(fly.at_photo(), 7);
+  EXPECT_EQ(fly.photo_index(), 7);
   expect_same(*fly.photo_camera(), target);
 }
 
@@ -284,14 +284,14 @@ TEST(FlyCamera, FliesByHalfATurnAboutAnyAxis) {
     for (const double off : {0.0, 2e-16, 1e-9, 1e-7, -1e-4}) {
       maq_pinhole_camera target = start;
       for (int i = 0; i < 9; ++i) target.rotation[i] *= i / 3 == axis ? 1 : -1;
-      // Not quite half a turn: each row is turned a little more about the axis.
+      // Not quite 180 degrees: each row is rotated a little more about the axis.
       const Vec3 a = row(start, axis);
       for (int i = 0; i < 3; ++i) {
         const Vec3 more = cross(a, row(target, i));
         for (size_t k = 0; k < 3; ++k) target.rotation[3 * i + int(k)] += off * more[k];
       }
       maquette::FlyCamera fly(scene(), {start});
-      fly.go_to(target, 1, 0);
+      fly.fly_to(target, 1, 0);
       maq_pinhole_camera before = start;
       while (fly.update(0.01)) {
         const maq_pinhole_camera now = fly.camera(640, 480);
@@ -308,24 +308,24 @@ TEST(FlyCamera, SteeringEndsAFlight) {
   const std::vector<maq_pinhole_camera> photos{photo({1, 2, 3}, {1, 1, -0.5}), photo({4, -2, 1}, {-1, 0.3, 0.1})};
   for (int way = 0; way < 3; ++way) {
     maquette::FlyCamera fly(scene(), photos);
-    fly.go_to(photos[0], 1, 0);
+    fly.fly_to(photos[0], 1, 0);
     fly.update(0.5);
     const maq_pinhole_camera half = fly.camera(800, 600);
     if (way == 0) fly.move(1e-9, 0, 0, 1, 0.1);
-    if (way == 1) fly.turn(1e-9, 0);
+    if (way == 1) fly.rotate(1e-9, 0);
     if (way == 2) fly.zoom(1 + 1e-9);
     EXPECT_FALSE(fly.update(1));
     expect_same(fly.camera(800, 600), half, 1e-5);
-    EXPECT_EQ(fly.at_photo(), -1);
+    EXPECT_EQ(fly.photo_index(), -1);
   }
 }
 
 TEST(FlyCamera, AFlightOfNoTimeIsThereAtOnce) {
   const maq_pinhole_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1});
   maquette::FlyCamera fly(scene(), {});
-  fly.go_to(target, 0, 3);
+  fly.fly_to(target, 0, 3);
   expect_same(fly.camera(640, 480), target);
-  EXPECT_EQ(fly.at_photo(), 3);
+  EXPECT_EQ(fly.photo_index(), 3);
 }
 
 TEST(FlyCamera, FindsTheNearestPhotoByPlaceAndDirection) {
@@ -333,9 +333,9 @@ TEST(FlyCamera, FindsTheNearestPhotoByPlaceAndDirection) {
                                                photo({3, 0, 0}, {1, 0, 0})};
   maquette::FlyCamera fly(scene(), {photo({0.12, 0, 0}, {1, 0.1, 0})});
   EXPECT_EQ(fly.nearest_photo(photos), 0) << "1 is nearer, but looks the other way";
-  fly.turn(3, 0);
+  fly.rotate(3, 0);
   EXPECT_EQ(fly.nearest_photo(photos), 1);
-  fly.go_to(photos[2], 0, 2);
+  fly.fly_to(photos[2], 0, 2);
   EXPECT_EQ(fly.nearest_photo(photos), 2);
   EXPECT_EQ(fly.nearest_photo({}), -1);
 }
@@ -347,9 +347,9 @@ TEST(FlyCamera, IsARotationAfterThousandsOfMoves) {
     maquette::FlyCamera fly(scene(up), {photo({1, 2, 3}, {1, 1, -0.5}, 0.9)});
     const maq_pinhole_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1}, 2);
     for (int i = 0; i < 20000; ++i) {
-      fly.turn(0.3 * any(random), 0.3 * any(random));
+      fly.rotate(0.3 * any(random), 0.3 * any(random));
       fly.move(any(random), any(random), any(random), 0.02, 0.1);
-      if (i % 1000 == 0) fly.go_to(target, 1, 0);
+      if (i % 1000 == 0) fly.fly_to(target, 1, 0);
       if (i % 1000 == 0) fly.update(std::abs(any(random)));
     }
     const maq_pinhole_camera camera = fly.camera(640, 480);
@@ -364,8 +364,8 @@ TEST(FlyCamera, WhatIsNotFiniteOrNoCameraDoesNothing) {
     fly.move(wrong, 0, 0, kNan, 0.1);
     fly.move(1, 0, 0, wrong, 0.1);
     fly.move(1, 0, 0, 1, wrong);
-    fly.turn(wrong, 0);
-    fly.turn(0, wrong);
+    fly.rotate(wrong, 0);
+    fly.rotate(0, wrong);
     EXPECT_FALSE(fly.update(wrong));
   }
   fly.move(kNan, 0, 0, 1, 0.1);
@@ -373,7 +373,7 @@ TEST(FlyCamera, WhatIsNotFiniteOrNoCameraDoesNothing) {
   const auto expect_ignored = [&](auto change) {
     maq_pinhole_camera camera = photo({4, -2, 1}, {-1, 0.3, 0.1});
     change(camera);
-    fly.go_to(camera, 0, 0);
+    fly.fly_to(camera, 0, 0);
     EXPECT_EQ(fly.camera(640, 480).centre[0], 1);
   };
   expect_ignored([](maq_pinhole_camera& camera) { camera.rotation[4] = kNan; });
@@ -389,8 +389,8 @@ TEST(FlyCamera, WhatIsNotFiniteOrNoCameraDoesNothing) {
   expect_ignored([](maq_pinhole_camera& camera) { camera.fy_px = -1; });
   expect_ignored([](maq_pinhole_camera& camera) { camera.fx_px = kNan; });
   expect_ignored([](maq_pinhole_camera& camera) { camera.cx_px = kInfinity; });
-  fly.go_to(photo({4, -2, 1}, {-1, 0.3, 0.1}), kNan, 0);
-  EXPECT_EQ(fly.at_photo(), 0) << "it never left";
+  fly.fly_to(photo({4, -2, 1}, {-1, 0.3, 0.1}), kNan, 0);
+  EXPECT_EQ(fly.photo_index(), 0) << "it never left";
   expect_rotation(
       maquette::FlyCamera(scene({kNan, 0, 0}, {kInfinity, 0, 0}, {0, 0, kNan}), {maq_pinhole_camera{}}).camera(64, 48));
   expect_rotation(maquette::FlyCamera(scene({0, 0, 0}), {}).camera(64, 48));
@@ -400,8 +400,8 @@ TEST(FlyCamera, ARotationThatIsATrifleOffIsMadeOne) {
   maq_pinhole_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1});
   for (double& number : target.rotation) number *= 1.0005;
   maquette::FlyCamera fly(scene(), {});
-  fly.go_to(target, 0, 0);
-  EXPECT_EQ(fly.at_photo(), 0);
+  fly.fly_to(target, 0, 0);
+  EXPECT_EQ(fly.photo_index(), 0);
   expect_rotation(fly.camera(640, 480));
 }
 
@@ -425,11 +425,11 @@ TEST(FlyCamera, FliesInScenesFarOutTinyHugeOrWithoutASize) {
     EXPECT_NEAR(pixel[0], 319.5, 1e-3);
     EXPECT_NEAR(pixel[1], 239.5, 1e-3);
     EXPECT_NEAR(pixel[2], one.diagonal, 1e-5 * one.diagonal);
-    fly.turn(1, 0.5);
+    fly.rotate(1, 0.5);
     fly.move(0, 0, 1, 1, 0.5);
     const maq_pinhole_camera after = fly.camera(640, 480);
     expect_rotation(after);
-    EXPECT_NEAR(distance(place(before), place(after)), 0.5 * one.diagonal, 1e-5 * one.diagonal);
+    EXPECT_NEAR(distance(position(before), position(after)), 0.5 * one.diagonal, 1e-5 * one.diagonal);
   }
 }
 

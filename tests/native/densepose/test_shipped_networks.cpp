@@ -235,7 +235,7 @@ cv::Mat ShippedNetworks::photo_;
 // integers with one rounding. Where they round to different sides a value moves by one step of 8 bits, and the layers
 // that follow make more of it. Measured on an AVX-512 machine: 0.034 for the trunk, whose first blocks are float and
 // whose fifty layers pass it on; 0 for the RPN and the heads.
-constexpr double kMostOfOptimisingTrunk = 0.05, kMostOfOptimising = 0.01;
+constexpr double kMaxOptimisingErrorTrunk = 0.05, kMaxOptimisingError = 0.01;
 
 TEST_F(ShippedNetworks, TheOptimisedTrunkAnswersAsTheUnoptimisedOne) {
   const std::vector<float> image = trunk_input();
@@ -245,7 +245,7 @@ TEST_F(ShippedNetworks, TheOptimisedTrunkAnswersAsTheUnoptimisedOne) {
   const Tensors plain = UnoptimisedGraph(*runtime_, *bundle_, "trunk").run(input);
   ASSERT_EQ(optimised.size(), plain.size());
   for (size_t l = 0; l < plain.size(); ++l) {
-    EXPECT_LE(relative_error(plain[l], optimised[l]), kMostOfOptimisingTrunk) << "p" << l + 2;
+    EXPECT_LE(relative_error(plain[l], optimised[l]), kMaxOptimisingErrorTrunk) << "p" << l + 2;
   }
 }
 
@@ -259,7 +259,7 @@ TEST_F(ShippedNetworks, TheOptimisedHeadsAnswerAsTheUnoptimisedOnes) {
     const Tensors plain = UnoptimisedGraph(*runtime_, *bundle_, head.graph).run(input);
     ASSERT_EQ(optimised.size(), plain.size());
     for (size_t i = 0; i < plain.size(); ++i) {
-      EXPECT_LE(relative_error(plain[i], optimised[i]), kMostOfOptimising) << head.graph << " output " << i;
+      EXPECT_LE(relative_error(plain[i], optimised[i]), kMaxOptimisingError) << head.graph << " output " << i;
     }
     if (std::string(head.graph) == "dense_head") {
       const std::vector<std::ptrdiff_t> a = best_parts(plain[0]), b = best_parts(optimised[0]);
@@ -276,7 +276,7 @@ TEST_F(ShippedNetworks, TheOptimisedRpnAnswersAsTheUnoptimisedOne) {
   maq::Session rpn = session("rpn_fine");
   const Tensors optimised = copies(rpn.run(input, {{1, kSide / 4, kSide / 4, 15}}));
   const Tensors plain = UnoptimisedGraph(*runtime_, *bundle_, "rpn_fine").run(input);
-  for (size_t i = 0; i < plain.size(); ++i) EXPECT_LE(relative_error(plain[i], optimised[i]), kMostOfOptimising) << i;
+  for (size_t i = 0; i < plain.size(); ++i) EXPECT_LE(relative_error(plain[i], optimised[i]), kMaxOptimisingError) << i;
 }
 
 // Threads share the outputs of a layer among them; no sum is split, so not one bit may change.

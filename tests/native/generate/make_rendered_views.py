@@ -1,7 +1,7 @@
 """Writes data/rendered_views: pictures that torch makes of the points of data/tiny_scene (make_tiny_scene.py).
 
 `views.json`: cameras (world to camera), held at different angles, one in the cloud, one with pixels that are not
-square, one with a principal point beside the picture, and the name of each one's picture by export/scenes/modelling.py.
+square, one with a principal point beside the picture, and the name of each one's picture by export/scenes/fitting.py.
 
     python -m tests.native.generate.make_rendered_views
 """

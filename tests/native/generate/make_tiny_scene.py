@@ -104,7 +104,7 @@ def write_capture(folder: Path) -> None:
 
 
 @torch.no_grad()
-def write_looks(folder: Path, networks: Networks) -> None:
+def write_descriptors(folder: Path, networks: Networks) -> None:
     capture = read_capture(folder / "capture")
     options = Options(up=capture.up, visibility_scale=0.5, precision=torch.float64)
     points = torch.from_numpy(capture.cloud.positions)
@@ -131,7 +131,7 @@ def main() -> None:
     torch.manual_seed(11)
     networks = write_bundle(FOLDER / "bundle")
     write_capture(FOLDER / "capture")
-    write_looks(FOLDER, networks)
+    write_descriptors(FOLDER, networks)
 
 
 if __name__ == "__main__":

@@ -3,9 +3,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
-#include "support/expect_error.h"
 #include "image/files/image_file.h"
 #include "image/files/image_header.h"
+#include "support/expect_error.h"
 #include "support/temp_folder.h"
 
 namespace {

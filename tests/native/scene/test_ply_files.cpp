@@ -1,4 +1,4 @@
-// PLY clouds of every form, and files that are none.
+// PLY clouds of every form, and files that are not PLY.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -41,15 +41,15 @@ Projected reference(const Cloud& cloud, size_t i, const PinholeCamera& camera) {
 }
 
 // Every point that the reference sees well inside of a pixel is visible there or behind the one that is; no other is.
-void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double near, double least_px = 0.01) {
+void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double near, double min_px = 0.01) {
   const FrontPoints visible(cloud.positions(), camera, near);
   ASSERT_EQ(visible.points.size(), size_t(camera.width_px) * size_t(camera.height_px));
   for (size_t i = 0; i < cloud.x.size(); ++i) {
     const Projected at = reference(cloud, i, camera);
     if (!(at.depth > near * 1.000001L)) continue;
     const long double column = std::floor(at.column + 0.5L), row = std::floor(at.row + 0.5L);
-    const bool near_edge = std::abs(at.column + 0.5L - std::round(at.column + 0.5L)) < least_px ||
-                           std::abs(at.row + 0.5L - std::round(at.row + 0.5L)) < least_px;
+    const bool near_edge = std::abs(at.column + 0.5L - std::round(at.column + 0.5L)) < min_px ||
+                           std::abs(at.row + 0.5L - std::round(at.row + 0.5L)) < min_px;
     if (near_edge || column < 0 || row < 0 || column >= camera.width_px || row >= camera.height_px) continue;
     const size_t pixel = size_t(row) * size_t(camera.width_px) + size_t(column);
     ASSERT_NE(visible.points[pixel], kNoPoint) << "point " << i;
@@ -63,8 +63,8 @@ void expect_as_reference(const Cloud& cloud, const PinholeCamera& camera, double
     }
     ASSERT_LT(front, cloud.x.size());
     const Projected at = reference(cloud, front, camera);
-    EXPECT_NEAR(double(at.column), double(pixel % size_t(camera.width_px)), 0.5 + least_px);
-    EXPECT_NEAR(double(at.row), double(pixel / size_t(camera.width_px)), 0.5 + least_px);
+    EXPECT_NEAR(double(at.column), double(pixel % size_t(camera.width_px)), 0.5 + min_px);
+    EXPECT_NEAR(double(at.row), double(pixel / size_t(camera.width_px)), 0.5 + min_px);
     EXPECT_NEAR(double(visible.depths[pixel] / at.depth), 1, 1e-5);
   }
 }

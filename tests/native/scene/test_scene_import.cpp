@@ -371,7 +371,7 @@ TEST_F(SceneImport, FoldersWithoutACaptureAreASentence) {
   expect_refused(MAQ_ERROR_UNREADABLE, "no photo that can be used: 1 cameras without a photo (first: 7)");
 }
 
-// A reader that opened one would wait for ever.
+// A reader that opened one would wait indefinitely.
 TEST_F(SceneImport, PipesInPlaceOfFilesAreRefused) {
   open_colmap(MadeCapture());
   std::filesystem::remove(folder_.path() / "images" / "a.png");

@@ -192,16 +192,16 @@ TEST(ScenePacking, TheFractionOfViewDependentPointsIsKeptByTheMostViewDependent)
     const std::vector<uint32_t> order = order_points(points, packing).points;
     const Scene scene = make_scene(points, packing);
     EXPECT_NEAR(scene.view_dependent, fraction * 10'000, 1);
-    float least_kept = 1e9f, most_dropped = 0;
+    float min_kept = 1e9f, max_dropped = 0;
     for (uint32_t b = 0; b < scene.block_count; ++b) {
       const SceneBlock& block = scene.blocks[b];
       for (uint32_t k = 0; k < block.count; ++k) {
         const float view_dependence = points.view_dependence[order[block.first + k]];
-        if (k < block.view_dependent) least_kept = std::min(least_kept, view_dependence);
-        if (k >= block.view_dependent) most_dropped = std::max(most_dropped, view_dependence);
+        if (k < block.view_dependent) min_kept = std::min(min_kept, view_dependence);
+        if (k >= block.view_dependent) max_dropped = std::max(max_dropped, view_dependence);
       }
     }
-    EXPECT_GE(least_kept, most_dropped);
+    EXPECT_GE(min_kept, max_dropped);
   }
   std::fill(points.view_dependence.begin(), points.view_dependence.end(), 1.0f);
   packing.max_view_dependent_fraction = 0.5f;

@@ -47,7 +47,7 @@ TEST_F(LiveCameras, AreListedWithWhatTheyOfferOrWhyTheyCannotBeOpened) {
   EXPECT_NE(found[0].problem.find("group"), std::string::npos);
   fake_.mend();
   fake_.capabilities = V4L2_CAP_STREAMING | V4L2_CAP_VIDEO_OUTPUT;
-  EXPECT_TRUE(maq::list_v4l2_cameras(fake_).empty()) << "an output is no camera";
+  EXPECT_TRUE(maq::list_v4l2_cameras(fake_).empty()) << "an output is not a camera";
   fake_.unplug();
   EXPECT_TRUE(maq::list_v4l2_cameras(fake_).empty());
 }

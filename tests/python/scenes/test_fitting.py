@@ -59,7 +59,7 @@ def test_a_camera_that_looks_along_up_stays_as_it_is():
 
 
 @pytest.mark.parametrize("roll", [0.0, 0.2, 0.8, np.pi / 2])
-def test_the_upright_frame_holds_the_whole_photo_and_little_more(roll):
+def test_the_aligned_frame_holds_the_whole_photo_and_little_more(roll):
     camera = looking((1, 0.7, 2), (0, 0, 0), 100, 60, roll)
     turned = upright(camera, np.array([0, 1.0, 0]), 16)
     assert turned.width_px % 16 == turned.height_px % 16 == 0

@@ -17,7 +17,7 @@ def scene_of(model: FittedPoints, networks_sha256: str, coefficients: int = 2, p
     head = np.zeros((), HEAD)
     head["magic"], head["version"], head["head_bytes"] = MAGIC, VERSION, HEAD.itemsize
     head["origin"], head["up"] = (0.5, -0.25, 1), (0, 1, 0)
-    head["place_kind"], head["coefficient_kind"] = places, coefficients
+    head["position_kind"], head["coefficient_kind"] = places, coefficients
     head["networks_sha256"] = np.frombuffer(bytes.fromhex(networks_sha256), np.uint8)
     order = np.argsort(at[:, 0], kind="stable")
     blocks, stored, kept, varying, first_varying = [], [], [], [], 0

@@ -17,13 +17,13 @@ constexpr int kMaxGapSplits = 2;  // one after the other: four blocks of one
 
 class BlockSplitter {
  public:
-  BlockSplitter(uint32_t max_points, BlockOrder& blocks) : most_points_(max_points), blocks_(blocks) {}
+  BlockSplitter(uint32_t max_points, BlockOrder& blocks) : max_points_(max_points), blocks_(blocks) {}
 
   void split(Entry* begin, Entry* end) {
     const size_t count = size_t(end - begin);
-    if (count <= most_points_) return split_gaps(begin, end, kMaxGapSplits);
-    const size_t blocks = (count + most_points_ - 1) / most_points_;
-    Entry* middle = begin + blocks / 2 * most_points_;
+    if (count <= max_points_) return split_gaps(begin, end, kMaxGapSplits);
+    const size_t blocks = (count + max_points_ - 1) / max_points_;
+    Entry* middle = begin + blocks / 2 * max_points_;
     std::nth_element(begin, middle, end, LessAlongAxis{longest_axis(begin, end)});
     split(begin, middle);
     split(middle, end);
@@ -80,7 +80,7 @@ class BlockSplitter {
     blocks_.ends.push_back(uint32_t(blocks_.order.size()));
   }
 
-  const uint32_t most_points_;
+  const uint32_t max_points_;
   BlockOrder& blocks_;
 };
 

@@ -20,7 +20,7 @@ constexpr int kMultiple = DescriptorRaster::kMultiple;
 // (export/scenes/config.py has the same).
 constexpr int kRotatedMultiple = 64;
 // The scene's background shows where no point is within 16 x 16 pixels, and fades towards there: within them the image
-// is the refiner's (export/scenes/modelling.py has the same). An app's own is blended by alpha.
+// is the refiner's (export/scenes/fitting.py has the same). An app's own is blended by alpha.
 constexpr int kOwnBackgroundGain = 4;
 
 void check_render_camera(const PinholeCamera& camera) {

@@ -1,16 +1,14 @@
-// A picture in memory, as textures take it.
-#ifndef MAQUETTE_PICTURE_HPP_
-#define MAQUETTE_PICTURE_HPP_
+// An image in memory, as textures take it.
+#pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <maquette/maquette.hpp>
 #include <vector>
-
-#include "maquette/maquette.hpp"
 
 namespace maquette {
 
-struct Picture {
+struct RgbaImage {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> rgba;  // rows from top to bottom, 4 bytes a pixel
 
@@ -18,14 +16,16 @@ struct Picture {
     width_px = width, height_px = height;
     rgba.resize(size_t(width) * size_t(height) * 4);
   }
+  void clear() { resize(0, 0); }
   bool empty() const { return rgba.empty(); }
 
-  void take(const Frame& frame) {
-    resize(frame.desc().width_px, frame.desc().height_px);
+  void copy_from(const Frame& frame) {
+    const maq_frame_desc desc = frame.desc();
+    resize(desc.width_px, desc.height_px);
     frame.copy_pixels(MAQ_PIXEL_RGBA8, rgba.data(), 0, rgba.size());
   }
-  // For the library, without a copy: the pixels must stay until the frame is gone.
-  Frame frame(const Context& context) const {
+  // A frame of these pixels, without a copy: they must stay as they are until the frame is gone.
+  Frame as_frame(const Context& context) const {
     maq_frame_desc desc;
     check(maq_frame_desc_init(&desc, sizeof desc), nullptr);
     desc.format = MAQ_PIXEL_RGBA8;
@@ -37,5 +37,3 @@ struct Picture {
 };
 
 }  // namespace maquette
-
-#endif  // MAQUETTE_PICTURE_HPP_

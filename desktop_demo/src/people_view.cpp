@@ -1,0 +1,180 @@
+#include "people_view.h"
+
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+#include <algorithm>
+#include <cstdio>
+#include <iterator>
+#include <maquette/densepose_mesh.hpp>
+#include <thread>
+#include <utility>
+
+namespace {
+
+constexpr char kRenderedPeople[] = "stub:people?count=2";
+constexpr const char* kStages[] = {"trunk", "proposals", "box head", "dense head", "decode", "resize", "copy", "wait"};
+
+maquette::LiveDensePoseOptions live_options(const Options& options) {
+  maquette::LiveDensePoseOptions live;
+  live.real_time = !options.headless;
+  live.max_results = options.frames;
+  if (options.headless) live.reconnect_ms = 4000;
+  return live;
+}
+
+}  // namespace
+
+PeopleView::PeopleView(const maquette::Context& context, const Window& window, Painter& painter, const Options& options)
+    : window_(window),
+      painter_(painter),
+      bundle_(options.bundle),
+      model_(options.model),
+      view_(options.view),
+      shows_mesh_(options.mesh),
+      live_(
+          context, options.model,
+          [this](maquette::PipelineResult mapped, double rate) {
+            frames_.back().copy_from(std::move(mapped), rate, &seen_);
+            frames_.publish();
+            Window::wake();
+          },
+          Window::wake, live_options(options)) {
+  model_.bundle_path = bundle_.c_str();
+  // Software OpenGL compiles a shader when it draws with it first: now, before the user waits.
+  for (const View view : {View::kCamera, View::kParts}) painter_.draw_people(view, {0, 0, 8, 8});
+  painter_.draw_body({0, 0, 8, 8}, 0, 0);
+}
+
+void PeopleView::open(const std::string& uri) {
+  stages_.clear();
+  seeks_camera_ = uri == kFirstCamera;
+  live_.open(uri, seeks_camera_ ? kRenderedPeople : "");
+}
+
+void PeopleView::set_visible(bool is_visible) {
+  is_visible_ = is_visible;
+  stages_.clear();
+  apply_pause();
+}
+
+bool PeopleView::update() {
+  if (!has_surface_) {
+    if (const std::optional<maq_densepose_surface> surface = live_.surface()) {
+      const size_t count = size_t(24 * 3) * size_t(surface->nodes) * size_t(surface->nodes);
+      painter_.set_body(maquette::DensePoseMesh({surface->points_m, surface->points_m + count}, surface->nodes));
+      has_surface_ = true;
+    }
+  }
+  has_ended_ = live_.status().has_ended;  // asked before the frame is taken, which then is the last
+  if (!frames_.take()) return false;
+  painter_.set_frame(frame());
+  const maq_densepose_stats& s = frame().stats;
+  stages_.add({s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.decode_ms, s.preprocess_ms,
+               float(frame().copying_ms), float(frame().waiting_ms)});
+  return true;
+}
+
+void PeopleView::press(int key) {
+  if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) view_ = View(key - GLFW_KEY_1);
+  if (key == GLFW_KEY_M) shows_mesh_ = !shows_mesh_;
+  if (key == GLFW_KEY_P) {
+    is_paused_ = !is_paused_;
+    apply_pause();
+  }
+}
+
+void PeopleView::steer(const Steering& steering) {
+  yaw_ -= steering.right();
+  pitch_ = std::clamp(pitch_ + steering.down(), -1.5f, 1.5f);
+}
+
+void PeopleView::draw(const Rect& area) {
+  mesh_rect_ = {};
+  if (frame().number == 0) return;
+  image_rect_ = area.fit(frame().camera.width_px, frame().camera.height_px);
+  painter_.draw_people(view_, image_rect_);
+  if (view_ == View::kBoxes) draw_boxes();
+  if (!shows_mesh_) return;
+  const int side = std::min(area.width, area.height) * 3 / 10;
+  mesh_rect_ = {0, area.height - side, side, side};
+  painter_.draw_body(mesh_rect_, yaw_, pitch_);
+}
+
+void PeopleView::draw_boxes() const {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const float scale = float(image_rect_.width) / float(frame().camera.width_px);
+  const auto on_screen = [&](float x, float y) {
+    return ImVec2(float(image_rect_.x) + x * scale, float(image_rect_.y) + y * scale);
+  };
+  for (const maq_person& person : frame().people) {
+    const ImVec2 from = on_screen(person.box_px[0], person.box_px[1]);
+    const ImVec2 to = on_screen(person.box_px[2], person.box_px[3]);
+    list->AddRect(from, to, IM_COL32(255, 255, 255, 255), 0, 0, 2 * window_.scale());
+    char score[8];
+    std::snprintf(score, sizeof score, "%.2f", double(person.score));
+    const ImVec2 size = ImGui::CalcTextSize(score);
+    const float top = std::max(float(image_rect_.y), from.y - size.y - 4);
+    list->AddRectFilled({from.x, top}, {from.x + size.x + 8, top + size.y + 4}, IM_COL32(255, 255, 255, 255));
+    list->AddText({from.x + 4, top + 2}, IM_COL32(24, 26, 40, 255), score);
+  }
+}
+
+std::string PeopleView::message() const {
+  const maquette::LiveDensePoseStatus status = live_.status();
+  const std::string text = status.problem.empty() ? status.activity : status.problem;
+  const bool shows_stand_ins = seeks_camera_ && status.uri == kRenderedPeople && !text.empty();
+  return text + (shows_stand_ins ? " These people are rendered; drop a photo, a clip or a recording here." : "");
+}
+
+Action PeopleView::draw_panel() {
+  Action action = Action::kNone;
+  const maquette::LiveDensePoseStatus status = live_.status();
+  const maq_densepose_stats& stats = frame().stats;
+  ImGui::TextWrapped("%s", status.uri.c_str());
+  if (ImGui::SmallButton("Look for a camera")) action = Action::kOpenCamera;
+  ImGui::Text("%.1f frames a second, %llu dropped", frame().results_per_second,
+              static_cast<unsigned long long>(status.dropped_frames));
+  ImGui::Text("%.1f ms a frame, %d %s%s", double(stats.total_ms), stats.person_count,
+              stats.person_count == 1 ? "person" : "people", stats.is_key_frame != 0 ? "" : ", tracked");
+  if (frame().age_ms >= 0) ImGui::Text("from camera to result: %.0f ms", frame().age_ms);
+  stages_.draw(kStages, std::size(kStages), window_.scale());
+  draw_views();
+  ImGui::Separator();
+  ImGui::TextWrapped("%s, %d x %d", bundle_.substr(bundle_.rfind('/') + 1).c_str(), stats.network_width_px,
+                     stats.network_height_px);
+  draw_model_options();
+  return action;
+}
+
+void PeopleView::draw_views() {
+  ImGui::TextUnformatted("Views (1 to 6)");
+  for (size_t view = 0; view < kViewNames.size(); ++view) {
+    if (view % 3 != 0) ImGui::SameLine(float(view % 3) * 100 * window_.scale());
+    if (ImGui::RadioButton(kViewNames[view], view_ == View(view))) view_ = View(view);
+  }
+  ImGui::Checkbox("body surface (M)", &shows_mesh_);
+  ImGui::SameLine();
+  if (ImGui::Checkbox("pause (P)", &is_paused_)) apply_pause();
+  if (view_ == View::kTryOn) ImGui::TextWrapped("Drop a picture to wear it.");
+}
+
+void PeopleView::draw_model_options() {
+  const int cores = int(std::max(1u, std::thread::hardware_concurrency()));
+  bool changed = false;
+  // Loading takes a moment, so a slider counts when it is released.
+  const auto slider = [&](const char* name, int* value, int min, int max, const char* format) {
+    ImGui::SliderInt(name, value, min, max, format, ImGuiSliderFlags_AlwaysClamp);
+    changed |= ImGui::IsItemDeactivatedAfterEdit();
+  };
+  slider("threads", &model_.threads, 0, cores, model_.threads == 0 ? "all cores" : "%d");
+  slider("key frames", &model_.key_frame_interval, 1, 30, model_.key_frame_interval == 1 ? "every" : "one in %d");
+  slider("long side", &model_.long_side_px, 0, 1024, model_.long_side_px == 0 ? "the model's" : "%d px");
+  if (model_.long_side_px > 0) model_.long_side_px = std::max(64, model_.long_side_px);
+  bool parts_alone = model_.detail == MAQ_DENSEPOSE_DETAIL_PART;
+  if (ImGui::Checkbox("parts alone, no U and V", &parts_alone)) {
+    model_.detail = parts_alone ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
+    changed = true;
+  }
+  changed |= ImGui::CheckboxFlags("threads stay awake", &model_.allow_spinning, 1);
+  if (changed) live_.set_model(model_);
+}

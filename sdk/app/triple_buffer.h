@@ -1,0 +1,37 @@
+// Hands values from one thread to another: the newest wins, neither thread waits, nothing is copied.
+#pragma once
+
+#include <mutex>
+#include <utility>
+
+namespace maquette {
+
+template <class T>
+class TripleBuffer {
+ public:
+  // Of the writing thread: the value that it fills next. It holds an older one, whose memory can be used again.
+  T& back() { return back_; }
+  // Of the writing thread: back() is the newest value from now on.
+  void publish() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    std::swap(back_, middle_);
+    is_fresh_ = true;
+  }
+
+  // Of the reading thread: true when front() has become a newer value.
+  bool take() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (!is_fresh_) return false;
+    std::swap(front_, middle_);
+    is_fresh_ = false;
+    return true;
+  }
+  const T& front() const { return front_; }
+
+ private:
+  std::mutex mutex_;
+  T back_{}, middle_{}, front_{};
+  bool is_fresh_ = false;
+};
+
+}  // namespace maquette

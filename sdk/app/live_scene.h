@@ -23,9 +23,9 @@
 namespace maquette {
 
 struct LiveSceneImage {
-  // Photo and error (mean of the channels) are empty unless the camera is a photo's;
+  // Photo and error (mean of the channels) are empty unless the camera is that of a photo.
   RgbaImage rendering, photo, error;
-  double psnr_db = 0;  // this is NaN then, and infinite where nothing differs
+  double psnr_db = 0;  // NaN where the photo is empty, infinite where nothing differs
   int photo_index = -1;
   maq_pinhole_camera camera{};  // of the rendering's size
   maq_scene_image_stats stats{};

@@ -92,7 +92,7 @@ def measure(
     """Rows; the places (name, real, photos, points, size, or why it is `missing`); and for each of them one photo with
     its pictures, to be looked at: name, photo, pictures by way."""
     rows, places, shown = rows_of(settings), [], []
-    folders = [(folder, False) for folder in sources.positions] + [(folder, True) for folder in sources.real]
+    folders = [(folder, False) for folder in sources.places] + [(folder, True) for folder in sources.real]
     with tqdm(total=len(folders) * (1 + len(settings)), desc="scenes", unit="setting", disable=None) as progress:
         for folder, real in folders:
             try:

@@ -23,8 +23,8 @@ namespace {
 constexpr const char* kSchema = "maquette-bench-2";
 // Sources take turns in blocks of so many frames, so that a busy moment of the machine meets all of them.
 constexpr int kBlock = 10;
-constexpr double kMostOthers = 0.05;  // of all cores: more, and the figures are others' too
-constexpr double kMostSpread = 1.5;   // p90 by p50
+constexpr double kMaxOthers = 0.05;  // of all cores: more, and the figures are others' too
+constexpr double kMaxSpread = 1.5;   // p90 by p50
 constexpr double kMibibyte = 1024.0 * 1024.0;
 
 struct Options {
@@ -114,8 +114,8 @@ class Case {
       reasons.emplace_back(text);
     }
     const double spread = percentile(kStageCount - 1, 90) / std::max(1e-6, frame_ms());
-    if (spread > kMostSpread) {
-      std::snprintf(text, sizeof text, "p90 is %.2f times p50, %.2f allowed", spread, kMostSpread);
+    if (spread > kMaxSpread) {
+      std::snprintf(text, sizeof text, "p90 is %.2f times p50, %.2f allowed", spread, kMaxSpread);
       reasons.emplace_back(text);
     }
     return reasons;
@@ -225,7 +225,7 @@ int run_bench(const Options& options) {
   nlohmann::ordered_json machine = describe_machine();
   const double others = std::max(0.0, others_s) / (std::max(1e-3, wall_s) * machine.at("cores").get<double>());
   std::vector<std::string> reasons;
-  if (others > kMostOthers) {
+  if (others > kMaxOthers) {
     char text[128];
     std::snprintf(text, sizeof text, "other processes had %.0f %% of the processor", 100 * others);
     reasons.emplace_back(text);

@@ -14,8 +14,8 @@ class AtomicFile {
   // Throws MAQ_ERROR_UNWRITABLE where the folder does not exist or may not be written to, and where `path` is something
   // other than a file. `temporary_extension` ends the temporary name, for libraries that choose a format by it.
   explicit AtomicFile(std::string path, const char* temporary_extension = "");
-  // Removes what was written, unless commit() was called. A process that dies before leaves the temporary file behind: its
-  // name is that of the file with ".part" and two numbers.
+  // Removes what was written, unless commit() was called. A process that dies before leaves the temporary file behind:
+  // its name is that of the file with ".part" and two numbers.
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;

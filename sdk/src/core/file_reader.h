@@ -19,7 +19,8 @@ enum class ByteOrder { kLittle, kBig };
 
 class FileReader {
  public:
-  // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE for what is not a file or may not be read.
+  // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE for what is not a readable
+  // file.
   explicit FileReader(std::string path);
 
   const std::string& path() const { return path_; }

@@ -30,7 +30,7 @@ class FrameOwner {
   virtual ~FrameOwner() = default;
   // Returns a buffer. From any thread, once for each time it was lent.
   virtual void give_back(int slot) = 0;
-  // The buffer as a dma-buf, which stays the owner's; -1 when there is none. From any thread, for a buffer that is held.
+  // The buffer as a dma-buf, which stays the owner's; -1 when there is none. From any thread, for a held buffer.
   virtual int dma_buf(int) { return -1; }
 };
 

@@ -1,20 +1,21 @@
 // Modules: parts of the SDK that bring foreign libraries along (OpenCV's codecs, libcamera, DepthAI). Each is a shared
 // library of its own, opened when it is first needed, so that an app without cameras or files does without them.
 //
-// Exceptions may cross the boundary between the SDK and a module, under two rules:
-// - What a call throws to the other side is an Error, or another exception of the standard library. Both sides are built
-//   together and share one C++ runtime, so that their types are the same. A foreign library's own exceptions
-//   (cv::Exception, dai::…) are caught inside the module and thrown again as one of those, because the module's symbols
-//   are private (RTLD_LOCAL).
-// - A call that a foreign library's thread, or C code, makes into either side is noexcept.
+// Exceptions may cross the boundary between the SDK and a module, under these rules:
+// - A module throws an Error or an exception of the standard library, nothing else. Both sides are built together and
+//   share one C++ runtime; libstdc++ compares the types of exceptions by name, so that they match although the symbols
+//   of a module are private (RTLD_LOCAL).
+// - The exceptions of a foreign library (cv::Exception, those of DepthAI) are caught inside the module, and told as one
+//   of the above or by the function's result.
+// - What a thread of a foreign library, or C code, calls is noexcept.
 #pragma once
 
 #include <string>
 
 namespace maq {
 
-// What a module exports, by a function without arguments: its version, which must be that of the SDK, and an object whose
-// type both sides know.
+// What a module exports, by a function without arguments: its version, which must be that of the SDK, and an object
+// whose type both sides know.
 struct ModuleExport {
   const char* version;
   void* object;
@@ -28,9 +29,9 @@ std::string library_folder();
 std::string module_path(const char* file);
 
 // Opens a module and returns the object that its function `symbol` exports. It is never closed again: the foreign
-// libraries do not survive unloading, and their threads may still run. Throws MAQ_ERROR_RUNTIME_LIBRARY where the module
-// is missing or of another build; the sentence begins with `needed_for` ("Image and video files need") and ends with
-// `remedy`.
+// libraries do not survive unloading, and their threads may still run. Throws MAQ_ERROR_RUNTIME_LIBRARY where the
+// module is missing or of another build; the sentence begins with `needed_for` ("Image and video files need") and ends
+// with `remedy`.
 void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy);
 
 }  // namespace maq

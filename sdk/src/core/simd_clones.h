@@ -1,5 +1,6 @@
-// Functions whose loops the compiler turns into vectors twice: for any processor of the architecture and, on x86-64, for
-// AVX2; which one runs is decided when the library is loaded. Both give the same bits: neither fuses multiply and add.
+// Functions whose loops the compiler turns into vectors twice: for any processor of the architecture and, on x86-64,
+// for AVX2; which one runs is decided when the library is loaded. Both give the same bits: neither fuses multiply and
+// add.
 #pragma once
 
 // Sanitizers are not ready yet when the loader asks which version to take.

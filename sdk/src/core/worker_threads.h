@@ -20,8 +20,8 @@ int default_threads();
 
 class WorkerThreads {
  public:
-  // `count` includes the thread that calls run(), so that of 1 none is started. Throws MAQ_ERROR_INVALID_ARGUMENT unless it
-  // is 1 to kMaxThreads, and std::system_error where the system has no more threads.
+  // `count` includes the thread that calls run(), so that of 1 none is started. Throws MAQ_ERROR_INVALID_ARGUMENT
+  // unless it is 1 to kMaxThreads, and std::system_error where the system has no more threads.
   explicit WorkerThreads(int count);
   ~WorkerThreads();
   WorkerThreads(const WorkerThreads&) = delete;
@@ -29,9 +29,9 @@ class WorkerThreads {
 
   int count() const { return int(threads_.size()) + 1; }
 
-  // Calls work(task, worker) once for each task below `tasks`, in no order, with worker below count() and never twice at
-  // once for the same worker. Returns when all are done; throws what one of them threw, after which the rest is skipped.
-  // Not for two threads at once.
+  // Calls work(task, worker) once for each task below `tasks`, in no order, with worker below count() and never twice
+  // at once for the same worker. Returns when all are done; throws what one of them threw, after which the rest is
+  // skipped. Not for two threads at once.
   template <class Work>
   void run(size_t tasks, Work&& work) {
     run_with(

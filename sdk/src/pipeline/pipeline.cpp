@@ -139,7 +139,7 @@ struct Pipeline::State {
     return {camera, camera == MAQ_PIPELINE_STALLED ? MAQ_TIMEOUT : MAQ_ERROR_DEVICE_LOST, camera_problem};
   }
 
-  // After each change: wakes whoever waits for it, and queues a report.
+  // After each change: wakes the calls that wait for it, and queues a report.
   void note_change() {
     changed.notify_all();
     PipelineStatus latest = status();

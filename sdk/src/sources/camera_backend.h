@@ -57,8 +57,8 @@ class Camera : public FrameOwner {
   virtual const std::string& identity() const = 0;
   // Null when the device does not know.
   virtual const maq_intrinsics* calibration() const { return nullptr; }
-  // From any thread. Throw MAQ_ERROR_UNSUPPORTED for what the device does not have, MAQ_ERROR_INVALID_ARGUMENT for values
-  // out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
+  // From any thread. Throw MAQ_ERROR_UNSUPPORTED for what the device does not have, MAQ_ERROR_INVALID_ARGUMENT for
+  // values out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
   virtual maq_control_info control(maq_control which);
   virtual void set_control(maq_control which, double value);
   // From any thread, of a replay: the next frame is the first at that time or later.

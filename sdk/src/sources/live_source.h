@@ -1,4 +1,4 @@
-// A camera as a source: a thread takes the camera's frames, keeps the newest, and opens the camera again when it was lost.
+// A camera as a source: a thread takes its frames, keeps the newest, and opens the camera again when it was lost.
 #pragma once
 
 #include <memory>

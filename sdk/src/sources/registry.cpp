@@ -72,7 +72,7 @@ const Entry* find_entry(const std::string& scheme) {
   return found == std::end(kEntries) ? nullptr : found;
 }
 
-// Opens a source that is not a camera. Pictures larger than the settings allow are made smaller, which is kept in `uri`.
+// Opens a source that is not a camera. Pictures larger than the settings allow are scaled down; `uri` keeps the size.
 std::unique_ptr<Source> open_within(const Entry& entry, SourceUri& uri, const SourceSettings& settings) {
   std::unique_ptr<Source> source = entry.open(uri, settings.log);
   const SourceInfo& info = source->info();

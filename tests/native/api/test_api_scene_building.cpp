@@ -288,7 +288,7 @@ TEST_F(ApiSceneBuilding, CamerasAndPhotosThatDoNotFitAreRefusedAndChangeNothing)
     for (int i = 0; i < 3; ++i) camera.rotation[i] *= -1;
   });
   expect(MAQ_ERROR_INVALID_ARGUMENT, "camera.struct_size", [](auto& camera) { camera.struct_size = 0; });
-  // With a distortion too: nothing is undistorted by figures that are none.
+  // With a distortion too: nothing is undistorted by numbers that are not finite.
   expect(MAQ_ERROR_INVALID_ARGUMENT, "focal lengths", [](auto& camera) {
     camera.intrinsics.fy_px = -3;
     camera.intrinsics.distortion[0] = 0.1;

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "support/expect_error.h"
 #include "sources/uri.h"
+#include "support/expect_error.h"
 
 namespace {
 

@@ -52,7 +52,8 @@ class FakeV4l2 : public maq::SystemCalls {
 
   // --- what a test does
 
-  // From now on `call` (a request, or one of the above) fails `times` times with `error`, after so many calls that work.
+  // From now on `call` (a request, or one of the above) fails `times` times with `error`, after so many calls that
+  // work.
   void break_call(unsigned long call, int error, int after = 0, int times = INT_MAX) {
     std::lock_guard<std::mutex> lock(mutex_);
     faults_ = {{call, {error, after, times}}};
@@ -91,8 +92,8 @@ class FakeV4l2 : public maq::SystemCalls {
     faults_.clear();
   }
 
-  // Fills the next queued buffer with the byte `value`, of its second plane of memory with `value + 1`; false when none is
-  // queued: the frame is lost, as in a driver. `bytes`: in each plane at most.
+  // Fills the next queued buffer with the byte `value`, of its second plane of memory with `value + 1`; false when none
+  // is queued: the frame is lost, as in a driver. `bytes`: in each plane at most.
   bool deliver(uint8_t value, uint32_t flags = 0, size_t bytes = SIZE_MAX) {
     return fill(flags, bytes,
                 [value](int plane, uint8_t* data, size_t size) { std::memset(data, value + plane, size); });

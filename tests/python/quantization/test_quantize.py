@@ -75,8 +75,8 @@ def test_a_name_that_matches_nothing_is_an_error(folder):
         matching_nodes(graph, ("/scores/*",))
 
 
-def test_nobody_to_calibrate_with_is_an_error(folder, tmp_path):
-    with pytest.raises(ValueError, match="nobody"):
+def test_no_person_to_calibrate_with_is_an_error(folder, tmp_path):
+    with pytest.raises(ValueError, match="no person"):
         quantize_graph(folder / "dense_head.onnx", tmp_path / "x.onnx", [], GraphSettings())
 
 

@@ -20,8 +20,8 @@ struct DepthAiRequest {
   std::optional<bool> depth;  // nothing: where the device has it
 };
 
-// Opens the device whose id or address (USB path, IP) `device` is, or the first that is free when it is empty, and after
-// that the same device wherever it is plugged in; frames lie in `buffers` buffers at most. The opener throws
+// Opens the device whose id or address (USB path, IP) `device` is, or the first that is free when it is empty, and
+// after that the same device wherever it is plugged in; frames lie in `buffers` buffers at most. The opener throws
 // MAQ_ERROR_NOT_FOUND, MAQ_ERROR_NO_PERMISSION, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST, and MAQ_ERROR_UNSUPPORTED for a
 // device that lacks what is requested. `driver` must outlive it and the cameras.
 CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, DepthAiRequest request, int buffers,

@@ -15,9 +15,9 @@ struct DepthAiPair {
   std::optional<DepthAiFrame> depth;
 };
 
-// Time decides, not the number: the cameras of a device count from where each of them began. The nearest depth image that
-// is at most half a frame period away is the picture's; of two that are as near, the one of the same number. Where a
-// device gives no times, equal numbers pair. All times are CLOCK_MONOTONIC.
+// Time decides, not the number: the cameras of a device count from where each of them began. The nearest depth image
+// that is at most half a frame period away is the picture's; of two that are as near, the one of the same number. Where
+// a device gives no times, equal numbers pair. All times are CLOCK_MONOTONIC.
 class DepthAiPairing {
  public:
   DepthAiPairing(double fps, bool with_depth);

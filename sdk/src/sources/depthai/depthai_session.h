@@ -1,5 +1,5 @@
-// What the SDK needs of a DepthAI device (an OAK camera of Luxonis), in its own types. depthai_session.cpp does it with the
-// vendor's library, in a library of its own, libmaquette_depthai.so; tests do it in memory.
+// What the SDK needs of a DepthAI device (an OAK camera of Luxonis), in its own types. depthai_session.cpp does it with
+// the vendor's library, in a library of its own, libmaquette_depthai.so; tests do it in memory.
 //
 // Everything a device says is a claim: DepthAiCamera checks it. Every call may throw a std::exception with a text.
 #pragma once

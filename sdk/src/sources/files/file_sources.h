@@ -15,8 +15,9 @@ std::unique_ptr<Source> open_image_source(SourceUri uri);
 // MAQ_ERROR_IMAGE_SIZE; next() throws MAQ_ERROR_UNREADABLE when the clip ends before its header says.
 std::unique_ptr<Source> open_video_source(SourceUri uri);
 
-// The scheme for a file: "image", "video" or "rec", by how the file begins, else by its extension. A file that is missing
-// or cannot be read is an "image": opening it says what is wrong. Throws MAQ_ERROR_INVALID_ARGUMENT for a folder.
+// The scheme for a file: "image", "video" or "rec", by how the file begins, else by its extension. A file that is
+// missing or cannot be read is an "image": opening it says what is wrong. Throws MAQ_ERROR_INVALID_ARGUMENT for a
+// folder.
 const char* scheme_of_file(const std::string& path);
 
 }  // namespace maq

@@ -1,5 +1,5 @@
-// The controls of a camera of libcamera. Each request takes one setting to the camera, so what was set goes out with the
-// next ones, in order.
+// The controls of a camera of libcamera. Each request takes one setting to the camera, so what was set goes out with
+// the next ones, in order.
 #pragma once
 
 #include <libcamera/controls.h>

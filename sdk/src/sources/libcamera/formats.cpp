@@ -104,7 +104,8 @@ void choose_libcamera_format(libcamera::CameraConfiguration& configuration, cons
         request.format != known.format.toString()) {
       continue;
     }
-    // The size that was asked for, and the nearest of the list: some cameras take any size, some the next smaller of the list.
+    // The size that was asked for, and the nearest of the list: some cameras take any size, some the next smaller of
+    // the list.
     std::vector<libcamera::Size> sizes = offered.sizes(known.format);
     const auto nearest = std::min_element(sizes.begin(), sizes.end(), [&](const auto& a, const auto& b) {
       return size_error(a, wanted) < size_error(b, wanted);

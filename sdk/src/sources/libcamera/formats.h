@@ -12,15 +12,16 @@
 
 namespace maq {
 
-// Acquired or not. Throws MAQ_ERROR_UNSUPPORTED for a camera that offers no pictures; `label` ("libcamera:0") begins the sentence.
+// Acquired or not. Throws MAQ_ERROR_UNSUPPORTED for a camera that offers no pictures; `label` ("libcamera:0") begins
+// the sentence.
 std::unique_ptr<libcamera::CameraConfiguration> libcamera_configuration(libcamera::Camera& camera,
                                                                         const std::string& label);
 
 // Every format and size of the camera.
 std::vector<CameraMode> libcamera_modes(const libcamera::CameraConfiguration& configuration);
 
-// Makes the configuration the nearest to the request: of all formats that both sides know, the one nearest in size, then the
-// cheapest to use. Throws MAQ_ERROR_UNSUPPORTED.
+// Makes the configuration the nearest to the request: of all formats that both sides know, the one nearest in size,
+// then the cheapest to use. Throws MAQ_ERROR_UNSUPPORTED.
 void choose_libcamera_format(libcamera::CameraConfiguration& configuration, const CameraRequest& request, int buffers,
                              const std::string& label);
 

@@ -37,8 +37,8 @@ Library& library() {
   return *one;
 }
 
-// The thread of the source that was destroyed last may still be closing its camera when the program ends. libcamera's own
-// static objects, which are destroyed after this one, must not go away under it; so the mutex is taken for good.
+// The thread of the source that was destroyed last may still be closing its camera when the program ends. libcamera's
+// own static objects, which are destroyed after this one, must not go away under it; so the mutex is taken for good.
 struct ExitGuard {
   ~ExitGuard() { [[maybe_unused]] const bool kept = library().mutex.try_lock_for(kExitTimeout); }
 } exit_guard;

@@ -25,8 +25,8 @@ constexpr char kLibcameraSymbol[] = "maquette_libcamera";
 
 // For "libcamera:0" or "libcamera:<id>", with size, fps and format as requests. Throws for unknown options.
 // Opening throws MAQ_ERROR_RUNTIME_LIBRARY without libmaquette_libcamera.so, and MAQ_ERROR_NOT_FOUND, _NO_PERMISSION,
-// _BUSY, _DEVICE_LOST, _OUT_OF_MEMORY, and _UNSUPPORTED for a camera without a format that this build knows. Opened again,
-// it is the camera of the same id, whatever number it has then.
+// _BUSY, _DEVICE_LOST, _OUT_OF_MEMORY, and _UNSUPPORTED for a camera without a format that this build knows. Opened
+// again, it is the camera of the same id, whatever number it has then.
 CameraOpener libcamera_uri_opener(SourceUri uri, int buffers, const Log& log);
 
 // The cameras that are connected; empty without the module.

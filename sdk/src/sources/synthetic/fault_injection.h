@@ -34,8 +34,8 @@ inline constexpr char kFaultOptions[] = "drop, corrupt, jitter, stall, unplug, h
 // Throws MAQ_ERROR_INVALID_ARGUMENT.
 FaultPlan take_faults(SourceUri& uri);
 
-// Adds the faults of the plan to the cameras that `open` opens: the same faults for the same seed and frames. The plan's
-// time and frame count continue when a camera is opened again.
+// Adds the faults of the plan to the cameras that `open` opens: the same faults for the same seed and frames. The
+// plan's time and frame count continue when a camera is opened again.
 CameraOpener with_faults(CameraOpener open, const FaultPlan& plan);
 
 }  // namespace maq

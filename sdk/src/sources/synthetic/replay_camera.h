@@ -17,7 +17,8 @@ struct ReplayOptions {
 };
 
 // Opens the source at once, and again for each loop. The cameras of the opener, one after another, continue in the same
-// source: frames due while none was open are lost, as with a camera that was unplugged. `identity` is Camera::identity().
+// source: frames due while none was open are lost, as with a camera that was unplugged. `identity` is
+// Camera::identity().
 CameraOpener replay_as_camera(std::function<std::unique_ptr<Source>()> open, std::string identity,
                               ReplayOptions options);
 

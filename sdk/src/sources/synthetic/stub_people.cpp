@@ -98,7 +98,7 @@ StubPeople::StubPeople(int count, uint64_t seed, int width_px, int height_px)
     const int width = std::max(2, walker.height_px * kTileWidthPx / kTileHeightPx);
     for (int frame = 0; frame < kCycleFrames; ++frame) {
       walker.tiles.push_back(crop_sprite(sheet, frame * kTileWidthPx, walker.row * kTileHeightPx, kTileWidthPx,
-                                        kTileHeightPx, width, walker.height_px, to_the_left));
+                                         kTileHeightPx, width, walker.height_px, to_the_left));
     }
     walkers_.push_back(std::move(walker));
   }

@@ -162,7 +162,8 @@ class V4l2Camera : public Camera {
     return !std::exchange(slot.is_held, true);
   }
 
-  // Shared, so that a slow control does not hold the lock, which returning a frame needs: the last owner closes the device.
+  // Shared, so that a slow control does not hold the lock, which returning a frame needs: the last owner closes the
+  // device.
   std::shared_ptr<const V4l2Device> open_device() {
     std::lock_guard<std::mutex> lock(mutex_);
     if (device_ == nullptr) throw Error(MAQ_ERROR_DEVICE_LOST, identity_, " is closed; plug it in again.");

@@ -1,0 +1,208 @@
+"""Who may include whom in the C++ code, how large a folder is, and that each says what it is for."""
+
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+SRC = Path("sdk/src")
+ROOTS = {"sdk/src": SRC, "sdk/app": Path("sdk/app"), "sdk/tools": Path("sdk/tools"), "demo": Path("desktop_demo/src")}
+CODE = (".h", ".hpp", ".cpp")
+MOST_FILES, SMALL_UNIT_LINES = 25, 60
+
+# Each folder of sdk/src, and the folders that its files may include beside their own. A folder in a folder is a room of
+# its own: "scene" means the files of sdk/src/scene, not those of its rooms.
+BASE = {"core", "image", "image/geometry", "image/files", "nn"}
+BACKEND = BASE - {"nn"} | {"sources"}
+CAPTURE = BASE | {"scene"}
+FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
+SEEN = FITTED | {"scene/visibility"}
+SCENE = SEEN | {"scene/build", "scene/render"}
+SYSTEMS = SCENE | {"densepose", "sources", "sources/recording"}
+MAY_INCLUDE = {
+    "core": set(),
+    "image": {"core", "image/geometry"},
+    "image/files": {"core", "image"},
+    "image/geometry": {"core", "image"},
+    "nn": {"core"},
+    "densepose": BASE,
+    "scene": BASE - {"nn"},
+    "scene/capture": CAPTURE,
+    "scene/networks": CAPTURE,
+    "scene/format": CAPTURE | {"scene/networks"},
+    "scene/visibility": FITTED - {"scene/capture"},
+    "scene/build": SEEN,
+    "scene/render": SEEN - {"scene/capture"},
+    "sources": BACKEND | {"sources/v4l2", "sources/libcamera", "sources/depthai", "sources/recording", "sources/files",
+                          "sources/synthetic"},
+    "sources/v4l2": BACKEND,
+    "sources/libcamera": BACKEND,
+    "sources/depthai": BACKEND,
+    "sources/recording": BACKEND,
+    "sources/files": BACKEND,
+    "sources/synthetic": BACKEND | {"sources/recording"},
+    "pipeline": SYSTEMS,
+    "api": SYSTEMS | {"pipeline"},
+}  # fmt: skip
+
+# sources/registry.cpp alone knows every backend; the other files of the folder know none.
+REGISTRY = "sources/registry.cpp"
+
+# Foreign headers, and the files that may include them.
+FOREIGN = {
+    r"onnxruntime.*": r"sdk/src/nn/.*",
+    r"linux/videodev2\.h": r"sdk/src/sources/v4l2/.*",
+    r"libcamera/.*": r"sdk/src/sources/libcamera/.*",
+    r"depthai/.*": r"sdk/src/sources/depthai/depthai_session\.cpp",
+    r"opencv2/.*": r"sdk/src/image/files/opencv_file_codecs\.cpp|sdk/tools/.*",
+    r"GLFW/.*|epoxy/.*|imgui.*|backends/imgui.*": r"desktop_demo/src/.*",
+    r"CLI/.*": r"sdk/tools/.*|desktop_demo/src/.*",
+}
+
+# Units under 60 lines that one other unit uses, each with its reason to be one.
+DEFENDED = {
+    "densepose/body_parts": "the names and colours of parts belong to dense pose; the C API only hands them out",
+    "scene/render/refiner_roi": "geometry with tests of its own, against every pixel that the refiner reads",
+}
+
+
+def code_files(root: Path) -> list[Path]:
+    return sorted(path for path in root.rglob("*") if path.suffix in CODE)
+
+
+def includes(path: Path) -> list[str]:
+    return re.findall(r'^\s*#\s*include\s+[<"]([^>"]+)[>"]', path.read_text(), re.MULTILINE)
+
+
+def folder_of(path: Path) -> str:
+    """Of a file of sdk/src: its folder as MAY_INCLUDE names it."""
+    return path.parent.relative_to(SRC).as_posix()
+
+
+def arrows() -> list[tuple[Path, Path]]:
+    """Includes within sdk/src, as (file, included file)."""
+    return [
+        (path, SRC / name) for path in code_files(SRC) for name in includes(path) if (SRC / name).is_file()
+    ]  # fmt: skip
+
+
+def units(root: Path) -> dict[str, list[Path]]:
+    """The files of each unit: a header and the source of its name."""
+    found = defaultdict(list)
+    for path in code_files(root):
+        found[path.with_suffix("").as_posix()].append(path)
+    return found
+
+
+def test_every_folder_has_its_layer():
+    folders = {folder_of(path) for path in code_files(SRC)}
+    assert sorted(folders - MAY_INCLUDE.keys()) == []
+    assert sorted(name for name, known in MAY_INCLUDE.items() if known - MAY_INCLUDE.keys()) == []
+
+
+def test_no_include_goes_up_or_across():
+    wrong = []
+    for path, included in arrows():
+        here, there = folder_of(path), folder_of(included)
+        known = there in MAY_INCLUDE[here] and not (here == "sources" and there.startswith("sources/"))
+        if here == there or known:
+            continue
+        if path.relative_to(SRC).as_posix() == REGISTRY and there in MAY_INCLUDE["sources"]:
+            continue
+        wrong.append(f"{path} includes {included.relative_to(SRC)}: {here} may not know {there}")
+    assert wrong == []
+
+
+def test_the_folders_have_no_cycle():
+    """Of the layers as written, image with its two rooms and sources with its backends taken as one each."""
+
+    def whole(folder: str) -> str:
+        return folder.split("/")[0] if folder.startswith(("image", "sources")) else folder
+
+    below = defaultdict(set)
+    for folder, known in MAY_INCLUDE.items():
+        below[whole(folder)] |= {whole(name) for name in known} - {whole(folder)}
+    while below:
+        ends = [folder for folder, known in below.items() if not known & below.keys()]
+        assert ends, f"a cycle between {sorted(below)}"
+        for folder in ends:
+            del below[folder]
+
+
+def test_no_file_includes_itself_by_way_of_others():
+    below = defaultdict(set)
+    for path, included in arrows():
+        below[path].add(included)
+    while True:
+        ends = [path for path, known in below.items() if not known & below.keys()]
+        if not ends:
+            break
+        for path in ends:
+            del below[path]
+    assert sorted(map(str, below)) == []
+
+
+def test_what_stands_on_the_public_headers_includes_nothing_of_the_library():
+    """The app library, the tools and the demo know include/maquette, their own files, and the app library."""
+    wrong = []
+    for name in ("sdk/app", "sdk/tools", "demo"):
+        root = ROOTS[name]
+        for path in code_files(root):
+            for header in includes(path):
+                own = (path.parent / header).is_file() or (root / header).is_file()
+                if not own and (SRC / header).is_file():
+                    wrong.append(f"{path} includes {header} of sdk/src")
+                if name == "sdk/app" and header.startswith(("opencv2/", "GLFW/", "epoxy/", "imgui")):
+                    wrong.append(f"{path} includes {header}")
+                if name == "sdk/tools" and header.startswith("app/"):
+                    wrong.append(f"{path} includes {header}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("header", FOREIGN)
+def test_foreign_headers_stay_behind_their_doors(header):
+    files = [path for root in ROOTS.values() for path in code_files(root)]
+    users = {path.as_posix() for path in files for name in includes(path) if re.fullmatch(header, name)}
+    assert sorted(path for path in users if not re.fullmatch(FOREIGN[header], path)) == []
+
+
+def test_no_folder_has_more_files_than_a_reader_takes_in():
+    counts = defaultdict(int)
+    for path in code_files(SRC):
+        counts[folder_of(path)] += 1
+    assert {folder: count for folder, count in counts.items() if count > MOST_FILES} == {}
+
+
+@pytest.mark.parametrize("folder", sorted({path.parent for path in code_files(SRC)}, key=str), ids=str)
+def test_every_folder_says_what_it_is_for(folder):
+    """In 8 to 30 lines, and names no file that is not there."""
+    text = (folder / "README.md").read_text()
+    assert 8 <= len(text.splitlines()) <= 30
+    named = re.findall(r"`([\w/.]+\.(?:h|hpp|cpp))`", text)
+    homes = (folder, folder.parent, SRC, Path())
+    assert [name for name in named if not any((home / name).is_file() for home in homes)] == []
+
+
+def test_small_units_with_one_user_have_a_reason():
+    """A unit of less than 60 lines that one other unit includes is a part of that one, unless DEFENDED says why not."""
+    found = units(SRC)
+    unit_of = {path: name for name, files in found.items() for path in files}
+    users = defaultdict(set)
+    for path, included in arrows():
+        if unit_of[path] != unit_of[included]:
+            users[unit_of[included]].add(unit_of[path])
+    for root in (Path("tests/native"), Path("benchmarks/native")):
+        for path in code_files(root):
+            for name in includes(path):
+                if SRC / name in unit_of:
+                    users[unit_of[SRC / name]].add("tests")
+    small = {
+        Path(name).relative_to(SRC).as_posix()
+        for name, files in found.items()
+        if any(path.suffix == ".h" for path in files)
+        and sum(len(path.read_text().splitlines()) for path in files) < SMALL_UNIT_LINES
+        and len(users[name] - {"tests"}) <= 1
+    }
+    assert sorted(small - DEFENDED.keys()) == []
+    assert sorted(DEFENDED.keys() - small) == [], "no longer small with one user: take it off the list"

@@ -1,0 +1,109 @@
+"""One language: the field's words, and none of the private ones that they replaced."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+EVERYWHERE = ("sdk", "desktop_demo", "export", "quantization", "benchmarks", "tests", "docs", "scripts", "README.md",
+              "CONTRIBUTING.md")  # fmt: skip
+NATIVE = ("sdk", "desktop_demo", "tests/native", "benchmarks/native", "docs", "README.md")
+# Where somebody is no person in a picture.
+MACHINERY = tuple(f"sdk/src/{name}/" for name in ("api", "core", "image", "nn", "pipeline", "scene", "sources")) + (
+    "sdk/app/",)  # fmt: skip
+TEXT = (".h", ".hpp", ".c", ".cpp", ".py", ".md", ".txt", ".cmake", ".sh", ".json", ".toml", ".in")
+HERE = Path("tests/python/project/test_words.py")
+
+# (pattern, the field's word, where to look). Words are matched as written, so `\\b` and case matter.
+WORDS = [
+    # Descriptors of points, in place of "looks".
+    (r"\blooks_(?!like|at)\w+|\w+_looks\b|\bLook[A-Z]\w*|\b\w*[a-z]Looks?\b", "descriptor", EVERYWHERE),
+    (r"\bhow (it|they|the points|points) looks?\b", "descriptors", NATIVE),
+    (r"\bwild\b|\bwild_\w+|\bWild[A-Z]\w*", "outlier", EVERYWHERE),
+    (r"[Mm]odelled_?[Pp]oints|[Mm]odelling_?[Ss]tate", "fitted points, state of fitting", EVERYWHERE),
+    (r"second_look\w*|looks_again|\bsecond looks?\b", "second pass (of the box head)", EVERYWHERE),
+    # Positions, indices and poses, in place of "places".
+    (r"PointPlaces?|place_kind|PlaceKind|PlaceInPicture|\bplaces_bytes\b", "position", EVERYWHERE),
+    (r"\bturn_in\b", "givens_rotate", EVERYWHERE),
+    (
+        r"\bturned_\w+|\bTurned[A-Z]\w*|\bturning_\w+|\bturn_ms\b|\w+_turn_?[sn]s\b",
+        "rotated, aligned; iteration",
+        NATIVE,
+    ),
+    (r"[Uu]pright_?[Ff]rame", "gravity alignment", EVERYWHERE),
+    (r"\bis_folded\b", "is_space_to_depth", EVERYWHERE),
+    (r"\w*Reach_px\b|\breach_px\b", "receptive field radius", EVERYWHERE),
+    # What is visible.
+    (r"[Pp]icture_?[Cc]over\b|\w*[Ss]ureness\w*|_SURENESS", "coverage, confidence", EVERYWHERE),
+    (r"k?[Hh]iding_?[Ss]hare|\bunhidden\b|\bshines? through\b", "occlusion, depth tolerance", EVERYWHERE),
+    (r"\b(who )?wins? (a|the|its|their|each|every|that) pixels?\b", "is front-most at, is visible at", EVERYWHERE),
+    # Amounts.
+    (r"\b_?least_(?!squares)\w+|\bkLeast\w*|\b_?LEAST_\w+", "min", EVERYWHERE),
+    (r"\b_?most_[a-z]\w*|\bkMost\w*|\b_?MOST_\w+", "max", EVERYWHERE),
+    (
+        r"\b[a-z]\w*_shares?\b|\bshares?_[a-z]\w*|\bk[A-Z]\w*Share\b|\b[A-Z_]+_SHARE\b",
+        "fraction, ratio, rate",
+        EVERYWHERE,
+    ),
+    # Files.
+    (r"\bwhole or not at all\b|\bNewFile\b|\bnew_file\b", "atomically, AtomicFile", EVERYWHERE),
+    (r"\b(?!is_)\w+_endings?\b|\bfile(name)? endings?\b|\bending of (a|the) (file|name)\b", "extension", EVERYWHERE),
+    (r"\bown_folder\b|\bOwnFolder\b", "library folder", EVERYWHERE),
+    (r"\bdrop_counts\b|\bsentence_part\b", "import report", NATIVE),
+    # Objects that are lent and asked for.
+    (r"\bhand_out\b|\btake_back\b", "lend, return", EVERYWHERE),
+    (r"\b[A-Z]\w*Wish\b|\bWish\b|\bstruct Orders\b|\bOrders\b", "request, command", NATIVE),
+    (r"\b(T|bool|u?int\d*(_t)?|float|double|string&?|Value&?) otherwise[,)]", "fallback", NATIVE),
+    (r"\bplayed_camera\b|\bplayed as cameras?\b", "replay", EVERYWHERE),
+    (r"\b(struct|class) Figures\b", "parameters, metrics", NATIVE),
+    # Riddles and speech of another day.
+    (
+        r"\bthat (is|are) none\b|\b(is|are) none of\b|\bis no camera\b",
+        "say what is wrong: invalid, is not a …",
+        EVERYWHERE,
+    ),
+    (r"\bis answered by\b", "is paired with", NATIVE),
+    (r"\bblocks shortly\b|\bmust return soon\b", "blocks briefly, returns promptly", NATIVE),
+    (r"\bkept[ _]out\b", "held out", EVERYWHERE),
+    (r"\b[Ww]hoever\b", "the caller, the thread that", EVERYWHERE),
+    (r"\b([Ss]omebody|[Nn]obody)\b", "a caller, no thread, no pixel", MACHINERY),
+    (r"\bby and by\b|\bfor ever\b|\bcameras? of glass\b", "gradually, indefinitely, physical camera", EVERYWHERE),
+    (r"\b[Qq]uantis", "quantiz", EVERYWHERE),
+]
+
+# Texts of others, and figures as a run wrote them.
+SKIPPED = ("sdk/licenses/", "desktop_demo/licenses/", "docs/benchmarks/", "docs/progress.json", "docs/ablation.json")
+# Where a pattern finds what means something else: (file, line) as regular expressions, each with its reason.
+EXCEPTIONS = [
+    (r"", r"\b(processor|others|roofline|unseen)_share\b"),  # of processor time, of a bound: figures in reports
+    (r"quantization", r"\bshare_scales\b"),  # shares: is in common
+]
+
+
+def lines() -> list[tuple[str, int, str]]:
+    """(file, number, text) of every line of what the repository holds."""
+    listed = subprocess.run(["git", "ls-files", *EVERYWHERE], capture_output=True, text=True, check=True).stdout
+    paths = [Path(name) for name in listed.splitlines()
+             if name.endswith(TEXT) and not name.startswith(SKIPPED) and Path(name) != HERE]  # fmt: skip
+    return [
+        (path.as_posix(), number, line)
+        for path in paths
+        if path.is_file()
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+    ]
+
+
+LINES = lines()
+
+
+@pytest.mark.parametrize(("pattern", "word", "where"), WORDS, ids=[word for _, word, _ in WORDS])
+def test_no_private_word_comes_back(pattern, word, where):
+    found = re.compile(pattern)
+    wrong = [
+        f"{file}:{number}: '{match[0]}'; say: {word}"
+        for file, number, line in LINES
+        if file.startswith(where) and (match := found.search(line))
+        if not any(re.search(path, file) and re.search(text, line) for path, text in EXCEPTIONS)
+    ]
+    assert not wrong, "\n".join(["", *wrong])

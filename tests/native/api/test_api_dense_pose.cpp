@@ -3,7 +3,7 @@
 #include <cstring>
 #include <filesystem>
 #include <maquette/maquette.hpp>
-#include <optional>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -76,7 +76,7 @@ TEST(ApiDensePose, PeopleAreReadByIndexAndHaveNoIdYet) {
 TEST(ApiDensePose, ABundleInMemoryIsCopiedAndGivesTheSame) {
   const maquette::Context context;
   const RedCell image;
-  std::optional<maquette::DensePose> densepose;
+  std::unique_ptr<maquette::DensePose> densepose;
   {
     std::vector<std::pair<std::string, std::string>> contents;
     for (const auto& entry : std::filesystem::directory_iterator(kBundle)) {
@@ -87,7 +87,7 @@ TEST(ApiDensePose, ABundleInMemoryIsCopiedAndGivesTheSame) {
     maq_densepose_config config = maquette::default_densepose_config();
     config.bundle_files = files.data();
     config.bundle_file_count = uint32_t(files.size());
-    densepose.emplace(context, config);
+    densepose = std::make_unique<maquette::DensePose>(context, config);
     for (auto& [name, bytes] : contents) bytes.assign(bytes.size(), 'x');
   }
   maquette::DensePose from_folder(context, kBundle);

@@ -232,7 +232,6 @@ TEST_F(ApiSceneBuilding, SettingsOutOfRangeAreRefusedByName) {
     expect_refused(cloud_of(places_), config, MAQ_ERROR_INVALID_ARGUMENT, name);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expect("config.bundle_path is NULL", [](auto& config) { config.bundle_path = nullptr; });
   expect("config.threads", [](auto& config) { config.threads = -1; });
   expect("config.threads", [](auto& config) { config.threads = 65; });
   expect("config.long_side_px", [](auto& config) { config.long_side_px = -1; });

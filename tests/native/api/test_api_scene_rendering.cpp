@@ -246,7 +246,6 @@ TEST_F(ApiSceneRendering, SettingsOutOfRangeAreRefusedByName) {
     change(config);
     expect_refused(config, MAQ_ERROR_INVALID_ARGUMENT, name);
   };
-  expect("config.bundle_path is NULL", [](auto& config) { config.bundle_path = nullptr; });
   expect("config.threads", [](auto& config) { config.threads = 65; });
   expect("config.image_pool_size is 0", [](auto& config) { config.image_pool_size = 0; });
   expect("config.image_pool_size is 65", [](auto& config) { config.image_pool_size = 65; });

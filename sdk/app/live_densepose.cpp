@@ -33,8 +33,8 @@ LiveDensePose::LiveDensePose(const Context& context, const maq_densepose_config&
   pipeline_.emplace(context, pipeline);
 }
 
-// Here, so that no callback runs when other members go.
-LiveDensePose::~LiveDensePose() { pipeline_->stop(); }
+// Here, so that no callback runs when other members go. By the C function, which does not throw.
+LiveDensePose::~LiveDensePose() { maq_pipeline_stop(pipeline_->get()); }
 
 void LiveDensePose::open(const std::string& uri, const std::string& fallback) {
   std::lock_guard<std::mutex> lock(mutex_);

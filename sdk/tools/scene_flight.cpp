@@ -27,8 +27,8 @@ cv::Matx33d nearest_rotation(const cv::Matx33d& matrix) {
   return found;
 }
 
-// Weights of four neighbours at 0 <= t <= 1 between the second and the third: a uniform cubic B-spline, which smooths the
-// hand's shaking instead of passing through every stop.
+// Weights of four neighbours at 0 <= t <= 1 between the second and the third: a uniform cubic B-spline, which smooths
+// the hand's shaking instead of passing through every stop.
 cv::Vec4d spline(double t) {
   const double s = 1 - t;
   return cv::Vec4d(s * s * s, 3 * t * t * t - 6 * t * t + 4, 3 * s * s * s - 6 * s * s + 4, t * t * t) / 6.0;

@@ -1,4 +1,4 @@
-/* Builds a scene from a captured place and renders it from between two photos: new_view <bundle> <capture> <out.png>. */
+/* Builds a scene from a capture and renders it from between two photos: new_view <bundle> <capture> <out.png>. */
 #include <maquette/maquette.h>
 #include <stdio.h>
 

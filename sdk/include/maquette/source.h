@@ -30,10 +30,10 @@ typedef struct maq_source_config {
   uint32_t struct_size;
   uint32_t frame_pool_size; /* frames the app may hold at once, 1 to 64; default 4 */
   /* For cameras (is_live): */
-  uint32_t
-      queue_length; /* frames that wait for the app, 1 to 64; a new one replaces the oldest; default 1: the newest */
-  int32_t stall_ms; /* after this time without a frame the camera counts as stalled, 50 to 60000; default 2000 */
-  int32_t reconnect_ms;                     /* how long to wait for a lost camera, 0 to 86400000; default 30000 */
+  /* Frames that wait for the app, 1 to 64; a new one replaces the oldest; default 1: the newest */
+  uint32_t queue_length;
+  int32_t stall_ms;     /* after this time without a frame the camera counts as stalled, 50 to 60000; default 2000 */
+  int32_t reconnect_ms; /* how long to wait for a lost camera, 0 to 86400000; default 30000 */
   maq_source_state_callback state_callback; /* may be NULL */
   void* state_user_data;                    /* passed to state_callback */
   /* For sources other than cameras: */

@@ -10,8 +10,8 @@
 namespace maq {
 
 // Reads the bundle in folder `path`; without one of `files`, which are copied, so that it may be read later; without
-// these the bundle `installed` of the folder share/maquette/models beside the library. Throws ArgumentError for a path and
-// files, or files without content; the reader throws what read_bundle throws.
+// these the bundle `installed` of the folder share/maquette/models beside the library. Throws ArgumentError for a path
+// and files, or files without content; the reader throws what read_bundle throws.
 std::function<Bundle()> bundle_reader(const char* path, const maq_memory_file* files, uint32_t file_count,
                                       const char* installed);
 

@@ -143,7 +143,8 @@ TEST(SteadyState, FramesInTheFormatsOfCamerasTakeNothingFromTheHeap) {
       maq_densepose_result_release(result);
     };
     for (int i = 0; i < 5; ++i) run();  // the pool of results
-    // A thread of OpenCV's pool may join late and make its notes once; what is taken for each frame is taken in each round.
+    // A thread of OpenCV's pool may join late and make its notes once; what is taken for each frame is taken in each
+    // round.
     Allocations found;
     for (int round = 0; round < 5; ++round) {
       counting = true;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -89,6 +90,15 @@ class Watched {
     return states_;
   }
 
+  bool saw(maq_pipeline_state state) const {
+    const std::vector<maq_pipeline_state> all = states();
+    return std::find(all.begin(), all.end(), state) != all.end();
+  }
+  void forget_states() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    states_.clear();
+  }
+
   Options options;
   maquette::Context context;
   std::optional<maquette::Pipeline> pipeline;
@@ -128,6 +138,14 @@ Watched::Options polling(bool real_time) {
   options.polls = true;
   options.real_time = real_time;
   return options;
+}
+
+// Has it load its model, so that what happens to the next camera does not happen meanwhile; then forgets its states.
+void load_model(Watched& watched) {
+  watched.pipeline->set_source("stub:pattern?frames=1&size=32x32");
+  ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
+  watched.pipeline->stop();
+  watched.forget_states();
 }
 
 maq_status status_of_next(maquette::Pipeline& pipeline, int64_t timeout_ns = MAQ_WAIT_FOREVER) {
@@ -212,32 +230,30 @@ TEST(Pipeline, PausesAndGoesOn) {
 
 TEST(Pipeline, TheCameraIsLostAndComesBack) {
   Watched watched({});
-  watched.pipeline->set_source("stub:pattern?fps=50&size=64x48&unplug=0.5s@20");
-  ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_RECONNECTING));
+  load_model(watched);
+  watched.pipeline->set_source("stub:pattern?fps=50&size=64x48&unplug=1s@20");
+  ASSERT_TRUE(watched.until([&] { return watched.saw(MAQ_PIPELINE_RECONNECTING); }));
   const maq_pipeline_info info = watched.pipeline->info();
   if (info.state == MAQ_PIPELINE_RECONNECTING) {
     EXPECT_EQ(info.status, MAQ_ERROR_DEVICE_LOST);
     EXPECT_STREQ(info.problem, "The camera was lost: unplugged, as its URI asks.");
   }
+  ASSERT_TRUE(watched.until([&] { return watched.states().back() == MAQ_PIPELINE_RUNNING; }));
   const size_t before = watched.count();
   ASSERT_TRUE(watched.until([&] { return watched.count() > before + 5; }));
   EXPECT_EQ(watched.pipeline->info().status, MAQ_OK);
   EXPECT_STREQ(watched.pipeline->info().problem, "");
-  EXPECT_EQ(watched.states(),
-            (std::vector<maq_pipeline_state>{MAQ_PIPELINE_OPENING, MAQ_PIPELINE_LOADING, MAQ_PIPELINE_RUNNING,
-                                             MAQ_PIPELINE_RECONNECTING, MAQ_PIPELINE_RUNNING}));
+  EXPECT_EQ(watched.states(), (std::vector<maq_pipeline_state>{MAQ_PIPELINE_OPENING, MAQ_PIPELINE_RUNNING,
+                                                               MAQ_PIPELINE_RECONNECTING, MAQ_PIPELINE_RUNNING}));
 }
 
-TEST(Pipeline, ACameraThatStallsIsSaidToUntilItGoesOn) {
+TEST(Pipeline, ACameraThatStallsIsReportedUntilItGoesOn) {
   Watched::Options options;
   options.stall_ms = 100;
   Watched watched(options);
+  load_model(watched);
   watched.pipeline->set_source("stub:pattern?fps=50&size=64x48&stall=1s@10");
-  const auto saw = [&](maq_pipeline_state state) {
-    const auto states = watched.states();
-    return std::find(states.begin(), states.end(), state) != states.end();
-  };
-  ASSERT_TRUE(watched.until([&] { return saw(MAQ_PIPELINE_STALLED); }));
+  ASSERT_TRUE(watched.until([&] { return watched.saw(MAQ_PIPELINE_STALLED); }));
   ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_RUNNING));
 }
 
@@ -424,7 +440,7 @@ TEST(Pipeline, ACameraThatHangsDoesNotHoldUpTheApp) {
   {
     Watched watched({});
     watched.pipeline->set_source("stub:pattern?fps=50&size=64x48&hang=120s@10");
-    ASSERT_TRUE(watched.until([&] { return watched.count() >= 5; }));
+    ASSERT_TRUE(watched.until([&] { return watched.count() >= 1; }));
     std::this_thread::sleep_for(400ms);
     watched.pipeline->set_source("stub:pattern?fps=50&size=32x32");
     ASSERT_TRUE(watched.until([&] { return watched.widths().back() == 32; }));

@@ -278,7 +278,7 @@ int run_bench(const Options& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options that contradict each other end it
   setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   CLI::App app("Measure how long each stage of a frame takes on this machine", "maquette bench");

@@ -6,7 +6,7 @@
 #include "commands.h"
 #include "program.h"
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options that contradict each other end it
   // What goes wrong with a file is said once, by the SDK; the decoders below it stay silent unless somebody asks.
   setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);

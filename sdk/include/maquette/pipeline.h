@@ -61,7 +61,7 @@ typedef struct maq_pipeline_config {
   uint32_t struct_size;
   uint32_t result_pool_size;             /* results, and frames, that the app may hold at once, 1 to 64;
                                                    default 4 */
-  const maq_densepose_config* densepose; /* the model; required. Copied, result_pool_size is not used. */
+  const maq_densepose_config* densepose; /* the model; NULL (default): the defaults. Copied, result_pool_size unused. */
   const maq_source_config* source;       /* of all sources; NULL (default): the defaults. Copied, frame_pool_size is not
                                                    used and state_callback must be NULL. */
   maq_pipeline_result_callback result_callback; /* NULL (default): results are taken by maq_pipeline_acquire_result */

@@ -109,7 +109,7 @@ bool takes_live(SourceUri& uri, const SourceSettings& settings, bool has_faults)
 // Of a scheme that does not stand for another.
 std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
   const FaultPlan faults = take_faults(uri);
-  const bool is_path = entry.camera != nullptr && uri.target.rfind("/", 0) == 0;
+  const bool is_path = entry.camera != nullptr && uri.target.rfind('/', 0) == 0;
   const std::string name = is_path ? uri.target : uri.scheme + ":" + uri.target;
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
@@ -151,7 +151,7 @@ std::unique_ptr<Source> open_first_camera(const SourceUri& uri, const SourceSett
         const SourceUri listed = parse_source_uri(camera.uri);
         same.scheme = listed.scheme;
         same.target = listed.target;
-        return open_entry(*find_entry(same.scheme), std::move(same), settings);
+        return open_entry(*find_entry(listed.scheme), std::move(same), settings);
       } catch (const Error& error) {
         problem = error.what();
       }

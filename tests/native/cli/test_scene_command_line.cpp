@@ -169,7 +169,7 @@ TEST_F(SceneCommandLine, WhatIsMissingOrWrongIsOneSentence) {
     expect_failure(head + "--path orbit --size '" + size + "'", "write it as 640x480");
   }
   expect_failure(head + "--path orbit --size 20000x10", "16384");
-  expect_failure(head + "--capture place --views all --seconds 3", "--seconds and --fps are those of a clip");
+  expect_failure(head + "--capture place --views all --seconds 3", "--seconds and --fps are for clips");
   expect_failure(head + "--path orbit --repeat 3", "--repeat and --no-alpha are for pictures");
   std::filesystem::copy(file("place/"), file("all_used"), std::filesystem::copy_options::recursive);
   nlohmann::json transforms = json("all_used/transforms.json");

@@ -70,7 +70,7 @@ ImageView view_of(const DepthAiFrame& frame) {
   return view;
 }
 
-class DepthAiCamera : public Camera {
+class DepthAiCamera final : public Camera {
  public:
   // `handle`: what the device was opened by.
   DepthAiCamera(const std::string& handle, std::unique_ptr<DepthAiSession> session, int buffers, const Log& log)

@@ -41,7 +41,7 @@ int64_t time_of(const v4l2_buffer& filled) {
   return stamp > now || stamp < now - kMaxStampAgeNs ? now : stamp;
 }
 
-class V4l2Camera : public Camera {
+class V4l2Camera final : public Camera {
  public:
   V4l2Camera(SystemCalls& calls, const std::string& path)
       : calls_(calls), device_(std::make_shared<V4l2Device>(calls, path)), identity_(device_->identity()) {}

@@ -139,7 +139,7 @@ def _signatures(library: ctypes.CDLL) -> None:
         function.argtypes, function.restype = (Handle,), None
     count = library.maq_densepose_result_get_person_count
     count.argtypes, count.restype = (Handle,), c_uint32
-    library.maq_get_last_error.argtypes, library.maq_get_last_error.restype = (Handle,), c_char_p
+    library.maq_last_error.argtypes, library.maq_last_error.restype = (Handle,), c_char_p
     library.maq_status_get_name.argtypes, library.maq_status_get_name.restype = (c_int32,), c_char_p
 
 
@@ -233,6 +233,6 @@ class DensePose:
         """Calls the library; a status other than MAQ_OK becomes MaquetteError with the library's text."""
         status = getattr(self._library, function)(*arguments)
         if status:
-            text = self._library.maq_get_last_error(None)
+            text = self._library.maq_last_error(None)
             name = self._library.maq_status_get_name(status).decode()
             raise MaquetteError(f"{function}: {(text or b'').decode() or name} ({name})")

@@ -72,7 +72,7 @@ int play(const Options& options) {
     if (status == MAQ_TIMEOUT) continue;
     if (status == MAQ_END_OF_STREAM) break;
     if (status != MAQ_OK) {
-      failure = maq_get_last_error(source.get());
+      failure = maq_last_error(source.get());
       break;
     }
     const maquette::Frame frame(taken);

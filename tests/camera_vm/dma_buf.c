@@ -13,7 +13,7 @@
 
 static void must(const char* what, maq_status status, const void* handle) {
   if (status == MAQ_OK) return;
-  printf("%s: %s\n", what, maq_get_last_error(handle));
+  printf("%s: %s\n", what, maq_last_error(handle));
   exit(1);
 }
 

@@ -53,7 +53,7 @@ static void check_dma_buf(const maq_frame* frame, const maq_frame_desc* desc) {
   size_t bytes = desc->stride_bytes[0] * (size_t)desc->height_px;
   int32_t fd = -1;
   void* memory;
-  if (maq_frame_get_dma_buf(frame, &fd) != MAQ_OK) fail("A frame has no dma-buf: %s", maq_get_last_error(frame));
+  if (maq_frame_get_dma_buf(frame, &fd) != MAQ_OK) fail("A frame has no dma-buf: %s", maq_last_error(frame));
   memory = mmap(NULL, bytes, PROT_READ, MAP_SHARED, fd, 0);
   if (memory == MAP_FAILED) fail("A frame's dma-buf cannot be mapped.");
   if (memcmp(memory, desc->planes[0], bytes) != 0) fail("A frame's dma-buf shows something else than its pixels.");
@@ -66,7 +66,7 @@ static void check_others(maq_context* context, const char* uri) {
   maq_camera_list* list = NULL;
   maq_status status = maq_source_create(context, uri, NULL, &second);
   if (status != MAQ_ERROR_BUSY) fail("Opened twice, it gives status %d and not MAQ_ERROR_BUSY.", status);
-  if (maq_camera_list_create(context, &list) != MAQ_OK) fail("%s", maq_get_last_error(context));
+  if (maq_camera_list_create(context, &list) != MAQ_OK) fail("%s", maq_last_error(context));
   if (maq_camera_list_get_count(list) == 0) fail("A camera that streams is not listed.");
   maq_camera_list_destroy(list);
 }
@@ -101,13 +101,13 @@ int main(int count, char** arguments) {
   maq_source_config_init(&config, sizeof config);
   config.reconnect_ms = is_back ? 20000 : 1000;
   config.state_callback = note_state;
-  if (maq_source_create(context, arguments[1], &config, &source) != MAQ_OK) fail("%s", maq_get_last_error(context));
+  if (maq_source_create(context, arguments[1], &config, &source) != MAQ_OK) fail("%s", maq_last_error(context));
   if (is_brightness) {
     maq_control_info info;
     info.struct_size = sizeof info;
     if (maq_source_set_control(source, MAQ_CONTROL_BRIGHTNESS, atof(arguments[2])) != MAQ_OK ||
         maq_source_get_control(source, MAQ_CONTROL_BRIGHTNESS, &info) != MAQ_OK) {
-      fail("%s", maq_get_last_error(source));
+      fail("%s", maq_last_error(source));
     }
     if (info.value != atof(arguments[2])) fail("The brightness is %g after it was set.", info.value);
     if (maq_source_set_control(source, MAQ_CONTROL_BRIGHTNESS, 100) != MAQ_ERROR_INVALID_ARGUMENT) {
@@ -121,14 +121,14 @@ int main(int count, char** arguments) {
     frame = NULL;
     status = maq_source_acquire_frame(source, 20000000000, &frame);
     if (is_lost && status == MAQ_ERROR_DEVICE_LOST && all > 0) {
-      printf("after %d frames: %s\n", all, maq_get_last_error(source));
+      printf("after %d frames: %s\n", all, maq_last_error(source));
       maq_source_destroy(source);
       maq_context_destroy(context);
       return 0;
     }
-    if (status != MAQ_OK) fail("after %d frames: %s", all, maq_get_last_error(source));
+    if (status != MAQ_OK) fail("after %d frames: %s", all, maq_last_error(source));
     desc.struct_size = sizeof desc;
-    if (maq_frame_get_desc(frame, &desc) != MAQ_OK) fail("%s", maq_get_last_error(frame));
+    if (maq_frame_get_desc(frame, &desc) != MAQ_OK) fail("%s", maq_last_error(frame));
     if (desc.clock != MAQ_CLOCK_MONOTONIC || desc.timestamp_ns > now_ns() ||
         desc.timestamp_ns < now_ns() - 5000000000) {
       fail("Frame %d is of %lld ns at %lld ns.", all, (long long)desc.timestamp_ns, (long long)now_ns());

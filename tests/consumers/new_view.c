@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
     failed = maq_scene_renderer_run(renderer, &first.camera, &image) != MAQ_OK ||
              maq_scene_image_save(image, argv[3], 0) != MAQ_OK;
   }
-  if (failed) fprintf(stderr, "%s\n", maq_get_last_error(NULL));
+  if (failed) fprintf(stderr, "%s\n", maq_last_error(NULL));
   maq_scene_image_release(image), maq_scene_renderer_destroy(renderer);
   maq_scene_close(scene), maq_capture_close(capture), maq_context_destroy(context);
   return failed;

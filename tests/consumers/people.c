@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
                maq_source_create(context, argc == 2 ? argv[1] : NULL, NULL, &source) != MAQ_OK ||
                maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame) != MAQ_OK ||
                maq_densepose_run(densepose, frame, &result) != MAQ_OK;
-  if (failed) fprintf(stderr, "%s\n", maq_get_last_error(NULL));
+  if (failed) fprintf(stderr, "%s\n", maq_last_error(NULL));
   for (i = 0; i < maq_densepose_result_get_person_count(result); ++i) {
     maq_person person = {sizeof person};
     maq_densepose_result_get_person(result, i, &person);

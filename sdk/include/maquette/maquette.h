@@ -8,17 +8,19 @@
  *   ... read the result ...    then release r and frame, destroy the rest, in any order.
  *
  * The grammar, which holds everywhere:
- * - Names are maq_<object>_<verb>_<noun>. `_get_…` reads and changes nothing; `_get_<thing>_count` returns how many
- * there are and `_get_<thing>(…, index, &thing)` gets one of them. Enum values begin with the noun of their type.
- * Bounds of every kind are min and max.
- * - What one of these verbs returned is given back by the verb on its right, once, in any order; NULL is fine:
- *     _create                               _destroy  contexts, sources, lists, models, builders, renderers, writers
- *     _open, _open_memory, _build, _finish  _close    captures and scenes (_finish of a builder; that of a clip or a
- *                                                     recorder completes its file and returns nothing)
- *     _acquire_…, _run, _load_…, _wrap      _release  frames, results and images, most of them from a pool of fixed
- * size What `_get_…` returns belongs to the object that it was called with.
+ *
+ * - Names are maq_<object>_<verb>_<noun>. `_get_…` reads and changes nothing: `_get_<thing>_count` returns a number,
+ *   `_get_<thing>(…, index, &thing)` one item. Enum values begin with the noun of their type; bounds are min and max.
+ * - Each verb that returns an object is paired with one that gives it back, once, in any order; NULL is fine:
+ *
+ *     _create                                 _destroy   contexts, sources, lists, models, builders, renderers, writers
+ *     _open, _open_memory, _build, _finish    _close     captures and scenes
+ *     _acquire_…, _run, _load_…, _wrap        _release   frames, results and images, most from a pool of fixed size
+ *
+ *   (_finish of a builder returns a scene; _finish of a clip or a recorder completes its file and returns nothing.)
+ *   What `_get_…` returns belongs to the object that it was called with.
  * - Every call that can fail returns maq_status and writes its result through its last argument only when it returns
- *   MAQ_OK. maq_get_last_error(NULL) is the sentence that says what was wrong and what to do.
+ *   MAQ_OK. maq_last_error(NULL) is the sentence that says what was wrong and what to do.
  * - Structs that may grow begin with struct_size, which the caller sets to sizeof the struct; the `_init` functions do
  *   so and fill in the defaults. A NULL config means the defaults. Configs are copied.
  * - Yes or no is an int32_t, 1 or 0. What holds a value of an enum has the enum's type, which takes 4 bytes.

@@ -34,7 +34,7 @@ class Error : public std::runtime_error {
 
 // Throws the error of this thread's latest call when `status` is one.
 inline void check(maq_status status) {
-  if (status != MAQ_OK) throw Error(status, maq_get_last_error(nullptr));
+  if (status != MAQ_OK) throw Error(status, maq_last_error(nullptr));
 }
 
 template <class Handle, void (*destroy)(Handle*)>

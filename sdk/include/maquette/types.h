@@ -69,9 +69,9 @@ MAQ_API const char* maq_status_get_name(maq_status status);
 /* Returns what was wrong and what to do, in a sentence: with NULL, of this thread's latest failed call, on whatever
  * handle or none; with a handle of this API, of the latest failed call on that handle, on any thread. "" when none
  * failed. A call that fails to create an object is one on the context. Calls that succeed do not clear the text. The
- * text is the library's and stays valid until this thread calls maq_get_last_error again.
+ * text is the library's and stays valid until this thread calls maq_last_error again.
  * Any thread, while `handle` is alive. Does not fail or block. */
-MAQ_API const char* maq_get_last_error(const void* handle);
+MAQ_API const char* maq_last_error(const void* handle);
 
 /* Return the version of the library found at run time ("0.2.0"), the git commit it was built from, and the options
  * it was built with ("release, g++ 12.2"). The texts are static. Any thread. Do not fail or block. */

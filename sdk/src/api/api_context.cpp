@@ -49,7 +49,7 @@ const char* maq_status_get_name(maq_status status) {
   return "unknown status";
 }
 
-const char* maq_get_last_error(const void* handle) { return last_error(static_cast<const Handle*>(handle)); }
+const char* maq_last_error(const void* handle) { return last_error(static_cast<const Handle*>(handle)); }
 
 const char* maq_get_sdk_version(void) { return sdk_version(); }
 const char* maq_get_git_commit(void) { return git_commit(); }

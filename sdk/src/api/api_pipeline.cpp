@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
 
-// Of the thread that asked, as with maq_get_last_error.
+// Of the thread that asked, as with maq_last_error.
 thread_local std::string given_problem, given_uri;
 
 maq_pipeline_config default_config() {

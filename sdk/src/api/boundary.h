@@ -18,7 +18,7 @@ class ArgumentError : public Error {
   explicit ArgumentError(const Parts&... parts) : Error(MAQ_ERROR_INVALID_ARGUMENT, parts...) {}
 };
 
-// Keeps the text for maq_get_last_error: as the thread's latest, and with the handle unless that is NULL. `function`
+// Keeps the text for maq_last_error: as the thread's latest, and with the handle unless that is NULL. `function`
 // begins the text when it is not NULL.
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept;
 

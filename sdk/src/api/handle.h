@@ -13,7 +13,7 @@
 
 namespace maq {
 
-// Every handle begins with this, so that maq_get_last_error works on each of them.
+// Every handle begins with this, so that maq_last_error works on each of them.
 class Handle {
  public:
   void set_error(std::string text) const {

@@ -14,8 +14,8 @@ class ApiArguments : public ::testing::Test {
   ~ApiArguments() override { maq_context_destroy(context_); }
 
   static void expect_error(maq_status actual, maq_status expected, const void* handle, const std::string& text) {
-    EXPECT_EQ(actual, expected) << maq_get_last_error(handle);
-    EXPECT_NE(std::string(maq_get_last_error(handle)).find(text), std::string::npos) << maq_get_last_error(handle);
+    EXPECT_EQ(actual, expected) << maq_last_error(handle);
+    EXPECT_NE(std::string(maq_last_error(handle)).find(text), std::string::npos) << maq_last_error(handle);
   }
 
   maq_context* context_ = nullptr;
@@ -252,8 +252,8 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
 
 TEST_F(ApiArguments, ErrorsWithoutAHandleAreOfTheThread) {
   maq_context_create(0, nullptr, nullptr);
-  EXPECT_NE(std::string(maq_get_last_error(nullptr)), "");
-  std::thread([] { EXPECT_STREQ(maq_get_last_error(nullptr), ""); }).join();
+  EXPECT_NE(std::string(maq_last_error(nullptr)), "");
+  std::thread([] { EXPECT_STREQ(maq_last_error(nullptr), ""); }).join();
 }
 
 TEST_F(ApiArguments, WithoutAHandleTheErrorIsTheThreadsLatestOnAnyHandle) {
@@ -263,9 +263,8 @@ TEST_F(ApiArguments, WithoutAHandleTheErrorIsTheThreadsLatestOnAnyHandle) {
                "/no/such.jpg");
   ASSERT_EQ(maq_source_create(context_, "stub:pattern?size=16x16", nullptr, &source), MAQ_OK);
   expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "negative");
-  EXPECT_NE(std::string(maq_get_last_error(context_)).find("/no/such.jpg"), std::string::npos)
-      << "and the handle's stays";
-  std::thread([] { EXPECT_STREQ(maq_get_last_error(nullptr), ""); }).join();
+  EXPECT_NE(std::string(maq_last_error(context_)).find("/no/such.jpg"), std::string::npos) << "and the handle's stays";
+  std::thread([] { EXPECT_STREQ(maq_last_error(nullptr), ""); }).join();
   maq_source_destroy(source);
 }
 

@@ -27,9 +27,9 @@ class ApiCaptures : public ::testing::Test {
 
   void expect_refused(maq_status status, const std::string& text) const {
     maq_capture* capture = nullptr;
-    EXPECT_EQ(maq_capture_open(context_.get(), copy().c_str(), &capture), status) << maq_get_last_error(context_.get());
-    EXPECT_NE(std::string(maq_get_last_error(context_.get())).find(text), std::string::npos)
-        << maq_get_last_error(context_.get());
+    EXPECT_EQ(maq_capture_open(context_.get(), copy().c_str(), &capture), status) << maq_last_error(context_.get());
+    EXPECT_NE(std::string(maq_last_error(context_.get())).find(text), std::string::npos)
+        << maq_last_error(context_.get());
     EXPECT_EQ(capture, nullptr);
   }
 
@@ -147,7 +147,7 @@ TEST_F(ApiCaptures, PhotosOfAnotherShapeThanTheirCameraAreDropped) {
 TEST_F(ApiCaptures, FoldersWithoutACaptureAreAStatus) {
   maq_capture* capture = nullptr;
   EXPECT_EQ(maq_capture_open(context_.get(), "/no/such/folder", &capture), MAQ_ERROR_NOT_FOUND);
-  EXPECT_NE(std::string(maq_get_last_error(context_.get())).find("/no/such/folder"), std::string::npos);
+  EXPECT_NE(std::string(maq_last_error(context_.get())).find("/no/such/folder"), std::string::npos);
   EXPECT_EQ(maq_capture_open(context_.get(), folder_.path().c_str(), &capture), MAQ_ERROR_NOT_FOUND);
   std::filesystem::remove(copy() + "/cloud.ply");
   expect_refused(MAQ_ERROR_NOT_FOUND, "cloud");
@@ -167,7 +167,7 @@ TEST_F(ApiCaptures, APhotoThatIsGoneOrDamagedSinceIsAStatusOfTheCapture) {
   maq_frame* frame = nullptr;
   std::filesystem::remove(copy() + "/images/0.png");
   EXPECT_EQ(maq_capture_load_view(capture.get(), 0, &frame), MAQ_ERROR_NOT_FOUND);
-  EXPECT_NE(std::string(maq_get_last_error(capture.get())).find("0.png"), std::string::npos);
+  EXPECT_NE(std::string(maq_last_error(capture.get())).find("0.png"), std::string::npos);
   write_text(copy() + "/images/1.png", "no picture");
   EXPECT_EQ(maq_capture_load_view(capture.get(), 1, &frame), MAQ_ERROR_UNREADABLE);
   EXPECT_EQ(frame, nullptr);

@@ -145,7 +145,7 @@ TEST_F(ApiClips, AFullDiskIsToldAndLeavesTheOldFile) {
         first = maq_clip_add_frame(clip.get(), frame.get());
       }
       if (first == MAQ_OK) first = maq_clip_finish(clip.get());
-      EXPECT_EQ(first, MAQ_ERROR_UNWRITABLE) << name << ' ' << most << ": " << maq_get_last_error(clip.get());
+      EXPECT_EQ(first, MAQ_ERROR_UNWRITABLE) << name << ' ' << most << ": " << maq_last_error(clip.get());
       EXPECT_NE(maq_clip_finish(clip.get()), MAQ_OK) << "nor the second time";
     }
     EXPECT_EQ(frames_of(path), 2) << name;

@@ -101,7 +101,7 @@ TEST(ApiDensePose, WithoutABundleTheInstalledOneIsUsed) {
   maquette::DensePose densepose(context), named(context, MAQ_TEST_MODELS "/densepose-b-int8");
   EXPECT_EQ(densepose.surface()->nodes, named.surface()->nodes);
   maq_densepose* made = nullptr;
-  ASSERT_EQ(maq_densepose_create(context.get(), nullptr, &made), MAQ_OK) << maq_get_last_error(nullptr);
+  ASSERT_EQ(maq_densepose_create(context.get(), nullptr, &made), MAQ_OK) << maq_last_error(nullptr);
   maq_densepose_destroy(made);
 }
 
@@ -147,7 +147,7 @@ TEST(ApiDensePose, EachThreadCanHaveItsOwnAndShareTheContext) {
       for (int i = 0; i < 5; ++i) EXPECT_EQ(densepose.run(frame).people().size(), 1u);
       maq_source* source = nullptr;
       EXPECT_EQ(maq_source_create(context.get(), "nothing", nullptr, &source), MAQ_ERROR_INVALID_ARGUMENT);
-      EXPECT_NE(std::string(maq_get_last_error(context.get())), "");
+      EXPECT_NE(std::string(maq_last_error(context.get())), "");
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -162,7 +162,7 @@ TEST(ApiDensePose, ADamagedBundleIsAStatusOfTheContext) {
   config.bundle_path = path.c_str();
   maq_densepose* densepose = nullptr;
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_BAD_BUNDLE);
-  EXPECT_NE(std::string(maq_get_last_error(context.get())).find("trunk.onnx"), std::string::npos);
+  EXPECT_NE(std::string(maq_last_error(context.get())).find("trunk.onnx"), std::string::npos);
   config.bundle_path = "/no/such/bundle";
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_NOT_FOUND);
   EXPECT_EQ(densepose, nullptr);
@@ -179,7 +179,7 @@ TEST(ApiDensePose, AMissingRuntimeLibraryIsAStatusAndCanBeMended) {
   const maquette::Context context;
   setenv("MAQ_ONNXRUNTIME_LIB", "/no/such/libonnxruntime.so.1", 1);
   EXPECT_EQ(maq_context_get_onnxruntime(context.get(), &version, nullptr), MAQ_ERROR_RUNTIME_LIBRARY);
-  EXPECT_NE(std::string(maq_get_last_error(context.get())).find("MAQ_ONNXRUNTIME_LIB"), std::string::npos);
+  EXPECT_NE(std::string(maq_last_error(context.get())).find("MAQ_ONNXRUNTIME_LIB"), std::string::npos);
   unsetenv("MAQ_ONNXRUNTIME_LIB");
   EXPECT_EQ(context.onnxruntime_version().rfind("1.", 0), 0u);
 }

@@ -71,7 +71,7 @@ TEST(ApiFrames, WrongDescriptionsAreStatusesOfTheContext) {
       maquette::Frame(context, desc);
       return MAQ_OK;
     } catch (const maquette::Error& error) {
-      EXPECT_STREQ(error.what(), maq_get_last_error(context.get()));
+      EXPECT_STREQ(error.what(), maq_last_error(context.get()));
       return error.status();
     }
   };

@@ -16,7 +16,7 @@ class ApiLibcamera : public ::testing::Test {
     maq_source_destroy(source);
     return status;
   }
-  std::string error() const { return maq_get_last_error(context_.get()); }
+  std::string error() const { return maq_last_error(context_.get()); }
 
   // The cameras of libcamera in the list: none on most machines that run tests.
   int listed() {

@@ -104,7 +104,7 @@ TEST_F(ApiSaving, OtherEndingsAreRefusedAndNothingIsWritten) {
   expect_refused(frame, "", MAQ_ERROR_INVALID_ARGUMENT, "ends neither in .png nor in .jpg");
   EXPECT_EQ(files_in(folder_.path()), 0u);
   EXPECT_EQ(maq_frame_save(frame.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(maq_get_last_error(frame.get()), "maq_frame_save: path is NULL.");
+  EXPECT_STREQ(maq_last_error(frame.get()), "maq_frame_save: path is NULL.");
   EXPECT_EQ(maq_frame_save(nullptr, "a.png"), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
@@ -195,7 +195,7 @@ TEST_F(ApiSaving, AStemIsTheBeginningOfANameAndNoFolder) {
   std::filesystem::create_directory(folder_.file("in"));
   for (const char* stem : {"", "in/a", "/a", "../a"}) {
     EXPECT_EQ(status_of([&] { result.save(folder_.path().string(), stem); }), MAQ_ERROR_INVALID_ARGUMENT) << stem;
-    EXPECT_NE(std::string(maq_get_last_error(result.get())).find("stem"), std::string::npos);
+    EXPECT_NE(std::string(maq_last_error(result.get())).find("stem"), std::string::npos);
   }
   EXPECT_EQ(files_in(folder_.path()), 1u);
   EXPECT_EQ(maq_densepose_result_save(nullptr, "a", "a"), MAQ_ERROR_INVALID_ARGUMENT);

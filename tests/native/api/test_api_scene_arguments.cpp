@@ -12,8 +12,8 @@ class ApiSceneArguments : public ::testing::Test {
   // On `handle` (NULL: of this thread) there is a sentence with `text`.
   static void expect_invalid(maq_status actual, const void* handle, const std::string& text) {
     EXPECT_EQ(actual, MAQ_ERROR_INVALID_ARGUMENT) << text;
-    EXPECT_NE(std::string(maq_get_last_error(handle)).find(text), std::string::npos)
-        << text << ": " << maq_get_last_error(handle);
+    EXPECT_NE(std::string(maq_last_error(handle)).find(text), std::string::npos)
+        << text << ": " << maq_last_error(handle);
   }
 
   maquette::Context context_;
@@ -190,8 +190,7 @@ TEST_F(ApiSceneArguments, DefaultsAreThoseOfTheHeader) {
 
 TEST_F(ApiSceneArguments, WithoutAConfigTheInstalledBundleIsUsed) {
   maq_scene_builder* builder = nullptr;
-  ASSERT_EQ(maq_scene_builder_create(context_.get(), nullptr, &cloud_, &builder), MAQ_OK)
-      << maq_get_last_error(nullptr);
+  ASSERT_EQ(maq_scene_builder_create(context_.get(), nullptr, &cloud_, &builder), MAQ_OK) << maq_last_error(nullptr);
   maq_scene_builder_destroy(builder);
 }
 

@@ -18,8 +18,8 @@ using api_tiny_scene::Photo;
 class ApiSceneBuilding : public ::testing::Test {
  protected:
   void expect_error(maq_status actual, maq_status expected, const void* handle, const std::string& text) {
-    EXPECT_EQ(actual, expected) << maq_get_last_error(handle);
-    EXPECT_NE(std::string(maq_get_last_error(handle)).find(text), std::string::npos) << maq_get_last_error(handle);
+    EXPECT_EQ(actual, expected) << maq_last_error(handle);
+    EXPECT_NE(std::string(maq_last_error(handle)).find(text), std::string::npos) << maq_last_error(handle);
   }
 
   void expect_refused(const maq_point_cloud& cloud, const maq_scene_build_config& config, maq_status status,

@@ -35,8 +35,8 @@ class ApiSceneRendering : public ::testing::Test {
   void expect_refused(const maq_scene_renderer_config& config, maq_status status, const std::string& text) const {
     maq_scene_renderer* renderer = nullptr;
     EXPECT_EQ(maq_scene_renderer_create(context_.get(), &config, scene_.get(), &renderer), status) << text;
-    EXPECT_NE(std::string(maq_get_last_error(context_.get())).find(text), std::string::npos)
-        << maq_get_last_error(context_.get());
+    EXPECT_NE(std::string(maq_last_error(context_.get())).find(text), std::string::npos)
+        << maq_last_error(context_.get());
     EXPECT_EQ(renderer, nullptr);
   }
 
@@ -180,8 +180,8 @@ TEST_F(ApiSceneRendering, CamerasThatAreNoneAreRefusedAndCostNoImage) {
     change(camera);
     maq_scene_image* image = nullptr;
     EXPECT_EQ(maq_scene_renderer_run(renderer.get(), &camera, &image), MAQ_ERROR_INVALID_ARGUMENT);
-    EXPECT_NE(std::string(maq_get_last_error(renderer.get())).find(text), std::string::npos)
-        << maq_get_last_error(renderer.get());
+    EXPECT_NE(std::string(maq_last_error(renderer.get())).find(text), std::string::npos)
+        << maq_last_error(renderer.get());
     EXPECT_EQ(image, nullptr);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -91,7 +91,7 @@ TEST_F(ApiScenes, PlyHasEveryPointAndItsColour) {
 TEST_F(ApiScenes, WhatCannotBeWrittenIsAStatusAndTheOldFileStays) {
   for (const auto save : {maq_scene_save, maq_scene_save_ply}) {
     EXPECT_EQ(save(scene_.get(), "/no/such/folder/ball.maqs"), MAQ_ERROR_UNWRITABLE);
-    EXPECT_NE(std::string(maq_get_last_error(scene_.get())).find("/no/such/folder"), std::string::npos);
+    EXPECT_NE(std::string(maq_last_error(scene_.get())).find("/no/such/folder"), std::string::npos);
     EXPECT_EQ(save(scene_.get(), folder_.path().c_str()), MAQ_ERROR_UNWRITABLE);
     EXPECT_EQ(save(scene_.get(), ""), MAQ_ERROR_UNWRITABLE);
   }
@@ -101,7 +101,7 @@ TEST_F(ApiScenes, WhatCannotBeWrittenIsAStatusAndTheOldFileStays) {
 
 TEST_F(ApiScenes, FilesThatAreNoneAreAStatus) {
   EXPECT_EQ(open(folder_.file("none.maqs")), MAQ_ERROR_NOT_FOUND);
-  EXPECT_NE(std::string(maq_get_last_error(context_.get())).find("none.maqs"), std::string::npos);
+  EXPECT_NE(std::string(maq_last_error(context_.get())).find("none.maqs"), std::string::npos);
   EXPECT_EQ(open(folder_.path().string()), MAQ_ERROR_UNREADABLE);
   write_text(folder_.file("text.maqs"), "no scene");
   EXPECT_EQ(open(folder_.file("text.maqs")), MAQ_ERROR_UNREADABLE);

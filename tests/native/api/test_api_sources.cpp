@@ -22,7 +22,7 @@ TEST(ApiSources, EverySchemeOfTheListHasAnExampleThatIsKnown) {
     names.insert(scheme.name);
     maq_source* source = nullptr;
     const maq_status status = maq_source_create(context.get(), scheme.example, nullptr, &source);
-    EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_get_last_error(context.get());
+    EXPECT_NE(status, MAQ_ERROR_UNSUPPORTED) << maq_last_error(context.get());
     maq_source_destroy(source);
   }
   EXPECT_EQ(names,
@@ -79,11 +79,11 @@ TEST(ApiSources, SayWhenEveryFrameIsHeldAndAFrameGivenBackIsNewToTheNext) {
   EXPECT_EQ(frame, nullptr);
   maq_frame_desc wrong{};
   EXPECT_EQ(maq_frame_get_desc(held.back().get(), &wrong), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_STRNE(maq_get_last_error(held.back().get()), "");
+  EXPECT_STRNE(maq_last_error(held.back().get()), "");
   held.pop_back();
   const std::optional<maquette::Frame> next = source.next();
   EXPECT_EQ(next->desc().sequence, 4u) << "a refused call takes no frame";
-  EXPECT_STREQ(maq_get_last_error(next->get()), "");
+  EXPECT_STREQ(maq_last_error(next->get()), "");
 }
 
 TEST(ApiSources, WhatIsRecordedIsPlayedAgain) {
@@ -160,7 +160,7 @@ TEST(ApiSources, OnlyCamerasHaveControls) {
   }
   maq_source* camera = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "v4l2:/no/such?gain=loud", nullptr, &camera), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(maq_get_last_error(context.get()), "gain=loud in v4l2:/no/such?gain=loud must be a number or auto.");
+  EXPECT_STREQ(maq_last_error(context.get()), "gain=loud in v4l2:/no/such?gain=loud must be a number or auto.");
 }
 
 // A copy of the SDK that lies alone.
@@ -218,7 +218,7 @@ class LoneCopy {
     function<decltype(maq_camera_list_destroy)>("maq_camera_list_destroy")(list);
     return found;
   }
-  std::string last_error() { return function<decltype(maq_get_last_error)>("maq_get_last_error")(context_); }
+  std::string last_error() { return function<decltype(maq_last_error)>("maq_last_error")(context_); }
   template <typename Function>
   Function* function(const char* name) const {
     return reinterpret_cast<Function*>(dlsym(library_, name));
@@ -319,11 +319,11 @@ TEST(ApiSources, UnknownSchemesAndMissingFilesAreSentences) {
   maq_source* source = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "rtsp:camera", nullptr, &source), MAQ_ERROR_UNSUPPORTED);
   EXPECT_STREQ(
-      maq_get_last_error(context.get()),
+      maq_last_error(context.get()),
       "\"rtsp:\" is not a kind of source of this build; there are file:, camera:, image:, video:, rec:, stub:, v4l2:, "
       "libcamera:, depthai:.");
   EXPECT_EQ(maq_source_create(context.get(), "image:/no/such.jpg", nullptr, &source), MAQ_ERROR_NOT_FOUND);
-  EXPECT_STREQ(maq_get_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
+  EXPECT_STREQ(maq_last_error(context.get()), "/no/such.jpg does not exist; check the path.");
   EXPECT_EQ(source, nullptr);
 }
 

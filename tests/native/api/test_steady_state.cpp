@@ -180,8 +180,7 @@ TEST(SteadyState, FramesOfLiveSourcesTakeNothingFromTheHeap) {
     const auto take = [&](int frames) {
       for (int i = 0; i < frames; ++i) {
         maq_frame* frame = nullptr;
-        ASSERT_EQ(maq_source_acquire_frame(source.get(), 10000000000, &frame), MAQ_OK)
-            << maq_get_last_error(source.get());
+        ASSERT_EQ(maq_source_acquire_frame(source.get(), 10000000000, &frame), MAQ_OK) << maq_last_error(source.get());
         maq_frame_release(frame);
       }
     };

@@ -267,7 +267,7 @@ TEST(Pipeline, ACameraThatStaysAwayFailsAndAnotherSourceGoesOn) {
   EXPECT_EQ(status, MAQ_ERROR_DEVICE_LOST);
   EXPECT_EQ(watched.pipeline->info().state, MAQ_PIPELINE_FAILED);
   EXPECT_EQ(watched.pipeline->info().status, MAQ_ERROR_DEVICE_LOST);
-  EXPECT_STREQ(maq_get_last_error(watched.pipeline->get()), watched.pipeline->info().problem);
+  EXPECT_STREQ(maq_last_error(watched.pipeline->get()), watched.pipeline->info().problem);
   watched.pipeline->set_source("stub:pattern?frames=2&size=32x32");
   EXPECT_EQ(watched.pipeline->next()->frame.desc().width_px, 32);
   EXPECT_STREQ(watched.pipeline->info().problem, "");
@@ -357,7 +357,7 @@ TEST(Pipeline, StoppingCancelsACallThatWaits) {
   watched.pipeline->set_source("stub:pattern?fps=0.01&size=32x32");
   status_of_next(*watched.pipeline);  // the first frame comes at once
   EXPECT_EQ(status_of_next(*watched.pipeline, 1000000), MAQ_TIMEOUT);
-  EXPECT_STREQ(maq_get_last_error(watched.pipeline->get()), "No result came within 1 ms.");
+  EXPECT_STREQ(maq_last_error(watched.pipeline->get()), "No result came within 1 ms.");
   maq_status status = MAQ_OK;
   std::thread waits([&] { status = status_of_next(*watched.pipeline); });
   std::this_thread::sleep_for(20ms);
@@ -552,7 +552,7 @@ TEST(Pipeline, RefusesWrongArguments) {
   maq_pipeline* pipeline = nullptr;
   const auto refused = [&](const maq_pipeline_config& config) {
     EXPECT_EQ(maq_pipeline_create(context.get(), &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT);
-    return std::string(maq_get_last_error(context.get()));
+    return std::string(maq_last_error(context.get()));
   };
   maq_pipeline_config config = maquette::default_pipeline_config();
   config.densepose = &densepose;

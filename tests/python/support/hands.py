@@ -22,8 +22,10 @@ class Hands:
         self._display = Display(display())
         self._root = self._display.screen().root
         self._window = self.until(lambda: self._find(self._root), "a window")
+        viewable = X.IsViewable  # before, it takes no focus and no keys
+        self.until(lambda: self._window.get_attributes().map_state == viewable, "a window on the screen")
 
-    def until(self, condition, what: str, timeout_s: float = 30):
+    def until(self, condition, what: str, timeout_s: float = 60):
         """What the condition gives once it is true; the window goes on meanwhile."""
         end_s = time.monotonic() + timeout_s
         while time.monotonic() < end_s:

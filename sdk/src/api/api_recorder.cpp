@@ -26,7 +26,7 @@ maq_status maq_recorder_create(maq_context* context, const char* path, const maq
     if (source != nullptr) {
       info.source = source->uri;
       info.fps = source->source->info().fps;
-      if (source->source->calibration() != nullptr) info.calibration = *source->source->calibration();
+      if (source->source->intrinsics() != nullptr) info.intrinsics = *source->source->intrinsics();
     }
     *recorder = new maq_recorder(path, info, int(config.jpeg_quality));
     return MAQ_OK;

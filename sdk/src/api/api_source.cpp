@@ -119,7 +119,7 @@ maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* i
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
     require_argument(intrinsics, "intrinsics");
-    const maq_intrinsics* found = source->source->calibration();
+    const maq_intrinsics* found = source->source->intrinsics();
     if (found == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The intrinsics of the source are not known.");
     *intrinsics = *found;
     return MAQ_OK;

@@ -389,7 +389,7 @@ struct Pipeline::State {
         end_recording();
         if (!now.recording.empty()) {
           RecordingInfo info{now.uri, source->info().fps, {}};
-          if (source->calibration() != nullptr) info.calibration = *source->calibration();
+          if (source->intrinsics() != nullptr) info.intrinsics = *source->intrinsics();
           recording = std::make_unique<RecordingWriter>(now.recording, info, 0);
         }
       }

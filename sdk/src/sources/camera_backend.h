@@ -56,7 +56,7 @@ class Camera : public FrameOwner {
   // The same for the same device in the same socket, whatever number it gets.
   virtual const std::string& identity() const = 0;
   // Null when the device does not know.
-  virtual const maq_intrinsics* calibration() const { return nullptr; }
+  virtual const maq_intrinsics* intrinsics() const { return nullptr; }
   // From any thread. Throw MAQ_ERROR_UNSUPPORTED for what the device does not have, MAQ_ERROR_INVALID_ARGUMENT for
   // values out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
   virtual maq_control_info control(maq_control which);

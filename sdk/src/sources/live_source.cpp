@@ -298,7 +298,7 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
   info_.fps = format.fps;
   info_.is_live = true;
   info_.clock = MAQ_CLOCK_MONOTONIC;
-  if (camera->calibration() != nullptr) calibration_ = *camera->calibration();
+  if (camera->intrinsics() != nullptr) intrinsics_ = *camera->intrinsics();
   state_->thread =
       std::thread([state = state_, camera = std::move(camera)]() mutable { state->run(std::move(camera)); });
   pthread_setname_np(state_->thread.native_handle(), "maq source");  // for debuggers and `top -H`

@@ -21,7 +21,7 @@ class LiveSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
   uint64_t drops() const override;
-  const maq_intrinsics* calibration() const override { return calibration_ ? &*calibration_ : nullptr; }
+  const maq_intrinsics* intrinsics() const override { return intrinsics_ ? &*intrinsics_ : nullptr; }
   // Of the camera, from any thread. Throw MAQ_ERROR_DEVICE_LOST while it is lost. What was set is restored when it is
   // back.
   maq_control_info control(maq_control which) override;
@@ -36,7 +36,7 @@ class LiveSource : public Source {
 
   std::shared_ptr<State> state_;
   SourceInfo info_;
-  std::optional<maq_intrinsics> calibration_;
+  std::optional<maq_intrinsics> intrinsics_;
 };
 
 }  // namespace maq

@@ -27,7 +27,7 @@ class Source {
   // Frames lost so far, on their way or because the app did not take them.
   virtual uint64_t drops() const { return 0; }
   // Null when the source does not know.
-  virtual const maq_intrinsics* calibration() const { return nullptr; }
+  virtual const maq_intrinsics* intrinsics() const { return nullptr; }
   // As those of a camera; every other source throws MAQ_ERROR_UNSUPPORTED.
   virtual maq_control_info control(maq_control which);
   virtual void set_control(maq_control which, double value);

@@ -100,7 +100,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
   ASSERT_EQ(maq_source_acquire_frame(source, 0, &frame), MAQ_OK);
   maq_control_info control{};
   control.struct_size = sizeof control;
-  maq_intrinsics calibration{};
+  maq_intrinsics intrinsics{};
   maq_frame_desc desc{};
   desc.struct_size = sizeof desc;
   int32_t fd = -5;
@@ -110,7 +110,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
                "value");
   expect_error(maq_source_set_control(source, maq_control(0), 1), MAQ_ERROR_INVALID_ARGUMENT, source, "control is 0");
   expect_error(maq_source_get_control(source, MAQ_CONTROL_GAIN, nullptr), MAQ_ERROR_INVALID_ARGUMENT, source, "info");
-  expect_error(maq_source_get_intrinsics(source, &calibration), MAQ_ERROR_UNSUPPORTED, source, "intrinsics");
+  expect_error(maq_source_get_intrinsics(source, &intrinsics), MAQ_ERROR_UNSUPPORTED, source, "intrinsics");
   expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, source, "negative");
   expect_error(maq_frame_get_depth(frame, &desc), MAQ_ERROR_UNSUPPORTED, frame, "without depth");
   expect_error(maq_frame_get_dma_buf(frame, &fd), MAQ_ERROR_UNSUPPORTED, frame, "dma-buf");
@@ -125,7 +125,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
   maq_source_destroy(source);
   for (const maq_status status :
        {maq_source_get_control(nullptr, MAQ_CONTROL_GAIN, &control),
-        maq_source_set_control(nullptr, MAQ_CONTROL_GAIN, 1), maq_source_get_intrinsics(nullptr, &calibration),
+        maq_source_set_control(nullptr, MAQ_CONTROL_GAIN, 1), maq_source_get_intrinsics(nullptr, &intrinsics),
         maq_source_seek(nullptr, 0), maq_frame_get_depth(nullptr, &desc), maq_frame_get_dma_buf(nullptr, &fd)}) {
     EXPECT_EQ(status, MAQ_ERROR_INVALID_ARGUMENT);
   }

@@ -292,11 +292,11 @@ TEST(ApiSources, DepthAiDeliversDepthAndCalibrationAcrossItsLibrary) {
   EXPECT_EQ(sdk.open("depthai:10.0.0.1"), MAQ_ERROR_NO_PERMISSION)
       << "an exception of the library: " << sdk.last_error();
   sdk.use("depthai:?size=64x48&fps=100", [&](maq_source* source) {
-    maq_intrinsics calibration{};
-    EXPECT_EQ(sdk.function<decltype(maq_source_get_intrinsics)>("maq_source_get_intrinsics")(source, &calibration),
+    maq_intrinsics intrinsics{};
+    EXPECT_EQ(sdk.function<decltype(maq_source_get_intrinsics)>("maq_source_get_intrinsics")(source, &intrinsics),
               MAQ_OK);
-    EXPECT_EQ(calibration.width_px, 64);
-    EXPECT_EQ(calibration.fx_px, 500);
+    EXPECT_EQ(intrinsics.width_px, 64);
+    EXPECT_EQ(intrinsics.fx_px, 500);
     maq_frame* frame = nullptr;
     ASSERT_EQ(sdk.function<decltype(maq_source_acquire_frame)>("maq_source_acquire_frame")(source, 5000000000, &frame),
               MAQ_OK);

@@ -615,8 +615,8 @@ TEST_F(DepthaiCameras, FramesAreTakenAndGivenBackByOtherThreadsWhileTheCameraCom
 TEST_F(DepthaiCameras, CalibrationIsThatOfTheAgreedSize) {
   fake_.lens = maq::DepthAiLens{501, 502, 31, 25, {1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0}, true};
   auto opened = camera({64, 48, 30, false});
-  ASSERT_NE(opened->calibration(), nullptr);
-  const maq_intrinsics found = *opened->calibration();
+  ASSERT_NE(opened->intrinsics(), nullptr);
+  const maq_intrinsics found = *opened->intrinsics();
   EXPECT_EQ(found.width_px, 64);
   EXPECT_EQ(found.height_px, 48);
   EXPECT_EQ(found.fx_px, 501);
@@ -625,34 +625,34 @@ TEST_F(DepthaiCameras, CalibrationIsThatOfTheAgreedSize) {
   EXPECT_EQ(found.cy_px, 25);
   for (int i = 0; i < 8; ++i) EXPECT_EQ(found.distortion[i], i + 1);
   opened = camera();
-  ASSERT_NE(opened->calibration(), nullptr);
-  for (const double value : opened->calibration()->distortion) EXPECT_EQ(value, 0) << "the device takes it out";
+  ASSERT_NE(opened->intrinsics(), nullptr);
+  for (const double value : opened->intrinsics()->distortion) EXPECT_EQ(value, 0) << "the device takes it out";
   fake_.lens.reset();
-  EXPECT_EQ(camera()->calibration(), nullptr);
+  EXPECT_EQ(camera()->intrinsics(), nullptr);
   fake_.lens = maq::DepthAiLens{501, 502, 31, 25, {}, true};
-  EXPECT_EQ(source({})->calibration()->fx_px, 501);
+  EXPECT_EQ(source({})->intrinsics()->fx_px, 501);
 }
 
 TEST_F(DepthaiCameras, ALensThatCannotBeSaidIsNotSaid) {
   const maq::DepthAiPlan plain{64, 48, 30, false}, undistorted{64, 48, 30, true};
   const maq::DepthAiLens good{500, 500, 32, 24, {0.1, 0.2, 0.3, 0.4, 0.5}, true};
-  ASSERT_TRUE(maq::depthai_calibration(good, plain));
-  EXPECT_EQ(maq::depthai_calibration(good, plain)->distortion[4], 0.5);
-  EXPECT_EQ(maq::depthai_calibration(good, plain)->distortion[5], 0);
+  ASSERT_TRUE(maq::depthai_intrinsics(good, plain));
+  EXPECT_EQ(maq::depthai_intrinsics(good, plain)->distortion[4], 0.5);
+  EXPECT_EQ(maq::depthai_intrinsics(good, plain)->distortion[5], 0);
   maq::DepthAiLens thin_prism = good, fisheye = good, endless = good;
   thin_prism.distortion.assign(14, 0);
   thin_prism.distortion[12] = 1e-6;
   fisheye.is_perspective = false;
   endless.distortion[1] = std::numeric_limits<double>::infinity();
   for (const maq::DepthAiLens& lens : {thin_prism, fisheye, endless}) {
-    EXPECT_FALSE(maq::depthai_calibration(lens, plain));
-    EXPECT_TRUE(maq::depthai_calibration(lens, undistorted));
+    EXPECT_FALSE(maq::depthai_intrinsics(lens, plain));
+    EXPECT_TRUE(maq::depthai_intrinsics(lens, undistorted));
   }
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const maq::DepthAiLens& lens :
        {maq::DepthAiLens{0, 500, 32, 24, {}, true}, maq::DepthAiLens{500, -1, 32, 24, {}, true},
         maq::DepthAiLens{500, 500, nan, 24, {}, true}, maq::DepthAiLens{nan, 500, 32, 24, {}, true}}) {
-    EXPECT_FALSE(maq::depthai_calibration(lens, undistorted));
+    EXPECT_FALSE(maq::depthai_intrinsics(lens, undistorted));
   }
 }
 

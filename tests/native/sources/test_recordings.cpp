@@ -65,7 +65,7 @@ TEST_F(Recordings, GiveBackEachFrameAsItWas) {
   EXPECT_EQ(source->info().width_px, 33);
   EXPECT_EQ(source->info().frame_count, 5);
   EXPECT_NEAR(source->info().fps, 10, 1e-9);
-  EXPECT_EQ(source->calibration(), nullptr);
+  EXPECT_EQ(source->intrinsics(), nullptr);
   for (int i = 0; i < 5; ++i) expect_frame(*source, i);
   maq::Frame frame;
   EXPECT_EQ(source->next(0, frame), NextFrame::kEnd);
@@ -79,12 +79,12 @@ TEST_F(Recordings, GiveBackEachFrameAsItWas) {
 
 TEST_F(Recordings, KeepEveryFormatDepthAndCalibration) {
   maq::RecordingInfo info{"a source\xff", 30, maq_intrinsics{}};
-  info.calibration->width_px = 64;
-  info.calibration->height_px = 48;
-  info.calibration->fx_px = 50.25;
-  info.calibration->fy_px = 51;
-  info.calibration->cx_px = -1e-7;
-  info.calibration->distortion[7] = 0.1;
+  info.intrinsics->width_px = 64;
+  info.intrinsics->height_px = 48;
+  info.intrinsics->fx_px = 50.25;
+  info.intrinsics->fy_px = 51;
+  info.intrinsics->cx_px = -1e-7;
+  info.intrinsics->distortion[7] = 0.1;
   maq::RecordingWriter writer(path_of(), info, 0);
   for (int format = MAQ_PIXEL_RGB8; format <= MAQ_PIXEL_DEPTH16; ++format) {
     maq::Frame frame = frame_of(format, maq_pixel_format(format), 31 + format, 5);
@@ -96,10 +96,10 @@ TEST_F(Recordings, KeepEveryFormatDepthAndCalibration) {
   }
   writer.finish();
   const auto source = play();
-  ASSERT_NE(source->calibration(), nullptr);
-  EXPECT_EQ(source->calibration()->fx_px, 50.25);
-  EXPECT_EQ(source->calibration()->cx_px, -1e-7);
-  EXPECT_EQ(source->calibration()->distortion[7], 0.1);
+  ASSERT_NE(source->intrinsics(), nullptr);
+  EXPECT_EQ(source->intrinsics()->fx_px, 50.25);
+  EXPECT_EQ(source->intrinsics()->cx_px, -1e-7);
+  EXPECT_EQ(source->intrinsics()->distortion[7], 0.1);
   maq::Frame frame;
   for (int format = MAQ_PIXEL_RGB8; format <= MAQ_PIXEL_DEPTH16; ++format) {
     frame.clear();
@@ -112,7 +112,7 @@ TEST_F(Recordings, KeepEveryFormatDepthAndCalibration) {
       EXPECT_EQ(frame.depth.planes[0].data[41], format);
     }
   }
-  EXPECT_EQ(play("?size=20x10")->calibration(), nullptr) << "it is of pictures of another size";
+  EXPECT_EQ(play("?size=20x10")->intrinsics(), nullptr) << "it is of pictures of another size";
 }
 
 TEST_F(Recordings, CompressOnlyWhenAsked) {

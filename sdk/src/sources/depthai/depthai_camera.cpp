@@ -86,14 +86,14 @@ class DepthAiCamera final : public Camera {
     with_depth_ = plan.with_depth;
     const auto lens = guarded(name_, "does not give its calibration", MAQ_ERROR_UNSUPPORTED,
                               [&] { return session_->lens(plan.width_px, plan.height_px); });
-    if (lens) calibration_ = depthai_calibration(*lens, plan);
+    if (lens) intrinsics_ = depthai_intrinsics(*lens, plan);
     inbox_ = std::make_shared<DepthAiInbox>(plan);
     guarded(name_, "does not start", MAQ_ERROR_UNSUPPORTED, [&] { session_->start(plan, inbox_); });
   }
 
   const CameraFormat& format() const override { return format_; }
   const std::string& identity() const override { return features_.id; }
-  const maq_intrinsics* calibration() const override { return calibration_ ? &*calibration_ : nullptr; }
+  const maq_intrinsics* intrinsics() const override { return intrinsics_ ? &*intrinsics_ : nullptr; }
 
   maq_control_info control(maq_control which) override {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -234,7 +234,7 @@ class DepthAiCamera final : public Camera {
   std::shared_ptr<DepthAiInbox> inbox_;
   DepthAiFeatures features_;
   CameraFormat format_;
-  std::optional<maq_intrinsics> calibration_;
+  std::optional<maq_intrinsics> intrinsics_;
   bool with_depth_ = false;
 
   std::mutex mutex_;  // of slots_ and controls_
@@ -294,7 +294,7 @@ std::shared_ptr<DepthAiCamera> open_chosen(DepthAiDriver& driver, const std::str
 
 }  // namespace
 
-std::optional<maq_intrinsics> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan) {
+std::optional<maq_intrinsics> depthai_intrinsics(const DepthAiLens& lens, const DepthAiPlan& plan) {
   constexpr size_t kKnown = 8;
   maq_intrinsics made{};
   made.width_px = plan.width_px;

@@ -1,4 +1,4 @@
-// Cameras of DepthAI (Luxonis OAK): colour with depth that fits it pixel by pixel, and calibration.
+// Cameras of DepthAI (Luxonis OAK): colour with depth that fits it pixel by pixel, and intrinsics.
 #pragma once
 
 #include <memory>
@@ -31,6 +31,6 @@ CameraOpener depthai_opener(DepthAiDriver& driver, const std::string& device, De
 std::vector<CameraListing> list_depthai_cameras(DepthAiDriver& driver);
 
 // Nothing when maq_intrinsics cannot express the lens, or its values make no sense.
-std::optional<maq_intrinsics> depthai_calibration(const DepthAiLens& lens, const DepthAiPlan& plan);
+std::optional<maq_intrinsics> depthai_intrinsics(const DepthAiLens& lens, const DepthAiPlan& plan);
 
 }  // namespace maq

@@ -1,4 +1,4 @@
-// Recordings (.maqrec): frames as a camera gave them, with their times, depth and calibration. docs/formats.md has the
+// Recordings (.maqrec): frames as a camera gave them, with their times, depth and intrinsics. docs/formats.md has the
 // layout. Each frame carries its own checksum and lies whole in the file once add() has returned, so that after a crash
 // every frame but the one being written can be read; an index at the end, when there is one, saves looking for them.
 #pragma once
@@ -22,7 +22,7 @@ namespace maq {
 struct RecordingInfo {
   std::string source;  // what was recorded: a URI
   double fps = 0;      // 0: not known
-  std::optional<maq_intrinsics> calibration;
+  std::optional<maq_intrinsics> intrinsics;
 };
 
 struct RecordingEntry {

@@ -39,24 +39,24 @@ size_t depth_bytes(const FrameHead& head) { return size_t(head.depth_width_px) *
 
 size_t whole_bytes(const FrameHead& head) { return sizeof head + head.picture_bytes + depth_bytes(head); }
 
-std::optional<maq_intrinsics> calibration_of(const nlohmann::json& from) {
-  maq_intrinsics calibration{};
-  calibration.width_px = from.at("width_px").get<int32_t>();
-  calibration.height_px = from.at("height_px").get<int32_t>();
-  calibration.fx_px = from.at("fx_px").get<double>();
-  calibration.fy_px = from.at("fy_px").get<double>();
-  calibration.cx_px = from.at("cx_px").get<double>();
-  calibration.cy_px = from.at("cy_px").get<double>();
+std::optional<maq_intrinsics> intrinsics_of(const nlohmann::json& from) {
+  maq_intrinsics intrinsics{};
+  intrinsics.width_px = from.at("width_px").get<int32_t>();
+  intrinsics.height_px = from.at("height_px").get<int32_t>();
+  intrinsics.fx_px = from.at("fx_px").get<double>();
+  intrinsics.fy_px = from.at("fy_px").get<double>();
+  intrinsics.cx_px = from.at("cx_px").get<double>();
+  intrinsics.cy_px = from.at("cy_px").get<double>();
   const auto distortion = from.at("distortion").get<std::vector<double>>();
-  bool is_sane = is_allowed_size(calibration.width_px, calibration.height_px) && distortion.size() == 8 &&
-                 calibration.fx_px > 0 && calibration.fy_px > 0;
-  for (const double value : {calibration.fx_px, calibration.fy_px, calibration.cx_px, calibration.cy_px}) {
+  bool is_sane = is_allowed_size(intrinsics.width_px, intrinsics.height_px) && distortion.size() == 8 &&
+                 intrinsics.fx_px > 0 && intrinsics.fy_px > 0;
+  for (const double value : {intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px}) {
     is_sane = is_sane && std::isfinite(value);
   }
   for (const double value : distortion) is_sane = is_sane && std::isfinite(value);
   if (!is_sane) return {};
-  std::copy(distortion.begin(), distortion.end(), calibration.distortion);
-  return calibration;
+  std::copy(distortion.begin(), distortion.end(), intrinsics.distortion);
+  return intrinsics;
 }
 
 }  // namespace
@@ -112,7 +112,7 @@ void RecordingReader::read_head() {
     info_.source = parsed.at("source").get<std::string>();
     info_.fps = parsed.at("fps").get<double>();
     if (!(info_.fps >= 0 && info_.fps <= 1000)) info_.fps = 0;
-    if (parsed.contains("calibration")) info_.calibration = calibration_of(parsed.at("calibration"));
+    if (parsed.contains("calibration")) info_.intrinsics = intrinsics_of(parsed.at("calibration"));
   } catch (const nlohmann::json::exception&) {
     throw Error(MAQ_ERROR_UNREADABLE, path_, " is damaged: its head says nothing of its frames.");
   }

@@ -41,8 +41,8 @@ class RecordingSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
   // As it was recorded: for pictures of another size it does not hold.
-  const maq_intrinsics* calibration() const override {
-    return reader_.info().calibration && width_px_ == 0 ? &*reader_.info().calibration : nullptr;
+  const maq_intrinsics* intrinsics() const override {
+    return reader_.info().intrinsics && width_px_ == 0 ? &*reader_.info().intrinsics : nullptr;
   }
 
   bool can_seek() const override { return true; }

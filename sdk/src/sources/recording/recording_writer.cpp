@@ -21,8 +21,8 @@ std::string head_json(const RecordingInfo& info) {
   head["made_by"] = std::string("maquette ") + sdk_version();
   head["source"] = info.source;
   head["fps"] = info.fps;
-  if (info.calibration) {
-    const maq_intrinsics& from = *info.calibration;
+  if (info.intrinsics) {
+    const maq_intrinsics& from = *info.intrinsics;
     head["calibration"] = {{"width_px", from.width_px},    {"height_px", from.height_px}, {"fx_px", from.fx_px},
                            {"fy_px", from.fy_px},          {"cx_px", from.cx_px},         {"cy_px", from.cy_px},
                            {"distortion", from.distortion}};

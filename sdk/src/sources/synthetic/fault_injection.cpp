@@ -51,7 +51,7 @@ class FaultyCamera : public Camera {
 
   const CameraFormat& format() const override { return camera_->format(); }
   const std::string& identity() const override { return camera_->identity(); }
-  const maq_intrinsics* calibration() const override { return camera_->calibration(); }
+  const maq_intrinsics* intrinsics() const override { return camera_->intrinsics(); }
   maq_control_info control(maq_control which) override { return camera_->control(which); }
   void set_control(maq_control which, double value) override { camera_->set_control(which, value); }
   void seek(int64_t time_ns) override { camera_->seek(time_ns); }

@@ -25,7 +25,7 @@ class ReplaySchedule {
       : open_(std::move(open)), options_(options), source_(open_()), can_seek_(source_->can_seek()) {}
 
   const SourceInfo& info() const { return source_->info(); }
-  const maq_intrinsics* calibration() const { return source_->calibration(); }
+  const maq_intrinsics* intrinsics() const { return source_->intrinsics(); }
   double fps() const { return (info().fps > 0 ? info().fps : kStillFps) * options_.speed; }
 
   struct Next {
@@ -99,7 +99,7 @@ class ReplayCamera : public Camera {
 
   const CameraFormat& format() const override { return format_; }
   const std::string& identity() const override { return identity_; }
-  const maq_intrinsics* calibration() const override { return schedule_->calibration(); }
+  const maq_intrinsics* intrinsics() const override { return schedule_->intrinsics(); }
   void close() override {}
 
   void give_back(int slot) override {

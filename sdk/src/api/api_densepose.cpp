@@ -45,7 +45,8 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config) {
   if (config.max_proposals != 0) require_range("config.max_proposals", config.max_proposals, 1, 1000);
   require_range("config.key_frame_interval", config.key_frame_interval, 1, 1000);
   require_range("config.min_person_height_px", config.min_person_height_px, 0, 100000);
-  require_range("config.detail", int(config.detail), int(MAQ_DENSEPOSE_DETAIL_SURFACE), int(MAQ_DENSEPOSE_DETAIL_PART));
+  require_range("config.detail", number_in(config.detail), int32_t(MAQ_DENSEPOSE_DETAIL_SURFACE),
+                int32_t(MAQ_DENSEPOSE_DETAIL_PART));
   require_range("config.allow_spinning", config.allow_spinning, 0, 1);
   DensePoseSettings settings;
   settings.threads = config.threads > 0 ? config.threads : default_threads();

@@ -94,10 +94,7 @@ maq_status maq_scene_image_get_plane(const maq_scene_image* image, maq_scene_pla
     require_argument(image, "image");
     require_argument(pixels, "pixels");
     require_argument(stride_bytes, "stride_bytes");
-    // Any number may come from C, also one that is no value of the enum in C++.
-    int32_t wanted;
-    static_assert(sizeof wanted == sizeof plane);
-    std::memcpy(&wanted, &plane, sizeof wanted);
+    const int32_t wanted = number_in(plane);
     require_range("plane", wanted, int32_t(MAQ_SCENE_PLANE_BGR), int32_t(MAQ_SCENE_PLANE_DEPTH));
     const RenderedImage& from = image->image;
     const size_t width = size_t(from.width_px);

@@ -68,6 +68,16 @@ inline void require_struct_size(const char* name, uint32_t size, size_t smallest
   }
 }
 
+// The number that a caller wrote where an enum is expected. C allows any; reading one that the enum does not have is
+// undefined in C++.
+template <class Enum>
+int32_t number_in(const Enum& value) {
+  int32_t number;
+  static_assert(sizeof number == sizeof value);
+  std::memcpy(&number, &value, sizeof number);
+  return number;
+}
+
 // The caller's config on top of the defaults.
 template <class T>
 T read_config(const T* given, const char* name, const T& defaults, size_t smallest) {

@@ -89,8 +89,14 @@ class ShardWriter:
         self._files: dict[str, list[bytes]] = {"image": [], "label": [], "point": []}
         self._boxes: list[tuple[np.ndarray, ...]] | None = [] if boxes else None
 
-    def add(self, image: np.ndarray, label: np.ndarray, jpeg_quality: int, point: np.ndarray | None = None) -> None:
-        """image: uint8 [H, W, 3] BGR; label: uint8 [H, W, 4]; point: float [H, W, 3] of people's pixels, metres."""
+    def add(
+        self, image: np.ndarray, label: np.ndarray, jpeg_quality: int,
+        point: np.ndarray | None = None, axis: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        """image: uint8 [H, W, 3] BGR; label: uint8 [H, W, 4]; point: float [H, W, 3] of people's pixels, metres.
+
+        axis: float [people, 2], the body axis of instance k in row k - 1 (`LabelledImage.axis`).
+        """
         self._files["image"].append(_encoded(".jpg", image, cv2.IMWRITE_JPEG_QUALITY, jpeg_quality))
         self._files["label"].append(_encoded(".png", label, cv2.IMWRITE_PNG_COMPRESSION, 3))
         if point is not None:
@@ -99,14 +105,16 @@ class ShardWriter:
             self._files["point"].append(_encoded(".png", scaled.astype(np.uint16), cv2.IMWRITE_PNG_COMPRESSION, 3))
         if self._boxes is not None:
             box, instance, ignore = visible_boxes(label)
-            self._boxes.append((box, np.full(len(box), len(self._boxes), np.int32), instance, ignore))
+            image_number = np.full(len(box), len(self._boxes), np.int32)
+            own = np.full((len(box), 2), np.nan) if axis is None else axis[instance.astype(int) - 1]
+            self._boxes.append((box, image_number, instance, ignore, own.astype(np.float32)))
 
     def write(self, path: Path, meta: dict[str, object]) -> None:
         """Writes the file atomically (temporary name, then rename)."""
         arrays = {}
         if self._boxes is not None:
             columns = map(np.concatenate, zip(*self._boxes, strict=True))
-            arrays |= dict(zip(("box", "box_image", "box_instance", "box_ignore"), columns, strict=True))
+            arrays |= dict(zip(_BOX_COLUMNS, columns, strict=True))
         arrays["meta"] = np.array(json.dumps(meta))
         for name, files in self._files.items():
             if files:
@@ -171,7 +179,9 @@ class LabelledImage:
     name: shard and position, the same in every run. image: uint8 [H, W, 3] RGB. label: uint8 [H, W, 4]
     holding I, U*255, V*255, instance. point: float32 [H, W, 3], surface point on the template body in
     metres, or None. box: float32 [n, 4] x0, y0, x1, y1. instance: uint8 [n], the box's number in label.
-    ignore: bool [n].
+    ignore: bool [n]. axis: float32 [n, 2], the direction in the picture (x to the right, y down) from the middle of the
+    hips to the top of the head; its length is 1 where the body lies in the picture's plane and 0 where it is seen along
+    the axis. NaN where nobody knows.
     """
 
     name: str
@@ -181,6 +191,7 @@ class LabelledImage:
     box: np.ndarray
     instance: np.ndarray
     ignore: np.ndarray
+    axis: np.ndarray
 
 
 def count_images(paths: list[Path]) -> int:
@@ -214,8 +225,9 @@ def read_image(folder: Path, name: str) -> LabelledImage:
 
 
 _ENCODED = ("image", "label", "point")
-_WITH_TRUTH = ("image", "label", "box", "box_image", "box_instance", "box_ignore", "point", "point_range")
-_OPTIONAL = {"point", "point_end", "point_range"}
+_BOX_COLUMNS = ("box", "box_image", "box_instance", "box_ignore", "box_axis")
+_WITH_TRUTH = ("image", "label", "point", "point_range", *_BOX_COLUMNS)
+_OPTIONAL = {"point", "point_end", "point_range", "box_axis"}
 
 
 def _read(path: Path, *keys: str) -> dict[str, np.ndarray]:
@@ -248,6 +260,7 @@ def _labelled_image(name: str, shard: dict[str, np.ndarray], k: int) -> Labelled
         box=shard["box"][own],
         instance=shard["box_instance"][own],
         ignore=shard["box_ignore"][own],
+        axis=shard["box_axis"][own] if "box_axis" in shard else np.full((own.sum(), 2), np.nan, np.float32),
     )
 
 

@@ -29,7 +29,7 @@ def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
     for k in range(images):
         rng = np.random.default_rng([SPLITS[studio.split], 7, number, k])
         sample = studio.sample(rng)
-        shard.add(sample.image, sample.label, int(rng.integers(55, 96)), sample.point)
+        shard.add(sample.image, sample.label, int(rng.integers(55, 96)), sample.point, sample.axis)
     shard.write(path, {"split": studio.split, "shard": number, "generator": studio.variety.generator})
 
 

@@ -27,15 +27,35 @@ SPLITS = {"train": 0, "val": 1, "test": 2}
 PANORAMA_FRACTION = 0.2  # of the images outside rendered rooms
 TILTED_PEOPLE = 0.25  # of the tilted images: the people are, not the camera
 BODIES = {"train": 400, "val": 60, "test": 60}
+_NEAR_M = 0.2  # a body's middle closer to the camera than this says nothing about its direction
 
 
 @dataclass(frozen=True)
 class Sample:
-    """image uint8 [H, W, 3] BGR; label uint8 [H, W, 4] = (I, U*255, V*255, instance); point float32 [H, W, 3]."""
+    """image uint8 [H, W, 3] BGR; label uint8 [H, W, 4] = (I, U*255, V*255, instance); point float32 [H, W, 3];
+    axis float32 [people, 2] by instance number - 1 (`export.shards.LabelledImage`)."""
 
     image: np.ndarray
     label: np.ndarray
     point: np.ndarray | None
+    axis: np.ndarray
+
+
+def body_axis(hips: np.ndarray, skull: np.ndarray, camera: Camera) -> np.ndarray:
+    """Direction of the body axis in the picture, float32 [2]; its length is the sine of the angle to the line of sight.
+
+    hips, skull: world points [3]. NaN where the head is behind the camera.
+    """
+    ends = (np.stack([hips, skull]) - camera.centre) @ camera.rotation.T
+    along, middle = ends[1] - ends[0], ends.mean(0)
+    # The hips of people before a webcam may lie behind it.
+    at = middle if middle[2] > _NEAR_M else ends[1]
+    if at[2] <= _NEAR_M:
+        return np.full(2, np.nan, np.float32)
+    across = along - at * (along @ at) / (at @ at)
+    in_picture = along[:2] - at[:2] / at[2] * along[2]
+    length = np.linalg.norm(across) / np.linalg.norm(along)
+    return (in_picture * length / max(float(np.linalg.norm(in_picture)), 1e-9)).astype(np.float32)
 
 
 class Studio:
@@ -89,7 +109,9 @@ class Studio:
             image = through_lens(image, source, labels=False)
             label, point = (through_lens(a, source, labels=True) for a in (label, point))
         point = np.where(label[..., 3:] > 0, point, 0) if self.points else None
-        return Sample(camera_faults(rng, image), label, point)
+        ends = [[p.vertices[at].mean(0) for at in (self.model.buttocks, self.model.skull)] for p in stage.people]
+        axis = np.array([body_axis(*pair, stage.camera) for pair in ends], np.float32).reshape(-1, 2)
+        return Sample(camera_faults(rng, image), label, point, axis)
 
     def _background_behind(self, rng: np.random.Generator, roll_degrees: float) -> np.ndarray:
         """A photo behind people; most of the time it is tilted with them, as by a camera that is held so."""

@@ -33,3 +33,9 @@ MIRROR_PART = np.array(
 MIRROR_COARSE = np.array([0, 1, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 14], np.uint8)
 MIRROR_FLIPS_U = np.isin(np.arange(25), (5, 6, 23, 24))
 MIRROR_FLIPS_V = np.isin(np.arange(25), (1, 2, *range(7, 23)))
+
+# 1 for parts of left limbs, 2 for right ones, 0 for torso and head: a head's halves meet in the middle of a face, where
+# a pixel more or less says nothing about left and right.
+LIMB_SIDE = np.array(
+    [0 if "head" in name else 1 if "left" in name else 2 if "right" in name else 0 for name in PART_NAMES], np.uint8
+)

@@ -58,6 +58,15 @@ def rate_at(step: int, fraction: float, rate: float, warm_up_steps: int = 200) -
     return rate * min(1.0, (step + 1) / warm_up_steps) * (0.02 + 0.98 * wave)
 
 
+def steady_rate_at(step: int, fraction: float, rate: float, decay: float, warm_up_steps: int = 200) -> float:
+    """The same with one rate up to the last `decay` of the run, then a straight line down to a fiftieth.
+
+    Up to there it does not depend on the run's length, so that a run can be made longer afterwards.
+    """
+    left = min(1.0, (1 - min(fraction, 1)) / decay)
+    return rate * min(1.0, (step + 1) / warm_up_steps) * (0.02 + 0.98 * left)
+
+
 def seed_step(seed: int, step: int) -> None:
     """Random numbers of a step are those of a run that never stopped."""
     torch.manual_seed((seed << 32) + step)

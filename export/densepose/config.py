@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Sizes of the network. `width`: channels of neck, RPN, box head and dense head (64 = variant B)."""
+    """Sizes of the network. `width`: channels of neck, RPN, box head and dense head (64 = variant B); `axis`: whether
+    the box head also tells the direction of the body axis."""
 
     BACKBONES: ClassVar[dict[str, tuple[int, ...]]] = {  # and their channels at strides 4, 8, 16, 32
         "mobilenet_v2": (24, 32, 96, 160),
@@ -17,6 +18,7 @@ class NetworkConfig:
 
     width: int = 64
     backbone: str = "mobilenet_v2"
+    axis: bool = False
     tap_strides: tuple[int, ...] = (4, 8, 16, 32)
     rpn_strides: tuple[int, ...] = (4, 8, 16, 32, 64)
     anchor_sizes: tuple[int, ...] = (32, 64, 128, 256, 512)
@@ -37,7 +39,9 @@ class NetworkConfig:
     @staticmethod
     def of(saved: dict[str, Any]) -> NetworkConfig:
         """The network that a checkpoint or weights file of `export.densepose.train` holds."""
-        return NetworkConfig(width=saved["width"], backbone=saved.get("backbone", "mobilenet_v3_large"))
+        return NetworkConfig(
+            width=saved["width"], backbone=saved.get("backbone", "mobilenet_v3_large"), axis=saved.get("axis", False)
+        )
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 import torch
 
+from export.densepose.second_look import Look, cut, cut_label, look_at, outline, rotation, turn_upright, turned_box
 from export.densepose.targets import Truth
-from export.shards import Record, mirror_iuv, visible_boxes
+from export.shards import BOX_ALONE, Record, mirror_iuv, visible_boxes
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)  # RGB, 0..255
 STD = np.array([58.395, 57.12, 57.375], np.float32)
@@ -24,45 +25,154 @@ def normalised(image: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Cropping:
-    """How crops are drawn: how often towards a person, whose long side then is `person_scale` crop sides
-    (log-uniform)."""
+    """How crops of whole pictures are drawn: how often towards a person, whose long side then is `person_scale` crop
+    sides (log-uniform).
+
+    filled: min fraction of the crop's side that the picture's long side fills, so that the crop shows more than margin.
+    rolls: (fraction, smallest and largest angle in degrees, either way) by which pictures are turned that nobody tilted
+    when they were made: photographs.
+    """
 
     towards_person: float = 0.8
     person_scale: tuple[float, float] = (0.3, 1.3)  # from far away to truncated by the crop
+    filled: float = 0.0
+    rolls: tuple[tuple[float, float, float], ...] = ()
+
+    def draw(self, record: Record, size: int, rng: np.random.Generator) -> list[tuple[np.ndarray, Truth]]:
+        """One crop and its people."""
+        image, label, axis = augmented(record, size, rng, self)
+        return [(image, truth_of(label, axis))]
+
+    def draw_roll(self, rng: np.random.Generator) -> float:
+        _, low, high = self.rolls[rng.choice(len(self.rolls), p=[fraction for fraction, _, _ in self.rolls])]
+        return float(rng.uniform(low, high) * rng.choice([-1, 1]))
+
+
+@dataclass(frozen=True)
+class SecondLooks:
+    """How crops of the second look are drawn: `count` a record, of different people as far as there are so many.
+
+    tilt_degrees: how far from upright, either way, they are turned; box_shake: how far each side of the box is off, in
+    fractions of its size; coarse: how often a crop shows no more than `coarse_px` pixels a side (log-uniform). Of a
+    record without anybody a square anywhere is drawn, as of a box that is a mistake.
+    """
+
+    count: int = 2
+    tilt_degrees: float = 20.0
+    box_shake: float = 0.1
+    coarse: float = 0.35
+    coarse_px: tuple[float, float] = (32, 160)
+
+    def draw(self, record: Record, size: int, rng: np.random.Generator) -> list[tuple[np.ndarray, Truth]]:
+        """Crops of `size` pixels; each has one person, whose box may reach out of the crop."""
+        image, label = record.decoded()
+        box, instance, ignore = visible_boxes(label)
+        shown = np.flatnonzero(~ignore & (instance < BOX_ALONE))
+        drawn = []
+        for k in range(self.count):
+            if not len(shown):
+                drawn.append(self._of_nobody(image, label, size, rng))
+                continue
+            if k % len(shown) == 0:
+                order = rng.permutation(shown)
+            person = order[k % len(shown)]
+            x0, y0, x1, y1 = box[person].astype(int)
+            own = label[y0:y1, x0:x1, 3] == instance[person]
+            known = None if record.axis is None else record.axis[instance[person] - 1]
+            turn = self._turn(known, rng)
+            look = look_at(self._shaken(turned_box(outline(own) + [x0, y0], turn), rng), turn, size)
+            drawn.append(self._crop(image, label, look, int(instance[person]), rng))
+        return drawn
+
+    def _turn(self, axis: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
+        tilt = rotation(rng.uniform(-self.tilt_degrees, self.tilt_degrees))
+        # Whose axis nobody knows stands upright in a photograph, mostly; whose axis is seen from its end has none.
+        if axis is None or not np.hypot(*axis) > MIN_AXIS:
+            return tilt
+        return tilt @ turn_upright(axis)
+
+    def _shaken(self, box: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        size = np.tile(box[2:] - box[:2], 2)
+        return box + size * rng.uniform(-self.box_shake, self.box_shake, 4)
+
+    def _of_nobody(
+        self, image: np.ndarray, label: np.ndarray, size: int, rng: np.random.Generator
+    ) -> tuple[np.ndarray, Truth]:
+        side = np.exp(rng.uniform(np.log(24), np.log(min(label.shape[:2]))))
+        wide = side * np.array([1, 1]) * rng.uniform(0.4, 1, 2)
+        corner = rng.uniform(0, np.array(label.shape[1::-1]) - wide)
+        look = look_at(np.concatenate([corner, corner + wide]), rotation(0), size)
+        return self._crop(image, label, look, BOX_ALONE - 1, rng)
+
+    def _crop(
+        self, image: np.ndarray, label: np.ndarray, look: Look, number: int, rng: np.random.Generator
+    ) -> tuple[np.ndarray, Truth]:
+        image, label, box = cut(image, look, _FILL), cut_label(label, look), look.box
+        if rng.random() < self.coarse:
+            side = round(np.exp(rng.uniform(*np.log(self.coarse_px))))
+            small = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA)
+            image = cv2.resize(small, image.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+        if rng.random() < 0.5:
+            image, label = np.ascontiguousarray(image[:, ::-1]), label[:, ::-1].copy()
+            label[..., :3] = mirror_iuv(label[..., :3])
+            box = np.array([look.side_px - box[2], box[1], look.side_px - box[0], box[3]])
+        truth = Truth(
+            torch.from_numpy(box[None].astype(np.float32)), torch.tensor([number], dtype=torch.uint8),
+            torch.zeros(1, dtype=torch.bool), torch.from_numpy(label), torch.full((1, 2), torch.nan),
+        )  # fmt: skip
+        return _recoloured(image, rng), truth
 
 
 ANY_CROPPING = Cropping()
 CLOSE_CROPPING = Cropping(towards_person=0.95, person_scale=(0.6, 1.3))
-SCALES = (0.15, 2.0)  # of the stored picture
+# At 320 to 448 pixels people from about 32 to 450 pixels; more than half within 15 degrees of upright.
+WIDE_CROPPING = Cropping(
+    towards_person=0.85, person_scale=(0.085, 1.17), filled=0.9, rolls=((0.6, 0, 15), (0.3, 15, 60), (0.1, 60, 180))
+)
+SECOND_LOOKS = SecondLooks()
+SCALES = (0.06, 2.0)  # of the stored picture
+MIN_AXIS = 0.15  # length below which the body axis points at the camera (`export.shards.LabelledImage.axis`)
+_FILL = tuple(float(v) for v in MEAN[::-1])
 
 
 def augmented(
     record: Record, size: int, rng: np.random.Generator, cropping: Cropping = ANY_CROPPING
-) -> tuple[np.ndarray, np.ndarray]:
-    """A random square crop at a random scale, mirrored half of the time, with other colours.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """A random square crop at a random scale, mirrored half of the time, with other colours: BGR, label and axes by
+    instance number - 1, where they are known.
 
     Where the crop is drawn towards a person, the scale is chosen by that person's size, so that people of all
     sizes in pixels are seen equally often.
     """
     image, label = record.decoded()
-    people = np.unique(label[..., 3])[1:]
-    focus = int(rng.choice(people)) if len(people) and rng.random() < cropping.towards_person else 0
-    if focus:
-        y, x = np.nonzero(label[..., 3] == focus)
-        long_side = max(np.ptp(x), np.ptp(y)) + 1
-        scale = np.clip(size / long_side * np.exp(rng.uniform(*np.log(cropping.person_scale))), *SCALES)
+    axis, box, instance = record.axis, *visible_boxes(label)[:2]
+    focus = 0
+    if len(instance) and rng.random() < cropping.towards_person:
+        chosen = rng.integers(len(instance))
+        focus, extent = int(instance[chosen]), box[chosen]
+        long_side = max(extent[2:] - extent[:2])
+        scale = float(np.clip(size / long_side * np.exp(rng.uniform(*np.log(cropping.person_scale))), *SCALES))
     else:
         scale = size / 256 * np.exp(rng.uniform(*np.log((0.6, 1.3))))
+    scale = max(scale, cropping.filled * size / max(image.shape[:2]))
+    roll = cropping.draw_roll(rng) if cropping.rolls and axis is None else 0.0
     shape = (max(int(image.shape[1] * scale), 8), max(int(image.shape[0] * scale), 8))
     image = cv2.resize(image, shape, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     label = cv2.resize(label, shape, interpolation=cv2.INTER_NEAREST)
     corner = _corner(label, size, focus, rng)
-    image, label = _crop(image, corner, size, MEAN[::-1]), _crop(label, corner, size, np.zeros(4))
+    if roll:
+        middle = np.array(corner) + size / 2
+        turn = rotation(roll)
+        look = Look(np.concatenate([turn, (size / 2 - turn @ middle)[:, None]], 1), np.zeros(4), size)
+        image, label = cut(image, look, _FILL), cut_label(label, look)
+    else:
+        image, label = _crop(image, corner, size, MEAN[::-1]), _crop(label, corner, size, np.zeros(4))
     if rng.random() < 0.5:
         image = image[:, ::-1]
         label = label[:, ::-1].copy()
         label[..., :3] = mirror_iuv(label[..., :3])
-    return _recoloured(np.ascontiguousarray(image), rng), label
+        axis = None if axis is None else axis * np.float32([-1, 1])
+    return _recoloured(np.ascontiguousarray(image), rng), label, axis
 
 
 def _corner(label: np.ndarray, size: int, focus: int, rng: np.random.Generator) -> tuple[int, int]:
@@ -100,13 +210,15 @@ def _recoloured(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.clip(colour, 0, 255).astype(np.uint8)
 
 
-def truth_of(label: np.ndarray) -> Truth:
+def truth_of(label: np.ndarray, axis: np.ndarray | None = None) -> Truth:
+    """axis: [people, 2] by instance number - 1."""
     box, instance, ignore = visible_boxes(label)
-    return Truth(torch.from_numpy(box), torch.from_numpy(instance), torch.from_numpy(ignore), torch.from_numpy(label))
+    own = np.full((len(box), 2), np.nan, np.float32) if axis is None else axis[instance.astype(int) - 1]
+    return Truth(*map(torch.from_numpy, (box, instance, ignore, label, own)))
 
 
 class Batches:
-    """Endless shuffled batches, `ahead` of them made ahead by a thread (OpenCV releases the interpreter's lock).
+    """Endless shuffled batches, `ahead` of them made ahead by `workers` threads (OpenCV releases the interpreter lock).
 
     Batch k depends on `seed` and k alone, so that a run resumed at step k sees what it would have seen. `photos`
     replace the fraction `photo_fraction` of the records; they are few, and so drawn with replacement.
@@ -114,39 +226,45 @@ class Batches:
 
     def __init__(
         self, records: list[Record], batch: int, seed: int, first: int = 0,
-        photos: list[Record] | None = None, photo_fraction: float = 0.0, ahead: int = 4,
+        photos: list[Record] | None = None, photo_fraction: float = 0.0, ahead: int = 4, workers: int = 1,
     ) -> None:  # fmt: skip
         self.records, self.batch, self.seed, self.ahead = records, batch, seed, ahead
         self.photos, self.photo_fraction = photos or [], photo_fraction if photos else 0.0
-        self._epoch, self._order = -1, np.empty(0, np.int64)
+        self._orders: dict[int, np.ndarray] = {}
         cv2.setNumThreads(1)
         self._number, self._kind = first, None
         self._made: deque[Future] = deque()
-        self._worker = ThreadPoolExecutor(1)
+        self._worker = ThreadPoolExecutor(workers)
 
-    def make(self, number: int, size: int, cropping: Cropping = ANY_CROPPING) -> tuple[torch.Tensor, list[Truth]]:
-        """Batch `number` at an image side of `size` pixels."""
+    def make(
+        self, number: int, sizes: tuple[int, ...], cropping: Cropping | SecondLooks = ANY_CROPPING
+    ) -> tuple[torch.Tensor, list[Truth]]:
+        """Batch `number` at an image side of one of `sizes`, pixels."""
         rng = np.random.default_rng([self.seed, number])
+        size = int(rng.choice(sizes)) if len(sizes) > 1 else sizes[0]
         images, truths = [], []
-        for k in range(number * self.batch, (number + 1) * self.batch):
+        records = -(-self.batch // getattr(cropping, "count", 1))
+        for k in range(number * records, (number + 1) * records):
             record = self.records[self._shuffled(k)]
             if rng.random() < self.photo_fraction:
                 record = self.photos[rng.integers(len(self.photos))]
-            image, label = augmented(record, size, rng, cropping)
-            images.append(normalised(image))
-            truths.append(truth_of(label))
-        return torch.from_numpy(np.stack(images)), truths
+            for image, truth in cropping.draw(record, size, rng):
+                images.append(normalised(image))
+                truths.append(truth)
+        return torch.from_numpy(np.stack(images[: self.batch])), truths[: self.batch]
 
-    def next(self, size: int, cropping: Cropping = ANY_CROPPING) -> tuple[torch.Tensor, list[Truth]]:
+    def next(
+        self, sizes: tuple[int, ...], cropping: Cropping | SecondLooks = ANY_CROPPING
+    ) -> tuple[torch.Tensor, list[Truth]]:
         """Image [N, 3, size, size] and its people; those made ahead of another kind are discarded."""
         if not self.ahead:
             self._number += 1
-            return self.make(self._number - 1, size, cropping)
-        if self._kind != (size, cropping):
+            return self.make(self._number - 1, sizes, cropping)
+        if self._kind != (sizes, cropping):
             self._drop()
-            self._kind = (size, cropping)
+            self._kind = (sizes, cropping)
         while len(self._made) <= self.ahead:
-            self._made.append(self._worker.submit(self.make, self._number + len(self._made), size, cropping))
+            self._made.append(self._worker.submit(self.make, self._number + len(self._made), sizes, cropping))
         self._number += 1
         return self._made.popleft().result()
 
@@ -163,7 +281,7 @@ class Batches:
     def _shuffled(self, k: int) -> int:
         """The k-th record drawn: every record once before any comes again."""
         epoch, index = divmod(k, len(self.records))
-        if epoch != self._epoch:
-            self._order = np.random.default_rng([self.seed, epoch, 1]).permutation(len(self.records))
-            self._epoch = epoch
-        return int(self._order[index])
+        if epoch not in self._orders:  # at the end of an epoch several threads may be in two of them
+            self._orders[epoch] = np.random.default_rng([self.seed, epoch, 1]).permutation(len(self.records))
+            self._orders.pop(epoch - 2, None)
+        return int(self._orders[epoch][index])

@@ -23,6 +23,7 @@ WEIGHTS = {
     "rpn_box": 1.0,
     "box_class": 1.0,
     "box_box": 1.0,
+    "axis": 1.0,
     "coarse": 0.5,
     "index": 1.0,
     "u": 3.0,
@@ -99,28 +100,47 @@ def batch_loss(
     truths: list[tg.Truth],
     autocast: torch.autocast,
     pixel_head: PixelHead | None = None,
+    boxes: bool = True,
 ) -> dict[str, Tensor]:
-    """image: normalised [N, 3, H, W]. Returns the weighted terms; their sum is what is minimised."""
-    config, size = net.config, image.shape[-2:]
-    with autocast:
-        features, objectness, deltas = net.detector(image)
-    features = [f.float() for f in features]
-    levels = [bx.flat_outputs(o.float(), d.float()) for o, d in zip(objectness, deltas, strict=True)]
-    per_level = [a.to(image.device) for a in bx.anchors(config, [o.shape[-2:] for o in objectness])]
-    every = torch.cat(per_level)
-    logits, offsets = (torch.cat([level[k] for level in levels], 1) for k in (0, 1))
-    terms = _rpn_terms(logits, offsets, every, truths)
+    """image: normalised [N, 3, H, W]. Returns the weighted terms; their sum is what is minimised.
 
-    rois, people, dense = [], [], []
-    for n, truth in enumerate(truths):
-        found = tg.proposals(*([level[k][n].detach() for level in levels] for k in (0, 1)), per_level, size, 300, 100)
-        rois.append(tg.box_samples(found, truth, BOX_ROIS))
-        dense.append(tg.dense_samples(found, truth, DENSE_ROIS))
-        people.append(truth)
-    pooled = tg.pooled(features, [r[0] for r in rois], config, config.box_pool)
+    boxes: without them RPN, proposals and box head are left out, which cost a third of a step and need it less often.
+    """
+    if boxes:
+        features, found, terms = _detection(net, image, truths, autocast)
+    else:
+        with autocast:
+            features = [net.finest(image)]
+        features, terms = [features[0].float()], {}
+        found = [image.new_zeros(0, 4)] * len(truths)
+    dense = [tg.dense_samples(f, truth, DENSE_ROIS) for f, truth in zip(found, truths, strict=True)]
+    terms |= _surface_terms(net, features, dense, truths, autocast, pixel_head)
+    return {name: WEIGHTS[name] * value for name, value in terms.items()}
+
+
+def second_look_loss(
+    net: MobileParsingRCNN,
+    image: Tensor,
+    truths: list[tg.Truth],
+    autocast: torch.autocast,
+    pixel_head: PixelHead | None = None,
+) -> dict[str, Tensor]:
+    """The terms of the dense head on crops, each with the box of one person (`data.SecondLooks`): "look_" and the
+    term's name. Only backbone, the neck up to P2 and the dense head learn from them."""
     with autocast:
-        class_logits, box_deltas = net.box_head(pooled)
-    terms |= _box_terms(class_logits.float(), box_deltas.float(), rois, truths, config.delta_weights)
+        finest = net.finest(image)
+    first = torch.zeros(1, dtype=torch.long, device=image.device)
+    dense = [(truth.box, first) for truth in truths]
+    terms = _surface_terms(net, [finest.float()], dense, truths, autocast, pixel_head)
+    return {f"look_{name}": WEIGHTS[name] * value for name, value in terms.items()}
+
+
+def _surface_terms(
+    net: MobileParsingRCNN, features: list[Tensor], dense: list[tuple[Tensor, Tensor]], truths: list[tg.Truth],
+    autocast: torch.autocast, pixel_head: PixelHead | None,
+) -> dict[str, Tensor]:  # fmt: skip
+    """dense: of each picture the boxes for the dense head and the numbers of their people; features: from P2 on."""
+    config, terms = net.config, {}
     if any(len(d[0]) for d in dense):
         pooled = tg.pooled(features, [d[0] for d in dense], config, config.dense_pool, level=0)
         with autocast:
@@ -131,7 +151,34 @@ def batch_loss(
         with autocast:
             output = pixel_head(features[0])
         terms |= _pixel_terms(output.float(), torch.stack([t.label for t in truths]))
-    return {name: WEIGHTS[name] * value for name, value in terms.items()}
+    return terms
+
+
+def _detection(
+    net: MobileParsingRCNN, image: Tensor, truths: list[tg.Truth], autocast: torch.autocast
+) -> tuple[list[Tensor], list[Tensor], dict[str, Tensor]]:
+    """Features P2.., each picture's proposals [K, 4], and the terms of RPN and box head."""
+    config, size = net.config, image.shape[-2:]
+    with autocast:
+        features, objectness, deltas = net.detector(image)
+    features = [f.float() for f in features]
+    levels = [bx.flat_outputs(o.float(), d.float()) for o, d in zip(objectness, deltas, strict=True)]
+    per_level = [a.to(image.device) for a in bx.anchors(config, [o.shape[-2:] for o in objectness])]
+    every = torch.cat(per_level)
+    logits, offsets = (torch.cat([level[k] for level in levels], 1) for k in (0, 1))
+    terms = _rpn_terms(logits, offsets, every, truths)
+    found = [
+        tg.proposals(*([level[k][n].detach() for level in levels] for k in (0, 1)), per_level, size, 300, 100)
+        for n in range(len(truths))
+    ]
+    rois = [tg.box_samples(f, truth, BOX_ROIS) for f, truth in zip(found, truths, strict=True)]
+    pooled = tg.pooled(features, [r[0] for r in rois], config, config.box_pool)
+    with autocast:
+        class_logits, box_deltas, *axis = (net.box_head.with_axis if config.axis else net.box_head)(pooled)
+    terms |= _box_terms(class_logits.float(), box_deltas.float(), rois, truths, config.delta_weights)
+    if axis:
+        terms["axis"] = _axis_loss(axis[0].float(), rois, truths)
+    return features, found, terms
 
 
 def _rpn_terms(logits: Tensor, offsets: Tensor, anchors: Tensor, truths: list[tg.Truth]) -> dict[str, Tensor]:
@@ -158,6 +205,19 @@ def _box_terms(
         "box_class": class_loss,
         "box_box": F.l1_loss(deltas[person], wanted, reduction="sum") / max(len(boxes), 1),
     }
+
+
+def _axis_loss(output: Tensor, rois: list, truths: list[tg.Truth]) -> Tensor:
+    """output [R, 2]: the direction of the body axis; people whose axis is seen from its end weigh less."""
+    person = torch.cat([r[1] for r in rois])
+    wanted = torch.cat([t.axis[r[2]] if len(t.box) else r[0][:, :2] for r, t in zip(rois, truths, strict=True)])[person]
+    length = wanted.norm(dim=1)
+    known = length > 0  # not where it is NaN
+    if not known.any():
+        return output.sum() * 0
+    length, unit = length[known], (wanted / length[:, None])[known]
+    off = F.smooth_l1_loss(output[person][known], unit, beta=0.2, reduction="none").sum(1)
+    return (length * off).sum() / length.sum()
 
 
 def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:

@@ -224,18 +224,29 @@ class BiFPN(nn.Module):
         self.conv = nn.ModuleDict({n: SeparableConv(width) for n in ("t4", "t3", "o2", "o3", "o4", "o5")})
         self.down = nn.ModuleDict({n: SeparableConv(width, stride=2) for n in ("o3", "o4", "o5")})
 
-    def forward(self, taps: list[Tensor]) -> list[Tensor]:
+    def _node(self, name: str, *maps: Tensor) -> Tensor:
+        return self.conv[name](self.fuse[name](*maps))
+
+    def _top_down(self, taps: list[Tensor]) -> tuple[Tensor, ...]:
         p2, p3, p4, p5 = (conv(x) for conv, x in zip(self.lateral, taps, strict=True))
+        t4 = self._node("t4", p4, self.up(p5, p4))
+        t3 = self._node("t3", p3, self.up(t4, p3))
+        return self._node("o2", p2, self.up(t3, p2)), p3, p4, p5, t3, t4
 
-        def node(name: str, *maps: Tensor) -> Tensor:
-            return self.conv[name](self.fuse[name](*maps))
+    def finest(self, taps: list[Tensor]) -> Tensor:
+        """P2 alone, which needs no coarser output."""
+        return self._top_down(taps)[0]
 
-        t4 = node("t4", p4, self.up(p5, p4))
-        t3 = node("t3", p3, self.up(t4, p3))
-        o2 = node("o2", p2, self.up(t3, p2))
-        o3 = node("o3", p3, t3, self.down["o3"](o2))
-        o4 = node("o4", p4, t4, self.down["o4"](o3))
-        o5 = node("o5", p5, self.down["o5"](o4))
+    def coarser_parameters(self) -> list[nn.Parameter]:
+        """Those that P2 does not depend on."""
+        names = ("o3", "o4", "o5")
+        return [p for n in names for part in (self.fuse, self.conv, self.down) for p in part[n].parameters()]
+
+    def forward(self, taps: list[Tensor]) -> list[Tensor]:
+        o2, p3, p4, p5, t3, t4 = self._top_down(taps)
+        o3 = self._node("o3", p3, t3, self.down["o3"](o2))
+        o4 = self._node("o4", p4, t4, self.down["o4"](o3))
+        o5 = self._node("o5", p5, self.down["o5"](o4))
         return [o2, o3, o4, o5, F.max_pool2d(o5, 1, 2)]
 
 
@@ -257,9 +268,13 @@ class RpnHead(nn.Module):
 
 
 class BoxHead(nn.Module):
-    """[R, C, 7, 7] -> class logits [R, 2] (person, background) and box deltas [R, 4]."""
+    """[R, C, 7, 7] -> class logits [R, 2] (person, background) and box deltas [R, 4].
 
-    def __init__(self, width: int, pool: int) -> None:
+    axis: whether `with_axis` is there, which also gives the direction from hips to head in the picture, [R, 2]: (1, 0)
+    is to the right, (0, 1) down; near (0, 0) where it cannot be told.
+    """
+
+    def __init__(self, width: int, pool: int, axis: bool = False) -> None:
         super().__init__()
         self.convs = nn.Sequential(
             nn.Conv2d(width, width, 3, padding=1), nn.ReLU(inplace=True),
@@ -271,10 +286,18 @@ class BoxHead(nn.Module):
         nn.init.normal_(self.deltas.weight, std=0.001)
         nn.init.zeros_(self.logits.bias)
         nn.init.zeros_(self.deltas.bias)
+        if axis:
+            self.axis = nn.Linear(width * pool * pool, 2)
+            nn.init.normal_(self.axis.weight, std=0.001)
+            nn.init.zeros_(self.axis.bias)
 
     def forward(self, rois: Tensor) -> tuple[Tensor, Tensor]:
         flat = self.convs(rois).flatten(1)
         return self.logits(flat), self.deltas(flat)
+
+    def with_axis(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        flat = self.convs(rois).flatten(1)
+        return self.logits(flat), self.deltas(flat), self.axis(flat)
 
 
 class ConvBnRelu(nn.Sequential):
@@ -346,10 +369,18 @@ class MobileParsingRCNN(nn.Module):
         self.backbone = _BACKBONES[config.backbone]()
         self.neck = BiFPN(config.tap_channels, config.width)
         self.rpn = RpnHead(config.width, len(config.aspect_ratios))
-        self.box_head = BoxHead(config.width, config.box_pool)
+        self.box_head = BoxHead(config.width, config.box_pool, config.axis)
         self.dense_head = DenseHead(config)
 
     def detector(self, image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
         """Normalised image [N, 3, H, W], H and W multiples of 32 -> P2..P6, objectness, deltas (5 levels)."""
         features = self.neck(self.backbone(image))
         return (features, *self.rpn(features))
+
+    def finest(self, image: Tensor) -> Tensor:
+        """P2 [N, C, H / 4, W / 4] alone: what the dense head needs."""
+        return self.neck.finest(self.backbone(image))
+
+    def box_parameters(self) -> list[nn.Parameter]:
+        """Those that only boxes are found by."""
+        return [*self.neck.coarser_parameters(), *self.rpn.parameters(), *self.box_head.parameters()]

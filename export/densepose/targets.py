@@ -15,12 +15,14 @@ from export.shards import BOX_ALONE, UNSURE
 
 @dataclass(frozen=True)
 class Truth:
-    """One image's people: box [G, 4], instance number [G], ignore [G], label uint8 [H, W, 4]."""
+    """One image's people: box [G, 4], instance number [G], ignore [G], label uint8 [H, W, 4], axis [G, 2]
+    (`export.shards.LabelledImage`; NaN where nobody knows)."""
 
     box: Tensor
     instance: Tensor
     ignore: Tensor
     label: Tensor
+    axis: Tensor
 
     def to(self, device: torch.device) -> Truth:
         return Truth(*(getattr(self, field.name).to(device) for field in fields(self)))

@@ -6,12 +6,17 @@ One loop for CPU, one GPU, and several processes: `torchrun --nproc-per-node N -
 for N GPUs. On a CPU one process a core with `--batch 8` is about four times as fast as one process with all
 cores. It resumes from `--out` by itself, saves every few minutes and on Ctrl-C, and draws the curves to
 `curves.png`.
+
+`--recipe both` trains the second look beside the first: each step has `--batch` whole pictures and `--looks` crops of
+one person. With `--decay` the rate stands until the last part of the run; the state before it is kept in `steady.pt`,
+and the same command with more `--minutes` or `--steps` goes on from there.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,9 +26,9 @@ from tqdm import tqdm
 
 from export.densepose import data
 from export.densepose.config import NetworkConfig
-from export.densepose.losses import PixelHead, batch_loss, surface_loss
+from export.densepose.losses import PixelHead, batch_loss, second_look_loss, surface_loss
 from export.densepose.network import MobileParsingRCNN
-from export.densepose.validation import validate, validate_surface
+from export.densepose.validation import validate, validate_looks, validate_surface
 from export.shards import Record, load_records
 from export.training import (
     SAVE_EVERY_S,
@@ -39,6 +44,7 @@ from export.training import (
     rate_at,
     save_atomically,
     seed_step,
+    steady_rate_at,
     write_log,
 )
 
@@ -62,33 +68,55 @@ class TrainingConfig:
     threads: int | None = None
     init: Path | None = None
     backbone: str = NetworkConfig.backbone
+    backbone_rate: float = 0.1
     pretrained: Path | None = None
+    recipe: str = "scratch"
+    looks: int = 12
+    look_size: int = 192
+    boxes_every: int = 1
+    decay: float | None = None
+    save_minutes: float = SAVE_EVERY_S / 60
     validate_minutes: float = 10
     bf16: bool = False
 
 
 @dataclass(frozen=True)
 class Stage:
-    """From `start` (fraction of the run) on: square crops of `size` pixels; `surface_only`: PixelHead's terms alone."""
+    """From `start` (fraction of the run) on: square crops of pictures, each batch at one of `sizes` pixels (none: no
+    pictures). `surface_only`: PixelHead's terms alone; `looks`: also crops of the second look."""
 
     start: float
-    size: int
+    sizes: tuple[int, ...]
     cropping: data.Cropping = data.ANY_CROPPING
     surface_only: bool = False
+    looks: bool = False
 
 
-# The trunk learns the surface first, on every pixel of small crops: almost three times as fast as the whole network.
-STAGES = (Stage(0.0, 128, data.CLOSE_CROPPING, surface_only=True), Stage(0.08, 192), Stage(0.55, 256))
-FROZEN_BACKBONE_RATE = 0.1  # of the learning rate
+# From scratch the trunk learns the surface first, on every pixel of small crops: almost three times as fast as the
+# whole network. The others go on from weights (`--init`).
+RECIPES = {
+    "scratch": (
+        Stage(0.0, (128,), data.CLOSE_CROPPING, surface_only=True), Stage(0.08, (192,)), Stage(0.55, (256,)),
+    ),
+    "looks": (Stage(0.0, (), looks=True),),
+    "both": (Stage(0.0, (320, 384, 448), data.WIDE_CROPPING, looks=True),),
+}  # fmt: skip
 HELD_OUT_IMAGES = 100
+LOOK_SEED = 500_000  # apart from the pictures' seed
+SURFACE_SIZE = 128  # of the crops that PixelHead is validated on
 MAX_GRADIENT_NORM = 10.0
-FIGURES = ("recall", "precision", "part", "mask_iou", "pixel_part", "pixel_mask_iou")
+FIGURES = (
+    "recall", "precision", "part", "mask_iou", "pixel_part", "pixel_mask_iou",
+    "look_part", "look_mask_iou", "look_side",
+)  # fmt: skip
 
 
-def optimiser_of(net: MobileParsingRCNN, pixel_head: PixelHead, rate: float, weight_decay: float) -> torch.optim.AdamW:
-    """Each of its groups has a "rate": a factor of the learning rate."""
+def optimiser_of(
+    net: MobileParsingRCNN, pixel_head: PixelHead, rate: float, weight_decay: float, backbone_rate: float = 0.1
+) -> torch.optim.AdamW:
+    """Each of its groups has a "rate": a factor of the learning rate, `backbone_rate` for a frozen backbone."""
     # Without BN to undo it, a full rate would wipe out what a pretrained backbone knows.
-    backbone_rate = FROZEN_BACKBONE_RATE if getattr(net.backbone, "frozen", False) else 1.0
+    backbone_rate = backbone_rate if getattr(net.backbone, "frozen", False) else 1.0
     others = nn.ModuleList([m for m in net.children() if m is not net.backbone] + [pixel_head])
     groups = [
         {
@@ -116,15 +144,18 @@ class Run:
     """One training: networks and their averages, optimiser, and how far it is; saved to and resumed from a folder."""
 
     def __init__(self, config: TrainingConfig, device: torch.device) -> None:
-        self.config, self.checkpoint = config, config.out / "checkpoint.pt"
+        self.config, self.checkpoint, self.steady = config, config.out / "checkpoint.pt", config.out / "steady.pt"
         config.out.mkdir(parents=True, exist_ok=True)
         resumes = self.checkpoint.exists()
         saved, self.frozen = {}, config.pretrained is not None
         if resumes or config.init:
             saved = torch.load(self.checkpoint if resumes else config.init, map_location=device, weights_only=False)
+            if resumes and self.steady.exists() and not self.decays(saved["step"], saved["spent"]):
+                saved = torch.load(self.steady, map_location=device, weights_only=False)
             # Another backbone's weights are not taken over, so there is nothing in it to keep.
             self.frozen |= saved.get("frozen", False) and config.backbone == "mobilenet_v2"
-        net = MobileParsingRCNN(NetworkConfig(width=config.width, backbone=config.backbone))
+        axis = config.recipe != "scratch" or saved.get("axis", False)
+        net = MobileParsingRCNN(NetworkConfig(width=config.width, backbone=config.backbone, axis=axis))
         self.net = net.to(device, memory_format=torch.channels_last)
         self.pixel_head = PixelHead(net.config).to(device)
         if self.frozen:
@@ -132,12 +163,17 @@ class Run:
         self.trained = nn.ModuleList([self.net, self.pixel_head])
         self.ema = Ema(self.trained, config.ema)
         self.averaged, self.averaged_pixel_head = self.ema.net
-        self.optimiser = optimiser_of(self.net, self.pixel_head, config.lr, config.weight_decay)
+        self.optimiser = optimiser_of(self.net, self.pixel_head, config.lr, config.weight_decay, config.backbone_rate)
         self.step, self.images, self.spent_s, self.log = 0, 0, 0.0, []
         if resumes:
             self._resume(saved)
         else:
             self._start(saved, device)
+
+    def decays(self, step: int, spent_s: float) -> bool:
+        """Whether the rate falls by then."""
+        done = Schedule(self.config.minutes, self.config.steps).fraction(step, spent_s)
+        return self.config.decay is not None and done > 1 - self.config.decay
 
     def _resume(self, saved: dict) -> None:
         for name, part in self._parts().items():
@@ -165,11 +201,24 @@ class Run:
             "optimiser": self.optimiser,
         }
 
-    def save(self) -> None:
+    def parameters_of(self, stage: Stage, boxes: bool) -> list[nn.Parameter]:
+        """What a step of the stage trains. The rest must keep no gradient, else weight decay would wear it down."""
+        if stage.surface_only:
+            used = nn.ModuleList([self.net.backbone, self.net.neck, self.pixel_head]).parameters()
+            left_out = set()
+        else:
+            used = self.trained.parameters()
+            left_out = set() if boxes and stage.sizes else set(self.net.box_parameters())
+        return [p for p in used if p.requires_grad and p not in left_out]
+
+    def save(self, keep: bool = False) -> None:
+        """keep: also as the state before the rate falls."""
         state = {name: part.state_dict() for name, part in self._parts().items()}
         progress = {"step": self.step, "images": self.images, "spent": self.spent_s, "log": self.log}
-        kind = {"width": self.config.width, "backbone": self.config.backbone, "frozen": self.frozen}
-        save_atomically({**state, **progress, **kind}, self.checkpoint)
+        network = self.net.config
+        kind = {"width": network.width, "backbone": network.backbone, "axis": network.axis, "frozen": self.frozen}
+        for path in (self.checkpoint, self.steady) if keep else (self.checkpoint,):
+            save_atomically({**state, **progress, **kind}, path)
         # What is shipped, and what another run may start from: the averaged weights, in half precision.
         half = {k: v.half() if v.is_floating_point() else v for k, v in state["ema"].items()}
         torch.save({"ema": half, **kind}, self.config.out / "weights.pt")
@@ -177,12 +226,20 @@ class Run:
 
     def check(self, held_out: list[Record], stage: Stage) -> None:
         """Adds figures on validation images to the log; boxes only where the stage has trained them."""
-        first = STAGES[0]
-        figures = validate_surface(self.averaged, self.averaged_pixel_head, held_out, first.size, first.cropping)
-        if not stage.surface_only:
+        cropping = data.CLOSE_CROPPING
+        figures = validate_surface(self.averaged, self.averaged_pixel_head, held_out, SURFACE_SIZE, cropping)
+        if stage.sizes and not stage.surface_only:
             figures |= validate(self.averaged, held_out)
+        if stage.looks:
+            figures |= validate_looks(self.averaged, held_out, self.config.look_size)
         self.log.append({"step": self.step, "images": self.images, "spent": self.spent_s, **figures})
         tqdm.write(json.dumps(self.log[-1]))
+
+
+def on_device(batch: tuple[torch.Tensor, list], device: torch.device) -> tuple[torch.Tensor, list]:
+    image, truths = batch
+    image = image.to(device).contiguous(memory_format=torch.channels_last)
+    return image, [truth.to(device) for truth in truths]
 
 
 def train(config: TrainingConfig) -> None:
@@ -201,58 +258,73 @@ def train(config: TrainingConfig) -> None:
     photos = load_records(config.photos)[rank::world] if config.photos else []
     # On the one core of this process a second thread would only take turns with it, a fifth slower than one alone.
     ahead = 0 if device.type == "cpu" and torch.get_num_threads() == 1 else 4
-    batches = data.Batches(records, config.batch, own_seed, run.step, photos, config.photo_fraction, ahead)
+    workers = max(1, (os.cpu_count() or 1) // world - 1) if device.type == "cuda" else 1
+    drawn = {"first": run.step, "photos": photos, "photo_fraction": config.photo_fraction}
+    drawn |= {"ahead": ahead * workers, "workers": workers}
+    batches = data.Batches(records, config.batch, own_seed, **drawn)
+    looks = data.Batches(records, config.looks, own_seed + LOOK_SEED, **drawn)
     autocast = torch.autocast(device.type, torch.bfloat16, enabled=config.bf16)
     smoothed, watch = SmoothedTerms(), Stopwatch(run.spent_s)
-    save_due, check_due = Interval(SAVE_EVERY_S), Interval(config.validate_minutes * 60)
+    save_due, check_due = Interval(config.save_minutes * 60), Interval(config.validate_minutes * 60)
     bar = schedule.bar(run.step, run.spent_s, disable=rank > 0)
     run.net.train()
     finished = False
     while not finished:
         seed_step(own_seed, run.step)
         fraction = schedule.fraction(run.step, watch.spent_s)
-        stage = [s for s in STAGES if fraction >= s.start][-1]
-        rate = rate_at(run.step, fraction, config.lr)
+        stage = [s for s in RECIPES[config.recipe] if fraction >= s.start][-1]
+        if config.decay:
+            rate = steady_rate_at(run.step, fraction, config.lr, config.decay)
+        else:
+            rate = rate_at(run.step, fraction, config.lr)
         for group in run.optimiser.param_groups:
             group["lr"] = rate * group["rate"]
 
-        image, truths = batches.next(stage.size, stage.cropping)
-        image = image.to(device).contiguous(memory_format=torch.channels_last)
-        truths = [truth.to(device) for truth in truths]
-        loss_terms = surface_loss if stage.surface_only else batch_loss
-        terms = loss_terms(run.net, image, truths, autocast, run.pixel_head)
+        terms, seen, boxes = {}, 0, run.step % config.boxes_every == 0
+        if stage.sizes:
+            image, truths = on_device(batches.next(stage.sizes, stage.cropping), device)
+            if stage.surface_only:
+                terms |= surface_loss(run.net, image, truths, autocast, run.pixel_head)
+            else:
+                terms |= batch_loss(run.net, image, truths, autocast, run.pixel_head, boxes)
+            seen += len(image)
+        if stage.looks:
+            image, truths = on_device(looks.next((config.look_size,), data.SECOND_LOOKS), device)
+            terms |= second_look_loss(run.net, image, truths, autocast, run.pixel_head)
+            seen += len(image)
         run.optimiser.zero_grad(set_to_none=True)
         sum(terms.values()).backward()
         stop_now = bool(stopped)
         if world > 1:
-            # What a stage leaves alone must keep no gradient, else weight decay would wear it down.
-            surface = nn.ModuleList([run.net.backbone, run.net.neck, run.pixel_head])
-            used = [p for p in (surface if stage.surface_only else run.trained).parameters() if p.requires_grad]
+            used = run.parameters_of(stage, boxes)
             watch.spent_s, stop_now = average_gradients(used, watch.spent_s, stop_now, world)
         finished = stop_now or schedule.finished(run.step + 1, watch.spent_s)
         if torch.isfinite(nn.utils.clip_grad_norm_(run.trained.parameters(), MAX_GRADIENT_NORM)):
             run.optimiser.step()
             run.ema.update(run.trained, run.step)
 
-        run.step, run.images = run.step + 1, run.images + len(image) * world
+        decayed = run.decays(run.step, watch.spent_s)
+        run.step, run.images = run.step + 1, run.images + seen * world
         smoothed.update(terms)
         watch.lap()
         run.spent_s = watch.spent_s
         schedule.advance(bar, run.step, run.spent_s)
         if run.step % 20 == 0:
             row = {"step": run.step, "images": run.images, "loss": smoothed.loss, "terms": smoothed.values}
-            run.log.append({**row, "rate": rate, "size": stage.size})
-            bar.set_postfix(step=run.step, images=run.images, loss=f"{smoothed.loss:.3f}", size=stage.size)
+            run.log.append({**row, "rate": rate, "sizes": stage.sizes})
+            bar.set_postfix(step=run.step, images=run.images, loss=f"{smoothed.loss:.3f}", refresh=False)
         if rank == 0 and check_due.due() and not finished:
             run.check(held_out, stage)
             check_due.restart()
             watch.skip()
-        if rank == 0 and save_due.due():
-            run.save()
+        begins_to_decay = run.decays(run.step, watch.spent_s) and not decayed
+        if rank == 0 and (save_due.due() or begins_to_decay):
+            run.save(keep=begins_to_decay)
             save_due.restart()
             watch.skip()
     bar.close()
     batches.close()
+    looks.close()
     if rank == 0:
         run.check(held_out, stage)
         run.save()
@@ -285,8 +357,27 @@ def parsed() -> TrainingConfig:
     )
     parser.add_argument("--backbone", choices=NetworkConfig.BACKBONES, default=default.backbone)
     parser.add_argument(
+        "--backbone-rate", type=float, default=default.backbone_rate,
+        help="learning rate of a pretrained backbone, of the others' (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
         "--pretrained", type=Path, help="weights of the backbone (export.teachers.backbone); BN, first blocks freeze"
     )
+    parser.add_argument(
+        "--recipe", choices=RECIPES, default=default.recipe,
+        help="scratch: surface, then the whole network; looks: crops of the second look alone; both: them and whole "
+             "pictures of 320 to 448 pixels (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument("--looks", type=int, default=default.looks, help="crops of the second look a step and process")
+    parser.add_argument("--look-size", type=int, default=default.look_size, help="their side, pixels")
+    parser.add_argument(
+        "--boxes-every", type=int, default=default.boxes_every, metavar="N",
+        help="RPN, proposals and box head in every Nth step alone (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--decay", type=float, help="one rate, falling in this last fraction of the run (default: a cosine)"
+    )
+    parser.add_argument("--save-minutes", type=float, default=default.save_minutes)
     parser.add_argument("--validate-minutes", type=float, default=default.validate_minutes)
     parser.add_argument("--bf16", action=argparse.BooleanOptionalAction, help="default: where it is faster")
     options = parser.parse_args()

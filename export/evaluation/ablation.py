@@ -173,7 +173,7 @@ def train(name: str, seed: int, options: argparse.Namespace, shown: bool) -> dic
     for step in tqdm(range(steps), desc=f"{name} {seed}", unit="step", disable=not shown):
         for group in optimiser.param_groups:
             group["lr"] = group["rate"] * rate_at(step, step / steps, 2e-3)
-        image, truths = batches.next(variation.size, variation.cropping)
+        image, truths = batches.next((variation.size,), variation.cropping)
         image = image.contiguous(memory_format=torch.channels_last)
         optimiser.zero_grad(set_to_none=True)
         sum(surface_loss(net, image, truths, autocast, pixel_head).values()).backward()

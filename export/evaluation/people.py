@@ -12,16 +12,10 @@ import numpy as np
 from export.evaluation.average_precision import ImageMatches, box_iou, match
 from export.evaluation.backends import Prediction
 from export.shards import LabelledImage
-from export.surface import COARSE_COUNT, PART_NAMES, PART_TO_COARSE
+from export.surface import COARSE_COUNT, LIMB_SIDE, PART_TO_COARSE
 
 MATCH_IOU = 0.5
 LONG_SIDE_PX = 320  # of the rendered images; photographs are measured as if they were as large
-
-# 1 for parts of left limbs, 2 for right ones, 0 for torso and head: a head's halves meet in the middle of a face, where
-# a pixel more or less says nothing about left and right.
-LIMB_SIDE = np.array(
-    [0 if "head" in name else 1 if "left" in name else 2 if "right" in name else 0 for name in PART_NAMES], np.uint8
-)
 
 
 @dataclass(frozen=True)

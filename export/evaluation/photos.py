@@ -23,7 +23,6 @@ from export.evaluation.failures import Case, worst_cases
 from export.evaluation.machine import describe_machine
 from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.people import (
-    LIMB_SIDE,
     LONG_SIDE_PX,
     MATCH_IOU,
     FalseAlarm,
@@ -35,6 +34,7 @@ from export.evaluation.people import (
 )
 from export.evaluation.plain import plain
 from export.evaluation.surface_accuracy import fraction
+from export.surface import LIMB_SIDE
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
 

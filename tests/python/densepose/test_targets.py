@@ -19,7 +19,9 @@ def truth(boxes, ignore=None) -> tg.Truth:
     boxes = torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4)
     ignore = torch.tensor(ignore or [False] * len(boxes), dtype=torch.bool)
     instance = torch.arange(1, len(boxes) + 1, dtype=torch.uint8)
-    return tg.Truth(boxes, instance, ignore, torch.zeros(160, 160, 4, dtype=torch.uint8))
+    return tg.Truth(
+        boxes, instance, ignore, torch.zeros(160, 160, 4, dtype=torch.uint8), torch.full((len(boxes), 2), torch.nan)
+    )
 
 
 @pytest.fixture
@@ -112,7 +114,7 @@ def test_a_mirrored_cut_carries_the_mirrored_labels():
     record = as_record(image, label)
     seen = set()
     for seed in range(12):
-        cut, marked = data.augmented(record, 128, np.random.default_rng(seed))
+        cut, marked, _ = data.augmented(record, 128, np.random.default_rng(seed))
         assert cut.shape == (128, 128, 3)
         columns = {part: np.nonzero(marked[..., 0] == part)[1] for part in (9, 10, 23, 24)}
         if min(len(c) for c in (columns[9], columns[10])) < 20:
@@ -139,7 +141,7 @@ def as_record(image: np.ndarray, label: np.ndarray) -> Record:
 
 def test_boxes_of_a_cut_are_around_what_is_left_of_a_person():
     image, label = picture(np.random.default_rng(0), people=2)
-    _, marked = data.augmented(as_record(image, label), 96, np.random.default_rng(1))
+    _, marked, _ = data.augmented(as_record(image, label), 96, np.random.default_rng(1))
     people = data.truth_of(marked)
     for box, number in zip(people.box.int().tolist(), people.instance.tolist(), strict=True):
         y, x = np.nonzero(marked[..., 3] == number)
@@ -149,23 +151,23 @@ def test_boxes_of_a_cut_are_around_what_is_left_of_a_person():
 def test_batches_depend_on_seed_and_number_alone():
     rng = np.random.default_rng(0)
     records = [as_record(*picture(rng)) for _ in range(5)]
-    third = data.Batches(records, 2, seed=7).make(3, 64)[0]
-    assert torch.equal(data.Batches(records, 2, seed=7).make(3, 64)[0], third)
-    assert not torch.equal(data.Batches(records, 2, seed=7).make(2, 64)[0], third)
-    assert not torch.equal(data.Batches(records, 2, seed=8).make(3, 64)[0], third)
+    third = data.Batches(records, 2, seed=7).make(3, (64,))[0]
+    assert torch.equal(data.Batches(records, 2, seed=7).make(3, (64,))[0], third)
+    assert not torch.equal(data.Batches(records, 2, seed=7).make(2, (64,))[0], third)
+    assert not torch.equal(data.Batches(records, 2, seed=8).make(3, (64,))[0], third)
     # Made ahead, in another size, or when it is asked for: the fourth batch drawn is batch 3.
     for ahead in (4, 0):
         straight = data.Batches(records, 2, seed=7, ahead=ahead)
-        drawn = [straight.next(size)[0] for size in (32, 32, 96, 64, 96)]
+        drawn = [straight.next((size,))[0] for size in (32, 32, 96, 64, 96)]
         straight.close()
         assert torch.equal(drawn[3], third)
-        assert torch.equal(drawn[4], data.Batches(records, 2, seed=7).make(4, 96)[0])
+        assert torch.equal(drawn[4], data.Batches(records, 2, seed=7).make(4, (96,))[0])
 
 
 def test_an_error_while_a_batch_is_made_reaches_the_caller():
     broken = data.Batches([Record(b"no picture", b"no label")], 1, seed=0)
     with pytest.raises(ValueError, match="damaged picture"):
-        broken.next(64)
+        broken.next((64,))
     broken.close()
 
 

@@ -28,7 +28,7 @@ def shards(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def short_pictures(monkeypatch, one_thread, signal_handlers):
-    monkeypatch.setattr(train, "STAGES", (train.Stage(0.0, 96),))
+    monkeypatch.setitem(train.RECIPES, "scratch", (train.Stage(0.0, (96,)),))
 
 
 def run(monkeypatch, shards, out, *options, stop_after=None) -> list[float]:
@@ -104,8 +104,8 @@ def test_a_finished_run_is_not_trained_on(monkeypatch, shards, tmp_path):
 
 
 def test_a_run_learns_the_surface_first_and_resumes_across_the_stages(monkeypatch, shards, tmp_path):
-    stages = (train.Stage(0.0, 64, data.CLOSE_CROPPING, surface_only=True), train.Stage(0.5, 96))
-    monkeypatch.setattr(train, "STAGES", stages)
+    stages = (train.Stage(0.0, (64,), data.CLOSE_CROPPING, surface_only=True), train.Stage(0.5, (96,)))
+    monkeypatch.setitem(train.RECIPES, "scratch", stages)
     surface = []
     monkeypatch.setattr(train, "surface_loss", lambda *given: surface.append(1) or surface_loss(*given))
     straight = run(monkeypatch, shards, tmp_path / "straight", "--steps", "6")
@@ -118,7 +118,7 @@ def test_a_run_learns_the_surface_first_and_resumes_across_the_stages(monkeypatc
 
 def test_the_surface_alone_is_learnt_on_a_few_pictures(shards):
     torch.manual_seed(0)
-    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, 96, data.CLOSE_CROPPING)
+    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, (96,), data.CLOSE_CROPPING)
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
     trained = torch.nn.ModuleList([net, PixelHead(net.config)])
     optimiser = torch.optim.AdamW(trained.parameters(), lr=3e-3)
@@ -150,7 +150,7 @@ def test_close_crops_show_people_larger(shards):
 def test_the_loss_falls_on_a_few_pictures(shards):
     torch.manual_seed(0)
     batches = data.Batches(load_records(shards / "train"), 4, seed=0)
-    fixed = [batches.make(k, 96) for k in range(2)]
+    fixed = [batches.make(k, (96,)) for k in range(2)]
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
     optimiser = torch.optim.AdamW(net.parameters(), lr=3e-3)
     autocast = torch.autocast("cpu", enabled=False)
@@ -172,7 +172,7 @@ def test_the_loss_falls_on_a_few_pictures(shards):
 def test_every_weight_gets_a_gradient(shards):
     torch.manual_seed(0)
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
-    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, 96)
+    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, (96,))
     sum(batch_loss(net, image, truths, torch.autocast("cpu", enabled=False)).values()).backward()
     assert [name for name, p in net.named_parameters() if p.grad is None] == []
 

@@ -101,7 +101,7 @@ def test_shards_are_read_by_the_training(folders, capsys):
     assert sizes[-1] == (round(600 * LONG_SIDE / 900), LONG_SIDE)
     assert len(sizes) == 2 * 2 + 3
     batches = data.Batches(records[:1] * 4, 8, 0, photos=records, photo_fraction=1.0)
-    image, truths = batches.make(0, 64)
+    image, truths = batches.make(0, (64,))
     batches.close()
     assert image.shape == (8, 3, 64, 64)
     assert len(truths) == 8

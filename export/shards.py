@@ -196,7 +196,7 @@ class LabelledImage:
     metres, or None. box: float32 [n, 4] x0, y0, x1, y1. instance: uint8 [n], the box's number in label.
     ignore: bool [n]. axis: float32 [n, 2], the direction in the picture (x to the right, y down) from the middle of the
     hips to the top of the head; its length is 1 where the body lies in the picture's plane and 0 where it is seen along
-    the axis. NaN where nobody knows.
+    the axis. NaN where nobody knows, None where nobody knows any.
     """
 
     name: str
@@ -206,7 +206,7 @@ class LabelledImage:
     box: np.ndarray
     instance: np.ndarray
     ignore: np.ndarray
-    axis: np.ndarray
+    axis: np.ndarray | None = None
 
 
 def count_images(paths: list[Path]) -> int:
@@ -275,7 +275,7 @@ def _labelled_image(name: str, shard: dict[str, np.ndarray], k: int) -> Labelled
         box=shard["box"][own],
         instance=shard["box_instance"][own],
         ignore=shard["box_ignore"][own],
-        axis=shard["box_axis"][own] if "box_axis" in shard else np.full((own.sum(), 2), np.nan, np.float32),
+        axis=shard["box_axis"][own] if "box_axis" in shard else None,
     )
 
 

@@ -115,14 +115,15 @@ class Interval:
 
 
 class SmoothedTerms:
-    """Exponential means of a loss's terms; a term that is no longer there is dropped."""
+    """Exponential means of a loss's terms, each over the steps that have it."""
 
     def __init__(self) -> None:
         self.values: dict[str, float] = {}
 
     def update(self, terms: Mapping[str, Tensor]) -> None:
         now = {name: value.item() for name, value in terms.items()}
-        self.values = {name: 0.95 * self.values.get(name, value) + 0.05 * value for name, value in now.items()}
+        mean = {name: 0.95 * self.values.get(name, value) + 0.05 * value for name, value in now.items()}
+        self.values = self.values | mean
 
     @property
     def loss(self) -> float:

@@ -10,7 +10,16 @@ import cv2
 import numpy as np
 import torch
 
-from export.densepose.second_look import Look, cut, cut_label, look_at, outline, rotation, turn_upright, turned_box
+from export.densepose.person_crop import (
+    PersonCrop,
+    crop_around,
+    cut,
+    cut_label,
+    outline,
+    rotation,
+    turn_upright,
+    turned_box,
+)
 from export.densepose.targets import Truth
 from export.shards import BOX_ALONE, Record, mirror_iuv, visible_boxes
 
@@ -49,8 +58,8 @@ class Cropping:
 
 
 @dataclass(frozen=True)
-class SecondLooks:
-    """How crops of the second look are drawn: `count` a record, of different people as far as there are so many.
+class PersonCropping:
+    """How person crops (`export.densepose.person_crop`) are drawn: `count` a record, of different people if there are.
 
     tilt_degrees: how far from upright, either way, they are turned; box_shake: how far each side of the box is off, in
     fractions of its size; coarse: how often a crop shows no more than `coarse_px` pixels a side (log-uniform). Of a
@@ -80,8 +89,8 @@ class SecondLooks:
             own = label[y0:y1, x0:x1, 3] == instance[person]
             known = None if record.axis is None else record.axis[instance[person] - 1]
             turn = self._turn(known, rng)
-            look = look_at(self._shaken(turned_box(outline(own) + [x0, y0], turn), rng), turn, size)
-            drawn.append(self._crop(image, label, look, int(instance[person]), rng))
+            crop = crop_around(self._shaken(turned_box(outline(own) + [x0, y0], turn), rng), turn, size)
+            drawn.append(self._crop(image, label, crop, int(instance[person]), rng))
         return drawn
 
     def _turn(self, axis: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
@@ -101,13 +110,13 @@ class SecondLooks:
         side = np.exp(rng.uniform(np.log(24), np.log(min(label.shape[:2]))))
         wide = side * np.array([1, 1]) * rng.uniform(0.4, 1, 2)
         corner = rng.uniform(0, np.array(label.shape[1::-1]) - wide)
-        look = look_at(np.concatenate([corner, corner + wide]), rotation(0), size)
-        return self._crop(image, label, look, BOX_ALONE - 1, rng)
+        crop = crop_around(np.concatenate([corner, corner + wide]), rotation(0), size)
+        return self._crop(image, label, crop, BOX_ALONE - 1, rng)
 
     def _crop(
-        self, image: np.ndarray, label: np.ndarray, look: Look, number: int, rng: np.random.Generator
+        self, image: np.ndarray, label: np.ndarray, crop: PersonCrop, number: int, rng: np.random.Generator
     ) -> tuple[np.ndarray, Truth]:
-        image, label, box = cut(image, look, _FILL), cut_label(label, look), look.box
+        image, label, box = cut(image, crop, _FILL), cut_label(label, crop), crop.box
         if rng.random() < self.coarse:
             side = round(np.exp(rng.uniform(*np.log(self.coarse_px))))
             small = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA)
@@ -115,7 +124,7 @@ class SecondLooks:
         if rng.random() < 0.5:
             image, label = np.ascontiguousarray(image[:, ::-1]), label[:, ::-1].copy()
             label[..., :3] = mirror_iuv(label[..., :3])
-            box = np.array([look.side_px - box[2], box[1], look.side_px - box[0], box[3]])
+            box = np.array([crop.side_px - box[2], box[1], crop.side_px - box[0], box[3]])
         truth = Truth(
             torch.from_numpy(box[None].astype(np.float32)), torch.tensor([number], dtype=torch.uint8),
             torch.zeros(1, dtype=torch.bool), torch.from_numpy(label), torch.full((1, 2), torch.nan),
@@ -129,7 +138,7 @@ CLOSE_CROPPING = Cropping(towards_person=0.95, person_scale=(0.6, 1.3))
 WIDE_CROPPING = Cropping(
     towards_person=0.85, person_scale=(0.085, 1.17), filled=0.9, rolls=((0.6, 0, 15), (0.3, 15, 60), (0.1, 60, 180))
 )
-SECOND_LOOKS = SecondLooks()
+PERSON_CROPPING = PersonCropping()
 SCALES = (0.06, 2.0)  # of the stored picture
 MIN_AXIS = 0.15  # length below which the body axis points at the camera (`export.shards.LabelledImage.axis`)
 _FILL = tuple(float(v) for v in MEAN[::-1])
@@ -163,8 +172,8 @@ def augmented(
     if roll:
         middle = np.array(corner) + size / 2
         turn = rotation(roll)
-        look = Look(np.concatenate([turn, (size / 2 - turn @ middle)[:, None]], 1), np.zeros(4), size)
-        image, label = cut(image, look, _FILL), cut_label(label, look)
+        crop = PersonCrop(np.concatenate([turn, (size / 2 - turn @ middle)[:, None]], 1), np.zeros(4), size)
+        image, label = cut(image, crop, _FILL), cut_label(label, crop)
     else:
         image, label = _crop(image, corner, size, MEAN[::-1]), _crop(label, corner, size, np.zeros(4))
     if rng.random() < 0.5:
@@ -237,7 +246,7 @@ class Batches:
         self._worker = ThreadPoolExecutor(workers)
 
     def make(
-        self, number: int, sizes: tuple[int, ...], cropping: Cropping | SecondLooks = ANY_CROPPING
+        self, number: int, sizes: tuple[int, ...], cropping: Cropping | PersonCropping = ANY_CROPPING
     ) -> tuple[torch.Tensor, list[Truth]]:
         """Batch `number` at an image side of one of `sizes`, pixels."""
         rng = np.random.default_rng([self.seed, number])
@@ -254,7 +263,7 @@ class Batches:
         return torch.from_numpy(np.stack(images[: self.batch])), truths[: self.batch]
 
     def next(
-        self, sizes: tuple[int, ...], cropping: Cropping | SecondLooks = ANY_CROPPING
+        self, sizes: tuple[int, ...], cropping: Cropping | PersonCropping = ANY_CROPPING
     ) -> tuple[torch.Tensor, list[Truth]]:
         """Image [N, 3, size, size] and its people; those made ahead of another kind are discarded."""
         if not self.ahead:

@@ -118,21 +118,21 @@ def batch_loss(
     return {name: WEIGHTS[name] * value for name, value in terms.items()}
 
 
-def second_look_loss(
+def crop_loss(
     net: MobileParsingRCNN,
     image: Tensor,
     truths: list[tg.Truth],
     autocast: torch.autocast,
     pixel_head: PixelHead | None = None,
 ) -> dict[str, Tensor]:
-    """The terms of the dense head on crops, each with the box of one person (`data.SecondLooks`): "look_" and the
+    """The terms of the dense head on crops, each with the box of one person (`data.PersonCropping`): "crop_" and the
     term's name. Only backbone, the neck up to P2 and the dense head learn from them."""
     with autocast:
         finest = net.finest(image)
     first = torch.zeros(1, dtype=torch.long, device=image.device)
     dense = [(truth.box, first) for truth in truths]
     terms = _surface_terms(net, [finest.float()], dense, truths, autocast, pixel_head)
-    return {f"look_{name}": WEIGHTS[name] * value for name, value in terms.items()}
+    return {f"crop_{name}": WEIGHTS[name] * value for name, value in terms.items()}
 
 
 def _surface_terms(

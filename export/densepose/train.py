@@ -7,9 +7,10 @@ for N GPUs. On a CPU one process a core with `--batch 8` is about four times as 
 cores. It resumes from `--out` by itself, saves every few minutes and on Ctrl-C, and draws the curves to
 `curves.png`.
 
-`--recipe both` trains the second look beside the first: each step has `--batch` whole pictures and `--looks` crops of
-one person. With `--decay` the rate stands until the last part of the run; the state before it is kept in `steady.pt`,
-and the same command with more `--minutes` or `--steps` goes on from there.
+`--recipe both` trains on whole pictures and on person crops: each step has `--batch` pictures and `--crops` crops of
+one person, upright and at one size, as a second pass over each person sees them. With `--decay` the rate stands until
+the last part of the run; the state before it is kept in `steady.pt`, and the same command with more `--minutes` or
+`--steps` goes on from there.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from tqdm import tqdm
 
 from export.densepose import data
 from export.densepose.config import NetworkConfig
-from export.densepose.losses import PixelHead, batch_loss, second_look_loss, surface_loss
+from export.densepose.losses import PixelHead, batch_loss, crop_loss, surface_loss
 from export.densepose.network import MobileParsingRCNN
-from export.densepose.validation import validate, validate_looks, validate_surface
+from export.densepose.validation import validate, validate_crops, validate_surface
 from export.shards import Record, load_records
 from export.training import (
     SAVE_EVERY_S,
@@ -71,8 +72,8 @@ class TrainingConfig:
     backbone_rate: float = 0.1
     pretrained: Path | None = None
     recipe: str = "scratch"
-    looks: int = 12
-    look_size: int = 192
+    crops: int = 12
+    crop_size: int = 192
     boxes_every: int = 1
     decay: float | None = None
     save_minutes: float = SAVE_EVERY_S / 60
@@ -83,13 +84,13 @@ class TrainingConfig:
 @dataclass(frozen=True)
 class Stage:
     """From `start` (fraction of the run) on: square crops of pictures, each batch at one of `sizes` pixels (none: no
-    pictures). `surface_only`: PixelHead's terms alone; `looks`: also crops of the second look."""
+    pictures). `surface_only`: PixelHead's terms alone; `crops`: also person crops."""
 
     start: float
     sizes: tuple[int, ...]
     cropping: data.Cropping = data.ANY_CROPPING
     surface_only: bool = False
-    looks: bool = False
+    crops: bool = False
 
 
 # From scratch the trunk learns the surface first, on every pixel of small crops: almost three times as fast as the
@@ -98,16 +99,16 @@ RECIPES = {
     "scratch": (
         Stage(0.0, (128,), data.CLOSE_CROPPING, surface_only=True), Stage(0.08, (192,)), Stage(0.55, (256,)),
     ),
-    "looks": (Stage(0.0, (), looks=True),),
-    "both": (Stage(0.0, (320, 384, 448), data.WIDE_CROPPING, looks=True),),
+    "crops": (Stage(0.0, (), crops=True),),
+    "both": (Stage(0.0, (320, 384, 448), data.WIDE_CROPPING, crops=True),),
 }  # fmt: skip
 HELD_OUT_IMAGES = 100
-LOOK_SEED = 500_000  # apart from the pictures' seed
+CROP_SEED = 500_000  # apart from the pictures' seed
 SURFACE_SIZE = 128  # of the crops that PixelHead is validated on
 MAX_GRADIENT_NORM = 10.0
 FIGURES = (
     "recall", "precision", "part", "mask_iou", "pixel_part", "pixel_mask_iou",
-    "look_part", "look_mask_iou", "look_side",
+    "crop_part", "crop_mask_iou", "crop_side",
 )  # fmt: skip
 
 
@@ -230,8 +231,8 @@ class Run:
         figures = validate_surface(self.averaged, self.averaged_pixel_head, held_out, SURFACE_SIZE, cropping)
         if stage.sizes and not stage.surface_only:
             figures |= validate(self.averaged, held_out)
-        if stage.looks:
-            figures |= validate_looks(self.averaged, held_out, self.config.look_size)
+        if stage.crops:
+            figures |= validate_crops(self.averaged, held_out, self.config.crop_size)
         self.log.append({"step": self.step, "images": self.images, "spent": self.spent_s, **figures})
         tqdm.write(json.dumps(self.log[-1]))
 
@@ -262,17 +263,19 @@ def train(config: TrainingConfig) -> None:
     drawn = {"first": run.step, "photos": photos, "photo_fraction": config.photo_fraction}
     drawn |= {"ahead": ahead * workers, "workers": workers}
     batches = data.Batches(records, config.batch, own_seed, **drawn)
-    looks = data.Batches(records, config.looks, own_seed + LOOK_SEED, **drawn)
+    crops = data.Batches(records, config.crops, own_seed + CROP_SEED, **drawn)
     autocast = torch.autocast(device.type, torch.bfloat16, enabled=config.bf16)
-    smoothed, watch = SmoothedTerms(), Stopwatch(run.spent_s)
+    watch = Stopwatch(run.spent_s)
     save_due, check_due = Interval(config.save_minutes * 60), Interval(config.validate_minutes * 60)
     bar = schedule.bar(run.step, run.spent_s, disable=rank > 0)
     run.net.train()
-    finished = False
+    stage, finished = None, False
     while not finished:
         seed_step(own_seed, run.step)
         fraction = schedule.fraction(run.step, watch.spent_s)
-        stage = [s for s in RECIPES[config.recipe] if fraction >= s.start][-1]
+        before, stage = stage, [s for s in RECIPES[config.recipe] if fraction >= s.start][-1]
+        if stage is not before:
+            smoothed = SmoothedTerms()
         if config.decay:
             rate = steady_rate_at(run.step, fraction, config.lr, config.decay)
         else:
@@ -288,9 +291,9 @@ def train(config: TrainingConfig) -> None:
             else:
                 terms |= batch_loss(run.net, image, truths, autocast, run.pixel_head, boxes)
             seen += len(image)
-        if stage.looks:
-            image, truths = on_device(looks.next((config.look_size,), data.SECOND_LOOKS), device)
-            terms |= second_look_loss(run.net, image, truths, autocast, run.pixel_head)
+        if stage.crops:
+            image, truths = on_device(crops.next((config.crop_size,), data.PERSON_CROPPING), device)
+            terms |= crop_loss(run.net, image, truths, autocast, run.pixel_head)
             seen += len(image)
         run.optimiser.zero_grad(set_to_none=True)
         sum(terms.values()).backward()
@@ -324,7 +327,7 @@ def train(config: TrainingConfig) -> None:
             watch.skip()
     bar.close()
     batches.close()
-    looks.close()
+    crops.close()
     if rank == 0:
         run.check(held_out, stage)
         run.save()
@@ -365,11 +368,11 @@ def parsed() -> TrainingConfig:
     )
     parser.add_argument(
         "--recipe", choices=RECIPES, default=default.recipe,
-        help="scratch: surface, then the whole network; looks: crops of the second look alone; both: them and whole "
+        help="scratch: surface, then the whole network; crops: person crops alone; both: them and whole "
              "pictures of 320 to 448 pixels (default %(default)s)",
     )  # fmt: skip
-    parser.add_argument("--looks", type=int, default=default.looks, help="crops of the second look a step and process")
-    parser.add_argument("--look-size", type=int, default=default.look_size, help="their side, pixels")
+    parser.add_argument("--crops", type=int, default=default.crops, help="person crops a step and process")
+    parser.add_argument("--crop-size", type=int, default=default.crop_size, help="their side, pixels")
     parser.add_argument(
         "--boxes-every", type=int, default=default.boxes_every, metavar="N",
         help="RPN, proposals and box head in every Nth step alone (default %(default)s)",

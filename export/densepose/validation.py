@@ -74,15 +74,15 @@ def validate_surface(
 
 
 @torch.no_grad()
-def validate_looks(net: MobileParsingRCNN, records: list[Record], size: int) -> dict[str, float]:
+def validate_crops(net: MobileParsingRCNN, records: list[Record], size: int) -> dict[str, float]:
     """Part accuracy (of all body cells; what is taken for background is wrong), mask IoU and left/right of the dense
-    head's cells, on crops of the second look: two people a record, turned upright by the true axis, true boxes."""
+    head's cells, on person crops: two people a record, turned upright by the true axis, true boxes."""
     device = next(net.parameters()).device
-    looks = data.SecondLooks(tilt_degrees=0, box_shake=0, coarse=0)
+    cropping = data.PersonCropping(tilt_degrees=0, box_shake=0, coarse=0)
     rng = np.random.default_rng(0)
     right = body = both = either = sided = limb = 0
     for record in records:
-        drawn = looks.draw(record, size, rng)
+        drawn = cropping.draw(record, size, rng)
         image = torch.from_numpy(np.stack([data.normalised(image) for image, _ in drawn])).to(device)
         pooled = tg.pooled(
             [net.finest(image)], [t.box.to(device) for _, t in drawn], net.config, net.config.dense_pool, 0
@@ -99,9 +99,9 @@ def validate_looks(net: MobileParsingRCNN, records: list[Record], size: int) -> 
         limb += ((side > 0) & (found > 0)).sum()
         sided += ((side == found) & (side > 0)).sum()
     return {
-        "look_part": float(right / max(body, 1)),
-        "look_mask_iou": float(both / max(either, 1)),
-        "look_side": float(sided / max(limb, 1)),
+        "crop_part": float(right / max(body, 1)),
+        "crop_mask_iou": float(both / max(either, 1)),
+        "crop_side": float(sided / max(limb, 1)),
     }
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import json
 import tarfile
 import zipfile
 
@@ -40,13 +41,22 @@ def test_no_photograph_is_both_trained_on_and_tested_on():
     assert len({p.name for p in photos}) == len({(p.package, p.member) for p in photos}) == len(photos)
     looked_at = {(m.package, m.member) for m in people.load_people()}
     assert not looked_at & {(p.package, p.member) for p in photos}
-    assert {p.split for p in photos} == {"train", "val", "test", "empty"}
+    assert {p.split for p in photos} == {"train", "val", "test", "empty", "views"}
 
 
 def test_photographs_without_a_licence_for_more_are_tested_on_alone():
     listed = packages.load_packages()
     for photo in backgrounds.load_photographs():
         assert photo.split in ("test", "empty") or "tests only" not in listed[photo.package].licence, photo.name
+
+
+def test_nothing_of_the_performance_that_checks_views_is_trained_on():
+    checked = {p.package for p in backgrounds.load_photographs() if p.split == "views"}
+    assert checked
+    assert not [p.name for p in backgrounds.load_photographs() if p.split == "train" and p.package in checked]
+    poses = json.loads((backgrounds.FOLDER.parent / "people" / "photo_poses.json").read_text())["poses"]
+    trained = {p.name for p in backgrounds.load_photographs() if p.split == "train"}
+    assert {pose["photo"] for pose in poses} <= trained
 
 
 def test_the_split_of_a_name_never_changes():

@@ -1,7 +1,7 @@
-"""The second look: one person cut out of the source picture, turned upright, at one size.
+"""Person crops: one person cut out of the source picture, turned upright, at one size.
 
-The trunk's finest map and the dense head see a person who is small, tilted or crowded in the whole picture once more in
-such a crop. Coordinates are continuous: pixel (x, y) covers [x, x + 1) x [y, y + 1).
+The trunk's finest map and the dense head go over such a crop in a second pass, for people who are small, tilted or
+crowded in the whole picture. Coordinates are continuous: pixel (x, y) covers [x, x + 1) x [y, y + 1).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ UPRIGHT = np.array([0.0, -1.0])
 
 
 @dataclass(frozen=True)
-class Look:
+class PersonCrop:
     """A square crop. into: float64 [2, 3], from the picture to the crop; box: float64 [4], the person in the crop."""
 
     into: np.ndarray
@@ -56,13 +56,13 @@ def turned_box(points: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return np.concatenate([turned.min(0), turned.max(0)])
 
 
-def look_at(box: np.ndarray, turn: np.ndarray, side_px: int) -> Look:
+def crop_around(box: np.ndarray, turn: np.ndarray, side_px: int) -> PersonCrop:
     """The crop with `box`, in turned coordinates as of `turned_box`, in its middle."""
     low, high = box[:2], box[2:]
     scale = side_px / (CONTEXT * max(float((high - low).max()), 1.0))
     shift = side_px / 2 - scale * (low + high) / 2
     into = np.concatenate([scale * turn, shift[:, None]], 1)
-    return Look(into, np.concatenate([scale * low + shift, scale * high + shift]), side_px)
+    return PersonCrop(into, np.concatenate([scale * low + shift, scale * high + shift]), side_px)
 
 
 def _between_centres(into: np.ndarray) -> np.ndarray:
@@ -72,14 +72,14 @@ def _between_centres(into: np.ndarray) -> np.ndarray:
     return out
 
 
-def cut(image: np.ndarray, look: Look, fill: tuple[float, ...]) -> np.ndarray:
+def cut(image: np.ndarray, crop: PersonCrop, fill: tuple[float, ...]) -> np.ndarray:
     """The crop of an image uint8 [H, W, C]; `fill` where the picture has ended. Shrunk pixels are averaged."""
-    into, size = look.into, (look.side_px, look.side_px)
+    into, size = crop.into, (crop.side_px, crop.side_px)
     scale = float(np.hypot(*into[:, 0]))
     if scale < 0.8:
         # Only what the crop shows is made smaller, by whole pixels on its upper left so that the map stays exact.
-        corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * look.side_px
-        seen = corners @ look.back[:, :2].T + look.back[:, 2]
+        corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * crop.side_px
+        seen = corners @ crop.back[:, :2].T + crop.back[:, 2]
         x0, y0 = np.clip(np.floor(seen.min(0)).astype(int) - 2, 0, [image.shape[1] - 1, image.shape[0] - 1])
         x1, y1 = np.clip(np.ceil(seen.max(0)).astype(int) + 2, [x0 + 1, y0 + 1], [image.shape[1], image.shape[0]])
         small = (max(round((x1 - x0) * scale), 1), max(round((y1 - y0) * scale), 1))
@@ -89,7 +89,7 @@ def cut(image: np.ndarray, look: Look, fill: tuple[float, ...]) -> np.ndarray:
     return cv2.warpAffine(image, _between_centres(into), size, flags=cv2.INTER_LINEAR, borderValue=fill)
 
 
-def cut_label(label: np.ndarray, look: Look) -> np.ndarray:
+def cut_label(label: np.ndarray, crop: PersonCrop) -> np.ndarray:
     """The crop of labels uint8 [H, W, C], not mixed; 0 where the picture has ended."""
-    size = (look.side_px, look.side_px)
-    return cv2.warpAffine(label, _between_centres(look.into), size, flags=cv2.INTER_NEAREST)
+    size = (crop.side_px, crop.side_px)
+    return cv2.warpAffine(label, _between_centres(crop.into), size, flags=cv2.INTER_NEAREST)

@@ -12,9 +12,9 @@ from rectangle_people import picture
 from export.densepose import data, train, validation
 from export.densepose import targets as tg
 from export.densepose.config import NetworkConfig
-from export.densepose.losses import PixelHead, batch_loss, second_look_loss
+from export.densepose.losses import PixelHead, batch_loss, crop_loss
 from export.densepose.network import MobileParsingRCNN
-from export.densepose.second_look import cut, cut_label, look_at, outline, rotation, turn_upright, turned_box
+from export.densepose.person_crop import crop_around, cut, cut_label, outline, rotation, turn_upright, turned_box
 from export.shards import Record, ShardWriter, load_records, visible_boxes
 
 NO_AUTOCAST = torch.autocast("cpu", enabled=False)
@@ -37,14 +37,14 @@ def as_record(image, label, axis=None) -> Record:
 def test_a_tilted_person_is_upright_in_the_crop_and_fills_it(degrees):
     _, label, axis = tilted(degrees)
     turn = turn_upright(axis[0])
-    look = look_at(turned_box(outline(label[..., 3] == 1), turn), turn, 128)
-    crop = cut_label(label, look)
-    (box,), *_ = visible_boxes(crop)
-    assert np.abs(box - look.box).max() < 3
+    crop = crop_around(turned_box(outline(label[..., 3] == 1), turn), turn, 128)
+    shown = cut_label(label, crop)
+    (box,), *_ = visible_boxes(shown)
+    assert np.abs(box - crop.box).max() < 3
     assert max(box[2:] - box[:2]) == pytest.approx(128 / 1.15, abs=3)
-    rows = {part: np.nonzero(crop[..., 0] == part)[0].mean() for part in (23, 2, 9)}
+    rows = {part: np.nonzero(shown[..., 0] == part)[0].mean() for part in (23, 2, 9)}
     assert rows[23] < rows[2] < rows[9]
-    columns = {part: np.nonzero(crop[..., 0] == part)[1].mean() for part in (9, 10)}
+    columns = {part: np.nonzero(shown[..., 0] == part)[1].mean() for part in (9, 10)}
     assert columns[9] < columns[10]  # turned, not mirrored
 
 
@@ -53,22 +53,22 @@ def test_pixels_and_labels_of_a_crop_agree_and_map_back(side):
     """Enlarged or shrunk: the coloured rectangles lie where their labels do."""
     image, label, axis = tilted(25)
     turn = turn_upright(axis[0])
-    look = look_at(turned_box(outline(label[..., 3] == 1), turn), turn, side)
-    pixels, marked = cut(image, look, (0, 0, 0)), cut_label(label, look)
-    border = 2 * int(np.ceil(np.hypot(*look.into[:, 0]))) + 1  # where the colours of neighbours mix
+    crop = crop_around(turned_box(outline(label[..., 3] == 1), turn), turn, side)
+    pixels, marked = cut(image, crop, (0, 0, 0)), cut_label(label, crop)
+    border = 2 * int(np.ceil(np.hypot(*crop.into[:, 0]))) + 1  # where the colours of neighbours mix
     inside = cv2.erode((marked[..., 0] == 2).astype(np.uint8), np.ones((border, border))) > 0
     assert inside.sum() > 20
     assert np.abs(pixels[inside].astype(int) - [(2 * 67) % 256, (2 * 131) % 256, 0]).max() <= 3
-    centre = look.box.reshape(2, 2).mean(0)
+    centre = crop.box.reshape(2, 2).mean(0)
     y, x = np.nonzero(label[..., 3] == 1)
-    there = look.back[:, :2] @ centre + look.back[:, 2]
+    there = crop.back[:, :2] @ centre + crop.back[:, 2]
     assert x.min() <= there[0] <= x.max() + 1
     assert y.min() <= there[1] <= y.max() + 1
 
 
-def test_looks_show_different_people_each_with_its_own_label():
+def test_crops_show_different_people_each_with_its_own_label():
     record = as_record(*tilted(40, seed=2, people=2))
-    drawn = data.SecondLooks(box_shake=0, tilt_degrees=0, coarse=0).draw(record, 96, np.random.default_rng(0))
+    drawn = data.PersonCropping(box_shake=0, tilt_degrees=0, coarse=0).draw(record, 96, np.random.default_rng(0))
     assert {int(t.instance) for _, t in drawn} == {1, 2}
     for image, truth in drawn:
         assert image.shape == (96, 96, 3)
@@ -81,7 +81,7 @@ def test_looks_show_different_people_each_with_its_own_label():
 
 def test_nobody_is_looked_at_where_nobody_is():
     record = as_record(np.full((60, 80, 3), 90, np.uint8), np.zeros((60, 80, 4), np.uint8))
-    for image, truth in data.SECOND_LOOKS.draw(record, 64, np.random.default_rng(0)):
+    for image, truth in data.PERSON_CROPPING.draw(record, 64, np.random.default_rng(0)):
         assert image.shape == (64, 64, 3)
         assert not tg.dense_labels(truth.box, torch.tensor([0]), truth, 32).any()
 
@@ -131,16 +131,16 @@ def test_crops_teach_the_dense_head_and_leave_boxes_alone(shards):
     torch.manual_seed(0)
     net = MobileParsingRCNN(NetworkConfig(width=16, axis=True)).train()
     head = PixelHead(net.config)
-    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, (96,), data.SECOND_LOOKS)
+    image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, (96,), data.PERSON_CROPPING)
     optimiser = torch.optim.AdamW([*net.parameters(), *head.parameters()], lr=3e-3)
     history = []
     for _ in range(16):
-        terms = second_look_loss(net, image, truths, NO_AUTOCAST, head)
+        terms = crop_loss(net, image, truths, NO_AUTOCAST, head)
         optimiser.zero_grad()
         sum(terms.values()).backward()
         optimiser.step()
         history.append({name: value.item() for name, value in terms.items()})
-    for name in ("look_coarse", "look_index", "look_u", "look_v"):
+    for name in ("crop_coarse", "crop_index", "crop_u", "crop_v"):
         assert history[-1][name] < 0.9 * history[0][name], name
     without = {id(p) for p in net.box_parameters()}
     named = dict(net.named_parameters())
@@ -171,13 +171,13 @@ def test_weights_without_an_axis_start_a_network_with_one(tmp_path):
 
 
 def options(shards, out, *more: str) -> list[str]:
-    given = ["train", "--recipe", "both", "--data", str(shards), "--out", str(out), "--batch", "2", "--looks", "2"]
-    return [*given, "--look-size", "64", "--width", "16", "--threads", "1", "--no-bf16", *more]
+    given = ["train", "--recipe", "both", "--data", str(shards), "--out", str(out), "--batch", "2", "--crops", "2"]
+    return [*given, "--crop-size", "64", "--width", "16", "--threads", "1", "--no-bf16", *more]
 
 
 @pytest.fixture
 def run(monkeypatch, shards, one_thread, signal_handlers):
-    monkeypatch.setitem(train.RECIPES, "both", (train.Stage(0.0, (96,), data.WIDE_CROPPING, looks=True),))
+    monkeypatch.setitem(train.RECIPES, "both", (train.Stage(0.0, (96,), data.WIDE_CROPPING, crops=True),))
 
     def start(out, *more: str, stop_after: int | None = None) -> list[tuple[float, bool]]:
         steps = []
@@ -215,11 +215,11 @@ def test_a_run_made_longer_goes_on_from_where_its_rate_still_stood(run, tmp_path
     assert run(tmp_path / "short", "--steps", "8", "--decay", "0.25") == []
 
 
-def test_looks_are_validated_on_true_boxes_and_axes(shards):
+def test_crops_are_validated_on_true_boxes_and_axes(shards):
     torch.manual_seed(0)
     records = load_records(shards / "val")
     net = MobileParsingRCNN(NetworkConfig(width=16)).eval()
-    figures = validation.validate_looks(net, records, 64)
-    assert set(figures) == {"look_part", "look_mask_iou", "look_side"}
+    figures = validation.validate_crops(net, records, 64)
+    assert set(figures) == {"crop_part", "crop_mask_iou", "crop_side"}
     assert all(0 <= value <= 1 for value in figures.values())
-    assert figures == validation.validate_looks(net, records, 64)
+    assert figures == validation.validate_crops(net, records, 64)

@@ -15,9 +15,9 @@ import numpy as np
 import onnx
 from tqdm import tqdm
 
-from quantization import qdq
-from quantization.activations import Activations, tensor_names
-from quantization.errors import sqnr_db
+from quantization.analysis.errors import sqnr_db
+from quantization.graphs import qdq
+from quantization.graphs.activations import Activations, tensor_names
 from quantization.samples import Sample
 
 

@@ -18,8 +18,8 @@ import numpy as np
 import onnx
 from onnx import helper
 
-from quantization import qdq
-from quantization.activations import Activations
+from quantization.graphs import qdq
+from quantization.graphs.activations import Activations
 from quantization.samples import Sample
 
 LARGEST, SMALLEST = 32767, -32768

@@ -14,8 +14,8 @@ import onnx
 from onnx import helper, numpy_helper
 from onnxruntime.quantization.quant_utils import TENSOR_NAME_QUANT_SUFFIX
 
-from quantization import qdq
-from quantization.activations import float_session
+from quantization.graphs import qdq
+from quantization.graphs.activations import float_session
 from quantization.samples import Sample
 
 

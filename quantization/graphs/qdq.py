@@ -104,7 +104,8 @@ def weights(quantized: onnx.GraphProto, reference: onnx.GraphProto) -> list[Weig
 def pairs(quantized: onnx.GraphProto) -> list[Pair]:
     """All activations with a quantize-dequantize pair, in the order of the graph.
 
-    Where a map times a number is the same map with another scale (quantization.simplify), the product is a pair too.
+    Where a map times a number is the same map with another scale (quantization.graphs.simplify), the product is
+    a pair too.
     """
     known = constants(quantized)
     readers: dict[str, list[onnx.NodeProto]] = {}

@@ -18,8 +18,8 @@ from onnx import helper, numpy_helper
 from onnxruntime.quantization.quant_utils import TENSOR_NAME_QUANT_SUFFIX
 from torch.nn import functional as F
 
-from quantization import qdq
-from quantization.activations import Activations
+from quantization.graphs import qdq
+from quantization.graphs.activations import Activations
 from quantization.samples import Sample
 
 DAMPING = 0.01  # of H's mean diagonal: inputs that were never seen apart must not count for nothing

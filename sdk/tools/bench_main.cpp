@@ -10,13 +10,13 @@
 #include <stdexcept>
 #include <vector>
 
+#include "arguments/model_options.h"
+#include "arguments/source_argument.h"
 #include "interrupt.h"
 #include "machine.h"
-#include "model_options.h"
-#include "output_file.h"
+#include "output/output_file.h"
+#include "output/progress_bar.h"
 #include "program.h"
-#include "progress_bar.h"
-#include "source_argument.h"
 
 namespace {
 

@@ -14,8 +14,8 @@ import torch
 from torch import Tensor, nn
 
 from export.scenes.config import COLOURS, FEATURES, RASTER
-from export.scenes.light_refiner import LightRefiner
-from export.scenes.system import Networks
+from export.scenes.networks.light_refiner import LightRefiner
+from export.scenes.networks.system import Networks
 
 SHARE = 0.999  # of a feature's values are within -0.5 .. 0.5 afterwards
 MAX_DIFFERENCE = 0.1  # of a feature's variance may differ between a bundle and its weights; 8 bits are about 0.001

@@ -6,8 +6,8 @@ two convolutions, ELU and a sigmoid, so that convolution and activation are one 
 borders, which convolutions bring along, where reflecting is an operation of its own; maps from below pass a 1x1
 convolution before they are doubled, not a 3x3 one after it; and pooling and doubling keep the values of int8 maps.
 
-What the network computes is added to the colours of the finest raster (`export.scenes.raster.filled`): training starts
-from a picture, and what is rounded to 8 bits is the difference alone.
+What the network computes is added to the colours of the finest raster (`export.scenes.geometry.raster.filled`):
+training starts from a picture, and what is rounded to 8 bits is the difference alone.
 """
 
 from __future__ import annotations

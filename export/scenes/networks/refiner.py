@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from export.scenes.config import RefinerConfig
-from export.scenes.gated_refiner import GatedRefiner
-from export.scenes.light_refiner import LightRefiner
+from export.scenes.networks.gated_refiner import GatedRefiner
+from export.scenes.networks.light_refiner import LightRefiner
 
 Refiner = GatedRefiner | LightRefiner
 

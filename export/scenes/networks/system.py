@@ -9,10 +9,10 @@ from typing import Any
 import torch
 from torch import nn
 
-from export.scenes.basis import Basis
 from export.scenes.config import ExtractorConfig, RefinerConfig, SceneConfig
-from export.scenes.extractor import Extractor
-from export.scenes.refiner import make_refiner
+from export.scenes.networks.basis import Basis
+from export.scenes.networks.extractor import Extractor
+from export.scenes.networks.refiner import make_refiner
 
 
 class Networks(nn.Module):

@@ -1,4 +1,4 @@
-#include "bundle_argument.h"
+#include "arguments/bundle_argument.h"
 
 #include <cstdlib>
 #include <filesystem>

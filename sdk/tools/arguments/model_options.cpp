@@ -1,10 +1,10 @@
-#include "model_options.h"
+#include "arguments/model_options.h"
 
 #include <CLI/CLI.hpp>
 #include <maquette/maquette.hpp>
 #include <stdexcept>
 
-#include "bundle_argument.h"
+#include "arguments/bundle_argument.h"
 
 void add_model_options(CLI::App& command, ModelOptions& options) {
   command.add_option("--bundle", options.bundle,

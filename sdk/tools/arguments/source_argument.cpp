@@ -1,4 +1,4 @@
-#include "source_argument.h"
+#include "arguments/source_argument.h"
 
 #include <maquette/maquette.h>
 #include <algorithm>

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "commands.h"
+#include "commands/commands.h"
 
 namespace {
 

@@ -9,16 +9,16 @@
 #include <stdexcept>
 #include <vector>
 
-#include "clip_file.h"
-#include "commands.h"
-#include "frame_image.h"
+#include "arguments/model_options.h"
+#include "arguments/source_argument.h"
+#include "commands/commands.h"
 #include "interrupt.h"
-#include "model_options.h"
-#include "output_file.h"
-#include "overlay.h"
+#include "output/clip_file.h"
+#include "output/frame_image.h"
+#include "output/output_file.h"
+#include "output/overlay.h"
+#include "output/progress_bar.h"
 #include "program.h"
-#include "progress_bar.h"
-#include "source_argument.h"
 
 namespace fs = std::filesystem;
 

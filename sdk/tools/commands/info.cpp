@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <maquette/maquette.hpp>
 
-#include "bundle_argument.h"
-#include "commands.h"
+#include "arguments/bundle_argument.h"
+#include "commands/commands.h"
 
 namespace {
 

@@ -5,12 +5,12 @@
 #include <memory>
 #include <optional>
 
-#include "commands.h"
+#include "arguments/source_argument.h"
+#include "commands/commands.h"
+#include "commands/play_statistics.h"
 #include "interrupt.h"
-#include "output_file.h"
-#include "play_statistics.h"
-#include "source_argument.h"
-#include "terminal_picture.h"
+#include "output/output_file.h"
+#include "output/terminal_picture.h"
 
 namespace {
 

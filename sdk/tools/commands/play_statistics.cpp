@@ -1,4 +1,4 @@
-#include "play_statistics.h"
+#include "commands/play_statistics.h"
 
 #include <algorithm>
 #include <cinttypes>

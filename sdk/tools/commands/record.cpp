@@ -6,11 +6,11 @@
 #include <memory>
 #include <stdexcept>
 
-#include "commands.h"
+#include "arguments/source_argument.h"
+#include "commands/commands.h"
 #include "interrupt.h"
+#include "output/progress_bar.h"
 #include "program.h"
-#include "progress_bar.h"
-#include "source_argument.h"
 
 namespace {
 

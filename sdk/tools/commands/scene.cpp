@@ -6,11 +6,11 @@
 #include <memory>
 #include <stdexcept>
 
-#include "bundle_argument.h"
-#include "commands.h"
-#include "output_file.h"
+#include "arguments/bundle_argument.h"
+#include "commands/commands.h"
+#include "commands/scene_commands.h"
+#include "output/output_file.h"
 #include "program.h"
-#include "scene_commands.h"
 
 namespace {
 

@@ -9,12 +9,12 @@
 #include <memory>
 #include <stdexcept>
 
+#include "commands/scene_commands.h"
 #include "interrupt.h"
 #include "machine.h"
-#include "output_file.h"
+#include "output/output_file.h"
+#include "output/progress_bar.h"
 #include "program.h"
-#include "progress_bar.h"
-#include "scene_commands.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "scene_flight.h"
+#include "commands/scene_flight.h"
 
 #include <algorithm>
 #include <cmath>

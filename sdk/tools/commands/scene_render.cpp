@@ -13,13 +13,13 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "clip_file.h"
+#include "commands/scene_commands.h"
+#include "commands/scene_flight.h"
 #include "interrupt.h"
-#include "output_file.h"
+#include "output/clip_file.h"
+#include "output/output_file.h"
+#include "output/progress_bar.h"
 #include "program.h"
-#include "progress_bar.h"
-#include "scene_commands.h"
-#include "scene_flight.h"
 
 namespace fs = std::filesystem;
 

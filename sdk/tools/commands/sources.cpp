@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <maquette/maquette.hpp>
 
-#include "commands.h"
+#include "commands/commands.h"
 
 namespace {
 

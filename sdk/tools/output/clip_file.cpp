@@ -1,9 +1,9 @@
-#include "clip_file.h"
+#include "output/clip_file.h"
 
 #include <algorithm>
 
-#include "frame_image.h"
-#include "output_file.h"
+#include "output/frame_image.h"
+#include "output/output_file.h"
 
 namespace fs = std::filesystem;
 

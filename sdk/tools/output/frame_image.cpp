@@ -1,4 +1,4 @@
-#include "frame_image.h"
+#include "output/frame_image.h"
 
 cv::Mat image_of(const maquette::Frame& frame) {
   const maq_frame_desc desc = frame.desc();

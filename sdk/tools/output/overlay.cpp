@@ -1,4 +1,4 @@
-#include "overlay.h"
+#include "output/overlay.h"
 
 #include <algorithm>
 #include <array>

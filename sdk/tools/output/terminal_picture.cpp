@@ -1,4 +1,4 @@
-#include "terminal_picture.h"
+#include "output/terminal_picture.h"
 
 #include <sys/ioctl.h>
 #include <unistd.h>

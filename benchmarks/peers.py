@@ -307,7 +307,7 @@ def main(argv: list[str] | None = None) -> int:
     line = document["roofline"]
     peaks = [line[name] / 1e9 for name in ("float32_macs_s", "int8_macs_s", "bytes_s")]
     print("Peak {:.0f} (float32), {:.0f} (int8) billion multiply-adds a second, {:.0f} GB/s".format(*peaks))
-    print(f"Share of that roofline: {line['share']:.0%}")
+    print(f"Fraction of that roofline: {line['fraction']:.0%}")
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(document, indent=1) + "\n")
     print(f"Written: {options.out}")

@@ -23,14 +23,14 @@ instruction_sets = ["avx2"]
 [[gate]]
 figure = "fps"
 says = "speed"
-at_least = 30
+min = 30
 stretch = 60
 machine = "two"
 
 [[gate]]
 figure = "mb"
 says = "size"
-at_most = 3.6
+max = 3.6
 stretch = 3.0
 """
 

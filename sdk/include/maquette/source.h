@@ -23,7 +23,7 @@ typedef enum maq_source_state {
 } maq_source_state;
 
 /* Receives a change of state on a thread of the source; it must return promptly and must not destroy the source.
- * `reason` is valid during the call. No call begins after maq_source_destroy has returned. */
+ * `reason` is valid during the call. maq_source_destroy waits for a call that is running; none begins after it. */
 typedef void (*maq_source_state_callback)(void* user_data, maq_source_state state, const char* reason);
 
 typedef struct maq_source_config {
@@ -115,7 +115,8 @@ MAQ_API maq_status maq_source_create(maq_context* context, const char* uri, cons
                                      maq_source** source);
 
 /* Closes the source (NULL is fine). Frames of it that are still held stay valid until they are released.
- * Once for each source, from any thread. Blocks for at most 50 ms, also when a device hangs. */
+ * Once for each source, from any thread. Blocks for at most 50 ms, also when a device hangs, and while a state callback
+ * runs. */
 MAQ_API void maq_source_destroy(maq_source* source);
 
 /* Describes the source. The caller sets info->struct_size.

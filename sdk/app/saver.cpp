@@ -1,14 +1,15 @@
-#include "saver.h"
+#include "app/saver.h"
 
 #include <ctime>
 #include <filesystem>
-#include <utility>
+
+namespace maquette {
+namespace {
 
 namespace fs = std::filesystem;
+constexpr std::chrono::seconds kMessageTime(5);
 
-namespace {
-constexpr double kMessageS = 5;
-}
+}  // namespace
 
 std::string Saver::new_path(const char* extension) {
   const std::time_t now = std::time(nullptr);
@@ -17,51 +18,49 @@ std::string Saver::new_path(const char* extension) {
   return (fs::path(folder_) / name).string() + "-" + std::to_string(++file_count_) + extension;
 }
 
-void Saver::save_snapshot(maquette::RgbaImage image, std::shared_ptr<const maquette::DensePoseResult> people) {
-  const auto kept = std::make_shared<maquette::RgbaImage>(std::move(image));
-  files_.add([this, path = new_path(""), kept, people = std::move(people)] {
+void Saver::save_snapshot(RgbaImage image, std::shared_ptr<const DensePoseResult> people) {
+  const auto kept = std::make_shared<RgbaImage>(std::move(image));
+  run([this, path = new_path(""), kept, people = std::move(people)] {
     kept->as_frame(context_).save(path + ".png");
     if (people != nullptr) people->save(folder_, fs::path(path).filename().string());
     return "Saved " + path + ".png" + (people != nullptr ? ", _IUV.png, _INDS.png and .json" : "");
   });
 }
 
-void Saver::begin_clip(const Rect& rect, double fps) {
-  clip_path_ = new_path(".mp4");
-  clip_rect_ = rect;
-  clip_ = std::make_shared<std::optional<maquette::Clip>>();
-  files_.add([this, clip = clip_, path = clip_path_, fps] {
-    clip->emplace(context_, path, fps);
-    return "Recording " + path;
+void Saver::begin_clip(double fps) {
+  end_clip();
+  clip_ = std::make_shared<OpenClip>();
+  clip_->path = new_path(".mp4");
+  run([this, clip = clip_, fps] {
+    clip->file.emplace(context_, clip->path, fps);
+    return "Recording " + clip->path;
   });
 }
 
 void Saver::end_clip() {
   if (clip_ == nullptr) return;
-  files_.add([clip = std::exchange(clip_, nullptr), path = clip_path_] {
-    if (*clip) (*clip)->finish();
-    return "Saved " + path;
+  run([clip = std::exchange(clip_, nullptr)] {
+    if (!clip->file) return std::string();  // it could not be made, and the message says why
+    clip->file->finish();
+    return "Saved " + clip->path;
   });
 }
 
-void Saver::add_to_clip(const Window& window, const Rect& rect) {
-  if (clip_rect_.width != rect.width || clip_rect_.height != rect.height) return end_clip();
-  if (files_.is_busy()) return;
-  const auto image = std::make_shared<maquette::RgbaImage>(window.read_pixels(rect));
-  files_.add([this, clip = clip_, image] {
-    if (*clip) (*clip)->add(image->as_frame(context_));
+void Saver::add_to_clip(RgbaImage image) {
+  if (!has_clip()) return;
+  if (clip_->width_px == 0) clip_->width_px = image.width_px, clip_->height_px = image.height_px;
+  if (clip_->width_px != image.width_px || clip_->height_px != image.height_px) return end_clip();
+  run([this, clip = clip_, kept = std::make_shared<RgbaImage>(std::move(image))] {
+    if (clip->file) clip->file->add(kept->as_frame(context_));
     return std::string();
   });
 }
 
-std::string Saver::toggle_recording() {
-  const std::string ended = std::exchange(recording_, recording_.empty() ? new_path(".maqrec") : "");
-  files_.add([text = ended.empty() ? "Recording " + recording_ : "Saved " + ended] { return text; });
-  return recording_;
+std::string Saver::message() {
+  const auto now = std::chrono::steady_clock::now();
+  const std::string latest = files_.message();
+  if (latest != message_) message_ = latest, message_since_ = now;
+  return now - message_since_ < kMessageTime ? message_ : "";
 }
 
-std::string Saver::message() {
-  const std::string latest = files_.message();
-  if (latest != message_) message_ = latest, message_since_s_ = monotonic_s();
-  return monotonic_s() - message_since_s_ < kMessageS ? message_ : "";
-}
+}  // namespace maquette

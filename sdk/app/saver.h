@@ -1,46 +1,62 @@
-// Writes snapshots, clips and recordings into a folder, without holding up the window.
+// Saves snapshots and clips of what is shown into a folder, without holding up the thread that draws.
+//
+//   maquette::Saver saver(context, "/home/me/Pictures");
+//   saver.begin_clip(25);
+//   for (;;) { draw(); if (saver.takes_clip_images()) saver.add_to_clip(shown_pixels()); write(saver.message()); }
 #pragma once
 
-#include <app/rgba_image.h>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
-#include "file_thread.h"
-#include "window.h"
+#include "app/file_thread.h"
+#include "app/rgba_image.h"
 
-class Saver {
+namespace maquette {
+
+class Saver {  // all calls by one thread
  public:
-  Saver(const maquette::Context& context, const std::string& folder) : context_(context), folder_(folder) {}
+  // The context must outlive this, whose destructor completes what was begun.
+  Saver(const Context& context, const std::string& folder) : context_(context), folder_(folder) {}
+  ~Saver() { end_clip(); }
+  Saver(const Saver&) = delete;
+  Saver& operator=(const Saver&) = delete;
 
-  // `people` may be null.
-  void save_snapshot(maquette::RgbaImage image, std::shared_ptr<const maquette::DensePoseResult> people);
+  // A PNG of the image; of `people`, which may be null, the three DensePose files.
+  void save_snapshot(RgbaImage image, std::shared_ptr<const DensePoseResult> people);
 
-  bool has_clip() const { return clip_ != nullptr; }
-  // Clips of that part of the window. `fps`: how often images will be added.
-  void begin_clip(const Rect& rect, double fps);
+  // `fps`: how often images will be added.
+  void begin_clip(double fps);
   void end_clip();
-  // Adds that part of the window; a clip has one size, so it ends when the part gets another.
-  void add_to_clip(const Window& window, const Rect& rect);
+  bool has_clip() const { return clip_ != nullptr; }
+  // False as well while the disk is slower than the images come.
+  bool takes_clip_images() const { return has_clip() && !files_.is_busy(); }
+  // A clip has one size, so it ends when an image has another.
+  void add_to_clip(RgbaImage image);
 
-  // The path of the recording that begins, or "" when one ends: the source is recorded by its pipeline.
-  std::string toggle_recording();
-  void forget_recording() { recording_.clear(); }  // it ended with its source
-  bool is_recording() const { return !recording_.empty(); }
-
+  // In the folder, named by the time and a count; for what others write.
+  std::string new_path(const char* extension);
+  // Another job for the thread that writes, in its turn.
   void run(FileThread::Job job) { files_.add(std::move(job)); }
-  // What was saved last, or why it was not, for some seconds.
+  // What was saved last, or why it was not, for five seconds.
   std::string message();
 
  private:
-  std::string new_path(const char* extension);
+  struct OpenClip {
+    std::string path;
+    int width_px = 0, height_px = 0;  // 0 before the first image
+    std::optional<Clip> file;         // of the thread that writes
+  };
 
-  const maquette::Context& context_;
+  const Context& context_;
   const std::string folder_;
   int file_count_ = 0;
-  std::string clip_path_, recording_, message_;
-  Rect clip_rect_;
-  double message_since_s_ = 0;
-  std::shared_ptr<std::optional<maquette::Clip>> clip_;  // of the file thread; none before it was made
-  FileThread files_;                                     // last: its jobs use the others
+  std::string message_;
+  std::chrono::steady_clock::time_point message_since_;
+  std::shared_ptr<OpenClip> clip_;
+  FileThread files_;  // last: its jobs use the others
 };
+
+}  // namespace maquette

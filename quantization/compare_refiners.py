@@ -27,7 +27,7 @@ from tqdm import tqdm
 
 from export.scenes.config import RefinerConfig
 from export.scenes.export_onnx import RefinerGraph, export_refiner, raster_shapes
-from export.scenes.refiner import Refiner, make_refiner
+from export.scenes.networks.refiner import Refiner, make_refiner
 from quantization.quantize import quantize_graph
 from quantization.settings import GraphSettings
 

@@ -56,7 +56,7 @@ std::optional<Size> size_of(const std::string& text) {
   const bool goes_on = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
   const auto height = goes_on ? std::from_chars(width.ptr + 1, end, size.height_px) : width;
   if (!goes_on || height.ec != std::errc() || height.ptr != end || size.width_px < 1 || size.height_px < 1) {
-    throw std::runtime_error("--size " + text + " is none; write it as 640x480.");
+    throw std::runtime_error("--size " + text + " is not a size; write it as 640x480.");
   }
   return size;
 }
@@ -92,7 +92,7 @@ float median(std::vector<float> values) {
 // Renders `repeat` times; `ms` gets the medians of the times.
 maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
                            nlohmann::ordered_json& ms) {
-  std::vector<float> total, project, shade, refine, turn;
+  std::vector<float> total, project, shade, refine, resample;
   // The first prepares networks for its size; its time is nobody's who looks at more than one picture.
   if (repeat > 1) renderer.run(camera);
   std::optional<maquette::SceneImage> image;
@@ -104,13 +104,13 @@ maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_
     project.push_back(stats.project_ms);
     shade.push_back(stats.shade_ms);
     refine.push_back(stats.refine_ms);
-    turn.push_back(stats.resample_ms);
+    resample.push_back(stats.resample_ms);
   }
   ms = {{"total", median(total)},
         {"project", median(project)},
         {"shade", median(shade)},
         {"refine", median(refine)},
-        {"turn", median(turn)}};
+        {"resample", median(resample)}};
   return std::move(*image);
 }
 
@@ -162,9 +162,9 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     image.save((fs::path(options.out) / picture_name(view)).string(), !options.no_alpha);
     document["views"].push_back({{"name", view.name},
                                  {"ms", ms},
-                                 {"blocks_drawn", stats.drawn_block_count},
-                                 {"points_drawn", stats.drawn_point_count},
-                                 {"points_shaded", stats.shaded_point_count},
+                                 {"drawn_blocks", stats.drawn_block_count},
+                                 {"drawn_points", stats.drawn_point_count},
+                                 {"shaded_points", stats.shaded_point_count},
                                  {"refined_pixels", stats.refined_pixel_count}});
     char note[32];
     std::snprintf(note, sizeof note, "%.1f ms", ms["total"].get<double>());
@@ -256,7 +256,7 @@ int render(const Options& options) {
 
 void add_scene_render_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = scene.add_subcommand("render", "Look at a scene: pictures from given cameras, or a clip");
+  CLI::App* command = scene.add_subcommand("render", "Render a scene: pictures from given cameras, or a clip");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
   command->add_option("-o,--out", options->out, "File of the clip (clip.mp4), or folder for the pictures")->required();
   command

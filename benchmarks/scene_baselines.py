@@ -18,8 +18,8 @@ from export.camera import Camera
 from export.scenes.captures import Capture
 from export.scenes.config import LEVELS, MULTIPLE
 from export.scenes.fitting import View
-from export.scenes.raster import NOTHING, pyramid, visible
-from export.scenes.source_views import in_frame
+from export.scenes.geometry.raster import NOTHING, pyramid, visible
+from export.scenes.geometry.source_views import in_frame
 
 SCORED_POINTS = 2000  # of the cloud, enough to tell which photo is nearest
 BACKGROUND_PHOTOS = 3

@@ -10,15 +10,15 @@ import torch
 from torch import Tensor, nn
 
 from export.densepose.graphs import session
-from export.scenes.basis import Basis
 from export.scenes.bundle import BASIS
 from export.scenes.config import RASTER
-from export.scenes.light_refiner import depth_to_space, space_to_depth
+from export.scenes.networks.basis import Basis
+from export.scenes.networks.light_refiner import depth_to_space, space_to_depth
 from quantization.samples import Sample
 
 
 class _Graph(nn.Module):
-    """A graph of a bundle, as a part of `export.scenes.system.Networks`."""
+    """A graph of a bundle, as a part of `export.scenes.networks.system.Networks`."""
 
     def __init__(self, path: Path, threads: int) -> None:
         super().__init__()

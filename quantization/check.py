@@ -21,8 +21,8 @@ from export.densepose.config import DecodeConfig
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.sheet import clip_frames
 from export.shards import Record
-from quantization.comparison import TensorError, pair_errors, weight_errors
-from quantization.prepare import prepare
+from quantization.analysis.comparison import TensorError, pair_errors, weight_errors
+from quantization.graphs.prepare import prepare
 from quantization.samples import Sample, collect
 
 MEDIA = Path("tests/media")

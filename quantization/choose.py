@@ -32,10 +32,11 @@ from export.densepose import bundle as bundle_format
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.maquette_api import MaquetteError
 from export.shards import load_records
-from quantization import agreement, qdq
-from quantization.activations import Activations
-from quantization.errors import output_sqnr
-from quantization.prepare import prepare
+from quantization import agreement
+from quantization.analysis.errors import output_sqnr
+from quantization.graphs import qdq
+from quantization.graphs.activations import Activations
+from quantization.graphs.prepare import prepare
 from quantization.quantize import calibrate, correct, quantize_prepared
 from quantization.samples import Sample, calibration_records, collect, options_of_calibration, spread
 from quantization.settings import DensePoseSettings, GraphSettings, read_settings

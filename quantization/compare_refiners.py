@@ -5,7 +5,7 @@
 
 Weights are random and so are the rasters: time does not depend on them. Each figure is the 10th percentile of many
 runs; `core ms` is processor time of a run with one thread, which others who use the machine disturb least. Candidates
-take turns, so that a busy minute does not hit one of them alone.
+are measured alternately, so that a busy minute does not hit one of them alone.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tqdm import tqdm
 
 from export.scenes.config import RefinerConfig
 from export.scenes.export_onnx import RefinerGraph, export_refiner, raster_shapes
-from export.scenes.refiner import Refiner, make_refiner
+from export.scenes.networks.refiner import Refiner, make_refiner
 from quantization.quantize import quantize_graph
 from quantization.settings import GraphSettings
 

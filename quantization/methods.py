@@ -22,8 +22,8 @@ from rich.table import Table
 from export.densepose.bundle import GRAPHS
 from export.densepose.graphs import open_bundle
 from export.shards import load_records
-from quantization.errors import output_sqnr
-from quantization.prepare import prepare
+from quantization.analysis.errors import output_sqnr
+from quantization.graphs.prepare import prepare
 from quantization.quantize import calibrate, correct, quantize_prepared
 from quantization.report import JSON, compact
 from quantization.samples import Sample, collect, options_of_calibration, spread

@@ -26,13 +26,13 @@ from export.bundle import BundleInfo, bytes_of
 from export.densepose import bundle as bundle_format
 from export.densepose.graphs import open_bundle
 from export.shards import load_records
-from quantization.bias_correction import correct_biases
-from quantization.errors import float_nodes_left, output_sqnr
-from quantization.prepare import prepare
-from quantization.rounding import round_together
+from quantization.analysis.errors import float_nodes_left, output_sqnr
+from quantization.graphs.bias_correction import correct_biases
+from quantization.graphs.prepare import prepare
+from quantization.graphs.rounding import round_together
+from quantization.graphs.simplify import simplify
 from quantization.samples import Sample, calibration_records, collect, options_of_calibration, spread
 from quantization.settings import DensePoseSettings, GraphSettings, read_settings
-from quantization.simplify import simplify
 
 METHODS = {
     "minmax": CalibrationMethod.MinMax,
@@ -115,7 +115,7 @@ def quantize_prepared(prepared: Path, target: Path, ranges: TensorsData, setting
 
 def eight_bit_weights(graph: onnx.GraphProto) -> dict[str, list[dict[str, object]]]:
     """Asks ONNX Runtime for all 8 bits in depthwise convolutions: their kernel adds in 32 bits on every processor
-    (quantization.saturation), so that they have nothing to fear from 16-bit sums."""
+    (quantization.analysis.saturation), so that they have nothing to fear from 16-bit sums."""
     shapes = {value.name: list(value.dims) for value in graph.initializer}
     found = {}
     for node in graph.node:

@@ -25,11 +25,11 @@ from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
 from export.shards import load_records
 from quantization import agreement, check
-from quantization.comparison import TensorError, activation_errors, weight_errors, worst_first
-from quantization.errors import float_nodes_left
+from quantization.analysis.comparison import TensorError, activation_errors, weight_errors, worst_first
+from quantization.analysis.errors import float_nodes_left
+from quantization.analysis.saturation import Saturation, saturation
 from quantization.report_files import write_markdown, write_picture
 from quantization.samples import Sample, collect, spread
-from quantization.saturation import Saturation, saturation
 
 SCHEMA = "maquette-quantization-1"
 JSON = Path("docs/quantization.json")

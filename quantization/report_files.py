@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import pyplot
 
 from quantization.agreement import GATE, STRETCH
-from quantization.comparison import TensorError
+from quantization.analysis.comparison import TensorError
 
 BEGIN, END = "<!-- begin: written by python -m quantization.report -->", "<!-- end -->"
 SHOWN = 15

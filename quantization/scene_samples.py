@@ -11,12 +11,12 @@ from torch import nn
 from tqdm import tqdm
 
 from export.scenes.bundle import GRAPHS
-from export.scenes.cameras import upright
 from export.scenes.captures import Capture
 from export.scenes.config import MULTIPLE
 from export.scenes.fitting import Options, fitted_to_views, gathered, render
+from export.scenes.geometry.cameras import upright
+from export.scenes.geometry.source_views import scores
 from export.scenes.picture_quality import psnr_db
-from export.scenes.source_views import scores
 from quantization.bundle_networks import BundleNetworks
 from quantization.samples import Sample
 

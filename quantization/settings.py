@@ -23,7 +23,7 @@ class GraphSettings:
     reduce_range: weights use 7 bits, so that two products never overflow 16 bits on x86 without VNNI.
     depthwise_8_bit: depthwise convolutions keep 8 bits all the same: their kernels add in 32 bits.
     float_nodes: names of nodes that stay float, `*` matches any text.
-    round_together: weights are rounded so that their errors cancel on real inputs (quantization.rounding).
+    round_together: weights are rounded so that their errors cancel on real inputs (quantization.graphs.rounding).
     bias_correction: biases take up the mean error that rounded weights cause.
     """
 

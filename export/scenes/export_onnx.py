@@ -34,16 +34,16 @@ from export.bundle import OPSET, BundleInfo
 from export.densepose.export_onnx import Doubled, channels_first, channels_last
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
-from export.scenes.basis import Basis
 from export.scenes.bundle import training_data, write_manifest
-from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture, read_captures
 from export.scenes.config import FEATURES, RASTER, SIZES
-from export.scenes.extractor import STRIDE, Extractor
-from export.scenes.feature_scale import measured, scaled
-from export.scenes.light_refiner import LightRefiner
-from export.scenes.refiner import Refiner
-from export.scenes.system import Networks, load_networks
+from export.scenes.geometry.cameras import upright, warped
+from export.scenes.networks.basis import Basis
+from export.scenes.networks.extractor import STRIDE, Extractor
+from export.scenes.networks.feature_scale import measured, scaled
+from export.scenes.networks.light_refiner import LightRefiner
+from export.scenes.networks.refiner import Refiner
+from export.scenes.networks.system import Networks, load_networks
 
 TOLERANCE = 1e-5  # largest |ONNX - torch|, relative to the output's largest value
 

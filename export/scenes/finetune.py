@@ -35,18 +35,18 @@ from export.bundle import read_manifest
 from export.densepose.graphs import session
 from export.point_cloud import PointCloudError
 from export.scenes.bundle import BASIS, identity
-from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture, CaptureError, read_capture
 from export.scenes.export_onnx import export_refiner
-from export.scenes.extractor import STRIDE
-from export.scenes.feature_scale import factors_between, scaled
 from export.scenes.fitting import View
-from export.scenes.light_refiner import LightRefiner, space_to_depth
+from export.scenes.geometry.cameras import upright, warped
 from export.scenes.losses import LossWeights
+from export.scenes.networks.extractor import STRIDE
+from export.scenes.networks.feature_scale import factors_between, scaled
+from export.scenes.networks.light_refiner import LightRefiner, space_to_depth
+from export.scenes.networks.system import Networks, load_networks
 from export.scenes.perceptual import load_perceptual
 from export.scenes.picture_quality import psnr_db
 from export.scenes.scene_file import SceneFile, SceneFileError, read_scene_file, write_scene_file
-from export.scenes.system import Networks, load_networks
 from export.scenes.tuning import Rates, Shown, TunedScene, Tuning
 
 REFINER_RATE = 1e-4

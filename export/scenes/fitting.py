@@ -15,13 +15,13 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.camera import Camera
-from export.scenes.basis import directions
-from export.scenes.cameras import moves, upright, warped
 from export.scenes.config import ALPHA, BACKGROUND_PX, DEPTH_TOLERANCE, LEVELS, MULTIPLE, RASTER, ROTATED_MULTIPLE
 from export.scenes.descriptors import FittedDescriptors, Moments
-from export.scenes.extractor import STRIDE
-from export.scenes.raster import filled, projected, pyramid, visible, without_occluded
-from export.scenes.system import Networks
+from export.scenes.geometry.cameras import moves, upright, warped
+from export.scenes.geometry.raster import filled, projected, pyramid, visible, without_occluded
+from export.scenes.networks.basis import directions
+from export.scenes.networks.extractor import STRIDE
+from export.scenes.networks.system import Networks
 
 _CONFIDENCE = (1.0, 1.0, 1.0, 0.5, 0.25)  # that a pixel is covered by points, by the scale that has one there
 

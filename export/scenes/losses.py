@@ -9,8 +9,8 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.scenes.config import COLOURS, LEVELS
+from export.scenes.geometry.raster import filled
 from export.scenes.perceptual import Perceptual
-from export.scenes.raster import filled
 
 
 @dataclass(frozen=True)

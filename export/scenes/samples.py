@@ -12,10 +12,10 @@ from torch import Tensor
 from torchvision.transforms import functional as colour
 
 from export.camera import Camera
-from export.scenes.cameras import upright, warped
 from export.scenes.captures import Capture
 from export.scenes.fitting import Options, Sources, gathered, seen_in
-from export.scenes.source_views import drawn
+from export.scenes.geometry.cameras import upright, warped
+from export.scenes.geometry.source_views import drawn
 
 SCORED_POINTS = 512  # of the cloud, enough to tell which photos see the same
 

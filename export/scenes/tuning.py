@@ -16,15 +16,15 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from export.camera import Camera
-from export.scenes.basis import directions
-from export.scenes.cameras import between, moves, upright
 from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, ROTATED_MULTIPLE
 from export.scenes.fitting import Options, View, coverage, shown_in
+from export.scenes.geometry.cameras import between, moves, upright
+from export.scenes.geometry.raster import Pyramid, filled, pyramid
 from export.scenes.losses import LossWeights, picture_terms
+from export.scenes.networks.basis import directions
+from export.scenes.networks.system import Networks
 from export.scenes.perceptual import Perceptual
-from export.scenes.raster import Pyramid, filled, pyramid
 from export.scenes.scene_file import SceneFile
-from export.scenes.system import Networks
 
 BETAS = 0.9, 0.99  # a point that is met for the first time then moves by the rate, not by a multiple of it
 

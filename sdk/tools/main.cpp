@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 
-#include "commands.h"
+#include "commands/commands.h"
 #include "program.h"
 
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options that contradict each other end it

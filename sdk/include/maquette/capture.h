@@ -10,8 +10,8 @@ extern "C" {
 
 typedef struct maq_capture maq_capture;
 
-/* A camera and its pose, in the convention of OpenCV: x to the right, y down, z forward. The world's point X is at
- * rotation * (X - centre) in the camera's coordinates. Lengths are in the unit of the point cloud ("units of the
+/* A camera and its pose, in the convention of OpenCV: x to the right, y down, z forward. A point X of the world
+ * has the camera coordinates rotation * (X - centre). Lengths are in the unit of the point cloud ("units of the
  * scene"). */
 typedef struct maq_pinhole_camera {
   uint32_t struct_size;
@@ -25,14 +25,14 @@ typedef struct maq_capture_info {
   uint32_t struct_size;
   uint32_t view_count;
   uint64_t point_count;
-  uint32_t drop_count; /* reasons why parts of the capture were dropped, see maq_capture_get_drop */
+  uint32_t drop_count; /* reasons for which parts were dropped, see maq_capture_get_drop */
   double up[3];        /* of the world; unit vector */
 } maq_capture_info;
 
 /* A photo of the capture. The text is the capture's. */
 typedef struct maq_capture_view {
   uint32_t struct_size;
-  int32_t is_held_out;       /* 1: the photo is kept for comparisons; do not build from it */
+  int32_t is_held_out;       /* 1: for comparison only; maq_scene_build does not use it by default */
   const char* name;          /* of the photo in the capture */
   maq_pinhole_camera camera; /* of the photo after undistortion */
 } maq_capture_view;
@@ -64,7 +64,8 @@ MAQ_API maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
 MAQ_API maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_capture_view* view);
 
-/* Gets why parts of the capture were dropped. `index` is below drop_count. The caller sets drop->struct_size.
+/* Gets one reason for which parts of the capture were dropped. `index` is below drop_count. The caller sets
+ * drop->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
 MAQ_API maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t index, maq_capture_drop* drop);
 

@@ -1,5 +1,5 @@
-/* Clips: pictures as a video file that any player shows. A recorder (recorder.h) keeps frames exactly, with their
- * times. */
+/* Clips: pictures in a video file for any player. To keep frames exactly, with their times, use a recorder
+ * (recorder.h). */
 #ifndef MAQUETTE_CLIP_H_
 #define MAQUETTE_CLIP_H_
 
@@ -11,16 +11,16 @@ extern "C" {
 
 typedef struct maq_clip maq_clip;
 
-/* Begins a video file: MPEG-4 in .mp4 or Motion JPEG in .avi, by the path's extension. It is written under another
- * name in the same folder, which must exist, and takes the place of `path` atomically when maq_clip_finish is
- * called. `fps`: pictures a second, 0.01 to 1000, rounded to three decimals, above 65.5 to four digits. `*clip` is
- * the caller's, to be given to maq_clip_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE,
- * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). May block while libraries are opened. */
+/* Begins a video file: MPEG-4 in .mp4 or Motion JPEG in .avi, by the path's extension. It is written under another name
+ * in the same folder, which must exist; maq_clip_finish renames it to `path` atomically. `fps`: pictures a second, 0.01
+ * to 1000, rounded to three decimals, above 65.5 to four digits. `*clip` is the caller's, to be given to
+ * maq_clip_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
+ * (libmaquette_files.so is missing). May block while libraries are opened. */
 MAQ_API maq_status maq_clip_create(maq_context* context, const char* path, double fps, maq_clip** clip);
 
-/* Adds a picture; the frame is not kept. All have the size of the first, at least 2 x 2; of an odd width or height
- * the last column or row is left out. Each is shown for `1 / fps` seconds: timestamps are ignored.
+/* Adds a picture; the frame is not kept. All have the size of the first, at least 2 x 2; an odd width or height
+ * loses its last column or row. Each is shown for `1 / fps` seconds: timestamps are ignored.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (another size, or the clip is finished), MAQ_ERROR_IMAGE_SIZE
  * (too small), MAQ_ERROR_UNSUPPORTED (a depth image; with the first picture also: this build cannot write that kind
  * of file, or not of that size; try the other extension), MAQ_ERROR_UNWRITABLE (the disk is full already). Blocks

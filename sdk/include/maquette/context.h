@@ -24,7 +24,7 @@ typedef void (*maq_log_callback)(void* user_data, maq_log_level level, const cha
 
 typedef struct maq_context_config {
   uint32_t struct_size;
-  maq_log_level log_level;         /* messages above this level are left out; default MAQ_LOG_WARNING */
+  maq_log_level log_level;         /* messages above this level are not logged; default MAQ_LOG_WARNING */
   maq_log_callback log_callback;   /* NULL (default): nothing is logged; the SDK itself never prints */
   void* log_user_data;             /* passed to log_callback */
   const char* onnxruntime_library; /* file to open; NULL (default): searched for as described below. Copied. */

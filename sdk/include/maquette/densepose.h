@@ -14,7 +14,7 @@ typedef struct maq_densepose_result maq_densepose_result;
 /* What is computed for each pixel of a person. */
 typedef enum maq_densepose_detail {
   MAQ_DENSEPOSE_DETAIL_SURFACE = 0, /* part, U and V */
-  MAQ_DENSEPOSE_DETAIL_PART = 1     /* part alone: faster; U and V stay 0 */
+  MAQ_DENSEPOSE_DETAIL_PART = 1     /* only the part: faster; U and V stay 0 */
 } maq_densepose_detail;
 
 typedef struct maq_densepose_config {
@@ -25,9 +25,9 @@ typedef struct maq_densepose_config {
   const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
   uint32_t bundle_file_count;          /* default 0 */
   int32_t long_side_px;                /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
-  float score_threshold;        /* people with a lower score are left out, 0 to 1; negative (default): the bundle's */
-  int32_t max_people;           /* 1 to 255, best scores first; 0 (default): the bundle's */
-  uint32_t result_pool_size;    /* results the app may hold at once, 1 to 64; default 4 */
+  float score_threshold;               /* minimum score of a person, 0 to 1; negative (default): the bundle's */
+  int32_t max_people;                  /* 1 to 255, best scores first; 0 (default): the bundle's */
+  uint32_t result_pool_size;           /* results the app may hold at once, 1 to 64; default 4 */
   int32_t max_proposals;        /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's. Fewer are faster
                                 and may miss people in a crowd. */
   int32_t key_frame_interval;   /* 1 (default): people are detected in every frame. N, up to 1000: in every N-th
@@ -97,14 +97,14 @@ MAQ_API maq_status maq_densepose_create(maq_context* context, const maq_densepos
  * Once for each handle, from any thread. May block briefly. */
 MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
 
-/* Finds the people in a frame, which is not kept, and maps their pixels to the body surface. `*result` comes from a
- * pool of result_pool_size: give it back with maq_densepose_result_release. Without people no head network runs and
+/* Finds the people in a frame and maps their pixels to the body surface. The frame is not kept. `*result` comes from a
+ * pool of result_pool_size: give it back with maq_densepose_result_release. Without people, no head network runs and
  * the planes are zero.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the
  * networks run. */
 MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
 
-/* Starts a new stream: the next frame is a key frame. Of use only with key_frame_interval above 1.
+/* Starts a new stream: the next frame is a key frame. Needed only with key_frame_interval above 1.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_reset(maq_densepose* densepose);
 
@@ -120,8 +120,8 @@ MAQ_API maq_status maq_densepose_result_get_size(const maq_densepose_result* res
 /* Returns the number of people found; 0 for NULL. Any thread. Does not fail or block. */
 MAQ_API uint32_t maq_densepose_result_get_person_count(const maq_densepose_result* result);
 
-/* Gets the person at `index`, best score first. The caller sets person->struct_size. Each has at least one pixel: boxes
- * without any pixel of a body are left out.
+/* Gets the person at `index`, best score first. The caller sets person->struct_size. Each person has at
+ * least one pixel: boxes without body pixels are dropped.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
 MAQ_API maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index,
                                                    maq_person* person);
@@ -144,8 +144,8 @@ MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* re
  * (libmaquette_files.so is missing). Blocks while they are written. */
 MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* folder, const char* stem);
 
-/* The points of the template body, in its rest pose, that parts, U and V stand for: in metres, x to the body's left,
- * y to its back, z up. */
+/* The points of the template body, in its rest pose, for each part, U and V: in metres, x to the body's left, y to its
+ * back, z up. */
 typedef struct maq_densepose_surface {
   uint32_t struct_size;
   int32_t nodes;         /* along U, and along V; at least 2 */

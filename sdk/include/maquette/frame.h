@@ -8,7 +8,8 @@
 extern "C" {
 #endif
 
-/* Images beyond these limits are refused with MAQ_ERROR_IMAGE_SIZE, from the file header where the format has one. */
+/* Images beyond these limits are refused with MAQ_ERROR_IMAGE_SIZE, before decoding if the file's header has the
+ * size. */
 #define MAQ_MAX_SIDE_PX 16384
 #define MAQ_MAX_PIXELS (64 * 1024 * 1024)
 
@@ -69,9 +70,10 @@ MAQ_API void maq_frame_release(maq_frame* frame);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc);
 
-/* Describes the depth image that came with the frame, pixel by pixel aligned with its picture (of which it may be a
- * smaller version): MAQ_PIXEL_DEPTH16, valid until the frame is released. The caller sets desc->struct_size.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (it came without). Does not block. */
+/* Describes the depth image that came with the frame: MAQ_PIXEL_DEPTH16, aligned with the frame's picture (it may be
+ * smaller and then covers the same view), valid until the frame is released. The caller sets desc->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the frame has no depth).
+ * Does not block. */
 MAQ_API maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc);
 
 /* Gets the frame's memory as a dma-buf, which a GPU or an encoder reads without a copy. `*fd` stays the frame's and
@@ -88,11 +90,11 @@ MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
                                          size_t stride_bytes, size_t size_bytes);
 
-/* Makes a copy of the frame in another size, as MAQ_PIXEL_BGR8: area-averaged where it gets smaller, bilinear where it
- * gets larger. Time and number stay, depth is left out. `*resized` is the caller's: give it back with
- * maq_frame_release.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_UNSUPPORTED (a depth image).
- * Does not block. */
+/* Makes a copy of the frame in another size, as MAQ_PIXEL_BGR8: area-averaged when it gets smaller, bilinear when it
+ * gets larger. The copy keeps timestamp and sequence, not the depth image. `*resized` is the caller's: give it back
+ * with maq_frame_release.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_UNSUPPORTED (a depth image). Does not
+ * block. */
 MAQ_API maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, int32_t height_px, maq_frame** resized);
 
 /* Writes the frame's picture to a file, in the format of the path's extension: PNG (.png), lossless, or JPEG (.jpg,

@@ -7,11 +7,12 @@
  *   maq_densepose_result* r;   maq_densepose_run(densepose, frame, &r);
  *   ... read the result ...    then release r and frame, destroy the rest, in any order.
  *
- * The grammar, which holds everywhere:
+ * Rules of the whole API:
  *
  * - Names are maq_<object>_<verb>_<noun>. `_get_…` reads and changes nothing: `_get_<thing>_count` returns a number,
  *   `_get_<thing>(…, index, &thing)` one item. Enum values begin with the noun of their type; bounds are min and max.
- * - Each verb that returns an object is paired with one that gives it back, once, in any order; NULL is fine:
+ * - Each verb that returns an object is paired with one that gives the object back. Call it once for each object, in
+ *   any order; NULL is fine:
  *
  *     _create                                 _destroy   contexts, sources, lists, models, builders, renderers, writers
  *     _open, _open_memory, _build, _finish    _close     captures and scenes
@@ -23,7 +24,8 @@
  *   MAQ_OK. maq_last_error(NULL) is the sentence that says what was wrong and what to do.
  * - Structs that may grow begin with struct_size, which the caller sets to sizeof the struct; the `_init` functions do
  *   so and fill in the defaults. A NULL config means the defaults. Configs are copied.
- * - Yes or no is an int32_t, 1 or 0. What holds a value of an enum has the enum's type, which takes 4 bytes.
+ * - Yes or no is an int32_t, 1 or 0. Fields and parameters with values of an enum have the enum's
+ *   type, 4 bytes.
  * - Units are in the names: _px, _ms, _ns, _m, _bytes. Texts are UTF-8 and end with a zero byte.
  * - No C++ exception leaves the library, and it never ends the process.
  * - Each function names its thread level: "any thread" may be called at any time from any thread; "one at a time" may

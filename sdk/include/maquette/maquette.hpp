@@ -1,4 +1,4 @@
-// Maquette for C++17: owners and exceptions over the C API, in this header alone. The C headers document each call.
+// Maquette for C++17: classes and exceptions over the C API, in this header alone. The C headers document each call.
 //
 //   maquette::Context context;
 //   maquette::Source source(context, "video:clip.mp4");
@@ -8,7 +8,7 @@
 //     for (const maq_person& person : result.people()) …
 //   }
 //
-// Every class owns one handle, can be moved but not copied, and gives the handle out by get(). Calls that fail throw
+// Every class owns one handle, can be moved but not copied, and returns the handle by get(). Calls that fail throw
 // maquette::Error.
 #ifndef MAQUETTE_MAQUETTE_HPP_
 #define MAQUETTE_MAQUETTE_HPP_

@@ -1,6 +1,6 @@
-/* Pipeline: a source and a dense pose model on a thread of the library's, for apps that must not block. The newest
- * frame wins: frames that come while the model is busy are dropped. Source, model and recording can be changed while
- * it runs.
+/* Pipeline: runs a source and a dense pose model on a thread of the library, for apps that must not block. The newest
+ * frame is processed; frames that come while the model is busy are dropped. Source, model and recording can be changed
+ * while it runs.
  *
  *   maq_pipeline_create(context, &config, &pipeline);
  *   maq_pipeline_set_source(pipeline, "camera:");
@@ -25,13 +25,13 @@ typedef struct maq_pipeline maq_pipeline;
 /* What a pipeline does. Values never change meaning; new ones are added at the end. */
 typedef enum maq_pipeline_state {
   MAQ_PIPELINE_STOPPED = 0,      /* no source: none was set yet, or maq_pipeline_stop was called */
-  MAQ_PIPELINE_OPENING = 1,      /* the source is opened */
-  MAQ_PIPELINE_LOADING = 2,      /* the model is loaded */
-  MAQ_PIPELINE_RUNNING = 3,      /* results come */
+  MAQ_PIPELINE_OPENING = 1,      /* the source is being opened */
+  MAQ_PIPELINE_LOADING = 2,      /* the model is being loaded */
+  MAQ_PIPELINE_RUNNING = 3,      /* results are delivered */
   MAQ_PIPELINE_PAUSED = 4,       /* by maq_pipeline_set_paused */
-  MAQ_PIPELINE_STALLED = 5,      /* the camera sends nothing; it may still go on by itself */
-  MAQ_PIPELINE_RECONNECTING = 6, /* the camera was lost and is waited for, reconnect_ms long */
-  MAQ_PIPELINE_ENDED = 7,        /* the source has no more frames: a photo was mapped, a clip ended */
+  MAQ_PIPELINE_STALLED = 5,      /* the camera sends no frames; it may recover by itself */
+  MAQ_PIPELINE_RECONNECTING = 6, /* the camera was lost; the pipeline tries to reopen it for reconnect_ms */
+  MAQ_PIPELINE_ENDED = 7,        /* the source has no more frames: the photo was processed, the clip ended */
   MAQ_PIPELINE_FAILED = 8        /* the source or the model cannot be used; maq_pipeline_info says why */
 } maq_pipeline_state;
 
@@ -41,14 +41,14 @@ typedef struct maq_pipeline_result {
   maq_frame* frame;                /* the caller's: for maq_frame_release or maq_pipeline_release_result */
   maq_densepose_result* densepose; /* the caller's: for maq_densepose_result_release or maq_pipeline_release_result */
   uint64_t number;                 /* counts the results of the pipeline, from 1; gaps are results that were dropped */
-  double wait_ms;                  /* how long the pipeline waited for the frame */
-  double run_ms;                   /* how long the model took; maq_densepose_result_get_stats has its stages */
-  double age_ms;                   /* from the capture of a camera's frame to the result; -1 where that is not known */
+  double wait_ms;                  /* time that the pipeline waited for the frame */
+  double run_ms;                   /* time that the model took; see maq_densepose_result_get_stats for its stages */
+  double age_ms;                   /* from the capture of a camera's frame to the result; -1 if unknown */
 } maq_pipeline_result;
 
-/* Receives each result on the pipeline's thread, which waits: return promptly. `result` is valid during the call; the
- * frame and the dense pose result in it are the callee's from then on, to be released now or later. The callback may
- * call any function of this header; it must not throw. */
+/* Receives each result on the pipeline's thread, which waits meanwhile: return promptly. `result` is valid during the
+ * call; the frame and the dense pose result in it are the callee's from then on, to be released now or later. The
+ * callback may call any function of this header; it must not throw. */
 typedef void (*maq_pipeline_result_callback)(void* user_data, const maq_pipeline_result* result);
 
 /* Receives each change of the state on the pipeline's thread, in order. `status` and `problem` are as in
@@ -66,18 +66,18 @@ typedef struct maq_pipeline_config {
                                                    used and state_callback must be NULL. */
   maq_pipeline_result_callback result_callback; /* NULL (default): results are taken by maq_pipeline_acquire_result */
   void* result_user_data;                       /* of result_callback */
-  maq_pipeline_state_callback state_callback;   /* NULL (default): states are asked for */
+  maq_pipeline_state_callback state_callback;   /* NULL (default): get the state with maq_pipeline_get_info */
   void* state_user_data;                        /* of state_callback */
-  int32_t nice;                                 /* added to the niceness of the pipeline's thread and of the model's
-                                                   threads, 0 (default) to 19, so that threads that draw go first.
-                                                   Linux and Android; elsewhere it has no effect. */
+  int32_t nice;                                 /* added to the niceness of the pipeline's and the model's threads,
+                                                   0 (default) to 19, so that drawing threads have priority. Linux and
+                                                   Android; no effect elsewhere. */
 } maq_pipeline_config;
 
 typedef struct maq_pipeline_info {
   uint32_t struct_size;
   maq_pipeline_state state;
-  maq_status status;      /* MAQ_OK, or why no results come or nothing is recorded any more */
-  const char* problem;    /* that in a sentence; "" with MAQ_OK */
+  maq_status status;      /* MAQ_OK, or why there are no results, or why the recording stopped */
+  const char* problem;    /* the status in a sentence; "" with MAQ_OK */
   const char* source_uri; /* as it was set; "" when none was set */
 } maq_pipeline_info;
 
@@ -86,7 +86,7 @@ typedef struct maq_pipeline_stats {
   uint64_t result_count;         /* made so far */
   uint64_t dropped_result_count; /* of these: replaced by a newer one before they were taken, or made while the app held
                                     as many as it may */
-  uint64_t dropped_frame_count;  /* of the present source: lost on their way, or while the model was busy */
+  uint64_t dropped_frame_count;  /* of the current source: lost by the camera, or while the model was busy */
   double results_per_second;     /* over the last second */
   double wait_ms, run_ms, age_ms; /* of the latest result, as in maq_pipeline_result */
 } maq_pipeline_stats;
@@ -95,67 +95,69 @@ typedef struct maq_pipeline_stats {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_config_init(maq_pipeline_config* config, uint32_t struct_size);
 
-/* Makes a pipeline, which is stopped until it is given a source; the model is loaded when the first source is open.
+/* Creates a pipeline, which is stopped until it is given a source; the model is loaded when the first source is open.
  * `*pipeline` is the caller's, to be given to maq_pipeline_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* config,
                                        maq_pipeline** pipeline);
 
 /* Stops the pipeline as maq_pipeline_stop does and frees it (NULL is fine). Results still held stay valid until they
- * are released. Once for each pipeline, from any thread, also from its callbacks. Blocks until the run of the model
- * that is under way is done, or the loading; a device that hangs is not waited for. */
+ * are released. Once for each pipeline, from any thread, also from its callbacks. Blocks until the current run or
+ * loading of the model is done; does not wait for a device that hangs. */
 MAQ_API void maq_pipeline_destroy(maq_pipeline* pipeline);
 
-/* Opens a source, by a URI as for maq_source_create, in place of the one there is; the state becomes
- * MAQ_PIPELINE_OPENING. No result of the former source can be acquired after the call; a callback with one may be under
- * way. After MAQ_PIPELINE_FAILED everything is tried anew. What goes wrong while opening is in maq_pipeline_info.
+/* Opens a source, by a URI as for maq_source_create, in place of the current one; the state becomes
+ * MAQ_PIPELINE_OPENING. No result of the previous source can be acquired after the call; a callback with one may still
+ * be running. After MAQ_PIPELINE_FAILED everything is tried again. maq_pipeline_info has errors of the opening.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri);
 
-/* Loads the model with other options, or another model, in place of the one there is. The source goes on; a photo is
- * mapped again. After MAQ_PIPELINE_FAILED everything is tried anew. result_pool_size is not used.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT; what goes wrong while loading is in maq_pipeline_info.
- * Does not block. */
+/* Loads the model with other options, or another model, in place of the current one. `config` NULL: the defaults. It is
+ * copied; result_pool_size is not used. The source stays open; a photo is processed again. After MAQ_PIPELINE_FAILED
+ * everything is tried again.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT; maq_pipeline_info has errors of the loading. Does not
+ * block. */
 MAQ_API maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_densepose_config* config);
 
-/* 1: no more frames are taken, but for one that is being mapped, until this is called with 0. The source stays open.
+/* Pauses with 1, resumes with 0. A paused pipeline finishes the current frame, then takes no more. The source stays
+ * open.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_paused);
 
-/* Records the frames that are mapped from now on to a file (recorder.h), which must not be there yet; NULL ends the
- * recording, and so does the end or change of the source, which gives the file its index. When a recording cannot go
- * on, results still come; maq_pipeline_info says why.
+/* Records the frames that are processed from now on to a file (recorder.h), which must not exist yet. NULL, or the end
+ * or a change of the source, finishes the recording. If the recording fails, results continue, and maq_pipeline_info
+ * has the reason.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_recording(maq_pipeline* pipeline, const char* path);
 
 /* Closes the source; the model stays loaded, and maq_pipeline_set_source starts again. After the call no callback runs
- * or begins, and waiting calls of maq_pipeline_acquire_result return MAQ_CANCELLED. From a callback: no other one
- * begins.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Blocks only while a callback of the app runs: the run of the model
- * that is under way is finished by the pipeline's thread. */
+ * or begins, and waiting calls of maq_pipeline_acquire_result return MAQ_CANCELLED. Called from a callback: no other
+ * callback begins.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Blocks only while a callback of the app runs; the pipeline's thread
+ * finishes the current run of the model later. */
 MAQ_API maq_status maq_pipeline_stop(maq_pipeline* pipeline);
 
-/* Takes the newest result that was not taken yet, or waits for the next, at most `timeout_ns` (MAQ_WAIT_FOREVER: no
- * bound). The caller sets result->struct_size; frame and densepose are the caller's afterwards.
+/* Takes the newest result that was not taken yet, or waits for the next one for at most `timeout_ns` (MAQ_WAIT_FOREVER:
+ * without limit). The caller sets result->struct_size; frame and densepose are the caller's afterwards.
  * Any thread. Errors: MAQ_TIMEOUT, MAQ_END_OF_STREAM, MAQ_CANCELLED (the pipeline is stopped), MAQ_ERROR_POOL_EMPTY
  * (all results are held), MAQ_ERROR_UNSUPPORTED (it has a result_callback), MAQ_ERROR_INVALID_ARGUMENT; when the
  * pipeline failed, the status of maq_pipeline_info. Blocks until there is a result. */
 MAQ_API maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_ns, maq_pipeline_result* result);
 
-/* Releases frame and densepose and sets them to NULL; those that are NULL already are left (and NULL is fine).
+/* Releases `frame` and `densepose` of the result, unless NULL, and sets them to NULL (a NULL `result` is fine).
  * Once for each result, from any thread. Does not block. */
 MAQ_API void maq_pipeline_release_result(maq_pipeline_result* result);
 
-/* The state. The caller sets info->struct_size; the texts stay until this thread calls this function again.
+/* Gets the state. The caller sets info->struct_size; the texts are valid until this thread calls this function again.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info* info);
 
-/* Counts and times. The caller sets stats->struct_size.
+/* Gets counts and times. The caller sets stats->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipeline_stats* stats);
 
-/* The surface that the model's labels mean, once a model is loaded; as maq_densepose_get_surface. The points live as
- * long as the pipeline, also when the model is replaced.
+/* Gets the surface that the model's labels refer to, once a model is loaded; like maq_densepose_get_surface. The points
+ * live as long as the pipeline, also when the model is replaced.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (no model is loaded, or it has none),
  * MAQ_ERROR_BAD_BUNDLE (it is damaged). Blocks briefly the first time, while it is decoded. */
 MAQ_API maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surface* surface);

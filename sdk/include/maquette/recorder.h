@@ -1,6 +1,6 @@
-/* Recordings: frames of any source in a file (.maqrec), which the source "rec:file.maqrec" plays. They keep the frames'
- * times, numbers, depth and intrinsics, carry checksums, and survive a crash: every frame that was added can be read.
- * docs/formats.md has the layout. */
+/* Recordings: frames of any source in a file (.maqrec), which the source "rec:file.maqrec" plays. They keep timestamps,
+ * sequence numbers, depth and intrinsics, and have checksums. After a crash, every frame that was added can be read.
+ * docs/formats.md describes the file. */
 #ifndef MAQUETTE_RECORDER_H_
 #define MAQUETTE_RECORDER_H_
 
@@ -36,7 +36,7 @@ MAQ_API maq_status maq_recorder_config_init(maq_recorder_config* config, uint32_
 MAQ_API maq_status maq_recorder_create(maq_context* context, const char* path, const maq_source* source,
                                        const maq_recorder_config* config, maq_recorder** recorder);
 
-/* Writes a frame: it is complete in the file when the call returns. Frames may have different sizes and formats.
+/* Adds a frame, which is complete in the file when the call returns. Frames may have different sizes and formats.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the frame before), MAQ_ERROR_UNWRITABLE (the
  * disk is full: earlier frames stay readable, and frames can be added again once there is space). Blocks while it is
  * written. */
@@ -46,7 +46,7 @@ MAQ_API maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_fram
  * One at a time. Errors: MAQ_ERROR_UNWRITABLE. Blocks until the file is on the disk. */
 MAQ_API maq_status maq_recorder_finish(maq_recorder* recorder);
 
-/* Tells how much was written so far. The caller sets info->struct_size.
+/* Gets how much has been written so far. The caller sets info->struct_size.
  * Not while a frame is added. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_recorder_get_info(const maq_recorder* recorder, maq_recorder_info* info);
 

@@ -1,5 +1,5 @@
-/* Scenes: captures of a place as posed photos and a point cloud, built into scenes that are rendered from new
- * viewpoints, without training for each place (NPBG++, arXiv 2203.13318; docs/scenes.md).
+/* Scenes: built from a capture (posed photos and a point cloud), rendered from new viewpoints, without training for
+ * each place (NPBG++, arXiv 2203.13318; docs/scenes.md).
  *
  *   maq_capture* capture;          maq_capture_open(context, "folder", &capture);
  *   maq_scene* scene;              maq_scene_build(context, NULL, capture, NULL, &scene);
@@ -26,8 +26,7 @@ typedef struct maq_scene_builder maq_scene_builder;
 typedef struct maq_scene_renderer maq_scene_renderer;
 typedef struct maq_scene_image maq_scene_image;
 
-/* ---- Building
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- Building ---- */
 
 /* Receives the progress of a call on the thread that builds: `done` is its fraction, 0 to 1, `stage` a sentence that is
  * valid during the call. Return 0 to cancel, anything else to go on. It must not call the builder, nor throw. */
@@ -42,12 +41,12 @@ typedef struct maq_scene_build_config {
   uint32_t bundle_file_count;          /* default 0 */
   int32_t long_side_px;     /* larger photos are scaled down to this long side; default 640; 0: they are not scaled */
   int32_t coefficient_bits; /* of the scene's descriptors: 8 (default), 16, or 32 (floats, positions then too) */
-  /* Points whose descriptors vary less between photos, as RMS of colours of 0 to 1, keep the constant term alone, which
-   * makes the file smaller. 0: all points keep view dependence; negative (default): 0.05, with 8 bits more where needed
-   * for at most half of the points to depend on the view. */
+  /* Points whose descriptors vary less than this between photos (RMS, for colours of 0 to 1) are stored without view
+   * dependence, which makes the file smaller. 0: all points are view-dependent; negative (default): 0.05, and with 8
+   * bits a larger value if needed, so that at most half of the points are view-dependent. */
   double min_variation;
-  /* Fraction of a photo's resolution at which visibility is tested: the smaller, the more a point hides of what is
-   * behind it, for sparse clouds. 1/16 to 1 (default). */
+  /* Fraction of a photo's resolution at which visibility is tested, 1/16 to 1 (default). With a smaller fraction, each
+   * point hides more of what is behind it; use it for sparse clouds. */
   double visibility_scale;
   double near_depth; /* points nearer to a camera, along its axis, are not seen by it; units of the scene, default 0 */
   uint64_t max_points; /* larger clouds are thinned out evenly; 0 (default): no limit */
@@ -57,7 +56,7 @@ typedef struct maq_scene_build_config {
   maq_scene_progress_callback progress_callback; /* of maq_scene_build and maq_scene_builder_add_view; may be NULL */
   void* progress_user_data;                      /* passed to progress_callback */
   /* For maq_scene_build; a builder takes the photos that it is given: */
-  uint32_t max_views;   /* of more photos an even selection is used; 0 (default): no limit */
+  uint32_t max_views;   /* if there are more photos, an even selection is used; 0 (default): no limit */
   int32_t use_held_out; /* 1: also photos that the capture holds out for comparisons; default 0 */
 } maq_scene_build_config;
 
@@ -76,15 +75,15 @@ typedef struct maq_scene_build_stats {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size);
 
-/* Builds a scene from a capture. Photos that cannot be read are left out and counted; points that no photo saw are left
- * out. `config` may be NULL for the defaults. `stats` may be NULL; else the caller sets stats->struct_size. `*scene` is
- * the caller's, to be given to maq_scene_close; it needs neither the capture nor its folder. On failure and when
- * cancelled `*scene` and `*stats` stay unchanged.
+/* Builds a scene from a capture. Photos that cannot be read are dropped and counted; points that no photo saw are
+ * dropped. `config` may be NULL for the defaults. `stats` may be NULL; else the caller sets stats->struct_size.
+ * `*scene` is the caller's, to be given to maq_scene_close; it needs neither the capture nor its folder. On failure and
+ * when cancelled `*scene` and `*stats` stay unchanged.
  * Any thread; several scenes may be built at once. Errors: MAQ_ERROR_INVALID_ARGUMENT (also: every photo is held out),
  * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE and MAQ_ERROR_UNSUPPORTED (the bundle; it is for another task),
  * MAQ_ERROR_RUNTIME_LIBRARY, MAQ_ERROR_UNREADABLE (no photo can be used or sees a point), MAQ_ERROR_OUT_OF_MEMORY
- * (max_memory_bytes, or the machine's memory), MAQ_ERROR_INFERENCE, MAQ_CANCELLED (by the progress callback).
- * Blocks until it is done. */
+ * (max_memory_bytes, or the machine's memory), MAQ_ERROR_INFERENCE, MAQ_CANCELLED (by the progress callback). Blocks
+ * until it is done. */
 MAQ_API maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* config,
                                    const maq_capture* capture, maq_scene_build_stats* stats, maq_scene** scene);
 
@@ -130,14 +129,13 @@ MAQ_API maq_status maq_scene_builder_cancel(maq_scene_builder* builder);
 MAQ_API maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_scene_build_stats* stats);
 
 /* Builds a scene from the photos so far; more can be added afterwards, for another scene. Points that no photo saw are
- * left out. Takes 244 bytes more for each seen point until it returns. `*scene` is the caller's, to be given to
+ * dropped. Takes 244 bytes more for each seen point until it returns. `*scene` is the caller's, to be given to
  * maq_scene_close.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (no photo saw a point), MAQ_ERROR_OUT_OF_MEMORY. Blocks until it is
  * done. */
 MAQ_API maq_status maq_scene_builder_finish(maq_scene_builder* builder, maq_scene** scene);
 
-/* ---- Scenes
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- Scenes ---- */
 
 typedef struct maq_scene_info {
   uint32_t struct_size;
@@ -157,7 +155,7 @@ typedef struct maq_scene_info {
  * not a scene), MAQ_ERROR_UNSUPPORTED (another version), MAQ_ERROR_OUT_OF_MEMORY. Blocks while it is checked. */
 MAQ_API maq_status maq_scene_open(maq_context* context, const char* path, maq_scene** scene);
 
-/* Opens a scene file that lies in memory, of any alignment; it is copied. As maq_scene_open otherwise. */
+/* Opens a scene file that lies in memory, of any alignment; it is copied. Otherwise like maq_scene_open. */
 MAQ_API maq_status maq_scene_open_memory(maq_context* context, const void* data, size_t size_bytes, maq_scene** scene);
 
 /* Closes the scene (NULL is fine), however it was made. Renderers of it stay usable.
@@ -176,8 +174,7 @@ MAQ_API maq_status maq_scene_save_ply(const maq_scene* scene, const char* path);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info);
 
-/* ---- Rendering
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- Rendering ---- */
 
 typedef struct maq_scene_renderer_config {
   uint32_t struct_size;
@@ -191,10 +188,10 @@ typedef struct maq_scene_renderer_config {
   uint8_t background[3]; /* red, green, blue; with use_background */
   uint32_t image_pool_size; /* images the app may hold at once, 1 to 64; default 4 */
   int32_t allow_spinning;   /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy and costs
-                               some   speed */
-  /* For measuring what is saved; pictures stay the same where alpha is above 0. Default 0: */
+                               some speed */
+  /* To measure what an optimisation saves; pictures stay the same where alpha is above 0. Default 0: */
   int32_t draw_unseen_blocks; /* 1: no frustum culling */
-  int32_t refine_empty_parts; /* 1: the network also runs where no points are */
+  int32_t refine_empty_parts; /* 1: the network also runs where there are no points */
 } maq_scene_renderer_config;
 
 /* The planes of an image, each of the camera's size. */
@@ -202,7 +199,7 @@ typedef enum maq_scene_plane {
   MAQ_SCENE_PLANE_BGR = 1,   /* three bytes a pixel: blue, green, red */
   MAQ_SCENE_PLANE_ALPHA = 2, /* one byte a pixel: coverage by points, 0 (none near) to 255 */
   MAQ_SCENE_PLANE_DEPTH = 3  /* a float a pixel: depth of the nearest point along the optical axis, in units of the
-                                scene;  0 where no point is near */
+                                scene; 0 where no point is near */
 } maq_scene_plane;
 
 /* Times in wall-clock milliseconds, and counts. */
@@ -236,7 +233,7 @@ MAQ_API maq_status maq_scene_renderer_create(maq_context* context, const maq_sce
 MAQ_API void maq_scene_renderer_destroy(maq_scene_renderer* renderer);
 
 /* Renders the view of a camera, in a picture of the camera's size. The first picture of a size takes longer, since
- * networks are prepared for it. Where no points are visible no network runs. `*image` comes from a pool of
+ * networks are prepared for it. If no point is visible, no network runs. `*image` comes from a pool of
  * image_pool_size: give it back with maq_scene_image_release.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, or one with distortion; a principal point
  * over a million pixels away; focal lengths that differ by a factor over 1000), MAQ_ERROR_IMAGE_SIZE,

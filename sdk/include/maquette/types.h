@@ -51,11 +51,11 @@ typedef enum maq_status {
   MAQ_CANCELLED = 19            /* not an error: the app cancelled the call */
 } maq_status;
 
-/* The id of something that is not tracked. */
+/* The id of a person who is not tracked. */
 #define MAQ_NO_ID (-1)
 
-/* A file that lies in memory of the app, where there is no file system to read it from (phones, browsers). The call
- * that takes it copies it: name and data may be freed when the call returns. */
+/* A file in the app's memory, for systems without a file system to read it from (phones, browsers). The call that takes
+ * it copies it: name and data may be freed when the call returns. */
 typedef struct maq_memory_file {
   const char* name; /* as in the folder: "manifest.json", "trunk.onnx" */
   const void* data;
@@ -66,10 +66,10 @@ typedef struct maq_memory_file {
  * The text is static. Any thread. Does not fail or block. */
 MAQ_API const char* maq_status_get_name(maq_status status);
 
-/* Returns what was wrong and what to do, in a sentence: with NULL, of this thread's latest failed call, on whatever
- * handle or none; with a handle of this API, of the latest failed call on that handle, on any thread. "" when none
- * failed. A call that fails to create an object is one on the context. Calls that succeed do not clear the text. The
- * text is the library's and stays valid until this thread calls maq_last_error again.
+/* Returns a sentence that says what was wrong and what to do. With NULL: for the latest failed call of this thread,
+ * with or without a handle. With a handle: for the latest failed call on that handle, on any thread. Returns "" if no
+ * call failed. A failure to create an object counts as a call on the context. Calls that succeed do not clear the text.
+ * The text is the library's and stays valid until this thread calls maq_last_error again.
  * Any thread, while `handle` is alive. Does not fail or block. */
 MAQ_API const char* maq_last_error(const void* handle);
 

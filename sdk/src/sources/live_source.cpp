@@ -59,7 +59,8 @@ struct LiveSource::State {
   bool at_end = false;  // after the frames that wait
   uint32_t seeks = 0;   // asked for; frames from before them are dropped
   bool stopping = false;
-  bool ended = false;  // the thread
+  bool reporting = false;  // the thread is in the caller's on_state
+  bool ended = false;      // the thread
   std::thread thread;
   JpegDecoder jpeg;  // of next() alone
   bool warned_of_bad_jpeg = false;
@@ -71,7 +72,27 @@ struct LiveSource::State {
   void report(maq_source_state state, const std::string& reason) {
     settings.log.write(state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_RECONNECTED ? MAQ_LOG_INFO : MAQ_LOG_WARNING,
                        name, ": ", reason);
-    if (settings.on_state != nullptr && !is_stopping()) settings.on_state(settings.user_data, state, reason.c_str());
+    if (settings.on_state == nullptr || !begin_report()) return;
+    try {
+      settings.on_state(settings.user_data, state, reason.c_str());
+    } catch (...) {
+      end_report();
+      throw;
+    }
+    end_report();
+  }
+
+  // False when the source is being destroyed: it waits for a report that was begun, not for a later one.
+  bool begin_report() {
+    std::lock_guard<std::mutex> lock(mutex);
+    reporting = !stopping;
+    return reporting;
+  }
+
+  void end_report() {
+    std::lock_guard<std::mutex> lock(mutex);
+    reporting = false;
+    changed.notify_all();
   }
 
   void push(Entry entry) {
@@ -314,6 +335,10 @@ LiveSource::~LiveSource() {
     state.changed.notify_all();
     state.wake.signal();
     ended = state.changed.wait_for(lock, kStopTimeout, [&] { return state.ended; });
+    // The app may free what its callback uses as soon as this returns.
+    if (std::this_thread::get_id() != state.thread.get_id()) {
+      state.changed.wait(lock, [&] { return !state.reporting; });
+    }
     left.swap(state.ring);
     state.ring.resize(1);
     state.first = state.count = 0;

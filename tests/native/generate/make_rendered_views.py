@@ -18,13 +18,13 @@ import numpy as np
 import torch
 
 from export.camera import Camera
-from export.scenes.cameras import upright
 from export.scenes.captures import read_capture
 from export.scenes.config import BASIS, FEATURES, ROTATED_MULTIPLE
 from export.scenes.descriptors import FittedDescriptors
 from export.scenes.fitting import FittedPoints, Options, render
-from export.scenes.raster import NOTHING, depths_of, visible
-from export.scenes.system import Networks
+from export.scenes.geometry.cameras import upright
+from export.scenes.geometry.raster import NOTHING, depths_of, visible
+from export.scenes.networks.system import Networks
 from tests.native.generate.make_tiny_scene import FOLDER as SCENE
 from tests.native.generate.make_tiny_scene import pose, write_bundle
 

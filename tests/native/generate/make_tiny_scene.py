@@ -23,13 +23,13 @@ import torch
 from torch import Tensor, nn
 
 from export.bundle import BundleInfo
-from export.scenes.basis import directions
 from export.scenes.bundle import write_manifest
 from export.scenes.captures import read_capture
 from export.scenes.config import FEATURES, ExtractorConfig, RefinerConfig, SceneConfig
 from export.scenes.export_onnx import export
 from export.scenes.fitting import Options, fitted_to_views, seen_in
-from export.scenes.system import Networks
+from export.scenes.networks.basis import directions
+from export.scenes.networks.system import Networks
 
 FOLDER = Path(__file__).parents[1] / "data" / "tiny_scene"
 WIDTH, HEIGHT = 72, 56

@@ -197,6 +197,24 @@ TEST_F(FaultInjection, ClosingDoesNotWaitForOneThatHangs) {
   EXPECT_TRUE(SourceThreads::any()) << "the thread still hangs";
 }
 
+TEST_F(FaultInjection, ClosingWaitsForAStateCallbackThatRuns) {
+  struct Callback {
+    std::atomic<bool> begun{false}, ended{false};
+  } callback;
+  maq::SourceSettings settings;
+  settings.user_data = &callback;
+  settings.on_state = [](void* self, maq_source_state, const char*) {
+    auto* state = static_cast<Callback*>(self);
+    state->begun = true;
+    std::this_thread::sleep_for(300ms);  // longer than closing waits for a device
+    state->ended = true;
+  };
+  auto source = maq::open_source("stub:pattern?live=1&fps=100&size=32x24", settings);
+  ASSERT_TRUE(wait_until([&] { return callback.begun.load(); }));
+  source.reset();
+  EXPECT_TRUE(callback.ended) << "the app may free what its callback uses";
+}
+
 TEST_F(FaultInjection, LateFramesKeepTheirTimes) {
   const auto source = open("stub:pattern?frames=20&fps=100&size=32x24&jitter=30ms", 20);
   maq::Frame frame;

@@ -1,13 +1,14 @@
 """Who may include whom in the C++ code, how large a folder is, and that each says what it is for."""
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
 
 SRC = Path("sdk/src")
 ROOTS = {"sdk/src": SRC, "sdk/app": Path("sdk/app"), "sdk/tools": Path("sdk/tools"), "demo": Path("desktop_demo/src")}
+LIBRARIES = (SRC, ROOTS["sdk/app"], ROOTS["sdk/tools"])  # the demo has its README one folder up
 CODE = (".h", ".hpp", ".cpp")
 MAX_FILES, SMALL_UNIT_LINES = 25, 60
 
@@ -45,6 +46,15 @@ MAY_INCLUDE = {
     "pipeline": SYSTEMS,
     "api": SYSTEMS | {"pipeline"},
 }  # fmt: skip
+
+# Each folder of sdk/tools, and those that its files may include beside their own; "." is sdk/tools itself, without the
+# two programs, which know everything.
+TOOLS_MAY_INCLUDE = {
+    ".": set(),
+    "arguments": {"."},
+    "output": {"."},
+    "commands": {".", "arguments", "output"},
+}
 
 # sources/registry.cpp alone knows every backend; the other files of the folder know none.
 REGISTRY = "sources/registry.cpp"
@@ -168,13 +178,25 @@ def test_foreign_headers_stay_behind_their_doors(header):
 
 
 def test_no_folder_has_more_files_than_a_reader_takes_in():
-    counts = defaultdict(int)
-    for path in code_files(SRC):
-        counts[folder_of(path)] += 1
+    counts = Counter(path.parent.as_posix() for root in ROOTS.values() for path in code_files(root))
     assert {folder: count for folder, count in counts.items() if count > MAX_FILES} == {}
 
 
-@pytest.mark.parametrize("folder", sorted({path.parent for path in code_files(SRC)}, key=str), ids=str)
+def test_the_rooms_of_the_tools_know_only_what_lies_below_them():
+    root = ROOTS["sdk/tools"]
+    wrong = []
+    for path in code_files(root):
+        here = path.parent.relative_to(root).as_posix()
+        if path.name in ("main.cpp", "bench_main.cpp"):
+            continue
+        for name in includes(path):
+            there = Path(name).parent.as_posix()
+            if (root / name).is_file() and there not in TOOLS_MAY_INCLUDE[here] | {here}:
+                wrong.append(f"{path} includes {name}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("folder", sorted({path.parent for root in LIBRARIES for path in code_files(root)}), ids=str)
 def test_every_folder_says_what_it_is_for(folder):
     """In 8 to 30 lines, and names no file that is not there."""
     text = (folder / "README.md").read_text()

@@ -1,6 +1,7 @@
 """Which Python package may import which, and what reads shards without a renderer."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -36,24 +37,40 @@ ALLOWED = {
     "benchmarks": {"export", "quantization"},
 }  # fmt: skip
 
+# A room of a package, and what else of the package it may import.
+ROOMS = {
+    "export.scenes.networks": ("export.scenes.config",),
+    "export.scenes.geometry": ("export.scenes.config",),
+    "quantization.graphs": ("quantization.samples",),
+    "quantization.analysis": ("quantization.graphs", "quantization.samples"),
+}
+TREES = ("export", "quantization", "benchmarks")
+FOLDERS = sorted({path.parent.relative_to(ROOT) for tree in TREES for path in (ROOT / tree).rglob("*.py")})
+MAX_FILES = 25
+
 
 def package_of(module: str) -> str:
     parts = module.split(".")
     return ".".join(parts[:2]) if parts[0] == "export" else parts[0]
 
 
-def imported(path: Path) -> set[str]:
-    """Packages of this project that a file imports, anywhere in it."""
+def modules(path: Path) -> set[str]:
+    """Names that a file imports, anywhere in it, with their modules."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            found |= {package_of(alias.name) for alias in node.names}
+            found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {package_of(f"{node.module}.{alias.name}") for alias in node.names}
-    return {name for name in found if name.split(".")[0] in ("export", "quantization", "benchmarks")}
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
 
 
-@pytest.mark.parametrize("folder", ["export", "quantization", "benchmarks"])
+def imported(path: Path) -> set[str]:
+    """Packages of this project that a file imports, anywhere in it."""
+    return {package_of(name) for name in modules(path) if name.split(".")[0] in TREES}
+
+
+@pytest.mark.parametrize("folder", TREES)
 def test_packages_import_only_what_lies_below_them(folder):
     for path in sorted((ROOT / folder).rglob("*.py")):
         own = package_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
@@ -63,6 +80,29 @@ def test_packages_import_only_what_lies_below_them(folder):
         allowed = ALLOWED[own]
         wrong = {name for name in others if name not in allowed and name.split(".")[0] not in allowed}
         assert not wrong, f"{path.relative_to(ROOT)} imports {', '.join(sorted(wrong))}"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_import_only_what_lies_below_them(room):
+    folder = ROOT.joinpath(*room.split("."))
+    package = package_of(room)
+    wrong = {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in folder.glob("*.py")
+        for name in modules(path)
+        if name.startswith(f"{package}.") and not name.startswith((f"{room}.", *ROOMS[room]))
+    }
+    assert sorted(wrong) == []
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=str)
+def test_every_folder_is_small_and_says_what_it_is_for(folder):
+    """At most MAX_FILES modules, and a README that names no module that is not there."""
+    assert len(list((ROOT / folder).glob("*.py"))) <= MAX_FILES
+    text = (ROOT / folder / "README.md").read_text()
+    named = re.findall(r"`([\w/]+\.py)`", text)
+    homes = (ROOT / folder, ROOT / folder.parent, ROOT)
+    assert [name for name in named if not any((home / name).is_file() for home in homes)] == []
 
 
 def test_the_table_of_packages_has_no_circle():

@@ -10,7 +10,7 @@ from onnx import helper, numpy_helper
 from export.evaluation.backends import Prediction
 from quantization.agreement import Agreement, Tally, compare, load_images
 from quantization.choose import Candidate, Workpiece, block_of, candidates, pick, with_float_nodes
-from quantization.prepare import prepare
+from quantization.graphs.prepare import prepare
 from quantization.quantize import calibrate
 from quantization.settings import DensePoseSettings, GraphSettings, read_settings
 

@@ -9,11 +9,11 @@ import torch
 from export.densepose import export_onnx
 from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
-from quantization.errors import float_nodes_left, output_sqnr, sqnr_db
+from quantization.analysis.errors import float_nodes_left, output_sqnr, sqnr_db
+from quantization.graphs.simplify import drop_unused_constants, fold_scalar_products, share_scales
 from quantization.quantize import equal_sizes, matching_nodes, quantize_graph
 from quantization.samples import spread
 from quantization.settings import DENSEPOSE, DensePoseSettings, GraphSettings, read_settings
-from quantization.simplify import drop_unused_constants, fold_scalar_products, share_scales
 
 WIDTH = 16
 pytestmark = pytest.mark.usefixtures("one_thread")

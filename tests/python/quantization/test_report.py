@@ -12,13 +12,14 @@ import torch
 from onnx import helper, numpy_helper
 
 from export.densepose.bundle import GRAPHS
-from quantization import check, qdq, report, report_files, rounding
-from quantization.bias_correction import correct_biases
-from quantization.comparison import TensorError, activation_errors, pair_errors, weight_errors, worst_first
-from quantization.errors import output_sqnr
-from quantization.prepare import prepare
+from quantization import check, report, report_files
+from quantization.analysis.comparison import TensorError, activation_errors, pair_errors, weight_errors, worst_first
+from quantization.analysis.errors import output_sqnr
+from quantization.analysis.saturation import bound, columns, count, layers, saturation
+from quantization.graphs import qdq, rounding
+from quantization.graphs.bias_correction import correct_biases
+from quantization.graphs.prepare import prepare
 from quantization.quantize import quantize_graph
-from quantization.saturation import bound, columns, count, layers, saturation
 from quantization.settings import GraphSettings
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -208,7 +209,7 @@ def test_overflows_are_counted_as_the_instruction_makes_them():
 
 
 def test_columns_times_weights_are_the_convolution(quantized, monkeypatch):
-    monkeypatch.setattr("quantization.saturation.ROWS", 10**6)
+    monkeypatch.setattr("quantization.analysis.saturation.ROWS", 10**6)
     reference, path, given = quantized
     (layer, depthwise, _) = layers(reference, onnx.load(path))
     assert depthwise.depthwise
@@ -329,7 +330,7 @@ def test_a_mixed_bundle_is_whole_and_has_the_graphs_asked_for(tmp_path):
 
 
 def report_session(model):
-    from quantization.activations import float_session
+    from quantization.graphs.activations import float_session
 
     return float_session(model)
 

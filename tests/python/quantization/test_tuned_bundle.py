@@ -11,10 +11,10 @@ from export.bundle import BundleInfo
 from export.scenes.bundle import write_manifest
 from export.scenes.config import SIZES
 from export.scenes.export_onnx import export
-from export.scenes.system import Networks
+from export.scenes.networks.system import Networks
 from quantization import tuned_bundle
+from quantization.analysis.errors import float_nodes_left
 from quantization.compare_refiners import made_up_rasters
-from quantization.errors import float_nodes_left
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 

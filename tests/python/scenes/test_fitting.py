@@ -9,11 +9,11 @@ import torch
 from box_scene import BoxScene, looking, ring
 
 from export.camera import Camera
-from export.scenes.cameras import between, rotated_upright, upright, warped
 from export.scenes.config import SIZES
 from export.scenes.descriptors import Moments
 from export.scenes.fitting import Options, View, background_of, fitted_to_views, painted, render, sampled, seen_in
-from export.scenes.raster import (
+from export.scenes.geometry.cameras import between, rotated_upright, upright, warped
+from export.scenes.geometry.raster import (
     NOTHING,
     OCCLUSION_BLOCK_PX,
     depths_of,
@@ -24,8 +24,8 @@ from export.scenes.raster import (
     visible,
     without_occluded,
 )
-from export.scenes.source_views import drawn, scores
-from export.scenes.system import Networks
+from export.scenes.geometry.source_views import drawn, scores
+from export.scenes.networks.system import Networks
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 

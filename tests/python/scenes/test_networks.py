@@ -5,15 +5,15 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from export.scenes.basis import Basis, directions, encoded
 from export.scenes.config import SIZES, ExtractorConfig, RefinerConfig, SceneConfig
 from export.scenes.export_onnx import ExtractorGraph, RefinerGraph, export, export_extractor, export_refiner, parity
-from export.scenes.extractor import Extractor
-from export.scenes.feature_scale import measured, scaled
-from export.scenes.gated_refiner import GatedRefiner
-from export.scenes.light_refiner import LightRefiner, depth_to_space, space_to_depth
-from export.scenes.refiner import make_refiner
-from export.scenes.system import Networks, load_networks, save_networks
+from export.scenes.networks.basis import Basis, directions, encoded
+from export.scenes.networks.extractor import Extractor
+from export.scenes.networks.feature_scale import measured, scaled
+from export.scenes.networks.gated_refiner import GatedRefiner
+from export.scenes.networks.light_refiner import LightRefiner, depth_to_space, space_to_depth
+from export.scenes.networks.refiner import make_refiner
+from export.scenes.networks.system import Networks, load_networks, save_networks
 from quantization import compare_refiners
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")

@@ -15,9 +15,9 @@ from export.scenes import train
 from export.scenes.captures import read_captures
 from export.scenes.config import SIZES
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
+from export.scenes.networks.system import Networks, load_networks
 from export.scenes.perceptual import Perceptual
 from export.scenes.samples import Sampling, draw_sample
-from export.scenes.system import Networks, load_networks
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed", "signal_handlers")
 

@@ -1,0 +1,1 @@
+"""Cameras rotated upright, the visible point of each pixel, and which photos see a point."""

@@ -1,0 +1,53 @@
+#include "arguments/model_options.h"
+
+#include <CLI/CLI.hpp>
+#include <maquette/maquette.hpp>
+#include <stdexcept>
+
+#include "arguments/bundle_argument.h"
+
+void add_model_options(CLI::App& command, ModelOptions& options) {
+  command.add_option("--bundle", options.bundle,
+                     "Folder of the model bundle; default: MAQ_BUNDLE, then the one installed with this program");
+  command.add_option("--size", options.size, "Long side of the network's input in pixels; larger is finer and slower")
+      ->check(CLI::Range(32, 2048));
+  command.add_option("--threshold", options.threshold, "Minimum score of a person")->check(CLI::Range(0.0f, 1.0f));
+  command.add_option("--threads", options.threads, "Threads of the networks; default: the cores, at most 4")
+      ->check(CLI::Range(1, 64));
+  command
+      .add_option("--max-proposals", options.max_proposals,
+                  "Maximum number of boxes for the box head; fewer are faster and may miss people in a crowd")
+      ->check(CLI::Range(1, 1000));
+  command
+      .add_option("--key-frames", options.key_frames,
+                  "Detect people in every N-th frame of a stream, and propagate their boxes in between")
+      ->check(CLI::Range(1, 1000));
+  command
+      .add_option("--min-person-height", options.min_person_height_px,
+                  "People less tall than this, in pixels, may be missed; large values are faster")
+      ->check(CLI::Range(0, 100000));
+  command.add_flag("--no-surface", options.no_surface, "Body parts alone: U and V stay 0");
+  command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: slower, saves energy");
+}
+
+std::string bundle_of(const ModelOptions& options) {
+  const std::string bundle = options.bundle.empty() ? default_bundle() : options.bundle;
+  if (bundle.empty()) {
+    throw std::runtime_error("No model bundle was found; name its folder with --bundle or MAQ_BUNDLE.");
+  }
+  return bundle;
+}
+
+maq_densepose_config config_of(const ModelOptions& options, const std::string& bundle) {
+  maq_densepose_config config = maquette::default_densepose_config();
+  config.bundle_path = bundle.c_str();
+  config.threads = options.threads;
+  config.long_side_px = options.size;
+  config.score_threshold = options.threshold;
+  config.max_proposals = options.max_proposals;
+  config.key_frame_interval = options.key_frames;
+  config.min_person_height_px = options.min_person_height_px;
+  config.detail = options.no_surface ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
+  config.allow_spinning = options.no_spin ? 0 : 1;
+  return config;
+}

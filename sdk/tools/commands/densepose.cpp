@@ -1,0 +1,225 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <vector>
+
+#include "arguments/model_options.h"
+#include "arguments/source_argument.h"
+#include "commands/commands.h"
+#include "interrupt.h"
+#include "output/clip_file.h"
+#include "output/frame_image.h"
+#include "output/output_file.h"
+#include "output/overlay.h"
+#include "output/progress_bar.h"
+#include "program.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int64_t kFramesOfEndlessSource = 100;
+
+struct Options {
+  std::vector<std::string> sources;
+  ModelOptions model;
+  std::string out;
+  bool overlay = false;
+  bool json = false;
+  int64_t max_frames = 0;
+  int64_t every = 1;
+};
+
+// The stages of a run, in order, with their times of every frame.
+class Timings {
+ public:
+  void add(const maq_densepose_stats& stats) {
+    const float values[] = {stats.preprocess_ms, stats.trunk_ms,  stats.proposals_ms, stats.box_head_ms,
+                            stats.dense_head_ms, stats.decode_ms, stats.total_ms};
+    for (size_t i = 0; i < kStages; ++i) ms_[i].push_back(values[i]);
+    people_ += stats.person_count;
+  }
+
+  size_t frames() const { return ms_[0].size(); }
+  int64_t people() const { return people_; }
+  float median_total_ms() const { return median(ms_[kStages - 1]); }
+
+  void print() const {
+    std::printf("%zu frame%s, %lld %s. Median of a frame: %.1f ms (%.1f FPS)\n", frames(), frames() == 1 ? "" : "s",
+                (long long)people_, people_ == 1 ? "person" : "people", double(median_total_ms()),
+                1000.0 / std::max(1e-3, double(median_total_ms())));
+    constexpr const char* kNames[] = {"preprocess", "trunk", "proposals", "box head", "dense head", "decode"};
+    for (size_t i = 0; i + 1 < kStages; ++i) {
+      std::printf("%s%s %.1f", i == 0 ? "  " : " | ", kNames[i], double(median(ms_[i])));
+    }
+    std::printf(" ms\n");
+  }
+
+ private:
+  static constexpr size_t kStages = 7;
+
+  static float median(std::vector<float> values) {
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+
+  std::vector<float> ms_[kStages];
+  int64_t people_ = 0;
+};
+
+std::string frame_stem(const std::string& stem, bool is_clip, uint64_t sequence) {
+  if (!is_clip) return stem;
+  char number[32];
+  std::snprintf(number, sizeof number, "_%06llu", (unsigned long long)sequence);
+  return stem + number;
+}
+
+void print_frame(const Options& options, const std::string& stem, const maq_frame_desc& desc,
+                 const maq_densepose_stats& stats) {
+  if (options.json) {
+    const nlohmann::ordered_json line = {{"frame", stem},
+                                         {"timestamp_ns", desc.timestamp_ns},
+                                         {"people", stats.person_count},
+                                         {"key_frame", stats.is_key_frame != 0},
+                                         {"proposals", stats.proposal_count},
+                                         {"network", {stats.network_width_px, stats.network_height_px}},
+                                         {"ms",
+                                          {{"preprocess", stats.preprocess_ms},
+                                           {"trunk", stats.trunk_ms},
+                                           {"proposals", stats.proposals_ms},
+                                           {"box_head", stats.box_head_ms},
+                                           {"dense_head", stats.dense_head_ms},
+                                           {"decode", stats.decode_ms},
+                                           {"total", stats.total_ms}}}};
+    std::printf("%s\n", line.dump().c_str());
+  } else {
+    std::printf("%s  %d x %d  %d %s  %.1f ms\n", stem.c_str(), desc.width_px, desc.height_px, stats.person_count,
+                stats.person_count == 1 ? "person" : "people", double(stats.total_ms));
+  }
+}
+
+// Runs one source to its end and writes its files.
+void run_source(const Options& options, const SourceArgument& argument, const maquette::Context& context,
+                maquette::DensePose& densepose, Timings& timings) {
+  maquette::Source source(context, argument.uri);
+  densepose.reset();
+  const maq_source_info info = source.info();
+  const bool is_clip = info.frame_count != 1;
+  int64_t limit = options.max_frames;
+  const bool endless = info.frame_count < 0 && argument.uri.rfind("stub:", 0) == 0;
+  if (limit == 0 && (endless || info.is_live != 0)) limit = kFramesOfEndlessSource;
+
+  int64_t expected = info.frame_count < 0 ? limit : (info.frame_count + options.every - 1) / options.every;
+  if (limit > 0) expected = expected > 0 ? std::min(expected, limit) : limit;
+  ProgressBar progress(argument.stem, is_clip && !options.json ? expected : 1);
+  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay.mp4"), info.fps / double(options.every));
+  int64_t done = 0;
+  for (int64_t index = 0; !interrupted() && (limit == 0 || done < limit); ++index) {
+    const auto frame = source.next();
+    if (!frame) break;
+    if (index % options.every != 0) continue;
+    const maq_frame_desc desc = frame->desc();
+    const maquette::DensePoseResult result = densepose.run(*frame);
+    const maq_densepose_stats stats = result.stats();
+    const std::string stem = frame_stem(argument.stem, is_clip, desc.sequence);
+    // Drawn before the first file is written, so that a frame has all its files or none.
+    const cv::Mat overlay = options.overlay ? draw_overlay(image_of(*frame), result) : cv::Mat();
+    make_folder_of(fs::path(options.out) / (stem + "_IUV.png"));
+    result.save(options.out, stem);
+    if (options.overlay && is_clip) clip.add(overlay);
+    if (options.overlay && !is_clip) {
+      frame_of(context, overlay).save((fs::path(options.out) / (stem + "_overlay.png")).string());
+    }
+    timings.add(stats);
+    ++done;
+    if (!is_clip || options.json) print_frame(options, stem, desc, stats);
+    if (is_clip && !options.json) progress.advance(done, std::to_string(stats.person_count) + " people");
+  }
+  progress.finish();
+  const fs::path overlay_path = clip.finish();
+  if (!overlay_path.empty() && !options.json) {
+    std::printf("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());
+  } else if (is_clip && !options.json) {
+    std::printf("%s  %lld frames\n", argument.stem.c_str(), (long long)done);
+  }
+}
+
+std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts) {
+  std::vector<SourceArgument> arguments;
+  std::set<std::string> stems;
+  for (const std::string& text : texts) {
+    arguments.push_back(parse_source_argument(text));
+    if (!stems.insert(arguments.back().stem).second) {
+      throw std::runtime_error("Two sources would write files named " + arguments.back().stem +
+                               "_…; run them one by one with different --out folders.");
+    }
+  }
+  return arguments;
+}
+
+int run_densepose(const Options& options) {
+  const std::vector<SourceArgument> arguments = parse_sources(options.sources);
+  const std::string bundle = bundle_of(options.model);
+  const maquette::Context context = open_context();
+  maquette::DensePose densepose(context, config_of(options.model, bundle));
+
+  catch_interrupts();
+  Timings timings;
+  int failed = 0;
+  for (const SourceArgument& argument : arguments) {
+    if (interrupted()) break;
+    try {
+      run_source(options, argument, context, densepose, timings);
+    } catch (const std::exception& error) {
+      // One bad file must not cost the rest of a batch.
+      std::fflush(stdout);
+      std::fprintf(stderr, "maquette: %s\n", error.what());
+      ++failed;
+    }
+  }
+  if (timings.frames() > 0 && !options.json) timings.print();
+  return failed == 0 && !interrupted() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_densepose_command(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("densepose", "Map every pixel of the people in images or clips to body surface");
+  command
+      ->add_option("source", options->sources,
+                   "Images, clips or URIs: photo.jpg, video:clip.mp4, stub:people?count=3 (see `maquette sources`)")
+      ->required();
+  command->add_option("-o,--out", options->out, "Folder for the results; created if needed")->required();
+  command->add_flag("--overlay", options->overlay,
+                    "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
+  command->add_flag("--json", options->json, "Print one JSON line a frame with counts and times, instead of text");
+  add_model_options(*command, options->model);
+  command
+      ->add_option("--max-frames", options->max_frames,
+                   "Stop after N frames; default: all, and 100 of a source without end")
+      ->check(CLI::Range(int64_t(1), int64_t(1) << 40));
+  command->add_option("--every", options->every, "Process only every N-th frame of a clip")
+      ->check(CLI::Range(int64_t(1), int64_t(1) << 30));
+  command->footer(
+      "Writes for each image, in the DensePose convention:\n"
+      "  <stem>_IUV.png   body part I, U * 255, V * 255 (channels B, G, R of the file)\n"
+      "  <stem>_INDS.png  index of the person a pixel belongs to, from 1; 0: background\n"
+      "  <stem>.json      boxes in pixels and scores\n"
+      "Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
+      "Examples:\n"
+      "  maquette densepose photo.jpg --out results --overlay\n"
+      "  maquette densepose holiday/*.jpg --out results --size 480\n"
+      "  maquette densepose 'video:dance.mp4?fps=10' --out results --overlay\n"
+      "  maquette densepose 'stub:people?count=3&seed=7' --out results --overlay --max-frames 60");
+  command->callback([=] { *exit_code = run_densepose(*options); });
+}

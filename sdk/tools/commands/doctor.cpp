@@ -1,0 +1,169 @@
+#include <grp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <maquette/maquette.hpp>
+#include <string>
+#include <vector>
+
+#include "commands/commands.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// What was found, and for what is not well a remedy.
+void well(const std::string& text) { std::printf("  ok    %s\n", text.c_str()); }
+void note(const std::string& text) { std::printf("  note  %s\n", text.c_str()); }
+void unwell(const std::string& text, const std::string& remedy) {
+  std::printf("  BAD   %s\n        -> %s\n", text.c_str(), remedy.c_str());
+}
+
+std::vector<fs::path> entries_of(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) found.push_back(entry.path());
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::string first_line(const fs::path& path) {
+  std::string line;
+  std::getline(std::ifstream(path) >> std::ws, line);
+  return line;
+}
+
+// "firefox (process 123)" for each program that has the file open; of other users' programs only root learns.
+std::string users_of(const fs::path& device) {
+  std::string users;
+  std::error_code error;
+  for (const fs::path& process : entries_of("/proc")) {
+    const std::string number = process.filename().string();
+    if (number.find_first_not_of("0123456789") != std::string::npos) continue;
+    for (const fs::path& file : entries_of(process / "fd")) {
+      if (fs::read_symlink(file, error) != device) continue;
+      users += (users.empty() ? "" : ", ") + first_line(process / "comm") + " (process " + number + ")";
+      break;
+    }
+  }
+  return users;
+}
+
+bool has_group(gid_t group) {
+  std::vector<gid_t> mine(256);
+  const int count = getgroups(int(mine.size()), mine.data());
+  return getegid() == group ||
+         std::find(mine.begin(), mine.begin() + std::max(count, 0), group) != mine.begin() + std::max(count, 0);
+}
+
+// Why this user may not open the device.
+void explain_permission(const fs::path& device) {
+  struct stat found {};
+  if (stat(device.c_str(), &found) != 0) return;
+  const group* owner = getgrgid(found.st_gid);
+  const std::string name = owner == nullptr ? std::to_string(found.st_gid) : owner->gr_name;
+  if ((found.st_mode & S_IRGRP) == 0 || (found.st_mode & S_IWGRP) == 0) {
+    unwell("only root may open it", "sudo chmod g+rw " + device.string() + ", or a udev rule with MODE=\"0660\"");
+  } else if (!has_group(found.st_gid)) {
+    unwell("it belongs to the group \"" + name + "\", in which you are not",
+           "sudo usermod -aG " + name + " $USER, then log in again (or: newgrp " + name + ")");
+  }
+}
+
+// A listed camera; true when it can be used.
+bool look_at(const maq_camera_list* list, uint32_t index) {
+  maq_camera_info info{};
+  info.struct_size = sizeof info;
+  maquette::check(maq_camera_list_get_camera(list, index, &info));
+  const std::string uri = info.uri;
+  const std::string place = uri.substr(uri.find(':') + 1);
+  std::printf("\n%s  %s\n", info.uri, info.name);
+  if (info.status != MAQ_OK) {
+    unwell(info.problem, "see below, and `maquette sources` when it is done");
+    if (info.status == MAQ_ERROR_NO_PERMISSION) explain_permission(place);
+    return false;
+  }
+  uint32_t usable = 0;
+  for (uint32_t k = 0; k < info.mode_count; ++k) {
+    maq_camera_mode mode{};
+    mode.struct_size = sizeof mode;
+    maquette::check(maq_camera_list_get_mode(list, index, k, &mode));
+    usable += mode.is_usable == 1 ? 1 : 0;
+  }
+  well("may be opened");
+  if (usable == 0) {
+    unwell("none of its " + std::to_string(info.mode_count) + " formats is understood",
+           "`maquette sources` lists them; look for a setting of the camera that gives YUYV, NV12 or MJPEG");
+  } else {
+    well(std::to_string(usable) + " sizes and formats can be used");
+  }
+  const std::string users = users_of(place);
+  if (!users.empty()) note("open in " + users + ": only one program can stream at a time");
+  return usable > 0;
+}
+
+// Cameras that the kernel knows and that have no file, or that no driver has taken.
+void look_for_the_missing() {
+  std::error_code error;
+  for (const fs::path& known : entries_of("/sys/class/video4linux")) {
+    const fs::path device = fs::path("/dev") / known.filename();
+    if (fs::exists(device, error)) continue;
+    unwell(first_line(known / "name") + " has no file " + device.string(),
+           "in a container: start it with --device=" + device.string() + "; else is udev running?");
+  }
+  for (const fs::path& interface : entries_of("/sys/bus/usb/devices")) {
+    constexpr const char* kVideoClass = "0e";
+    if (first_line(interface / "bInterfaceClass") != kVideoClass || fs::exists(interface / "driver", error)) continue;
+    unwell("the USB camera at " + interface.filename().string() + " has no driver", "sudo modprobe uvcvideo");
+  }
+  if (!fs::exists("/run/udev/data", error)) {
+    note("udev is not running: cameras work, but libcamera finds none without it");
+  }
+}
+
+// Parts of the SDK that bring libraries of others, and so may be missing.
+void look_at_parts(const maquette::Context& context) {
+  for (const char* uri : {"libcamera:none", "depthai:none"}) {
+    const std::string scheme = std::string(uri).substr(0, std::string(uri).find(':') + 1);
+    maq_source* source = nullptr;
+    const maq_status status = maq_source_create(context.get(), uri, nullptr, &source);
+    maq_source_destroy(source);
+    if (status == MAQ_ERROR_RUNTIME_LIBRARY || status == MAQ_ERROR_UNSUPPORTED) {
+      note(scheme + " cannot be used by this build; `maquette play " + uri + "` says why");
+    } else {
+      well(scheme + " can be used by this build");
+    }
+  }
+}
+
+int look_at_cameras() {
+  std::printf("maquette %s (%s)\n", maq_get_sdk_version(), maq_get_build_options());
+  const maquette::Context context;
+  maq_camera_list* made = nullptr;
+  maquette::check(maq_camera_list_create(context.get(), &made));
+  const maquette::Owner<maq_camera_list, maq_camera_list_destroy> list(made);
+  const uint32_t count = maq_camera_list_get_count(list.get());
+  uint32_t usable = 0;
+  for (uint32_t i = 0; i < count; ++i) usable += look_at(list.get(), i) ? 1 : 0;
+  std::printf("\nThis machine\n");
+  look_for_the_missing();
+  look_at_parts(context);
+  if (count == 0) {
+    unwell("no camera is plugged in", "plug one in; without one try: maquette play stub:people, or play a recording");
+  }
+  std::printf("\n%u of %u cameras can be used.\n", usable, count);
+  return usable > 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_doctor_command(CLI::App& app, int* exit_code) {
+  CLI::App* command = app.add_subcommand("doctor", "Find out why a camera does not work, and what to do");
+  command->footer("Exit status 0 when some camera can be used, 1 when none can.");
+  command->callback([=] { *exit_code = look_at_cameras(); });
+}

@@ -1,0 +1,117 @@
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <optional>
+
+#include "arguments/source_argument.h"
+#include "commands/commands.h"
+#include "commands/play_statistics.h"
+#include "interrupt.h"
+#include "output/output_file.h"
+#include "output/terminal_picture.h"
+
+namespace {
+
+struct Options {
+  std::string source;
+  double speed = 1;
+  double from_s = 0;
+  int64_t frames = 0;
+  double seconds = 0;
+  std::optional<bool> picture;
+  std::string json;
+};
+
+bool is_camera(const std::string& uri) {
+  for (uint32_t i = 0; i < maq_source_get_scheme_count(); ++i) {
+    maq_source_scheme scheme{};
+    scheme.struct_size = sizeof scheme;
+    maquette::check(maq_source_get_scheme(i, &scheme));
+    if (uri.rfind(std::string(scheme.name) + ":", 0) == 0) return scheme.is_camera != 0;
+  }
+  return false;
+}
+
+std::string with_option(const std::string& uri, const std::string& key, const std::string& value) {
+  return uri + (uri.find('?') == std::string::npos ? "?" : "&") + key + "=" + value;
+}
+
+int play(const Options& options) {
+  catch_interrupts();
+  std::string uri = parse_source_argument(options.source).uri;
+  if (!is_camera(uri)) {
+    if (uri.find("live=") == std::string::npos) uri = with_option(uri, "live", "1");
+    if (options.speed != 1) uri = with_option(uri, "speed", std::to_string(options.speed));
+  }
+  PlayStatistics statistics(options.frames);
+  // What happens later is in the statistics, and would come between the lines of a picture.
+  std::atomic<bool> is_opening{true};
+  maq_context_config log = maquette::default_context_config();
+  log.log_user_data = &is_opening;
+  log.log_callback = [](void* opening, maq_log_level, const char* text) {
+    if (*static_cast<const std::atomic<bool>*>(opening)) std::fprintf(stderr, "maquette: %s\n", text);
+  };
+  const maquette::Context context(log);
+  maq_source_config config = maquette::default_source_config();
+  config.state_callback = PlayStatistics::note_state;
+  config.state_user_data = &statistics;
+  maquette::Source source(context, uri, &config);
+  is_opening = false;
+  if (options.from_s > 0) source.seek(int64_t(options.from_s * 1e9));
+
+  const bool shows = options.picture.value_or(terminal_shows_pictures());
+  TerminalPicture picture;
+  std::string failure;
+  const int64_t end_ns = options.seconds > 0 ? monotonic_ns() + int64_t(options.seconds * 1e9) : INT64_MAX;
+  while (!interrupted() && monotonic_ns() < end_ns && (options.frames == 0 || statistics.frames() < options.frames)) {
+    constexpr int64_t kPatienceNs = 250000000;  // how soon Ctrl-C is heard while no frame comes
+    maq_frame* taken = nullptr;
+    const maq_status status = maq_source_acquire_frame(source.get(), kPatienceNs, &taken);
+    if (status == MAQ_TIMEOUT) continue;
+    if (status == MAQ_END_OF_STREAM) break;
+    if (status != MAQ_OK) {
+      failure = maq_last_error(source.get());
+      break;
+    }
+    const maquette::Frame frame(taken);
+    const maq_frame_desc desc = frame.desc();
+    statistics.add(desc);
+    if (shows) picture.show(frame, statistics.line(source.info().dropped_frame_count));
+  }
+  const maq_source_info info = source.info();
+  statistics.close(std::move(source));
+  statistics.print(info);
+  if (!options.json.empty()) {
+    const std::string text = statistics.report(info).dump(1) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  if (!failure.empty()) std::fprintf(stderr, "maquette: %s\n", failure.c_str());
+  return failure.empty() && statistics.frames() > 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_play_command(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("play", "Watch a camera, a recording or another source, and how it delivers");
+  command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
+  command->add_option("-s,--speed", options->speed, "Speed of a recording, clip or stub: 2 is twice as fast")
+      ->check(CLI::Range(0.01, 100.0));
+  command->add_option("--from", options->from_s, "Start at this time of a recording, in seconds")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("-n,--frames", options->frames, "Stop after N frames")->check(CLI::PositiveNumber);
+  command->add_option("-t,--seconds", options->seconds, "Stop after this time")->check(CLI::PositiveNumber);
+  command->add_flag_callback(
+      "--no-picture", [=] { options->picture = false; }, "Print statistics only; the default without a terminal");
+  command->add_option("--json", options->json, "Write the statistics to this file");
+  command->footer(
+      "Plays frames at their own times, also from files. A terminal shows the picture in colour; missing and late "
+      "frames\n"
+      "and interruptions are counted:\n\n"
+      "  maquette play v4l2:/dev/video0\n"
+      "  maquette play take.maqrec --from 5 --speed 0.5\n"
+      "  maquette play 'stub:people?drop=0.1&unplug=3s@5s'");
+  command->callback([=] { *exit_code = play(*options); });
+}

@@ -1,0 +1,81 @@
+#include <CLI/CLI.hpp>
+#include <cinttypes>
+#include <cstdio>
+#include <filesystem>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <stdexcept>
+
+#include "arguments/bundle_argument.h"
+#include "commands/commands.h"
+#include "commands/scene_commands.h"
+#include "output/output_file.h"
+#include "program.h"
+
+namespace {
+
+struct InfoOptions {
+  std::string scene;
+  std::string json;
+};
+
+int show(const InfoOptions& options) {
+  const maquette::Context context = open_context();
+  const maquette::Scene scene(context, options.scene);
+  const maq_scene_info info = scene.info();
+  const uint64_t bytes = std::filesystem::file_size(options.scene);
+  std::printf("%s: %.1f MB\n", options.scene.c_str(), double(bytes) / 1e6);
+  std::printf("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count,
+              double(bytes) / double(info.point_count), info.block_count);
+  std::printf("  of these   %" PRIu64 " (%.0f %%) depend on the view, the rest are constant; %d bits a coefficient\n",
+              info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
+              info.coefficient_bits);
+  std::printf("  box        %g %g %g to %g %g %g\n", info.bounds_min[0], info.bounds_min[1], info.bounds_min[2],
+              info.bounds_max[0], info.bounds_max[1], info.bounds_max[2]);
+  std::printf("  up         %g %g %g\n", info.up[0], info.up[1], info.up[2]);
+  if (!options.json.empty()) {
+    const std::string text = describe_scene(info, bytes).dump(2) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string scene_bundle_or_default(const std::string& given) {
+  const std::string bundle = given.empty() ? default_scene_bundle() : given;
+  if (bundle.empty()) {
+    throw std::runtime_error(
+        "No bundle of scene networks was found; name its folder with --bundle or MAQ_SCENE_BUNDLE.");
+  }
+  return bundle;
+}
+
+nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_bytes) {
+  nlohmann::ordered_json document;
+  document["points"] = info.point_count;
+  document["view_dependent_points"] = info.view_dependent_count;
+  document["blocks"] = info.block_count;
+  document["bytes"] = file_bytes;
+  document["coefficient_bits"] = info.coefficient_bits;
+  document["up"] = info.up;
+  document["bounds_min"] = info.bounds_min;
+  document["bounds_max"] = info.bounds_max;
+  return document;
+}
+
+void add_scene_command(CLI::App& app, int* exit_code) {
+  CLI::App* scene = app.add_subcommand("scene", "Scenes from photos: build one, render it from new viewpoints");
+  scene->require_subcommand(1);
+  scene->footer(
+      "From a folder of photos with cameras and a cloud (COLMAP, or transforms.json with a PLY) to a clip:\n\n"
+      "  maquette scene build my-place --out my-place.maqs\n"
+      "  maquette scene render my-place.maqs --capture my-place --path through --out clip.mp4");
+  add_scene_build_command(*scene, exit_code);
+  add_scene_render_command(*scene, exit_code);
+  auto options = std::make_shared<InfoOptions>();
+  CLI::App* command = scene->add_subcommand("info", "What is in a scene file; checks all of it");
+  command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
+  command->add_option("--json", options->json, "Also write these figures to this file");
+  command->callback([=] { *exit_code = show(*options); });
+}

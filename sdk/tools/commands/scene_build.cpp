@@ -1,0 +1,164 @@
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cinttypes>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <stdexcept>
+
+#include "commands/scene_commands.h"
+#include "interrupt.h"
+#include "machine.h"
+#include "output/output_file.h"
+#include "output/progress_bar.h"
+#include "program.h"
+
+namespace {
+
+struct Options {
+  std::string capture;
+  std::string out;
+  std::string bundle;
+  std::string ply;
+  std::string json;
+  int threads = 0;
+  int long_side = 640;
+  int coefficients = 8;
+  double min_variation = -1;
+  double visibility_scale = 1;
+  double near_depth = 0;
+  uint64_t points = 0;
+  uint32_t views = 0;
+  bool all_photos = false;
+};
+
+constexpr int kPermille = 1000;
+
+int32_t show_progress(void* bar, double done, const char* what) {
+  static_cast<ProgressBar*>(bar)->advance(int64_t(done * kPermille), what);
+  return interrupted() ? 0 : 1;
+}
+
+// Before the work: that its result has a place. Makes the folder.
+void require_writable(const std::string& path) {
+  if (path.empty()) return;
+  if (std::filesystem::is_directory(path)) throw std::runtime_error(path + " is a folder; name a file in it.");
+  const OutputFile probe(path);
+  if (!std::ofstream(probe.temporary_path())) {
+    throw std::runtime_error(path + " cannot be written: " + std::strerror(errno) + ".");
+  }
+}
+
+maquette::Scene build_or_tell(const maquette::Context& context, const maq_scene_build_config& config,
+                              const maquette::Capture& capture, maq_scene_build_stats* stats, const std::string& out) {
+  try {
+    return maquette::Scene(context, config, capture, stats);
+  } catch (const maquette::Error&) {
+    if (!interrupted()) throw;
+    throw std::runtime_error("Interrupted; " + out + " is as it was before.");
+  }
+}
+
+int build(const Options& options) {
+  catch_interrupts();
+  const maquette::Context context = open_context();
+  const maquette::Capture capture(context, options.capture);
+  const maq_capture_info info = capture.info();
+  std::fprintf(stderr, "%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count,
+               info.point_count);
+  for (uint32_t i = 0; i < info.drop_count; ++i) {
+    const maq_capture_drop drop = capture.drop(i);
+    std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
+  }
+  const std::string networks = scene_bundle_or_default(options.bundle);
+  for (const std::string* path : {&options.out, &options.ply}) require_writable(*path);
+  ProgressBar progress("building", kPermille);
+  maq_scene_build_config config = maquette::default_scene_build_config();
+  config.bundle_path = networks.c_str();
+  config.threads = options.threads;
+  config.long_side_px = options.long_side;
+  config.coefficient_bits = options.coefficients;
+  config.min_variation = options.min_variation;
+  config.visibility_scale = options.visibility_scale;
+  config.near_depth = options.near_depth;
+  config.max_points = options.points;
+  config.max_views = options.views;
+  config.use_held_out = options.all_photos ? 1 : 0;
+  config.progress_callback = show_progress;
+  config.progress_user_data = &progress;
+  maq_scene_build_stats stats{};
+  const maquette::Scene scene = build_or_tell(context, config, capture, &stats, options.out);
+  progress.finish();
+  const double before_saving_s = seconds_since_start();
+  scene.save(options.out);
+  if (!options.ply.empty()) scene.save_ply(options.ply);
+  const double total_s = seconds_since_start();
+
+  const maq_scene_info made = scene.info();
+  const uint64_t bytes = std::filesystem::file_size(options.out);
+  std::printf("%s: %" PRIu64 " of %" PRIu64 " points were seen by %u photos; %.1f MB, %.1f bytes a point; %.1f s\n",
+              options.out.c_str(), made.point_count, stats.cloud_point_count, stats.view_count, double(bytes) / 1e6,
+              double(bytes) / double(made.point_count), total_s);
+  if (stats.unused_view_count > 0) {
+    std::printf("  %u photos could not be used: unreadable, missing, or they see no point\n", stats.unused_view_count);
+  }
+  if (!options.json.empty()) {
+    nlohmann::ordered_json document = describe_scene(made, bytes);
+    document["cloud_points"] = stats.cloud_point_count;
+    document["views"] = stats.view_count;
+    document["unused_views"] = stats.unused_view_count;
+    document["seconds"] = {{"total", total_s},
+                           {"load", stats.load_ms / 1e3},
+                           {"visibility", stats.visibility_ms / 1e3},
+                           {"align", stats.align_ms / 1e3},
+                           {"extract", stats.extract_ms / 1e3},
+                           {"accumulate", stats.accumulate_ms / 1e3},
+                           {"solve", stats.solve_ms / 1e3},
+                           {"pack", stats.pack_ms / 1e3},
+                           {"save", total_s - before_saving_s}};
+    document["peak_memory_mib"] = double(peak_memory_bytes()) / double(1 << 20);
+    const std::string text = document.dump(2) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_scene_build_command(CLI::App& scene, int* exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = scene.add_subcommand("build", "Make a scene of a folder with photos, cameras and a cloud");
+  command->add_option("capture", options->capture, "Folder with a COLMAP model or transforms.json, photos and cloud")
+      ->required();
+  command->add_option("-o,--out", options->out, "File of the scene: place.maqs; replaces an existing one")->required();
+  command->add_option("--bundle", options->bundle,
+                      "Bundle of scene networks; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
+  command->add_option("--points", options->points, "Maximum number of points; larger clouds are thinned out evenly")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--views", options->views, "Maximum number of photos, selected evenly")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--long-side", options->long_side, "Scale larger photos down to this long side in pixels; 0: never")
+      ->check(CLI::Range(0, 16384));
+  command->add_option("--coefficients", options->coefficients, "Bits of the numbers in the file: 8, 16 or 32")
+      ->check(CLI::IsMember({8, 16, 32}));
+  command
+      ->add_option("--min-variation", options->min_variation,
+                   "Points that vary less between views keep one colour, for a smaller file; RMS of colours of 0 to 1")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--visibility-scale", options->visibility_scale,
+                   "Test visibility at this fraction of the resolution; below 1 for sparse clouds")
+      ->check(CLI::Range(1.0 / 16, 1.0));
+  command->add_option("--near", options->near_depth, "Ignore points nearer to a camera than this, in scene units")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
+      ->check(CLI::Range(1, 64));
+  command->add_flag("--all-photos", options->all_photos, "Also use photos that the capture holds out for comparisons");
+  command->add_option("--ply", options->ply, "Also write the points with their colours as PLY");
+  command->add_option("--json", options->json, "Write counts and times to this file");
+  command->callback([=] { *exit_code = build(*options); });
+}

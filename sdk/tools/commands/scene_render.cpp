@@ -1,0 +1,289 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include "commands/scene_commands.h"
+#include "commands/scene_flight.h"
+#include "interrupt.h"
+#include "output/clip_file.h"
+#include "output/output_file.h"
+#include "output/progress_bar.h"
+#include "program.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Options {
+  std::string scene;
+  std::string out;
+  std::string bundle;
+  std::string capture;
+  std::string views;
+  std::string path;
+  std::string size;
+  std::string json;
+  double seconds = 6;
+  double fps = 25;
+  double near_depth = 0;
+  int threads = 0;
+  int repeat = 1;
+  bool no_alpha = false;
+  bool is_timed_clip = false;  // --seconds or --fps were given
+  std::vector<std::string> without;
+};
+
+struct Size {
+  int width_px = 0, height_px = 0;
+};
+
+std::optional<Size> size_of(const std::string& text) {
+  if (text.empty()) return {};
+  Size size;
+  const char* const end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width_px);
+  const bool goes_on = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+  const auto height = goes_on ? std::from_chars(width.ptr + 1, end, size.height_px) : width;
+  if (!goes_on || height.ec != std::errc() || height.ptr != end || size.width_px < 1 || size.height_px < 1) {
+    throw std::runtime_error("--size " + text + " is not a size; write it as 640x480.");
+  }
+  return size;
+}
+
+maquette::SceneRenderer make_renderer(const maquette::Context& context, const maquette::Scene& scene,
+                                      const Options& options) {
+  const std::string networks = scene_bundle_or_default(options.bundle);
+  maq_scene_renderer_config config = maquette::default_scene_renderer_config();
+  config.bundle_path = networks.c_str();
+  config.threads = options.threads;
+  config.near_depth = options.near_depth;
+  for (const std::string& saving : options.without) {
+    if (saving == "culling") config.draw_unseen_blocks = 1;
+    if (saving == "tiles") config.refine_empty_parts = 1;
+  }
+  return maquette::SceneRenderer(context, config, scene);
+}
+
+// The picture as it lies in the image.
+cv::Mat picture_of(const maquette::SceneImage& image, const maq_pinhole_camera& camera) {
+  size_t stride_bytes = 0;
+  const void* pixels = image.plane(MAQ_SCENE_PLANE_BGR, &stride_bytes);
+  return cv::Mat(camera.intrinsics.height_px, camera.intrinsics.width_px, CV_8UC3, const_cast<void*>(pixels),
+                 stride_bytes);
+}
+
+float median(std::vector<float> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Renders `repeat` times; `ms` gets the medians of the times.
+maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
+                           nlohmann::ordered_json& ms) {
+  std::vector<float> total, project, shade, refine, resample;
+  // The first prepares networks for its size; its time is nobody's who looks at more than one picture.
+  if (repeat > 1) renderer.run(camera);
+  std::optional<maquette::SceneImage> image;
+  for (int i = 0; i < repeat; ++i) {
+    image.reset();
+    image.emplace(renderer.run(camera));
+    const maq_scene_image_stats stats = image->stats();
+    total.push_back(stats.total_ms);
+    project.push_back(stats.project_ms);
+    shade.push_back(stats.shade_ms);
+    refine.push_back(stats.refine_ms);
+    resample.push_back(stats.resample_ms);
+  }
+  ms = {{"total", median(total)},
+        {"project", median(project)},
+        {"shade", median(shade)},
+        {"refine", median(refine)},
+        {"resample", median(resample)}};
+  return std::move(*image);
+}
+
+// Indices of the capture's views that `wanted` names: "held-out", "all" or names with commas.
+std::vector<uint32_t> chosen_views(const maquette::Capture& capture, const std::string& wanted) {
+  std::set<std::string> names;
+  std::istringstream list(wanted);
+  for (std::string name; std::getline(list, name, ',');) names.insert(name);
+  std::vector<uint32_t> chosen;
+  for (uint32_t i = 0; i < capture.info().view_count; ++i) {
+    const maq_capture_view view = capture.view(i);
+    if (wanted == "all" || (wanted == "held-out" && view.is_held_out == 1) || names.erase(view.name) > 0) {
+      chosen.push_back(i);
+    }
+  }
+  if (chosen.empty() && wanted == "held-out") {
+    throw std::runtime_error("The capture holds no photos out; use --views all, or names of photos.");
+  }
+  if (chosen.empty() || (wanted != "all" && wanted != "held-out" && !names.empty())) {
+    throw std::runtime_error("The capture has no photo " + (names.empty() ? wanted : *names.begin()) + ".");
+  }
+  return chosen;
+}
+
+std::string picture_name(const maq_capture_view& view) { return fs::path(view.name).stem().string() + ".png"; }
+
+int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& capture, const Options& options) {
+  const std::vector<uint32_t> views = chosen_views(capture, options.views);
+  const std::optional<Size> size = size_of(options.size);
+  std::set<std::string> names;
+  for (const uint32_t index : views) {
+    const std::string name = picture_name(capture.view(index));
+    if (!names.insert(name).second) {
+      throw std::runtime_error("Two photos of the capture would both be " + name + "; name one of them in --views.");
+    }
+  }
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error) throw std::runtime_error(options.out + " cannot be made: " + error.message() + ".");
+  nlohmann::ordered_json document;
+  document["views"] = nlohmann::json::array();
+  ProgressBar progress("rendering", int64_t(views.size()));
+  for (size_t i = 0; i < views.size() && !interrupted(); ++i) {
+    const maq_capture_view view = capture.view(views[i]);
+    const maq_pinhole_camera camera = size ? with_size(view.camera, size->width_px, size->height_px) : view.camera;
+    nlohmann::ordered_json ms;
+    const maquette::SceneImage image = timed(renderer, camera, options.repeat, ms);
+    const maq_scene_image_stats stats = image.stats();
+    image.save((fs::path(options.out) / picture_name(view)).string(), !options.no_alpha);
+    document["views"].push_back({{"name", view.name},
+                                 {"ms", ms},
+                                 {"drawn_blocks", stats.drawn_block_count},
+                                 {"drawn_points", stats.drawn_point_count},
+                                 {"shaded_points", stats.shaded_point_count},
+                                 {"refined_pixels", stats.refined_pixel_count}});
+    char note[32];
+    std::snprintf(note, sizeof note, "%.1f ms", ms["total"].get<double>());
+    progress.advance(int64_t(i + 1), note);
+  }
+  progress.finish();
+  if (!options.json.empty()) {
+    const std::string text = document.dump(2) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  std::printf("%s: %zu pictures\n", options.out.c_str(), document["views"].size());
+  return interrupted() ? 1 : 0;
+}
+
+std::vector<maq_pinhole_camera> flight(const maquette::Scene& scene, const maquette::Capture* capture,
+                                       const Options& options) {
+  constexpr Size kUsual = {640, 480};
+  const Size size = size_of(options.size).value_or(kUsual);
+  const int frames = std::max(1, int(std::lround(options.seconds * options.fps)));
+  if (options.path == "orbit") return flight_around(scene.info(), size.width_px, size.height_px, frames);
+  if (capture == nullptr) {
+    throw std::runtime_error("--path through follows the cameras of the photos: name their folder with --capture.");
+  }
+  // More stops a second would be a hurry.
+  constexpr double kStopsASecond = 1.5;
+  const uint32_t count = capture->info().view_count;
+  const auto wanted = std::clamp(uint32_t(std::lround(options.seconds * kStopsASecond)) + 1, 2u, std::max(2u, count));
+  std::vector<maq_pinhole_camera> stops;
+  for (uint32_t i = 0; i < std::min(wanted, count); ++i) {
+    stops.push_back(with_size(capture->view(uint32_t(uint64_t(i) * count / std::min(wanted, count))).camera,
+                              size.width_px, size.height_px));
+  }
+  return flight_through(stops, frames);
+}
+
+int render_clip(const maquette::Context& context, maquette::SceneRenderer& renderer, const maquette::Scene& scene,
+                const maquette::Capture* capture, const Options& options) {
+  const std::vector<maq_pinhole_camera> cameras = flight(scene, capture, options);
+  ClipFile clip(context, options.out, options.fps);
+  ProgressBar progress("rendering", int64_t(cameras.size()));
+  std::vector<float> times_ms;
+  for (size_t i = 0; i < cameras.size() && !interrupted(); ++i) {
+    const maquette::SceneImage image = renderer.run(cameras[i]);
+    clip.add(picture_of(image, cameras[i]));
+    times_ms.push_back(image.stats().total_ms);
+    char note[32];
+    std::snprintf(note, sizeof note, "%.1f ms", double(times_ms.back()));
+    progress.advance(int64_t(i + 1), note);
+  }
+  progress.finish();
+  if (interrupted()) {
+    // Half of a clip takes no whole one's place.
+    throw std::runtime_error("Interrupted; " + options.out + " is as it was before.");
+  }
+  const fs::path path = clip.finish();
+  const float median_ms = median(times_ms);
+  std::printf("%s: %zu frames, %.1f ms each (median)\n", path.string().c_str(), times_ms.size(), double(median_ms));
+  if (!options.json.empty()) {
+    const nlohmann::ordered_json document = {
+        {"clip", path.string()}, {"frames", times_ms.size()}, {"ms", {{"total", median_ms}}}};
+    const std::string text = document.dump(2) + "\n";
+    write_whole_file(options.json, text.data(), text.size());
+  }
+  return 0;
+}
+
+int render(const Options& options) {
+  if (options.views.empty() == options.path.empty()) {
+    throw std::runtime_error("Say what to render: --views with --capture for pictures, or --path for a clip.");
+  }
+  if (options.path.empty() ? options.is_timed_clip : options.repeat != 1 || options.no_alpha) {
+    throw std::runtime_error(options.path.empty() ? "--seconds and --fps are for clips: use them with --path."
+                                                  : "--repeat and --no-alpha are for pictures: use them with --views.");
+  }
+  if (!options.views.empty() && options.capture.empty()) {
+    throw std::runtime_error("--views are those of a capture: name its folder with --capture.");
+  }
+  catch_interrupts();
+  const maquette::Context context = open_context();
+  const maquette::Scene scene(context, options.scene);
+  std::optional<maquette::Capture> capture;
+  if (!options.capture.empty()) capture.emplace(context, options.capture);
+  maquette::SceneRenderer renderer = make_renderer(context, scene, options);
+  return options.path.empty() ? render_views(renderer, *capture, options)
+                              : render_clip(context, renderer, scene, capture ? &*capture : nullptr, options);
+}
+
+}  // namespace
+
+void add_scene_render_command(CLI::App& scene, int* exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = scene.add_subcommand("render", "Render a scene: pictures from given cameras, or a clip");
+  command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
+  command->add_option("-o,--out", options->out, "File of the clip (clip.mp4), or folder for the pictures")->required();
+  command
+      ->add_option("--path", options->path,
+                   "Path of the camera in a clip: `orbit` around the scene, or `through` the cameras of the capture")
+      ->check(CLI::IsMember({"orbit", "through"}));
+  command->add_option("--seconds", options->seconds, "Length of the clip")->check(CLI::Range(0.04, 600.0));
+  command->add_option("--fps", options->fps, "Frames a second of the clip")->check(CLI::Range(1.0, 240.0));
+  command->add_option("--capture", options->capture, "Folder that the scene was built from, for its cameras");
+  command->add_option("--views", options->views, "Cameras of the capture to render: held-out, all, or names,…");
+  command->add_option("--size", options->size, "Size of the pictures, as 640x480; default: that of the photo");
+  command->add_option(
+      "--bundle", options->bundle,
+      "Bundle that built the scene; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
+  command->add_option("--near", options->near_depth, "Do not draw points nearer than this, in scene units")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
+      ->check(CLI::Range(1, 64));
+  command->add_flag("--no-alpha", options->no_alpha, "Leave out the alpha channel");
+  command->add_option("--repeat", options->repeat, "Render each picture N times and report median times")
+      ->check(CLI::Range(1, 10000));
+  command->add_option("--without", options->without, "Switch off an optimisation, to measure it: culling, tiles")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"culling", "tiles"}));
+  command->add_option("--json", options->json, "Write times and counts to this file");
+  command->callback([=] {
+    options->is_timed_clip = command->count("--seconds") + command->count("--fps") > 0;
+    *exit_code = render(*options);
+  });
+}

@@ -95,7 +95,7 @@ def lost_camera(tmp_path_factory):
 
 def test_a_camera_that_is_lost_and_comes_back_goes_on(lost_camera):
     shown = lost_camera
-    assert shown.report["frames"] == 500
+    assert shown.report["frames"] == 100
     assert shown.report["problem"] == ""
     states = shown.report["states"]
     assert "running" in states[states.index("reconnecting") :]

@@ -285,18 +285,19 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options
   Options options;
   app.add_option("source", options.sources,
                  "Images, clips or URIs, measured in turns; default: one, four and no people of stub:people");
-  app.add_option("--json", options.json, "Also write everything to this file (docs/formats.md, \"Benchmarks\")");
+  app.add_option("--json", options.json, "Also write all figures to this file (docs/formats.md, \"Benchmarks\")");
   add_model_options(app, options.model);
   app.add_option("--warm-up", options.warm_up, "Frames of each source that are not counted (default 10)")
       ->check(CLI::Range(0, 100000));
-  app.add_option("--runs", options.runs, "Frames of each source, at least (default 100)")
+  app.add_option("--runs", options.runs, "Minimum number of frames of each source (default 100)")
       ->check(CLI::Range(1, 1000000));
-  app.add_option("--seconds", options.seconds, "Seconds of each source, at least (default 3)")
+  app.add_option("--seconds", options.seconds, "Minimum time of each source in seconds (default 3)")
       ->check(CLI::Range(0.0, 86400.0));
   app.footer(
-      "A frame is counted from asking the source for it to having the result. CPU ms is what all threads worked for\n"
-      "one frame: the nearest to its energy that every machine can tell. Compare figures of one run; times that\n"
-      "should not be believed (others busy, few runs, wide spread) are named.\n\n"
+      "The time of a frame is from acquiring it to its result. CPU ms is the time of all threads for one frame, the "
+      "best\n"
+      "estimate of energy that every machine can give. Compare only figures of the same run. Times that cannot be\n"
+      "trusted (busy machine, few runs, wide spread) are marked.\n\n"
       "Examples:\n"
       "  maquette bench\n"
       "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json");

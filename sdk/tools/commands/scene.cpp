@@ -27,7 +27,7 @@ int show(const InfoOptions& options) {
   std::printf("%s: %.1f MB\n", options.scene.c_str(), double(bytes) / 1e6);
   std::printf("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count,
               double(bytes) / double(info.point_count), info.block_count);
-  std::printf("  looks      %" PRIu64 " (%.0f %%) depend on the side, the rest are constant; %d bits a number\n",
+  std::printf("  view       %" PRIu64 " points (%.0f %%) are view-dependent; descriptors have %d bits a number\n",
               info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
               info.coefficient_bits);
   std::printf("  box        %g %g %g to %g %g %g\n", info.bounds_min[0], info.bounds_min[1], info.bounds_min[2],
@@ -45,8 +45,7 @@ int show(const InfoOptions& options) {
 std::string scene_bundle_or_default(const std::string& given) {
   const std::string bundle = given.empty() ? default_scene_bundle() : given;
   if (bundle.empty()) {
-    throw std::runtime_error(
-        "No bundle of scene networks was found; name its folder with --bundle or MAQ_SCENE_BUNDLE.");
+    throw std::runtime_error("No scene bundle was found; name its folder with --bundle or MAQ_SCENE_BUNDLE.");
   }
   return bundle;
 }
@@ -65,16 +64,17 @@ nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_
 }
 
 void add_scene_command(CLI::App& app, int* exit_code) {
-  CLI::App* scene = app.add_subcommand("scene", "Places from photos: build one, look at it from new sides");
+  CLI::App* scene = app.add_subcommand(
+      "scene", "Build a scene from posed photos and a point cloud, and render it from new viewpoints");
   scene->require_subcommand(1);
   scene->footer(
-      "From a folder of photos with cameras and a cloud (COLMAP, or transforms.json with a PLY) to a clip:\n\n"
+      "From a folder with photos, cameras and a point cloud (COLMAP, or transforms.json with a PLY file) to a clip:\n\n"
       "  maquette scene build my-place --out my-place.maqs\n"
       "  maquette scene render my-place.maqs --capture my-place --path through --out clip.mp4");
   add_scene_build_command(*scene, exit_code);
   add_scene_render_command(*scene, exit_code);
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = scene->add_subcommand("info", "What is in a scene file; checks all of it");
+  CLI::App* command = scene->add_subcommand("info", "Check a scene file and print what it contains");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
   command->add_option("--json", options->json, "Also write the numbers to this file");
   command->callback([=] { *exit_code = show(*options); });

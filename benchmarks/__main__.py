@@ -26,7 +26,7 @@ from benchmarks import cameras, frame_time, gates, report, scenes
 from export.evaluation.maquette_api import LIBRARY, MaquetteError
 from export.shards import read_images, shard_paths
 
-SCHEMA = "maquette-benchmark-3"
+SCHEMA = "maquette-benchmark-4"
 PARTS = ("frames", "sweep", "agreement", "peers", "cameras", "scenes")
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
@@ -186,7 +186,7 @@ def peers_part(options: argparse.Namespace, float_bundle: Path) -> tuple[dict, d
     has_amx = "amx_bf16" in Path("/proc/cpuinfo").read_text().split()
     subprocess.run([*(["scripts/with-amx.sh"] if has_amx else []), *command], check=True)
     document = json.loads(path.read_text())
-    figures, missing = {"roofline_share": document["roofline"]["share"]}, {}
+    figures, missing = {"roofline_fraction": document["roofline"]["fraction"]}, {}
     for name, runtime, precision in PEER_RATIOS:
         row = next(r for r in document["runtimes"] if (r["name"], r["precision"]) == (runtime, precision))
         if row["ours_int8_ratio"] is None:

@@ -42,18 +42,18 @@ def section(measured: dict) -> tuple[str, list]:
 
 
 def delivery_rows(said: dict) -> list[list[str]]:
-    rows = [["camera", "size", "frames", "frames a second", "lost", "between two, ms (p50, p99)", "processor",
+    rows = [["camera", "size", "frames", "frames a second", "dropped", "between two, ms (p50, p99)", "processor",
              "allocations a frame"]]  # fmt: skip
     for camera, name in NAMES.items():
         if camera not in said:
             continue
         played, few, counted = said[camera], said.get(f"{camera}_few"), said.get(f"{camera}_allocations")
         between = played["interval_ms"]
-        share = f"{cameras.processor_share(played, few):.2%} of the core" if few else ""
+        share = f"{cameras.cpu_utilization(played, few):.2%} of the core" if few else ""
         allocated = f"{counted['allocations'] / counted['frames']:g}" if counted else ""
         size = f"{played['width_px']} x {played['height_px']}"
         intervals = f"{between['median']:.1f}, {between['p99']:.1f}"
-        delivered = [str(played["frames"]), f"{played['fps']:.2f}", str(played["drops"]), intervals]
+        delivered = [str(played["frames"]), f"{played['fps']:.2f}", str(played["dropped_frames"]), intervals]
         rows.append([name, size, *delivered, share, allocated])
     return rows
 
@@ -72,7 +72,7 @@ def time_rows(measured: dict) -> list[list[str]]:
             "ms", [a["p99"] for a in ages])  # fmt: skip
     for kind, name in (("recording", "recording"), ("stub", "stub, which draws")):
         add("processor time of capture, of a core", f"{name}, 640 x 480 at 30",
-            [100 * run["processor_share"] for run in host[kind]], "%")  # fmt: skip
+            [100 * run["cpu_utilization"] for run in host[kind]], "%")  # fmt: skip
     add("closing a source whose device hangs", "stub", host["closing"], "ms")
     for place, found in (("stub", host["outages"]), (USB, said.get("outages", []))):
         if not found:

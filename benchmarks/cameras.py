@@ -26,7 +26,7 @@ from benchmarks.frame_time import MAX_OTHERS, OthersFraction
 
 HOST_FIGURES = ("camera_age_ms", "camera_processor_percent", "camera_close_ms", "camera_fault_noticed_ms",
                 "camera_fault_replug_ms", "camera_allocations")  # fmt: skip
-GUEST_FIGURES = ("camera_vivid_lost", "camera_vivid_fps", "camera_uvc_lost", "camera_uvc_fps",
+GUEST_FIGURES = ("camera_vivid_dropped_frames", "camera_vivid_fps", "camera_uvc_dropped_frames", "camera_uvc_fps",
                  "camera_v4l2_allocations", "camera_noticed_ms", "camera_replug_ms", "camera_reopen_ms")  # fmt: skip
 FIGURES = HOST_FIGURES + GUEST_FIGURES
 COUNTER = Path("benchmarks/count_allocations.c")
@@ -59,9 +59,9 @@ def play(uri: str, *arguments: str, **environment: str) -> dict:
         return json.loads(path.read_text())
 
 
-def processor_share(longer: dict, shorter: dict) -> float:
+def cpu_utilization(longer: dict, shorter: dict) -> float:
     """Of a core, without what starting and ending take: from two runs of the same that differ in length."""
-    spent_s = [run["processor_share"] * run["wall_seconds"] for run in (longer, shorter)]
+    spent_s = [run["cpu_utilization"] * run["wall_seconds"] for run in (longer, shorter)]
     return (spent_s[0] - spent_s[1]) / (longer["wall_seconds"] - shorter["wall_seconds"])
 
 
@@ -70,10 +70,10 @@ def outages(played: dict, cycles: list[dict]) -> list[Outage]:
 
     Raises ValueError when the source did not notice, or did not come back, as often.
     """
-    events = [(event["state"], played["begin_monotonic_s"] + event["at_s"], event) for event in played["events"]]
+    events = [(event["state"], played["start_monotonic_s"] + event["at_s"], event) for event in played["events"]]
     lost = [at_s for state, at_s, _ in events if state == "lost"]
     first = [at_s + event["before_next_frame_s"] for state, at_s, event in events
-             if state == "back" and "before_next_frame_s" in event]  # fmt: skip
+             if state == "reconnected" and "before_next_frame_s" in event]  # fmt: skip
     if not len(lost) == len(first) == len(cycles):
         raise ValueError(
             f"of {len(cycles)} times that the camera was unplugged {len(lost)} were noticed, and after {len(first)} it "
@@ -91,7 +91,7 @@ def fault_outage(absence_s: float) -> Outage:
     both are too long by that."""
     uri = f"{STUB}&unplug={absence_s:g}s@{UNPLUG_AT_S:g}s"
     played = play(uri, "--seconds", str(UNPLUG_AT_S + absence_s + 1))
-    begin_s = played["begin_monotonic_s"]
+    begin_s = played["start_monotonic_s"]
     unplugged_s, back_s = begin_s + UNPLUG_AT_S, begin_s + UNPLUG_AT_S + absence_s
     return outages(played, [{"unplugged_s": unplugged_s, "plugged_in_s": back_s, "appeared_s": back_s}])[0]
 
@@ -107,7 +107,7 @@ def count_allocations(folder: Path) -> dict:
 
 
 def measure_host(quick: bool) -> dict:
-    """Runs of each kind, in turns: lists by name."""
+    """Runs of each kind, alternately: lists by name."""
     rounds = 1 if quick else 3
     few, many = ("15", "60") if quick else ("30", "270")
     measured: dict[str, list] = {"stub": [], "recording": [], "closing": [], "outages": []}
@@ -120,8 +120,8 @@ def measure_host(quick: bool) -> dict:
         for k in tqdm(range(rounds), desc="cameras", unit="round", disable=None):
             for kind, uri in (("stub", STUB), ("recording", f"rec:{recording}?live=1&loop=1")):
                 shorter, longer = play(uri, "--frames", few), play(uri, "--frames", many)
-                measured[kind].append({"age_ms": longer["age_ms"], "lost": longer["drops"],
-                                       "processor_share": processor_share(longer, shorter)})  # fmt: skip
+                measured[kind].append({"age_ms": longer["age_ms"], "dropped_frames": longer["dropped_frames"],
+                                       "cpu_utilization": cpu_utilization(longer, shorter)})  # fmt: skip
             measured["closing"].append(play(f"{STUB}&hang=5s@1s", "--seconds", "2")["close_ms"])
             measured["outages"].append(vars(fault_outage(ABSENCES_S[k])))
         measured["allocations"] = count_allocations(folder)
@@ -133,7 +133,7 @@ def host_figures(measured: dict) -> dict[str, float]:
     counted = measured["allocations"]
     return {
         "camera_age_ms": statistics.median(run["age_ms"]["median"] for run in measured["stub"]),
-        "camera_processor_percent": 100 * statistics.median(run["processor_share"] for run in measured["recording"]),
+        "camera_processor_percent": 100 * statistics.median(run["cpu_utilization"] for run in measured["recording"]),
         "camera_close_ms": statistics.median(measured["closing"]),
         "camera_fault_noticed_ms": statistics.median(outage["noticed_ms"] for outage in measured["outages"]),
         "camera_fault_replug_ms": statistics.median(outage["replug_ms"] for outage in measured["outages"]),
@@ -180,7 +180,7 @@ def guest_figures(said: dict, frames: int, why: str) -> tuple[dict[str, float], 
     for camera in ("vivid", "uvc"):
         played = said.get(camera)
         if played is not None and played["frames"] == frames:
-            figures[f"camera_{camera}_lost"] = played["drops"]
+            figures[f"camera_{camera}_dropped_frames"] = played["dropped_frames"]
             figures[f"camera_{camera}_fps"] = played["fps"]
     counts = [said[name] for name in ("vivid_allocations", "uvc_allocations") if name in said]
     if len(counts) == 2:
@@ -199,5 +199,5 @@ def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float
     found, missing = guest_figures(said, frames, why)
     figures = {name: round(value, 4) for name, value in (host_figures(host) | found).items()}
     others = host["others_fraction"]
-    doubts = [f"other processes had {others:.0%} of the processor (cameras)"] if others > MAX_OTHERS else []
-    return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "doubts": doubts}, figures, missing
+    warnings = [f"other processes used {others:.0%} of the CPU (cameras)"] if others > MAX_OTHERS else []
+    return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "warnings": warnings}, figures, missing

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 MAX_DIFFERENCE = 0.05
-RATIOS = ("time_by_openvino_int8", "time_by_pytorch_fp32", "roofline_share")
+RATIOS = ("time_by_openvino_int8", "time_by_pytorch_fp32", "roofline_fraction")
 
 
 def differences(first: dict[str, float], second: dict[str, float]) -> dict[str, float]:

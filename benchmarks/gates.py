@@ -46,16 +46,16 @@ def check(
         name = gate["figure"]
         if only is not None and name not in only:
             continue
-        if ("at_least" in gate) == ("at_most" in gate):
-            raise ValueError(f"{targets}: {name} needs either at_least or at_most")
-        least = "at_least" in gate
-        bound, stretch, sign = gate["at_least" if least else "at_most"], gate["stretch"], "≥" if least else "≤"
+        if ("min" in gate) == ("max" in gate):
+            raise ValueError(f"{targets}: {name} needs either min or max")
+        is_min = "min" in gate
+        bound, stretch, sign = gate["min" if is_min else "max"], gate["stretch"], "≥" if is_min else "≤"
         state, why, value = "not measured", missing.get(name, ""), figures.get(name)
         wanted = document["machine"][gate["machine"]] if "machine" in gate else None
         if wanted and not same_machine(machine, wanted):
             why = f"the gate is for a {wanted['says']}"
         elif value is not None:
-            reached = [value >= limit if least else value <= limit for limit in (bound, stretch)]
+            reached = [value >= limit if is_min else value <= limit for limit in (bound, stretch)]
             state = "stretch" if reached[1] else "met" if reached[0] else "missed"
         elif not why:
             raise ValueError(f"{targets}: no figure is called {name}")

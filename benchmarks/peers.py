@@ -1,9 +1,9 @@
-"""The same graphs in other runtimes, in turns: how fast is ours beside them?
+"""The same graphs in other runtimes, measured alternately: how fast is ours beside them?
 
     python -m benchmarks.peers            writes build/benchmarks/peers.json
 
 Each graph gets what it sees on a photograph of one person (640 x 480, the bundle's input size). All use the same
-number of threads and fixed sizes, and take turns round by round; a figure is the median over rounds.
+number of threads and fixed sizes, and are measured alternately, round by round; a figure is the median over rounds.
 """
 
 from __future__ import annotations
@@ -237,7 +237,7 @@ def compare_outputs(peers: list[Peer]) -> None:
             peer.runs = {}
 
 
-def time_in_turns(peers: list[Peer], rounds: int, block: int) -> None:
+def time_alternately(peers: list[Peer], rounds: int, block: int) -> None:
     """Fills `ms`. In each round every runtime runs each graph once to wake up, then `block` times; the block's median
     counts."""
     times: dict[tuple[int, str], list[float]] = {}
@@ -265,7 +265,7 @@ def measure(
     feeds = feeds_of(open_bundle(int8), four_by_three())
     peers = prepare(int8, float32, checkpoint, feeds, threads)
     compare_outputs(peers)
-    time_in_turns(peers, rounds, block)
+    time_alternately(peers, rounds, block)
     ours = {peer.precision: peer.total_ms for peer in peers[:2]}
     rows = []
     for peer in peers:
@@ -280,7 +280,7 @@ def measure(
 
 
 def print_table(document: dict) -> None:
-    table = Table(title="Milliseconds a graph, same inputs, in turns", title_justify="left")
+    table = Table(title="Milliseconds per graph: same inputs, runtimes measured alternately", title_justify="left")
     for column in ("runtime", *GRAPHS, "all", "int8 Maquette by it"):
         table.add_column(column, justify="left" if column == "runtime" else "right")
     for row in document["runtimes"]:
@@ -307,7 +307,7 @@ def main(argv: list[str] | None = None) -> int:
     line = document["roofline"]
     peaks = [line[name] / 1e9 for name in ("float32_macs_s", "int8_macs_s", "bytes_s")]
     print("Peak {:.0f} (float32), {:.0f} (int8) billion multiply-adds a second, {:.0f} GB/s".format(*peaks))
-    print(f"Share of that roofline: {line['share']:.0%}")
+    print(f"Fraction of that roofline: {line['fraction']:.0%}")
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(document, indent=1) + "\n")
     print(f"Written: {options.out}")

@@ -149,9 +149,9 @@ def sweep_section(sweep: list[dict]) -> Section:
         rows.append([row["setting"], *figures, "●" if k in front else ""])
     return "Error against run time", [
         ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
-        "Rendered people that no training saw; all settings took turns on the same pictures. AP by GPS: average "
-        "precision by geodesic point similarity (1 is perfect). With key frames the picture moves by 1 % of its "
-        "width a frame; the error is that of the last frame before the next key frame.",
+        "Rendered people that no training saw; all settings measured alternately on the same pictures. AP by GPS: "
+        "average precision by geodesic point similarity (1 is perfect). With key frames the picture moves by 1 % of "
+        "its width a frame; the error is that of the last frame before the next key frame.",
         rows,
     ]
 
@@ -168,7 +168,7 @@ def frames_section(frames: dict) -> Section:
         ("scaling.png", "Time against people in view, pixels of the source, and the network's input."),
         ("stages.png", "Where the time goes."),
         "From asking the source for a picture to having the result; walking people of the stub source. "
-        "CPU ms: work of all threads a frame, the nearest to energy that every machine can tell.",
+        "CPU ms: CPU time of all threads for a frame, a measure of its energy on every machine.",
         rows,
     ]
 
@@ -187,14 +187,14 @@ def peers_section(peers: dict) -> Section:
     line_rows = [["graph", "million multiply-adds", "of these int8", "min. ms", "fraction reached"]]
     for name, graph in line["graphs"].items():
         line_rows.append([name, f"{graph['macs'] / 1e6:.1f}", f"{graph['int8_macs'] / max(graph['macs'], 1):.0%}",
-                          f"{graph['min_ms']:.2f}", f"{graph['share']:.0%}"])  # fmt: skip
+                          f"{graph['min_ms']:.2f}", f"{graph['fraction']:.0%}"])  # fmt: skip
     return "Other runtimes on the same graphs", [
         ("runtimes.png", "The five networks for a picture with one person."),
         rows,
         f"Roofline: this machine reached {line['float32_macs_s'] / 1e9:.0f} billion float32 and "
         f"{line['int8_macs_s'] / 1e9:.0f} billion int8 multiply-adds a second in large matrix products, and copied "
         f"{line['bytes_s'] / 1e9:.0f} GB/s within its caches. The minimum time is that of each layer by its numbers' "
-        f"rate or its bytes, whichever is larger; the networks reach {line['share']:.0%} of it.",
+        f"rate or its bytes, whichever is larger; the networks reach {line['fraction']:.0%} of it.",
         line_rows,
     ]
 
@@ -217,22 +217,22 @@ SECTIONS = {
 }
 
 
-def doubts_of(document: dict) -> set[str]:
-    """What makes the measured parts doubtful, as they say themselves."""
+def warnings_of(document: dict) -> set[str]:
+    """Why figures of the measured parts are unreliable, as the parts say."""
     frames = document.get("frames", {})
     runs = [frames[name] for name in ("people", "sizes", "one_thread") if name in frames]
-    found = {text for run in runs for text in run["doubts"]}
-    found |= {text for run in runs for case in run["cases"] for text in case["doubts"]}
-    return found.union(*(document[name]["doubts"] for name in ("cameras", "scenes") if name in document))
+    found = {text for run in runs for text in run["warnings"]}
+    found |= {text for run in runs for case in run["cases"] for text in case["warnings"]}
+    return found.union(*(document[name]["warnings"] for name in ("cameras", "scenes") if name in document))
 
 
 def circumstances(document: dict) -> list[str]:
-    machine, doubts = document["machine"], doubts_of(document)
+    machine, warnings = document["machine"], warnings_of(document)
     return [
         f"Measured on: {machine['processor']}, {machine['cores']} cores, {machine['memory_mib'] / 1024:.0f} GiB, "
         f"{machine['system']}; instruction sets: {', '.join(machine['instruction_sets'])}.",
         *(["A quick run, to see that it works: do not quote it."] if document["quick"] else []),
-        *([f"Doubts that the measurement itself has: {'; '.join(sorted(doubts))}."] if doubts else []),
+        *([f"Warnings of the measurement: {'; '.join(sorted(warnings))}."] if warnings else []),
     ]
 
 

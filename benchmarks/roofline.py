@@ -1,4 +1,4 @@
-"""What this machine could do at most, measured, and the share of it that the networks reach.
+"""The maximum that this machine can do, measured, and the fraction of it that the networks reach.
 
 Each convolution and matrix product takes at least its multiply-adds over the peak rate of its numbers, and at least its
 bytes over the bandwidth; the larger of the two, summed over a graph, is the time that no runtime can beat on this
@@ -101,7 +101,7 @@ def measure(work: dict[str, list[Work]], ms: dict[str, float], threads: int = 2)
             "int8_macs": sum(w.macs for w in operations if w.integer),
             "bytes": sum(w.bytes for w in operations),
             "min_ms": round(least, 4),
-            "share": round(least / ms[name], 4),
+            "fraction": round(least / ms[name], 4),
         }
     least = sum(graph["min_ms"] for graph in graphs.values())
-    return {"threads": threads, **rates, "graphs": graphs, "share": round(least / sum(ms.values()), 4)}
+    return {"threads": threads, **rates, "graphs": graphs, "fraction": round(least / sum(ms.values()), 4)}

@@ -1,8 +1,8 @@
 """Drives `maquette scene build`, `render` and `info`, and checks what they say.
 
-What is read of their JSON: of build `cloud_points`, `points`, `varying`, `bytes`, `seconds` (a table: `total` and each
-stage) and `peak_memory_mib`; of render `views`, a list of `name` and `ms` (a table: `total`, and `project`, `shade`,
-`refine`, `turn`; medians over the repeats). Files are written by the commands themselves.
+What is read of their JSON: of build `cloud_points`, `points`, `view_dependent_points`, `bytes`, `seconds` (`total` and
+each stage) and `peak_memory_mib`; of render `views`, a list of `name` and `ms` (a table: `total`, and `project`,
+`shade`, `refine`, `resample`; medians over the repeats). Files are written by the commands themselves.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks import frame_time
 
-STAGES = ("project", "shade", "refine", "turn")
+STAGES = ("project", "shade", "refine", "resample")
 LONGEST_S = 900  # of one command: then it hangs
 
 
@@ -31,12 +31,12 @@ class SceneCommandError(RuntimeError):
 
 @dataclass(frozen=True)
 class Built:
-    """cloud_points: that were looked at; points: of them in the file; varying: of these, whose look depends on the
-    side. seconds: by stage, with `total`. wall_s: of the whole process."""
+    """cloud_points: that were read; points: of them in the file; view_dependent_points: of these, whose descriptor
+    depends on the view. seconds: by stage, with `total`. wall_s: of the whole process."""
 
     cloud_points: int
     points: int
-    varying: int
+    view_dependent_points: int
     bytes: int
     seconds: dict[str, float]
     peak_memory_mb: float
@@ -58,11 +58,11 @@ def build(capture: Path, scene: Path, networks: Path, *options: str) -> Built:
     said, wall_s = _run("build", str(capture), "--out", str(scene), "--bundle", str(networks), *options)
     try:
         seconds = {str(stage): _number(value) for stage, value in said["seconds"].items()}
-        names = ("cloud_points", "points", "varying", "bytes")
-        cloud, points, varying, size = (int(_number(said[name])) for name in names)
-        found = Built(cloud, points, varying, size, seconds, _number(said["peak_memory_mib"]) * 1.048576, wall_s)
-        if "total" not in seconds or not 0 <= varying <= points <= cloud or not points or not scene.exists():
-            raise ValueError(f"{points} of {cloud} points, {varying} varying, stages {', '.join(seconds)}")
+        names = ("cloud_points", "points", "view_dependent_points", "bytes")
+        cloud, points, view_dependent, size = (int(_number(said[name])) for name in names)
+        found = Built(cloud, points, view_dependent, size, seconds, _number(said["peak_memory_mib"]) * 1.048576, wall_s)
+        if "total" not in seconds or not 0 <= view_dependent <= points <= cloud or not points or not scene.exists():
+            raise ValueError(f"{view_dependent} of {points} of {cloud} points, stages {', '.join(seconds)}")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SceneCommandError(f"maquette scene build: its JSON is not what it should be ({error!r})") from None
     return found

@@ -195,7 +195,7 @@ class Place:
             else:
                 said = scene_command.build(self.folder, scene, networks, *first.build)
                 built = {"build_s": said.wall_s, "cloud_points": said.cloud_points, "points": said.points,
-                         "varying": said.varying, "bytes": said.bytes,
+                         "view_dependent_points": said.view_dependent_points, "bytes": said.bytes,
                          "bytes_a_point": said.bytes / said.points, "modelling_mb": said.peak_memory_mb}  # fmt: skip
         except SceneCommandError as error:
             why = str(error)

@@ -19,7 +19,7 @@ def section(measured: dict) -> tuple[str, list]:
         f"out: {photos_of(rendered)} of {len(rendered)} rendered places that no training saw, {photos_of(real)} of "
         f"{len(real)} real ones."
     ]
-    parts += [f"Not as it should be: {'; '.join(measured['doubts'])}."] if measured["doubts"] else []
+    parts += [f"Warnings of the measurement: {'; '.join(measured['warnings'])}."] if measured["warnings"] else []
     if any(row["rendered"] for row in rows):
         parts += [
             (

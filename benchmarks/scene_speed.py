@@ -121,8 +121,8 @@ def place_cloud(place: Place) -> str:
 
 
 def built_row(asked: int, built: Built) -> dict:
-    return {"cloud": asked, "points": built.points, "varying": built.varying, "build_s": built.wall_s,
-            "stages_s": built.seconds, "peak_memory_mb": built.peak_memory_mb,
+    return {"cloud": asked, "points": built.points, "view_dependent_points": built.view_dependent_points,
+            "build_s": built.wall_s, "stages_s": built.seconds, "peak_memory_mb": built.peak_memory_mb,
             "bytes_a_point": built.bytes / built.points}  # fmt: skip
 
 

@@ -62,11 +62,11 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     rows, places, shown = scene_quality.measure(few, wanted, perceptual, quick)
     speed, why = scene_speed.measure(given.places, given.bundles[SHIPPED], threads, quick)
     fraction = others.now()
-    doubts = doubts_of(places, perceptual is not None)
+    warnings = warnings_of(places, perceptual is not None)
     if fraction > MAX_OTHERS:
-        doubts.append(f"other processes had {fraction:.0%} of the processor (scenes)")
+        warnings.append(f"other processes used {fraction:.0%} of the CPU (scenes)")
     sheet = scene_pictures.write_sheet(shown, rows, folder)
-    document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "doubts": doubts,
+    document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "warnings": warnings,
                 "sheet": sheet.name if sheet else ""}  # fmt: skip
     figures, missing = quality_figures(rows, given)
     found, lost = scene_speed.figures_of(speed) if speed else ({}, {})
@@ -75,16 +75,16 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     return document, figures, {name: reason for name, reason in missing.items() if name not in figures}
 
 
-def doubts_of(places: list[dict], has_distance: bool) -> list[str]:
+def warnings_of(places: list[dict], has_distance: bool) -> list[str]:
     """What this run should have had and has not."""
-    doubts = [f"{place['name']} was left out: {place['missing']}" for place in places if "missing" in place]
+    warnings = [f"{place['name']} was left out: {place['missing']}" for place in places if "missing" in place]
     for real, wanted, kind in ((False, MIN_PLACES, "rendered"), (True, MIN_REAL, "real")):
         count = sum(place["real"] == real and "missing" not in place for place in places)
         if count < wanted:
-            doubts.append(f"{count} {kind} places, {wanted} are wanted")
+            warnings.append(f"{count} {kind} places, {wanted} are wanted")
     if not has_distance:
-        doubts.append(f"no distance by features: {PERCEPTUAL} is not there (python -m export.teachers.backbone)")
-    return doubts
+        warnings.append(f"no distance by features: {PERCEPTUAL} is not there (python -m export.teachers.backbone)")
+    return warnings
 
 
 def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float], dict[str, str]]:

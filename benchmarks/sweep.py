@@ -129,7 +129,7 @@ def measure(
     threshold: float,
     threads: int = 2,
 ) -> list[Measured]:
-    """All settings on the same images, in turns of BLOCK images. The first image of a turn is not timed."""
+    """All settings on the same images, alternately, BLOCK images each. The first image of a block is not timed."""
     columns = [Column(setting, bundles[setting.bundle], threads) for setting in wanted]
     with tqdm(total=len(images) * len(columns), desc="error against run time", unit="image", disable=None) as progress:
         for start in range(0, len(images), BLOCK):

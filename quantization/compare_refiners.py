@@ -5,7 +5,7 @@
 
 Weights are random and so are the rasters: time does not depend on them. Each figure is the 10th percentile of many
 runs; `core ms` is processor time of a run with one thread, which others who use the machine disturb least. Candidates
-take turns, so that a busy minute does not hit one of them alone.
+are measured alternately, so that a busy minute does not hit one of them alone.
 """
 
 from __future__ import annotations

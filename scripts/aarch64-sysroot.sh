@@ -15,7 +15,7 @@ case "${1:-}" in
 esac
 
 packages=(libc6 libstdc++6 libgtest-dev libgmock-dev nlohmann-json3-dev libcli11-dev
-    libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libwebp-dev
+    libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev
     libturbojpeg0-dev libxxhash-dev)
 sysroot="$PWD/.deps/aarch64-sysroot"
 stamp="$sysroot/.ready"

@@ -41,7 +41,6 @@ needs_command npm npm                  # brings ONNX Runtime: headers, and the l
 needs_package nlohmann-json3-dev
 needs_package libcli11-dev
 for module in core imgproc imgcodecs videoio; do needs_package "libopencv-$module-dev"; done
-needs_package libwebp-dev
 needs_package libturbojpeg0-dev
 needs_package libxxhash-dev
 needs_package ca-certificates

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the native tests (release and asan builds; those of threads in the tsan build), the Python tests and those with
 # cameras in a virtual machine, where there can be one, two groups at a time, and closes with their sum:
-#   scripts/test.sh [GROUP...]      default: python asan camera-vm release tsan
+#   scripts/test.sh [GROUP...]      default: python asan camera-vm tsan release
 # Each group prints when it ends. Everything runs even when something before it failed; the exit status says whether
 # anything did.
 set -uo pipefail
@@ -38,10 +38,10 @@ case "${1:-}" in
     --group) group "$2"; exit ;;
     -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
 esac
-[ $# -gt 0 ] || set -- python asan camera-vm release tsan  # the longest first
+[ $# -gt 0 ] || set -- python asan camera-vm tsan release  # the longest first
 for name in "$@"; do
     case "$name" in
-        python | asan | camera-vm | release | tsan) ;;
+        python | asan | camera-vm | tsan | release) ;;
         *) sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
     esac
 done

@@ -13,27 +13,17 @@ namespace {
 constexpr int kMaxOutfitPx = 4096;
 // Between two frames, while the picture moves and while nothing happens.
 constexpr double kMovingS = 0.016, kIdleS = 0.25;
-
-// A path as a URI of the library, which says what is wrong with it.
-std::string uri_of(const std::string& path_or_uri) {
-  std::error_code error;
-  if (!fs::exists(path_or_uri, error) && path_or_uri.find(':') != std::string::npos) return path_or_uri;
-  std::string uri = "file:";
-  for (const char c : path_or_uri) uri += c == '?' ? "%3F" : c == '%' ? "%25" : std::string(1, c);
-  return uri;
-}
+constexpr float kArrowSpeed = 1.5f, kDragSpeed = 0.005f;  // radians a second, radians a unit of the window
 
 }  // namespace
 
 App::App(const Options& options)
     : options_(options),
-      headless_(options),
       window_("Maquette", options.width_px, options.height_px, !options.headless),
       painter_(window_),
       panel_(window_),
-      people_(context_, window_, painter_, options),
-      scene_(context_, window_, painter_, options),
-      shows_panel_(options.panel),
+      people_(context_, options, window_, painter_),
+      scene_(context_, options, window_, painter_),
       saver_(context_, options.out) {
   if (!options.texture.empty()) load_outfit(options.texture);
   open(options.source);
@@ -43,74 +33,42 @@ int App::run() {
   maquette::RgbaImage last;
   double before_s = monotonic_s();
   while (!window_.is_closing()) {
-    window_.wait(shows_scene_ && scene_.is_moving() ? kMovingS : kIdleS);
+    window_.wait(view_->is_moving() ? kMovingS : kIdleS);
     const double begin_s = monotonic_s();
     draw_frame(begin_s - before_s);
     before_s = begin_s;
-    const bool is_done = options_.headless && (shows_scene_ ? headless_.is_done(scene_) : headless_.is_done(people_));
+    const bool is_done = options_.headless && view_->act_alone();
     if (is_done) last = window_.read_pixels(window_.rect());
     window_.show();
-    headless_.add_frame(begin_s);
+    times_.add_frame(begin_s);
     if (is_done) window_.close();
   }
-  saver_.end_clip();
   window_.hide();  // before it waits for the threads
-  if (!options_.headless) return 0;
-  if (!options_.screenshot.empty() && !last.empty()) last.as_frame(context_).save(options_.screenshot);
-  std::puts(headless_.report(people_, shows_scene_ ? &scene_ : nullptr, window_).c_str());
-  const std::string failure = shows_scene_ ? headless_.failure(scene_) : headless_.failure(people_);
-  if (failure.empty()) return 0;
-  std::fprintf(stderr, "maquette-demo: %s\n", failure.c_str());
-  return 1;
+  return options_.headless ? report(last) : 0;
 }
 
 void App::draw_frame(double seconds) {
   take_drops();
   if (outfits_.take()) painter_.set_outfit(outfits_.front());
-  const bool has_people = people_.update(), has_scene = scene_.update();
-  has_new_image_ = shows_scene_ ? has_scene : has_people;
+  const bool has_new_image = view_->update();
   take_keys();
-  steer(float(std::min(0.1, seconds)));
+  const Rect all = window_.rect();
+  const int panel_px = shows_panel_ ? std::min(int(330 * window_.scale()), all.width / 2) : 0;
+  const Rect area = {0, 0, std::max(1, all.width - panel_px), all.height};
+  steer(float(std::min(0.1, seconds)), area);
   window_.begin_drawing();
-  draw();
+  view_->draw(area);
+  draw_message(area);
+  if (shows_panel_) perform(panel_.draw({all.width - panel_px, 0, panel_px, all.height}, *view_, saver_.has_clip()));
+  if (shows_help_) panel_.draw_help(&shows_help_);
   window_.end_drawing();
-  if (saver_.has_clip() && has_new_image_) saver_.add_to_clip(window_, image_rect());
-}
-
-void App::open(const std::string& path_or_uri) {
-  std::error_code error;
-  shows_scene_ = fs::is_directory(path_or_uri, error) || fs::path(path_or_uri).extension() == ".maqs";
-  people_.set_visible(!shows_scene_);
-  if (shows_scene_) return scene_.open(path_or_uri);
-  scene_.close();
-  saver_.forget_recording();
-  people_.open(path_or_uri == kFirstCamera ? path_or_uri : uri_of(path_or_uri));
-}
-
-void App::show_people() {
-  if (!people_.has_source()) return open(kFirstCamera);
-  shows_scene_ = false;
-  scene_.close();
-  people_.set_visible(true);
-}
-
-void App::load_outfit(const std::string& path) {
-  saver_.run([this, path] {
-    const auto frame = maquette::Source(context_, uri_of(path)).next();
-    if (!frame || std::max(frame->desc().width_px, frame->desc().height_px) > kMaxOutfitPx) {
-      return path + " cannot be worn: its sides must be up to " + std::to_string(kMaxOutfitPx) + " pixels.";
-    }
-    outfits_.back().copy_from(*frame);
-    outfits_.publish();
-    Window::wake();
-    return std::string();
-  });
+  if (has_new_image && saver_.takes_clip_images()) saver_.add_to_clip(window_.read_pixels(view_->image_rect()));
 }
 
 void App::take_drops() {
   for (const std::string& path : window_.take_drops()) {
     // In the try-on view a dropped picture is something to wear.
-    if (people_.view() == View::kTryOn && !shows_scene_) {
+    if (view_ == &people_ && people_.is_trying_on()) {
       load_outfit(path);
     } else {
       open(path);
@@ -123,7 +81,6 @@ void App::take_keys() {
     if (ImGui::GetIO().WantTextInput) continue;
     switch (key) {
       case GLFW_KEY_H: shows_panel_ = !shows_panel_; break;
-      case GLFW_KEY_X: perform(shows_scene_ ? Action::kLeaveScene : Action::kNone); break;
       case GLFW_KEY_F1: perform(Action::kHelp); break;
       case GLFW_KEY_F2: perform(Action::kSnapshot); break;
       case GLFW_KEY_F3: perform(Action::kClip); break;
@@ -131,53 +88,30 @@ void App::take_keys() {
       case GLFW_KEY_F6: ImGui::SetWindowFocus(ImGui::GetIO().NavActive ? nullptr : "panel"); break;
       case GLFW_KEY_F11: window_.toggle_full_screen(); break;
       case GLFW_KEY_ESCAPE: shows_help_ = false; break;
-      default:
-        people_.press(key);
-        if (shows_scene_) scene_.press(key);
+      default: perform(view_->press(key));
     }
   }
 }
 
-// Arrows, and the mouse where it was pressed.
-void App::steer(float seconds) {
+// By the arrows, and by the mouse where it was pressed.
+void App::steer(float seconds, const Rect& area) {
   const ImGuiIO& io = ImGui::GetIO();
   Steering steering;
   steering.seconds = seconds;
   steering.is_dragging = !io.WantCaptureMouse && ImGui::IsMouseDown(ImGuiMouseButton_Left);
   steering.has_begun = steering.is_dragging && ImGui::IsMouseClicked(ImGuiMouseButton_Left);
   steering.pointer_x = io.MousePos.x;
-  if (steering.is_dragging) steering.drag_x = io.MouseDelta.x, steering.drag_y = io.MouseDelta.y;
-  const float arrows = io.NavActive ? 0 : seconds * 1.5f;
-  steering.arrow_x = window_.held(GLFW_KEY_RIGHT, GLFW_KEY_LEFT) * arrows;
-  steering.arrow_y = window_.held(GLFW_KEY_DOWN, GLFW_KEY_UP) * arrows;
-  if (shows_scene_) {
-    scene_.steer(steering, area_);
-  } else {
-    people_.steer(steering);
-  }
-}
-
-void App::draw() {
-  const Rect all = window_.rect();
-  const int panel_px = shows_panel_ ? std::min(int(330 * window_.scale()), all.width / 2) : 0;
-  area_ = {0, 0, std::max(1, all.width - panel_px), all.height};
-  if (shows_scene_) {
-    scene_.draw(area_);
-  } else {
-    people_.draw(area_);
-  }
-  draw_message(area_);
-  if (shows_panel_) {
-    const auto draw_view = [&] { return shows_scene_ ? scene_.draw_panel() : people_.draw_panel(); };
-    perform(panel_.draw({all.width - panel_px, 0, panel_px, all.height}, draw_view, !shows_scene_,
-                        saver_.is_recording(), saver_.has_clip()));
-  }
-  if (shows_help_) panel_.draw_help(&shows_help_);
+  const ImVec2 drag = steering.is_dragging ? io.MouseDelta : ImVec2();
+  steering.drag_x = drag.x;
+  const float arrows = io.NavActive ? 0 : seconds * kArrowSpeed;
+  steering.right = window_.held(GLFW_KEY_RIGHT, GLFW_KEY_LEFT) * arrows + drag.x * kDragSpeed;
+  steering.down = window_.held(GLFW_KEY_DOWN, GLFW_KEY_UP) * arrows + drag.y * kDragSpeed;
+  view_->steer(steering, area);
 }
 
 // Over the picture: why there is none, what is being done, what was saved.
 void App::draw_message(const Rect& area) {
-  std::string text = shows_scene_ ? scene_.message() : people_.message();
+  std::string text = view_->message();
   const std::string saved = saver_.message();
   if (!saved.empty()) text += (text.empty() ? "" : "\n") + saved;
   if (text.empty()) return;
@@ -194,18 +128,49 @@ void App::perform(Action action) {
   switch (action) {
     case Action::kNone: break;
     case Action::kOpenCamera: open(kFirstCamera); break;
-    case Action::kLeaveScene: show_people(); break;
+    case Action::kLeaveScene: open(people_.has_source() ? "" : kFirstCamera); break;
     case Action::kHelp: shows_help_ = !shows_help_; break;
-    case Action::kSnapshot:
-      saver_.save_snapshot(window_.read_pixels(image_rect()), shows_scene_ ? nullptr : people_.frame().result);
-      break;
-    case Action::kClip:
-      if (saver_.has_clip()) {
-        saver_.end_clip();
-      } else {
-        saver_.begin_clip(image_rect(), shows_scene_ ? 25 : std::max(1.0, people_.frame().results_per_second));
-      }
-      break;
-    case Action::kRecord: people_.set_recording(saver_.toggle_recording()); break;
+    case Action::kSnapshot: saver_.save_snapshot(window_.read_pixels(view_->image_rect()), view_->result()); break;
+    case Action::kClip: saver_.has_clip() ? saver_.end_clip() : saver_.begin_clip(view_->images_per_second()); break;
+    case Action::kRecord: people_.toggle_recording(saver_); break;
   }
+}
+
+// "": the people that were shown before the scene.
+void App::open(const std::string& path_or_uri) {
+  std::error_code error;
+  const bool is_scene = fs::is_directory(path_or_uri, error) || fs::path(path_or_uri).extension() == ".maqs";
+  view_ = is_scene ? static_cast<MainView*>(&scene_) : &people_;
+  people_.set_visible(!is_scene);
+  scene_.open(is_scene ? path_or_uri : "");
+  if (!is_scene && !path_or_uri.empty()) people_.open(path_or_uri);
+}
+
+void App::load_outfit(const std::string& path) {
+  saver_.run([this, path] {
+    maq_source_config config = maquette::default_source_config();
+    config.max_side_px = kMaxOutfitPx;
+    const auto frame = maquette::Source(context_, maquette::source_uri(path), &config).next();
+    if (!frame) return path + " has no picture that could be worn.";
+    outfits_.back().copy_from(*frame);
+    outfits_.publish();
+    Window::wake();
+    return std::string();
+  });
+}
+
+// Of a run without a user, as one line of JSON. Returns the exit code.
+int App::report(const maquette::RgbaImage& screenshot) {
+  if (!options_.screenshot.empty() && !screenshot.empty()) screenshot.as_frame(context_).save(options_.screenshot);
+  nlohmann::ordered_json json;
+  people_.add_to_report(&json);
+  if (view_ != &people_) view_->add_to_report(&json);
+  const Rect all = window_.in_pixels(window_.rect());
+  json["window_px"] = {all.width, all.height};
+  json["opengl"] = window_.opengl();
+  json["ui"] = times_.report();
+  const std::string failure = view_->failure();
+  std::puts(json.dump().c_str());
+  if (!failure.empty()) std::fprintf(stderr, "maquette-demo: %s\n", failure.c_str());
+  return failure.empty() ? 0 : 1;
 }

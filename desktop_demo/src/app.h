@@ -1,47 +1,44 @@
 // Brings window, views, panel and saver together: routes what the user does, and draws one frame after the other.
 #pragma once
 
+#include <app/saver.h>
 #include <app/triple_buffer.h>
 #include <string>
 
-#include "headless.h"
 #include "options.h"
 #include "painter.h"
 #include "panel.h"
 #include "people_view.h"
-#include "saver.h"
 #include "scene_view.h"
+#include "ui_times.h"
 #include "window.h"
 
 class App {
  public:
-  explicit App(const Options& options);
-  int run();  // returns the exit code
+  explicit App(const Options& options);  // which must outlive this
+  int run();                             // returns the exit code
 
  private:
-  void open(const std::string& path_or_uri);
-  void show_people();
-  void load_outfit(const std::string& path);
   void draw_frame(double seconds);
   void take_drops();
   void take_keys();
-  void steer(float seconds);
-  void draw();
+  void steer(float seconds, const Rect& area);
   void draw_message(const Rect& area);
   void perform(Action action);
-  Rect image_rect() const { return shows_scene_ ? scene_.image_rect() : people_.image_rect(); }
+  void open(const std::string& path_or_uri);
+  void load_outfit(const std::string& path);
+  int report(const maquette::RgbaImage& screenshot);
 
-  const Options options_;
-  HeadlessRun headless_;
+  const Options& options_;
+  UiTimes times_;
   maquette::Context context_;
   Window window_;
   Painter painter_;
   Panel panel_;
   PeopleView people_;
   SceneView scene_;
-  bool shows_scene_ = false, shows_panel_, shows_help_ = false;
-  bool has_new_image_ = false;  // with this frame
-  Rect area_{0, 0, 1, 1};       // of the window, beside the panel
+  MainView* view_ = &people_;  // or &scene_
+  bool shows_panel_ = true, shows_help_ = false;
   maquette::TripleBuffer<maquette::RgbaImage> outfits_;
-  Saver saver_;  // last: its jobs use the others
+  maquette::Saver saver_;  // last: its jobs use the others
 };

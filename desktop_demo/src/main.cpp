@@ -1,5 +1,6 @@
 // maquette-demo: a person's own body surface, live from a webcam.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -50,7 +51,7 @@ int main(int argc, char** argv) try {
       ->check(CLI::ExistingDirectory);
   cli.add_option("--compare", compare, "Photo against rendering")
       ->capture_default_str()
-      ->check(CLI::IsMember({"none", "slider", "error"}));
+      ->check(CLI::IsMember(kCompareNames));
   cli.add_option("--bundle", options.bundle, "Folder of the dense pose networks");
   cli.add_option("--scene-bundle", options.scene_bundle, "Folder of the scene networks");
   cli.add_option("--threads", options.model.threads, "Of the networks; 0: all cores")->check(CLI::Range(0, 64));
@@ -62,20 +63,26 @@ int main(int argc, char** argv) try {
       ->check(CLI::ExistingDirectory);
   auto* const headless = cli.add_flag("--headless", options.headless, "No visible window; ends with a line of JSON");
   cli.add_option("--frames", options.frames, "End after so many frames")
+      ->capture_default_str()
       ->needs(headless)
       ->check(CLI::Range(1, 1000000));
   cli.add_option("--screenshot", options.screenshot, "PNG of the window at the end")->needs(headless);
   CLI11_PARSE(cli, argc, argv);
 
   options.view = View(std::find(kViewNames.begin(), kViewNames.end(), view) - kViewNames.begin());
-  options.compare = compare == "slider" ? Compare::kSlider : compare == "error" ? Compare::kError : Compare::kNone;
-  if (std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) != 2 || options.width_px < 64 ||
-      options.height_px < 64 || std::max(options.width_px, options.height_px) > 16384) {
-    throw std::runtime_error("--size " + size + " is no size of a window, such as 1280x800.");
+  options.compare = Compare(std::find(kCompareNames.begin(), kCompareNames.end(), compare) - kCompareNames.begin());
+  const bool is_size = std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
+  if (!is_size || std::min(options.width_px, options.height_px) < 64 ||
+      std::max(options.width_px, options.height_px) > 16384) {
+    throw std::runtime_error("--size " + size + " is no size of a window: write it as 1280x800, each 64 to 16384.");
   }
   options.model.bundle_path = options.bundle.c_str();
   options.model.detail = part_only ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
-  if (options.headless && options.frames == 0) options.frames = 30;
+  if (options.headless) {
+    options.live.real_time = false;
+    options.live.max_results = options.frames;
+    options.live.reconnect_ms = 4000;
+  }
   if (!path.empty()) options.source = path;
   return App(options).run();
 } catch (const std::exception& error) {

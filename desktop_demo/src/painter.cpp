@@ -9,7 +9,12 @@
 
 namespace {
 
-constexpr float kContoursPerChart = 8;  // of U, and as many of V
+// As the shaders call them, in the order of Painter::Texture.
+constexpr const char* kTextureNames[] = {"camera", "iuv", "outfit", "surface", "seen", "rendering", "photo"};
+
+// Each texture stays bound to a unit of its own; the first is Dear ImGui's.
+constexpr int kFirstUnit = 1;
+void activate(int texture) { glActiveTexture(unsigned(GL_TEXTURE0 + kFirstUnit + texture)); }
 
 unsigned compiled(unsigned kind, const char* source) {
   const unsigned shader = glCreateShader(kind);
@@ -33,13 +38,15 @@ unsigned linked(const char* vertex_source, const char* fragment_source) {
   glGetProgramiv(program, GL_LINK_STATUS, &fine);
   if (fine == 0) throw std::runtime_error("This OpenGL cannot link the shaders of the demo; update its driver.");
   glUseProgram(program);
-  for (int part = 0; part <= 24; ++part) {
+  float colours[25][3];
+  for (int part = 0; part < 25; ++part) {
     uint8_t rgb[3];
     maq_densepose_get_part_colour(part, rgb);
-    const std::string name = "part_colours[" + std::to_string(part) + "]";
-    glUniform3f(glGetUniformLocation(program, name.c_str()), float(rgb[0]) / 255, float(rgb[1]) / 255,
-                float(rgb[2]) / 255);
+    for (int channel = 0; channel < 3; ++channel) colours[part][channel] = float(rgb[channel]) / 255;
   }
+  glUniform3fv(glGetUniformLocation(program, "part_colours"), 25, colours[0]);
+  int unit = kFirstUnit;
+  for (const char* const name : kTextureNames) glUniform1i(glGetUniformLocation(program, name), unit++);
   return program;
 }
 
@@ -55,20 +62,14 @@ Painter::Painter(const Window& window) : window_(window) {
     const unsigned kind = layered ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D;
     const int filter = texture == kIuvTexture ? GL_NEAREST : GL_LINEAR;
     const int wrap = texture == kOutfitTexture ? GL_REPEAT : GL_CLAMP_TO_EDGE;
-    glActiveTexture(GL_TEXTURE0 + unsigned(texture));
+    activate(texture);
     glBindTexture(kind, textures_[texture]);
     glTexParameteri(kind, GL_TEXTURE_MIN_FILTER, filter);
     glTexParameteri(kind, GL_TEXTURE_MAG_FILTER, filter);
     glTexParameteri(kind, GL_TEXTURE_WRAP_S, wrap);
     glTexParameteri(kind, GL_TEXTURE_WRAP_T, wrap);
-    const uint8_t black[24 * 4] = {};
-    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    if (layered) {
-      glTexImage3D(kind, 0, GL_R8, 1, 1, 24, 0, GL_RED, GL_UNSIGNED_BYTE, black);
-    } else {
-      glTexImage2D(kind, 0, GL_RGBA8, 1, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, black);
-    }
   }
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   people_program_ = linked(kPictureVertexShader, kPeopleShader);
   scene_program_ = linked(kPictureVertexShader, kSceneShader);
   body_program_ = linked(kBodyVertexShader, kBodyShader);
@@ -85,30 +86,20 @@ Painter::~Painter() {
 
 int Painter::uniform(const char* name) const { return glGetUniformLocation(program_, name); }
 
-// Each texture has a unit of its own, so binding is naming.
-void Painter::bind(const char* name, Texture texture) const { glUniform1i(uniform(name), int(texture)); }
-
 void Painter::upload(Texture texture, int width_px, int height_px, const uint8_t* rgba) {
-  glActiveTexture(GL_TEXTURE0 + unsigned(texture));
-  // Dear ImGui binds its own to the first unit.
-  glBindTexture(GL_TEXTURE_2D, textures_[texture]);
-  int(&size)[2] = sizes_[texture];
-  if (size[0] != width_px || size[1] != height_px) {
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width_px, height_px, 0, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
-    size[0] = width_px, size[1] = height_px;
-  } else {
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_px, height_px, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
-  }
+  activate(texture);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width_px, height_px, 0, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
 }
 
-void Painter::set_frame(const MappedFrame& frame) {
+void Painter::set_frame(const maquette::MappedFrame& frame) {
+  constexpr int kSeenCells = maquette::MappedFrame::kSeenCells;
   const int width_px = frame.camera.width_px, height_px = frame.camera.height_px;
   upload(kCameraTexture, width_px, height_px, frame.camera.rgba.data());
   upload(kIuvTexture, width_px, height_px, frame.iuv.data());
   people_ = int(frame.people.size());
-  glActiveTexture(GL_TEXTURE0 + kSeenTexture);
-  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R8, int(MappedFrame::kSeenCells), int(MappedFrame::kSeenCells), 24, 0, GL_RED,
-               GL_UNSIGNED_BYTE, frame.seen.data());
+  activate(kSeenTexture);
+  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R8, kSeenCells, kSeenCells, 24, 0, GL_RED, GL_UNSIGNED_BYTE,
+               frame.seen.data());
 }
 
 void Painter::set_outfit(const maquette::RgbaImage& outfit) {
@@ -122,7 +113,7 @@ void Painter::set_scene(const maquette::RgbaImage& rendering, const maquette::Rg
 }
 
 void Painter::set_body(const maquette::DensePoseMesh& body) {
-  glActiveTexture(GL_TEXTURE0 + kSurfaceTexture);
+  activate(kSurfaceTexture);
   glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGB32F, body.nodes, body.nodes, 24, 0, GL_RGB, GL_FLOAT,
                body.filled_points_m.data());
   body_vertex_count_ = int(body.triangles.size());
@@ -144,29 +135,18 @@ void Painter::use(unsigned program, const Rect& rect) {
   glViewport(pixels.x, all.height - pixels.y - pixels.height, pixels.width, pixels.height);
   glBindVertexArray(no_vertices_);
   glDisable(GL_DEPTH_TEST);
-  glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_2D, textures_[0]);
 }
 
 void Painter::draw_people(View view, const Rect& rect) {
   use(people_program_, rect);
-  bind("camera", kCameraTexture);
-  bind("iuv", kIuvTexture);
-  bind("outfit", kOutfitTexture);
-  bind("surface", kSurfaceTexture);
   glUniform1i(uniform("view"), int(view));
   glUniform1i(uniform("people"), people_);
   glUniform1i(uniform("outfit_is_atlas"), outfit_is_atlas_ ? 1 : 0);
-  glUniform1f(uniform("lines"), kContoursPerChart);
-  glUniform1f(uniform("screen_px"),
-              float(window_.in_pixels(rect).width) / float(std::max(1, sizes_[kCameraTexture][0])));
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
 void Painter::draw_scene(const Rect& rect, float slider) {
   use(scene_program_, rect);
-  bind("rendering", kRenderingTexture);
-  bind("photo", kPhotoTexture);
   glUniform1f(uniform("slider"), slider);
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
@@ -177,7 +157,6 @@ void Painter::draw_body(const Rect& rect, float yaw, float pitch) {
   glEnable(GL_DEPTH_TEST);
   glClear(GL_DEPTH_BUFFER_BIT);
   glBindVertexArray(body_vertices_);
-  bind("seen", kSeenTexture);
   // The body stands on z = 0, faces -y and is under 2 m tall and wide; seen from far away.
   const float eye[] = {std::sin(yaw) * std::cos(pitch), -std::cos(yaw) * std::cos(pitch), std::sin(pitch)};
   const float right[] = {std::cos(yaw), std::sin(yaw), 0};

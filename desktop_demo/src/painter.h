@@ -1,9 +1,9 @@
 // Draws pictures of people, of scenes and of the body into the window, from textures that it keeps.
 #pragma once
 
+#include <app/mapped_frame.h>
 #include <maquette/densepose_mesh.hpp>
 
-#include "mapped_frame.h"
 #include "options.h"
 #include "window.h"
 
@@ -12,7 +12,7 @@ class Painter {
   explicit Painter(const Window& window);
   ~Painter();
 
-  void set_frame(const MappedFrame& frame);
+  void set_frame(const maquette::MappedFrame& frame);
   // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any picture, which is
   // repeated over the body's front and back.
   void set_outfit(const maquette::RgbaImage& outfit);
@@ -38,13 +38,11 @@ class Painter {
   };
   void upload(Texture texture, int width_px, int height_px, const uint8_t* rgba);
   void use(unsigned program, const Rect& rect);
-  int uniform(const char* name) const;
-  void bind(const char* uniform, Texture texture) const;
+  int uniform(const char* name) const;  // of the program in use
 
   const Window& window_;
   unsigned people_program_ = 0, scene_program_ = 0, body_program_ = 0, program_ = 0;
   unsigned textures_[kTextureCount] = {};
-  int sizes_[kTextureCount][2] = {};
   unsigned no_vertices_ = 0, body_vertices_ = 0, body_buffer_ = 0;
   int body_vertex_count_ = 0, people_ = 0;
   bool outfit_is_atlas_ = false;

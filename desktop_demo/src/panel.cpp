@@ -1,36 +1,15 @@
 #include "panel.h"
 
 #include <imgui.h>
-#include <sys/resource.h>
-#include <unistd.h>
-#include <fstream>
 #include <thread>
 
-namespace {
-
-double process_cpu_s() {
-  rusage used{};
-  getrusage(RUSAGE_SELF, &used);
-  const auto seconds = [](const timeval& time) { return double(time.tv_sec) + double(time.tv_usec) * 1e-6; };
-  return seconds(used.ru_utime) + seconds(used.ru_stime);
-}
-
-double process_memory_mb() {
-  long pages = 0, resident = 0;
-  std::ifstream("/proc/self/statm") >> pages >> resident;
-  return double(resident) * double(sysconf(_SC_PAGESIZE)) / 1e6;
-}
-
-}  // namespace
-
-Action Panel::draw(const Rect& rect, const std::function<Action()>& draw_view, bool can_record, bool is_recording,
-                   bool has_clip) {
+Action Panel::draw(const Rect& rect, MainView& view, bool has_clip) {
   ImGui::SetNextWindowPos({float(rect.x), float(rect.y)});
   ImGui::SetNextWindowSize({float(rect.width), float(rect.height)});
   ImGui::Begin("panel", nullptr, ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize);
   if (ImGui::IsWindowAppearing()) ImGui::SetWindowFocus(nullptr);  // arrows are the picture's at first
   ImGui::PushItemWidth(-110 * window_.scale());
-  Action action = draw_view();
+  Action action = view.draw_panel();
   draw_load();
   ImGui::Separator();
   if (ImGui::Button("Snapshot (F2)")) action = Action::kSnapshot;
@@ -38,24 +17,15 @@ Action Panel::draw(const Rect& rect, const std::function<Action()>& draw_view, b
   if (ImGui::Button(has_clip ? "End clip (F3)" : "Clip (F3)")) action = Action::kClip;
   ImGui::SameLine();
   if (ImGui::Button("Help (F1)")) action = Action::kHelp;
-  if (can_record && ImGui::Button(is_recording ? "End recording (F4)" : "Record the source (F4)")) {
-    action = Action::kRecord;
-  }
   ImGui::End();
   return action;
 }
 
 void Panel::draw_load() {
-  const double now_s = ImGui::GetTime();
-  if (now_s - measured_at_s_ > 1) {
-    const double used_s = process_cpu_s();
-    cpu_percent_ = 100 * (used_s - cpu_s_) / (now_s - measured_at_s_);
-    memory_mb_ = process_memory_mb();
-    measured_at_s_ = now_s, cpu_s_ = used_s;
-  }
-  if (memory_mb_ > 0) {
-    ImGui::Text("CPU %.0f %% of %u cores, memory %.0f MB", cpu_percent_, std::thread::hardware_concurrency(),
-                memory_mb_);
+  load_.update();
+  if (load_.memory_mb() > 0) {
+    ImGui::Text("CPU %.0f %% of %u cores, memory %.0f MB", load_.cpu_percent(), std::thread::hardware_concurrency(),
+                load_.memory_mb());
   } else {
     ImGui::TextUnformatted("CPU and memory: in a second");
   }

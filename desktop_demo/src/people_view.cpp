@@ -13,21 +13,13 @@ namespace {
 
 constexpr char kRenderedPeople[] = "stub:people?count=2";
 constexpr const char* kStages[] = {"trunk", "proposals", "box head", "dense head", "decode", "resize", "copy", "wait"};
-
-maquette::LiveDensePoseOptions live_options(const Options& options) {
-  maquette::LiveDensePoseOptions live;
-  live.real_time = !options.headless;
-  live.max_results = options.frames;
-  if (options.headless) live.reconnect_ms = 4000;
-  return live;
-}
+constexpr const char* kStateNames[] = {"stopped", "opening",      "loading", "running", "paused",
+                                       "stalled", "reconnecting", "ended",   "failed"};
 
 }  // namespace
 
-PeopleView::PeopleView(const maquette::Context& context, const Window& window, Painter& painter, const Options& options)
-    : window_(window),
-      painter_(painter),
-      bundle_(options.bundle),
+PeopleView::PeopleView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
+    : MainView(options, window, painter),
       model_(options.model),
       view_(options.view),
       shows_mesh_(options.mesh),
@@ -38,8 +30,7 @@ PeopleView::PeopleView(const maquette::Context& context, const Window& window, P
             frames_.publish();
             Window::wake();
           },
-          Window::wake, live_options(options)) {
-  model_.bundle_path = bundle_.c_str();
+          Window::wake, options.live) {
   // Software OpenGL compiles a shader when it draws with it first: now, before the user waits.
   for (const View view : {View::kCamera, View::kParts}) painter_.draw_people(view, {0, 0, 8, 8});
   painter_.draw_body({0, 0, 8, 8}, 0, 0);
@@ -48,13 +39,20 @@ PeopleView::PeopleView(const maquette::Context& context, const Window& window, P
 void PeopleView::open(const std::string& uri) {
   stages_.clear();
   seeks_camera_ = uri == kFirstCamera;
-  live_.open(uri, seeks_camera_ ? kRenderedPeople : "");
+  recording_.clear();  // it ends with its source
+  live_.open(maquette::source_uri(uri), seeks_camera_ ? kRenderedPeople : "");
 }
 
 void PeopleView::set_visible(bool is_visible) {
   is_visible_ = is_visible;
   stages_.clear();
   apply_pause();
+}
+
+void PeopleView::toggle_recording(maquette::Saver& saver) {
+  const std::string ended = std::exchange(recording_, recording_.empty() ? saver.new_path(".maqrec") : "");
+  live_.set_recording(recording_);
+  saver.run([text = ended.empty() ? "Recording " + recording_ : "Saved " + ended] { return text; });
 }
 
 bool PeopleView::update() {
@@ -74,18 +72,19 @@ bool PeopleView::update() {
   return true;
 }
 
-void PeopleView::press(int key) {
+Action PeopleView::press(int key) {
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) view_ = View(key - GLFW_KEY_1);
   if (key == GLFW_KEY_M) shows_mesh_ = !shows_mesh_;
   if (key == GLFW_KEY_P) {
     is_paused_ = !is_paused_;
     apply_pause();
   }
+  return Action::kNone;
 }
 
-void PeopleView::steer(const Steering& steering) {
-  yaw_ -= steering.right();
-  pitch_ = std::clamp(pitch_ + steering.down(), -1.5f, 1.5f);
+void PeopleView::steer(const Steering& steering, const Rect&) {
+  yaw_ -= steering.right;
+  pitch_ = std::clamp(pitch_ + steering.down, -1.5f, 1.5f);
 }
 
 void PeopleView::draw(const Rect& area) {
@@ -119,6 +118,32 @@ void PeopleView::draw_boxes() const {
   }
 }
 
+std::string PeopleView::failure() const {
+  const maquette::LiveDensePoseStatus status = live_.status();
+  return status.has_failed ? status.problem : "";
+}
+
+void PeopleView::add_to_report(nlohmann::ordered_json* report) const {
+  const maquette::LiveDensePoseStatus status = live_.status();
+  nlohmann::ordered_json& json = *report;
+  json["frames"] = frame().number;
+  json["source"] = status.uri;
+  json["view"] = kViewNames[size_t(view_)];
+  json["picture_px"] = window_.in_pixels(image_rect_).numbers();
+  json["mesh_px"] = nullptr;
+  if (mesh_rect_.width > 0) json["mesh_px"] = window_.in_pixels(mesh_rect_).numbers();
+  json["frame_px"] = {frame().camera.width_px, frame().camera.height_px};
+  json["people"] = nlohmann::json::array();
+  for (const maq_person& person : frame().people) {
+    json["people"].push_back({{"box", person.box_px}, {"score", person.score}});
+  }
+  json["dropped_frames"] = status.dropped_frames;
+  json["states"] = nlohmann::json::array();
+  for (const maq_pipeline_state state : status.states) json["states"].push_back(kStateNames[state]);
+  json["problem"] = status.problem;
+  json["scene"] = nullptr;
+}
+
 std::string PeopleView::message() const {
   const maquette::LiveDensePoseStatus status = live_.status();
   const std::string text = status.problem.empty() ? status.activity : status.problem;
@@ -131,6 +156,9 @@ Action PeopleView::draw_panel() {
   const maquette::LiveDensePoseStatus status = live_.status();
   const maq_densepose_stats& stats = frame().stats;
   ImGui::TextWrapped("%s", status.uri.c_str());
+  if (ImGui::SmallButton(recording_.empty() ? "Record the source (F4)" : "End recording (F4)"))
+    action = Action::kRecord;
+  ImGui::SameLine();
   if (ImGui::SmallButton("Look for a camera")) action = Action::kOpenCamera;
   ImGui::Text("%.1f frames a second, %llu dropped", frame().results_per_second,
               static_cast<unsigned long long>(status.dropped_frames));
@@ -140,8 +168,8 @@ Action PeopleView::draw_panel() {
   stages_.draw(kStages, std::size(kStages), window_.scale());
   draw_views();
   ImGui::Separator();
-  ImGui::TextWrapped("%s, %d x %d", bundle_.substr(bundle_.rfind('/') + 1).c_str(), stats.network_width_px,
-                     stats.network_height_px);
+  ImGui::TextWrapped("%s, %d x %d", options_.bundle.substr(options_.bundle.rfind('/') + 1).c_str(),
+                     stats.network_width_px, stats.network_height_px);
   draw_model_options();
   return action;
 }

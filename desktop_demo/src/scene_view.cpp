@@ -11,16 +11,12 @@ namespace {
 constexpr int kMovingSidePx = 640, kStillSidePx = 1280;  // of images while flying, and after
 constexpr double kFlightSpeed = 0.12;                    // diagonals of the scene a second
 constexpr double kToPhotoS = 0.6;
-constexpr const char* kCompareNames[] = {"off", "slider", "error"};
 constexpr const char* kStages[] = {"project", "shade", "refine", "resample"};
 
 }  // namespace
 
-SceneView::SceneView(const maquette::Context& context, const Window& window, Painter& painter, const Options& options)
-    : window_(window),
-      painter_(painter),
-      capture_(options.capture),
-      to_photo_s_(options.headless ? 0 : kToPhotoS),
+SceneView::SceneView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
+    : MainView(options, window, painter),
       compare_(options.compare),
       live_(context, options.scene_bundle, options.model.threads, Window::wake) {
   painter_.draw_scene({0, 0, 8, 8}, 0);  // software OpenGL compiles a shader when it draws with it first
@@ -28,15 +24,9 @@ SceneView::SceneView(const maquette::Context& context, const Window& window, Pai
 
 void SceneView::open(const std::string& path) {
   camera_.reset();
-  image_count_ = 0;
+  image_count_ = acted_on_ = 0;
   stages_.clear();
-  live_.open(path, capture_);
-}
-
-void SceneView::close() {
-  live_.close();
-  camera_.reset();
-  image_count_ = 0;
+  live_.open(path, options_.capture);
 }
 
 bool SceneView::update() {
@@ -53,23 +43,18 @@ void SceneView::set_images() {
   painter_.set_scene(image().rendering, compare_ == Compare::kError ? image().error : image().photo);
 }
 
-void SceneView::press(int key) {
+Action SceneView::press(int key) {
   if (key == GLFW_KEY_C) set_compare(Compare((int(compare_) + 1) % 3));
   if (key == GLFW_KEY_N) fly_to_nearest_photo();
   if (key == GLFW_KEY_COMMA) fly_to_photo(photo_ - 1);
   if (key == GLFW_KEY_PERIOD) fly_to_photo(photo_ + 1);
+  return key == GLFW_KEY_X ? Action::kLeaveScene : Action::kNone;
 }
 
 void SceneView::set_compare(Compare compare) {
   compare_ = compare;
   if (compare != Compare::kNone && camera_ && camera_->photo_index() < 0) fly_to_nearest_photo();
   set_images();
-}
-
-void SceneView::rotate(double yaw) {
-  if (!camera_) return;
-  camera_->rotate(yaw, 0);
-  needs_image_ = true;
 }
 
 void SceneView::fly_to_nearest_photo() {
@@ -81,7 +66,7 @@ void SceneView::fly_to_photo(int index) {
   const int count = int(scene->photos.size());
   if (!camera_ || count == 0) return;
   photo_ = (index + count) % count;
-  camera_->fly_to(scene->photos[size_t(photo_)], to_photo_s_, photo_);
+  camera_->fly_to(scene->photos[size_t(photo_)], options_.headless ? 0 : kToPhotoS, photo_);
   needs_image_ = true;
 }
 
@@ -110,9 +95,9 @@ bool SceneView::fly(const Steering& steering) {
   const double forward = double(window_.held(GLFW_KEY_W, GLFW_KEY_S)), seconds = double(steering.seconds);
   const float wheel = ImGui::GetIO().WantCaptureMouse ? 0 : ImGui::GetIO().MouseWheel;
   const bool is_steered =
-      steering.right() != 0 || steering.down() != 0 || right != 0 || up != 0 || forward != 0 || wheel != 0;
+      steering.right != 0 || steering.down != 0 || right != 0 || up != 0 || forward != 0 || wheel != 0;
   if (is_steered) {
-    camera_->rotate(double(steering.right()), double(-steering.down()));
+    camera_->rotate(double(steering.right), double(-steering.down));
     camera_->zoom(std::pow(1.1, double(wheel)));
     camera_->move(right, up, forward, seconds, kFlightSpeed);
   }
@@ -152,6 +137,38 @@ void SceneView::draw_slider() const {
   list->AddText({x + 8, top + 3}, IM_COL32_WHITE, "rendering");
 }
 
+bool SceneView::act_alone() {
+  if (!failure().empty()) return true;
+  if (image_count_ == acted_on_) return false;
+  acted_on_ = image_count_;
+  if (image_count_ + 1 < options_.frames) {
+    camera_->rotate(image_count_ % 40 < 20 ? 0.02 : -0.02, 0);
+    needs_image_ = true;
+  } else if (image().photo_index >= 0 || state()->photos.empty()) {
+    return true;
+  } else {
+    fly_to_nearest_photo();
+  }
+  return false;
+}
+
+std::string SceneView::failure() const {
+  const auto scene = state();
+  return scene->phase == maquette::LiveSceneState::kFailed ? scene->text : "";
+}
+
+void SceneView::add_to_report(nlohmann::ordered_json* report) const {
+  const auto scene = state();
+  nlohmann::ordered_json& json = *report;
+  json["frames"] = image_count_;
+  json["picture_px"] = window_.in_pixels(image_rect_).numbers();
+  json["problem"] = failure();
+  json["scene"] = {{"points", scene->info.point_count}, {"photo", nullptr}, {"psnr_db", nullptr}};
+  if (image_count_ == 0 || image().photo_index < 0) return;
+  json["scene"]["photo"] = scene->photo_names[size_t(image().photo_index)];
+  json["scene"]["psnr_db"] = image().psnr_db;
+}
+
 std::string SceneView::message() const {
   const auto scene = state();
   if (scene->phase == maquette::LiveSceneState::kReady) return "";
@@ -189,7 +206,7 @@ void SceneView::draw_facts() const {
 
 void SceneView::draw_photo_buttons() {
   ImGui::TextUnformatted("Photo against rendering (C)");
-  for (size_t which = 0; which < std::size(kCompareNames); ++which) {
+  for (size_t which = 0; which < kCompareNames.size(); ++which) {
     if (which != 0) ImGui::SameLine();
     if (ImGui::RadioButton(kCompareNames[which], compare_ == Compare(which))) set_compare(Compare(which));
   }

@@ -10,18 +10,17 @@ void main() {
   gl_Position = vec4(corner * 2.0 - 1.0, 0.0, 1.0);
 })";
 
-// `view` counts as View in painter.h. Part, U, V are the label that most of the four nearest pixels have, and of these
+// `view` counts as View in options.h. Part, U, V are the label that most of the four nearest pixels have, and of these
 // the bilinear mean, so that nothing bleeds from one chart into the next and edges are smooth at any size.
 constexpr char kPeopleShader[] = R"(#version 330 core
 in vec2 at;
 out vec4 colour;
-uniform sampler2D camera, outfit;
-uniform sampler2D iuv;
+uniform sampler2D camera, outfit, iuv;
 uniform sampler2DArray surface;
 uniform vec3 part_colours[25];
 uniform int view, people;
-uniform bool outfit_is_atlas, has_surface;
-uniform float lines, screen_px;  // iso-lines of a chart; of the screen for each pixel of the frame
+uniform bool outfit_is_atlas;
+const float lines = 8.0;  // iso-lines of a chart, of U and as many of V
 
 vec4 texel(ivec2 p) { return texelFetch(iuv, clamp(p, ivec2(0), textureSize(iuv, 0) - 1), 0) * 255.0; }
 
@@ -54,7 +53,7 @@ vec4 label(vec2 p, out float cover) {
 vec3 by_value(float t) { return clamp(1.5 - abs(4.0 * t - vec3(3.0, 2.0, 1.0)), 0.0, 1.0); }
 
 // How much of an iso-line of U (1) or V (2) lies here, from the slope over up to four pixels of one chart.
-float contour(vec4 here, vec2 p, int plane) {
+float contour(vec4 here, vec2 p, float screen_px, int plane) {
   vec2 slope = vec2(0.0);
   for (int axis = 0; axis < 2; ++axis) {
     ivec2 d = axis == 0 ? ivec2(2, 0) : ivec2(0, 2);
@@ -85,10 +84,11 @@ vec3 worn(vec4 here) {
 }
 
 void main() {
+  vec2 p = at * vec2(textureSize(iuv, 0)) - 0.5;
+  float screen_px = 1.0 / dFdx(p.x);  // for each pixel of the frame
   vec3 seen = texture(camera, at).rgb;
   colour = vec4(seen, 1.0);
   if (view == 0 || view == 4) return;
-  vec2 p = at * vec2(textureSize(iuv, 0)) - 0.5;
   float cover;
   vec4 here = label(p, cover);
   float inside = smoothstep(0.3, 0.7, cover);
@@ -98,8 +98,8 @@ void main() {
   if (view == 1) {
     seen = mix(seen, part_colours[part], 0.7 * inside);
   } else if (view == 2) {
-    seen = mix(seen, by_value(here.y), inside * contour(here, p, 1));
-    seen = mix(seen, by_value(here.z), inside * contour(here, p, 2));
+    seen = mix(seen, by_value(here.y), inside * contour(here, p, screen_px, 1));
+    seen = mix(seen, by_value(here.z), inside * contour(here, p, screen_px, 2));
   } else if (view == 3) {
     seen = mix(seen, part_colours[1 + (int(here.w) * 7) % 24], 0.55 * inside);
   } else {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <app/rgba_image.h>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ struct Rect {
   int x = 0, y = 0, width = 0, height = 0;
   // The largest of the shape width : height that fits, in the middle.
   Rect fit(int of_width, int of_height) const;
+  std::array<int, 4> numbers() const { return {x, y, width, height}; }
 };
 
 class Window {

@@ -132,7 +132,7 @@ def _rendered_figures(data: dict, figures: dict) -> str:
 
 {figures["images"]} rendered images{whole}, {figures["people"]} people; {figures["ignored"]} more are
 too small or hidden to be asked for. AP and calibration are over scores from {data["score_floor"]:g} up, the rest at
-{figures["threshold"]:g} or better. Shares are in hundredths. Definitions: `python -m export.evaluation --help`.
+{figures["threshold"]:g} or better. Fractions are in percent. Definitions: `python -m export.evaluation --help`.
 
 """
     rows = [(label, _number(figures[field], unit)) for label, field, unit in ROWS if unit != "ms"]
@@ -142,13 +142,13 @@ too small or hidden to be asked for. AP and calibration are over scores from {da
 def _fates(fates: dict[str, float]) -> str:
     rows = [(name, _number(value, "points")) for name, value in fates.items()]
     text = "What people's pixels are painted with; background: also everything of people who were missed.\n\n"
-    return "### Where pixels go\n\n" + text + _table(("painted with", "share"), rows)
+    return "### Where pixels go\n\n" + text + _table(("painted with", "fraction"), rows)
 
 
 def _groups(title: str, accuracy: str, groups: list[dict]) -> str:
-    shares = ("recall", "part_accuracy", "mask_iou")
+    fractions = ("recall", "part_accuracy", "mask_iou")
     rows = [
-        (f"{g['by']}: {g['name']}", str(g["people"]), *(_number(g[field], "points") for field in shares))
+        (f"{g['by']}: {g['name']}", str(g["people"]), *(_number(g[field], "points") for field in fractions))
         for g in groups
     ]
     text = "Heights are those of an image with a long side of 320 px. Missed people count as wrong everywhere.\n\n"
@@ -185,7 +185,7 @@ def _calibration(bins: int, calibration: dict) -> str:
     ]
     text = (
         "How far a score is the chance that the box is right (IoU .5). Expected calibration error: "
-        f"{_number(calibration['expected_error'], 'points')} hundredths.\n\n"
+        f"{_number(calibration['expected_error'], 'points')} %.\n\n"
     )
     return f"### Calibration of scores\n\n{text}" + _table(("score", "detections", "mean score", "right"), rows)
 
@@ -234,7 +234,7 @@ left, what is painted on the right. The images show fabrics and backgrounds unde
 
 
 def _number(value: float | None, unit: str) -> str:
-    """As in the tables of the evaluation: shares in hundredths; `-` where nothing was measured."""
+    """As in the tables of the evaluation: fractions in percent; `-` where nothing was measured."""
     if value is None:
         return "-"
     scale = 100 if unit == "points" else 1

@@ -11,7 +11,7 @@ KINDS = {
     "missed": "people without a box (IoU .5), the tallest first",
     "false": "boxes that fit nobody, the best score first",
     "mask": "people with a box, the lowest mask IoU first",
-    "side": "left and right confused, the smallest correct share first",
+    "side": "left and right confused, the smallest correct fraction first",
 }
 MIN_HEIGHT_PX = 64  # of people whose mask is judged: in smaller ones a pixel more or less decides
 CASES = 6

@@ -88,8 +88,8 @@ class PhotoSet:
 
 @dataclass(frozen=True)
 class PhotoFigures:
-    """Shares 0..1; NaN: nothing to measure. Calibration is over photos with people. landmark: share right by landmark
-    name. groups, failures: as for rendered images, with landmarks in place of pixels."""
+    """Fractions 0..1; NaN: nothing to measure. Calibration is over photos with people. landmark: fraction right by
+    landmark name. groups, failures: as for rendered images, with landmarks in place of pixels."""
 
     photos: int
     people: int

@@ -22,7 +22,7 @@ from export.surface import PART_NAMES
 SCHEMA = "maquette-evaluation-2"
 WIDTH_OF_FILES = 140  # columns of the table when it does not go to a terminal
 
-# Rows of the table: label, field, unit. Shares are shown in points (hundredths), and so are differences.
+# Rows of the table: label, field, unit. Fractions are shown in percent, and so are differences.
 ROWS = (
     ("box AP50", "ap_box_50", "points"),
     ("box AP .50:.95", "ap_box", "points"),
@@ -101,8 +101,8 @@ def print_groups(title: str, groups: list[GroupFigures], console: Console | None
     for before, group in zip([None, *groups], groups, strict=False):
         if before is not None and before.by != group.by:
             table.add_section()
-        shares = (group.recall, group.part_accuracy, group.mask_iou)
-        cells = [_text(100 * value, "points") for value in shares]
+        fractions = (group.recall, group.part_accuracy, group.mask_iou)
+        cells = [_text(100 * value, "points") for value in fractions]
         table.add_row(f"{group.by}: {group.name}", str(group.people), *cells)
     console.print(table)
 

@@ -1,9 +1,12 @@
 """Draws the walking people that the SDK's `stub:people` source shows: one sheet of RGBA tiles.
 
-    python -m export.people.sprites --out sdk/assets/stub_people.webp
+    python -m export.people.sprites --out sdk/assets/stub_people.jpg                      # other people than now
+    python -m export.people.sprites --sheet SHEET --out sdk/assets/stub_people.jpg        # a sheet drawn before
 
 Rows are people of the test split, columns the frames of one walk cycle; a tile is 128 x 256 pixels, feet near
-its lower edge, the person walking towards the right.
+its lower edge, the person walking towards the right. Who is drawn follows from the wardrobe and the bodies as they are
+today; the people of sdk/assets are older than some of both, so they were packed from their sheet (commit 2b41f01,
+sdk/assets/stub_people.webp).
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from export.camera import Camera
 from export.people import assets, motion
 from export.people.render import Light, Person
 from export.people.scene import Studio
+from export.people.sprite_files import write_sheet
 from export.people.wardrobe import dress
 
 TILE_WIDTH, TILE_HEIGHT, PEOPLE, FRAMES = 128, 256, 4, 16
@@ -34,12 +38,9 @@ def walk_cycle(count: int) -> list[motion.Pose]:
     return [motion.Pose(root[k], chest[k], chest[k], limbs[k]) for k in picked]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("sdk/assets/stub_people.webp"))
-    parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
-    options = parser.parse_args()
-    studio = Studio("test", TILE_WIDTH, TILE_HEIGHT, options.places, points=False)
+def drawn_sheet(places: Path) -> np.ndarray:
+    """Four people, 16 frames each: rows x columns x (blue, green, red, alpha)."""
+    studio = Studio("test", TILE_WIDTH, TILE_HEIGHT, places, points=False)
     up = np.array([0, -1.0, 0])
     light = Light(
         up,
@@ -71,9 +72,24 @@ def main() -> None:
             colour = picture.rgb[..., ::-1] / np.maximum(picture.alpha, 1e-3)[..., None]
             tiles.append(np.dstack([np.clip(colour, 0, 255), picture.alpha * 255]).astype(np.uint8))
         rows.append(np.concatenate(tiles, 1))
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(options.out), np.concatenate(rows), [cv2.IMWRITE_WEBP_QUALITY, 80])
-    print(f"wrote {options.out}, {options.out.stat().st_size} bytes")
+    return np.concatenate(rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("sdk/assets/stub_people.jpg"), help="the mask goes beside it")
+    parser.add_argument("--sheet", type=Path, help="an image of the tiles with alpha, instead of drawing some")
+    parser.add_argument("--quality", type=int, default=71, help="of the JPEG")
+    parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
+    options = parser.parse_args()
+    if options.sheet is None:
+        sheet = drawn_sheet(options.places)
+    else:
+        sheet = cv2.imread(str(options.sheet), cv2.IMREAD_UNCHANGED)
+        if sheet is None or sheet.shape != (PEOPLE * TILE_HEIGHT, FRAMES * TILE_WIDTH, 4):
+            parser.error(f"{options.sheet} is no image of {FRAMES * TILE_WIDTH} x {PEOPLE * TILE_HEIGHT} with alpha.")
+    size_bytes = write_sheet(sheet, options.out, options.quality)
+    print(f"wrote {options.out} and its mask, {size_bytes} bytes")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 #include "app/live_densepose.h"
 
+#include <filesystem>
 #include <utility>
 
 namespace maquette {
@@ -9,6 +10,14 @@ constexpr size_t kMaxStates = 1000;
 constexpr uint32_t kResultsHeld = 6;
 
 }  // namespace
+
+std::string source_uri(const std::string& path_or_uri) {
+  std::error_code error;
+  if (!std::filesystem::exists(path_or_uri, error) && path_or_uri.find(':') != std::string::npos) return path_or_uri;
+  std::string uri = "file:";
+  for (const char c : path_or_uri) uri += c == '?' ? "%3F" : c == '%' ? "%25" : std::string(1, c);
+  return uri;
+}
 
 LiveDensePose::LiveDensePose(const Context& context, const maq_densepose_config& config,
                              std::function<void(PipelineResult, double)> on_result, std::function<void()> on_change,

@@ -20,6 +20,9 @@
 
 namespace maquette {
 
+// A file's path as a URI (maquette/source.h); what is one already, as it is.
+std::string source_uri(const std::string& path_or_uri);
+
 struct LiveDensePoseStatus {
   maq_pipeline_state state = MAQ_PIPELINE_STOPPED;
   std::string uri;         // what plays

@@ -20,10 +20,11 @@
 
 namespace {
 
-constexpr const char* kSchema = "maquette-bench-2";
-// Sources take turns in blocks of so many frames, so that a busy moment of the machine meets all of them.
+constexpr const char* kSchema = "maquette-bench-3";
+// Sources are measured alternately, in blocks of so many frames, so that a busy moment of the machine meets all of
+// them.
 constexpr int kBlock = 10;
-constexpr double kMaxOthers = 0.05;  // of all cores: more, and the figures are others' too
+constexpr double kMaxOthers = 0.05;  // of all cores: more, and the figures are of other processes too
 constexpr double kMaxSpread = 1.5;   // p90 by p50
 constexpr double kMibibyte = 1024.0 * 1024.0;
 
@@ -70,7 +71,8 @@ class Case {
     const maquette::DensePoseResult result = densepose.run(*frame);
     const auto done = Clock::now();
     const maq_frame_desc desc = frame->desc();
-    if (counted && last_sequence_ && desc.sequence > *last_sequence_) drops_ += desc.sequence - *last_sequence_ - 1;
+    if (counted && last_sequence_ && desc.sequence > *last_sequence_)
+      dropped_frames_ += desc.sequence - *last_sequence_ - 1;
     last_sequence_ = desc.sequence;
     const maq_densepose_stats stats = result.stats();
     stats_ = stats;
@@ -88,7 +90,7 @@ class Case {
     return total_ms;
   }
 
-  // A pause between two blocks is no drop of a live source.
+  // Frames of a live source that pass between two blocks are not dropped ones.
   void pause() { last_sequence_.reset(); }
 
   double percentile(size_t stage, double percent) const {
@@ -104,8 +106,8 @@ class Case {
   double people() const { return double(people_) / double(std::max<size_t>(1, runs())); }
   double cpu_ms() const { return 1e3 * cpu_s_ / double(std::max<size_t>(1, runs())); }
 
-  // Why the times should not be believed; empty if they may.
-  std::vector<std::string> doubts(const Options& options) const {
+  // Why the times are unreliable; empty if they are not.
+  std::vector<std::string> warnings(const Options& options) const {
     std::vector<std::string> reasons;
     char text[128];
     if (runs() < size_t(options.runs) || seconds_ < options.seconds) {
@@ -128,7 +130,7 @@ class Case {
         ms[kStages[i]]["p" + std::to_string(percent)] = std::round(1e3 * percentile(i, percent)) / 1e3;
       }
     }
-    const std::vector<std::string> reasons = doubts(options);
+    const std::vector<std::string> reasons = warnings(options);
     return {{"source", uri_},
             {"size_px", size_px_},
             {"network_px", {stats_.network_width_px, stats_.network_height_px}},
@@ -136,13 +138,13 @@ class Case {
             {"seconds", seconds_},
             {"people", people()},
             {"proposals", stats_.proposal_count},
-            {"drops", drops_},
+            {"dropped_frames", dropped_frames_},
             {"ms", ms},
             {"fps", 1e3 / std::max(1e-6, frame_ms())},
             {"cpu_ms", cpu_ms()},
             {"cores_busy", cpu_s_ / std::max(1e-6, seconds_)},
             {"valid", reasons.empty()},
-            {"doubts", reasons}};
+            {"warnings", reasons}};
   }
 
  private:
@@ -161,7 +163,7 @@ class Case {
   double seconds_ = 0;
   double cpu_s_ = 0;
   int64_t people_ = 0;
-  uint64_t drops_ = 0;
+  uint64_t dropped_frames_ = 0;
 };
 
 void print_table(const std::vector<std::unique_ptr<Case>>& cases) {
@@ -227,7 +229,7 @@ int run_bench(const Options& options) {
   std::vector<std::string> reasons;
   if (others > kMaxOthers) {
     char text[128];
-    std::snprintf(text, sizeof text, "other processes had %.0f %% of the processor", 100 * others);
+    std::snprintf(text, sizeof text, "other processes used %.0f %% of the CPU", 100 * others);
     reasons.emplace_back(text);
   }
   nlohmann::ordered_json document;
@@ -253,19 +255,19 @@ int run_bench(const Options& options) {
   document["first_frame_ms"] = first_frame_ms;
   document["start_to_first_result_ms"] = first_result_ms;
   document["peak_memory_mib"] = double(peak_memory_bytes()) / kMibibyte;
-  document["others_share"] = others;
+  document["other_processes_cpu_fraction"] = others;
   document["valid"] = reasons.empty();
-  document["doubts"] = reasons;
+  document["warnings"] = reasons;
   document["cases"] = nlohmann::ordered_json::array();
   for (const auto& timed : cases) document["cases"].push_back(timed->json(options));
 
   print_table(cases);
   std::printf("create %.0f ms, first frame %.0f ms, program start to first result %.0f ms, peak memory %.0f MiB\n",
               create_ms, first_frame_ms, first_result_ms, double(peak_memory_bytes()) / kMibibyte);
-  for (const std::string& reason : reasons) std::printf("Doubtful: %s\n", reason.c_str());
+  for (const std::string& reason : reasons) std::printf("Warning: %s\n", reason.c_str());
   for (const auto& timed : cases) {
-    for (const std::string& reason : timed->doubts(options)) {
-      std::printf("Doubtful: %s: %s\n", timed->uri().c_str(), reason.c_str());
+    for (const std::string& reason : timed->warnings(options)) {
+      std::printf("Warning: %s: %s\n", timed->uri().c_str(), reason.c_str());
     }
   }
   if (!options.json.empty()) {
@@ -284,8 +286,8 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options
   CLI::App app("Measure how long each stage of a frame takes on this machine", "maquette bench");
   Options options;
   app.add_option("source", options.sources,
-                 "Images, clips or URIs, measured in turns; default: one, four and no people of stub:people");
-  app.add_option("--json", options.json, "Also write all figures to this file (docs/formats.md, \"Benchmarks\")");
+                 "Images, clips or URIs, measured alternately; default: one, four and no people of stub:people");
+  app.add_option("--json", options.json, "Also write everything to this file (docs/formats.md, \"Benchmarks\")");
   add_model_options(app, options.model);
   app.add_option("--warm-up", options.warm_up, "Frames of each source that are not counted (default 10)")
       ->check(CLI::Range(0, 100000));
@@ -294,10 +296,9 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options
   app.add_option("--seconds", options.seconds, "Minimum time of each source in seconds (default 3)")
       ->check(CLI::Range(0.0, 86400.0));
   app.footer(
-      "The time of a frame is from acquiring it to its result. CPU ms is the time of all threads for one frame, the "
-      "best\n"
-      "estimate of energy that every machine can give. Compare only figures of the same run. Times that cannot be\n"
-      "trusted (busy machine, few runs, wide spread) are marked.\n\n"
+      "A frame is counted from asking the source for it to having the result. CPU ms is the CPU time of all threads\n"
+      "for one frame, a measure of its energy on every machine. Compare figures of one run; a warning says why\n"
+      "times are unreliable: other processes busy, few runs, wide spread.\n\n"
       "Examples:\n"
       "  maquette bench\n"
       "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json");

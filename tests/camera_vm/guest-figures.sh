@@ -12,7 +12,7 @@ figure() {
 # delivers NAME FRAMES URI
 delivers() {
     LD_PRELOAD=/count_allocations.so $maquette play "$3" --frames "$2" --no-picture --json "/tmp/$1.json" || return 1
-    grep -q '"drops": 0' "/tmp/$1.json" || { echo "frames were lost"; return 1; }
+    grep -q '"dropped_frames": 0' "/tmp/$1.json" || { echo "frames were lost"; return 1; }
 }
 # Delivers, and counts what is taken from the heap once a fifth of the frames has come.
 delivers_from_no_heap() {
@@ -66,7 +66,7 @@ plugs_again() {
     kill $program
     wait $program || return 1
     echo "{\"cycles\": [$cycles], \"play\": $(cat /tmp/plug_play.json)}" >/tmp/plug.json
-    [ "$(grep -c '"state": "back"' /tmp/plug_play.json)" -eq 5 ]
+    [ "$(grep -c '"state": "reconnected"' /tmp/plug_play.json)" -eq 5 ]
 }
 
 check "vivid loads" modprobe vivid n_devs=1 node_types=0x1

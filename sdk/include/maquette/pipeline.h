@@ -112,8 +112,9 @@ MAQ_API void maq_pipeline_destroy(maq_pipeline* pipeline);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri);
 
-/* Loads the model with other options, or another model, in place of the current one. The source stays open; a photo is
- * processed again. After MAQ_PIPELINE_FAILED everything is tried again. result_pool_size is not used.
+/* Loads the model with other options, or another model, in place of the current one. `config` NULL: the defaults. It is
+ * copied; result_pool_size is not used. The source stays open; a photo is processed again. After MAQ_PIPELINE_FAILED
+ * everything is tried again.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT; maq_pipeline_info has errors of the loading. Does not
  * block. */
 MAQ_API maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_densepose_config* config);

@@ -84,7 +84,7 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     require_argument(densepose, "densepose");
     const maq_densepose_config config = read_densepose_config(given, "config");
     const DensePoseSettings settings = densepose_settings(config);
-    const Bundle bundle = bundle_reader(config, kDensePoseBundle)();
+    const Bundle bundle = read_bundle_argument(config, kDensePoseBundle);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                                 bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");

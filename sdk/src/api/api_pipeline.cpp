@@ -135,7 +135,6 @@ maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri) {
 maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_densepose_config* config) {
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");
-    require_argument(config, "config");
     pipeline->pipeline.set_model(model_of(config, "config"));
     return MAQ_OK;
   });

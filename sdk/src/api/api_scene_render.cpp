@@ -55,7 +55,7 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     }
     options.skips_unseen_blocks = config.draw_unseen_blocks == 0;
     options.skips_empty_parts = config.refine_empty_parts == 0;
-    Bundle bundle = bundle_reader(config, kSceneBundle)();
+    Bundle bundle = read_bundle_argument(config, kSceneBundle);
     const std::string where = bundle.prefix;
     auto networks = open_scene_networks(context, std::move(bundle), options.threads, config.allow_spinning == 1);
     if (scene->scene.networks_sha256 != networks->sha256()) {

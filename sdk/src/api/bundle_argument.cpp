@@ -23,25 +23,42 @@ Bundle read_installed_bundle(const std::string& name) {
               " does not exist; install the models with the library, or set bundle_path or bundle_files.");
 }
 
+// Names and addresses of what the caller gave.
+std::vector<NamedBuffer> buffers_of(const char* path, const maq_memory_file* files, uint32_t file_count) {
+  if (path != nullptr && file_count > 0) throw ArgumentError("config has both bundle_path and bundle_files; set one.");
+  if (file_count > 0) require_argument(files, "config.bundle_files");
+  std::vector<NamedBuffer> buffers;
+  for (uint32_t i = 0; i < file_count; ++i) {
+    if (files[i].name == nullptr || files[i].data == nullptr) {
+      throw ArgumentError("config.bundle_files[", i, "] has no ", files[i].name == nullptr ? "name" : "data", ".");
+    }
+    buffers.push_back({files[i].name, files[i].data, files[i].size_bytes});
+  }
+  return buffers;
+}
+
 }  // namespace
+
+Bundle read_bundle_argument(const char* path, const maq_memory_file* files, uint32_t file_count,
+                            const char* installed) {
+  const std::vector<NamedBuffer> buffers = buffers_of(path, files, file_count);
+  if (path != nullptr) return read_bundle(std::string(path));
+  return buffers.empty() ? read_installed_bundle(installed) : read_bundle(buffers);
+}
 
 std::function<Bundle()> bundle_reader(const char* path, const maq_memory_file* files, uint32_t file_count,
                                       const char* installed) {
-  if (path != nullptr && file_count > 0) throw ArgumentError("config has both bundle_path and bundle_files; set one.");
+  const std::vector<NamedBuffer> given = buffers_of(path, files, file_count);
   if (path != nullptr) return [folder = std::string(path)] { return read_bundle(folder); };
-  if (file_count == 0) return [name = std::string(installed)] { return read_installed_bundle(name); };
-  require_argument(files, "config.bundle_files");
+  if (given.empty()) return [name = std::string(installed)] { return read_installed_bundle(name); };
   struct File {
     std::string name;
     std::vector<uint8_t> bytes;
   };
   const auto copies = std::make_shared<std::vector<File>>();
-  for (uint32_t i = 0; i < file_count; ++i) {
-    if (files[i].name == nullptr || files[i].data == nullptr) {
-      throw ArgumentError("config.bundle_files[", i, "] has no ", files[i].name == nullptr ? "name" : "data", ".");
-    }
-    const auto* const bytes = static_cast<const uint8_t*>(files[i].data);
-    copies->push_back({files[i].name, {bytes, bytes + files[i].size_bytes}});
+  for (const NamedBuffer& buffer : given) {
+    const auto* const bytes = static_cast<const uint8_t*>(buffer.data);
+    copies->push_back({buffer.name, {bytes, bytes + buffer.size_bytes}});
   }
   return [copies] {
     std::vector<NamedBuffer> buffers;

@@ -37,26 +37,26 @@ inline void make_chroma_terms(const uint8_t* chroma, int pairs, ChromaTerms& ter
   }
 }
 
-inline uint8_t yuv_to_byte(int sum) { return uint8_t(std::clamp(sum >> kYuvBits, 0, 255)); }
-
+// Clamped as 16 bits, twice as many in a vector as the sums.
 inline void add_luma(const uint8_t* luma, int count, const ChromaTerms& terms, uint8_t* bgr) {
-  uint8_t blue[kBlockPx], green[kBlockPx], red[kBlockPx];
+  int16_t blue[kBlockPx], green[kBlockPx], red[kBlockPx];
   for (int i = 0; i < count; ++i) {
     const int y = std::max(luma[i] - 16, 0) * kLuma;
-    blue[i] = yuv_to_byte(y + terms.blue[i]);
-    green[i] = yuv_to_byte(y + terms.green[i]);
-    red[i] = yuv_to_byte(y + terms.red[i]);
+    blue[i] = int16_t((y + terms.blue[i]) >> kYuvBits);
+    green[i] = int16_t((y + terms.green[i]) >> kYuvBits);
+    red[i] = int16_t((y + terms.red[i]) >> kYuvBits);
   }
+  const auto to_byte = [](int16_t value) { return uint8_t(std::clamp<int16_t>(value, 0, 255)); };
   for (int i = 0; i < count; ++i) {
-    bgr[3 * i] = blue[i];
-    bgr[3 * i + 1] = green[i];
-    bgr[3 * i + 2] = red[i];
+    bgr[3 * i] = to_byte(blue[i]);
+    bgr[3 * i + 1] = to_byte(green[i]);
+    bgr[3 * i + 2] = to_byte(red[i]);
   }
 }
 
 // One or two rows of pixels that share a row of chroma.
-MAQ_SIMD_CLONES void yuv_rows_to_bgr(const uint8_t* const* luma_rows, const uint8_t* chroma, int rows, int width,
-                                     uint8_t* bgr, size_t bgr_stride) {
+inline void yuv_to_bgr(const uint8_t* const* luma_rows, const uint8_t* chroma, int rows, int width, uint8_t* bgr,
+                       size_t bgr_stride) {
   for (int x = 0; x < width; x += kBlockPx) {
     const int count = std::min(kBlockPx, width - x);
     ChromaTerms terms;
@@ -67,7 +67,12 @@ MAQ_SIMD_CLONES void yuv_rows_to_bgr(const uint8_t* const* luma_rows, const uint
   }
 }
 
-void yuyv_row_to_bgr(const uint8_t* yuyv, int width, uint8_t* bgr) {
+MAQ_SIMD_CLONES void yuv_rows_to_bgr(const uint8_t* const* luma_rows, const uint8_t* chroma, int rows, int width,
+                                     uint8_t* bgr, size_t bgr_stride) {
+  yuv_to_bgr(luma_rows, chroma, rows, width, bgr, bgr_stride);
+}
+
+MAQ_SIMD_CLONES void yuyv_row_to_bgr(const uint8_t* yuyv, int width, uint8_t* bgr) {
   uint8_t luma[kBlockPx], chroma[kBlockPx];
   for (int x = 0; x < width; x += kBlockPx, yuyv += 2 * kBlockPx, bgr += 3 * kBlockPx) {
     const int count = std::min(kBlockPx, width - x);
@@ -76,7 +81,7 @@ void yuyv_row_to_bgr(const uint8_t* yuyv, int width, uint8_t* bgr) {
       chroma[i] = yuyv[2 * i + 1];
     }
     const uint8_t* const luma_rows[] = {luma};
-    yuv_rows_to_bgr(luma_rows, chroma, 1, count, bgr, 0);
+    yuv_to_bgr(luma_rows, chroma, 1, count, bgr, 0);
   }
 }
 
@@ -93,9 +98,17 @@ void nv12_to_bgr(const ImageView& image, uint8_t* bgr) {
 // --- packed formats, row by row
 // ---------------------------------------------------------------------------------------
 
-// RGB to BGR and back.
+// RGB to BGR and back. Five pixels are a vector of which the last byte is written over by the next.
 MAQ_SIMD_CLONES void swap_red_and_blue(const uint8_t* from, int width, uint8_t* to) {
-  for (int i = 0; i < width; ++i) {
+  using Bytes __attribute__((vector_size(16))) = uint8_t;
+  int i = 0;
+  for (; i + 6 <= width; i += 5) {
+    Bytes pixels;
+    std::memcpy(&pixels, from + 3 * i, sizeof pixels);
+    pixels = __builtin_shufflevector(pixels, pixels, 2, 1, 0, 5, 4, 3, 8, 7, 6, 11, 10, 9, 14, 13, 12, 15);
+    std::memcpy(to + 3 * i, &pixels, sizeof pixels);
+  }
+  for (; i < width; ++i) {
     to[3 * i] = from[3 * i + 2];
     to[3 * i + 1] = from[3 * i + 1];
     to[3 * i + 2] = from[3 * i];

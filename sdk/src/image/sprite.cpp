@@ -1,26 +1,10 @@
 #include "image/sprite.h"
 
-#include <webp/decode.h>
-
 #include <algorithm>
 
-#include "core/error.h"
 #include "image/geometry/resize.h"
 
 namespace maq {
-
-BgraImage decode_webp(const uint8_t* bytes, size_t size_bytes, const std::string& what) {
-  BgraImage image;
-  if (WebPGetInfo(bytes, size_bytes, &image.width_px, &image.height_px) == 0) {
-    throw Error(MAQ_ERROR_UNREADABLE, what, " is not a WebP image.");
-  }
-  const int stride_bytes = image.width_px * 4;
-  image.pixels.resize(size_t(stride_bytes) * size_t(image.height_px));
-  if (WebPDecodeBGRAInto(bytes, size_bytes, image.pixels.data(), image.pixels.size(), stride_bytes) == nullptr) {
-    throw Error(MAQ_ERROR_UNREADABLE, what, " cannot be decoded.");
-  }
-  return image;
-}
 
 BgraImage crop_sprite(const BgraImage& sheet, int x, int y, int width, int height, int to_width, int to_height,
                       bool mirrored) {

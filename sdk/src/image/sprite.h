@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "core/frame.h"
@@ -15,9 +14,6 @@ struct BgraImage {
   int height_px = 0;
   std::vector<uint8_t> pixels;
 };
-
-// Decodes a WebP file that is in memory. Throws MAQ_ERROR_UNREADABLE; `what` names it in the error.
-BgraImage decode_webp(const uint8_t* bytes, size_t size_bytes, const std::string& what);
 
 // The part of `sheet` at (x, y), scaled to `to_width` x `to_height` and mirrored left to right if asked.
 // Its colours come out multiplied by alpha, as draw_sprite wants them.

@@ -15,15 +15,15 @@ const char* name_of(maq_source_state state) {
     case MAQ_SOURCE_STALLED: return "stalled";
     case MAQ_SOURCE_LOST: return "lost";
     case MAQ_SOURCE_RECONNECTING: return "reconnecting";
-    case MAQ_SOURCE_RECONNECTED: return "back";
+    case MAQ_SOURCE_RECONNECTED: return "reconnected";
   }
   return "unknown";
 }
 
 template <class T>
-double quantile(std::vector<T> values, double share) {
+double quantile(std::vector<T> values, double fraction) {
   if (values.empty()) return 0;
-  const auto at = values.begin() + ptrdiff_t(double(values.size() - 1) * share);
+  const auto at = values.begin() + ptrdiff_t(double(values.size() - 1) * fraction);
   std::nth_element(values.begin(), at, values.end());
   return double(*at);
 }
@@ -72,10 +72,10 @@ double PlayStatistics::seconds_since_first() const {
   return timestamps_ns_.size() < 2 ? 0 : double(timestamps_ns_.back() - timestamps_ns_.front()) / 1e9;
 }
 
-std::string PlayStatistics::line(uint64_t drops) const {
+std::string PlayStatistics::line(uint64_t dropped_frames) const {
   char text[128];
-  std::snprintf(text, sizeof text, "frame %" PRIu64 "  %.1f s  %.1f a second  %" PRIu64 " lost", last_sequence_,
-                seconds_since_first(), rate_now(), drops);
+  std::snprintf(text, sizeof text, "frame %" PRIu64 "  %.1f s  %.1f fps  %" PRIu64 " dropped", last_sequence_,
+                seconds_since_first(), rate_now(), dropped_frames);
   return text;
 }
 
@@ -94,21 +94,21 @@ nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const
   }
   const double wall_s = double(monotonic_ns() - begin_ns_) / 1e9;
   nlohmann::ordered_json report = {
-      {"schema", "maquette-play-1"},
+      {"schema", "maquette-play-2"},
       {"width_px", info.width_px},
       {"height_px", info.height_px},
-      {"promised_fps", info.fps},
+      {"nominal_fps", info.fps},
       {"frames", frames()},
       {"seconds", seconds_since_first()},
       {"fps", seconds_since_first() > 0 ? double(frames() - 1) / seconds_since_first() : 0.0},
-      {"drops", info.dropped_frame_count},
-      {"missing_numbers", frames() == 0 ? 0 : int64_t(last_sequence_ - first_sequence_) + 1 - frames()},
-      {"times_not_later", backwards},
+      {"dropped_frames", info.dropped_frame_count},
+      {"missing_sequence_numbers", frames() == 0 ? 0 : int64_t(last_sequence_ - first_sequence_) + 1 - frames()},
+      {"non_increasing_timestamps", backwards},
       {"interval_ms", {{"median", quantile(intervals_ms, .5)}, {"p99", quantile(intervals_ms, .99)}}},
-      {"begin_monotonic_s", double(begin_ns_) / 1e9},
+      {"start_monotonic_s", double(begin_ns_) / 1e9},
       {"wall_seconds", wall_s},
       {"close_ms", close_ms_},
-      {"processor_share", (own_processor_seconds() - processor_s_) / wall_s},
+      {"cpu_utilization", (own_processor_seconds() - processor_s_) / wall_s},
       {"events", nlohmann::ordered_json::array()},
   };
   if (!ages_ms_.empty()) {
@@ -130,15 +130,15 @@ nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const
 
 void PlayStatistics::print(const maq_source_info& info) const {
   const auto all = report(info);
-  std::printf("%" PRId64 " frames of %d x %d in %.1f s: %.2f a second, %" PRIu64 " lost\n", frames(), info.width_px,
+  std::printf("%" PRId64 " frames of %d x %d in %.1f s: %.2f fps, %" PRIu64 " dropped\n", frames(), info.width_px,
               info.height_px, all["seconds"].get<double>(), all["fps"].get<double>(), info.dropped_frame_count);
-  std::printf("  from one to the next %.2f ms (median), %.2f ms (99 %%)\n", all["interval_ms"]["median"].get<double>(),
+  std::printf("  frame interval       %.2f ms (median), %.2f ms (p99)\n", all["interval_ms"]["median"].get<double>(),
               all["interval_ms"]["p99"].get<double>());
   if (all.contains("age_ms")) {
-    std::printf("  age when handed out  %.2f ms (median), %.2f ms (99 %%)\n", all["age_ms"]["median"].get<double>(),
+    std::printf("  age at delivery      %.2f ms (median), %.2f ms (p99)\n", all["age_ms"]["median"].get<double>(),
                 all["age_ms"]["p99"].get<double>());
   }
-  std::printf("  processor            %.1f %% of a core\n", all["processor_share"].get<double>() * 100);
+  std::printf("  CPU                  %.1f %% of one core\n", all["cpu_utilization"].get<double>() * 100);
   for (const auto& event : all["events"]) {
     std::printf("  %7.2f s  %s: %s\n", event["at_s"].get<double>(), event["state"].get<std::string>().c_str(),
                 event["reason"].get<std::string>().c_str());

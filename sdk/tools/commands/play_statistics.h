@@ -1,4 +1,4 @@
-// How a source delivers: rate, loss, age of its frames and processor time.
+// How a source delivers: rate, dropped frames, age of its frames and processor time.
 #pragma once
 
 #include <maquette/maquette.hpp>
@@ -22,8 +22,8 @@ class PlayStatistics {
   int64_t frames() const { return int64_t(timestamps_ns_.size()); }
   // Frames a second over the last second or so.
   double rate_now() const;
-  // "frame 120  4.0 s  30.0 a second  0 lost", for a line that changes.
-  std::string line(uint64_t drops) const;
+  // "frame 120  4.0 s  30.0 fps  0 dropped", for a line that changes.
+  std::string line(uint64_t dropped_frames) const;
   // Closes the source, and says how long that took.
   void close(maquette::Source source);
   // Everything, at the end; `info` is what the source said last.

@@ -63,13 +63,13 @@ int record(const Options& options) {
     recorder.add(frame);
     ++done;
     char note[64];
-    std::snprintf(note, sizeof note, "%.1f MB, %" PRIu64 " lost", double(recorder.info().size_bytes) / 1e6,
+    std::snprintf(note, sizeof note, "%.1f MB, %" PRIu64 " dropped", double(recorder.info().size_bytes) / 1e6,
                   source.info().dropped_frame_count);
     progress.advance(done, note);
   }
   recorder.finish();
   progress.finish();
-  std::printf("%s: %" PRId64 " frames, %.1f s, %.1f MB, %" PRIu64 " lost. Play it: maquette play %s\n",
+  std::printf("%s: %" PRId64 " frames, %.1f s, %.1f MB, %" PRIu64 " dropped. To watch it: maquette play %s\n",
               options.out.c_str(), done, double(last_ns - first_ns) / 1e9, double(recorder.info().size_bytes) / 1e6,
               source.info().dropped_frame_count, options.out.c_str());
   return done > 0 ? 0 : 1;

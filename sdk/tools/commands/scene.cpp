@@ -27,7 +27,7 @@ int show(const InfoOptions& options) {
   std::printf("%s: %.1f MB\n", options.scene.c_str(), double(bytes) / 1e6);
   std::printf("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count,
               double(bytes) / double(info.point_count), info.block_count);
-  std::printf("  view       %" PRIu64 " points (%.0f %%) are view-dependent; descriptors have %d bits a number\n",
+  std::printf("  of these   %" PRIu64 " (%.0f %%) depend on the view, the rest are constant; %d bits a coefficient\n",
               info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
               info.coefficient_bits);
   std::printf("  box        %g %g %g to %g %g %g\n", info.bounds_min[0], info.bounds_min[1], info.bounds_min[2],
@@ -53,19 +53,18 @@ std::string scene_bundle_or_default(const std::string& given) {
 nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_bytes) {
   nlohmann::ordered_json document;
   document["points"] = info.point_count;
-  document["varying"] = info.view_dependent_count;
+  document["view_dependent_points"] = info.view_dependent_count;
   document["blocks"] = info.block_count;
   document["bytes"] = file_bytes;
   document["coefficient_bits"] = info.coefficient_bits;
   document["up"] = info.up;
-  document["low"] = info.bounds_min;
-  document["high"] = info.bounds_max;
+  document["bounds_min"] = info.bounds_min;
+  document["bounds_max"] = info.bounds_max;
   return document;
 }
 
 void add_scene_command(CLI::App& app, int* exit_code) {
-  CLI::App* scene = app.add_subcommand(
-      "scene", "Build a scene from posed photos and a point cloud, and render it from new viewpoints");
+  CLI::App* scene = app.add_subcommand("scene", "Scenes from photos: build one, render it from new viewpoints");
   scene->require_subcommand(1);
   scene->footer(
       "From a folder with photos, cameras and a point cloud (COLMAP, or transforms.json with a PLY file) to a clip:\n\n"
@@ -76,6 +75,6 @@ void add_scene_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = scene->add_subcommand("info", "Check a scene file and print what it contains");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
-  command->add_option("--json", options->json, "Also write the numbers to this file");
+  command->add_option("--json", options->json, "Also write these figures to this file");
   command->callback([=] { *exit_code = show(*options); });
 }

@@ -113,12 +113,12 @@ int build(const Options& options) {
     document["seconds"] = {{"total", total_s},
                            {"load", stats.load_ms / 1e3},
                            {"visibility", stats.visibility_ms / 1e3},
-                           {"turning", stats.align_ms / 1e3},
-                           {"extractor", stats.extract_ms / 1e3},
-                           {"moments", stats.accumulate_ms / 1e3},
-                           {"solving", stats.solve_ms / 1e3},
-                           {"packing", stats.pack_ms / 1e3},
-                           {"saving", total_s - before_saving_s}};
+                           {"align", stats.align_ms / 1e3},
+                           {"extract", stats.extract_ms / 1e3},
+                           {"accumulate", stats.accumulate_ms / 1e3},
+                           {"solve", stats.solve_ms / 1e3},
+                           {"pack", stats.pack_ms / 1e3},
+                           {"save", total_s - before_saving_s}};
     document["peak_memory_mib"] = double(peak_memory_bytes()) / double(1 << 20);
     const std::string text = document.dump(2) + "\n";
     write_whole_file(options.json, text.data(), text.size());

@@ -92,7 +92,7 @@ float median(std::vector<float> values) {
 // Renders `repeat` times; `ms` gets the medians of the times.
 maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
                            nlohmann::ordered_json& ms) {
-  std::vector<float> total, project, shade, refine, turn;
+  std::vector<float> total, project, shade, refine, resample;
   // The first prepares networks for its size; its time is nobody's who looks at more than one picture.
   if (repeat > 1) renderer.run(camera);
   std::optional<maquette::SceneImage> image;
@@ -104,13 +104,13 @@ maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_
     project.push_back(stats.project_ms);
     shade.push_back(stats.shade_ms);
     refine.push_back(stats.refine_ms);
-    turn.push_back(stats.resample_ms);
+    resample.push_back(stats.resample_ms);
   }
   ms = {{"total", median(total)},
         {"project", median(project)},
         {"shade", median(shade)},
         {"refine", median(refine)},
-        {"turn", median(turn)}};
+        {"resample", median(resample)}};
   return std::move(*image);
 }
 
@@ -162,9 +162,9 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     image.save((fs::path(options.out) / picture_name(view)).string(), !options.no_alpha);
     document["views"].push_back({{"name", view.name},
                                  {"ms", ms},
-                                 {"blocks_drawn", stats.drawn_block_count},
-                                 {"points_drawn", stats.drawn_point_count},
-                                 {"points_shaded", stats.shaded_point_count},
+                                 {"drawn_blocks", stats.drawn_block_count},
+                                 {"drawn_points", stats.drawn_point_count},
+                                 {"shaded_points", stats.shaded_point_count},
                                  {"refined_pixels", stats.refined_pixel_count}});
     char note[32];
     std::snprintf(note, sizeof note, "%.1f ms", ms["total"].get<double>());
@@ -256,13 +256,9 @@ int render(const Options& options) {
 
 void add_scene_render_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      scene.add_subcommand("render", "Render pictures from the cameras of a capture, or a clip along a path");
-  command->add_option("scene", options->scene, "Scene file, made by `maquette scene build`")->required();
-  command
-      ->add_option("-o,--out", options->out,
-                   "File of the clip (with --path), or folder for the pictures (with --views)")
-      ->required();
+  CLI::App* command = scene.add_subcommand("render", "Render a scene: pictures from given cameras, or a clip");
+  command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
+  command->add_option("-o,--out", options->out, "File of the clip (clip.mp4), or folder for the pictures")->required();
   command
       ->add_option("--path", options->path,
                    "Path of the camera in a clip: `orbit` around the scene, or `through` the cameras of the capture")

@@ -226,6 +226,16 @@ TEST(LiveDensePose, ARecordingIsCompleteWhenItCloses) {
   EXPECT_EQ(warned, "") << "it has its index";
 }
 
+TEST(LiveDensePose, APathIsMadeAUriAndAUriStaysAsItIs) {
+  const TempFolder folder;
+  const std::string odd = folder.file("50%? a:b.jpg");
+  write_text(odd, "");
+  EXPECT_EQ(maquette::source_uri(odd), "file:" + folder.file("50%25%3F a:b.jpg"));
+  EXPECT_EQ(maquette::source_uri("missing.jpg"), "file:missing.jpg");
+  EXPECT_EQ(maquette::source_uri("stub:people?count=2"), "stub:people?count=2");
+  EXPECT_EQ(maquette::source_uri("camera:"), "camera:");
+}
+
 TEST(LiveDensePose, LoadsNoModelBeforeThereIsASource) {
   Live people({}, "/no/bundle");
   std::this_thread::sleep_for(std::chrono::milliseconds(200));

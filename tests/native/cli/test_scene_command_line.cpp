@@ -65,13 +65,13 @@ TEST_F(SceneCommandLine, BuildsASceneWithTheFiguresThatTheBenchmarkReads) {
   EXPECT_EQ(files("o"), (std::set<std::string>{"place.maqs", "build.json", "place.ply"}));
   const nlohmann::json figures = json("o/build.json");
   EXPECT_GT(figures.at("points"), 100);
-  EXPECT_LE(figures.at("varying"), figures.at("points"));
+  EXPECT_LE(figures.at("view_dependent_points"), figures.at("points"));
   EXPECT_EQ(figures.at("bytes"), std::filesystem::file_size(file("o/place.maqs")));
   EXPECT_GT(figures.at("peak_memory_mib"), 1);
   EXPECT_EQ(figures.at("views"), 4);
   EXPECT_EQ(figures.at("unused_views"), 0);
   double stages = 0;
-  for (const char* stage : {"load", "visibility", "turning", "extractor", "moments", "solving", "packing", "saving"}) {
+  for (const char* stage : {"load", "visibility", "align", "extract", "accumulate", "solve", "pack", "save"}) {
     EXPECT_GE(figures.at("seconds").at(stage), 0) << stage;
     stages += figures.at("seconds").at(stage).get<double>();
   }
@@ -80,7 +80,8 @@ TEST_F(SceneCommandLine, BuildsASceneWithTheFiguresThatTheBenchmarkReads) {
   const Outcome info = run("info o/place.maqs --json info.json");
   ASSERT_EQ(info.exit_code, 0) << info.err;
   EXPECT_NE(info.out.find(" blocks"), std::string::npos) << info.out;
-  for (const char* key : {"points", "varying", "blocks", "bytes", "coefficient_bits", "up", "low", "high"}) {
+  for (const char* key :
+       {"points", "view_dependent_points", "blocks", "bytes", "coefficient_bits", "up", "bounds_min", "bounds_max"}) {
     EXPECT_EQ(json("info.json").at(key), figures.at(key)) << key;
   }
 }
@@ -98,7 +99,7 @@ TEST_F(SceneCommandLine, EveryOptionOfBuildingDoesWhatItSays) {
   EXPECT_EQ(built("--all-photos").at("views"), 5);
   EXPECT_EQ(built("--coefficients 16").at("coefficient_bits"), 16);
   EXPECT_EQ(built("--coefficients 32").at("coefficient_bits"), 32);
-  EXPECT_EQ(built("--min-variation 100").at("varying"), 0);
+  EXPECT_EQ(built("--min-variation 100").at("view_dependent_points"), 0);
   EXPECT_LT(built("--visibility-scale 0.25").at("points"), usual.at("points"));
   // Who is too near hides nobody.
   EXPECT_NE(built("--near 3").at("points"), usual.at("points"));
@@ -119,9 +120,9 @@ TEST_F(SceneCommandLine, RendersPicturesWithTheFiguresThatTheBenchmarkReads) {
   EXPECT_EQ(picture.channels(), 4);
   const nlohmann::json view = json("r.json").at("views").at(0);
   EXPECT_EQ(view.at("name"), "images/3.png");
-  for (const char* stage : {"total", "project", "shade", "refine", "turn"}) EXPECT_GE(view.at("ms").at(stage), 0);
+  for (const char* stage : {"total", "project", "shade", "refine", "resample"}) EXPECT_GE(view.at("ms").at(stage), 0);
   EXPECT_GT(view.at("ms").at("total"), 0);
-  EXPECT_GT(view.at("points_shaded"), 10);
+  EXPECT_GT(view.at("shaded_points"), 10);
 
   EXPECT_EQ(run("render place.maqs --capture place --views all --out all --no-alpha --size 40x30").exit_code, 0);
   EXPECT_EQ(files("all").size(), 5u);

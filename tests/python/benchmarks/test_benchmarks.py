@@ -23,14 +23,14 @@ instruction_sets = ["avx2"]
 [[gate]]
 figure = "fps"
 says = "speed"
-at_least = 30
+min = 30
 stretch = 60
 machine = "two"
 
 [[gate]]
 figure = "mb"
 says = "size"
-at_most = 3.6
+max = 3.6
 stretch = 3.0
 """
 
@@ -83,7 +83,7 @@ def test_a_part_that_is_measured_again_leaves_nothing_of_before():
 def test_the_shipped_targets_can_be_read():
     names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "library_mb", "peak_memory_mb",
              "first_result_ms", "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8",
-             "time_by_pytorch_fp32", "roofline_share", *cameras.FIGURES, *scenes.FIGURES}  # fmt: skip
+             "time_by_pytorch_fp32", "roofline_fraction", *cameras.FIGURES, *scenes.FIGURES}  # fmt: skip
     assert {v.figure for v in gates.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
 
 
@@ -141,31 +141,31 @@ def test_the_roofline_is_the_slower_of_work_and_bytes():
 
 
 def test_runs_that_differ_are_told_apart(tmp_path, capsys):
-    figures = {"time_by_openvino_int8": 0.9, "time_by_pytorch_fp32": 0.2, "roofline_share": 0.3}
+    figures = {"time_by_openvino_int8": 0.9, "time_by_pytorch_fp32": 0.2, "roofline_fraction": 0.3}
     for name, scale in (("a", 1.0), ("b", 1.04), ("c", 1.06)):
         values = {key: value * scale for key, value in figures.items()}
         (tmp_path / f"{name}.json").write_text(json.dumps({"figures": values}))
     assert compare.main([str(tmp_path / "a.json"), str(tmp_path / "b.json")]) == 0
     assert compare.main([str(tmp_path / "a.json"), str(tmp_path / "c.json")]) == 1
-    assert "roofline_share" in capsys.readouterr().out
+    assert "roofline_fraction" in capsys.readouterr().out
 
 
 def case(source, people, ms):
     times = {stage: {"p50": ms / 8, "p90": ms / 7, "p99": ms / 6} for stage in report.STAGES}
     times["frame"] = {"p50": ms, "p90": ms + 1, "p99": ms + 2}
-    return {"source": source, "people": people, "ms": times, "fps": 1000 / ms, "cpu_ms": 2 * ms, "doubts": [],
+    return {"source": source, "people": people, "ms": times, "fps": 1000 / ms, "cpu_ms": 2 * ms, "warnings": [],
             "size_px": [640, 480]}  # fmt: skip
 
 
 def camera_host():
-    run = {"age_ms": {"median": 0.1, "p99": 0.4}, "lost": 0, "processor_share": 0.01}
+    run = {"age_ms": {"median": 0.1, "p99": 0.4}, "dropped_frames": 0, "cpu_utilization": 0.01}
     return {"stub": [run, run | {"age_ms": {"median": 0.3, "p99": 0.9}}, run], "recording": [run],
             "closing": [40.0, 44.0, 41.0], "outages": [{"noticed_ms": 4.0, "replug_ms": 90.0, "reopen_ms": 90.0}],
             "allocations": {"frames": 1000, "allocations": 5}, "others_fraction": 0.0}  # fmt: skip
 
 
 def document():
-    frames = {name: {"cases": [case("s0", 0, 8.0), case("s1", 1, 10.0)], "doubts": ["others were busy"]}
+    frames = {name: {"cases": [case("s0", 0, 8.0), case("s1", 1, 10.0)], "warnings": ["others were busy"]}
               for name in ("people", "sizes", "one_thread", "no_spin")}  # fmt: skip
     rows = [{"setting": name, "axis": axis, "ms": ms, "error": error, "error_cm": 10 * error, "box_ap": 0.5,
              "part_accuracy": 0.6}
@@ -175,8 +175,8 @@ def document():
                  "ours_int8_ratio": 1.0, "missing": ""},
                 {"name": "Other", "version": "", "precision": "fp32", "ms": {}, "total_ms": None,
                  "ours_int8_ratio": None, "missing": "does not load it"}]  # fmt: skip
-    line = {"float32_macs_s": 1e11, "int8_macs_s": 4e11, "bytes_s": 1e11, "share": 0.4,
-            "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "min_ms": 1.6, "share": 0.4}}}  # fmt: skip
+    line = {"float32_macs_s": 1e11, "int8_macs_s": 4e11, "bytes_s": 1e11, "fraction": 0.4,
+            "graphs": {"trunk": {"macs": 10**8, "int8_macs": 10**7, "min_ms": 1.6, "fraction": 0.4}}}  # fmt: skip
     gate = {
         "says": "speed",
         "value": 40.0,
@@ -186,8 +186,9 @@ def document():
         "why": "",
         "tried": "All of it.",
     }
-    measured = {"host": camera_host(), "guest": {}, "guest_missing": "not run: no <qemu>", "frames": 100, "doubts": []}
-    unseen = {"rows": [], "places": [], "speed": {}, "speed_missing": "no <networks>", "doubts": ["0 real places"],
+    measured = {"host": camera_host(), "guest": {}, "guest_missing": "not run: no <qemu>", "frames": 100,
+                "warnings": []}  # fmt: skip
+    unseen = {"rows": [], "places": [], "speed": {}, "speed_missing": "no <networks>", "warnings": ["0 real places"],
               "sheet": ""}  # fmt: skip
     return {"machine": MACHINE, "cameras": measured, "scenes": unseen,
             "frames": frames, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],

@@ -11,19 +11,19 @@ MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2"], "
            "system": "S"}  # fmt: skip
 
 
-def played(frames=100, drops=0, share=0.01, wall_s=4.0, events=()):
+def played(frames=100, dropped_frames=0, cpu=0.01, wall_s=4.0, events=()):
     return {
-        "schema": "maquette-play-1",
+        "schema": "maquette-play-2",
         "width_px": 640,
         "height_px": 360,
         "frames": frames,
         "fps": 29.97,
-        "drops": drops,
+        "dropped_frames": dropped_frames,
         "interval_ms": {"median": 33.3, "p99": 34.0},
         "age_ms": {"median": 0.1, "p99": 0.4},
         "wall_seconds": wall_s,
-        "processor_share": share,
-        "begin_monotonic_s": 50.0,
+        "cpu_utilization": cpu,
+        "start_monotonic_s": 50.0,
         "events": list(events),
     }
 
@@ -35,14 +35,14 @@ def event(state, at_s, before_next_frame_s=None):
 
 # Unplugged at 52 and 56 on the monotonic clock.
 TWICE = [event("started", 0.01, 0.03),
-         event("lost", 2.02, 1.9), event("reconnecting", 2.02, 1.9), event("back", 3.9, 0.02),
-         event("lost", 6.04, 2.0), event("reconnecting", 6.04, 2.0), event("back", 8.0, 0.04)]  # fmt: skip
+         event("lost", 2.02, 1.9), event("reconnecting", 2.02, 1.9), event("reconnected", 3.9, 0.02),
+         event("lost", 6.04, 2.0), event("reconnecting", 6.04, 2.0), event("reconnected", 8.0, 0.04)]  # fmt: skip
 CYCLES = [{"unplugged_s": 52.0, "plugged_in_s": 53.4, "appeared_s": 53.8},
           {"unplugged_s": 56.0, "plugged_in_s": 57.5, "appeared_s": 57.9}]  # fmt: skip
 
 
 def guest_output(**changes):
-    said = {"vivid": played(), "vivid_few": played(10, wall_s=1.0, share=0.02), "uvc": played(drops=2),
+    said = {"vivid": played(), "vivid_few": played(10, wall_s=1.0, cpu=0.02), "uvc": played(dropped_frames=2),
             "vivid_allocations": {"frames": 80, "allocations": 0}, "uvc_allocations": {"frames": 80, "allocations": 4},
             "plug": {"cycles": CYCLES, "play": played(events=TWICE)}} | changes  # fmt: skip
     figures = [f"figure {name} {json.dumps(value)}" for name, value in said.items() if value is not None]
@@ -56,7 +56,9 @@ def test_each_outage_is_timed_from_its_own_unplugging():
 
 
 @pytest.mark.parametrize(
-    "events", [TWICE[:4], TWICE[:-1], [*TWICE[:-1], event("back", 8.0)]], ids=["once", "not back", "back without frame"]
+    "events",
+    [TWICE[:4], TWICE[:-1], [*TWICE[:-1], event("reconnected", 8.0)]],
+    ids=["once", "not reconnected", "reconnected without frame"],
 )
 def test_an_outage_that_was_not_seen_is_no_figure(events):
     with pytest.raises(ValueError, match="of 2 times"):
@@ -66,12 +68,12 @@ def test_an_outage_that_was_not_seen_is_no_figure(events):
     figures, missing = cameras.guest_figures(said, 100, why)
     assert "camera_noticed_ms" not in figures
     assert "of 2 times" in missing["camera_replug_ms"]
-    assert figures["camera_vivid_lost"] == 0
+    assert figures["camera_vivid_dropped_frames"] == 0
 
 
 def test_processor_time_of_starting_is_taken_off():
-    longer, shorter = played(share=0.03, wall_s=10.0), played(share=0.12, wall_s=2.0)
-    assert cameras.processor_share(longer, shorter) == pytest.approx((0.3 - 0.24) / 8)
+    longer, shorter = played(cpu=0.03, wall_s=10.0), played(cpu=0.12, wall_s=2.0)
+    assert cameras.cpu_utilization(longer, shorter) == pytest.approx((0.3 - 0.24) / 8)
 
 
 def test_the_guests_figures_are_read_from_its_lines():
@@ -80,7 +82,7 @@ def test_the_guests_figures_are_read_from_its_lines():
     assert not why
     assert not missing
     assert set(figures) == set(cameras.GUEST_FIGURES)
-    assert (figures["camera_vivid_lost"], figures["camera_uvc_lost"]) == (0, 2)
+    assert (figures["camera_vivid_dropped_frames"], figures["camera_uvc_dropped_frames"]) == (0, 2)
     assert figures["camera_vivid_fps"] == 29.97
     assert figures["camera_v4l2_allocations"] == 0.05
     assert figures["camera_noticed_ms"] == pytest.approx(30)
@@ -100,21 +102,21 @@ def test_a_guest_that_cannot_run_leaves_its_figures_out_and_says_why():
 def test_figures_of_fewer_frames_than_asked_for_do_not_count():
     said, why = cameras.read_guest(guest_output(vivid=played(frames=60)) + "\nnot ok vivid: stopped: it hung", 1)
     figures, missing = cameras.guest_figures(said, 100, why)
-    assert "camera_vivid_lost" not in figures
+    assert "camera_vivid_dropped_frames" not in figures
     assert missing["camera_vivid_fps"] == "vivid: stopped: it hung"
-    assert figures["camera_uvc_lost"] == 2
+    assert figures["camera_uvc_dropped_frames"] == 2
 
 
 def test_a_guest_that_ends_early_without_saying_so_is_noticed():
     said, why = cameras.read_guest(guest_output(uvc=None), 124)
     _, missing = cameras.guest_figures(said, 100, why)
-    assert set(missing) == {"camera_uvc_lost", "camera_uvc_fps"}
-    assert "status 124" in missing["camera_uvc_lost"]
+    assert set(missing) == {"camera_uvc_dropped_frames", "camera_uvc_fps"}
+    assert "status 124" in missing["camera_uvc_dropped_frames"]
 
 
 def host(**changes):
-    def run(age, share):
-        return {"age_ms": {"median": age, "p99": 4 * age}, "lost": 0, "processor_share": share}
+    def run(age, cpu):
+        return {"age_ms": {"median": age, "p99": 4 * age}, "dropped_frames": 0, "cpu_utilization": cpu}
 
     away = [{"noticed_ms": x, "replug_ms": 10 * x, "reopen_ms": 10 * x} for x in (2.0, 9.0, 4.0)]
     return {"stub": [run(0.1, 0.02), run(0.9, 0.02), run(0.15, 0.02)],
@@ -138,13 +140,13 @@ def test_gates_of_cameras_tell_good_from_bad():
         {v.figure for v in gates.check(good | other, MACHINE, {}, only=cameras.FIGURES) if v.state == "missed"}
         for other in ({}, bad)
     ]
-    assert missed[0] == {"camera_uvc_lost", "camera_v4l2_allocations"}
+    assert missed[0] == {"camera_uvc_dropped_frames", "camera_v4l2_allocations"}
     assert missed[1] - missed[0] == {"camera_close_ms", "camera_allocations", "camera_age_ms", "camera_noticed_ms"}
 
 
 def test_the_section_shows_what_was_lost_and_the_pages_are_written(tmp_path):
     said, why = cameras.read_guest(guest_output(), 0)
-    measured = {"host": host(), "guest": said, "guest_missing": why, "frames": 100, "doubts": ["others were busy"]}
+    measured = {"host": host(), "guest": said, "guest_missing": why, "frames": 100, "warnings": ["others were busy"]}
     title, parts = camera_section.section(measured)
     assert title == "Cameras"
     vivid, usb = parts[1][1:]

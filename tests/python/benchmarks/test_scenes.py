@@ -90,7 +90,7 @@ def test_pictures_are_compared_with_the_photos_of_their_names(given):
     # The stand-in's noise, of which a little is cut at black and white.
     assert figures["psnr_db"] == pytest.approx(-20 * np.log10(noise), abs=0.3)
     assert found["means alone"]["rendered"]["psnr_db"] < figures["psnr_db"] - 2
-    assert found["means alone"]["rendered"]["varying"] == 0
+    assert found["means alone"]["rendered"]["view_dependent_points"] == 0
     assert found["half the size"]["rendered"]["frame_ms"] < figures["frame_ms"]
     assert found["scenes-wide"]["rendered"] is not None
     assert figures["first_image_s"] > figures["build_s"] > 0
@@ -269,9 +269,9 @@ def test_a_folder_that_is_no_capture_is_left_out_and_named(given, tmp_path):
     broken = Sources(given.places[:1], [tmp_path / "nothing"], given.bundles)
     rows, places, _ = scene_quality.measure(broken, [], None, quick=True)
     assert rows[0]["rendered"] is not None
-    doubts = scenes.doubts_of(places, has_distance=True)
-    assert doubts[0].startswith("nothing was left out: ")
-    assert doubts[1:] == ["1 rendered places, 8 are wanted", "0 real places, 2 are wanted"]
+    warnings = scenes.warnings_of(places, has_distance=True)
+    assert warnings[0].startswith("nothing was left out: ")
+    assert warnings[1:] == ["1 rendered places, 8 are wanted", "0 real places, 2 are wanted"]
 
 
 def test_bundles_of_one_name_cannot_be_told_apart(tmp_path):

@@ -32,10 +32,11 @@ def scene_file(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def scenes(tmp_path_factory):
-    """The room with each way to compare; it ends where one of its photos was taken."""
+def scenes(tmp_path_factory, scene_file):
+    """The room with each way to compare, once made of its photos by the demo; ends where one of them was taken."""
     folder = tmp_path_factory.mktemp("room")
-    return {way: show(folder, ROOM, "--compare", way, "--frames", 3) for way in ("none", "slider", "error")}
+    files = {"none": [ROOM], "slider": [scene_file, "--capture", ROOM], "error": [scene_file, "--capture", ROOM]}
+    return {way: show(folder, *paths, "--compare", way, "--frames", 3) for way, paths in files.items()}
 
 
 def photo_of(shown) -> np.ndarray:
@@ -85,8 +86,15 @@ def test_a_scene_file_is_shown_without_its_photos(scene_file, tmp_path):
 # --- cameras ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_camera_that_is_lost_and_comes_back_goes_on(tmp_path):
-    shown = show(tmp_path, "--source", "stub:people?count=2&seed=7&unplug=1s@2s", "--frames", 100)
+@pytest.fixture(scope="module")
+def lost_camera(tmp_path_factory):
+    """A long run, with a camera that is lost and comes back."""
+    folder = tmp_path_factory.mktemp("lost_camera")
+    return show(folder, "--source", "stub:people?count=2&seed=7&unplug=1s@2s", "--frames", 100)
+
+
+def test_a_camera_that_is_lost_and_comes_back_goes_on(lost_camera):
+    shown = lost_camera
     assert shown.report["frames"] == 100
     assert shown.report["problem"] == ""
     states = shown.report["states"]
@@ -178,11 +186,9 @@ def test_help_teaches_every_option():
 # --- report, memory, size ---------------------------------------------------------------------------------------------
 
 
-def test_the_times_of_the_windows_frames_are_reported():
+def test_the_times_of_the_windows_frames_are_reported(lost_camera):
     """How short they are is a figure (scripts/desktop-demo-pictures.py prints it), not a test."""
-    ran = headless("--source", "stub:people?count=2&seed=7&live=1", "--frames", 100, timeout_s=300)
-    assert ran.returncode == 0, ran.stderr
-    ui = json.loads(ran.stdout)["ui"]
+    ui = lost_camera.report["ui"]
     assert ui["frames"] >= 20
     assert 0 < ui["p99_ms"] <= ui["longest_ms"]
     assert ui["start_ms"] > 0
@@ -195,17 +201,17 @@ def test_nothing_is_left_in_the_folder_that_it_is_started_in(tmp_path):
 
 
 @pytest.mark.skipif(not WITH_SANITIZERS.exists(), reason="build/asan has no maquette-demo")
-def test_500_frames_leak_nothing(tmp_path):
+def test_a_hundred_frames_leak_nothing(tmp_path):
     # Drivers and X libraries are unloaded before leaks are looked for, and what only their variables point to would
     # count as leaked, with no name left to tell it by. So they stay.
     (tmp_path / "stay.c").write_text("int dlclose(void* library) { return library == 0; }")
     assert run("cc", "-shared", "-fPIC", tmp_path / "stay.c", "-o", tmp_path / "stay.so").returncode == 0
     env = {"ASAN_OPTIONS": "detect_leaks=1:verify_asan_link_order=0", "LD_PRELOAD": str(tmp_path / "stay.so")}
-    options = ("--source", "stub:people?count=2&seed=7", "--frames", 500, "--view", "try-on", "--mesh")
+    options = ("--source", "stub:people?count=2&seed=7", "--frames", 100, "--view", "try-on", "--mesh")
     ran = headless(*options, program=WITH_SANITIZERS, env=env, timeout_s=900)
     assert "Sanitizer" not in ran.stderr, ran.stderr[-3000:]
     assert ran.returncode == 0, ran.stderr[-3000:]
-    assert json.loads(ran.stdout)["frames"] == 500
+    assert json.loads(ran.stdout)["frames"] == 100
 
 
 def test_its_own_code_stays_short():
@@ -213,7 +219,7 @@ def test_its_own_code_stays_short():
     lines = [line.strip() for path in files for line in path.read_text().splitlines()]
     code = [line for line in lines if line and not line.startswith("//")]
     print(f"{len(code)} lines of code, {len(lines)} with blank lines and those of comment alone")
-    assert len(code) <= 1800
+    assert len(code) <= 1500
 
 
 # --- installation -----------------------------------------------------------------------------------------------------
@@ -251,10 +257,13 @@ def test_an_installation_has_program_outfit_icon_and_desktop_entry(installed, tm
 def test_it_is_built_with_the_app_helpers_alone_against_an_installed_sdk(installed, tmp_path):
     for folder in ("desktop_demo", "sdk/app"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
+    # That it compiles and runs is asked, not how fast: optimisation would be most of the time.
+    quick = ("-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O0")
+    source, build = tmp_path / "desktop_demo", tmp_path / "build"
     for command in (
-        ("cmake", "-S", tmp_path / "desktop_demo", "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={installed}"),
-        ("cmake", "--build", tmp_path / "build"),
+        ("cmake", "-S", source, "-B", build, f"-DCMAKE_PREFIX_PATH={installed}", *quick),
+        ("cmake", "--build", build, "-j", "2"),
     ):
         ran = run(*command, timeout_s=900)
         assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert_shows_people(tmp_path / "build/stage/bin/maquette-demo", tmp_path)
+    assert_shows_people(build / "stage/bin/maquette-demo", tmp_path)

@@ -1,6 +1,7 @@
 """What the desktop demo shows of people: the same frames through the command line say where which colours belong."""
 
 import shutil
+from functools import cache
 
 import cv2
 import numpy as np
@@ -31,11 +32,15 @@ def mapped(source, tmp_path_factory) -> Mapped:
     return found
 
 
-@pytest.fixture
-def shown(source, tmp_path):
+@pytest.fixture(scope="module")
+def shown(source, tmp_path_factory):
+    """What the program shows of the source, by view and options; one run serves every test that asks for the same."""
+    folder = tmp_path_factory.mktemp(f"shown_{source}")
+
+    @cache
     def of(view: str, *options) -> Shown:
         uri, frames = SOURCES[source]
-        found = show(tmp_path, "--source", uri, "--frames", frames, "--view", view, *options)
+        found = show(folder, "--source", uri, "--frames", frames, "--view", view, *options)
         assert (found.report["view"], found.report["frames"], found.report["problem"]) == (view, frames, "")
         return found
 
@@ -70,8 +75,8 @@ def test_the_camera_is_shown_as_it_is(shown, mapped):
 
 
 def test_people_are_reported_as_the_command_line_finds_them(shown, mapped):
-    for view in ("boxes", "parts"):
-        people = shown(view).report["people"]
+    for options in (("boxes", "--no-mesh"), ("parts",)):
+        people = shown(*options).report["people"]
         assert len(people) == len(mapped.people)
         for ours, theirs in zip(people, mapped.people, strict=True):
             assert np.allclose(ours["box"], theirs["box"], atol=0.5)

@@ -95,7 +95,7 @@ def test_the_cards_figures_are_those_of_the_json():
     assert row(text, "mask IoU") == ["-"]
     assert row(text, "right hand") == ["25.0", "50.0", "101.3 cm"]
     assert row(text, "size: small")[0] == str(figures["groups"][0]["people"])
-    assert "Expected calibration error: 11.6 hundredths" in text
+    assert "Expected calibration error: 11.6 %" in text
     photos = text[text.index("real photographs") :]
     assert row(photos, "left/right") == ["65.8"]
     assert f"({figures['photos']['empty_photos']} photos) | 1.59 |" in photos

@@ -46,6 +46,19 @@ WORDS = [
         "fraction, ratio, rate",
         EVERYWHERE,
     ),
+    (r"[\"`]at_(least|most)[\"`]|^at_(least|most) = ", "min, max", ("benchmarks", "tests/python/benchmarks", "docs")),
+    # Measurements: keys of JSON and texts.
+    (
+        r"[\"`](drops|doubts|promised_fps|missing_numbers|times_not_later|begin_monotonic_s)[\"`]|\bdoubts_of\b",
+        "dropped_frames, warnings, nominal_fps, missing_sequence_numbers, non_increasing_timestamps",
+        EVERYWHERE,
+    ),
+    (
+        r"\bin turns\b|\btook turns\b|\btake turns every\b",
+        "alternately",
+        ("benchmarks", "quantization", "sdk/tools", "docs"),
+    ),
+    (r"\ba second, %.* lost\b|\d lost\"", "dropped", ("sdk/tools",)),
     # Files.
     (r"\bwhole or not at all\b|\bNewFile\b|\bnew_file\b", "atomically, AtomicFile", EVERYWHERE),
     (r"\b(?!is_)\w+_endings?\b|\bfile(name)? endings?\b|\bending of (a|the) (file|name)\b", "extension", EVERYWHERE),
@@ -76,7 +89,6 @@ WORDS = [
 SKIPPED = ("sdk/licenses/", "desktop_demo/licenses/", "docs/benchmarks/", "docs/progress.json", "docs/ablation.json")
 # Where a pattern finds what means something else: (file, line) as regular expressions, each with its reason.
 EXCEPTIONS = [
-    (r"", r"\b(processor|others|roofline|unseen)_share\b"),  # of processor time, of a bound: figures in reports
     (r"quantization", r"\bshare_scales\b"),  # shares: is in common
 ]
 

@@ -33,11 +33,11 @@ def cloud_points(capture: Path) -> int:
 def build(options: argparse.Namespace) -> dict:
     cloud = min(options.points, cloud_points(options.first))
     points = cloud - cloud % 100  # the rest is seen by nobody
-    varying = 0 if options.min_variation > 1e6 else points if options.min_variation == 0 else points // 2
+    view_dependent = 0 if options.min_variation > 1e6 else points if options.min_variation == 0 else points // 2
     each = 6 + 8 * options.coefficients // 8
-    size = points * each + varying * 48 * options.coefficients // 8
-    noise = 0.02 + 0.01 * (varying == 0) + 0.002 * (options.coefficients == 8) + 20 / points
-    said = {"cloud_points": cloud, "points": points, "varying": varying, "bytes": size,
+    size = points * each + view_dependent * 48 * options.coefficients // 8
+    noise = 0.02 + 0.01 * (view_dependent == 0) + 0.002 * (options.coefficients == 8) + 20 / points
+    said = {"cloud_points": cloud, "points": points, "view_dependent_points": view_dependent, "bytes": size,
             "seconds": {"total": 0.1, "extract": 0.08}, "peak_memory_mib": 100 + points / 1e4}  # fmt: skip
     options.out.write_text(json.dumps(said | {"noise": noise, "networks": options.bundle.name}))
     return said
@@ -58,7 +58,7 @@ def render(options: argparse.Namespace) -> dict:
         image += rng.normal(0, 255 * scene["noise"], image.shape)
         cv2.imwrite(str(options.out / f"{Path(name).stem}.png"), np.clip(np.rint(image), 0, 255))
         ms = {"project": scene["points"] / 1e5, "shade": 1.0, "refine": width * height / 3e4 / options.threads,
-              "turn": 0.5 + 0.25 * ("tiles" in options.without)}  # fmt: skip
+              "resample": 0.5 + 0.25 * ("tiles" in options.without)}  # fmt: skip
         views.append({"name": name, "ms": ms | {"total": sum(ms.values())}})
     return {"views": views}
 

@@ -26,6 +26,10 @@ inline uint8_t rounded(float value) {
   return uint8_t(int(value + kNoFraction) - int(kNoFraction));
 }
 
+MAQ_SIMD_CLONES void to_floats(const uint8_t* from, size_t count, float* to) {
+  for (size_t i = 0; i < count; ++i) to[i] = float(from[i]);
+}
+
 // --- bilinear: weights of 11 fractional bits, the vertical sum of rows that lost 4 of them
 // ------------------------------
 
@@ -35,7 +39,7 @@ constexpr int kWeightBits = 11;
 struct LinearAxis {
   struct Between {
     int first, second;
-    int first_weight, second_weight;
+    float first_weight, second_weight;  // whole numbers
   };
   std::vector<Between> at;
 
@@ -48,36 +52,49 @@ struct LinearAxis {
       const int floor = int(std::floor(fraction));
       fraction -= float(floor);
       if (are_columns && (floor < 0 || floor >= from_px - 1)) fraction = 0;
-      const auto weight = [](float of_one) { return int(std::nearbyint(of_one * (1 << kWeightBits))); };
+      const auto weight = [](float of_one) { return float(std::nearbyint(of_one * (1 << kWeightBits))); };
       at[size_t(i)] = {std::clamp(floor, 0, from_px - 1), std::clamp(floor + 1, 0, from_px - 1), weight(1 - fraction),
                        weight(fraction)};
     }
   }
 };
 
+// `from` and `to` have a value more than their rows have. Products and sums are exact in floats. `lanes` is a power of
+// two, so that a pixel is one vector.
 template <int channels>
-void blend_columns(const uint8_t* from, const LinearAxis& axis, int* to) {
+void blend_columns(const float* from, const LinearAxis& axis, float* to) {
+  constexpr int lanes = channels == 3 ? 4 : channels;
   for (const LinearAxis::Between at : axis.at) {
-    for (int c = 0; c < channels; ++c) {
-      *to++ = from[at.first * channels + c] * at.first_weight + from[at.second * channels + c] * at.second_weight;
-    }
+    const float* const first = from + at.first * channels;
+    const float* const second = from + at.second * channels;
+    float blended[lanes];
+    for (int c = 0; c < lanes; ++c) blended[c] = first[c] * at.first_weight + second[c] * at.second_weight;
+    for (int c = 0; c < lanes; ++c) to[c] = blended[c];
+    to += channels;
   }
 }
 
-MAQ_SIMD_CLONES void blend_rows(const int* first, const int* second, int first_weight, int second_weight, size_t count,
-                                uint8_t* to) {
+// Less than 2^15 when the last 4 bits are gone.
+MAQ_SIMD_CLONES void drop_last_bits(const float* from, size_t count, int16_t* to) {
+  for (size_t i = 0; i < count; ++i) to[i] = int16_t(int(from[i]) >> 4);
+}
+
+MAQ_SIMD_CLONES void blend_rows(const int16_t* first, const int16_t* second, int16_t first_weight,
+                                int16_t second_weight, size_t count, uint8_t* to) {
   for (size_t i = 0; i < count; ++i) {
-    const int sum = ((first_weight * (first[i] >> 4)) >> 16) + ((second_weight * (second[i] >> 4)) >> 16);
-    to[i] = uint8_t((sum + 2) >> 2);
+    const int16_t upper = int16_t((first_weight * first[i]) >> 16), lower = int16_t((second_weight * second[i]) >> 16);
+    to[i] = uint8_t(uint16_t(upper + lower + 2) >> 2);
   }
 }
 
 void resize_bilinear(const Source& from, const Target& to) {
   const auto blend = to.channels == 1 ? blend_columns<1> : to.channels == 3 ? blend_columns<3> : blend_columns<4>;
   const LinearAxis columns(from.width_px, to.width_px, true), rows(from.height_px, to.height_px, false);
+  const size_t from_values = size_t(from.width_px) * size_t(from.channels);
   const size_t values = size_t(to.width_px) * size_t(to.channels);
-  std::vector<int> memory(2 * values);
-  int* blended[2] = {memory.data(), memory.data() + values};
+  std::vector<float> line(from_values + 1), sums(values + 1);
+  std::vector<int16_t> memory(2 * values);
+  int16_t* blended[2] = {memory.data(), memory.data() + values};
   int blended_row[2] = {-1, -1};
   for (int y = 0; y < to.height_px; ++y) {
     const LinearAxis::Between& at = rows.at[size_t(y)];
@@ -88,10 +105,12 @@ void resize_bilinear(const Source& from, const Target& to) {
     const int wanted[2] = {at.first, at.second};
     for (int i = 0; i < 2; ++i) {
       if (blended_row[i] == wanted[i]) continue;
-      blend(row_of(from, wanted[i]), columns, blended[i]);
+      to_floats(row_of(from, wanted[i]), from_values, line.data());
+      blend(line.data(), columns, sums.data());
+      drop_last_bits(sums.data(), values, blended[i]);
       blended_row[i] = wanted[i];
     }
-    blend_rows(blended[0], blended[1], at.first_weight, at.second_weight, values, row_of(to, y));
+    blend_rows(blended[0], blended[1], int16_t(at.first_weight), int16_t(at.second_weight), values, row_of(to, y));
   }
 }
 
@@ -106,13 +125,42 @@ MAQ_SIMD_CLONES void add_row(const uint8_t* from, size_t count, int* sums) {
 template <int channels>
 void average_columns(const int* sums, int factor, int pixels, int width, uint8_t* to) {
   const float weight = 1.0f / float(pixels);
-  const bool is_half = factor == 2 && pixels == 4;  // in both directions: halves are rounded up
   for (int x = 0; x < width; ++x, to += channels) {
     int all[channels] = {};
     for (int i = 0; i < factor; ++i, sums += channels) {
       for (int c = 0; c < channels; ++c) all[c] += sums[c];
     }
-    for (int c = 0; c < channels; ++c) to[c] = is_half ? uint8_t((all[c] + 2) >> 2) : rounded(float(all[c]) * weight);
+    for (int c = 0; c < channels; ++c) to[c] = rounded(float(all[c]) * weight);
+  }
+}
+
+// means[i]: that of four neighbours, halves rounded up, as those `step` bytes apart of both rows.
+MAQ_SIMD_CLONES void average_neighbours(const uint8_t* upper, const uint8_t* lower, size_t step, size_t count,
+                                        uint8_t* means) {
+  for (size_t i = 0; i < count; ++i) {
+    const unsigned sum = unsigned(upper[i]) + upper[i + step] + lower[i] + lower[i + step];
+    means[i] = uint8_t((sum + 2) >> 2);
+  }
+}
+
+// Every other pixel of `from`, which has room for a byte after its last.
+template <size_t channels>
+void take_every_other(const uint8_t* from, int width, uint8_t* to) {
+  constexpr size_t whole = channels == 3 ? 4 : channels;  // with a byte of the next pixel, which is written over
+  for (int x = 0; x + 1 < width; ++x, from += 2 * channels, to += channels) std::memcpy(to, from, whole);
+  std::memcpy(to, from, channels);
+}
+
+// Averages all neighbours and takes every other mean: two plain loops, the first of them over bytes side by side.
+void halve(const Source& from, const Target& to) {
+  const auto take = to.channels == 1   ? take_every_other<1>
+                    : to.channels == 3 ? take_every_other<3>
+                                       : take_every_other<4>;
+  const size_t channels = size_t(to.channels), count = (2 * size_t(to.width_px) - 1) * channels;
+  std::vector<uint8_t> means(count + 1);
+  for (int y = 0; y < to.height_px; ++y) {
+    average_neighbours(row_of(from, 2 * y), row_of(from, 2 * y + 1), channels, count, means.data());
+    take(means.data(), to.width_px, row_of(to, y));
   }
 }
 
@@ -121,6 +169,7 @@ void shrink_by_whole_factors(const Source& from, const Target& to) {
                        : to.channels == 3 ? average_columns<3>
                                           : average_columns<4>;
   const int factor_x = from.width_px / to.width_px, factor_y = from.height_px / to.height_px;
+  if (factor_x == 2 && factor_y == 2) return halve(from, to);
   std::vector<int> sums(size_t(from.width_px) * size_t(from.channels));
   for (int y = 0; y < to.height_px; ++y) {
     std::fill(sums.begin(), sums.end(), 0);
@@ -156,10 +205,6 @@ struct AreaAxis {
     begin.push_back(taps.size());
   }
 };
-
-MAQ_SIMD_CLONES void to_floats(const uint8_t* from, size_t count, float* to) {
-  for (size_t i = 0; i < count; ++i) to[i] = float(from[i]);
-}
 
 // `from` has a value more than the row has. `lanes` is a power of two, so that a pixel is one vector.
 template <int channels>

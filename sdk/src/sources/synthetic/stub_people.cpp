@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "image/sprite.h"
+#include "sources/synthetic/people_sheet.h"
 
 namespace maq {
 namespace {
@@ -60,12 +61,12 @@ std::vector<uint8_t> draw_room(int width, int height, Dice& dice) {
 }
 
 BgraImage decode_sheet() {
-  const EmbeddedFile sheet = stub_people_sheet();
-  if (sheet.size_bytes == 0) {
+  const EmbeddedFile colours = stub_people_colours();
+  if (colours.size_bytes == 0) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "This build has no sprites for stub:people; ",
-                "use stub:pattern, or build with MAQ_STUB_PEOPLE_SHEET.");
+                "use stub:pattern, or build with MAQ_STUB_PEOPLE_JPEG.");
   }
-  BgraImage image = decode_webp(sheet.bytes, sheet.size_bytes, "The sprite sheet of stub:people");
+  BgraImage image = decode_people_sheet(colours, stub_people_mask());
   if (image.width_px != kTileWidthPx * kCycleFrames || image.height_px != kTileHeightPx * kPeople) {
     throw Error(MAQ_ERROR_INTERNAL, "The sprite sheet of stub:people is ", image.width_px, " x ", image.height_px,
                 ", but must be ", kTileWidthPx * kCycleFrames, " x ", kTileHeightPx * kPeople, ".");

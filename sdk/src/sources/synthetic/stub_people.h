@@ -1,7 +1,6 @@
 // The people of stub:people: sprites of rendered people in a walk cycle, moving through a plain room.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -9,13 +8,6 @@
 #include "image/sprite.h"
 
 namespace maq {
-
-// The sprite sheet that CMake puts into the library (cmake/EmbedFile.cmake).
-struct EmbeddedFile {
-  const uint8_t* bytes = nullptr;
-  size_t size_bytes = 0;  // 0: this build has none
-};
-EmbeddedFile stub_people_sheet();
 
 class StubPeople {
  public:

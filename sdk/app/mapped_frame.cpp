@@ -1,11 +1,12 @@
-#include "mapped_frame.h"
+#include "app/mapped_frame.h"
 
+#include <chrono>
 #include <utility>
 
-#include "window.h"
+namespace maquette {
 
-void MappedFrame::copy_from(maquette::PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before) {
-  const double before_s = monotonic_s();
+void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before) {
+  const auto before = std::chrono::steady_clock::now();
   camera.copy_from(mapped.frame);
   iuv.resize(camera.rgba.size());
   const maq_densepose_plane planes[] = {MAQ_DENSEPOSE_PLANE_PART, MAQ_DENSEPOSE_PLANE_U, MAQ_DENSEPOSE_PLANE_V,
@@ -28,11 +29,13 @@ void MappedFrame::copy_from(maquette::PipelineResult mapped, double rate, std::v
   }
   seen = *seen_before;
   people = mapped.densepose.people();
-  result = std::make_shared<maquette::DensePoseResult>(std::move(mapped.densepose));
+  result = std::make_shared<DensePoseResult>(std::move(mapped.densepose));
   stats = result->stats();
   number = mapped.number;
   results_per_second = rate;
   age_ms = mapped.age_ms;
   waiting_ms = mapped.wait_ms;
-  copying_ms = (monotonic_s() - before_s) * 1000;
+  copying_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count();
 }
+
+}  // namespace maquette

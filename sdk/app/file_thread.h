@@ -1,4 +1,4 @@
-// Reads and writes files on a thread of its own, one after the other, so that the window does not wait for the disk.
+// Reads and writes files on a thread of its own, one after the other, so that drawing does not wait for the disk.
 #pragma once
 
 #include <condition_variable>
@@ -8,13 +8,16 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
+
+namespace maquette {
 
 class FileThread {
  public:
   using Job = std::function<std::string()>;  // returns what it did, for the user; "": nothing to say
 
   FileThread() : thread_([this] { run(); }) {}
-  ~FileThread() {
+  ~FileThread() {  // after all that was added
     add(nullptr);
     thread_.join();
   }
@@ -61,3 +64,5 @@ class FileThread {
   std::string message_;
   std::thread thread_;
 };
+
+}  // namespace maquette

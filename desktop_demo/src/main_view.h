@@ -1,0 +1,54 @@
+// What fills the window beside the panel: people (PeopleView) or a scene (SceneView).
+#pragma once
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "options.h"
+#include "painter.h"
+#include "stage_chart.h"
+#include "window.h"
+
+// What the user wants that is not the view's own business, by a key or a button.
+enum class Action { kNone, kOpenCamera, kLeaveScene, kSnapshot, kClip, kRecord, kHelp };
+
+// What pointer and arrow keys did since the last frame.
+struct Steering {
+  float seconds = 0;
+  float right = 0, down = 0;                    // in radians
+  bool is_dragging = false, has_begun = false;  // begun: with this frame
+  float pointer_x = 0, drag_x = 0;
+};
+
+class MainView {
+ public:
+  MainView(const Options& options, const Window& window, Painter& painter)
+      : options_(options), window_(window), painter_(painter) {}
+  virtual ~MainView() = default;
+
+  virtual bool update() = 0;  // takes the newest image; true when there was one
+  virtual Action press(int key) = 0;
+  virtual void steer(const Steering& steering, const Rect& area) = 0;
+  virtual void draw(const Rect& area) = 0;
+  virtual Action draw_panel() = 0;
+
+  virtual bool is_moving() const { return false; }  // by itself, without another image
+  virtual std::string message() const = 0;          // what the user must know
+  Rect image_rect() const { return image_rect_; }
+  virtual double images_per_second() const = 0;
+  // Of the people in the image, for a snapshot.
+  virtual std::shared_ptr<const maquette::DensePoseResult> result() const { return nullptr; }
+
+  // Without a user: once a frame, does what one would; true at the end.
+  virtual bool act_alone() = 0;
+  virtual std::string failure() const = 0;  // a sentence; "" where nothing failed
+  virtual void add_to_report(nlohmann::ordered_json* report) const = 0;
+
+ protected:
+  const Options& options_;
+  const Window& window_;
+  Painter& painter_;
+  Rect image_rect_;
+  StageChart stages_;  // of the images
+};

@@ -1,0 +1,62 @@
+// Saves snapshots and clips of what is shown into a folder, without holding up the thread that draws.
+//
+//   maquette::Saver saver(context, "/home/me/Pictures");
+//   saver.begin_clip(25);
+//   for (;;) { draw(); if (saver.takes_clip_images()) saver.add_to_clip(shown_pixels()); write(saver.message()); }
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "app/file_thread.h"
+#include "app/rgba_image.h"
+
+namespace maquette {
+
+class Saver {  // all calls by one thread
+ public:
+  // The context must outlive this, whose destructor completes what was begun.
+  Saver(const Context& context, const std::string& folder) : context_(context), folder_(folder) {}
+  ~Saver() { end_clip(); }
+  Saver(const Saver&) = delete;
+  Saver& operator=(const Saver&) = delete;
+
+  // A PNG of the image; of `people`, which may be null, the three DensePose files.
+  void save_snapshot(RgbaImage image, std::shared_ptr<const DensePoseResult> people);
+
+  // `fps`: how often images will be added.
+  void begin_clip(double fps);
+  void end_clip();
+  bool has_clip() const { return clip_ != nullptr; }
+  // False as well while the disk is slower than the images come.
+  bool takes_clip_images() const { return has_clip() && !files_.is_busy(); }
+  // A clip has one size, so it ends when an image has another.
+  void add_to_clip(RgbaImage image);
+
+  // In the folder, named by the time and a count; for what others write.
+  std::string new_path(const char* extension);
+  // Another job for the thread that writes, in its turn.
+  void run(FileThread::Job job) { files_.add(std::move(job)); }
+  // What was saved last, or why it was not, for five seconds.
+  std::string message();
+
+ private:
+  struct OpenClip {
+    std::string path;
+    int width_px = 0, height_px = 0;  // 0 before the first image
+    std::optional<Clip> file;         // of the thread that writes
+  };
+
+  const Context& context_;
+  const std::string folder_;
+  int file_count_ = 0;
+  std::string message_;
+  std::chrono::steady_clock::time_point message_since_;
+  std::shared_ptr<OpenClip> clip_;
+  FileThread files_;  // last: its jobs use the others
+};
+
+}  // namespace maquette

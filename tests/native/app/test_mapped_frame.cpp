@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include <app/mapped_frame.h>
+
+#include <numeric>
+
+namespace {
+
+constexpr size_t kCells = maquette::MappedFrame::kSeenCells;
+
+// The photo of the tests through the tiny networks.
+class MappedFrame : public ::testing::Test {
+ protected:
+  maquette::PipelineResult mapped() {
+    maq_densepose_config densepose = maquette::default_densepose_config();
+    densepose.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+    maq_pipeline_config config = maquette::default_pipeline_config();
+    config.densepose = &densepose;
+    maquette::Pipeline pipeline(context_, config);
+    pipeline.set_source("image:" MAQ_TEST_MEDIA "/photo.jpg");
+    return std::move(*pipeline.next());
+  }
+
+  maquette::Context context_;
+  std::vector<uint8_t> seen_;
+};
+
+TEST_F(MappedFrame, HasTheFrameAndItsPlanesPixelByPixel) {
+  maquette::PipelineResult from = mapped();
+  maquette::RgbaImage camera;
+  camera.copy_from(from.frame);
+  const size_t pixels = camera.rgba.size() / 4;
+  std::vector<uint8_t> wanted(pixels * 4);
+  const maq_densepose_plane planes[] = {MAQ_DENSEPOSE_PLANE_PART, MAQ_DENSEPOSE_PLANE_U, MAQ_DENSEPOSE_PLANE_V,
+                                        MAQ_DENSEPOSE_PLANE_PERSON};
+  for (size_t channel = 0; channel < 4; ++channel) {
+    size_t stride_bytes = 0;
+    const uint8_t* const rows = from.densepose.plane(planes[channel], &stride_bytes);
+    for (size_t i = 0; i < pixels; ++i) {
+      const size_t x = i % size_t(camera.width_px), y = i / size_t(camera.width_px);
+      wanted[4 * i + channel] = rows[y * stride_bytes + x];
+    }
+  }
+  const uint32_t people = from.densepose.person_count();
+  ASSERT_GT(people, 0u);
+  const uint64_t number = from.number;
+
+  maquette::MappedFrame frame;
+  EXPECT_EQ(frame.number, 0u);
+  frame.copy_from(std::move(from), 12.5, &seen_);
+  EXPECT_EQ(frame.camera.rgba, camera.rgba);
+  EXPECT_EQ(frame.iuv, wanted);
+  EXPECT_EQ(frame.people.size(), people);
+  EXPECT_EQ(frame.result->person_count(), people);
+  EXPECT_EQ(frame.number, number);
+  EXPECT_EQ(frame.results_per_second, 12.5);
+  EXPECT_GE(frame.copying_ms, 0);
+}
+
+TEST_F(MappedFrame, WhatIsSeenOfTheBodyIsTheCellsOfItsLabels) {
+  maquette::MappedFrame frame;
+  frame.copy_from(mapped(), 1, &seen_);
+  std::vector<uint8_t> wanted(24 * kCells * kCells);
+  for (size_t at = 0; at < frame.iuv.size(); at += 4) {
+    const size_t part = frame.iuv[at], u = frame.iuv[at + 1] * kCells / 256, v = frame.iuv[at + 2] * kCells / 256;
+    if (part > 0) wanted[((part - 1) * kCells + v) * kCells + u] = 255;
+  }
+  EXPECT_GT(std::accumulate(wanted.begin(), wanted.end(), 0), 0);
+  EXPECT_EQ(frame.seen, wanted);
+  EXPECT_EQ(seen_, wanted);
+}
+
+TEST_F(MappedFrame, WhatWasSeenBeforeFades) {
+  seen_.assign(24 * kCells * kCells, 160);
+  maquette::MappedFrame frame;
+  frame.copy_from(mapped(), 1, &seen_);
+  size_t faded = 0;
+  for (const uint8_t cell : frame.seen) {
+    EXPECT_TRUE(cell == 255 || cell == 150) << int(cell);
+    faded += cell == 150 ? 1 : 0;
+  }
+  EXPECT_GT(faded, 0u);
+  EXPECT_LT(faded, frame.seen.size());
+}
+
+}  // namespace

@@ -1,4 +1,5 @@
-// The time of converting and resizing a frame of 640 x 480, beside OpenCV's, on one thread: minimum of many, in turns.
+// The time of converting and resizing a frame of 640 x 480, beside OpenCV's, on one thread: the minimum of many runs,
+// measured alternately.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>

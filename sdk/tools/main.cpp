@@ -11,8 +11,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options
   setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
 
-  CLI::App app(
-      "Maquette: dense pose of people in images, clips and camera pictures, and scenes from photos, on the CPU.");
+  CLI::App app("Maquette: dense pose of people in images, clips and cameras, and scenes from photos, on the CPU.");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("maquette ") + maq_get_sdk_version());
   app.footer(

@@ -20,14 +20,14 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
       ->check(CLI::Range(1, 1000));
   command
       .add_option("--key-frames", options.key_frames,
-                  "Detect people in every N-th frame of a stream, and propagate their boxes in between")
+                  "Detect people in every N-th frame of a stream, and propagate their boxes in between (default 1)")
       ->check(CLI::Range(1, 1000));
   command
       .add_option("--min-person-height", options.min_person_height_px,
                   "People less tall than this, in pixels, may be missed; large values are faster")
       ->check(CLI::Range(0, 100000));
-  command.add_flag("--no-surface", options.no_surface, "Body parts alone: U and V stay 0");
-  command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: slower, saves energy");
+  command.add_flag("--no-surface", options.no_surface, "Compute only body parts, which is faster: U and V stay 0");
+  command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: saves energy, slower");
 }
 
 std::string bundle_of(const ModelOptions& options) {

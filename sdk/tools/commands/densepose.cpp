@@ -194,7 +194,7 @@ int run_densepose(const Options& options) {
 void add_densepose_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
-      app.add_subcommand("densepose", "Map every pixel of the people in images or clips to body surface");
+      app.add_subcommand("densepose", "Map each pixel of the people in images or clips to the body surface");
   command
       ->add_option("source", options->sources,
                    "Images, clips or URIs: photo.jpg, video:clip.mp4, stub:people?count=3 (see `maquette sources`)")
@@ -202,11 +202,11 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
   command->add_option("-o,--out", options->out, "Folder for the results; created if needed")->required();
   command->add_flag("--overlay", options->overlay,
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
-  command->add_flag("--json", options->json, "Print one JSON line a frame with counts and times, instead of text");
+  command->add_flag("--json", options->json, "Print counts and times as one JSON line per frame");
   add_model_options(*command, options->model);
   command
       ->add_option("--max-frames", options->max_frames,
-                   "Stop after N frames; default: all, and 100 of a source without end")
+                   "Stop after N frames; default: all, or 100 of an endless source")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 40));
   command->add_option("--every", options->every, "Process only every N-th frame of a clip")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 30));

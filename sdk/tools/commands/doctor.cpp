@@ -97,7 +97,7 @@ bool look_at(const maq_camera_list* list, uint32_t index) {
   }
   well("may be opened");
   if (usable == 0) {
-    unwell("none of its " + std::to_string(info.mode_count) + " formats is understood",
+    unwell("none of its " + std::to_string(info.mode_count) + " formats is supported",
            "`maquette sources` lists them; look for a setting of the camera that gives YUYV, NV12 or MJPEG");
   } else {
     well(std::to_string(usable) + " sizes and formats can be used");
@@ -164,6 +164,6 @@ int look_at_cameras() {
 
 void add_doctor_command(CLI::App& app, int* exit_code) {
   CLI::App* command = app.add_subcommand("doctor", "Find out why a camera does not work, and what to do");
-  command->footer("Exit status 0 when some camera can be used, 1 when none can.");
+  command->footer("Exit status: 0 if at least one camera can be used, 1 if none can.");
   command->callback([=] { *exit_code = look_at_cameras(); });
 }

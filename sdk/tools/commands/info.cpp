@@ -27,6 +27,7 @@ int print_info() {
 }  // namespace
 
 void add_info_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand("info", "Print versions and where the runtime and the model bundle are");
+  CLI::App* command =
+      app.add_subcommand("info", "Print the versions, and the paths of ONNX Runtime and the model bundle");
   command->callback([=] { *exit_code = print_info(); });
 }

@@ -95,19 +95,20 @@ int play(const Options& options) {
 
 void add_play_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("play", "Watch a camera, a recording or another source, and how it delivers");
+  CLI::App* command =
+      app.add_subcommand("play", "Show a camera, a recording or another source, and count late and missing frames");
   command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
   command->add_option("-s,--speed", options->speed, "Speed of a recording, clip or stub: 2 is twice as fast")
       ->check(CLI::Range(0.01, 100.0));
   command->add_option("--from", options->from_s, "Start at this time of a recording, in seconds")
       ->check(CLI::NonNegativeNumber);
   command->add_option("-n,--frames", options->frames, "Stop after N frames")->check(CLI::PositiveNumber);
-  command->add_option("-t,--seconds", options->seconds, "Stop after this time")->check(CLI::PositiveNumber);
+  command->add_option("-t,--seconds", options->seconds, "Stop after this time, in seconds")->check(CLI::PositiveNumber);
   command->add_flag_callback(
-      "--no-picture", [=] { options->picture = false; }, "Print statistics only; the default without a terminal");
+      "--no-picture", [=] { options->picture = false; }, "Print only statistics; default without a terminal");
   command->add_option("--json", options->json, "Write the statistics to this file");
   command->footer(
-      "Plays frames at their own times, also from files. A terminal shows the picture in colour; missing and late "
+      "Plays frames in real time, also from files. A terminal shows the picture in colour. Missing and late "
       "frames\n"
       "and interruptions are counted:\n\n"
       "  maquette play v4l2:/dev/video0\n"

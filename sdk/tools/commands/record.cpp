@@ -34,7 +34,7 @@ int record(const Options& options) {
   maquette::Source source(context, argument.uri, &config);
   const maq_source_info info = source.info();
   if (info.frame_count < 0 && info.is_live == 0 && options.frames == 0 && options.seconds == 0) {
-    throw std::runtime_error(argument.uri + " has no end: say how much of it with --frames or --seconds.");
+    throw std::runtime_error(argument.uri + " has no end: limit it with --frames or --seconds.");
   }
   maq_recorder_config how{};
   maquette::check(maq_recorder_config_init(&how, sizeof how));
@@ -79,17 +79,17 @@ int record(const Options& options) {
 
 void add_record_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("record", "Record a camera, or another source, to a file that can be played");
+  CLI::App* command = app.add_subcommand("record", "Record a camera or another source to a file");
   command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
   command->add_option("out", options->out, "File of the recording: take.maqrec; must not exist yet")->required();
   command->add_option("-n,--frames", options->frames, "Stop after N frames")->check(CLI::PositiveNumber);
-  command->add_option("-t,--seconds", options->seconds, "Stop after this time")->check(CLI::PositiveNumber);
+  command->add_option("-t,--seconds", options->seconds, "Stop after this time, in seconds")->check(CLI::PositiveNumber);
   command
       ->add_option("-q,--quality", options->quality,
-                   "Compress frames as JPEG of this quality, 1 to 100; default: keep them exactly as they came")
+                   "Compress frames as JPEG of this quality, 1 to 100; default: store them unchanged")
       ->check(CLI::Range(1, 100));
   command->footer(
-      "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording; after a crash or a power cut\n"
+      "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording. After a crash or a power cut\n"
       "it can still be played.\n\n"
       "  maquette record v4l2:/dev/video0 take.maqrec --seconds 10\n"
       "  maquette densepose take.maqrec --out results --overlay\n"

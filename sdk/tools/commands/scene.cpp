@@ -45,8 +45,7 @@ int show(const InfoOptions& options) {
 std::string scene_bundle_or_default(const std::string& given) {
   const std::string bundle = given.empty() ? default_scene_bundle() : given;
   if (bundle.empty()) {
-    throw std::runtime_error(
-        "No bundle of scene networks was found; name its folder with --bundle or MAQ_SCENE_BUNDLE.");
+    throw std::runtime_error("No scene bundle was found; name its folder with --bundle or MAQ_SCENE_BUNDLE.");
   }
   return bundle;
 }
@@ -68,13 +67,13 @@ void add_scene_command(CLI::App& app, int* exit_code) {
   CLI::App* scene = app.add_subcommand("scene", "Scenes from photos: build one, render it from new viewpoints");
   scene->require_subcommand(1);
   scene->footer(
-      "From a folder of photos with cameras and a cloud (COLMAP, or transforms.json with a PLY) to a clip:\n\n"
+      "From a folder with photos, cameras and a point cloud (COLMAP, or transforms.json with a PLY file) to a clip:\n\n"
       "  maquette scene build my-place --out my-place.maqs\n"
       "  maquette scene render my-place.maqs --capture my-place --path through --out clip.mp4");
   add_scene_build_command(*scene, exit_code);
   add_scene_render_command(*scene, exit_code);
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = scene->add_subcommand("info", "What is in a scene file; checks all of it");
+  CLI::App* command = scene->add_subcommand("info", "Check a scene file and print what it contains");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
   command->add_option("--json", options->json, "Also write these figures to this file");
   command->callback([=] { *exit_code = show(*options); });

@@ -130,12 +130,16 @@ int build(const Options& options) {
 
 void add_scene_build_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = scene.add_subcommand("build", "Make a scene of a folder with photos, cameras and a cloud");
-  command->add_option("capture", options->capture, "Folder with a COLMAP model or transforms.json, photos and cloud")
+  CLI::App* command =
+      scene.add_subcommand("build", "Build a scene from a folder with photos, cameras and a point cloud");
+  command
+      ->add_option("capture", options->capture,
+                   "Folder with photos, a point cloud, and a COLMAP model or transforms.json")
       ->required();
   command->add_option("-o,--out", options->out, "File of the scene: place.maqs; replaces an existing one")->required();
-  command->add_option("--bundle", options->bundle,
-                      "Bundle of scene networks; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
+  command->add_option(
+      "--bundle", options->bundle,
+      "Folder of the scene bundle; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
   command->add_option("--points", options->points, "Maximum number of points; larger clouds are thinned out evenly")
       ->check(CLI::PositiveNumber);
   command->add_option("--views", options->views, "Maximum number of photos, selected evenly")
@@ -143,22 +147,26 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
   command
       ->add_option("--long-side", options->long_side, "Scale larger photos down to this long side in pixels; 0: never")
       ->check(CLI::Range(0, 16384));
-  command->add_option("--coefficients", options->coefficients, "Bits of the numbers in the file: 8, 16 or 32")
+  command
+      ->add_option("--coefficients", options->coefficients,
+                   "Bits of each number of a descriptor: 8, 16 or 32 (default 8)")
       ->check(CLI::IsMember({8, 16, 32}));
   command
       ->add_option("--min-variation", options->min_variation,
-                   "Points that vary less between views keep one colour, for a smaller file; RMS of colours of 0 to 1")
+                   "Store points that vary less between photos without view dependence, for a smaller file; RMS of "
+                   "colours of 0 to 1")
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option("--visibility-scale", options->visibility_scale,
                    "Test visibility at this fraction of the resolution; below 1 for sparse clouds")
       ->check(CLI::Range(1.0 / 16, 1.0));
-  command->add_option("--near", options->near_depth, "Ignore points nearer to a camera than this, in scene units")
+  command
+      ->add_option("--near", options->near_depth, "Ignore points nearer to a camera than this, in units of the scene")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
       ->check(CLI::Range(1, 64));
-  command->add_flag("--all-photos", options->all_photos, "Also use photos that the capture holds out for comparisons");
-  command->add_option("--ply", options->ply, "Also write the points with their colours as PLY");
+  command->add_flag("--all-photos", options->all_photos, "Also use the held-out photos of the capture");
+  command->add_option("--ply", options->ply, "Also write the points with their colours to this PLY file");
   command->add_option("--json", options->json, "Write counts and times to this file");
   command->callback([=] { *exit_code = build(*options); });
 }

@@ -127,7 +127,7 @@ std::vector<uint32_t> chosen_views(const maquette::Capture& capture, const std::
     }
   }
   if (chosen.empty() && wanted == "held-out") {
-    throw std::runtime_error("The capture holds no photos out; use --views all, or names of photos.");
+    throw std::runtime_error("The capture has no held-out photos; use --views all, or names of photos.");
   }
   if (chosen.empty() || (wanted != "all" && wanted != "held-out" && !names.empty())) {
     throw std::runtime_error("The capture has no photo " + (names.empty() ? wanted : *names.begin()) + ".");
@@ -263,19 +263,20 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
       ->add_option("--path", options->path,
                    "Path of the camera in a clip: `orbit` around the scene, or `through` the cameras of the capture")
       ->check(CLI::IsMember({"orbit", "through"}));
-  command->add_option("--seconds", options->seconds, "Length of the clip")->check(CLI::Range(0.04, 600.0));
+  command->add_option("--seconds", options->seconds, "Length of the clip in seconds")->check(CLI::Range(0.04, 600.0));
   command->add_option("--fps", options->fps, "Frames a second of the clip")->check(CLI::Range(1.0, 240.0));
-  command->add_option("--capture", options->capture, "Folder that the scene was built from, for its cameras");
-  command->add_option("--views", options->views, "Cameras of the capture to render: held-out, all, or names,…");
-  command->add_option("--size", options->size, "Size of the pictures, as 640x480; default: that of the photo");
+  command->add_option("--capture", options->capture, "Folder of the capture whose cameras are used");
+  command->add_option("--views", options->views,
+                      "Photos of the capture to render: held-out, all, or names with commas");
+  command->add_option("--size", options->size, "Size of the pictures, such as 640x480; default: that of the photo");
   command->add_option(
       "--bundle", options->bundle,
       "Bundle that built the scene; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
-  command->add_option("--near", options->near_depth, "Do not draw points nearer than this, in scene units")
+  command->add_option("--near", options->near_depth, "Do not draw points nearer than this, in units of the scene")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
       ->check(CLI::Range(1, 64));
-  command->add_flag("--no-alpha", options->no_alpha, "Leave out the alpha channel");
+  command->add_flag("--no-alpha", options->no_alpha, "Write pictures without alpha");
   command->add_option("--repeat", options->repeat, "Render each picture N times and report median times")
       ->check(CLI::Range(1, 10000));
   command->add_option("--without", options->without, "Switch off an optimisation, to measure it: culling, tiles")

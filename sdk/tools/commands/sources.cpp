@@ -32,14 +32,14 @@ void print_cameras() {
 }
 
 int print_sources() {
-  std::printf("Where frames can come from, with an example of each:\n\n");
+  std::printf("Kinds of sources, with an example of each:\n\n");
   for (uint32_t i = 0; i < maq_source_get_scheme_count(); ++i) {
     maq_source_scheme scheme{};
     scheme.struct_size = sizeof scheme;
     maquette::check(maq_source_get_scheme(i, &scheme));
     std::printf("  %-38s %s\n", scheme.example, scheme.summary);
   }
-  std::printf("\n?size=640x480&fps=15 works on each. In a file name write ? as %%3F.\n");
+  std::printf("\n?size=640x480&fps=15 works with each. In a file name write ? as %%3F.\n");
   print_cameras();
   return 0;
 }
@@ -48,6 +48,6 @@ int print_sources() {
 
 void add_sources_command(CLI::App& app, int* exit_code) {
   CLI::App* command =
-      app.add_subcommand("sources", "List the kinds of sources of this build, and the cameras that are plugged in");
+      app.add_subcommand("sources", "List the kinds of sources of this build, and the connected cameras");
   command->callback([=] { *exit_code = print_sources(); });
 }

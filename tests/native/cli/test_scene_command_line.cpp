@@ -176,7 +176,7 @@ TEST_F(SceneCommandLine, WhatIsMissingOrWrongIsOneSentence) {
   nlohmann::json transforms = json("all_used/transforms.json");
   transforms.erase("test_filenames");
   write_text(file("all_used/transforms.json"), transforms.dump());
-  expect_failure(head + "--capture all_used --views held-out", "holds no photos out; use --views all");
+  expect_failure(head + "--capture all_used --views held-out", "has no held-out photos; use --views all");
   EXPECT_EQ(files(), (std::set<std::string>{"place.maqs", "all_used"}));
 }
 

@@ -16,6 +16,7 @@
 #include "machine.h"
 #include "output/output_file.h"
 #include "output/progress_bar.h"
+#include "print.h"
 #include "program.h"
 
 namespace {
@@ -127,7 +128,7 @@ class Case {
     nlohmann::ordered_json ms;
     for (size_t i = 0; i < kStageCount; ++i) {
       for (const int percent : {50, 90, 99}) {
-        ms[kStages[i]]["p" + std::to_string(percent)] = std::round(1e3 * percentile(i, percent)) / 1e3;
+        ms[kStages[i]]["p" + std::to_string(percent)] = rounded_ms(percentile(i, percent));
       }
     }
     const std::vector<std::string> reasons = warnings(options);
@@ -169,31 +170,34 @@ class Case {
 void print_table(const std::vector<std::unique_ptr<Case>>& cases) {
   size_t widest = 6;
   for (const auto& timed : cases) widest = std::max(widest, timed->uri().size());
-  std::printf("%-*s  people    FPS    p50    p90    p99 ms   CPU ms |", int(widest), "source");
-  for (size_t i = 0; i + 1 < kStageCount; ++i) std::printf(" %s", kStages[i]);
-  std::printf("\n");
+  print_output("%-*s  people    FPS    p50    p90    p99 ms   CPU ms |", int(widest), "source");
+  for (size_t i = 0; i + 1 < kStageCount; ++i) print_output(" %s", kStages[i]);
+  print_output("\n");
   for (const auto& timed : cases) {
-    std::printf("%-*s  %6.2f %6.1f %6.1f %6.1f %6.1f %11.1f |", int(widest), timed->uri().c_str(), timed->people(),
-                1e3 / std::max(1e-6, timed->frame_ms()), timed->frame_ms(), timed->percentile(kStageCount - 1, 90),
-                timed->percentile(kStageCount - 1, 99), timed->cpu_ms());
+    print_output("%-*s  %6.2f %6.1f %6.1f %6.1f %6.1f %11.1f |", int(widest), timed->uri().c_str(), timed->people(),
+                 1e3 / std::max(1e-6, timed->frame_ms()), timed->frame_ms(), timed->percentile(kStageCount - 1, 90),
+                 timed->percentile(kStageCount - 1, 99), timed->cpu_ms());
     for (size_t i = 0; i + 1 < kStageCount; ++i) {
-      std::printf(" %*.1f", int(std::char_traits<char>::length(kStages[i])), timed->percentile(i, 50));
+      print_output(" %*.1f", int(std::char_traits<char>::length(kStages[i])), timed->percentile(i, 50));
     }
-    std::printf("\n");
+    print_output("\n");
   }
 }
 
 int run_bench(const Options& options) {
   const std::string bundle = bundle_of(options.model);
+  require_writable(options.json);
   const auto start = Clock::now();
   const maquette::Context context;
-  maquette::DensePose densepose(context, config_of(options.model, bundle));
-  const double create_ms = ms_between(start, Clock::now());
-
+  const auto context_made = Clock::now();
   std::vector<std::unique_ptr<Case>> cases;
   for (const std::string& text : options.sources) {
     cases.push_back(std::make_unique<Case>(context, parse_source_argument(text).uri));
   }
+  const auto sources_open = Clock::now();
+  maquette::DensePose densepose(context, config_of(options.model, bundle));
+  const double create_ms = ms_between(start, context_made) + ms_between(sources_open, Clock::now());
+
   const double first_frame_ms = cases[0]->run(densepose, false);
   const double first_result_ms = 1e3 * seconds_since_start();
 
@@ -262,18 +266,17 @@ int run_bench(const Options& options) {
   for (const auto& timed : cases) document["cases"].push_back(timed->json(options));
 
   print_table(cases);
-  std::printf("create %.0f ms, first frame %.0f ms, program start to first result %.0f ms, peak memory %.0f MiB\n",
-              create_ms, first_frame_ms, first_result_ms, double(peak_memory_bytes()) / kMibibyte);
-  for (const std::string& reason : reasons) std::printf("Warning: %s\n", reason.c_str());
+  print_output("create %.0f ms, first frame %.0f ms, program start to first result %.0f ms, peak memory %.0f MiB\n",
+               create_ms, first_frame_ms, first_result_ms, double(peak_memory_bytes()) / kMibibyte);
+  for (const std::string& reason : reasons) print_output("Warning: %s\n", reason.c_str());
   for (const auto& timed : cases) {
     for (const std::string& reason : timed->warnings(options)) {
-      std::printf("Warning: %s: %s\n", timed->uri().c_str(), reason.c_str());
+      print_output("Warning: %s: %s\n", timed->uri().c_str(), reason.c_str());
     }
   }
   if (!options.json.empty()) {
-    const std::string text = document.dump(1) + "\n";
-    write_whole_file(options.json, text.data(), text.size());
-    std::printf("Written: %s\n", options.json.c_str());
+    write_json_file(options.json, document, 1);
+    print_output("Written: %s\n", options.json.c_str());
   }
   return !interrupted() ? 0 : 1;
 }

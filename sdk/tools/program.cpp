@@ -1,30 +1,87 @@
 #include "program.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
-#include <cstdio>
+#include <csignal>
+#include <cstdlib>
 #include <exception>
+#include <sstream>
+
+#include "print.h"
 
 namespace {
 
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
+// A closed one would be the number of the first file that is opened, and what is printed would go there. Nothing can
+// be written to what takes its place.
+void fill_standard_descriptors() {
+  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(number, F_GETFD) < 0 && open("/dev/null", O_RDONLY) != number) std::abort();
+  }
+}
+
+// What is wrong with a word where a command is expected; CLI11 says only that one is required. "" when nothing is.
+std::string unknown_command(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* at = &app;
+  std::string path = app.get_name().empty() ? "maquette" : app.get_name();
+  for (int i = 1; i < argc && at->get_require_subcommand_min() > 0 && argv[i][0] != '-'; ++i) {
+    const std::string word = argv[i];
+    const auto found = at->get_subcommands([&](const CLI::App* command) { return command->check_name(word); });
+    if (found.empty()) return "\"" + word + "\" is not a command; `" + path + " --help` lists them.";
+    at = found.front();
+    path += " " + word;
+  }
+  return "";
+}
+
+// Prints what CLI11 has to say: help, the version, or what is wrong with the arguments.
+int answer(const CLI::App& app, const CLI::ParseError& error) {
+  std::ostringstream out, err;
+  const int exit_code = app.exit(error, out, err) == 0 ? 0 : kWrongUsage;
+  print_error("%s", err.str().c_str());
+  print_output("%s", out.str().c_str());
+  return exit_code;
+}
+
+int parse(CLI::App& app, int argc, char** argv, const int* exit_code) {
+  const std::string problem = unknown_command(app, argc, argv);
+  if (!problem.empty()) {
+    print_error("maquette: %s\n", printable(problem).c_str());
+    return kWrongUsage;
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return answer(app, error);
+  }
+  return *exit_code;
+}
+
 }  // namespace
 
 maquette::Context open_context() {
   maq_context_config config = maquette::default_context_config();
-  config.log_callback = [](void*, maq_log_level, const char* text) { std::fprintf(stderr, "maquette: %s\n", text); };
+  config.log_callback = [](void*, maq_log_level, const char* text) { print_error("maquette: %s\n", text); };
   return maquette::Context(config);
 }
 
 int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
+  fill_standard_descriptors();
+  // Output that is lost is an error, told and cleaned up after, and not the end of the process.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kWrongUsage;
+    const int result = parse(app, argc, argv, exit_code);
+    flush_output();
+    return result;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "maquette: %s\n", error.what());
+    // What was found before stands above the error also where both go to one file.
+    std::fflush(stdout);
+    print_error("maquette: %s\n", printable(error.what()).c_str());
     return kFailed;
   }
-  return *exit_code;
 }

@@ -50,7 +50,8 @@ MAQ_API maq_status maq_recorder_finish(maq_recorder* recorder);
  * Not while a frame is added. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_recorder_get_info(const maq_recorder* recorder, maq_recorder_info* info);
 
-/* Closes the file (NULL is fine); the index is missing unless maq_recorder_finish was called.
+/* Closes the file (NULL is fine); unless maq_recorder_finish was called, the index is missing, and a file without a
+ * frame is removed.
  * Once for each recorder, from any thread. Does not block. */
 MAQ_API void maq_recorder_destroy(maq_recorder* recorder);
 

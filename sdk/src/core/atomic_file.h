@@ -1,9 +1,12 @@
 // A file that is written atomically: under a temporary name, and renamed when it is complete and on the disk.
 #pragma once
 
+#include <sys/stat.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/unique_fd.h"
 
@@ -11,11 +14,14 @@ namespace maq {
 
 class AtomicFile {
  public:
+  // Of a symbolic link, the file that it leads to is written. Character devices, pipes and descriptors by their name
+  // (/dev/stdout, /dev/fd/3) keep their place: they get all bytes at once from commit(). Folders are not made.
   // Throws MAQ_ERROR_UNWRITABLE where the folder does not exist or may not be written to, and where `path` is something
-  // other than a file. `temporary_extension` ends the temporary name, for libraries that choose a format by it.
+  // else: a folder, a disk. `temporary_extension` ends the temporary name, for libraries that choose a format by it;
+  // with one, `path` must be a file.
   explicit AtomicFile(std::string path, const char* temporary_extension = "");
   // Removes what was written, unless commit() was called. A process that dies before leaves the temporary file behind:
-  // its name is that of the file with ".part" and two numbers.
+  // its name is that of the file with ".part-" and 16 random digits.
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
@@ -31,13 +37,20 @@ class AtomicFile {
   void overwrite(uint64_t offset, const void* bytes, size_t count);
 
   // Gives the file its name, in place of one that has it. Throws MAQ_ERROR_UNWRITABLE; then the old file is unchanged.
+  // A pipe waits two seconds for a program that reads it.
   void commit();
 
  private:
+  void make_temporary_file(const char* extension, mode_t mode);
   void write_at(uint64_t offset, const void* bytes, size_t count);
+  UniqueFd open_stream() const;
+  void write_stream() const;
   [[noreturn]] void fail(const char* what, int reason) const;
 
-  std::string path_, temporary_path_;
+  std::string path_;                     // as given
+  std::string target_, temporary_path_;  // without links; "" for streams
+  bool is_stream_ = false;
+  std::vector<uint8_t> stream_bytes_;
   UniqueFd file_;
   uint64_t size_bytes_ = 0;
 };

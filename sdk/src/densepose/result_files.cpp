@@ -11,7 +11,7 @@ namespace maq {
 namespace {
 
 // Coordinates to a hundredth of a pixel and scores to four digits: what is there, without the noise of float to text.
-double rounded(double value, double step) { return std::round(value / step) * step; }
+double rounded(double value, double steps) { return std::round(value * steps) / steps; }
 
 std::string json_of(const DensePoseResult& result) {
   nlohmann::ordered_json document;
@@ -22,9 +22,9 @@ std::string json_of(const DensePoseResult& result) {
     nlohmann::ordered_json entry;
     entry["box"] = nlohmann::json::array();
     for (const float edge : {person.box.x0, person.box.y0, person.box.x1, person.box.y1}) {
-      entry["box"].push_back(rounded(double(edge), 0.01));
+      entry["box"].push_back(rounded(double(edge), 100));
     }
-    entry["score"] = rounded(double(person.score), 0.0001);
+    entry["score"] = rounded(double(person.score), 10000);
     document["people"].push_back(entry);
   }
   return document.dump() + "\n";

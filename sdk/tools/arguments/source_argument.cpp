@@ -36,6 +36,7 @@ bool is_known_scheme(const std::string& name) {
 }  // namespace
 
 SourceArgument parse_source_argument(const std::string& text) {
+  if (text.empty()) throw std::runtime_error("The source is empty; name a file, or see `maquette sources`.");
   const size_t colon = text.find(':');
   const std::string scheme = colon == std::string::npos ? "" : text.substr(0, colon);
   std::error_code error;

@@ -5,6 +5,7 @@
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "output/output_file.h"
 #include "output/overlay.h"
 #include "output/progress_bar.h"
+#include "print.h"
 #include "program.h"
 
 namespace fs = std::filesystem;
@@ -51,14 +53,14 @@ class Timings {
   float median_total_ms() const { return median(ms_[kStages - 1]); }
 
   void print() const {
-    std::printf("%zu frame%s, %lld %s. Median of a frame: %.1f ms (%.1f FPS)\n", frames(), frames() == 1 ? "" : "s",
-                (long long)people_, people_ == 1 ? "person" : "people", double(median_total_ms()),
-                1000.0 / std::max(1e-3, double(median_total_ms())));
+    print_output("%zu frame%s, %lld %s. Median of a frame: %.1f ms (%.1f FPS)\n", frames(), frames() == 1 ? "" : "s",
+                 (long long)people_, people_ == 1 ? "person" : "people", double(median_total_ms()),
+                 1000.0 / std::max(1e-3, double(median_total_ms())));
     constexpr const char* kNames[] = {"preprocess", "trunk", "proposals", "box head", "dense head", "decode"};
     for (size_t i = 0; i + 1 < kStages; ++i) {
-      std::printf("%s%s %.1f", i == 0 ? "  " : " | ", kNames[i], double(median(ms_[i])));
+      print_output("%s%s %.1f", i == 0 ? "  " : " | ", kNames[i], double(median(ms_[i])));
     }
-    std::printf(" ms\n");
+    print_output(" ms\n");
   }
 
  private:
@@ -92,24 +94,24 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
                                          {"proposals", stats.proposal_count},
                                          {"network", {stats.network_width_px, stats.network_height_px}},
                                          {"ms",
-                                          {{"preprocess", stats.preprocess_ms},
-                                           {"trunk", stats.trunk_ms},
-                                           {"proposals", stats.proposals_ms},
-                                           {"box_head", stats.box_head_ms},
-                                           {"dense_head", stats.dense_head_ms},
-                                           {"decode", stats.decode_ms},
-                                           {"total", stats.total_ms}}}};
-    std::printf("%s\n", line.dump().c_str());
+                                          {{"preprocess", rounded_ms(double(stats.preprocess_ms))},
+                                           {"trunk", rounded_ms(double(stats.trunk_ms))},
+                                           {"proposals", rounded_ms(double(stats.proposals_ms))},
+                                           {"box_head", rounded_ms(double(stats.box_head_ms))},
+                                           {"dense_head", rounded_ms(double(stats.dense_head_ms))},
+                                           {"decode", rounded_ms(double(stats.decode_ms))},
+                                           {"total", rounded_ms(double(stats.total_ms))}}}};
+    print_output("%s\n", json_text(line).c_str());
+    flush_output();  // for who reads line by line
   } else {
-    std::printf("%s  %d x %d  %d %s  %.1f ms\n", stem.c_str(), desc.width_px, desc.height_px, stats.person_count,
-                stats.person_count == 1 ? "person" : "people", double(stats.total_ms));
+    print_output("%s  %d x %d  %d %s  %.1f ms\n", stem.c_str(), desc.width_px, desc.height_px, stats.person_count,
+                 stats.person_count == 1 ? "person" : "people", double(stats.total_ms));
   }
 }
 
 // Runs one source to its end and writes its files.
 void run_source(const Options& options, const SourceArgument& argument, const maquette::Context& context,
-                maquette::DensePose& densepose, Timings& timings) {
-  maquette::Source source(context, argument.uri);
+                maquette::Source& source, maquette::DensePose& densepose, Timings& timings) {
   densepose.reset();
   const maq_source_info info = source.info();
   const bool is_clip = info.frame_count != 1;
@@ -120,7 +122,7 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
   int64_t expected = info.frame_count < 0 ? limit : (info.frame_count + options.every - 1) / options.every;
   if (limit > 0) expected = expected > 0 ? std::min(expected, limit) : limit;
   ProgressBar progress(argument.stem, is_clip && !options.json ? expected : 1);
-  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay.mp4"), info.fps / double(options.every));
+  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay"), info.fps / double(options.every));
   int64_t done = 0;
   for (int64_t index = 0; !interrupted() && (limit == 0 || done < limit); ++index) {
     const auto frame = source.next();
@@ -146,9 +148,9 @@ void run_source(const Options& options, const SourceArgument& argument, const ma
   progress.finish();
   const fs::path overlay_path = clip.finish();
   if (!overlay_path.empty() && !options.json) {
-    std::printf("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());
+    print_output("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());
   } else if (is_clip && !options.json) {
-    std::printf("%s  %lld frames\n", argument.stem.c_str(), (long long)done);
+    print_output("%s  %lld frames\n", argument.stem.c_str(), (long long)done);
   }
 }
 
@@ -165,23 +167,38 @@ std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts)
   return arguments;
 }
 
+// One bad file must not cost the rest of a batch.
+void tell(const std::exception& error) {
+  flush_output();
+  print_error("maquette: %s\n", printable(error.what()).c_str());
+}
+
 int run_densepose(const Options& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
   const std::string bundle = bundle_of(options.model);
   const maquette::Context context = open_context();
-  maquette::DensePose densepose(context, config_of(options.model, bundle));
+  std::optional<maquette::DensePose> densepose;  // loaded when there is something to find people in
 
   catch_interrupts();
   Timings timings;
   int failed = 0;
   for (const SourceArgument& argument : arguments) {
     if (interrupted()) break;
+    std::optional<maquette::Source> source;
     try {
-      run_source(options, argument, context, densepose, timings);
+      source.emplace(context, argument.uri);
     } catch (const std::exception& error) {
-      // One bad file must not cost the rest of a batch.
-      std::fflush(stdout);
-      std::fprintf(stderr, "maquette: %s\n", error.what());
+      tell(error);
+      ++failed;
+      continue;
+    }
+    if (!densepose) densepose.emplace(context, config_of(options.model, bundle));
+    try {
+      run_source(options, argument, context, *source, *densepose, timings);
+    } catch (const OutputLost&) {
+      throw;
+    } catch (const std::exception& error) {
+      tell(error);
       ++failed;
     }
   }

@@ -12,16 +12,17 @@
 #include <vector>
 
 #include "commands/commands.h"
+#include "print.h"
 
 namespace fs = std::filesystem;
 
 namespace {
 
 // What was found, and for what is not well a remedy.
-void well(const std::string& text) { std::printf("  ok    %s\n", text.c_str()); }
-void note(const std::string& text) { std::printf("  note  %s\n", text.c_str()); }
+void well(const std::string& text) { print_output("  ok    %s\n", text.c_str()); }
+void note(const std::string& text) { print_output("  note  %s\n", text.c_str()); }
 void unwell(const std::string& text, const std::string& remedy) {
-  std::printf("  BAD   %s\n        -> %s\n", text.c_str(), remedy.c_str());
+  print_output("  BAD   %s\n        -> %s\n", text.c_str(), remedy.c_str());
 }
 
 std::vector<fs::path> entries_of(const fs::path& folder) {
@@ -82,7 +83,7 @@ bool look_at(const maq_camera_list* list, uint32_t index) {
   maquette::check(maq_camera_list_get_camera(list, index, &info));
   const std::string uri = info.uri;
   const std::string place = uri.substr(uri.find(':') + 1);
-  std::printf("\n%s  %s\n", info.uri, info.name);
+  print_output("\n%s  %s\n", info.uri, info.name);
   if (info.status != MAQ_OK) {
     unwell(info.problem, "see below, and `maquette sources` when it is done");
     if (info.status == MAQ_ERROR_NO_PERMISSION) explain_permission(place);
@@ -142,7 +143,7 @@ void look_at_parts(const maquette::Context& context) {
 }
 
 int look_at_cameras() {
-  std::printf("maquette %s (%s)\n", maq_get_sdk_version(), maq_get_build_options());
+  print_output("maquette %s (%s)\n", maq_get_sdk_version(), maq_get_build_options());
   const maquette::Context context;
   maq_camera_list* made = nullptr;
   maquette::check(maq_camera_list_create(context.get(), &made));
@@ -150,13 +151,13 @@ int look_at_cameras() {
   const uint32_t count = maq_camera_list_get_count(list.get());
   uint32_t usable = 0;
   for (uint32_t i = 0; i < count; ++i) usable += look_at(list.get(), i) ? 1 : 0;
-  std::printf("\nThis machine\n");
+  print_output("\nThis machine\n");
   look_for_the_missing();
   look_at_parts(context);
   if (count == 0) {
     unwell("no camera is plugged in", "plug one in; without one try: maquette play stub:people, or play a recording");
   }
-  std::printf("\n%u of %u cameras can be used.\n", usable, count);
+  print_output("\n%u of %u cameras can be used.\n", usable, count);
   return usable > 0 ? 0 : 1;
 }
 

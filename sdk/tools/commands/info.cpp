@@ -1,26 +1,36 @@
 #include <CLI/CLI.hpp>
-#include <cstdio>
+#include <filesystem>
 #include <maquette/maquette.hpp>
 
 #include "arguments/bundle_argument.h"
 #include "commands/commands.h"
+#include "print.h"
 
 namespace {
 
 int print_info() {
-  std::printf("Maquette       %s (commit %s)\n", maq_get_sdk_version(), maq_get_git_commit());
-  std::printf("Build          %s\n", maq_get_build_options());
+  print_output("Maquette       %s (commit %s)\n", maq_get_sdk_version(), maq_get_git_commit());
+  print_output("Build          %s\n", maq_get_build_options());
   const maquette::Context context;
   int exit_code = 0;
   try {
     const std::string version = context.onnxruntime_version();
-    std::printf("ONNX Runtime   %s, %s\n", version.c_str(), context.onnxruntime_path().c_str());
+    print_output("ONNX Runtime   %s, %s\n", version.c_str(), context.onnxruntime_path().c_str());
   } catch (const maquette::Error& error) {
-    std::printf("ONNX Runtime   missing: %s\n", error.what());
+    print_output("ONNX Runtime   missing: %s\n", error.what());
     exit_code = 1;
   }
   const std::string bundle = default_bundle();
-  std::printf("Model bundle   %s\n", bundle.empty() ? "none found; give one with --bundle" : bundle.c_str());
+  std::error_code error;
+  if (bundle.empty()) {
+    print_output("Model bundle   missing: none was found; give one with --bundle or MAQ_BUNDLE\n");
+    exit_code = 1;
+  } else if (!std::filesystem::exists(std::filesystem::path(bundle) / "manifest.json", error)) {
+    print_output("Model bundle   missing: %s has no manifest.json; see MAQ_BUNDLE\n", bundle.c_str());
+    exit_code = 1;
+  } else {
+    print_output("Model bundle   %s\n", bundle.c_str());
+  }
   return exit_code;
 }
 

@@ -11,6 +11,7 @@
 #include "interrupt.h"
 #include "output/output_file.h"
 #include "output/terminal_picture.h"
+#include "print.h"
 
 namespace {
 
@@ -39,6 +40,7 @@ std::string with_option(const std::string& uri, const std::string& key, const st
 }
 
 int play(const Options& options) {
+  require_writable(options.json);
   catch_interrupts();
   std::string uri = parse_source_argument(options.source).uri;
   if (!is_camera(uri)) {
@@ -51,7 +53,7 @@ int play(const Options& options) {
   maq_context_config log = maquette::default_context_config();
   log.log_user_data = &is_opening;
   log.log_callback = [](void* opening, maq_log_level, const char* text) {
-    if (*static_cast<const std::atomic<bool>*>(opening)) std::fprintf(stderr, "maquette: %s\n", text);
+    if (*static_cast<const std::atomic<bool>*>(opening)) print_error("maquette: %s\n", text);
   };
   const maquette::Context context(log);
   maq_source_config config = maquette::default_source_config();
@@ -83,11 +85,8 @@ int play(const Options& options) {
   const maq_source_info info = source.info();
   statistics.close(std::move(source));
   statistics.print(info);
-  if (!options.json.empty()) {
-    const std::string text = statistics.report(info).dump(1) + "\n";
-    write_whole_file(options.json, text.data(), text.size());
-  }
-  if (!failure.empty()) std::fprintf(stderr, "maquette: %s\n", failure.c_str());
+  if (!options.json.empty()) write_json_file(options.json, statistics.report(info), 1);
+  if (!failure.empty()) print_error("maquette: %s\n", printable(failure).c_str());
   return failure.empty() && statistics.frames() > 0 ? 0 : 1;
 }
 

@@ -6,6 +6,7 @@
 #include <ctime>
 
 #include "machine.h"
+#include "print.h"
 
 namespace {
 
@@ -130,17 +131,17 @@ nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const
 
 void PlayStatistics::print(const maq_source_info& info) const {
   const auto all = report(info);
-  std::printf("%" PRId64 " frames of %d x %d in %.1f s: %.2f fps, %" PRIu64 " dropped\n", frames(), info.width_px,
-              info.height_px, all["seconds"].get<double>(), all["fps"].get<double>(), info.dropped_frame_count);
-  std::printf("  frame interval       %.2f ms (median), %.2f ms (p99)\n", all["interval_ms"]["median"].get<double>(),
-              all["interval_ms"]["p99"].get<double>());
+  print_output("%" PRId64 " frames of %d x %d in %.1f s: %.2f fps, %" PRIu64 " dropped\n", frames(), info.width_px,
+               info.height_px, all["seconds"].get<double>(), all["fps"].get<double>(), info.dropped_frame_count);
+  print_output("  frame interval       %.2f ms (median), %.2f ms (p99)\n", all["interval_ms"]["median"].get<double>(),
+               all["interval_ms"]["p99"].get<double>());
   if (all.contains("age_ms")) {
-    std::printf("  age at delivery      %.2f ms (median), %.2f ms (p99)\n", all["age_ms"]["median"].get<double>(),
-                all["age_ms"]["p99"].get<double>());
+    print_output("  age at delivery      %.2f ms (median), %.2f ms (p99)\n", all["age_ms"]["median"].get<double>(),
+                 all["age_ms"]["p99"].get<double>());
   }
-  std::printf("  CPU                  %.1f %% of one core\n", all["cpu_utilization"].get<double>() * 100);
+  print_output("  CPU                  %.1f %% of one core\n", all["cpu_utilization"].get<double>() * 100);
   for (const auto& event : all["events"]) {
-    std::printf("  %7.2f s  %s: %s\n", event["at_s"].get<double>(), event["state"].get<std::string>().c_str(),
-                event["reason"].get<std::string>().c_str());
+    print_output("  %7.2f s  %s: %s\n", event["at_s"].get<double>(), event["state"].get<std::string>().c_str(),
+                 event["reason"].get<std::string>().c_str());
   }
 }

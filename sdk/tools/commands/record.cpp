@@ -10,6 +10,7 @@
 #include "commands/commands.h"
 #include "interrupt.h"
 #include "output/progress_bar.h"
+#include "print.h"
 #include "program.h"
 
 namespace {
@@ -67,12 +68,13 @@ int record(const Options& options) {
                   source.info().dropped_frame_count);
     progress.advance(done, note);
   }
-  recorder.finish();
   progress.finish();
-  std::printf("%s: %" PRId64 " frames, %.1f s, %.1f MB, %" PRIu64 " dropped. To watch it: maquette play %s\n",
-              options.out.c_str(), done, double(last_ns - first_ns) / 1e9, double(recorder.info().size_bytes) / 1e6,
-              source.info().dropped_frame_count, options.out.c_str());
-  return done > 0 ? 0 : 1;
+  if (done == 0) throw std::runtime_error("No frame of " + argument.uri + " came, so nothing was recorded.");
+  recorder.finish();
+  print_output("%s: %" PRId64 " frames, %.1f s, %.1f MB, %" PRIu64 " dropped. To watch it: maquette play %s\n",
+               options.out.c_str(), done, double(last_ns - first_ns) / 1e9, double(recorder.info().size_bytes) / 1e6,
+               source.info().dropped_frame_count, options.out.c_str());
+  return 0;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "commands/commands.h"
 #include "commands/scene_commands.h"
 #include "output/output_file.h"
+#include "print.h"
 #include "program.h"
 
 namespace {
@@ -20,23 +21,21 @@ struct InfoOptions {
 };
 
 int show(const InfoOptions& options) {
+  require_writable(options.json);
   const maquette::Context context = open_context();
   const maquette::Scene scene(context, options.scene);
   const maq_scene_info info = scene.info();
   const uint64_t bytes = std::filesystem::file_size(options.scene);
-  std::printf("%s: %.1f MB\n", options.scene.c_str(), double(bytes) / 1e6);
-  std::printf("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count,
-              double(bytes) / double(info.point_count), info.block_count);
-  std::printf("  of these   %" PRIu64 " (%.0f %%) depend on the view, the rest are constant; %d bits a coefficient\n",
-              info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
-              info.coefficient_bits);
-  std::printf("  box        %g %g %g to %g %g %g\n", info.bounds_min[0], info.bounds_min[1], info.bounds_min[2],
-              info.bounds_max[0], info.bounds_max[1], info.bounds_max[2]);
-  std::printf("  up         %g %g %g\n", info.up[0], info.up[1], info.up[2]);
-  if (!options.json.empty()) {
-    const std::string text = describe_scene(info, bytes).dump(2) + "\n";
-    write_whole_file(options.json, text.data(), text.size());
-  }
+  print_output("%s: %.1f MB\n", options.scene.c_str(), double(bytes) / 1e6);
+  print_output("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count,
+               double(bytes) / double(info.point_count), info.block_count);
+  print_output("  of these   %" PRIu64 " (%.0f %%) depend on the view, the rest are constant; %d bits a coefficient\n",
+               info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
+               info.coefficient_bits);
+  print_output("  box        %g %g %g to %g %g %g\n", info.bounds_min[0], info.bounds_min[1], info.bounds_min[2],
+               info.bounds_max[0], info.bounds_max[1], info.bounds_max[2]);
+  print_output("  up         %g %g %g\n", info.up[0], info.up[1], info.up[2]);
+  write_json_file(options.json, describe_scene(info, bytes), 2);
   return 0;
 }
 

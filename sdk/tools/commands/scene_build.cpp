@@ -1,10 +1,7 @@
 #include <CLI/CLI.hpp>
-#include <cerrno>
 #include <cinttypes>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <stdexcept>
@@ -14,6 +11,7 @@
 #include "machine.h"
 #include "output/output_file.h"
 #include "output/progress_bar.h"
+#include "print.h"
 #include "program.h"
 
 namespace {
@@ -42,16 +40,6 @@ int32_t show_progress(void* bar, double done, const char* what) {
   return interrupted() ? 0 : 1;
 }
 
-// Before the work: that its result has a place. Makes the folder.
-void require_writable(const std::string& path) {
-  if (path.empty()) return;
-  if (std::filesystem::is_directory(path)) throw std::runtime_error(path + " is a folder; name a file in it.");
-  const OutputFile probe(path);
-  if (!std::ofstream(probe.temporary_path())) {
-    throw std::runtime_error(path + " cannot be written: " + std::strerror(errno) + ".");
-  }
-}
-
 maquette::Scene build_or_tell(const maquette::Context& context, const maq_scene_build_config& config,
                               const maquette::Capture& capture, maq_scene_build_stats* stats, const std::string& out) {
   try {
@@ -67,14 +55,17 @@ int build(const Options& options) {
   const maquette::Context context = open_context();
   const maquette::Capture capture(context, options.capture);
   const maq_capture_info info = capture.info();
-  std::fprintf(stderr, "%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count,
-               info.point_count);
+  print_error("%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count, info.point_count);
   for (uint32_t i = 0; i < info.drop_count; ++i) {
     const maq_capture_drop drop = capture.drop(i);
-    std::fprintf(stderr, "  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
+    print_error("  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
   }
   const std::string networks = scene_bundle_or_default(options.bundle);
-  for (const std::string* path : {&options.out, &options.ply}) require_writable(*path);
+  for (const std::string* path : {&options.out, &options.ply}) {
+    make_folder_of(*path);
+    require_writable(*path);
+  }
+  require_writable(options.json);
   ProgressBar progress("building", kPermille);
   maq_scene_build_config config = maquette::default_scene_build_config();
   config.bundle_path = networks.c_str();
@@ -99,11 +90,11 @@ int build(const Options& options) {
 
   const maq_scene_info made = scene.info();
   const uint64_t bytes = std::filesystem::file_size(options.out);
-  std::printf("%s: %" PRIu64 " of %" PRIu64 " points were seen by %u photos; %.1f MB, %.1f bytes a point; %.1f s\n",
-              options.out.c_str(), made.point_count, stats.cloud_point_count, stats.view_count, double(bytes) / 1e6,
-              double(bytes) / double(made.point_count), total_s);
+  print_output("%s: %" PRIu64 " of %" PRIu64 " points were seen by %u photos; %.1f MB, %.1f bytes a point; %.1f s\n",
+               options.out.c_str(), made.point_count, stats.cloud_point_count, stats.view_count, double(bytes) / 1e6,
+               double(bytes) / double(made.point_count), total_s);
   if (stats.unused_view_count > 0) {
-    std::printf("  %u photos could not be used: unreadable, missing, or they see no point\n", stats.unused_view_count);
+    print_output("  %u photos could not be used: unreadable, missing, or they see no point\n", stats.unused_view_count);
   }
   if (!options.json.empty()) {
     nlohmann::ordered_json document = describe_scene(made, bytes);
@@ -120,8 +111,7 @@ int build(const Options& options) {
                            {"pack", stats.pack_ms / 1e3},
                            {"save", total_s - before_saving_s}};
     document["peak_memory_mib"] = double(peak_memory_bytes()) / double(1 << 20);
-    const std::string text = document.dump(2) + "\n";
-    write_whole_file(options.json, text.data(), text.size());
+    write_json_file(options.json, document, 2);
   }
   return 0;
 }

@@ -16,9 +16,10 @@
 #include "commands/scene_commands.h"
 #include "commands/scene_flight.h"
 #include "interrupt.h"
-#include "output/clip_file.h"
+#include "output/frame_image.h"
 #include "output/output_file.h"
 #include "output/progress_bar.h"
+#include "print.h"
 #include "program.h"
 
 namespace fs = std::filesystem;
@@ -106,11 +107,11 @@ maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_
     refine.push_back(stats.refine_ms);
     resample.push_back(stats.resample_ms);
   }
-  ms = {{"total", median(total)},
-        {"project", median(project)},
-        {"shade", median(shade)},
-        {"refine", median(refine)},
-        {"resample", median(resample)}};
+  ms = {{"total", rounded_ms(double(median(total)))},
+        {"project", rounded_ms(double(median(project)))},
+        {"shade", rounded_ms(double(median(shade)))},
+        {"refine", rounded_ms(double(median(refine)))},
+        {"resample", rounded_ms(double(median(resample)))}};
   return std::move(*image);
 }
 
@@ -171,11 +172,8 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     progress.advance(int64_t(i + 1), note);
   }
   progress.finish();
-  if (!options.json.empty()) {
-    const std::string text = document.dump(2) + "\n";
-    write_whole_file(options.json, text.data(), text.size());
-  }
-  std::printf("%s: %zu pictures\n", options.out.c_str(), document["views"].size());
+  write_json_file(options.json, document, 2);
+  print_output("%s: %zu pictures\n", options.out.c_str(), document["views"].size());
   return interrupted() ? 1 : 0;
 }
 
@@ -203,12 +201,13 @@ std::vector<maq_pinhole_camera> flight(const maquette::Scene& scene, const maque
 int render_clip(const maquette::Context& context, maquette::SceneRenderer& renderer, const maquette::Scene& scene,
                 const maquette::Capture* capture, const Options& options) {
   const std::vector<maq_pinhole_camera> cameras = flight(scene, capture, options);
-  ClipFile clip(context, options.out, options.fps);
+  make_folder_of(options.out);
+  maquette::Clip clip(context, options.out, options.fps);
   ProgressBar progress("rendering", int64_t(cameras.size()));
   std::vector<float> times_ms;
   for (size_t i = 0; i < cameras.size() && !interrupted(); ++i) {
     const maquette::SceneImage image = renderer.run(cameras[i]);
-    clip.add(picture_of(image, cameras[i]));
+    clip.add(frame_of(context, picture_of(image, cameras[i])));
     times_ms.push_back(image.stats().total_ms);
     char note[32];
     std::snprintf(note, sizeof note, "%.1f ms", double(times_ms.back()));
@@ -219,14 +218,13 @@ int render_clip(const maquette::Context& context, maquette::SceneRenderer& rende
     // Half of a clip takes no whole one's place.
     throw std::runtime_error("Interrupted; " + options.out + " is as it was before.");
   }
-  const fs::path path = clip.finish();
+  clip.finish();
   const float median_ms = median(times_ms);
-  std::printf("%s: %zu frames, %.1f ms each (median)\n", path.string().c_str(), times_ms.size(), double(median_ms));
+  print_output("%s: %zu frames, %.1f ms each (median)\n", options.out.c_str(), times_ms.size(), double(median_ms));
   if (!options.json.empty()) {
     const nlohmann::ordered_json document = {
-        {"clip", path.string()}, {"frames", times_ms.size()}, {"ms", {{"total", median_ms}}}};
-    const std::string text = document.dump(2) + "\n";
-    write_whole_file(options.json, text.data(), text.size());
+        {"clip", options.out}, {"frames", times_ms.size()}, {"ms", {{"total", rounded_ms(double(median_ms))}}}};
+    write_json_file(options.json, document, 2);
   }
   return 0;
 }
@@ -242,6 +240,7 @@ int render(const Options& options) {
   if (!options.views.empty() && options.capture.empty()) {
     throw std::runtime_error("--views are those of a capture: name its folder with --capture.");
   }
+  require_writable(options.json);
   catch_interrupts();
   const maquette::Context context = open_context();
   const maquette::Scene scene(context, options.scene);
@@ -258,7 +257,8 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<Options>();
   CLI::App* command = scene.add_subcommand("render", "Render a scene: pictures from given cameras, or a clip");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
-  command->add_option("-o,--out", options->out, "File of the clip (clip.mp4), or folder for the pictures")->required();
+  command->add_option("-o,--out", options->out, "File of the clip, clip.mp4 or clip.avi, or folder for the pictures")
+      ->required();
   command
       ->add_option("--path", options->path,
                    "Path of the camera in a clip: `orbit` around the scene, or `through` the cameras of the capture")

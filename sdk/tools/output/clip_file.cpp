@@ -16,17 +16,16 @@ constexpr double kMaxFps = 1000;
 }  // namespace
 
 ClipFile::ClipFile(const maquette::Context& context, fs::path path, double fps)
-    : context_(context), path_(std::move(path)), fps_(fps > 0 ? std::clamp(fps, kMinFps, kMaxFps) : 25) {}
+    : context_(context), stem_(std::move(path)), fps_(fps > 0 ? std::clamp(fps, kMinFps, kMaxFps) : 25) {}
 
 void ClipFile::begin(const maquette::Frame& first, const char* extension) {
-  path_.replace_extension(extension);
+  path_ = stem_.string() + extension;
   make_folder_of(path_);
   clip_.emplace(context_, path_.string(), fps_);
   clip_->add(first);
 }
 
 void ClipFile::add(const cv::Mat& picture) {
-  if (picture.cols < 2 || picture.rows < 2) return;  // too small for a clip
   const maquette::Frame frame = frame_of(context_, picture);
   if (clip_) return clip_->add(frame);
   try {

@@ -1,52 +1,37 @@
 #include "output/output_file.h"
 
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <memory>
+#include <cmath>
 #include <stdexcept>
 
+#include "core/atomic_file.h"
+#include "print.h"
+
 namespace fs = std::filesystem;
-
-namespace {
-
-[[noreturn]] void fail(const fs::path& path, const std::string& reason) {
-  throw std::runtime_error(path.string() + " cannot be written: " + reason + ".");
-}
-
-}  // namespace
 
 void make_folder_of(const fs::path& path) {
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
-  if (error) fail(path, error.message());
+  if (error) throw std::runtime_error(path.string() + " cannot be written: " + error.message() + ".");
 }
 
-OutputFile::OutputFile(fs::path path) : path_(std::move(path)) {
-  make_folder_of(path_);
-  temporary_path_ = path_.parent_path() / ("." + path_.filename().string() + ".part" + std::to_string(getpid()));
-}
-
-OutputFile::~OutputFile() {
-  std::error_code ignored;
-  if (!committed_) fs::remove(temporary_path_, ignored);
-}
-
-void OutputFile::commit() {
+void require_writable(const std::string& path) {
+  if (path.empty()) return;
   std::error_code error;
-  fs::rename(temporary_path_, path_, error);
-  if (error) fail(path_, error.message());
-  committed_ = true;
+  if (fs::is_directory(path, error)) throw std::runtime_error(path + " is a folder; name a file in it.");
+  const maq::AtomicFile probe(path);
 }
 
-void write_whole_file(const fs::path& path, const void* bytes, size_t size_bytes) {
-  OutputFile output(path);
-  FILE* file = std::fopen(output.temporary_path().c_str(), "wb");
-  if (file == nullptr) fail(path, std::strerror(errno));
-  const bool written = std::fwrite(bytes, 1, size_bytes, file) == size_bytes;
-  const int reason = errno;
-  if (std::fclose(file) != 0 || !written) fail(path, std::strerror(written ? errno : reason));
-  output.commit();
+std::string json_text(const nlohmann::ordered_json& document, int indent) {
+  return document.dump(indent, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
 }
+
+void write_json_file(const std::string& path, const nlohmann::ordered_json& document, int indent) {
+  if (path.empty()) return;
+  const std::string text = json_text(document, indent) + "\n";
+  flush_output();  // where the file may lead to
+  maq::AtomicFile file(path);
+  file.append(text.data(), text.size());
+  file.commit();
+}
+
+double rounded_ms(double ms) { return std::round(1e3 * ms) / 1e3; }

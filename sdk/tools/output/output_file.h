@@ -1,31 +1,23 @@
-// Files that appear atomically: written under another name and renamed when complete.
+// Files that commands write: their folders, whether they can be written, and JSON.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
 
 // Makes the folder of `path` when it is not there. Throws std::runtime_error.
 void make_folder_of(const std::filesystem::path& path);
 
-class OutputFile {
- public:
-  // Makes the folder of `path` when it is not there.
-  explicit OutputFile(std::filesystem::path path);
-  // Removes what was written unless commit() was called.
-  ~OutputFile();
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
+// Before long work: that its result can be written; "" has no result. Makes no folder. Throws std::runtime_error.
+void require_writable(const std::string& path);
 
-  // Where to write.
-  const std::filesystem::path& temporary_path() const { return temporary_path_; }
-  // Gives the file its final name, replacing one that was there. Throws std::runtime_error.
-  void commit();
+// JSON in ASCII: other characters are escapes such as \u00e4, and bytes that are no UTF-8, as in names of files,
+// \ufffd. `indent` is for each level; -1: one line.
+std::string json_text(const nlohmann::ordered_json& document, int indent = -1);
 
- private:
-  std::filesystem::path path_;
-  std::filesystem::path temporary_path_;
-  bool committed_ = false;
-};
+// Writes such a text and a line end, as the SDK writes files: atomically, through links, devices and pipes. "" is not
+// written. Makes no folder. Throws std::runtime_error, for example when the disk is full.
+void write_json_file(const std::string& path, const nlohmann::ordered_json& document, int indent);
 
-// Writes all bytes to a new file at `path`. Throws std::runtime_error, for example when the disk is full.
-void write_whole_file(const std::filesystem::path& path, const void* bytes, size_t size_bytes);
+// To a microsecond, which in JSON is a short number.
+double rounded_ms(double ms);

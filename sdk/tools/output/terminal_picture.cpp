@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "print.h"
+
 namespace {
 
 constexpr int kMaxColumns = 100;
@@ -59,6 +61,6 @@ void TerminalPicture::show(const maquette::Frame& frame, const std::string& line
   }
   text_ += line + "\x1b[K\n";
   rows_drawn_ = rows + 1;
-  std::fwrite(text_.data(), 1, text_.size(), stdout);
-  std::fflush(stdout);
+  print_unchanged(text_);
+  flush_output();
 }

@@ -12,11 +12,11 @@ namespace {
 
 class ApiSaving : public ::testing::Test {
  protected:
-  // 320 x 256, black but for one red cell: one person (make_tiny_bundle.py).
-  static std::vector<uint8_t> one_person() {
+  // 320 x 256, black but for one red cell, at (left, 100): one person (make_tiny_bundle.py).
+  static std::vector<uint8_t> one_person(int left = 80) {
     std::vector<uint8_t> pixels(320 * 256 * 3);
     for (int y = 100; y < 104; ++y) {
-      for (int x = 80; x < 84; ++x) pixels[size_t(y * 320 + x) * 3] = 255;
+      for (int x = left; x < left + 4; ++x) pixels[size_t(y * 320 + x) * 3] = 255;
     }
     return pixels;
   }
@@ -180,6 +180,12 @@ TEST_F(ApiSaving, AResultIsThreeFilesInTheDensePoseConvention) {
     }
   }
   EXPECT_GT(painted, 500);
+}
+
+TEST_F(ApiSaving, BoxesAreShortNumbers) {
+  result_of(one_person(160), 320, 256).save(folder_.path().string(), "a");
+  EXPECT_NE(read_text(folder_.file("a.json")).find("[147.2,84.0,179.2,116.0]"), std::string::npos)
+      << read_text(folder_.file("a.json"));
 }
 
 TEST_F(ApiSaving, AResultWithoutPeopleSaysSo) {

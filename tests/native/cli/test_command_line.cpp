@@ -194,10 +194,10 @@ TEST_F(CommandLine, AFolderThatCannotBeWrittenIsNamed) {
 
 TEST_F(CommandLine, MeasuresItsSourcesAndWritesDownEverything) {
   write_clip("clip.avi", 4);
-  const Outcome result = run("bench image:two.png clip.avi --runs 12 --seconds 0 --warm-up 1 --json o/bench.json");
+  const Outcome result = run("bench image:two.png clip.avi --runs 12 --seconds 0 --warm-up 1 --json bench.json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("image:two.png"), std::string::npos) << result.out;
-  const auto document = nlohmann::json::parse(read_text(folder_.file("o/bench.json")));
+  const auto document = nlohmann::json::parse(read_text(folder_.file("bench.json")));
   EXPECT_EQ(document.at("schema"), "maquette-bench-3");
   EXPECT_GE(document.at("machine").at("cores"), 1);
   EXPECT_GT(document.at("machine").at("memory_mib"), 100);
@@ -222,8 +222,8 @@ TEST_F(CommandLine, MeasuresItsSourcesAndWritesDownEverything) {
 }
 
 TEST_F(CommandLine, WhatCannotBeMeasuredIsOneSentence) {
-  expect_failure("bench image:two.png none.jpg --runs 1 --seconds 0 --json o/bench.json", "none.jpg does not exist");
-  expect_failure("bench image:two.png --bundle nowhere --runs 1 --seconds 0 --json o/bench.json", "nowhere");
+  expect_failure("bench image:two.png none.jpg --runs 1 --seconds 0 --json bench.json", "none.jpg does not exist");
+  expect_failure("bench image:two.png --bundle nowhere --runs 1 --seconds 0 --json bench.json", "nowhere");
 }
 
 TEST_F(CommandLine, RecordsPlaysAndMeasures) {
@@ -282,6 +282,23 @@ TEST_F(CommandLine, TheDoctorSaysWhatToDo) {
   }
 }
 
+TEST_F(CommandLine, AWordThatIsNoCommandIsNamed) {
+  for (const auto& [arguments, text] :
+       {std::pair("frobnicate", "\"frobnicate\" is not a command; `maquette --help`"),
+        {"scene paint a.maqs", "\"paint\" is not a command; `maquette scene --help`"}}) {
+    const Outcome result = run(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+  }
+}
+
+TEST_F(CommandLine, ASourceThatIsMissingIsToldBeforeNetworksAreLoaded) {
+  environment_ = "MAQ_ONNXRUNTIME_LIB=/no/such.so";
+  expect_failure("densepose image:none.jpg --out o", "none.jpg does not exist");
+  expect_failure("bench image:none.jpg", "none.jpg does not exist");
+  expect_failure("densepose '' --out o", "The source is empty; name a file");
+}
+
 TEST_F(CommandLine, WrongUsageIsExitCodeTwoAndHelpTeaches) {
   EXPECT_EQ(run("").exit_code, 2);
   EXPECT_EQ(run("densepose two.png").exit_code, 2) << "--out is required";
@@ -293,6 +310,13 @@ TEST_F(CommandLine, WrongUsageIsExitCodeTwoAndHelpTeaches) {
   for (const char* text : {"_IUV.png", "--overlay", "stub:people", "Examples"}) {
     EXPECT_NE(help.out.find(text), std::string::npos) << text;
   }
+}
+
+TEST_F(CommandLine, InfoTellsOfABundleThatIsNotThere) {
+  bundle_ = "nowhere";
+  const Outcome info = run("info");
+  EXPECT_EQ(info.exit_code, 1);
+  EXPECT_NE(info.out.find("Model bundle   missing: nowhere has no manifest.json"), std::string::npos) << info.out;
 }
 
 TEST_F(CommandLine, InfoAndSourcesSayWhatThereIs) {

@@ -148,6 +148,20 @@ TEST_F(SceneCommandLine, RendersClipsThatPlay) {
   EXPECT_EQ(frames_of("t.mp4", 64, 48), 10) << "of even sides";
 }
 
+TEST_F(SceneCommandLine, AClipHasTheNameThatWasGivenOrIsNotMade) {
+  build();
+  const std::string orbit = "render place.maqs --path orbit --seconds 0.2 --fps 10 ";
+  const Outcome avi = run(orbit + "--size 64x48 --out orbit.avi");
+  ASSERT_EQ(avi.exit_code, 0) << avi.err;
+  EXPECT_EQ(frames_of("orbit.avi", 64, 48), 2);
+  for (const char* name : {"orbit.mov", "orbit"}) {
+    expect_failure(orbit + "--size 64x48 --out " + name, std::string(name) + " ends neither in .mp4 nor in .avi");
+  }
+  expect_failure(orbit + "--size 1x1 --out tiny.mp4", "1 x 1 pixels, but a clip needs 2 x 2");
+  expect_failure(orbit + "--size 64x48 --out o.mp4 --json none/a.json", "none/a.json cannot be made");
+  EXPECT_EQ(files(), (std::set<std::string>{"place.maqs", "orbit.avi"}));
+}
+
 TEST_F(SceneCommandLine, WhatIsMissingOrWrongIsOneSentence) {
   expect_failure("build nowhere --out a.maqs", "nowhere");
   expect_failure("build . --out a.maqs", "");
@@ -169,7 +183,7 @@ TEST_F(SceneCommandLine, WhatIsMissingOrWrongIsOneSentence) {
   for (const char* size : {"640", "640x", "x480", "640x480x3", "0x10", "-5x10", "64 x 48", "99999999999x10"}) {
     expect_failure(head + "--path orbit --size '" + size + "'", "write it as 640x480");
   }
-  expect_failure(head + "--path orbit --size 20000x10", "16384");
+  expect_failure("render place.maqs --out c.mp4 --path orbit --size 20000x10", "16384");
   expect_failure(head + "--capture place --views all --seconds 3", "--seconds and --fps are for clips");
   expect_failure(head + "--path orbit --repeat 3", "--repeat and --no-alpha are for pictures");
   std::filesystem::copy(file("place/"), file("all_used"), std::filesystem::copy_options::recursive);

@@ -283,6 +283,18 @@ TEST_F(Recordings, OfHostileHeadsAreRefused) {
   expect_error(MAQ_ERROR_UNREADABLE, "its head is not what was written", [&] { play(); });
 }
 
+TEST_F(Recordings, WithoutAFrameLeaveNoFileInTheWayOfTheNextTry) {
+  for (const rlim_t most : {0, 10, 1000}) {  // no room for a head, for half of it, for a frame
+    const FileSizeLimit full(most);
+    expect_error(MAQ_ERROR_UNWRITABLE, "cannot be written", [&] {
+      maq::RecordingWriter writer(path_of(), {"stub:test", 10, {}}, 0);
+      writer.add(frame_of(0));
+    });
+    EXPECT_FALSE(std::filesystem::exists(path_of())) << most;
+  }
+  EXPECT_EQ(record(2).size(), 3u);
+}
+
 TEST_F(Recordings, OnAFullDiskEndWithAWholeFrameAndCanGoOn) {
   const std::vector<uint64_t> ends = record(3);
   std::filesystem::remove(path_of());

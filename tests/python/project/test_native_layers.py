@@ -56,6 +56,9 @@ TOOLS_MAY_INCLUDE = {
     "commands": {".", "arguments", "output"},
 }
 
+# What the tools compile in of sdk/src: there is one way to write a file that appears whole.
+COMPILED_IN = {("sdk/tools/output/output_file.cpp", "core/atomic_file.h")}
+
 # sources/registry.cpp alone knows every backend; the other files of the folder know none.
 REGISTRY = "sources/registry.cpp"
 
@@ -161,7 +164,7 @@ def test_what_stands_on_the_public_headers_includes_nothing_of_the_library():
         for path in code_files(root):
             for header in includes(path):
                 own = (path.parent / header).is_file() or (root / header).is_file()
-                if not own and (SRC / header).is_file():
+                if not own and (SRC / header).is_file() and (path.as_posix(), header) not in COMPILED_IN:
                     wrong.append(f"{path} includes {header} of sdk/src")
                 if name == "sdk/app" and header.startswith(("opencv2/", "GLFW/", "epoxy/", "imgui")):
                     wrong.append(f"{path} includes {header}")

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/blocked_write_signals.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/file_reader.h"
@@ -74,6 +75,13 @@ ClipWriter::ClipWriter(const std::string& path, double fps)
   file_codecs();  // where it is missing, an error before the first image
 }
 
+ClipWriter::~ClipWriter() { end_encoding(); }
+
+void ClipWriter::end_encoding() {
+  const BlockedWriteSignals blocked;
+  encoder_.reset();
+}
+
 void ClipWriter::begin(const ImageView& first) {
   // FFmpeg takes what is before a colon for a protocol, but not behind a slash.
   const std::string& path = file_.temporary_path();
@@ -108,6 +116,7 @@ void ClipWriter::add(const ImageView& image) {
   ImageView bgr = as_bgr(image, bgr_);
   bgr.width_px = image.width_px / 2 * 2;
   bgr.height_px = image.height_px / 2 * 2;
+  const BlockedWriteSignals blocked;  // the encoder writes by itself
   if (encoder_ == nullptr) begin(image);
   if (!encoder_->write(bgr)) {
     throw Error(MAQ_ERROR_INTERNAL, "A picture of ", file_.path(), " could not be encoded.");
@@ -118,7 +127,7 @@ void ClipWriter::add(const ImageView& image) {
 void ClipWriter::finish() {
   if (is_finished_) return;
   if (images_ == 0) throw Error(MAQ_ERROR_INVALID_ARGUMENT, file_.path(), " has no picture yet: add one.");
-  encoder_.reset();
+  end_encoding();
   if (!is_whole(file_.temporary_path(), format_)) {
     throw Error(MAQ_ERROR_UNWRITABLE, file_.path(), " cannot be written to its end: make room on the disk.");
   }

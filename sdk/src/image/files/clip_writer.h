@@ -20,6 +20,7 @@ class ClipWriter {
   // MPEG-4 in .mp4 or Motion JPEG in .avi, by the extension of `path`; `fps` from kMinClipFps to kMaxClipFps.
   // Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, what AtomicFile throws, and what file_codecs() throws.
   ClipWriter(const std::string& path, double fps);
+  ~ClipWriter();
 
   // All have the size of the first; of an odd side the last column or row is left out.
   // Throws MAQ_ERROR_INVALID_ARGUMENT for another size and after finish(), MAQ_ERROR_IMAGE_SIZE for less than 2 x 2
@@ -33,6 +34,7 @@ class ClipWriter {
 
  private:
   void begin(const ImageView& first);
+  void end_encoding();
 
   ClipFormat format_;
   double fps_;

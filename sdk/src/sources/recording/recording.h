@@ -35,8 +35,8 @@ class RecordingWriter {
   // Makes the file, which must not be there yet. `jpeg_quality` 0 keeps pixels as they are, 1 to 100 compresses them;
   // what came from a camera as JPEG is kept as it came in both cases. Throws MAQ_ERROR_UNWRITABLE.
   RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality);
-  // Without finish() the file has no index.
-  ~RecordingWriter() = default;
+  // Without finish() the file has no index; without finish() and a frame it is removed.
+  ~RecordingWriter();
 
   // Throws MAQ_ERROR_INVALID_ARGUMENT unless the frame is later than the one before, MAQ_ERROR_UNWRITABLE when the disk
   // is full; the file then holds the frames before.

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "core/blocked_write_signals.h"
 #include "core/build_info.h"
 #include "core/error.h"
 #include "sources/recording/recording.h"
@@ -47,10 +48,21 @@ RecordingWriter::RecordingWriter(std::string path, const RecordingInfo& info, in
   head.version = kRecordingVersion;
   head.json_bytes = uint32_t(json.size());
   head.json_check = XXH3_64bits(json.data(), json.size());
-  append(&head, sizeof head, json.data(), json.size());
+  try {
+    append(&head, sizeof head, json.data(), json.size());
+  } catch (...) {
+    ::unlink(path_.c_str());  // the destructor does not run
+    throw;
+  }
+}
+
+RecordingWriter::~RecordingWriter() {
+  // A file without a frame cannot be played, and its name would be taken.
+  if (file_.is_open() && entries_.empty()) ::unlink(path_.c_str());
 }
 
 void RecordingWriter::append(const void* header, size_t header_bytes, const void* payload, size_t payload_bytes) {
+  const BlockedWriteSignals blocked;
   iovec parts[2] = {{const_cast<void*>(header), header_bytes}, {const_cast<void*>(payload), payload_bytes}};
   iovec* part = parts;
   int left = 2;

@@ -1,0 +1,25 @@
+// Text on standard output and standard error. Names of files, cameras and URIs come from strangers, so control
+// characters and bytes that are no UTF-8 appear as \x1b, and a terminal does nothing on them. Text that cannot be
+// written is an error: a full disk behind `>`, a pipe whose reader is gone.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+class OutputLost : public std::runtime_error {
+ public:
+  explicit OutputLost(int reason);  // errno
+};
+
+// The text with control characters, line ends too, and bytes that are no UTF-8 as \x and two digits.
+std::string printable(const std::string& text);
+
+// As printf, but made printable apart from line ends. Throws OutputLost, at the latest at the next flush_output().
+[[gnu::format(printf, 1, 2)]] void print_output(const char* format, ...);
+// Writes text with the control characters that are in it. Throws likewise.
+void print_unchanged(const std::string& text);
+// Throws OutputLost.
+void flush_output();
+
+// Likewise on standard error; what cannot be written there is lost.
+[[gnu::format(printf, 1, 2)]] void print_error(const char* format, ...);

@@ -5,7 +5,6 @@
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <set>
 #include <stdexcept>
 #include <vector>
@@ -177,22 +176,22 @@ int run_densepose(const Options& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
   const std::string bundle = bundle_of(options.model);
   const maquette::Context context = open_context();
-  std::optional<maquette::DensePose> densepose;  // loaded when there is something to find people in
+  std::unique_ptr<maquette::DensePose> densepose;  // loaded when there is something to find people in
 
   catch_interrupts();
   Timings timings;
   int failed = 0;
   for (const SourceArgument& argument : arguments) {
     if (interrupted()) break;
-    std::optional<maquette::Source> source;
+    std::unique_ptr<maquette::Source> source;
     try {
-      source.emplace(context, argument.uri);
+      source = std::make_unique<maquette::Source>(context, argument.uri);
     } catch (const std::exception& error) {
       tell(error);
       ++failed;
       continue;
     }
-    if (!densepose) densepose.emplace(context, config_of(options.model, bundle));
+    if (!densepose) densepose = std::make_unique<maquette::DensePose>(context, config_of(options.model, bundle));
     try {
       run_source(options, argument, context, *source, *densepose, timings);
     } catch (const OutputLost&) {

@@ -1,5 +1,5 @@
-// A full disk: no file of this process can grow over a limit. The signal that the kernel sends then would end the process
-// where the library did not keep it away.
+// A full disk: no file of this process can grow over a limit. The signal that the kernel sends then would end the
+// process where the library did not keep it away.
 #pragma once
 
 #include <sys/resource.h>

@@ -96,10 +96,10 @@ maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_
   std::vector<float> total, project, shade, refine, resample;
   // The first prepares networks for its size; its time is nobody's who looks at more than one picture.
   if (repeat > 1) renderer.run(camera);
-  std::optional<maquette::SceneImage> image;
+  std::unique_ptr<maquette::SceneImage> image;
   for (int i = 0; i < repeat; ++i) {
     image.reset();
-    image.emplace(renderer.run(camera));
+    image = std::make_unique<maquette::SceneImage>(renderer.run(camera));
     const maq_scene_image_stats stats = image->stats();
     total.push_back(stats.total_ms);
     project.push_back(stats.project_ms);

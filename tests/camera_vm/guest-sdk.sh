@@ -57,7 +57,7 @@ survives_unplugging() {
     $maquette densepose v4l2:/dev/video0 --out /tmp/results --max-frames 12 $small >/tmp/summary 2>&1 &
     program=$!
     has_a_frame() { ls /tmp/results/*_IUV.png; }
-    wait_until has_a_frame || wait_until has_a_frame || return 1
+    wait_until has_a_frame || return 1
     unplug || return 1
     sleep 2
     plug_in --jpeg /photo.jpg || return 1

@@ -111,6 +111,7 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
 // Runs one source to its end and writes its files.
 void run_source(const Options& options, const SourceArgument& argument, const maquette::Context& context,
                 maquette::Source& source, maquette::DensePose& densepose, Timings& timings) {
+  const StoppedByInterrupt stopped(source);
   densepose.reset();
   const maq_source_info info = source.info();
   const bool is_clip = info.frame_count != 1;

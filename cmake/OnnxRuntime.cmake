@@ -96,7 +96,7 @@ function(_maq_find_target_library output)
   set(${output} "${file}" PARENT_SCOPE)
 endfunction()
 
-set(_ort_header_folders . onnxruntime onnxruntime/core/session)
+set(_ort_header_folders onnxruntime onnxruntime/core/session)
 if(MAQ_ONNXRUNTIME_DIR)
   # Looked for each time, so that another folder counts at once.
   unset(MAQ_ONNXRUNTIME_INCLUDE_DIR CACHE)

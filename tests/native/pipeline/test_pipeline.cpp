@@ -276,7 +276,7 @@ TEST(Pipeline, ACameraThatStaysAwayFailsAndAnotherSourceGoesOn) {
 TEST(Pipeline, ABadSourceFailsWithItsSentence) {
   Watched watched(polling(false));
   for (const auto& [uri, status] :
-       {std::pair("image:/none.jpg", MAQ_ERROR_NOT_FOUND), std::pair("nothing", MAQ_ERROR_INVALID_ARGUMENT),
+       {std::pair("image:/none.jpg", MAQ_ERROR_NOT_FOUND), std::pair("stub:people?", MAQ_ERROR_INVALID_ARGUMENT),
         std::pair("tape:1", MAQ_ERROR_UNSUPPORTED)}) {
     watched.pipeline->set_source(uri);
     EXPECT_EQ(status_of_next(*watched.pipeline), status) << uri;
@@ -316,6 +316,22 @@ TEST(Pipeline, ABadModelFailsAndAGoodOneGoesOn) {
   watched.pipeline->set_densepose(config);
   ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
   EXPECT_EQ(watched.count(), 2u);
+}
+
+TEST(Pipeline, LoadingIsReportedBeforeItIsOver) {
+  std::atomic<maq_status> surface_status{MAQ_OK};
+  Watched::Options options;
+  Watched* watched = nullptr;
+  options.on_state = [&](maq_pipeline_state state) {
+    maq_densepose_surface surface{};
+    surface.struct_size = sizeof surface;
+    if (state == MAQ_PIPELINE_LOADING) surface_status = maq_pipeline_get_surface(watched->pipeline->get(), &surface);
+  };
+  Watched with_callback(options);
+  watched = &with_callback;
+  with_callback.pipeline->set_source("stub:people?size=96x72&frames=1");
+  ASSERT_TRUE(with_callback.until_state(MAQ_PIPELINE_ENDED));
+  EXPECT_EQ(surface_status, MAQ_ERROR_UNSUPPORTED) << "no model is loaded yet";
 }
 
 TEST(Pipeline, WithoutAConfigTheModelIsTheInstalledOne) {

@@ -1,4 +1,4 @@
-# Warnings and sanitizers, as one interface target that every target of this project links.
+# Warnings, hardening and sanitizers, as one interface target that every target of this project links.
 #
 # -ffp-contract=off: where a processor can multiply and add at once (aarch64), compilers use that, and it rounds once
 # instead of twice. A last bit of the networks' input then changes, int8 layers round some values to the other side, and
@@ -10,6 +10,36 @@ target_compile_options(maq_compiler_settings INTERFACE
   $<$<BOOL:${MAQ_WARNINGS_AS_ERRORS}>:-Werror>
   $<$<CONFIG:Release>:-ffunction-sections;-fdata-sections>)
 target_link_options(maq_compiler_settings INTERFACE $<$<CONFIG:Release>:-Wl,--gc-sections>)
+
+# What reads files and cameras of strangers takes what compilers and linkers offer against errors that it may still have.
+# _FORTIFY_SOURCE needs optimisation, and takes from sanitizers what they would report; a level that the C library does
+# not have is a warning there. Addresses known only at load time: position-independent programs, too.
+include(CheckCompilerFlag)
+include(CheckCXXSourceCompiles)
+include(CheckPIESupported)
+target_compile_options(maq_compiler_settings INTERFACE -fstack-protector-strong)
+target_link_options(maq_compiler_settings INTERFACE -Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+check_pie_supported(LANGUAGES C CXX)
+# Where a jump or a return may lead: x86-64 CET, aarch64 BTI and PAC.
+foreach(_flag -fcf-protection=full -mbranch-protection=standard)
+  string(MAKE_C_IDENTIFIER "MAQ_HAVE${_flag}" _have)
+  check_compiler_flag(CXX ${_flag} ${_have})
+  if(${_have})
+    target_compile_options(maq_compiler_settings INTERFACE ${_flag})
+  endif()
+endforeach()
+if(NOT MAQ_SANITIZE)
+  set(CMAKE_REQUIRED_FLAGS "-O2 -Werror -U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=3")
+  check_cxx_source_compiles("#include <cstring>\nint main() { return 0; }" MAQ_HAVE_FORTIFY_SOURCE_3)
+  unset(CMAKE_REQUIRED_FLAGS)
+  set(_fortify 2)
+  if(MAQ_HAVE_FORTIFY_SOURCE_3)
+    set(_fortify 3)
+  endif()
+  target_compile_options(maq_compiler_settings INTERFACE
+    "$<$<CONFIG:Release,RelWithDebInfo,MinSizeRel>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=${_fortify}>")
+endif()
 
 if(MAQ_SANITIZE STREQUAL "address")
   set(_maq_sanitizers -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)

@@ -1,9 +1,13 @@
 # ONNX Runtime, headers and shared library. The SDK opens the library itself at run time, so nothing links it here.
 #
-# Sets MAQ_ONNXRUNTIME_LIBRARY (a file) and the interface target maq_onnxruntime_headers.
-# Taken from MAQ_ONNXRUNTIME_DIR when that is given; otherwise fetched once into MAQ_DEPS_DIR by the ordinary package
-# clients and checked against the SHA-256 below. 1.26.0 is the last release whose binaries send no telemetry.
+# Sets MAQ_ONNXRUNTIME_LIBRARY (a file), MAQ_ONNXRUNTIME_SONAME and the interface target maq_onnxruntime_headers, from
+#   MAQ_ONNXRUNTIME_DIR, when that is given: an unpacked release;
+#   else, with MAQ_FETCH_ONNXRUNTIME, the release below, fetched once into MAQ_DEPS_DIR by the ordinary package clients
+#     and checked against its SHA-256; 1.26.0 is the last one whose binaries send no telemetry;
+#   else the target onnxruntime::onnxruntime of the app that this build is a part of, or of a package (onnxruntimeConfig),
+#     or the header and the library where the system keeps such files.
 set(MAQ_ONNXRUNTIME_VERSION 1.26.0)
+set(_ort_min_api 20)  # as kApiVersion in sdk/src/nn/onnxruntime_library.cpp
 
 # The npm package repacks the official Android archive (which has the C headers and every Android ABI) and the official
 # Linux x86-64 library; the aarch64 library is only in the official jar, which is fetched for that target alone.
@@ -73,6 +77,26 @@ function(_maq_unpack_onnxruntime root target)
   file(TOUCH "${stamp}")
 endfunction()
 
+# Where the target onnxruntime::onnxruntime has its library: an imported one's file, which is what is opened at run time.
+function(_maq_find_target_library output)
+  get_target_property(type onnxruntime::onnxruntime TYPE)
+  get_target_property(configurations onnxruntime::onnxruntime IMPORTED_CONFIGURATIONS)
+  set(file)
+  foreach(suffix "" _RELEASE _RELWITHDEBINFO _NOCONFIG ${configurations})
+    string(REGEX REPLACE "^([^_])" "_\\1" suffix "${suffix}")
+    get_target_property(location onnxruntime::onnxruntime IMPORTED_LOCATION${suffix})
+    if(location AND NOT file)
+      set(file "${location}")
+    endif()
+  endforeach()
+  if(type STREQUAL "STATIC_LIBRARY" OR NOT file OR NOT file MATCHES "\\.so")
+    message(FATAL_ERROR "The target onnxruntime::onnxruntime is no shared library that is there already "
+      "(${type}, '${file}'). Maquette opens ONNX Runtime at run time: set MAQ_ONNXRUNTIME_DIR to a shared one.")
+  endif()
+  set(${output} "${file}" PARENT_SCOPE)
+endfunction()
+
+set(_ort_header_folders onnxruntime onnxruntime/core/session)
 if(MAQ_ONNXRUNTIME_DIR)
   # Looked for each time, so that another folder counts at once.
   unset(MAQ_ONNXRUNTIME_INCLUDE_DIR CACHE)
@@ -85,6 +109,26 @@ if(MAQ_ONNXRUNTIME_DIR)
     message(FATAL_ERROR "MAQ_ONNXRUNTIME_DIR is '${MAQ_ONNXRUNTIME_DIR}', but include/onnxruntime_c_api.h or "
       "lib/libonnxruntime.so is missing there. Point it at an unpacked ONNX Runtime ${MAQ_ONNXRUNTIME_VERSION} or "
       "newer, or clear it so that one is fetched.")
+  endif()
+elseif(NOT MAQ_FETCH_ONNXRUNTIME)
+  if(NOT TARGET onnxruntime::onnxruntime)
+    find_package(onnxruntime CONFIG QUIET)
+  endif()
+  unset(MAQ_ONNXRUNTIME_INCLUDE_DIR CACHE)
+  unset(MAQ_ONNXRUNTIME_LIBRARY CACHE)
+  if(TARGET onnxruntime::onnxruntime)
+    get_target_property(_ort_folders onnxruntime::onnxruntime INTERFACE_INCLUDE_DIRECTORIES)
+    find_path(MAQ_ONNXRUNTIME_INCLUDE_DIR onnxruntime_c_api.h NO_DEFAULT_PATH NO_CMAKE_FIND_ROOT_PATH
+      HINTS ${_ort_folders} PATH_SUFFIXES ${_ort_header_folders})
+    _maq_find_target_library(MAQ_ONNXRUNTIME_LIBRARY)
+  else()
+    find_path(MAQ_ONNXRUNTIME_INCLUDE_DIR onnxruntime_c_api.h PATH_SUFFIXES ${_ort_header_folders})
+    find_library(MAQ_ONNXRUNTIME_LIBRARY onnxruntime)
+  endif()
+  if(NOT MAQ_ONNXRUNTIME_INCLUDE_DIR OR NOT MAQ_ONNXRUNTIME_LIBRARY)
+    message(FATAL_ERROR "ONNX Runtime (onnxruntime_c_api.h, libonnxruntime.so) was not found, neither as a target "
+      "onnxruntime::onnxruntime nor as a package. Install one, set MAQ_ONNXRUNTIME_DIR to an unpacked ONNX Runtime "
+      "${MAQ_ONNXRUNTIME_VERSION} or newer, or set MAQ_FETCH_ONNXRUNTIME=ON to fetch one with npm or Maven.")
   endif()
 else()
   if(ANDROID)
@@ -101,6 +145,23 @@ else()
   set(_ort_library_of_linux-x64 npm/package/Plugins/Linux/x64/libonnxruntime.so)
   set(_ort_library_of_linux-aarch64 jar/ai/onnxruntime/native/linux-aarch64/libonnxruntime.so)
   set(MAQ_ONNXRUNTIME_LIBRARY "${_ort_root}/${_ort_library_of_${_ort_target}}")
+endif()
+
+file(STRINGS "${MAQ_ONNXRUNTIME_INCLUDE_DIR}/onnxruntime_c_api.h" _ort_api REGEX "#define ORT_API_VERSION +[0-9]+")
+string(REGEX REPLACE ".* ([0-9]+).*" "\\1" _ort_api "${_ort_api}")
+if(NOT _ort_api GREATER_EQUAL _ort_min_api)
+  message(FATAL_ERROR "ONNX Runtime in ${MAQ_ONNXRUNTIME_INCLUDE_DIR} is version 1.${_ort_api}; 1.${_ort_min_api} or "
+    "newer is needed. Set MAQ_ONNXRUNTIME_DIR to one, or MAQ_FETCH_ONNXRUNTIME=ON to fetch "
+    "${MAQ_ONNXRUNTIME_VERSION} with npm or Maven.")
+endif()
+
+# The name under which the loader finds it where it is not installed beside libmaquette.so: some distributions put more of
+# the version into it than the project does.
+set(MAQ_ONNXRUNTIME_SONAME libonnxruntime.so.1)
+execute_process(COMMAND "${CMAKE_READELF}" -d "${MAQ_ONNXRUNTIME_LIBRARY}" OUTPUT_VARIABLE _ort_dynamic
+  ERROR_VARIABLE _ort_error RESULT_VARIABLE _ort_failed)
+if(NOT _ort_failed AND _ort_dynamic MATCHES "SONAME[^\n]*\\[([^]\n]+)\\]")
+  set(MAQ_ONNXRUNTIME_SONAME "${CMAKE_MATCH_1}")
 endif()
 
 add_library(maq_onnxruntime_headers INTERFACE)

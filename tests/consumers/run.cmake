@@ -34,8 +34,7 @@ else()
   run(pkg-config --cflags --libs "maquette >= 0.2")
   string(STRIP "${output}" flags)
   separate_arguments(flags UNIX_COMMAND "${flags}")
-  run("${C_COMPILER}" -std=c99 -Wall -Werror "${CMAKE_CURRENT_LIST_DIR}/people.c" -o people ${flags}
-    "-Wl,-rpath,${moved}/${LIBDIR}")
+  run("${C_COMPILER}" -std=c99 -Wall -Werror "${CMAKE_CURRENT_LIST_DIR}/people.c" -o people ${flags})
   set(programs ./people)
 endif()
 

@@ -11,6 +11,9 @@
 namespace maq {
 namespace {
 
+// The oldest interface that has what the SDK calls and that it was tested with; later releases keep it.
+constexpr uint32_t kApiVersion = 20;
+static_assert(kApiVersion <= ORT_API_VERSION, "the headers are of an older ONNX Runtime");
 constexpr char kFileName[] = "libonnxruntime.so.1";
 constexpr char kRemedy[] =
     " Set MAQ_ONNXRUNTIME_LIB to the file, or put libonnxruntime.so.1 in the folder of libmaquette.so.";
@@ -33,7 +36,8 @@ void* open_library(const std::string& explicit_path, std::string* opened_path) {
     return library;
   }
   const std::string folder = library_folder();
-  for (const std::string& path : {folder + "maquette/" + kFileName, folder + kFileName, std::string(kFileName)}) {
+  for (const std::string& path : {folder + "maquette/" + kFileName, folder + kFileName, std::string(kFileName),
+                                  std::string(MAQ_ONNXRUNTIME_SONAME)}) {
     if (void* library = open_privately(path)) {
       *opened_path = path;
       return library;
@@ -62,9 +66,9 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
   }
   const OrtApiBase* base = get_api_base();
   version_ = base->GetVersionString();
-  api_ = base->GetApi(ORT_API_VERSION);
+  api_ = base->GetApi(kApiVersion);
   if (api_ == nullptr) {
-    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is ONNX Runtime ", version_, ", but 1.", ORT_API_VERSION,
+    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is ONNX Runtime ", version_, ", but 1.", kApiVersion,
                 ".0 or newer is needed.", kRemedy);
   }
   check(api_->CreateEnvWithCustomLogger(discard_log, nullptr, ORT_LOGGING_LEVEL_WARNING, "maquette", &env_),

@@ -178,6 +178,11 @@ TEST(Bundle, AMissingRuntimeLibraryIsNamedWithARemedy) {
                [&] { maq::OnnxRuntimeLibrary("libm.so.6", maq::Log()); });
 }
 
+TEST(Bundle, ARuntimeLibraryThatIsTooOldIsNamedWithItsVersion) {
+  expect_error(MAQ_ERROR_RUNTIME_LIBRARY, "is ONNX Runtime 1.9.0, but 1.20.0 or newer is needed",
+               [] { maq::OnnxRuntimeLibrary(MAQ_TEST_OLD_ONNXRUNTIME, maq::Log()); });
+}
+
 TEST(Bundle, TelemetryIsOffBeforeTheLibraryIsOpened) {
   unsetenv("ORT_DISABLE_TELEMETRY");
   const auto library = runtime();

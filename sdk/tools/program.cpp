@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <new>
 
 namespace {
 
@@ -23,8 +24,13 @@ int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "maquette: %s\n", error.what());
-    return kFailed;
+    return report(error);
   }
   return *exit_code;
+}
+
+int report(const std::exception& error) {
+  const bool is_memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+  std::fprintf(stderr, "maquette: %s\n", is_memory ? "There is not enough memory." : error.what());
+  return kFailed;
 }

@@ -3,12 +3,19 @@
 #include <dlfcn.h>
 
 #include <cstring>
+#include <new>
 #include <string>
 
 #include "core/build_info.h"
 #include "core/error.h"
+#include "core/memory.h"
 
 namespace maq {
+namespace {
+
+constexpr size_t kLargestLibraryBytes = size_t(128) << 20;
+
+}  // namespace
 
 std::string library_folder() {
   Dl_info info{};
@@ -20,12 +27,24 @@ std::string library_folder() {
 
 std::string module_path(const char* file) { return library_folder() + "maquette/" + file; }
 
+LibraryOpening open_library(const std::string& path) {
+  LibraryOpening opening{dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL), ""};
+  if (opening.library != nullptr) return opening;
+  opening.error = dlerror();
+  const auto says = [&](const char* text) { return opening.error.find(text) != std::string::npos; };
+  // glibc says the same of a file system whose programs may not run, and leaves no errno.
+  const bool is_unmapped = says("failed to map segment") && !has_memory(kLargestLibraryBytes);
+  // Which is not of the process's memory: too many libraries with thread-local storage were opened.
+  const bool is_static_storage = says("static TLS block");
+  if (is_unmapped || (says_out_of_memory(opening.error) && !is_static_storage)) throw std::bad_alloc();
+  return opening;
+}
+
 void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy) {
   const std::string path = module_path(file);
-  void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  const auto [library, error] = open_library(path);
   if (library == nullptr) {
-    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, needed_for, " ", path, ", which cannot be opened: ", dlerror(), ". ",
-                remedy);
+    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, needed_for, " ", path, ", which cannot be opened: ", error, ". ", remedy);
   }
   const auto get_export = reinterpret_cast<ModuleExport (*)()>(dlsym(library, symbol));
   const ModuleExport found = get_export == nullptr ? ModuleExport{"", nullptr} : get_export();

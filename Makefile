@@ -57,6 +57,8 @@ test-camera-vm: packages-test build  ## camera tests on a real kernel in qemu, w
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench
+	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
+	@cmake --build --preset release -j $(JOBS) --target measure_start measure_live_source measure_live_scene
 	@.venv/bin/python -m benchmarks
 
 .PHONY: format

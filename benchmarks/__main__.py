@@ -5,8 +5,9 @@
     python -m benchmarks --only peers     one part; the others' figures are taken from the last run in --out
     python -m benchmarks --publish        also copies the report to docs/benchmarks
 
-Parts: frames (people, pixels, threads; start, memory), sweep (error against run time), agreement (int8 against fp32),
-peers (other runtimes and the roofline), cameras (how frames get to the app), scenes (new views of captured places).
+Parts: frames (people, pixels, threads; start, memory), start (libraries, their size, CPU time), window (what an app
+with a window waits for), sweep (error against run time), agreement (int8 against fp32), peers (other runtimes and the
+roofline), cameras (how frames get to the app), scenes (new views of captured scenes).
 The report holds the parts that were measured, now or in the last run.
 Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
@@ -22,12 +23,13 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import cameras, frame_time, gates, report, scenes
-from export.evaluation.maquette_api import LIBRARY, MaquetteError
+from benchmarks import cameras, frame_time, gates, report, scenes, start, window
+from benchmarks.scene_command import SceneCommandError
+from export.evaluation.maquette_api import MaquetteError
 from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-4"
-PARTS = ("frames", "sweep", "agreement", "peers", "cameras", "scenes")
+PARTS = ("frames", "start", "window", "sweep", "agreement", "peers", "cameras", "scenes")
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -54,7 +56,7 @@ def main(argv: list[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     try:
         document = measure(options)
-    except (MaquetteError, FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
+    except (MaquetteError, SceneCommandError, FileNotFoundError, ValueError, subprocess.SubprocessError) as error:
         print(f"The benchmark stopped: {error}", file=sys.stderr)
         return 2
     figures, missing = document["figures"], document["missing"]
@@ -91,9 +93,14 @@ def measure(options: argparse.Namespace) -> dict:
         document["frames"], found, document["machine"] = frame_time.measure(options.out, options.threads, options.quick)
         figures |= found
         figures["bundle_mb"] = round(sum(p.stat().st_size for p in INT8.iterdir()) / 1e6, 3)
-        figures["library_mb"] = round(LIBRARY.resolve().stat().st_size / 1e6, 3)
     elif "machine" not in document:
         document["machine"] = frame_time.machine()
+    if "start" in options.only:
+        document["start"], found = start.measure(options.quick)
+        replace(figures, missing, start.FIGURES, found, {})
+    if "window" in options.only:
+        document["window"], found, why = window.measure(options.quick)
+        replace(figures, missing, window.FIGURES, found, why)
     if "sweep" in options.only:
         document["sweep"], found = sweep_part(options, float_bundle_in(options.out))
         figures |= found

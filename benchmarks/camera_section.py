@@ -77,10 +77,10 @@ def time_rows(measured: dict) -> list[list[str]]:
     for place, found in (("stub", host["outages"]), (USB, said.get("outages", []))):
         if not found:
             continue
-        add("unplugged, to the app's being told", place, [x["noticed_ms"] for x in found], "ms")
+        add("from unplugging to the app's notification", place, [x["noticed_ms"] for x in found], "ms")
         if place != "stub":
-            add("plugged in, to the first frame", place, [x["replug_ms"] for x in found], "ms")
-        add("the device is there again, to the first frame", place, [x["reopen_ms"] for x in found], "ms")
+            add("from plugging in to the first frame", place, [x["replug_ms"] for x in found], "ms")
+        add("from the device's return to the first frame", place, [x["reopen_ms"] for x in found], "ms")
     counted = host["allocations"]
     each = counted["allocations"] / counted["frames"]
     rows.append(["allocations a frame", "stub", f"{each:g}", "", f"{counted['frames']} frames"])

@@ -40,8 +40,8 @@ UNUSABLE = 77  # exit status of run.sh where there can be no virtual machine
 
 @dataclass(frozen=True)
 class Outage:
-    """Milliseconds from unplugging to the app's being told, from plugging in to the first frame, and from the device's
-    being there to the first frame."""
+    """Milliseconds from unplugging to the app's notification, from plugging in to the first frame, and from the
+    device's return to the first frame."""
 
     noticed_ms: float
     replug_ms: float

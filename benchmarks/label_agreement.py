@@ -107,7 +107,7 @@ class Agreement:
         return self.person_equal / self.person_pixels if self.person_pixels else 1.0
 
     def passes(self, bar: float) -> bool:
-        """Enough of all pixels are the same, and nobody is lost or new. The worst picture is reported, not barred:
+        """Enough of all pixels are the same, and each person has a match. The worst picture is reported, not barred:
         one value that float sums of another order push over a rounding step changes a picture of small people.
         """
         return self.fraction >= bar and self.unmatched == 0
@@ -213,7 +213,7 @@ def print_table(bundle: Path, results: dict[str, Agreement | str], features: dic
     title = f"Labels of {bundle.name} against those on this processor"
     table = Table(title=title, title_justify="left")
     table.add_column("processor", no_wrap=True)
-    for column in ("people", "lost, new", "same %", "worst %", "on people %", "box px"):
+    for column in ("people", "unmatched", "same %", "worst %", "on people %", "box px"):
         table.add_column(column, justify="right")
     table.add_column("bar", no_wrap=True)
     for name, found in results.items():
@@ -244,7 +244,7 @@ def failure_of(found: Agreement | str, bar: float) -> str | None:
         return None
     return (
         f"The same label on {100 * found.fraction:.3f} % of the pixels, where {100 * bar:g} % are asked for; "
-        f"{found.unmatched} people lost or new."
+        f"{found.unmatched} people without a match."
     )
 
 

@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section, scene_pictures, scene_section
+from benchmarks import camera_section, scene_pictures, scene_section, start, window
 from benchmarks.sweep import pareto
 
 STAGES = ("capture", "preprocess", "trunk", "proposals", "box_head", "dense_head", "decode")
@@ -210,6 +210,8 @@ def agreement_section(agreement: dict) -> Section:
 SECTIONS = {
     "sweep": sweep_section,
     "frames": frames_section,
+    "start": start.section,
+    "window": window.section,
     "peers": peers_section,
     "agreement": agreement_section,
     "cameras": camera_section.section,
@@ -223,7 +225,8 @@ def warnings_of(document: dict) -> set[str]:
     runs = [frames[name] for name in ("people", "sizes", "one_thread") if name in frames]
     found = {text for run in runs for text in run["warnings"]}
     found |= {text for run in runs for case in run["cases"] for text in case["warnings"]}
-    return found.union(*(document[name]["warnings"] for name in ("cameras", "scenes") if name in document))
+    others = ("start", "window", "cameras", "scenes")
+    return found.union(*(document[name]["warnings"] for name in others if name in document))
 
 
 def circumstances(document: dict) -> list[str]:

@@ -15,8 +15,8 @@ def section(measured: dict) -> tuple[str, list]:
     there = [place for place in measured["places"] if "missing" not in place]
     rendered, real = ([place for place in there if place["real"] == is_real] for is_real in (False, True))
     parts: list = [
-        "Pictures of a place from new sides, made of its posed photos and point cloud, beside photos that were held "
-        f"out: {photos_of(rendered)} of {len(rendered)} rendered places that no training saw, {photos_of(real)} of "
+        "New views of captured scenes, built from their posed photos and point clouds, beside photos that were held "
+        f"out: {photos_of(rendered)} of {len(rendered)} rendered scenes that no training saw, {photos_of(real)} of "
         f"{len(real)} real ones."
     ]
     parts += [f"Warnings of the measurement: {'; '.join(measured['warnings'])}."] if measured["warnings"] else []
@@ -24,7 +24,7 @@ def section(measured: dict) -> tuple[str, list]:
         parts += [
             (
                 "scenes-quality.png",
-                "Error against the time to the first image, means over the rendered places. Named: ways "
+                "Error against the time to the first image, means over the rendered scenes. Named: ways "
                 "without a network, the scene as shipped, and what no other beats in both.",
             ),
             error_rows(rows, "rendered"),
@@ -39,7 +39,7 @@ def section(measured: dict) -> tuple[str, list]:
             "figures compare with none elsewhere. What is half the size is compared with photos of half the size.",
         ]
     if any(row["real"] for row in rows):
-        parts += ["On the real places:", error_rows(rows, "real")]
+        parts += ["On the real scenes:", error_rows(rows, "real")]
     missing = missing_lines(rows)
     parts += [f"Not measured: {'; '.join(missing)}."] if missing else []
     gain = gain_over(rows, "pyramid of points")
@@ -53,7 +53,7 @@ def section(measured: dict) -> tuple[str, list]:
         parts += [
             saved,
             "Work that a scene does not need, and what it costs to do it all the same: differences to the scene as "
-            "shipped, means over the rendered places. Error: the PSNR that leaving it out costs.",
+            "shipped, means over the rendered scenes. Error: the PSNR that leaving it out costs.",
             "Points that no photo sees have no descriptor and are never stored: "
             f"{unseen_fraction(rows):.0%} of the clouds'.",
         ]
@@ -65,7 +65,7 @@ def section(measured: dict) -> tuple[str, list]:
 
 
 def gain_over(rows: list[dict], way: str) -> float | None:
-    """Of the scene as shipped, dB, where both were measured on all rendered places."""
+    """Of the scene as shipped, dB, where both were measured on all rendered scenes."""
     found = {row["setting"]: row["rendered"] for row in rows}
     if not found.get(SHIPPED) or not found.get(way):
         return None
@@ -94,7 +94,7 @@ def error_rows(rows: list[dict], kind: str) -> list[list[str]]:
 
 
 def missing_lines(rows: list[dict]) -> list[str]:
-    """Reasons, with the settings that have each, one place standing for all."""
+    """Reasons, with the settings that have each, one scene standing for all."""
     by_reason: dict[str, list[str]] = {}
     for row in rows:
         for reason in list(row["missing"].values())[:1]:
@@ -103,15 +103,15 @@ def missing_lines(rows: list[dict]) -> list[str]:
 
 
 def unseen_fraction(rows: list[dict]) -> float:
-    """Of the points of the clouds of the rendered places, as shipped."""
+    """Of the points of the clouds of the rendered scenes, as shipped."""
     figures = next(row["rendered"] for row in rows if row["setting"] == SHIPPED)
     return 1 - figures["points"] / figures["cloud_points"]
 
 
 def place_rows(places: list[dict], rows: list[dict]) -> list[list[str]]:
-    """PSNR place by place, of the ways that are shown."""
+    """PSNR scene by scene, of the ways that are shown."""
     ways = [row for row in rows if row["axis"] in ("shipped", "baseline") and row["places"]]
-    table = [["place", "photos", "points of its cloud", *(f"{row['setting']}, dB" for row in ways)]]
+    table = [["scene", "photos", "points of its cloud", *(f"{row['setting']}, dB" for row in ways)]]
     for place in places:
         found = [row["places"].get(place["name"], {}) for row in ways]
         table.append([place["name"] + (", real" if place["real"] else ""), str(place["photos"]),

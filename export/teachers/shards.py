@@ -188,6 +188,25 @@ def write_shards(pictures: Iterator[tuple[np.ndarray, np.ndarray]], count: int, 
             shard.write(out / f"shard-{number:05d}.npz", {"split": out.name, "shard": number, "generator": "photos"})
 
 
+def write_training_set(
+    pictures: list[tuple[np.ndarray, np.ndarray]], empty: list[tuple[np.ndarray, np.ndarray]], repeat: int,
+    composed_images: int, out: Path,
+) -> tuple[int, int]:  # fmt: skip
+    """Shards of pictures with people and without, each `repeat` times, and of images composed of both. Returns how many
+    people were cut out and how many images composed."""
+    people = [person for picture in pictures for person in cut_outs(*picture)]
+    every = (pictures + empty) * repeat
+    rng = np.random.default_rng(0)
+    rng.shuffle(every)  # so that every shard holds both kinds
+    count = composed_images if people and empty else 0
+    more = (
+        composed(empty[rng.integers(len(empty))][0], people, CLOSE.sizes[rng.integers(len(CLOSE.sizes))], rng)
+        for _ in range(count)
+    )  # fmt: skip
+    write_shards(itertools.chain(every, more), len(every) + count, out)
+    return len(people), count
+
+
 def read(path: Path) -> np.ndarray:
     image = cv2.imread(str(path))
     if image is None:
@@ -223,31 +242,22 @@ def main(argv: list[str] | None = None) -> int:
         print(f"No labels for {missing} of {len(photos)} photos in {arguments.photos}: run "
               f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip
         return 1
-    pictures, people, fitted = [], [], 0
+    pictures, fitted = [], 0
     for path, labels in photos:
         image = read(path)
         fits = PhotoFits.load(kept) if (kept := arguments.fits / labels.name).exists() else None
         fitted += 0 if fits is None else int(fits.accepted.sum())
         pictures.append(shrunk(image, weak_label(PhotoLabels.load(labels), image.shape[:2], fits)))
-        people += cut_outs(*pictures[-1])
     known = np.concatenate([instance[~ignore] for _, instance, ignore in (visible_boxes(p[1]) for p in pictures)])
     empty = []
     for path in sorted(arguments.empty.glob("*.jpg")):
         image = read(path)
         empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
-    pictures = (pictures + empty) * arguments.repeat
-    rng = np.random.default_rng(0)
-    rng.shuffle(pictures)  # so that every shard holds both kinds
-    count = arguments.composed if people and empty else 0
-    more = (
-        composed(empty[rng.integers(len(empty))][0], people, CLOSE.sizes[rng.integers(len(CLOSE.sizes))], rng)
-        for _ in range(count)
-    )  # fmt: skip
-    write_shards(itertools.chain(pictures, more), len(pictures) + count, arguments.out)
+    people, count = write_training_set(pictures, empty, arguments.repeat, arguments.composed, arguments.out)
     print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
           f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body), "
           f"{int((known >= BOX_ALONE).sum())} with a box alone; each {arguments.repeat} times; "
-          f"{count} images composed of {len(people)} people cut out")  # fmt: skip
+          f"{count} images composed of {people} people cut out")  # fmt: skip
     return 0
 
 

@@ -326,6 +326,9 @@ struct Pipeline::State {
 
   bool load_model() {
     if (!enter_if_current(MAQ_PIPELINE_LOADING)) return false;
+    // Before the load, which takes a while.
+    while (report_a_change()) {
+    }
     show_model(nullptr);  // before the next one takes memory
     const Bundle bundle = now.model.read_bundle();
     const auto loaded = std::make_shared<DensePose>(settings.runtime(), bundle, now.model.settings);

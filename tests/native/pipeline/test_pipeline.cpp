@@ -318,6 +318,22 @@ TEST(Pipeline, ABadModelFailsAndAGoodOneGoesOn) {
   EXPECT_EQ(watched.count(), 2u);
 }
 
+TEST(Pipeline, LoadingIsReportedBeforeItIsOver) {
+  std::atomic<maq_status> surface_status{MAQ_OK};
+  Watched::Options options;
+  Watched* watched = nullptr;
+  options.on_state = [&](maq_pipeline_state state) {
+    maq_densepose_surface surface{};
+    surface.struct_size = sizeof surface;
+    if (state == MAQ_PIPELINE_LOADING) surface_status = maq_pipeline_get_surface(watched->pipeline->get(), &surface);
+  };
+  Watched with_callback(options);
+  watched = &with_callback;
+  with_callback.pipeline->set_source("stub:people?size=96x72&frames=1");
+  ASSERT_TRUE(with_callback.until_state(MAQ_PIPELINE_ENDED));
+  EXPECT_EQ(surface_status, MAQ_ERROR_UNSUPPORTED) << "no model is loaded yet";
+}
+
 TEST(Pipeline, WithoutAConfigTheModelIsTheInstalledOne) {
   Watched watched(polling(false));
   watched.pipeline->set_source("stub:pattern?frames=1&size=64x48");

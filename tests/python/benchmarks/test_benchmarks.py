@@ -9,7 +9,7 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from benchmarks import __main__ as benchmark
-from benchmarks import cameras, compare, gates, graphs, report, roofline, scenes, sweep
+from benchmarks import cameras, compare, gates, graphs, report, roofline, scenes, start, sweep, window
 
 MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2", "fma"], "processor": "P",
            "memory_mib": 2048, "system": "S"}  # fmt: skip
@@ -81,9 +81,9 @@ def test_a_part_that_is_measured_again_leaves_nothing_of_before():
 
 
 def test_the_shipped_targets_can_be_read():
-    names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "library_mb", "peak_memory_mb",
-             "first_result_ms", "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8",
-             "time_by_pytorch_fp32", "roofline_fraction", *cameras.FIGURES, *scenes.FIGURES}  # fmt: skip
+    names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "peak_memory_mb", "first_result_ms",
+             "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8", "time_by_pytorch_fp32",
+             "roofline_fraction", *start.FIGURES, *window.FIGURES, *cameras.FIGURES, *scenes.FIGURES}  # fmt: skip
     assert {v.figure for v in gates.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
 
 
@@ -190,13 +190,20 @@ def document():
                 "warnings": []}  # fmt: skip
     unseen = {"rows": [], "places": [], "speed": {}, "speed_missing": "no <networks>", "warnings": ["0 real places"],
               "sheet": ""}  # fmt: skip
-    return {"machine": MACHINE, "cameras": measured, "scenes": unseen,
+    processes = {kind: {"libraries": ["libc.so.6"], "cpu_ms": [2.0]} for kind in start.NAMES}
+    file = {"name": "libmaquette.so", "bytes": 10**6, "needed": ["libc.so.6"]}
+    live = dict.fromkeys(("opening_ms", "running_ms", "result_ms", "lost_ms", "back_ms", "longest_call_ms"), 1.0)
+    view = {"open_ms": 1.0, "first_view_ms": 2.0, "longest_call_ms": 0.5}
+    waits = {"first": [live], "next": [live], "scene": [view], "capture": [view], "demo": {},
+             "demo_missing": "there is no <Xvfb>", "warnings": []}  # fmt: skip
+    return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "window": waits,
+            "start": {"processes": processes, "files": {"library": file}, "warnings": []},
             "frames": frames, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
 
 
-@pytest.mark.parametrize("part", ["frames", "sweep", "peers", "agreement", "cameras", "scenes"])
+@pytest.mark.parametrize("part", benchmark.PARTS)
 def test_a_report_of_one_part_shows_what_is_there(tmp_path, part):
     whole = document()
     report.write({name: whole[name] for name in ("machine", "threads", "quick", "gates", part)}, tmp_path)

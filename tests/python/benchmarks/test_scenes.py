@@ -252,7 +252,7 @@ def test_the_report_of_scenes_alone(given, tmp_path, capsys):
     assert document["figures"]["scene_int8_loss_db"] == pytest.approx(loss, abs=1e-3)
     pyramid = rows["as shipped"]["rendered"]["psnr_db"] - rows["pyramid of points"]["rendered"]["psnr_db"]
     text, page = (out / "report.md").read_text(), (out / "index.html").read_text()
-    for said in ("2 rendered places, 8 are wanted", "1 real places, 2 are wanted", "not LPIPS", "On the real places",
+    for said in ("2 rendered places, 8 are wanted", "1 real places, 2 are wanted", "not LPIPS", "On the real scenes",
                  "never stored: 1% of the clouds'", "fine-tuned 10 s, fine-tuned 1 min, fine-tuned 10 min (no folder",
                  "Each point of the cloud adds", f"the networks gain {pyramid:+.2f} dB",
                  "| tiles without points are not refined | 0 | -0.25 | 0 |"):  # fmt: skip

@@ -25,3 +25,12 @@ def test_with_amx_teaches_and_hides_no_crash():
     assert "torchrun" in with_amx("--help").stdout
     if "amx_bf16" in Path("/proc/cpuinfo").read_text().split():
         assert with_amx(sys.executable, "-c", "import ctypes; ctypes.string_at(0)").returncode < 0
+
+
+def test_training_from_a_pack_says_what_it_needs():
+    script = WITH_AMX.with_name("train-from-pack.sh")
+    said = subprocess.run([script], capture_output=True, text=True)
+    assert said.returncode == 2
+    assert all(f"train-from-pack.sh {command}" in said.stdout for command in ("render", "crops", "both"))
+    assert "PERCENT" in said.stdout
+    assert subprocess.run([script, "render"], capture_output=True, text=True).returncode == 2

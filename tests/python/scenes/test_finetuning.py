@@ -256,4 +256,4 @@ def test_the_sdk_opens_a_tuned_scene(place, tmp_path, name):
     )
     assert made.returncode == 0, made.stderr
     said = json.loads((tmp_path / "info.json").read_text())
-    assert (said["points"], said["varying"]) == (len(scene.means), len(scene.slopes))
+    assert (said["points"], said["view_dependent_points"]) == (len(scene.means), len(scene.slopes))

@@ -74,7 +74,7 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
                           " threads, which takes longer. ", threads_.shortage());
   }
   check(api.SetIntraOpNumThreads(options.get(), thread_count));
-  check(api.SessionOptionsSetCustomCreateThreadFn(options.get(), SessionThreads::hand_out));
+  check(api.SessionOptionsSetCustomCreateThreadFn(options.get(), SessionThreads::assign));
   check(api.SessionOptionsSetCustomThreadCreationOptions(options.get(), &threads_));
   check(api.SessionOptionsSetCustomJoinThreadFn(options.get(), SessionThreads::join));
   check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));

@@ -63,7 +63,7 @@ SessionThreads::~SessionThreads() {
   for (const auto& worker : waiting_) worker->end();
 }
 
-OrtCustomThreadHandle SessionThreads::hand_out(void* self, OrtThreadWorkerFn work, void* argument) noexcept {
+OrtCustomThreadHandle SessionThreads::assign(void* self, OrtThreadWorkerFn work, void* argument) noexcept {
   auto& waiting = static_cast<SessionThreads*>(self)->waiting_;
   if (waiting.empty()) return nullptr;
   Worker* const worker = waiting.back().release();

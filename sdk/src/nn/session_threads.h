@@ -1,5 +1,5 @@
-// The threads of a session's pool, started before ONNX Runtime asks for them: it waits for ever where the system gives
-// it some of its threads, but not all.
+// The threads of a session's pool, started before ONNX Runtime asks for them: it hangs where the system gives it
+// some of its threads, but not all.
 #pragma once
 
 #include <onnxruntime_c_api.h>
@@ -17,7 +17,7 @@ class SessionThreads {
  public:
   // Starts `count` threads, or as many as the system gives.
   explicit SessionThreads(int count);
-  // Ends those that were not handed out.
+  // Ends those that were not assigned.
   ~SessionThreads();
   SessionThreads(const SessionThreads&) = delete;
   SessionThreads& operator=(const SessionThreads&) = delete;
@@ -27,8 +27,8 @@ class SessionThreads {
   const std::string& shortage() const { return shortage_; }
 
   // For OrtApi's SessionOptionsSetCustomCreateThreadFn, whose options are this object, and …SetCustomJoinThreadFn.
-  // What was handed out does not need this object any more. Null when all were.
-  static OrtCustomThreadHandle hand_out(void* self, OrtThreadWorkerFn work, void* argument) noexcept;
+  // What was assigned does not need this object any more. Null when all were.
+  static OrtCustomThreadHandle assign(void* self, OrtThreadWorkerFn work, void* argument) noexcept;
   static void join(OrtCustomThreadHandle handle) noexcept;
 
  private:

@@ -99,6 +99,7 @@ struct LiveSource::State {
     Entry old;  // returned to the camera after the lock is released
     {
       std::lock_guard<std::mutex> lock(mutex);
+      if (ring.empty()) return;  // the source is gone
       if (count == ring.size()) {
         old = std::move(ring[first]);
         first = (first + 1) % ring.size();
@@ -353,7 +354,6 @@ LiveSource::~LiveSource() {
       state.changed.wait(lock, [&] { return !state.reporting; });
     }
     left.swap(state.ring);
-    state.ring.resize(1);
     state.first = state.count = 0;
   }
   if (ended) {

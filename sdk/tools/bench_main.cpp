@@ -58,14 +58,18 @@ class Case {
   double seconds() const { return seconds_; }
 
   // Takes the next frame, from the start again after the last one, and finds its people. Returns how long it took.
-  double run(maquette::DensePose& densepose, bool counted) {
+  // Nothing when the program was interrupted.
+  std::optional<double> run(maquette::DensePose& densepose, bool counted) {
     const double cpu_before_s = own_processor_seconds();
     const auto start = Clock::now();
     std::optional<maquette::Frame> frame = source_->next();
-    if (!frame) {
+    if (!frame && !interrupted()) {
       open();
       frame = source_->next();
-      if (!frame) throw std::runtime_error(uri_ + " has no frames.");
+    }
+    if (!frame) {
+      if (interrupted()) return std::nullopt;
+      throw std::runtime_error(uri_ + " has no frames.");
     }
     const auto taken = Clock::now();
     const maquette::DensePoseResult result = densepose.run(*frame);
@@ -149,13 +153,16 @@ class Case {
 
  private:
   void open() {
+    stopped_.reset();
     source_ = std::make_unique<maquette::Source>(context_, uri_);
+    stopped_.emplace(*source_);
     last_sequence_.reset();
   }
 
   const maquette::Context& context_;
   std::string uri_;
   std::unique_ptr<maquette::Source> source_;
+  std::optional<StoppedByInterrupt> stopped_;
   std::vector<double> ms_[kStageCount];
   maq_densepose_stats stats_{};
   std::array<int32_t, 2> size_px_{};
@@ -194,7 +201,7 @@ int run_bench(const Options& options) {
   for (const std::string& text : options.sources) {
     cases.push_back(std::make_unique<Case>(context, parse_source_argument(text).uri));
   }
-  const double first_frame_ms = cases[0]->run(densepose, false);
+  const double first_frame_ms = *cases[0]->run(densepose, false);  // before interrupts are caught
   const double first_result_ms = 1e3 * seconds_since_start();
 
   catch_interrupts();

@@ -1,21 +1,88 @@
 #include "interrupt.h"
 
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <csignal>
+#include <cstdint>
+#include <ctime>
 #include <initializer_list>
+#include <mutex>
+#include <thread>
+#include <vector>
 
 namespace {
 
-volatile std::sig_atomic_t stop_asked = 0;
+// timeout(1) and some supervisors send a signal to the process and to its group: both are the same request.
+constexpr int64_t kSameRequestNs = 500000000;
+
+std::atomic<int64_t> asked_ns{0};  // when; 0: not yet
+int event = -1;
+
+int64_t now_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return int64_t(now.tv_sec) * 1000000000 + now.tv_nsec;
+}
+
+// Calls only what a signal handler may.
+void handle(int number) {
+  const int error = errno;
+  const int64_t now = now_ns();
+  int64_t first = 0;
+  if (asked_ns.compare_exchange_strong(first, now)) {
+    const uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = write(event, &one, sizeof one);
+  } else if (now - first > kSameRequestNs) {
+    std::signal(number, SIG_DFL);
+    std::raise(number);
+  }
+  errno = error;
+}
+
+// Never destroyed: the thread that reads it may outlive main().
+struct OpenSources {
+  std::mutex mutex;
+  std::vector<maq_source*> all;
+};
+OpenSources& open_sources() {
+  static auto* sources = new OpenSources;
+  return *sources;
+}
+
+void stop_sources_when_asked() {
+  uint64_t count = 0;
+  while (read(event, &count, sizeof count) < 0 && errno == EINTR) {
+  }
+  const std::lock_guard<std::mutex> lock(open_sources().mutex);
+  for (maq_source* source : open_sources().all) maq_source_stop(source);
+}
 
 }  // namespace
 
 void catch_interrupts() {
-  for (const int number : {SIGINT, SIGTERM}) {
-    std::signal(number, [](int caught) {
-      stop_asked = 1;
-      std::signal(caught, SIG_DFL);
-    });
+  if (event >= 0) return;
+  event = eventfd(0, EFD_CLOEXEC);
+  if (event >= 0) std::thread(stop_sources_when_asked).detach();
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    const auto before = std::signal(number, handle);
+    if (number == SIGHUP && before == SIG_IGN) std::signal(number, SIG_IGN);  // nohup(1)
   }
 }
 
-bool interrupted() { return stop_asked != 0; }
+bool interrupted() { return asked_ns != 0; }
+
+StoppedByInterrupt::StoppedByInterrupt(const maquette::Source& source) : source_(source.get()) {
+  const std::lock_guard<std::mutex> lock(open_sources().mutex);
+  open_sources().all.push_back(source_);
+  if (interrupted()) maq_source_stop(source_);
+}
+
+StoppedByInterrupt::~StoppedByInterrupt() {
+  const std::lock_guard<std::mutex> lock(open_sources().mutex);
+  std::vector<maq_source*>& all = open_sources().all;
+  all.erase(std::remove(all.begin(), all.end(), source_), all.end());
+}

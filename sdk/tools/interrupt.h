@@ -1,6 +1,20 @@
 // Ctrl-C as a request to finish what is at hand.
 #pragma once
 
-// From now on Ctrl-C (and SIGTERM) asks to stop; a second time it ends the program at once.
+#include <maquette/maquette.hpp>
+
+// From now on Ctrl-C, SIGTERM and SIGHUP ask to stop; the next time they end the program at once.
 void catch_interrupts();
 bool interrupted();
+
+// While this lives, a request to stop stops the source: a wait for a frame ends at once.
+class StoppedByInterrupt {
+ public:
+  explicit StoppedByInterrupt(const maquette::Source& source);
+  ~StoppedByInterrupt();
+  StoppedByInterrupt(const StoppedByInterrupt&) = delete;
+  StoppedByInterrupt& operator=(const StoppedByInterrupt&) = delete;
+
+ private:
+  maq_source* source_;
+};

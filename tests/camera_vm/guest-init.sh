@@ -23,13 +23,13 @@ check() {
     fi
 }
 
-# wait_until COMMAND...: for 10 seconds at most.
+# wait_until COMMAND...: for two minutes at most, since an emulated processor takes seconds for a frame.
 wait_until() {
     wait_tries=0
     until "$@" >/dev/null 2>&1; do
         wait_tries=$((wait_tries + 1))
-        if [ $wait_tries -ge 100 ]; then
-            echo "10 s passed without: $*"
+        if [ $wait_tries -ge 1200 ]; then
+            echo "two minutes passed without: $*"
             return 1
         fi
         sleep 0.1

@@ -100,9 +100,14 @@ MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
 /* Finds the people in a frame and maps their pixels to the body surface. The frame is not kept. `*result` comes from a
  * pool of result_pool_size: give it back with maq_densepose_result_release. Without people, no head network runs and
  * the planes are zero.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while the
- * networks run. */
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks
+ * while the networks run. */
 MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
+
+/* Cancels the maq_densepose_run that runs, or else the next: it returns MAQ_CANCELLED as soon as the layer of a network
+ * that runs is done. Later ones run as usual, and the next frame is a key frame.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_densepose_cancel(maq_densepose* densepose);
 
 /* Starts a new stream: the next frame is a key frame. Needed only with key_frame_interval above 1.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */

@@ -175,11 +175,23 @@ class Source {
 
   void seek(int64_t time_ns) { check(maq_source_seek(get(), time_ns)); }
 
-  // Nothing after the last frame. Throws Error with MAQ_TIMEOUT when none came in time.
+  // Nothing for sources other than cameras; readable while next() would not wait.
+  std::optional<int> event_fd() const {
+    int32_t fd = -1;
+    const maq_status status = maq_source_get_event_fd(get(), &fd);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status);
+    return fd;
+  }
+
+  // From any thread: next() returns nothing, now and later.
+  void stop() { check(maq_source_stop(get())); }
+
+  // Nothing after the last frame, and after stop(). Throws Error with MAQ_TIMEOUT when none came in time.
   std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
     maq_frame* frame = nullptr;
     const maq_status status = maq_source_acquire_frame(get(), timeout_ns, &frame);
-    if (status == MAQ_END_OF_STREAM) return std::nullopt;
+    if (status == MAQ_END_OF_STREAM || status == MAQ_CANCELLED) return std::nullopt;
     check(status);
     return Frame(frame);
   }
@@ -298,6 +310,9 @@ class DensePose {
     check(maq_densepose_run(get(), frame.get(), &result));
     return DensePoseResult(result);
   }
+
+  // From any thread: the run that runs, or else the next, throws Error with MAQ_CANCELLED.
+  void cancel() { check(maq_densepose_cancel(get())); }
 
   void reset() { check(maq_densepose_reset(get())); }
 

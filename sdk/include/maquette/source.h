@@ -99,14 +99,15 @@ typedef struct maq_source_scheme {
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
 /* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec",
- * "stub:people?count=2&seed=7", "stub:pattern", "v4l2:/dev/video0", "libcamera:0" or "depthai:". "file:clip.mp4"
- * chooses among the first three by the file's content, "camera:" opens the first camera that can be opened.
+ * "stub:people?count=2&seed=7", "stub:pattern", "v4l2:/dev/video0" or "v4l2:0", "libcamera:0" or "depthai:".
+ * "file:clip.mp4" chooses among the first three by the file's content, "camera:" opens the first camera that can be
+ * opened. Without a scheme it is the path of a file or a camera, "clip.mp4" or "/dev/video0", as it is: no options.
  * "?size=640x480&fps=15" works with each: frames are scaled to that size, frames of a clip are dropped down to that
  * rate; a camera uses the nearest mode that it offers, which maq_source_get_info returns. For cameras, "format=MJPG"
  * selects a pixel format and "exposure=10000&focus=auto" sets controls. "live=1" plays a file or stub in real time
  * like a camera, and faults such as "drop=0.1" or "unplug=3s@5s" can be injected into any source
- * (docs/cameras/simulated.md). Write a '?' of a file name as %3F and a '%' as %25. `config` may be NULL. `*source`
- * is the caller's, to be given to maq_source_destroy.
+ * (docs/cameras/simulated.md). Behind a scheme, write a '?' of a file name as %3F and a '%' as %25. `config` may be
+ * NULL. `*source` is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme),
  * MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE; for cameras MAQ_ERROR_DEVICE_LOST,
  * MAQ_ERROR_BUSY, MAQ_ERROR_NO_PERMISSION, MAQ_ERROR_RUNTIME_LIBRARY too. Blocks while files are read and devices
@@ -114,9 +115,17 @@ MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t st
 MAQ_API maq_status maq_source_create(maq_context* context, const char* uri, const maq_source_config* config,
                                      maq_source** source);
 
-/* Closes the source (NULL is fine). Frames of it that are still held stay valid until they are released.
- * Once for each source, from any thread. Blocks for at most 50 ms, also when a device hangs, and while a state callback
- * runs. */
+/* Stops the source for good: a call of maq_source_acquire_frame that waits in another thread, and every later one,
+ * returns MAQ_CANCELLED, and no state callback begins any more. A camera is closed as soon as it answers. Frames that
+ * are held stay valid.
+ * Any thread, also in a state callback. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_source_stop(maq_source* source);
+
+/* Stops the source as maq_source_stop does and frees it (NULL is fine). Frames of it that are still held stay valid
+ * until they are released. A call of maq_source_acquire_frame that waits in another thread returns MAQ_CANCELLED first;
+ * no other call may run, and none may begin.
+ * Once for each source, from any thread. Blocks for at most 50 ms, also when a device hangs, while a state callback
+ * runs, and while another thread decodes a frame of the source. */
 MAQ_API void maq_source_destroy(maq_source* source);
 
 /* Describes the source. The caller sets info->struct_size.
@@ -127,10 +136,19 @@ MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info
  * has few buffers and drops frames while the app holds them all. `timeout_ns` bounds the wait for live sources
  * (MAQ_WAIT_FOREVER: no bound); files and stubs deliver at once and ignore it. `*frame` comes from a pool of
  * frame_pool_size: give it back promptly with maq_frame_release.
- * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_ERROR_DEVICE_LOST,
- * MAQ_ERROR_POOL_EMPTY when all frames are held, MAQ_ERROR_UNREADABLE when a clip ends before its header says, after
- * all readable frames, or for a damaged frame of a recording, which is skipped. Blocks while decoding. */
+ * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_CANCELLED (the source is stopped),
+ * MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_POOL_EMPTY when all frames are held, MAQ_ERROR_UNREADABLE when a clip ends before
+ * its header says, after all readable frames, or for a damaged frame of a recording, which is skipped. Blocks while
+ * decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
+
+/* Gets a file descriptor for poll, epoll or a looper of Android: it is readable while maq_source_acquire_frame would
+ * not wait, because a frame waits, or because the source has ended, failed or was stopped. Acquire with a timeout of 0
+ * then; a damaged frame is dropped, and the call returns MAQ_TIMEOUT. It is the source's: do not read, write or close
+ * it; maq_source_destroy closes it.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (not live: frames need no waiting),
+ * MAQ_ERROR_OUT_OF_MEMORY (the process has no descriptor left). Does not block. */
+MAQ_API maq_status maq_source_get_event_fd(maq_source* source, int32_t* fd);
 
 /* Gets the camera's intrinsics.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (they are unknown). Does not block. */
@@ -149,7 +167,7 @@ MAQ_API maq_status maq_source_set_control(maq_source* source, maq_control contro
 
 /* Moves to the first frame at `time_ns` after the source's first frame, or later: the next call acquires it.
  * One at a time, together with maq_source_acquire_frame. Errors: MAQ_ERROR_INVALID_ARGUMENT (negative),
- * MAQ_ERROR_UNSUPPORTED (only recordings and stubs can). Does not block. */
+ * MAQ_ERROR_UNSUPPORTED (only clips, recordings and stubs can). Does not block: the next call searches. */
 MAQ_API maq_status maq_source_seek(maq_source* source, int64_t time_ns);
 
 /* Get the number of kinds of sources of this build, and the kind at `index`. The caller sets scheme->struct_size.

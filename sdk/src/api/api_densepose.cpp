@@ -107,6 +107,14 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
   });
 }
 
+maq_status maq_densepose_cancel(maq_densepose* densepose) {
+  return guarded(densepose, __func__, [&] {
+    require_argument(densepose, "densepose");
+    densepose->densepose->cancel();
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_densepose_reset(maq_densepose* densepose) {
   return guarded(densepose, __func__, [&] {
     require_argument(densepose, "densepose");

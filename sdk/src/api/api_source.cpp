@@ -78,6 +78,14 @@ maq_status maq_source_create(maq_context* context, const char* uri, const maq_so
   });
 }
 
+maq_status maq_source_stop(maq_source* source) {
+  return guarded(source, __func__, [&] {
+    require_argument(source, "source");
+    source->stop();
+    return MAQ_OK;
+  });
+}
+
 void maq_source_destroy(maq_source* source) { destroy(source); }
 
 maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) {
@@ -99,18 +107,29 @@ maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) 
 }
 
 maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame) {
+  const SourceCall call(source);
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
     require_argument(frame, "frame");
     BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
-    switch (source->source->next(timeout_ns, handle->frame)) {
+    switch (source->is_stopped ? NextFrame::kStopped : source->source->next(timeout_ns, handle->frame)) {
       case NextFrame::kFrame: break;
       case NextFrame::kEnd: return MAQ_END_OF_STREAM;
       case NextFrame::kTimeout:
         return keep_error(source, MAQ_TIMEOUT, nullptr,
                           concatenate("No frame came within ", timeout_ns / 1000000, " ms.").c_str());
+      case NextFrame::kStopped: return keep_error(source, MAQ_CANCELLED, nullptr, "The source was stopped.");
     }
     *frame = lend<maq_frame>(std::move(handle));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_source_get_event_fd(maq_source* source, int32_t* fd) {
+  return guarded(source, __func__, [&] {
+    require_argument(source, "source");
+    require_argument(fd, "fd");
+    *fd = source->source->event_fd();
     return MAQ_OK;
   });
 }

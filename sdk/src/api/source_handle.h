@@ -1,5 +1,8 @@
 #pragma once
 
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
 #include <vector>
 
 #include "api/frame_handle.h"
@@ -19,10 +22,49 @@ SourceSettings source_settings(const maq_source_config& config, const Log& log);
 struct maq_source : maq::Handle {
   maq_source(std::string opened, std::unique_ptr<maq::Source> made, size_t pool_size)
       : uri(std::move(opened)), source(std::move(made)), frames(pool_size, "frames") {}
+  // Calls of other threads for a frame end before.
+  ~maq_source() {
+    stop();
+    std::unique_lock<std::mutex> lock(mutex);
+    idle.wait(lock, [this] { return calls == 0; });
+  }
+
+  void stop() {
+    is_stopped = true;
+    source->stop();
+  }
+
   std::string uri;
   std::unique_ptr<maq::Source> source;
   maq::BoundedPool<maq_frame> frames;
+  std::atomic<bool> is_stopped{false};
+  std::mutex mutex;  // of the rest
+  std::condition_variable idle;
+  int calls = 0;
 };
+
+namespace maq {
+
+// A call that the end of the source waits for: until it leaves, its errors can be kept with the handle.
+class SourceCall {
+ public:
+  explicit SourceCall(maq_source* source) : source_(source) { add(1); }
+  ~SourceCall() { add(-1); }
+  SourceCall(const SourceCall&) = delete;
+  SourceCall& operator=(const SourceCall&) = delete;
+
+ private:
+  void add(int calls) {
+    if (source_ == nullptr || source_->is_of_parent()) return;
+    const std::lock_guard<std::mutex> lock(source_->mutex);
+    source_->calls += calls;
+    if (source_->calls == 0) source_->idle.notify_all();
+  }
+
+  maq_source* source_;
+};
+
+}  // namespace maq
 
 struct maq_camera_list : maq::Handle {
   std::vector<maq::CameraListing> cameras;

@@ -76,6 +76,7 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
               bundle.path_of(spec_.charts_file)),
       surface_(spec_.surface_file.empty() ? std::vector<uint8_t>() : bundle.files.at(spec_.surface_file),
                bundle.path_of(spec_.surface_file)) {
+  cancel_ = std::make_unique<RunCancel>(runtime);
   const Manifest& manifest = bundle.manifest;
   const auto make = [&](const GraphSpec& graph) {
     return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file),
@@ -98,6 +99,21 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
 }
 
 void DensePose::run(const ImageView& image, DensePoseResult& result) {
+  // However this ends, a cancel of this run does not cancel a later one.
+  struct Reset {
+    RunCancel& cancel;
+    ~Reset() { cancel.reset(); }
+  } const after{*cancel_};
+  try {
+    find_people(image, result);
+  } catch (...) {
+    reset();  // of the frame's boxes, some may be missing
+    throw;
+  }
+}
+
+void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
+  cancel_->check();
   Stopwatch total, stage;
   DensePoseStats& stats = result.stats;
   stats = {};
@@ -157,7 +173,7 @@ void DensePose::run_trunk() {
     shapes_.push_back({1, cells(height, stride), cells(width, stride), channels_});
   }
   inputs_.assign(1, {input_.values.data(), {1, 3, height, width}});
-  pyramid_ = trunk_->run(inputs_, shapes_);
+  pyramid_ = trunk_->run(inputs_, shapes_, cancel_.get());
   features_.clear();
   for (size_t l = 0; l < kFeatureLevels; ++l) {
     const TensorView& map = pyramid_[l];
@@ -173,7 +189,7 @@ void DensePose::propose(int image_height_px, std::vector<ScoredBox>& found, int*
     const int64_t anchors = int64_t(spec_.rpn.aspect_ratios.size());
     shapes_.clear();
     for (const TensorView& map : inputs_) shapes_.push_back({1, map.shape[1], map.shape[2], 5 * anchors});
-    const std::vector<TensorView>& outputs = rpn.run(inputs_, shapes_);
+    const std::vector<TensorView>& outputs = rpn.run(inputs_, shapes_, cancel_.get());
     for (size_t l = 0; l < count; ++l) {
       rpn_levels_[first + l] = {outputs[l].data, int(inputs_[l].shape[2]), int(inputs_[l].shape[1])};
     }
@@ -206,12 +222,13 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_scor
   const size_t roi_size = size_t(channels_) * size_t(spec.pool_size) * size_t(spec.pool_size);
   rois_.resize(size_t(count) * roi_size);
   for (size_t i = 0; i < boxes.size(); ++i) {
+    cancel_->check();
     roi_align_.run(level_for(boxes[i].box), boxes[i].box, spec.pool_size, rois_.data() + i * roi_size);
   }
   // Of each: logits of person and background, then dx, dy, dw, dh.
   inputs_.assign(1, {rois_.data(), {count, spec.pool_size, spec.pool_size, channels_}});
   shapes_.assign(1, {count, 6});
-  const TensorView& outputs = box_head_->run(inputs_, shapes_).front();
+  const TensorView& outputs = box_head_->run(inputs_, shapes_, cancel_.get()).front();
 
   for (size_t i = 0; i < boxes.size(); ++i) {
     const float score = first_of_two(outputs.data + 6 * i);
@@ -238,7 +255,7 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
   inputs_.assign(1, {rois_.data(), {count, spec.pool_size, spec.pool_size, channels_}});
   shapes_.assign(2, {count, spec.pool_size, spec.pool_size, 4 * classes});
   shapes_[1][3] = charts_.channels();
-  const std::vector<TensorView>& outputs = dense_head_->run(inputs_, shapes_);
+  const std::vector<TensorView>& outputs = dense_head_->run(inputs_, shapes_, cancel_.get());
   result.stats.dense_head_ms = float(stage.lap_ms());
 
   const float scale_x = float(result.planes.width_px) / float(input_.width_px);
@@ -246,6 +263,7 @@ void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseRe
   const size_t labels_size = size_t(spec.output_size) * size_t(spec.output_size) * size_t(classes);
   const size_t surface_size = size_t(charts_.channels()) * size_t(spec.pool_size) * size_t(spec.pool_size);
   for (size_t i = 0; i < people.size(); ++i) {
+    cancel_->check();
     if (settings_.surface) charts_.begin(outputs[1].data + i * surface_size, spec.pool_size);
     const DenseLogits logits{outputs[0].data + i * labels_size, settings_.surface ? &charts_ : nullptr,
                              spec.coarse_classes, spec.index_classes, spec.output_size};

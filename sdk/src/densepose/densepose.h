@@ -66,8 +66,11 @@ class DensePose {
   DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, const DensePoseSettings& settings);
 
   // Memory of `result` is reused. Not for two threads at once. With key_frame_interval above 1 images are frames of one
-  // stream: between key frames the boxes of the frame before take the place of proposals. Throws MAQ_ERROR_INFERENCE.
+  // stream: between key frames the boxes of the frame before take the place of proposals. Throws MAQ_ERROR_INFERENCE,
+  // MAQ_CANCELLED.
   void run(const ImageView& image, DensePoseResult& result);
+  // From any thread: ends the run that runs, or else the next.
+  void cancel() noexcept { cancel_->cancel(); }
   // The next image begins another stream.
   void reset();
 
@@ -75,6 +78,7 @@ class DensePose {
   const SurfaceGrid& surface() { return surface_.grid(); }
 
  private:
+  void find_people(const ImageView& image, DensePoseResult& result);
   void run_trunk();
   // The best boxes of the RPN. Its finest level runs only where people of min_person_height_px may be that small.
   void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
@@ -87,6 +91,7 @@ class DensePose {
   DensePoseSpec spec_;
   DensePoseSettings settings_;  // none is 0 that stands for the bundle's value
   int channels_ = 0;
+  std::unique_ptr<RunCancel> cancel_;
   std::unique_ptr<Session> trunk_;
   std::unique_ptr<Session> rpn_fine_;
   std::unique_ptr<Session> rpn_coarse_;

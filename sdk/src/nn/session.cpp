@@ -44,6 +44,29 @@ bool fits(const std::vector<int64_t>& actual, const std::vector<Dimension>& expe
 
 }  // namespace
 
+RunCancel::RunCancel(std::shared_ptr<const OnnxRuntimeLibrary> runtime) : runtime_(std::move(runtime)) {
+  runtime_->check(runtime_->api().CreateRunOptions(&options_), MAQ_ERROR_INTERNAL, "Runs cannot be cancelled");
+}
+
+RunCancel::~RunCancel() { runtime_->api().ReleaseRunOptions(options_); }
+
+void RunCancel::cancel() noexcept {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  is_cancelled_ = true;
+  runtime_->api().ReleaseStatus(runtime_->api().RunOptionsSetTerminate(options_));
+}
+
+void RunCancel::reset() noexcept {
+  if (!is_cancelled_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  runtime_->api().ReleaseStatus(runtime_->api().RunOptionsUnsetTerminate(options_));
+  is_cancelled_ = false;
+}
+
+void RunCancel::check() const {
+  if (is_cancelled_) throw Error(MAQ_CANCELLED, "The app cancelled the run.");
+}
+
 // ONNX Runtime asks the same of inputs and of outputs, by functions of different names.
 struct Session::GraphSide {
   const char* kind;
@@ -191,7 +214,7 @@ void Session::bind(Binding& binding, const float* data, const Shape& shape) {
 }
 
 const std::vector<TensorView>& Session::run(const std::vector<TensorView>& inputs,
-                                            const std::vector<Shape>& output_shapes) {
+                                            const std::vector<Shape>& output_shapes, const RunCancel* cancel) {
   for (size_t i = 0; i < inputs_.size(); ++i) {
     bind(inputs_[i], inputs[i].data, inputs[i].shape);
     input_values_[i] = inputs_[i].value;
@@ -205,8 +228,14 @@ const std::vector<TensorView>& Session::run(const std::vector<TensorView>& input
     views_[i].data = buffers_[i].data();
     views_[i].shape = output_shapes[i];
   }
-  check_run(runtime_->api().Run(session_, nullptr, input_names_.data(), input_values_.data(), input_values_.size(),
-                                output_names_.data(), output_names_.size(), output_values_.data()));
+  OrtStatus* status = runtime_->api().Run(session_, cancel == nullptr ? nullptr : cancel->options_, input_names_.data(),
+                                          input_values_.data(), input_values_.size(), output_names_.data(),
+                                          output_names_.size(), output_values_.data());
+  if (status != nullptr && cancel != nullptr && cancel->is_cancelled_) {
+    runtime_->api().ReleaseStatus(status);
+    cancel->check();
+  }
+  check_run(status);
   return views_;
 }
 

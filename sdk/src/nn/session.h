@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -53,6 +55,29 @@ struct SessionSettings {
   bool plans_memory = true;
 };
 
+// Ends a run from another thread: the one that runs, or else the next.
+class RunCancel {
+ public:
+  explicit RunCancel(std::shared_ptr<const OnnxRuntimeLibrary> runtime);
+  ~RunCancel();
+  RunCancel(const RunCancel&) = delete;
+  RunCancel& operator=(const RunCancel&) = delete;
+
+  // Any thread.
+  void cancel() noexcept;
+  // Of the thread that runs. Throws MAQ_CANCELLED after cancel(), until reset().
+  void check() const;
+  void reset() noexcept;
+
+ private:
+  friend class Session;
+
+  std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
+  OrtRunOptions* options_ = nullptr;
+  std::mutex mutex_;  // of changes, so that both of these say the same
+  std::atomic<bool> is_cancelled_{false};
+};
+
 class Session {
  public:
   // Prepares `bytes` (an ONNX model without external data) to run, and compares its inputs and outputs with `spec`.
@@ -65,8 +90,10 @@ class Session {
 
   // Runs the network on its inputs, in the order of the spec. The outputs, of the shapes that the caller expects and in
   // the order of the spec, lie in memory of the session and stay until the next run. Not for two threads at once.
-  // Throws MAQ_ERROR_INFERENCE, also when an output has another shape.
-  const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes);
+  // Throws MAQ_ERROR_INFERENCE, also when an output has another shape; MAQ_CANCELLED, between two nodes of the graph,
+  // where `cancel` says so.
+  const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes,
+                                     const RunCancel* cancel = nullptr);
 
  private:
   struct GraphSide;

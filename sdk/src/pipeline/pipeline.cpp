@@ -33,7 +33,6 @@ using Clock = MonotonicClock;
 
 constexpr int64_t kWaitSliceNs = 50000000;  // how long a wait for a frame may hold up a request
 constexpr std::chrono::milliseconds kOpeningPatience(50);
-constexpr int64_t kLongestTimeoutNs = int64_t(365) * 24 * 3600 * 1000000000;
 constexpr size_t kMaxReports = 1000;  // that wait for a callback that hangs
 
 double ms_between(Clock::time_point begin, Clock::time_point end) {
@@ -444,6 +443,7 @@ Pipeline::~Pipeline() {
   stop();
   std::unique_lock<std::mutex> lock(state.mutex);
   state.is_ending = true;
+  if (state.model != nullptr) state.model->cancel();
   state.changed.notify_all();
   bool waits = state.thread.get_id() != std::this_thread::get_id();
   const auto patience_ends = Clock::now() + kOpeningPatience;
@@ -521,7 +521,7 @@ maq_status Pipeline::acquire(int64_t timeout_ns, Frame& frame, DensePoseResult& 
   if (timeout_ns < 0) {
     state->changed.wait(lock, is_over);
   } else {
-    state->changed.wait_for(lock, std::chrono::nanoseconds(std::min(timeout_ns, kLongestTimeoutNs)), is_over);
+    state->changed.wait_until(lock, deadline_after(timeout_ns), is_over);
   }
   if (state->has_result) {
     std::swap(frame, state->newest_frame);

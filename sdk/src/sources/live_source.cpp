@@ -64,6 +64,8 @@ struct LiveSource::State {
   std::thread thread;
   JpegDecoder jpeg;  // of next() alone
   bool warned_of_bad_jpeg = false;
+  std::optional<EventFd> news;  // of the app, once it has asked for it
+  bool is_signalled = false;    // the news
 
   std::mutex control_mutex;                  // one call at a time; before `mutex`, and never taken by the thread
   std::weak_ptr<Camera> present;             // the thread owns the camera; empty while it is lost
@@ -82,7 +84,7 @@ struct LiveSource::State {
     end_report();
   }
 
-  // False when the source is being destroyed: it waits for a report that was begun, not for a later one.
+  // False when the source was stopped: its end waits for a report that was begun, not for a later one.
   bool begin_report() {
     std::lock_guard<std::mutex> lock(mutex);
     reporting = !stopping;
@@ -108,6 +110,7 @@ struct LiveSource::State {
       }
       ring[(first + count) % ring.size()] = std::move(entry);
       ++count;
+      show_news();
     }
     changed.notify_all();
   }
@@ -115,6 +118,7 @@ struct LiveSource::State {
   // The camera, for the length of a call. Throws while it is lost.
   std::shared_ptr<Camera> present_camera() {
     std::lock_guard<std::mutex> lock(mutex);
+    if (stopping) throw Error(MAQ_CANCELLED, name, " was stopped.");
     std::shared_ptr<Camera> camera = present.lock();
     if (camera != nullptr) return camera;
     if (failure) throw Error(failure_status, *failure, ".");
@@ -158,7 +162,30 @@ struct LiveSource::State {
     return stopping;
   }
 
-  // Waits, at most until the source is destroyed; true then.
+  // With the mutex locked: whether next() has something to say.
+  bool is_ready() const { return count > 0 || failure || at_end || stopping; }
+
+  // With the mutex locked, after each change of what is_ready() says.
+  void show_news() {
+    if (!news || is_signalled == is_ready()) return;
+    is_signalled = !is_signalled;
+    if (is_signalled) {
+      news->signal();
+    } else {
+      news->take();
+    }
+  }
+
+  // Ends the thread, when the device answers, and the waits of others.
+  void stop() {
+    std::lock_guard<std::mutex> lock(mutex);
+    stopping = true;
+    show_news();
+    changed.notify_all();
+    wake.signal();
+  }
+
+  // Waits, at most until the source is stopped; true then.
   bool pause(milliseconds time) {
     std::unique_lock<std::mutex> lock(mutex);
     return changed.wait_for(lock, time, [&] { return stopping; });
@@ -198,6 +225,7 @@ struct LiveSource::State {
   void fail(std::string reason) {
     std::lock_guard<std::mutex> lock(mutex);
     failure = std::move(reason);
+    show_news();
     changed.notify_all();
   }
 
@@ -209,16 +237,17 @@ struct LiveSource::State {
                        " x ", buffer.image.height_px, " pixels agreed on; it is dropped, and so are others like it.");
   }
 
-  // Waits at the end for a seek; false when the source is destroyed instead.
+  // Waits at the end for a seek; false when the source is stopped instead.
   bool wait_at_end() {
     std::unique_lock<std::mutex> lock(mutex);
     at_end = true;
+    show_news();
     changed.notify_all();
     changed.wait(lock, [&] { return stopping || !at_end; });
     return !stopping;
   }
 
-  // Runs until the source is destroyed or a lost camera stays away; `camera` is null then.
+  // Runs until the source is stopped or a lost camera stays away; `camera` is null then.
   void stream(std::shared_ptr<Camera>& camera) {
     uint64_t next_sequence = 0;  // continues when the camera is opened again
     uint32_t last_number = 0;    // the device's own
@@ -287,6 +316,7 @@ struct LiveSource::State {
       left.swap(ring);
       dropped += count;
       first = count = 0;
+      show_news();
     }
   }
 
@@ -295,7 +325,7 @@ struct LiveSource::State {
     dropped += more;
   }
 
-  // The camera again, or null when it did not come back in time or the source is closed.
+  // The camera again, or null when it did not come back in time or the source is stopped.
   std::shared_ptr<Camera> reconnect() {
     const auto deadline = Clock::now() + milliseconds(settings.reconnect_ms);
     std::string reason = "the device is not connected";
@@ -341,13 +371,11 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
 
 LiveSource::~LiveSource() {
   State& state = *state_;
+  state.stop();
   std::vector<State::Entry> left;
   bool ended = false;
   {
     std::unique_lock<std::mutex> lock(state.mutex);
-    state.stopping = true;
-    state.changed.notify_all();
-    state.wake.signal();
     ended = state.changed.wait_for(lock, kStopTimeout, [&] { return state.ended; });
     // The app may free what its callback uses as soon as this returns.
     if (std::this_thread::get_id() != state.thread.get_id()) {
@@ -388,28 +416,40 @@ void LiveSource::seek(int64_t time_ns) {
   std::lock_guard<std::mutex> state_lock(state_->mutex);
   ++state_->seeks;
   state_->at_end = false;
+  state_->show_news();
   state_->changed.notify_all();
+}
+
+void LiveSource::stop() { state_->stop(); }
+
+int LiveSource::event_fd() {
+  std::lock_guard<std::mutex> lock(state_->mutex);
+  if (!state_->news) state_->news.emplace();
+  state_->show_news();
+  return state_->news->get();
 }
 
 NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
   const bool has_end = timeout_ns >= 0;
-  const auto deadline = Clock::now() + std::chrono::nanoseconds(has_end ? timeout_ns : 0);
+  const auto deadline = deadline_after(timeout_ns);
   for (;;) {
     State::Entry entry;
     uint32_t seeks = 0;
     {
       std::unique_lock<std::mutex> lock(state_->mutex);
-      const auto ready = [&] { return state_->count > 0 || state_->failure || state_->at_end; };
+      const auto ready = [&] { return state_->is_ready(); };
       if (!has_end) {
         state_->changed.wait(lock, ready);
       } else if (!state_->changed.wait_until(lock, deadline, ready)) {
         return NextFrame::kTimeout;
       }
+      if (state_->stopping) return NextFrame::kStopped;
       if (state_->count == 0 && state_->at_end) return NextFrame::kEnd;
       if (state_->count == 0) throw Error(state_->failure_status, *state_->failure, ".");
       entry = std::move(state_->ring[state_->first]);
       state_->first = (state_->first + 1) % state_->ring.size();
       --state_->count;
+      state_->show_news();
       seeks = state_->seeks;
     }
     const CameraBuffer& buffer = entry.buffer;

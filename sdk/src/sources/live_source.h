@@ -30,6 +30,9 @@ class LiveSource : public Source {
   void seek(int64_t time_ns) override;
   // Throws MAQ_ERROR_DEVICE_LOST when the camera was lost and did not come back in time.
   NextFrame next(int64_t timeout_ns, Frame& frame) override;
+  // The thread closes the camera as soon as that answers.
+  void stop() override;
+  int event_fd() override;
 
  private:
   struct State;

@@ -1,8 +1,10 @@
 #include "sources/registry.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "sources/control_options.h"
 #include "sources/depthai/depthai_backend.h"
 #include "sources/files/file_sources.h"
@@ -140,6 +142,29 @@ std::unique_ptr<Source> open_file(SourceUri uri, const SourceSettings& settings)
   return open_entry(entry, std::move(uri), settings);
 }
 
+// A file of that name goes before a scheme that there is not.
+bool is_path(const std::string& text) {
+  if (text.empty()) return false;
+  return !has_scheme(text) || (find_entry(text.substr(0, text.find(':'))) == nullptr && file_exists(text));
+}
+
+std::unique_ptr<Source> open_path(const std::string& path, const SourceSettings& settings) {
+  SourceUri uri;
+  uri.text = uri.target = path;
+  for (const char* cameras : {"/dev/video", "/dev/v4l/"}) {
+    if (path.rfind(cameras, 0) != 0) continue;
+    uri.scheme = "v4l2";
+    const Entry& entry = *find_entry(uri.scheme);
+    return open_entry(entry, std::move(uri), settings);
+  }
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    throw Error(MAQ_ERROR_NOT_FOUND, path,
+                " does not exist; check the path, or write scheme:target, as in stub:people or camera:.");
+  }
+  return open_file(std::move(uri), settings);
+}
+
 // With the options of `uri`.
 std::unique_ptr<Source> open_first_camera(const SourceUri& uri, const SourceSettings& settings) {
   std::string problems;
@@ -185,6 +210,7 @@ std::vector<CameraListing> list_cameras() {
 }
 
 std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {
+  if (is_path(text)) return open_path(text, settings);
   SourceUri uri = parse_source_uri(text);
   const Entry* entry = find_entry(uri.scheme);
   if (entry == nullptr) {

@@ -11,7 +11,7 @@ namespace {
 }
 
 [[noreturn]] void refuse_to_seek() {
-  throw Error(MAQ_ERROR_UNSUPPORTED, "This source cannot go to a time; recordings and stubs can.");
+  throw Error(MAQ_ERROR_UNSUPPORTED, "This source cannot go to a time; clips, recordings and stubs can.");
 }
 
 }  // namespace
@@ -23,5 +23,9 @@ void Camera::seek(int64_t) { refuse_to_seek(); }
 maq_control_info Source::control(maq_control which) { refuse_control(which); }
 void Source::set_control(maq_control which, double) { refuse_control(which); }
 void Source::seek(int64_t) { refuse_to_seek(); }
+int Source::event_fd() {
+  throw Error(MAQ_ERROR_UNSUPPORTED,
+              "Frames of this source need no waiting; cameras and sources with live=1 have events.");
+}
 
 }  // namespace maq

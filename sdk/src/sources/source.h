@@ -18,7 +18,7 @@ struct SourceInfo {
   maq_clock clock = MAQ_CLOCK_MEDIA;
 };
 
-enum class NextFrame { kFrame, kEnd, kTimeout };
+enum class NextFrame { kFrame, kEnd, kTimeout, kStopped };
 
 class Source {
  public:
@@ -37,6 +37,11 @@ class Source {
   // Fills `frame` (pixels, time, sequence) with the next frame, unless it says something else. Pixels may be those that
   // the frame had before; the rest is clear (Frame::clear).
   virtual NextFrame next(int64_t timeout_ns, Frame& frame) = 0;
+  // From any thread, for good: where next() waits, it returns kStopped, now and later. Others end what they decode.
+  virtual void stop() {}
+  // From any thread: a descriptor of the source that is readable while next() would not wait. Throws
+  // MAQ_ERROR_UNSUPPORTED where it never does.
+  virtual int event_fd();
 };
 
 // Of maq_source_config, whose comments say what they mean.

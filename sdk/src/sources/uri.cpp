@@ -1,5 +1,6 @@
 #include "sources/uri.h"
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -20,7 +21,7 @@ int hex_digit(char c) {
 }
 
 // A '%' without two hexadecimal digits after it is kept, so that most file names need no escapes.
-std::string percent_decoded(const std::string& text) {
+std::string percent_decoded(const std::string& text, const SourceUri& uri) {
   std::string decoded;
   for (size_t i = 0; i < text.size(); ++i) {
     if (text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 && hex_digit(text[i + 2]) >= 0) {
@@ -29,6 +30,10 @@ std::string percent_decoded(const std::string& text) {
     } else {
       decoded += text[i];
     }
+  }
+  // Files are opened by texts that end with the first zero byte: it would be another file.
+  if (decoded.find('\0') != std::string::npos) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, uri.text, " has a zero byte (%00), which no name can have.");
   }
   return decoded;
 }
@@ -48,9 +53,9 @@ void read_options(const std::string& query, SourceUri& uri) {
     if (equals == 0 || equals == std::string::npos) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Option \"", pair, "\" of ", uri.text, " is not key=value.");
     }
-    const std::string key = percent_decoded(pair.substr(0, equals));
+    const std::string key = percent_decoded(pair.substr(0, equals), uri);
     const std::string value = pair.substr(pair[equals] == '=' ? equals + 1 : equals);  // unplug@5s: the value is "@5s"
-    if (!uri.options.emplace(key, percent_decoded(value)).second) {
+    if (!uri.options.emplace(key, percent_decoded(value, uri)).second) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Option ", key, " is given twice in ", uri.text, ".");
     }
     begin = end + 1;
@@ -121,21 +126,25 @@ void SourceUri::expect_no_more_options(const std::string& known) const {
               ": has ", known, ".");
 }
 
+bool has_scheme(const std::string& text) {
+  const size_t colon = text.find(':');
+  return colon != std::string::npos && colon > 0 &&
+         std::all_of(text.begin(), text.begin() + std::ptrdiff_t(colon),
+                     [](unsigned char c) { return std::isalnum(c) != 0; });
+}
+
 SourceUri parse_source_uri(const std::string& text) {
   SourceUri uri;
   uri.text = text;
   const size_t colon = text.find(':');
-  bool well_formed = colon != std::string::npos && colon > 0;
-  for (size_t i = 0; well_formed && i < colon; ++i) {
-    well_formed = std::isalnum(static_cast<unsigned char>(text[i])) != 0;
-  }
-  if (!well_formed) {
+  if (!has_scheme(text)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text,
                 "\" is not a source; write scheme:target, as in image:photo.jpg or stub:people.");
   }
   uri.scheme = text.substr(0, colon);
   const size_t question = text.find('?', colon);
-  uri.target = percent_decoded(text.substr(colon + 1, question == std::string::npos ? question : question - colon - 1));
+  uri.target =
+      percent_decoded(text.substr(colon + 1, question == std::string::npos ? question : question - colon - 1), uri);
   if (question != std::string::npos) read_options(text.substr(question + 1), uri);
   take_size(uri);
   uri.fps = uri.take_number("fps", 0, 0.01, 1000);

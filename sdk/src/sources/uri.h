@@ -35,6 +35,9 @@ struct SourceUri {
 // Nothing when the text is not a finite number. Independent of the process's locale, which may expect a comma.
 std::optional<double> read_number(const std::string& text);
 
+// Whether the text begins with letters or digits and a colon. Others are paths.
+bool has_scheme(const std::string& text);
+
 // Throws MAQ_ERROR_INVALID_ARGUMENT for an ill-formed text and MAQ_ERROR_IMAGE_SIZE for a size outside the limits.
 SourceUri parse_source_uri(const std::string& text);
 

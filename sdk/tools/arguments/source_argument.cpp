@@ -38,6 +38,9 @@ bool is_known_scheme(const std::string& name) {
 SourceArgument parse_source_argument(const std::string& text) {
   const size_t colon = text.find(':');
   const std::string scheme = colon == std::string::npos ? "" : text.substr(0, colon);
+  for (const char* cameras : {"/dev/video", "/dev/v4l/"}) {
+    if (text.rfind(cameras, 0) == 0) return {"v4l2:" + escaped(text), "v4l2_" + fs::path(text).stem().string()};
+  }
   std::error_code error;
   if (!is_known_scheme(scheme) && fs::exists(text, error)) {
     if (fs::is_directory(text, error)) {

@@ -110,6 +110,7 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
 void run_source(const Options& options, const SourceArgument& argument, const maquette::Context& context,
                 maquette::DensePose& densepose, Timings& timings) {
   maquette::Source source(context, argument.uri);
+  const StoppedByInterrupt stopped(source);
   densepose.reset();
   const maq_source_info info = source.info();
   const bool is_clip = info.frame_count != 1;

@@ -59,6 +59,7 @@ int play(const Options& options) {
   config.state_user_data = &statistics;
   maquette::Source source(context, uri, &config);
   is_opening = false;
+  std::optional<StoppedByInterrupt> stopped(source);
   if (options.from_s > 0) source.seek(int64_t(options.from_s * 1e9));
 
   const bool shows = options.picture.value_or(terminal_shows_pictures());
@@ -66,11 +67,11 @@ int play(const Options& options) {
   std::string failure;
   const int64_t end_ns = options.seconds > 0 ? monotonic_ns() + int64_t(options.seconds * 1e9) : INT64_MAX;
   while (!interrupted() && monotonic_ns() < end_ns && (options.frames == 0 || statistics.frames() < options.frames)) {
-    constexpr int64_t kPatienceNs = 250000000;  // how soon Ctrl-C is heard while no frame comes
+    constexpr int64_t kPatienceNs = 250000000;  // how late --seconds may end while no frame comes
     maq_frame* taken = nullptr;
     const maq_status status = maq_source_acquire_frame(source.get(), kPatienceNs, &taken);
     if (status == MAQ_TIMEOUT) continue;
-    if (status == MAQ_END_OF_STREAM) break;
+    if (status == MAQ_END_OF_STREAM || status == MAQ_CANCELLED) break;
     if (status != MAQ_OK) {
       failure = maq_last_error(source.get());
       break;
@@ -81,6 +82,7 @@ int play(const Options& options) {
     if (shows) picture.show(frame, statistics.line(source.info().dropped_frame_count));
   }
   const maq_source_info info = source.info();
+  stopped.reset();
   statistics.close(std::move(source));
   statistics.print(info);
   if (!options.json.empty()) {
@@ -100,7 +102,7 @@ void add_play_command(CLI::App& app, int* exit_code) {
   command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
   command->add_option("-s,--speed", options->speed, "Speed of a recording, clip or stub: 2 is twice as fast")
       ->check(CLI::Range(0.01, 100.0));
-  command->add_option("--from", options->from_s, "Start at this time of a recording, in seconds")
+  command->add_option("--from", options->from_s, "Start at this time of a recording or clip, in seconds")
       ->check(CLI::NonNegativeNumber);
   command->add_option("-n,--frames", options->frames, "Stop after N frames")->check(CLI::PositiveNumber);
   command->add_option("-t,--seconds", options->seconds, "Stop after this time, in seconds")->check(CLI::PositiveNumber);

@@ -32,6 +32,7 @@ int record(const Options& options) {
   config.queue_length = kWaitingFrames;
   const SourceArgument argument = parse_source_argument(options.source);
   maquette::Source source(context, argument.uri, &config);
+  const StoppedByInterrupt stopped(source);
   const maq_source_info info = source.info();
   if (info.frame_count < 0 && info.is_live == 0 && options.frames == 0 && options.seconds == 0) {
     throw std::runtime_error(argument.uri + " has no end: limit it with --frames or --seconds.");
@@ -50,17 +51,12 @@ int record(const Options& options) {
   int64_t first_ns = 0, last_ns = 0;
   int64_t done = 0;
   while (!interrupted() && (options.frames == 0 || done < options.frames)) {
-    constexpr int64_t kPatienceNs = 250000000;  // how soon Ctrl-C is heard while no frame comes
-    maq_frame* taken = nullptr;
-    const maq_status status = maq_source_acquire_frame(source.get(), kPatienceNs, &taken);
-    if (status == MAQ_TIMEOUT) continue;
-    if (status == MAQ_END_OF_STREAM) break;
-    maquette::check(status);
-    const maquette::Frame frame(taken);
-    last_ns = frame.desc().timestamp_ns;
+    const auto frame = source.next();
+    if (!frame) break;
+    last_ns = frame->desc().timestamp_ns;
     if (done == 0) first_ns = last_ns;
     if (options.seconds > 0 && double(last_ns - first_ns) >= options.seconds * 1e9) break;
-    recorder.add(frame);
+    recorder.add(*frame);
     ++done;
     char note[64];
     std::snprintf(note, sizeof note, "%.1f MB, %" PRIu64 " dropped", double(recorder.info().size_bytes) / 1e6,

@@ -56,6 +56,35 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
             MAQ_ERROR_INVALID_ARGUMENT);
 }
 
+TEST(ApiDensePose, ACancelEndsTheRunThatRunsOrElseTheNextAndNoOther) {
+  const maquette::Context context;
+  maquette::DensePose densepose(context, kBundle);
+  const RedCell image;
+  const maquette::Frame frame(context, image.desc);
+  const auto run = [&] {
+    maq_densepose_result* result = nullptr;
+    const maq_status status = maq_densepose_run(densepose.get(), frame.get(), &result);
+    EXPECT_EQ(result != nullptr, status == MAQ_OK);
+    maq_densepose_result_release(result);
+    return status;
+  };
+  for (int i = 0; i < 10; ++i) {
+    densepose.cancel();
+    densepose.cancel();
+    EXPECT_EQ(run(), MAQ_CANCELLED);
+    EXPECT_STREQ(maq_last_error(densepose.get()), "The app cancelled the run.");
+    EXPECT_EQ(run(), MAQ_OK) << "no result of the pool is lost";
+  }
+  for (int i = 0; i < 20; ++i) {
+    std::thread other([&] { densepose.cancel(); });
+    int runs = 0;
+    while (run() == MAQ_OK) ++runs;
+    other.join();
+    EXPECT_EQ(run(), MAQ_OK) << "after " << runs;
+  }
+  EXPECT_EQ(maq_densepose_cancel(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
 TEST(ApiDensePose, PeopleAreReadByIndexAndHaveNoIdYet) {
   const maquette::Context context;
   maquette::DensePose densepose(context, kBundle);
@@ -146,7 +175,7 @@ TEST(ApiDensePose, EachThreadCanHaveItsOwnAndShareTheContext) {
       const maquette::Frame frame(context, image.desc);
       for (int i = 0; i < 5; ++i) EXPECT_EQ(densepose.run(frame).people().size(), 1u);
       maq_source* source = nullptr;
-      EXPECT_EQ(maq_source_create(context.get(), "nothing", nullptr, &source), MAQ_ERROR_INVALID_ARGUMENT);
+      EXPECT_EQ(maq_source_create(context.get(), "stub:people?", nullptr, &source), MAQ_ERROR_INVALID_ARGUMENT);
       EXPECT_NE(std::string(maq_last_error(context.get())), "");
     });
   }

@@ -212,7 +212,7 @@ TEST_F(SceneCommandLine, CtrlCLeavesTheOldFiles) {
   const std::string before = read_text(file("place.maqs"));
   write_text(file("clip.mp4"), "an older clip");
   const auto interrupted = [&](const std::string& arguments) {
-    // A second is far less than this takes. Without --foreground the signal would come twice, and the second one kills.
+    // A second is far less than this takes. Without --foreground the signal comes twice.
     const std::string command = "cd '" + folder_.path().string() + "' && " + environment_ +
                                 " timeout --foreground --preserve-status -s INT 1 " MAQ_TEST_EMULATOR " '" MAQ_TEST_CLI
                                 "' scene " +

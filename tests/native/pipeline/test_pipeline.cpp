@@ -276,7 +276,7 @@ TEST(Pipeline, ACameraThatStaysAwayFailsAndAnotherSourceGoesOn) {
 TEST(Pipeline, ABadSourceFailsWithItsSentence) {
   Watched watched(polling(false));
   for (const auto& [uri, status] :
-       {std::pair("image:/none.jpg", MAQ_ERROR_NOT_FOUND), std::pair("nothing", MAQ_ERROR_INVALID_ARGUMENT),
+       {std::pair("image:/none.jpg", MAQ_ERROR_NOT_FOUND), std::pair("stub:people?", MAQ_ERROR_INVALID_ARGUMENT),
         std::pair("tape:1", MAQ_ERROR_UNSUPPORTED)}) {
     watched.pipeline->set_source(uri);
     EXPECT_EQ(status_of_next(*watched.pipeline), status) << uri;

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
+
+#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/bounded_pool.h"
@@ -29,6 +32,42 @@ TEST(Sources, TheSameSeedShowsTheSameFrames) {
   const std::string uri = "stub:people?count=3&seed=7&size=160x120";
   EXPECT_EQ(frame_of(uri, 5), frame_of(uri, 5));
   EXPECT_NE(frame_of(uri, 5), frame_of("stub:people?count=3&seed=8&size=160x120", 5));
+}
+
+TEST(Sources, APathAloneIsTheFileOfThatName) {
+  const TempFolder folder;
+  cv::imwrite(folder.file("a.png"), cv::Mat(12, 16, CV_8UC3, cv::Scalar(1, 2, 3)));
+  for (const char* name : {"what? 50%25.png", "12:30.png", "a.b:c?d=e.png"}) {
+    std::filesystem::copy(folder.file("a.png"), folder.file(name));
+    EXPECT_EQ(maq::open_source(folder.file(name))->info().width_px, 16) << name;
+  }
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  for (const char* name : {"a.png", "./a.png", "what? 50%25.png", "12:30.png"}) {
+    EXPECT_EQ(maq::open_source(name)->info().width_px, 16) << name;
+  }
+  std::filesystem::current_path(before);
+  EXPECT_EQ(maq::open_source(MAQ_TEST_MEDIA "/clip.mp4")->info().frame_count, 72);
+  expect_error(MAQ_ERROR_NOT_FOUND, "write scheme:target", [] { maq::open_source("people"); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "is a folder", [&] { maq::open_source(folder.path().string()); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "is not a source", [] { maq::open_source(""); });
+}
+
+TEST(Sources, ACameraIsOpenedByItsPathOrItsNumber) {
+  expect_error(MAQ_ERROR_NOT_FOUND, "/dev/video999 cannot be opened", [] { maq::open_source("/dev/video999"); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "/dev/video999 cannot be opened", [] { maq::open_source("v4l2:999?size=64x48"); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "/dev/v4l/by-id/none cannot", [] { maq::open_source("/dev/v4l/by-id/none"); });
+}
+
+TEST(Sources, WhatIsNoCameraIsNotOpenedAsOne) {
+  const TempFolder folder;
+  write_text(folder.file("a.txt"), "a text");
+  ASSERT_EQ(::mkfifo(folder.file("fifo").c_str(), 0600), 0);
+  for (const std::string& path : {std::string("/dev/tty"), std::string("/dev/null"), folder.file("a.txt"),
+                                  folder.file("fifo"), folder.path().string()}) {
+    expect_error(MAQ_ERROR_UNSUPPORTED, "is not a video device; name a camera, as in v4l2:/dev/video0",
+                 [&] { maq::open_source("v4l2:" + path); });
+  }
 }
 
 TEST(Sources, PeopleMoveAndFillPartOfThePicture) {

@@ -25,6 +25,12 @@ TEST(Uri, KeepsPathsAsTheyAreAndDecodesPercents) {
   EXPECT_EQ(parse_source_uri("image:100%.jpg").target, "100%.jpg");
 }
 
+TEST(Uri, RefusesAZeroByteWhichWouldCutANameShort) {
+  for (const char* text : {"image:photo.jpg%00.png", "rec:a?size=16x16&x=%00", "rec:a?%00=1"}) {
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "zero byte (%00)", [&] { parse_source_uri(text); });
+  }
+}
+
 TEST(Uri, RefusesWhatIsNoUri) {
   for (const char* text : {"", "photo.jpg", ":photo.jpg", "dir/a:b", " image:x"}) {
     expect_error(MAQ_ERROR_INVALID_ARGUMENT, "is not a source", [&] { parse_source_uri(text); });

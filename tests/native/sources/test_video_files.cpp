@@ -5,6 +5,7 @@
 #include "sources/registry.h"
 #include "support/expect_error.h"
 #include "support/temp_folder.h"
+#include "support/variable_rate_clip.h"
 
 namespace {
 
@@ -34,6 +35,65 @@ TEST(VideoFiles, FramesComeInOrderWithTheirTimes) {
     }
     EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
     EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
+  }
+}
+
+std::vector<maq::Frame> rest_of(maq::Source& source) {
+  std::vector<maq::Frame> frames;
+  for (;;) {
+    maq::Frame frame;
+    if (source.next(0, frame) != maq::NextFrame::kFrame) return frames;
+    frames.push_back(std::move(frame));
+  }
+}
+
+TEST(VideoFiles, FramesOfAVaryingRateThatAreReorderedKeepTheirTimesToTheLast) {
+  const TempFolder folder;
+  const VariableRateClip clip(read_text(MAQ_TEST_MEDIA "/clip.mp4"), {512, 1024, 256, 2048});
+  write_text(folder.file("a.mp4"), clip.bytes());
+  const std::vector<double> expected_s = clip.times_s();
+  const auto source = maq::open_source("video:" + folder.file("a.mp4"));
+  const std::vector<maq::Frame> frames = rest_of(*source);
+  ASSERT_EQ(frames.size(), expected_s.size());
+  // Decoders do not report the times of the frames that they held back to the end.
+  constexpr size_t kHeldBack = 3;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const double time_s = double(frames[i].timestamp_ns) * 1e-9;
+    EXPECT_NEAR(time_s, expected_s[i], i + kHeldBack < frames.size() ? 1e-3 : 0.05) << i;
+    const int64_t before_ns = i == 0 ? -1000000000 : frames[i - 1].timestamp_ns;
+    EXPECT_GT(frames[i].timestamp_ns - before_ns, 10000000) << i;
+  }
+}
+
+TEST(VideoFiles, GoToATimeForwardsBackwardsAndBehindTheEnd) {
+  const TempFolder folder;
+  const VariableRateClip varying(read_text(MAQ_TEST_MEDIA "/clip.mp4"), {512, 1024, 256, 2048});
+  write_text(folder.file("varying.mp4"), varying.bytes());
+  const std::string long_clip = written_clip(folder, "long.mp4", 31, 2);
+  for (const std::string& path : {std::string(MAQ_TEST_MEDIA "/clip.mp4"), folder.file("varying.mp4"), long_clip,
+                                  written_clip(folder, "long.avi", 31, 2)}) {
+    const auto source = maq::open_source("video:" + path);
+    EXPECT_TRUE(source->can_seek());
+    const std::vector<maq::Frame> frames = rest_of(*source);
+    ASSERT_GT(frames.size(), 30u);
+    for (const size_t k : {size_t(20), size_t(0), frames.size() - 4, size_t(3), size_t(29)}) {
+      SCOPED_TRACE(path + " frame " + std::to_string(k));
+      const maq::Frame& expected = frames[k];
+      for (const int64_t before_ns : {int64_t(0), int64_t(1000000)}) {
+        source->seek(std::max<int64_t>(0, expected.timestamp_ns - before_ns));
+        maq::Frame found;
+        ASSERT_EQ(source->next(0, found), maq::NextFrame::kFrame);
+        EXPECT_NEAR(double(found.timestamp_ns), double(expected.timestamp_ns), 1e6);
+        EXPECT_EQ(found.storage, expected.storage);
+        const bool has_one_rate = path != folder.file("varying.mp4");
+        EXPECT_TRUE(found.sequence == expected.sequence || !has_one_rate) << found.sequence;
+      }
+    }
+    source->seek(frames.back().timestamp_ns + 100000000000);
+    maq::Frame none;
+    EXPECT_EQ(source->next(0, none), maq::NextFrame::kEnd) << path;
+    source->seek(0);
+    EXPECT_EQ(rest_of(*source).size(), frames.size()) << path;
   }
 }
 

@@ -156,6 +156,7 @@ class FakeV4l2 : public maq::SystemCalls {
 
   // --- what the camera calls
 
+  bool is_other_thing(const char*) override { return false; }
   int open(const char* path, int) override {
     std::lock_guard<std::mutex> lock(mutex_);
     if (path != path_ || fails(kOpen)) return path != path_ ? failed(ENOENT) : -1;

@@ -32,8 +32,12 @@ class ClipDecoder {
   virtual int height_px() const = 0;
   virtual double fps() const = 0;
   virtual double frame_count() const = 0;
-  // The presentation time of the frame that read() gave last.
+  // The presentation time of the frame that read() gave last; 0 where it is not known.
   virtual double position_ms() const = 0;
+  // The number of that frame, from 0; after seek_ms() by the clip's mean rate.
+  virtual double frame_number() const = 0;
+  // Goes to a frame near that time, before or after it. False where this clip cannot.
+  virtual bool seek_ms(double time_ms) = 0;
   // The next frame, BGR8 or GREY8, valid until the next call. False after the last that can be decoded. `image` has no
   // pixels where those of the frame are of another kind.
   virtual bool read(ImageView& image) = 0;

@@ -31,6 +31,14 @@ class OpenCvClipDecoder : public ClipDecoder {
   double fps() const override { return clip_.get(cv::CAP_PROP_FPS); }
   double frame_count() const override { return clip_.get(cv::CAP_PROP_FRAME_COUNT); }
   double position_ms() const override { return clip_.get(cv::CAP_PROP_POS_MSEC); }
+  double frame_number() const override { return clip_.get(cv::CAP_PROP_POS_FRAMES) - 1; }
+  bool seek_ms(double time_ms) override {
+    try {
+      return clip_.set(cv::CAP_PROP_POS_MSEC, time_ms);
+    } catch (const std::exception&) {
+      return false;
+    }
+  }
   bool read(ImageView& image) override {
     try {
       if (!clip_.read(decoded_) || decoded_.empty()) return false;

@@ -1,5 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <optional>
+#include <utility>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -11,16 +14,16 @@
 namespace maq {
 namespace {
 
+constexpr double kMaxFrames = 1e9;
+constexpr double kMaxTimeMs = 1e12;       // decades, in nanoseconds far from the end of 64 bits
+constexpr int64_t kSameTimeNs = 1500000;  // containers round times to milliseconds
+
 class VideoSource : public Source {
  public:
   explicit VideoSource(SourceUri uri) : path_(uri.target), asked_fps_(uri.fps) {
     uri.expect_no_more_options("size and fps");
     if (!file_exists(path_)) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
-    clip_ = file_codecs().open_clip(path_);
-    if (clip_ == nullptr) {
-      throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be opened as a video: it is truncated, damaged or no video. ",
-                  "Use a whole MP4, AVI, MOV or WebM file.");
-    }
+    open();
     const int width = clip_->width_px();
     const int height = clip_->height_px();
     check_image_size(width, height, path_);
@@ -33,7 +36,7 @@ class VideoSource : public Source {
     info_.fps = thinned ? asked_fps_ : clip_fps_;
 
     const double count = clip_->frame_count();
-    if (std::isfinite(count) && count >= 1 && count < 1e9) {
+    if (std::isfinite(count) && count >= 1 && count < kMaxFrames) {
       promised_frames_ = int64_t(count);
       info_.frame_count = thinned ? int64_t(std::ceil(count * asked_fps_ / clip_fps_)) : promised_frames_;
     }
@@ -41,50 +44,114 @@ class VideoSource : public Source {
 
   const SourceInfo& info() const override { return info_; }
 
+  bool can_seek() const override { return true; }
+  void seek(int64_t time_ns) override { seek_to_ns_ = time_ns; }
+
   NextFrame next(int64_t, Frame& frame) override {
-    while (read()) {
-      const int64_t index = frames_read_++;
-      const int64_t timestamp_ns = presentation_time_ns(index);
+    if (seek_to_ns_) find(*std::exchange(seek_to_ns_, std::nullopt));
+    while (std::exchange(is_ahead_, false) || read()) {
       if (asked_fps_ > 0) {
-        if (timestamp_ns < next_due_ns_) continue;
+        if (time_ns_ < next_due_ns_) continue;
         // Due times lie on a fixed grid, so that the rate does not drift.
         const double period_ns = 1e9 / asked_fps_;
-        next_due_ns_ = int64_t((std::floor(double(timestamp_ns) / period_ns + 1e-3) + 1) * period_ns) - 500000;
+        next_due_ns_ = int64_t((std::floor(double(time_ns_) / period_ns + 1e-3) + 1) * period_ns) - 500000;
       }
-      deliver(frame, timestamp_ns, index);
+      deliver(frame);
       return NextFrame::kFrame;
     }
     return NextFrame::kEnd;
   }
 
  private:
+  void open() {
+    clip_ = file_codecs().open_clip(path_);
+    if (clip_ != nullptr) return;
+    throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be opened as a video: it is truncated, damaged or no video. ",
+                "Use a whole MP4, AVI, MOV or WebM file.");
+  }
+
+  // The next frame with its number and time; false at the end.
+  bool decode() {
+    if (!is_ended_) is_ended_ = !clip_->read(decoded_);
+    if (is_ended_) return false;
+    ++index_;
+    time_ns_ = presentation_time_ns();
+    return true;
+  }
+
   bool read() {
-    if (ended_) return false;
-    ended_ = !clip_->read(decoded_);
-    if (!ended_) return true;
-    if (frames_read_ == 0) {
+    if (is_ended_) return false;
+    if (decode()) return true;
+    if (was_sought_) return false;  // the count of frames is not exact any more
+    if (index_ < 0) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " has no frame that can be decoded: it is truncated or damaged.");
     }
     // Headers of clips with a varying frame rate give the count only roughly, so a few frames less are no defect.
-    if (promised_frames_ > frames_read_ + 2 + promised_frames_ / 20) {
-      throw Error(MAQ_ERROR_UNREADABLE, path_, " ends after ", frames_read_, " of ", promised_frames_,
+    const int64_t frames = index_ + 1;
+    if (promised_frames_ > frames + 2 + promised_frames_ / 20) {
+      throw Error(MAQ_ERROR_UNREADABLE, path_, " ends after ", frames, " of ", promised_frames_,
                   " frames: the file is truncated or damaged; copy it again.");
     }
     return false;
   }
 
-  // Containers without times report 0 for every frame; there the frame rate counts. Never runs backwards.
-  int64_t presentation_time_ns(int64_t index) {
+  // Never runs backwards. Some decoders do not report the first frame's time (0), those of the last frames, which they
+  // held back to reorder them, or any: such frames divide what is left of the clip evenly.
+  int64_t presentation_time_ns() const {
     const double reported_ms = clip_->position_ms();
-    int64_t time_ns = std::isfinite(reported_ms) && reported_ms > 0
-                          ? int64_t(std::llround(reported_ms * 1e6))
-                          : int64_t(std::llround(double(index) * 1e9 / clip_fps_));
-    time_ns = std::max(time_ns, last_time_ns_ + 1);
-    last_time_ns_ = time_ns;
-    return time_ns;
+    if (std::isfinite(reported_ms) && reported_ms > 0) {
+      return std::max(int64_t(std::llround(std::min(reported_ms, kMaxTimeMs) * 1e6)), time_ns_ + 1);
+    }
+    const int64_t grid_ns = std::llround(double(index_) * 1e9 / clip_fps_);
+    const auto period_ns = int64_t(1e9 / clip_fps_);
+    if (time_ns_ < 0 || std::abs(grid_ns - period_ns - time_ns_) < kSameTimeNs) return std::max(grid_ns, time_ns_ + 1);
+    const int64_t left_ns = std::llround(double(promised_frames_) * 1e9 / clip_fps_) - time_ns_;
+    const int64_t left_frames = promised_frames_ - index_;
+    return time_ns_ + (left_frames > 0 && left_ns > left_frames ? left_ns / (left_frames + 1) : period_ns);
   }
 
-  void deliver(Frame& frame, int64_t timestamp_ns, int64_t index) {
+  // Decodes up to the first frame at that time or later, from a frame before it that can be decoded on its own.
+  void find(int64_t time_ns) {
+    is_ahead_ = false;
+    next_due_ns_ = 0;
+    was_sought_ = true;
+    is_ended_ = promised_frames_ > 0 && double(time_ns) > double(promised_frames_) * 1e9 / clip_fps_ + 1e9;
+    if (is_ended_) return;
+    if (!goes_near(time_ns)) {
+      open();
+      index_ = -1;
+      time_ns_ = -1;
+      is_ended_ = false;
+    } else if (time_ns_ >= time_ns) {
+      is_ahead_ = true;
+      return;
+    }
+    while (decode()) {
+      if (time_ns_ < time_ns) continue;
+      is_ahead_ = true;
+      return;
+    }
+  }
+
+  // Decodes a frame that is not later than `time_ns`, not long before it. False where that cannot be done: the clip has
+  // to be decoded from its beginning.
+  bool goes_near(int64_t time_ns) {
+    // Decoders land up to a few frames beside the time asked for.
+    for (const int64_t margin_ns : {int64_t(500000000), int64_t(5000000000)}) {
+      if (time_ns <= margin_ns || !clip_->seek_ms(double(time_ns - margin_ns) * 1e-6)) return false;
+      is_ended_ = false;
+      time_ns_ = -1;
+      if (!clip_->read(decoded_)) continue;
+      const double number = clip_->frame_number();
+      if (!(number >= 0 && number < kMaxFrames)) return false;
+      index_ = std::llround(number);
+      time_ns_ = presentation_time_ns();
+      if (time_ns_ <= time_ns) return true;
+    }
+    return false;
+  }
+
+  void deliver(Frame& frame) {
     if (decoded_.planes[0].data == nullptr) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " has frames of an unusual format; convert it to 8-bit video.");
     }
@@ -95,9 +162,9 @@ class VideoSource : public Source {
       uint8_t* pixels = frame.allocate_bgr(decoded_.width_px, decoded_.height_px);
       copy_pixels(decoded_, MAQ_PIXEL_BGR8, pixels, 0, frame.storage.size());
     }
-    frame.timestamp_ns = timestamp_ns;
+    frame.timestamp_ns = time_ns_;
     frame.clock = MAQ_CLOCK_MEDIA;
-    frame.sequence = uint64_t(index);
+    frame.sequence = uint64_t(index_);
   }
 
   std::string path_;
@@ -107,10 +174,14 @@ class VideoSource : public Source {
   double clip_fps_ = 0;
   double asked_fps_ = 0;
   int64_t promised_frames_ = -1;
-  int64_t frames_read_ = 0;
-  int64_t last_time_ns_ = -1;
+  // Of the frame that was decoded last.
+  int64_t index_ = -1;
+  int64_t time_ns_ = -1;
+  bool is_ahead_ = false;  // it is still to be delivered
   int64_t next_due_ns_ = 0;
-  bool ended_ = false;
+  bool is_ended_ = false;
+  bool was_sought_ = false;
+  std::optional<int64_t> seek_to_ns_;
 };
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <fcntl.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 namespace maq {
@@ -15,6 +17,12 @@ void* SystemCalls::mmap(size_t length, int fd, off_t offset) {
 }
 int SystemCalls::munmap(void* address, size_t length) { return ::munmap(address, length); }
 int SystemCalls::poll(pollfd* fds, nfds_t count, int timeout_ms) { return ::poll(fds, count, timeout_ms); }
+
+bool SystemCalls::is_other_thing(const char* path) {
+  constexpr unsigned kVideoMajor = 81;  // linux/Documentation/admin-guide/devices.txt
+  struct stat found {};
+  return ::stat(path, &found) == 0 && (!S_ISCHR(found.st_mode) || major(found.st_rdev) != kVideoMajor);
+}
 
 SystemCalls& SystemCalls::real() {
   static SystemCalls calls;

@@ -386,7 +386,9 @@ class V4l2Camera final : public Camera {
 CameraOpener v4l2_uri_opener(SourceUri uri, int buffers, const Log&) {
   CameraRequest request{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
   uri.expect_no_more_options(std::string("size, fps, format, ") + kControlOptions);
-  return v4l2_opener(SystemCalls::real(), uri.target, std::move(request), buffers);
+  const bool is_number = uri.target.find_first_not_of("0123456789") == std::string::npos;
+  const std::string path = is_number ? "/dev/video" + uri.target : uri.target;
+  return v4l2_opener(SystemCalls::real(), path, std::move(request), buffers);
 }
 
 CameraOpener v4l2_opener(SystemCalls& calls, const std::string& path, CameraRequest request, int buffers) {

@@ -22,7 +22,7 @@ std::shared_ptr<Camera> open_v4l2_camera(SystemCalls& calls, const std::string& 
 // number while frames of before are held.
 CameraOpener v4l2_opener(SystemCalls& calls, const std::string& path, CameraRequest request, int buffers);
 
-// For "v4l2:/dev/video0", with size, fps and format as requests. Throws for unknown options.
+// For "v4l2:/dev/video0" or "v4l2:0", with size, fps and format as requests. Throws for unknown options.
 CameraOpener v4l2_uri_opener(SourceUri uri, int buffers, const Log& log);
 
 // The cameras among /dev/video0 to /dev/video63. One that cannot be opened is listed with the reason.

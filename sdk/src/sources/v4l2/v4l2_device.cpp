@@ -52,6 +52,9 @@ std::string fourcc_name(uint32_t fourcc) {
 }
 
 V4l2Device::V4l2Device(SystemCalls& calls, std::string path) : calls_(calls), path_(std::move(path)) {
+  if (calls_.is_other_thing(path_.c_str())) {
+    refuse_camera(path_, "is not a video device; name a camera, as in v4l2:/dev/video0");
+  }
   fd_ = repeated([&] { return calls_.open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC); });
   if (fd_ < 0) fail("cannot be opened", errno);
   try {

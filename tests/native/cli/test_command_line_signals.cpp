@@ -1,0 +1,123 @@
+// What Ctrl-C, a closed terminal and a supervisor do to the program while it waits for frames that do not come.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include "support/program_run.h"
+#include "support/temp_folder.h"
+#include "support/wait_until.h"
+
+namespace {
+
+// The program in the background; killed with this.
+class Running {
+ public:
+  Running(const TempFolder& folder, const std::string& arguments) : process_(fork()) {
+    if (process_ != 0) return;
+    const std::string command = "cd '" + folder.path().string() +
+                                "' && exec env MAQ_BUNDLE='" MAQ_TEST_DATA "/tiny_bundle' " MAQ_TEST_EMULATOR
+                                " '" MAQ_TEST_CLI "' " +
+                                arguments + " >out.txt 2>err.txt";
+    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    _exit(127);
+  }
+  ~Running() {
+    if (process_ == 0) return;
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+  pid_t process() const { return process_; }
+  void send(int number) const { kill(process_, number); }
+
+  // The status of waitpid(); -1 when it goes on.
+  int wait_for_end() {
+    int status = -1;
+    if (wait_until([&] { return waitpid(process_, &status, WNOHANG) == process_; })) process_ = 0;
+    return status;
+  }
+
+ private:
+  pid_t process_;
+};
+
+class CommandLineSignals : public ::testing::Test {
+ protected:
+  std::set<std::string> files() const {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
+      if (entry.is_regular_file()) names.insert(entry.path().filename().string());
+    }
+    return names;
+  }
+  bool has_file_with(const std::string& part) const {
+    const auto names = files();
+    return std::any_of(names.begin(), names.end(),
+                       [&](const std::string& name) { return name.find(part) != std::string::npos; });
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(CommandLineSignals, EndAProgramThatWaitsForFramesWithWholeFiles) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    for (const int times : {1, 2}) {  // timeout(1) sends its signal to the process and to its group
+      SCOPED_TRACE(std::string(strsignal(number)) + " " + std::to_string(times));
+      std::filesystem::remove_all(folder_.file("o"));
+      Running program(folder_, "densepose 'stub:people?size=64x48&stall=@2' --out o --overlay");
+      ASSERT_TRUE(wait_until([&] { return has_file_with(".json"); })) << read_text(folder_.file("err.txt"));
+      for (int i = 0; i < times; ++i) program.send(number);
+      const int status = program.wait_for_end();
+      EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << status;
+      EXPECT_TRUE(has_file_with("_overlay.mp4"));
+      EXPECT_FALSE(has_file_with(".part"));
+    }
+  }
+}
+
+TEST_F(CommandLineSignals, EndARecordingAsAWholeFile) {
+  Running program(folder_, "record 'stub:pattern?size=16x16&stall=@3' a.maqrec");
+  const auto has_frame = [&] {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(folder_.file("a.maqrec"), error);
+    return !error && bytes > 16 * 16 * 3;
+  };
+  ASSERT_TRUE(wait_until(has_frame)) << read_text(folder_.file("err.txt"));
+  program.send(SIGHUP);
+  const int status = program.wait_for_end();
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  EXPECT_NE(read_text(folder_.file("out.txt")).find("To watch it: maquette play a.maqrec"), std::string::npos);
+}
+
+TEST_F(CommandLineSignals, BenchTakesItsOtherProgramWithIt) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGKILL}) {
+    SCOPED_TRACE(strsignal(number));
+    Running program(folder_, "bench 'stub:people?size=64x48' --seconds 600 --runs 1000000");
+    const std::string children =
+        "/proc/" + std::to_string(program.process()) + "/task/" + std::to_string(program.process()) + "/children";
+    pid_t other = 0;
+    ASSERT_TRUE(wait_until([&] {
+      const std::string text = read_text(children);
+      other = text.empty() ? 0 : std::stoi(text);
+      return other != 0 && read_text("/proc/" + std::to_string(other) + "/comm") == "maquette-bench\n";
+    }));
+    program.send(number);
+    const int status = program.wait_for_end();
+    EXPECT_EQ(WIFSIGNALED(status), number == SIGKILL) << status;
+    EXPECT_TRUE(wait_until([&] {
+      const std::string state = read_text("/proc/" + std::to_string(other) + "/stat");
+      return state.empty() || state.find(") Z ") != std::string::npos;  // gone, but where nobody takes note of it
+    }));
+  }
+}
+
+}  // namespace

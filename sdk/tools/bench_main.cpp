@@ -290,7 +290,7 @@ int run_bench(const Options& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options that contradict each other end it
+int main(int argc, char** argv) try {
   setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   CLI::App app("Measure how long each stage of a frame takes on this machine", "maquette bench");
@@ -315,4 +315,6 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options
   int exit_code = 0;
   app.callback([&] { exit_code = run_bench(options); });
   return run_program(app, argc, argv, &exit_code);
+} catch (const std::exception& error) {  // no memory for the options
+  return report(error);
 }

@@ -6,7 +6,7 @@
 #include "commands/commands.h"
 #include "program.h"
 
-int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options that contradict each other end it
+int main(int argc, char** argv) try {
   // What goes wrong with a file is said once, by the SDK; the decoders below it stay silent unless somebody asks.
   setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
@@ -27,4 +27,6 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): options
   add_scene_command(app, &exit_code);
   add_bench_command(app, &exit_code);
   return run_program(app, argc, argv, &exit_code);
+} catch (const std::exception& error) {  // no memory for the options
+  return report(error);
 }

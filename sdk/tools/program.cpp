@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <exception>
+#include <new>
 #include <sstream>
 
 #include "print.h"
@@ -79,9 +80,13 @@ int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
     flush_output();
     return result;
   } catch (const std::exception& error) {
-    // What was found before stands above the error also where both go to one file.
-    std::fflush(stdout);
-    print_error("maquette: %s\n", printable(error.what()).c_str());
-    return kFailed;
+    return report(error);
   }
+}
+
+int report(const std::exception& error) {
+  const bool is_memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+  std::fflush(stdout);  // what was found before stands above the error also where both go to one file
+  print_error("maquette: %s\n", is_memory ? "There is not enough memory." : printable(error.what()).c_str());
+  return kFailed;
 }

@@ -1,6 +1,7 @@
 // What the programs of this folder have in common.
 #pragma once
 
+#include <exception>
 #include <maquette/maquette.hpp>
 
 namespace CLI {
@@ -13,3 +14,6 @@ maquette::Context open_context();
 // Parses the arguments, which runs what they ask for, and returns the exit status: *exit_code, 1 after an exception,
 // which is printed, and where standard output is lost, 2 for wrong usage.
 int run_program(CLI::App& app, int argc, char** argv, const int* exit_code);
+
+// Prints what an exception says, and returns the exit status for it.
+int report(const std::exception& error);

@@ -31,6 +31,13 @@
  *   to is replaced; a character device, a pipe or /dev/stdout gets the whole at once (clips and recordings need files).
  * - No C++ exception leaves the library, and it never ends the process: nor do the signals of a full disk or of a pipe
  *   without a reader (SIGXFSZ, SIGPIPE) while it writes.
+ * - Where the system starts fewer threads than asked for (ulimit -u, limits of containers), networks and renderers run
+ *   on those there are, with a warning in the log; live sources and pipelines, which need one, return
+ *   MAQ_ERROR_OUT_OF_MEMORY.
+ * - Objects belong to the process that made them. In a child of fork() they have no threads, and their files and
+ * devices are the parent's: each call on one returns MAQ_ERROR_INVALID_ARGUMENT at once, and giving it back does
+ * nothing. A child makes a context and all else anew; that works if no other thread of the parent was in a call of the
+ * library during fork(). Cameras of libcamera and DepthAI need exec() too once the parent has used one.
  * - Each function names its thread level: "any thread" may be called at any time from any thread; "one at a time" may
  *   be called from any thread, but not for the same handle from two threads at once.
  */

@@ -40,15 +40,15 @@ typedef enum maq_status {
   MAQ_ERROR_RUNTIME_LIBRARY = 8,  /* ONNX Runtime or libmaquette_files.so: not found, cannot be opened, or too old */
   MAQ_ERROR_POOL_EMPTY = 9,       /* every frame or result of the pool is still held: release one */
   MAQ_ERROR_INFERENCE = 10,       /* a network failed to run */
-  MAQ_ERROR_OUT_OF_MEMORY = 11,
-  MAQ_ERROR_INTERNAL = 12,      /* a defect of the library; please report it */
-  MAQ_END_OF_STREAM = 13,       /* not an error: the source has no more frames */
-  MAQ_TIMEOUT = 14,             /* not an error: no frame or result came within the timeout */
-  MAQ_ERROR_DEVICE_LOST = 15,   /* a camera was unplugged, or broke, and did not come back in time */
-  MAQ_ERROR_BUSY = 16,          /* another program has the camera */
-  MAQ_ERROR_NO_PERMISSION = 17, /* the user may not open the camera */
-  MAQ_ERROR_UNWRITABLE = 18,    /* a file cannot be created or written: it exists already, the disk is full */
-  MAQ_CANCELLED = 19            /* not an error: the app cancelled the call */
+  MAQ_ERROR_OUT_OF_MEMORY = 11,   /* no memory, or no thread or event is left: limits of the user or the container */
+  MAQ_ERROR_INTERNAL = 12,        /* a defect of the library; please report it */
+  MAQ_END_OF_STREAM = 13,         /* not an error: the source has no more frames */
+  MAQ_TIMEOUT = 14,               /* not an error: no frame or result came within the timeout */
+  MAQ_ERROR_DEVICE_LOST = 15,     /* a camera was unplugged, or broke, and did not come back in time */
+  MAQ_ERROR_BUSY = 16,            /* another program has the camera */
+  MAQ_ERROR_NO_PERMISSION = 17,   /* the user may not open the camera */
+  MAQ_ERROR_UNWRITABLE = 18,      /* a file cannot be created or written: it exists already, the disk is full */
+  MAQ_CANCELLED = 19              /* not an error: the app cancelled the call */
 } maq_status;
 
 /* The id of a person who is not tracked. */

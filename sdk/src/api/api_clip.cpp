@@ -38,4 +38,4 @@ maq_status maq_clip_finish(maq_clip* clip) {
   });
 }
 
-void maq_clip_destroy(maq_clip* clip) { delete clip; }
+void maq_clip_destroy(maq_clip* clip) { destroy(clip); }

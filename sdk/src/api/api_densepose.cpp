@@ -93,7 +93,7 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
   });
 }
 
-void maq_densepose_destroy(maq_densepose* densepose) { delete densepose; }
+void maq_densepose_destroy(maq_densepose* densepose) { destroy(densepose); }
 
 maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result) {
   return guarded(densepose, __func__, [&] {

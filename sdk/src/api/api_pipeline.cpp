@@ -74,7 +74,8 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
       std::optional<ResultHandles> handles;
       try {
         handles.emplace(pools);
-      } catch (const Error&) {
+      } catch (const Error& error) {
+        if (error.status() != MAQ_ERROR_POOL_EMPTY) throw;
         return false;  // the app holds them all
       }
       std::swap(handles->frame->frame, frame);
@@ -121,7 +122,7 @@ maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* 
   });
 }
 
-void maq_pipeline_destroy(maq_pipeline* pipeline) { delete pipeline; }
+void maq_pipeline_destroy(maq_pipeline* pipeline) { destroy(pipeline); }
 
 maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri) {
   return guarded(pipeline, __func__, [&] {

@@ -59,4 +59,4 @@ maq_status maq_recorder_get_info(const maq_recorder* recorder, maq_recorder_info
   });
 }
 
-void maq_recorder_destroy(maq_recorder* recorder) { delete recorder; }
+void maq_recorder_destroy(maq_recorder* recorder) { destroy(recorder); }

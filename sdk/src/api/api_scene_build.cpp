@@ -157,7 +157,7 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
   });
 }
 
-void maq_scene_builder_destroy(maq_scene_builder* builder) { delete builder; }
+void maq_scene_builder_destroy(maq_scene_builder* builder) { destroy(builder); }
 
 maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
                                       const maq_pinhole_camera* camera, uint64_t* seen_point_count) {

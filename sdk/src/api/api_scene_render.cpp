@@ -67,7 +67,7 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
   });
 }
 
-void maq_scene_renderer_destroy(maq_scene_renderer* renderer) { delete renderer; }
+void maq_scene_renderer_destroy(maq_scene_renderer* renderer) { destroy(renderer); }
 
 maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhole_camera* camera,
                                   maq_scene_image** image) {

@@ -86,7 +86,7 @@ maq_status maq_source_stop(maq_source* source) {
   });
 }
 
-void maq_source_destroy(maq_source* source) { delete source; }
+void maq_source_destroy(maq_source* source) { destroy(source); }
 
 maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) {
   return guarded(source, __func__, [&] {
@@ -204,7 +204,7 @@ maq_status maq_camera_list_create(maq_context* context, maq_camera_list** list) 
   });
 }
 
-void maq_camera_list_destroy(maq_camera_list* list) { delete list; }
+void maq_camera_list_destroy(maq_camera_list* list) { destroy(list); }
 
 uint32_t maq_camera_list_get_count(const maq_camera_list* list) {
   return list == nullptr ? 0 : uint32_t(list->cameras.size());

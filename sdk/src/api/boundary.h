@@ -22,6 +22,9 @@ class ArgumentError : public Error {
 // begins the text when it is not NULL.
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept;
 
+// The text of what a call on an object of the parent process returns, which is MAQ_ERROR_INVALID_ARGUMENT.
+extern const char kIsOfParent[];
+
 // The text of the handle, or the thread's latest for NULL; it stays until the thread calls this again.
 const char* last_error(const Handle* handle) noexcept;
 
@@ -29,17 +32,17 @@ const char* last_error(const Handle* handle) noexcept;
 template <class Body>
 maq_status guarded(const Handle* handle, const char* function, Body&& body) noexcept {
   try {
+    if (handle != nullptr && handle->is_of_parent()) {
+      return keep_error(nullptr, MAQ_ERROR_INVALID_ARGUMENT, function, kIsOfParent);
+    }
     return body();
   } catch (const ArgumentError& error) {
     return keep_error(handle, error.status(), function, error.what());
   } catch (const Error& error) {
     return keep_error(handle, error.status(), nullptr, error.what());
-  } catch (const std::bad_alloc&) {
-    return keep_error(handle, MAQ_ERROR_OUT_OF_MEMORY, nullptr, "There is not enough memory.");
-  } catch (const std::exception& error) {
-    return keep_error(handle, MAQ_ERROR_INTERNAL, function, error.what());
   } catch (...) {
-    return keep_error(handle, MAQ_ERROR_INTERNAL, function, "An unknown exception was thrown.");
+    const Failure failure = current_failure();
+    return keep_error(handle, failure.status, failure.status == MAQ_ERROR_INTERNAL ? function : nullptr, failure.text);
   }
 }
 

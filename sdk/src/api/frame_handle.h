@@ -19,7 +19,7 @@ namespace maq {
 
 // Gives its pixels back at once, and the handle to its pool.
 inline void return_to_pool(maq_frame* frame) {
-  if (frame == nullptr) return;
+  if (frame == nullptr || frame->is_of_parent()) return;
   frame->frame.clear();
   std::exchange(frame->deleter, {})(frame);
 }

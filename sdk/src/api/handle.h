@@ -1,6 +1,7 @@
 // What every handle of the C API begins with, and the context.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -13,9 +14,16 @@
 
 namespace maq {
 
+// How many calls of fork() lie between this process and the first that loaded the library.
+uint32_t fork_count();
+
 // Every handle begins with this, so that maq_last_error works on each of them.
 class Handle {
  public:
+  // In a child of fork(), the objects of the parent have no threads, their mutexes may be locked for good, and their
+  // files and devices are the parent's: nothing may touch them.
+  bool is_of_parent() const { return fork_count_ != fork_count(); }
+
   void set_error(std::string text) const {
     std::lock_guard<std::mutex> lock(mutex_);
     error_ = std::move(text);
@@ -26,9 +34,16 @@ class Handle {
   }
 
  private:
+  const uint32_t fork_count_ = fork_count();
   mutable std::mutex mutex_;
   mutable std::string error_;
 };
+
+// For the `_destroy` and `_close` functions; NULL is fine.
+template <class T>
+void destroy(T* handle) {
+  if (handle != nullptr && !handle->is_of_parent()) delete handle;
+}
 
 // What the objects made from a context keep of it when it is destroyed before them.
 class ContextState {
@@ -71,7 +86,7 @@ T* lend(typename BoundedPool<T>::Pooled handle) {
 // Returns it; NULL is fine.
 template <class T>
 void return_to_pool(T* handle) {
-  if (handle != nullptr) std::exchange(handle->deleter, {})(handle);
+  if (handle != nullptr && !handle->is_of_parent()) std::exchange(handle->deleter, {})(handle);
 }
 
 }  // namespace maq

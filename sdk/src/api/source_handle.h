@@ -55,7 +55,7 @@ class SourceCall {
 
  private:
   void add(int calls) {
-    if (source_ == nullptr) return;
+    if (source_ == nullptr || source_->is_of_parent()) return;
     const std::lock_guard<std::mutex> lock(source_->mutex);
     source_->calls += calls;
     if (source_->calls == 0) source_->idle.notify_all();

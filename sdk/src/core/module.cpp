@@ -1,14 +1,22 @@
 #include "core/module.h"
 
 #include <dlfcn.h>
+#include <unistd.h>
 
 #include <cstring>
+#include <new>
 #include <string>
 
 #include "core/build_info.h"
 #include "core/error.h"
+#include "core/memory.h"
 
 namespace maq {
+namespace {
+
+constexpr size_t kLargestLibraryBytes = size_t(128) << 20;
+
+}  // namespace
 
 std::string library_folder() {
   Dl_info info{};
@@ -20,12 +28,28 @@ std::string library_folder() {
 
 std::string module_path(const char* file) { return library_folder() + "maquette/" + file; }
 
+LibraryOpening open_library(const std::string& path) {
+  for (bool again = false;; again = true) {
+    LibraryOpening opening{dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL), ""};
+    if (opening.library != nullptr) return opening;
+    if (const char* error = dlerror()) opening.error = error;
+    const auto says = [&](const char* text) { return opening.error.find(text) != std::string::npos; };
+    // glibc says the same of a file system whose programs may not run, and leaves no errno.
+    const bool is_unmapped = says("failed to map segment") && !has_memory(kLargestLibraryBytes);
+    // Which is not of the process's memory: too many libraries with thread-local storage were opened.
+    const bool is_static_storage = says("static TLS block");
+    const bool is_told = says_out_of_memory(opening.error) && !is_static_storage;
+    if (is_told || is_unmapped || !has_memory(kThreadLocalBytes)) throw std::bad_alloc();
+    // For what glibc does not say, memory may have been short for a moment.
+    if (again || access(path.c_str(), R_OK) != 0) return opening;
+  }
+}
+
 void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy) {
   const std::string path = module_path(file);
-  void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  const auto [library, error] = open_library(path);
   if (library == nullptr) {
-    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, needed_for, " ", path, ", which cannot be opened: ", dlerror(), ". ",
-                remedy);
+    throw Error(MAQ_ERROR_RUNTIME_LIBRARY, needed_for, " ", path, ", which cannot be opened: ", error, ". ", remedy);
   }
   const auto get_export = reinterpret_cast<ModuleExport (*)()>(dlsym(library, symbol));
   const ModuleExport found = get_export == nullptr ? ModuleExport{"", nullptr} : get_export();

@@ -28,6 +28,15 @@ std::string library_folder();
 // The path of a module: in maquette/ beside this copy of the SDK.
 std::string module_path(const char* file);
 
+// A library that dlopen() opened, or null and why not.
+struct LibraryOpening {
+  void* library = nullptr;
+  std::string error;
+};
+
+// With all symbols resolved and kept private. Throws std::bad_alloc where there is too little memory.
+LibraryOpening open_library(const std::string& path);
+
 // Opens a module and returns the object that its function `symbol` exports. It is never closed again: the foreign
 // libraries do not survive unloading, and their threads may still run. Throws MAQ_ERROR_RUNTIME_LIBRARY where the
 // module is missing or of another build; the sentence begins with `needed_for` ("Image and video files need") and ends

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/thread.h"
 
 namespace maq {
 
@@ -12,8 +13,13 @@ WorkerThreads::WorkerThreads(int count) {
   if (count < 1 || count > kMaxThreads) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Threads are ", count, ", but must be 1 to ", kMaxThreads, ".");
   }
+  threads_.reserve(size_t(count - 1));
   try {
-    for (int worker = 1; worker < count; ++worker) threads_.emplace_back([this, worker] { stay(worker); });
+    while (this->count() < count) {
+      threads_.push_back(start_thread("maq worker", [this, worker = this->count()] { stay(worker); }));
+    }
+  } catch (const Error&) {
+    // Those that are there do the work.
   } catch (...) {
     stop();
     throw;

@@ -20,8 +20,8 @@ int default_threads();
 
 class WorkerThreads {
  public:
-  // `count` includes the thread that calls run(), so that of 1 none is started. Throws MAQ_ERROR_INVALID_ARGUMENT
-  // unless it is 1 to kMaxThreads, and std::system_error where the system has no more threads.
+  // `count` includes the thread that calls run(), so that of 1 none is started. Where the system has no more threads,
+  // count() is less. Throws MAQ_ERROR_INVALID_ARGUMENT unless it is 1 to kMaxThreads.
   explicit WorkerThreads(int count);
   ~WorkerThreads();
   WorkerThreads(const WorkerThreads&) = delete;

@@ -3,9 +3,11 @@
 #include <dlfcn.h>
 
 #include <cstdlib>
+#include <new>
 #include <vector>
 
 #include "core/error.h"
+#include "core/memory.h"
 #include "core/module.h"
 
 namespace maq {
@@ -18,17 +20,15 @@ constexpr char kFileName[] = "libonnxruntime.so.1";
 constexpr char kRemedy[] =
     " Set MAQ_ONNXRUNTIME_LIB to the file, or put libonnxruntime.so.1 in the folder of libmaquette.so.";
 
-void* open_privately(const std::string& path) { return dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL); }
-
 // Either the one file that was named, which must open, or the first of the usual places that does.
-void* open_library(const std::string& explicit_path, std::string* opened_path) {
+void* find_library(const std::string& explicit_path, std::string* opened_path) {
   const char* from_environment = std::getenv("MAQ_ONNXRUNTIME_LIB");
   std::string named = explicit_path;
   if (named.empty() && from_environment != nullptr) named = from_environment;
   if (!named.empty()) {
-    void* library = open_privately(named);
+    const auto [library, error] = open_library(named);
     if (library == nullptr) {
-      throw Error(MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime cannot be opened: ", dlerror(), ".",
+      throw Error(MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime cannot be opened: ", error, ".",
                   explicit_path.empty() ? " The file was named by MAQ_ONNXRUNTIME_LIB; correct or unset it."
                                         : " The file was named by onnxruntime_library of the context's config.");
     }
@@ -38,7 +38,7 @@ void* open_library(const std::string& explicit_path, std::string* opened_path) {
   const std::string folder = library_folder();
   for (const std::string& path : {folder + "maquette/" + kFileName, folder + kFileName, std::string(kFileName),
                                   std::string(MAQ_ONNXRUNTIME_SONAME)}) {
-    if (void* library = open_privately(path)) {
+    if (void* library = open_library(path).library) {
       *opened_path = path;
       return library;
     }
@@ -59,11 +59,12 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
   setenv("ORT_DISABLE_TELEMETRY", "1", 0);
 
   // Never closed again: the library's threads and thread-local storage do not survive unloading.
-  void* library = open_library(explicit_path, &path_);
+  void* library = find_library(explicit_path, &path_);
   const auto get_api_base = reinterpret_cast<const OrtApiBase* (*)()>(dlsym(library, "OrtGetApiBase"));
   if (get_api_base == nullptr) {
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is not ONNX Runtime: it has no OrtGetApiBase.", kRemedy);
   }
+  if (!has_memory(kThreadLocalBytes)) throw std::bad_alloc();
   const OrtApiBase* base = get_api_base();
   version_ = base->GetVersionString();
   api_ = base->GetApi(kApiVersion);
@@ -84,6 +85,9 @@ void OnnxRuntimeLibrary::check(OrtStatus* result, maq_status status, const std::
   if (result == nullptr) return;
   const std::string text = api_->GetErrorMessage(result);
   api_->ReleaseStatus(result);
+  if (says_out_of_memory(text)) {
+    throw Error(MAQ_ERROR_OUT_OF_MEMORY, what, ": there is not enough memory. Free memory, or raise the limit of it.");
+  }
   throw Error(status, what, ": ", text);
 }
 

@@ -25,7 +25,8 @@ class OnnxRuntimeLibrary {
   const std::string& version() const { return version_; }
   const std::string& path() const { return path_; }
 
-  // Throws `status` with "<what>: <ONNX Runtime's text>" when `result` is an error, and frees it.
+  // Throws `status` with "<what>: <ONNX Runtime's text>" when `result` is an error, and frees it. The status is
+  // MAQ_ERROR_OUT_OF_MEMORY instead where the text says so.
   void check(OrtStatus* result, maq_status status, const std::string& what) const;
 
  private:

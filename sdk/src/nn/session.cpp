@@ -2,8 +2,10 @@
 
 #include <map>
 #include <memory>
+#include <new>
 
 #include "core/error.h"
+#include "core/memory.h"
 
 namespace maq {
 namespace {
@@ -75,17 +77,29 @@ struct Session::GraphSide {
 
 Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
                  std::string name, const SessionSettings& settings)
-    : runtime_(std::move(runtime)), spec_(std::move(spec)), name_(std::move(name)) {
+    : runtime_(std::move(runtime)),
+      spec_(std::move(spec)),
+      name_(std::move(name)),
+      threads_(settings.threads - 1) {  // the first is the caller of run()
   const OrtApi& api = runtime_->api();
   const auto check = [&](OrtStatus* result) {
     runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be loaded"));
   };
+  if (!has_memory(kThreadLocalBytes)) throw std::bad_alloc();  // that of this thread
   OrtSessionOptions* made = nullptr;
   check(api.CreateSessionOptions(&made));
   const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made,
                                                                                         api.ReleaseSessionOptions);
   check(api.SetUserLoggingFunction(options.get(), forward_to_log, const_cast<Log*>(&runtime_->log())));
-  check(api.SetIntraOpNumThreads(options.get(), settings.threads));
+  const int thread_count = threads_.count() + 1;
+  if (!threads_.shortage().empty()) {
+    runtime_->log().write(MAQ_LOG_WARNING, name_, " runs on ", thread_count, " of ", settings.threads,
+                          " threads, which takes longer. ", threads_.shortage());
+  }
+  check(api.SetIntraOpNumThreads(options.get(), thread_count));
+  check(api.SessionOptionsSetCustomCreateThreadFn(options.get(), SessionThreads::assign));
+  check(api.SessionOptionsSetCustomThreadCreationOptions(options.get(), &threads_));
+  check(api.SessionOptionsSetCustomJoinThreadFn(options.get(), SessionThreads::join));
   check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));
   // The networks run one after another: the threads of one must not keep spinning while the next one works.
   check(api.AddSessionConfigEntry(options.get(), "session.force_spinning_stop", "1"));
@@ -98,18 +112,18 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
   try {
     check(api.CreateCpuMemoryInfo(OrtDeviceAllocator, OrtMemTypeDefault, &cpu_memory_));
     compare_with_spec();
+    for (const TensorSpec& input : spec_.inputs) input_names_.push_back(input.name.c_str());
+    for (const TensorSpec& output : spec_.outputs) output_names_.push_back(output.name.c_str());
+    inputs_.resize(input_names_.size());
+    outputs_.resize(output_names_.size());
+    input_values_.resize(input_names_.size());
+    output_values_.resize(output_names_.size());
+    buffers_.resize(output_names_.size());
+    views_.resize(output_names_.size());
   } catch (...) {
     release();
     throw;
   }
-  for (const TensorSpec& input : spec_.inputs) input_names_.push_back(input.name.c_str());
-  for (const TensorSpec& output : spec_.outputs) output_names_.push_back(output.name.c_str());
-  inputs_.resize(input_names_.size());
-  outputs_.resize(output_names_.size());
-  input_values_.resize(input_names_.size());
-  output_values_.resize(output_names_.size());
-  buffers_.resize(output_names_.size());
-  views_.resize(output_names_.size());
 }
 
 Session::~Session() { release(); }

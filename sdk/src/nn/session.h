@@ -13,6 +13,7 @@
 
 #include "nn/manifest.h"
 #include "nn/onnxruntime_library.h"
+#include "nn/session_threads.h"
 
 namespace maq {
 
@@ -115,6 +116,7 @@ class Session {
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   GraphSpec spec_;
   std::string name_;
+  SessionThreads threads_;
   OrtSession* session_ = nullptr;
   OrtMemoryInfo* cpu_memory_ = nullptr;
   std::vector<const char*> input_names_, output_names_;

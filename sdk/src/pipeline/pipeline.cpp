@@ -1,6 +1,5 @@
 #include "pipeline/pipeline.h"
 
-#include <pthread.h>
 #if defined(__linux__)
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -22,6 +21,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/thread.h"
 #include "nn/bundle.h"
 #include "sources/recording/recording.h"
 #include "sources/registry.h"
@@ -171,14 +171,10 @@ struct Pipeline::State {
     while (wait_for_work()) {
       try {
         if (!report_a_change()) step();
-      } catch (const Error& error) {
-        fail(error.status(), error.what());
-      } catch (const std::bad_alloc&) {
-        fail(MAQ_ERROR_OUT_OF_MEMORY, "There is not enough memory.");
-      } catch (const std::exception& error) {
-        fail(MAQ_ERROR_INTERNAL, error.what());
+      } catch (const std::exception&) {
+        fail(current_failure());
       } catch (...) {
-        fail(MAQ_ERROR_INTERNAL, "A callback of the pipeline threw an exception; callbacks must not throw.");
+        fail({MAQ_ERROR_INTERNAL, "A callback of the pipeline threw an exception; callbacks must not throw."});
       }
     }
     close_source();
@@ -254,12 +250,20 @@ struct Pipeline::State {
     return is_current();
   }
 
-  void fail(maq_status with, const std::string& sentence) noexcept {
+  void fail(const Failure& why) noexcept {
     close_source();
     source_number = 0;
-    if (with == MAQ_ERROR_INFERENCE) model_number = 0;
+    if (why.status == MAQ_ERROR_INFERENCE) model_number = 0;
     std::lock_guard<std::mutex> lock(mutex);
-    if (is_current()) enter(MAQ_PIPELINE_FAILED, with, sentence);
+    if (!is_current()) return;
+    try {
+      enter(MAQ_PIPELINE_FAILED, why.status, why.text);
+    } catch (const std::exception&) {  // no memory for the text, or for reporting it
+      phase = MAQ_PIPELINE_FAILED;
+      failure = why.status;
+      problem = kShortNoMemory;
+      changed.notify_all();
+    }
   }
 
   bool open_source_of_request() {
@@ -348,7 +352,7 @@ struct Pipeline::State {
       }
     } catch (const Error& error) {
       if (error.status() != MAQ_ERROR_UNREADABLE) throw;
-      return note_problem(error);  // later frames can be read still, or the end follows
+      return note_problem({error.status(), error.what()});  // later frames can be read still, or the end follows
     }
     record_frame();
     const auto begin = Clock::now();
@@ -398,7 +402,7 @@ struct Pipeline::State {
       if (recording != nullptr) recording->add(frame);
     } catch (const Error& error) {
       recording.reset();
-      note_problem(error);
+      note_problem({error.status(), error.what()});
     }
   }
 
@@ -407,19 +411,23 @@ struct Pipeline::State {
     if (ended != nullptr) ended->finish();
   }
 
-  void note_problem(const Error& error) {
+  void note_problem(const Failure& why) noexcept {
     std::lock_guard<std::mutex> lock(mutex);
     if (!is_current()) return;
-    failure = error.status();
-    problem = error.what();
-    note_change();
+    failure = why.status;
+    try {
+      problem = why.text;
+      note_change();
+    } catch (const std::exception&) {
+      problem = kShortNoMemory;
+    }
   }
 
   void close_source() noexcept {
     try {
       end_recording();
-    } catch (const Error& error) {
-      note_problem(error);
+    } catch (const std::exception&) {
+      note_problem(current_failure());
     }
     frame.clear();
     source.reset();
@@ -427,8 +435,7 @@ struct Pipeline::State {
 };
 
 Pipeline::Pipeline(PipelineSettings settings) : state_(std::make_shared<State>(std::move(settings))) {
-  state_->thread = std::thread([state = state_] { state->run(); });
-  pthread_setname_np(state_->thread.native_handle(), "maq pipeline");  // for debuggers and `top -H`
+  state_->thread = start_thread("maq pipeline", [state = state_] { state->run(); });
 }
 
 Pipeline::~Pipeline() {

@@ -1,7 +1,5 @@
 #include "sources/live_source.h"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -13,6 +11,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/rounding.h"
+#include "core/thread.h"
 #include "core/unique_fd.h"
 #include "image/files/jpeg.h"
 
@@ -56,6 +55,7 @@ struct LiveSource::State {
   size_t first = 0, count = 0;
   uint64_t dropped = 0;
   std::optional<std::string> failure;
+  maq_status failure_status = MAQ_ERROR_DEVICE_LOST;
   bool at_end = false;  // after the frames that wait
   uint32_t seeks = 0;   // asked for; frames from before them are dropped
   bool stopping = false;
@@ -101,6 +101,7 @@ struct LiveSource::State {
     Entry old;  // returned to the camera after the lock is released
     {
       std::lock_guard<std::mutex> lock(mutex);
+      if (ring.empty()) return;  // the source is gone
       if (count == ring.size()) {
         old = std::move(ring[first]);
         first = (first + 1) % ring.size();
@@ -120,7 +121,7 @@ struct LiveSource::State {
     if (stopping) throw Error(MAQ_CANCELLED, name, " was stopped.");
     std::shared_ptr<Camera> camera = present.lock();
     if (camera != nullptr) return camera;
-    if (failure) throw Error(MAQ_ERROR_DEVICE_LOST, *failure, ".");
+    if (failure) throw Error(failure_status, *failure, ".");
     throw Error(MAQ_ERROR_DEVICE_LOST, name,
                 " is not connected at the moment; try again when its state is MAQ_SOURCE_RECONNECTED.");
   }
@@ -194,10 +195,10 @@ struct LiveSource::State {
   void run(std::shared_ptr<Camera> camera) noexcept {
     try {
       stream(camera);
-    } catch (const std::exception& error) {
-      fail(concatenate(name, " stopped: ", error.what()));
+    } catch (const std::exception&) {
+      fail_by(current_failure());
     } catch (...) {
-      fail(name + " stopped: its state callback threw an exception");
+      fail_by({MAQ_ERROR_DEVICE_LOST, "its state callback threw an exception"});
     }
     show(nullptr);
     if (camera != nullptr) camera->close();
@@ -205,6 +206,20 @@ struct LiveSource::State {
     std::lock_guard<std::mutex> lock(mutex);
     ended = true;
     changed.notify_all();
+  }
+
+  void fail_by(const Failure& exception) noexcept {
+    const bool is_memory = exception.status == MAQ_ERROR_OUT_OF_MEMORY;
+    std::string reason = "out of memory";  // short, so that there is memory for it
+    try {
+      reason = concatenate(name, " stopped: ", is_memory ? "there is not enough memory" : exception.text);
+    } catch (const std::exception&) {
+    }
+    {
+      std::lock_guard<std::mutex> lock(mutex);
+      if (is_memory) failure_status = MAQ_ERROR_OUT_OF_MEMORY;
+    }
+    fail(std::move(reason));
   }
 
   void fail(std::string reason) {
@@ -350,9 +365,8 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
   info_.is_live = true;
   info_.clock = MAQ_CLOCK_MONOTONIC;
   if (camera->intrinsics() != nullptr) intrinsics_ = *camera->intrinsics();
-  state_->thread =
-      std::thread([state = state_, camera = std::move(camera)]() mutable { state->run(std::move(camera)); });
-  pthread_setname_np(state_->thread.native_handle(), "maq source");  // for debuggers and `top -H`
+  state_->thread = start_thread(
+      "maq source", [state = state_, camera = std::move(camera)]() mutable { state->run(std::move(camera)); });
 }
 
 LiveSource::~LiveSource() {
@@ -368,7 +382,6 @@ LiveSource::~LiveSource() {
       state.changed.wait(lock, [&] { return !state.reporting; });
     }
     left.swap(state.ring);
-    state.ring.resize(1);
     state.first = state.count = 0;
   }
   if (ended) {
@@ -432,7 +445,7 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
       }
       if (state_->stopping) return NextFrame::kStopped;
       if (state_->count == 0 && state_->at_end) return NextFrame::kEnd;
-      if (state_->count == 0) throw Error(MAQ_ERROR_DEVICE_LOST, *state_->failure, ".");
+      if (state_->count == 0) throw Error(state_->failure_status, *state_->failure, ".");
       entry = std::move(state_->ring[state_->first]);
       state_->first = (state_->first + 1) % state_->ring.size();
       --state_->count;

@@ -178,6 +178,7 @@ std::unique_ptr<Source> open_first_camera(const SourceUri& uri, const SourceSett
         same.target = listed.target;
         return open_entry(*find_entry(listed.scheme), std::move(same), settings);
       } catch (const Error& error) {
+        if (error.status() == MAQ_ERROR_OUT_OF_MEMORY) throw;
         problem = error.what();
       }
     }

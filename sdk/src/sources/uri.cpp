@@ -84,6 +84,7 @@ void take_size(SourceUri& uri) {
 std::optional<double> read_number(const std::string& text) {
   std::istringstream in(text);
   in.imbue(std::locale::classic());
+  in.exceptions(std::ios::badbit);  // without memory
   double value = 0;
   if (text.empty() || !(in >> value) || !in.eof() || !std::isfinite(value)) return {};
   return value;

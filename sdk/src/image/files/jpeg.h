@@ -17,7 +17,7 @@ class JpegDecoder {
   JpegDecoder& operator=(const JpegDecoder&) = delete;
 
   // Into `frame`, as BGR8. False for what is damaged, truncated, over the limits of frame.h, or of more than
-  // `max_pixels`.
+  // `max_pixels`. Throws std::bad_alloc.
   bool decode(const uint8_t* bytes, size_t size_bytes, int64_t max_pixels, Frame& frame);
 
  private:

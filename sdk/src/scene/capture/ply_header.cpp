@@ -105,6 +105,7 @@ PlyHeader read_ply_header(FileReader& file) {
   for (int i = 0; i < kMaxLines; ++i) {
     if (!file.next_line(line, kMaxLineBytes)) break;
     std::istringstream words(line);
+    words.exceptions(std::ios::badbit);  // without memory
     std::string keyword;
     words >> keyword;
     if (keyword == "end_header") {

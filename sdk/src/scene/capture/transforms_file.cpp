@@ -207,6 +207,7 @@ TransformsFile read_transforms_file(const std::string& folder, const std::string
         photo.lens.width_px = whole_pixels(double(size.width));
         photo.lens.height_px = whole_pixels(double(size.height));
       } catch (const Error& error) {
+        if (error.status() == MAQ_ERROR_OUT_OF_MEMORY) throw;
         report.add(error.status() == MAQ_ERROR_NOT_FOUND ? kPhotosMissing : kPhotosUnreadable, photo.name);
         continue;
       }

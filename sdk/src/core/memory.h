@@ -1,0 +1,19 @@
+// Too little memory, where foreign libraries tell of it in words or not at all.
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+namespace maq {
+
+// Whether the text of a foreign library's error says that there was no memory.
+bool says_out_of_memory(std::string_view text);
+
+// Whether the process could get that much memory now.
+bool has_memory(size_t bytes);
+
+// What the thread-local storage of a library takes when a thread first uses it; glibc ends the process where it cannot
+// be had.
+inline constexpr size_t kThreadLocalBytes = 64 << 10;
+
+}  // namespace maq

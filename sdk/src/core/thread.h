@@ -1,0 +1,28 @@
+// Starting threads: what the system says when it has no more of them is told as an Error.
+#pragma once
+
+#include <pthread.h>
+
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "core/error.h"
+
+namespace maq {
+
+// `name`, of at most 15 letters, is for debuggers and `top -H`. Throws MAQ_ERROR_OUT_OF_MEMORY where the system has no
+// more threads, or no memory for one.
+template <class Body>
+std::thread start_thread(const char* name, Body&& body) {
+  try {
+    std::thread thread(std::forward<Body>(body));
+    pthread_setname_np(thread.native_handle(), name);
+    return thread;
+  } catch (const std::system_error& error) {
+    throw Error(MAQ_ERROR_OUT_OF_MEMORY, "The system starts no more threads (", error.code().message(),
+                "): raise the limit of this user (ulimit -u) or of the container, or free memory.");
+  }
+}
+
+}  // namespace maq

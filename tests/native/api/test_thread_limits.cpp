@@ -1,0 +1,121 @@
+// What happens where the system starts fewer threads than asked for (ulimit -u, limits of containers). A program of its
+// own, since it takes the place of pthread_create: root's threads have no limit.
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+#include <pthread.h>
+
+#include <atomic>
+#include <cerrno>
+#include <climits>
+#include <maquette/maquette.hpp>
+
+#include "support/api_tiny_scene.h"
+#include "support/child_process.h"
+
+namespace {
+
+std::atomic<int> threads_left{INT_MAX};
+
+}  // namespace
+
+extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*body)(void*),
+                              void* argument) noexcept {
+  static const auto real = reinterpret_cast<decltype(&pthread_create)>(dlsym(RTLD_NEXT, "pthread_create"));
+  if (threads_left.fetch_sub(1) <= 0) {
+    ++threads_left;
+    return EAGAIN;
+  }
+  return real(thread, attributes, body, argument);
+}
+
+namespace {
+
+const char* const kRemedy = "ulimit -u";
+
+struct Log {
+  std::string text;
+  static void add(void* self, maq_log_level, const char* line) { static_cast<Log*>(self)->text += line; }
+};
+
+maquette::Context logging_context(Log& log) {
+  maq_context_config config = maquette::default_context_config();
+  config.log_callback = Log::add;
+  config.log_user_data = &log;
+  return maquette::Context(config);
+}
+
+int say(int pipe, const std::string& text) {
+  return write(pipe, text.data(), text.size()) == ssize_t(text.size()) ? 0 : 1;
+}
+
+TEST(ThreadLimits, ADensePoseModelRunsOnTheThreadsThereAreAndWarns) {
+  const int threads = 3, sessions = 5, wanted = (threads - 1) * sessions;
+  for (int given = 0; given <= wanted; ++given) {
+    const ChildOutcome outcome = run_in_child([&](int pipe) {
+      Log log;
+      const maquette::Context context = logging_context(log);
+      maq_densepose_config config = maquette::default_densepose_config();
+      config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+      config.threads = threads;
+      threads_left = given;
+      maquette::DensePose densepose(context, config);
+      maquette::Source source(context, "stub:people");
+      densepose.run(*source.next());
+      return say(pipe, log.text);
+    });
+    EXPECT_EQ(outcome.trouble, "") << given << " threads";
+    EXPECT_EQ(outcome.said.find(kRemedy) != std::string::npos, given < wanted) << given << ": " << outcome.said;
+  }
+}
+
+TEST(ThreadLimits, AScenePassesThroughBuilderAndRendererOnTheThreadsThereAre) {
+  for (int given = 0; given < 6; ++given) {
+    const ChildOutcome outcome = run_in_child([&](int) {
+      const maquette::Context context;
+      threads_left = given;
+      const std::vector<float> places = api_tiny_scene::ball(2000);
+      maq_scene_build_config build = api_tiny_scene::build_config();
+      build.threads = 4;
+      maquette::SceneBuilder builder(context, build, api_tiny_scene::cloud_of(places));
+      const api_tiny_scene::Photo photo;
+      for (int i = 0; i < 4; ++i) {
+        builder.add_view(maquette::Frame(context, photo.desc), api_tiny_scene::camera_at(1.5 * i));
+      }
+      const maquette::Scene scene = builder.finish();
+      maq_scene_renderer_config render = api_tiny_scene::renderer_config();
+      render.threads = 4;
+      maquette::SceneRenderer renderer(context, render, scene);
+      renderer.run(api_tiny_scene::camera_at(0));
+      return 0;
+    });
+    EXPECT_EQ(outcome.trouble, "") << given << " threads";
+  }
+}
+
+TEST(ThreadLimits, WhatNeedsAThreadOfItsOwnIsRefusedWithTheRemedy) {
+  const ChildOutcome outcome = run_in_child([](int pipe) {
+    const maquette::Context context;
+    threads_left = 0;
+    maq_source* source = nullptr;
+    if (maq_source_create(context.get(), "stub:people?live=1", nullptr, &source) != MAQ_ERROR_OUT_OF_MEMORY) return 1;
+    std::string said = maq_last_error(nullptr);
+    maq_pipeline* pipeline = nullptr;
+    const maq_pipeline_config config = maquette::default_pipeline_config();
+    const maq_status status = maq_pipeline_create(context.get(), &config, &pipeline);
+    if (status != MAQ_ERROR_OUT_OF_MEMORY || said != maq_last_error(nullptr)) {
+      say(pipe, maq_last_error(nullptr));
+      return 2;
+    }
+    // Once there are threads again, both work.
+    threads_left = INT_MAX;
+    if (maq_source_create(context.get(), "stub:people?live=1", nullptr, &source) != MAQ_OK) return 4;
+    if (maq_pipeline_create(context.get(), &config, &pipeline) != MAQ_OK) return 5;
+    maq_pipeline_destroy(pipeline);
+    maq_source_destroy(source);
+    return say(pipe, said);
+  });
+  EXPECT_EQ(outcome.trouble, "") << outcome.said;
+  EXPECT_NE(outcome.said.find(kRemedy), std::string::npos) << outcome.said;
+}
+
+}  // namespace

@@ -1,4 +1,5 @@
-// Apps with a locale in which 1234.5 is written 1.234,5: the texts and files of the library are those of C all the same.
+// Apps with a locale in which 1234.5 is written 1.234,5: the texts and files of the library are those of C all the
+// same.
 #include <gtest/gtest.h>
 
 #include <clocale>
@@ -125,14 +126,11 @@ TEST_F(ApiLocales, RecordingsKeepTheirNumbers) {
 }
 
 TEST_F(ApiLocales, CapturesAreWhatTheyAreInC) {
-  write_text(folder_.file("capture/cloud.ply"), "");
   std::filesystem::copy(api_tiny_scene::kCapture, folder_.file("capture"), std::filesystem::copy_options::recursive);
-  write_text(folder_.file("capture/cloud.ply"),
-             "ply\nformat ascii 1.0\nelement vertex 1200\nproperty float x\nproperty float y\nproperty float z\n"
-             "end_header\n");
-  std::string lines;
-  for (int i = 0; i < 1200; ++i) lines += "0.5 1.25e-1 " + std::to_string(i % 3) + ".75\n";
-  write_text(folder_.file("capture/cloud.ply"), read_text(folder_.file("capture/cloud.ply")) + lines);
+  std::string cloud =
+      "ply\nformat ascii 1.0\nelement vertex 1200\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  for (int i = 0; i < 1200; ++i) cloud += "0.5 1.25e-1 " + std::to_string(i % 3) + ".75\n";
+  write_text(folder_.file("capture/cloud.ply"), cloud);
   const auto described = [&] {
     const maquette::Capture capture(context_, folder_.file("capture"));
     std::ostringstream text;

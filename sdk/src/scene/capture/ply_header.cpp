@@ -1,6 +1,7 @@
 #include "scene/capture/ply_header.h"
 
 #include <cmath>
+#include <locale>
 #include <optional>
 #include <sstream>
 
@@ -105,6 +106,7 @@ PlyHeader read_ply_header(FileReader& file) {
   for (int i = 0; i < kMaxLines; ++i) {
     if (!file.next_line(line, kMaxLineBytes)) break;
     std::istringstream words(line);
+    words.imbue(std::locale::classic());
     std::string keyword;
     words >> keyword;
     if (keyword == "end_header") {

@@ -39,7 +39,7 @@ typedef struct maq_frame_desc {
   int32_t width_px;
   int32_t height_px;
   const uint8_t* planes[2]; /* planes[1] only for NV12 */
-  size_t stride_bytes[2];   /* from one row to the next; 0 in maq_frame_wrap means rows without padding */
+  size_t stride_bytes[2];   /* from one row to the next, below 2 GiB; 0 in maq_frame_wrap: rows without padding */
   int64_t timestamp_ns;
   maq_clock clock;
   uint64_t sequence; /* number of the frame in its source, from 0; gaps are frames that were dropped */
@@ -57,8 +57,8 @@ MAQ_API maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_siz
  * The pixels stay the app's: they must not change or be freed until `release_callback` is called with `user_data`, or,
  * with a NULL callback, until the frame has been released. On failure the callback is not called.
  * `*frame` is the caller's: give it back with maq_frame_release.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (NULL plane, stride shorter than a row), MAQ_ERROR_IMAGE_SIZE,
- * MAQ_ERROR_UNSUPPORTED (format). Does not block. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (NULL plane, stride shorter than a row or longer than memory),
+ * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_UNSUPPORTED (format). Does not block. */
 MAQ_API maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* desc,
                                   maq_frame_release_callback release_callback, void* user_data, maq_frame** frame);
 
@@ -85,7 +85,8 @@ MAQ_API maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd);
 
 /* Copies the frame's pixels to `pixels` in `format` (RGB8, BGR8, RGBA8 or GREY8), height_px rows of `stride_bytes`
  * (0: rows without padding). `size_bytes` is the size of the caller's memory there.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory), MAQ_ERROR_UNSUPPORTED (format).
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory, a stride too long for any), MAQ_ERROR_UNSUPPORTED
+ * (format).
  * Does not block. */
 MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_format format, uint8_t* pixels,
                                          size_t stride_bytes, size_t size_bytes);

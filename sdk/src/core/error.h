@@ -1,6 +1,7 @@
 // Failure inside the library: a status and a sentence. src/api turns it into the C API's status and error text.
 #pragma once
 
+#include <locale>
 #include <new>
 #include <sstream>
 #include <stdexcept>
@@ -11,10 +12,12 @@
 
 namespace maq {
 
+// With the numbers of C, whatever the locale of the app: 1234.5, not 1.234,5.
 template <class... Parts>
 std::string concatenate(const Parts&... parts) {
   std::ostringstream text;
   text.exceptions(std::ios::badbit);  // what throws without memory, where the text would end early
+  text.imbue(std::locale::classic());
   (text << ... << parts);
   return text.str();
 }

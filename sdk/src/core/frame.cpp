@@ -1,10 +1,18 @@
 #include "core/frame.h"
 
+#include <cstdint>
 #include <cstring>
 
+#include "core/checked_arithmetic.h"
 #include "core/error.h"
 
 namespace maq {
+namespace {
+
+// Decoders and encoders of files take an int.
+constexpr size_t kMaxStrideBytes = INT32_MAX;
+
+}  // namespace
 
 uint8_t* Frame::allocate(maq_pixel_format format, int width_px, int height_px) {
   storage.resize(packed_bytes(format, width_px, height_px));
@@ -43,6 +51,12 @@ size_t row_bytes(maq_pixel_format format, int plane, int width_px) {
 
 int plane_rows(maq_pixel_format format, int plane, int height_px) {
   return format == MAQ_PIXEL_NV12 && plane == 1 ? (height_px + 1) / 2 : height_px;
+}
+
+std::optional<size_t> bytes_of_rows(size_t stride_bytes, int rows, size_t row_bytes) {
+  const std::optional<size_t> before = checked_product(stride_bytes, size_t(rows - 1));
+  const std::optional<size_t> all = before ? checked_sum(*before, row_bytes) : before;
+  return all && *all <= size_t(PTRDIFF_MAX) ? all : std::nullopt;
 }
 
 size_t packed_bytes(maq_pixel_format format, int width_px, int height_px) {
@@ -103,6 +117,13 @@ ImageView checked_image_view(const maq_frame_desc& desc) {
     if (stride < shortest) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[", plane, "] is ", stride, ", but a row of ", desc.width_px,
                   " pixels in ", pixel_format_name(desc.format), " takes ", shortest, " bytes.");
+    }
+    const int rows = plane_rows(desc.format, plane, desc.height_px);
+    const std::optional<size_t> bytes =
+        stride <= kMaxStrideBytes ? bytes_of_rows(stride, rows, shortest) : std::nullopt;
+    if (!bytes || !checked_sum(reinterpret_cast<uintptr_t>(desc.planes[plane]), uintptr_t(*bytes))) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[", plane, "] is ", stride, ", but ", rows,
+                  " rows that far apart are no image in memory; a row of it takes ", shortest, " bytes.");
     }
     view.planes[plane] = PlaneView{desc.planes[plane], stride};
   }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -94,6 +95,10 @@ int plane_count(maq_pixel_format format);
 // Bytes of pixels in a row of plane `plane`, without padding.
 size_t row_bytes(maq_pixel_format format, int plane, int width_px);
 int plane_rows(maq_pixel_format format, int plane, int height_px);
+
+// From the first row's beginning to the last row's end: the padding behind it need not be there. Nothing where it is
+// more than an array can have. `rows` is at least 1.
+std::optional<size_t> bytes_of_rows(size_t stride_bytes, int rows, size_t row_bytes);
 
 // Of an image whose rows follow one another without padding, and so do its planes.
 size_t packed_bytes(maq_pixel_format format, int width_px, int height_px);

@@ -213,11 +213,14 @@ void copy_pixels(const ImageView& image, maq_pixel_format format, uint8_t* pixel
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes is ", stride, ", but a row of ", image.width_px,
                 " pixels in ", pixel_format_name(format), " takes ", shortest, " bytes.");
   }
-  // The padding after the last row need not be there.
-  const size_t needed = stride * size_t(image.height_px - 1) + shortest;
-  if (size_bytes < needed) {
+  const std::optional<size_t> needed = bytes_of_rows(stride, image.height_px, shortest);
+  if (!needed) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes is ", stride, ", but ", image.height_px,
+                " rows that far apart fit into no memory; a row takes ", shortest, " bytes.");
+  }
+  if (size_bytes < *needed) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "size_bytes is ", size_bytes, ", but ", image.width_px, " x ",
-                image.height_px, " pixels in ", pixel_format_name(format), " take ", needed, " bytes.");
+                image.height_px, " pixels in ", pixel_format_name(format), " take ", *needed, " bytes.");
   }
   std::vector<uint8_t> memory;
   convert_rows(as_bgr(image, memory), row_from_bgr(format), pixels, stride);

@@ -1,6 +1,7 @@
 #include "nn/manifest_node.h"
 
 #include <cmath>
+#include <cstdint>
 
 namespace maq {
 
@@ -65,7 +66,9 @@ int ManifestNode::integer(int min, int max) const {
 
 int64_t ManifestNode::size() const {
   if (!value_->is_number_unsigned()) fail("is not a whole number of 0 or more");
-  return value_->get<int64_t>();
+  const auto size = value_->get<uint64_t>();
+  if (size > uint64_t(INT64_MAX)) fail("is ", size, ", more than any file has");
+  return int64_t(size);
 }
 
 }  // namespace maq

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <maquette/maquette.hpp>
+#include <optional>
+#include <string>
 #include <vector>
 
 namespace {
@@ -83,6 +86,53 @@ TEST(ApiFrames, WrongDescriptionsAreStatusesOfTheContext) {
   EXPECT_EQ(status_of([](auto& desc) { desc.format = maq_pixel_format(0); }), MAQ_ERROR_UNSUPPORTED);
   EXPECT_EQ(status_of([](auto& desc) { desc.clock = maq_clock(3); }), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(status_of([](auto& desc) { desc.struct_size = 0; }), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+// Bytes from the first row to the end of the last, modulo the largest number, are few for each of them.
+TEST(ApiFrames, AreNotCopiedWithAStrideWhoseSizeWraps) {
+  const maquette::Context context;
+  maquette::Source source(context, "stub:pattern?size=16x9");
+  const std::optional<maquette::Frame> frame = source.next();
+  const std::vector<uint8_t> untouched(16 * 9 * 4, 0xA5);
+  for (const size_t stride :
+       {SIZE_MAX, SIZE_MAX - 15, SIZE_MAX / 2, SIZE_MAX / 2 + 1, SIZE_MAX / 4 + 1, SIZE_MAX / 8 + 1, SIZE_MAX / 8}) {
+    for (const maq_pixel_format format : {MAQ_PIXEL_RGB8, MAQ_PIXEL_BGR8, MAQ_PIXEL_RGBA8, MAQ_PIXEL_GREY8}) {
+      for (const size_t size : {untouched.size(), SIZE_MAX}) {
+        std::vector<uint8_t> pixels = untouched;
+        EXPECT_EQ(maq_frame_copy_pixels(frame->get(), format, pixels.data(), stride, size), MAQ_ERROR_INVALID_ARGUMENT)
+            << stride;
+        EXPECT_NE(std::string(maq_last_error(frame->get())).find("stride_bytes is " + std::to_string(stride)),
+                  std::string::npos)
+            << maq_last_error(frame->get());
+        ASSERT_EQ(pixels, untouched);
+      }
+    }
+  }
+}
+
+TEST(ApiFrames, AreNotWrappedWithRowsThatAreInNoMemory) {
+  const maquette::Context context;
+  const std::vector<uint8_t> pixels(300);
+  const auto expect_refused = [&](const char* what, auto change) {
+    maq_frame_desc desc = desc_of(pixels, 10, 9);
+    change(desc);
+    maq_frame* frame = nullptr;
+    EXPECT_EQ(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &frame), MAQ_ERROR_INVALID_ARGUMENT) << what;
+    EXPECT_NE(std::string(maq_last_error(nullptr)).find(what), std::string::npos) << maq_last_error(nullptr);
+  };
+  // The last: no rows are that long, and codecs of files count with 31 bits.
+  for (const size_t stride : {SIZE_MAX, SIZE_MAX / 2 + 1, SIZE_MAX / 8 + 1, size_t(1) << 31}) {
+    expect_refused("stride_bytes[0] is ", [&](auto& desc) { desc.stride_bytes[0] = stride; });
+  }
+  expect_refused("stride_bytes[1] is ", [&](auto& desc) {
+    desc.format = MAQ_PIXEL_NV12;
+    desc.planes[1] = pixels.data();
+    desc.stride_bytes[1] = SIZE_MAX / 4 + 1;
+  });
+  expect_refused("stride_bytes[0] is 30", [](auto& desc) {
+    desc.planes[0] = reinterpret_cast<const uint8_t*>(UINTPTR_MAX - 100);
+    desc.stride_bytes[0] = 30;
+  });
 }
 
 TEST(ApiFrames, AreResized) {

@@ -113,6 +113,15 @@ TEST(FrameFormats, SizesOutsideTheLimitsAreRefused) {
   expect_error(MAQ_ERROR_IMAGE_SIZE, "over the limit", [] { maq::check_image_size(16384, 4097, "x"); });
 }
 
+TEST(FrameFormats, BytesOfRowsThatNoArrayHasAreNone) {
+  EXPECT_EQ(maq::bytes_of_rows(10, 1, 7), 7u);
+  EXPECT_EQ(maq::bytes_of_rows(10, 3, 7), 27u);
+  EXPECT_EQ(maq::bytes_of_rows(size_t(PTRDIFF_MAX) - 7, 2, 7), size_t(PTRDIFF_MAX));
+  EXPECT_EQ(maq::bytes_of_rows(size_t(PTRDIFF_MAX) - 6, 2, 7), std::nullopt);
+  EXPECT_EQ(maq::bytes_of_rows(SIZE_MAX, 2, 7), std::nullopt);
+  EXPECT_EQ(maq::bytes_of_rows(SIZE_MAX / 2 + 1, 3, 7), std::nullopt);
+}
+
 TEST(FrameFormats, DescriptionsAreCheckedPlaneByPlane) {
   std::vector<uint8_t> bytes(1000);
   maq_frame_desc desc{};

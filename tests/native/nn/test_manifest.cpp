@@ -72,6 +72,7 @@ TEST(Manifest, NamesTheKeyOfAMistake) {
 TEST(Manifest, RefusesValuesOutOfRange) {
   const std::pair<const char*, json> wrong[] = {{"/files/trunk.onnx/sha256", "abc"},
                                                 {"/files/trunk.onnx/bytes", -1},
+                                                {"/files/trunk.onnx/bytes", UINT64_MAX},
                                                 {"/graphs/trunk/file", "other.onnx"},
                                                 {"/graphs/trunk/inputs", "image"},
                                                 {"/format", "zip"},

@@ -1,6 +1,7 @@
 // Recordings: what goes in comes out, also after a crash, and nothing that was changed is believed.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <xxhash.h>
 
 #include <cstring>
 
@@ -172,6 +173,26 @@ TEST_F(Recordings, FramesMustGetLater) {
   EXPECT_EQ(play()->info().frame_count, 2);
 }
 
+TEST_F(Recordings, SpanAtMost31Years) {
+  constexpr int64_t kYearNs = int64_t(365) * 24 * 3600 * 1000000000;
+  maq::RecordingWriter writer(path_of(), {}, 0);
+  maq::Frame frame = frame_of(0);
+  for (const int64_t time_ns : {INT64_MIN, INT64_MIN + 31 * kYearNs}) {
+    frame.timestamp_ns = time_ns;
+    writer.add(frame);
+  }
+  for (const int64_t time_ns : {INT64_MIN + 32 * kYearNs, int64_t(0), INT64_MAX}) {
+    frame.timestamp_ns = time_ns;
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "a recording spans at most", [&] { writer.add(frame); });
+  }
+  writer.finish();
+  const auto source = play();
+  EXPECT_EQ(source->info().frame_count, 2);
+  ASSERT_EQ(source->next(0, frame), NextFrame::kFrame);
+  ASSERT_EQ(source->next(0, frame), NextFrame::kFrame);
+  EXPECT_EQ(frame.timestamp_ns, 31 * kYearNs);
+}
+
 TEST_F(Recordings, AreNeverWrittenOver) {
   record(1);
   const std::string before = read_text(path_of());
@@ -293,6 +314,32 @@ TEST_F(Recordings, WithoutAFrameLeaveNoFileInTheWayOfTheNextTry) {
     EXPECT_FALSE(std::filesystem::exists(path_of())) << most;
   }
   EXPECT_EQ(record(2).size(), 3u);
+}
+
+// Made to do harm: its checks are right.
+TEST_F(Recordings, WithAnIndexWhoseNumbersWrapAreLookedThrough) {
+  const std::vector<uint64_t> begins = record(3);
+  const std::string whole = read_text(path_of());
+  const auto with_last_entry = [&](uint64_t offset, int64_t timestamp_ns) {
+    std::string changed = whole;
+    std::vector<maq::RecordingEntry> entries(3);
+    std::memcpy(entries.data(), whole.data() + begins[3], 3 * sizeof entries[0]);
+    entries[2] = {offset, timestamp_ns};
+    maq::RecordingTail tail;
+    std::memcpy(&tail, whole.data() + whole.size() - sizeof tail, sizeof tail);
+    tail.index_check = XXH3_64bits(entries.data(), 3 * sizeof entries[0]);
+    std::memcpy(changed.data() + begins[3], entries.data(), 3 * sizeof entries[0]);
+    std::memcpy(changed.data() + changed.size() - sizeof tail, &tail, sizeof tail);
+    write_text(path_of(), changed);
+    const auto source = play();
+    EXPECT_EQ(source->info().frame_count, 3);
+    for (int i = 0; i < 3; ++i) expect_frame(*source, i);
+  };
+  const int64_t right_time_ns = frame_of(2).timestamp_ns;
+  with_last_entry(begins[2], right_time_ns);
+  with_last_entry(UINT64_MAX - sizeof(maq::FrameHead) + 1, right_time_ns);
+  with_last_entry(UINT64_MAX, right_time_ns);
+  with_last_entry(begins[2], INT64_MAX);
 }
 
 TEST_F(Recordings, OnAFullDiskEndWithAWholeFrameAndCanGoOn) {

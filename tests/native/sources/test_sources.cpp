@@ -13,6 +13,8 @@
 
 namespace {
 
+using maq::NextFrame;
+
 std::vector<uint8_t> frame_of(const std::string& uri, int index, maq::Frame* out = nullptr) {
   const auto source = maq::open_source(uri);
   maq::Frame frame;
@@ -103,6 +105,33 @@ TEST(Sources, StubsStampTheirFramesAndEndWhenAsked) {
   EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
   EXPECT_EQ(source->next(0, frame), maq::NextFrame::kEnd);
   EXPECT_EQ(maq::open_source("stub:pattern")->info().frame_count, -1);
+}
+
+TEST(Sources, TheEndOfTimeCanBeSoughtAndPlayed) {
+  maq::Frame frame;
+  for (const char* options : {"?fps=0.01", "?fps=30", "?fps=1000", "?fps=0.01&frames=1000000"}) {
+    const auto source = maq::open_source(std::string("stub:pattern") + options + "&size=4x4");
+    source->seek(INT64_MAX);
+    while (source->next(0, frame) == NextFrame::kFrame && frame.sequence % 7 != 0) EXPECT_GE(frame.timestamp_ns, 0);
+    EXPECT_LE(frame.timestamp_ns, int64_t(2e18));
+  }
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "from 1 to 10000000",
+               [] { maq::open_source("stub:pattern?fps=0.01&frames=10000001"); });
+  // Two pictures 31 years apart, as slow as can be: the first is shown.
+  const TempFolder folder;
+  {
+    maq::RecordingWriter writer(folder.file("long.maqrec"), {}, 0);
+    frame.allocate_bgr(4, 4);
+    for (const int64_t time_ns : {int64_t(0), int64_t(1e18)}) {
+      frame.timestamp_ns = time_ns;
+      writer.add(frame);
+    }
+    writer.finish();
+  }
+  const auto source = maq::open_source("rec:" + folder.file("long.maqrec") + "?live=1&loop=1&speed=0.01");
+  EXPECT_EQ(source->next(int64_t(2e10), frame), NextFrame::kFrame);
+  source->seek(INT64_MAX);
+  EXPECT_EQ(source->next(int64_t(2e10), frame), NextFrame::kFrame);
 }
 
 TEST(Sources, AnImageIsOneFrameAtTheSizeAskedFor) {

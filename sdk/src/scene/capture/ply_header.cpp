@@ -1,6 +1,7 @@
 #include "scene/capture/ply_header.h"
 
 #include <cmath>
+#include <locale>
 #include <optional>
 #include <sstream>
 
@@ -106,6 +107,7 @@ PlyHeader read_ply_header(FileReader& file) {
     if (!file.next_line(line, kMaxLineBytes)) break;
     std::istringstream words(line);
     words.exceptions(std::ios::badbit);  // without memory
+    words.imbue(std::locale::classic());
     std::string keyword;
     words >> keyword;
     if (keyword == "end_header") {

@@ -1,6 +1,7 @@
 #include "sources/depthai/depthai_inbox.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 
 #include "core/clock.h"
@@ -19,7 +20,8 @@ bool has_its_bytes(const DepthAiFrame& frame) {
   if (frame.data == nullptr || frame.stride_bytes < row || frame.stride_bytes > kMaxStrideRows * row) return false;
   // The padding behind the last row may be missing.
   const auto plane_bytes = [&](int plane) {
-    return frame.stride_bytes * size_t(plane_rows(format, plane, height_px) - 1) + row_bytes(format, plane, width_px);
+    return bytes_of_rows(frame.stride_bytes, plane_rows(format, plane, height_px), row_bytes(format, plane, width_px))
+        .value_or(SIZE_MAX);
   };
   if (plane_bytes(0) > frame.size_bytes) return false;
   if (plane_count(format) == 1) return true;

@@ -95,11 +95,11 @@ void LibcameraCamera::make_slot(libcamera::FrameBuffer& buffer) {
     const size_t index = planes.size() == 1 ? 0 : size_t(plane);
     const size_t rows = size_t(plane_rows(format_.pixels, plane, format_.height_px));
     const size_t row = row_bytes(format_.pixels, plane, format_.width_px);
-    const size_t needed = stride_bytes_ * (rows - 1) + row;
+    const size_t needed = bytes_of_rows(stride_bytes_, int(rows), row).value_or(SIZE_MAX);
     const size_t length = index < planes.size() ? planes[index].length : 0;
-    if (row > stride_bytes_ || length < before + needed) {
-      refuse_camera(label_, concatenate("has ", length, " bytes in plane ", index, " of its buffers, and ",
-                                        before + needed, " are needed"));
+    if (row > stride_bytes_ || before > length || needed > length - before) {
+      refuse_camera(label_, concatenate("has ", length, " bytes in plane ", index, " of its buffers, and ", needed,
+                                        " behind ", before, " are needed"));
     }
     slot.planes[plane] = {map(slot, planes[index]) + before, stride_bytes_};
     slot.size_bytes += needed;
@@ -120,8 +120,8 @@ const uint8_t* LibcameraCamera::map(Slot& slot, const libcamera::FrameBuffer::Pl
     slot.mappings.push_back({plane.fd, data, size_t(size)});
     mapping = slot.mappings.end() - 1;
   }
-  if (plane.offset == libcamera::FrameBuffer::Plane::kInvalidOffset ||
-      size_t(plane.offset) + plane.length > mapping->size_bytes) {
+  if (plane.offset == libcamera::FrameBuffer::Plane::kInvalidOffset || plane.offset > mapping->size_bytes ||
+      plane.length > mapping->size_bytes - plane.offset) {
     refuse_camera(
         label_, concatenate("has ", plane.length, " bytes at ", plane.offset, " of a buffer of ", mapping->size_bytes));
   }

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "core/checked_arithmetic.h"
 #include "core/error.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
@@ -20,6 +21,11 @@ namespace {
 bool is_allowed_size(int64_t width_px, int64_t height_px) {
   return width_px >= 1 && height_px >= 1 && width_px <= MAQ_MAX_SIDE_PX && height_px <= MAQ_MAX_SIDE_PX &&
          width_px * height_px <= MAQ_MAX_PIXELS;
+}
+
+// Later than `first`, and not so much that differences of times would not fit.
+bool is_within_span(int64_t time_ns, int64_t first_ns) {
+  return time_ns >= first_ns && uint64_t(time_ns) - uint64_t(first_ns) <= uint64_t(kMaxSpanNs);
 }
 
 // Whether this is the head of a frame, and its values agree.
@@ -132,9 +138,11 @@ bool RecordingReader::read_index() {
   if (!read_at(tail.index_offset, entries.data(), index_bytes)) return false;
   if (tail.index_check != XXH3_64bits(entries.data(), index_bytes)) return false;
   for (size_t i = 0; i < entries.size(); ++i) {
-    if (entries[i].offset < first_offset_ || entries[i].offset + sizeof(FrameHead) > tail.index_offset) return false;
+    const auto end_of_head = checked_sum<uint64_t>(entries[i].offset, sizeof(FrameHead));
+    if (entries[i].offset < first_offset_ || !end_of_head || *end_of_head > tail.index_offset) return false;
     if (i > 0 && entries[i].offset <= entries[i - 1].offset) return false;
     if (i > 0 && entries[i].timestamp_ns <= entries[i - 1].timestamp_ns) return false;
+    if (!is_within_span(entries[i].timestamp_ns, entries[0].timestamp_ns)) return false;
   }
   entries_ = std::move(entries);
   return true;
@@ -148,7 +156,8 @@ void RecordingReader::scan_for_frames() {
     FrameHead head{};
     if (!read_at(offset, &head, sizeof head)) return;
     if (is_valid(head) && whole_bytes(head) <= size_bytes_ - offset) {
-      if (entries_.empty() || head.timestamp_ns > entries_.back().timestamp_ns) {
+      if (entries_.empty() || (head.timestamp_ns > entries_.back().timestamp_ns &&
+                               is_within_span(head.timestamp_ns, entries_[0].timestamp_ns))) {
         entries_.push_back({offset, head.timestamp_ns});
       }
       offset += whole_bytes(head);

@@ -98,6 +98,10 @@ void RecordingWriter::add(const Frame& frame) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The frame is of ", frame.timestamp_ns, " ns, but the one before it of ",
                 entries_.back().timestamp_ns, " ns: frames must get later.");
   }
+  if (!entries_.empty() && uint64_t(frame.timestamp_ns) - uint64_t(entries_[0].timestamp_ns) > uint64_t(kMaxSpanNs)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The frame is of ", frame.timestamp_ns, " ns, but the first of ", path_,
+                " of ", entries_[0].timestamp_ns, " ns: a recording spans at most ", kMaxSpanNs, " ns.");
+  }
   const ImageView& image = frame.image;
   FrameHead head{};
   head.magic = kFrameMagic;

@@ -17,6 +17,9 @@ using Clock = MonotonicClock;
 using std::chrono::nanoseconds;
 
 constexpr double kStillFps = 30;  // of a single image, which is repeated
+constexpr double kMaxNs = 1e18;   // 31 years: sums of a few of these fit
+
+nanoseconds limited_ns(double ns) { return nanoseconds(int64_t(std::min(ns, kMaxNs))); }
 
 // The source, and when each of its frames is due.
 class ReplaySchedule {
@@ -58,8 +61,9 @@ class ReplaySchedule {
     } else {
       ++last_sequence_;
     }
-    if (!begin_) begin_ = Clock::now() - nanoseconds(int64_t(double(last_ns_) / options_.speed));
-    return Next{*begin_ + nanoseconds(int64_t(double(last_ns_) / options_.speed)), uint32_t(last_sequence_), damaged};
+    const nanoseconds after_begin = limited_ns(double(last_ns_) / options_.speed);
+    if (!begin_) begin_ = Clock::now() - after_begin;
+    return Next{*begin_ + after_begin, uint32_t(last_sequence_), damaged};
   }
 
   bool can_seek() const { return can_seek_; }
@@ -94,7 +98,7 @@ class ReplayCamera : public Camera {
     format_.width_px = schedule_->info().width_px;
     format_.height_px = schedule_->info().height_px;
     format_.fps = schedule_->fps();
-    max_delay_ = nanoseconds(int64_t(buffers * 1e9 / format_.fps));
+    max_delay_ = limited_ns(buffers * 1e9 / format_.fps);
   }
 
   const CameraFormat& format() const override { return format_; }

@@ -10,7 +10,7 @@ namespace maq {
 namespace {
 
 constexpr double kDefaultFps = 30;
-constexpr int64_t kMaxFrames = int64_t(1) << 40;
+constexpr double kMaxLengthS = 1e9;  // nanoseconds of it fit
 
 // Seven bars of 75 % intensity in the usual order, moving to the left, above a grey ramp.
 void draw_pattern(int64_t index, double fps, Frame& frame) {
@@ -40,7 +40,8 @@ class StubSource : public Source {
     info_.width_px = uri.width_px > 0 ? uri.width_px : 640;
     info_.height_px = uri.height_px > 0 ? uri.height_px : 480;
     info_.fps = uri.fps > 0 ? uri.fps : kDefaultFps;
-    info_.frame_count = uri.take_integer("frames", -1, 1, kMaxFrames);
+    max_frames_ = int64_t(kMaxLengthS * info_.fps);
+    info_.frame_count = uri.take_integer("frames", -1, 1, max_frames_);
     if (shows_people) {
       const int count = int(uri.take_integer("count", 2, 0, 30));
       const uint64_t seed = uint64_t(uri.take_integer("seed", 1, 0, INT64_MAX));
@@ -56,7 +57,7 @@ class StubSource : public Source {
   bool can_seek() const override { return true; }
   void seek(int64_t time_ns) override {
     const double index = std::ceil(double(time_ns) / 1e9 * info_.fps - 1e-6);
-    index_ = int64_t(std::min(index, double(info_.frame_count < 0 ? kMaxFrames : info_.frame_count)));
+    index_ = int64_t(std::min(index, double(info_.frame_count < 0 ? max_frames_ : info_.frame_count)));
   }
 
   NextFrame next(int64_t, Frame& frame) override {
@@ -77,6 +78,7 @@ class StubSource : public Source {
  private:
   SourceInfo info_;
   std::unique_ptr<StubPeople> people_;
+  int64_t max_frames_ = 0;
   int64_t index_ = 0;
 };
 

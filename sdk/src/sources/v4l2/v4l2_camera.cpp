@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/checked_arithmetic.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "sources/camera_errors.h"
@@ -267,7 +268,7 @@ class V4l2Camera final : public Camera {
     format_.height_px = agreed.height_px;
     memory_bytes_[0] = memory_bytes_[1] = 1;
     if (format_.jpeg) return;
-    size_t whole_bytes = 0;
+    std::optional<size_t> whole_bytes = 0;
     for (int plane = 0; plane < plane_count(format_.pixels); ++plane) {
       const size_t row = row_bytes(format_.pixels, plane, format_.width_px);
       // Planes in the same memory have the same stride.
@@ -276,10 +277,13 @@ class V4l2Camera final : public Camera {
       if (stride_bytes_[plane] < row || stride_bytes_[plane] > 16 * row) {
         device_->fail(concatenate("answered with lines of ", said, " bytes for ", format_.width_px, " pixels"), EINVAL);
       }
-      memory_bytes_[plane] = stride_bytes_[plane] * size_t(plane_rows(format_.pixels, plane, format_.height_px));
-      whole_bytes += memory_bytes_[plane];
+      const auto bytes =
+          checked_product(stride_bytes_[plane], size_t(plane_rows(format_.pixels, plane, format_.height_px)));
+      if (whole_bytes) whole_bytes = bytes ? checked_sum(*whole_bytes, *bytes) : bytes;
+      if (!whole_bytes) device_->fail(concatenate("answered with lines of ", said, " bytes, too many to map"), EINVAL);
+      memory_bytes_[plane] = *bytes;
     }
-    if (known_->memory_planes == 1) memory_bytes_[0] = whole_bytes;
+    if (known_->memory_planes == 1) memory_bytes_[0] = *whole_bytes;
   }
 
   void set_rate(double fps) {

@@ -27,7 +27,7 @@
  * - Yes or no is an int32_t, 1 or 0. Fields and parameters with values of an enum have the enum's
  *   type, 4 bytes.
  * - Units are in the names: _px, _ms, _ns, _m, _bytes. Texts are UTF-8 and end with a zero byte.
- * - Files that are saved appear whole or not at all, in folders that exist. Of a symbolic link, the file that it leads
+ * - Files that are saved appear atomically, in folders that exist. Of a symbolic link, the file that it leads
  *   to is replaced; a character device, a pipe or /dev/stdout gets the whole at once (clips and recordings need files).
  * - No C++ exception leaves the library, and it never ends the process: nor do the signals of a full disk or of a pipe
  *   without a reader (SIGXFSZ, SIGPIPE) while it writes.

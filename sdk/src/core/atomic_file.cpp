@@ -53,7 +53,7 @@ std::string without_links(std::string path) {
   return path;
 }
 
-// Nobody can put something in its place beforehand.
+// Unpredictable, so that no other program can put something in its place beforehand.
 std::string random_digits() {
   std::random_device random;
   char digits[17];

@@ -1,4 +1,4 @@
-// Writes that fail by an error alone: a limit on file sizes (SIGXFSZ) and a pipe that nobody reads (SIGPIPE) would
+// Writes that fail by an error alone: a limit on file sizes (SIGXFSZ) and a pipe without a reader (SIGPIPE) would
 // also end the process, and its signal handlers are not the library's to set.
 #pragma once
 
@@ -19,7 +19,7 @@ class BlockedWriteSignals {
     sigset_t pending;
     sigpending(&pending);
     for (const int number : {SIGXFSZ, SIGPIPE}) {
-      if (sigismember(&pending, number) == 1) sigdelset(&ours_, number);  // somebody else's, which stays pending
+      if (sigismember(&pending, number) == 1) sigdelset(&ours_, number);  // of another cause; it stays pending
     }
     pthread_sigmask(SIG_BLOCK, &ours_, &before_);
   }

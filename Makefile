@@ -54,6 +54,16 @@ test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2
 test-camera-vm: packages-test build  ## camera tests on a real kernel in qemu, with test cameras; part of `test`
 	@tests/camera_vm/run.sh
 
+.PHONY: test-hostile
+test-hostile: packages-test build  ## some 4,000 hostile inputs to the built program: crashes, hangs, unclear errors; not part of `test`
+	@scripts/make-venv.sh
+	@.venv/bin/python -m tests.hostile --json build/hostile.json
+
+.PHONY: test-newcomer
+test-newcomer:  ## the commands of README.md in a bare Debian, from top to bottom; needs root; not part of `test`
+	@scripts/install-packages.sh newcomer
+	@$(PYTHON) -m tests.newcomer
+
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench

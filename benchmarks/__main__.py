@@ -23,8 +23,9 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import cameras, frame_time, gates, report, scenes, start, window
-from benchmarks.scene_command import SceneCommandError
+from benchmarks import cameras, frame_time, gates, report, start, window
+from benchmarks.scenes import measure as scenes
+from benchmarks.scenes.command import SceneCommandError
 from export.evaluation.maquette_api import MaquetteError
 from export.shards import read_images, shard_paths
 

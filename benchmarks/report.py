@@ -11,13 +11,15 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section, scene_pictures, scene_section, start, window
+from benchmarks import camera_section, start, window
+from benchmarks.scenes import pictures as scene_pictures
+from benchmarks.scenes import section as scene_section
 from benchmarks.sweep import pareto
 
 STAGES = ("capture", "preprocess", "trunk", "proposals", "box_head", "dense_head", "decode")
 COLOURS = {"shipped": "black", "precision": "tab:red", "input size": "tab:blue", "proposals": "tab:green",
            "key frames": "tab:orange", "min. person": "tab:purple", "detail": "tab:brown",
-           "together": "tab:cyan"}  # fmt: skip
+           "together": "tab:cyan", "crops": "tab:pink"}  # fmt: skip
 
 
 def write(document: dict, folder: Path) -> list[Path]:

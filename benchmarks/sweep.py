@@ -46,6 +46,15 @@ def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 320, 384)) -> li
     made += [Setting(f"{n} proposals", "proposals", options={"max_proposals": n}) for n in (10, 25, 100)]
     made += [Setting(f"key frame every {n}", "key frames", options={"key_frame_interval": n}) for n in (2, 4, 8)]
     made += [Setting(f"no person below {n} px", "min. person", options={"min_person_height_px": n}) for n in (64, 128)]
+    made += [
+        Setting(f"crops of {who}, {side} px", "crops", options={"person_crops": k, "person_crop_px": side})
+        for k, who in ((1, "the small and leaning"), (2, "all"))
+        for side in (192, 256)
+    ]
+    for side, frames in ((224, 1), (384, 1), (288, 2), (288, 4), (288, 8)):
+        options = {"person_crops": 2, "long_side_px": side, "key_frame_interval": frames}
+        often = f", key frame every {frames}" if frames > 1 else ""
+        made.append(Setting(f"{side} px, crops of all{often}", "crops", options=options))
     made.append(Setting("parts alone", "detail", options={"detail": 1}))
     for side, proposals in ((224, 25), (192, 25), (160, 10)):
         options = {"long_side_px": side, "max_proposals": proposals, "key_frame_interval": 4}

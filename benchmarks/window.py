@@ -20,8 +20,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from benchmarks import scene_command
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
+from benchmarks.scenes import command as scene_command
 
 FIGURES = ("live_first_result_ms", "live_next_result_ms", "live_lost_ms", "live_back_ms", "live_scene_ms",
            "demo_longest_ms")  # fmt: skip

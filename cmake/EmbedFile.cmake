@@ -5,7 +5,7 @@ if(EXISTS "${INPUT}")
   string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
   string(REGEX REPLACE "(0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,0x..,)" "\\1\n"
     bytes "${bytes}")
-  set(array "const uint8_t kBytes[] = {\n${bytes}};\n")
+  set(array "  static const uint8_t kBytes[] = {\n${bytes}};\n")
   set(value "{kBytes, sizeof kBytes}")
 else()
   set(array "")
@@ -14,10 +14,10 @@ endif()
 file(WRITE "${OUTPUT}" "#include \"${HEADER}\"
 
 namespace maq {
-namespace {
-${array}}  // namespace
 
-EmbeddedFile ${FUNCTION}() { return ${value}; }
+EmbeddedFile ${FUNCTION}() {
+${array}  return ${value};
+}
 
 }  // namespace maq
 ")

@@ -1,4 +1,4 @@
-# maq_turbojpeg: libjpeg-turbo, which decodes the frames of cameras that send JPEG and the sprites of stub:people.
+# maq_turbojpeg: libjpeg-turbo, which decodes JPEG images: photos, frames of cameras, the sprites of stub:people.
 find_path(maq_turbojpeg_INCLUDE_DIR turbojpeg.h)
 find_library(maq_turbojpeg_FILE turbojpeg)
 mark_as_advanced(maq_turbojpeg_INCLUDE_DIR maq_turbojpeg_FILE)

@@ -1,10 +1,11 @@
 """Runs clang-tidy on the C++ sources of a build, on every processor, and only where something changed.
 
-    python scripts/clang_tidy.py [--build build/release] FILE...
+    python scripts/clang_tidy.py [--build build/release] FILE...        (in the project's root)
 
 A file is checked again when it, a header it includes, its compile command, .clang-tidy or clang-tidy itself changed:
-the stamps under BUILD/clang-tidy hold the hashes of a clean run. Files that the build does not compile are named and
-left out. Exit status 1 when clang-tidy has something to say.
+the stamps under ~/.cache/maquette/clang-tidy (XDG_CACHE_HOME is obeyed) hold the hashes of a clean run, for all
+checkouts of this machine. Files that the build does not compile are named and left out. Exit status 1 when clang-tidy
+has something to say.
 """
 
 from __future__ import annotations
@@ -14,12 +15,18 @@ import functools
 import hashlib
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+
+
+def cache_folder() -> Path:
+    """Where this user's programs keep what can be made again."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "maquette"
 
 
 @functools.cache
@@ -49,43 +56,56 @@ class Compilation:
 
 
 def compilations(build: Path) -> dict[Path, Compilation]:
-    """The commands of a build by source, without a compiler cache before them."""
+    """The commands of a build by source, without a compiler cache before them. Sources that CMake compiles several as
+    one (UNITY_BUILD) are checked one by one: the analyzer follows only what is in the file itself."""
     found = {}
     for entry in json.loads((build / "compile_commands.json").read_text()):
         words = shlex.split(entry["command"])
-        if Path(words[0]).name == "ccache":
-            words = words[1:]
-        source = Path(entry["file"]).resolve()
-        found[source] = Compilation(source, Path(entry["directory"]), tuple(words))
+        cache = next((i for i, word in enumerate(words) if Path(word).name == "ccache"), -1)
+        words = words[cache + 1 :]
+        file = Path(entry["file"])
+        sources = [file]
+        if file.parent.name == "Unity":
+            sources = [Path(name) for name in re.findall(r'^#include "(.+)"$', file.read_text(), re.MULTILINE)]
+        for source in sources:
+            command = tuple(str(source) if word == entry["file"] else word for word in words)
+            found[source.resolve()] = Compilation(source.resolve(), Path(entry["directory"]), command)
     return found
 
 
 class Checker:
-    """Checks sources and remembers the clean ones in `stamps`."""
+    """Checks sources and remembers the clean ones in `stamps`, by paths that do not tell where the checkout is."""
 
-    def __init__(self, build: Path, stamps: Path):
-        self.build, self.stamps = build, stamps
+    def __init__(self, stamps: Path, root: Path):
+        self.stamps, self.root = stamps, root
         stamps.mkdir(parents=True, exist_ok=True)
         self.version = subprocess.run(["clang-tidy", "--version"], capture_output=True, text=True, check=True).stdout
 
     def stamp(self, compilation: Compilation) -> Path:
         settings = [hash_of(folder / ".clang-tidy") for folder in compilation.source.parents]
         key = "\0".join([self.version, *settings, str(compilation.source), *compilation.words])
+        key = key.replace(str(self.root), ".")
         return self.stamps / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
 
     def is_known_clean(self, compilation: Compilation) -> bool:
         stamp = self.stamp(compilation)
         if not stamp.is_file():
             return False
-        return all(hash_of(Path(path)) == wanted for path, wanted in json.loads(stamp.read_text()).items())
+        return all(hash_of(self.root / path) == wanted for path, wanted in json.loads(stamp.read_text()).items())
 
     def check(self, compilation: Compilation) -> str:
         """What clang-tidy says of a source; nothing when it is clean."""
         if self.is_known_clean(compilation):
             return ""
-        hashes = {str(path): hash_of(path) for path in compilation.dependencies()}
-        command = ["clang-tidy", "-p", str(self.build), "--quiet", "--warnings-as-errors=*", str(compilation.source)]
-        ran = subprocess.run(command, capture_output=True, text=True)
+        paths = [Path(os.path.normpath(path)) for path in compilation.dependencies()]
+        hashes = {
+            str(path.relative_to(self.root) if path.is_relative_to(self.root) else path): hash_of(path)
+            for path in paths
+        }
+        command = ["clang-tidy", "--quiet", "--warnings-as-errors=*", str(compilation.source)]
+        ran = subprocess.run(
+            [*command, "--", *compilation.words[1:]], cwd=compilation.folder, capture_output=True, text=True
+        )
         if ran.returncode == 0:
             self.stamp(compilation).write_text(json.dumps(hashes))
             return ""
@@ -102,7 +122,7 @@ def main(arguments: list[str]) -> int:
     for path in wanted:
         if path not in known:
             print(f"not checked: {path}, which {options.build} does not compile")
-    checker = Checker(options.build, options.build / "clang-tidy")
+    checker = Checker(cache_folder() / "clang-tidy", Path.cwd())
     failed = 0
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for text in pool.map(checker.check, [known[path] for path in wanted if path in known]):

@@ -7,15 +7,16 @@
 #   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (120 MB)
 #   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (35 MB)
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
+#   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,11s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,12s/^# \{0,1\}//p' "$0"; }
 
 group="${1:-}"
 case "$group" in
-    demo | desktop | test | isa | camera-vm | lint) ;;
+    demo | desktop | test | isa | camera-vm | lint | newcomer) ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
 esac
@@ -42,6 +43,7 @@ needs_package nlohmann-json3-dev
 needs_package libcli11-dev
 for module in core imgproc imgcodecs videoio; do needs_package "libopencv-$module-dev"; done
 needs_package libturbojpeg0-dev
+needs_package libpng-dev
 needs_package libxxhash-dev
 needs_package ca-certificates
 
@@ -52,6 +54,7 @@ if [ "$group" != demo ]; then
 fi
 if [ "$group" != demo ] && [ "$group" != desktop ]; then
     needs_command git git
+    needs_command ccache ccache       # what was compiled in another checkout is not compiled again
     needs_package libgtest-dev
     needs_package libgmock-dev
     needs_package libcamera-dev       # without it the SDK is built without libcamera: cameras
@@ -81,6 +84,7 @@ if [ "$group" = lint ]; then
     needs_command clang-format clang-format
     needs_command clang-tidy clang-tidy
 fi
+[ "$group" != newcomer ] || needs_command debootstrap debootstrap
 
 [ ${#missing[@]} -eq 0 ] && exit 0
 
@@ -91,9 +95,9 @@ if [ "$(id -u)" -ne 0 ]; then
         echo "Install them as root (apt-get install ${missing[*]}) and run make again." >&2
         exit 1
     fi
-    as_root=(sudo)
+    as_root=(sudo env DEBIAN_FRONTEND=noninteractive)
 fi
 echo "Installing Debian packages: ${missing[*]}"
-export DEBIAN_FRONTEND=noninteractive
+export DEBIAN_FRONTEND=noninteractive  # sudo passes nothing on
 "${as_root[@]}" apt-get update -qq
 "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null

@@ -12,7 +12,8 @@
 namespace {
 
 constexpr char kRenderedPeople[] = "stub:people?count=2";
-constexpr const char* kStages[] = {"trunk", "proposals", "box head", "dense head", "decode", "resize", "copy", "wait"};
+constexpr const char* kStages[] = {"trunk",  "proposals", "box head", "dense head", "crops",
+                                   "decode", "resize",    "copy",     "wait"};
 constexpr const char* kStateNames[] = {"stopped", "opening",      "loading", "running", "paused",
                                        "stalled", "reconnecting", "ended",   "failed"};
 
@@ -67,7 +68,7 @@ bool PeopleView::update() {
   if (!frames_.take()) return false;
   painter_.set_frame(frame());
   const maq_densepose_stats& s = frame().stats;
-  stages_.add({s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.decode_ms, s.preprocess_ms,
+  stages_.add({s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms, s.preprocess_ms,
                float(frame().copying_ms), float(frame().waiting_ms)});
   return true;
 }
@@ -201,6 +202,11 @@ void PeopleView::draw_model_options() {
   bool parts_alone = model_.detail == MAQ_DENSEPOSE_DETAIL_PART;
   if (ImGui::Checkbox("parts alone, no U and V", &parts_alone)) {
     model_.detail = parts_alone ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
+    changed = true;
+  }
+  int crops = int(model_.person_crops);
+  if (ImGui::Combo("crops of people", &crops, "off\0small or leaning\0all\0")) {
+    model_.person_crops = maq_person_crops(crops);
     changed = true;
   }
   changed |= ImGui::CheckboxFlags("threads stay awake", &model_.allow_spinning, 1);

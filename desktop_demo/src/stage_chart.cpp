@@ -10,7 +10,7 @@ namespace {
 constexpr size_t kMaxFrames = 200;
 constexpr ImU32 kColours[] = {IM_COL32(88, 140, 232, 255),  IM_COL32(80, 200, 200, 255), IM_COL32(100, 200, 110, 255),
                               IM_COL32(236, 190, 70, 255),  IM_COL32(240, 130, 60, 255), IM_COL32(214, 90, 110, 255),
-                              IM_COL32(170, 110, 210, 255), IM_COL32(110, 110, 118, 255)};
+                              IM_COL32(170, 110, 210, 255), IM_COL32(150, 120, 90, 255), IM_COL32(110, 110, 118, 255)};
 
 }  // namespace
 

@@ -7,7 +7,7 @@
 
 class StageChart {
  public:
-  using Times = std::array<float, 8>;
+  using Times = std::array<float, 9>;
 
   void add(const Times& times_ms);
   void clear() { times_ms_.clear(); }

@@ -11,11 +11,11 @@ from export.captures.plane_sweep import GreyView, depth_of
 from export.captures.structure import CaptureError
 from export.point_cloud import evenly_spread
 
-POINTS = 200_000
+POINTS = 200_000  # this and the witnesses by the table in docs/scenes.md
 NEIGHBOURS = 4
 _BEST_ANGLE, _ANGLE_WIDTH = 10.0, 8.0  # degrees between two cameras and a point
 _AGREEMENT = 0.01  # of depth
-_WITNESSES = 2  # other depth maps that must agree
+WITNESSES = 2  # other depth maps that must agree
 
 
 def neighbours_of(k: int, cameras: list[Camera], seen: list[set[int]], places: dict[int, np.ndarray]) -> list[int]:
@@ -33,17 +33,17 @@ def neighbours_of(k: int, cameras: list[Camera], seen: list[set[int]], places: d
     return sorted(scores, key=scores.get, reverse=True)[:NEIGHBOURS]
 
 
-def dense_cloud(
+def depth_maps(
     cameras: list[Camera],
     images: list[np.ndarray],
     masks: list[np.ndarray],
     seen: list[set[int]],
     places: dict[int, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Points float32 [P, 3] and colours uint8 [P, 3], red first.
+) -> list[np.ndarray]:
+    """Depth of each photo, float32 [H, W], along the optical axis; 0: unknown.
 
     images: uint8 [H, W, 3], blue first; masks: bool [H, W]; seen: numbers of the sparse points in each photo;
-    places: of those, [3]. Raises CaptureError where hardly a point is found.
+    places: of those, [3].
     """
     greys = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32) for image in images]
     views = [GreyView(*three) for three in zip(cameras, greys, masks, strict=True)]
@@ -57,18 +57,33 @@ def dense_cloud(
         along = (sparse - view.camera.centre) @ view.camera.rotation[2]
         near, far = np.quantile(along, (0.01, 0.99)) * (0.9, 1.1)
         depths.append(depth_of(view, others, float(near), float(far)))
+    return depths
+
+
+def fused(
+    cameras: list[Camera],
+    images: list[np.ndarray],
+    depths: list[np.ndarray],
+    max_points: int = POINTS,
+    min_witnesses: int = WITNESSES,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The points that a photo and at least so many others have at one depth: float32 [P, 3] and colours uint8 [P, 3],
+    red first.
+
+    Raises CaptureError where hardly a point is found.
+    """
     xyz, rgb = [], []
-    for k, view in enumerate(views):
+    for k, camera in enumerate(cameras):
         y, x = np.nonzero(depths[k])
-        points = _lifted(view.camera, x, y, depths[k][y, x])
-        witnesses = sum(_agrees(points, views[j].camera, depths[j]) for j in range(len(views)) if j != k)
-        agreed = np.broadcast_to(witnesses >= _WITNESSES, len(points))
+        points = _lifted(camera, x, y, depths[k][y, x])
+        witnesses = sum(_agrees(points, cameras[j], depths[j]) for j in range(len(cameras)) if j != k)
+        agreed = np.broadcast_to(witnesses >= min_witnesses, len(points))
         xyz.append(points[agreed])
         rgb.append(images[k][y[agreed], x[agreed]][:, ::-1])
     xyz, rgb = np.concatenate(xyz), np.concatenate(rgb)
     if len(xyz) < 1000:
         raise CaptureError(f"Only {len(xyz)} points were found that several photos agree on.")
-    xyz, rgb = evenly_spread(xyz, rgb, POINTS, np.random.default_rng(0))
+    xyz, rgb = evenly_spread(xyz, rgb, max_points, np.random.default_rng(0))
     return xyz.astype(np.float32), np.ascontiguousarray(rgb)
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from export.camera import Camera
-from export.captures.dense import dense_cloud
+from export.captures.dense import POINTS, WITNESSES, depth_maps, fused
 from export.captures.originals import Original
 from export.captures.structure import pose, up_of_cameras, write_photos
 from export.photos.packages import load_packages
@@ -21,16 +22,48 @@ HELD_OUT_EVERY = 8
 _TO_OPENGL = np.diag([1.0, -1.0, -1.0])
 
 
-def make(original: Original, folder: Path) -> tuple[int, int, int]:
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """What a cloud is made of: cameras, photos uint8 [H, W, 3], blue first, and depth maps, without those held out.
+    turn, scale, middle: from COLMAP's world to the capture's."""
+
+    cameras: list[Camera]
+    images: list[np.ndarray]
+    depths: list[np.ndarray]
+    turn: np.ndarray
+    scale: float
+    middle: np.ndarray
+
+    def write_clouds(self, folder: Path, xyz: np.ndarray, rgb: np.ndarray) -> None:
+        """Of the capture, and in COLMAP's own world."""
+        write_ply(folder / "cloud.ply", xyz, rgb)
+        in_model = ((xyz @ self.turn) / self.scale + self.middle).astype(np.float32)
+        write_ply(folder / "model/fused.ply", in_model, rgb)
+
+
+def make(
+    original: Original, folder: Path, max_points: int = POINTS, min_witnesses: int = WITNESSES
+) -> tuple[int, int, int]:
     """Writes the folder atomically; gives the numbers of photos, of those posed, and of points.
 
     Raises PackageError and CaptureError.
     """
+    partial = folder.with_name(f".{folder.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    photos, posed, sources = pose_and_sweep(original, partial)
+    xyz, rgb = fused(sources.cameras, sources.images, sources.depths, max_points, min_witnesses)
+    sources.write_clouds(partial, xyz, rgb)
+    shutil.rmtree(folder, ignore_errors=True)
+    partial.rename(folder)
+    return photos, posed, len(xyz)
+
+
+def pose_and_sweep(original: Original, partial: Path) -> tuple[int, int, Sources]:
+    """Writes all of the folder but its clouds; gives the numbers of photos and of those posed, and what clouds are made
+    of. Raises PackageError and CaptureError."""
     import pycolmap  # of the extra `captures`
 
     photos = original.photos()
-    partial = folder.with_name(f".{folder.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
     colmap = partial / "model"
     write_photos(photos, colmap, original.alone)
     model = pose(colmap, os.cpu_count() or 1)
@@ -47,9 +80,8 @@ def make(original: Original, folder: Path) -> tuple[int, int, int]:
     masks = [_flat_mask(colmap, model, view.name, camera) for view, camera in zip(views, cameras, strict=True)]
     held_out = [k for k in range(len(views)) if k % HELD_OUT_EVERY == HELD_OUT_EVERY // 2]
     sources = [k for k in range(len(views)) if k not in held_out]
-    xyz, rgb = dense_cloud(*([part[k] for k in sources] for part in (cameras, images, masks, seen)), places)
-    write_ply(partial / "cloud.ply", xyz, rgb)
-    write_ply(colmap / "fused.ply", ((xyz @ turn) / scale + middle).astype(np.float32), rgb)
+    of_sources = [[part[k] for k in sources] for part in (cameras, images, masks, seen)]
+    depths = depth_maps(*of_sources, places)
     (flat / "images").rename(partial / "images")
     shutil.rmtree(flat)
     shutil.rmtree(colmap / "masks")
@@ -68,9 +100,7 @@ def make(original: Original, folder: Path) -> tuple[int, int, int]:
         "reprojection_error_px": float(model.compute_mean_reprojection_error()),
     }
     (partial / "transforms.json").write_text(json.dumps(table, indent=1) + "\n")
-    shutil.rmtree(folder, ignore_errors=True)
-    partial.rename(folder)
-    return len(photos), len(views), len(xyz)
+    return len(photos), len(views), Sources(of_sources[0], of_sources[1], depths, turn, scale, middle)
 
 
 def _camera(view) -> Camera:

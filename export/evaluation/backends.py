@@ -5,6 +5,8 @@ A backend is written `kind` or `kind=path`:
     torch=CHECKPOINT   the networks as they were trained
     onnx=BUNDLE        the exported graphs, run by ONNX Runtime with the Python reference of decoding
     capi=BUNDLE        what an app gets: libmaquette through its C API
+
+Fields of maq_densepose_config may follow capi: `capi?person_crops=1&long_side_px=384`.
 """
 
 from __future__ import annotations
@@ -121,14 +123,16 @@ class CApiBackend:
 
     kind = "capi"
 
-    def __init__(self, path: Path, score_floor: float) -> None:
+    def __init__(self, path: Path, score_floor: float, **settings: int) -> None:
         from export.evaluation.maquette_api import DensePose
 
         manifest = read_manifest(path)
         self.path = path
         self.precision = manifest["precision"]
         self.threshold = manifest["box_head"]["score_threshold"]
-        self._densepose = DensePose(path, score_threshold=score_floor)
+        self._densepose = DensePose(path, score_threshold=score_floor, **settings)
+        if settings:  # tables name columns by the kind
+            self.kind = "capi?" + "&".join(f"{name}={value}" for name, value in settings.items())
 
     def predict(self, image: np.ndarray) -> Prediction:
         result = self._densepose.run(image)
@@ -136,16 +140,25 @@ class CApiBackend:
 
 
 def open_backend(text: str, score_floor: float) -> Backend:
-    """text: `kind` or `kind=path`. score_floor: people with lower scores are not asked for."""
+    """text: `kind` or `kind=path`, for capi with settings. score_floor: people with lower scores are not asked for."""
     os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
-    kind, _, path = text.partition("=")
+    named, _, settings = text.partition("?")
+    kind, _, path = named.partition("=")
     kinds = {"torch": TorchBackend, "onnx": OnnxBackend, "capi": CApiBackend}
     if kind not in kinds:
         raise ValueError(f"unknown backend {kind!r}: write torch, onnx or capi, or e.g. capi={DEFAULT_PATHS['capi']}")
     chosen = Path(path) if path else DEFAULT_PATHS[kind]
     if not chosen.exists():
         raise FileNotFoundError(f"{kind}: {chosen} is not there. Name another with {kind}=PATH.")
-    return kinds[kind](chosen, score_floor)
+    if settings and kind != "capi":
+        raise ValueError(f"{text}: only capi takes settings")
+    fields = {}
+    for setting in settings.split("&") if settings else ():
+        name, _, value = setting.partition("=")
+        if not value.lstrip("-").isdigit():
+            raise ValueError(f"{kind} takes maq_densepose_config's fields as name=number, not {setting!r}")
+        fields[name] = int(value)
+    return kinds[kind](chosen, score_floor, **fields)
 
 
 def fingerprint(path: Path) -> str:

@@ -37,6 +37,8 @@ class _DenseposeConfig(ctypes.Structure):
         ("min_person_height_px", c_int32),
         ("detail", c_int32),
         ("allow_spinning", c_int32),
+        ("person_crops", c_int32),
+        ("person_crop_px", c_int32),
     )
 
 
@@ -66,12 +68,14 @@ class _Stats(ctypes.Structure):
         ("proposals_ms", c_float),
         ("box_head_ms", c_float),
         ("dense_head_ms", c_float),
+        ("crops_ms", c_float),
         ("decode_ms", c_float),
         ("total_ms", c_float),
         ("network_width_px", c_int32),
         ("network_height_px", c_int32),
         ("proposal_count", c_int32),
         ("person_count", c_int32),
+        ("crop_count", c_int32),
         ("dropped_box_count", c_int32),
         ("body_pixel_count", c_int64),
         ("clamped_pixel_count", c_int64),
@@ -88,12 +92,14 @@ class Stats:
     proposals_ms: float
     box_head_ms: float
     dense_head_ms: float
+    crops_ms: float
     decode_ms: float
     total_ms: float
     network_width_px: int
     network_height_px: int
     proposal_count: int
     person_count: int
+    crop_count: int
     dropped_box_count: int
     body_pixel_count: int
     clamped_pixel_count: int

@@ -45,8 +45,8 @@ double ms_between(Clock::time_point from, Clock::time_point to) {
 }
 
 // The stages of a frame in their order: taking it from the source, those of maq_densepose_stats, and all of it.
-constexpr const char* kStages[] = {"capture",  "preprocess", "trunk",  "proposals",
-                                   "box_head", "dense_head", "decode", "frame"};
+constexpr const char* kStages[] = {"capture",    "preprocess", "trunk",  "proposals", "box_head",
+                                   "dense_head", "crops",      "decode", "frame"};
 constexpr size_t kStageCount = std::size(kStages);
 
 // One source with the times of its frames.
@@ -85,9 +85,9 @@ class Case {
     const double total_ms = ms_between(start, done);
     if (!counted) return total_ms;
 
-    const double values[kStageCount] = {
-        ms_between(start, taken), stats.preprocess_ms, stats.trunk_ms,  stats.proposals_ms,
-        stats.box_head_ms,        stats.dense_head_ms, stats.decode_ms, total_ms};
+    const double values[kStageCount] = {ms_between(start, taken), stats.preprocess_ms, stats.trunk_ms,
+                                        stats.proposals_ms,       stats.box_head_ms,   stats.dense_head_ms,
+                                        stats.crops_ms,           stats.decode_ms,     total_ms};
     for (size_t i = 0; i < kStageCount; ++i) ms_[i].push_back(values[i]);
     seconds_ += total_ms / 1e3;
     cpu_s_ += own_processor_seconds() - cpu_before_s;
@@ -257,6 +257,8 @@ int run_bench(const Options& options) {
                           {"max_proposals", options.model.max_proposals},
                           {"key_frames", options.model.key_frames},
                           {"min_person_height_px", options.model.min_person_height_px},
+                          {"crops", options.model.crops},
+                          {"crop_size", options.model.crop_px},
                           {"surface", !options.model.no_surface},
                           {"spin", !options.model.no_spin},
                           {"warm_up", options.warm_up},
@@ -291,8 +293,6 @@ int run_bench(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   CLI::App app("Measure how long each stage of a frame takes on this machine", "maquette bench");
   Options options;
   app.add_option("source", options.sources,

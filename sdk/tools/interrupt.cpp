@@ -11,6 +11,7 @@
 #include <ctime>
 #include <initializer_list>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -66,7 +67,11 @@ void stop_sources_when_asked() {
 void catch_interrupts() {
   if (event >= 0) return;
   event = eventfd(0, EFD_CLOEXEC);
-  if (event >= 0) std::thread(stop_sources_when_asked).detach();
+  try {
+    if (event >= 0) std::thread(stop_sources_when_asked).detach();
+  } catch (const std::system_error&) {
+    return;  // no more threads: signals end the program as they find it
+  }
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     const auto before = std::signal(number, handle);
     if (number == SIGHUP && before == SIG_IGN) std::signal(number, SIG_IGN);  // nohup(1)

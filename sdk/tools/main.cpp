@@ -1,16 +1,11 @@
 // The `maquette` command line: each command is one file, built on the public C++ header alone.
 #include <maquette/maquette.h>
 #include <CLI/CLI.hpp>
-#include <cstdlib>
 
 #include "commands/commands.h"
 #include "program.h"
 
 int main(int argc, char** argv) try {
-  // What goes wrong with a file is said once, by the SDK; the decoders below it stay silent unless somebody asks.
-  setenv("OPENCV_LOG_LEVEL", "SILENT", 0);
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
-
   CLI::App app("Maquette: dense pose of people in images, clips and cameras, and scenes from photos, on the CPU.");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("maquette ") + maq_get_sdk_version());

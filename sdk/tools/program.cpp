@@ -9,6 +9,8 @@
 #include <exception>
 #include <new>
 #include <sstream>
+#include <string>
+#include <system_error>
 
 #include "print.h"
 
@@ -85,8 +87,13 @@ int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
 }
 
 int report(const std::exception& error) {
-  const bool is_memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+  std::string text = error.what();
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) text = "There is not enough memory.";
+  const auto* of_system = dynamic_cast<const std::system_error*>(&error);
+  if (of_system != nullptr && of_system->code() == std::errc::resource_unavailable_try_again) {
+    text = "The system starts no more threads: raise the limit of this user (ulimit -u) or of the container.";
+  }
   std::fflush(stdout);  // what was found before stands above the error also where both go to one file
-  print_error("maquette: %s\n", is_memory ? "There is not enough memory." : printable(error.what()).c_str());
+  print_error("maquette: %s\n", printable(text).c_str());
   return kFailed;
 }

@@ -127,7 +127,7 @@ int main(int count, char** arguments) {
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   void* memory[BUFFERS];
   const char* expected;
-  unsigned width, height, frames, got, i, last_sequence = 0;
+  unsigned width, height, frames, got, i, late = 0, last_sequence = 0;
   int64_t first_us = 0, last_us = 0;
   uint32_t code;
 
@@ -181,6 +181,12 @@ int main(int count, char** arguments) {
     time_us = (int64_t)buffer.timestamp.tv_sec * 1000000 + buffer.timestamp.tv_usec;
     if (got == 0) {
       first_us = time_us;
+    } else if (buffer.sequence < last_sequence && time_us < last_us && ++late <= frames / 5) {
+      /* uvcvideo copies frames side by side: under load one is done after the next. */
+      printf("frame %u came after frame %u\n", buffer.sequence, last_sequence);
+      MUST(VIDIOC_QBUF, &buffer);
+      --got;
+      continue;
     } else if (buffer.sequence <= last_sequence || time_us <= last_us) {
       fail("Frame %u has the number %u after %u, and came %lld us after the one before.", got, buffer.sequence,
            last_sequence, (long long)(time_us - last_us));

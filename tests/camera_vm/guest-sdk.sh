@@ -3,15 +3,18 @@
 export LD_LIBRARY_PATH=/opt/maquette/lib
 maquette=/opt/maquette/bin/maquette
 
+# Of any number: as long as a program holds a frame of the camera that went away, the next one gets another.
+has_camera() { ls /dev/video[0-9]*; }
+has_no_camera() { ! has_camera; }
 plug_in() {
     virtual_uvc_camera "$@" &
     camera=$!
-    wait_until test -e /dev/video0 && sleep 0.3
+    wait_until has_camera && sleep 0.3
 }
 unplug() {
     kill $camera
     wait $camera 2>/dev/null
-    wait_until test ! -e /dev/video0
+    wait_until has_no_camera
 }
 lists() {
     $maquette sources >/tmp/sources

@@ -71,8 +71,8 @@ MAQ_API maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t ind
 
 /* Reads the photo of a view and undistorts it: BGR, of the size of the view's camera. `*frame` is the caller's: give it
  * back with maq_frame_release.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE,
- * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the photo is read. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED,
+ * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the photo is read. */
 MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq_frame** frame);
 
 #ifdef __cplusplus

@@ -17,6 +17,15 @@ typedef enum maq_densepose_detail {
   MAQ_DENSEPOSE_DETAIL_PART = 1     /* only the part: faster; U and V stay 0 */
 } maq_densepose_detail;
 
+/* Whose surface is computed a second time, from a crop of the frame in its full resolution, rotated upright by the axis
+ * of the first surface. Finds more of the hands and of people who lean or are far away; each crop costs about as much
+ * as the networks' run over a small frame. */
+typedef enum maq_person_crops {
+  MAQ_PERSON_CROPS_OFF = 0,
+  MAQ_PERSON_CROPS_AUTO = 1, /* of people who are small in the networks' input, or lean by more than 15 degrees */
+  MAQ_PERSON_CROPS_ALL = 2
+} maq_person_crops;
+
 typedef struct maq_densepose_config {
   uint32_t struct_size;
   int32_t threads;         /* for the networks; 0 (default): the machine's cores, at most 4 */
@@ -32,11 +41,14 @@ typedef struct maq_densepose_config {
                                 and may miss people in a crowd. */
   int32_t key_frame_interval;   /* 1 (default): people are detected in every frame. N, up to 1000: in every N-th
                                  frame of a stream; in between, boxes are propagated, no new people are found, and
-                                 frames without people cost nothing. A frame of another size is a key frame. */
+                                 frames without people cost nothing. A frame of another size is a key frame. Where
+                                 everybody has a crop (person_crops), only the crops are computed in between. */
   int32_t min_person_height_px; /* people less tall than this in the frame may be missed; 0 (default): none */
   maq_densepose_detail detail;  /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
   int32_t allow_spinning; /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy and costs
                                    some speed */
+  maq_person_crops person_crops; /* default MAQ_PERSON_CROPS_OFF */
+  int32_t person_crop_px;        /* side of a crop, 64 to 512; 0 (default): 192. Smaller is faster. */
 } maq_densepose_config;
 
 typedef struct maq_person {
@@ -70,12 +82,14 @@ typedef struct maq_densepose_stats {
   float proposals_ms;  /* region proposal network, top-k, NMS */
   float box_head_ms;   /* RoIAlign, box network, NMS */
   float dense_head_ms; /* RoIAlign, dense network */
+  float crops_ms;      /* crops of people: trunk and dense head over them */
   float decode_ms;     /* logits to planes, with U and V */
   float total_ms;
   int32_t network_width_px; /* the resized image, without padding */
   int32_t network_height_px;
   int32_t proposal_count;      /* boxes that reached the box head */
   int32_t person_count;        /* in the result */
+  int32_t crop_count;          /* crops of people that were computed (maq_person_crops) */
   int32_t dropped_box_count;   /* boxes with NaN, or with no area inside the frame */
   int64_t body_pixel_count;    /* pixels that belong to a person */
   int64_t clamped_pixel_count; /* of these, pixels where the network's U or V was outside 0 to 1 */

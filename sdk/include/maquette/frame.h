@@ -1,4 +1,5 @@
-/* Frames: one image with its format, strides and time. They come from a source or wrap memory of the app. */
+/* Frames: one image with its format, strides and time. They come from a source, are decoded from memory, or wrap pixels
+ * of the app. */
 #ifndef MAQUETTE_FRAME_H_
 #define MAQUETTE_FRAME_H_
 
@@ -46,7 +47,7 @@ typedef struct maq_frame_desc {
 } maq_frame_desc;
 
 /* Called once, when the library no longer needs the pixels of a frame made by maq_frame_wrap, on the thread that
- * released it last. */
+ * released it last. It must not throw: what it throws is caught, and maq_last_error(NULL) has it. */
 typedef void (*maq_frame_release_callback)(void* user_data);
 
 /* Fills `desc` with zeros, MAQ_CLOCK_MEDIA and struct_size. `struct_size` is sizeof(maq_frame_desc) of the caller.
@@ -61,6 +62,15 @@ MAQ_API maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_siz
  * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_UNSUPPORTED (format). Does not block. */
 MAQ_API maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* desc,
                                   maq_frame_release_callback release_callback, void* user_data, maq_frame** frame);
+
+/* Decodes an image that the app has in memory: a whole JPEG, PNG, WebP, BMP or TIFF file, as from an upload, a network
+ * or the assets of an app. It is checked like the file of an image: source, made upright by its EXIF orientation, and
+ * becomes MAQ_PIXEL_BGR8 at time 0 of MAQ_CLOCK_MEDIA. `data` is not needed afterwards.
+ * `*frame` is the caller's: give it back with maq_frame_release.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNREADABLE (damaged, truncated or no image),
+ * MAQ_ERROR_UNSUPPORTED (another format), MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is
+ * missing, which all but JPEG need). Blocks while it is decoded. */
+MAQ_API maq_status maq_frame_decode(maq_context* context, const void* data, size_t size_bytes, maq_frame** frame);
 
 /* Gives the frame back to its pool or to the app (NULL is fine). Pointers into it are invalid afterwards.
  * Once for each frame, from any thread. Does not block. */

@@ -16,7 +16,8 @@
  *
  *     _create                                 _destroy   contexts, sources, lists, models, builders, renderers, writers
  *     _open, _open_memory, _build, _finish    _close     captures and scenes
- *     _acquire_…, _run, _load_…, _wrap        _release   frames, results and images, most from a pool of fixed size
+ *     _acquire_…, _run, _load_…, _wrap,       _release   frames, results and images, most from a pool of fixed size
+ *     _decode, _resize
  *
  *   (_finish of a builder returns a scene; _finish of a clip or a recorder completes its file and returns nothing.)
  *   What `_get_…` returns belongs to the object that it was called with.
@@ -30,16 +31,28 @@
  * - Files that are saved appear atomically, in folders that exist. Of a symbolic link, the file that it leads
  *   to is replaced; a character device, a pipe or /dev/stdout gets the whole at once (clips and recordings need files).
  * - No C++ exception leaves the library, and it never ends the process: nor do the signals of a full disk or of a pipe
- *   without a reader (SIGXFSZ, SIGPIPE) while it writes.
+ *   without a reader (SIGXFSZ, SIGPIPE) while it writes. What a callback throws is caught.
  * - Where the system starts fewer threads than asked for (ulimit -u, limits of containers), networks and renderers run
  *   on those there are, with a warning in the log; live sources and pipelines, which need one, return
  *   MAQ_ERROR_OUT_OF_MEMORY.
  * - Objects belong to the process that made them. In a child of fork() they have no threads, and their files and
- * devices are the parent's: each call on one returns MAQ_ERROR_INVALID_ARGUMENT at once, and giving it back does
- * nothing. A child makes a context and all else anew; that works if no other thread of the parent was in a call of the
- * library during fork(). Cameras of libcamera and DepthAI need exec() too once the parent has used one.
+ *   devices are the parent's: each call on one returns MAQ_ERROR_INVALID_ARGUMENT at once, and giving it back does
+ *   nothing. A child makes a context and all else anew; that works if no other thread of the parent was in a call of
+ *   the library during fork(). Cameras of libcamera and DepthAI need exec() too once the parent has used one.
  * - Each function names its thread level: "any thread" may be called at any time from any thread; "one at a time" may
  *   be called from any thread, but not for the same handle from two threads at once.
+ * - Misuse is MAQ_ERROR_INVALID_ARGUMENT where the library can see it: an object of another type, one that was given
+ *   back before, two calls at once on an object whose functions run one at a time, also from a callback of the first.
+ *   A `_destroy`, `_close` or `_release` for which that holds changes nothing, and maq_last_error(NULL) says why. The
+ *   library cannot see, and the behaviour is undefined for:
+ *
+ *     - a pointer that is not of this library; a shorter array or buffer than was said;
+ *     - an object that was given back so long ago that its memory has become another's: those of a pool until the pool
+ *       lends them again, or is gone, and the latest 64 others are remembered;
+ *     - an object that is given back while a call of "any thread" level uses it, or a call to which it is an argument,
+ *       on another thread, unless the function's comment allows it;
+ *     - memory of the app that changes while a call, or a frame made by maq_frame_wrap, reads it;
+ *     - a callback that does not return (longjmp, the end of its thread).
  */
 #ifndef MAQUETTE_MAQUETTE_H_
 #define MAQUETTE_MAQUETTE_H_

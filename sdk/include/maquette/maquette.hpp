@@ -100,6 +100,13 @@ class Frame {
     owner_.reset(made);
   }
 
+  // An image file in memory, of `size_bytes` at `data`, which is not needed afterwards.
+  static Frame decode(const Context& context, const void* data, size_t size_bytes) {
+    maq_frame* made = nullptr;
+    check(maq_frame_decode(context.get(), data, size_bytes, &made));
+    return Frame(made);
+  }
+
   maq_frame* get() const { return owner_.get(); }
 
   maq_frame_desc desc() const {

@@ -5,7 +5,7 @@
 
 using namespace maq;
 
-struct maq_clip : Handle {
+struct maq_clip : HandleOf<HandleKind::kClip> {
   maq_clip(const char* path, double fps) : file(path, fps) {}
   ClipWriter file;
 };
@@ -22,8 +22,7 @@ maq_status maq_clip_create(maq_context* context, const char* path, double fps, m
 }
 
 maq_status maq_clip_add_frame(maq_clip* clip, const maq_frame* frame) {
-  return guarded(clip, __func__, [&] {
-    require_argument(clip, "clip");
+  return guarded_alone(clip, "clip", __func__, [&] {
     require_argument(frame, "frame");
     clip->file.add(frame->frame.image);
     return MAQ_OK;
@@ -31,11 +30,10 @@ maq_status maq_clip_add_frame(maq_clip* clip, const maq_frame* frame) {
 }
 
 maq_status maq_clip_finish(maq_clip* clip) {
-  return guarded(clip, __func__, [&] {
-    require_argument(clip, "clip");
+  return guarded_alone(clip, "clip", __func__, [&] {
     clip->file.finish();
     return MAQ_OK;
   });
 }
 
-void maq_clip_destroy(maq_clip* clip) { destroy(clip); }
+void maq_clip_destroy(maq_clip* clip) { destroy(clip, "clip", __func__); }

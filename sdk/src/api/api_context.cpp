@@ -73,7 +73,7 @@ maq_status maq_context_create(uint32_t header_version, const maq_context_config*
   });
 }
 
-void maq_context_destroy(maq_context* context) { destroy(context); }
+void maq_context_destroy(maq_context* context) { destroy(context, "context", __func__); }
 
 maq_status maq_context_get_onnxruntime(maq_context* context, const char** version, const char** library_path) {
   return guarded(context, __func__, [&] {

@@ -36,18 +36,22 @@ maq_densepose_config read_densepose_config(const maq_densepose_config* given, co
   return read_config(given, name, default_config(), sizeof(maq_densepose_config));
 }
 
-DensePoseSettings densepose_settings(const maq_densepose_config& config) {
-  require_range("config.threads", config.threads, 0, kMaxThreads);
-  if (config.long_side_px != 0) require_range("config.long_side_px", config.long_side_px, 32, 2048);
-  if (!(config.score_threshold < 0)) require_range("config.score_threshold", config.score_threshold, 0.0f, 1.0f);
-  if (config.max_people != 0) require_range("config.max_people", config.max_people, 1, 255);
-  require_range("config.result_pool_size", config.result_pool_size, 1u, 64u);
-  if (config.max_proposals != 0) require_range("config.max_proposals", config.max_proposals, 1, 1000);
-  require_range("config.key_frame_interval", config.key_frame_interval, 1, 1000);
-  require_range("config.min_person_height_px", config.min_person_height_px, 0, 100000);
-  require_range("config.detail", number_in(config.detail), int32_t(MAQ_DENSEPOSE_DETAIL_SURFACE),
+DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name) {
+  const auto field = [name](const char* of) { return concatenate(name, ".", of); };
+  require_range(field("threads"), config.threads, 0, kMaxThreads);
+  if (config.long_side_px != 0) require_range(field("long_side_px"), config.long_side_px, 32, 2048);
+  if (!(config.score_threshold < 0)) require_range(field("score_threshold"), config.score_threshold, 0.0f, 1.0f);
+  if (config.max_people != 0) require_range(field("max_people"), config.max_people, 1, 255);
+  require_range(field("result_pool_size"), config.result_pool_size, 1u, 64u);
+  if (config.max_proposals != 0) require_range(field("max_proposals"), config.max_proposals, 1, 1000);
+  require_range(field("key_frame_interval"), config.key_frame_interval, 1, 1000);
+  require_range(field("min_person_height_px"), config.min_person_height_px, 0, 100000);
+  require_range(field("detail"), number_in(config.detail), int32_t(MAQ_DENSEPOSE_DETAIL_SURFACE),
                 int32_t(MAQ_DENSEPOSE_DETAIL_PART));
-  require_range("config.allow_spinning", config.allow_spinning, 0, 1);
+  require_range(field("allow_spinning"), config.allow_spinning, 0, 1);
+  require_range(field("person_crops"), number_in(config.person_crops), int32_t(MAQ_PERSON_CROPS_OFF),
+                int32_t(MAQ_PERSON_CROPS_ALL));
+  if (config.person_crop_px != 0) require_range(field("person_crop_px"), config.person_crop_px, 64, 512);
   DensePoseSettings settings;
   settings.threads = config.threads > 0 ? config.threads : default_threads();
   settings.long_side_px = config.long_side_px;
@@ -58,6 +62,10 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config) {
   settings.min_person_height_px = config.min_person_height_px;
   settings.surface = config.detail == MAQ_DENSEPOSE_DETAIL_SURFACE;
   settings.spin = config.allow_spinning == 1;
+  settings.crops = config.person_crops == MAQ_PERSON_CROPS_AUTO  ? PersonCrops::kAuto
+                   : config.person_crops == MAQ_PERSON_CROPS_ALL ? PersonCrops::kAll
+                                                                 : PersonCrops::kOff;
+  settings.crop_side_px = config.person_crop_px;
   return settings;
 }
 
@@ -83,8 +91,8 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     require_argument(context, "context");
     require_argument(densepose, "densepose");
     const maq_densepose_config config = read_densepose_config(given, "config");
-    const DensePoseSettings settings = densepose_settings(config);
-    const Bundle bundle = read_bundle_argument(config, kDensePoseBundle);
+    const DensePoseSettings settings = densepose_settings(config, "config");
+    const Bundle bundle = read_bundle_argument(config, "config", kDensePoseBundle);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                                 bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");
@@ -93,11 +101,10 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
   });
 }
 
-void maq_densepose_destroy(maq_densepose* densepose) { destroy(densepose); }
+void maq_densepose_destroy(maq_densepose* densepose) { destroy(densepose, "densepose", __func__); }
 
 maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result) {
-  return guarded(densepose, __func__, [&] {
-    require_argument(densepose, "densepose");
+  return guarded_alone(densepose, "densepose", __func__, [&] {
     require_argument(frame, "frame");
     require_argument(result, "result");
     BoundedPool<maq_densepose_result>::Pooled handle = densepose->results.acquire();
@@ -116,14 +123,15 @@ maq_status maq_densepose_cancel(maq_densepose* densepose) {
 }
 
 maq_status maq_densepose_reset(maq_densepose* densepose) {
-  return guarded(densepose, __func__, [&] {
-    require_argument(densepose, "densepose");
+  return guarded_alone(densepose, "densepose", __func__, [&] {
     densepose->densepose->reset();
     return MAQ_OK;
   });
 }
 
-void maq_densepose_result_release(maq_densepose_result* result) { return_to_pool(result); }
+void maq_densepose_result_release(maq_densepose_result* result) {
+  return_handle(result, "result", __func__, return_to_pool<maq_densepose_result>);
+}
 
 maq_status maq_densepose_result_get_size(const maq_densepose_result* result, int32_t* width_px, int32_t* height_px) {
   return guarded(result, __func__, [&] {
@@ -174,12 +182,14 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.proposals_ms = from.proposals_ms;
     filled.box_head_ms = from.box_head_ms;
     filled.dense_head_ms = from.dense_head_ms;
+    filled.crops_ms = from.crops_ms;
     filled.decode_ms = from.decode_ms;
     filled.total_ms = from.total_ms;
     filled.network_width_px = from.network_width_px;
     filled.network_height_px = from.network_height_px;
     filled.proposal_count = from.proposals;
     filled.person_count = int32_t(result->result.people.size());
+    filled.crop_count = from.crops;
     filled.dropped_box_count = from.dropped_boxes;
     filled.body_pixel_count = from.decoded.body_pixels;
     filled.clamped_pixel_count = from.decoded.clamped_uv;

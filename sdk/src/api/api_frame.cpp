@@ -28,7 +28,7 @@ maq_frame_desc description(const ImageView& image, const Frame& frame) {
 maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size) {
   maq_frame_desc defaults{};
   defaults.clock = MAQ_CLOCK_MEDIA;
-  return init_config(__func__, desc, struct_size, defaults, sizeof(maq_frame_desc));
+  return init_config(__func__, desc, struct_size, defaults, sizeof(maq_frame_desc), "desc");
 }
 
 maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
@@ -51,7 +51,26 @@ maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
   });
 }
 
-void maq_frame_release(maq_frame* frame) { return_to_pool(frame); }
+maq_status maq_frame_decode(maq_context* context, const void* data, size_t size_bytes, maq_frame** frame) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(data, "data");
+    require_argument(frame, "frame");
+    auto handle = std::make_unique<maq_frame>();
+    decode_image({static_cast<const uint8_t*>(data), size_bytes}, "The image in memory", handle->frame);
+    *frame = handle.release();
+    return MAQ_OK;
+  });
+}
+
+void maq_frame_release(maq_frame* frame) {
+  return_handle(frame, "frame", __func__, [](maq_frame* taken) {
+    const maq_frame_release_callback callback = std::exchange(taken->release_callback, nullptr);
+    void* const user_data = taken->user_data;
+    return_to_pool(taken);
+    if (callback != nullptr) callback(user_data);
+  });
+}
 
 maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {

@@ -25,8 +25,8 @@ maq_pipeline_config default_config() {
 
 PipelineModel model_of(const maq_densepose_config* given, const char* name) {
   const maq_densepose_config config = read_densepose_config(given, name);
-  const DensePoseSettings settings = densepose_settings(config);
-  return {bundle_reader(config, kDensePoseBundle), settings};
+  const DensePoseSettings settings = densepose_settings(config, name);
+  return {bundle_reader(config, name, kDensePoseBundle), settings};
 }
 
 // The handles of results. A copy has the same pools.
@@ -62,7 +62,7 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
   }
   PipelineSettings settings;
   settings.model = model_of(config.densepose, "config.densepose");
-  settings.source = source_settings(source, state->log());
+  settings.source = source_settings(source, "config.source", state->log());
   // Those that the app holds, one that waits for it and one that is being mapped.
   settings.source.pool_size = int(config.result_pool_size) + 2;
   settings.nice = config.nice;
@@ -95,7 +95,7 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
 
 }  // namespace
 
-struct maq_pipeline : Handle {
+struct maq_pipeline : HandleOf<HandleKind::kPipeline> {
   maq_pipeline(const maq_pipeline_config& config, const std::shared_ptr<ContextState>& state)
       : pools(config.result_pool_size),
         has_callback(config.result_callback != nullptr),
@@ -122,7 +122,7 @@ maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* 
   });
 }
 
-void maq_pipeline_destroy(maq_pipeline* pipeline) { destroy(pipeline); }
+void maq_pipeline_destroy(maq_pipeline* pipeline) { destroy(pipeline, "pipeline", __func__); }
 
 maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri) {
   return guarded(pipeline, __func__, [&] {
@@ -193,8 +193,8 @@ maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_n
 
 void maq_pipeline_release_result(maq_pipeline_result* result) {
   if (result == nullptr) return;
-  return_to_pool(std::exchange(result->frame, nullptr));
-  return_to_pool(std::exchange(result->densepose, nullptr));
+  maq_frame_release(std::exchange(result->frame, nullptr));
+  maq_densepose_result_release(std::exchange(result->densepose, nullptr));
 }
 
 maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info* info) {

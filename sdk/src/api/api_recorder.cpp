@@ -5,7 +5,7 @@
 
 using namespace maq;
 
-struct maq_recorder : Handle {
+struct maq_recorder : HandleOf<HandleKind::kRecorder> {
   maq_recorder(const char* path, const RecordingInfo& info, int jpeg_quality) : writer(path, info, jpeg_quality) {}
   RecordingWriter writer;
 };
@@ -34,8 +34,7 @@ maq_status maq_recorder_create(maq_context* context, const char* path, const maq
 }
 
 maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame) {
-  return guarded(recorder, __func__, [&] {
-    require_argument(recorder, "recorder");
+  return guarded_alone(recorder, "recorder", __func__, [&] {
     require_argument(frame, "frame");
     recorder->writer.add(frame->frame);
     return MAQ_OK;
@@ -43,20 +42,18 @@ maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame
 }
 
 maq_status maq_recorder_finish(maq_recorder* recorder) {
-  return guarded(recorder, __func__, [&] {
-    require_argument(recorder, "recorder");
+  return guarded_alone(recorder, "recorder", __func__, [&] {
     recorder->writer.finish();
     return MAQ_OK;
   });
 }
 
 maq_status maq_recorder_get_info(const maq_recorder* recorder, maq_recorder_info* info) {
-  return guarded(recorder, __func__, [&] {
-    require_argument(recorder, "recorder");
+  return guarded_alone(recorder, "recorder", __func__, [&] {
     write_struct(info, "info", maq_recorder_info{0, recorder->writer.frame_count(), recorder->writer.size_bytes()},
                  sizeof(maq_recorder_info));
     return MAQ_OK;
   });
 }
 
-void maq_recorder_destroy(maq_recorder* recorder) { destroy(recorder); }
+void maq_recorder_destroy(maq_recorder* recorder) { destroy(recorder, "recorder", __func__); }

@@ -68,4 +68,4 @@ maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
   });
 }
 
-void maq_scene_close(maq_scene* scene) { destroy(scene); }
+void maq_scene_close(maq_scene* scene) { destroy(scene, "scene", __func__); }

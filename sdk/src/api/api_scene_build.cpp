@@ -33,7 +33,7 @@ maq_scene_build_config default_config() {
 
 BuildSettings checked_settings(const maq_scene_build_config& config) {
   BuildSettings settings;
-  settings.read_bundle = bundle_reader(config, kSceneBundle);
+  settings.read_bundle = bundle_reader(config, "config", kSceneBundle);
   SceneBuildOptions& options = settings.options;
   require_range("config.long_side_px", config.long_side_px, 0, MAQ_MAX_SIDE_PX);
   options.long_side_px = config.long_side_px;
@@ -95,7 +95,7 @@ std::array<double, 3> unit_vector(const double (&vector)[3]) {
 
 }  // namespace
 
-struct maq_scene_builder : Handle {
+struct maq_scene_builder : HandleOf<HandleKind::kSceneBuilder> {
   maq_scene_builder(BuildProgress wanted, PointCloud cloud, const std::array<double, 3>& up,
                     std::shared_ptr<SceneNetworks> networks, const SceneBuildOptions& options)
       : progress(std::move(wanted)), builder(std::move(cloud), up, std::move(networks), options) {}
@@ -157,12 +157,11 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
   });
 }
 
-void maq_scene_builder_destroy(maq_scene_builder* builder) { destroy(builder); }
+void maq_scene_builder_destroy(maq_scene_builder* builder) { destroy(builder, "builder", __func__); }
 
 maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_frame* photo,
                                       const maq_pinhole_camera* camera, uint64_t* seen_point_count) {
-  return guarded(builder, __func__, [&] {
-    require_argument(builder, "builder");
+  return guarded_alone(builder, "builder", __func__, [&] {
     require_argument(photo, "photo");
     require_argument(camera, "camera");
     require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
@@ -185,16 +184,14 @@ maq_status maq_scene_builder_cancel(maq_scene_builder* builder) {
 }
 
 maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_scene_build_stats* stats) {
-  return guarded(builder, __func__, [&] {
-    require_argument(builder, "builder");
+  return guarded_alone(builder, "builder", __func__, [&] {
     write_struct(stats, "stats", stats_of(builder->builder.stats()), sizeof *stats);
     return MAQ_OK;
   });
 }
 
 maq_status maq_scene_builder_finish(maq_scene_builder* builder, maq_scene** scene) {
-  return guarded(builder, __func__, [&] {
-    require_argument(builder, "builder");
+  return guarded_alone(builder, "builder", __func__, [&] {
     require_argument(scene, "scene");
     *scene = new maq_scene(builder->builder.finish());
     return MAQ_OK;

@@ -21,7 +21,7 @@ maq_scene_renderer_config default_config() {
 
 }  // namespace
 
-struct maq_scene_renderer : Handle {
+struct maq_scene_renderer : HandleOf<HandleKind::kSceneRenderer> {
   maq_scene_renderer(const Scene& scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options,
                      size_t pool_size)
       : renderer(scene, std::move(networks), options), images(pool_size, "images") {}
@@ -55,7 +55,7 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     }
     options.skips_unseen_blocks = config.draw_unseen_blocks == 0;
     options.skips_empty_parts = config.refine_empty_parts == 0;
-    Bundle bundle = read_bundle_argument(config, kSceneBundle);
+    Bundle bundle = read_bundle_argument(config, "config", kSceneBundle);
     const std::string where = bundle.prefix;
     auto networks = open_scene_networks(context, std::move(bundle), options.threads, config.allow_spinning == 1);
     if (scene->scene.networks_sha256 != networks->sha256()) {
@@ -67,12 +67,11 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
   });
 }
 
-void maq_scene_renderer_destroy(maq_scene_renderer* renderer) { destroy(renderer); }
+void maq_scene_renderer_destroy(maq_scene_renderer* renderer) { destroy(renderer, "renderer", __func__); }
 
 maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhole_camera* camera,
                                   maq_scene_image** image) {
-  return guarded(renderer, __func__, [&] {
-    require_argument(renderer, "renderer");
+  return guarded_alone(renderer, "renderer", __func__, [&] {
     require_argument(camera, "camera");
     require_argument(image, "image");
     require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
@@ -86,7 +85,9 @@ maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhol
   });
 }
 
-void maq_scene_image_release(maq_scene_image* image) { return_to_pool(image); }
+void maq_scene_image_release(maq_scene_image* image) {
+  return_handle(image, "image", __func__, return_to_pool<maq_scene_image>);
+}
 
 maq_status maq_scene_image_get_plane(const maq_scene_image* image, maq_scene_plane plane, const void** pixels,
                                      size_t* stride_bytes) {

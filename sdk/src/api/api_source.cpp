@@ -37,14 +37,15 @@ maq_source_config read_source_config(const maq_source_config* given, const char*
   return read_config(given, name, default_config(), kFirstConfigSize);
 }
 
-SourceSettings source_settings(const maq_source_config& config, const Log& log) {
-  require_range("config.frame_pool_size", config.frame_pool_size, 1u, kLargestPoolSize);
-  require_range("config.queue_length", config.queue_length, 1u, kLargestPoolSize);
-  require_range("config.stall_ms", config.stall_ms, 50, 60000);
-  require_range("config.reconnect_ms", config.reconnect_ms, 0, 86400000);
-  require_range("config.real_time", config.real_time, 0, 1);
-  require_range("config.loop", config.loop, 0, 1);
-  if (config.max_side_px != 0) require_range("config.max_side_px", config.max_side_px, 1, MAQ_MAX_SIDE_PX);
+SourceSettings source_settings(const maq_source_config& config, const char* name, const Log& log) {
+  const auto field = [name](const char* of) { return concatenate(name, ".", of); };
+  require_range(field("frame_pool_size"), config.frame_pool_size, 1u, kLargestPoolSize);
+  require_range(field("queue_length"), config.queue_length, 1u, kLargestPoolSize);
+  require_range(field("stall_ms"), config.stall_ms, 50, 60000);
+  require_range(field("reconnect_ms"), config.reconnect_ms, 0, 86400000);
+  require_range(field("real_time"), config.real_time, 0, 1);
+  require_range(field("loop"), config.loop, 0, 1);
+  if (config.max_side_px != 0) require_range(field("max_side_px"), config.max_side_px, 1, MAQ_MAX_SIDE_PX);
   SourceSettings settings;
   settings.pool_size = int(config.frame_pool_size);
   settings.queue_length = int(config.queue_length);
@@ -72,7 +73,7 @@ maq_status maq_source_create(maq_context* context, const char* uri, const maq_so
     require_argument(uri, "uri");
     require_argument(source, "source");
     const maq_source_config config = read_source_config(given, "config");
-    const SourceSettings settings = source_settings(config, context->state->log());
+    const SourceSettings settings = source_settings(config, "config", context->state->log());
     *source = new maq_source(uri, open_source(uri, settings), config.frame_pool_size);
     return MAQ_OK;
   });
@@ -86,7 +87,8 @@ maq_status maq_source_stop(maq_source* source) {
   });
 }
 
-void maq_source_destroy(maq_source* source) { destroy(source); }
+// Ends the calls that wait for a frame.
+void maq_source_destroy(maq_source* source) { destroy(source, "source", __func__, WhileInUse::kAllowed); }
 
 maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) {
   return guarded(source, __func__, [&] {
@@ -108,8 +110,7 @@ maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) 
 
 maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame) {
   const SourceCall call(source);
-  return guarded(source, __func__, [&] {
-    require_argument(source, "source");
+  return guarded_alone(source, "source", __func__, [&] {
     require_argument(frame, "frame");
     BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
     switch (source->is_stopped ? NextFrame::kStopped : source->source->next(timeout_ns, handle->frame)) {
@@ -166,8 +167,7 @@ maq_status maq_source_set_control(maq_source* source, maq_control control, doubl
 }
 
 maq_status maq_source_seek(maq_source* source, int64_t time_ns) {
-  return guarded(source, __func__, [&] {
-    require_argument(source, "source");
+  return guarded_alone(source, "source", __func__, [&] {
     if (time_ns < 0) throw ArgumentError("time_ns is ", time_ns, ", but must not be negative.");
     source->source->seek(time_ns);
     return MAQ_OK;
@@ -204,7 +204,7 @@ maq_status maq_camera_list_create(maq_context* context, maq_camera_list** list) 
   });
 }
 
-void maq_camera_list_destroy(maq_camera_list* list) { destroy(list); }
+void maq_camera_list_destroy(maq_camera_list* list) { destroy(list, "list", __func__); }
 
 uint32_t maq_camera_list_get_count(const maq_camera_list* list) {
   return list == nullptr ? 0 : uint32_t(list->cameras.size());

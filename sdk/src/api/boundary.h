@@ -5,6 +5,7 @@
 #include <cstring>
 #include <new>
 #include <string>
+#include <type_traits>
 
 #include "api/handle.h"
 #include "core/error.h"
@@ -32,7 +33,7 @@ const char* last_error(const Handle* handle) noexcept;
 template <class Body>
 maq_status guarded(const Handle* handle, const char* function, Body&& body) noexcept {
   try {
-    if (handle != nullptr && handle->is_of_parent()) {
+    if (handle != nullptr && handle->handle_state().is_of_parent()) {
       return keep_error(nullptr, MAQ_ERROR_INVALID_ARGUMENT, function, kIsOfParent);
     }
     return body();
@@ -46,13 +47,67 @@ maq_status guarded(const Handle* handle, const char* function, Body&& body) noex
   }
 }
 
+// Of handles also: that it is one of that type and process, which the app has.
 template <class T>
 void require_argument(const T* pointer, const char* name) {
   if (pointer == nullptr) throw ArgumentError(name, " is NULL.");
+  if constexpr (std::is_base_of_v<Handle, T>) {
+    if (!pointer->handle_state().is_held_as(T::kKind)) pointer->handle_state().refuse(T::kKind, name);
+    if (pointer->handle_state().is_of_parent()) throw ArgumentError(kIsOfParent);
+  }
+}
+
+// guarded() for functions that run one at a time on a handle: a second call at the same time, from another thread or
+// from a callback of the first, is an ArgumentError.
+template <class T, class Body>
+maq_status guarded_alone(const T* handle, const char* name, const char* function, Body&& body) noexcept {
+  // Until the error has been kept with the handle too.
+  struct Call {
+    HandleState* state;
+    ~Call() {
+      if (state != nullptr) state->end_call();
+    }
+  };
+  const Call call{handle != nullptr && handle->handle_state().begin_call(T::kKind) ? &handle->handle_state() : nullptr};
+  return guarded(handle, function, [&] {
+    require_argument(handle, name);
+    if (call.state == nullptr) {
+      throw ArgumentError(name, " is in use by another call; let that return first, or make one for each thread.");
+    }
+    return body();
+  });
+}
+
+enum class WhileInUse { kRefused, kAllowed };
+
+// For `_destroy`, `_close` and `_release`: `reclaim` gets the handle unless it is NULL. The app keeps what it cannot
+// give back: a handle of another type, one that was given back before, one with a call that runs.
+template <class T, class Reclaim>
+void return_handle(T* handle, const char* name, const char* function, Reclaim&& reclaim,
+                   WhileInUse while_in_use = WhileInUse::kRefused) noexcept {
+  if (handle == nullptr) return;
+  guarded(nullptr, function, [&] {
+    if (handle->handle_state().is_of_parent()) return MAQ_OK;
+    bool is_in_use = false;
+    if (handle->handle_state().mark_returned(T::kKind, while_in_use == WhileInUse::kAllowed, is_in_use)) {
+      reclaim(handle);
+      return MAQ_OK;
+    }
+    if (is_in_use) throw ArgumentError(name, " is in use by another call, so it was not freed; let that return first.");
+    handle->handle_state().refuse(T::kKind, name);
+  });
 }
 
 template <class T>
-void require_range(const char* name, T value, T min, T max) {
+void destroy(T* handle, const char* name, const char* function,
+             WhileInUse while_in_use = WhileInUse::kRefused) noexcept {
+  return_handle(
+      handle, name, function, [](T* taken) { delete taken; }, while_in_use);
+}
+
+// `name`: a text, also a std::string.
+template <class Name, class T>
+void require_range(const Name& name, T value, T min, T max) {
   if (!(value >= min && value <= max)) {
     throw ArgumentError(name, " is ", value, ", but must be ", min, " to ", max, ".");
   }
@@ -100,12 +155,16 @@ void write_struct(T* target, const char* name, T value, size_t smallest) {
   std::memcpy(target, &value, target->struct_size);
 }
 
-// For the `_init` functions.
+// For the `_init` functions, whose parameters are `name` and struct_size.
 template <class T>
-maq_status init_config(const char* function, T* config, uint32_t struct_size, const T& defaults, size_t smallest) {
+maq_status init_config(const char* function, T* config, uint32_t struct_size, const T& defaults, size_t smallest,
+                       const char* name = "config") {
   return guarded(nullptr, function, [&] {
-    require_argument(config, "config");
-    require_struct_size("config", struct_size, smallest, sizeof(T));
+    require_argument(config, name);
+    if (struct_size < smallest || struct_size > sizeof(T)) {
+      throw ArgumentError("struct_size is ", struct_size, ", but this library knows ", smallest, " to ", sizeof(T),
+                          " bytes; give sizeof the struct, of headers that fit the library.");
+    }
     T filled = defaults;
     filled.struct_size = struct_size;
     std::memcpy(config, &filled, struct_size);

@@ -13,24 +13,27 @@ namespace maq {
 namespace {
 
 // The library may lie in lib/ or, as on Debian, in lib/<architecture>/.
-Bundle read_installed_bundle(const std::string& name) {
+Bundle read_installed_bundle(const std::string& config, const std::string& name) {
   const std::string library = library_folder();
   for (const char* up : {"../", "../../"}) {
     const std::string folder = concatenate(library, up, "share/maquette/models/", name);
     if (access((folder + "/manifest.json").c_str(), F_OK) == 0) return read_bundle(folder);
   }
-  throw Error(MAQ_ERROR_NOT_FOUND, "config.bundle_path is NULL, but ", library, "../share/maquette/models/", name,
+  throw Error(MAQ_ERROR_NOT_FOUND, config, ".bundle_path is NULL, but ", library, "../share/maquette/models/", name,
               " does not exist; install the models with the library, or set bundle_path or bundle_files.");
 }
 
 // Names and addresses of what the caller gave.
-std::vector<NamedBuffer> buffers_of(const char* path, const maq_memory_file* files, uint32_t file_count) {
-  if (path != nullptr && file_count > 0) throw ArgumentError("config has both bundle_path and bundle_files; set one.");
-  if (file_count > 0) require_argument(files, "config.bundle_files");
+std::vector<NamedBuffer> buffers_of(const char* config, const char* path, const maq_memory_file* files,
+                                    uint32_t file_count) {
+  if (path != nullptr && file_count > 0) {
+    throw ArgumentError(config, " has both bundle_path and bundle_files; set one.");
+  }
+  if (file_count > 0 && files == nullptr) throw ArgumentError(config, ".bundle_files is NULL.");
   std::vector<NamedBuffer> buffers;
   for (uint32_t i = 0; i < file_count; ++i) {
     if (files[i].name == nullptr || files[i].data == nullptr) {
-      throw ArgumentError("config.bundle_files[", i, "] has no ", files[i].name == nullptr ? "name" : "data", ".");
+      throw ArgumentError(config, ".bundle_files[", i, "] has no ", files[i].name == nullptr ? "name" : "data", ".");
     }
     buffers.push_back({files[i].name, files[i].data, files[i].size_bytes});
   }
@@ -39,18 +42,20 @@ std::vector<NamedBuffer> buffers_of(const char* path, const maq_memory_file* fil
 
 }  // namespace
 
-Bundle read_bundle_argument(const char* path, const maq_memory_file* files, uint32_t file_count,
+Bundle read_bundle_argument(const char* config, const char* path, const maq_memory_file* files, uint32_t file_count,
                             const char* installed) {
-  const std::vector<NamedBuffer> buffers = buffers_of(path, files, file_count);
+  const std::vector<NamedBuffer> buffers = buffers_of(config, path, files, file_count);
   if (path != nullptr) return read_bundle(std::string(path));
-  return buffers.empty() ? read_installed_bundle(installed) : read_bundle(buffers);
+  return buffers.empty() ? read_installed_bundle(config, installed) : read_bundle(buffers);
 }
 
-std::function<Bundle()> bundle_reader(const char* path, const maq_memory_file* files, uint32_t file_count,
-                                      const char* installed) {
-  const std::vector<NamedBuffer> given = buffers_of(path, files, file_count);
+std::function<Bundle()> bundle_reader(const char* config, const char* path, const maq_memory_file* files,
+                                      uint32_t file_count, const char* installed) {
+  const std::vector<NamedBuffer> given = buffers_of(config, path, files, file_count);
   if (path != nullptr) return [folder = std::string(path)] { return read_bundle(folder); };
-  if (given.empty()) return [name = std::string(installed)] { return read_installed_bundle(name); };
+  if (given.empty()) {
+    return [of = std::string(config), name = std::string(installed)] { return read_installed_bundle(of, name); };
+  }
   struct File {
     std::string name;
     std::vector<uint8_t> bytes;

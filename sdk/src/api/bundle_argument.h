@@ -10,22 +10,23 @@
 namespace maq {
 
 // Reads the bundle in folder `path`; without one of `files`; without these the bundle `installed` of the folder
-// share/maquette/models beside the library. Throws ArgumentError for a path and files, or files without content, and
-// what read_bundle throws.
-Bundle read_bundle_argument(const char* path, const maq_memory_file* files, uint32_t file_count, const char* installed);
+// share/maquette/models beside the library. `config` is the name of the config that has them. Throws ArgumentError for
+// a path and files, or files without content, and what read_bundle throws.
+Bundle read_bundle_argument(const char* config, const char* path, const maq_memory_file* files, uint32_t file_count,
+                            const char* installed);
 
 template <class Config>
-Bundle read_bundle_argument(const Config& config, const char* installed) {
-  return read_bundle_argument(config.bundle_path, config.bundle_files, config.bundle_file_count, installed);
+Bundle read_bundle_argument(const Config& config, const char* name, const char* installed) {
+  return read_bundle_argument(name, config.bundle_path, config.bundle_files, config.bundle_file_count, installed);
 }
 
 // The same for later, and more than once: `files` are copied. Throws ArgumentError; the reader throws the rest.
-std::function<Bundle()> bundle_reader(const char* path, const maq_memory_file* files, uint32_t file_count,
-                                      const char* installed);
+std::function<Bundle()> bundle_reader(const char* config, const char* path, const maq_memory_file* files,
+                                      uint32_t file_count, const char* installed);
 
 template <class Config>
-std::function<Bundle()> bundle_reader(const Config& config, const char* installed) {
-  return bundle_reader(config.bundle_path, config.bundle_files, config.bundle_file_count, installed);
+std::function<Bundle()> bundle_reader(const Config& config, const char* name, const char* installed) {
+  return bundle_reader(name, config.bundle_path, config.bundle_files, config.bundle_file_count, installed);
 }
 
 }  // namespace maq

@@ -5,10 +5,7 @@
 #include "maquette/frame.h"
 
 // Frames of sources and results are whole handles from pools, so that lending one allocates nothing.
-struct maq_frame : maq::Handle {
-  ~maq_frame() {
-    if (release_callback != nullptr) release_callback(user_data);
-  }
+struct maq_frame : maq::HandleOf<maq::HandleKind::kFrame> {
   maq::Frame frame;
   maq_frame_release_callback release_callback = nullptr;
   void* user_data = nullptr;
@@ -19,7 +16,6 @@ namespace maq {
 
 // Gives its pixels back at once, and the handle to its pool.
 inline void return_to_pool(maq_frame* frame) {
-  if (frame == nullptr || frame->is_of_parent()) return;
   frame->frame.clear();
   std::exchange(frame->deleter, {})(frame);
 }

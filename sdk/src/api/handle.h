@@ -1,12 +1,13 @@
 // What every handle of the C API begins with, and the context.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
 
+#include "api/handle_state.h"
 #include "core/bounded_pool.h"
 #include "core/log.h"
 #include "maquette/context.h"
@@ -14,15 +15,12 @@
 
 namespace maq {
 
-// How many calls of fork() lie between this process and the first that loaded the library.
-uint32_t fork_count();
-
 // Every handle begins with this, so that maq_last_error works on each of them.
 class Handle {
  public:
-  // In a child of fork(), the objects of the parent have no threads, their mutexes may be locked for good, and their
-  // files and devices are the parent's: nothing may touch them.
-  bool is_of_parent() const { return fork_count_ != fork_count(); }
+  explicit Handle(HandleKind kind) : state_(kind) {}
+
+  HandleState& handle_state() const { return state_; }
 
   void set_error(std::string text) const {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -34,16 +32,21 @@ class Handle {
   }
 
  private:
-  const uint32_t fork_count_ = fork_count();
+  mutable HandleState state_;  // the first: it is read before it is known what the object is, if it is one
   mutable std::mutex mutex_;
   mutable std::string error_;
 };
 
-// For the `_destroy` and `_close` functions; NULL is fine.
-template <class T>
-void destroy(T* handle) {
-  if (handle != nullptr && !handle->is_of_parent()) delete handle;
-}
+template <HandleKind kind>
+class HandleOf : public Handle {
+ public:
+  static constexpr HandleKind kKind = kind;
+
+  HandleOf() : Handle(kind) {}
+
+  static void* operator new(size_t size_bytes) { return ::operator new(size_bytes); }
+  static void operator delete(void* memory) noexcept { HandleState::retire(memory, kind); }
+};
 
 // What the objects made from a context keep of it when it is destroyed before them.
 class ContextState {
@@ -68,7 +71,7 @@ class ContextState {
 
 }  // namespace maq
 
-struct maq_context : maq::Handle {
+struct maq_context : maq::HandleOf<maq::HandleKind::kContext> {
   explicit maq_context(std::shared_ptr<maq::ContextState> made) : state(std::move(made)) {}
   std::shared_ptr<maq::ContextState> state;
 };
@@ -80,13 +83,14 @@ template <class T>
 T* lend(typename BoundedPool<T>::Pooled handle) {
   handle->set_error({});  // of its use before
   handle->deleter = handle.get_deleter();
+  handle->handle_state().lend();
   return handle.release();
 }
 
-// Returns it; NULL is fine.
+// Returns it.
 template <class T>
 void return_to_pool(T* handle) {
-  if (handle != nullptr && !handle->is_of_parent()) std::exchange(handle->deleter, {})(handle);
+  std::exchange(handle->deleter, {})(handle);
 }
 
 }  // namespace maq

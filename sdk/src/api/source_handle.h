@@ -14,12 +14,12 @@ namespace maq {
 // The caller's config on top of the defaults. `name` begins error texts.
 maq_source_config read_source_config(const maq_source_config* given, const char* name);
 
-// Throws ArgumentError for what is out of range.
-SourceSettings source_settings(const maq_source_config& config, const Log& log);
+// Throws ArgumentError for what is out of range; `name` is that of the config.
+SourceSettings source_settings(const maq_source_config& config, const char* name, const Log& log);
 
 }  // namespace maq
 
-struct maq_source : maq::Handle {
+struct maq_source : maq::HandleOf<maq::HandleKind::kSource> {
   maq_source(std::string opened, std::unique_ptr<maq::Source> made, size_t pool_size)
       : uri(std::move(opened)), source(std::move(made)), frames(pool_size, "frames") {}
   // Calls of other threads for a frame end before.
@@ -45,17 +45,21 @@ struct maq_source : maq::Handle {
 
 namespace maq {
 
-// A call that the end of the source waits for: until it leaves, its errors can be kept with the handle.
+// A call that the end of the source waits for: until it leaves, its errors can be kept with the handle. Of nothing but
+// a source that the app has.
 class SourceCall {
  public:
-  explicit SourceCall(maq_source* source) : source_(source) { add(1); }
+  explicit SourceCall(maq_source* source)
+      : source_(source != nullptr && source->handle_state().is_held_as(maq_source::kKind) ? source : nullptr) {
+    add(1);
+  }
   ~SourceCall() { add(-1); }
   SourceCall(const SourceCall&) = delete;
   SourceCall& operator=(const SourceCall&) = delete;
 
  private:
   void add(int calls) {
-    if (source_ == nullptr || source_->is_of_parent()) return;
+    if (source_ == nullptr || source_->handle_state().is_of_parent()) return;
     const std::lock_guard<std::mutex> lock(source_->mutex);
     source_->calls += calls;
     if (source_->calls == 0) source_->idle.notify_all();
@@ -66,6 +70,6 @@ class SourceCall {
 
 }  // namespace maq
 
-struct maq_camera_list : maq::Handle {
+struct maq_camera_list : maq::HandleOf<maq::HandleKind::kCameraList> {
   std::vector<maq::CameraListing> cameras;
 };

@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "core/unique_fd.h"
+
 namespace maq {
 
-bool file_exists(const std::string& path);  // and is a regular file, not a folder
+bool file_exists(const std::string& path);  // and is no folder
 bool is_folder(const std::string& path);
 
 // Whether a relative path read from a file stays inside its folder: it is not empty, does not begin with '/' and has no
@@ -17,7 +20,21 @@ bool stays_inside(const std::string& relative_path);
 // The extension of a file's name with its dot, in lower case: ".png" of "a.b/C.PNG"; "" when it has none.
 std::string lower_case_extension(const std::string& path);
 
-// Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE when it cannot be read.
-std::vector<uint8_t> read_file(const std::string& path);
+struct OpenFile {
+  UniqueFd fd;
+  uint64_t size_bytes = 0;
+};
+
+// Opens a regular file for reading. Throws MAQ_ERROR_NOT_FOUND when there is none, MAQ_ERROR_UNREADABLE when it cannot
+// be read or is something else: a folder, a pipe, a device.
+OpenFile open_file(const std::string& path);
+
+// Throws what is wrong with the first bytes of a file.
+using StartCheck = std::function<void(const std::vector<uint8_t>& start)>;
+
+// Reads a regular file, or a pipe such as /dev/stdin, to its end. `check_start` gets its first 64 KiB, or the whole of
+// what is shorter, before more is read. Throws what open_file() throws, and MAQ_ERROR_UNREADABLE when there are more
+// than `max_bytes`, no program writes to the pipe, or its writer gives nothing for 10 seconds.
+std::vector<uint8_t> read_file(const std::string& path, uint64_t max_bytes, const StartCheck& check_start = {});
 
 }  // namespace maq

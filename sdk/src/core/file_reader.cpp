@@ -1,7 +1,5 @@
 #include "core/file_reader.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -17,28 +15,16 @@ bool is_space(int character) { return character == ' ' || (character >= '\t' && 
 
 }  // namespace
 
-FileReader::FileReader(std::string path) : path_(std::move(path)) {
-  // Without O_NONBLOCK, opening a pipe would wait for a writer.
-  file_ = UniqueFd(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!file_.is_open()) {
-    const int reason = errno;
-    if (reason == ENOENT || reason == ENOTDIR) {
-      throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
-    }
-    fail(" cannot be opened (", std::strerror(reason), ").");
-  }
-  struct stat found {};
-  if (::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
-  size_bytes_ = uint64_t(found.st_size);
-  buffer_ = std::make_unique<uint8_t[]>(kBufferBytes);
-}
+FileReader::FileReader(std::string path)
+    : path_(std::move(path)), file_(open_file(path_)), buffer_(std::make_unique<uint8_t[]>(kBufferBytes)) {}
 
 bool FileReader::fill() {
   buffer_offset_ += position_;
   position_ = filled_ = 0;
-  const size_t count = size_t(std::min<uint64_t>(kBufferBytes, size_bytes_ - buffer_offset_));
+  const size_t count = size_t(std::min<uint64_t>(kBufferBytes, file_.size_bytes - buffer_offset_));
   while (filled_ < count) {
-    const ssize_t got = ::pread(file_.get(), buffer_.get() + filled_, count - filled_, off_t(buffer_offset_ + filled_));
+    const ssize_t got =
+        ::pread(file_.fd.get(), buffer_.get() + filled_, count - filled_, off_t(buffer_offset_ + filled_));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) fail(" cannot be read to its end; did it change meanwhile?");
     filled_ += size_t(got);

@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/unique_fd.h"
+#include "core/file.h"
 
 namespace maq {
 
@@ -19,13 +19,12 @@ enum class ByteOrder { kLittle, kBig };
 
 class FileReader {
  public:
-  // Throws MAQ_ERROR_NOT_FOUND when there is no such file, MAQ_ERROR_UNREADABLE for what is not a readable
-  // file.
+  // Throws what open_file() throws.
   explicit FileReader(std::string path);
 
   const std::string& path() const { return path_; }
   // Bytes that have not been read or skipped yet.
-  uint64_t remaining() const { return size_bytes_ - buffer_offset_ - position_; }
+  uint64_t remaining() const { return file_.size_bytes - buffer_offset_ - position_; }
   // Of the line or word that was read last, from 1.
   uint64_t line() const { return line_; }
 
@@ -67,8 +66,7 @@ class FileReader {
   int next_character();  // -1 at the end of the file
 
   std::string path_;
-  UniqueFd file_;
-  uint64_t size_bytes_ = 0;
+  OpenFile file_;
   uint64_t buffer_offset_ = 0;  // of the buffer's first byte in the file
   std::unique_ptr<uint8_t[]> buffer_;
   size_t position_ = 0, filled_ = 0;

@@ -89,6 +89,17 @@ void copy_packed(const ImageView& image, uint8_t* pixels) {
   }
 }
 
+ImageView window_of(const ImageView& image, int x, int y, int width_px, int height_px) {
+  ImageView window{image.format, width_px, height_px, {}};
+  for (int plane = 0; plane < plane_count(image.format); ++plane) {
+    const PlaneView& from = image.planes[plane];
+    const size_t rows = size_t(plane_rows(image.format, plane, y));
+    window.planes[plane] = {from.data + rows * from.stride_bytes + row_bytes(image.format, plane, x),
+                            from.stride_bytes};
+  }
+  return window;
+}
+
 void check_image_size(int64_t width_px, int64_t height_px, const std::string& what) {
   if (width_px < 1 || height_px < 1) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, what, " is ", width_px, " x ", height_px,
@@ -111,18 +122,18 @@ ImageView checked_image_view(const maq_frame_desc& desc) {
     const size_t shortest = row_bytes(desc.format, plane, desc.width_px);
     const size_t stride = desc.stride_bytes[plane] == 0 ? shortest : desc.stride_bytes[plane];
     if (desc.planes[plane] == nullptr) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "planes[", plane, "] is NULL, but ", pixel_format_name(desc.format),
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "desc.planes[", plane, "] is NULL, but ", pixel_format_name(desc.format),
                   " has ", plane_count(desc.format), " plane(s).");
     }
     if (stride < shortest) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[", plane, "] is ", stride, ", but a row of ", desc.width_px,
-                  " pixels in ", pixel_format_name(desc.format), " takes ", shortest, " bytes.");
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "desc.stride_bytes[", plane, "] is ", stride, ", but a row of ",
+                  desc.width_px, " pixels in ", pixel_format_name(desc.format), " takes ", shortest, " bytes.");
     }
     const int rows = plane_rows(desc.format, plane, desc.height_px);
     const std::optional<size_t> bytes =
         stride <= kMaxStrideBytes ? bytes_of_rows(stride, rows, shortest) : std::nullopt;
     if (!bytes || !checked_sum(reinterpret_cast<uintptr_t>(desc.planes[plane]), uintptr_t(*bytes))) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes[", plane, "] is ", stride, ", but ", rows,
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "desc.stride_bytes[", plane, "] is ", stride, ", but ", rows,
                   " rows that far apart are no image in memory; a row of it takes ", shortest, " bytes.");
     }
     view.planes[plane] = PlaneView{desc.planes[plane], stride};

@@ -104,6 +104,8 @@ std::optional<size_t> bytes_of_rows(size_t stride_bytes, int rows, size_t row_by
 size_t packed_bytes(maq_pixel_format format, int width_px, int height_px);
 ImageView packed_view(maq_pixel_format format, int width_px, int height_px, const uint8_t* pixels);
 void copy_packed(const ImageView& image, uint8_t* pixels);
+// A part of an image, in its memory. `x` and `y` must be even: of YUV images two pixels share their colour.
+ImageView window_of(const ImageView& image, int x, int y, int width_px, int height_px);
 
 // Throws MAQ_ERROR_IMAGE_SIZE unless 1 <= side <= MAQ_MAX_SIDE_PX and the area is at most MAQ_MAX_PIXELS.
 // `what` begins the sentence: "photo.jpg" or "The frame".

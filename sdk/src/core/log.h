@@ -16,9 +16,14 @@ class Log {
 
   bool wants(maq_log_level level) const { return callback_ != nullptr && level <= level_; }
 
+  // A callback that throws loses its line: logging fails no call, and ends no thread.
   template <class... Parts>
-  void write(maq_log_level level, const Parts&... parts) const {
-    if (wants(level)) callback_(user_data_, level, concatenate(parts...).c_str());
+  void write(maq_log_level level, const Parts&... parts) const noexcept {
+    if (!wants(level)) return;
+    try {
+      callback_(user_data_, level, concatenate(parts...).c_str());
+    } catch (...) {
+    }
   }
 
  private:

@@ -1,9 +1,16 @@
 #include "core/memory.h"
 
 #include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
+#include <memory>
+#include <new>
 
 namespace maq {
 namespace {
@@ -15,7 +22,7 @@ constexpr size_t kMaxHeapBytes = 64 << 10;
 
 bool says_out_of_memory(std::string_view text) {
   // std::bad_alloc, ONNX Runtime's arena and strerror(ENOMEM), glibc's loader, libjpeg.
-  constexpr std::array<std::string_view, 4> kWords = {"bad_alloc", "llocate memory", "ut of memory",
+  constexpr std::array<std::string_view, 5> kWords = {"bad_alloc", "llocate memory", "emory alloc", "ut of memory",
                                                       "nsufficient memory"};
   for (const std::string_view words : kWords) {
     if (text.find(words) != std::string_view::npos) return true;
@@ -34,6 +41,20 @@ bool has_memory(size_t bytes) {
   if (memory == MAP_FAILED) return false;
   ::munmap(memory, bytes);
   return true;
+}
+
+void require_memory(size_t bytes) {
+  if (!has_memory(bytes) || !has_memory(std::min(bytes, kMaxHeapBytes))) throw std::bad_alloc();
+}
+
+size_t address_space_left() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return SIZE_MAX;
+  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen("/proc/self/statm", "re"), &std::fclose);
+  unsigned long long pages = 0;
+  if (file == nullptr || std::fscanf(file.get(), "%llu", &pages) != 1) return 0;
+  const rlim_t taken = rlim_t(pages) * rlim_t(sysconf(_SC_PAGESIZE));
+  return taken < limit.rlim_cur ? size_t(limit.rlim_cur - taken) : 0;
 }
 
 }  // namespace maq

@@ -12,6 +12,12 @@ bool says_out_of_memory(std::string_view text);
 // Whether the process could get that much memory now.
 bool has_memory(size_t bytes);
 
+// Throws std::bad_alloc unless it could.
+void require_memory(size_t bytes);
+
+// How much address space a limit of this process leaves (RLIMIT_AS: ulimit -v); SIZE_MAX where there is no limit.
+size_t address_space_left();
+
 // What the thread-local storage of a library takes when a thread first uses it; glibc ends the process where it cannot
 // be had.
 inline constexpr size_t kThreadLocalBytes = 64 << 10;

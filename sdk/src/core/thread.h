@@ -3,9 +3,12 @@
 
 #include <pthread.h>
 
+#include <cstddef>
+#include <future>
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 
@@ -23,6 +26,21 @@ std::thread start_thread(const char* name, Body&& body) {
     throw Error(MAQ_ERROR_OUT_OF_MEMORY, "The system starts no more threads (", error.code().message(),
                 "): raise the limit of this user (ulimit -u) or of the container, or free memory.");
   }
+}
+
+// Throws as start_thread() does where the system does not start so many threads now; for foreign libraries that hang,
+// or give another reason, where theirs do not start.
+inline void require_threads(size_t count) {
+  struct Held {
+    ~Held() {
+      end.set_value();
+      for (std::thread& thread : threads) thread.join();
+    }
+    std::promise<void> end;
+    std::vector<std::thread> threads;
+  } held;
+  const std::shared_future<void> end = held.end.get_future().share();
+  while (held.threads.size() < count) held.threads.push_back(start_thread("maq try", [end] { end.wait(); }));
 }
 
 }  // namespace maq

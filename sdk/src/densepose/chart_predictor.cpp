@@ -11,10 +11,10 @@ namespace maq {
 namespace {
 
 constexpr int kKernel = 4;
-constexpr size_t kLanes = 8;
 
 // Sums in lanes, so that the compiler may make vectors of them without changing the order of additions.
 inline float dot(const float* a, const float* b, size_t count) {
+  constexpr size_t kLanes = 8;
   float lanes[kLanes] = {};
   size_t i = 0;
   for (; i + kLanes <= count; i += kLanes) {

@@ -20,15 +20,18 @@ constexpr int kLanes = 8;
 
 using Tap = ResizeTap;
 
+// Between the centres of which two of `cells` cells a coordinate lies; before the first and behind the last, at it.
+inline Tap tap_at(float coordinate, int cells) {
+  const float at = std::max(0.0f, coordinate - 0.5f);
+  const int low = std::min(int(at), cells - 1);
+  return {low, std::min(low + 1, cells - 1), at - float(low)};
+}
+
 // Where each pixel of `to` lies between two cells of `from`.
 void fill_taps(int from, int to, std::vector<Tap>& taps) {
   taps.resize(static_cast<size_t>(to));
   const float scale = float(from) / float(to);
-  for (int i = 0; i < to; ++i) {
-    const float at = std::max(0.0f, (float(i) + 0.5f) * scale - 0.5f);
-    const int low = std::min(int(at), from - 1);
-    taps[size_t(i)] = {low, std::min(low + 1, from - 1), at - float(low)};
-  }
+  for (int i = 0; i < to; ++i) taps[size_t(i)] = tap_at((float(i) + 0.5f) * scale, from);
 }
 
 // The first of `count` values (of `padded`, a multiple of kLanes, the rest kSentinelLogit) that is the largest. NaN
@@ -142,7 +145,7 @@ MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<floa
 }
 
 // Of each cell the part with the largest logit, from 0 (of equal ones the lowest); -1 if all are NaN.
-MAQ_SIMD_CLONES void best_parts(const DenseLogits& logits, std::vector<int8_t>& best) {
+MAQ_SIMD_CLONES void best_parts(const DenseLogits& logits, std::vector<int16_t>& best) {
   const int parts = logits.index_classes - 1;
   const int padded = round_up(parts, kLanes);
   std::array<float, kMaxClasses> values;
@@ -151,7 +154,7 @@ MAQ_SIMD_CLONES void best_parts(const DenseLogits& logits, std::vector<int8_t>& 
   for (int y = 0; y < logits.size; ++y) {
     for (int x = 0; x < logits.size; ++x) {
       std::copy_n(logits.cell(y, x) + logits.coarse_classes + 1, parts, values.begin());
-      best[size_t(y) * size_t(logits.size) + size_t(x)] = int8_t(best_of(values.data(), parts, padded));
+      best[size_t(y) * size_t(logits.size) + size_t(x)] = int16_t(best_of(values.data(), parts, padded));
     }
   }
 }
@@ -204,6 +207,115 @@ uint8_t to_byte(float value, bool* clamped) {
   return uint8_t(value * 255.0f + 0.5f);
 }
 
+// The part with the largest logit between four cells, as ClassRow gives it.
+inline int best_between(const DenseLogits& logits, const Tap& row, const Tap& column) {
+  const int parts = logits.index_classes - 1, padded = round_up(parts, kLanes);
+  const int first = logits.coarse_classes + 1;
+  const float* const cells[] = {logits.cell(row.low, column.low) + first, logits.cell(row.high, column.low) + first,
+                                logits.cell(row.low, column.high) + first, logits.cell(row.high, column.high) + first};
+  alignas(32) std::array<float, kMaxClasses> mixed;
+  mixed.fill(kSentinelLogit);
+  for (int c = 0; c < parts; ++c) {
+    const float left = cells[0][c] + (cells[1][c] - cells[0][c]) * row.fraction;
+    const float right = cells[2][c] + (cells[3][c] - cells[2][c]) * row.fraction;
+    mixed[size_t(c)] = left + (right - left) * column.fraction;
+  }
+  return best_of(mixed.data(), parts, padded);
+}
+
+// The pixels of the planes whose centres may lie in the `size` x `size` cells.
+PixelRect rotated_rect(const AffineMap& to_image, int size, const DensePlanes& planes) {
+  const double side = size;
+  Point low = to_image({0, 0}), high = low;
+  for (const Point& corner : {to_image({side, 0}), to_image({0, side}), to_image({side, side})}) {
+    low = {std::min(low.x, corner.x), std::min(low.y, corner.y)};
+    high = {std::max(high.x, corner.x), std::max(high.y, corner.y)};
+  }
+  const auto clipped = [](double at, int side_px) { return int(std::clamp(at, 0.0, double(side_px))); };
+  const int x = clipped(std::floor(low.x), planes.width_px), y = clipped(std::floor(low.y), planes.height_px);
+  return {x, y, clipped(std::ceil(high.x), planes.width_px) - x, clipped(std::ceil(high.y), planes.height_px) - y};
+}
+
+// Paints one person into the planes, pixel by pixel.
+class Painter {
+ public:
+  // `rect`: what is painted into, which may reach beyond the planes.
+  Painter(const DenseLogits& logits, const PixelRect& rect, uint8_t person, float mask_threshold, DecodeMemory& memory,
+          DensePlanes& planes)
+      : size_(logits.size),
+        person_(person),
+        min_odds_(min_log_odds(mask_threshold)),
+        odds_(memory.odds),
+        best_(memory.best),
+        planes_(planes),
+        first_row_(std::max(0, rect.y)),
+        end_row_(std::min(rect.y + rect.height, planes.height_px)),
+        first_column_(std::max(0, rect.x)),
+        end_column_(std::min(rect.x + rect.width, planes.width_px)) {
+    classify_cells(logits, memory);
+  }
+
+  int first_row() const { return first_row_; }
+  int end_row() const { return end_row_; }
+  int first_column() const { return first_column_; }
+  int end_column() const { return end_column_; }
+
+  // The pixel of the planes that lies at `row` and `column` of the cells. `part_between`: the best part there, from 0,
+  // -1 for none; asked only where the cells around do not agree.
+  template <class PartBetween>
+  void paint(int x, int y, const Tap& row, const Tap& column, ChartSampler* charts, PartBetween&& part_between) {
+    if (!(bilinear(odds_.data(), size_, row, column) > min_odds_)) return;
+    const size_t pixel = size_t(y) * size_t(planes_.width_px) + size_t(x);
+    if (planes_.person[pixel] != 0) {
+      ++taken_;
+      return;
+    }
+    // What is largest in all four cells around a pixel is so between them.
+    const int16_t* const low = best_.data() + size_t(row.low) * size_t(size_);
+    const int16_t* const high = best_.data() + size_t(row.high) * size_t(size_);
+    int part = low[column.low];
+    if (part < 0 || low[column.high] != part || high[column.low] != part || high[column.high] != part) {
+      part = part_between();
+      if (part < 0) return;
+    }
+    bool clamped = false;
+    planes_.part[pixel] = uint8_t(part + 1);
+    if (charts != nullptr) {
+      const ChartPoint point = charts->at(part, column);
+      planes_.u[pixel] = to_byte(point.u, &clamped);
+      planes_.v[pixel] = to_byte(point.v, &clamped);
+    }
+    planes_.person[pixel] = person_;
+    ++counts_.body_pixels;
+    counts_.clamped_uv += clamped ? 1 : 0;
+  }
+
+  // Takes everything back where people in front leave less than that fraction of the person.
+  DecodeCounts finish(float min_visible_fraction) {
+    if (float(counts_.body_pixels) >= min_visible_fraction * float(counts_.body_pixels + taken_)) return counts_;
+    for (int y = first_row_; y < end_row_; ++y) {
+      const size_t start = size_t(y) * size_t(planes_.width_px);
+      for (size_t pixel = start + size_t(first_column_); pixel < start + size_t(end_column_); ++pixel) {
+        if (planes_.person[pixel] != person_) continue;
+        for (std::vector<uint8_t>* plane : {&planes_.part, &planes_.u, &planes_.v, &planes_.person})
+          (*plane)[pixel] = 0;
+      }
+    }
+    return {};
+  }
+
+ private:
+  int size_;
+  uint8_t person_;
+  float min_odds_;
+  const std::vector<float>& odds_;
+  const std::vector<int16_t>& best_;
+  DensePlanes& planes_;
+  int first_row_, end_row_, first_column_, end_column_;
+  DecodeCounts counts_;
+  int64_t taken_ = 0;  // pixels of the person that belong to people in front
+};
+
 }  // namespace
 
 void DensePlanes::reset(int width, int height) {
@@ -218,69 +330,79 @@ PixelRect pixel_rect(const Box& box) {
   return {x, y, std::max(1, int(std::floor(box.x1)) - x), std::max(1, int(std::floor(box.y1)) - y)};
 }
 
+void classify_cells(const DenseLogits& logits, DecodeMemory& memory) {
+  person_log_odds(logits, memory.odds);
+  best_parts(logits, memory.best);
+}
+
+MAQ_SIMD_CLONES float part_confidence(const DenseLogits& logits, float mask_threshold, const DecodeMemory& memory) {
+  const int parts = logits.index_classes - 1;
+  const float min_odds = min_log_odds(mask_threshold);
+  double sum = 0;
+  int count = 0;
+  for (int row = 0; row < logits.size; ++row) {
+    for (int column = 0; column < logits.size; ++column) {
+      const size_t cell = size_t(row) * size_t(logits.size) + size_t(column);
+      if (!(memory.odds[cell] > min_odds) || memory.best[cell] < 0) continue;
+      const float* const values = logits.cell(row, column) + logits.coarse_classes + 1;
+      const float best = values[memory.best[cell]];
+      float total = 0;
+      for (int c = 0; c < parts; ++c) {
+        const float below = values[c] - best;
+        total += below > -87.0f ? exp_of_negative(below) : 0;  // 0 for what is no number too
+      }
+      sum += double(1 / total);
+      ++count;
+    }
+  }
+  return count == 0 ? 0 : float(sum / count);
+}
+
+float min_log_odds(float mask_threshold) { return std::log(mask_threshold / (1 - mask_threshold)); }
+
 MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person,
                                           float mask_threshold, float min_visible_fraction, DecodeMemory& memory,
                                           DensePlanes& planes) {
-  DecodeCounts counts;
-  int64_t taken = 0;  // pixels of the person that belong to people in front
   const PixelRect rect = pixel_rect(box);
-  auto& [rows, cols, odds, best, mixed_row] = memory;
-  fill_taps(logits.size, rect.height, rows);
-  fill_taps(logits.size, rect.width, cols);
-  person_log_odds(logits, odds);
-  const float min_odds = std::log(mask_threshold / (1 - mask_threshold));
-  ClassRow parts(logits.index_classes - 1, logits.size, mixed_row);  // all but the background
-  best_parts(logits, best);
-
-  const int first_row = std::max(0, -rect.y);
-  const int last_row = std::min(rect.height, planes.height_px - rect.y);
-  const int first_col = std::max(0, -rect.x);
-  const int last_col = std::min(rect.width, planes.width_px - rect.x);
-  for (int y = first_row; y < last_row; ++y) {
-    const Tap& row = rows[size_t(y)];
+  fill_taps(logits.size, rect.height, memory.rows);
+  fill_taps(logits.size, rect.width, memory.columns);
+  Painter painter(logits, rect, person, mask_threshold, memory, planes);
+  ClassRow parts(logits.index_classes - 1, logits.size, memory.mixed_row);  // all but the background
+  for (int y = painter.first_row(); y < painter.end_row(); ++y) {
+    const Tap& row = memory.rows[size_t(y - rect.y)];
     std::optional<ChartSampler> charts;
     if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
     bool filled = false;  // many rows of a box need no resized logits
-    const int8_t* best_low = best.data() + size_t(row.low) * size_t(logits.size);
-    const int8_t* best_high = best.data() + size_t(row.high) * size_t(logits.size);
-    for (int x = first_col; x < last_col; ++x) {
-      const size_t pixel = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x + x);
-      const Tap& col = cols[size_t(x)];
-      if (!(bilinear(odds.data(), logits.size, row, col) > min_odds)) continue;
-      if (planes.person[pixel] != 0) {
-        ++taken;
-        continue;
-      }
-      // What is largest in all four cells around a pixel is so between them.
-      int part = best_low[col.low] + 1;
-      if (part == 0 || best_low[col.high] + 1 != part || best_high[col.low] + 1 != part ||
-          best_high[col.high] + 1 != part) {
+    for (int x = painter.first_column(); x < painter.end_column(); ++x) {
+      const Tap& column = memory.columns[size_t(x - rect.x)];
+      painter.paint(x, y, row, column, charts ? &*charts : nullptr, [&] {
         if (!filled) parts.fill(logits, logits.coarse_classes + 1, row);
         filled = true;
-        part = parts.best(col) + 1;
-        if (part == 0) continue;
-      }
-      bool clamped = false;
-      planes.part[pixel] = uint8_t(part);
-      if (charts) {
-        const ChartPoint point = charts->at(part - 1, col);
-        planes.u[pixel] = to_byte(point.u, &clamped);
-        planes.v[pixel] = to_byte(point.v, &clamped);
-      }
-      planes.person[pixel] = person;
-      ++counts.body_pixels;
-      counts.clamped_uv += clamped ? 1 : 0;
+        return parts.best(column);
+      });
     }
   }
-  if (float(counts.body_pixels) >= min_visible_fraction * float(counts.body_pixels + taken)) return counts;
-  for (int y = first_row; y < last_row; ++y) {
-    const size_t start = size_t(rect.y + y) * size_t(planes.width_px) + size_t(rect.x);
-    for (size_t pixel = start + size_t(first_col); pixel < start + size_t(last_col); ++pixel) {
-      if (planes.person[pixel] != person) continue;
-      for (std::vector<uint8_t>* plane : {&planes.part, &planes.u, &planes.v, &planes.person}) (*plane)[pixel] = 0;
+  return painter.finish(min_visible_fraction);
+}
+
+MAQ_SIMD_CLONES DecodeCounts paint_rotated_person(const DenseLogits& logits, const AffineMap& to_cells, uint8_t person,
+                                                  float mask_threshold, float min_visible_fraction,
+                                                  DecodeMemory& memory, DensePlanes& planes) {
+  const float size = float(logits.size);
+  Painter painter(logits, rotated_rect(to_cells.inverse(), logits.size, planes), person, mask_threshold, memory,
+                  planes);
+  for (int y = painter.first_row(); y < painter.end_row(); ++y) {
+    for (int x = painter.first_column(); x < painter.end_column(); ++x) {
+      const Point cell = to_cells({x + 0.5, y + 0.5});
+      const float cell_x = float(cell.x), cell_y = float(cell.y);
+      if (!(cell_x >= 0 && cell_x <= size && cell_y >= 0 && cell_y <= size)) continue;
+      const Tap row = tap_at(cell_y, logits.size), column = tap_at(cell_x, logits.size);
+      std::optional<ChartSampler> charts;
+      if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
+      painter.paint(x, y, row, column, charts ? &*charts : nullptr, [&] { return best_between(logits, row, column); });
     }
   }
-  return {};
+  return painter.finish(min_visible_fraction);
 }
 
 }  // namespace maq

@@ -6,6 +6,7 @@
 
 #include "densepose/box.h"
 #include "densepose/chart_predictor.h"
+#include "image/crop_input.h"
 
 namespace maq {
 
@@ -50,8 +51,8 @@ struct ResizeTap {
 // What painting a person needs in between; kept from person to person.
 struct DecodeMemory {
   std::vector<ResizeTap> rows, columns;
-  std::vector<float> odds;       // of each cell
-  std::vector<int8_t> best;      // part of each cell
+  std::vector<float> odds;       // of each cell: log(p / (1 - p)), p the probability that it shows the person
+  std::vector<int16_t> best;     // of each cell the part, from 0; -1: none
   std::vector<float> mixed_row;  // logits of a row of cells
 };
 
@@ -61,6 +62,14 @@ struct PixelRect {
 };
 PixelRect pixel_rect(const Box& box);
 
+// Fills `memory.odds` and `memory.best`.
+void classify_cells(const DenseLogits& logits, DecodeMemory& memory);
+// The mean probability of the best part, over the cells that show the person; 0 where none does. `memory` holds the
+// classified cells of `logits`.
+float part_confidence(const DenseLogits& logits, float mask_threshold, const DecodeMemory& memory);
+// The log-odds above which a cell or pixel shows the person.
+float min_log_odds(float mask_threshold);
+
 // Paints where the coarse classes other than background together have a probability above `mask_threshold` (log-odds of
 // each cell, resized bilinearly with half-pixel centres to the box's pixels): the best part of the index logits,
 // resized alike (of equal ones the lowest; background is not among them), with its U and V, resized alike and clamped
@@ -68,5 +77,11 @@ PixelRect pixel_rect(const Box& box);
 // `min_visible_fraction` of the person's pixels remains, nothing is painted. `person` counts from 1.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
                           float min_visible_fraction, DecodeMemory& memory, DensePlanes& planes);
+
+// Likewise, of a box that is rotated in the image: `to_cells` takes places of the image to the cells of the logits, of
+// which cell (0, 0) covers [0, 1) x [0, 1). Paints the pixels whose centres lie in the cells.
+DecodeCounts paint_rotated_person(const DenseLogits& logits, const AffineMap& to_cells, uint8_t person,
+                                  float mask_threshold, float min_visible_fraction, DecodeMemory& memory,
+                                  DensePlanes& planes);
 
 }  // namespace maq

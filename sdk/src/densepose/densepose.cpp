@@ -5,6 +5,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/rounding.h"
 
 namespace maq {
 namespace {
@@ -12,6 +13,17 @@ namespace {
 constexpr size_t kFeatureLevels = 4;  // P2 to P5, which the heads read
 constexpr size_t kRpnLevels = 5;      // P2 to P6
 constexpr int kFirstLevel = 2;
+// People gain by a crop whose box has a shorter long side, in pixels of the network's input, or who lean by more.
+constexpr float kSmallPersonPx = 150;
+constexpr double kMinLeanDegrees = 15;
+constexpr int kCropSidePx = 192;
+// In crops people are followed who move by less than this, of their long side, from frame to frame; and who keep this
+// fraction of their pixels.
+constexpr double kMotionMargin = 0.05;
+constexpr double kMinKeptBody = 0.25;
+// How much less confident than the first answer, in mean probability of the part, that of a crop may be. Measured on
+// renderings and photographs: what crops cost some people, large ones in groups above all, is less with it.
+constexpr float kMaxLostConfidence = 0.1f;
 
 // Names of tensors at the levels from `first` to `last`: "p3", "p4", …
 std::vector<std::string> at_levels(const std::string& name, int first, int last) {
@@ -52,12 +64,35 @@ int feature_channels(const GraphSpec& trunk, const std::string& bundle_name) {
   return int(*channels);
 }
 
+constexpr int64_t kAnySize = -1;
+
+// Throws unless the manifest gives a tensor of `graph` a shape that the runtime will use. Where it has a name for a
+// size that must be known, the tensor gets the number, so that Session compares it with the graph.
+void require_shape(TensorSpec& tensor, const std::vector<int64_t>& shape, const std::string& where) {
+  const auto fail = [&] {
+    std::string text;
+    for (const int64_t size : shape)
+      text += (text.empty() ? "" : ", ") + (size == kAnySize ? "n" : std::to_string(size));
+    throw Error(MAQ_ERROR_BAD_BUNDLE, where, tensor.name, " must have the shape [", text,
+                "] by the manifest's other values, but its graph lists another. Export the bundle again.");
+  };
+  if (tensor.shape.size() != shape.size()) fail();
+  for (size_t axis = 0; axis < shape.size(); ++axis) {
+    if (shape[axis] == kAnySize) continue;
+    const int64_t* listed = std::get_if<int64_t>(&tensor.shape[axis]);
+    if (listed != nullptr && *listed != shape[axis]) fail();
+    tensor.shape[axis] = shape[axis];
+  }
+}
+
 // Settings with the bundle's values in place of zeros.
 DensePoseSettings resolved(DensePoseSettings settings, const DensePoseSpec& spec) {
   if (settings.long_side_px == 0) settings.long_side_px = spec.long_side_px;
   if (settings.score_threshold < 0) settings.score_threshold = spec.box_head.score_threshold;
   if (settings.max_people == 0) settings.max_people = spec.box_head.max_people;
   if (settings.max_proposals == 0) settings.max_proposals = spec.rpn.post_nms_top_k;
+  if (settings.crop_side_px == 0) settings.crop_side_px = kCropSidePx;
+  settings.crop_side_px = round_up(settings.crop_side_px, spec.input.multiple_of);
   return settings;
 }
 
@@ -82,15 +117,37 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
     return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file),
                                      SessionSettings{settings_.threads, settings_.spin});
   };
+  // A graph, whose inputs and outputs have these shapes.
+  const auto make_checked = [&](const std::string& name, GraphSpec graph, const std::vector<int64_t>& input,
+                                const std::vector<std::vector<int64_t>>& outputs) {
+    const std::string where = concatenate("Bundle ", manifest.name, ": graph ", name, ": ");
+    for (TensorSpec& tensor : graph.inputs) require_shape(tensor, input, where + "input ");
+    for (size_t i = 0; i < graph.outputs.size(); ++i) {
+      require_shape(graph.outputs[i], outputs[std::min(i, outputs.size() - 1)], where + "output ");
+    }
+    return make(graph);
+  };
   const int first = kFirstLevel, last = kFirstLevel + int(kRpnLevels) - 1;
   const GraphSpec trunk = graph_with(manifest, "trunk", {"image"}, at_levels("p", first, last));
   channels_ = feature_channels(trunk, manifest.name);
-  trunk_ = make(trunk);
-  rpn_fine_ = make(graph_with(manifest, "rpn_fine", at_levels("p", first, first), at_levels("rpn", first, first)));
-  rpn_coarse_ =
-      make(graph_with(manifest, "rpn_coarse", at_levels("p", first + 1, last), at_levels("rpn", first + 1, last)));
-  box_head_ = make(graph_with(manifest, "box_head", {"rois"}, {"boxes"}));
-  dense_head_ = make(graph_with(manifest, "dense_head", {"rois"}, {"labels", "surface"}));
+  const std::vector<int64_t> features = {1, kAnySize, kAnySize, channels_};
+  trunk_ = make_checked("trunk", trunk, {1, 3, kAnySize, kAnySize}, {features});
+  const std::vector<int64_t> anchors = {1, kAnySize, kAnySize, 5 * int64_t(spec_.rpn.aspect_ratios.size())};
+  rpn_fine_ = make_checked(
+      "rpn_fine", graph_with(manifest, "rpn_fine", at_levels("p", first, first), at_levels("rpn", first, first)),
+      features, {anchors});
+  rpn_coarse_ = make_checked(
+      "rpn_coarse",
+      graph_with(manifest, "rpn_coarse", at_levels("p", first + 1, last), at_levels("rpn", first + 1, last)), features,
+      {anchors});
+  const int64_t box_pool = spec_.box_head.pool_size, dense_pool = spec_.dense_head.pool_size;
+  box_head_ = make_checked("box_head", graph_with(manifest, "box_head", {"rois"}, {"boxes"}),
+                           {kAnySize, box_pool, box_pool, channels_}, {{kAnySize, 6}});
+  const int64_t classes = spec_.dense_head.coarse_classes + spec_.dense_head.index_classes;
+  dense_head_ = make_checked(
+      "dense_head", graph_with(manifest, "dense_head", {"rois"}, {"labels", "surface"}),
+      {kAnySize, dense_pool, dense_pool, channels_},
+      {{kAnySize, dense_pool, dense_pool, 4 * classes}, {kAnySize, dense_pool, dense_pool, charts_.channels()}});
   if (spec_.dense_head.output_size != 2 * spec_.dense_head.pool_size) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": the dense head's output is ",
                 spec_.dense_head.output_size, " cells wide, but must be twice its pool of ", spec_.dense_head.pool_size,
@@ -99,14 +156,11 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
 }
 
 void DensePose::run(const ImageView& image, DensePoseResult& result) {
-  // However this ends, a cancel of this run does not cancel a later one.
-  struct Reset {
-    RunCancel& cancel;
-    ~Reset() { cancel.reset(); }
-  } const after{*cancel_};
   try {
     find_people(image, result);
+    cancel_->check();  // one that comes later is of the next run
   } catch (...) {
+    cancel_->reset();
     reset();  // of the frame's boxes, some may be missing
     throw;
   }
@@ -114,65 +168,76 @@ void DensePose::run(const ImageView& image, DensePoseResult& result) {
 
 void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
   cancel_->check();
-  Stopwatch total, stage;
+  Stopwatch total;
   DensePoseStats& stats = result.stats;
   stats = {};
   result.people.clear();
   result.planes.reset(image.width_px, image.height_px);
 
-  const NetworkSize size = network_size(image.width_px, image.height_px, settings_.long_side_px);
-  stats.network_width_px = size.width_px;
-  stats.network_height_px = size.height_px;
-  const bool is_same_stream = size.width_px == input_.width_px && size.height_px == input_.height_px;
+  const bool is_same_stream = image.width_px == image_width_px_ && image.height_px == image_height_px_;
+  image_width_px_ = image.width_px;
+  image_height_px_ = image.height_px;
   stats.key_frame = !is_same_stream || frames_since_key_ == 0;
   frames_since_key_ = stats.key_frame ? 1 : frames_since_key_ + 1;
   if (frames_since_key_ >= settings_.key_frame_interval) frames_since_key_ = 0;
-  // Without boxes to propagate nothing runs until the next key frame.
-  if (stats.key_frame || !tracked_.empty()) {
-    make_network_input(image, size, spec_.input, input_);
-    stats.preprocess_ms = float(stage.lap_ms());
+  const NetworkSize size = network_size(image.width_px, image.height_px, settings_.long_side_px);
+  stats.network_width_px = size.width_px;
+  stats.network_height_px = size.height_px;
 
-    run_trunk();
-    stats.trunk_ms = float(stage.lap_ms());
-
-    if (stats.key_frame) {
-      propose(image.height_px, proposals_, &stats.dropped_boxes);
-    } else {
-      proposals_ = tracked_;
-    }
-    tracked_.clear();
-    stats.proposals = int(proposals_.size());
-    stats.proposals_ms = float(stage.lap_ms());
-
-    // Propagated boxes went through the box head in the frame before, so that this is their second pass.
-    const float min_score = settings_.score_threshold;
-    if (stats.key_frame && spec_.box_head.second_pass_threshold) {
-      run_box_head(proposals_, std::min(min_score, *spec_.box_head.second_pass_threshold), found_,
-                   &stats.dropped_boxes);
-      proposals_.swap(found_);
-    }
-    run_box_head(proposals_, min_score, found_, &stats.dropped_boxes);
-    stats.box_head_ms = float(stage.lap_ms());
-
-    if (!found_.empty()) run_dense_head(found_, result);
+  mapped_.clear();
+  if (!stats.key_frame && tracks_crops_) {
+    mapped_.swap(tracked_);
+    for (MappedPerson& person : mapped_) person.labels = person.surface = nullptr;  // of the frame before
+    run_crops(image, stats);
+  } else if (stats.key_frame || !tracked_.empty()) {  // else nothing runs until the next key frame
+    find_boxes(image, stats);
+    if (!found_.empty()) map_people(image, result.planes, stats);
   }
+  paint_people(result);
   stats.total_ms = float(total.lap_ms());
+}
+
+void DensePose::find_boxes(const ImageView& image, DensePoseStats& stats) {
+  Stopwatch stage;
+  make_network_input(image, {stats.network_width_px, stats.network_height_px}, spec_.input, input_);
+  stats.preprocess_ms = float(stage.lap_ms());
+
+  run_trunk(input_.values, input_.padded_width_px, input_.padded_height_px);
+  stats.trunk_ms = float(stage.lap_ms());
+
+  if (stats.key_frame) {
+    propose(image.height_px, proposals_, &stats.dropped_boxes);
+  } else {
+    proposals_.clear();
+    for (const MappedPerson& person : tracked_) proposals_.push_back(person.found);
+  }
+  stats.proposals = int(proposals_.size());
+  stats.proposals_ms = float(stage.lap_ms());
+
+  // Propagated boxes went through the box head in the frame before, so that this is their second pass.
+  const float min_score = settings_.score_threshold;
+  if (stats.key_frame && spec_.box_head.second_pass_threshold) {
+    run_box_head(proposals_, std::min(min_score, *spec_.box_head.second_pass_threshold), found_, &stats.dropped_boxes);
+    proposals_.swap(found_);
+  }
+  run_box_head(proposals_, min_score, found_, &stats.dropped_boxes);
+  stats.box_head_ms = float(stage.lap_ms());
 }
 
 void DensePose::reset() {
   frames_since_key_ = 0;
   tracked_.clear();
+  tracks_crops_ = false;
 }
 
-void DensePose::run_trunk() {
-  const int64_t height = input_.padded_height_px;
-  const int64_t width = input_.padded_width_px;
+void DensePose::run_trunk(const std::vector<float>& values, int width_px, int height_px) {
+  const int64_t height = height_px, width = width_px;
   const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
   shapes_.clear();
   for (const int stride : spec_.rpn.strides) {
     shapes_.push_back({1, cells(height, stride), cells(width, stride), channels_});
   }
-  inputs_.assign(1, {input_.values.data(), {1, 3, height, width}});
+  inputs_.assign(1, {values.data(), {1, 3, height, width}});
   pyramid_ = trunk_->run(inputs_, shapes_, cancel_.get());
   features_.clear();
   for (size_t l = 0; l < kFeatureLevels; ++l) {
@@ -242,44 +307,170 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_scor
   non_maximum_suppression(found, spec.nms_iou, size_t(settings_.max_people));
 }
 
-void DensePose::run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result) {
+void DensePose::map_people(const ImageView& image, const DensePlanes& planes, DensePoseStats& stats) {
   Stopwatch stage;
   const DenseHeadSpec& spec = spec_.dense_head;
-  const int64_t count = int64_t(people.size());
-  const size_t roi_size = size_t(channels_) * size_t(spec.pool_size) * size_t(spec.pool_size);
-  rois_.resize(size_t(count) * roi_size);
-  for (size_t i = 0; i < people.size(); ++i) {
-    roi_align_.run(features_[0], people[i].box, spec.pool_size, rois_.data() + i * roi_size);
+  const float scale_x = float(planes.width_px) / float(input_.width_px);
+  const float scale_y = float(planes.height_px) / float(input_.height_px);
+  rois_.resize(found_.size() * dense_roi_size());
+  for (const ScoredBox& person : found_) {
+    roi_align_.run(features_[0], person.box, spec.pool_size, rois_.data() + mapped_.size() * dense_roi_size());
+    MappedPerson mapped;
+    mapped.found = person;
+    mapped.box = scaled(person.box, scale_x, scale_y);
+    clip_box(mapped.box, float(planes.width_px), float(planes.height_px));
+    mapped_.push_back(mapped);
   }
-  const int classes = spec.coarse_classes + spec.index_classes;
-  inputs_.assign(1, {rois_.data(), {count, spec.pool_size, spec.pool_size, channels_}});
-  shapes_.assign(2, {count, spec.pool_size, spec.pool_size, 4 * classes});
-  shapes_[1][3] = charts_.channels();
-  const std::vector<TensorView>& outputs = dense_head_->run(inputs_, shapes_, cancel_.get());
-  result.stats.dense_head_ms = float(stage.lap_ms());
+  const std::vector<TensorView>& answers = run_dense_head(found_.size());
+  for (size_t i = 0; i < mapped_.size(); ++i) {
+    mapped_[i].labels = answers[0].data + i * labels_size();
+    mapped_[i].surface = answers[1].data + i * surface_size();
+  }
+  stats.dense_head_ms = float(stage.lap_ms());
+  if (settings_.crops == PersonCrops::kOff) return;
+  choose_crops();
+  run_crops(image, stats);
+  stats.crops_ms = float(stage.lap_ms());
+}
 
-  const float scale_x = float(result.planes.width_px) / float(input_.width_px);
-  const float scale_y = float(result.planes.height_px) / float(input_.height_px);
-  const size_t labels_size = size_t(spec.output_size) * size_t(spec.output_size) * size_t(classes);
-  const size_t surface_size = size_t(charts_.channels()) * size_t(spec.pool_size) * size_t(spec.pool_size);
-  for (size_t i = 0; i < people.size(); ++i) {
-    cancel_->check();
-    if (settings_.surface) charts_.begin(outputs[1].data + i * surface_size, spec.pool_size);
-    const DenseLogits logits{outputs[0].data + i * labels_size, settings_.surface ? &charts_ : nullptr,
-                             spec.coarse_classes, spec.index_classes, spec.output_size};
-    Box box = scaled(people[i].box, scale_x, scale_y);
-    clip_box(box, float(result.planes.width_px), float(result.planes.height_px));
-    const DecodeCounts counts = paint_person(logits, box, uint8_t(result.people.size() + 1), spec.mask_threshold,
-                                             spec.min_visible_fraction, decode_memory_, result.planes);
-    // A box without a body is a false alarm; one whose body is painted already shows the same person again.
-    if (counts.body_pixels > 0) {
-      result.people.push_back({box, people[i].score});
-      tracked_.push_back(people[i]);
+size_t DensePose::dense_roi_size() const {
+  return size_t(channels_) * size_t(spec_.dense_head.pool_size) * size_t(spec_.dense_head.pool_size);
+}
+
+size_t DensePose::labels_size() const {
+  const DenseHeadSpec& spec = spec_.dense_head;
+  return size_t(spec.output_size) * size_t(spec.output_size) * size_t(spec.coarse_classes + spec.index_classes);
+}
+
+size_t DensePose::surface_size() const {
+  const DenseHeadSpec& spec = spec_.dense_head;
+  return size_t(charts_.channels()) * size_t(spec.pool_size) * size_t(spec.pool_size);
+}
+
+const std::vector<TensorView>& DensePose::run_dense_head(size_t count) {
+  const DenseHeadSpec& spec = spec_.dense_head;
+  const int64_t people = int64_t(count);
+  inputs_.assign(1, {rois_.data(), {people, spec.pool_size, spec.pool_size, channels_}});
+  shapes_.assign(2, {people, spec.pool_size, spec.pool_size, 4 * (spec.coarse_classes + spec.index_classes)});
+  shapes_[1][3] = charts_.channels();
+  return dense_head_->run(inputs_, shapes_, cancel_.get());
+}
+
+DenseLogits DensePose::logits_of(const MappedPerson& person) {
+  const DenseHeadSpec& spec = spec_.dense_head;
+  charts_.begin(person.surface, spec.pool_size);
+  return {person.labels, &charts_, spec.coarse_classes, spec.index_classes, spec.output_size};
+}
+
+void DensePose::choose_crops() {
+  const float threshold = spec_.dense_head.mask_threshold;
+  for (MappedPerson& person : mapped_) {
+    const DenseLogits logits = logits_of(person);
+    classify_cells(logits, decode_memory_);
+    person.confidence = part_confidence(logits, threshold, decode_memory_);
+    const AffineMap cells = map_of_cells(person.box, logits.size);
+    const auto axis = find_body_axis(logits, cells, threshold, decode_memory_);
+    const PersonCrop crop =
+        crop_around_person(logits.size, cells, axis, threshold, 0, settings_.crop_side_px, decode_memory_);
+    const bool is_small = std::max(person.found.box.width(), person.found.box.height()) < kSmallPersonPx;
+    if (settings_.crops == PersonCrops::kAll || leans(axis, kMinLeanDegrees) || is_small) person.crop = crop;
+  }
+}
+
+void DensePose::run_crops(const ImageView& image, DensePoseStats& stats) {
+  Stopwatch stage;
+  const auto has_crop = [](const MappedPerson& person) { return person.crop.has_value(); };
+  const size_t count = size_t(std::count_if(mapped_.begin(), mapped_.end(), has_crop));
+  stats.crops = int(count);
+  if (count == 0) return;
+  // The dense head's memory is needed again.
+  const size_t answer_size = labels_size() + surface_size();
+  first_answers_.resize(mapped_.size() * answer_size);
+  rois_.resize(count * dense_roi_size());
+  const int side = settings_.crop_side_px;
+  float* roi = rois_.data();
+  for (size_t i = 0; i < mapped_.size(); ++i) {
+    MappedPerson& person = mapped_[i];
+    if (person.labels != nullptr) {
+      float* const labels = first_answers_.data() + i * answer_size;
+      float* const surface = std::copy_n(person.labels, labels_size(), labels);
+      std::copy_n(person.surface, surface_size(), surface);
+      person.labels = labels;
+      person.surface = surface;
     }
+    if (!person.crop) continue;
+    make_crop_input(image, person.crop->to_image, side, spec_.input, crop_input_);
+    run_trunk(crop_input_.values, side, side);
+    roi_align_.run(features_[0], person.crop->box, spec_.dense_head.pool_size, roi);
+    roi += dense_roi_size();
+  }
+  const std::vector<TensorView>& answers = run_dense_head(count);
+  const float *labels = answers[0].data, *surface = answers[1].data;
+  for (MappedPerson& person : mapped_) {
+    if (!person.crop) continue;
+    MappedPerson again = person;
+    again.labels = labels;
+    again.surface = surface;
+    labels += labels_size();
+    surface += surface_size();
+    if (person.labels != nullptr) {
+      const DenseLogits logits = logits_of(again);
+      classify_cells(logits, decode_memory_);
+      const float confidence = part_confidence(logits, spec_.dense_head.mask_threshold, decode_memory_);
+      if (confidence < person.confidence - kMaxLostConfidence) again = person, again.crop.reset();
+    }
+    person = again;
+  }
+  stats.crops_ms = float(stage.lap_ms());
+}
+
+void DensePose::paint_people(DensePoseResult& result) {
+  Stopwatch stage;
+  const DenseHeadSpec& spec = spec_.dense_head;
+  tracked_.clear();
+  tracks_crops_ = false;
+  if (mapped_.empty()) return;
+  tracks_crops_ = settings_.key_frame_interval > 1 &&
+                  std::all_of(mapped_.begin(), mapped_.end(), [](const MappedPerson& p) { return p.crop.has_value(); });
+  for (MappedPerson& person : mapped_) {
+    cancel_->check();
+    DenseLogits logits = logits_of(person);
+    if (!settings_.surface) logits.charts = nullptr;
+    const uint8_t number = uint8_t(result.people.size() + 1);
+    const DecodeCounts counts =
+        person.crop ? paint_rotated_person(logits, person.crop->to_cells(logits.size), number, spec.mask_threshold,
+                                           spec.min_visible_fraction, decode_memory_, result.planes)
+                    : paint_person(logits, person.box, number, spec.mask_threshold, spec.min_visible_fraction,
+                                   decode_memory_, result.planes);
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
+    // A box without a body is a false alarm; one whose body is painted already shows the same person again.
+    if (counts.body_pixels == 0) continue;
+    const bool is_lost = double(counts.body_pixels) < kMinKeptBody * double(person.body_pixels);
+    person.body_pixels = counts.body_pixels;
+    if (tracks_crops_) follow_in_crop(person, result);
+    result.people.push_back({person.box, person.found.score});
+    if (!(tracks_crops_ && is_lost)) tracked_.push_back(person);
   }
   result.stats.decode_ms = float(stage.lap_ms());
+}
+
+void DensePose::follow_in_crop(MappedPerson& person, const DensePoseResult& result) {
+  const float threshold = spec_.dense_head.mask_threshold;
+  const DenseLogits logits = logits_of(person);
+  const AffineMap cells = person.crop->to_cells(logits.size).inverse();
+  Box bounds = person_bounds(logits.size, cells, threshold, decode_memory_);
+  if (result.stats.key_frame) {
+    person.beyond_body = {person.box.x0 - bounds.x0, person.box.y0 - bounds.y0, person.box.x1 - bounds.x1,
+                          person.box.y1 - bounds.y1};
+  } else {  // the box head has not seen the person in this frame
+    bounds = {bounds.x0 + person.beyond_body.x0, bounds.y0 + person.beyond_body.y0, bounds.x1 + person.beyond_body.x1,
+              bounds.y1 + person.beyond_body.y1};
+    if (clip_box(bounds, float(result.planes.width_px), float(result.planes.height_px))) person.box = bounds;
+  }
+  const auto axis = find_body_axis(logits, cells, threshold, decode_memory_);
+  person.crop =
+      crop_around_person(logits.size, cells, axis, threshold, kMotionMargin, settings_.crop_side_px, decode_memory_);
 }
 
 }  // namespace maq

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,14 +11,18 @@
 #include "densepose/chart_predictor.h"
 #include "densepose/dense_decode.h"
 #include "densepose/manifest.h"
+#include "densepose/person_crop.h"
 #include "densepose/proposals.h"
 #include "densepose/roi_align.h"
 #include "densepose/surface_grid.h"
+#include "image/crop_input.h"
 #include "image/network_input.h"
 #include "nn/bundle.h"
 #include "nn/session.h"
 
 namespace maq {
+
+enum class PersonCrops { kOff, kAuto, kAll };  // as maq_person_crops
 
 // As in maq_densepose_config, whose comments say what they mean; 0 (a negative threshold): the bundle's value.
 struct DensePoseSettings {
@@ -28,6 +33,8 @@ struct DensePoseSettings {
   int max_proposals = 0;
   int key_frame_interval = 1;
   int min_person_height_px = 0;
+  PersonCrops crops = PersonCrops::kOff;
+  int crop_side_px = 0;
   bool surface = true;
   bool spin = true;
 };
@@ -43,6 +50,7 @@ struct DensePoseStats {
   float proposals_ms = 0;
   float box_head_ms = 0;
   float dense_head_ms = 0;
+  float crops_ms = 0;
   float decode_ms = 0;
   float total_ms = 0;
   int network_width_px = 0;
@@ -50,6 +58,7 @@ struct DensePoseStats {
   bool key_frame = false;
   int proposals = 0;
   int dropped_boxes = 0;
+  int crops = 0;
   DecodeCounts decoded;
 };
 
@@ -78,14 +87,45 @@ class DensePose {
   const SurfaceGrid& surface() { return surface_.grid(); }
 
  private:
+  // A person whom the dense head sees.
+  struct MappedPerson {
+    ScoredBox found;  // in pixels of the network's input
+    Box box;          // in pixels of the image
+    Box beyond_body;  // from the bounds of the painted body to `box`, side by side, when the box head saw it
+    std::optional<PersonCrop> crop;
+    float confidence = 0;           // of the answer from the whole image
+    int64_t body_pixels = 0;        // when last painted
+    const float* labels = nullptr;  // the dense head's answer, of the crop where there is one
+    const float* surface = nullptr;
+  };
+
   void find_people(const ImageView& image, DensePoseResult& result);
-  void run_trunk();
+  // `values`: [3, height_px, width_px], normalised; the sides are multiples of the spec's.
+  void run_trunk(const std::vector<float>& values, int width_px, int height_px);
   // The best boxes of the RPN. Its finest level runs only where people of min_person_height_px may be that small.
   void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
   // One pass of the box head: scores and refines `boxes`, keeps those of a score above `min_score`, then NMS.
   void run_box_head(const std::vector<ScoredBox>& boxes, float min_score, std::vector<ScoredBox>& found, int* dropped);
-  // Paints the people, whose boxes are in pixels of the network's input, and adds those that got a pixel to `result`.
-  void run_dense_head(const std::vector<ScoredBox>& people, DensePoseResult& result);
+  // Finds people in the whole image, at key frames, or follows those of the frame before; into `found_`.
+  void find_boxes(const ImageView& image, DensePoseStats& stats);
+  // Runs the dense head on `found_`, then on crops of those who gain by it; into `mapped_`.
+  void map_people(const ImageView& image, const DensePlanes& planes, DensePoseStats& stats);
+  // Of the first `count` RoIs in `rois_`: labels and surface, in memory of the session until it runs again.
+  const std::vector<TensorView>& run_dense_head(size_t count);
+  // Values of one person's RoI, labels and surface.
+  size_t dense_roi_size() const;
+  size_t labels_size() const;
+  size_t surface_size() const;
+  DenseLogits logits_of(const MappedPerson& person);
+  // Gives crops to the people of `mapped_` who gain by one.
+  void choose_crops();
+  // Runs trunk and dense head over the crops of `mapped_`. Those answers take the place of the first, unless they are
+  // clearly less confident; then the person loses the crop.
+  void run_crops(const ImageView& image, DensePoseStats& stats);
+  // Paints `mapped_` and adds those who got a pixel to `result`; they are followed in the next frame.
+  void paint_people(DensePoseResult& result);
+  // Gives the person, who was painted last, the crop of the next frame, and between key frames the box of this one.
+  void follow_in_crop(MappedPerson& person, const DensePoseResult& result);
   const FeatureMap& level_for(const Box& box) const;
 
   DensePoseSpec spec_;
@@ -103,16 +143,21 @@ class DensePose {
   std::vector<TensorView> pyramid_;   // P2 to P6, in memory of the trunk
   std::vector<FeatureMap> features_;  // P2 to P5, the same
   std::vector<float> rois_;
+  std::vector<MappedPerson> mapped_;
   // Scratch of a frame, kept so that the next one takes nothing from the heap.
   RoiAlign roi_align_;
   DecodeMemory decode_memory_;
+  CropInput crop_input_;
+  std::vector<float> first_answers_;  // from the whole image, while the dense head runs again
   std::vector<RpnCandidate> candidates_;
   std::vector<RpnLevel> rpn_levels_;
   std::vector<ScoredBox> proposals_, found_;
   std::vector<TensorView> inputs_;
   std::vector<Shape> shapes_;
-  // Boxes of the frame before, in pixels of the network's input, to be propagated; and frames since the last key frame.
-  std::vector<ScoredBox> tracked_;
+  // People of the frame before, to be followed: by their boxes or, where all have crops, in these alone.
+  std::vector<MappedPerson> tracked_;
+  bool tracks_crops_ = false;
+  int image_width_px_ = 0, image_height_px_ = 0;
   int frames_since_key_ = 0;
 };
 

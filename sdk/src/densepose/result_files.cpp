@@ -5,15 +5,20 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/memory.h"
 #include "image/files/image_file.h"
 
 namespace maq {
 namespace {
 
+constexpr size_t kMaxJsonBytes = 256 << 10;
+
 // Coordinates to a hundredth of a pixel and scores to four digits: what is there, without the noise of float to text.
 double rounded(double value, double steps) { return std::round(value * steps) / steps; }
 
 std::string json_of(const DensePoseResult& result) {
+  // Where a few bytes fail, the JSON library ends the process.
+  require_memory(kMaxJsonBytes);
   nlohmann::ordered_json document;
   document["width"] = result.planes.width_px;
   document["height"] = result.planes.height_px;

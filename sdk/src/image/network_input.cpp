@@ -27,8 +27,7 @@ MAQ_SIMD_CLONES void weighted_lines(const uint8_t* first_line, size_t stride_byt
 
 void ResizeAxis::prepare(int from, int to, bool shrinks) {
   if (from_px == from && to_px == to) return;
-  from_px = from;
-  to_px = to;
+  from_px = to_px = 0;  // until it is made: memory may fail
   const double scale = double(from) / double(to);
   taps = std::min(from, shrinks ? int(std::ceil(scale)) + 1 : 2);
   first.assign(size_t(to), 0);
@@ -48,6 +47,8 @@ void ResizeAxis::prepare(int from, int to, bool shrinks) {
     }
     for (int k = 0; k < taps; ++k) weights[k] = float(weights[k] / sum);
   }
+  from_px = from;
+  to_px = to;
 }
 
 NetworkSize network_size(int width_px, int height_px, int long_side_px) {

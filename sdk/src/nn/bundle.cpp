@@ -1,6 +1,7 @@
 #include "nn/bundle.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <iterator>
 #include <optional>
@@ -13,10 +14,12 @@ namespace maq {
 namespace {
 
 using Bytes = std::vector<uint8_t>;
-// The bytes of a file of that name; nothing where there is none.
-using FileReading = std::function<std::optional<Bytes>(const std::string& name)>;
+// The bytes of a file of that name; nothing where there is none. `listed` is null for the manifest itself.
+using FileReading = std::function<std::optional<Bytes>(const std::string& name, const FileSpec* listed)>;
 
 constexpr char kManifest[] = "manifest.json";
+constexpr uint64_t kMaxManifestBytes = 1 << 24;
+constexpr uint64_t kMaxModelBytes = uint64_t(1) << 31;  // protobuf ends there
 constexpr char kRemedy[] = "Fetch or export the bundle again.";
 
 // Whether an ONNX file keeps weights in other files, which the manifest would not cover. Such a tensor has an entry
@@ -26,11 +29,14 @@ bool refers_to_other_files(const Bytes& onnx) {
   return std::search(onnx.begin(), onnx.end(), std::begin(kEntry), std::end(kEntry)) != onnx.end();
 }
 
+void check_size(uint64_t size_bytes, const FileSpec& spec, const std::string& path) {
+  if (size_bytes == uint64_t(spec.bytes)) return;
+  throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has ", size_bytes, " bytes, but the manifest says ", spec.bytes,
+              ": it is incomplete or was changed. ", kRemedy);
+}
+
 void verify(const Bytes& bytes, const FileSpec& spec, const std::string& path) {
-  if (int64_t(bytes.size()) != spec.bytes) {
-    throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has ", bytes.size(), " bytes, but the manifest says ", spec.bytes,
-                ": it is incomplete or was changed. ", kRemedy);
-  }
+  check_size(bytes.size(), spec, path);
   if (const std::string digest = sha256_hex(bytes.data(), bytes.size()); digest != spec.sha256) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, path, " has SHA-256 ", digest.substr(0, 12), "…, but the manifest says ",
                 spec.sha256.substr(0, 12), "…: it is damaged or was changed. ", kRemedy);
@@ -46,7 +52,7 @@ void verify(const Bytes& bytes, const FileSpec& spec, const std::string& path) {
 Bundle read_verified(const std::string& prefix, const Bytes& manifest, const FileReading& read) {
   Bundle bundle{prefix, parse_manifest(std::string(manifest.begin(), manifest.end()), prefix + kManifest), {}};
   for (const auto& [name, spec] : bundle.manifest.files) {
-    std::optional<Bytes> bytes = read(name);
+    std::optional<Bytes> bytes = read(name, &spec);
     if (!bytes) {
       throw Error(MAQ_ERROR_BAD_BUNDLE, bundle.path_of(name), " is missing, but the manifest lists it. ", kRemedy);
     }
@@ -63,12 +69,17 @@ Bundle read_bundle(const std::string& folder) {
     throw Error(MAQ_ERROR_NOT_FOUND, "Model bundle ", folder,
                 " is not a folder; give the folder that holds manifest.json and the .onnx files.");
   }
-  const FileReading read = [&](const std::string& name) -> std::optional<Bytes> {
+  const FileReading read = [&](const std::string& name, const FileSpec* listed) -> std::optional<Bytes> {
     const std::string path = folder + "/" + name;
     if (!file_exists(path)) return std::nullopt;
-    return read_file(path);
+    if (listed == nullptr) return read_file(path, kMaxManifestBytes);
+    // A file of another size is not even read.
+    std::error_code is_no_file;
+    const uintmax_t size_bytes = std::filesystem::file_size(path, is_no_file);
+    if (!is_no_file) check_size(size_bytes, *listed, path);
+    return read_file(path, std::min(uint64_t(listed->bytes), kMaxModelBytes));
   };
-  const std::optional<Bytes> manifest = read(kManifest);
+  const std::optional<Bytes> manifest = read(kManifest, nullptr);
   if (!manifest) {
     throw Error(MAQ_ERROR_NOT_FOUND, folder, " has no manifest.json, so it is not a model bundle; check the path.");
   }
@@ -88,14 +99,14 @@ Bundle read_bundle(const std::vector<NamedBuffer>& buffers) {
                   "; give each file once.");
     }
   }
-  const FileReading read = [&](const std::string& name) -> std::optional<Bytes> {
+  const FileReading read = [&](const std::string& name, const FileSpec*) -> std::optional<Bytes> {
     const auto found =
         std::find_if(buffers.begin(), buffers.end(), [&](const NamedBuffer& buffer) { return buffer.name == name; });
     if (found == buffers.end()) return std::nullopt;
     const auto* bytes = static_cast<const uint8_t*>(found->data);
     return Bytes(bytes, bytes + found->size_bytes);
   };
-  const std::optional<Bytes> manifest = read(kManifest);
+  const std::optional<Bytes> manifest = read(kManifest, nullptr);
   if (!manifest) {
     throw Error(MAQ_ERROR_NOT_FOUND, "None of the ", buffers.size(),
                 " buffers of the bundle is named manifest.json; give the manifest and each file that it lists.");

@@ -8,11 +8,26 @@ namespace maq {
 using nlohmann::json;
 
 ManifestNode ManifestNode::parse(const std::string& text, const std::string& origin) {
-  const auto document =
-      std::make_shared<const Document>(Document{json::parse(text, nullptr, /*allow_exceptions=*/false), origin});
-  if (!document->root.is_object()) {  // also where the text is not JSON
-    throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object. Fetch or export the bundle again.");
+  constexpr char kRemedy[] = ". Fetch or export the bundle again.";
+  json root;
+  try {
+    root = json::parse(text);
+  } catch (const json::exception& error) {
+    // "[json.exception.parse_error.101] parse error at line 3, column 9: …"; also for numbers that a double cannot
+    // hold.
+    // The text quotes what was read, however long that is.
+    constexpr size_t kMaxBytes = 200;
+    std::string what = error.what();
+    what = what.substr(what.find(']') + 2);
+    if (what.size() > kMaxBytes) {
+      what.resize(kMaxBytes);
+      while (!what.empty() && uint8_t(what.back()) >= 0x80) what.pop_back();  // a part of a character
+      what += "...";
+    }
+    throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object: ", what, kRemedy);
   }
+  if (!root.is_object()) throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object", kRemedy);
+  const auto document = std::make_shared<const Document>(Document{std::move(root), origin});
   return {document, document->root, ""};
 }
 
@@ -46,8 +61,11 @@ std::vector<std::pair<std::string, ManifestNode>> ManifestNode::members() const 
 }
 
 std::string ManifestNode::text() const {
+  constexpr size_t kMaxBytes = 1000;  // of names, which errors quote
   if (!value_->is_string()) fail("is not a text");
-  return value_->get<std::string>();
+  const auto text = value_->get<std::string>();
+  if (text.size() > kMaxBytes) fail("has ", text.size(), " bytes, but must have at most ", kMaxBytes);
+  return text;
 }
 
 float ManifestNode::number(double min, double max) const {

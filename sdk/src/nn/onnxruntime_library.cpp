@@ -3,7 +3,6 @@
 #include <dlfcn.h>
 
 #include <cstdlib>
-#include <new>
 #include <vector>
 
 #include "core/error.h"
@@ -47,11 +46,28 @@ void* find_library(const std::string& explicit_path, std::string* opened_path) {
               folder, " or on the system's search path.", kRemedy);
 }
 
+// What the schemas of operators take; where that cannot be had, ONNX prints.
+constexpr size_t kEnvironmentBytes = size_t(24) << 20;
+
 // ONNX Runtime has one environment for a process, whose logger is the one of the first caller and may be gone by the
 // time it is called; sessions have loggers of their own (session.cpp), so this one only keeps it from printing.
 void ORT_API_CALL discard_log(void*, OrtLoggingLevel, const char*, const char*, const char*, const char*) {}
 
 }  // namespace
+
+std::string without_source_place(const char* given) {
+  std::string text = given;
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  const size_t place = text.find("/onnxruntime_src/");
+  const size_t open = place == std::string::npos ? place : text.find('(', place);
+  if (open == std::string::npos) return text;
+  size_t close = open;
+  for (int depth = 0; close < text.size(); ++close) {
+    depth += (text[close] == '(') - (text[close] == ')');
+    if (depth == 0) break;
+  }
+  return close + 2 >= text.size() ? text : text.substr(0, place) + text.substr(close + 2);
+}
 
 OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const Log& log) : log_(log) {
   // Releases after 1.26 carry telemetry that starts when the library is loaded; this keeps it off. It does not
@@ -64,7 +80,7 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
   if (get_api_base == nullptr) {
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is not ONNX Runtime: it has no OrtGetApiBase.", kRemedy);
   }
-  if (!has_memory(kThreadLocalBytes)) throw std::bad_alloc();
+  require_memory(kThreadLocalBytes);
   const OrtApiBase* base = get_api_base();
   version_ = base->GetVersionString();
   api_ = base->GetApi(kApiVersion);
@@ -72,6 +88,7 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is ONNX Runtime ", version_, ", but 1.", kApiVersion,
                 ".0 or newer is needed.", kRemedy);
   }
+  require_memory(kEnvironmentBytes);
   check(api_->CreateEnvWithCustomLogger(discard_log, nullptr, ORT_LOGGING_LEVEL_WARNING, "maquette", &env_),
         MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime does not start");
   log_.write(MAQ_LOG_INFO, "ONNX Runtime ", version_, " opened from ", path_);
@@ -83,7 +100,7 @@ OnnxRuntimeLibrary::~OnnxRuntimeLibrary() {
 
 void OnnxRuntimeLibrary::check(OrtStatus* result, maq_status status, const std::string& what) const {
   if (result == nullptr) return;
-  const std::string text = api_->GetErrorMessage(result);
+  const std::string text = without_source_place(api_->GetErrorMessage(result));
   api_->ReleaseStatus(result);
   if (says_out_of_memory(text)) {
     throw Error(MAQ_ERROR_OUT_OF_MEMORY, what, ": there is not enough memory. Free memory, or raise the limit of it.");

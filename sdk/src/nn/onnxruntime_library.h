@@ -10,6 +10,9 @@
 
 namespace maq {
 
+// A text of ONNX Runtime without the place in its source, the function and the line end that some begin and end with.
+std::string without_source_place(const char* text);
+
 class OnnxRuntimeLibrary {
  public:
   // Opens `explicit_path`, or searches as maq_context_create documents when it is empty.

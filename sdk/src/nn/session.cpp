@@ -2,7 +2,6 @@
 
 #include <map>
 #include <memory>
-#include <new>
 
 #include "core/error.h"
 #include "core/memory.h"
@@ -13,7 +12,11 @@ namespace {
 void ORT_API_CALL forward_to_log(void* log, OrtLoggingLevel severity, const char*, const char*, const char*,
                                  const char* message) {
   const maq_log_level level = severity >= ORT_LOGGING_LEVEL_ERROR ? MAQ_LOG_ERROR : MAQ_LOG_WARNING;
-  static_cast<const Log*>(log)->write(level, "ONNX Runtime: ", message);
+  if (says_out_of_memory(message)) return;  // the call that fails says so
+  try {
+    static_cast<const Log*>(log)->write(level, "ONNX Runtime: ", without_source_place(message));
+  } catch (const std::bad_alloc&) {  // may not pass through ONNX Runtime
+  }
 }
 
 std::string to_text(const std::vector<int64_t>& shape) {
@@ -85,7 +88,7 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
   const auto check = [&](OrtStatus* result) {
     runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be loaded"));
   };
-  if (!has_memory(kThreadLocalBytes)) throw std::bad_alloc();  // that of this thread
+  require_memory(kThreadLocalBytes);  // that of this thread
   OrtSessionOptions* made = nullptr;
   check(api.CreateSessionOptions(&made));
   const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made,

@@ -7,6 +7,12 @@
 #include "core/thread.h"
 
 namespace maq {
+namespace {
+
+// Networks and frames of common sizes need less.
+constexpr size_t kMinAddressSpace = size_t(1) << 30;
+
+}  // namespace
 
 void SessionThreads::Worker::run() {
   // Kept until ONNX Runtime's thread-local storage can take its place.
@@ -41,6 +47,11 @@ void SessionThreads::Worker::end() {
 }
 
 SessionThreads::SessionThreads(int count) : SessionThreads() {  // so that what is thrown here ends those started
+  if (count > 0 && address_space_left() < kMinAddressSpace) {
+    shortage_ = concatenate("The process may take less than ", kMinAddressSpace >> 20,
+                            " MiB more (ulimit -v), and ONNX Runtime hangs where memory ends on several threads.");
+    return;
+  }
   waiting_.reserve(size_t(count));
   try {
     while (this->count() < count) {

@@ -15,7 +15,7 @@ namespace maq {
 
 class SessionThreads {
  public:
-  // Starts `count` threads, or as many as the system gives.
+  // Starts `count` threads, or as many as the system gives; none where a limit of the address space is near.
   explicit SessionThreads(int count);
   // Ends those that were not assigned.
   ~SessionThreads();

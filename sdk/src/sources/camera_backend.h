@@ -12,6 +12,9 @@
 
 namespace maq {
 
+// Asked of devices where the app asks for no size.
+constexpr int kDefaultCameraWidthPx = 640, kDefaultCameraHeightPx = 480;
+
 // What the app asks for; 0 or empty: the device's default. The nearest that the device offers is taken.
 struct CameraRequest {
   std::string format;  // four letters, as the device calls it: "MJPG"

@@ -265,7 +265,11 @@ struct LiveSource::State {
         if (event == Camera::Event::kFrame) camera->give_back(buffer.slot);
         break;
       }
-      if (event == Camera::Event::kFrame) {
+      if (event == Camera::Event::kFrame && !is_first && buffer.timestamp_ns < last_time_ns &&
+          int32_t(buffer.sequence - last_number) < 0) {
+        // A frame that comes after its successor, as uvcvideo shows some under load: it was counted as lost by then.
+        camera->give_back(buffer.slot);
+      } else if (event == Camera::Event::kFrame) {
         const uint32_t lost_before = is_first ? 0 : buffer.sequence - last_number - 1;
         // A number that repeats, goes back or leaps says nothing of frames that were lost.
         const uint64_t sequence = next_sequence + (lost_before < kMaxLostAtOnce ? lost_before : 0);

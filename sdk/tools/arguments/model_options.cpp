@@ -26,6 +26,13 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
       .add_option("--min-person-height", options.min_person_height_px,
                   "People less tall than this, in pixels, may be missed; large values are faster")
       ->check(CLI::Range(0, 100000));
+  command
+      .add_option("--crops", options.crops,
+                  "Look again at people in crops of the frame, rotated upright: off (default), auto (who is small or "
+                  "leans), all. Finer and slower")
+      ->check(CLI::IsMember({"off", "auto", "all"}));
+  command.add_option("--crop-size", options.crop_px, "Side of these crops in pixels (default 192)")
+      ->check(CLI::Range(64, 512));
   command.add_flag("--no-surface", options.no_surface, "Compute only body parts, which is faster: U and V stay 0");
   command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: saves energy, slower");
 }
@@ -49,5 +56,9 @@ maq_densepose_config config_of(const ModelOptions& options, const std::string& b
   config.min_person_height_px = options.min_person_height_px;
   config.detail = options.no_surface ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
   config.allow_spinning = options.no_spin ? 0 : 1;
+  config.person_crops = options.crops == "auto"  ? MAQ_PERSON_CROPS_AUTO
+                        : options.crops == "all" ? MAQ_PERSON_CROPS_ALL
+                                                 : MAQ_PERSON_CROPS_OFF;
+  config.person_crop_px = options.crop_px;
   return config;
 }

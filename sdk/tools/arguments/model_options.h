@@ -16,6 +16,8 @@ struct ModelOptions {
   int max_proposals = 0;
   int key_frames = 1;
   int min_person_height_px = 0;
+  std::string crops = "off";
+  int crop_px = 0;
   bool no_surface = false;
   bool no_spin = false;
 };

@@ -40,7 +40,7 @@ int run_beside(const char* name, std::vector<std::string> arguments) {
   sigset_t passed_on, before;
   sigemptyset(&passed_on);
   for (const int number : kPassedOn) sigaddset(&passed_on, number);
-  sigprocmask(SIG_BLOCK, &passed_on, &before);  // until there is somebody to pass them on to
+  sigprocmask(SIG_BLOCK, &passed_on, &before);  // until the child runs, to which they go on
   const pid_t parent = getpid();
   process = fork();
   if (process < 0) throw std::runtime_error(program + " cannot be started: " + std::strerror(errno) + ".");

@@ -27,7 +27,7 @@ namespace {
 
 constexpr int64_t kFramesOfEndlessSource = 100;
 
-struct Options {
+struct DensePoseOptions {
   std::vector<std::string> sources;
   ModelOptions model;
   std::string out;
@@ -41,8 +41,8 @@ struct Options {
 class Timings {
  public:
   void add(const maq_densepose_stats& stats) {
-    const float values[] = {stats.preprocess_ms, stats.trunk_ms,  stats.proposals_ms, stats.box_head_ms,
-                            stats.dense_head_ms, stats.decode_ms, stats.total_ms};
+    const float values[] = {stats.preprocess_ms, stats.trunk_ms, stats.proposals_ms, stats.box_head_ms,
+                            stats.dense_head_ms, stats.crops_ms, stats.decode_ms,    stats.total_ms};
     for (size_t i = 0; i < kStages; ++i) ms_[i].push_back(values[i]);
     people_ += stats.person_count;
   }
@@ -55,7 +55,7 @@ class Timings {
     print_output("%zu frame%s, %lld %s. Median of a frame: %.1f ms (%.1f FPS)\n", frames(), frames() == 1 ? "" : "s",
                  (long long)people_, people_ == 1 ? "person" : "people", double(median_total_ms()),
                  1000.0 / std::max(1e-3, double(median_total_ms())));
-    constexpr const char* kNames[] = {"preprocess", "trunk", "proposals", "box head", "dense head", "decode"};
+    constexpr const char* kNames[] = {"preprocess", "trunk", "proposals", "box head", "dense head", "crops", "decode"};
     for (size_t i = 0; i + 1 < kStages; ++i) {
       print_output("%s%s %.1f", i == 0 ? "  " : " | ", kNames[i], double(median(ms_[i])));
     }
@@ -63,7 +63,7 @@ class Timings {
   }
 
  private:
-  static constexpr size_t kStages = 7;
+  static constexpr size_t kStages = 8;
 
   static float median(std::vector<float> values) {
     if (values.empty()) return 0;
@@ -83,7 +83,7 @@ std::string frame_stem(const std::string& stem, bool is_clip, uint64_t sequence)
   return stem + number;
 }
 
-void print_frame(const Options& options, const std::string& stem, const maq_frame_desc& desc,
+void print_frame(const DensePoseOptions& options, const std::string& stem, const maq_frame_desc& desc,
                  const maq_densepose_stats& stats) {
   if (options.json) {
     const nlohmann::ordered_json line = {{"frame", stem},
@@ -91,6 +91,7 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
                                          {"people", stats.person_count},
                                          {"key_frame", stats.is_key_frame != 0},
                                          {"proposals", stats.proposal_count},
+                                         {"crops", stats.crop_count},
                                          {"network", {stats.network_width_px, stats.network_height_px}},
                                          {"ms",
                                           {{"preprocess", rounded_ms(double(stats.preprocess_ms))},
@@ -98,6 +99,7 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
                                            {"proposals", rounded_ms(double(stats.proposals_ms))},
                                            {"box_head", rounded_ms(double(stats.box_head_ms))},
                                            {"dense_head", rounded_ms(double(stats.dense_head_ms))},
+                                           {"crops", rounded_ms(double(stats.crops_ms))},
                                            {"decode", rounded_ms(double(stats.decode_ms))},
                                            {"total", rounded_ms(double(stats.total_ms))}}}};
     print_output("%s\n", json_text(line).c_str());
@@ -109,7 +111,7 @@ void print_frame(const Options& options, const std::string& stem, const maq_fram
 }
 
 // Runs one source to its end and writes its files.
-void run_source(const Options& options, const SourceArgument& argument, const maquette::Context& context,
+void run_source(const DensePoseOptions& options, const SourceArgument& argument, const maquette::Context& context,
                 maquette::Source& source, maquette::DensePose& densepose, Timings& timings) {
   const StoppedByInterrupt stopped(source);
   densepose.reset();
@@ -173,7 +175,7 @@ void tell(const std::exception& error) {
   print_error("maquette: %s\n", printable(error.what()).c_str());
 }
 
-int run_densepose(const Options& options) {
+int run_densepose(const DensePoseOptions& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
   const std::string bundle = bundle_of(options.model);
   const maquette::Context context = open_context();
@@ -209,7 +211,7 @@ int run_densepose(const Options& options) {
 }  // namespace
 
 void add_densepose_command(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DensePoseOptions>();
   CLI::App* command =
       app.add_subcommand("densepose", "Map each pixel of the people in images or clips to the body surface");
   command

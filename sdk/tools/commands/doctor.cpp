@@ -43,12 +43,12 @@ std::string first_line(const fs::path& path) {
 std::string users_of(const fs::path& device) {
   std::string users;
   std::error_code error;
-  for (const fs::path& process : entries_of("/proc")) {
-    const std::string number = process.filename().string();
+  for (const fs::path& entry : entries_of("/proc")) {
+    const std::string number = entry.filename().string();
     if (number.find_first_not_of("0123456789") != std::string::npos) continue;
-    for (const fs::path& file : entries_of(process / "fd")) {
+    for (const fs::path& file : entries_of(entry / "fd")) {
       if (fs::read_symlink(file, error) != device) continue;
-      users += (users.empty() ? "" : ", ") + first_line(process / "comm") + " (process " + number + ")";
+      users += (users.empty() ? "" : ", ") + first_line(entry / "comm") + " (process " + number + ")";
       break;
     }
   }

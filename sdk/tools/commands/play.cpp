@@ -15,7 +15,7 @@
 
 namespace {
 
-struct Options {
+struct PlayOptions {
   std::string source;
   double speed = 1;
   double from_s = 0;
@@ -39,7 +39,7 @@ std::string with_option(const std::string& uri, const std::string& key, const st
   return uri + (uri.find('?') == std::string::npos ? "?" : "&") + key + "=" + value;
 }
 
-int play(const Options& options) {
+int play(const PlayOptions& options) {
   require_writable(options.json);
   catch_interrupts();
   std::string uri = parse_source_argument(options.source).uri;
@@ -84,6 +84,10 @@ int play(const Options& options) {
     if (shows) picture.show(frame, statistics.line(source.info().dropped_frame_count));
   }
   const maq_source_info info = source.info();
+  if (statistics.frames() == 0 && failure.empty() && !interrupted()) {
+    failure = options.source + " delivered no frame before it ended or the time was over; dropped frames: " +
+              std::to_string(info.dropped_frame_count) + ".";
+  }
   stopped.reset();
   statistics.close(std::move(source));
   statistics.print(info);
@@ -95,7 +99,7 @@ int play(const Options& options) {
 }  // namespace
 
 void add_play_command(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlayOptions>();
   CLI::App* command =
       app.add_subcommand("play", "Show a camera, a recording or another source, and count late and missing frames");
   command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();

@@ -15,7 +15,7 @@
 
 namespace {
 
-struct Options {
+struct RecordOptions {
   std::string source;
   std::string out;
   int64_t frames = 0;
@@ -26,7 +26,7 @@ struct Options {
 // Frames that may wait while the disk is slow.
 constexpr uint32_t kWaitingFrames = 30;
 
-int record(const Options& options) {
+int record(const RecordOptions& options) {
   catch_interrupts();
   const maquette::Context context = open_context();
   maq_source_config config = maquette::default_source_config();
@@ -76,7 +76,7 @@ int record(const Options& options) {
 }  // namespace
 
 void add_record_command(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecordOptions>();
   CLI::App* command = app.add_subcommand("record", "Record a camera or another source to a file");
   command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
   command->add_option("out", options->out, "File of the recording: take.maqrec; must not exist yet")->required();

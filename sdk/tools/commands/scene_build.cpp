@@ -16,7 +16,7 @@
 
 namespace {
 
-struct Options {
+struct BuildOptions {
   std::string capture;
   std::string out;
   std::string bundle;
@@ -50,7 +50,7 @@ maquette::Scene build_or_tell(const maquette::Context& context, const maq_scene_
   }
 }
 
-int build(const Options& options) {
+int build(const BuildOptions& options) {
   catch_interrupts();
   const maquette::Context context = open_context();
   const maquette::Capture capture(context, options.capture);
@@ -89,7 +89,9 @@ int build(const Options& options) {
   const double total_s = seconds_since_start();
 
   const maq_scene_info made = scene.info();
-  const uint64_t bytes = std::filesystem::file_size(options.out);
+  std::error_code is_device;  // which has no size
+  uint64_t bytes = std::filesystem::file_size(options.out, is_device);
+  if (is_device) bytes = 0;
   print_output("%s: %" PRIu64 " of %" PRIu64 " points were seen by %u photos; %.1f MB, %.1f bytes a point; %.1f s\n",
                options.out.c_str(), made.point_count, stats.cloud_point_count, stats.view_count, double(bytes) / 1e6,
                double(bytes) / double(made.point_count), total_s);
@@ -119,7 +121,7 @@ int build(const Options& options) {
 }  // namespace
 
 void add_scene_build_command(CLI::App& scene, int* exit_code) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BuildOptions>();
   CLI::App* command =
       scene.add_subcommand("build", "Build a scene from a folder with photos, cameras and a point cloud");
   command

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct Options {
+struct RenderOptions {
   std::string scene;
   std::string out;
   std::string bundle;
@@ -63,7 +63,7 @@ std::optional<Size> size_of(const std::string& text) {
 }
 
 maquette::SceneRenderer make_renderer(const maquette::Context& context, const maquette::Scene& scene,
-                                      const Options& options) {
+                                      const RenderOptions& options) {
   const std::string networks = scene_bundle_or_default(options.bundle);
   maq_scene_renderer_config config = maquette::default_scene_renderer_config();
   config.bundle_path = networks.c_str();
@@ -138,7 +138,7 @@ std::vector<uint32_t> chosen_views(const maquette::Capture& capture, const std::
 
 std::string picture_name(const maq_capture_view& view) { return fs::path(view.name).stem().string() + ".png"; }
 
-int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& capture, const Options& options) {
+int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& capture, const RenderOptions& options) {
   const std::vector<uint32_t> views = chosen_views(capture, options.views);
   const std::optional<Size> size = size_of(options.size);
   std::set<std::string> names;
@@ -178,7 +178,7 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
 }
 
 std::vector<maq_pinhole_camera> flight(const maquette::Scene& scene, const maquette::Capture* capture,
-                                       const Options& options) {
+                                       const RenderOptions& options) {
   constexpr Size kUsual = {640, 480};
   const Size size = size_of(options.size).value_or(kUsual);
   const int frames = std::max(1, int(std::lround(options.seconds * options.fps)));
@@ -199,7 +199,7 @@ std::vector<maq_pinhole_camera> flight(const maquette::Scene& scene, const maque
 }
 
 int render_clip(const maquette::Context& context, maquette::SceneRenderer& renderer, const maquette::Scene& scene,
-                const maquette::Capture* capture, const Options& options) {
+                const maquette::Capture* capture, const RenderOptions& options) {
   const std::vector<maq_pinhole_camera> cameras = flight(scene, capture, options);
   make_folder_of(options.out);
   maquette::Clip clip(context, options.out, options.fps);
@@ -229,7 +229,7 @@ int render_clip(const maquette::Context& context, maquette::SceneRenderer& rende
   return 0;
 }
 
-int render(const Options& options) {
+int render(const RenderOptions& options) {
   if (options.views.empty() == options.path.empty()) {
     throw std::runtime_error("Say what to render: --views with --capture for pictures, or --path for a clip.");
   }
@@ -254,7 +254,7 @@ int render(const Options& options) {
 }  // namespace
 
 void add_scene_render_command(CLI::App& scene, int* exit_code) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RenderOptions>();
   CLI::App* command = scene.add_subcommand("render", "Render a scene: pictures from given cameras, or a clip");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
   command->add_option("-o,--out", options->out, "File of the clip, clip.mp4 or clip.avi, or folder for the pictures")

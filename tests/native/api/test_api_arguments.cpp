@@ -248,6 +248,86 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   expect_refused("min_person_height_px", [](auto& config) { config.min_person_height_px = -1; });
   expect_refused("detail", [](auto& config) { reinterpret_cast<int32_t&>(config.detail) = 2; });
   expect_refused("allow_spinning", [](auto& config) { config.allow_spinning = 2; });
+  expect_refused("person_crops", [](auto& config) { reinterpret_cast<int32_t&>(config.person_crops) = 3; });
+  expect_refused("person_crop_px", [](auto& config) { config.person_crop_px = 63; });
+  expect_refused("person_crop_px", [](auto& config) { config.person_crop_px = 513; });
+}
+
+TEST_F(ApiArguments, ErrorsNameTheParameterOfTheHeader) {
+  maq_frame_desc desc{};
+  expect_error(maq_frame_desc_init(nullptr, sizeof desc), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "maq_frame_desc_init: desc is NULL");
+  expect_error(maq_frame_desc_init(&desc, 1), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "maq_frame_desc_init: struct_size is 1,");
+  maq_source_config init;
+  expect_error(maq_source_config_init(&init, 0), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "maq_source_config_init: struct_size is 0,");
+  ASSERT_EQ(maq_frame_desc_init(&desc, sizeof desc), MAQ_OK);
+  desc.format = MAQ_PIXEL_GREY8;
+  desc.width_px = desc.height_px = 8;
+  maq_frame* frame = nullptr;
+  expect_error(maq_frame_wrap(context_, &desc, nullptr, nullptr, &frame), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
+               "desc.planes[0] is NULL");
+}
+
+TEST_F(ApiArguments, FieldsOfAConfigInAConfigAreNamedWithBoth) {
+  const auto expect_refused = [&](const char* text, auto change) {
+    maq_densepose_config densepose;
+    maq_source_config source;
+    maq_pipeline_config config;
+    ASSERT_EQ(maq_densepose_config_init(&densepose, sizeof densepose), MAQ_OK);
+    ASSERT_EQ(maq_source_config_init(&source, sizeof source), MAQ_OK);
+    ASSERT_EQ(maq_pipeline_config_init(&config, sizeof config), MAQ_OK);
+    config.densepose = &densepose;
+    config.source = &source;
+    change(densepose, source);
+    maq_pipeline* pipeline = nullptr;
+    expect_error(maq_pipeline_create(context_, &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT, nullptr, text);
+  };
+  expect_refused("config.densepose.threads is -1", [](auto& densepose, auto&) { densepose.threads = -1; });
+  expect_refused("config.densepose.bundle_files is NULL",
+                 [](auto& densepose, auto&) { densepose.bundle_file_count = 1; });
+  expect_refused("config.source.queue_length is 0", [](auto&, auto& source) { source.queue_length = 0; });
+  expect_refused("config.source.struct_size is 1", [](auto&, auto& source) { source.struct_size = 1; });
+}
+
+TEST_F(ApiArguments, WhyNothingWasMadeIsFoundWithAndWithoutTheContext) {
+  const auto expect_text = [&](maq_status status, const std::string& text) {
+    EXPECT_NE(status, MAQ_OK);
+    EXPECT_EQ(std::string(maq_last_error(nullptr)), std::string(maq_last_error(context_)));
+    EXPECT_NE(std::string(maq_last_error(nullptr)).find(text), std::string::npos) << maq_last_error(nullptr);
+  };
+  maq_source* source = nullptr;
+  expect_text(maq_source_create(context_, "image:/no/such/1.jpg", nullptr, &source), "/no/such/1.jpg");
+  maq_densepose_config densepose_config;
+  ASSERT_EQ(maq_densepose_config_init(&densepose_config, sizeof densepose_config), MAQ_OK);
+  densepose_config.bundle_path = "/no/such/2";
+  maq_densepose* densepose = nullptr;
+  expect_text(maq_densepose_create(context_, &densepose_config, &densepose), "/no/such/2");
+  maq_pipeline_config pipeline_config{};
+  maq_pipeline* pipeline = nullptr;
+  expect_text(maq_pipeline_create(context_, &pipeline_config, &pipeline), "config.struct_size is 0");
+  maq_recorder* recorder = nullptr;
+  expect_text(maq_recorder_create(context_, "/no/such/3", nullptr, nullptr, &recorder), "/no/such/3");
+  maq_clip* clip = nullptr;
+  expect_text(maq_clip_create(context_, "/no/such/4.mp4", 10, &clip), "/no/such/4.mp4");
+  maq_frame_desc desc{};
+  maq_frame* frame = nullptr;
+  expect_text(maq_frame_wrap(context_, &desc, nullptr, nullptr, &frame), "desc.struct_size is 0");
+  maq_capture* capture = nullptr;
+  expect_text(maq_capture_open(context_, "/no/such/5", &capture), "/no/such/5");
+  maq_scene* scene = nullptr;
+  expect_text(maq_scene_open(context_, "/no/such/6", &scene), "/no/such/6");
+  expect_text(maq_scene_open_memory(context_, "text", 4, &scene), "The scene in memory");
+  maq_scene_builder* builder = nullptr;
+  maq_point_cloud cloud{};
+  expect_text(maq_scene_builder_create(context_, nullptr, &cloud, &builder), "cloud.struct_size is 0");
+  maq_scene_renderer* renderer = nullptr;
+  expect_text(maq_scene_renderer_create(context_, nullptr, nullptr, &renderer), "scene is NULL");
+  expect_text(maq_scene_build(context_, nullptr, nullptr, nullptr, &scene), "capture is NULL");
+  maq_context* context = nullptr;
+  EXPECT_EQ(maq_context_create(0, nullptr, &context), MAQ_ERROR_VERSION_MISMATCH);
+  EXPECT_NE(std::string(maq_last_error(nullptr)).find("build the app again"), std::string::npos);
 }
 
 TEST_F(ApiArguments, ErrorsWithoutAHandleAreOfTheThread) {
@@ -292,12 +372,12 @@ static_assert(sizeof(void*) != 8 ||
                   (offsetof(maq_source_info, dropped_frame_count) == 48 && sizeof(maq_source_info) == 56),
               "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
-static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 64, "");
+static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 72, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 32 && offsetof(maq_person, id) == 24, "");
 static_assert(sizeof(maq_intrinsics) == 104, "");
 static_assert(sizeof(maq_pixel_format) == 4 && sizeof(maq_status) == 4 && sizeof(maq_densepose_detail) == 4, "");
-static_assert(sizeof(maq_densepose_stats) == 80, "");
+static_assert(sizeof(maq_densepose_stats) == 88, "");
 static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_RECONNECTED == 5 &&
                   MAQ_PIXEL_DEPTH16 == 7 && MAQ_DENSEPOSE_PLANE_PERSON == 4,
               "");

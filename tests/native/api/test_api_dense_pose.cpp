@@ -56,6 +56,20 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
             MAQ_ERROR_INVALID_ARGUMENT);
 }
 
+TEST(ApiDensePose, ALogCallbackThatThrowsFailsNothing) {
+  maq_context_config config;
+  ASSERT_EQ(maq_context_config_init(&config, sizeof config), MAQ_OK);
+  config.log_level = MAQ_LOG_DEBUG;
+  int lines = 0;
+  config.log_user_data = &lines;
+  config.log_callback = [](void* count, maq_log_level, const char*) { throw ++*static_cast<int*>(count); };
+  const maquette::Context context(config);
+  maquette::DensePose densepose(context, kBundle);
+  const RedCell image;
+  EXPECT_EQ(densepose.run(maquette::Frame(context, image.desc)).person_count(), 1u);
+  EXPECT_GT(lines, 0);
+}
+
 TEST(ApiDensePose, ACancelEndsTheRunThatRunsOrElseTheNextAndNoOther) {
   const maquette::Context context;
   maquette::DensePose densepose(context, kBundle);

@@ -3,8 +3,12 @@
 #include <cstdint>
 #include <maquette/maquette.hpp>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "support/picture_files.h"
+#include "support/temp_folder.h"
 
 namespace {
 
@@ -36,6 +40,42 @@ TEST(ApiFrames, WrapMemoryOfTheAppWithoutACopy) {
   EXPECT_EQ(back.sequence, 9u);
 }
 
+std::string bytes_of_photo() { return read_text(std::string(MAQ_TEST_MEDIA) + "/photo.jpg"); }
+
+TEST(ApiFrames, AreDecodedFromMemoryAsFromAFile) {
+  const maquette::Context context;
+  const TempFolder folder;
+  const std::string photo = bytes_of_photo();
+  const maquette::Frame frame = maquette::Frame::decode(context, photo.data(), photo.size());
+  const maq_frame_desc desc = frame.desc();
+  EXPECT_EQ(desc.format, MAQ_PIXEL_BGR8);
+  EXPECT_EQ(desc.timestamp_ns, 0);
+  EXPECT_EQ(desc.clock, MAQ_CLOCK_MEDIA);
+  EXPECT_EQ(rgb_of(frame), read_rgb(context, std::string(MAQ_TEST_MEDIA) + "/photo.jpg"));
+  frame.save(folder.file("a.png"));
+  const std::string png = read_text(folder.file("a.png"));
+  EXPECT_EQ(rgb_of(maquette::Frame::decode(context, png.data(), png.size())), rgb_of(frame));
+}
+
+TEST(ApiFrames, AreNotDecodedFromWhatIsNoWholeImage) {
+  const maquette::Context context;
+  const std::string photo = bytes_of_photo();
+  maq_frame* frame = nullptr;
+  const auto decode = [&](const std::string& bytes) {
+    return maq_frame_decode(context.get(), bytes.data(), bytes.size(), &frame);
+  };
+  EXPECT_EQ(decode(photo.substr(0, photo.size() / 2)), MAQ_ERROR_UNREADABLE);
+  EXPECT_STREQ(maq_last_error(context.get()),
+               "The image in memory is truncated: the end of the JPEG image is missing; copy it again.");
+  EXPECT_EQ(decode(""), MAQ_ERROR_UNREADABLE);
+  EXPECT_EQ(decode("no image"), MAQ_ERROR_UNREADABLE);
+  EXPECT_EQ(decode("GIF89a" + std::string(100, '\0')), MAQ_ERROR_UNSUPPORTED);
+  EXPECT_EQ(maq_frame_decode(nullptr, photo.data(), photo.size(), &frame), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_frame_decode(context.get(), nullptr, photo.size(), &frame), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_frame_decode(context.get(), photo.data(), photo.size(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(frame, nullptr);
+}
+
 TEST(ApiFrames, CallTheAppBackOnceWhenReleased) {
   const maquette::Context context;
   const std::vector<uint8_t> pixels(300);
@@ -50,6 +90,22 @@ TEST(ApiFrames, CallTheAppBackOnceWhenReleased) {
   desc.width_px = 0;
   EXPECT_EQ(maq_frame_wrap(context.get(), &desc, count, &freed, &frame), MAQ_ERROR_IMAGE_SIZE);
   EXPECT_EQ(freed, 1) << "a frame that was not made is not freed";
+}
+
+TEST(ApiFrames, ACallbackThatThrowsEndsNothingAndIsTold) {
+  const maquette::Context context;
+  const std::vector<uint8_t> pixels(300);
+  const maq_frame_desc desc = desc_of(pixels, 10, 10);
+  maq_frame* frame = nullptr;
+  const auto throw_error = [](void*) { throw std::runtime_error("The app's own error."); };
+  ASSERT_EQ(maq_frame_wrap(context.get(), &desc, throw_error, nullptr, &frame), MAQ_OK);
+  maq_frame_release(frame);
+  EXPECT_STREQ(maq_last_error(nullptr), "maq_frame_release: The app's own error.");
+  ASSERT_EQ(maq_frame_wrap(
+                context.get(), &desc, [](void*) { throw 5; }, nullptr, &frame),
+            MAQ_OK);
+  maq_frame_release(frame);
+  EXPECT_STREQ(maq_last_error(nullptr), "maq_frame_release: An unknown exception was thrown.");
 }
 
 TEST(ApiFrames, OutliveTheirContextAndSource) {
@@ -122,14 +178,14 @@ TEST(ApiFrames, AreNotWrappedWithRowsThatAreInNoMemory) {
   };
   // The last: no rows are that long, and codecs of files count with 31 bits.
   for (const size_t stride : {SIZE_MAX, SIZE_MAX / 2 + 1, SIZE_MAX / 8 + 1, size_t(1) << 31}) {
-    expect_refused("stride_bytes[0] is ", [&](auto& desc) { desc.stride_bytes[0] = stride; });
+    expect_refused("desc.stride_bytes[0] is ", [&](auto& desc) { desc.stride_bytes[0] = stride; });
   }
-  expect_refused("stride_bytes[1] is ", [&](auto& desc) {
+  expect_refused("desc.stride_bytes[1] is ", [&](auto& desc) {
     desc.format = MAQ_PIXEL_NV12;
     desc.planes[1] = pixels.data();
     desc.stride_bytes[1] = SIZE_MAX / 4 + 1;
   });
-  expect_refused("stride_bytes[0] is 30", [](auto& desc) {
+  expect_refused("desc.stride_bytes[0] is 30", [](auto& desc) {
     desc.planes[0] = reinterpret_cast<const uint8_t*>(UINTPTR_MAX - 100);
     desc.stride_bytes[0] = 30;
   });

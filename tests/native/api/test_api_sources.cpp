@@ -1,5 +1,6 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <filesystem>
@@ -7,6 +8,8 @@
 #include <set>
 #include <vector>
 
+#include "support/picture_files.h"
+#include "support/pipe_writer.h"
 #include "support/source_threads.h"
 #include "support/temp_folder.h"
 
@@ -52,6 +55,62 @@ TEST(ApiSources, CamerasAreListedAndWrongIndicesRefused) {
   EXPECT_EQ(maq_camera_list_get_count(nullptr), 0u);
   maq_camera_list_destroy(list);
   maq_camera_list_destroy(nullptr);
+}
+
+TEST(ApiSources, PipesWithoutAWriterAndDevicesAreRefused) {
+  const maquette::Context context;
+  const TempFolder folder;
+  ASSERT_EQ(mkfifo(folder.file("pipe").c_str(), 0600), 0);
+  std::filesystem::create_symlink("/dev/zero", folder.file("zeros"));
+  for (const char* scheme : {"image:", "file:", "video:", "rec:"}) {
+    for (const char* name : {"pipe", "zeros"}) {
+      maq_source* source = nullptr;
+      const std::string uri = scheme + folder.file(name);
+      EXPECT_EQ(maq_source_create(context.get(), uri.c_str(), nullptr, &source), MAQ_ERROR_UNREADABLE) << uri;
+      EXPECT_NE(std::string(maq_last_error(context.get())).find(" is "), std::string::npos);
+    }
+  }
+}
+
+TEST(ApiSources, AnImageComesThroughAPipe) {
+  const maquette::Context context;
+  const TempFolder folder;
+  const std::string photo = std::string(MAQ_TEST_MEDIA) + "/photo.jpg";
+  ASSERT_EQ(mkfifo(folder.file("pipe").c_str(), 0600), 0);
+  for (const char* scheme : {"image:", "file:"}) {
+    const PipeWriter writer(folder.file("pipe"), read_text(photo));
+    EXPECT_EQ(rgb_of(*maquette::Source(context, scheme + folder.file("pipe")).next()), read_rgb(context, photo));
+  }
+}
+
+TEST(ApiSources, NothingIsPrintedOfDamagedFiles) {
+  const maquette::Context context;
+  const TempFolder folder;
+  const std::string media = MAQ_TEST_MEDIA;
+  const maquette::Frame frame = *maquette::Source(context, "image:" + media + "/photo.jpg").next();
+  frame.save(folder.file("a.png"));
+  maquette::Clip clip(context, folder.file("b.avi"), 10);
+  for (int i = 0; i < 5; ++i) clip.add(frame);
+  clip.finish();
+  std::string bmp = std::string("BM\x36\x0c\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x20\0\0\0\x20\0\0\0\1\0\x18\0", 30);
+  bmp.resize(54 + 32 * 32 * 3);
+  testing::internal::CaptureStderr();
+  for (const std::string& whole : {read_text(media + "/photo.jpg"), read_text(folder.file("a.png")), bmp,
+                                   read_text(media + "/clip.mp4"), read_text(folder.file("b.avi"))}) {
+    for (int i = 1; i < 16; ++i) {
+      std::string damaged = i % 2 == 0 ? whole.substr(0, whole.size() * size_t(i) / 16) : whole;
+      for (size_t k = damaged.size() * size_t(i) / 17; k < damaged.size(); k += 4999) damaged[k] = char(damaged[k] + i);
+      write_text(folder.file("damaged"), damaged);
+      for (const char* scheme : {"image:", "video:", "file:"}) {
+        status_of([&] {
+          maquette::Source source(context, scheme + folder.file("damaged"));
+          while (source.next()) {
+          }
+        });
+      }
+    }
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(ApiSources, DescribeThemselvesAndDeliverUntilTheEnd) {
@@ -233,9 +292,12 @@ class LoneCopy {
 
 TEST(ApiSources, FilesNeedTheirLibraryAndNothingElseDoes) {
   LoneCopy sdk;
-  const std::string image = "image:" + sdk.beside("libmaquette.so");  // exists; that it is no image comes later
+  const std::string image = "image:" + sdk.beside("a.png");
+  write_text(sdk.beside("a.png"), "\x89PNG\r\n\x1a\n");  // that it is damaged comes later
   const std::string video = "video:" + sdk.beside("libmaquette.so");
-  EXPECT_EQ(sdk.open("stub:people"), MAQ_OK) << sdk.last_error();
+  for (const char* uri : {"stub:people", "image:" MAQ_TEST_MEDIA "/photo.jpg"}) {
+    EXPECT_EQ(sdk.open(uri), MAQ_OK) << sdk.last_error();
+  }
   for (const std::string& uri : {image, video}) {
     EXPECT_EQ(sdk.open(uri.c_str()), MAQ_ERROR_RUNTIME_LIBRARY);
     EXPECT_NE(sdk.last_error().find("maquette/libmaquette_files.so"), std::string::npos) << sdk.last_error();

@@ -10,7 +10,7 @@ namespace {
 
 constexpr unsigned kLimit_s = 30;  // for calls that return at once
 
-maq_densepose_config densepose_config() {
+maq_densepose_config two_threads() {
   maq_densepose_config config = maquette::default_densepose_config();
   config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
   config.threads = 2;
@@ -29,7 +29,7 @@ struct Refusals {
 TEST(ForkedChildren, AreRefusedEachObjectOfTheirParentAndGiveThemBackWithoutWaiting) {
   const TempFolder folder;
   const maquette::Context context;
-  maq_densepose_config config = densepose_config();
+  maq_densepose_config config = two_threads();
   maquette::DensePose densepose(context, config);
   maquette::Source live(context, "stub:people?live=1");
   std::optional<maquette::Frame> frame = live.next();
@@ -84,7 +84,7 @@ TEST(ForkedChildren, AreRefusedEachObjectOfTheirParentAndGiveThemBackWithoutWait
 
 TEST(ForkedChildren, WorkWithObjectsOfTheirOwn) {
   const maquette::Context context;
-  const maq_densepose_config config = densepose_config();
+  const maq_densepose_config config = two_threads();
   maquette::DensePose densepose(context, config);
   maquette::Source source(context, "stub:people");
   const maquette::Frame frame = *source.next();

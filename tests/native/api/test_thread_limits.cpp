@@ -1,6 +1,8 @@
 // What happens where the system starts fewer threads than asked for (ulimit -u, limits of containers). A program of its
 // own, since it takes the place of pthread_create: root's threads have no limit.
 #include <dlfcn.h>
+#include <sys/resource.h>
+
 #include <gtest/gtest.h>
 #include <pthread.h>
 
@@ -68,6 +70,30 @@ TEST(ThreadLimits, ADensePoseModelRunsOnTheThreadsThereAreAndWarns) {
   }
 }
 
+TEST(ThreadLimits, WhereALimitOfMemoryIsNearNetworksRunOnOneThreadAndSaySo) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "sanitizers take terabytes of address space";
+#endif
+  for (const bool is_near : {true, false}) {
+    const ChildOutcome outcome = run_in_child([&](int pipe) {
+      const rlim_t mebibyte = rlim_t(1) << 20;
+      const rlimit limit = {is_near ? 900 * mebibyte : 64 * 1024 * mebibyte, RLIM_INFINITY};
+      if (setrlimit(RLIMIT_AS, &limit) != 0) return 1;
+      Log log;
+      const maquette::Context context = logging_context(log);
+      maq_densepose_config config = maquette::default_densepose_config();
+      config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+      config.threads = 4;
+      maquette::DensePose densepose(context, config);
+      maquette::Source source(context, "stub:people");
+      densepose.run(*source.next());
+      return say(pipe, log.text);
+    });
+    EXPECT_EQ(outcome.trouble, "");
+    EXPECT_EQ(outcome.said.find("runs on 1 of 4 threads") != std::string::npos, is_near) << outcome.said;
+  }
+}
+
 TEST(ThreadLimits, AScenePassesThroughBuilderAndRendererOnTheThreadsThereAre) {
   for (int given = 0; given < 6; ++given) {
     const ChildOutcome outcome = run_in_child([&](int) {
@@ -113,6 +139,20 @@ TEST(ThreadLimits, WhatNeedsAThreadOfItsOwnIsRefusedWithTheRemedy) {
     maq_pipeline_destroy(pipeline);
     maq_source_destroy(source);
     return say(pipe, said);
+  });
+  EXPECT_EQ(outcome.trouble, "") << outcome.said;
+  EXPECT_NE(outcome.said.find(kRemedy), std::string::npos) << outcome.said;
+}
+
+TEST(ThreadLimits, AClipWhoseDecoderHasNoThreadsIsNotCalledDamaged) {
+  const ChildOutcome outcome = run_in_child([](int pipe) {
+    const maquette::Context context;
+    threads_left = 0;
+    maq_source* source = nullptr;
+    const maq_status status = maq_source_create(context.get(), "video:" MAQ_TEST_MEDIA "/clip.mp4", nullptr, &source);
+    maq_source_destroy(source);
+    if (status == MAQ_OK) return say(pipe, kRemedy);  // decoded without threads, as on one processor
+    return status == MAQ_ERROR_OUT_OF_MEMORY ? say(pipe, maq_last_error(nullptr)) : 1;
   });
   EXPECT_EQ(outcome.trouble, "") << outcome.said;
   EXPECT_NE(outcome.said.find(kRemedy), std::string::npos) << outcome.said;

@@ -148,7 +148,8 @@ TEST_F(CommandLine, BadBundlesAreOneSentenceAndNothingIsWritten) {
   nlohmann::json manifest = reshaped.manifest();
   manifest["graphs"]["box_head"]["outputs"][0]["shape"][1] = 3;
   reshaped.write_manifest(manifest);
-  expect_failure("densepose two.png --out o --bundle '" + reshaped.path() + "'", "output boxes has shape");
+  expect_failure("densepose two.png --out o --bundle '" + reshaped.path() + "'",
+                 "output boxes must have the shape [n, 6]");
 }
 
 TEST_F(CommandLine, AMissingRuntimeLibraryIsOneSentence) {
@@ -258,6 +259,9 @@ TEST_F(CommandLine, PlayTellsOfLossAndReturnAndOfWhatStaysAway) {
   for (const auto& event : figures["events"]) states.push_back(event["state"]);
   EXPECT_EQ(states, (std::vector<std::string>{"started", "lost", "reconnecting", "reconnected"}));
   EXPECT_GT(figures["dropped_frames"].get<int>(), 0);
+  const Outcome dropped = run("play 'stub:pattern?frames=5&fps=100&drop=1'");
+  EXPECT_EQ(dropped.exit_code, 1);
+  EXPECT_NE(dropped.err.find("delivered no frame"), std::string::npos) << dropped.err;
   const Outcome lost = run("play v4l2:/dev/video77");
   EXPECT_EQ(lost.exit_code, 1);
   EXPECT_NE(lost.err.find("plugged in"), std::string::npos) << lost.err;
@@ -328,6 +332,22 @@ TEST_F(CommandLine, InfoAndSourcesSayWhatThereIs) {
   for (const char* text : {"image:photo.jpg", "video:clip.mp4", "stub:people"}) {
     EXPECT_NE(sources.out.find(text), std::string::npos) << text;
   }
+}
+
+TEST_F(CommandLine, TooLittleMemoryIsASentence) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers take terabytes of address space";
+#endif
+  int refused = 0;
+  for (const int mebibytes : {60, 80, 120, 200, 300}) {
+    const std::string limit = "ulimit -v " + std::to_string(mebibytes << 10) + " &&";
+    const Outcome result = run_program(folder_, limit, "densepose two.png --out o --threads 1");
+    if (result.exit_code == 0) continue;
+    EXPECT_EQ(result.exit_code, 1) << mebibytes << " MiB: " << result.err;
+    EXPECT_NE(result.err.find("not enough memory"), std::string::npos) << mebibytes << " MiB: " << result.err;
+    ++refused;
+  }
+  EXPECT_GT(refused, 0);
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ class CommandLineOutput : public ::testing::Test {
   }
 
   TempFolder folder_;
-  const std::string play_ = "maquette play 'stub:pattern?frames=3&fps=100&size=64x48' ";
+  const std::string play_ = "maquette play 'stub:pattern?frames=3&fps=10&size=64x48' ";
 };
 
 TEST_F(CommandLineOutput, ThatIsLostIsAnError) {
@@ -52,6 +52,11 @@ TEST_F(CommandLineOutput, ThatIsLostIsAnError) {
     expect_failure(std::string("maquette ") + command + " >&-", "Standard output cannot be written: Bad file");
   }
   EXPECT_EQ(run("maquette info 2>&-").exit_code, 0);
+}
+
+TEST_F(CommandLineOutput, ThatIsLongerThanAFileMayBeIsAnErrorAndNotTheEnd) {
+  expect_failure("ulimit -f 1; maquette densepose --help >help.txt",
+                 "Standard output cannot be written: File too large.");
 }
 
 TEST_F(CommandLineOutput, ThatIsClosedDoesNotGoIntoFiles) {
@@ -108,6 +113,27 @@ TEST_F(CommandLineOutput, JsonGoesWhereItsNameLeads) {
   ASSERT_EQ(run(play_ + "--json /dev/null").exit_code, 0);
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   expect_failure(play_ + "--json /dev/full", "/dev/full cannot be written: No space left on device");
+}
+
+TEST_F(CommandLineOutput, AListOfCamerasWithLittleMemoryIsNoCrash) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "sanitizers take terabytes of address space";
+#endif
+  // In KiB. Some are too few for the loader, which says so.
+  for (int limit = 40000; limit <= 130000; limit += 6000) {
+    const Outcome result = run("ulimit -v " + std::to_string(limit) + "; maquette sources");
+    EXPECT_TRUE(result.exit_code <= 1 || result.err.find("error while loading") != std::string::npos)
+        << limit << ": " << result.exit_code << " " << result.err;
+  }
+}
+
+TEST_F(CommandLineOutput, AListOfCamerasWithoutFilesToOpenIsNoCrash) {
+  for (const char* files : {"4", "5", "6", "8"}) {
+    const Outcome result = run(std::string("ulimit -n ") + files + "; maquette sources");
+    // The loader needs more files for the library of a sanitizer than the program does for what it lists.
+    if (result.err.find("error while loading shared libraries") != std::string::npos) continue;
+    EXPECT_LE(result.exit_code, 1) << files << ": " << result.err;
+  }
 }
 
 TEST_F(CommandLineOutput, JsonMakesNoFolder) {

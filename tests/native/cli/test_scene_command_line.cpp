@@ -86,6 +86,12 @@ TEST_F(SceneCommandLine, BuildsASceneWithTheFiguresThatTheBenchmarkReads) {
   }
 }
 
+TEST_F(SceneCommandLine, ASceneThatIsBuiltIntoADeviceIsNoFailure) {
+  const Outcome result = run("build place --out /dev/null");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+}
+
 TEST_F(SceneCommandLine, EveryOptionOfBuildingDoesWhatItSays) {
   const auto built = [&](const std::string& options) {
     const Outcome result = run("build place --out a.maqs --json a.json " + options);

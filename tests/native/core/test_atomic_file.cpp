@@ -1,18 +1,42 @@
 // Files that appear whole, and what else a path may lead to: links, devices, pipes, descriptors.
 #include "core/atomic_file.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 
 #include <csignal>
+#include <cstdarg>
+#include <cstring>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "support/expect_error.h"
 #include "support/file_size_limit.h"
 #include "support/temp_folder.h"
+
+namespace {
+
+std::string linked_meanwhile;
+
+}  // namespace
+
+// In the place of the C library's: another program, which found out the name, puts a link to `linked_meanwhile` where
+// the next unfinished file would be made.
+extern "C" int open(const char* path, int flags, ...) {
+  static const auto real = reinterpret_cast<int (*)(const char*, int, ...)>(dlsym(RTLD_NEXT, "open"));
+  va_list arguments;
+  va_start(arguments, flags);
+  const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(arguments, mode_t) : 0;
+  va_end(arguments);
+  if (!linked_meanwhile.empty() && std::strstr(path, ".part-") != nullptr) {
+    EXPECT_EQ(symlink(std::exchange(linked_meanwhile, "").c_str(), path), 0) << path;
+  }
+  return real(path, flags, mode);
+}
 
 namespace {
 
@@ -64,6 +88,17 @@ TEST_F(AtomicFile, IsWrittenUnderANameThatNobodyKnowsBefore) {
   const std::string longest(255, 'n');  // of a name
   write(file(longest), "new");
   EXPECT_EQ(read_text(file(longest)), "new");
+}
+
+TEST_F(AtomicFile, IsNotWrittenThroughALinkThatTookItsName) {
+  write_text(file("other"), "of another user");
+  linked_meanwhile = file("other");
+  write(file("a"), "new");
+  EXPECT_EQ(linked_meanwhile, "") << "the link was made";
+  EXPECT_EQ(read_text(file("other")), "of another user");
+  EXPECT_EQ(read_text(file("a")), "new");
+  EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(file("a"))));
+  EXPECT_EQ(count(), 3u) << "the link is not this program's to remove";
 }
 
 TEST_F(AtomicFile, KeepsALinkAndReplacesWhatItLeadsTo) {
@@ -152,7 +187,7 @@ TEST_F(AtomicFile, ALimitOfFileSizesIsAnErrorAndNotTheEnd) {
     expect_refused(file("a"), "a cannot be written: File too large");
   }
   EXPECT_EQ(read_text(file("a")), "old");
-  // What somebody else sent or blocked is as before.
+  // Signals that others sent or blocked are as before.
   sigset_t now;
   ASSERT_EQ(pthread_sigmask(SIG_SETMASK, nullptr, &now), 0);
   EXPECT_EQ(sigismember(&now, SIGXFSZ), 0);

@@ -11,7 +11,6 @@ namespace {
 using maq::Box;
 using maq::ScoredBox;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::array<float, 4> kUnit = {1, 1, 1, 1};
 
@@ -73,7 +72,7 @@ TEST(Box, ExtremeDeltasAreClampedAndStayFinite) {
 TEST(Box, NanIsDroppedByClippingInEveryPlace) {
   for (int place = 0; place < 4; ++place) {
     float deltas[] = {0, 0, 0, 0};
-    deltas[place] = kNan;
+    deltas[place] = std::nanf("");
     Box box = maq::apply_deltas({10, 10, 20, 20}, deltas, kUnit);
     EXPECT_FALSE(clip_box(box, 100, 100)) << "delta " << place;
   }

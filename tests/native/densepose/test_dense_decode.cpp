@@ -96,24 +96,37 @@ void make_everybody_part(Logits& logits, int part) {
   logits.fill(logits.index, part, 5);
 }
 
+// Of 16 x 16 cells, about half of them background.
+Logits random_logits(std::mt19937& random) {
+  std::uniform_real_distribution<float> logit(-4, 4), coordinate(-0.2f, 1.2f);
+  Logits logits(16);
+  for (auto* plane : {&logits.coarse, &logits.index}) {
+    for (float& value : *plane) value = logit(random);
+  }
+  for (size_t cell = 0; cell < 256; ++cell) logits.coarse[cell] += 4;
+  for (auto* plane : {&logits.u, &logits.v}) {
+    for (float& value : *plane) value = coordinate(random);
+  }
+  return logits;
+}
+
+// The definition: of each cell the log-odds of a person, whichever part.
+std::vector<float> person_odds(const Logits& logits) {
+  const size_t cells = size_t(logits.size * logits.size);
+  std::vector<float> odds(cells);
+  for (size_t cell = 0; cell < cells; ++cell) {
+    double sum = 0;
+    for (size_t c = 1; c < kCoarse; ++c) sum += std::exp(double(logits.coarse[c * cells + cell]));
+    odds[cell] = float(std::log(sum) - logits.coarse[cell]);
+  }
+  return odds;
+}
+
 TEST(DenseDecode, EqualsTheReferenceOnRandomLogits) {
   std::mt19937 random(5);
-  std::uniform_real_distribution<float> logit(-4, 4), coordinate(-0.2f, 1.2f);
   for (const Box& box : {Box{3, 5, 43, 65}, Box{-10.5f, -4.2f, 30.7f, 100}, Box{50, 60, 51.5f, 61}}) {
-    Logits logits(16);
-    for (auto* plane : {&logits.coarse, &logits.index}) {
-      for (float& value : *plane) value = logit(random);
-    }
-    for (size_t cell = 0; cell < 256; ++cell) logits.coarse[cell] += 4;  // about half of the cells are background
-    for (auto* plane : {&logits.u, &logits.v}) {
-      for (float& value : *plane) value = coordinate(random);
-    }
-    std::vector<float> odds(256);
-    for (size_t cell = 0; cell < odds.size(); ++cell) {
-      double sum = 0;
-      for (size_t c = 1; c < kCoarse; ++c) sum += std::exp(double(logits.coarse[c * 256 + cell]));
-      odds[cell] = float(std::log(sum) - logits.coarse[cell]);
-    }
+    Logits logits = random_logits(random);
+    const std::vector<float> odds = person_odds(logits);
     const std::vector<float> parts(logits.index.begin() + 256, logits.index.end());
     DensePlanes planes;
     planes.reset(70, 80);
@@ -144,6 +157,76 @@ TEST(DenseDecode, EqualsTheReferenceOnRandomLogits) {
     }
     EXPECT_EQ(counts.body_pixels, body);
   }
+}
+
+TEST(DenseDecode, ARotatedPersonIsPaintedAsTheReference) {
+  std::mt19937 random(6);
+  Logits logits = random_logits(random);
+  const std::vector<float> odds = person_odds(logits);
+  const std::vector<float> parts(logits.index.begin() + 256, logits.index.end());
+  Planes charts(logits.u, logits.v, logits.size);
+  // A box of 40 x 60 pixels about (34, 30), rotated by 30 degrees, partly beyond the image.
+  const double c = std::cos(0.5236), s = std::sin(0.5236);
+  maq::AffineMap to_cells;
+  to_cells.xx = c * 16 / 40, to_cells.xy = s * 16 / 40, to_cells.shift_x = 8 - (c * 34 + s * 30) * 16 / 40;
+  to_cells.yx = -s * 16 / 60, to_cells.yy = c * 16 / 60, to_cells.shift_y = 8 - (-s * 34 + c * 30) * 16 / 60;
+  DensePlanes planes;
+  planes.reset(60, 50);
+  maq::DecodeMemory memory;
+  const maq::DecodeCounts counts = paint_rotated_person(logits.view(&charts), to_cells, 9, 0.5f, 0, memory, planes);
+  int64_t body = 0, outside = 0;
+  for (int y = 0; y < 50; ++y) {
+    for (int x = 0; x < 60; ++x) {
+      const size_t pixel = size_t(y * 60 + x);
+      body += planes.person[pixel] != 0;
+      const maq::Point cell = to_cells({x + 0.5, y + 0.5});
+      if (cell.x < 0 || cell.y < 0 || cell.x > 16 || cell.y > 16) {
+        ASSERT_EQ(planes.person[pixel] + planes.part[pixel], 0) << "outside the box";
+        ++outside;
+        continue;
+      }
+      double margin = 1e9;
+      const double person = resized(odds.data(), 16, cell.y - 0.5, cell.x - 0.5);
+      margin = std::min(margin, std::abs(person));
+      const int part = person <= 0 ? 0 : 1 + best_class(parts, kIndex - 1, 16, cell.y - 0.5, cell.x - 0.5, &margin);
+      if (margin < 1e-4) continue;
+      ASSERT_EQ(planes.part[pixel], part) << x << " " << y;
+      ASSERT_EQ(planes.person[pixel], part == 0 ? 0 : 9);
+      if (part == 0) continue;
+      const double u = resized(logits.u.data() + part * 256, 16, cell.y - 0.5, cell.x - 0.5);
+      ASSERT_NEAR(planes.u[pixel], std::clamp(u, 0.0, 1.0) * 255, 0.51);
+    }
+  }
+  EXPECT_EQ(counts.body_pixels, body);
+  EXPECT_GT(body, 500);
+  EXPECT_GT(outside, 500);
+  // Those in front stay, and who is mostly hidden leaves no trace.
+  const DensePlanes before = planes;
+  EXPECT_EQ(paint_rotated_person(logits.view(&charts), to_cells, 7, 0.5f, 0.5f, memory, planes).body_pixels, 0);
+  EXPECT_EQ(planes.person, before.person);
+}
+
+TEST(DenseDecode, ConfidenceIsTheMeanProbabilityOfTheBestPartWhereThePersonIs) {
+  Logits logits(8);
+  maq::DecodeMemory memory;
+  const auto confidence = [&] {
+    const DenseLogits view = logits.view(nullptr);
+    classify_cells(view, memory);
+    return part_confidence(view, 0.5f, memory);
+  };
+  EXPECT_NEAR(confidence(), 1 / 24.0, 1e-5) << "all alike";
+  logits.fill(logits.index, 4, std::log(23.0f));
+  EXPECT_NEAR(confidence(), 0.5, 1e-5);
+  logits.fill(logits.index, 9, kNan);
+  EXPECT_NEAR(confidence(), 23.0 / 45, 1e-5) << "what is no number counts as absent";
+  // Half of the cells are background, whatever their parts are.
+  for (size_t cell = 0; cell < 32; ++cell) {
+    logits.coarse[cell] = 50;
+    logits.index[4 * 64 + cell] = 0;
+  }
+  EXPECT_NEAR(confidence(), 23.0 / 45, 1e-5);
+  logits.fill(logits.coarse, 0, 50);
+  EXPECT_EQ(confidence(), 0);
 }
 
 TEST(DenseDecode, BackgroundOfTheCoarseHeadGatesTheParts) {

@@ -6,6 +6,7 @@
 
 #include "densepose/densepose.h"
 #include "support/bundle_copy.h"
+#include "support/expect_error.h"
 
 namespace {
 
@@ -51,6 +52,32 @@ class DensePose : public ::testing::Test {
 };
 
 std::shared_ptr<const maq::OnnxRuntimeLibrary> DensePose::runtime_;
+
+TEST_F(DensePose, AManifestThatDoesNotFitItsGraphsIsRefusedWhenTheyAreLoaded) {
+  const auto expect_refused = [](const char* key, const nlohmann::json& value, const std::string& text) {
+    const BundleCopy bundle;
+    nlohmann::json manifest = bundle.manifest();
+    manifest[nlohmann::json::json_pointer(key)] = value;
+    bundle.write_manifest(manifest);
+    expect_error(MAQ_ERROR_BAD_BUNDLE, text, [&] { make({}, bundle.path()); });
+  };
+  expect_refused("/box_head/pool_size", 9, "graph box_head: input rois must have the shape [n, 9, 9, 3]");
+  expect_refused("/dense_head/coarse_classes", 14,
+                 "graph dense_head: output labels must have the shape [n, 32, 32, 156]");
+  // Names for sizes leave it to the graph.
+  const BundleCopy bundle;
+  nlohmann::json manifest = bundle.manifest();
+  for (const int pool_size : {9, 7}) {
+    manifest["box_head"]["pool_size"] = pool_size;
+    manifest["graphs"]["box_head"]["inputs"][0]["shape"] = {"n", "pool", "pool", "channels"};
+    bundle.write_manifest(manifest);
+    if (pool_size == 7) {
+      EXPECT_NO_THROW(make({}, bundle.path()));
+    } else {
+      expect_error(MAQ_ERROR_BAD_BUNDLE, "has shape [?, 7, 7, 3] in the graph", [&] { make({}, bundle.path()); });
+    }
+  }
+}
 
 cv::Mat black(int width, int height) { return cv::Mat::zeros(height, width, CV_8UC3); }
 
@@ -228,6 +255,57 @@ TEST_F(DensePose, BetweenKeyFramesBoxesArePropagatedAndNoNewPeopleAreFound) {
   expect_sane(result, 160, 256);
   densepose.reset();
   EXPECT_EQ(see(black(160, 256)), 0u);
+  EXPECT_TRUE(result.stats.key_frame);
+}
+
+TEST_F(DensePose, ACropIsTheDenseHeadsAnswerForTheBodyOfTheFirst) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;  // a person of 128 px, whose body is the lower three quarters
+  maq::DensePoseSettings settings;
+  settings.crops = maq::PersonCrops::kAll;
+  const maq::DensePoseResult first = run(image), again = run(image, settings);
+  ASSERT_EQ(again.people.size(), 1u);
+  EXPECT_EQ(again.stats.crops, 1);
+  EXPECT_EQ(again.people[0].box.x0, first.people[0].box.x0) << "the box stays the first";
+  const auto top = [](const maq::DensePoseResult& result) {
+    const auto at =
+        std::find_if(result.planes.part.begin(), result.planes.part.end(), [](uint8_t p) { return p != 0; });
+    return int(at - result.planes.part.begin()) / 320;
+  };
+  // The dense head leaves out the upper quarter of whatever it sees.
+  EXPECT_NEAR(top(first) - double(first.people[0].box.y0), 32, 1.5);
+  EXPECT_NEAR(top(again) - top(first), 24, 1.5);
+  expect_sane(again, 320, 256);
+}
+
+TEST_F(DensePose, BetweenKeyFramesOnlyCropsAreComputedWhereEverybodyHasOne) {
+  maq::DensePoseSettings settings;
+  settings.key_frame_interval = 3;
+  settings.crops = maq::PersonCrops::kAll;
+  maq::DensePose densepose = make(settings);
+  maq::DensePoseResult result;
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(80, 100, 4, 4)) = kRed;
+  image(cv::Rect(200, 128, 8, 8)) = kGreen;
+  const auto see = [&](const cv::Mat& shown) {
+    densepose.run({MAQ_PIXEL_BGR8, shown.cols, shown.rows, {{shown.data, shown.step}, {}}}, result);
+    expect_sane(result, shown.cols, shown.rows);
+    return result.people.size();
+  };
+  EXPECT_EQ(see(image), 2u);
+  EXPECT_TRUE(result.stats.key_frame);
+  EXPECT_GT(result.stats.trunk_ms, 0);
+  const float score = result.people[0].score;
+  for (int frame = 0; frame < 2; ++frame) {
+    EXPECT_EQ(see(image), 2u);
+    EXPECT_FALSE(result.stats.key_frame);
+    EXPECT_EQ(result.stats.trunk_ms + result.stats.box_head_ms + result.stats.dense_head_ms, 0);
+    EXPECT_EQ(result.stats.crops, 2);
+    EXPECT_EQ(result.people[0].score, score) << "of the last key frame";
+  }
+  EXPECT_EQ(see(image), 2u);
+  EXPECT_TRUE(result.stats.key_frame);
+  EXPECT_EQ(see(black(640, 512)), 0u) << "crops of another size are of another stream";
   EXPECT_TRUE(result.stats.key_frame);
 }
 

@@ -9,8 +9,6 @@ namespace {
 
 using maq::Box;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
 maq::RpnSpec spec() {
   maq::RpnSpec spec;
   spec.strides = {4, 8, 16, 32, 64};
@@ -99,9 +97,9 @@ TEST(Proposals, EachLevelKeepsItsBestAndTheWholeItsLimit) {
 
 TEST(Proposals, NanAndBoxesWithoutAreaAreDroppedAndCounted) {
   Level level(4, 4, 0);
-  level.logit(0, 0, 0) = kNan;
+  level.logit(0, 0, 0) = std::nanf("");
   level.logit(0, 1, 0) = std::numeric_limits<float>::infinity();
-  level.delta(1, 1, 1, 2) = kNan;
+  level.delta(1, 1, 1, 2) = std::nanf("");
   level.delta(2, 2, 1, 0) = 1e4f;
   level.delta(3, 3, 1, 1) = -1e4f;
   maq::RpnSpec all = spec();
@@ -116,7 +114,7 @@ TEST(Proposals, NanAndBoxesWithoutAreaAreDroppedAndCounted) {
 }
 
 TEST(Proposals, AModelThatIsAllNanGivesNothing) {
-  Level level(8, 8, kNan);
+  Level level(8, 8, std::nanf(""));
   int dropped = 0;
   EXPECT_TRUE(select({level.view()}, spec(), 32, 32, &dropped).empty());
   EXPECT_EQ(dropped, 3 * 64);

@@ -388,6 +388,51 @@ TEST_F(ShippedNetworks, AFrameOf33MegapixelsTakesLittleMoreMemoryThanItsResult) 
 #endif
 }
 
+TEST_F(ShippedNetworks, PeopleHaveACropIfTheyAreSmallInTheNetworkOrLean) {
+  maq::DensePoseSettings settings;
+  settings.crops = maq::PersonCrops::kAuto;
+  const maq::DensePoseResult upright = run(photo_, settings);
+  ASSERT_EQ(upright.people.size(), 1u);
+  EXPECT_EQ(upright.stats.crops, 0);
+  EXPECT_EQ(upright.planes.part, run(photo_).planes.part);
+
+  cv::Mat leaning;
+  const cv::Point2f middle(float(photo_.cols) / 2, float(photo_.rows) / 2);
+  cv::warpAffine(photo_, leaning, cv::getRotationMatrix2D(middle, 45, 0.8), photo_.size());
+  const maq::DensePoseResult rotated = run(leaning, settings);
+  EXPECT_GE(rotated.stats.crops, 1);
+  expect_sane(rotated, leaning);
+
+  settings.long_side_px = 96;
+  const maq::DensePoseResult small = run(photo_, settings);
+  EXPECT_EQ(small.stats.crops, 1);
+  settings.crops = maq::PersonCrops::kOff;
+  const maq::DensePoseResult coarse = run(photo_, settings);
+  const auto agreement = [&](const maq::DensePoseResult& result) {
+    size_t equal = 0;
+    for (size_t i = 0; i < photo_.total(); ++i) equal += result.planes.part[i] == upright.planes.part[i];
+    return double(equal) / double(photo_.total());
+  };
+  EXPECT_GT(agreement(small), agreement(coarse)) << "with a crop the small input labels as the large one";
+}
+
+TEST_F(ShippedNetworks, FramesOfExtremeSizeWithCropsGiveSaneResults) {
+  maq::DensePoseSettings settings;
+  settings.crops = maq::PersonCrops::kAll;
+  settings.key_frame_interval = 2;
+  maq::DensePose densepose = make(settings);
+  maq::DensePoseResult result;
+  for (const auto& [width, height] : {std::pair{1, 1}, {3, 700}, {1200, 4}, {37, 41}, {4000, 3000}}) {
+    cv::Mat image;
+    cv::resize(photo_, image, cv::Size(width, height), 0, 0, cv::INTER_AREA);
+    for (int frame = 0; frame < 2; ++frame) {
+      densepose.run(view_of(image), result);
+      expect_sane(result, image);
+    }
+  }
+  EXPECT_EQ(result.people.size(), 1u);
+}
+
 TEST_F(ShippedNetworks, ThePersonIsFoundWhenTruncatedByEachBorderAndWhenFillingTheFrame) {
   // The astronaut: head at the top, cut by the lower and left borders already.
   const maq::DensePoseResult whole = run(photo_);

@@ -17,10 +17,12 @@ std::string written_image(const TempFolder& folder, const std::string& name, int
   return folder.file(name);
 }
 
+std::vector<uint8_t> bytes_of(const std::string& path) { return maq::read_file(path, 1 << 20); }
+
 TEST(ImageFiles, HeadersTellTheSizeOfEachFormat) {
   const TempFolder folder;
   for (const char* name : {"a.png", "a.jpg", "a.webp", "a.bmp"}) {
-    const auto size = maq::read_image_size(maq::read_file(written_image(folder, name, 123, 45)));
+    const auto size = maq::read_image_size(bytes_of(written_image(folder, name, 123, 45)));
     ASSERT_TRUE(size) << name;
     EXPECT_EQ(size->width, 123) << name;
     EXPECT_EQ(size->height, 45) << name;
@@ -30,7 +32,7 @@ TEST(ImageFiles, HeadersTellTheSizeOfEachFormat) {
 TEST(ImageFiles, HeadersCutAnywhereAreNoSizeAndNoCrash) {
   const TempFolder folder;
   for (const char* name : {"a.png", "a.jpg", "a.webp", "a.bmp"}) {
-    const std::vector<uint8_t> whole = maq::read_file(written_image(folder, name, 40, 30));
+    const std::vector<uint8_t> whole = bytes_of(written_image(folder, name, 40, 30));
     for (size_t length = 0; length < std::min<size_t>(whole.size(), 700); ++length) {
       // A copy of exact size, so that a read past its end is seen by AddressSanitizer.
       const std::vector<uint8_t> cut(whole.begin(), whole.begin() + std::ptrdiff_t(length));
@@ -76,7 +78,8 @@ TEST(ImageFiles, MissingEmptyAndDamagedFilesAreToldApart) {
   const TempFolder folder;
   maq::Frame frame;
   expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { maq::read_image_file(folder.file("no.jpg"), frame); });
-  expect_error(MAQ_ERROR_UNREADABLE, "is a folder", [&] { maq::read_image_file(folder.path().string(), frame); });
+  expect_error(MAQ_ERROR_UNREADABLE, "is not a file but a folder",
+               [&] { maq::read_image_file(folder.path().string(), frame); });
   write_text(folder.file("empty.jpg"), "");
   expect_error(MAQ_ERROR_UNREADABLE, "is empty", [&] { maq::read_image_file(folder.file("empty.jpg"), frame); });
   write_text(folder.file("text.jpg"), "this is no image at all, but it is long enough to look for a header in it");

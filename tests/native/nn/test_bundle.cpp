@@ -56,6 +56,20 @@ TEST(Bundle, AMissingFolderOrManifestIsNotFound) {
   expect_error(MAQ_ERROR_NOT_FOUND, "no manifest.json", [&] { maq::read_bundle(empty.path().string()); });
 }
 
+TEST(Bundle, AFileOfAnotherSizeIsNotRead) {
+  const BundleCopy long_file;
+  std::filesystem::resize_file(long_file.file("trunk.onnx"), uint64_t(1) << 40);  // a hole: it takes no disk
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "has 1099511627776 bytes, but the manifest says",
+               [&] { maq::read_bundle(long_file.path()); });
+  const BundleCopy endless;
+  std::filesystem::remove(endless.file("manifest.json"));
+  std::filesystem::create_symlink("/dev/zero", endless.file("manifest.json"));
+  expect_error(MAQ_ERROR_UNREADABLE, "is not a file but a device", [&] { maq::read_bundle(endless.path()); });
+  const BundleCopy with_long_manifest;
+  std::filesystem::resize_file(with_long_manifest.file("manifest.json"), (1 << 24) + 1);
+  expect_error(MAQ_ERROR_UNREADABLE, "is over 16 MiB", [&] { maq::read_bundle(with_long_manifest.path()); });
+}
+
 TEST(Bundle, AChangedByteIsRefused) {
   for (const char* name : {"trunk.onnx", "box_head.onnx", "dense_head.onnx"}) {
     const BundleCopy bundle;
@@ -77,6 +91,21 @@ TEST(Bundle, AFileThatIsNotANetworkIsRefused) {
   const BundleCopy bundle;
   replace_file(bundle, "trunk.onnx", "no network, but its hash is right");
   expect_error(MAQ_ERROR_BAD_BUNDLE, "trunk.onnx cannot be loaded", [&] { load(bundle); });
+}
+
+TEST(Bundle, ARefusalDoesNotNameFunctionsOfTheRuntime) {
+  const BundleCopy bundle;
+  // A sparse initializer (fields 7 and 15) without a name.
+  replace_file(bundle, "box_head.onnx", read_text(bundle.file("box_head.onnx")) + std::string("\x3a\x02\x7a\x00", 4));
+  try {
+    load(bundle);
+    FAIL();
+  } catch (const maq::Error& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("Sparse initializer must have a name"), std::string::npos) << text;
+    EXPECT_EQ(text.find("onnxruntime"), std::string::npos) << text;
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+  }
 }
 
 TEST(Bundle, WeightsInAnotherFileAreRefused) {

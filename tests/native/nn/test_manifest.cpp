@@ -33,6 +33,30 @@ TEST(Manifest, RefusesWhatIsNotAJsonObject) {
   }
 }
 
+TEST(Manifest, SaysWhatIsNoJsonAndWhere) {
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "line 2, column 8", [] { maq::parse_manifest("{\n  \"a\": !}", "m"); });
+  std::string text = tiny().dump();
+  const std::string key = "\"nms_iou\":";
+  text.replace(text.find(key) + key.size(), 3, "1e400");
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "number overflow parsing '1e400'", [&] { maq::parse_manifest(text, "m"); });
+}
+
+TEST(Manifest, AnErrorDoesNotQuoteAllOfAnEndlessValue) {
+  json long_name = tiny();
+  long_name["graphs"]["trunk"]["inputs"][0]["name"] = std::string(100000, 'x');
+  std::string long_number = tiny().dump();
+  const std::string key = "\"nms_iou\":";
+  long_number.replace(long_number.find(key) + key.size(), 3, std::string(5000, '9'));
+  for (const std::string& text : {long_name.dump(), long_number}) {
+    try {
+      maq::parse_manifest(text, "m");
+      ADD_FAILURE() << text.size();
+    } catch (const maq::Error& error) {
+      EXPECT_LT(std::string(error.what()).size(), 500u) << error.what();
+    }
+  }
+}
+
 // Each key in turn is taken away, then given a value of a wrong type.
 void expect_each_key_needed(const json& node, const json::json_pointer& at) {
   // What a person reads, and what belongs to the task.

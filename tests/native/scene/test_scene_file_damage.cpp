@@ -26,7 +26,7 @@ using maq::SceneFileHead;
 // A scene of two blocks, a few kilobytes.
 std::string small_file(const TempFolder& folder,
                        maq::ScenePacking packing = {maq::PositionFormat::kUint16, maq::CoefficientFormat::kInt8, 0}) {
-  maq::FittedPoints points = synthetic_points(7);
+  maq::FittedPoints points = ball_over_a_floor(7);
   points.x[3] = 1e6f;
   const maq::Scene scene = make_scene(points, packing);
   EXPECT_EQ(scene.block_count, 2u);

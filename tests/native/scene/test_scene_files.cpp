@@ -60,7 +60,7 @@ size_t files_in(const TempFolder& folder) {
 
 TEST(SceneFiles, KeepScenesOfEveryKind) {
   TempFolder folder;
-  const maq::FittedPoints points = synthetic_points(3'000);
+  const maq::FittedPoints points = ball_over_a_floor(3'000);
   for (const PositionFormat positions : {PositionFormat::kFloat32, PositionFormat::kUint16}) {
     for (const CoefficientFormat kind :
          {CoefficientFormat::kFloat32, CoefficientFormat::kInt16, CoefficientFormat::kInt8}) {
@@ -79,7 +79,7 @@ TEST(SceneFiles, KeepScenesOfEveryKind) {
 
 TEST(SceneFiles, ASceneOfOnePointIsOne) {
   TempFolder folder;
-  const Scene scene = make_scene(synthetic_points(1), {});
+  const Scene scene = make_scene(ball_over_a_floor(1), {});
   write_scene_file(scene, folder.file("a.maqs"));
   expect_same(maq::open_scene_file(folder.file("a.maqs")), scene);
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "no points", [&] { write_scene_file(Scene(), folder.file("b.maqs")); });
@@ -89,7 +89,7 @@ TEST(SceneFiles, ASceneOfOnePointIsOne) {
 TEST(SceneFiles, AnOpenSceneStaysWhenItsFileIsWrittenAnewOrRemoved) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs");
-  const Scene first = make_scene(synthetic_points(2'000, 1), {}), second = make_scene(synthetic_points(500, 2), {});
+  const Scene first = make_scene(ball_over_a_floor(2'000, 1), {}), second = make_scene(ball_over_a_floor(500, 2), {});
   write_scene_file(first, path);
   const Scene opened = maq::open_scene_file(path);
   write_scene_file(second, path);
@@ -102,7 +102,7 @@ TEST(SceneFiles, AnOpenSceneStaysWhenItsFileIsWrittenAnewOrRemoved) {
 
 TEST(SceneFiles, ASceneFromMemoryKeepsNothingOfItAndNeedsNoAlignment) {
   TempFolder folder;
-  const Scene scene = make_scene(synthetic_points(2'000), {PositionFormat::kFloat32, CoefficientFormat::kFloat32, 0});
+  const Scene scene = make_scene(ball_over_a_floor(2'000), {PositionFormat::kFloat32, CoefficientFormat::kFloat32, 0});
   write_scene_file(scene, folder.file("a.maqs"));
   for (size_t shift = 0; shift < 4; ++shift) {
     std::string bytes = std::string(shift, 'x') + read_text(folder.file("a.maqs"));
@@ -116,7 +116,7 @@ TEST(SceneFiles, ASceneFromMemoryKeepsNothingOfItAndNeedsNoAlignment) {
 TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs"), ply = folder.file("a.ply");
-  const Scene small = make_scene(synthetic_points(100), {}), large = make_scene(synthetic_points(20'000), {});
+  const Scene small = make_scene(ball_over_a_floor(100), {}), large = make_scene(ball_over_a_floor(20'000), {});
   write_scene_file(small, path);
   write_scene_ply(small, ply);
   const std::string old_ply = read_text(ply);
@@ -141,7 +141,7 @@ TEST(SceneFiles, AFullDiskLeavesTheOldFile) {
 TEST(SceneFiles, AProcessThatDiesWhileItWritesLeavesTheOldFile) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs");
-  const Scene small = make_scene(synthetic_points(100), {}), large = make_scene(synthetic_points(20'000), {});
+  const Scene small = make_scene(ball_over_a_floor(100), {}), large = make_scene(ball_over_a_floor(20'000), {});
   write_scene_file(small, path);
   const pid_t child = fork();
   if (child == 0) {
@@ -160,7 +160,7 @@ TEST(SceneFiles, AProcessThatDiesWhileItWritesLeavesTheOldFile) {
 
 TEST(SceneFiles, WhereNoneCanBeWrittenIsOneSentence) {
   TempFolder folder;
-  const Scene scene = make_scene(synthetic_points(10), {});
+  const Scene scene = make_scene(ball_over_a_floor(10), {});
   std::filesystem::create_directory(folder.file("folder"));
   expect_error(MAQ_ERROR_UNWRITABLE, "is not a file", [&] { write_scene_file(scene, folder.file("folder")); });
   expect_error(MAQ_ERROR_UNWRITABLE, "cannot be made",
@@ -183,7 +183,7 @@ TEST(SceneFiles, WhatIsNoSceneIsOneSentence) {
 
 TEST(SceneFiles, ThePlyHasTheScenesPointsAndColours) {
   TempFolder folder;
-  maq::FittedPoints points = synthetic_points(5'000);
+  maq::FittedPoints points = ball_over_a_floor(5'000);
   points.constant_terms[0] = -0.5f;  // darker than black
   points.constant_terms[1] = 7;
   for (const bool is_far : {false, true}) {
@@ -220,7 +220,7 @@ TEST(SceneFiles, ThePlyHasTheScenesPointsAndColours) {
 TEST(SceneFiles, AMillionPointsAreOpenedWithoutBeingCopied) {
   TempFolder folder;
   const std::string path = folder.file("a.maqs");
-  write_scene_file(make_scene(synthetic_points(1'000'000), {}), path);
+  write_scene_file(make_scene(ball_over_a_floor(1'000'000), {}), path);
   const double file_mib = double(std::filesystem::file_size(path)) / 1048576;
   const std::string bytes = read_text(path);
   for (const bool is_mapped : {true, false}) {

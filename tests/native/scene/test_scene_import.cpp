@@ -287,8 +287,10 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
   made.images.push_back({211, pose, 7, "text.png"});
   made.images.push_back({212, pose, 7, "folder"});
   made.images.push_back({213, pose, 7, "huge.png"});
+  made.images.push_back({214, pose, 7, "a.gif"});
   cv::imwrite(folder_.path().parent_path() / "up.png", cv::Mat(24, 32, CV_8UC3, cv::Scalar()));
   write_text(folder_.file("images/text.png"), "no image");
+  write_text(folder_.file("images/a.gif"), "GIF89a" + std::string(100, 1));
   std::filesystem::create_directories(folder_.path() / "images" / "folder");
   std::string huge = read_text(folder_.file("images/a.png"));
   huge[17] = 1;  // 65568 pixels wide
@@ -316,7 +318,7 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
               "3 photos whose pose is not finite (first: nan.png)\n"
               "1 photos that are not in their folder (first: missing.png)\n"
               "3 photos whose name leads out of their folder (first: ../up.png)\n"
-              "2 photos that cannot be read as images (first: text.png)\n"
+              "3 photos that cannot be read as images (first: text.png)\n"
               "1 photos without pixels, or over the limit of size (first: huge.png)\n"
               "2 points whose position is not finite\n");
   }

@@ -84,7 +84,7 @@ DescriptorError descriptor_error(const FittedPoints& given, const FittedPoints& 
 }
 
 TEST(ScenePacking, EveryPointIsInOneBlockAndBlocksAreSmallAndFull) {
-  const FittedPoints points = synthetic_points(50'000);
+  const FittedPoints points = ball_over_a_floor(50'000);
   const std::vector<uint32_t> order = order_points(points, kExact).points;
   const Scene scene = make_scene(points, kExact);
   EXPECT_EQ(scene.points, 50'000u);
@@ -109,7 +109,7 @@ TEST(ScenePacking, EveryPointIsInOneBlockAndBlocksAreSmallAndFull) {
 }
 
 TEST(ScenePacking, FloatsAreThoseGiven) {
-  const FittedPoints points = synthetic_points(5'000);
+  const FittedPoints points = ball_over_a_floor(5'000);
   const std::vector<uint32_t> order = order_points(points, kExact).points;
   const FittedPoints stored = unpack(make_scene(points, kExact), order);
   EXPECT_EQ(stored.x, points.x);
@@ -120,7 +120,7 @@ TEST(ScenePacking, FloatsAreThoseGiven) {
 }
 
 TEST(ScenePacking, PositionsOf16BitsAreWithinHalfAStepAndInTheirBox) {
-  const FittedPoints points = synthetic_points(20'000);
+  const FittedPoints points = ball_over_a_floor(20'000);
   const std::vector<uint32_t> order =
       order_points(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0}).points;
   const Scene scene = make_scene(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0});
@@ -149,7 +149,7 @@ TEST(ScenePacking, PositionsOf16BitsAreWithinHalfAStepAndInTheirBox) {
 
 TEST(ScenePacking, ItsErrorIsSmallForDescriptorsOfAnySize) {
   for (const float size : {1e-6f, 1.0f, 1e6f}) {
-    FittedPoints points = synthetic_points(20'000);
+    FittedPoints points = ball_over_a_floor(20'000);
     for (float& value : points.constant_terms) value *= size;
     for (float& value : points.linear_terms) value *= size;
     for (const CoefficientFormat kind : {CoefficientFormat::kInt16, CoefficientFormat::kInt8}) {
@@ -167,7 +167,7 @@ TEST(ScenePacking, ItsErrorIsSmallForDescriptorsOfAnySize) {
 }
 
 TEST(ScenePacking, LessViewDependentPointsKeepTheConstantTermAlone) {
-  const FittedPoints points = synthetic_points(10'000);
+  const FittedPoints points = ball_over_a_floor(10'000);
   const float min = 0.1f;
   const std::vector<uint32_t> order =
       order_points(points, {PositionFormat::kFloat32, CoefficientFormat::kFloat32, min}).points;
@@ -185,7 +185,7 @@ TEST(ScenePacking, LessViewDependentPointsKeepTheConstantTermAlone) {
 }
 
 TEST(ScenePacking, TheFractionOfViewDependentPointsIsKeptByTheMostViewDependent) {
-  FittedPoints points = synthetic_points(10'000);
+  FittedPoints points = ball_over_a_floor(10'000);
   maq::ScenePacking packing = kExact;
   for (const float fraction : {0.0f, 0.3f, 0.9999f, 1.0f}) {
     packing.max_view_dependent_fraction = fraction;
@@ -213,7 +213,7 @@ TEST(ScenePacking, TheFractionOfViewDependentPointsIsKeptByTheMostViewDependent)
 }
 
 TEST(ScenePacking, AScenesBytesAPointAreAtMost39WithHalfOfThemViewDependent) {
-  const FittedPoints points = synthetic_points(20'000);
+  const FittedPoints points = ball_over_a_floor(20'000);
   const Scene scene = make_scene(points, {PositionFormat::kUint16, CoefficientFormat::kInt8, 0, 0.5f});
   const size_t bytes =
       blocks_bytes(scene) + positions_bytes(scene) + constant_terms_bytes(scene) + linear_terms_bytes(scene);
@@ -222,14 +222,14 @@ TEST(ScenePacking, AScenesBytesAPointAreAtMost39WithHalfOfThemViewDependent) {
 }
 
 TEST(ScenePacking, LinearTermsThatAreZeroAreNotStored) {
-  FittedPoints points = synthetic_points(3'000);
+  FittedPoints points = ball_over_a_floor(3'000);
   std::fill(points.linear_terms.begin() + 1'000 * kLinearTerms, points.linear_terms.end(), 0.0f);
   EXPECT_EQ(make_scene(points, kExact).view_dependent, 1'000u);
 }
 
 TEST(ScenePacking, AnOutlierDoesNotSpoilItsNeighbours) {
   const maq::ScenePacking packing = {PositionFormat::kUint16, CoefficientFormat::kInt8, 0};
-  FittedPoints points = synthetic_points(20'000);
+  FittedPoints points = ball_over_a_floor(20'000);
   const auto error_of = [&](const std::vector<uint32_t>& skipped) {
     return descriptor_error(points, unpack(make_scene(points, packing), order_points(points, packing).points), skipped);
   };
@@ -253,7 +253,7 @@ TEST(ScenePacking, AnOutlierDoesNotSpoilItsNeighbours) {
 }
 
 TEST(ScenePacking, APointFarAwayDoesNotSpoilItsNeighbours) {
-  FittedPoints points = synthetic_points(20'000);
+  FittedPoints points = ball_over_a_floor(20'000);
   points.x[5] = 3e7f;
   points.y[6] = -1e12f;
   const std::vector<uint32_t> order =
@@ -268,7 +268,7 @@ TEST(ScenePacking, APointFarAwayDoesNotSpoilItsNeighbours) {
 }
 
 TEST(ScenePacking, BlocksStayFewHoweverPointsAreSpread) {
-  FittedPoints points = synthetic_points(4'096);
+  FittedPoints points = ball_over_a_floor(4'096);
   for (size_t i = 0; i < points.count(); ++i) {
     points.x[i] = std::ldexp(1.0f, -3 * int(i % 40));  // a gap of 7/8 of what is left, again and again
     points.y[i] = points.z[i] = 0;
@@ -278,7 +278,7 @@ TEST(ScenePacking, BlocksStayFewHoweverPointsAreSpread) {
 
 TEST(ScenePacking, OnePointAndPointsAtOnePosition) {
   for (const size_t count : {size_t(1), size_t(2), size_t(3), size_t(3'000)}) {
-    FittedPoints points = synthetic_points(count);
+    FittedPoints points = ball_over_a_floor(count);
     std::fill(points.x.begin(), points.x.end(), 0.1f);
     std::fill(points.y.begin(), points.y.end(), -7e-30f);
     std::fill(points.z.begin(), points.z.end(), 1e30f);
@@ -301,7 +301,7 @@ TEST(ScenePacking, OnePointAndPointsAtOnePosition) {
 }
 
 TEST(ScenePacking, TheLargestNumbersStayFinite) {
-  FittedPoints points = synthetic_points(2'000);
+  FittedPoints points = ball_over_a_floor(2'000);
   for (size_t i = 0; i < points.count(); ++i) {
     points.x[i] = i % 2 == 0 ? maq::kMaxMagnitude : -maq::kMaxMagnitude;
     points.constant_terms[i * kFeatures] = points.x[i];
@@ -320,7 +320,7 @@ TEST(ScenePacking, TheLargestNumbersStayFinite) {
 TEST(ScenePacking, WhatIsNoSceneIsRefused) {
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "no point", [] { make_scene(FittedPoints(), {}); });
   const auto refused = [](const char* text, auto&& change) {
-    FittedPoints points = synthetic_points(100);
+    FittedPoints points = ball_over_a_floor(100);
     change(points);
     expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { make_scene(points, {}); });
   };
@@ -339,7 +339,7 @@ TEST(ScenePacking, WhatIsNoSceneIsRefused) {
 }
 
 TEST(ScenePacking, TheSamePointsMakeTheSameScene) {
-  const FittedPoints points = synthetic_points(5'000);
+  const FittedPoints points = ball_over_a_floor(5'000);
   const Scene a = make_scene(points, {}), b = make_scene(points, {});
   EXPECT_EQ(std::memcmp(a.blocks, b.blocks, blocks_bytes(a)), 0);
   EXPECT_EQ(std::memcmp(a.positions, b.positions, positions_bytes(a)), 0);
@@ -350,7 +350,7 @@ TEST(ScenePacking, TheSamePointsMakeTheSameScene) {
 // The points themselves take 248 bytes each.
 TEST(ScenePacking, MillionsOfPointsTakeMemoryByTheirNumber) {
   constexpr size_t kCount = 1'000'000;
-  const FittedPoints points = synthetic_points(kCount);
+  const FittedPoints points = ball_over_a_floor(kCount);
   const auto begin = std::chrono::steady_clock::now();
   const double grown_mib = peak_memory_growth_mib([&] { EXPECT_EQ(make_scene(points, {}).points, kCount); });
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;

@@ -13,6 +13,7 @@
 #include "sources/live_source.h"
 #include "support/expect_error.h"
 #include "support/fake_depthai.h"
+#include "support/state_reports.h"
 #include "support/wait_until.h"
 
 namespace {
@@ -23,30 +24,9 @@ using maq::NextFrame;
 using Call = FakeDepthAi::Call;
 using Fault = FakeDepthAi::Fault;
 
-constexpr int64_t kSecond = 1000000000;
 constexpr int64_t kMillisecond = 1000000;
-constexpr int64_t kPeriod = kSecond / 30;
+constexpr int64_t kPeriod = 1000 * kMillisecond / 30;
 constexpr int kLimitMs = 60000;  // for a defect, not for speed
-
-// What was reported, in order.
-class Reports {
- public:
-  static void note(void* self, maq_source_state state, const char*) {
-    auto* reports = static_cast<Reports*>(self);
-    std::lock_guard<std::mutex> lock(reports->mutex_);
-    reports->states_.push_back(state);
-  }
-  bool wait_for(maq_source_state state) const {
-    return wait_until([&] {
-      std::lock_guard<std::mutex> lock(mutex_);
-      return std::find(states_.begin(), states_.end(), state) != states_.end();
-    });
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<maq_source_state> states_;
-};
 
 // What came of a wait: pixels, depth (-1: none), number and time.
 struct Picture {

@@ -22,8 +22,6 @@ using maq::NextFrame;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr int64_t kLimit = 60000000000;  // for a defect, not for speed
-
 class FaultInjection : public ::testing::Test {
  protected:
   std::unique_ptr<maq::Source> open(const std::string& uri, int queue_length = 1, int stall_ms = 60000) {

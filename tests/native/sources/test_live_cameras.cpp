@@ -322,12 +322,13 @@ TEST_F(LiveCameras, ACallbackThatThrowsEndsTheSourceAndNotTheApp) {
 class HangingV4l2 : public FakeV4l2 {
  public:
   int poll(pollfd* fds, nfds_t count, int timeout_ms) override {
-    is_entered_ = true;
+    is_waiting_ = true;
     std::unique_lock<std::mutex> lock(hang_);
+    is_waiting_ = false;
     return FakeV4l2::poll(fds, count, timeout_ms);
   }
   std::mutex hang_;
-  std::atomic<bool> is_entered_{false};
+  std::atomic<bool> is_waiting_{false};
 };
 
 TEST_F(LiveCameras, ClosingDoesNotWaitForADeviceThatHangs) {
@@ -336,8 +337,7 @@ TEST_F(LiveCameras, ClosingDoesNotWaitForADeviceThatHangs) {
                                                 "/dev/video0", maq::SourceSettings());
   {
     std::unique_lock<std::mutex> hang(device.hang_);
-    device.is_entered_ = false;
-    ASSERT_TRUE(wait_until([&] { return device.is_entered_.load(); })) << "the thread is in the call that hangs";
+    ASSERT_TRUE(wait_until([&] { return device.is_waiting_.load(); })) << "the thread is in the call that hangs";
     live.reset();  // would never return if it waited for the device
     EXPECT_EQ(device.open_files(), 1);
   }

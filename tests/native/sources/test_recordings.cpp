@@ -281,9 +281,23 @@ TEST_F(Recordings, ThatHaveLostTheirIndexAreLookedThroughAndSaySo) {
   for (int i = 0; i < 4; ++i) expect_frame(*source, i);
 }
 
+TEST_F(Recordings, WithAHoleTakeNeitherItsMemoryNorItsTime) {
+  const std::vector<uint64_t> ends = record(3, /*finish=*/false);
+  constexpr uint64_t kHole = uint64_t(1) << 40;
+  std::filesystem::resize_file(path_of(), ends.back() + kHole);
+  maq::RecordingTail tail{};  // of an index that is the hole
+  tail.index_offset = ends.back();
+  std::memcpy(tail.magic, maq::kRecordingEnd, sizeof tail.magic);
+  std::ofstream(path_of(), std::ios::binary | std::ios::app).write(reinterpret_cast<const char*>(&tail), sizeof tail);
+  const auto source = play();
+  EXPECT_EQ(source->info().frame_count, 3);
+  for (int i = 0; i < 3; ++i) expect_frame(*source, i);
+}
+
 TEST_F(Recordings, OfHostileHeadsAreRefused) {
   expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { play(); });
-  expect_error(MAQ_ERROR_UNREADABLE, "is it a file", [&] { maq::open_source("rec:" + folder_.path().string()); });
+  expect_error(MAQ_ERROR_UNREADABLE, "is not a file but a folder",
+               [&] { maq::open_source("rec:" + folder_.path().string()); });
   for (const std::string& text : {std::string(), std::string(1000, '\0'), std::string("MAQREC\r\n")}) {
     write_text(path_of(), text);
     expect_error(MAQ_ERROR_UNREADABLE, "is no recording", [&] { play(); });

@@ -310,6 +310,20 @@ TEST_F(V4l2Faults, TimesThatRepeatOrGoBackAreDroppedAndCounted) {
   EXPECT_EQ(live->drops(), 3u);
 }
 
+TEST_F(V4l2Faults, AFrameThatComesAfterItsSuccessorIsDroppedOnce) {
+  const auto live = source(settings());
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  for (const int number : {0, 1, 3, 2, 4}) {
+    fake_.number_frames_from(uint32_t(number));
+    fake_.stamp_frames(timeval{now.tv_sec - 1, number * 1000});
+    ASSERT_TRUE(fake_.deliver(uint8_t(number)));
+    if (number == 2) continue;  // is not shown
+    EXPECT_EQ(next(*live).sequence, uint64_t(number));
+  }
+  EXPECT_EQ(live->drops(), 1u);
+}
+
 TEST_F(V4l2Faults, TimesThatCannotBeAreThoseOfArrival) {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);

@@ -8,7 +8,7 @@
 #include "scene/format/fitted_points.h"
 #include "scene/format/scene.h"
 
-inline maq::FittedPoints synthetic_points(size_t count, uint32_t seed = 1) {
+inline maq::FittedPoints ball_over_a_floor(size_t count, uint32_t seed = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
   std::uniform_real_distribution<float> uniform(-1, 1);

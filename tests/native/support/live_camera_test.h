@@ -15,36 +15,11 @@
 #include "support/expect_error.h"
 #include "support/fake_v4l2.h"
 #include "support/source_threads.h"
+#include "support/state_reports.h"
 #include "support/wait_until.h"
 
 using namespace std::chrono_literals;
 using maq::NextFrame;
-constexpr int64_t kSecond = 1000000000;
-constexpr int64_t kLimit = 60 * kSecond;  // for a defect, not for speed
-
-// What was reported, in order.
-class Reports {
- public:
-  static void note(void* self, maq_source_state state, const char*) {
-    auto* reports = static_cast<Reports*>(self);
-    std::lock_guard<std::mutex> lock(reports->mutex_);
-    reports->states_.push_back(state);
-  }
-  std::vector<maq_source_state> states() const {
-    std::lock_guard<std::mutex> lock(mutex_);
-    return states_;
-  }
-  bool wait_for(maq_source_state state) const {
-    return wait_until([&] {
-      const auto all = states();
-      return std::find(all.begin(), all.end(), state) != all.end();
-    });
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<maq_source_state> states_;
-};
 
 class LiveCameraTest : public ::testing::Test {
  protected:

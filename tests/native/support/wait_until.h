@@ -2,7 +2,11 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <thread>
+
+constexpr int64_t kSecond = 1000000000;
+constexpr int64_t kLimit = 60 * kSecond;
 
 // False when `happened` is not true within the limit.
 template <class Condition>

@@ -9,7 +9,8 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from benchmarks import __main__ as benchmark
-from benchmarks import cameras, compare, gates, graphs, report, roofline, scenes, start, sweep, window
+from benchmarks import cameras, compare, gates, graphs, report, roofline, start, sweep, window
+from benchmarks.scenes import measure as scenes
 
 MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2", "fma"], "processor": "P",
            "memory_mib": 2048, "system": "S"}  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 import torch
 from box_scene import BoxScene, looking, ring, write_capture
 
-from benchmarks.scene_baselines import Cloud, cloud_of, moved_px, nearest_photo
+from benchmarks.scenes.baselines import Cloud, cloud_of, moved_px, nearest_photo
 from export.scenes.captures import read_capture
 from export.scenes.picture_quality import psnr_db
 

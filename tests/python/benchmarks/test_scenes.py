@@ -10,8 +10,13 @@ from box_scene import BoxScene, ring, write_ply
 from fake_maquette import install
 
 from benchmarks import __main__ as benchmark
-from benchmarks import frame_time, gates, scene_command, scene_pictures, scene_quality, scene_speed, scenes
-from benchmarks.scene_settings import FLOAT, SHIPPED, Sources, settings, sources
+from benchmarks import frame_time, gates
+from benchmarks.scenes import command as scene_command
+from benchmarks.scenes import measure as scenes
+from benchmarks.scenes import pictures as scene_pictures
+from benchmarks.scenes import quality as scene_quality
+from benchmarks.scenes import speed as scene_speed
+from benchmarks.scenes.settings import FLOAT, SHIPPED, Sources, settings, sources
 from export.densepose.network import MobileNetV2
 from export.places.place import load_place
 from export.scenes.perceptual import Perceptual

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from export.camera import Camera
-from export.captures.dense import dense_cloud, neighbours_of
+from export.captures.dense import depth_maps, fused, neighbours_of
 from export.captures.originals import ORIGINALS, Photo, box_mask
 from export.captures.plane_sweep import GreyView, depth_of
 from export.captures.structure import CaptureError, up_of_cameras
@@ -75,14 +75,17 @@ def test_points_are_kept_where_views_agree(wall):
     known, places = sparse_points(cameras)
     images = [np.repeat(picture[..., None], 3, 2).astype(np.uint8) for picture, _ in seen]
     masks = [np.ones(SIZE[::-1], bool) for _ in cameras]
-    xyz, rgb = dense_cloud(cameras, images, masks, known, places)
+    depths = depth_maps(cameras, images, masks, known, places)
+    xyz, rgb = fused(cameras, images, depths)
     assert len(xyz) == len(rgb) > 5000
     assert np.quantile(np.abs(xyz[:, 1]), 0.95) < 0.04  # of 2
+    assert 4000 < len(fused(cameras, images, depths, max_points=5000)[0]) <= 5000
+    assert len(fused(cameras, images, depths, min_witnesses=4)[0]) < len(xyz)
     # Pictures of nothing in common make no cloud.
     rng = np.random.default_rng(1)
     noise = [rng.integers(0, 255, image.shape, dtype=np.uint8) for image in images]
     with pytest.raises(CaptureError, match="points"):
-        dense_cloud(cameras, noise, masks, known, places)
+        fused(cameras, noise, depth_maps(cameras, noise, masks, known, places))
 
 
 def test_neighbours_stand_aside_a_little():

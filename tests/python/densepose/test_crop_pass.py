@@ -35,7 +35,7 @@ def test_the_axis_is_read_off_torso_and_head(degrees, head):
     assert axis @ (rotation(degrees) @ [0, -1]) > np.cos(np.radians(3))
 
 
-def test_without_a_torso_there_is_no_axis_and_nothing_is_turned():
+def test_without_a_torso_there_is_no_axis_and_nothing_is_rotated():
     label = upright_torso()
     label[label[..., 0] == 2] = 0
     assert axis_of_surface(label) is None
@@ -43,7 +43,7 @@ def test_without_a_torso_there_is_no_axis_and_nothing_is_turned():
     assert np.allclose(crop_of(mask, np.zeros(4), None, 64).into[0, 1], 0)
 
 
-def test_only_who_leans_is_turned():
+def test_only_who_leans_is_rotated():
     mask, box = upright_torso()[..., 0] > 0, np.array([60, 40, 100, 120.0])
     for degrees, turned in ((10, False), (-20, True), (170, True)):
         crop = crop_of(mask, box, rotation(degrees) @ [0, -1.0], 64)

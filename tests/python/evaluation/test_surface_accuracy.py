@@ -313,3 +313,16 @@ def test_unknown_backend_and_missing_model_are_explained(tmp_path):
         open_backend("tflite", 0.05)
     with pytest.raises(FileNotFoundError, match="onnx=PATH"):
         open_backend(f"onnx={tmp_path / 'nothing'}", 0.05)
+    with pytest.raises(ValueError, match="only capi takes settings"):
+        open_backend("torch?person_crops=1", 0.05)
+    with pytest.raises(ValueError, match=r"maq_densepose_config's fields as name=number, not 'person_crops=auto'"):
+        open_backend("capi?person_crops=auto", 0.05)
+
+
+def test_settings_of_the_sdk_are_part_of_the_backends_name(monkeypatch):
+    given = {}
+    monkeypatch.setattr("export.evaluation.maquette_api.DensePose", lambda path, **settings: given.update(settings))
+    backend = open_backend("capi?person_crops=1&long_side_px=384", 0.05)
+    assert given == {"score_threshold": 0.05, "person_crops": 1, "long_side_px": 384}
+    assert backend.kind == "capi?person_crops=1&long_side_px=384"
+    assert open_backend("capi", 0.05).kind == "capi"

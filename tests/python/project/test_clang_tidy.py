@@ -13,15 +13,19 @@ SCRIPT = Path("scripts/clang_tidy.py").resolve()
 # Stands in for clang-tidy: notes each source that it is given, and complains about those with "BAD" in them.
 FAKE = """#!/bin/sh
 [ "$1" = --version ] && echo fake && exit
-for last; do :; done
-echo "$last" >>"$FAKE_LOG"
-! grep -n BAD "$last"
+for word; do
+    [ "$word" != -- ] || break
+    source=$word
+done
+echo "$source" >>"$FAKE_LOG"
+! grep -n BAD "$source"
 """
 
 
 @pytest.fixture
 def project(tmp_path):
-    """A folder with a.cpp, which includes a.h, and b.cpp; called, it gives (exit status, output, sources checked)."""
+    """A folder with a.cpp, which includes a.h, and b.cpp; called, it gives (exit status, output, sources checked)
+    in its `folder`, which can be changed."""
     if shutil.which("c++") is None:
         pytest.skip("no C++ compiler")
     (tmp_path / "bin").mkdir()
@@ -30,16 +34,24 @@ def project(tmp_path):
     (tmp_path / "a.h").write_text("int a();\n")
     (tmp_path / "a.cpp").write_text('#include "a.h"\n')
     (tmp_path / "b.cpp").write_text("int b();\n")
-    commands = [{"directory": str(tmp_path), "file": name, "command": f"ccache c++ -o {name}.o -c {name}"}
-                for name in (str(tmp_path / "a.cpp"), str(tmp_path / "b.cpp"))]  # fmt: skip
+    compiler = "cmake -E env CCACHE_NOHASHDIR=1 /usr/bin/ccache c++"
+    commands = [
+        {"directory": str(tmp_path), "file": name, "command": f"{compiler} -o {name}.o -c {name}"}
+        for name in (str(tmp_path / "a.cpp"), str(tmp_path / "b.cpp"))
+    ]
     (tmp_path / "compile_commands.json").write_text(json.dumps(commands))
     log = tmp_path / "log"
-    environment = os.environ | {"PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}", "FAKE_LOG": str(log)}
+    environment = os.environ | {
+        "PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}",
+        "FAKE_LOG": str(log),
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
+    }
 
     def run(*names):
         log.write_text("")
-        command = [sys.executable, SCRIPT, "--build", tmp_path, *(tmp_path / name for name in names)]
-        ran = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=tmp_path)
+        folder = run.folder
+        command = [sys.executable, SCRIPT, "--build", folder, *(folder / name for name in names)]
+        ran = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=folder)
         return ran.returncode, ran.stdout + ran.stderr, sorted(Path(line).name for line in log.read_text().splitlines())
 
     run.folder = tmp_path
@@ -53,6 +65,28 @@ def test_a_clean_file_is_checked_once_and_again_when_a_header_or_the_settings_ch
     assert project("a.cpp", "b.cpp") == (0, "", ["a.cpp"])
     (project.folder / ".clang-tidy").write_text("Checks: '*'\n")
     assert project("a.cpp", "b.cpp") == (0, "", ["a.cpp", "b.cpp"])
+
+
+def test_files_that_are_compiled_as_one_are_checked_one_by_one(project):
+    unity = project.folder / "Unity/unity_0_cxx.cxx"
+    unity.parent.mkdir()
+    unity.write_text(f'#include "{project.folder}/a.cpp"\n\n#include "{project.folder}/b.cpp"\n')
+    commands = [{"directory": str(project.folder), "file": str(unity), "command": f"c++ -o u.o -c {unity}"}]
+    (project.folder / "compile_commands.json").write_text(json.dumps(commands))
+    assert project("a.cpp", "b.cpp") == (0, "", ["a.cpp", "b.cpp"])
+
+
+def test_a_clean_file_is_known_in_another_checkout(project, tmp_path_factory):
+    project("a.cpp")
+    other = tmp_path_factory.mktemp("other")
+    for name in ("a.cpp", "a.h"):
+        (other / name).write_text((project.folder / name).read_text())
+    commands = (project.folder / "compile_commands.json").read_text().replace(str(project.folder), str(other))
+    (other / "compile_commands.json").write_text(commands)
+    project.folder = other
+    assert project("a.cpp") == (0, "", [])
+    (other / "a.h").write_text("int a(int);\n")
+    assert project("a.cpp") == (0, "", ["a.cpp"])
 
 
 def test_what_it_says_fails_the_run_until_it_is_mended(project):

@@ -69,6 +69,7 @@ FOREIGN = {
     r"libcamera/.*": r"sdk/src/sources/libcamera/.*",
     r"depthai/.*": r"sdk/src/sources/depthai/depthai_session\.cpp",
     r"opencv2/.*": r"sdk/src/image/files/opencv_file_codecs\.cpp|sdk/tools/.*",
+    r"png\.h": r"sdk/src/image/files/png\.cpp",
     r"GLFW/.*|epoxy/.*|imgui.*|backends/imgui.*": r"desktop_demo/src/.*",
     r"CLI/.*": r"sdk/tools/.*|desktop_demo/src/.*",
 }

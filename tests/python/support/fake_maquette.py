@@ -1,4 +1,4 @@
-"""Stands in for `maquette scene` and `maquette bench`: honours what benchmarks.scene_command reads, makes photos worse.
+"""Stands in for `maquette scene` and `maquette bench`: what benchmarks.scenes.command reads, photos made worse.
 
 Pictures are the held-out photos themselves plus noise, as much as the options deserve; times follow from points and
 pixels. `install` writes it as a program. What is in `refused` is an option that it does not know.

@@ -1,5 +1,5 @@
-// What decodes and encodes image and video files: OpenCV's imgcodecs and videoio, the only place of the library where
-// OpenCV is.
+// What decodes and encodes image and video files: libpng and OpenCV's imgcodecs and videoio, the only place of the
+// library where OpenCV is. JPEG images are decoded without it (jpeg.h).
 //
 // They bring some two hundred shared libraries on Debian (GDAL and FFmpeg among them), 65 MB of memory and more than a
 // tenth of a second, which an app with a camera does not need. So they are in a library of their own,
@@ -12,11 +12,9 @@
 #include <vector>
 
 #include "core/frame.h"
+#include "image/files/image_header.h"
 
 namespace maq {
-
-// Whether an image is rotated as its EXIF orientation says or left as it lies in the file.
-enum class Orientation { kUpright, kAsStored };
 
 // An image that was decoded, and its memory. No width: nothing was decoded.
 struct DecodedImage {
@@ -57,8 +55,8 @@ class ClipEncoder {
 class FileCodecs {
  public:
   virtual ~FileCodecs() = default;
-  // BGR8; no width for what is damaged or no image.
-  virtual DecodedImage decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const = 0;
+  // A PNG, WebP, BMP or TIFF image, as it is stored, as BGR8; no width for what is damaged.
+  virtual DecodedImage decode_image(const EncodedBytes& bytes, ImageFormat format) const = 0;
   // `extension`: ".png" or ".jpg"; the image is BGR8, GREY8 or, for PNG, RGBA8. False where it cannot be encoded.
   virtual bool encode_image(const std::string& extension, const ImageView& image,
                             std::vector<uint8_t>& bytes) const = 0;
@@ -70,7 +68,8 @@ class FileCodecs {
 };
 
 // Opens libmaquette_files.so at the first call. Throws MAQ_ERROR_RUNTIME_LIBRARY where it is missing or of another
-// build. Where the codecs are linked in (tests), it is those.
+// build. Its codecs throw std::bad_alloc where they fail and there is too little memory. Where the codecs are linked in
+// (tests), it is those.
 const FileCodecs& file_codecs();
 
 // What the library exports, a FileCodecs (core/module.h).

@@ -1,7 +1,6 @@
 #include "image/files/image_file.h"
 
 #include <algorithm>
-#include <filesystem>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -9,27 +8,99 @@
 #include "core/file_reader.h"
 #include "image/convert.h"
 #include "image/files/file_codecs.h"
+#include "image/files/jpeg.h"
 
 namespace maq {
+namespace {
+
+// Over what an image of MAQ_MAX_PIXELS takes without compression, at 16 bits and four channels.
+constexpr uint64_t kMaxImageBytes = uint64_t(1) << 30;
+
+constexpr char kFormats[] = "JPEG, PNG, WebP, BMP or TIFF";
+
+[[noreturn]] void fail_to_decode(const std::string& origin) {
+  throw Error(MAQ_ERROR_UNREADABLE, origin, " cannot be decoded: it is damaged or no image; use a whole ", kFormats,
+              " file.");
+}
+
+// The format of an image by its first bytes. Throws for those that are not read.
+ImageFormat format_of(const EncodedBytes& start, const std::string& origin) {
+  const auto [format, name] = recognise_format(start);
+  if (format == ImageFormat::kClip) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, origin, " is ", name, ", no image; open the file as a source, as video:.");
+  }
+  if (format == ImageFormat::kNotRead) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, origin, " is ", name, ", which is not read; save it as ", kFormats, ".");
+  }
+  return format;
+}
+
+// Throws for what cannot be decoded, by its first bytes.
+void check_start(const EncodedBytes& start, const std::string& origin) {
+  if (start.size == 0) throw Error(MAQ_ERROR_UNREADABLE, origin, " is empty; an image was expected.");
+  if (format_of(start, origin) == ImageFormat::kUnknown) fail_to_decode(origin);
+  if (const auto size = read_image_size(start)) check_image_size(size->width, size->height, origin);
+}
+
+// Makes the image of `frame`, BGR8 in its own memory, upright.
+void apply_orientation(Frame& frame, int orientation) {
+  if (orientation == 1) return;
+  const bool is_transposed = orientation >= 5;
+  const int width = frame.image.width_px, height = frame.image.height_px;
+  const std::vector<uint8_t> stored = std::move(frame.storage);
+  uint8_t* to = frame.allocate_bgr(is_transposed ? height : width, is_transposed ? width : height);
+  // Which stored pixel is the first of the upright image, and how far it is to the next across and down.
+  const bool from_right = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+  const bool from_bottom = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+  const ptrdiff_t column = from_right ? -3 : 3, row = ptrdiff_t(from_bottom ? -3 : 3) * width;
+  const uint8_t* first = stored.data() + (from_right ? ptrdiff_t(width - 1) * 3 : 0) +
+                         (from_bottom ? ptrdiff_t(height - 1) * width * 3 : 0);
+  const ptrdiff_t across = is_transposed ? row : column, down = is_transposed ? column : row;
+  // In tiles, so that stored rows that were read stay in the cache.
+  constexpr int kTile = 32;
+  const int columns = frame.image.width_px, rows = frame.image.height_px;
+  for (int y0 = 0; y0 < rows; y0 += kTile) {
+    for (int x0 = 0; x0 < columns; x0 += kTile) {
+      for (int y = y0; y < std::min(y0 + kTile, rows); ++y) {
+        const uint8_t* from = first + y * down + x0 * across;
+        uint8_t* pixel = to + (ptrdiff_t(y) * columns + x0) * 3;
+        for (int x = x0; x < std::min(x0 + kTile, columns); ++x, from += across, pixel += 3) {
+          std::copy_n(from, 3, pixel);
+        }
+      }
+    }
+  }
+}
+
+void decode_jpeg(const EncodedBytes& bytes, const std::string& origin, Frame& frame) {
+  const JpegResult result = decode_jpeg_photo(bytes.data, bytes.size, frame);
+  if (result == JpegResult::kDamaged) fail_to_decode(origin);
+  if (result == JpegResult::kTruncated) {
+    throw Error(MAQ_ERROR_UNREADABLE, origin, " is truncated: the end of the JPEG image is missing; copy it again.");
+  }
+}
+
+}  // namespace
+
+void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& frame, Orientation orientation) {
+  if (bytes.size > kMaxImageBytes) throw Error(MAQ_ERROR_UNREADABLE, origin, " is over 1 GiB; is it an image?");
+  check_start(bytes, origin);
+  const ImageFormat format = recognise_format(bytes).format;
+  if (format == ImageFormat::kJpeg) {
+    decode_jpeg(bytes, origin, frame);
+  } else {
+    const DecodedImage image = file_codecs().decode_image(bytes, format);
+    if (image.view.width_px == 0 || image.view.planes[0].data == nullptr) fail_to_decode(origin);
+    check_image_size(image.view.width_px, image.view.height_px, origin);
+    uint8_t* pixels = frame.allocate_bgr(image.view.width_px, image.view.height_px);
+    copy_pixels(image.view, MAQ_PIXEL_BGR8, pixels, 0, frame.storage.size());
+  }
+  if (orientation == Orientation::kUpright) apply_orientation(frame, read_exif_orientation(bytes));
+}
 
 void read_image_file(const std::string& path, Frame& frame, Orientation orientation) {
-  std::error_code ignored;  // what is no file is for read_file() to say
-  const uintmax_t size_bytes = std::filesystem::file_size(path, ignored);
-  if (!ignored && size_bytes > uintmax_t(1) << 30) {
-    throw Error(MAQ_ERROR_UNREADABLE, path, " is over 1 GiB; an image file was expected.");
-  }
-  const std::vector<uint8_t> bytes = read_file(path);
-  if (bytes.empty()) throw Error(MAQ_ERROR_UNREADABLE, path, " is empty; an image file was expected.");
-  if (const auto size = read_image_size(bytes)) check_image_size(size->width, size->height, path);
-
-  const DecodedImage image = file_codecs().decode_image(bytes.data(), bytes.size(), orientation);
-  if (image.view.width_px == 0) {
-    throw Error(MAQ_ERROR_UNREADABLE, path,
-                " cannot be decoded: it is damaged or no image; use a whole JPEG, PNG, WebP, BMP or TIFF file.");
-  }
-  check_image_size(image.view.width_px, image.view.height_px, path);
-  uint8_t* pixels = frame.allocate_bgr(image.view.width_px, image.view.height_px);
-  copy_pixels(image.view, MAQ_PIXEL_BGR8, pixels, 0, frame.storage.size());
+  const StartCheck check = [&](const std::vector<uint8_t>& start) { check_start(start, path); };
+  decode_image(read_file(path, kMaxImageBytes, check), path, frame, orientation);
 }
 
 SizePx read_image_file_size(const std::string& path) {
@@ -38,6 +109,7 @@ SizePx read_image_file_size(const std::string& path) {
     // Up to a JPEG's size there may be a preview and colour tables.
     std::vector<uint8_t> start(size_t(std::min<uint64_t>(file.remaining(), 1 << 18)));
     file.read(start.data(), start.size());
+    format_of(start, path);
     if (const auto size = read_image_size(start)) return *size;
   }
   Frame frame;

@@ -11,8 +11,16 @@
 
 namespace maq {
 
-// Decodes an image file into `frame` as BGR.
-// Throws MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE, and what file_codecs() throws.
+// Whether an image is rotated as its EXIF orientation says or left as it is stored.
+enum class Orientation { kUpright, kAsStored };
+
+// Decodes an image, a whole JPEG, PNG, WebP, BMP or TIFF file, into `frame` as BGR. `origin` names it in errors.
+// Throws MAQ_ERROR_UNREADABLE for what is damaged, truncated or no image, MAQ_ERROR_UNSUPPORTED for other formats,
+// MAQ_ERROR_IMAGE_SIZE, and, but for JPEG, what file_codecs() throws.
+void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& frame,
+                  Orientation orientation = Orientation::kUpright);
+
+// The same of a file or a pipe. Throws what read_file() throws too.
 void read_image_file(const std::string& path, Frame& frame, Orientation orientation = Orientation::kUpright);
 
 // Of the image as it is stored, from the file's first bytes where the format has it there; otherwise it is decoded.

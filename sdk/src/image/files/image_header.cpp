@@ -1,5 +1,6 @@
 #include "image/files/image_header.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 
@@ -8,42 +9,68 @@ namespace {
 
 class Reader {
  public:
-  explicit Reader(const std::vector<uint8_t>& bytes) : bytes_(bytes) {}
+  explicit Reader(const EncodedBytes& bytes) : bytes_(bytes) {}
 
-  bool has(size_t offset, size_t count) const { return offset <= bytes_.size() && count <= bytes_.size() - offset; }
+  size_t size() const { return bytes_.size; }
+  bool has(size_t offset, size_t count) const { return offset <= bytes_.size && count <= bytes_.size - offset; }
   bool equals(size_t offset, const char* text) const {
     const size_t count = std::strlen(text);
-    return has(offset, count) && std::memcmp(bytes_.data() + offset, text, count) == 0;
+    return has(offset, count) && std::memcmp(bytes_.data + offset, text, count) == 0;
   }
-  uint32_t byte(size_t offset) const { return bytes_[offset]; }
+  uint32_t byte(size_t offset) const { return bytes_.data[offset]; }
   uint32_t big16(size_t offset) const { return byte(offset) << 8 | byte(offset + 1); }
   uint32_t big32(size_t offset) const { return big16(offset) << 16 | big16(offset + 2); }
   uint32_t little16(size_t offset) const { return byte(offset) | byte(offset + 1) << 8; }
   uint32_t little24(size_t offset) const { return little16(offset) | byte(offset + 2) << 16; }
   uint32_t little32(size_t offset) const { return little16(offset) | little16(offset + 2) << 16; }
 
+  const uint8_t* at(size_t offset) const { return bytes_.data + offset; }
+
  private:
-  const std::vector<uint8_t>& bytes_;
+  EncodedBytes bytes_;
 };
 
-// Walks the segments up to a start of frame, which holds the size.
+struct JpegSegment {
+  uint32_t marker = 0;
+  size_t offset = 0;  // of the marker
+};
+
+// Goes from segment to segment of a JPEG image, up to the start of its first scan.
+class JpegSegments {
+ public:
+  explicit JpegSegments(const Reader& in) : in_(in) {}
+
+  // False behind the last, and where there is no segment.
+  bool next(JpegSegment& segment) {
+    while (in_.has(offset_, 4) && in_.byte(offset_) == 0xff) {
+      segment = {in_.byte(offset_ + 1), offset_};
+      if (segment.marker == 0xff) {  // padding between segments
+        ++offset_;
+        continue;
+      }
+      if (segment.marker == 0xd9) return false;
+      const bool has_length = segment.marker != 0x01 && (segment.marker < 0xd0 || segment.marker > 0xd8);
+      offset_ += has_length ? 2 + in_.big16(offset_ + 2) : 2;
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  const Reader& in_;
+  size_t offset_ = 2;
+};
+
+constexpr uint32_t kStartOfScan = 0xda;
+
+// In a start of frame.
 std::optional<SizePx> jpeg_size(const Reader& in) {
-  size_t offset = 2;
-  while (in.has(offset, 4)) {
-    if (in.byte(offset) != 0xff) return {};
-    const uint32_t marker = in.byte(offset + 1);
-    if (marker == 0xff) {  // padding between segments
-      ++offset;
-      continue;
-    }
-    const bool start_of_frame = marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
-    if (start_of_frame) {
-      if (!in.has(offset, 9)) return {};
-      return SizePx{in.big16(offset + 7), in.big16(offset + 5)};
-    }
-    if (marker == 0xda || marker == 0xd9) return {};
-    const bool without_length = marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8);
-    offset += without_length ? 2 : 2 + in.big16(offset + 2);
+  JpegSegments segments(in);
+  for (JpegSegment segment; segments.next(segment) && segment.marker != kStartOfScan;) {
+    const uint32_t marker = segment.marker;
+    if (marker < 0xc0 || marker > 0xcf || marker == 0xc4 || marker == 0xc8 || marker == 0xcc) continue;
+    if (!in.has(segment.offset, 9)) return {};
+    return SizePx{in.big16(segment.offset + 7), in.big16(segment.offset + 5)};
   }
   return {};
 }
@@ -59,9 +86,103 @@ std::optional<SizePx> webp_size(const Reader& in) {
   return {};
 }
 
+// Where EXIF data begin, behind the "Exif" that some put before them; 0: nowhere.
+size_t exif_offset(const Reader& in, ImageFormat format) {
+  const auto behind_name = [&](size_t offset) {
+    return in.has(offset, 6) && std::memcmp(in.at(offset), "Exif\0\0", 6) == 0 ? offset + 6 : offset;
+  };
+  if (format == ImageFormat::kJpeg) {
+    JpegSegments segments(in);
+    for (JpegSegment segment; segments.next(segment) && segment.marker != kStartOfScan;) {
+      const size_t begin = segment.offset + 4;
+      if (segment.marker == 0xe1 && behind_name(begin) != begin) return begin + 6;
+    }
+  } else if (format == ImageFormat::kPng) {
+    for (size_t offset = 8; in.has(offset, 8); offset += 12 + size_t(in.big32(offset))) {
+      if (in.equals(offset + 4, "eXIf")) return behind_name(offset + 8);
+    }
+  } else if (format == ImageFormat::kWebp) {
+    for (size_t offset = 12; in.has(offset, 8); offset += 8 + (size_t(in.little32(offset + 4)) + 1) / 2 * 2) {
+      if (in.equals(offset, "EXIF")) return behind_name(offset + 8);
+    }
+  }
+  return 0;
+}
+
+bool is_svg(const Reader& in) {
+  const size_t count = std::min<size_t>(in.size(), 1024);
+  const char* text = reinterpret_cast<const char*>(in.at(0));
+  const auto contains = [&](const char* part) {
+    return std::search(text, text + count, part, part + std::strlen(part)) != text + count;
+  };
+  return in.equals(0, "<svg") || ((in.equals(0, "<?xml") || in.equals(0, "<!DOCTYPE")) && contains("<svg"));
+}
+
+// TGA has no magic number: its kinds of image, and the bits of a pixel.
+bool is_tga(const Reader& in) {
+  if (!in.has(0, 18) || in.little16(12) == 0 || in.little16(14) == 0) return false;
+  const bool has_palette = in.byte(1) == 1;
+  if (in.byte(1) > 1 || (in.byte(2) % 8 == 1 && !has_palette)) return false;
+  constexpr uint32_t kKinds[] = {1, 2, 3, 9, 10, 11}, kBits[] = {8, 15, 16, 24, 32};
+  return std::find(std::begin(kKinds), std::end(kKinds), in.byte(2)) != std::end(kKinds) &&
+         std::find(std::begin(kBits), std::end(kBits), in.byte(16)) != std::end(kBits);
+}
+
+// ISO/IEC 14496-12: photos of phones and clips have the same container, and a brand.
+FormatName of_brand(const Reader& in) {
+  for (const char* brand : {"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1"}) {
+    if (in.equals(8, brand)) return {ImageFormat::kNotRead, "a HEIC image"};
+  }
+  if (in.equals(8, "avif") || in.equals(8, "avis")) return {ImageFormat::kNotRead, "an AVIF image"};
+  if (in.equals(8, "crx ")) return {ImageFormat::kNotRead, "a camera's raw image"};
+  return {ImageFormat::kClip, "an MP4 or MOV video"};
+}
+
 }  // namespace
 
-std::optional<SizePx> read_image_size(const std::vector<uint8_t>& bytes) {
+FormatName recognise_format(const EncodedBytes& bytes) {
+  const Reader in(bytes);
+  constexpr uint32_t kAnimated = 2;
+  if (in.equals(0, "\xff\xd8\xff")) return {ImageFormat::kJpeg, "a JPEG image"};
+  if (in.equals(0, "\x89PNG\r\n\x1a\n")) return {ImageFormat::kPng, "a PNG image"};
+  if (in.equals(0, "RIFF") && in.equals(8, "WEBP")) {
+    const bool is_animated = in.equals(12, "VP8X") && in.has(20, 1) && (in.byte(20) & kAnimated) != 0;
+    if (is_animated) return {ImageFormat::kNotRead, "an animated WebP image"};
+    return {ImageFormat::kWebp, "a WebP image"};
+  }
+  if (in.equals(0, "BM")) return {ImageFormat::kBmp, "a BMP image"};
+  if (in.has(0, 4) && (std::memcmp(in.at(0), "II*\0", 4) == 0 || std::memcmp(in.at(0), "MM\0*", 4) == 0)) {
+    return {ImageFormat::kTiff, "a TIFF image"};
+  }
+  if (in.equals(4, "ftyp")) return of_brand(in);
+  if (in.equals(0, "RIFF") && in.equals(8, "AVI ")) return {ImageFormat::kClip, "an AVI video"};
+  if (in.equals(0, "\x1a\x45\xdf\xa3")) return {ImageFormat::kClip, "a WebM or Matroska video"};
+  constexpr struct {
+    const char *begin, *name;
+  } kNotRead[] = {{"GIF8", "a GIF image"},
+                  {"8BPS", "a Photoshop image"},
+                  {"%PDF", "a PDF document"},
+                  {"\xff\x0a", "a JPEG XL image"},
+                  {"\xff\x4f\xff\x51", "a JPEG 2000 image"},
+                  {"v/1\x01", "an OpenEXR image"},
+                  {"#?RADIANCE", "a Radiance image"},
+                  {"gimp xcf", "a GIMP image"},
+                  {"qoif", "a QOI image"}};
+  for (const auto& format : kNotRead) {
+    if (in.equals(0, format.begin)) return {ImageFormat::kNotRead, format.name};
+  }
+  if (in.equals(4, "JXL \r\n\x87\n")) return {ImageFormat::kNotRead, "a JPEG XL image"};
+  if (in.equals(4, "jP  \r\n\x87\n")) return {ImageFormat::kNotRead, "a JPEG 2000 image"};
+  if (in.has(0, 4) && std::memcmp(in.at(0), "\0\0\1\0", 4) == 0) return {ImageFormat::kNotRead, "an icon"};
+  if (in.has(0, 3) && in.byte(0) == 'P' && in.byte(1) >= '1' && in.byte(1) <= '7' && in.byte(2) <= ' ') {
+    return {ImageFormat::kNotRead, "a PNM image"};
+  }
+  if (is_svg(in)) return {ImageFormat::kNotRead, "an SVG drawing"};
+  if (is_tga(in)) return {ImageFormat::kNotRead, "a TGA image"};
+  return {ImageFormat::kUnknown, "no image"};
+}
+
+std::optional<SizePx> read_image_size(const EncodedBytes& bytes) {
   const Reader in(bytes);
   if (in.equals(0, "\x89PNG\r\n\x1a\n") && in.has(16, 8)) return SizePx{in.big32(16), in.big32(20)};
   if (in.equals(0, "\xff\xd8")) return jpeg_size(in);
@@ -72,6 +193,40 @@ std::optional<SizePx> read_image_size(const std::vector<uint8_t>& bytes) {
     return SizePx{int32_t(in.little32(18)), std::llabs(int32_t(in.little32(22)))};
   }
   return {};
+}
+
+int read_exif_orientation(const EncodedBytes& bytes) {
+  const Reader all(bytes);
+  const size_t begin = exif_offset(all, recognise_format(bytes).format);
+  if (begin == 0 || !all.has(begin, 8)) return 1;
+  // A TIFF file: its byte order, 42, and where its first directory is (TIFF 6.0, section 2).
+  const Reader in({bytes.data + begin, bytes.size - begin});
+  const bool is_little = in.equals(0, "II*");
+  if (!is_little && std::memcmp(in.at(0), "MM\0*", 4) != 0) return 1;
+  const auto number16 = [&](size_t offset) { return is_little ? in.little16(offset) : in.big16(offset); };
+  const size_t directory = is_little ? in.little32(4) : in.big32(4);
+  if (!in.has(directory, 2)) return 1;
+  const size_t count = number16(directory);
+  for (size_t i = 0; i < count && in.has(directory + 2 + 12 * i, 12); ++i) {
+    const size_t entry = directory + 2 + 12 * i;
+    if (number16(entry) != 274) continue;
+    const uint32_t orientation = number16(entry + 8);
+    return orientation >= 1 && orientation <= 8 ? int(orientation) : 1;
+  }
+  return 1;
+}
+
+bool has_jpeg_end(const EncodedBytes& bytes) {
+  const Reader in(bytes);
+  JpegSegments segments(in);
+  for (JpegSegment segment; segments.next(segment);) {
+    if (segment.marker != kStartOfScan) continue;
+    // Of coded data, 0xff is followed by 0.
+    constexpr uint8_t kEnd[] = {0xff, 0xd9};
+    const uint8_t* end = in.at(in.size());
+    return std::search(in.at(segment.offset), end, std::begin(kEnd), std::end(kEnd)) != end;
+  }
+  return false;
 }
 
 }  // namespace maq

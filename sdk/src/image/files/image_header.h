@@ -1,11 +1,39 @@
-// The size of an encoded image from its first bytes, so that one that is too large is refused before it is decoded.
+// What an encoded image says of itself before it is decoded: its format, its size, which way up it is.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 namespace maq {
+
+// An encoded image, or its beginning, in memory of another owner.
+struct EncodedBytes {
+  EncodedBytes(const uint8_t* first, size_t count) : data(first), size(count) {}
+  EncodedBytes(const std::vector<uint8_t>& bytes) : data(bytes.data()), size(bytes.size()) {}
+  const uint8_t* data;
+  size_t size;
+};
+
+enum class ImageFormat {
+  kUnknown,
+  kJpeg,
+  kPng,
+  kWebp,
+  kBmp,
+  kTiff,
+  kNotRead,  // an image of a format that the SDK does not read
+  kClip      // no image, but a video file
+};
+
+struct FormatName {
+  ImageFormat format;
+  const char* name;  // with its article: "a GIF image"
+};
+
+// By the first 64 bytes, or a few more for SVG, which is text.
+FormatName recognise_format(const EncodedBytes& bytes);
 
 struct SizePx {
   int64_t width = 0;
@@ -13,6 +41,13 @@ struct SizePx {
 };
 
 // Of PNG, JPEG, WebP, BMP and GIF; nothing for other formats and for truncated headers.
-std::optional<SizePx> read_image_size(const std::vector<uint8_t>& bytes);
+std::optional<SizePx> read_image_size(const EncodedBytes& bytes);
+
+// The EXIF orientation (Exif 2.32, 4.6.4, tag 274) of a whole JPEG, PNG or WebP image: 1 to 8, and 1 where there is
+// none.
+int read_exif_orientation(const EncodedBytes& bytes);
+
+// Whether a JPEG image has its last marker, which is missing from one that was cut.
+bool has_jpeg_end(const EncodedBytes& bytes);
 
 }  // namespace maq

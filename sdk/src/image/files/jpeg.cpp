@@ -3,11 +3,14 @@
 #include <turbojpeg.h>
 
 #include <algorithm>
+#include <cstring>
+#include <memory>
 #include <new>
 
 #include "core/error.h"
 #include "core/memory.h"
 #include "image/convert.h"
+#include "image/files/image_header.h"
 
 namespace maq {
 
@@ -35,6 +38,48 @@ bool JpegDecoder::decode_by_library(const uint8_t* bytes, size_t size_bytes, int
   uint8_t* pixels = frame.allocate_bgr(width, height);
   // A truncated frame is only a warning to the library, which fills the rest with grey.
   return tjDecompress2(decoder_, bytes, size_bytes, pixels, width, width * 3, height, TJPF_BGR, TJFLAG_FASTDCT) == 0;
+}
+
+namespace {
+
+// As OpenCV: K scales what Adobe's programs write, the complements of C, M and Y.
+void cmyk_to_bgr(const uint8_t* cmyk, size_t pixels, uint8_t* bgr) {
+  for (size_t i = 0; i < pixels; ++i) {
+    const int black = cmyk[4 * i + 3];
+    for (size_t c = 0; c < 3; ++c) bgr[3 * i + c] = uint8_t(black - ((255 - cmyk[4 * i + 2 - c]) * black >> 8));
+  }
+}
+
+// Whether an image that libjpeg decoded in part lacks its end. Of several warnings it tells the first.
+bool is_cut(tjhandle decoder, const uint8_t* bytes, size_t size_bytes) {
+  return !has_jpeg_end({bytes, size_bytes}) || std::strstr(tjGetErrorStr2(decoder), "remature end") != nullptr;
+}
+
+}  // namespace
+
+JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& frame) {
+  const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), &tjDestroy);
+  if (decoder == nullptr) throw std::bad_alloc();
+  const auto failure = [&] {
+    if (says_out_of_memory(tjGetErrorStr2(decoder.get()))) throw std::bad_alloc();
+    return has_jpeg_end({bytes, size_bytes}) ? JpegResult::kDamaged : JpegResult::kTruncated;
+  };
+  int width = 0, height = 0, subsampling = 0, colours = -1;
+  // The result is also an error for subsamplings without a name, which can be decoded.
+  tjDecompressHeader3(decoder.get(), bytes, size_bytes, &width, &height, &subsampling, &colours);
+  if (width < 1 || height < 1 || colours < 0) return failure();
+  if (width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX || int64_t(width) * height > MAQ_MAX_PIXELS) {
+    return JpegResult::kDamaged;
+  }
+  const bool is_cmyk = colours == TJCS_CMYK || colours == TJCS_YCCK;
+  uint8_t* bgr = frame.allocate_bgr(width, height);
+  std::vector<uint8_t> cmyk(is_cmyk ? size_t(width) * size_t(height) * 4 : 0);
+  const int result = tjDecompress2(decoder.get(), bytes, size_bytes, is_cmyk ? cmyk.data() : bgr, width, 0, height,
+                                   is_cmyk ? TJPF_CMYK : TJPF_BGR, TJFLAG_LIMITSCANS);
+  if (result != 0 && tjGetErrorCode(decoder.get()) != TJERR_WARNING) return failure();
+  if (result != 0 && is_cut(decoder.get(), bytes, size_bytes)) return JpegResult::kTruncated;
+  if (is_cmyk) cmyk_to_bgr(cmyk.data(), size_t(width) * size_t(height), bgr);
+  return JpegResult::kDecoded;
 }
 
 JpegEncoder::~JpegEncoder() {

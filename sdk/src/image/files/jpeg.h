@@ -1,4 +1,4 @@
-// JPEG images, as cameras send them.
+// JPEG images: those that cameras send, and photos.
 #pragma once
 
 #include <cstddef>
@@ -25,6 +25,12 @@ class JpegDecoder {
 
   void* decoder_ = nullptr;
 };
+
+enum class JpegResult { kDecoded, kTruncated, kDamaged };
+
+// A photo, of any colours, at full accuracy, into `frame` as BGR8: to the bit what OpenCV decodes. What libjpeg only
+// warns of, such as bytes between segments, is decoded; what is cut is not. Over the limits of frame.h: damaged.
+JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& frame);
 
 class JpegEncoder {
  public:

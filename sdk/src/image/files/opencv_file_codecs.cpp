@@ -1,12 +1,116 @@
+#include <dlfcn.h>
+
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <opencv2/videoio/registry.hpp>
 
+#include <atomic>
+#include <cstdarg>
+#include <iostream>
+#include <mutex>
+#include <streambuf>
+
 #include "core/module.h"
 #include "image/files/file_codecs.h"
+#include "image/files/png.h"
 
 namespace maq {
 namespace {
+
+// The library never prints, but OpenCV tells stderr what it dislikes in a file. How much, is one number for the
+// process: while one of these is alive it is the lowest, and afterwards what the app had.
+class OpenCvSilence {
+ public:
+  OpenCvSilence() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (users_++ == 0) level_ = cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  }
+  ~OpenCvSilence() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (--users_ == 0) cv::utils::logging::setLogLevel(level_);
+  }
+  OpenCvSilence(const OpenCvSilence&) = delete;
+  OpenCvSilence& operator=(const OpenCvSilence&) = delete;
+
+ private:
+  static inline std::mutex mutex_;
+  static inline int users_ = 0;
+  static inline cv::utils::logging::LogLevel level_ = cv::utils::logging::LOG_LEVEL_SILENT;
+};
+
+// FFmpeg tells stderr too, on threads of its own, and OpenCV sets its level anew whenever it opens a clip. So the log
+// callback of the process is replaced: while one of these is alive nothing is said, afterwards what FFmpeg's own says.
+// There is no function that returns the callback before: this one is set once, so that an app's, set later, stays.
+class FfmpegSilence {
+ public:
+  FfmpegSilence() {
+    [[maybe_unused]] static const bool is_set = replace_callback();
+    ++users_;
+  }
+  ~FfmpegSilence() { --users_; }
+  FfmpegSilence(const FfmpegSilence&) = delete;
+  FfmpegSilence& operator=(const FfmpegSilence&) = delete;
+
+ private:
+  using Callback = void (*)(void* object, int level, const char* format, va_list arguments);
+
+  static bool replace_callback() {
+    default_ = reinterpret_cast<Callback>(find("av_log_default_callback"));
+    const auto set_callback = reinterpret_cast<void (*)(Callback)>(find("av_log_set_callback"));
+    if (default_ != nullptr && set_callback != nullptr) set_callback(log);
+    return true;
+  }
+  static void log(void* object, int level, const char* format, va_list arguments) {
+    if (users_ == 0) default_(object, level, format, arguments);
+  }
+  // FFmpeg comes with OpenCV, without headers: its functions are looked up in what this module needs.
+  static void* find(const char* function) {
+    Dl_info info{};
+    static const int here = 0;
+    dladdr(&here, &info);
+    void* module = dlopen(info.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
+    return dlsym(module == nullptr ? RTLD_DEFAULT : module, function);  // null: in the program itself, as in tests
+  }
+
+  static inline std::atomic<int> users_ = 0;
+  static inline Callback default_ = nullptr;
+};
+
+// imdecode() tells std::cerr of the exceptions that it catches, whatever the level. What other threads say gets
+// through.
+class ErrorStreamGate : public std::streambuf {
+ public:
+  // Closes the gate for this thread, until it is destroyed.
+  class Closed {
+   public:
+    Closed() {
+      static std::once_flag flag;
+      std::call_once(flag, [] { std::cerr.rdbuf(new ErrorStreamGate(std::cerr.rdbuf())); });  // stays, as cerr does
+      is_closed_ = true;
+    }
+    ~Closed() { is_closed_ = false; }
+    Closed(const Closed&) = delete;
+    Closed& operator=(const Closed&) = delete;
+  };
+
+ protected:
+  int_type overflow(int_type character) override {
+    if (is_closed_ || traits_type::eq_int_type(character, traits_type::eof())) return traits_type::not_eof(character);
+    return target_ == nullptr ? traits_type::eof() : target_->sputc(traits_type::to_char_type(character));
+  }
+  std::streamsize xsputn(const char* text, std::streamsize count) override {
+    if (is_closed_) return count;
+    return target_ == nullptr ? 0 : target_->sputn(text, count);
+  }
+  int sync() override { return is_closed_ || target_ == nullptr ? 0 : target_->pubsync(); }
+
+ private:
+  explicit ErrorStreamGate(std::streambuf* target) : target_(target) {}
+
+  static inline thread_local bool is_closed_ = false;
+  std::streambuf* const target_;
+};
 
 cv::Mat as_mat(const ImageView& image) {
   return cv::Mat(image.height_px, image.width_px, image.format == MAQ_PIXEL_GREY8 ? CV_8UC1 : CV_8UC3,
@@ -50,6 +154,8 @@ class OpenCvClipDecoder : public ClipDecoder {
   }
 
  private:
+  OpenCvSilence opencv_silence_;
+  FfmpegSilence ffmpeg_silence_;
   cv::VideoCapture clip_;
   cv::Mat decoded_;
 };
@@ -82,19 +188,22 @@ class OpenCvClipEncoder : public ClipEncoder {
   }
 
  private:
+  OpenCvSilence opencv_silence_;
+  FfmpegSilence ffmpeg_silence_;
   cv::VideoWriter file_;
 };
 
 class OpenCvFileCodecs : public FileCodecs {
  public:
   // OpenCV throws for some damaged files and returns an empty image for others.
-  DecodedImage decode_image(const uint8_t* bytes, size_t size_bytes, Orientation orientation) const override {
+  DecodedImage decode_image(const EncodedBytes& bytes, ImageFormat format) const override {
     try {
-      const cv::Mat encoded(1, int(size_bytes), CV_8UC1, const_cast<uint8_t*>(bytes));
-      const int flags = orientation == Orientation::kUpright
-                            ? int(cv::IMREAD_COLOR)
-                            : int(cv::IMREAD_COLOR) | int(cv::IMREAD_IGNORE_ORIENTATION);
-      const auto image = std::make_shared<cv::Mat>(cv::imdecode(encoded, flags));
+      if (format == ImageFormat::kPng) return decode_png(bytes.data, bytes.size);
+      const OpenCvSilence silence;
+      const ErrorStreamGate::Closed closed;
+      const cv::Mat encoded(1, int(bytes.size), CV_8UC1, const_cast<uint8_t*>(bytes.data));
+      const auto image =
+          std::make_shared<cv::Mat>(cv::imdecode(encoded, int(cv::IMREAD_COLOR) | int(cv::IMREAD_IGNORE_ORIENTATION)));
       if (image->empty()) return {};
       return {as_view(*image), image};
     } catch (const std::exception&) {

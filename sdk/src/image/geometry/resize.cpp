@@ -31,9 +31,7 @@ MAQ_SIMD_CLONES void to_floats(const uint8_t* from, size_t count, float* to) {
 }
 
 // --- bilinear: weights of 11 fractional bits, the vertical sum of rows that lost 4 of them
-// ------------------------------
-
-constexpr int kWeightBits = 11;
+// -----------------------------
 
 // Between which two old pixels each new one is, and what they weigh.
 struct LinearAxis {
@@ -52,7 +50,7 @@ struct LinearAxis {
       const int floor = int(std::floor(fraction));
       fraction -= float(floor);
       if (are_columns && (floor < 0 || floor >= from_px - 1)) fraction = 0;
-      const auto weight = [](float of_one) { return float(std::nearbyint(of_one * (1 << kWeightBits))); };
+      const auto weight = [](float of_one) { return float(std::nearbyint(of_one * (1 << 11))); };
       at[size_t(i)] = {std::clamp(floor, 0, from_px - 1), std::clamp(floor + 1, 0, from_px - 1), weight(1 - fraction),
                        weight(fraction)};
     }

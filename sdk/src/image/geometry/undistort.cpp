@@ -9,12 +9,12 @@ namespace maq {
 namespace {
 
 constexpr int kFractionBits = 5;
-constexpr int kOne = 1 << kFractionBits;
+constexpr int kPixel = 1 << kFractionBits;
 
 // To the nearest, halves to even. Adding 1.5 * 2^23 leaves no bits for a fraction.
 inline int in_fractions(double at_px) {
   constexpr float kNoFraction = 12582912;
-  return int(float(at_px) * kOne + kNoFraction) - int(kNoFraction);
+  return int(float(at_px) * kPixel + kNoFraction) - int(kNoFraction);
 }
 
 // The three bytes of a pixel, far enough apart for their sums of products with 1024.
@@ -24,7 +24,7 @@ inline uint64_t spread(const uint8_t* pixel) {
 
 // Of all three at once: what one borrows from the next cancels in the sum, which has no negative part.
 inline uint64_t blend(uint64_t first, uint64_t second, unsigned weight) {
-  return first * kOne + (second - first) * weight;
+  return first * kPixel + (second - first) * weight;
 }
 
 // Where the pixels of a row are read in another picture.
@@ -66,13 +66,14 @@ void read_row(const ImageView& bgr, const Positions& positions, const uint8_t* v
       continue;
     }
     const int x = positions.column[i] >> kFractionBits, y = positions.row[i] >> kFractionBits;
-    const unsigned right = unsigned(positions.column[i] & (kOne - 1)), below = unsigned(positions.row[i] & (kOne - 1));
+    const unsigned right = unsigned(positions.column[i] & (kPixel - 1)),
+                   below = unsigned(positions.row[i] & (kPixel - 1));
     const uint8_t* const upper = pixels + size_t(std::max(y, 0)) * stride + 3 * size_t(std::max(x, 0));
     const size_t next = x >= 0 && x < last_column ? 3 : 0;
     const uint8_t* const lower = y >= 0 && y < last_row ? upper + stride : upper;
     const uint64_t over = blend(spread(upper), spread(upper + next), right);
     const uint64_t under = blend(spread(lower), spread(lower + next), right);
-    constexpr uint64_t kHalf = kOne * kOne / 2;
+    constexpr uint64_t kHalf = kPixel * kPixel / 2;
     const uint64_t sums = blend(over, under, below) + (kHalf | kHalf << 20 | kHalf << 40);
     to[0] = uint8_t(sums >> (2 * kFractionBits));
     to[1] = uint8_t(sums >> (2 * kFractionBits + 20));

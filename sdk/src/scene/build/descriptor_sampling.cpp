@@ -7,7 +7,7 @@ namespace maq {
 namespace {
 
 // Regressions of points may lie anywhere in memory, so that each is prefetched.
-constexpr size_t kAhead = 8, kCacheLine = 64;
+constexpr size_t kAhead = 8;
 
 // In the arithmetic of PointProjection: the first two rows are times the focal lengths.
 void scaled_rotation(const PinholeCamera& camera, float rotation[9]) {
@@ -82,6 +82,7 @@ void DescriptorSampling::add(const uint32_t* points, size_t count, RegressionSto
   for (size_t i = 0; i < count; ++i) {
     if (i + kAhead < count) {
       const char* later = reinterpret_cast<const char*>(&regressions.of(points[i + kAhead]));
+      constexpr size_t kCacheLine = 64;
       for (size_t offset = 0; offset < sizeof(DescriptorRegression); offset += kCacheLine)
         __builtin_prefetch(later + offset, 1);
     }

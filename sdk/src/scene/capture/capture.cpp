@@ -76,7 +76,7 @@ class ViewMaker {
       view.lens = resized(photo.lens, int(size.width), int(size.height));
     } catch (const Error& error) {
       if (error.status() == MAQ_ERROR_NOT_FOUND) return kPhotosMissing;
-      if (error.status() == MAQ_ERROR_UNREADABLE) return kPhotosUnreadable;
+      if (error.status() == MAQ_ERROR_UNREADABLE || error.status() == MAQ_ERROR_UNSUPPORTED) return kPhotosUnreadable;
       if (error.status() == MAQ_ERROR_IMAGE_SIZE) return "photos without pixels, or over the limit of size";
       throw;
     }

@@ -8,7 +8,7 @@
 namespace maq {
 namespace {
 
-constexpr size_t kMaxLineBytes = 4096;
+constexpr size_t kMaxHeaderLineBytes = 4096;
 constexpr int kMaxLines = 10000;
 constexpr size_t kMaxElements = 64, kMaxProperties = 512;
 
@@ -98,13 +98,13 @@ int PlyElement::index_of(const std::string& property) const {
 
 PlyHeader read_ply_header(FileReader& file) {
   std::string line;
-  if (!file.next_line(line, kMaxLineBytes) || line != "ply") {
+  if (!file.next_line(line, kMaxHeaderLineBytes) || line != "ply") {
     file.fail(" is not a PLY file: its first line is not \"ply\".");
   }
   PlyHeader header;
   std::optional<PlyForm> form;
   for (int i = 0; i < kMaxLines; ++i) {
-    if (!file.next_line(line, kMaxLineBytes)) break;
+    if (!file.next_line(line, kMaxHeaderLineBytes)) break;
     std::istringstream words(line);
     words.exceptions(std::ios::badbit);  // without memory
     words.imbue(std::locale::classic());

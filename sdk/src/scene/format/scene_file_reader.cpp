@@ -1,6 +1,4 @@
-#include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -12,7 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/unique_fd.h"
+#include "core/file.h"
 #include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
@@ -87,18 +85,9 @@ class SceneFileReader {
 };
 
 SceneFileReader::SceneFileReader(const std::string& path) : path_(path) {
-  // Without O_NONBLOCK, opening a pipe would wait for a writer.
-  file_ = UniqueFd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!file_.is_open()) {
-    const int reason = errno;
-    if (reason == ENOENT || reason == ENOTDIR) {
-      throw Error(MAQ_ERROR_NOT_FOUND, path, " does not exist; check the path.");
-    }
-    fail(" cannot be opened (", std::strerror(reason), ").");
-  }
-  struct stat found {};
-  if (::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) fail(" is not a file.");
-  read_head(uint64_t(found.st_size));
+  OpenFile file = open_file(path);
+  file_ = std::move(file.fd);
+  read_head(file.size_bytes);
 }
 
 SceneFileReader::SceneFileReader(const void* bytes, size_t count)

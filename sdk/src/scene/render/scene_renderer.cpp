@@ -15,7 +15,6 @@
 namespace maq {
 namespace {
 
-constexpr int kMultiple = DescriptorRaster::kMultiple;
 // So that the frames of a camera that rolls a little have few sizes: for every size a session is prepared
 // (export/scenes/config.py has the same).
 constexpr int kRotatedMultiple = 64;
@@ -104,18 +103,18 @@ void SceneRenderer::project(const PinholeCamera& frame, RenderCounts& counts) {
 }
 
 RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
-  const int cells = frame.width_px / kMultiple;
-  occupied_.assign(size_t(frame.height_px / kMultiple), {});
+  const int cells = frame.width_px / DescriptorRaster::kMultiple;
+  occupied_.assign(size_t(frame.height_px / DescriptorRaster::kMultiple), {});
   threads_.run(occupied_.size(), [&](size_t strip, int) {
-    const int top = int(strip) * kMultiple;
-    buffer_.finish(top, top + kMultiple);
-    buffer_.remove_occluded(top, top + kMultiple, kDepthTolerance);
+    const int top = int(strip) * DescriptorRaster::kMultiple;
+    buffer_.finish(top, top + DescriptorRaster::kMultiple);
+    buffer_.remove_occluded(top, top + DescriptorRaster::kMultiple, kDepthTolerance);
     int first = cells, last = -1;
-    for (int y = top; y < top + kMultiple; ++y) {
+    for (int y = top; y < top + DescriptorRaster::kMultiple; ++y) {
       const DepthKey* const row = buffer_.keys() + size_t(y) * size_t(frame.width_px);
       const auto has_points = [row](int cell) {
-        const DepthKey* const begin = row + cell * kMultiple;
-        return std::any_of(begin, begin + kMultiple, [](DepthKey key) { return key != kNoPointKey; });
+        const DepthKey* const begin = row + cell * DescriptorRaster::kMultiple;
+        return std::any_of(begin, begin + DescriptorRaster::kMultiple, [](DepthKey key) { return key != kNoPointKey; });
       };
       for (int cell = 0; cell < first; ++cell) {
         if (has_points(cell)) first = cell;
@@ -124,7 +123,9 @@ RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
         if (has_points(cell)) last = cell;
       }
     }
-    if (last >= 0) occupied_[strip] = {first * kMultiple, top, (last + 1 - first) * kMultiple, kMultiple};
+    if (last >= 0)
+      occupied_[strip] = {first * DescriptorRaster::kMultiple, top, (last + 1 - first) * DescriptorRaster::kMultiple,
+                          DescriptorRaster::kMultiple};
   });
   RasterWindow all;
   for (const RasterWindow& strip : occupied_) {
@@ -136,7 +137,7 @@ RasterWindow SceneRenderer::finish(const PinholeCamera& frame) {
     const int right = std::max(all.left_px + all.width_px, strip.left_px + strip.width_px);
     all.left_px = std::min(all.left_px, strip.left_px);
     all.width_px = right - all.left_px;
-    all.height_px = strip.top_px + kMultiple - all.top_px;
+    all.height_px = strip.top_px + DescriptorRaster::kMultiple - all.top_px;
   }
   return all;
 }
@@ -148,8 +149,8 @@ SceneRenderer::Frame SceneRenderer::frame_of(const PinholeCamera& camera) const 
   frame.is_rotated = is_visible_rotation(frame.to_frame, camera);
   if (!frame.is_rotated) {
     frame.camera = camera;
-    frame.camera.width_px = round_up(camera.width_px, kMultiple);
-    frame.camera.height_px = round_up(camera.height_px, kMultiple);
+    frame.camera.width_px = round_up(camera.width_px, DescriptorRaster::kMultiple);
+    frame.camera.height_px = round_up(camera.height_px, DescriptorRaster::kMultiple);
   }
   if (int64_t(frame.camera.width_px) * frame.camera.height_px > SceneNetworks::kMaxPixels) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of ", camera.width_px, " x ", camera.height_px,

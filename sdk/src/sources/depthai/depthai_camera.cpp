@@ -17,8 +17,6 @@
 namespace maq {
 namespace {
 
-constexpr int kDefaultWidthPx = 640;
-constexpr int kDefaultHeightPx = 480;
 constexpr double kDefaultFps = 30;
 constexpr double kMinFps = 0.01;
 constexpr int64_t kMaxLostInARow = 1000;
@@ -172,8 +170,8 @@ class DepthAiCamera final : public Camera {
     // Of NV12, four pixels share a colour, and the link takes depth images of even size only.
     const auto side = [](int wanted, int max) { return std::max(2, (max > 0 ? std::min(wanted, max) : wanted) & ~1); };
     DepthAiPlan plan;
-    plan.width_px = side(has_size ? request.width_px : kDefaultWidthPx, features_.width_px);
-    plan.height_px = side(has_size ? request.height_px : kDefaultHeightPx, features_.height_px);
+    plan.width_px = side(has_size ? request.width_px : kDefaultCameraWidthPx, features_.width_px);
+    plan.height_px = side(has_size ? request.height_px : kDefaultCameraHeightPx, features_.height_px);
     plan.fps = request.fps > 0 ? request.fps : kDefaultFps;
     if (features_.fps >= kMinFps) plan.fps = std::min(plan.fps, features_.fps);
     plan.with_depth = request.depth.value_or(features_.has_stereo);

@@ -1,13 +1,15 @@
 #include "sources/files/file_sources.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
 
 #include "core/error.h"
+#include "core/file.h"
+#include "image/files/image_header.h"
 
 namespace fs = std::filesystem;
 
@@ -18,14 +20,17 @@ const char* scheme_of_file(const std::string& path) {
   if (fs::is_directory(path, error)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " is a folder; name a file in it.");
   }
-  std::array<char, 12> head{};
-  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
-  const auto has = [&](size_t at, const char* text) { return std::memcmp(&head[at], text, std::strlen(text)) == 0; };
-  if (has(0, "MAQREC")) return "rec";
-  if (has(4, "ftyp") || has(8, "AVI ") || has(0, "\x1a\x45\xdf\xa3")) return "video";  // MP4, MOV; AVI; Matroska, WebM
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
+  if (!fs::is_regular_file(path, error)) return "image";
+  constexpr size_t kHeadBytes = 1024;
+  std::vector<uint8_t> head(kHeadBytes);
+  std::ifstream file(path, std::ios::binary);
+  file.read(reinterpret_cast<char*>(head.data()), std::streamsize(head.size()));
+  head.resize(size_t(file.gcount()));
+  const std::string magic = "MAQREC";
+  if (head.size() >= magic.size() && std::equal(magic.begin(), magic.end(), head.begin())) return "rec";
+  const ImageFormat format = recognise_format(head).format;
+  if (format != ImageFormat::kUnknown) return format == ImageFormat::kClip ? "video" : "image";
+  const std::string extension = lower_case_extension(path);
   constexpr const char* kClips[] = {".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ogv"};
   return std::any_of(std::begin(kClips), std::end(kClips), [&](const char* clip) { return extension == clip; })
              ? "video"

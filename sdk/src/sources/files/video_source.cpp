@@ -2,10 +2,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/memory.h"
+#include "core/thread.h"
 #include "image/convert.h"
 #include "image/files/file_codecs.h"
 #include "image/geometry/resize.h"
@@ -15,6 +18,8 @@ namespace maq {
 namespace {
 
 constexpr double kMaxFrames = 1e9;
+constexpr size_t kDecoderBytes = size_t(64) << 20;  // more than it takes; without, it ends early
+constexpr size_t kMaxDecoderThreads = 16;
 constexpr double kMaxTimeMs = 1e12;       // decades, in nanoseconds far from the end of 64 bits
 constexpr int64_t kSameTimeNs = 1500000;  // containers round times to milliseconds
 
@@ -22,7 +27,7 @@ class VideoSource : public Source {
  public:
   explicit VideoSource(SourceUri uri) : path_(uri.target), asked_fps_(uri.fps) {
     uri.expect_no_more_options("size and fps");
-    if (!file_exists(path_)) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
+    open_file(path_);  // throws for what is no file: decoders would wait for a pipe, and go back and forth in it
     open();
     const int width = clip_->width_px();
     const int height = clip_->height_px();
@@ -66,6 +71,8 @@ class VideoSource : public Source {
   void open() {
     clip_ = file_codecs().open_clip(path_);
     if (clip_ != nullptr) return;
+    // FFmpeg opens no clip where the threads of its decoder, one for each processor, do not start.
+    require_threads(std::min<size_t>(std::thread::hardware_concurrency(), kMaxDecoderThreads));
     throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be opened as a video: it is truncated, damaged or no video. ",
                 "Use a whole MP4, AVI, MOV or WebM file.");
   }
@@ -84,11 +91,13 @@ class VideoSource : public Source {
     if (decode()) return true;
     if (was_sought_) return false;  // the count of frames is not exact any more
     if (index_ < 0) {
+      require_memory(kDecoderBytes);
       throw Error(MAQ_ERROR_UNREADABLE, path_, " has no frame that can be decoded: it is truncated or damaged.");
     }
     // Headers of clips with a varying frame rate give the count only roughly, so a few frames less are no defect.
     const int64_t frames = index_ + 1;
     if (promised_frames_ > frames + 2 + promised_frames_ / 20) {
+      require_memory(kDecoderBytes);
       throw Error(MAQ_ERROR_UNREADABLE, path_, " ends after ", frames, " of ", promised_frames_,
                   " frames: the file is truncated or damaged; copy it again.");
     }

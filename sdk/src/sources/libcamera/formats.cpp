@@ -28,8 +28,6 @@ constexpr KnownFormat kKnownFormats[] = {
     {formats::XBGR8888, MAQ_PIXEL_RGBA8, false}, {formats::ABGR8888, MAQ_PIXEL_RGBA8, false},
     {formats::R8, MAQ_PIXEL_GREY8, false},       {formats::MJPEG, MAQ_PIXEL_BGR8, true},
 };
-constexpr unsigned kDefaultWidthPx = 640;
-constexpr unsigned kDefaultHeightPx = 480;
 
 const KnownFormat* known_format(const libcamera::PixelFormat& format) {
   for (const KnownFormat& known : kKnownFormats) {
@@ -87,8 +85,8 @@ std::vector<CameraMode> libcamera_modes(const libcamera::CameraConfiguration& co
 
 void choose_libcamera_format(libcamera::CameraConfiguration& configuration, const CameraRequest& request, int buffers,
                              const std::string& label) {
-  const libcamera::Size wanted(request.width_px > 0 ? unsigned(request.width_px) : kDefaultWidthPx,
-                               request.height_px > 0 ? unsigned(request.height_px) : kDefaultHeightPx);
+  const libcamera::Size wanted(request.width_px > 0 ? unsigned(request.width_px) : unsigned(kDefaultCameraWidthPx),
+                               request.height_px > 0 ? unsigned(request.height_px) : unsigned(kDefaultCameraHeightPx));
   const libcamera::StreamConfiguration& stream = configuration.at(0);
   const libcamera::StreamFormats offered = stream.formats();
   const std::vector<libcamera::PixelFormat> pixel_formats = offered.pixelformats();

@@ -3,6 +3,7 @@
 #include <libcamera/logging.h>
 #include <libcamera/property_ids.h>
 #include <libcamera/version.h>
+#include <sys/eventfd.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <unistd.h>
@@ -11,8 +12,11 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <vector>
 
 #include "core/error.h"
+#include "core/memory.h"
+#include "core/thread.h"
 #include "sources/camera_errors.h"
 
 // Private in libcamera's header, but a symbol of its library: making a second manager in a process aborts it.
@@ -43,6 +47,27 @@ struct ExitGuard {
   ~ExitGuard() { [[maybe_unused]] const bool kept = library().mutex.try_lock_for(kExitTimeout); }
 } exit_guard;
 
+// libcamera waits without end for a thread of its own that does not start, and ends the process where it gets no
+// descriptor or memory. What it starts with is tried before.
+void require_means_to_start() {
+  constexpr size_t kBytes = size_t(96) << 20;
+  constexpr size_t kThreads = 4;
+  constexpr size_t kDescriptors = 8;
+  require_memory(kBytes);
+  require_threads(kThreads);
+  std::vector<int> descriptors;
+  while (descriptors.size() < kDescriptors && (descriptors.empty() || descriptors.back() >= 0)) {
+    descriptors.push_back(eventfd(0, EFD_CLOEXEC));
+  }
+  const int error = descriptors.back() < 0 ? errno : 0;
+  for (const int descriptor : descriptors) {
+    if (descriptor >= 0) close(descriptor);
+  }
+  if (error == 0) return;
+  throw Error(MAQ_ERROR_UNSUPPORTED, "libcamera does not start: ", std::strerror(error),
+              ". Close files, or raise the limit of them (ulimit -n).");
+}
+
 std::unique_ptr<libcamera::CameraManager> start_manager() {
   if (&running_manager != nullptr && running_manager != nullptr) {
     throw Error(MAQ_ERROR_BUSY,
@@ -51,6 +76,7 @@ std::unique_ptr<libcamera::CameraManager> start_manager() {
   if (std::getenv("LIBCAMERA_LOG_LEVELS") == nullptr && std::getenv("LIBCAMERA_LOG_FILE") == nullptr) {
     libcamera::logSetTarget(libcamera::LoggingTargetNone);
   }
+  require_means_to_start();
   auto manager = std::make_unique<libcamera::CameraManager>();
   const int error = manager->start();
   if (error != 0) {

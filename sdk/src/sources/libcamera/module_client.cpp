@@ -1,15 +1,24 @@
 #include "sources/libcamera/module_client.h"
+
+#include "core/memory.h"
 #include "core/module.h"
+#include "core/thread.h"
 #include "sources/control_options.h"
 
 namespace maq {
 namespace {
 
+const void* load() {
+  // libcamera brings LTTng, which starts two threads as it is loaded and, where they did not start, crashes as the
+  // program ends.
+  require_memory(size_t(64) << 20);
+  require_threads(2);
+  return open_module("libmaquette_libcamera.so", kLibcameraSymbol, "Cameras of libcamera need",
+                     "Install libcamera, and an SDK that was built where its headers are (libcamera-dev on Debian).");
+}
+
 const LibcameraCameras& cameras() {
-  // Tried again when it throws.
-  static const auto* const opened = static_cast<const LibcameraCameras*>(
-      open_module("libmaquette_libcamera.so", kLibcameraSymbol, "Cameras of libcamera need",
-                  "Install libcamera, and an SDK that was built where its headers are (libcamera-dev on Debian)."));
+  static const auto* const opened = static_cast<const LibcameraCameras*>(load());  // tried again when it throws
   return *opened;
 }
 

@@ -67,8 +67,9 @@ struct RecordedFrame {
 
 class RecordingReader {
  public:
-  // Throws MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (not a recording, or no whole frame in it), MAQ_ERROR_UNSUPPORTED
-  // (of a newer version). A recording without a valid index is searched for frames; the log says so.
+  // Throws what open_file() throws, MAQ_ERROR_UNREADABLE (not a recording, or no whole frame in it), and
+  // MAQ_ERROR_UNSUPPORTED (of a newer version). A recording without a valid index is searched for frames; the log says
+  // so.
   RecordingReader(std::string path, const Log& log);
 
   const RecordingInfo& info() const { return info_; }

@@ -11,6 +11,7 @@ inline constexpr uint32_t kRecordingVersion = 1;
 inline constexpr uint32_t kFrameMagic = 0x4651414d;  // "MAQF"
 inline constexpr uint32_t kJpegEncoding = 100;       // beside the values of maq_pixel_format
 inline constexpr uint32_t kMaxHeadBytes = 1 << 20;
+inline constexpr uint64_t kMaxIndexBytes = 1 << 28;               // of 16 million frames: six days at 30 a second
 inline constexpr int64_t kMaxSpanNs = 1'000'000'000'000'000'000;  // from the first frame to the last: 31 years
 
 // Checks are the 64-bit XXH3 hash of https://xxhash.com, or its lower half.

@@ -1,5 +1,3 @@
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -12,6 +10,7 @@
 
 #include "core/checked_arithmetic.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
 
@@ -67,14 +66,10 @@ std::optional<maq_intrinsics> intrinsics_of(const nlohmann::json& from) {
 
 }  // namespace
 
-RecordingReader::RecordingReader(std::string path, const Log& log)
-    : path_(std::move(path)), file_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC)) {
-  struct stat found {};
-  if (!file_.is_open() && errno == ENOENT) throw Error(MAQ_ERROR_NOT_FOUND, path_, " does not exist; check the path.");
-  if (!file_.is_open() || ::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) {
-    throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be read; is it a file, and may you read it?");
-  }
-  size_bytes_ = uint64_t(found.st_size);
+RecordingReader::RecordingReader(std::string path, const Log& log) : path_(std::move(path)) {
+  OpenFile file = open_file(path_);
+  file_ = std::move(file.fd);
+  size_bytes_ = file.size_bytes;
   read_head();
   has_index_ = read_index();
   if (!has_index_) {
@@ -133,7 +128,8 @@ bool RecordingReader::read_index() {
   if (std::memcmp(tail.magic, kRecordingEnd, sizeof tail.magic) != 0) return false;
   if (tail.index_offset < first_offset_ || tail.index_offset > end) return false;
   const uint64_t index_bytes = end - tail.index_offset;
-  if (index_bytes % sizeof(RecordingEntry) != 0) return false;
+  // A file with a hole has any length. What is over the limit is searched for frames, like a file without an index.
+  if (index_bytes % sizeof(RecordingEntry) != 0 || index_bytes > kMaxIndexBytes) return false;
   std::vector<RecordingEntry> entries(index_bytes / sizeof(RecordingEntry));
   if (!read_at(tail.index_offset, entries.data(), index_bytes)) return false;
   if (tail.index_check != XXH3_64bits(entries.data(), index_bytes)) return false;
@@ -161,6 +157,13 @@ void RecordingReader::scan_for_frames() {
         entries_.push_back({offset, head.timestamp_ns});
       }
       offset += whole_bytes(head);
+      continue;
+    }
+    // Nothing is in a hole of the file, which may be of any length.
+    const off_t data = ::lseek(file_.get(), off_t(offset + 1), SEEK_DATA);
+    if (data < 0 && errno == ENXIO) return;
+    if (data > off_t(offset + 1)) {
+      offset = uint64_t(data);
       continue;
     }
     const size_t size = size_t(std::min<uint64_t>(window.size(), size_bytes_ - offset - 1));

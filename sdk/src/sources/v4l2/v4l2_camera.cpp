@@ -25,8 +25,6 @@
 namespace maq {
 namespace {
 
-constexpr int kDefaultWidthPx = 640;
-constexpr int kDefaultHeightPx = 480;
 constexpr int64_t kSecondNs = 1000000000;
 constexpr int64_t kMaxStampAgeNs = 10 * kSecondNs;
 
@@ -211,8 +209,8 @@ class V4l2Camera final : public Camera {
 
   // Of all formats that both sides know, the one nearest to the wanted size, then fast enough, then cheapest to use.
   void negotiate(const CameraRequest& request) {
-    const int width = request.width_px > 0 ? request.width_px : kDefaultWidthPx;
-    const int height = request.height_px > 0 ? request.height_px : kDefaultHeightPx;
+    const int width = request.width_px > 0 ? request.width_px : kDefaultCameraWidthPx;
+    const int height = request.height_px > 0 ? request.height_px : kDefaultCameraHeightPx;
     struct Choice {
       double size_error, fps_missing;
       const V4l2Format* format;

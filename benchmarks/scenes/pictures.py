@@ -12,9 +12,9 @@ import matplotlib.pyplot as plt
 import matplotlib.ticker
 import numpy as np
 
-from benchmarks.scene_command import STAGES
-from benchmarks.scene_quality import SHOWN
-from benchmarks.scene_speed import GATE_SIZE
+from benchmarks.scenes.command import STAGES
+from benchmarks.scenes.quality import SHOWN
+from benchmarks.scenes.speed import GATE_SIZE
 from benchmarks.sweep import pareto
 
 COLOURS = {"shipped": "black", "baseline": "0.5", "points": "tab:blue", "size": "tab:cyan", "networks": "tab:olive",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from benchmarks.scene_command import STAGES
-from benchmarks.scene_settings import savings
-from benchmarks.scene_speed import memory_a_point
+from benchmarks.scenes.command import STAGES
+from benchmarks.scenes.settings import savings
+from benchmarks.scenes.speed import memory_a_point
 
 SHIPPED = "as shipped"
 

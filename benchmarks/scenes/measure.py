@@ -14,9 +14,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks import scene_pictures, scene_quality, scene_speed
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
-from benchmarks.scene_settings import SHIPPED, Sources, settings, sources
+from benchmarks.scenes import pictures as scene_pictures
+from benchmarks.scenes import quality as scene_quality
+from benchmarks.scenes import speed as scene_speed
+from benchmarks.scenes.settings import SHIPPED, Sources, settings, sources
 from export.scenes.perceptual import load_perceptual
 
 FIGURES = ("scene_fps_500k", "scene_fps_200k_small", "scene_build_s", "scene_bytes_a_point", "scene_gain_db",

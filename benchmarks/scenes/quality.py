@@ -20,10 +20,10 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from benchmarks import scene_command
-from benchmarks.scene_baselines import cloud_of, nearest_photo
-from benchmarks.scene_command import SceneCommandError
-from benchmarks.scene_settings import SHIPPED, Setting, Sources
+from benchmarks.scenes import command as scene_command
+from benchmarks.scenes.baselines import cloud_of, nearest_photo
+from benchmarks.scenes.command import SceneCommandError
+from benchmarks.scenes.settings import SHIPPED, Setting, Sources
 from export.camera import Camera
 from export.point_cloud import PointCloudError
 from export.scenes.captures import Capture, CaptureError, read_capture

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks import scene_command
-from benchmarks.scene_command import Built, SceneCommandError
+from benchmarks.scenes import command as scene_command
+from benchmarks.scenes.command import Built, SceneCommandError
 from export.places.place import Place, PlaceError, load_place
 from export.point_cloud import write_ply
 
@@ -60,7 +60,7 @@ def chosen_place(folders: list[Path]) -> Place | None:
         try:
             place = load_place(folder)
         except PlaceError:
-            continue  # scene_quality says what is wrong with it
+            continue  # quality.py says what is wrong with it
         if is_size((place.images.width, place.images.height), GATE_SIZE) and len(place.source) >= VIEWS:
             found.append(place)
     return min(found, key=lambda place: place.about.get("kind") != "room") if found else None

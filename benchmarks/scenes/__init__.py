@@ -1,0 +1,1 @@
+"""New views of captured places: quality, speed, memory."""

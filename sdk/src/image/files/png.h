@@ -1,0 +1,14 @@
+// PNG images, by libpng itself: OpenCV lets it write what it thinks of a file to stderr.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "image/files/file_codecs.h"
+
+namespace maq {
+
+// As BGR8, the high byte of 16 bits, without alpha. No width: it is damaged or truncated. Throws std::bad_alloc.
+DecodedImage decode_png(const uint8_t* bytes, size_t size_bytes);
+
+}  // namespace maq

@@ -1,0 +1,84 @@
+"""Commands of README.md, in order, and what the test knows of them."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+# Left out, with the reason that is printed.
+LEFT_OUT = {
+    "make test": "continuous integration runs it",
+    "scripts/make-venv.sh train,teachers": "training takes hours",
+    "python -m": "training takes hours",
+}
+
+# Run until the reader presses Ctrl-C: text of the command, and the seconds that the reader looks at it.
+UNTIL_INTERRUPTED = {"make desktop-demo": 15, "maquette play": 5}
+
+# What the reader has beforehand, under the names that the README uses: name in the README, file of the clone.
+READERS_FILES = {"photo.jpg": "tests/media/photo.jpg", "clip.mp4": "tests/media/clip.mp4"}
+
+# What a command promises: text of the command, and a pattern of files of the clone, or of its output.
+PRINTS = "prints:"
+PROMISES = {
+    "make demo": "demo-output/*.png",
+    "densepose photo.jpg": "results/photo_IUV.png",
+    "densepose clip.mp4": "results/clip*_IUV.png",
+    "scene build": "room.maqs",
+    "scene render": "room.mp4",
+    "./people": PRINTS + r"person 0\.\d+ at x \d+ y \d+",
+    "maquette play": PRINTS + r"\d+ frames",
+}
+
+
+@dataclass(frozen=True)
+class Block:
+    """Commands that share a shell: lines of a README that follow each other, indented by four spaces."""
+
+    heading: str
+    lines: tuple[str, ...]  # without those left out
+    left_out: tuple[tuple[str, str], ...]  # line, reason
+
+    @property
+    def script(self) -> str:
+        return "\n".join(self.lines) + "\n"
+
+    @property
+    def seconds_until_interrupted(self) -> int | None:
+        """How long it runs until Ctrl-C; None if it ends by itself."""
+        return next((seconds for text, seconds in UNTIL_INTERRUPTED.items() if text in self.script), None)
+
+    @property
+    def promises(self) -> list[str]:
+        return [promise for text, promise in PROMISES.items() if text in self.script]
+
+
+def command_blocks(readme: str) -> list[Block]:
+    """The README's indented blocks from top to bottom; fenced code is not one."""
+    blocks: list[Block] = []
+    heading, lines, is_fenced = "", [], False
+    for line in [*readme.splitlines(), ""]:
+        if line.startswith("    ") and not is_fenced:
+            lines.append(line[4:])
+            continue
+        if lines:
+            blocks.append(_block(heading, lines))
+            lines = []
+        if line.startswith("```"):
+            is_fenced = not is_fenced
+        elif line.startswith("#") and not is_fenced:
+            heading = line.lstrip("# ")
+    return blocks
+
+
+def _block(heading: str, lines: list[str]) -> Block:
+    commands = re.sub(r"\\\n\s*", "", "\n".join(lines)).splitlines()
+    reasons = [next((why for text, why in LEFT_OUT.items() if line.startswith(text)), None) for line in commands]
+    return Block(
+        heading,
+        tuple(line for line, why in zip(commands, reasons, strict=True) if why is None),
+        tuple((line, why) for line, why in zip(commands, reasons, strict=True) if why is not None),
+    )
+
+
+def readme_blocks(root: Path) -> list[Block]:
+    return command_blocks((root / "README.md").read_text())

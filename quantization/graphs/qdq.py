@@ -89,7 +89,8 @@ def weights(quantized: onnx.GraphProto, reference: onnx.GraphProto) -> list[Weig
         if name not in expected:
             raise ValueError(f"{node.input[0]} has no counterpart in the float graph: was it made from other weights?")
         axis = next((a.i for a in node.attribute if a.name == "axis"), 1)
-        scale, zero = np.atleast_1d(known[node.input[1]]), np.atleast_1d(known[node.input[2]])
+        scale = np.atleast_1d(known[node.input[1]])
+        zero = np.atleast_1d(known[node.input[2]]) if len(node.input) > 2 else np.zeros_like(scale, np.int32)
         label = node.input[0].removesuffix(TENSOR_NAME_QUANT_SUFFIX)
         found.append(
             Weight(

@@ -13,6 +13,7 @@ def simplify(model: onnx.ModelProto) -> None:
     """All of this module, in place."""
     fold_scalar_products(model)
     share_scales(model)
+    drop_zero_points_of_biases(model)
     drop_unused_constants(model)
 
 
@@ -101,6 +102,24 @@ def share_scales(model: onnx.ModelProto) -> int:
                 continue
             quantize.input[1:] = joined.input[1:]
             dequantize.input[1:] = joined.input[1:]
+            count += 1
+    return count
+
+
+def drop_zero_points_of_biases(model: onnx.ModelProto) -> int:
+    """They are 0 for every channel of a 32-bit bias, which is what a missing one means, and 4 bytes a channel.
+
+    Returns how many went.
+    """
+    constants, count = {value.name: value for value in model.graph.initializer}, 0
+    for node in model.graph.node:
+        if node.op_type != "DequantizeLinear" or len(node.input) < 3:
+            continue
+        bias, zero_point = (constants.get(node.input[k]) for k in (0, 2))
+        if bias is None or bias.data_type != onnx.TensorProto.INT32 or zero_point is None:
+            continue
+        if not numpy_helper.to_array(zero_point).any():
+            del node.input[2]
             count += 1
     return count
 

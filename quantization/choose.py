@@ -234,7 +234,8 @@ def workpieces(arguments: argparse.Namespace, source: Bundle, folder: Path) -> d
     calibration = collect(source, records, settings.people_per_image)
     held_out = collect(source, spread(load_records(arguments.held_out), arguments.samples), 4)
     pieces = {}
-    for name, graph_settings in tqdm(settings.graphs.items(), desc="calibrating", unit="graph", disable=None):
+    for name in tqdm(bundle_format.GRAPHS, desc="calibrating", unit="graph", disable=None):
+        graph_settings = settings.graphs[name]
         path = folder / f"{name}.onnx"
         prepare(source.folder / f"{name}.onnx", path)
         ranges = calibrate(path, calibration[name], graph_settings)

@@ -3,6 +3,11 @@
     python -m quantization.quantize --bundle .data/bundles/densepose-b-fp32 --out sdk/models/densepose-b-int8 \\
         --photos .data/photos/shards/train
 
+With networks for person crops (`export.densepose.export_onnx --crops`), the others taken over as they are shipped:
+
+    python -m quantization.quantize --bundle .data/bundles/densepose-full-fp32 --keep sdk/models/densepose-b-int8 \\
+        --out .data/bundles/densepose-full-int8 --data .data/people-wide/train --held-out .data/people-wide/val
+
 Activations are unsigned, weights signed 8-bit numbers. What stays float is in `quantization/densepose.toml`.
 Prints sizes and each output's signal to noise ratio on images that were not used for calibration.
 """
@@ -22,7 +27,7 @@ from onnxruntime.quantization.calibrate import TensorsData, create_calibrator
 from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
 from onnxruntime.quantization.registry import QDQRegistry, QLinearOpsRegistry
 
-from export.bundle import BundleInfo, bytes_of
+from export.bundle import BundleInfo, bytes_of, read_manifest
 from export.densepose import bundle as bundle_format
 from export.densepose.graphs import open_bundle
 from export.shards import load_records
@@ -185,24 +190,31 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, parents=[options_of_calibration()]
     )
     parser.add_argument("--out", type=Path, default=Path("sdk/models/densepose-b-int8"))
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="int8 bundle whose graphs are taken over as they are")
     parser.add_argument("--name", help="default: the folder's name")
     options = parser.parse_args()
     settings = read_settings(options.settings, DensePoseSettings)
     source = open_bundle(options.bundle)
+    kept = read_manifest(options.keep) if options.keep else {"graphs": {}, "measured": {}}
     calibration = calibration_records(settings, options.data, options.photos)
     held_out = spread(load_records(options.held_out), settings.held_out_images)
     options.out.mkdir(parents=True, exist_ok=True)
-    shutil.copy(source.folder / bundle_format.CHARTS, options.out)  # chart weights stay float
+    crops = source.crop_graphs is not None
+    for charts in (bundle_format.CHARTS, *([bundle_format.CROP_CHARTS] if crops else [])):
+        shutil.copy(source.folder / charts, options.out)  # chart weights stay float
+    for name in kept["graphs"]:
+        shutil.copy(options.keep / f"{name}.onnx", options.out)
+    wanted = {name: settings.graphs[name] for name in source.manifest["graphs"] if name not in kept["graphs"]}
     samples = [collect(source, records, settings.people_per_image) for records in (calibration, held_out)]
-    quality = quantize_graphs(source.folder, options.out, settings.graphs, *samples)
+    quality = quantize_graphs(source.folder, options.out, wanted, *samples)
     info = BundleInfo(
         name=options.name or options.out.name,
         precision="int8",
         version=source.manifest["version"],
         training_data=tuple(source.manifest["training_data"]),
-        measured={"sqnr_db": as_measured(quality)},
+        measured={"sqnr_db": kept["measured"].get("sqnr_db", {}) | as_measured(quality)},
     )
-    bundle_format.write_manifest(options.out, info, source.network, source.decode)
+    bundle_format.write_manifest(options.out, info, source.network, source.decode, crops=crops)
     sizes = [bytes_of(folder) / 1e6 for folder in (options.bundle, options.out)]
     print(f"{options.out}: {sizes[0]:.2f} -> {sizes[1]:.2f} MB")
 

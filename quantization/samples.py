@@ -6,10 +6,12 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+import torch
+from torch import Tensor
 from tqdm import tqdm
 
 from export.densepose import targets as tg
-from export.densepose.bundle import GRAPHS
+from export.densepose.data import PERSON_CROPPING, normalised
 from export.densepose.decode import detect
 from export.densepose.graphs import Bundle
 from export.evaluation.backends import DEFAULT_PATHS
@@ -18,7 +20,7 @@ from quantization.settings import DENSEPOSE, DensePoseSettings
 
 # Proposals are many and mostly background; so many of each image are enough to see what the box head sees.
 PROPOSALS = 32
-
+CROP_SIDE = 192  # pixels of a person crop; the default of maq_densepose_config
 
 # What a graph is given, by the names of its inputs.
 Sample = dict[str, np.ndarray]
@@ -27,10 +29,19 @@ Sample = dict[str, np.ndarray]
 def collect(bundle: Bundle, records: list[Record], people: int) -> dict[str, list[Sample]]:
     """Inputs of each graph, one sample an image; images without people give none to the dense head.
 
-    The heads see the RoI features of the bundle's own proposals and detections, at most `people` an image.
+    The heads see the RoI features of the bundle's own proposals and detections, at most `people` an image; the networks
+    of the crop pass crops of labelled people as in training, one sample a crop.
     """
-    samples: dict[str, list[Sample]] = {name: [] for name in GRAPHS}
+    samples: dict[str, list[Sample]] = {name: [] for name in bundle.manifest["graphs"]}
     network = bundle.network
+
+    def add(name: str, tensors: list[Tensor]) -> None:
+        inputs = [value["name"] for value in bundle.manifest["graphs"][name]["inputs"]]
+        samples[name].append(
+            {x: np.ascontiguousarray(tensor.numpy()) for x, tensor in zip(inputs, tensors, strict=True)}
+        )
+
+    rng = np.random.default_rng(0)
     for record in tqdm(records, desc="running the fp32 bundle", unit="image", leave=False):
         image = np.ascontiguousarray(record.decoded()[0][..., ::-1])
         found = detect(bundle.graphs, image, network, bundle.decode)
@@ -40,12 +51,14 @@ def collect(bundle: Bundle, records: list[Record], people: int) -> dict[str, lis
             rois = tg.pooled(found.features, [found.boxes[:people]], network, network.dense_pool, level=0)
             given["dense_head"] = [rois]
         for name, tensors in given.items():
-            if name != "trunk":
-                tensors = [tensor.permute(0, 2, 3, 1) for tensor in tensors]
-            inputs = [value["name"] for value in bundle.manifest["graphs"][name]["inputs"]]
-            samples[name].append(
-                {x: np.ascontiguousarray(tensor.numpy()) for x, tensor in zip(inputs, tensors, strict=True)}
-            )
+            add(name, tensors if name == "trunk" else [tensor.permute(0, 2, 3, 1) for tensor in tensors])
+        if bundle.crop_graphs is not None:
+            for crop, truth in PERSON_CROPPING.draw(record, CROP_SIDE, rng):
+                pixels = torch.from_numpy(normalised(crop))[None]
+                add("crop_trunk", [pixels])
+                finest = [bundle.crop_graphs.finest(pixels)]
+                rois = tg.pooled(finest, [truth.box], network, network.dense_pool, level=0)
+                add("crop_dense_head", [rois.permute(0, 2, 3, 1)])
     return samples
 
 

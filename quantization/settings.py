@@ -38,12 +38,12 @@ class GraphSettings:
 
 @dataclass(frozen=True)
 class DensePoseSettings:
-    """graphs: settings by graph name. calibration_images, calibration_photos, held_out_images: how many images
-    and photographs set the ranges, and how many images measure the error. people_per_image: at most so many people
-    of an image calibrate the dense head.
+    """graphs: settings by graph name, also of graphs that only some bundles have. calibration_images,
+    calibration_photos, held_out_images: how many images and photographs set the ranges, and how many images measure
+    the error. people_per_image: at most so many people of an image calibrate the dense head.
     """
 
-    GRAPHS: ClassVar[tuple[str, ...]] = densepose.GRAPHS
+    GRAPHS: ClassVar[tuple[str, ...]] = densepose.GRAPHS + densepose.CROP_GRAPHS
 
     graphs: dict[str, GraphSettings]
     calibration_images: int

@@ -1,4 +1,5 @@
-"""The manifest of a dense pose bundle (docs/formats.md): five graphs, the chart weights and the surface grid."""
+"""The manifest of a dense pose bundle (docs/formats.md): five graphs, the chart weights and the surface grid; those of
+the crop pass, where it has networks of its own."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ from export.densepose.data import MEAN, STD
 from export.surface_grid import FILE as SURFACE_GRID
 
 GRAPHS = ("trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head")
-CHARTS = "charts.f32"
+CROP_GRAPHS = ("crop_trunk", "crop_dense_head")  # of bundles with networks of their own for person crops
+CHARTS, CROP_CHARTS = "charts.f32", "crop_charts.f32"
 LEVELS = (2, 3, 4, 5, 6)
 # What the pictures are rendered from; the packages are named in export/people/assets.py and export/photos.
 TRAINING_DATA = (
@@ -44,8 +46,8 @@ TRAINING_DATA = (
 )
 
 
-def signatures(network: NetworkConfig) -> dict[str, Signature]:
-    """Of each graph."""
+def signatures(network: NetworkConfig, crops: bool = False) -> dict[str, Signature]:
+    """Of each graph, with `crops` also of `CROP_GRAPHS`."""
     width, anchors = network.width, len(network.aspect_ratios)
     sizes = {k: [f"height/{2**k}", f"width/{2**k}"] for k in LEVELS}
     # P6 is every second cell of P5, rounded up; that is no plain quotient of the input.
@@ -61,20 +63,27 @@ def signatures(network: NetworkConfig) -> dict[str, Signature]:
         return {"rois": ["people", pool, pool, width]}
 
     pool, classes = network.dense_pool, network.coarse_classes + network.index_classes
+    image = {"image": [1, 3, "height", "width"]}
+    dense_head = {
+        "inputs": rois(pool),
+        "outputs": {"labels": ["people", pool, pool, 4 * classes], "surface": ["people", pool, pool, width]},
+    }
+    crop_trunk = {"inputs": image, "outputs": maps("p", LEVELS[:1], width)}
     return {
-        "trunk": {"inputs": {"image": [1, 3, "height", "width"]}, "outputs": maps("p", LEVELS, width)},
+        "trunk": {"inputs": image, "outputs": maps("p", LEVELS, width)},
         "rpn_fine": rpn(LEVELS[:1]),
         "rpn_coarse": rpn(LEVELS[1:]),
         "box_head": {"inputs": rois(network.box_pool), "outputs": {"boxes": ["people", 6]}},
-        "dense_head": {
-            "inputs": rois(pool),
-            "outputs": {"labels": ["people", pool, pool, 4 * classes], "surface": ["people", pool, pool, width]},
-        },
-    }
+        "dense_head": dense_head,
+    } | ({"crop_trunk": crop_trunk, "crop_dense_head": dense_head} if crops else {})
 
 
-def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decode: DecodeConfig) -> dict:
+def write_manifest(
+    folder: Path, info: BundleInfo, network: NetworkConfig, decode: DecodeConfig, crops: bool = False
+) -> dict:
     """Describes the graphs and chart weights that lie in `folder` and writes `manifest.json`, which it returns.
+
+    crops: whether networks of the crop pass are among them.
 
     Raises ValueError when a graph's inputs and outputs are not those of the format.
     """
@@ -119,8 +128,12 @@ def write_manifest(folder: Path, info: BundleInfo, network: NetworkConfig, decod
         "charts": {"file": CHARTS},
         "surface": {"file": SURFACE_GRID},
     }
+    files = (CHARTS, SURFACE_GRID)
+    if crops:
+        files = (*files, CROP_CHARTS)
+        task_keys["crop_charts"] = {"file": CROP_CHARTS}
     return write_bundle_manifest(
-        folder, "densepose", info, signatures(network), files=(CHARTS, SURFACE_GRID), task_keys=task_keys
+        folder, "densepose", info, signatures(network, crops), files=files, task_keys=task_keys
     )
 
 

@@ -7,6 +7,8 @@ The Python reference of what an application may run for people who are small or 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -14,8 +16,9 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.densepose import targets as tg
-from export.densepose.config import DecodeConfig
+from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import MEAN, normalised
+from export.densepose.decode import DenseHead
 from export.densepose.network import MobileParsingRCNN
 from export.densepose.person_crop import UPRIGHT, PersonCrop, crop_around, cut, outline, turn_upright, turned_box
 
@@ -54,13 +57,25 @@ def crop_of(mask: np.ndarray, box: np.ndarray, axis: np.ndarray | None, side_px:
     return crop_around(turned_box(outline(mask) if mask.any() else corners, turn), turn, side_px)
 
 
+@dataclass(frozen=True)
+class CropGraphs:
+    """The networks of the crop pass. finest: normalised crops [N, 3, s, s] -> P2 [N, C, s / 4, s / 4]."""
+
+    finest: Callable[[Tensor], Tensor]
+    dense_head: DenseHead
+
+    @staticmethod
+    def of_network(net: MobileParsingRCNN) -> CropGraphs:
+        return CropGraphs(net.finest, net.dense_head)
+
+
 @torch.no_grad()
-def crop_maps(net: MobileParsingRCNN, image: np.ndarray, crops: list[PersonCrop]) -> list[Tensor]:
+def crop_maps(graphs: CropGraphs, network: NetworkConfig, image: np.ndarray, crops: list[PersonCrop]) -> list[Tensor]:
     """The dense head's coarse [P, 15, s, s], index, u and v [P, 25, s, s] of the crops of one picture uint8 [H, W, 3]
     BGR."""
     pixels = torch.from_numpy(np.stack([normalised(cut(image, crop, tuple(MEAN[::-1].tolist()))) for crop in crops]))
     boxes = [torch.from_numpy(crop.box[None].astype(np.float32)) for crop in crops]
-    return list(net.dense_head(tg.pooled([net.finest(pixels)], boxes, net.config, net.config.dense_pool, level=0)))
+    return list(graphs.dense_head(tg.pooled([graphs.finest(pixels)], boxes, network, network.dense_pool, level=0)))
 
 
 def painted(maps: list[Tensor], crop: PersonCrop, shape: tuple[int, int], config: DecodeConfig) -> np.ndarray:

@@ -1,11 +1,16 @@
 """Exports trained weights as a fp32 model bundle, and compares the graphs with the torch network.
 
     python -m export.densepose.export_onnx --checkpoint RUN/checkpoint.pt --out .data/bundles/densepose-b-fp32
+    python -m export.densepose.export_onnx --checkpoint RUN/checkpoint.pt --crops CROPS/weights.pt \
+        --out .data/bundles/densepose-full-fp32
     python -m export.densepose.export_onnx --random --out .data/bundles/random-fp32
 
 The graphs compute the same as the network, written more simply: batch normalisation is folded into the
 convolutions, the fusion weights are constants, and the image-wide ASPP branch is added after its part of the
 1x1 mixture instead of being spread over the map first. Sizes of images and the number of people stay open.
+
+`--crops` adds networks for the crop pass alone (`--recipe crops` of export.densepose.train): a trunk up to P2 and a
+dense head.
 """
 
 from __future__ import annotations
@@ -30,7 +35,7 @@ from export.densepose import targets as tg
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.decode import Graphs, detect
 from export.densepose.graphs import chart_maps, read_charts, session
-from export.densepose.network import Aspp, Fusion, MobileParsingRCNN
+from export.densepose.network import Aspp, DenseHead, Fusion, MobileParsingRCNN
 from export.shards import load_records
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the tensor's largest value
@@ -110,6 +115,17 @@ class Trunk(nn.Module):
 
     def forward(self, image: Tensor) -> tuple[Tensor, ...]:
         return tuple(channels_last(x) for x in self.neck(self.backbone(image)))
+
+
+class CropTrunk(nn.Module):
+    """Backbone and neck: a person crop -> P2."""
+
+    def __init__(self, net: MobileParsingRCNN) -> None:
+        super().__init__()
+        self.backbone, self.neck = net.backbone, net.neck
+
+    def forward(self, image: Tensor) -> Tensor:
+        return channels_last(self.neck.finest(self.backbone(image)))
 
 
 class Rpn(nn.Module):
@@ -234,28 +250,36 @@ def _fold_batch_norm(layers: nn.Sequential) -> None:
             setattr(layers, norm_name, nn.Identity())
 
 
-def graph_modules(net: MobileParsingRCNN) -> dict[str, nn.Module]:
-    """The parts that become graphs."""
+def graph_modules(net: MobileParsingRCNN, crop_net: MobileParsingRCNN | None = None) -> dict[str, nn.Module]:
+    """The parts that become graphs. crop_net: the network of the crop pass, where it has one of its own."""
     rpn = Rpn(net)
-    return {
+    modules = {
         "trunk": Trunk(net),
         "rpn_fine": rpn,
         "rpn_coarse": rpn,
         "box_head": BoxHeadGraph(net),
         "dense_head": DenseHeadGraph(net),
     }
+    if crop_net is not None:
+        modules |= {"crop_trunk": CropTrunk(crop_net), "crop_dense_head": DenseHeadGraph(crop_net)}
+    return modules
 
 
-def export_graphs(net: MobileParsingRCNN, folder: Path) -> None:
-    """Writes the graphs of `bundle.GRAPHS` (opset 17, batch normalisation folded) and the chart weights."""
+def export_graphs(net: MobileParsingRCNN, folder: Path, crop_net: MobileParsingRCNN | None = None) -> None:
+    """Writes the graphs of `bundle.GRAPHS` (opset 17, batch normalisation folded) and the chart weights; with the
+    network of the crop pass those of `bundle.CROP_GRAPHS` and its chart weights, too."""
     folder.mkdir(parents=True, exist_ok=True)
     simple = simplified(net)
-    modules = graph_modules(simple)
     chart_weights(simple).astype("<f4").tofile(folder / bundle.CHARTS)
+    simple_crop_net = None
+    if crop_net is not None:
+        simple_crop_net = simplified(crop_net)
+        chart_weights(simple_crop_net).astype("<f4").tofile(folder / bundle.CROP_CHARTS)
+    modules = graph_modules(simple, simple_crop_net)
     # Odd sizes, so that no size of the example can be mistaken for a constant.
     example = {"height": 96, "width": 160, "people": 3, "height6": 2, "width6": 3}
     example |= {f"{side}/{2**k}": example[side] // 2**k for k in range(2, 6) for side in ("height", "width")}
-    for name, tensors in bundle.signatures(net.config).items():
+    for name, tensors in bundle.signatures(net.config, crop_net is not None).items():
         given = [torch.randn([example.get(size, size) for size in shape]) for shape in tensors["inputs"].values()]
         axes = {
             tensor: {axis: size for axis, size in enumerate(sizes) if isinstance(size, str)}
@@ -300,17 +324,18 @@ def tuple_of(outputs: Tensor | tuple[Tensor, ...]) -> tuple[Tensor, ...]:
 
 
 @torch.no_grad()
-def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> dict[str, float]:
+def parity(
+    net: MobileParsingRCNN, folder: Path, images: list[np.ndarray], crop_net: MobileParsingRCNN | None = None
+) -> dict[str, float]:
     """Largest |ONNX - torch| of each output over the images, relative to the output's largest value.
 
     images: RGB uint8 [H, W, 3]. Every graph gets the torch network's own features; the heads those of its proposals.
-    `dense_head.u` and `.v` are what chart weights and `surface` give.
+    `dense_head.u` and `.v` are what chart weights and `surface` give. The crop pass gets the pictures, too.
     """
-    net = copy.deepcopy(net).cpu().eval()
-    modules = graph_modules(net)
-    names = {name: list(s["outputs"]) for name, s in bundle.signatures(net.config).items()}
+    net, crop_net = (copy.deepcopy(x).cpu().eval() if x is not None else None for x in (net, crop_net))
+    modules = graph_modules(net, crop_net)
+    names = {name: list(s["outputs"]) for name, s in bundle.signatures(net.config, crop_net is not None).items()}
     sessions = {name: session(folder / f"{name}.onnx") for name in names}
-    charts = read_charts(folder / bundle.CHARTS, net.config.index_classes - 1)
     worst: dict[str, float] = {}
 
     def note(name: str, expected: Tensor, actual: Tensor) -> None:
@@ -324,6 +349,12 @@ def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> di
             note(f"{graph}.{name}", expected, actual)
         return found
 
+    def compare_dense_head(graph: str, head: DenseHead, rois: Tensor, charts: str) -> None:
+        *_, surface = compare(graph, channels_last(rois))
+        found = chart_maps(surface, *read_charts(folder / charts, net.config.index_classes - 1))
+        for name, maps, actual in zip("uv", head(rois)[2:], found, strict=True):
+            note(f"{graph}.{name}", maps[:, 1:], actual[:, 1:])
+
     for image in images:
         found = detect(Graphs.of_network(net), image, net.config, DecodeConfig())
         compare("trunk", found.tensor)
@@ -331,11 +362,13 @@ def parity(net: MobileParsingRCNN, folder: Path, images: list[np.ndarray]) -> di
         compare("rpn_coarse", *(channels_last(x) for x in found.features[1:]))
         rois = tg.pooled(found.features, [found.proposed], net.config, net.config.box_pool)
         compare("box_head", channels_last(rois))
-        rois = tg.pooled(found.features, [found.proposed[:4]], net.config, net.config.dense_pool, level=0)
-        *_, surface = compare("dense_head", channels_last(rois))
-        expected = net.dense_head(rois)[2:]
-        for name, maps, actual in zip("uv", expected, chart_maps(surface, *charts), strict=True):
-            note(f"dense_head.{name}", maps[:, 1:], actual[:, 1:])
+        boxes, pool = [found.proposed[:4]], net.config.dense_pool
+        rois = tg.pooled(found.features, boxes, net.config, pool, level=0)
+        compare_dense_head("dense_head", net.dense_head, rois, bundle.CHARTS)
+        if crop_net is not None:
+            compare("crop_trunk", found.tensor)
+            rois = tg.pooled([crop_net.finest(found.tensor)], boxes, net.config, pool, level=0)
+            compare_dense_head("crop_dense_head", crop_net.dense_head, rois, bundle.CROP_CHARTS)
     return worst
 
 
@@ -352,6 +385,7 @@ def main() -> None:
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--checkpoint", type=Path, help="checkpoint.pt of export.densepose.train")
     source.add_argument("--random", action="store_true", help="untrained weights, to try the runtime with")
+    parser.add_argument("--crops", type=Path, metavar="FILE", help="weights of networks for the crop pass alone")
     parser.add_argument("--out", type=Path, required=True, help="the bundle's folder")
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--width", type=int, default=64, help="channels, with --random")
@@ -361,10 +395,13 @@ def main() -> None:
     torch.set_num_threads(1)
     torch.manual_seed(0)
     net = MobileParsingRCNN(NetworkConfig(width=options.width)) if options.random else load_network(options.checkpoint)
-    export_graphs(net.eval(), options.out)
+    crop_net = load_network(options.crops) if options.crops else None
+    if crop_net is not None and crop_net.config.width != net.config.width:
+        raise SystemExit(f"{options.crops} has width {crop_net.config.width}, but the network {net.config.width}")
+    export_graphs(net.eval(), options.out, crop_net)
     records = load_records(options.data, options.images)
     images = [np.ascontiguousarray(record.decoded()[0][..., ::-1]) for record in records]
-    errors = parity(net, options.out, images)
+    errors = parity(net, options.out, images, crop_net)
     for name, error in errors.items():
         print(f"{name:24} largest error {error:.1e}")
     info = BundleInfo(
@@ -378,7 +415,7 @@ def main() -> None:
             }
         },
     )
-    bundle.write_manifest(options.out, info, net.config, DecodeConfig())
+    bundle.write_manifest(options.out, info, net.config, DecodeConfig(), crops=crop_net is not None)
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
     if max(errors.values()) > TOLERANCE:
         raise SystemExit(f"the graphs differ from the network by more than {TOLERANCE:g}")

@@ -14,7 +14,8 @@ from torch.nn import functional as F
 from export.bundle import read_manifest
 from export.densepose.bundle import decode_config
 from export.densepose.config import DecodeConfig, NetworkConfig
-from export.densepose.decode import Graphs
+from export.densepose.crop_pass import CropGraphs
+from export.densepose.decode import DenseHead, Graphs
 
 
 def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
@@ -27,13 +28,17 @@ def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
 
 @dataclass(frozen=True)
 class Bundle:
-    """A bundle's graphs as callables, and the settings that its manifest names."""
+    """A bundle's graphs as callables, and the settings that its manifest names.
+
+    crop_graphs: of the crop pass; None where those of the whole picture do that, too.
+    """
 
     folder: Path
     manifest: dict
     network: NetworkConfig
     decode: DecodeConfig
     graphs: Graphs
+    crop_graphs: CropGraphs | None
 
 
 def open_bundle(folder: Path, threads: int = 1) -> Bundle:
@@ -48,7 +53,6 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
         delta_weights=tuple(head["delta_weights"]),
     )
     sessions = {name: session(folder / entry["file"], threads) for name, entry in manifest["graphs"].items()}
-    charts = read_charts(folder / manifest["charts"]["file"], dense["index_classes"] - 1)
 
     def run(name: str, *given: Tensor) -> list[Tensor]:
         entry = manifest["graphs"][name]
@@ -66,14 +70,26 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
         (found,) = run("box_head", rois.permute(0, 2, 3, 1))
         return found[:, :2], found[:, 2:]
 
-    def dense_head(rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        labels, surface = run("dense_head", rois.permute(0, 2, 3, 1))
-        both = interleaved(labels)
-        coarse, index = both[:, : dense["coarse_classes"]], both[:, dense["coarse_classes"] :]
-        return coarse, index, *chart_maps(surface, *charts)
+    def dense_head_of(graph: str, charts_file: str) -> DenseHead:
+        charts = read_charts(folder / charts_file, dense["index_classes"] - 1)
 
-    graphs = Graphs(detector, box_head, dense_head)
-    return Bundle(folder, manifest, network, decode_config(manifest), graphs)
+        def dense_head(rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+            labels, surface = run(graph, rois.permute(0, 2, 3, 1))
+            both = interleaved(labels)
+            coarse, index = both[:, : dense["coarse_classes"]], both[:, dense["coarse_classes"] :]
+            return coarse, index, *chart_maps(surface, *charts)
+
+        return dense_head
+
+    def finest(crops: Tensor) -> Tensor:
+        # Exported for one picture, as the trunk is.
+        return torch.cat([run("crop_trunk", crop[None])[0].permute(0, 3, 1, 2) for crop in crops])
+
+    graphs = Graphs(detector, box_head, dense_head_of("dense_head", manifest["charts"]["file"]))
+    crop_graphs = None
+    if "crop_charts" in manifest:
+        crop_graphs = CropGraphs(finest, dense_head_of("crop_dense_head", manifest["crop_charts"]["file"]))
+    return Bundle(folder, manifest, network, decode_config(manifest), graphs, crop_graphs)
 
 
 def read_charts(path: Path, parts: int) -> tuple[Tensor, Tensor]:

@@ -1,6 +1,6 @@
-"""What a second pass over person crops gains: part accuracy and masks of the same weights, person by person.
+"""What a second pass over person crops gains: part accuracy and masks, person by person.
 
-    python -m export.evaluation.person_crops --data .data/people-wide/val --weights .data/runs/crops/weights.pt
+    python -m export.evaluation.person_crops --data .data/people-wide/val --crop-weights .data/runs/crops/weights.pt
 
 Each person found by the first pass (the whole picture) is labelled four times: by the first pass; from a crop turned
 upright by the axis read off the first pass's surface; by the axis of the box head, where the weights have one; and by
@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from export.densepose import targets as tg
 from export.densepose.config import DecodeConfig, NetworkConfig
-from export.densepose.crop_pass import axis_of_surface, crop_maps, crop_of, painted
+from export.densepose.crop_pass import CropGraphs, axis_of_surface, crop_maps, crop_of, painted
 from export.densepose.decode import Graphs, detect, paint
 from export.densepose.network import MobileParsingRCNN
 from export.shards import LabelledImage, read_images, shard_paths
@@ -67,10 +67,12 @@ def degrees_between(a: np.ndarray | None, b: np.ndarray) -> float:
 
 
 class CropJudge:
-    """Labels the people of a picture in all `WAYS` and keeps their scores by group."""
+    """Labels the people of a picture in all `WAYS` and keeps their scores by group. crop_net: for the second pass."""
 
-    def __init__(self, net: MobileParsingRCNN, crop_size: int, config: DecodeConfig) -> None:
-        self.net, self.crop_size, self.config = net, crop_size, config
+    def __init__(
+        self, net: MobileParsingRCNN, crop_net: MobileParsingRCNN, crop_size: int, config: DecodeConfig
+    ) -> None:
+        self.net, self.crop_net, self.crop_size, self.config = net, crop_net, crop_size, config
         self.graphs = Graphs.of_network(net)
         self.scores: dict[str, dict[str, list[Score]]] = defaultdict(lambda: defaultdict(list))
         self.people = self.missed = 0
@@ -112,7 +114,9 @@ class CropJudge:
             way: crop_of(own if way == WAYS[3] else first[..., 0] > 0, box, axis, self.crop_size)
             for way, axis in axes.items()
         }
-        again = crop_maps(self.net, np.ascontiguousarray(image.image[..., ::-1]), list(crops.values()))
+        picture = np.ascontiguousarray(image.image[..., ::-1])
+        graphs = CropGraphs.of_network(self.crop_net)
+        again = crop_maps(graphs, self.crop_net.config, picture, list(crops.values()))
         scores = {WAYS[0]: score(first, image, number)}
         for k, (way, crop) in enumerate(crops.items()):
             label = painted([m[k] for m in again], crop, shape, self.config)
@@ -172,6 +176,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/people-wide/val"), metavar="DIR")
     parser.add_argument("--weights", type=Path, default=Path("export/weights/densepose-b.pt"), metavar="FILE")
+    parser.add_argument("--crop-weights", type=Path, metavar="FILE", help="of the second pass (default: the same)")
     parser.add_argument("--crop-size", type=int, default=192, help="pixels (default %(default)s)")
     parser.add_argument("--long-side", type=int, default=DecodeConfig.long_side, help="of the first pass's input")
     parser.add_argument("--score", type=float, default=0.3, help="min score of a person (default %(default)s)")
@@ -179,7 +184,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("build/evaluation/person_crops.json"), metavar="FILE")
     options = parser.parse_args()
     config = DecodeConfig(long_side=options.long_side, score_threshold=options.score)
-    judge = CropJudge(load_network(options.weights), options.crop_size, config)
+    crop_weights = options.crop_weights or options.weights
+    judge = CropJudge(load_network(options.weights), load_network(crop_weights), options.crop_size, config)
     for image in tqdm(read_images(shard_paths(options.data), options.limit), unit="image"):
         judge.add(image)
     table = judge.table()
@@ -194,9 +200,8 @@ def main() -> None:
         if way in table.get(GROUPS[0], {}):
             print(f"{way}: median {table[GROUPS[0]][way]['axis_off_degrees']:.1f} degrees off")
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(
-        json.dumps({"weights": str(options.weights), "people": judge.people, "missed": judge.missed, "groups": table})
-    )
+    weights = {"weights": str(options.weights), "crop_weights": str(crop_weights)}
+    options.out.write_text(json.dumps({**weights, "people": judge.people, "missed": judge.missed, "groups": table}))
 
 
 if __name__ == "__main__":

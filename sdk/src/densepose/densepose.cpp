@@ -144,10 +144,26 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
   box_head_ = make_checked("box_head", graph_with(manifest, "box_head", {"rois"}, {"boxes"}),
                            {kAnySize, box_pool, box_pool, channels_}, {{kAnySize, 6}});
   const int64_t classes = spec_.dense_head.coarse_classes + spec_.dense_head.index_classes;
-  dense_head_ = make_checked(
-      "dense_head", graph_with(manifest, "dense_head", {"rois"}, {"labels", "surface"}),
-      {kAnySize, dense_pool, dense_pool, channels_},
-      {{kAnySize, dense_pool, dense_pool, 4 * classes}, {kAnySize, dense_pool, dense_pool, charts_.channels()}});
+  const auto make_dense_head = [&](const std::string& name) {
+    return make_checked(
+        name, graph_with(manifest, name, {"rois"}, {"labels", "surface"}),
+        {kAnySize, dense_pool, dense_pool, channels_},
+        {{kAnySize, dense_pool, dense_pool, 4 * classes}, {kAnySize, dense_pool, dense_pool, charts_.channels()}});
+  };
+  dense_head_ = make_dense_head("dense_head");
+  whole_ = crops_ = {trunk_.get(), dense_head_.get(), &charts_, kRpnLevels};
+  if (!spec_.crop_charts_file.empty() && settings_.crops != PersonCrops::kOff) {
+    crop_trunk_ = make_checked("crop_trunk", graph_with(manifest, "crop_trunk", {"image"}, {"p2"}),
+                               {1, 3, kAnySize, kAnySize}, {features});
+    crop_dense_head_ = make_dense_head("crop_dense_head");
+    crop_charts_.emplace(bundle.files.at(spec_.crop_charts_file), spec_.dense_head.index_classes - 1,
+                         bundle.path_of(spec_.crop_charts_file));
+    if (crop_charts_->channels() != charts_.channels()) {
+      throw Error(MAQ_ERROR_BAD_BUNDLE, bundle.path_of(spec_.crop_charts_file), " is for ", crop_charts_->channels(),
+                  " channels, but ", spec_.charts_file, " for ", charts_.channels(), ". Export the bundle again.");
+    }
+    crops_ = {crop_trunk_.get(), crop_dense_head_.get(), &*crop_charts_, 1};
+  }
   if (spec_.dense_head.output_size != 2 * spec_.dense_head.pool_size) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": the dense head's output is ",
                 spec_.dense_head.output_size, " cells wide, but must be twice its pool of ", spec_.dense_head.pool_size,
@@ -202,7 +218,7 @@ void DensePose::find_boxes(const ImageView& image, DensePoseStats& stats) {
   make_network_input(image, {stats.network_width_px, stats.network_height_px}, spec_.input, input_);
   stats.preprocess_ms = float(stage.lap_ms());
 
-  run_trunk(input_.values, input_.padded_width_px, input_.padded_height_px);
+  run_trunk(whole_, input_.values, input_.padded_width_px, input_.padded_height_px);
   stats.trunk_ms = float(stage.lap_ms());
 
   if (stats.key_frame) {
@@ -230,17 +246,18 @@ void DensePose::reset() {
   tracks_crops_ = false;
 }
 
-void DensePose::run_trunk(const std::vector<float>& values, int width_px, int height_px) {
+void DensePose::run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px) {
   const int64_t height = height_px, width = width_px;
   const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
   shapes_.clear();
-  for (const int stride : spec_.rpn.strides) {
+  for (size_t l = 0; l < mapper.levels; ++l) {
+    const int stride = spec_.rpn.strides[l];
     shapes_.push_back({1, cells(height, stride), cells(width, stride), channels_});
   }
   inputs_.assign(1, {values.data(), {1, 3, height, width}});
-  pyramid_ = trunk_->run(inputs_, shapes_, cancel_.get());
+  pyramid_ = mapper.trunk->run(inputs_, shapes_, cancel_.get());
   features_.clear();
-  for (size_t l = 0; l < kFeatureLevels; ++l) {
+  for (size_t l = 0; l < std::min(mapper.levels, kFeatureLevels); ++l) {
     const TensorView& map = pyramid_[l];
     features_.push_back({map.data, channels_, int(map.shape[1]), int(map.shape[2]), spec_.box_head.strides[l]});
   }
@@ -321,10 +338,11 @@ void DensePose::map_people(const ImageView& image, const DensePlanes& planes, De
     clip_box(mapped.box, float(planes.width_px), float(planes.height_px));
     mapped_.push_back(mapped);
   }
-  const std::vector<TensorView>& answers = run_dense_head(found_.size());
+  const std::vector<TensorView>& answers = run_dense_head(whole_, found_.size());
   for (size_t i = 0; i < mapped_.size(); ++i) {
     mapped_[i].labels = answers[0].data + i * labels_size();
     mapped_[i].surface = answers[1].data + i * surface_size();
+    mapped_[i].charts = &charts_;
   }
   stats.dense_head_ms = float(stage.lap_ms());
   if (settings_.crops == PersonCrops::kOff) return;
@@ -347,19 +365,19 @@ size_t DensePose::surface_size() const {
   return size_t(charts_.channels()) * size_t(spec.pool_size) * size_t(spec.pool_size);
 }
 
-const std::vector<TensorView>& DensePose::run_dense_head(size_t count) {
+const std::vector<TensorView>& DensePose::run_dense_head(const Mapper& mapper, size_t count) {
   const DenseHeadSpec& spec = spec_.dense_head;
   const int64_t people = int64_t(count);
   inputs_.assign(1, {rois_.data(), {people, spec.pool_size, spec.pool_size, channels_}});
   shapes_.assign(2, {people, spec.pool_size, spec.pool_size, 4 * (spec.coarse_classes + spec.index_classes)});
   shapes_[1][3] = charts_.channels();
-  return dense_head_->run(inputs_, shapes_, cancel_.get());
+  return mapper.dense_head->run(inputs_, shapes_, cancel_.get());
 }
 
 DenseLogits DensePose::logits_of(const MappedPerson& person) {
   const DenseHeadSpec& spec = spec_.dense_head;
-  charts_.begin(person.surface, spec.pool_size);
-  return {person.labels, &charts_, spec.coarse_classes, spec.index_classes, spec.output_size};
+  person.charts->begin(person.surface, spec.pool_size);
+  return {person.labels, person.charts, spec.coarse_classes, spec.index_classes, spec.output_size};
 }
 
 void DensePose::choose_crops() {
@@ -400,17 +418,18 @@ void DensePose::run_crops(const ImageView& image, DensePoseStats& stats) {
     }
     if (!person.crop) continue;
     make_crop_input(image, person.crop->to_image, side, spec_.input, crop_input_);
-    run_trunk(crop_input_.values, side, side);
+    run_trunk(crops_, crop_input_.values, side, side);
     roi_align_.run(features_[0], person.crop->box, spec_.dense_head.pool_size, roi);
     roi += dense_roi_size();
   }
-  const std::vector<TensorView>& answers = run_dense_head(count);
+  const std::vector<TensorView>& answers = run_dense_head(crops_, count);
   const float *labels = answers[0].data, *surface = answers[1].data;
   for (MappedPerson& person : mapped_) {
     if (!person.crop) continue;
     MappedPerson again = person;
     again.labels = labels;
     again.surface = surface;
+    again.charts = crops_.charts;
     labels += labels_size();
     surface += surface_size();
     if (person.labels != nullptr) {

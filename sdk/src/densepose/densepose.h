@@ -74,6 +74,9 @@ class DensePose {
   // MAQ_ERROR_UNSUPPORTED for a bundle of another task.
   DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, const DensePoseSettings& settings);
 
+  DensePose(const DensePose&) = delete;
+  DensePose& operator=(const DensePose&) = delete;
+
   // Memory of `result` is reused. Not for two threads at once. With key_frame_interval above 1 images are frames of one
   // stream: between key frames the boxes of the frame before take the place of proposals. Throws MAQ_ERROR_INFERENCE,
   // MAQ_CANCELLED.
@@ -95,13 +98,22 @@ class DensePose {
     std::optional<PersonCrop> crop;
     float confidence = 0;           // of the answer from the whole image
     int64_t body_pixels = 0;        // when last painted
-    const float* labels = nullptr;  // the dense head's answer, of the crop where there is one
+    const float* labels = nullptr;  // a dense head's answer, of the crop where there is one
     const float* surface = nullptr;
+    ChartPredictor* charts = nullptr;  // of that dense head
+  };
+
+  // What maps the surface, of whole images or of crops.
+  struct Mapper {
+    Session* trunk = nullptr;
+    Session* dense_head = nullptr;
+    ChartPredictor* charts = nullptr;
+    size_t levels = 0;  // that the trunk gives
   };
 
   void find_people(const ImageView& image, DensePoseResult& result);
-  // `values`: [3, height_px, width_px], normalised; the sides are multiples of the spec's.
-  void run_trunk(const std::vector<float>& values, int width_px, int height_px);
+  // `values`: [3, height_px, width_px], normalised; the sides are multiples of the spec's. Into `features_`.
+  void run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px);
   // The best boxes of the RPN. Its finest level runs only where people of min_person_height_px may be that small.
   void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
   // One pass of the box head: scores and refines `boxes`, keeps those of a score above `min_score`, then NMS.
@@ -111,7 +123,7 @@ class DensePose {
   // Runs the dense head on `found_`, then on crops of those who gain by it; into `mapped_`.
   void map_people(const ImageView& image, const DensePlanes& planes, DensePoseStats& stats);
   // Of the first `count` RoIs in `rois_`: labels and surface, in memory of the session until it runs again.
-  const std::vector<TensorView>& run_dense_head(size_t count);
+  const std::vector<TensorView>& run_dense_head(const Mapper& mapper, size_t count);
   // Values of one person's RoI, labels and surface.
   size_t dense_roi_size() const;
   size_t labels_size() const;
@@ -138,10 +150,13 @@ class DensePose {
   std::unique_ptr<Session> box_head_;
   std::unique_ptr<Session> dense_head_;
   ChartPredictor charts_;
+  std::unique_ptr<Session> crop_trunk_, crop_dense_head_;  // null where crops go through those above
+  std::optional<ChartPredictor> crop_charts_;
+  Mapper whole_, crops_;
   BodySurface surface_;
   NetworkInput input_;
-  std::vector<TensorView> pyramid_;   // P2 to P6, in memory of the trunk
-  std::vector<FeatureMap> features_;  // P2 to P5, the same
+  std::vector<TensorView> pyramid_;   // P2 to P6, or P2, in memory of a trunk
+  std::vector<FeatureMap> features_;  // the same, without P6
   std::vector<float> rois_;
   std::vector<MappedPerson> mapped_;
   // Scratch of a frame, kept so that the next one takes nothing from the heap.

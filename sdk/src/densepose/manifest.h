@@ -50,7 +50,8 @@ struct DensePoseSpec {
   BoxHeadSpec box_head;
   DenseHeadSpec dense_head;
   std::string charts_file;
-  std::string surface_file;  // "" when the bundle has none
+  std::string surface_file;      // "" when the bundle has none
+  std::string crop_charts_file;  // "" when crops go through the networks of the whole picture
 };
 
 // Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE for what is missing, of the wrong

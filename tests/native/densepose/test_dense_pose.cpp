@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <opencv2/core.hpp>
 
 #include "densepose/densepose.h"
+#include "nn/sha256.h"
 #include "support/bundle_copy.h"
 #include "support/expect_error.h"
 
@@ -276,6 +278,80 @@ TEST_F(DensePose, ACropIsTheDenseHeadsAnswerForTheBodyOfTheFirst) {
   EXPECT_NEAR(top(first) - double(first.people[0].box.y0), 32, 1.5);
   EXPECT_NEAR(top(again) - top(first), 24, 1.5);
   expect_sane(again, 320, 256);
+}
+
+// A tiny bundle whose crops have networks of their own: those of the whole picture, but U is everywhere `u`.
+class BundleWithCropNetworks : public BundleCopy {
+ public:
+  explicit BundleWithCropNetworks(float u) {
+    std::string charts = read_text(file("charts.f32"));
+    const size_t parts = 24, weights = 2 * parts * 4 * 4 * 4;
+    std::vector<float> values(charts.size() / sizeof(float));
+    std::memcpy(values.data(), charts.data(), charts.size());
+    std::fill_n(values.begin(), weights / 2, 0.0f);
+    std::fill_n(values.begin() + std::ptrdiff_t(weights), parts, u);
+    write_crop_charts(values);
+    nlohmann::json changed = manifest();
+    changed["crop_charts"]["file"] = "crop_charts.f32";
+    changed["graphs"]["crop_trunk"] = changed["graphs"]["trunk"];
+    changed["graphs"]["crop_trunk"]["outputs"] = {changed["graphs"]["trunk"]["outputs"][0]};
+    changed["graphs"]["crop_dense_head"] = changed["graphs"]["dense_head"];
+    write_manifest(changed);
+  }
+
+  void write_crop_charts(const std::vector<float>& values) {
+    const std::string bytes(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+    write_text(file("crop_charts.f32"), bytes);
+    nlohmann::json changed = manifest();
+    changed["files"]["crop_charts.f32"] = {{"sha256", maq::sha256_hex(bytes.data(), bytes.size())},
+                                           {"bytes", bytes.size()}};
+    write_manifest(changed);
+  }
+};
+
+TEST_F(DensePose, CropsGoThroughNetworksOfTheirOwnWhereTheBundleHasThem) {
+  const BundleWithCropNetworks bundle(0.25f);
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;
+  maq::DensePoseSettings settings;
+  settings.key_frame_interval = 2;
+  const auto see = [&](maq::DensePose& densepose) {
+    maq::DensePoseResult result;
+    densepose.run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    expect_sane(result, image.cols, image.rows);
+    EXPECT_EQ(result.people.size(), 1u);
+    return result.planes;
+  };
+  maq::DensePose whole = make(settings, bundle.path()), whole_of_both = make(settings);
+  EXPECT_EQ(see(whole).u, see(whole_of_both).u) << "without crops";
+  settings.crops = maq::PersonCrops::kAll;
+  maq::DensePose own = make(settings, bundle.path()), shared = make(settings);
+  for (const char* frame : {"key frame", "between key frames"}) {
+    const maq::DensePlanes planes = see(own), expected = see(shared);
+    EXPECT_EQ(planes.part, expected.part) << frame;
+    EXPECT_EQ(planes.v, expected.v) << frame;
+    for (size_t i = 0; i < planes.part.size(); ++i) ASSERT_EQ(planes.u[i], planes.part[i] == 0 ? 0 : 64) << frame;
+  }
+}
+
+TEST_F(DensePose, NetworksOfCropsThatDoNotFitAreRefusedWhenTheyAreLoaded) {
+  maq::DensePoseSettings settings;
+  settings.crops = maq::PersonCrops::kAuto;
+  const auto expect_refused = [&](const BundleCopy& bundle, const std::string& text) {
+    expect_error(MAQ_ERROR_BAD_BUNDLE, text, [&] { make(settings, bundle.path()); });
+  };
+  BundleWithCropNetworks five_channels(0.5f);
+  five_channels.write_crop_charts(std::vector<float>(2 * 24 * (4 * 4 * 5 + 1), 0.5f));
+  expect_refused(five_channels, "crop_charts.f32 is for 5 channels, but charts.f32 for 4");
+  const BundleWithCropNetworks without_head(0.5f), other_shape(0.5f);
+  nlohmann::json manifest = without_head.manifest();
+  manifest["graphs"].erase("crop_dense_head");
+  without_head.write_manifest(manifest);
+  expect_refused(without_head, "crop_dense_head");
+  manifest = other_shape.manifest();
+  manifest["graphs"]["crop_dense_head"]["outputs"][0]["shape"][3] = 120;
+  other_shape.write_manifest(manifest);
+  expect_refused(other_shape, "graph crop_dense_head: output labels must have the shape [n, 32, 32, 160]");
 }
 
 TEST_F(DensePose, BetweenKeyFramesOnlyCropsAreComputedWhereEverybodyHasOne) {

@@ -7,7 +7,7 @@ import torch
 from rectangle_people import picture
 
 from export.densepose.config import DecodeConfig, NetworkConfig
-from export.densepose.crop_pass import axis_of_surface, crop_maps, crop_of, painted
+from export.densepose.crop_pass import CropGraphs, axis_of_surface, crop_maps, crop_of, painted
 from export.densepose.network import MobileParsingRCNN
 from export.densepose.person_crop import cut_label, rotation
 
@@ -86,8 +86,8 @@ def test_crops_of_a_picture_go_through_the_network_together():
     net = MobileParsingRCNN(NetworkConfig(width=16)).eval()
     image, label = picture(np.random.default_rng(0), people=2)
     crops = [crop_of(label[..., 3] == k, np.zeros(4), None, 64) for k in (1, 2)]
-    together = crop_maps(net, image, crops)
-    alone = crop_maps(net, image, crops[1:])
+    together = crop_maps(CropGraphs.of_network(net), net.config, image, crops)
+    alone = crop_maps(CropGraphs.of_network(net), net.config, image, crops[1:])
     assert [tuple(m.shape) for m in together] == [(2, 15, 64, 64), *[(2, 25, 64, 64)] * 3]
     for a, b in zip(together, alone, strict=True):
         assert torch.allclose(a[1], b[0], atol=1e-4)

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from export.bundle import BundleInfo
-from export.densepose import bundle, export_onnx, graphs
+from export.densepose import bundle, export_onnx, graphs, targets
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.network import MobileParsingRCNN
 
@@ -17,10 +17,9 @@ WIDTH = 16
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 
-@pytest.fixture(scope="module")
-def net():
+def lively_network(seed):
     """An untrained network whose normalisation and fusion do something."""
-    torch.manual_seed(0)
+    torch.manual_seed(seed)
     net = MobileParsingRCNN(NetworkConfig(width=WIDTH))
     for module in net.modules():
         if isinstance(module, torch.nn.BatchNorm2d):
@@ -31,6 +30,25 @@ def net():
     for fusion in net.neck.fuse.values():
         torch.nn.init.uniform_(fusion.weight, -0.5, 1.5)
     return net.eval()
+
+
+@pytest.fixture(scope="module")
+def net():
+    return lively_network(0)
+
+
+@pytest.fixture(scope="module")
+def crop_net():
+    return lively_network(1)
+
+
+@pytest.fixture(scope="module")
+def full_folder(net, crop_net, tmp_path_factory):
+    """A bundle whose crop pass has networks of its own."""
+    folder = tmp_path_factory.mktemp("full")
+    export_onnx.export_graphs(net, folder, crop_net)
+    bundle.write_manifest(folder, BundleInfo("full", "fp32"), net.config, DecodeConfig(), crops=True)
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +115,31 @@ def test_a_bundle_opens_as_what_decoding_works_with(net, folder):
     assert opened.network.width == WIDTH
 
 
+def test_crops_go_through_networks_of_their_own(net, crop_net, full_folder, folder):
+    opened = graphs.open_bundle(full_folder)
+    crops, boxes = torch.randn(2, 3, 64, 64), [torch.tensor([[8.0, 4.0, 56.0, 60.0]])] * 2
+    with torch.no_grad():
+        finest = crop_net.finest(crops)
+        assert_close([finest], [opened.crop_graphs.finest(crops).numpy()])
+        rois = targets.pooled([finest], boxes, net.config, net.config.dense_pool, level=0)
+        expected, found = crop_net.dense_head(rois), opened.crop_graphs.dense_head(rois)
+        whole = opened.graphs.dense_head(rois)
+    assert_close(expected[:2], [array.numpy() for array in found[:2]])
+    assert_close([m[:, 1:] for m in expected[2:]], [m[:, 1:].numpy() for m in found[2:]])
+    assert_close([net.dense_head(rois)[0].detach()], [whole[0].numpy()])
+    assert graphs.open_bundle(folder).crop_graphs is None
+
+
+def test_parity_covers_the_networks_of_crops(net, crop_net, full_folder):
+    image = np.random.default_rng(0).integers(0, 255, (64, 96, 3), np.uint8)
+    errors = export_onnx.parity(net, full_folder, [image], crop_net)
+    assert len(errors) == 15 + 1 + 4
+    assert max(errors.values()) <= export_onnx.TOLERANCE
+    mistaken = export_onnx.parity(net, full_folder, [image], net)
+    assert mistaken["crop_trunk.p2"] > export_onnx.TOLERANCE
+    assert mistaken["crop_dense_head.u"] > export_onnx.TOLERANCE
+
+
 def test_parity_on_pictures_is_measured_for_every_output(net, folder):
     image = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
     errors = export_onnx.parity(net, folder, [image])
@@ -113,17 +156,22 @@ def test_parity_notices_other_weights(net, folder):
     assert errors["dense_head.v"] <= export_onnx.TOLERANCE
 
 
-def test_no_batch_normalisation_is_left(folder):
-    for name in bundle.GRAPHS:
-        kinds = [node.op_type for node in onnx.load(folder / f"{name}.onnx").graph.node]
+def test_no_batch_normalisation_is_left(full_folder):
+    for name in bundle.GRAPHS + bundle.CROP_GRAPHS:
+        kinds = [node.op_type for node in onnx.load(full_folder / f"{name}.onnx").graph.node]
         assert not set(kinds) & {"BatchNormalization", "Identity", "Expand", "Resize", "ConvTranspose", "Pad"}
-        assert kinds.count("Shape") == (3 if name == "trunk" else 0)  # of what is made twice as large
+        assert kinds.count("Shape") == (3 if name.endswith("trunk") else 0)  # of what is made twice as large
 
 
-def test_manifest_signs_the_files_and_lists_their_tensors(folder):
+@pytest.mark.parametrize("kind", ["folder", "full_folder"])
+def test_manifest_signs_the_files_and_lists_their_tensors(kind, request):
+    folder, graph_names = request.getfixturevalue(kind), bundle.GRAPHS
     manifest = json.loads((folder / "manifest.json").read_text())
     others = {manifest["surface"]["file"], manifest["charts"]["file"]}
-    assert set(manifest["files"]) == {f"{name}.onnx" for name in bundle.GRAPHS} | others
+    if kind == "full_folder":
+        graph_names += bundle.CROP_GRAPHS
+        others.add(manifest["crop_charts"]["file"])
+    assert set(manifest["files"]) == {f"{name}.onnx" for name in graph_names} | others
     for name, entry in manifest["files"].items():
         data = (folder / name).read_bytes()
         assert entry == {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}

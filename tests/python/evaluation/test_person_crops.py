@@ -63,7 +63,7 @@ def test_everybody_is_found_or_missed_and_judged_in_every_way(axis, monkeypatch)
     monkeypatch.setattr(person_crops, "detect", detected)
     torch.manual_seed(0)
     net = MobileParsingRCNN(NetworkConfig(width=16, axis=axis)).eval()
-    judge = person_crops.CropJudge(net, 64, DecodeConfig(long_side=96))
+    judge = person_crops.CropJudge(net, net, 64, DecodeConfig(long_side=96))
     judge.add(image)
     assert (judge.people, judge.missed) == (2, 1)
     ways = judge.table()["everybody found"]

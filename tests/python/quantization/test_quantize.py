@@ -1,18 +1,23 @@
 """Int8 graphs stay close to their float originals, and what must stay float does."""
 
+import cv2
 import numpy as np
 import onnx
 import onnxruntime
 import pytest
 import torch
+from rectangle_people import picture
 
-from export.densepose import export_onnx
-from export.densepose.config import NetworkConfig
+from export.bundle import BundleInfo
+from export.densepose import bundle, export_onnx
+from export.densepose.config import DecodeConfig, NetworkConfig
+from export.densepose.graphs import open_bundle
 from export.densepose.network import MobileParsingRCNN
+from export.shards import Record
 from quantization.analysis.errors import float_nodes_left, output_sqnr, sqnr_db
 from quantization.graphs.simplify import drop_unused_constants, fold_scalar_products, share_scales
 from quantization.quantize import equal_sizes, matching_nodes, quantize_graph
-from quantization.samples import spread
+from quantization.samples import collect, spread
 from quantization.settings import DENSEPOSE, DensePoseSettings, GraphSettings, read_settings
 
 WIDTH = 16
@@ -51,6 +56,19 @@ def test_the_int8_dense_head_is_small_and_close(folder, tmp_path):
     assert names == ["labels", "surface"]
 
 
+def test_biases_need_no_zero_points(folder, tmp_path):
+    quantize_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", rois(2, 7), GraphSettings())
+    graph = onnx.load(tmp_path / "box_head.onnx").graph
+    kinds = {value.name: value.data_type for value in graph.initializer}
+    read = [
+        n for n in graph.node if n.op_type == "DequantizeLinear" and kinds.get(n.input[0]) == onnx.TensorProto.INT32
+    ]
+    assert read
+    assert all(len(node.input) == 2 for node in read)
+    others = [n for n in graph.node if n.op_type == "DequantizeLinear" and n not in read]
+    assert all(len(node.input) == 3 for node in others)
+
+
 def test_named_nodes_stay_float(folder, tmp_path):
     settings = GraphSettings(float_nodes=("/predict/*",))
     quantize_graph(folder / "box_head.onnx", tmp_path / "box_head.onnx", rois(4, 7), settings)
@@ -82,7 +100,7 @@ def test_no_person_to_calibrate_with_is_an_error(folder, tmp_path):
 
 def test_the_shipped_settings_name_every_graph():
     settings = read_settings(DENSEPOSE, DensePoseSettings)
-    assert set(settings.graphs) == {"trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head"}
+    assert set(settings.graphs) == {*bundle.GRAPHS, "crop_trunk", "crop_dense_head"}
 
 
 @pytest.mark.parametrize("text", ["[trunk]\nmethod = 'magic'", "[trunk]\nbits = 4", "images = 3"])
@@ -93,6 +111,23 @@ def test_wrong_settings_are_errors(tmp_path, text):
     )
     with pytest.raises(ValueError, match=str(path)):
         read_settings(path, DensePoseSettings)
+
+
+def test_crops_of_labelled_people_calibrate_the_networks_of_crops(tmp_path):
+    torch.manual_seed(0)
+    net, crop_net = (MobileParsingRCNN(NetworkConfig(width=WIDTH)).eval() for _ in range(2))
+    export_onnx.export_graphs(net, tmp_path, crop_net)
+    bundle.write_manifest(tmp_path, BundleInfo("full", "fp32"), net.config, DecodeConfig(), crops=True)
+    image, label = picture(np.random.default_rng(0), people=2)
+    record = Record(*(cv2.imencode(".png", array)[1].tobytes() for array in (image, label)))
+    samples = collect(open_bundle(tmp_path), [record] * 3, people=4)
+    assert set(samples) == {*bundle.GRAPHS, *bundle.CROP_GRAPHS}
+    assert [s["image"].shape for s in samples["crop_trunk"]] == [(1, 3, 192, 192)] * 6  # of each person
+    assert [s["rois"].shape for s in samples["crop_dense_head"]] == [(1, 32, 32, WIDTH)] * 6
+    image = samples["crop_trunk"][0]["image"]
+    with torch.no_grad():
+        features = crop_net.finest(torch.from_numpy(image)).numpy()
+    assert samples["crop_dense_head"][0]["rois"].max() <= 1.001 * features.max(), "of the network of crops"
 
 
 def test_signal_to_noise_in_decibels():

@@ -68,7 +68,7 @@ class PersonCropping:
 
     count: int = 2
     tilt_degrees: float = 20.0
-    box_shake: float = 0.1
+    box_shake: float = 0.2
     coarse: float = 0.35
     coarse_px: tuple[float, float] = (32, 160)
 

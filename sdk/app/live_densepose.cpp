@@ -51,6 +51,7 @@ void LiveDensePose::open(const std::string& uri, const std::string& fallback) {
   fallback_ = fallback;
   fallback_reason_.clear();
   is_open_ = false;
+  is_awaited_ = true;
   states_.clear();
   pipeline_->set_source(uri);
 }
@@ -66,6 +67,9 @@ void LiveDensePose::take_result(PipelineResult result) {
 void LiveDensePose::take_state(maq_pipeline_state state, const char* problem) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
+    // Reports are queued: the last ones of the source before may come after open().
+    if (is_awaited_ && state != MAQ_PIPELINE_OPENING && state != pipeline_->info().state) return;
+    is_awaited_ = false;
     if (state == MAQ_PIPELINE_LOADING || state == MAQ_PIPELINE_RUNNING) is_open_ = true;
     if (states_.size() < kMaxStates) states_.push_back(state);
     if (falls_back(pipeline_->info().state)) {

@@ -82,7 +82,8 @@ class LiveDensePose {
 
   mutable std::mutex mutex_;  // of what follows to the next line
   std::string uri_, fallback_, fallback_reason_;
-  bool is_open_ = false;  // the source was opened
+  bool is_open_ = false;     // the source was opened
+  bool is_awaited_ = false;  // no state of the source was reported yet
   std::vector<maq_pipeline_state> states_;
 
   std::optional<Pipeline> pipeline_;  // last: its callbacks use the others

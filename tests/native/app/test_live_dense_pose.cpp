@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <future>
 #include <mutex>
 #include <thread>
 
@@ -130,6 +131,29 @@ TEST(LiveDensePose, TheCameraIsLostAndComesBack) {
   ASSERT_TRUE(people.until([&] { return people.frames() > before + 5; }));
   EXPECT_EQ(people.live.status().problem, "");
   EXPECT_FALSE(people.live.status().has_ended);
+}
+
+TEST(LiveDensePose, LateReportsOfTheSourceBeforeAreNotOfTheNewOne) {
+  std::promise<void> hold;
+  const std::shared_future<void> released = hold.get_future().share();
+  std::atomic<int> results{0};
+  const maquette::Context context;
+  maquette::LiveDensePose live(context, Live::config_of(kTinyBundle), [&](const maquette::PipelineResult&, double) {
+    if (++results == 1) released.wait();
+  });
+  const auto until = [](auto condition) {
+    for (int i = 0; i < 12000 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return condition();
+  };
+  live.open("stub:pattern?fps=50&size=64x48");
+  const bool is_held = until([&] { return results == 1; });
+  live.set_paused(true);  // reported later, since the pipeline is held
+  live.set_paused(false);
+  live.open("stub:pattern?fps=50&size=32x32");
+  hold.set_value();
+  ASSERT_TRUE(is_held);
+  const std::vector<maq_pipeline_state> expected{MAQ_PIPELINE_OPENING, MAQ_PIPELINE_RUNNING};
+  EXPECT_TRUE(until([&] { return results > 3 && live.status().states == expected; }));
 }
 
 TEST(LiveDensePose, EndsAfterAsManyResultsAsItWasAskedFor) {

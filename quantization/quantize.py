@@ -200,8 +200,10 @@ def main() -> None:
     held_out = spread(load_records(options.held_out), settings.held_out_images)
     options.out.mkdir(parents=True, exist_ok=True)
     crops = source.crop_graphs is not None
-    for charts in (bundle_format.CHARTS, *([bundle_format.CROP_CHARTS] if crops else [])):
-        shutil.copy(source.folder / charts, options.out)  # chart weights stay float
+    # Chart weights stay float. Those of the graphs that are kept belong to them.
+    shutil.copy((options.keep or source.folder) / bundle_format.CHARTS, options.out)
+    if crops:
+        shutil.copy(source.folder / bundle_format.CROP_CHARTS, options.out)
     for name in kept["graphs"]:
         shutil.copy(options.keep / f"{name}.onnx", options.out)
     wanted = {name: settings.graphs[name] for name in source.manifest["graphs"] if name not in kept["graphs"]}

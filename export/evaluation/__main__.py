@@ -12,9 +12,10 @@ from pathlib import Path
 from export.evaluation import photos, report
 from export.evaluation.backends import fingerprint, open_backend
 from export.evaluation.maquette_api import MaquetteError
-from export.evaluation.measure import Figures, measure
+from export.evaluation.measure import Figures, image_ranges, measure
 from export.evaluation.picture import write_picture
-from export.shards import count_images, read_images, shard_paths
+from export.jobs import Workers
+from export.shards import count_images, shard_paths
 
 EPILOG = """\
 backends, each `kind` or `kind=path`, separated by commas:
@@ -59,6 +60,7 @@ def main(argv: list[str] | None = None) -> int:
         "--score-floor", type=float, default=0.05, metavar="S",
         help="lowest score that enters AP (default 0.05)",
     )  # fmt: skip
+    Workers.add_arguments(parser, processes=0)
     parser.add_argument(
         "--out", type=Path, default=Path("build/evaluation"), metavar="DIR",
         help="for evaluation.json and evaluation.png (default: build/evaluation)",
@@ -66,7 +68,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     try:
         return run(arguments)
-    except (MaquetteError, FileNotFoundError, ValueError) as error:
+    except (MaquetteError, OSError, RuntimeError, ValueError) as error:
         print(f"Evaluation stopped: {error}", file=sys.stderr)
         return 1
 
@@ -77,18 +79,19 @@ def run(arguments: argparse.Namespace) -> int:
     paths = shard_paths(arguments.data)
     total = count_images(paths)
     total = total if arguments.limit is None else min(total, arguments.limit)
-    backends = [open_backend(text, arguments.score_floor) for text in arguments.backends.split(",")]
+    texts = arguments.backends.split(",")
+    backends = [open_backend(text, arguments.score_floor) for text in texts]
     table = load_surface_table()
     photo_set = photos.PhotoSet.find(arguments.photos, arguments.labels, arguments.empty)
     results: dict[str, Figures] = {}
     photo_results: dict[str, photos.PhotoFigures] = {}
     sources: dict[str, tuple[Path, str]] = {}
-    for backend in backends:
+    for text, backend in zip(texts, backends, strict=True):
         name = report.column_name(backend.kind, backend.precision)
         if name in results:
             name = f"{name} ({backend.path.name})"
-        images = read_images(paths, arguments.limit)
-        results[name] = measure(backend, images, table, total)
+        ranges = image_ranges(text, arguments.score_floor, paths, arguments.limit)
+        results[name] = measure(ranges, table, Workers.of(arguments))
         if photo_set.photos:
             photo_results[name] = photos.measure(backend, photo_set)
         sources[name] = (backend.path, fingerprint(backend.path))

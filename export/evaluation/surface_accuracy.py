@@ -81,6 +81,10 @@ class PixelAccuracy:
             gap = np.abs(label[right, 1 + axis].astype(np.int64) - iuv[right, 1 + axis].astype(np.int64))
             self.difference[axis] += np.bincount(gap, minlength=256)
 
+    def merge(self, other: PixelAccuracy) -> None:
+        self.confusion += other.confusion
+        self.difference += other.difference
+
     def part_accuracy(self) -> float:
         return fraction(np.trace(self.confusion[1:, 1:]), self.confusion[1:].sum())
 
@@ -137,6 +141,17 @@ class PointAccuracy:
             slices.append(slice(self._count, self._count + len(y)))
             self._count += len(y)
         self.images.append((slices, detections))
+
+    def merge(self, other: PointAccuracy) -> None:
+        """The other's images follow those that are here."""
+        for slices, detections in other.images:
+            moved = [slice(points.start + self._count, points.stop + self._count) for points in slices]
+            self.images.append((moved, detections))
+        for own, more in (
+            (self._point, other._point), (self._part, other._part), (self._iuv, other._iuv), (self._owner, other._owner)
+        ):  # fmt: skip
+            own += more
+        self._count += other._count
 
     def solve(self, table: SurfaceTable) -> SurfacePoints:
         if not self._point:

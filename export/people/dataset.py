@@ -3,21 +3,22 @@
     python -m export.people.dataset --split train --images 12000 --processes 2
     python -m export.people.dataset --variety wide --out .data/people-wide    # 640 x 512: small, tilted, crowded
 
-A shard is a function of (split, shard number) alone, so several machines can render one set with
-`--first-shard`. Format: docs/formats.md. Splits share no body, motion clip, fabric or photo.
+A shard is a function of (split, shard number) alone, so that many machines (`--cluster`) render the same set as one.
+Shards that are there are kept: a stopped run goes on where it was. Format: docs/formats.md. Splits share no
+body, motion clip, fabric or photo.
 """
 
 from __future__ import annotations
 
 import argparse
-import multiprocessing
-import os
+import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export.jobs import Workers, results
 from export.people.scene import SPLITS, Studio
 from export.people.variety import VARIETIES
 from export.shards import ShardWriter
@@ -37,6 +38,7 @@ _studios: dict[tuple[int, int], Studio] = {}
 
 
 def _work(job: tuple[str, int, int, Path, Path, bool, str]) -> int:
+    cv2.setNumThreads(1)
     split, number, images, out, places, bare, variety_name = job
     variety = VARIETIES[variety_name]
     size = variety.sizes[number % len(variety.sizes)]
@@ -46,13 +48,13 @@ def _work(job: tuple[str, int, int, Path, Path, bool, str]) -> int:
     return images
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--split", choices=SPLITS, default="train")
     parser.add_argument("--images", type=int, default=12000, help="rounded up to whole shards (default %(default)s)")
     parser.add_argument("--per-shard", type=int, default=200)
     parser.add_argument("--first-shard", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    Workers.add_arguments(parser)
     parser.add_argument("--out", type=Path, default=Path(".data/people"))
     parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
     parser.add_argument(
@@ -67,12 +69,15 @@ def main() -> None:
     common = (options.places, options.bare, options.variety)
     jobs = [(options.split, n, options.per_shard, out, *common) for n in shards]
     jobs = [job for job in jobs if not (out / f"shard-{job[1]:05d}.npz").exists()]
-    cv2.setNumThreads(1)
-    pool = multiprocessing.get_context("spawn").Pool(options.processes)
-    with pool, tqdm(total=len(jobs) * options.per_shard, unit="image") as bar:
-        for done in pool.imap_unordered(_work, jobs):
-            bar.update(done)
+    try:
+        with tqdm(total=len(jobs) * options.per_shard, unit="image") as bar:
+            for _, images in results(Workers.of(options).run(_work, jobs)):
+                bar.update(images)
+    except (OSError, RuntimeError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

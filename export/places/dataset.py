@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import shutil
 from dataclasses import asdict
 from pathlib import Path
@@ -21,13 +20,13 @@ import numpy as np
 from tqdm import tqdm
 
 from export.camera import Camera
+from export.jobs import Workers
 from export.places.assets import SPLITS
 from export.places.clouds import CloudFaults, CloudMaker, draw_faults
 from export.places.place import AXES, FORMAT
 from export.places.recipe import FRAMES, NothingSeenError, choose_exposure, choose_views, draw_place, generator
 from export.places.render import Renderer
 from export.places.rooms import Staged
-from export.places.workers import done
 from export.point_cloud import write_ply
 
 VERSION = "places-1"
@@ -150,12 +149,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--split", choices=SPLITS, default="train")
     parser.add_argument("--scenes", type=int, default=100, help="default %(default)s")
-    parser.add_argument("--first-seed", type=int, default=0, help="so that several machines can render one set")
+    parser.add_argument("--first-seed", type=int, default=0, help="of the first place (default %(default)s)")
     parser.add_argument("--frames", type=int, default=FRAMES, help="cameras of a place (default %(default)s)")
     parser.add_argument("--small", action="store_true", help="half the width and height, a quarter of the points")
     parser.add_argument("--exact", action="store_true", help="clouds without noise, holes or outliers")
     parser.add_argument("--plain", action="store_true", help="boxes instead of furniture: needs no package")
-    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    Workers.add_arguments(parser)
     parser.add_argument(
         "--max-seconds", type=float, default=600, help="a place that takes longer is left out (default %(default)s)"
     )
@@ -172,11 +171,11 @@ def main() -> None:
     missing = [job for job in jobs if not job[2].exists()]
     lost = 0
     with tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit="place") as bar:
-        for job, error in done(_work, missing, options.processes, options.max_seconds):
+        for done in Workers.of(options, options.max_seconds).run(_work, missing):
             bar.update()
-            if error is not None:
+            if done.error is not None:
                 lost += 1
-                tqdm.write(f"{job[2].name} is left out: {error}")
+                tqdm.write(f"{done.job[2].name} is left out: {done.error}")
     if lost == len(missing) > 0:
         raise SystemExit(f"None of {lost} places could be rendered; the lines above say why.")
 

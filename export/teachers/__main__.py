@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import sys
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export.jobs import Workers, results
 from export.photos.packages import PackageError
 from export.teachers.label import PhotoLabels, draw, label_photo
 
@@ -36,6 +38,7 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
     parser.add_argument("--force", action="store_true", help="ask again for photos that have labels")
+    Workers.add_arguments(parser)
     arguments = parser.parse_args(argv)
     every = [path for folder in arguments.photos for path in sorted(folder.glob("*"))]
     photos = [path for path in every if path.suffix in (".jpg", ".jpeg", ".png")]
@@ -44,8 +47,8 @@ def main(argv: list[str] | None = None) -> int:
         print(f"No photos in {folders}: run `python -m export.photos people` first.", file=sys.stderr)
         return 1
     try:
-        found = label_all(photos, arguments.out, arguments.force)
-    except PackageError as error:
+        found = label_all(photos, arguments.out, Workers.of(arguments), arguments.force)
+    except (PackageError, OSError, RuntimeError) as error:
         print(error, file=sys.stderr)
         return 1
     tiles = [tile(draw(cv2.imread(str(path)), labels)) for path, labels in found.items()]
@@ -58,18 +61,23 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def label_all(photos: list[Path], out: Path, force: bool = False) -> dict[Path, PhotoLabels]:
-    teachers = None
-    found = {}
-    for photo in tqdm(photos, desc="labelling", unit="photo", disable=None):
-        path = out / f"{photo.stem}.npz"
-        if force or not path.exists():
-            teachers = teachers or _teachers()
-            label_photo(cv2.imread(str(photo)), *teachers).save(path)
-        found[photo] = PhotoLabels.load(path)
-    return found
+def label_all(photos: list[Path], out: Path, workers: Workers, force: bool = False) -> dict[Path, PhotoLabels]:
+    """Labels of every photo, made now or earlier, in `out`."""
+    out.mkdir(parents=True, exist_ok=True)
+    files = {photo: out / f"{photo.stem}.npz" for photo in photos}
+    jobs = [(photo, path) for photo, path in files.items() if force or not path.exists()]
+    with tqdm(total=len(photos), initial=len(photos) - len(jobs), desc="labelling", unit="photo", disable=None) as bar:
+        for _ in results(workers.run(_label, jobs)):
+            bar.update()
+    return {photo: PhotoLabels.load(path) for photo, path in files.items()}
 
 
+def _label(job: tuple[Path, Path]) -> None:
+    photo, path = job
+    label_photo(cv2.imread(str(photo)), *_teachers()).save(path)
+
+
+@functools.cache
 def _teachers():
     from export.teachers.detector import PersonDetector
     from export.teachers.landmarks import LandmarkNetwork

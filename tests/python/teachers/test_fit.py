@@ -214,6 +214,8 @@ def test_photos_with_fits_are_not_fitted_again(tmp_path, monkeypatch, capsys):
         str(tmp_path / "labels"),
         "--out",
         str(tmp_path / "fits"),
+        "--processes",
+        "0",
     ]
     assert fit.main(arguments) == fit.main(arguments) == 0
     assert fake.asked == 1

@@ -90,7 +90,7 @@ def _serve(connection: Connection, work: Work) -> None:
             return
         try:
             outcome = (work(job), None)
-        except Exception as error:  # whoever waits reports it
+        except Exception as error:  # the process that waits reports it
             outcome = (None, error)
         try:
             connection.send(outcome)

@@ -6,8 +6,9 @@
     python -m benchmarks --publish        also copies the report to docs/benchmarks
 
 Parts: frames (people, pixels, threads; start, memory), start (libraries, their size, CPU time), window (what an app
-with a window waits for), sweep (error against run time), agreement (int8 against fp32), peers (other runtimes and the
-roofline), cameras (how frames get to the app), scenes (new views of captured scenes).
+with a window waits for), sweep (error against run time), person_sizes (the same for small, tilted and crowded people),
+agreement (int8 against fp32), peers (other runtimes and the roofline), cameras (how frames get to the app), scenes (new
+views of captured scenes).
 The report holds the parts that were measured, now or in the last run.
 Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
@@ -30,7 +31,7 @@ from export.evaluation.maquette_api import MaquetteError
 from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-4"
-PARTS = ("frames", "start", "window", "sweep", "agreement", "peers", "cameras", "scenes")
+PARTS = ("frames", "start", "window", "sweep", "person_sizes", "agreement", "peers", "cameras", "scenes")
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -47,6 +48,18 @@ def main(argv: list[str] | None = None) -> int:
         "--data", type=Path, default=Path(".data/people/test"), metavar="DIR", help="rendered people; made if not there"
     )
     parser.add_argument("--images", type=int, default=150, help="of them (default 150)")
+    parser.add_argument(
+        "--wide-data", type=Path, default=Path(".data/people-wide/test"), metavar="DIR",
+        help="rendered people of all sizes, tilted and in crowds; made if not there",
+    )  # fmt: skip
+    parser.add_argument(
+        "--photos", type=Path, default=Path(".data/photos"), metavar="DIR",
+        help="photographs of people (python -m export.photos people)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR",
+        help="what other networks say of them (python -m export.teachers)",
+    )  # fmt: skip
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
@@ -105,6 +118,8 @@ def measure(options: argparse.Namespace) -> dict:
     if "sweep" in options.only:
         document["sweep"], found = sweep_part(options, float_bundle_in(options.out))
         figures |= found
+    if "person_sizes" in options.only:
+        document["person_sizes"] = person_sizes_part(options)
     if "agreement" in options.only:
         document["agreement"], found = agreement_part(options, float_bundle_in(options.out))
         figures |= found
@@ -148,15 +163,20 @@ def float_bundle_in(folder: Path) -> Path:
     return target
 
 
-def test_images(options: argparse.Namespace) -> list:
-    if not list(options.data.glob("shard-*.npz")):
-        print(f"Rendering {options.images} images into {options.data}")
+def rendered_people(folder: Path, images: int, *more: str) -> list:
+    """The first images of a test set, which is rendered where it is not there. more: options of the renderer."""
+    if not list(folder.glob("shard-*.npz")):
+        print(f"Rendering {images} images into {folder}")
         commands = [["export.people.assets"], ["export.photos", "fetch"]]
-        commands.append(["export.people.dataset", "--split", "test", "--images", str(options.images), "--out",
-                         str(options.data.parent), "--per-shard", "150"])  # fmt: skip
+        commands.append(["export.people.dataset", "--split", "test", "--images", str(images), "--out",
+                         str(folder.parent), "--per-shard", "150", *more])  # fmt: skip
         for command in commands:
             subprocess.run([sys.executable, "-m", *command], check=True)
-    return list(read_images(shard_paths(options.data), 30 if options.quick else options.images))
+    return list(read_images(shard_paths(folder), images))
+
+
+def test_images(options: argparse.Namespace) -> list:
+    return rendered_people(options.data, options.images)[: 30 if options.quick else options.images]
 
 
 def sweep_part(options: argparse.Namespace, float_bundle: Path) -> tuple[list[dict], dict[str, float]]:
@@ -174,6 +194,27 @@ def sweep_part(options: argparse.Namespace, float_bundle: Path) -> tuple[list[di
     by_name = {row["setting"]: row for row in rows}
     loss = 100 * (by_name["as shipped"]["error"] - by_name["fp32"]["error"])
     return rows, {"int8_gps_loss_points": round(loss, 2)}
+
+
+def person_sizes_part(options: argparse.Namespace) -> list[dict]:
+    from benchmarks import person_sizes
+    from export.bundle import read_manifest
+    from export.evaluation import views
+    from export.evaluation.photos import PhotoSet
+    from export.people.atlas import load_surface_table
+
+    photos = options.photos
+    chosen = PhotoSet.find([photos / "photo", photos / "test"], options.labels, [])
+    moments = PhotoSet.find([photos / "views"], options.labels, [])
+    images = 10 if options.quick else 100
+    pictures = person_sizes.Pictures(
+        rendered=rendered_people(options.wide_data, images, "--variety", "wide"),
+        photographs=chosen,
+        moments=moments,
+        cameras=views.calibrated_cameras() if moments.photos else [],
+    )
+    threshold = read_manifest(INT8)["box_head"]["score_threshold"]
+    return person_sizes.measure(pictures, INT8, load_surface_table(), threshold, threads=options.threads)
 
 
 def agreement_part(options: argparse.Namespace, float_bundle: Path) -> tuple[dict, dict[str, float]]:

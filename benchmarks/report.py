@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section, start, window
+from benchmarks import camera_section, person_sizes, start, window
 from benchmarks.scenes import pictures as scene_pictures
 from benchmarks.scenes import section as scene_section
 from benchmarks.sweep import pareto
@@ -119,6 +119,7 @@ def runtimes(document: dict) -> plt.Figure:
 # Pictures, what draws each, and the part of the document that it cannot do without.
 PICTURES = {
     "error-against-run-time.png": (error_against_time, "sweep"),
+    "people-at-any-size.png": (person_sizes.draw, "person_sizes"),
     "scaling.png": (scaling, "frames"),
     "stages.png": (stages, "frames"),
     "runtimes.png": (runtimes, "peers"),
@@ -211,6 +212,7 @@ def agreement_section(agreement: dict) -> Section:
 
 SECTIONS = {
     "sweep": sweep_section,
+    "person_sizes": person_sizes.section,
     "frames": frames_section,
     "start": start.section,
     "window": window.section,

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from export.evaluation.backends import Prediction
 from export.evaluation.maquette_api import DensePose
-from export.evaluation.measure import measure as measure_figures
+from export.evaluation.measure import Tally
 from export.evaluation.surface_accuracy import SurfaceTable
 from export.shards import LabelledImage
 
@@ -150,7 +150,10 @@ def measure(
     for column in columns:
         column.close()
         backend = Replay(column, column.setting.bundle, bundles[column.setting.bundle], threshold)
-        figures = measure_figures(backend, images, table, len(images))
+        tally = Tally(threshold)
+        for image in images:
+            tally.add(backend, image)
+        figures = tally.figures(table)
         measured.append(
             Measured(
                 setting=column.setting,

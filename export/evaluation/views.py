@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -163,17 +164,23 @@ def judge_views(labels: dict[str, dict[int, np.ndarray]], cameras: list[Calibrat
     return ViewFigures(median, by_chance, 1 - median / by_chance, pairs, len(every) / asked)
 
 
-def measure(
-    backend: Backend, folder: Path, teachers: Path, cameras: list[CalibratedCamera]
+def judge(
+    predict: Callable[[Path], Prediction], threshold: float, chosen: PhotoSet, cameras: list[CalibratedCamera]
 ) -> tuple[ViewFigures, Tally]:
-    tally, labels = Tally(backend.threshold), {}
-    for path in tqdm(sorted(folder.glob("*.jpg")), desc=backend.kind, unit="photo", disable=None):
-        found = backend.predict(read_photo(path))
+    """predict: what is found in a photo of `chosen`; each is called once, in order."""
+    tally, labels = Tally(threshold), {}
+    for path in chosen.photos:
+        found = predict(path)
         moment, _, camera = path.stem.rpartition("-cam")
-        labels.setdefault(moment, {})[int(camera) - 1] = largest_person(found.above(backend.threshold))
-        if (file := teachers / f"{path.stem}.npz").exists():
-            tally.add(path.name, found, PhotoLabels.load(file))
+        labels.setdefault(moment, {})[int(camera) - 1] = largest_person(found.above(threshold))
+        tally.add(path.name, found, PhotoLabels.load(chosen.labels / f"{path.stem}.npz"))
     return judge_views(labels, cameras), tally
+
+
+def calibrated_cameras() -> list[CalibratedCamera]:
+    """Those of the package's take. Raises PackageError."""
+    with PackageReader(fetch(load_packages()[PACKAGE])) as reader:
+        return read_cameras(reader.read(CALIBRATION).decode())
 
 
 def main() -> None:
@@ -183,16 +190,22 @@ def main() -> None:
     parser.add_argument("--backends", default="capi", help="as for export.evaluation (default %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("build/evaluation/views.json"), metavar="FILE")
     options = parser.parse_args()
-    if not PhotoSet.find([options.photos], options.labels, []).photos:
+    chosen = PhotoSet.find([options.photos], options.labels, [])
+    if not chosen.photos:
         parser.error(
             f"no labels of {options.photos} in {options.labels}: python -m export.teachers --photos {options.photos}"
         )
-    with PackageReader(fetch(load_packages()[PACKAGE])) as reader:
-        cameras = read_cameras(reader.read(CALIBRATION).decode())
+    cameras = calibrated_cameras()
     results = {}
     for text in options.backends.split(","):
         backend = open_backend(text, 0.05)
-        views, tally = measure(backend, options.photos, options.labels, cameras)
+        with tqdm(total=len(chosen.photos), desc=backend.kind, unit="photo", disable=None) as bar:
+
+            def predict(path: Path, backend: Backend = backend, bar: tqdm = bar) -> Prediction:
+                bar.update()
+                return backend.predict(read_photo(path))
+
+            views, tally = judge(predict, backend.threshold, chosen, cameras)
         figures, name = tally.figures(), f"{backend.precision} {backend.kind} {backend.path}"
         print_figures(name, figures)
         print(f"views: median {views.median_px:.1f} px, at random in a part {views.random_px:.1f} px, "

@@ -191,6 +191,8 @@ def document():
                 "warnings": []}  # fmt: skip
     unseen = {"rows": [], "places": [], "speed": {}, "speed_missing": "no <networks>", "warnings": ["0 real places"],
               "sheet": ""}  # fmt: skip
+    sizes = [{"setting": "288 px", "axis": "no crops", "ms": 5.0, "rendered": None, "views": None,
+              "photographs": dict.fromkeys(("recall", "mask", "part", "side"), 0.5)}]  # fmt: skip
     processes = {kind: {"libraries": ["libc.so.6"], "cpu_ms": [2.0]} for kind in start.NAMES}
     file = {"name": "libmaquette.so", "bytes": 10**6, "needed": ["libc.so.6"]}
     live = dict.fromkeys(("opening_ms", "running_ms", "result_ms", "lost_ms", "back_ms", "longest_call_ms"), 1.0)
@@ -199,7 +201,7 @@ def document():
              "demo_missing": "there is no <Xvfb>", "warnings": []}  # fmt: skip
     return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "window": waits,
             "start": {"processes": processes, "files": {"library": file}, "warnings": []},
-            "frames": frames, "sweep": rows, "threads": 2, "quick": True, "gates": [gate],
+            "frames": frames, "sweep": rows, "person_sizes": sizes, "threads": 2, "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
 
@@ -224,6 +226,6 @@ def test_a_report_holds_its_figures_and_pictures(tmp_path):
     assert "fp32 &lt;slow&gt;" in page
     assert "Not measured in the virtual machine: not run: no <qemu>." in text
     assert "Time of a frame was not measured: no <networks>." in text
-    assert page.count("data:image/png;base64,") == 4
+    assert page.count("data:image/png;base64,") == 5
     assert "| as shipped | 10.0 | 0.600 | 6.0 | 0.500 | 0.600 | ● |" in text
     assert "| fp32 <slow> | 20.0 | 0.610 | 6.1 | 0.500 | 0.600 |  |" in text

@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     texts = arguments.backends.split(",")
     backends = [open_backend(text, arguments.score_floor) for text in texts]
     table = load_surface_table()
-    photo_set = photos.PhotoSet.find(arguments.photos, arguments.labels, arguments.empty)
+    photo_set = photos.PhotoSet.find(arguments.photos, arguments.labels, arguments.empty, arguments.animals)
     results: dict[str, Figures] = {}
     photo_results: dict[str, photos.PhotoFigures] = {}
     sources: dict[str, tuple[Path, str]] = {}
@@ -107,7 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
     data = {"folder": str(arguments.data), "shards": len(paths), "images": total, "limit": arguments.limit,
             "score_floor": arguments.score_floor,
             "photos": [str(folder) for folder in arguments.photos],
-            "empty": [str(folder) for folder in arguments.empty]}  # fmt: skip
+            "empty": [str(folder) for folder in arguments.empty],
+            "animals": [str(folder) for folder in arguments.animals]}  # fmt: skip
     report.write_json(arguments.out / "evaluation.json", results, photo_results, sources, data)
     write_picture(arguments.out / "evaluation.png", results, photo_results)
     print(f"Written: {arguments.out / 'evaluation.json'}, {arguments.out / 'evaluation.png'}")

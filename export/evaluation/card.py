@@ -208,6 +208,9 @@ Definitions: `python -m export.evaluation.photos --help`.
             _number(photos["false_people"], "rate"),
         )
     )
+    if photos.get("animal_photos"):
+        label = f"people shown in a photo of animals ({photos['animal_photos']} photos)"
+        rows.append((label, _number(photos["false_people_by_animals"], "rate")))
     groups = _groups("By group of people, photographs", "part at landmark", photos["groups"])
     return title + text + _table(("figure", "value"), rows) + "\n" + groups
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
@@ -64,7 +64,7 @@ figures:
   part at landmark         fraction of visible landmarks of those people with one of the parts painted there that belong
                            there; nothing painted is wrong
   left/right               of the landmarks of limbs with a limb painted, those with the right side
-  false people             shown per photo without people
+  false people             shown per photo without people; per photo of animals
 
 example:
   python -m export.teachers && python -m export.evaluation.photos --backends capi
@@ -73,17 +73,20 @@ example:
 
 @dataclass(frozen=True)
 class PhotoSet:
-    """photos: image files that have labels; labels: folder of NAME.npz (PhotoLabels); empty: photos of nobody."""
+    """photos: image files that have labels; labels: folder of NAME.npz (PhotoLabels); empty: photos of nobody;
+    animals: photos of animals and nobody."""
 
     photos: list[Path]
     labels: Path
     empty: list[Path]
+    animals: list[Path] = field(default_factory=list)
 
     @staticmethod
-    def find(photos: list[Path], labels: Path, empty: list[Path]) -> PhotoSet:
+    def find(photos: list[Path], labels: Path, empty: list[Path], animals: list[Path] | None = None) -> PhotoSet:
         every = [p for folder in photos for p in sorted(folder.glob("*"))]
         labelled = [p for p in every if (labels / f"{p.stem}.npz").exists()]
-        return PhotoSet(labelled, labels, [p for folder in empty for p in sorted(folder.glob("*.jpg"))])
+        nobody, beasts = ([p for f in folders for p in sorted(f.glob("*.jpg"))] for folders in (empty, animals or []))
+        return PhotoSet(labelled, labels, nobody, beasts)
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,8 @@ class PhotoFigures:
     left_right: float
     empty_photos: int
     false_people: float
+    animal_photos: int
+    false_people_by_animals: float
     landmark: dict[str, float]
     calibration: Calibration
     groups: list[GroupFigures]
@@ -117,8 +122,9 @@ class Tally:
         self.people: list[PersonRecord] = []
         self.alarms: list[FalseAlarm] = []
         self.in_empty: list[FalseAlarm] = []
+        self.by_animals: list[FalseAlarm] = []
         self.landmarks: dict[str, list[bool]] = {name: [] for name in _ALLOWED}
-        self.photos = self.empty = 0
+        self.photos = self.empty = self.animals = 0
 
     def add(self, name: str, found: Prediction, labels: PhotoLabels) -> None:
         self.photos += 1
@@ -168,11 +174,16 @@ class Tally:
                 sides.append(side == (1 if name.startswith("left") else 2))
         return len(hits), sum(hits), len(sides), int(sum(sides))
 
-    def add_empty(self, name: str, found: Prediction) -> None:
-        """found: on a photo without people."""
-        self.empty += 1
+    def add_empty(self, name: str, found: Prediction, animals: bool = False) -> None:
+        """found: on a photo without people, of animals or not."""
         nobody = np.zeros((0, 4)), np.zeros(0, bool)
-        self.in_empty += compare(found, *nobody, self.threshold).false_alarms(name)
+        alarms = compare(found, *nobody, self.threshold).false_alarms(name)
+        if animals:
+            self.animals += 1
+            self.by_animals += alarms
+        else:
+            self.empty += 1
+            self.in_empty += alarms
 
     def figures(self) -> PhotoFigures:
         right = sum(person.found for person in self.people)
@@ -188,10 +199,12 @@ class Tally:
             left_right=left_right(self.people),
             empty_photos=self.empty,
             false_people=fraction(len(self.in_empty), self.empty),
+            animal_photos=self.animals,
+            false_people_by_animals=fraction(len(self.by_animals), self.animals),
             landmark={name: fraction(sum(hits), len(hits)) for name, hits in self.landmarks.items()},
             calibration=calibrate(self.matches),
             groups=breakdown(self.people),
-            failures=worst_cases(self.people, self.alarms + self.in_empty, MIN_LIMB_LANDMARKS),
+            failures=worst_cases(self.people, self.alarms + self.in_empty + self.by_animals, MIN_LIMB_LANDMARKS),
         )
 
 
@@ -209,14 +222,14 @@ def recall_at_precision(matches: list[ImageMatches], precision: float) -> float:
 
 def measure(backend: Backend, chosen: PhotoSet) -> PhotoFigures:
     tally = Tally(backend.threshold)
-    total = len(chosen.photos) + len(chosen.empty)
+    total = len(chosen.photos) + len(chosen.empty) + len(chosen.animals)
     with tqdm(total=total, desc=f"{backend.kind} {backend.precision}", unit="photo", disable=None) as bar:
         for path in chosen.photos:
             labels = PhotoLabels.load(chosen.labels / f"{path.stem}.npz")
             tally.add(path.name, backend.predict(read_photo(path)), labels)
             bar.update()
-        for path in chosen.empty:
-            tally.add_empty(path.name, backend.predict(read_photo(path)))
+        for path in chosen.empty + chosen.animals:
+            tally.add_empty(path.name, backend.predict(read_photo(path)), path in chosen.animals)
             bar.update()
     return tally.figures()
 
@@ -230,7 +243,7 @@ def read_photo(path: Path) -> np.ndarray:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """--photos, --labels and --empty: the folders of a PhotoSet."""
+    """--photos, --labels, --empty and --animals: the folders of a PhotoSet."""
     folder = Path(".data/photos")
     parser.add_argument(
         "--photos", type=Path, nargs="+", default=[folder / "photo", folder / "test"], metavar="DIR",
@@ -241,6 +254,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--empty", type=Path, nargs="+", default=[Path(".data/backgrounds/test"), folder / "empty"], metavar="DIR",
         help="photos of nobody",
     )  # fmt: skip
+    parser.add_argument(
+        "--animals", type=Path, nargs="+", default=[folder / "animals"], metavar="DIR", help="photos of animals"
+    )
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -252,7 +268,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--backends", default="capi", help="as for export.evaluation; default: capi")
     parser.add_argument("--out", type=Path, default=Path("build/evaluation/photos.json"), metavar="FILE")
     arguments = parser.parse_args(argv)
-    chosen = PhotoSet.find(arguments.photos, arguments.labels, arguments.empty)
+    chosen = PhotoSet.find(arguments.photos, arguments.labels, arguments.empty, arguments.animals)
     if not chosen.photos:
         print(f"No labels in {arguments.labels}: run `python -m export.teachers` first.", file=sys.stderr)
         return 1
@@ -287,6 +303,7 @@ def print_figures(name: str, figures: PhotoFigures) -> None:
         ("part at landmark", figures.part_at_landmark),
         ("left/right", figures.left_right),
         (f"false people a photo ({figures.empty_photos} photos)", figures.false_people),
+        (f"false people a photo of animals ({figures.animal_photos} photos)", figures.false_people_by_animals),
         *figures.landmark.items(),
     ]
     for label, value in rows:

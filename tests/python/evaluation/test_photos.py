@@ -91,6 +91,10 @@ def test_people_in_empty_photos_are_counted_from_the_threshold_on():
     for found in (painted(2, score=0.8), painted(2, score=0.4), NOBODY, NOBODY):
         tally.add_empty("room.jpg", found)
     assert tally.figures().false_people == 0.25
+    assert np.isnan(tally.figures().false_people_by_animals)
+    tally.add_empty("dog.jpg", painted(2, score=0.8), animals=True)
+    assert (tally.figures().false_people, tally.figures().false_people_by_animals) == (0.25, 1)
+    assert (tally.figures().empty_photos, tally.figures().animal_photos) == (4, 1)
 
 
 def test_recall_at_precision_takes_the_best_cut():

@@ -41,13 +41,21 @@ def test_no_photograph_is_both_trained_on_and_tested_on():
     assert len({p.name for p in photos}) == len({(p.package, p.member) for p in photos}) == len(photos)
     looked_at = {(m.package, m.member) for m in people.load_people()}
     assert not looked_at & {(p.package, p.member) for p in photos}
-    assert {p.split for p in photos} == {"train", "val", "test", "empty", "views"}
+    assert {p.split for p in photos} == {"train", "val", "test", "empty", "animals", "views"}
+
+
+def test_no_animal_of_the_test_stands_in_the_background_of_training():
+    tested = {(p.package, p.member) for p in backgrounds.load_photographs() if p.split == "animals"}
+    assert len(tested) >= 9
+    assert not tested & {(p.package, p.member) for p in backgrounds.load_backgrounds()}
 
 
 def test_photographs_without_a_licence_for_more_are_tested_on_alone():
     listed = packages.load_packages()
     for photo in backgrounds.load_photographs():
-        assert photo.split in ("test", "empty") or "tests only" not in listed[photo.package].licence, photo.name
+        assert photo.split in ("test", "empty", "animals") or "tests only" not in listed[photo.package].licence, (
+            photo.name
+        )
 
 
 def test_nothing_of_the_performance_that_checks_views_is_trained_on():

@@ -59,6 +59,13 @@ test-hostile: packages-test build  ## some 4,000 hostile inputs to the built pro
 	@scripts/make-venv.sh
 	@.venv/bin/python -m tests.hostile --json build/hostile.json
 
+.PHONY: test-android
+test-android: build  ## the Kotlin API of android/ on this machine's Java, with the built library; not part of `test` yet
+	@scripts/install-packages.sh android
+	@cmake --preset release -DMAQ_BUILD_JNI=ON >/dev/null
+	@cmake --build --preset release -j $(JOBS) --target maquette_jni
+	@scripts/test-android.sh
+
 .PHONY: test-newcomer
 test-newcomer:  ## the commands of README.md in a bare Debian, from top to bottom; needs root; not part of `test`
 	@scripts/install-packages.sh newcomer

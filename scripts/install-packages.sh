@@ -7,16 +7,17 @@
 #   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (120 MB)
 #   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (35 MB)
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
+#   scripts/install-packages.sh android     + Java and Maven
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,12s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,13s/^# \{0,1\}//p' "$0"; }
 
 group="${1:-}"
 case "$group" in
-    demo | desktop | test | isa | camera-vm | lint | newcomer) ;;
+    demo | desktop | test | isa | camera-vm | lint | android | newcomer) ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
 esac
@@ -83,6 +84,10 @@ fi
 if [ "$group" = lint ]; then
     needs_command clang-format clang-format
     needs_command clang-tidy clang-tidy
+fi
+if [ "$group" = android ]; then
+    needs_command javac openjdk-17-jdk-headless
+    needs_command mvn maven           # brings Kotlin, and Android's classes to test against
 fi
 [ "$group" != newcomer ] || needs_command debootstrap debootstrap
 

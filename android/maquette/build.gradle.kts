@@ -1,0 +1,55 @@
+plugins {
+    id("com.android.library")
+    kotlin("android")
+    `maven-publish`
+}
+
+group = "dev.maquette"
+version = "0.2.0"
+
+android {
+    namespace = "dev.maquette"
+    compileSdk = 35
+    ndkVersion = "28.2.13676358"
+
+    defaultConfig {
+        minSdk = 26
+        consumerProguardFiles("consumer-rules.pro")
+        ndk { abiFilters += listOf("arm64-v8a", "x86_64") }
+        externalNativeBuild {
+            cmake { arguments += listOf("-DANDROID_STL=c++_static", "-DANDROID_SUPPORT_FLEXIBLE_PAGE_SIZES=ON") }
+        }
+    }
+    externalNativeBuild {
+        cmake {
+            path = file("src/main/cpp/CMakeLists.txt")
+            version = "3.31.6"
+        }
+    }
+    compileOptions {
+        sourceCompatibility = JavaVersion.VERSION_17
+        targetCompatibility = JavaVersion.VERSION_17
+    }
+    publishing { singleVariant("release") { withSourcesJar() } }
+}
+
+kotlin { jvmToolchain(17) }
+
+publishing {
+    publications {
+        register<MavenPublication>("release") {
+            artifactId = "maquette"
+            afterEvaluate { from(components["release"]) }
+            pom {
+                name = "Maquette"
+                description = "On-device vision: dense pose and scenes from a camera, on the CPU"
+                licenses {
+                    license {
+                        name = "Apache-2.0"
+                        url = "https://www.apache.org/licenses/LICENSE-2.0"
+                    }
+                }
+            }
+        }
+    }
+}

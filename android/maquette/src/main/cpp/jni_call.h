@@ -1,0 +1,98 @@
+// What every native method shares: statuses of the C API as Java exceptions, and values that cross the border.
+#pragma once
+
+#include <jni.h>
+
+#include <cstring>
+#include <exception>
+#include <new>
+#include <string>
+#include <type_traits>
+
+#include "maquette/maquette.h"
+
+// A native method of the object dev.maquette.Native.
+#define MAQ_NATIVE(type, name) extern "C" JNIEXPORT type JNICALL Java_dev_maquette_Native_##name
+
+namespace maq_jni {
+
+// A call of the C API that did not return MAQ_OK.
+struct StatusError {
+  maq_status status;
+  std::string message;
+};
+
+// A Java exception is pending already.
+struct PendingException {};
+
+inline void check(maq_status status) {
+  if (status != MAQ_OK) throw StatusError{status, maq_last_error(nullptr)};
+}
+
+inline void refuse(const char* message) { throw StatusError{MAQ_ERROR_INVALID_ARGUMENT, message}; }
+
+inline void check_pending(JNIEnv* env) {
+  if (env->ExceptionCheck()) throw PendingException();
+}
+
+// Throws dev.maquette.MaquetteException. The message crosses as bytes: JNI's own strings are not quite UTF-8, and may
+// end the process where a path is not.
+inline void throw_status(JNIEnv* env, maq_status status, const std::string& message) {
+  jclass type = env->FindClass("dev/maquette/MaquetteException");
+  if (type == nullptr) return;  // what FindClass threw is pending
+  jmethodID constructor = env->GetMethodID(type, "<init>", "(I[B)V");
+  if (constructor == nullptr) return;
+  jbyteArray bytes = env->NewByteArray(jsize(message.size()));
+  if (bytes == nullptr) return;
+  env->SetByteArrayRegion(bytes, 0, jsize(message.size()), reinterpret_cast<const jbyte*>(message.data()));
+  jobject error = env->NewObject(type, constructor, jint(status), bytes);
+  if (error != nullptr) env->Throw(jthrowable(error));
+}
+
+// Runs the body of a native method; what it throws becomes a Java exception, and the value 0.
+template <typename Body>
+auto call(JNIEnv* env, Body body) -> decltype(body()) {
+  try {
+    return body();
+  } catch (const PendingException&) {
+  } catch (const StatusError& error) {
+    throw_status(env, error.status, error.message);
+  } catch (const std::bad_alloc&) {
+    throw_status(env, MAQ_ERROR_OUT_OF_MEMORY, "There is not enough memory for this call.");
+  } catch (const std::exception& error) {
+    throw_status(env, MAQ_ERROR_INTERNAL, error.what());
+  }
+  if constexpr (!std::is_void_v<decltype(body())>) return {};
+}
+
+// Handles of the C API cross as numbers; 0 is NULL.
+template <typename Object>
+Object* object(jlong handle) {
+  return reinterpret_cast<Object*>(handle);
+}
+template <typename Object>
+jlong handle(Object* object) {
+  return reinterpret_cast<jlong>(object);
+}
+
+// UTF-8 of a byte array; "" of null.
+inline std::string text(JNIEnv* env, jbyteArray utf8) {
+  if (utf8 == nullptr) return {};
+  std::string value(size_t(env->GetArrayLength(utf8)), '\0');
+  env->GetByteArrayRegion(utf8, 0, jsize(value.size()), reinterpret_cast<jbyte*>(value.data()));
+  return value;
+}
+
+struct Memory {
+  uint8_t* data = nullptr;
+  size_t size_bytes = 0;
+};
+
+// The memory of a direct java.nio.ByteBuffer, from its start to its capacity.
+inline Memory memory_of(JNIEnv* env, jobject buffer) {
+  void* const data = buffer == nullptr ? nullptr : env->GetDirectBufferAddress(buffer);
+  if (data == nullptr) refuse("The buffer is not direct: make it with ByteBuffer.allocateDirect.");
+  return {static_cast<uint8_t*>(data), size_t(env->GetDirectBufferCapacity(buffer))};
+}
+
+}  // namespace maq_jni

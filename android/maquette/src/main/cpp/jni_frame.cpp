@@ -1,0 +1,157 @@
+// Frames: decoded, or wrapped around direct buffers of the app.
+#include <array>
+#include <memory>
+
+#include "jni_call.h"
+
+using maq_jni::call;
+using maq_jni::check;
+using maq_jni::handle;
+using maq_jni::Memory;
+using maq_jni::object;
+
+namespace {
+
+JavaVM* java = nullptr;
+
+// Buffers of the app that a frame lies in.
+struct Held {
+  std::array<jobject, 2> buffers{};
+
+  void release(JNIEnv* env) {
+    for (jobject buffer : buffers) {
+      if (buffer != nullptr) env->DeleteGlobalRef(buffer);
+    }
+  }
+};
+
+// Called on the thread that released the frame last, which may be one of the library's own.
+void release_buffers(void* user_data) {
+  const std::unique_ptr<Held> held(static_cast<Held*>(user_data));
+  JNIEnv* env = nullptr;
+  if (java->GetEnv(reinterpret_cast<void**>(&env), JNI_VERSION_1_6) == JNI_OK) {
+    held->release(env);
+    return;
+  }
+#ifdef __ANDROID__
+  const jint attached = java->AttachCurrentThread(&env, nullptr);
+#else
+  const jint attached = java->AttachCurrentThread(reinterpret_cast<void**>(&env), nullptr);
+#endif
+  if (attached != JNI_OK) return;  // the virtual machine ends, and all its objects with it
+  held->release(env);
+  java->DetachCurrentThread();
+}
+
+int64_t rows_of(maq_pixel_format format, int plane, int64_t height_px) {
+  return format == MAQ_PIXEL_NV12 && plane == 1 ? (height_px + 1) / 2 : height_px;
+}
+
+int64_t row_bytes(maq_pixel_format format, int64_t width_px) {
+  switch (format) {
+    case MAQ_PIXEL_RGB8:
+    case MAQ_PIXEL_BGR8: return 3 * width_px;
+    case MAQ_PIXEL_RGBA8: return 4 * width_px;
+    case MAQ_PIXEL_GREY8: return width_px;
+    case MAQ_PIXEL_NV12: return 2 * ((width_px + 1) / 2);
+    case MAQ_PIXEL_YUYV: return 4 * ((width_px + 1) / 2);
+    case MAQ_PIXEL_DEPTH16: return 2 * width_px;
+  }
+  maq_jni::refuse("unknown pixel format");
+  return 0;
+}
+
+// The C API cannot see how long a buffer is; Java can.
+void require_rows(const Memory& memory, int64_t rows, int64_t stride, int64_t row) {
+  if (rows < 1) return;  // refused by maq_frame_wrap
+  const int64_t needed = (rows - 1) * stride + row;
+  if (stride < 0 || row < 0 || needed < 0 || uint64_t(needed) > memory.size_bytes) {
+    throw maq_jni::StatusError{MAQ_ERROR_INVALID_ARGUMENT, "A plane needs " + std::to_string(needed) +
+                                                               " bytes, but its buffer has " +
+                                                               std::to_string(memory.size_bytes) + "."};
+  }
+}
+
+}  // namespace
+
+extern "C" JNIEXPORT jint JNICALL JNI_OnLoad(JavaVM* machine, void*) {
+  java = machine;
+  return JNI_VERSION_1_6;
+}
+
+MAQ_NATIVE(jlong, wrapFrame)
+(JNIEnv* env, jclass, jlong context, jint format, jint width_px, jint height_px, jobject first, jint first_stride,
+ jobject second, jint second_stride, jlong timestamp_ns, jint clock, jlong sequence) {
+  return call(env, [&] {
+    maq_frame_desc desc;
+    check(maq_frame_desc_init(&desc, sizeof desc));
+    desc.format = maq_pixel_format(format);
+    desc.width_px = width_px;
+    desc.height_px = height_px;
+    desc.timestamp_ns = timestamp_ns;
+    desc.clock = maq_clock(clock);
+    desc.sequence = uint64_t(sequence);
+    const jobject buffers[] = {first, second};
+    const jint strides[] = {first_stride, second_stride};
+    const int64_t row = row_bytes(desc.format, width_px);
+    auto held = std::make_unique<Held>();
+    for (int plane = 0; plane < (desc.format == MAQ_PIXEL_NV12 ? 2 : 1); ++plane) {
+      const Memory memory = maq_jni::memory_of(env, buffers[plane]);
+      const int64_t stride = strides[plane] == 0 ? row : strides[plane];
+      require_rows(memory, rows_of(desc.format, plane, height_px), stride, row);
+      desc.planes[plane] = memory.data;
+      desc.stride_bytes[plane] = size_t(stride);
+    }
+    for (size_t plane = 0; plane < held->buffers.size(); ++plane) {
+      if (buffers[plane] != nullptr) held->buffers[plane] = env->NewGlobalRef(buffers[plane]);
+    }
+    maq_frame* frame = nullptr;
+    const maq_status status = maq_frame_wrap(object<maq_context>(context), &desc, release_buffers, held.get(), &frame);
+    if (status != MAQ_OK) held->release(env);
+    check(status);
+    held.release();
+    return handle(frame);
+  });
+}
+
+MAQ_NATIVE(jlong, decodeFrame)(JNIEnv* env, jclass, jlong context, jobject buffer, jint size_bytes) {
+  return call(env, [&] {
+    const Memory memory = maq_jni::memory_of(env, buffer);
+    if (size_bytes < 0 || size_t(size_bytes) > memory.size_bytes) maq_jni::refuse("the size is not the buffer's");
+    maq_frame* frame = nullptr;
+    check(maq_frame_decode(object<maq_context>(context), memory.data, size_t(size_bytes), &frame));
+    return handle(frame);
+  });
+}
+
+MAQ_NATIVE(void, releaseFrame)(JNIEnv*, jclass, jlong frame) { maq_frame_release(object<maq_frame>(frame)); }
+
+// Width, height, format, clock, timestamp, sequence.
+MAQ_NATIVE(jlongArray, describeFrame)(JNIEnv* env, jclass, jlong frame) {
+  return call(env, [&]() -> jlongArray {
+    maq_frame_desc desc;
+    check(maq_frame_desc_init(&desc, sizeof desc));
+    check(maq_frame_get_desc(object<maq_frame>(frame), &desc));
+    const jlong values[] = {desc.width_px, desc.height_px,    desc.format,
+                            desc.clock,    desc.timestamp_ns, jlong(desc.sequence)};
+    jlongArray array = env->NewLongArray(6);
+    maq_jni::check_pending(env);
+    env->SetLongArrayRegion(array, 0, 6, values);
+    return array;
+  });
+}
+
+MAQ_NATIVE(void, copyFramePixels)(JNIEnv* env, jclass, jlong frame, jint format, jobject buffer) {
+  call(env, [&] {
+    const Memory memory = maq_jni::memory_of(env, buffer);
+    check(maq_frame_copy_pixels(object<maq_frame>(frame), maq_pixel_format(format), memory.data, 0, memory.size_bytes));
+  });
+}
+
+MAQ_NATIVE(jlong, resizeFrame)(JNIEnv* env, jclass, jlong frame, jint width_px, jint height_px) {
+  return call(env, [&] {
+    maq_frame* resized = nullptr;
+    check(maq_frame_resize(object<maq_frame>(frame), width_px, height_px, &resized));
+    return handle(resized);
+  });
+}

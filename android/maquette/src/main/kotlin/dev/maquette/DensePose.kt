@@ -1,0 +1,157 @@
+package dev.maquette
+
+import java.nio.ByteBuffer
+
+/** Finds people and maps each of their pixels to the body surface. Made by [Maquette.densePose]. */
+class DensePose internal constructor(pointer: Long) : AutoCloseable {
+    private val handle = Handle(this, pointer, Native::destroyDensePose)
+
+    /** What is computed for each pixel of a person. */
+    enum class Detail {
+        /** Part, U and V. */
+        SURFACE,
+
+        /** Only the part: faster. */
+        PART,
+    }
+
+    /** Whose surface is computed again from a crop of the frame in its full resolution, rotated upright. */
+    enum class PersonCrops {
+        OFF,
+
+        /** Of people who are small in the networks' input, or lean. */
+        AUTO,
+        ALL,
+    }
+
+    /**
+     * Zeros stand for the bundle's values, and [threads] 0 for the cores, at most 4.
+     *
+     * @property scoreThreshold min score of a person; negative: the bundle's.
+     * @property resultPoolSize results that the app may hold at once.
+     * @property keyFrameInterval 1: people are looked for in each frame; N: in every N-th frame of a stream.
+     * @property minPersonHeightPx people less tall than this in the frame may be missed.
+     * @property allowSpinning true: idle threads spin for a while, which is faster; false: they sleep, which saves
+     *   energy.
+     */
+    data class Config(
+        val threads: Int = 0,
+        val longSidePx: Int = 0,
+        val scoreThreshold: Float = -1f,
+        val maxPeople: Int = 0,
+        val resultPoolSize: Int = 4,
+        val maxProposals: Int = 0,
+        val keyFrameInterval: Int = 1,
+        val minPersonHeightPx: Int = 0,
+        val detail: Detail = Detail.SURFACE,
+        val allowSpinning: Boolean = false,
+        val personCrops: PersonCrops = PersonCrops.OFF,
+        val personCropPx: Int = 0,
+    )
+
+    /**
+     * Finds the people of a frame. Takes milliseconds, so not on the main thread; one call at a time.
+     *
+     * @throws MaquetteException with [Status.POOL_EMPTY] while [Config.resultPoolSize] results are open, and with
+     *   [Status.CANCELLED] after [cancel].
+     */
+    fun run(frame: Frame): DensePoseResult =
+        handle.use { densePose -> frame.handle.use { DensePoseResult(Native.runDensePose(densePose, it)) } }
+
+    /** Ends the [run] that runs, or else the next; from any thread. */
+    fun cancel() = handle.use(Native::cancelDensePose)
+
+    /** The next frame begins another stream: a key frame. */
+    fun reset() = handle.use(Native::resetDensePose)
+
+    override fun close() = handle.close()
+
+    companion object {
+        /** The name of a body part, 1 to 24; "background" for 0. */
+        fun partName(part: Int): String = Native.partName(part)
+
+        /** The colour that the part is painted with in Maquette's pictures, opaque ARGB; transparent for 0. */
+        fun partColour(part: Int): Int = if (part in 1..24) Native.partColour(part) or (0xFF shl 24) else 0
+    }
+}
+
+/** Edges in pixels of the frame, the right and the bottom one exclusive; score 0 to 1. */
+data class Person(val left: Float, val top: Float, val right: Float, val bottom: Float, val score: Float)
+
+/** The people of a frame, best score first, and a byte for each pixel of the frame in four planes. */
+class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
+    private val handle = Handle(this, pointer, Native::releaseResult)
+
+    enum class Plane {
+        /** Body part 1 to 24, 0 for background. */
+        PART,
+
+        /** U * 255. */
+        U,
+
+        /** V * 255. */
+        V,
+
+        /** Index of the person in [people] plus 1, 0 for background. */
+        PERSON,
+    }
+
+    /** Milliseconds of the stages, and counts. */
+    data class Stats(
+        val preprocessMs: Double,
+        val trunkMs: Double,
+        val proposalsMs: Double,
+        val boxHeadMs: Double,
+        val denseHeadMs: Double,
+        val cropsMs: Double,
+        val decodeMs: Double,
+        val totalMs: Double,
+        val networkWidthPx: Int,
+        val networkHeightPx: Int,
+        val proposals: Int,
+        val people: Int,
+        val crops: Int,
+        val droppedBoxes: Int,
+        val bodyPixels: Long,
+        val clampedPixels: Long,
+        val isKeyFrame: Boolean,
+    )
+
+    val widthPx: Int
+    val heightPx: Int
+    val people: List<Person>
+
+    init {
+        val (width, height) = handle.use(Native::sizeOfResult)
+        widthPx = width
+        heightPx = height
+        people = handle.use(Native::peopleOfResult).toList().chunked(5)
+            .map { (left, top, right, bottom, score) -> Person(left, top, right, bottom, score) }
+    }
+
+    /**
+     * A plane as it lies in native memory, [heightPx] rows of [widthPx] bytes, read-only and without a copy. It must
+     * not be read after the result has been closed: [copyPlane] gives what stays.
+     */
+    fun plane(plane: Plane): ByteBuffer =
+        handle.use { Native.planeOfResult(it, plane.ordinal + 1).asReadOnlyBuffer() }
+
+    /** Copies a plane, [heightPx] rows of [widthPx] bytes. */
+    fun copyPlane(plane: Plane): ByteArray =
+        handle.use { result ->
+            ByteArray(widthPx * heightPx).also { Native.planeOfResult(result, plane.ordinal + 1).get(it) }
+        }
+
+    val stats: Stats
+        get() {
+            val s = handle.use(Native::statsOfResult)
+            val counts = s.drop(8).map(Double::toLong)
+            val (width, height, proposals, found, crops) = counts.map(Long::toInt)
+            return Stats(
+                s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], width, height, proposals, found, crops,
+                counts[5].toInt(), counts[6], counts[7], counts[8] != 0L,
+            )
+        }
+
+    override fun close() = handle.close()
+}

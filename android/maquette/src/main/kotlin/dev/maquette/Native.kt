@@ -1,0 +1,70 @@
+package dev.maquette
+
+import java.nio.ByteBuffer
+
+/** The C API (src/main/cpp). Handles are numbers here; [Handle] keeps them. Texts are UTF-8. */
+internal object Native {
+    init {
+        System.loadLibrary("maquette_jni")
+    }
+
+    @JvmStatic external fun version(): String
+    @JvmStatic external fun partName(part: Int): String
+    @JvmStatic external fun partColour(part: Int): Int
+
+    @JvmStatic external fun createContext(logLevel: Int, onnxRuntime: ByteArray?): Long
+    @JvmStatic external fun destroyContext(context: Long)
+    @JvmStatic external fun onnxRuntimeVersion(context: Long): String
+
+    @JvmStatic
+    external fun wrapFrame(
+        context: Long,
+        format: Int,
+        widthPx: Int,
+        heightPx: Int,
+        first: ByteBuffer,
+        firstStride: Int,
+        second: ByteBuffer?,
+        secondStride: Int,
+        timestampNs: Long,
+        clock: Int,
+        sequence: Long,
+    ): Long
+
+    @JvmStatic external fun decodeFrame(context: Long, data: ByteBuffer, sizeBytes: Int): Long
+    @JvmStatic external fun releaseFrame(frame: Long)
+    @JvmStatic external fun describeFrame(frame: Long): LongArray
+    @JvmStatic external fun copyFramePixels(frame: Long, format: Int, pixels: ByteBuffer)
+    @JvmStatic external fun resizeFrame(frame: Long, widthPx: Int, heightPx: Int): Long
+
+    @JvmStatic
+    external fun createDensePose(
+        context: Long,
+        path: ByteArray?,
+        names: Array<ByteArray>?,
+        buffers: Array<ByteBuffer>?,
+        threads: Int,
+        longSidePx: Int,
+        scoreThreshold: Float,
+        maxPeople: Int,
+        resultPoolSize: Int,
+        maxProposals: Int,
+        keyFrameInterval: Int,
+        minPersonHeightPx: Int,
+        detail: Int,
+        allowSpinning: Boolean,
+        personCrops: Int,
+        personCropPx: Int,
+    ): Long
+
+    @JvmStatic external fun destroyDensePose(densePose: Long)
+    @JvmStatic external fun runDensePose(densePose: Long, frame: Long): Long
+    @JvmStatic external fun cancelDensePose(densePose: Long)
+    @JvmStatic external fun resetDensePose(densePose: Long)
+
+    @JvmStatic external fun releaseResult(result: Long)
+    @JvmStatic external fun sizeOfResult(result: Long): IntArray
+    @JvmStatic external fun peopleOfResult(result: Long): FloatArray
+    @JvmStatic external fun planeOfResult(result: Long, plane: Int): ByteBuffer
+    @JvmStatic external fun statsOfResult(result: Long): DoubleArray
+}

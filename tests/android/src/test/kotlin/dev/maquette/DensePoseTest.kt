@@ -1,0 +1,194 @@
+package dev.maquette
+
+import android.graphics.Bitmap
+import android.graphics.Color
+import java.io.File
+import java.nio.ByteBuffer
+import kotlin.concurrent.thread
+import org.junit.Assert.assertArrayEquals
+import org.junit.Assert.assertEquals
+import org.junit.Assert.assertFalse
+import org.junit.Assert.assertThrows
+import org.junit.Assert.assertTrue
+import org.junit.Test
+import org.junit.runner.RunWith
+import org.robolectric.RobolectricTestRunner
+import org.robolectric.annotation.Config
+import org.robolectric.annotation.GraphicsMode
+
+@RunWith(RobolectricTestRunner::class)
+@Config(sdk = [34], manifest = Config.NONE)
+@GraphicsMode(GraphicsMode.Mode.NATIVE)
+class DensePoseTest {
+    private fun failure(status: Status, work: () -> Unit): String {
+        val error = assertThrows(MaquetteException::class.java) { work() }
+        assertEquals(error.message, status, error.status)
+        return error.message!!
+    }
+
+    private fun black(maquette: Maquette, width: Int, height: Int) =
+        maquette.frame(PixelFormat.RGB8, width, height, Plane(ByteBuffer.allocateDirect(3 * width * height)))
+
+    @Test
+    fun aPhotoHasOnePersonWhateverWayTheBundleComes() {
+        Maquette().use { maquette ->
+            assertTrue(maquette.onnxRuntimeVersion.startsWith("1."))
+            val bundles = listOf(
+                ModelBundle.ofFolder(TestFiles.bundle.path),
+                ModelBundle.ofBuffers(TestFiles.bundleInMemory()),
+            )
+            val parts = bundles.map { bundle ->
+                maquette.densePose(bundle).use { densePose ->
+                    maquette.decode(TestFiles.photo.readBytes()).use { frame ->
+                        densePose.run(frame).use { result ->
+                            assertEquals(frame.widthPx, result.widthPx)
+                            assertEquals(frame.heightPx, result.heightPx)
+                            val person = result.people.single()
+                            assertTrue(person.score > 0.9f)
+                            assertTrue(person.left < person.right && person.top < person.bottom)
+                            val part = result.copyPlane(DensePoseResult.Plane.PART)
+                            val people = result.plane(DensePoseResult.Plane.PERSON)
+                            assertTrue(people.isReadOnly)
+                            assertEquals(result.stats.bodyPixels, part.count { it > 0 }.toLong())
+                            for (k in part.indices) assertEquals(part[k] > 0, people[k] == 1.toByte())
+                            assertEquals(1, result.stats.people)
+                            assertTrue(result.stats.isKeyFrame && result.stats.totalMs > 0)
+                            part
+                        }
+                    }
+                }
+            }
+            assertTrue(parts[0].count { it > 0 } > 30_000)
+            assertArrayEquals(parts[0], parts[1])
+        }
+    }
+
+    @Test
+    fun framesAreWhatTheAppGave() {
+        Maquette().use { maquette ->
+            val bitmap = Bitmap.createBitmap(3, 2, Bitmap.Config.ARGB_8888)
+            bitmap.setPixel(2, 1, Color.rgb(10, 20, 30))
+            maquette.frame(bitmap, timestampNs = 5).use { frame ->
+                assertEquals(PixelFormat.RGBA8, frame.format)
+                assertEquals(5L, frame.timestampNs)
+                val bgr = ByteBuffer.allocateDirect(3 * 3 * 2)
+                frame.copyPixels(PixelFormat.BGR8, bgr)
+                // Phones keep R, G, B, A in memory (Bitmap.Config.ARGB_8888), which is what a frame takes them for;
+                // Robolectric's Skia keeps B, G, R, A.
+                val inMemory = ByteBuffer.allocateDirect(4 * 3 * 2).also(bitmap::copyPixelsToBuffer)
+                assertEquals(setOf<Byte>(10, 20, 30), (20..22).map { inMemory[it] }.toSet())
+                assertEquals((20..22).map { inMemory[it] }, (15..17).map { bgr[it] }.reversed())
+                assertEquals(Color.rgb(10, 20, 30), frame.toBitmap().getPixel(2, 1))
+                frame.resize(6, 4).use { assertEquals(6 to 4, it.widthPx to it.heightPx) }
+            }
+            val y = ByteBuffer.allocateDirect(16 * 8)
+            val uv = ByteBuffer.allocateDirect(16 * 4)
+            maquette.frame(PixelFormat.NV12, 15, 8, Plane(y, 16), Plane(uv, 16), 9, Clock.MONOTONIC, 3).use { frame ->
+                assertEquals(listOf<Any>(15, 8, PixelFormat.NV12, Clock.MONOTONIC, 9L, 3L), with(frame) {
+                    listOf(widthPx, heightPx, format, clock, timestampNs, sequence)
+                })
+            }
+        }
+    }
+
+    @Test
+    fun wrongInputIsAnExceptionThatSaysWhatToDo() {
+        Maquette().use { maquette ->
+            val missing = failure(Status.NOT_FOUND) { maquette.densePose(ModelBundle.ofFolder("/no/bündle 🏃")) }
+            assertTrue(missing, "bündle 🏃" in missing)
+            val damaged = TestFiles.bundleInMemory().toMutableMap()
+            damaged["trunk.onnx"] = TestFiles.direct(ByteArray(100))
+            failure(Status.BAD_BUNDLE) { maquette.densePose(ModelBundle.ofBuffers(damaged)) }
+            failure(Status.UNREADABLE) { maquette.decode(TestFiles.photo.readBytes().copyOf(1000)) }
+            failure(Status.UNREADABLE) { maquette.decode(ByteArray(0)) }
+            val pixels = ByteBuffer.allocateDirect(29)
+            val short = failure(Status.INVALID_ARGUMENT) { maquette.frame(PixelFormat.RGB8, 5, 2, Plane(pixels)) }
+            assertTrue(short, "30 bytes" in short)
+            failure(Status.INVALID_ARGUMENT) { maquette.frame(PixelFormat.GREY8, 5, 2, Plane(ByteBuffer.allocate(29))) }
+            failure(Status.INVALID_ARGUMENT) { maquette.frame(PixelFormat.NV12, 4, 4, Plane(pixels)) }
+            failure(Status.INVALID_ARGUMENT) { maquette.frame(PixelFormat.GREY8, 5, 2, Plane(pixels, -5)) }
+            val huge = 2_000_000_000
+            failure(Status.INVALID_ARGUMENT) { maquette.frame(PixelFormat.GREY8, huge, huge, Plane(pixels)) }
+            failure(Status.IMAGE_SIZE) { maquette.frame(PixelFormat.GREY8, 0, 2, Plane(pixels)) }
+            maquette.frame(PixelFormat.GREY8, 5, 5, Plane(pixels)).use { frame ->
+                failure(Status.INVALID_ARGUMENT) { frame.copyPixels(PixelFormat.RGBA8, ByteBuffer.allocateDirect(99)) }
+            }
+            val config = DensePose.Config(longSidePx = -1)
+            failure(Status.INVALID_ARGUMENT) { maquette.densePose(ModelBundle.ofFolder(TestFiles.bundle.path), config) }
+            val bitmap = Bitmap.createBitmap(3, 2, Bitmap.Config.RGB_565)
+            assertThrows(IllegalArgumentException::class.java) { maquette.frame(bitmap) }
+        }
+    }
+
+    @Test
+    fun objectsAreClosedInAnyOrderAndNotUsedAfterwards() {
+        val maquette = Maquette()
+        val bundle = ModelBundle.ofFolder(TestFiles.bundle.path)
+        val densePose = maquette.densePose(bundle, DensePose.Config(resultPoolSize = 1))
+        val frame = maquette.decode(TestFiles.photo.readBytes())
+        maquette.close()
+        assertThrows(IllegalStateException::class.java) { maquette.decode(ByteArray(3)) }
+        val result = densePose.run(frame)
+        failure(Status.POOL_EMPTY) { densePose.run(frame) }
+        frame.close()
+        assertThrows(IllegalStateException::class.java) { densePose.run(frame) }
+        densePose.close()
+        assertEquals(1, result.people.size)
+        assertTrue(result.copyPlane(DensePoseResult.Plane.U).any { it != 0.toByte() })
+        result.close()
+        result.close()
+        assertThrows(IllegalStateException::class.java) { result.plane(DensePoseResult.Plane.U) }
+        assertThrows(IllegalStateException::class.java) { densePose.cancel() }
+    }
+
+    @Test
+    fun aRunIsCancelledFromAnotherThread() {
+        Maquette().use { maquette ->
+            maquette.densePose(ModelBundle.ofFolder(TestFiles.bundle.path)).use { densePose ->
+                black(maquette, 64, 48).use { frame ->
+                    densePose.cancel()
+                    failure(Status.CANCELLED) { densePose.run(frame) }
+                    densePose.run(frame).use { assertTrue(it.people.isEmpty()) }
+                    densePose.reset()
+                }
+            }
+        }
+    }
+
+    @Test
+    fun tenThousandFramesAndAHundredNetworksLeaveNothing() {
+        Maquette().use { maquette ->
+            repeat(10_000) { black(maquette, 32, 24).close() }
+            val bundle = ModelBundle.ofFolder(TestFiles.bundle.path)
+            repeat(20) { maquette.densePose(bundle).close() }
+            val before = residentMiB()
+            repeat(80) { maquette.densePose(bundle).close() }
+            assertTrue("${residentMiB() - before} MiB more after 80 networks", residentMiB() - before < 60)
+        }
+    }
+
+    @Test
+    fun framesThatAreForgottenGiveTheirBuffersBack() {
+        Maquette().use { maquette ->
+            val collector = thread { repeat(40) { System.gc(); Thread.sleep(5) } }
+            // 6 GB in all: only garbage collection makes room for them.
+            repeat(2000) { black(maquette, 1024, 1024).widthPx }
+            collector.join()
+        }
+    }
+
+    @Test
+    fun partsHaveNamesAndColours() {
+        assertEquals("background", DensePose.partName(0))
+        assertEquals(24, (1..24).map(DensePose::partName).toSet().size)
+        assertEquals(0, DensePose.partColour(0))
+        assertTrue((1..24).all { Color.alpha(DensePose.partColour(it)) == 255 })
+        assertFalse(DensePose.partColour(1) == DensePose.partColour(2))
+        assertEquals("0.2.0", Maquette.version)
+    }
+
+    private fun residentMiB(): Long {
+        val line = File("/proc/self/status").readLines().first { it.startsWith("VmRSS") }
+        return line.filter(Char::isDigit).toLong() / 1024
+    }
+}

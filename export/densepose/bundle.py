@@ -15,7 +15,6 @@ GRAPHS = ("trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head")
 CROP_GRAPHS = ("crop_trunk", "crop_dense_head")  # of bundles with networks of their own for person crops
 CHARTS, CROP_CHARTS = "charts.f32", "crop_charts.f32"
 LEVELS = (2, 3, 4, 5, 6)
-BOX_VALUES = 6  # of the box head: two logits and four deltas; two more where it gives the body axis
 # What the pictures are rendered from; the packages are named in export/people/assets.py and export/photos.
 TRAINING_DATA = (
     {"name": "Maquette rendered people", "licence": "Apache-2.0", "used_for": "training, calibration"},
@@ -64,7 +63,6 @@ def signatures(network: NetworkConfig, crops: bool = False) -> dict[str, Signatu
         return {"rois": ["people", pool, pool, width]}
 
     pool, classes = network.dense_pool, network.coarse_classes + network.index_classes
-    box_values = BOX_VALUES + (2 if network.axis else 0)
     image = {"image": [1, 3, "height", "width"]}
     dense_head = {
         "inputs": rois(pool),
@@ -75,7 +73,7 @@ def signatures(network: NetworkConfig, crops: bool = False) -> dict[str, Signatu
         "trunk": {"inputs": image, "outputs": maps("p", LEVELS, width)},
         "rpn_fine": rpn(LEVELS[:1]),
         "rpn_coarse": rpn(LEVELS[1:]),
-        "box_head": {"inputs": rois(network.box_pool), "outputs": {"boxes": ["people", box_values]}},
+        "box_head": {"inputs": rois(network.box_pool), "outputs": {"boxes": ["people", 6]}},
         "dense_head": dense_head,
     } | ({"crop_trunk": crop_trunk, "crop_dense_head": dense_head} if crops else {})
 

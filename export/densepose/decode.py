@@ -24,7 +24,7 @@ from export.densepose.data import MEAN, STD
 from export.densepose.network import MobileParsingRCNN
 
 Detector = Callable[[Tensor], tuple[list[Tensor], list[Tensor], list[Tensor]]]
-BoxHead = Callable[[Tensor], tuple[Tensor, ...]]  # logits, deltas; the body axis, where the network has it
+BoxHead = Callable[[Tensor], tuple[Tensor, Tensor]]
 DenseHead = Callable[[Tensor], tuple[Tensor, Tensor, Tensor, Tensor]]
 
 
@@ -138,7 +138,7 @@ def _box_pass(graphs: Graphs, features: list[Tensor], boxes: Tensor, network: Ne
               inner: tuple[int, int], threshold: float) -> tuple[Tensor, Tensor]:  # fmt: skip
     if not len(boxes):
         return boxes, boxes.new_zeros(0)
-    logits, deltas, *_ = graphs.box_head(tg.pooled(features, [boxes], network, network.box_pool))
+    logits, deltas = graphs.box_head(tg.pooled(features, [boxes], network, network.box_pool))
     scores = logits.softmax(1)[:, 0]
     boxes = bx.clip(bx.decode(deltas, boxes, network.delta_weights), *inner)
     valid = (scores > threshold) & ((boxes[:, 2:] - boxes[:, :2]) > 0).all(1)

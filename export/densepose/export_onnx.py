@@ -143,12 +143,12 @@ class Rpn(nn.Module):
 
 
 class BoxHeadGraph(nn.Module):
-    """The box head, its outputs by one matrix, whose rows are in channels-last order."""
+    """The box head, logits and deltas by one matrix, whose rows are in channels-last order."""
 
     def __init__(self, net: MobileParsingRCNN) -> None:
         super().__init__()
         self.convs = net.box_head.convs
-        self.predict = joined(*net.box_head.predictors)
+        self.predict = joined(net.box_head.logits, net.box_head.deltas)
         width, pool = net.config.width, net.config.box_pool
         weight = self.predict.weight.data.unflatten(1, (width, pool, pool))
         self.predict.weight.data = weight.permute(0, 2, 3, 1).flatten(1).contiguous()

@@ -12,7 +12,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.bundle import read_manifest
-from export.densepose.bundle import BOX_VALUES, decode_config
+from export.densepose.bundle import decode_config
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.crop_pass import CropGraphs
 from export.densepose.decode import DenseHead, Graphs
@@ -47,7 +47,6 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
     rpn, head, dense = manifest["rpn"], manifest["box_head"], manifest["dense_head"]
     network = NetworkConfig(
         width=manifest["graphs"]["box_head"]["inputs"][0]["shape"][3],
-        axis=manifest["graphs"]["box_head"]["outputs"][0]["shape"][1] > BOX_VALUES,
         anchor_sizes=tuple(rpn["anchor_sizes_px"]),
         aspect_ratios=tuple(rpn["aspect_ratios"]),
         rpn_strides=tuple(rpn["strides"]),
@@ -67,10 +66,9 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
         maps = [x.permute(0, 3, 1, 2).contiguous() for x in features]
         return maps, [x[:, :anchors] for x in found], [x[:, anchors:] for x in found]
 
-    def box_head(rois: Tensor) -> tuple[Tensor, ...]:
+    def box_head(rois: Tensor) -> tuple[Tensor, Tensor]:
         (found,) = run("box_head", rois.permute(0, 2, 3, 1))
-        parts = (found[:, :2], found[:, 2:BOX_VALUES], found[:, BOX_VALUES:])
-        return parts if network.axis else parts[:2]
+        return found[:, :2], found[:, 2:]
 
     def dense_head_of(graph: str, charts_file: str) -> DenseHead:
         charts = read_charts(folder / charts_file, dense["index_classes"] - 1)

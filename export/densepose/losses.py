@@ -174,7 +174,7 @@ def _detection(
     rois = [tg.box_samples(f, truth, BOX_ROIS) for f, truth in zip(found, truths, strict=True)]
     pooled = tg.pooled(features, [r[0] for r in rois], config, config.box_pool)
     with autocast:
-        class_logits, box_deltas, *axis = net.box_head(pooled)
+        class_logits, box_deltas, *axis = (net.box_head.with_axis if config.axis else net.box_head)(pooled)
     terms |= _box_terms(class_logits.float(), box_deltas.float(), rois, truths, config.delta_weights)
     if axis:
         terms["axis"] = _axis_loss(axis[0].float(), rois, truths)

@@ -270,8 +270,8 @@ class RpnHead(nn.Module):
 class BoxHead(nn.Module):
     """[R, C, 7, 7] -> class logits [R, 2] (person, background) and box deltas [R, 4].
 
-    axis: whether it also gives the direction from hips to head in the picture, [R, 2]: (1, 0) is to the right, (0, 1)
-    down; near (0, 0) where it cannot be told.
+    axis: whether `with_axis` is there, which also gives the direction from hips to head in the picture, [R, 2]: (1, 0)
+    is to the right, (0, 1) down; near (0, 0) where it cannot be told.
     """
 
     def __init__(self, width: int, pool: int, axis: bool = False) -> None:
@@ -286,19 +286,18 @@ class BoxHead(nn.Module):
         nn.init.normal_(self.deltas.weight, std=0.001)
         nn.init.zeros_(self.logits.bias)
         nn.init.zeros_(self.deltas.bias)
-        self.axis = nn.Linear(width * pool * pool, 2) if axis else None
         if axis:
+            self.axis = nn.Linear(width * pool * pool, 2)
             nn.init.normal_(self.axis.weight, std=0.001)
             nn.init.zeros_(self.axis.bias)
 
-    @property
-    def predictors(self) -> list[nn.Linear]:
-        """In the order of the outputs."""
-        return [layer for layer in (self.logits, self.deltas, self.axis) if layer is not None]
-
-    def forward(self, rois: Tensor) -> tuple[Tensor, ...]:
+    def forward(self, rois: Tensor) -> tuple[Tensor, Tensor]:
         flat = self.convs(rois).flatten(1)
-        return tuple(layer(flat) for layer in self.predictors)
+        return self.logits(flat), self.deltas(flat)
+
+    def with_axis(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        flat = self.convs(rois).flatten(1)
+        return self.logits(flat), self.deltas(flat), self.axis(flat)
 
 
 class ConvBnRelu(nn.Sequential):

@@ -89,7 +89,7 @@ class CropJudge:
         maps = self.net.dense_head(tg.pooled(features, [found.boxes], network, network.dense_pool, level=0))
         told = None
         if network.axis:
-            told = self.net.box_head(tg.pooled(features, [found.boxes], network, network.box_pool))[2].numpy()
+            told = self.net.box_head.with_axis(tg.pooled(features, [found.boxes], network, network.box_pool))[2].numpy()
         boxes = found.boxes * found.boxes.new_tensor(found.scale * 2)
         overlap, match = box_iou(torch.from_numpy(image.box[wanted]), boxes).max(1)
         for person, iou, k in zip(wanted, overlap.tolist(), match.tolist(), strict=True):

@@ -12,11 +12,6 @@ namespace {
 
 constexpr size_t kFeatureLevels = 4;  // P2 to P5, which the heads read
 constexpr size_t kRpnLevels = 5;      // P2 to P6
-// Of the box head: logits of person and background, then dx, dy, dw, dh; then the body axis, where the network gives
-// it.
-constexpr int64_t kBoxValues = 6, kBoxValuesWithAxis = 8;
-// Of the vector that the box head gives for the body axis, a unit vector in training; a shorter one is no direction.
-constexpr float kMinAxisLength = 0.3f;
 constexpr int kFirstLevel = 2;
 // People gain by a crop whose box has a shorter long side, in pixels of the network's input, or who lean by more.
 constexpr float kSmallPersonPx = 150;
@@ -67,13 +62,6 @@ int feature_channels(const GraphSpec& trunk, const std::string& bundle_name) {
                 "Export the bundle again.");
   }
   return int(*channels);
-}
-
-// Whether the box head's graph gives the body axis.
-bool gives_axis(const GraphSpec& box_head) {
-  const std::vector<Dimension>& shape = box_head.outputs[0].shape;
-  const int64_t* values = shape.size() == 2 ? std::get_if<int64_t>(&shape[1]) : nullptr;
-  return values != nullptr && *values == kBoxValuesWithAxis;
 }
 
 constexpr int64_t kAnySize = -1;
@@ -153,9 +141,8 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
       graph_with(manifest, "rpn_coarse", at_levels("p", first + 1, last), at_levels("rpn", first + 1, last)), features,
       {anchors});
   const int64_t box_pool = spec_.box_head.pool_size, dense_pool = spec_.dense_head.pool_size;
-  const GraphSpec box_head = graph_with(manifest, "box_head", {"rois"}, {"boxes"});
-  box_values_ = gives_axis(box_head) ? kBoxValuesWithAxis : kBoxValues;
-  box_head_ = make_checked("box_head", box_head, {kAnySize, box_pool, box_pool, channels_}, {{kAnySize, box_values_}});
+  box_head_ = make_checked("box_head", graph_with(manifest, "box_head", {"rois"}, {"boxes"}),
+                           {kAnySize, box_pool, box_pool, channels_}, {{kAnySize, 6}});
   const int64_t classes = spec_.dense_head.coarse_classes + spec_.dense_head.index_classes;
   const auto make_dense_head = [&](const std::string& name) {
     return make_checked(
@@ -320,14 +307,14 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_scor
     cancel_->check();
     roi_align_.run(level_for(boxes[i].box), boxes[i].box, spec.pool_size, rois_.data() + i * roi_size);
   }
+  // Of each: logits of person and background, then dx, dy, dw, dh.
   inputs_.assign(1, {rois_.data(), {count, spec.pool_size, spec.pool_size, channels_}});
-  shapes_.assign(1, {count, box_values_});
-  box_outputs_ = box_head_->run(inputs_, shapes_, cancel_.get()).front().data;
+  shapes_.assign(1, {count, 6});
+  const TensorView& outputs = box_head_->run(inputs_, shapes_, cancel_.get()).front();
 
   for (size_t i = 0; i < boxes.size(); ++i) {
-    const float* const values = box_outputs_ + i * size_t(box_values_);
-    const float score = first_of_two(values);
-    Box box = apply_deltas(boxes[i].box, values + 2, spec.delta_weights);
+    const float score = first_of_two(outputs.data + 6 * i);
+    Box box = apply_deltas(boxes[i].box, outputs.data + 6 * i + 2, spec.delta_weights);
     if (std::isnan(score) || !clip_box(box, float(input_.width_px), float(input_.height_px))) {
       ++*dropped;
     } else if (score > min_score) {
@@ -335,14 +322,6 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_scor
     }
   }
   non_maximum_suppression(found, spec.nms_iou, size_t(settings_.max_people));
-}
-
-std::optional<Point> DensePose::axis_of(const ScoredBox& person) const {
-  if (box_values_ != kBoxValuesWithAxis) return std::nullopt;
-  const float* const axis = box_outputs_ + size_t(person.index) * size_t(box_values_) + kBoxValues;
-  const float length = std::hypot(axis[0], axis[1]);
-  if (!(length > kMinAxisLength) || std::isinf(length)) return std::nullopt;
-  return Point{double(axis[0] / length), double(axis[1] / length)};
 }
 
 void DensePose::map_people(const ImageView& image, const DensePlanes& planes, DensePoseStats& stats) {
@@ -408,8 +387,7 @@ void DensePose::choose_crops() {
     classify_cells(logits, decode_memory_);
     person.confidence = part_confidence(logits, threshold, decode_memory_);
     const AffineMap cells = map_of_cells(person.box, logits.size);
-    auto axis = axis_of(person.found);
-    if (!axis) axis = find_body_axis(logits, cells, threshold, decode_memory_);
+    const auto axis = find_body_axis(logits, cells, threshold, decode_memory_);
     const PersonCrop crop =
         crop_around_person(logits.size, cells, axis, threshold, 0, settings_.crop_side_px, decode_memory_);
     const bool is_small = std::max(person.found.box.width(), person.found.box.height()) < kSmallPersonPx;

@@ -118,8 +118,6 @@ class DensePose {
   void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
   // One pass of the box head: scores and refines `boxes`, keeps those of a score above `min_score`, then NMS.
   void run_box_head(const std::vector<ScoredBox>& boxes, float min_score, std::vector<ScoredBox>& found, int* dropped);
-  // The direction from hips to head of a person of `found_`, as the box head told it last; none where it did not.
-  std::optional<Point> axis_of(const ScoredBox& person) const;
   // Finds people in the whole image, at key frames, or follows those of the frame before; into `found_`.
   void find_boxes(const ImageView& image, DensePoseStats& stats);
   // Runs the dense head on `found_`, then on crops of those who gain by it; into `mapped_`.
@@ -145,7 +143,6 @@ class DensePose {
   DensePoseSpec spec_;
   DensePoseSettings settings_;  // none is 0 that stands for the bundle's value
   int channels_ = 0;
-  int64_t box_values_ = 0;  // of the box head, for each box
   std::unique_ptr<RunCancel> cancel_;
   std::unique_ptr<Session> trunk_;
   std::unique_ptr<Session> rpn_fine_;
@@ -161,7 +158,6 @@ class DensePose {
   std::vector<TensorView> pyramid_;   // P2 to P6, or P2, in memory of a trunk
   std::vector<FeatureMap> features_;  // the same, without P6
   std::vector<float> rois_;
-  const float* box_outputs_ = nullptr;  // in memory of the box head, of its last run
   std::vector<MappedPerson> mapped_;
   // Scratch of a frame, kept so that the next one takes nothing from the heap.
   RoiAlign roi_align_;

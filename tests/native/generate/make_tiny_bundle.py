@@ -1,6 +1,4 @@
-"""Writes data/tiny_bundle: a model bundle of the real interface whose answers are known without training; and beside it
-data/box_head_with_axis.onnx, a box head that says of blue people that they lie with the head to the right, and of the
-others next to nothing.
+"""Writes data/tiny_bundle: a model bundle of the real interface whose answers are known without training.
 
 The networks see colours. In a black image, one pixel cell of pure colour is one person:
 red at a cell of P2 is a person of 32 px, green at a cell of P3 one of 64 px, blue at a cell of P4 one of 128 px,
@@ -77,12 +75,8 @@ def rpn(name, levels):
     return graph(name, nodes, maps("p", levels, CHANNELS), maps("rpn", levels, 15), constants)
 
 
-def box_head(with_axis=False):
+def box_head():
     """A person where the middle of the RoI has colour: logit 24 * brightest - 3 against 0."""
-    weight = np.array([[24, 0, 0, 0, 0, 0, 0, 0]] * CHANNELS, np.float32)
-    # Of colours in the order R, G, B; the brightest bin of an RoI has a quarter of its person's colour.
-    weight[:, 6:] = (0, -0.8), (0.8, 0), (4, 0)
-    bias, count = np.array([-3, 0, 1, 0, 0, 0, 0, 0], np.float32), 8 if with_axis else 6
     nodes = [
         helper.make_node("Slice", ["rois", "begin", "end", "axes"], ["middle"]),
         helper.make_node("ReduceMax", ["middle"], ["brightest"], axes=[1, 2], keepdims=0),
@@ -92,11 +86,10 @@ def box_head(with_axis=False):
         tensor("begin", np.array([2, 2], np.int64)),
         tensor("end", np.array([5, 5], np.int64)),
         tensor("axes", np.array([1, 2], np.int64)),
-        tensor("weight", weight[:, :count].copy()),
-        tensor("bias", bias[:count].copy()),
+        tensor("weight", np.array([[24, 0, 0, 0, 0, 0]] * CHANNELS, np.float32)),
+        tensor("bias", np.array([-3, 0, 1, 0, 0, 0], np.float32)),
     ]
-    rois, boxes = [("rois", ["people", POOL, POOL, CHANNELS])], [("boxes", ["people", count])]
-    return graph("box_head", nodes, rois, boxes, constants)
+    return graph("box_head", nodes, [("rois", ["people", POOL, POOL, CHANNELS])], [("boxes", ["people", 6])], constants)
 
 
 def fours(cells):
@@ -165,7 +158,6 @@ def main():
         (folder / f"{name}.onnx").write_bytes(model.SerializeToString())
         graphs[name] = {"inputs": dict(inputs), "outputs": dict(outputs)}
     (folder / "charts.f32").write_bytes(charts())
-    (folder.parent / "box_head_with_axis.onnx").write_bytes(box_head(with_axis=True)[0].SerializeToString())
     task_keys = {
         "input": {"color": "RGB", "mean": [0, 0, 0], "std": [255, 255, 255], "multiple_of": 32, "long_side_px": 320},
         "rpn": {

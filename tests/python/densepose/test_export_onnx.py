@@ -17,10 +17,10 @@ WIDTH = 16
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 
-def lively_network(seed, axis=False):
+def lively_network(seed):
     """An untrained network whose normalisation and fusion do something."""
     torch.manual_seed(seed)
-    net = MobileParsingRCNN(NetworkConfig(width=WIDTH, axis=axis))
+    net = MobileParsingRCNN(NetworkConfig(width=WIDTH))
     for module in net.modules():
         if isinstance(module, torch.nn.BatchNorm2d):
             module.running_mean.uniform_(-0.2, 0.2)
@@ -113,21 +113,6 @@ def test_a_bundle_opens_as_what_decoding_works_with(net, folder):
     assert_close([m[:, 1:] for m in maps[2:]], [u[:, 1:].numpy(), v[:, 1:].numpy()])
     assert not u[:, 0].any()
     assert opened.network.width == WIDTH
-
-
-def test_the_body_axis_follows_the_deltas(tmp_path, folder):
-    net = lively_network(2, axis=True)
-    export_onnx.export_graphs(net, tmp_path)
-    bundle.write_manifest(tmp_path, BundleInfo("axis", "fp32"), net.config, DecodeConfig())
-    opened, rois = graphs.open_bundle(tmp_path), torch.randn(3, WIDTH, 7, 7)
-    assert opened.network.axis
-    with torch.no_grad():
-        expected, found = net.box_head(rois), opened.graphs.box_head(rois)
-    assert len(found) == 3
-    assert_close(expected, [array.numpy() for array in found])
-    without = graphs.open_bundle(folder)
-    assert not without.network.axis
-    assert len(without.graphs.box_head(rois)) == 2
 
 
 def test_crops_go_through_networks_of_their_own(net, crop_net, full_folder, folder):

@@ -134,8 +134,9 @@ class Body:
             with gzip.open(root / f"{name}.target.gz", "rt") as file:
                 lines = np.array(file.read().split(), np.float64).reshape(-1, 4)
             row[lines[:, 0].astype(int)] = lines[:, 1:]
-        self._targets = self._targets.reshape(len(names), -1)
-        assets.save_cache(cache, targets=self._targets.astype(np.float16))
+        packed = self._targets.reshape(len(names), -1).astype(np.float16)
+        assets.save_cache(cache, targets=packed)
+        self._targets = packed.astype(np.float32)  # as the next process reads them: bodies are the same in both
 
     def _read_rig(self, root: Path) -> None:
         rig = json.loads((root / "rig.default.json").read_text())

@@ -44,7 +44,7 @@ class Done:
 @dataclass(frozen=True)
 class Workers:
     """Who does the jobs. processes: of this machine, 0: none but this one; cluster: address of a Dask scheduler,
-    instead of these. max_s: seconds after which a job is given up (None: never), which this process never does."""
+    instead of these. max_s: seconds after which a job is given up (None: never); not applied with 0 processes."""
 
     processes: int = 1
     cluster: str | None = None

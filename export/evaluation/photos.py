@@ -73,8 +73,8 @@ example:
 
 @dataclass(frozen=True)
 class PhotoSet:
-    """photos: image files that have labels; labels: folder of NAME.npz (PhotoLabels); empty: photos of nobody;
-    animals: photos of animals and nobody."""
+    """photos: image files that have labels; labels: folder of NAME.npz (PhotoLabels); empty: photos without
+    people; animals: photos of animals without people."""
 
     photos: list[Path]
     labels: Path
@@ -85,8 +85,11 @@ class PhotoSet:
     def find(photos: list[Path], labels: Path, empty: list[Path], animals: list[Path] | None = None) -> PhotoSet:
         every = [p for folder in photos for p in sorted(folder.glob("*"))]
         labelled = [p for p in every if (labels / f"{p.stem}.npz").exists()]
-        nobody, beasts = ([p for f in folders for p in sorted(f.glob("*.jpg"))] for folders in (empty, animals or []))
-        return PhotoSet(labelled, labels, nobody, beasts)
+
+        def photos_in(folders: list[Path]) -> list[Path]:
+            return [p for folder in folders for p in sorted(folder.glob("*.jpg"))]
+
+        return PhotoSet(labelled, labels, photos_in(empty), photos_in(animals or []))
 
 
 @dataclass(frozen=True)

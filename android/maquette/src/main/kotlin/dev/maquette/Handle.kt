@@ -11,7 +11,7 @@ import kotlin.concurrent.thread
 /**
  * A native object that belongs to one Kotlin object.
  *
- * It is released once: by [close], as soon as no call uses it any longer; or, where nobody closed it, some time after
+ * It is released once: by [close], as soon as no call uses it any longer; or, if it is never closed, some time after
  * its owner is garbage. After [close] every use throws [IllegalStateException], and nothing reaches the native library.
  */
 internal class Handle(owner: Any, private val pointer: Long, private val release: (Long) -> Unit) : AutoCloseable {

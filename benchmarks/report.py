@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section, person_sizes, start, window
+from benchmarks import camera_section, frame_budget, person_sizes, start, window
 from benchmarks.scenes import pictures as scene_pictures
 from benchmarks.scenes import section as scene_section
 from benchmarks.sweep import pareto
@@ -213,6 +213,7 @@ def agreement_section(agreement: dict) -> Section:
 SECTIONS = {
     "sweep": sweep_section,
     "person_sizes": person_sizes.section,
+    "frame_budget": frame_budget.section,
     "frames": frames_section,
     "start": start.section,
     "window": window.section,

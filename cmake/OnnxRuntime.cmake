@@ -7,7 +7,7 @@
 #   else the target onnxruntime::onnxruntime of the app that this build is a part of, or of a package (onnxruntimeConfig),
 #     or the header and the library where the system keeps such files.
 set(MAQ_ONNXRUNTIME_VERSION 1.26.0)
-set(_ort_min_api 20)  # as kApiVersion in sdk/src/nn/onnxruntime_library.cpp
+set(_ort_min_api 24)  # of headers: kNewerApiVersion in sdk/src/nn/onnxruntime_library.cpp; the library may be 1.20
 
 # The npm package repacks the official Android archive (which has the C headers and every Android ABI) and the official
 # Linux x86-64 library; the aarch64 library is only in the official jar, which is fetched for that target alone.
@@ -158,9 +158,12 @@ endif()
 # The name under which the loader finds it where it is not installed beside libmaquette.so: some distributions put more of
 # the version into it than the project does.
 set(MAQ_ONNXRUNTIME_SONAME libonnxruntime.so.1)
+if(ANDROID)  # packed under a name of its own (scripts/android/rename_library.py), which is as long
+  set(MAQ_ONNXRUNTIME_SONAME libmaquetteort.so)
+endif()
 execute_process(COMMAND "${CMAKE_READELF}" -d "${MAQ_ONNXRUNTIME_LIBRARY}" OUTPUT_VARIABLE _ort_dynamic
   ERROR_VARIABLE _ort_error RESULT_VARIABLE _ort_failed)
-if(NOT _ort_failed AND _ort_dynamic MATCHES "SONAME[^\n]*\\[([^]\n]+)\\]")
+if(NOT ANDROID AND NOT _ort_failed AND _ort_dynamic MATCHES "SONAME[^\n]*\\[([^]\n]+)\\]")
   set(MAQ_ONNXRUNTIME_SONAME "${CMAKE_MATCH_1}")
 endif()
 

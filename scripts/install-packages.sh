@@ -7,7 +7,7 @@
 #   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (120 MB)
 #   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (35 MB)
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
-#   scripts/install-packages.sh android     + Java and Maven
+#   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
@@ -85,9 +85,15 @@ if [ "$group" = lint ]; then
     needs_command clang-format clang-format
     needs_command clang-tidy clang-tidy
 fi
-if [ "$group" = android ]; then
+if [ "$group" = test ] || [ "$group" = android ]; then
     needs_command javac openjdk-17-jdk-headless
     needs_command mvn maven           # brings Kotlin, and Android's classes to test against
+    needs_command clang++-14 clang-14
+    needs_command ld.lld-14 lld-14
+    needs_package libc++-14-dev       # headers; the library is Android's
+    needs_command unzip unzip
+    needs_command python3 python3
+    needs_package python3-pip         # brings headers of a C library like Android's
 fi
 [ "$group" != newcomer ] || needs_command debootstrap debootstrap
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs the native tests (release and asan builds; those of threads in the tsan build), the Python tests and those with
-# cameras in a virtual machine, where there can be one, two groups at a time, and closes with their sum:
-#   scripts/test.sh [GROUP...]      default: python asan camera-vm tsan release
+# Runs the native tests (release and asan builds; those of threads in the tsan build), the Python tests, those of Android
+# and those with cameras in a virtual machine, where there can be one, two groups at a time, and closes with their sum:
+#   scripts/test.sh [GROUP...]      default: python asan camera-vm tsan android release
 # Each group prints when it ends. Everything runs even when something before it failed; the exit status says whether
 # anything did.
 set -uo pipefail
@@ -24,6 +24,7 @@ group() {
         case "$1" in
             python) .venv/bin/python -m pytest -rs --junitxml "$results/pytest.xml" ;;
             camera-vm) tests/camera_vm/run.sh ;;
+            android) scripts/android/build.sh 1 && scripts/android/test.sh ;;
             tsan) native tsan -L threads ;;
             *) native "$1" ;;
         esac
@@ -38,10 +39,11 @@ case "${1:-}" in
     --group) group "$2"; exit ;;
     -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
 esac
-[ $# -gt 0 ] || set -- python asan camera-vm tsan release  # the longest first
+# The longest first. Java of android not beside the virtual machine, whose emulated cameras time out when they starve.
+[ $# -gt 0 ] || set -- python asan camera-vm tsan android release
 for name in "$@"; do
     case "$name" in
-        python | asan | camera-vm | tsan | release) ;;
+        python | asan | camera-vm | android | tsan | release) ;;
         *) sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
     esac
 done

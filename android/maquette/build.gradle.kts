@@ -30,10 +30,18 @@ android {
         sourceCompatibility = JavaVersion.VERSION_17
         targetCompatibility = JavaVersion.VERSION_17
     }
+    // The shipped networks: ModelBundle.ofAssets(assets, "densepose-b-int8").
+    sourceSets["main"].assets.srcDir("../../sdk/models")
     publishing { singleVariant("release") { withSourcesJar() } }
 }
 
 kotlin { jvmToolchain(17) }
+
+dependencies {
+    // In the API: Flows.kt returns its Flow. Apps in Kotlin nearly all have it, and a shrinker removes it where no flow is
+    // used. 1.10.2 fits Kotlin 2.2.
+    api("org.jetbrains.kotlinx:kotlinx-coroutines-core:1.10.2")
+}
 
 publishing {
     publications {

@@ -57,6 +57,9 @@ int main(int argc, char** argv) try {
   cli.add_option("--threads", options.model.threads, "Of the networks; 0: all cores")->check(CLI::Range(0, 64));
   cli.add_option("--key-frames", options.model.key_frame_interval, "People are looked for in one of so many frames")
       ->check(CLI::Range(1, 1000));
+  cli.add_option("--frame-budget", options.live.frame_budget_ms,
+                 "Milliseconds that the networks may take for a frame; they do less where they take longer")
+      ->check(CLI::Range(0.0, 60000.0));
   cli.add_flag("--part-only", part_only, "No U and V: faster");
   cli.add_option("--size", size, "Of the window")->capture_default_str();
   cli.add_option("--out", options.out, "Folder of snapshots, clips and recordings; default: this one")

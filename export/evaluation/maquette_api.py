@@ -39,6 +39,7 @@ class _DenseposeConfig(ctypes.Structure):
         ("allow_spinning", c_int32),
         ("person_crops", c_int32),
         ("person_crop_px", c_int32),
+        ("provider", c_int32),
     )
 
 
@@ -80,6 +81,7 @@ class _Stats(ctypes.Structure):
         ("body_pixel_count", c_int64),
         ("clamped_pixel_count", c_int64),
         ("is_key_frame", c_int32),
+        ("provider", c_int32),
     )
 
 
@@ -104,6 +106,7 @@ class Stats:
     body_pixel_count: int
     clamped_pixel_count: int
     is_key_frame: int
+    provider: int
 
 
 @dataclass(frozen=True)

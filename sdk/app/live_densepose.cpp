@@ -32,6 +32,7 @@ LiveDensePose::LiveDensePose(const Context& context, const maq_densepose_config&
   pipeline.source = &source;
   pipeline.result_pool_size = kResultsHeld;
   pipeline.nice = options.nice;
+  pipeline.frame_budget_ms = options.frame_budget_ms;
   pipeline.result_user_data = pipeline.state_user_data = this;
   pipeline.result_callback = [](void* self, const maq_pipeline_result* result) {
     static_cast<LiveDensePose*>(self)->take_result(PipelineResult(*result));

@@ -40,6 +40,7 @@ struct LiveDensePoseOptions {
   int32_t reconnect_ms = 86400000;  // how long a lost camera is waited for
   int32_t max_side_px = 2048;       // larger pictures of files are made smaller
   int32_t nice = 5;                 // so that the thread that draws goes first
+  double frame_budget_ms = 0;       // as in maq_pipeline_config
 };
 
 class LiveDensePose {

@@ -139,6 +139,7 @@ class Case {
     return {{"source", uri_},
             {"size_px", size_px_},
             {"network_px", {stats_.network_width_px, stats_.network_height_px}},
+            {"provider", name_of(stats_.provider)},
             {"runs", runs()},
             {"seconds", seconds_},
             {"people", people()},
@@ -261,6 +262,7 @@ int run_bench(const Options& options) {
                           {"crop_size", options.model.crop_px},
                           {"surface", !options.model.no_surface},
                           {"spin", !options.model.no_spin},
+                          {"provider", options.model.provider},
                           {"warm_up", options.warm_up},
                           {"runs", options.runs},
                           {"seconds", options.seconds}};

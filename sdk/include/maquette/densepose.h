@@ -28,7 +28,7 @@ typedef enum maq_person_crops {
 
 typedef struct maq_densepose_config {
   uint32_t struct_size;
-  int32_t threads;         /* for the networks; 0 (default): the machine's cores, at most 4 */
+  int32_t threads;         /* for the networks; 0 (default): the machine's large cores, at most 4 */
   const char* bundle_path; /* folder with manifest.json; NULL (default): bundle_files, or without them the bundle
                                  installed with the library (share/maquette/models/densepose-b-int8). Copied. */
   const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
@@ -49,6 +49,9 @@ typedef struct maq_densepose_config {
                                    some speed */
   maq_person_crops person_crops; /* default MAQ_PERSON_CROPS_OFF */
   int32_t person_crop_px;        /* side of a crop, 64 to 512; 0 (default): 192. Smaller is faster. */
+  maq_provider provider; /* for the trunk and the heads; default MAQ_PROVIDER_CPU. Networks for which another cannot be
+                            had, or of which it takes less than half, run on the CPU: the log says why. Others are
+                            prepared anew for each size of the input. */
 } maq_densepose_config;
 
 typedef struct maq_person {
@@ -94,6 +97,7 @@ typedef struct maq_densepose_stats {
   int64_t body_pixel_count;    /* pixels that belong to a person */
   int64_t clamped_pixel_count; /* of these, pixels where the network's U or V was outside 0 to 1 */
   int32_t is_key_frame;        /* 1: people were detected; 0: boxes of the frame before were propagated */
+  maq_provider provider;       /* in use for the trunk */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.

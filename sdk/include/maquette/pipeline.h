@@ -71,6 +71,11 @@ typedef struct maq_pipeline_config {
   int32_t nice;                                 /* added to the niceness of the pipeline's and the model's threads,
                                                    0 (default) to 19, so that drawing threads have priority. Linux and
                                                    Android; no effect elsewhere. */
+  /* What the model may take for a frame of a stream, in the mean, as on a device that throttles: 0 (default): any time;
+   * else up to 60000. When it takes longer, people are detected in every 2nd and then every 4th frame
+   * (key_frame_interval), then long_side_px is lowered, in steps of 32 pixels, to no less than half. Both come back,
+   * step by step, when there has been time for some seconds. */
+  double frame_budget_ms;
 } maq_pipeline_config;
 
 typedef struct maq_pipeline_info {
@@ -89,6 +94,8 @@ typedef struct maq_pipeline_stats {
   uint64_t dropped_frame_count;  /* of the current source: lost by the camera, or while the model was busy */
   double results_per_second;     /* over the last second */
   double wait_ms, run_ms, age_ms; /* of the latest result, as in maq_pipeline_result */
+  int32_t key_frame_interval;     /* of the model's config, or what frame_budget_ms makes of it; 0 before a result */
+  int32_t long_side_px;           /* the same */
 } maq_pipeline_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_pipeline_config) of the caller.

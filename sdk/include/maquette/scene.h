@@ -34,7 +34,7 @@ typedef int32_t (*maq_scene_progress_callback)(void* user_data, double done, con
 
 typedef struct maq_scene_build_config {
   uint32_t struct_size;
-  int32_t threads;         /* 0 (default): the machine's cores, at most 4 */
+  int32_t threads;         /* 0 (default): the machine's large cores, at most 4 */
   const char* bundle_path; /* folder of the scene networks; NULL (default): bundle_files, or without them the bundle
                               installed with the library (share/maquette/models/scenes-int8). Copied. */
   const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
@@ -178,7 +178,7 @@ MAQ_API maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* in
 
 typedef struct maq_scene_renderer_config {
   uint32_t struct_size;
-  int32_t threads;                     /* 0 (default): the machine's cores, at most 4 */
+  int32_t threads;                     /* 0 (default): the machine's large cores, at most 4 */
   const char* bundle_path;             /* as in maq_scene_build_config; the bundle that built the scene */
   const maq_memory_file* bundle_files; /* as in maq_scene_build_config */
   uint32_t bundle_file_count;
@@ -192,6 +192,7 @@ typedef struct maq_scene_renderer_config {
   /* To measure what an optimisation saves; pictures stay the same where alpha is above 0. Default 0: */
   int32_t draw_unseen_blocks; /* 1: no frustum culling */
   int32_t refine_empty_parts; /* 1: the network also runs where there are no points */
+  maq_provider provider;      /* for the network, as in maq_densepose_config; default MAQ_PROVIDER_CPU */
 } maq_scene_renderer_config;
 
 /* The planes of an image, each of the camera's size. */
@@ -214,6 +215,7 @@ typedef struct maq_scene_image_stats {
   uint64_t drawn_point_count;  /* in these blocks */
   uint64_t shaded_point_count; /* front-most at some pixel */
   int64_t refined_pixel_count; /* that the network computed */
+  maq_provider provider;       /* in use for the network; MAQ_PROVIDER_CPU where it did not run */
 } maq_scene_image_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_scene_renderer_config) of the

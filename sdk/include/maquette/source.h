@@ -99,9 +99,10 @@ typedef struct maq_source_scheme {
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
 /* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec",
- * "stub:people?count=2&seed=7", "stub:pattern", "v4l2:/dev/video0" or "v4l2:0", "libcamera:0" or "depthai:".
- * "file:clip.mp4" chooses among the first three by the file's content, "camera:" opens the first camera that can be
- * opened. Without a scheme it is the path of a file or a camera, "clip.mp4" or "/dev/video0", as it is: no options.
+ * "stub:people?count=2&seed=7", "stub:pattern", "v4l2:/dev/video0" or "v4l2:0", "libcamera:0", "depthai:", and on
+ * Android "android:back" or "android:0". "file:clip.mp4" chooses among the first three by the file's content, "camera:"
+ * opens the first camera that can be opened. Without a scheme it is the path of a file or a camera, "clip.mp4" or
+ * "/dev/video0", as it is: no options.
  * An image may also come out of a pipe (/dev/stdin); the other files are regular files.
  * "?size=640x480&fps=15" works with each: frames are scaled to that size, frames of a clip are dropped down to that
  * rate; a camera uses the nearest mode that it offers, which maq_source_get_info returns. For cameras, "format=MJPG"

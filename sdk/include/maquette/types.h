@@ -54,6 +54,13 @@ typedef enum maq_status {
 /* The id of a person who is not tracked. */
 #define MAQ_NO_ID (-1)
 
+/* What runs the layers of networks. Values never change meaning; new ones are added at the end. */
+typedef enum maq_provider {
+  MAQ_PROVIDER_CPU = 0,     /* ONNX Runtime's own kernels */
+  MAQ_PROVIDER_XNNPACK = 1, /* those of XNNPACK, for networks of floats, on the CPU */
+  MAQ_PROVIDER_NNAPI = 2    /* accelerators of an Android device; may be slower than the CPU: measure it */
+} maq_provider;
+
 /* A file in the app's memory, for systems without a file system to read it from (phones, browsers). The call that takes
  * it copies it: name and data may be freed when the call returns. */
 typedef struct maq_memory_file {

@@ -12,6 +12,9 @@ using namespace maq;
 
 namespace {
 
+// Of the struct without what came after the crops of people.
+constexpr size_t kFirstConfigSize = offsetof(maq_densepose_config, provider);
+
 maq_densepose_config default_config() {
   maq_densepose_config config{};
   config.struct_size = sizeof config;
@@ -33,7 +36,7 @@ const BodyPart* body_part(int32_t part) {
 namespace maq {
 
 maq_densepose_config read_densepose_config(const maq_densepose_config* given, const char* name) {
-  return read_config(given, name, default_config(), sizeof(maq_densepose_config));
+  return read_config(given, name, default_config(), kFirstConfigSize);
 }
 
 DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name) {
@@ -52,6 +55,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   require_range(field("person_crops"), number_in(config.person_crops), int32_t(MAQ_PERSON_CROPS_OFF),
                 int32_t(MAQ_PERSON_CROPS_ALL));
   if (config.person_crop_px != 0) require_range(field("person_crop_px"), config.person_crop_px, 64, 512);
+  require_provider(field("provider"), config.provider);
   DensePoseSettings settings;
   settings.threads = config.threads > 0 ? config.threads : default_threads();
   settings.long_side_px = config.long_side_px;
@@ -66,6 +70,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
                    : config.person_crops == MAQ_PERSON_CROPS_ALL ? PersonCrops::kAll
                                                                  : PersonCrops::kOff;
   settings.crop_side_px = config.person_crop_px;
+  settings.provider = config.provider;
   return settings;
 }
 
@@ -83,7 +88,7 @@ void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]) {
 }
 
 maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_densepose_config));
+  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
 }
 
 maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* given, maq_densepose** densepose) {
@@ -194,6 +199,7 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.body_pixel_count = from.decoded.body_pixels;
     filled.clamped_pixel_count = from.decoded.clamped_uv;
     filled.is_key_frame = from.key_frame ? 1 : 0;
+    filled.provider = from.provider;
     write_struct(stats, "stats", filled, sizeof(maq_densepose_stats));
     return MAQ_OK;
   });

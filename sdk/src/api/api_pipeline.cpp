@@ -12,6 +12,10 @@ using namespace maq;
 namespace {
 
 constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
+constexpr double kMaxFrameBudgetMs = 60000;
+// Of the structs without the frame budget.
+constexpr size_t kFirstConfigSize = offsetof(maq_pipeline_config, nice) + sizeof(int32_t);
+constexpr size_t kFirstStatsSize = offsetof(maq_pipeline_stats, key_frame_interval);
 
 // Of the thread that asked, as with maq_last_error.
 thread_local std::string given_problem, given_uri;
@@ -56,6 +60,7 @@ struct ResultHandles {
 PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std::shared_ptr<ContextState>& state,
                                    const ResultPools& pools) {
   require_range("config.nice", config.nice, 0, 19);
+  require_range("config.frame_budget_ms", config.frame_budget_ms, 0.0, kMaxFrameBudgetMs);
   const maq_source_config source = read_source_config(config.source, "config.source");
   if (source.state_callback != nullptr) {
     throw ArgumentError("config.source.state_callback is not NULL; use config.state_callback.");
@@ -66,6 +71,7 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
   // Those that the app holds, one that waits for it and one that is being mapped.
   settings.source.pool_size = int(config.result_pool_size) + 2;
   settings.nice = config.nice;
+  settings.frame_budget_ms = config.frame_budget_ms;
   settings.runtime = [state] { return state->onnxruntime(); };
   if (config.result_callback != nullptr) {
     settings.on_result = [pools = ResultPools(pools), call = config.result_callback,
@@ -107,7 +113,7 @@ struct maq_pipeline : HandleOf<HandleKind::kPipeline> {
 };
 
 maq_status maq_pipeline_config_init(maq_pipeline_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_pipeline_config));
+  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
 }
 
 maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* given, maq_pipeline** pipeline) {
@@ -115,7 +121,7 @@ maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* 
     require_argument(context, "context");
     require_argument(given, "config");
     require_argument(pipeline, "pipeline");
-    const maq_pipeline_config config = read_config(given, "config", default_config(), sizeof(maq_pipeline_config));
+    const maq_pipeline_config config = read_config(given, "config", default_config(), kFirstConfigSize);
     require_range("config.result_pool_size", config.result_pool_size, 1u, kMaxPoolSize);
     *pipeline = new maq_pipeline(config, context->state);
     return MAQ_OK;
@@ -215,8 +221,9 @@ maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipeline_sta
     const PipelineStats from = pipeline->pipeline.stats();
     write_struct(stats, "stats",
                  maq_pipeline_stats{0, from.results, from.dropped_results, from.dropped_frames, from.results_per_second,
-                                    from.latest.wait_ms, from.latest.run_ms, from.latest.age_ms},
-                 sizeof(maq_pipeline_stats));
+                                    from.latest.wait_ms, from.latest.run_ms, from.latest.age_ms,
+                                    from.effort.key_frame_interval, from.effort.long_side_px},
+                 kFirstStatsSize);
     return MAQ_OK;
   });
 }

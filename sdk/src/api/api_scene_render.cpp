@@ -47,6 +47,7 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     require_range("config.use_background", config.use_background, 0, 1);
     require_range("config.draw_unseen_blocks", config.draw_unseen_blocks, 0, 1);
     require_range("config.refine_empty_parts", config.refine_empty_parts, 0, 1);
+    require_provider("config.provider", config.provider);
     RenderOptions options;
     options.threads = scene_threads(config.threads);
     options.near = config.near_depth;
@@ -57,7 +58,8 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     options.skips_empty_parts = config.refine_empty_parts == 0;
     Bundle bundle = read_bundle_argument(config, "config", kSceneBundle);
     const std::string where = bundle.prefix;
-    auto networks = open_scene_networks(context, std::move(bundle), options.threads, config.allow_spinning == 1);
+    auto networks =
+        open_scene_networks(context, std::move(bundle), options.threads, config.allow_spinning == 1, config.provider);
     if (scene->scene.networks_sha256 != networks->sha256()) {
       throw Error(MAQ_ERROR_BAD_BUNDLE, "The scene was built with other networks than bundle ", where,
                   " has; give the bundle that it was built with, or build the scene again.");
@@ -131,7 +133,8 @@ maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_ima
     filled.drawn_point_count = from.projected_points;
     filled.shaded_point_count = from.shaded_points;
     filled.refined_pixel_count = int64_t(from.refined_pixels);
-    write_struct(stats, "stats", filled, sizeof filled);
+    filled.provider = from.provider;
+    write_struct(stats, "stats", filled, offsetof(maq_scene_image_stats, provider));
     return MAQ_OK;
   });
 }

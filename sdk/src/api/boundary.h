@@ -136,6 +136,11 @@ int32_t number_in(const Enum& value) {
   return number;
 }
 
+template <class Name>
+void require_provider(const Name& name, const maq_provider& provider) {
+  require_range(name, number_in(provider), int32_t(MAQ_PROVIDER_CPU), int32_t(MAQ_PROVIDER_NNAPI));
+}
+
 // The caller's config on top of the defaults.
 template <class T>
 T read_config(const T* given, const char* name, const T& defaults, size_t smallest) {

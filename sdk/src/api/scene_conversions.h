@@ -12,6 +12,7 @@
 #include "api/scene_handles.h"
 #include "core/worker_threads.h"
 #include "image/geometry/lens.h"
+#include "nn/provider.h"
 #include "scene/networks/scene_networks.h"
 #include "scene/pinhole_camera.h"
 
@@ -25,11 +26,14 @@ inline int scene_threads(int32_t wanted) {
 // The bundle that a config without one means.
 inline constexpr char kSceneBundle[] = "scenes-int8";
 
-inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, Bundle bundle, int threads, bool spin) {
+inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, Bundle bundle, int threads, bool spin,
+                                                          maq_provider provider = MAQ_PROVIDER_CPU) {
   SessionSettings settings;
   settings.threads = threads;
   settings.spin = spin;
-  return std::make_shared<SceneNetworks>(context->state->onnxruntime(), std::move(bundle), settings);
+  const auto runtime = context->state->onnxruntime();
+  settings.provider = available_provider(*runtime, provider);
+  return std::make_shared<SceneNetworks>(runtime, std::move(bundle), settings);
 }
 
 // Without the distortion.

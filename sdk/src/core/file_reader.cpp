@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 
 namespace maq {
 namespace {
@@ -96,6 +97,8 @@ std::string_view FileReader::next_word() {
   return {word_.data(), length};
 }
 
+#if defined(__cpp_lib_to_chars) && !defined(MAQ_WITHOUT_FLOAT_FROM_CHARS)
+
 bool parse_number(std::string_view text, double& number) {
   if (!text.empty() && text[0] == '+') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -107,5 +110,19 @@ bool parse_number(std::string_view text, double& number) {
   }
   return error == std::errc() && end == text.data() + text.size();
 }
+
+#else  // libc++ before release 20, which Android's compilers have; there strtod always takes the point of C
+
+bool parse_number(std::string_view text, double& number) {
+  if (!text.empty() && text[0] == '+') text.remove_prefix(1);
+  // What strtod takes besides: space before the number, a second sign, hexadecimal numbers.
+  if (text.empty() || is_space(text[0]) || text[0] == '+' || text.find_first_of("xX") != text.npos) return false;
+  const std::string word(text);
+  char* end = nullptr;
+  number = std::strtod(word.c_str(), &end);
+  return end == word.c_str() + word.size();
+}
+
+#endif
 
 }  // namespace maq

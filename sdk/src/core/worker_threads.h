@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -15,7 +16,16 @@ namespace maq {
 // The limit for a network or a piece of work; more is refused.
 inline constexpr int kMaxThreads = 64;
 
-// The default: as many as the processor has cores, but at most 4. More do not pay for networks of this size.
+// The numbers of the cores that this thread may run on, as of now; empty where the system does not tell.
+std::vector<int> allowed_cores();
+
+// How many of the cores `allowed` are large. Phones and boards pair a few with several that take less power and are
+// some three times slower, so that all others would wait for their part of a network. By the capacity that the system
+// gives them, else by their highest frequency; all of them where it tells neither for one of them. `folder`: with cpu0,
+// cpu1, …, as Linux has it.
+int count_large_cores(const std::vector<int>& allowed, const std::string& folder = "/sys/devices/system/cpu");
+
+// The default: as many as there are large cores, but at most 4. More do not pay for networks of this size.
 int default_threads();
 
 class WorkerThreads {

@@ -6,6 +6,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/rounding.h"
+#include "nn/provider.h"
 
 namespace maq {
 namespace {
@@ -17,6 +18,7 @@ constexpr int kFirstLevel = 2;
 constexpr float kSmallPersonPx = 150;
 constexpr double kMinLeanDegrees = 15;
 constexpr int kCropSidePx = 192;
+constexpr size_t kSizedTrunks = 2;  // kept: of frames and of crops
 // In crops people are followed who move by less than this, of their long side, from frame to frame; and who keep this
 // fraction of their pixels.
 constexpr double kMotionMargin = 0.05;
@@ -113,48 +115,56 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
                bundle.path_of(spec_.surface_file)) {
   cancel_ = std::make_unique<RunCancel>(runtime);
   const Manifest& manifest = bundle.manifest;
-  const auto make = [&](const GraphSpec& graph) {
-    return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file),
-                                     SessionSettings{settings_.threads, settings_.spin});
-  };
+  const SessionSettings on_cpu{settings_.threads, settings_.spin};
+  SessionSettings on_provider = on_cpu;
+  on_provider.provider = available_provider(*runtime, settings_.provider);
   // A graph, whose inputs and outputs have these shapes.
   const auto make_checked = [&](const std::string& name, GraphSpec graph, const std::vector<int64_t>& input,
-                                const std::vector<std::vector<int64_t>>& outputs) {
+                                const std::vector<std::vector<int64_t>>& outputs, const SessionSettings& with) {
     const std::string where = concatenate("Bundle ", manifest.name, ": graph ", name, ": ");
     for (TensorSpec& tensor : graph.inputs) require_shape(tensor, input, where + "input ");
     for (size_t i = 0; i < graph.outputs.size(); ++i) {
       require_shape(graph.outputs[i], outputs[std::min(i, outputs.size() - 1)], where + "output ");
     }
-    return make(graph);
+    return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file), with);
   };
   const int first = kFirstLevel, last = kFirstLevel + int(kRpnLevels) - 1;
   const GraphSpec trunk = graph_with(manifest, "trunk", {"image"}, at_levels("p", first, last));
   channels_ = feature_channels(trunk, manifest.name);
   const std::vector<int64_t> features = {1, kAnySize, kAnySize, channels_};
-  trunk_ = make_checked("trunk", trunk, {1, 3, kAnySize, kAnySize}, {features});
+  trunk_ = make_checked("trunk", trunk, {1, 3, kAnySize, kAnySize}, {features}, on_cpu);
   const std::vector<int64_t> anchors = {1, kAnySize, kAnySize, 5 * int64_t(spec_.rpn.aspect_ratios.size())};
   rpn_fine_ = make_checked(
       "rpn_fine", graph_with(manifest, "rpn_fine", at_levels("p", first, first), at_levels("rpn", first, first)),
-      features, {anchors});
+      features, {anchors}, on_cpu);
   rpn_coarse_ = make_checked(
       "rpn_coarse",
       graph_with(manifest, "rpn_coarse", at_levels("p", first + 1, last), at_levels("rpn", first + 1, last)), features,
-      {anchors});
+      {anchors}, on_cpu);
   const int64_t box_pool = spec_.box_head.pool_size, dense_pool = spec_.dense_head.pool_size;
   box_head_ = make_checked("box_head", graph_with(manifest, "box_head", {"rois"}, {"boxes"}),
-                           {kAnySize, box_pool, box_pool, channels_}, {{kAnySize, 6}});
+                           {kAnySize, box_pool, box_pool, channels_}, {{kAnySize, 6}}, on_provider);
   const int64_t classes = spec_.dense_head.coarse_classes + spec_.dense_head.index_classes;
   const auto make_dense_head = [&](const std::string& name) {
     return make_checked(
         name, graph_with(manifest, name, {"rois"}, {"labels", "surface"}),
         {kAnySize, dense_pool, dense_pool, channels_},
-        {{kAnySize, dense_pool, dense_pool, 4 * classes}, {kAnySize, dense_pool, dense_pool, charts_.channels()}});
+        {{kAnySize, dense_pool, dense_pool, 4 * classes}, {kAnySize, dense_pool, dense_pool, charts_.channels()}},
+        on_provider);
   };
   dense_head_ = make_dense_head("dense_head");
-  whole_ = crops_ = {trunk_.get(), dense_head_.get(), &charts_, kRpnLevels};
+  // Null on the CPU.
+  const auto make_sized = [&](const GraphSpec& graph, std::vector<uint8_t>& bytes,
+                              std::optional<SizedSessions>& made) -> SizedSessions* {
+    if (on_provider.provider == MAQ_PROVIDER_CPU) return nullptr;
+    bytes = bundle.files.at(graph.file);
+    return &made.emplace(runtime, bytes, graph, bundle.path_of(graph.file), on_provider, kSizedTrunks);
+  };
+  SizedSessions* const sized_trunk = make_sized(trunk, trunk_bytes_, sized_trunk_);
+  whole_ = crops_ = {trunk_.get(), sized_trunk, dense_head_.get(), &charts_, kRpnLevels};
   if (!spec_.crop_charts_file.empty() && settings_.crops != PersonCrops::kOff) {
-    crop_trunk_ = make_checked("crop_trunk", graph_with(manifest, "crop_trunk", {"image"}, {"p2"}),
-                               {1, 3, kAnySize, kAnySize}, {features});
+    const GraphSpec crop_trunk = graph_with(manifest, "crop_trunk", {"image"}, {"p2"});
+    crop_trunk_ = make_checked("crop_trunk", crop_trunk, {1, 3, kAnySize, kAnySize}, {features}, on_cpu);
     crop_dense_head_ = make_dense_head("crop_dense_head");
     crop_charts_.emplace(bundle.files.at(spec_.crop_charts_file), spec_.dense_head.index_classes - 1,
                          bundle.path_of(spec_.crop_charts_file));
@@ -162,7 +172,8 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
       throw Error(MAQ_ERROR_BAD_BUNDLE, bundle.path_of(spec_.crop_charts_file), " is for ", crop_charts_->channels(),
                   " channels, but ", spec_.charts_file, " for ", charts_.channels(), ". Export the bundle again.");
     }
-    crops_ = {crop_trunk_.get(), crop_dense_head_.get(), &*crop_charts_, 1};
+    SizedSessions* const sized = make_sized(crop_trunk, crop_trunk_bytes_, sized_crop_trunk_);
+    crops_ = {crop_trunk_.get(), sized, crop_dense_head_.get(), &*crop_charts_, 1};
   }
   if (spec_.dense_head.output_size != 2 * spec_.dense_head.pool_size) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": the dense head's output is ",
@@ -218,7 +229,7 @@ void DensePose::find_boxes(const ImageView& image, DensePoseStats& stats) {
   make_network_input(image, {stats.network_width_px, stats.network_height_px}, spec_.input, input_);
   stats.preprocess_ms = float(stage.lap_ms());
 
-  run_trunk(whole_, input_.values, input_.padded_width_px, input_.padded_height_px);
+  stats.provider = run_trunk(whole_, input_.values, input_.padded_width_px, input_.padded_height_px);
   stats.trunk_ms = float(stage.lap_ms());
 
   if (stats.key_frame) {
@@ -246,7 +257,13 @@ void DensePose::reset() {
   tracks_crops_ = false;
 }
 
-void DensePose::run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px) {
+void DensePose::set_effort(int key_frame_interval, int long_side_px) {
+  if (long_side_px != settings_.long_side_px) reset();  // boxes are followed in pixels of the network's input
+  settings_.key_frame_interval = key_frame_interval;
+  settings_.long_side_px = long_side_px;
+}
+
+maq_provider DensePose::run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px) {
   const int64_t height = height_px, width = width_px;
   const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
   shapes_.clear();
@@ -255,12 +272,14 @@ void DensePose::run_trunk(const Mapper& mapper, const std::vector<float>& values
     shapes_.push_back({1, cells(height, stride), cells(width, stride), channels_});
   }
   inputs_.assign(1, {values.data(), {1, 3, height, width}});
-  pyramid_ = mapper.trunk->run(inputs_, shapes_, cancel_.get());
+  Session& trunk = mapper.sized_trunk == nullptr ? *mapper.trunk : mapper.sized_trunk->at(width_px, height_px);
+  pyramid_ = trunk.run(inputs_, shapes_, cancel_.get());
   features_.clear();
   for (size_t l = 0; l < std::min(mapper.levels, kFeatureLevels); ++l) {
     const TensorView& map = pyramid_[l];
     features_.push_back({map.data, channels_, int(map.shape[1]), int(map.shape[2]), spec_.box_head.strides[l]});
   }
+  return trunk.provider();
 }
 
 void DensePose::propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped) {
@@ -418,7 +437,7 @@ void DensePose::run_crops(const ImageView& image, DensePoseStats& stats) {
     }
     if (!person.crop) continue;
     make_crop_input(image, person.crop->to_image, side, spec_.input, crop_input_);
-    run_trunk(crops_, crop_input_.values, side, side);
+    stats.provider = run_trunk(crops_, crop_input_.values, side, side);
     roi_align_.run(features_[0], person.crop->box, spec_.dense_head.pool_size, roi);
     roi += dense_roi_size();
   }

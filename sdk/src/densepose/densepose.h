@@ -19,6 +19,7 @@
 #include "image/network_input.h"
 #include "nn/bundle.h"
 #include "nn/session.h"
+#include "nn/sized_sessions.h"
 
 namespace maq {
 
@@ -37,6 +38,7 @@ struct DensePoseSettings {
   int crop_side_px = 0;
   bool surface = true;
   bool spin = true;
+  maq_provider provider = MAQ_PROVIDER_CPU;
 };
 
 struct Person {
@@ -56,6 +58,7 @@ struct DensePoseStats {
   int network_width_px = 0;
   int network_height_px = 0;
   bool key_frame = false;
+  maq_provider provider = MAQ_PROVIDER_CPU;  // of the trunk
   int proposals = 0;
   int dropped_boxes = 0;
   int crops = 0;
@@ -86,6 +89,12 @@ class DensePose {
   // The next image begins another stream.
   void reset();
 
+  int long_side_px() const { return settings_.long_side_px; }
+  int key_frame_interval() const { return settings_.key_frame_interval; }
+  // Between two runs: takes effect with the next, which is a key frame where the long side changes. No network is made
+  // anew, unless another provider than the CPU runs them.
+  void set_effort(int key_frame_interval, int long_side_px);
+
   // Where on the body labels lie; from any thread, also during run(). Throws what BodySurface::grid() throws.
   const SurfaceGrid& surface() { return surface_.grid(); }
 
@@ -106,6 +115,7 @@ class DensePose {
   // What maps the surface, of whole images or of crops.
   struct Mapper {
     Session* trunk = nullptr;
+    SizedSessions* sized_trunk = nullptr;  // in its place, unless null
     Session* dense_head = nullptr;
     ChartPredictor* charts = nullptr;
     size_t levels = 0;  // that the trunk gives
@@ -113,7 +123,8 @@ class DensePose {
 
   void find_people(const ImageView& image, DensePoseResult& result);
   // `values`: [3, height_px, width_px], normalised; the sides are multiples of the spec's. Into `features_`.
-  void run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px);
+  // Returns the provider in use.
+  maq_provider run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px);
   // The best boxes of the RPN. Its finest level runs only where people of min_person_height_px may be that small.
   void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
   // One pass of the box head: scores and refines `boxes`, keeps those of a score above `min_score`, then NMS.
@@ -150,6 +161,9 @@ class DensePose {
   std::unique_ptr<Session> box_head_;
   std::unique_ptr<Session> dense_head_;
   ChartPredictor charts_;
+  // For other providers than the CPU, which want to know the sizes; the bytes are those of the networks.
+  std::vector<uint8_t> trunk_bytes_, crop_trunk_bytes_;
+  std::optional<SizedSessions> sized_trunk_, sized_crop_trunk_;
   std::unique_ptr<Session> crop_trunk_, crop_dense_head_;  // null where crops go through those above
   std::optional<ChartPredictor> crop_charts_;
   Mapper whole_, crops_;

@@ -14,7 +14,9 @@ namespace {
 
 // The oldest interface that has what the SDK calls and that it was tested with; later releases keep it.
 constexpr uint32_t kApiVersion = 20;
-static_assert(kApiVersion <= ORT_API_VERSION, "the headers are of an older ONNX Runtime");
+// What is called where it is there (provider.cpp).
+constexpr uint32_t kNewerApiVersion = 24;
+static_assert(kNewerApiVersion <= ORT_API_VERSION, "the headers are of an older ONNX Runtime");
 constexpr char kFileName[] = "libonnxruntime.so.1";
 constexpr char kRemedy[] =
     " Set MAQ_ONNXRUNTIME_LIB to the file, or put libonnxruntime.so.1 in the folder of libmaquette.so.";
@@ -75,15 +77,16 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
   setenv("ORT_DISABLE_TELEMETRY", "1", 0);
 
   // Never closed again: the library's threads and thread-local storage do not survive unloading.
-  void* library = find_library(explicit_path, &path_);
-  const auto get_api_base = reinterpret_cast<const OrtApiBase* (*)()>(dlsym(library, "OrtGetApiBase"));
+  library_ = find_library(explicit_path, &path_);
+  const auto get_api_base = reinterpret_cast<const OrtApiBase* (*)()>(symbol("OrtGetApiBase"));
   if (get_api_base == nullptr) {
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is not ONNX Runtime: it has no OrtGetApiBase.", kRemedy);
   }
   require_memory(kThreadLocalBytes);
   const OrtApiBase* base = get_api_base();
   version_ = base->GetVersionString();
-  api_ = base->GetApi(kApiVersion);
+  minor_version_ = std::atoi(version_.c_str() + version_.find('.') + 1);
+  api_ = base->GetApi(minor_version_ < int(kNewerApiVersion) ? kApiVersion : kNewerApiVersion);
   if (api_ == nullptr) {
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is ONNX Runtime ", version_, ", but 1.", kApiVersion,
                 ".0 or newer is needed.", kRemedy);
@@ -97,6 +100,8 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
 OnnxRuntimeLibrary::~OnnxRuntimeLibrary() {
   if (env_ != nullptr) api_->ReleaseEnv(env_);
 }
+
+void* OnnxRuntimeLibrary::symbol(const char* name) const { return dlsym(library_, name); }
 
 void OnnxRuntimeLibrary::check(OrtStatus* result, maq_status status, const std::string& what) const {
   if (result == nullptr) return;

@@ -26,7 +26,11 @@ class OnnxRuntimeLibrary {
   OrtEnv* env() const { return env_; }
   const Log& log() const { return log_; }
   const std::string& version() const { return version_; }
+  int minor_version() const { return minor_version_; }  // 26 of 1.26.0
   const std::string& path() const { return path_; }
+
+  // A function that only some builds export, or null.
+  void* symbol(const char* name) const;
 
   // Throws `status` with "<what>: <ONNX Runtime's text>" when `result` is an error, and frees it. The status is
   // MAQ_ERROR_OUT_OF_MEMORY instead where the text says so.
@@ -34,9 +38,11 @@ class OnnxRuntimeLibrary {
 
  private:
   Log log_;
+  void* library_ = nullptr;
   const OrtApi* api_ = nullptr;
   OrtEnv* env_ = nullptr;
   std::string version_;
+  int minor_version_ = 0;
   std::string path_;
 };
 

@@ -2,9 +2,11 @@
 
 #include <map>
 #include <memory>
+#include <utility>
 
 #include "core/error.h"
 #include "core/memory.h"
+#include "nn/provider.h"
 
 namespace maq {
 namespace {
@@ -80,40 +82,20 @@ struct Session::GraphSide {
 
 Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
                  std::string name, const SessionSettings& settings)
-    : runtime_(std::move(runtime)),
-      spec_(std::move(spec)),
-      name_(std::move(name)),
-      threads_(settings.threads - 1) {  // the first is the caller of run()
+    : runtime_(std::move(runtime)), spec_(std::move(spec)), name_(std::move(name)), provider_(settings.provider) {
   const OrtApi& api = runtime_->api();
-  const auto check = [&](OrtStatus* result) {
-    runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be loaded"));
-  };
-  require_memory(kThreadLocalBytes);  // that of this thread
-  OrtSessionOptions* made = nullptr;
-  check(api.CreateSessionOptions(&made));
-  const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made,
-                                                                                        api.ReleaseSessionOptions);
-  check(api.SetUserLoggingFunction(options.get(), forward_to_log, const_cast<Log*>(&runtime_->log())));
-  const int thread_count = threads_.count() + 1;
-  if (!threads_.shortage().empty()) {
-    runtime_->log().write(MAQ_LOG_WARNING, name_, " runs on ", thread_count, " of ", settings.threads,
-                          " threads, which takes longer. ", threads_.shortage());
-  }
-  check(api.SetIntraOpNumThreads(options.get(), thread_count));
-  check(api.SessionOptionsSetCustomCreateThreadFn(options.get(), SessionThreads::assign));
-  check(api.SessionOptionsSetCustomThreadCreationOptions(options.get(), &threads_));
-  check(api.SessionOptionsSetCustomJoinThreadFn(options.get(), SessionThreads::join));
-  check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));
-  // The networks run one after another: the threads of one must not keep spinning while the next one works.
-  check(api.AddSessionConfigEntry(options.get(), "session.force_spinning_stop", "1"));
-  check(api.AddSessionConfigEntry(options.get(), "session.intra_op.allow_spinning", settings.spin ? "1" : "0"));
-  if (!settings.plans_memory) check(api.DisableMemPattern(options.get()));
-  for (const auto& [size_name, size] : settings.fixed_sizes) {
-    check(api.AddFreeDimensionOverrideByName(options.get(), size_name.c_str(), size));
-  }
-  check(api.CreateSessionFromArray(runtime_->env(), bytes.data(), bytes.size(), options.get(), &session_));
   try {
-    check(api.CreateCpuMemoryInfo(OrtDeviceAllocator, OrtMemTypeDefault, &cpu_memory_));
+    try {
+      open(bytes, settings);
+    } catch (const Error& error) {
+      if (provider_ == MAQ_PROVIDER_CPU || error.status() == MAQ_ERROR_OUT_OF_MEMORY) throw;
+      runtime_->log().write(MAQ_LOG_WARNING, name_, " runs on the CPU: ", error.what());
+      api.ReleaseSession(std::exchange(session_, nullptr));
+      provider_ = MAQ_PROVIDER_CPU;
+      open(bytes, settings);
+    }
+    runtime_->check(api.CreateCpuMemoryInfo(OrtDeviceAllocator, OrtMemTypeDefault, &cpu_memory_), MAQ_ERROR_BAD_BUNDLE,
+                    name_);
     compare_with_spec();
     for (const TensorSpec& input : spec_.inputs) input_names_.push_back(input.name.c_str());
     for (const TensorSpec& output : spec_.outputs) output_names_.push_back(output.name.c_str());
@@ -130,6 +112,47 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
 }
 
 Session::~Session() { release(); }
+
+void Session::open(const std::vector<uint8_t>& bytes, const SessionSettings& settings) {
+  const OrtApi& api = runtime_->api();
+  const auto check = [&](OrtStatus* result) {
+    runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be loaded"));
+  };
+  require_memory(kThreadLocalBytes);  // that of this thread
+  OrtSessionOptions* made = nullptr;
+  check(api.CreateSessionOptions(&made));
+  const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made,
+                                                                                        api.ReleaseSessionOptions);
+  check(api.SetUserLoggingFunction(options.get(), forward_to_log, const_cast<Log*>(&runtime_->log())));
+  // XNNPACK brings threads of its own, beside which ONNX Runtime wants those of the session to be one that does not
+  // spin: https://onnxruntime.ai/docs/execution-providers/Xnnpack-ExecutionProvider.html
+  const bool has_own_threads = provider_ == MAQ_PROVIDER_XNNPACK;
+  threads_.emplace(has_own_threads ? 0 : settings.threads - 1);  // the first is the caller of run()
+  const int thread_count = threads_->count() + 1;
+  if (!threads_->shortage().empty()) {
+    runtime_->log().write(MAQ_LOG_WARNING, name_, " runs on ", thread_count, " of ", settings.threads,
+                          " threads, which takes longer. ", threads_->shortage());
+  }
+  check(api.SetIntraOpNumThreads(options.get(), thread_count));
+  check(api.SessionOptionsSetCustomCreateThreadFn(options.get(), SessionThreads::assign));
+  check(api.SessionOptionsSetCustomThreadCreationOptions(options.get(), &*threads_));
+  check(api.SessionOptionsSetCustomJoinThreadFn(options.get(), SessionThreads::join));
+  check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));
+  // The networks run one after another: the threads of one must not keep spinning while the next one works.
+  check(api.AddSessionConfigEntry(options.get(), "session.force_spinning_stop", "1"));
+  check(api.AddSessionConfigEntry(options.get(), "session.intra_op.allow_spinning",
+                                  settings.spin && !has_own_threads ? "1" : "0"));
+  if (!settings.plans_memory) check(api.DisableMemPattern(options.get()));
+  for (const auto& [size_name, size] : settings.fixed_sizes) {
+    check(api.AddFreeDimensionOverrideByName(options.get(), size_name.c_str(), size));
+  }
+  if (provider_ != MAQ_PROVIDER_CPU) {
+    append_provider(*runtime_, provider_, settings.threads, options.get());
+    check(api.AddSessionConfigEntry(options.get(), "session.record_ep_graph_assignment_info", "1"));
+  }
+  check(api.CreateSessionFromArray(runtime_->env(), bytes.data(), bytes.size(), options.get(), &session_));
+  if (provider_ != MAQ_PROVIDER_CPU) check_assignment(*runtime_, provider_, session_, name_);
+}
 
 void Session::release() {
   const OrtApi& api = runtime_->api();

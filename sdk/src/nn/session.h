@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,8 @@ struct SessionSettings {
   // Whether memory is planned for each size of input after its first run. With inputs of many sizes, or large ones,
   // that takes more than it saves.
   bool plans_memory = true;
+  // Runs what it can of the graph; where it cannot be used, or takes too little, the session is as with the CPU.
+  maq_provider provider = MAQ_PROVIDER_CPU;
 };
 
 // Ends a run from another thread: the one that runs, or else the next.
@@ -95,8 +98,13 @@ class Session {
   const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes,
                                      const RunCancel* cancel = nullptr);
 
+  // The one in use.
+  maq_provider provider() const { return provider_; }
+
  private:
   struct GraphSide;
+
+  void open(const std::vector<uint8_t>& bytes, const SessionSettings& settings);
 
   void compare_with_spec() const;
   // Throws unless the graph has each of `expected` with its type and shape; returns how many it has in all.
@@ -116,7 +124,8 @@ class Session {
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   GraphSpec spec_;
   std::string name_;
-  SessionThreads threads_;
+  maq_provider provider_ = MAQ_PROVIDER_CPU;
+  std::optional<SessionThreads> threads_;
   OrtSession* session_ = nullptr;
   OrtMemoryInfo* cpu_memory_ = nullptr;
   std::vector<const char*> input_names_, output_names_;

@@ -124,6 +124,7 @@ struct Pipeline::State {
   DensePoseResult densepose;
   std::optional<Clock::time_point> waiting_since;
   EventRate rate;
+  std::optional<FrameBudget> budget;  // of the model that is loaded
 
   std::thread thread;  // of the pipeline
 
@@ -334,6 +335,10 @@ struct Pipeline::State {
     settings.source.log.write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                               bundle.manifest.precision, ") loaded, ", now.model.settings.threads, " thread(s)");
     show_model(loaded);
+    budget.reset();
+    if (settings.frame_budget_ms > 0) {
+      budget.emplace(settings.frame_budget_ms, FrameEffort{loaded->key_frame_interval(), loaded->long_side_px()});
+    }
     model_number = now.model_number;
     std::lock_guard<std::mutex> lock(mutex);
     return is_current();
@@ -363,6 +368,7 @@ struct Pipeline::State {
   void deliver(double wait_ms, Clock::time_point begin) {
     const auto end = Clock::now();
     const uint64_t dropped_frames = source->drops();
+    keep_budget(end, ms_between(begin, end));
     std::unique_lock<std::mutex> lock(mutex);
     if (is_ending || request.source_number != now.source_number) return;
     PipelineTimes times{++counts.results, wait_ms, ms_between(begin, end), -1};
@@ -372,6 +378,7 @@ struct Pipeline::State {
     counts.dropped_frames = dropped_frames;
     counts.results_per_second = rate.add(end);
     counts.latest = times;
+    counts.effort = {model->key_frame_interval(), model->long_side_px()};
     if (settings.on_result) {
       bool taken = false;
       call_back(lock, [&] { taken = settings.on_result(frame, densepose, times); });
@@ -385,6 +392,16 @@ struct Pipeline::State {
     }
     lock.unlock();
     frame.clear();  // of a result that was dropped
+  }
+
+  // After a frame.
+  void keep_budget(Clock::time_point end, double run_ms) {
+    if (!budget || !budget->add(end, run_ms)) return;
+    const FrameEffort& effort = budget->effort();
+    model->set_effort(effort.key_frame_interval, effort.long_side_px);
+    settings.source.log.write(MAQ_LOG_INFO, "A frame took ", run_ms, " ms, of ", settings.frame_budget_ms,
+                              ": from now on one key frame in ", effort.key_frame_interval, ", long side ",
+                              effort.long_side_px, " px");
   }
 
   // A disk that is full ends the recording, not the results.
@@ -477,8 +494,10 @@ void Pipeline::set_model(const PipelineModel& model) {
   state.request.model = model;
   ++state.request.model_number;
   ++state.request_number;
+  // A photo may be mapped already while its end is not told yet.
+  const bool maps_photo = state.is_photo && (state.phase == MAQ_PIPELINE_RUNNING || state.phase == MAQ_PIPELINE_ENDED);
+  const bool again = state.phase == MAQ_PIPELINE_FAILED || maps_photo;
   if (state.phase == MAQ_PIPELINE_RUNNING) state.enter(MAQ_PIPELINE_LOADING, state.failure, state.problem);
-  const bool again = state.phase == MAQ_PIPELINE_FAILED || (state.phase == MAQ_PIPELINE_ENDED && state.is_photo);
   if (!again) return;
   ++state.request.source_number;
   state.enter(MAQ_PIPELINE_OPENING);

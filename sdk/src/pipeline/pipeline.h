@@ -12,6 +12,7 @@
 #include "maquette/pipeline.h"
 #include "nn/bundle.h"
 #include "nn/onnxruntime_library.h"
+#include "pipeline/frame_budget.h"
 #include "sources/source.h"
 
 namespace maq {
@@ -38,6 +39,7 @@ struct PipelineStats {
   uint64_t dropped_frames = 0;
   double results_per_second = 0;
   PipelineTimes latest;
+  FrameEffort effort{0, 0};  // of the next frame
 };
 
 struct PipelineModel {
@@ -49,6 +51,7 @@ struct PipelineSettings {
   PipelineModel model;
   SourceSettings source;  // on_state is not used
   int nice = 0;
+  double frame_budget_ms = 0;                                          // 0: none
   std::function<std::shared_ptr<const OnnxRuntimeLibrary>()> runtime;  // on the thread, before a model is loaded
   // Called on the thread; may call every function of the pipeline. `on_result` takes what it wants to keep out of its
   // arguments by swapping, and returns false when the result is dropped; without it results wait for acquire().

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "sources/android/camera2_camera.h"
 #include "sources/control_options.h"
 #include "sources/depthai/depthai_backend.h"
 #include "sources/files/file_sources.h"
@@ -52,6 +53,12 @@ const Entry kEntries[] = {
       "rendered frames: people (who walk; count, seed, frames) or pattern (colour bars)"},
      without_log<open_stub_source>,
      nullptr},
+#ifdef __ANDROID__
+    {{"android", "android:back?size=640x480&fps=30",
+      "a camera of Android (Camera2), by number, id or direction: back, front or external"},
+     nullptr,
+     android_uri_opener},
+#else
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
       "a camera on Linux (Video4Linux2); takes the nearest size and rate that it offers; ?format=MJPG&exposure=10000 "
       "(microseconds)"},
@@ -66,6 +73,7 @@ const Entry kEntries[] = {
      nullptr,
      depthai_uri_opener,
      false},
+#endif
 };
 
 const Entry* find_entry(const std::string& scheme) {
@@ -152,10 +160,10 @@ std::unique_ptr<Source> open_path(const std::string& path, const SourceSettings&
   SourceUri uri;
   uri.text = uri.target = path;
   for (const char* cameras : {"/dev/video", "/dev/v4l/"}) {
-    if (path.rfind(cameras, 0) != 0) continue;
-    uri.scheme = "v4l2";
-    const Entry& entry = *find_entry(uri.scheme);
-    return open_entry(entry, std::move(uri), settings);
+    const Entry* entry = find_entry("v4l2");  // null on Android
+    if (path.rfind(cameras, 0) != 0 || entry == nullptr) continue;
+    uri.scheme = entry->scheme.name;
+    return open_entry(*entry, std::move(uri), settings);
   }
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
@@ -203,10 +211,14 @@ const std::vector<SourceScheme>& source_schemes() {
 }
 
 std::vector<CameraListing> list_cameras() {
+#ifdef __ANDROID__
+  return list_android_cameras();
+#else
   std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
   for (CameraListing& camera : list_libcamera_cameras()) all.push_back(std::move(camera));
   for (CameraListing& camera : list_depthai_cameras()) all.push_back(std::move(camera));
   return all;
+#endif
 }
 
 std::unique_ptr<Source> open_source(const std::string& text, const SourceSettings& settings) {

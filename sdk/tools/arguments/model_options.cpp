@@ -1,10 +1,18 @@
 #include "arguments/model_options.h"
 
 #include <CLI/CLI.hpp>
+#include <map>
 #include <maquette/maquette.hpp>
 #include <stdexcept>
 
 #include "arguments/bundle_argument.h"
+
+namespace {
+
+const std::map<std::string, maq_provider> kProviders = {
+    {"cpu", MAQ_PROVIDER_CPU}, {"xnnpack", MAQ_PROVIDER_XNNPACK}, {"nnapi", MAQ_PROVIDER_NNAPI}};
+
+}  // namespace
 
 void add_model_options(CLI::App& command, ModelOptions& options) {
   command.add_option("--bundle", options.bundle,
@@ -12,7 +20,7 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
   command.add_option("--size", options.size, "Long side of the network's input in pixels; larger is finer and slower")
       ->check(CLI::Range(32, 2048));
   command.add_option("--threshold", options.threshold, "Minimum score of a person")->check(CLI::Range(0.0f, 1.0f));
-  command.add_option("--threads", options.threads, "Threads of the networks; default: the cores, at most 4")
+  command.add_option("--threads", options.threads, "Threads of the networks; default: the large cores, at most 4")
       ->check(CLI::Range(1, 64));
   command
       .add_option("--max-proposals", options.max_proposals,
@@ -35,6 +43,17 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
       ->check(CLI::Range(64, 512));
   command.add_flag("--no-surface", options.no_surface, "Compute only body parts, which is faster: U and V stay 0");
   command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: saves energy, slower");
+  command
+      .add_option("--provider", options.provider,
+                  "What runs the networks' layers: cpu (default), or xnnpack or nnapi where ONNX Runtime has them")
+      ->check(CLI::IsMember(kProviders));
+}
+
+const char* name_of(maq_provider provider) {
+  for (const auto& [name, value] : kProviders) {
+    if (value == provider) return name.c_str();
+  }
+  return "unknown";
 }
 
 std::string bundle_of(const ModelOptions& options) {
@@ -60,5 +79,6 @@ maq_densepose_config config_of(const ModelOptions& options, const std::string& b
                         : options.crops == "all" ? MAQ_PERSON_CROPS_ALL
                                                  : MAQ_PERSON_CROPS_OFF;
   config.person_crop_px = options.crop_px;
+  config.provider = kProviders.at(options.provider);
   return config;
 }

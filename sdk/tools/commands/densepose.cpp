@@ -93,6 +93,7 @@ void print_frame(const DensePoseOptions& options, const std::string& stem, const
                                          {"proposals", stats.proposal_count},
                                          {"crops", stats.crop_count},
                                          {"network", {stats.network_width_px, stats.network_height_px}},
+                                         {"provider", name_of(stats.provider)},
                                          {"ms",
                                           {{"preprocess", rounded_ms(double(stats.preprocess_ms))},
                                            {"trunk", rounded_ms(double(stats.trunk_ms))},

@@ -155,7 +155,7 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
   command
       ->add_option("--near", options->near_depth, "Ignore points nearer to a camera than this, in units of the scene")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
+  command->add_option("--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(1, 64));
   command->add_flag("--all-photos", options->all_photos, "Also use the held-out photos of the capture");
   command->add_option("--ply", options->ply, "Also write the points with their colours to this PLY file");

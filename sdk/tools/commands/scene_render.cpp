@@ -274,7 +274,7 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
       "Bundle that built the scene; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
   command->add_option("--near", options->near_depth, "Do not draw points nearer than this, in units of the scene")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--threads", options->threads, "Threads; default: the cores, at most 4")
+  command->add_option("--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(1, 64));
   command->add_flag("--no-alpha", options->no_alpha, "Write pictures without alpha");
   command->add_option("--repeat", options->repeat, "Render each picture N times and report median times")

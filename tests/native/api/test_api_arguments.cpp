@@ -176,7 +176,7 @@ void expect_size_checked(maq_status (*init)(Config*, uint32_t), size_t first_siz
 TEST_F(ApiArguments, InitFunctionsCheckTheSizeAndSetIt) {
   expect_size_checked(maq_context_config_init);
   expect_size_checked(maq_source_config_init, offsetof(maq_source_config, queue_length));
-  expect_size_checked(maq_densepose_config_init);
+  expect_size_checked(maq_densepose_config_init, offsetof(maq_densepose_config, provider));
   expect_size_checked(maq_frame_desc_init);
 }
 
@@ -251,6 +251,7 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   expect_refused("person_crops", [](auto& config) { reinterpret_cast<int32_t&>(config.person_crops) = 3; });
   expect_refused("person_crop_px", [](auto& config) { config.person_crop_px = 63; });
   expect_refused("person_crop_px", [](auto& config) { config.person_crop_px = 513; });
+  expect_refused("provider", [](auto& config) { reinterpret_cast<int32_t&>(config.provider) = 3; });
 }
 
 TEST_F(ApiArguments, ErrorsNameTheParameterOfTheHeader) {
@@ -372,12 +373,12 @@ static_assert(sizeof(void*) != 8 ||
                   (offsetof(maq_source_info, dropped_frame_count) == 48 && sizeof(maq_source_info) == 56),
               "");
 static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, bundle_path) == 8, "");
-static_assert(sizeof(void*) != 8 || sizeof(maq_densepose_config) == 72, "");
+static_assert(sizeof(void*) != 8 || offsetof(maq_densepose_config, provider) == 72, "");
 static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 32 && offsetof(maq_person, id) == 24, "");
 static_assert(sizeof(maq_intrinsics) == 104, "");
 static_assert(sizeof(maq_pixel_format) == 4 && sizeof(maq_status) == 4 && sizeof(maq_densepose_detail) == 4, "");
-static_assert(sizeof(maq_densepose_stats) == 88, "");
+static_assert(sizeof(maq_densepose_stats) == 88 && offsetof(maq_densepose_stats, provider) == 84, "");
 static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_RECONNECTED == 5 &&
                   MAQ_PIXEL_DEPTH16 == 7 && MAQ_DENSEPOSE_PLANE_PERSON == 4,
               "");

@@ -51,9 +51,21 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
   EXPECT_EQ(stats.network_width_px, 320);
   EXPECT_GT(stats.total_ms, 0);
   EXPECT_GE(stats.total_ms, stats.trunk_ms);
+  EXPECT_EQ(stats.provider, MAQ_PROVIDER_CPU);
   const uint8_t* pixels = nullptr;
   EXPECT_EQ(maq_densepose_result_get_plane(result.get(), maq_densepose_plane(5), &pixels, &stride),
             MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(ApiDensePose, AConfigFromBeforeProvidersIsTaken) {
+  const uint32_t old_size = offsetof(maq_densepose_config, provider);
+  maq_densepose_config config;
+  reinterpret_cast<int32_t&>(config.provider) = 99;  // what lies behind the older struct
+  ASSERT_EQ(maq_densepose_config_init(&config, old_size), MAQ_OK);
+  EXPECT_EQ(config.struct_size, old_size);
+  config.bundle_path = kBundle;
+  const maquette::Context context;
+  EXPECT_NO_THROW(maquette::DensePose(context, config));
 }
 
 TEST(ApiDensePose, ALogCallbackThatThrowsFailsNothing) {

@@ -250,6 +250,7 @@ TEST_F(ApiSceneRendering, SettingsOutOfRangeAreRefusedByName) {
   expect("config.image_pool_size is 0", [](auto& config) { config.image_pool_size = 0; });
   expect("config.image_pool_size is 65", [](auto& config) { config.image_pool_size = 65; });
   expect("config.allow_spinning is 2", [](auto& config) { config.allow_spinning = 2; });
+  expect("config.provider is -1", [](auto& config) { reinterpret_cast<int32_t&>(config.provider) = -1; });
   expect("config.near_depth", [](auto& config) { config.near_depth = -1; });
   expect("config.near_depth", [](auto& config) { config.near_depth = std::numeric_limits<double>::quiet_NaN(); });
   expect("config.use_background is 2", [](auto& config) { config.use_background = 2; });

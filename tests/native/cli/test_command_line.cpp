@@ -195,7 +195,8 @@ TEST_F(CommandLine, AFolderThatCannotBeWrittenIsNamed) {
 
 TEST_F(CommandLine, MeasuresItsSourcesAndWritesDownEverything) {
   write_clip("clip.avi", 4);
-  const Outcome result = run("bench image:two.png clip.avi --runs 12 --seconds 0 --warm-up 1 --json bench.json");
+  const Outcome result =
+      run("bench image:two.png clip.avi --runs 12 --seconds 0 --warm-up 1 --provider xnnpack --json bench.json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("image:two.png"), std::string::npos) << result.out;
   const auto document = nlohmann::json::parse(read_text(folder_.file("bench.json")));
@@ -206,7 +207,9 @@ TEST_F(CommandLine, MeasuresItsSourcesAndWritesDownEverything) {
   EXPECT_GT(document.at("peak_memory_mib"), 1);
   EXPECT_EQ(document.at("valid"), document.at("warnings").empty());
   ASSERT_EQ(document.at("cases").size(), 2U);
+  EXPECT_EQ(document.at("settings").at("provider"), "xnnpack");
   for (const auto& timed : document.at("cases")) {
+    EXPECT_EQ(timed.at("provider"), "cpu") << "in use: ONNX Runtime for Linux has no other";
     EXPECT_GE(timed.at("runs"), 12);  // the clip of four frames is begun anew
     EXPECT_EQ(timed.at("dropped_frames"), 0);
     EXPECT_GT(timed.at("cpu_ms"), 0);

@@ -32,6 +32,7 @@ class Watched {
     bool polls = false, real_time = false, loop = false;
     int reconnect_ms = 30000, stall_ms = 2000;
     uint32_t pool_size = 4;
+    double frame_budget_ms = 0;
     std::string bundle = kTinyBundle;
     std::function<void(const maquette::PipelineResult&)> on_result;
     std::function<void(maq_pipeline_state)> on_state;
@@ -48,6 +49,7 @@ class Watched {
     config.densepose = &densepose;
     config.source = &source;
     config.result_pool_size = options.pool_size;
+    config.frame_budget_ms = options.frame_budget_ms;
     config.result_user_data = config.state_user_data = this;
     if (!options.polls) {
       config.result_callback = [](void* self, const maq_pipeline_result* result) {
@@ -368,6 +370,41 @@ TEST(Pipeline, OptionsOfTheModelChangeWhileItRuns) {
   EXPECT_EQ(watched.pipeline->info().state, MAQ_PIPELINE_RUNNING);
 }
 
+TEST(Pipeline, AFrameBudgetThatCannotBeKeptMakesTheModelDoLessAndTheStatsSaySo) {
+  Watched::Options options;
+  options.frame_budget_ms = 1e-3;
+  Watched watched(std::move(options));
+  EXPECT_EQ(watched.pipeline->stats().long_side_px, 0) << "no result yet";
+  watched.pipeline->set_source("stub:people?size=64x48&frames=40");
+  ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
+  const maq_pipeline_stats stats = watched.pipeline->stats();
+  EXPECT_EQ(stats.result_count, 40u);
+  EXPECT_EQ(stats.key_frame_interval, 4);
+  EXPECT_EQ(stats.long_side_px, 160) << "half of the tiny bundle's";
+}
+
+TEST(Pipeline, WithoutAFrameBudgetTheStatsSayWhatTheConfigDoes) {
+  Watched watched({});
+  watched.pipeline->set_source("stub:people?size=64x48&frames=20");
+  ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
+  EXPECT_EQ(watched.pipeline->stats().key_frame_interval, 1);
+  EXPECT_EQ(watched.pipeline->stats().long_side_px, 320);
+}
+
+TEST(Pipeline, AConfigFromBeforeTheFrameBudgetIsTaken) {
+  maquette::Context context;
+  maq_pipeline_config config;
+  config.frame_budget_ms = -1;  // what lies behind the older struct
+  const uint32_t old_size = offsetof(maq_pipeline_config, nice) + sizeof config.nice;
+  ASSERT_EQ(maq_pipeline_config_init(&config, old_size), MAQ_OK);
+  maq_pipeline* pipeline = nullptr;
+  EXPECT_EQ(maq_pipeline_create(context.get(), &config, &pipeline), MAQ_OK);
+  maq_pipeline_destroy(pipeline);
+  config.struct_size = sizeof config;
+  EXPECT_EQ(maq_pipeline_create(context.get(), &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(maq_last_error(context.get())).find("config.frame_budget_ms is -1"), std::string::npos);
+}
+
 TEST(Pipeline, APhotoIsMappedAgainWithOtherOptions) {
   Watched::Options options = polling(false);
   options.real_time = true;
@@ -378,6 +415,20 @@ TEST(Pipeline, APhotoIsMappedAgainWithOtherOptions) {
   watched.pipeline->set_densepose(densepose_config());
   EXPECT_TRUE(watched.pipeline->next().has_value());
   EXPECT_FALSE(watched.pipeline->next().has_value());
+}
+
+TEST(Pipeline, APhotoIsMappedAgainAlsoBeforeItsEndIsTold) {
+  Watched watched(polling(false));
+  for (int i = 0; i < 20; ++i) {
+    watched.pipeline->set_source("image:" MAQ_TEST_MEDIA "/photo.jpg?size=64x48");
+    ASSERT_TRUE(watched.pipeline->next().has_value()) << i;
+    maq_densepose_config config = densepose_config();
+    config.long_side_px = i % 2 == 0 ? 128 : 160;
+    watched.pipeline->set_densepose(config);
+    const auto again = watched.pipeline->next();
+    ASSERT_TRUE(again.has_value()) << i;
+    EXPECT_EQ(again->densepose.stats().network_width_px, config.long_side_px) << i;
+  }
 }
 
 TEST(Pipeline, StoppingCancelsACallThatWaits) {

@@ -201,7 +201,9 @@ def document():
              "demo_missing": "there is no <Xvfb>", "warnings": []}  # fmt: skip
     return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "window": waits,
             "start": {"processes": processes, "files": {"library": file}, "warnings": []},
-            "frames": frames, "sweep": rows, "person_sizes": sizes, "threads": 2, "quick": True, "gates": [gate],
+            "frames": frames, "sweep": rows, "person_sizes": sizes, "threads": 2,
+            "frame_budget": {"missing": "no control group can be made: <mkdir>"},
+            "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
 

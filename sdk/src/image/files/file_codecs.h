@@ -1,5 +1,5 @@
 // What decodes and encodes image and video files: libpng and OpenCV's imgcodecs and videoio, the only place of the
-// library where OpenCV is. JPEG images are decoded without it (jpeg.h).
+// library where OpenCV is. JPEG images are decoded without it (jpeg.h). Android brings decoders of its own (android/).
 //
 // They bring some two hundred shared libraries on Debian (GDAL and FFmpeg among them), 65 MB of memory and more than a
 // tenth of a second, which an app with a camera does not need. So they are in a library of their own,

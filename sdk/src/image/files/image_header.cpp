@@ -195,25 +195,31 @@ std::optional<SizePx> read_image_size(const EncodedBytes& bytes) {
   return {};
 }
 
-int read_exif_orientation(const EncodedBytes& bytes) {
+std::optional<ExifOrientationPlace> find_exif_orientation(const EncodedBytes& bytes) {
   const Reader all(bytes);
   const size_t begin = exif_offset(all, recognise_format(bytes).format);
-  if (begin == 0 || !all.has(begin, 8)) return 1;
+  if (begin == 0 || !all.has(begin, 8)) return {};
   // A TIFF file: its byte order, 42, and where its first directory is (TIFF 6.0, section 2).
   const Reader in({bytes.data + begin, bytes.size - begin});
   const bool is_little = in.equals(0, "II*");
-  if (!is_little && std::memcmp(in.at(0), "MM\0*", 4) != 0) return 1;
+  if (!is_little && std::memcmp(in.at(0), "MM\0*", 4) != 0) return {};
   const auto number16 = [&](size_t offset) { return is_little ? in.little16(offset) : in.big16(offset); };
   const size_t directory = is_little ? in.little32(4) : in.big32(4);
-  if (!in.has(directory, 2)) return 1;
+  if (!in.has(directory, 2)) return {};
   const size_t count = number16(directory);
   for (size_t i = 0; i < count && in.has(directory + 2 + 12 * i, 12); ++i) {
     const size_t entry = directory + 2 + 12 * i;
-    if (number16(entry) != 274) continue;
-    const uint32_t orientation = number16(entry + 8);
-    return orientation >= 1 && orientation <= 8 ? int(orientation) : 1;
+    if (number16(entry) == 274) return ExifOrientationPlace{begin + entry + 8, is_little};
   }
-  return 1;
+  return {};
+}
+
+int read_exif_orientation(const EncodedBytes& bytes) {
+  const auto place = find_exif_orientation(bytes);
+  if (!place) return 1;
+  const Reader in(bytes);
+  const uint32_t orientation = place->is_little_endian ? in.little16(place->offset) : in.big16(place->offset);
+  return orientation >= 1 && orientation <= 8 ? int(orientation) : 1;
 }
 
 bool has_jpeg_end(const EncodedBytes& bytes) {

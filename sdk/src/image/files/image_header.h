@@ -47,6 +47,13 @@ std::optional<SizePx> read_image_size(const EncodedBytes& bytes);
 // none.
 int read_exif_orientation(const EncodedBytes& bytes);
 
+// Where that number lies in the image, as two bytes.
+struct ExifOrientationPlace {
+  size_t offset = 0;
+  bool is_little_endian = false;
+};
+std::optional<ExifOrientationPlace> find_exif_orientation(const EncodedBytes& bytes);
+
 // Whether a JPEG image has its last marker, which is missing from one that was cut.
 bool has_jpeg_end(const EncodedBytes& bytes);
 

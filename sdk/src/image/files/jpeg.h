@@ -1,4 +1,4 @@
-// JPEG images: those that cameras send, and photos.
+// JPEG images: those that cameras send, and photos. By libjpeg-turbo (jpeg.cpp) or by Android (android/).
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace maq {
 class JpegDecoder {
  public:
   JpegDecoder() = default;
-  ~JpegDecoder();
+  ~JpegDecoder();  // NOLINT(performance-trivially-destructible): on Android it holds nothing
   JpegDecoder(const JpegDecoder&) = delete;
   JpegDecoder& operator=(const JpegDecoder&) = delete;
 
@@ -23,7 +23,7 @@ class JpegDecoder {
  private:
   bool decode_by_library(const uint8_t* bytes, size_t size_bytes, int64_t max_pixels, Frame& frame);
 
-  void* decoder_ = nullptr;
+  [[maybe_unused]] void* decoder_ = nullptr;
 };
 
 enum class JpegResult { kDecoded, kTruncated, kDamaged };
@@ -35,7 +35,7 @@ JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& fra
 class JpegEncoder {
  public:
   JpegEncoder() = default;
-  ~JpegEncoder();
+  ~JpegEncoder();  // NOLINT(performance-trivially-destructible)
   JpegEncoder(const JpegEncoder&) = delete;
   JpegEncoder& operator=(const JpegEncoder&) = delete;
 
@@ -43,8 +43,8 @@ class JpegEncoder {
   void encode(const ImageView& image, int quality, std::vector<uint8_t>& bytes);
 
  private:
-  void* encoder_ = nullptr;
-  std::vector<uint8_t> bgr_;
+  [[maybe_unused]] void* encoder_ = nullptr;
+  [[maybe_unused]] std::vector<uint8_t> bgr_;
 };
 
 }  // namespace maq

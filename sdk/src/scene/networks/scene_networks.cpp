@@ -147,6 +147,7 @@ const float* SceneNetworks::extract(const float* photo, int width_px, int height
     const GraphSpec& spec = bundle_.manifest.graphs.at("extractor");
     SessionSettings settings = settings_;
     settings.plans_memory = false;
+    settings.provider = MAQ_PROVIDER_CPU;  // others want to know the sizes
     extractor_ =
         std::make_unique<Session>(runtime_, bundle_.files.at(spec.file), spec, bundle_.path_of(spec.file), settings);
   }
@@ -163,7 +164,9 @@ const float* SceneNetworks::refine(const std::vector<const float*>& rasters, int
   for (int level = 0; level < layout_.levels; ++level) {
     inputs_.push_back({rasters[size_t(level)], layout_.raster_shape(level, width_px, height_px)});
   }
-  return refiner_.at(width_px, height_px).run(inputs_, {layout_.picture_shape(width_px, height_px)})[0].data;
+  Session& refiner = refiner_.at(width_px, height_px);
+  provider_ = refiner.provider();
+  return refiner.run(inputs_, {layout_.picture_shape(width_px, height_px)})[0].data;
 }
 
 }  // namespace maq

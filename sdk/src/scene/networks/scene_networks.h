@@ -60,6 +60,9 @@ class SceneNetworks {
   // kPictureMultiple. Not for two threads at once; beside extract() is fine. Throws as extract() does.
   const float* refine(const std::vector<const float*>& rasters, int width_px, int height_px);
 
+  // In use for the latest picture.
+  maq_provider provider() const { return provider_; }
+
   // Gives the extractor's memory back; it is made again when it is needed.
   void forget_extractor() { extractor_.reset(); }
 
@@ -73,6 +76,7 @@ class SceneNetworks {
   // With open sizes: gravity-aligned photos are of many, and a session for each takes longer to make than it saves.
   std::unique_ptr<Session> extractor_;
   SizedSessions refiner_;
+  maq_provider provider_ = MAQ_PROVIDER_CPU;
   std::vector<TensorView> inputs_;
 };
 

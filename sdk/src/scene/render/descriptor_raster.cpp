@@ -9,7 +9,6 @@ namespace maq {
 namespace {
 
 constexpr int kStripRows = DescriptorRaster::kMultiple;
-constexpr size_t kChannels = DescriptorRaster::kChannels;
 
 }  // namespace
 

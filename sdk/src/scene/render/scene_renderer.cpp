@@ -178,6 +178,7 @@ void SceneRenderer::refine(const PinholeCamera& frame, const RasterWindow& occup
   for (int level = 0; level < layout.levels; ++level) inputs_.push_back(raster_.level(level));
   const float* const refined = networks_->refine(inputs_, window.width_px, window.height_px);
   counts.refine_ms = watch.lap_ms();
+  counts.provider = networks_->provider();
 
   coverage_.find(raster_, window.width_px, window.height_px, threads_);
   refined_.write(refined, layout, window, coverage_.alphas(), coverage_.depths(), background,

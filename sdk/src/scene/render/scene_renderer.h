@@ -31,10 +31,11 @@ struct RenderCounts {
   uint32_t blocks = 0;            // of the scene
   uint32_t projected_blocks = 0;  // of those, not culled
   uint64_t projected_points = 0;
-  uint64_t shaded_points = 0;          // visible ones
-  uint64_t view_dependent_points = 0;  // of those
-  uint64_t frame_pixels = 0;           // of the gravity-aligned frame
-  uint64_t refined_pixels = 0;         // of those, seen by the refiner
+  uint64_t shaded_points = 0;                // visible ones
+  uint64_t view_dependent_points = 0;        // of those
+  uint64_t frame_pixels = 0;                 // of the gravity-aligned frame
+  uint64_t refined_pixels = 0;               // of those, seen by the refiner
+  maq_provider provider = MAQ_PROVIDER_CPU;  // of the refiner
   bool is_rotated = false;
   double project_ms = 0, shade_ms = 0, reduce_ms = 0, refine_ms = 0, coverage_ms = 0, rotate_ms = 0, all_ms = 0;
 };

@@ -76,8 +76,7 @@ BgraImage decode_sheet() {
 
 }  // namespace
 
-StubPeople::StubPeople(int count, uint64_t seed, int width_px, int height_px)
-    : width_px_(width_px), height_px_(height_px) {
+StubPeople::StubPeople(int count, uint64_t seed, int width_px, int height_px) : width_px_(width_px) {
   Dice dice(seed);
   background_ = draw_room(width_px, height_px, dice);
   if (count == 0) return;

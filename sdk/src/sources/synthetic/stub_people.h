@@ -31,7 +31,6 @@ class StubPeople {
   };
 
   int width_px_;
-  int height_px_;
   std::vector<uint8_t> background_;  // BGR
   std::vector<Walker> walkers_;      // the farthest first
 };

@@ -8,11 +8,13 @@
 #include <new>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "maquette/maquette.h"
 
-// A native method of the object dev.maquette.Native.
-#define MAQ_NATIVE(type, name) extern "C" JNIEXPORT type JNICALL Java_dev_maquette_Native_##name
+// A native method of an object of the package dev.maquette.
+#define MAQ_NATIVE_OF(object, type, name) extern "C" JNIEXPORT type JNICALL Java_dev_maquette_##object##_##name
+#define MAQ_NATIVE(type, name) MAQ_NATIVE_OF(Native, type, name)
 
 namespace maq_jni {
 
@@ -80,7 +82,47 @@ inline std::string text(JNIEnv* env, jbyteArray utf8) {
   if (utf8 == nullptr) return {};
   std::string value(size_t(env->GetArrayLength(utf8)), '\0');
   env->GetByteArrayRegion(utf8, 0, jsize(value.size()), reinterpret_cast<jbyte*>(value.data()));
+  if (value.find('\0') != std::string::npos) refuse("A text must not contain the character 0.");
   return value;
+}
+
+// UTF-8 as a byte array.
+inline jbyteArray bytes_of(JNIEnv* env, const char* utf8) {
+  const auto size = jsize(std::strlen(utf8));
+  jbyteArray bytes = env->NewByteArray(size);
+  check_pending(env);
+  env->SetByteArrayRegion(bytes, 0, size, reinterpret_cast<const jbyte*>(utf8));
+  return bytes;
+}
+
+inline jobjectArray texts_of(JNIEnv* env, const std::vector<const char*>& values) {
+  jclass type = env->FindClass("[B");
+  check_pending(env);
+  jobjectArray texts = env->NewObjectArray(jsize(values.size()), type, nullptr);
+  check_pending(env);
+  for (size_t i = 0; i < values.size(); ++i) {
+    jbyteArray bytes = bytes_of(env, values[i]);
+    env->SetObjectArrayElement(texts, jsize(i), bytes);
+    env->DeleteLocalRef(bytes);
+  }
+  return texts;
+}
+
+inline jdoubleArray doubles_of(JNIEnv* env, const std::vector<jdouble>& values) {
+  jdoubleArray array = env->NewDoubleArray(jsize(values.size()));
+  check_pending(env);
+  env->SetDoubleArrayRegion(array, 0, jsize(values.size()), values.data());
+  return array;
+}
+
+// The `count` numbers of a configuration, in the order of its struct.
+inline std::vector<jdouble> numbers(JNIEnv* env, jdoubleArray array, size_t count) {
+  if (array == nullptr || size_t(env->GetArrayLength(array)) != count) {
+    throw StatusError{MAQ_ERROR_INTERNAL, "a configuration has another number of values"};
+  }
+  std::vector<jdouble> values(count);
+  env->GetDoubleArrayRegion(array, 0, jsize(count), values.data());
+  return values;
 }
 
 struct Memory {

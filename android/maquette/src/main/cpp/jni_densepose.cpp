@@ -1,66 +1,18 @@
 // Dense pose: networks, runs and results.
 #include <vector>
 
-#include "jni_call.h"
+#include "jni_config.h"
 
 using maq_jni::call;
 using maq_jni::check;
 using maq_jni::handle;
-using maq_jni::Memory;
 using maq_jni::object;
 
-namespace {
-
-// The files of a bundle in direct buffers.
-struct BundleFiles {
-  std::vector<std::string> names;
-  std::vector<maq_memory_file> files;
-
-  BundleFiles(JNIEnv* env, jobjectArray utf8_names, jobjectArray buffers) {
-    if (utf8_names == nullptr || buffers == nullptr) return;
-    const jsize count = env->GetArrayLength(utf8_names);
-    if (env->GetArrayLength(buffers) != count) maq_jni::refuse("a bundle needs a name for each buffer");
-    names.reserve(size_t(count));  // `files` points into them
-    for (jsize i = 0; i < count; ++i) {
-      const auto name = static_cast<jbyteArray>(env->GetObjectArrayElement(utf8_names, i));
-      jobject buffer = env->GetObjectArrayElement(buffers, i);
-      maq_jni::check_pending(env);
-      names.push_back(maq_jni::text(env, name));
-      const Memory memory = maq_jni::memory_of(env, buffer);
-      files.push_back({names.back().c_str(), memory.data, memory.size_bytes});
-      env->DeleteLocalRef(name);
-      env->DeleteLocalRef(buffer);
-    }
-  }
-};
-
-}  // namespace
-
 MAQ_NATIVE(jlong, createDensePose)
-(JNIEnv* env, jclass, jlong context, jbyteArray path, jobjectArray names, jobjectArray buffers, jint threads,
- jint long_side_px, jfloat score_threshold, jint max_people, jint result_pool_size, jint max_proposals,
- jint key_frame_interval, jint min_person_height_px, jint detail, jboolean allow_spinning, jint person_crops,
- jint person_crop_px) {
+(JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values) {
   return call(env, [&] {
-    maq_densepose_config config;
-    check(maq_densepose_config_init(&config, sizeof config));
-    const std::string folder = maq_jni::text(env, path);
-    const BundleFiles bundle(env, names, buffers);
-    if (path != nullptr) config.bundle_path = folder.c_str();
-    config.bundle_files = bundle.files.data();
-    config.bundle_file_count = uint32_t(bundle.files.size());
-    config.threads = threads;
-    config.long_side_px = long_side_px;
-    config.score_threshold = score_threshold;
-    config.max_people = max_people;
-    config.result_pool_size = uint32_t(result_pool_size);
-    config.max_proposals = max_proposals;
-    config.key_frame_interval = key_frame_interval;
-    config.min_person_height_px = min_person_height_px;
-    config.detail = maq_densepose_detail(detail);
-    config.allow_spinning = allow_spinning;
-    config.person_crops = maq_person_crops(person_crops);
-    config.person_crop_px = person_crop_px;
+    const maq_jni::Bundle bundle(env, folder, names, buffers);
+    const maq_densepose_config config = maq_jni::densepose_config(env, bundle, values);
     maq_densepose* densepose = nullptr;
     check(maq_densepose_create(object<maq_context>(context), &config, &densepose));
     return handle(densepose);
@@ -143,27 +95,10 @@ MAQ_NATIVE(jdoubleArray, statsOfResult)(JNIEnv* env, jclass, jlong result) {
     maq_densepose_stats s;
     s.struct_size = sizeof s;
     check(maq_densepose_result_get_stats(object<maq_densepose_result>(result), &s));
-    const jdouble values[] = {s.preprocess_ms,
-                              s.trunk_ms,
-                              s.proposals_ms,
-                              s.box_head_ms,
-                              s.dense_head_ms,
-                              s.crops_ms,
-                              s.decode_ms,
-                              s.total_ms,
-                              double(s.network_width_px),
-                              double(s.network_height_px),
-                              double(s.proposal_count),
-                              double(s.person_count),
-                              double(s.crop_count),
-                              double(s.dropped_box_count),
-                              double(s.body_pixel_count),
-                              double(s.clamped_pixel_count),
-                              double(s.is_key_frame)};
-    constexpr jsize count = sizeof values / sizeof *values;
-    jdoubleArray array = env->NewDoubleArray(count);
-    maq_jni::check_pending(env);
-    env->SetDoubleArrayRegion(array, 0, count, values);
-    return array;
+    return maq_jni::doubles_of(
+        env, {s.preprocess_ms, s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms,
+              s.total_ms, double(s.network_width_px), double(s.network_height_px), double(s.proposal_count),
+              double(s.person_count), double(s.crop_count), double(s.dropped_box_count), double(s.body_pixel_count),
+              double(s.clamped_pixel_count), double(s.is_key_frame), double(s.provider)});
   });
 }

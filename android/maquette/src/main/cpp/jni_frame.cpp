@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "jni_call.h"
+#include "jni_threads.h"
 
 using maq_jni::call;
 using maq_jni::check;
@@ -11,8 +12,6 @@ using maq_jni::Memory;
 using maq_jni::object;
 
 namespace {
-
-JavaVM* java = nullptr;
 
 // Buffers of the app that a frame lies in.
 struct Held {
@@ -28,32 +27,21 @@ struct Held {
 // Called on the thread that released the frame last, which may be one of the library's own.
 void release_buffers(void* user_data) {
   const std::unique_ptr<Held> held(static_cast<Held*>(user_data));
-  JNIEnv* env = nullptr;
-  if (java->GetEnv(reinterpret_cast<void**>(&env), JNI_VERSION_1_6) == JNI_OK) {
-    held->release(env);
-    return;
-  }
-#ifdef __ANDROID__
-  const jint attached = java->AttachCurrentThread(&env, nullptr);
-#else
-  const jint attached = java->AttachCurrentThread(reinterpret_cast<void**>(&env), nullptr);
-#endif
-  if (attached != JNI_OK) return;  // the virtual machine ends, and all its objects with it
-  held->release(env);
-  java->DetachCurrentThread();
+  const maq_jni::Attached attached;
+  if (attached.env != nullptr) held->release(attached.env);
 }
 
 int64_t rows_of(maq_pixel_format format, int plane, int64_t height_px) {
   return format == MAQ_PIXEL_NV12 && plane == 1 ? (height_px + 1) / 2 : height_px;
 }
 
-int64_t row_bytes(maq_pixel_format format, int64_t width_px) {
+int64_t row_bytes(maq_pixel_format format, int plane, int64_t width_px) {
   switch (format) {
     case MAQ_PIXEL_RGB8:
     case MAQ_PIXEL_BGR8: return 3 * width_px;
     case MAQ_PIXEL_RGBA8: return 4 * width_px;
     case MAQ_PIXEL_GREY8: return width_px;
-    case MAQ_PIXEL_NV12: return 2 * ((width_px + 1) / 2);
+    case MAQ_PIXEL_NV12: return plane == 0 ? width_px : 2 * ((width_px + 1) / 2);
     case MAQ_PIXEL_YUYV: return 4 * ((width_px + 1) / 2);
     case MAQ_PIXEL_DEPTH16: return 2 * width_px;
   }
@@ -74,11 +62,6 @@ void require_rows(const Memory& memory, int64_t rows, int64_t stride, int64_t ro
 
 }  // namespace
 
-extern "C" JNIEXPORT jint JNICALL JNI_OnLoad(JavaVM* machine, void*) {
-  java = machine;
-  return JNI_VERSION_1_6;
-}
-
 MAQ_NATIVE(jlong, wrapFrame)
 (JNIEnv* env, jclass, jlong context, jint format, jint width_px, jint height_px, jobject first, jint first_stride,
  jobject second, jint second_stride, jlong timestamp_ns, jint clock, jlong sequence) {
@@ -93,10 +76,10 @@ MAQ_NATIVE(jlong, wrapFrame)
     desc.sequence = uint64_t(sequence);
     const jobject buffers[] = {first, second};
     const jint strides[] = {first_stride, second_stride};
-    const int64_t row = row_bytes(desc.format, width_px);
     auto held = std::make_unique<Held>();
     for (int plane = 0; plane < (desc.format == MAQ_PIXEL_NV12 ? 2 : 1); ++plane) {
       const Memory memory = maq_jni::memory_of(env, buffers[plane]);
+      const int64_t row = row_bytes(desc.format, plane, width_px);
       const int64_t stride = strides[plane] == 0 ? row : strides[plane];
       require_rows(memory, rows_of(desc.format, plane, height_px), stride, row);
       desc.planes[plane] = memory.data;

@@ -1,5 +1,6 @@
 package dev.maquette
 
+import android.graphics.Bitmap
 import java.nio.ByteBuffer
 
 /** Finds people and maps each of their pixels to the body surface. Made by [Maquette.densePose]. */
@@ -13,6 +14,18 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
 
         /** Only the part: faster. */
         PART,
+    }
+
+    /** What runs the layers of networks. */
+    enum class Provider {
+        /** ONNX Runtime's own kernels. */
+        CPU,
+
+        /** Those of XNNPACK, for networks of floats, on the CPU. */
+        XNNPACK,
+
+        /** Accelerators of the device; may be slower than the CPU: measure it. */
+        NNAPI,
     }
 
     /** Whose surface is computed again from a crop of the frame in its full resolution, rotated upright. */
@@ -33,6 +46,8 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
      * @property minPersonHeightPx people less tall than this in the frame may be missed.
      * @property allowSpinning true: idle threads spin for a while, which is faster; false: they sleep, which saves
      *   energy.
+     * @property provider networks for which it cannot be had, or of which it takes less than half, run on the CPU;
+     *   [DensePoseResult.Stats.provider] tells. The shipped int8 networks gain nothing from XNNPACK.
      */
     data class Config(
         val threads: Int = 0,
@@ -47,7 +62,25 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         val allowSpinning: Boolean = false,
         val personCrops: PersonCrops = PersonCrops.OFF,
         val personCropPx: Int = 0,
-    )
+        val provider: Provider = Provider.CPU,
+    ) {
+        internal fun values() =
+            doubleArrayOf(
+                threads.toDouble(),
+                longSidePx.toDouble(),
+                scoreThreshold.toDouble(),
+                maxPeople.toDouble(),
+                resultPoolSize.toDouble(),
+                maxProposals.toDouble(),
+                keyFrameInterval.toDouble(),
+                minPersonHeightPx.toDouble(),
+                detail.ordinal.toDouble(),
+                if (allowSpinning) 1.0 else 0.0,
+                personCrops.ordinal.toDouble(),
+                personCropPx.toDouble(),
+                provider.ordinal.toDouble(),
+            )
+    }
 
     /**
      * Finds the people of a frame. Takes milliseconds, so not on the main thread; one call at a time.
@@ -82,6 +115,7 @@ data class Person(val left: Float, val top: Float, val right: Float, val bottom:
 class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
     private val handle = Handle(this, pointer, Native::releaseResult)
 
+    /** What is known of each pixel. */
     enum class Plane {
         /** Body part 1 to 24, 0 for background. */
         PART,
@@ -115,6 +149,7 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
         val bodyPixels: Long,
         val clampedPixels: Long,
         val isKeyFrame: Boolean,
+        val provider: DensePose.Provider,
     )
 
     val widthPx: Int
@@ -142,6 +177,23 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
             ByteArray(widthPx * heightPx).also { Native.planeOfResult(result, plane.ordinal + 1).get(it) }
         }
 
+    /**
+     * A picture of the frame's size to draw over it: each pixel of a person in the colour of its part
+     * ([DensePose.partColour]), the background transparent. It stays when the result is closed.
+     *
+     * @param opacity of the colours, 0 (invisible) to 255 (they cover the frame).
+     * @throws IllegalArgumentException for another opacity.
+     */
+    fun overlay(opacity: Int = 180): Bitmap {
+        require(opacity in 0..255) { "The opacity is $opacity; it must be 0 to 255." }
+        val colours = IntArray(25) { part -> DensePose.partColour(part) and 0xFFFFFF or (opacity shl 24) }
+        colours[0] = 0
+        val parts = copyPlane(Plane.PART)
+        val pixels = IntArray(parts.size) { colours[parts[it].toInt()] }
+        return Bitmap.createBitmap(pixels, widthPx, heightPx, Bitmap.Config.ARGB_8888)
+    }
+
+    /** Of the run that gave the result. */
     val stats: Stats
         get() {
             val s = handle.use(Native::statsOfResult)
@@ -150,6 +202,7 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
             return Stats(
                 s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], width, height, proposals, found, crops,
                 counts[5].toInt(), counts[6], counts[7], counts[8] != 0L,
+                DensePose.Provider.entries[counts[9].toInt()],
             )
         }
 

@@ -60,6 +60,7 @@ class Frame internal constructor(pointer: Long) : AutoCloseable {
         into: ByteBuffer,
     ) = handle.use { Native.copyFramePixels(it, format.code, into) }
 
+    /** A copy as an ARGB_8888 bitmap. */
     fun toBitmap(): Bitmap {
         val pixels = ByteBuffer.allocateDirect(4 * widthPx * heightPx)
         copyPixels(PixelFormat.RGBA8, pixels)

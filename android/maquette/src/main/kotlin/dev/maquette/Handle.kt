@@ -42,6 +42,16 @@ internal class Handle(owner: Any, private val pointer: Long, private val release
         endUse()
     }
 
+    /** As [close], but first runs [work], which ends calls that wait; not when it is closed already. */
+    fun closeAfter(work: (Long) -> Unit) {
+        try {
+            use(work)
+        } catch (_: IllegalStateException) {
+            return
+        }
+        close()
+    }
+
     private fun endUse() {
         if (uses.decrementAndGet() == 0) release(pointer)
     }

@@ -1,6 +1,10 @@
 package dev.maquette
 
+import android.content.res.AssetManager
 import android.graphics.Bitmap
+import android.graphics.ImageFormat
+import android.media.Image
+import java.io.IOException
 import java.nio.ByteBuffer
 
 /**
@@ -72,7 +76,52 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
             )
         }
 
-    /** Decodes a JPEG, PNG, WebP, BMP or TIFF file, upright by its EXIF orientation. */
+    /**
+     * A copy of an image of the camera or of a video decoder (YUV_420_888, with any strides) as an NV12 frame: the
+     * image may be closed when the call returns. It is neither rotated nor mirrored, and its crop rectangle is not used.
+     *
+     * @param isFullRange true: brightness is 0 to 255, as of images of a camera (JFIF); false: 16 to 235, as of most
+     *   videos.
+     * @param clock of the image's timestamp: [Clock.MONOTONIC] for a camera, [Clock.MEDIA] for a video.
+     * @param sequence its number, from 0.
+     * @throws IllegalArgumentException for another format.
+     * @throws IllegalStateException if the image is closed.
+     */
+    fun frame(
+        image: Image,
+        isFullRange: Boolean = true,
+        clock: Clock = Clock.MONOTONIC,
+        sequence: Long = 0,
+    ): Frame {
+        val format = image.format
+        require(format == ImageFormat.YUV_420_888) { "The image has format $format; YUV_420_888 is needed." }
+        val planes = image.planes
+        val buffers = Array(3) { planes[it].buffer }
+        val strides = IntArray(6) { if (it % 2 == 0) planes[it / 2].rowStride else planes[it / 2].pixelStride }
+        return handle.use { context ->
+            Frame(
+                Native.frameOfImage(
+                    context,
+                    image.width,
+                    image.height,
+                    buffers,
+                    strides,
+                    isFullRange,
+                    image.timestamp,
+                    clock.code,
+                    sequence,
+                ),
+            )
+        }
+    }
+
+    /**
+     * Decodes a JPEG, PNG, WebP or BMP file, upright by its EXIF orientation. Needs Android 11: before, decode it with
+     * `BitmapFactory` and call [frame].
+     *
+     * @throws MaquetteException with [Status.UNREADABLE] (damaged, or no image), [Status.UNSUPPORTED] (another format, an
+     *   older Android), [Status.IMAGE_SIZE].
+     */
     fun decode(file: ByteArray): Frame {
         val data = ByteBuffer.allocateDirect(maxOf(file.size, 1))
         data.put(file)
@@ -81,7 +130,107 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
 
     /** Loads the networks of dense pose; takes some 100 ms, so not on the main thread. */
     fun densePose(bundle: ModelBundle, config: DensePose.Config = DensePose.Config()): DensePose =
-        handle.use { context -> DensePose(bundle.create(context, config)) }
+        handle.use { context ->
+            DensePose(
+                Native.createDensePose(context, bundle.folder, bundle.names, bundle.buffers, config.values()),
+            )
+        }
+
+    /**
+     * Opens a source by a URI: "android:back" (a camera), "image:photo.jpg", "rec:take.maqrec" or
+     * "stub:people?count=2&seed=7", with options as "?size=640x480&fps=15"; [Source.schemes] lists the kinds of this build.
+     * Video files are not read on Android. Blocks while files are read and devices start: not on the main thread.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (ill-formed URI or option), [Status.UNSUPPORTED]
+     *   (scheme, format), [Status.NOT_FOUND], [Status.UNREADABLE], [Status.IMAGE_SIZE]; for cameras also
+     *   [Status.DEVICE_LOST], [Status.BUSY], [Status.NO_PERMISSION].
+     */
+    fun source(uri: String, config: Source.Config = Source.Config()): Source =
+        handle.use { context -> Source(context, uri, config) }
+
+    /** The cameras that are connected now. Blocks while devices answer: not on the main thread. */
+    fun cameras(): List<Camera> = handle.use(Camera::all)
+
+    /**
+     * A pipeline with the networks of dense pose, which are loaded when its first source is open. Does not block but to
+     * copy a bundle in memory.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
+     */
+    fun pipeline(bundle: ModelBundle, config: Pipeline.Config = Pipeline.Config()): Pipeline =
+        handle.use { context -> Pipeline(context, bundle, config) }
+
+    /**
+     * Opens a capture: a folder with a COLMAP model and its photos, or with `transforms.json` and a PLY cloud. Blocks
+     * while cameras and cloud are read.
+     *
+     * @throws MaquetteException with [Status.NOT_FOUND] (no folder, no capture or no cloud), [Status.UNREADABLE]
+     *   (damaged, or without a usable photo or point), [Status.UNSUPPORTED] (camera models, sizes).
+     */
+    fun openCapture(folder: String): Capture = handle.use { context -> Capture(context, folder) }
+
+    /**
+     * Builds a scene from a capture; takes seconds to minutes, so not on the main thread. Photos that cannot be read
+     * are dropped and counted ([Scene.buildStats]).
+     *
+     * @param bundle networks of scenes.
+     * @param progress may cancel; what it throws cancels too, and is thrown.
+     * @throws MaquetteException with [Status.CANCELLED]; [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of
+     *   another task); [Status.UNREADABLE] (no photo can be used, or sees a point); [Status.OUT_OF_MEMORY];
+     *   [Status.INVALID_ARGUMENT].
+     */
+    fun buildScene(
+        capture: Capture,
+        bundle: ModelBundle,
+        config: SceneBuildConfig = SceneBuildConfig(),
+        progress: SceneProgress? = null,
+    ): Scene = handle.use { context -> Scene.build(context, capture, bundle, config, progress) }
+
+    /**
+     * A builder for a cloud and photos of the app. Blocks while networks are read and the cloud is copied.
+     *
+     * @param bundle networks of scenes.
+     * @throws MaquetteException as [buildScene], and with [Status.INVALID_ARGUMENT] for a cloud without points or with
+     *   a point that is not finite.
+     */
+    fun sceneBuilder(
+        cloud: PointCloud,
+        bundle: ModelBundle,
+        config: SceneBuildConfig = SceneBuildConfig(),
+    ): SceneBuilder = handle.use { context -> SceneBuilder(context, cloud, bundle, config) }
+
+    /**
+     * Opens a scene file (.maqs), which is checked completely and mapped: it must not be written to while the scene is
+     * open.
+     *
+     * @throws MaquetteException with [Status.NOT_FOUND], [Status.UNREADABLE] (damaged, or not a scene) and
+     *   [Status.UNSUPPORTED] (another version).
+     */
+    fun openScene(path: String): Scene =
+        handle.use { context -> Scene(NativeScene.open(context, path.toByteArray()), null) }
+
+    /** Opens a scene file in a direct buffer, from its start to its capacity; it is copied. Fails as for a path. */
+    fun openScene(file: ByteBuffer): Scene =
+        handle.use { context -> Scene(NativeScene.openMemory(context, file), null) }
+
+    /**
+     * Opens a scene file of the app's assets. Fails as for a path.
+     *
+     * @throws IOException if it is not there.
+     */
+    fun openScene(assets: AssetManager, path: String): Scene = openScene(ModelBundle.mappedOrRead(assets, path))
+
+    /**
+     * A renderer of a scene; takes some 100 ms, so not on the main thread.
+     *
+     * @param bundle the networks that built the scene.
+     * @throws MaquetteException with [Status.BAD_BUNDLE], also for other networks than those that built it.
+     */
+    fun sceneRenderer(
+        scene: Scene,
+        bundle: ModelBundle,
+        config: SceneRenderer.Config = SceneRenderer.Config(),
+    ): SceneRenderer = handle.use { context -> SceneRenderer(context, scene, bundle, config) }
 
     override fun close() = handle.close()
 
@@ -91,4 +240,5 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     }
 }
 
+/** How much is logged. */
 enum class LogLevel { OFF, ERROR, WARNING, INFO, DEBUG }

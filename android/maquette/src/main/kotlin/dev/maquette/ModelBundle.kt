@@ -6,32 +6,14 @@ import java.io.IOException
 import java.nio.ByteBuffer
 import java.nio.channels.FileChannel
 
-/** Trained networks: the files of a folder with `manifest.json`. Needed only until the networks have been made. */
-class ModelBundle private constructor(private val path: String?, private val files: Map<String, ByteBuffer>?) {
-    internal fun create(
-        context: Long,
-        config: DensePose.Config,
-    ): Long {
-        val names = files?.keys?.map { it.toByteArray() }?.toTypedArray()
-        return Native.createDensePose(
-            context,
-            path?.toByteArray(),
-            names,
-            files?.values?.toTypedArray(),
-            config.threads,
-            config.longSidePx,
-            config.scoreThreshold,
-            config.maxPeople,
-            config.resultPoolSize,
-            config.maxProposals,
-            config.keyFrameInterval,
-            config.minPersonHeightPx,
-            config.detail.ordinal,
-            config.allowSpinning,
-            config.personCrops.ordinal,
-            config.personCropPx,
-        )
-    }
+/**
+ * Trained networks: the files of a folder with `manifest.json`. Buffers are copied by the call that takes the bundle. A
+ * folder is read by that call too; a [Pipeline] reads it when it opens its first source.
+ */
+class ModelBundle private constructor(folder: String?, files: Map<String, ByteBuffer>?) {
+    internal val folder = folder?.toByteArray()
+    internal val names = files?.keys?.map(String::toByteArray)?.toTypedArray()
+    internal val buffers = files?.values?.toTypedArray()
 
     companion object {
         /** A bundle in a folder of the file system. */
@@ -55,7 +37,7 @@ class ModelBundle private constructor(private val path: String?, private val fil
             return ofBuffers(names.associateWith { mappedOrRead(assets, "$folder/$it") })
         }
 
-        private fun mappedOrRead(
+        internal fun mappedOrRead(
             assets: AssetManager,
             path: String,
         ): ByteBuffer =

@@ -2,7 +2,11 @@ package dev.maquette
 
 import java.nio.ByteBuffer
 
-/** The C API (src/main/cpp). Handles are numbers here; [Handle] keeps them. Texts are UTF-8. */
+/**
+ * The C API (src/main/cpp): contexts, frames and dense pose; [NativeSource], [NativePipeline] and [NativeScene] have
+ * the rest. Handles are numbers here; [Handle] keeps them. Texts are UTF-8. A bundle is a folder, or names and buffers.
+ * The values of a configuration are in the order of its properties.
+ */
 internal object Native {
     init {
         System.loadLibrary("maquette_jni")
@@ -31,6 +35,20 @@ internal object Native {
         sequence: Long,
     ): Long
 
+    /** Buffers of Y, U and V, and of each its row stride and pixel stride. */
+    @JvmStatic
+    external fun frameOfImage(
+        context: Long,
+        widthPx: Int,
+        heightPx: Int,
+        buffers: Array<ByteBuffer>,
+        strides: IntArray,
+        isFullRange: Boolean,
+        timestampNs: Long,
+        clock: Int,
+        sequence: Long,
+    ): Long
+
     @JvmStatic external fun decodeFrame(context: Long, data: ByteBuffer, sizeBytes: Int): Long
     @JvmStatic external fun releaseFrame(frame: Long)
     @JvmStatic external fun describeFrame(frame: Long): LongArray
@@ -40,21 +58,10 @@ internal object Native {
     @JvmStatic
     external fun createDensePose(
         context: Long,
-        path: ByteArray?,
+        folder: ByteArray?,
         names: Array<ByteArray>?,
         buffers: Array<ByteBuffer>?,
-        threads: Int,
-        longSidePx: Int,
-        scoreThreshold: Float,
-        maxPeople: Int,
-        resultPoolSize: Int,
-        maxProposals: Int,
-        keyFrameInterval: Int,
-        minPersonHeightPx: Int,
-        detail: Int,
-        allowSpinning: Boolean,
-        personCrops: Int,
-        personCropPx: Int,
+        values: DoubleArray,
     ): Long
 
     @JvmStatic external fun destroyDensePose(densePose: Long)

@@ -2,15 +2,29 @@ package dev.maquette
 
 import java.io.File
 import java.nio.ByteBuffer
+import java.nio.file.Files
 
 /** What the repository has to test with. */
 object TestFiles {
     private val root = File(System.getProperty("maquette.root")!!)
     val bundle = File(root, "sdk/models/densepose-b-int8")
+    val scenesBundle = File(root, "sdk/models/scenes-int8")
     val photo = File(root, "tests/media/photo.jpg")
+    val clip = File(root, "tests/media/clip.mp4")
+    val room = File(root, "tests/media/room")
 
-    fun bundleInMemory(): Map<String, ByteBuffer> =
-        bundle.listFiles()!!.associate { file -> file.name to direct(file.readBytes()) }
+    fun bundleInMemory(folder: File = bundle): Map<String, ByteBuffer> =
+        folder.listFiles()!!.associate { file -> file.name to direct(file.readBytes()) }
 
     fun direct(bytes: ByteArray): ByteBuffer = ByteBuffer.allocateDirect(bytes.size).apply { put(bytes) }
+
+    /** Runs [work] with a folder that is deleted afterwards. */
+    fun <T> inNewFolder(work: (File) -> T): T {
+        val folder = Files.createTempDirectory("maquette-test").toFile()
+        try {
+            return work(folder)
+        } finally {
+            folder.deleteRecursively()
+        }
+    }
 }

@@ -1,0 +1,130 @@
+// Pipelines: a source and dense pose on a thread of the library.
+#include <memory>
+
+#include "jni_config.h"
+#include "jni_threads.h"
+
+using maq_jni::call;
+using maq_jni::check;
+using maq_jni::handle;
+using maq_jni::object;
+
+namespace {
+
+// A pipeline and whom it tells of changes.
+struct ListenedPipeline {
+  maq_jni::Listener listener;
+  maq_pipeline* pipeline = nullptr;
+};
+
+maq_pipeline* pipeline_of(jlong listened) { return object<ListenedPipeline>(listened)->pipeline; }
+
+void tell(void* listened, maq_pipeline_state state, maq_status status, const char* problem) {
+  static_cast<ListenedPipeline*>(listened)->listener.tell(state, status, problem);
+}
+
+}  // namespace
+
+MAQ_NATIVE_OF(NativePipeline, jlong, create)
+(JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers,
+ jdoubleArray densepose_values, jdoubleArray source_values, jint result_pool_size, jint nice, jdouble frame_budget_ms,
+ jobject changes) {
+  return call(env, [&] {
+    const maq_jni::Bundle bundle(env, folder, names, buffers);
+    const maq_densepose_config densepose = maq_jni::densepose_config(env, bundle, densepose_values);
+    const maq_source_config source = maq_jni::source_config(env, source_values);
+    maq_pipeline_config config;
+    check(maq_pipeline_config_init(&config, sizeof config));
+    auto listened = std::unique_ptr<ListenedPipeline>(new ListenedPipeline{{env, changes}});
+    config.result_pool_size = uint32_t(result_pool_size);
+    config.densepose = &densepose;
+    config.source = &source;
+    config.state_callback = tell;
+    config.state_user_data = listened.get();
+    config.nice = nice;
+    config.frame_budget_ms = frame_budget_ms;
+    const maq_status status = maq_pipeline_create(object<maq_context>(context), &config, &listened->pipeline);
+    if (status != MAQ_OK) listened->listener.release(env);
+    check(status);
+    return handle(listened.release());
+  });
+}
+
+MAQ_NATIVE_OF(NativePipeline, void, destroy)(JNIEnv* env, jclass, jlong pipeline) {
+  const std::unique_ptr<ListenedPipeline> listened(object<ListenedPipeline>(pipeline));
+  maq_pipeline_destroy(listened->pipeline);
+  listened->listener.release(env);
+}
+
+MAQ_NATIVE_OF(NativePipeline, void, setSource)(JNIEnv* env, jclass, jlong pipeline, jbyteArray uri) {
+  call(env, [&] { check(maq_pipeline_set_source(pipeline_of(pipeline), maq_jni::text(env, uri).c_str())); });
+}
+
+MAQ_NATIVE_OF(NativePipeline, void, setDensePose)
+(JNIEnv* env, jclass, jlong pipeline, jbyteArray folder, jobjectArray names, jobjectArray buffers,
+ jdoubleArray values) {
+  call(env, [&] {
+    const maq_jni::Bundle bundle(env, folder, names, buffers);
+    const maq_densepose_config config = maq_jni::densepose_config(env, bundle, values);
+    check(maq_pipeline_set_densepose(pipeline_of(pipeline), &config));
+  });
+}
+
+MAQ_NATIVE_OF(NativePipeline, void, setPaused)(JNIEnv* env, jclass, jlong pipeline, jboolean is_paused) {
+  call(env, [&] { check(maq_pipeline_set_paused(pipeline_of(pipeline), is_paused)); });
+}
+
+// null ends the recording.
+MAQ_NATIVE_OF(NativePipeline, void, setRecording)(JNIEnv* env, jclass, jlong pipeline, jbyteArray path) {
+  call(env, [&] {
+    const std::string to = maq_jni::text(env, path);
+    check(maq_pipeline_set_recording(pipeline_of(pipeline), path == nullptr ? nullptr : to.c_str()));
+  });
+}
+
+MAQ_NATIVE_OF(NativePipeline, void, stop)(JNIEnv* env, jclass, jlong pipeline) {
+  call(env, [&] { check(maq_pipeline_stop(pipeline_of(pipeline))); });
+}
+
+// Writes frame, dense pose result and number to `objects`, and the times in milliseconds to `times`. False after the
+// last frame and after a stop.
+MAQ_NATIVE_OF(NativePipeline, jboolean, acquire)
+(JNIEnv* env, jclass, jlong pipeline, jlong timeout_ns, jlongArray objects, jdoubleArray times) {
+  return call(env, [&]() -> jboolean {
+    maq_pipeline_result result{};
+    result.struct_size = sizeof result;
+    const maq_status status = maq_pipeline_acquire_result(pipeline_of(pipeline), timeout_ns, &result);
+    if (status == MAQ_END_OF_STREAM || status == MAQ_CANCELLED) return JNI_FALSE;
+    check(status);
+    const jlong three[] = {handle(result.frame), handle(result.densepose), jlong(result.number)};
+    const jdouble ms[] = {result.wait_ms, result.run_ms, result.age_ms};
+    env->SetLongArrayRegion(objects, 0, 3, three);
+    env->SetDoubleArrayRegion(times, 0, 3, ms);
+    return JNI_TRUE;
+  });
+}
+
+// State and status in `codes`; returns the problem and the URI of the source.
+MAQ_NATIVE_OF(NativePipeline, jobjectArray, info)(JNIEnv* env, jclass, jlong pipeline, jintArray codes) {
+  return call(env, [&] {
+    maq_pipeline_info info{};
+    info.struct_size = sizeof info;
+    check(maq_pipeline_get_info(pipeline_of(pipeline), &info));
+    const jint two[] = {info.state, info.status};
+    env->SetIntArrayRegion(codes, 0, 2, two);
+    return maq_jni::texts_of(env, {info.problem, info.source_uri});
+  });
+}
+
+// In the order of maq_pipeline_stats.
+MAQ_NATIVE_OF(NativePipeline, jdoubleArray, stats)(JNIEnv* env, jclass, jlong pipeline) {
+  return call(env, [&] {
+    maq_pipeline_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_pipeline_get_stats(pipeline_of(pipeline), &stats));
+    return maq_jni::doubles_of(
+        env, {double(stats.result_count), double(stats.dropped_result_count), double(stats.dropped_frame_count),
+              stats.results_per_second, stats.wait_ms, stats.run_ms, stats.age_ms, double(stats.key_frame_interval),
+              double(stats.long_side_px)});
+  });
+}

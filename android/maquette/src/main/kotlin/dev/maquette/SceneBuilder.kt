@@ -1,0 +1,196 @@
+package dev.maquette
+
+import java.nio.ByteBuffer
+import java.nio.ByteOrder
+
+/** Told how far building has come, on the thread that builds, which waits meanwhile. */
+fun interface SceneProgress {
+    /**
+     * @param done the fraction that is done, 0 to 1.
+     * @param stage what is done now, in a sentence.
+     * @return false to cancel.
+     */
+    fun onProgress(done: Double, stage: String): Boolean
+}
+
+/** Called by native code, by its name. */
+internal class Progress(private val progress: SceneProgress) {
+    @Suppress("unused")
+    fun onProgress(done: Double, stage: ByteArray): Boolean = progress.onProgress(done, stage.decodeToString())
+}
+
+/**
+ * How scenes are built. Lengths are in units of the scene.
+ *
+ * @property threads 0: the cores, at most 4.
+ * @property longSidePx larger photos are scaled down to this long side; 0: they are not scaled.
+ * @property coefficientBits of the scene's descriptors: 8, 16, or 32 (floats, positions then too).
+ * @property minVariation points whose descriptors vary less between photos (RMS, for colours of 0 to 1) are stored
+ *   without view dependence, which makes the file smaller; 0: all points are view-dependent; negative: 0.05, and with 8
+ *   bits a larger value if needed, so that at most half of the points are.
+ * @property visibilityScale fraction of a photo's resolution at which visibility is tested, 1/16 to 1. With a smaller
+ *   one each point hides more of what is behind it; use it for sparse clouds.
+ * @property nearDepth points nearer to a camera, along its axis, are not seen by it.
+ * @property maxPoints larger clouds are thinned out evenly; 0: no limit.
+ * @property maxMemoryBytes for the fitting of descriptors; 0: 2 GiB.
+ * @property maxViews of a capture: if there are more photos, an even selection is used; 0: no limit.
+ * @property useHeldOut of a capture: also photos that it holds out for comparison.
+ */
+data class SceneBuildConfig(
+    val threads: Int = 0,
+    val longSidePx: Int = 640,
+    val coefficientBits: Int = 8,
+    val minVariation: Double = -1.0,
+    val visibilityScale: Double = 1.0,
+    val nearDepth: Double = 0.0,
+    val maxPoints: Long = 0,
+    val maxMemoryBytes: Long = 0,
+    val maxViews: Int = 0,
+    val useHeldOut: Boolean = false,
+) {
+    internal fun values() =
+        doubleArrayOf(
+            threads.toDouble(),
+            longSidePx.toDouble(),
+            coefficientBits.toDouble(),
+            minVariation,
+            visibilityScale,
+            nearDepth,
+            maxPoints.toDouble(),
+            maxMemoryBytes.toDouble(),
+            maxViews.toDouble(),
+            if (useHeldOut) 1.0 else 0.0,
+        )
+}
+
+/**
+ * Counts and times of building. Milliseconds are wall-clock, over all photos so far.
+ *
+ * @property views photos that saw points.
+ * @property unusedViews photos that saw none; of a capture also those that are missing, damaged or too large.
+ * @property cloudPoints after [SceneBuildConfig.maxPoints].
+ * @property seenPoints points that a photo has seen.
+ */
+data class SceneBuildStats(
+    val views: Int,
+    val unusedViews: Int,
+    val cloudPoints: Long,
+    val seenPoints: Long,
+    val loadMs: Double,
+    val visibilityMs: Double,
+    val alignMs: Double,
+    val extractMs: Double,
+    val accumulateMs: Double,
+    val solveMs: Double,
+    val packMs: Double,
+) {
+    internal companion object {
+        const val COUNT = 11
+
+        fun of(s: DoubleArray) =
+            SceneBuildStats(
+                s[0].toInt(), s[1].toInt(), s[2].toLong(), s[3].toLong(), s[4], s[5], s[6], s[7], s[8], s[9], s[10],
+            )
+    }
+}
+
+/**
+ * A point cloud of the app. It is copied by [Maquette.sceneBuilder].
+ *
+ * @property xyz a direct buffer of floats in native byte order, from its start: x, y, z of each point, relative to
+ *   [origin], in units of the scene.
+ * @property pointCount 1 to 30 million; 12 bytes each.
+ * @property origin x, y, z in the world; near the cloud, since floats have 7 digits.
+ * @property up of the world; any length but 0.
+ */
+class PointCloud(
+    val xyz: ByteBuffer,
+    val pointCount: Long,
+    val origin: List<Double> = listOf(0.0, 0.0, 0.0),
+    val up: List<Double>,
+) {
+    init {
+        require(origin.size == 3 && up.size == 3) {
+            "Origin and up of a cloud have ${origin.size} and ${up.size} numbers; each needs 3."
+        }
+    }
+
+    companion object {
+        /** A cloud from an array of x, y, z of each point. */
+        fun of(
+            xyz: FloatArray,
+            origin: List<Double> = listOf(0.0, 0.0, 0.0),
+            up: List<Double>,
+        ): PointCloud {
+            require(xyz.size % 3 == 0) { "The cloud has ${xyz.size} coordinates; each point needs 3." }
+            val buffer = ByteBuffer.allocateDirect(maxOf(4 * xyz.size, 1)).order(ByteOrder.nativeOrder())
+            buffer.asFloatBuffer().put(xyz)
+            return PointCloud(buffer, xyz.size / 3L, origin, up)
+        }
+    }
+}
+
+/**
+ * Builds a scene from a cloud and photos of the app. Made by [Maquette.sceneBuilder]. Functions may be called from any
+ * thread, one at a time but for [cancel]; they take long, so not on the main thread.
+ */
+class SceneBuilder internal constructor(
+    context: Long,
+    cloud: PointCloud,
+    bundle: ModelBundle,
+    config: SceneBuildConfig,
+) : AutoCloseable {
+    private val handle =
+        Handle(
+            this,
+            NativeScene.createBuilder(
+                context,
+                cloud.xyz,
+                cloud.pointCount,
+                (cloud.origin + cloud.up).toDoubleArray(),
+                bundle.folder,
+                bundle.names,
+                bundle.buffers,
+                config.values(),
+            ),
+            NativeScene::destroyBuilder,
+        )
+
+    /** As it is now. */
+    val stats: SceneBuildStats get() = SceneBuildStats.of(handle.use(NativeScene::builderStats))
+
+    /**
+     * Adds a photo of any format but depth, which may be closed afterwards. When it fails or is cancelled, the builder
+     * stays as it was.
+     *
+     * @param camera of the photo, in its size.
+     * @param progress may cancel; what it throws cancels too, and is thrown. It must not use this builder.
+     * @return how many points the photo saw, possibly 0.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (an invalid camera, or one of another size than the
+     *   photo), [Status.CANCELLED], [Status.IMAGE_SIZE], [Status.UNSUPPORTED], [Status.OUT_OF_MEMORY].
+     */
+    fun addView(
+        photo: Frame,
+        camera: PinholeCamera,
+        progress: SceneProgress? = null,
+    ): Long =
+        handle.use { builder ->
+            photo.handle.use { NativeScene.addView(builder, it, camera.values(), progress?.let(::Progress)) }
+        }
+
+    /** Cancels the [addView] that runs, or else the next; from any thread. Does not block. */
+    fun cancel() = handle.use(NativeScene::cancelBuilder)
+
+    /**
+     * Builds a scene from the photos so far; more can be added afterwards, for another scene.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] if no photo saw a point, [Status.OUT_OF_MEMORY].
+     */
+    fun finish(): Scene {
+        val scene = handle.use(NativeScene::finishBuilder)
+        return Scene(scene, stats)
+    }
+
+    /** Scenes that it finished stay valid. */
+    override fun close() = handle.close()
+}

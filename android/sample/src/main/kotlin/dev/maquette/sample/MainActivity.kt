@@ -1,0 +1,24 @@
+package dev.maquette.sample
+
+import android.content.Intent
+import android.os.Bundle
+import dev.maquette.Maquette
+
+/** The list of screens. */
+class MainActivity : Screen() {
+    override fun onCreate(state: Bundle?) {
+        super.onCreate(state)
+        say("Maquette ${Maquette.version}. Everything is computed on this device; nothing is sent anywhere.")
+        open("Live: people of the camera", LiveActivity::class.java)
+        open("Photo: people of a picture", PhotoActivity::class.java)
+        open("Scene: look around in a place", SceneActivity::class.java)
+        open("Benchmark: how fast this device is", BenchmarkActivity::class.java)
+    }
+
+    private fun open(
+        text: String,
+        screen: Class<out Screen>,
+    ) {
+        button(text) { startActivity(Intent(this, screen)) }
+    }
+}

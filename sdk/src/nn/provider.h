@@ -1,0 +1,24 @@
+// Execution providers: what may run the nodes of a graph in place of ONNX Runtime's own kernels. One that a build of
+// ONNX Runtime does not have, or that takes too little of a graph, costs a line in the log and not the app's run.
+#pragma once
+
+#include <string>
+
+#include "nn/onnxruntime_library.h"
+
+namespace maq {
+
+// `wanted`, or MAQ_PROVIDER_CPU where this build of ONNX Runtime does not offer it; the log says why.
+maq_provider available_provider(const OnnxRuntimeLibrary& runtime, maq_provider wanted);
+
+// Adds `provider`, which is not the CPU, to `options`, with that many threads where it has threads of its own. Throws
+// MAQ_ERROR_UNSUPPORTED where this build does not offer it.
+void append_provider(const OnnxRuntimeLibrary& runtime, maq_provider provider, int threads, OrtSessionOptions* options);
+
+// What `provider` took of the graph of a session that was made with it, to the log. Throws MAQ_ERROR_UNSUPPORTED where
+// that is less than half of the nodes: the CPU, which has few threads in such a session, would run the others. Older
+// releases of ONNX Runtime than 1.24 do not tell; their choice stays.
+void check_assignment(const OnnxRuntimeLibrary& runtime, maq_provider provider, const OrtSession* session,
+                      const std::string& name);
+
+}  // namespace maq

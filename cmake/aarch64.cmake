@@ -1,5 +1,5 @@
 # Toolchain: aarch64 Linux, by Debian's cross compiler (g++-aarch64-linux-gnu), against the arm64 packages that
-# scripts/aarch64-sysroot.sh unpacks. Programs run under qemu-aarch64 (qemu-user-static).
+# scripts/aarch64-sysroot.sh unpacks. Programs run under qemu-aarch64 (qemu-user).
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
@@ -26,4 +26,4 @@ endforeach()
 set(CMAKE_EXE_LINKER_FLAGS_INIT "${_rpath_links}")
 set(CMAKE_SHARED_LINKER_FLAGS_INIT "${_rpath_links}")
 
-set(CMAKE_CROSSCOMPILING_EMULATOR "qemu-aarch64-static;-L;${MAQ_AARCH64_SYSROOT}")
+set(CMAKE_CROSSCOMPILING_EMULATOR "qemu-aarch64;-L;${MAQ_AARCH64_SYSROOT}")

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import ClassVar, TypeVar
 
 from export.densepose import bundle as densepose
+from export.edges import bundle as edges
 from export.scenes import bundle as scenes
 
-DENSEPOSE, SCENES = (Path(__file__).with_name(f"{system}.toml") for system in ("densepose", "scenes"))
+DENSEPOSE, EDGES, SCENES = (Path(__file__).with_name(f"{system}.toml") for system in ("densepose", "edges", "scenes"))
 METHODS = ("minmax", "percentile", "entropy")
 
 
@@ -63,7 +64,18 @@ class SceneSettings:
     held_out_views: int
 
 
-Settings = TypeVar("Settings", DensePoseSettings, SceneSettings)
+@dataclass(frozen=True)
+class EdgeSettings:
+    """graphs: settings by graph name. frames, held_out_frames: how many frames calibrate, and measure the error."""
+
+    GRAPHS: ClassVar[tuple[str, ...]] = edges.GRAPHS
+
+    graphs: dict[str, GraphSettings]
+    frames: int
+    held_out_frames: int
+
+
+Settings = TypeVar("Settings", DensePoseSettings, EdgeSettings, SceneSettings)
 
 
 def read_settings(path: Path, kind: type[Settings]) -> Settings:

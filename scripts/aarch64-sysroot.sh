@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes .deps/aarch64-sysroot: Debian's arm64 packages that the aarch64 build needs (OpenCV, GoogleTest, headers),
+# Makes .deps/aarch64-sysroot: Debian's arm64 packages that the aarch64 build needs (OpenCV, GoogleTest, headers), and Python,
 # unpacked but not installed. cmake/aarch64.cmake builds against it and qemu-aarch64 runs programs in it.
 #
 #   scripts/aarch64-sysroot.sh
@@ -16,7 +16,8 @@ esac
 
 packages=(libc6 libstdc++6 libgtest-dev libgmock-dev nlohmann-json3-dev libcli11-dev
     libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev
-    libturbojpeg0-dev libpng-dev libxxhash-dev)
+    libturbojpeg0-dev libpng-dev libxxhash-dev
+    python3.11-minimal libpython3.11-stdlib)  # benchmarks.provider_counts
 sysroot="$PWD/.deps/aarch64-sysroot"
 stamp="$sysroot/.ready"
 # The stamp is written last and holds what made the folder, so an interrupted or older one is made again.

@@ -4,7 +4,7 @@
 #   scripts/install-packages.sh demo        to build the SDK and run it
 #   scripts/install-packages.sh desktop     + the desktop demo
 #   scripts/install-packages.sh test        + the native tests, Python, a display and OpenGL in software
-#   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (120 MB)
+#   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (70 MB)
 #   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (35 MB)
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
@@ -68,7 +68,7 @@ if [ "$group" != demo ] && [ "$group" != desktop ]; then
     needs_command xauth xauth         # ... which xvfb-run needs to start it
 fi
 if [ "$group" = isa ]; then
-    needs_command qemu-aarch64-static qemu-user-static
+    needs_command qemu-aarch64 qemu-user
     needs_command aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
     needs_command mvn maven           # brings ONNX Runtime for aarch64
 fi

@@ -13,6 +13,10 @@ android {
         versionCode = 1
         versionName = "0.2.0"
     }
+    // ArCaptureActivity, apart from what is compiled without ARCore; and the outfit that the desktop demo has.
+    sourceSets["main"].kotlin.srcDir("src/arcore/kotlin")
+    sourceSets["main"].assets.srcDir("../../desktop_demo/assets")
+    androidResources { ignoreAssetsPatterns += listOf("!*.svg", "!*.desktop") }
     buildTypes { release { isMinifyEnabled = true } }
     compileOptions {
         sourceCompatibility = JavaVersion.VERSION_17
@@ -22,4 +26,8 @@ android {
 
 kotlin { jvmToolchain(17) }
 
-dependencies { implementation(project(":maquette")) }
+dependencies {
+    implementation(project(":maquette"))
+    // Of this app alone: its licence is Google's, and the library knows nothing of it.
+    implementation("com.google.ar:core:1.54.0")
+}

@@ -146,5 +146,16 @@ unplug
 check "a camera appears for its dma-bufs" plug_in
 check "a frame's dma-buf is readable when the camera is unplugged" dma_buf_outlives_the_camera
 wait $camera 2>/dev/null
+check "a depth camera appears" plug_in --depth
+check "the depth camera is listed" lists "v4l2:/dev/video0" "Z16"
+check "its depth is in millimetres, without calibration" depth_check "v4l2:/dev/video0?format=Z16" 5 0.001 0
+check "its depth is in the unit and has the calibration that are given" \
+    depth_check "v4l2:/dev/video0?format=Z16&size=320x240&depth_unit=0.0001&fov=90" 5 0.0001 160
+check "its depth is a dma-buf" dma_buf "v4l2:/dev/video0?format=Z16" 3
+check "its depth is recorded with the calibration" $maquette record "v4l2:/dev/video0?format=Z16&fx=600" \
+    /tmp/depth.maqrec --frames 5
+check "its depth is replayed with the calibration" depth_check rec:/tmp/depth.maqrec 5 0.001 600
+check "as a camera of pictures it is refused, with what to do" refuses "size=320x240" "open depth with format=Z16"
+unplug
 check "the doctor says that there is none" doctor_says 1 "no camera is plugged in" "0 of 0 cameras"
 check "without a camera it says what to do" sh -c "! $maquette densepose v4l2:/dev/video0 --out /tmp/x 2>&1 | grep 'plugged in' && exit 1; true"

@@ -60,8 +60,10 @@ pack() {
         sdk)
             cc -std=c99 -Wall -Wextra -Werror -O2 -Isdk/include tests/camera_vm/dma_buf.c -o "$work/dma_buf" \
                 -Lbuild/release/stage/lib -lmaquette
+            cc -std=c99 -Wall -Wextra -Werror -O2 -Isdk/include tests/camera_vm/depth_check.c -o "$work/depth_check" \
+                -Lbuild/release/stage/lib -lmaquette -lm
             contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
-                --program "$work/dma_buf" --file tests/media/photo.jpg=photo.jpg
+                --program "$work/dma_buf" --program "$work/depth_check" --file tests/media/photo.jpg=photo.jpg
                 --tree build/release/stage=/opt/maquette) ;;
         libcamera)
             [ -e build/release/stage/lib/maquette/libmaquette_libcamera.so ] || {

@@ -1,6 +1,6 @@
 /* A USB camera without hardware: a UVC 1.0 camera with bulk transfers, which the kernel's vhci-hcd driver plugs in.
  *
- *   virtual_uvc_camera [--port N] [--seconds N] [--picture FILE] [--jpeg FILE]
+ *   virtual_uvc_camera [--port N] [--seconds N] [--picture FILE] [--jpeg FILE] [--depth]
  *
  * vhci-hcd is the client side of USB/IP: it takes a connected socket and speaks of each USB transfer over it. Here the
  * other end of a socket pair answers, so no network is needed, and the camera is unplugged the moment this process
@@ -8,10 +8,12 @@
  *
  * Frames are YUYV of 640x480 or 320x240 at 30 per second. Without --picture they are a moving gradient: Y is (x + 2 y +
  * 4 frame) mod 256, U is 90, V is 160, and frames count from 0 at each start of the stream. --picture is a raw YUYV
- * picture of 640x480. --jpeg adds the format MJPEG, 640x480, whose every frame is that file.
+ * picture of 640x480. --jpeg adds the format MJPEG, 640x480, whose every frame is that file. With --depth it is a depth
+ * camera: in place of YUYV it has 16 bits of depth a pixel, 1000 + x + 2 y + 4 (frame mod 1000).
  *
  * Sources: USB 2.0, chapter 9; USB Device Class Definition for Video Devices 1.0a ("UVC" below); Linux,
- * Documentation/usb/usbip_protocol.rst. Runs on little-endian machines only, as USB numbers are little-endian.
+ * Documentation/usb/usbip_protocol.rst, and include/linux/usb/uvc.h for the format that it calls Z16. Runs on
+ * little-endian machines only, as USB numbers are little-endian.
  */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
@@ -46,6 +48,7 @@ static const struct {
 } sizes[] = {{640, 480}, {320, 240}}; /* bFrameIndex is the place here, from 1; MJPEG has the first one only */
 
 static uint8_t* picture; /* YUYV of the largest size, or NULL for the gradient */
+static int shows_depth;
 static uint8_t* jpeg;
 static size_t jpeg_bytes;
 
@@ -75,7 +78,14 @@ static void draw_frame(void) {
     return;
   }
   frame.length = (size_t)width * height * 2;
-  for (y = 0; y < height; ++y) {
+  for (y = 0; y < height && shows_depth; ++y) {
+    for (x = 0; x < width; ++x, out += 2) {
+      unsigned depth = 1000 + x + 2 * y + 4 * (frame.number % 1000);
+      out[0] = (uint8_t)depth;
+      out[1] = (uint8_t)(depth >> 8);
+    }
+  }
+  for (y = 0; y < height && !shows_depth; ++y) {
     for (x = 0; x < width; x += 2, out += 4) {
       if (picture) {
         memcpy(out, picture + ((size_t)y * step * LARGEST_WIDTH + (size_t)x * step) * 2, 4);
@@ -155,8 +165,13 @@ static void make_configuration(void) {
   } else {
     streaming = ADD(15, 0x24, 1, 2, 0, 0, STREAM_ENDPOINT, 0, 3, 0, 0, 0, 1, 0, 0);
   }
-  ADD(27, 0x24, 4, FORMAT_YUYV, 2, 'Y', 'U', 'Y', '2', 0, 0, 0x10, 0, 0x80, 0, 0, 0xAA, 0, 0x38, 0x9B, 0x71, 16, 1, 0,
-      0, 0, 0);
+  if (shows_depth) {
+    ADD(27, 0x24, 4, FORMAT_YUYV, 2, 'I', 'N', 'V', 'Z', 0x90, 0x2D, 0x58, 0x4A, 0x92, 0x0B, 0x77, 0x3F, 0x1F, 0x2C,
+        0x55, 0x6B, 16, 1, 0, 0, 0, 0);
+  } else {
+    ADD(27, 0x24, 4, FORMAT_YUYV, 2, 'Y', 'U', 'Y', '2', 0, 0, 0x10, 0, 0x80, 0, 0, 0xAA, 0, 0x38, 0x9B, 0x71, 16, 1, 0,
+        0, 0, 0);
+  }
   add_frame(5, 1, sizes[0].width, sizes[0].height);
   add_frame(5, 2, sizes[1].width, sizes[1].height);
   ADD(6, 0x24, 0x0D, 1, 1, 4); /* colours: BT.709 primaries and transfer, BT.601 matrix */
@@ -455,11 +470,10 @@ static uint8_t* read_file(const char* path, size_t largest, size_t* bytes) {
 }
 
 int main(int count, char** arguments) {
-  static const struct option options[] = {{"port", required_argument, NULL, 'p'},
-                                          {"seconds", required_argument, NULL, 's'},
-                                          {"picture", required_argument, NULL, 'y'},
-                                          {"jpeg", required_argument, NULL, 'j'},
-                                          {NULL, 0, NULL, 0}};
+  static const struct option options[] = {
+      {"port", required_argument, NULL, 'p'},    {"seconds", required_argument, NULL, 's'},
+      {"picture", required_argument, NULL, 'y'}, {"jpeg", required_argument, NULL, 'j'},
+      {"depth", no_argument, NULL, 'd'},         {NULL, 0, NULL, 0}};
   int64_t end_ns = INT64_MAX;
   size_t bytes;
   int port = 0, option;
@@ -482,8 +496,10 @@ int main(int count, char** arguments) {
           return 1;
         }
         break;
+      case 'd': shows_depth = 1; break;
       default:
-        fprintf(stderr, "usage: virtual_uvc_camera [--port N] [--seconds N] [--picture FILE] [--jpeg FILE]\n");
+        fprintf(stderr,
+                "usage: virtual_uvc_camera [--port N] [--seconds N] [--picture FILE] [--jpeg FILE] [--depth]\n");
         return 2;
     }
   }

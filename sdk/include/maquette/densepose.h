@@ -159,6 +159,32 @@ MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* re
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
+/* How a result is drawn. */
+typedef struct maq_densepose_drawing {
+  uint32_t struct_size;
+  int32_t x_px; /* the part of the frame that is drawn; default: from its left upper corner */
+  int32_t y_px;
+  int32_t width_px; /* 0 (default): up to the frame's right edge */
+  int32_t height_px;
+  int32_t opacity;     /* of the parts' colours: 0, invisible, to 255, which cover the frame; default 180 */
+  int32_t is_mirrored; /* 1: left and right change sides, as in a mirror; default 0 */
+} maq_densepose_drawing;
+
+/* Fills `drawing` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_drawing) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_densepose_drawing_init(maq_densepose_drawing* drawing, uint32_t struct_size);
+
+/* Draws the people over their frame into memory of the app, as a preview or a window shows it: each of their pixels is
+ * blended with the colour of its part (maq_densepose_get_part_colour). `frame` is the one that the result is of. NULL:
+ * the colours alone, multiplied by their opacity, on transparent ground, to be drawn over a picture by others.
+ * `rgba` gets height_px rows of `stride_bytes` (0: rows without padding), 4 bytes a pixel; `size_bytes` is the size of
+ * the memory there. `drawing` may be NULL for the defaults.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory, a part that is not inside the frame, a frame of
+ * another size), MAQ_ERROR_UNSUPPORTED (a depth image). Does not block. */
+MAQ_API maq_status maq_densepose_result_draw(const maq_densepose_result* result, const maq_frame* frame,
+                                             const maq_densepose_drawing* drawing, uint8_t* rgba, size_t stride_bytes,
+                                             size_t size_bytes);
+
 /* Writes three files into an existing folder ("": the current one), in the DensePose convention (docs/formats.md):
  * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png
  * (MAQ_DENSEPOSE_PLANE_PERSON) and <stem>.json (size, boxes, scores). Each is written atomically and replaces an

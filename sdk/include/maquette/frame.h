@@ -18,13 +18,16 @@ typedef struct maq_frame maq_frame;
 
 /* Rows from top to bottom; 8 bits a channel but for depth. */
 typedef enum maq_pixel_format {
-  MAQ_PIXEL_RGB8 = 1,   /* one plane, 3 bytes a pixel */
-  MAQ_PIXEL_BGR8 = 2,   /* one plane, 3 bytes a pixel */
-  MAQ_PIXEL_RGBA8 = 3,  /* one plane, 4 bytes a pixel; alpha is ignored */
-  MAQ_PIXEL_GREY8 = 4,  /* one plane, 1 byte a pixel */
-  MAQ_PIXEL_NV12 = 5,   /* planes Y [h, w] and UV [ceil(h / 2), 2 * ceil(w / 2)] bytes; BT.601, video range */
-  MAQ_PIXEL_YUYV = 6,   /* one plane, Y0 U Y1 V for two pixels; rows of 4 * ceil(w / 2) bytes; BT.601, video range */
-  MAQ_PIXEL_DEPTH16 = 7 /* one plane, uint16_t a pixel: millimetres along the optical axis, 0 where nothing is known */
+  MAQ_PIXEL_RGB8 = 1,    /* one plane, 3 bytes a pixel */
+  MAQ_PIXEL_BGR8 = 2,    /* one plane, 3 bytes a pixel */
+  MAQ_PIXEL_RGBA8 = 3,   /* one plane, 4 bytes a pixel; alpha is ignored */
+  MAQ_PIXEL_GREY8 = 4,   /* one plane, 1 byte a pixel */
+  MAQ_PIXEL_NV12 = 5,    /* planes Y [h, w] and UV [ceil(h / 2), 2 * ceil(w / 2)] bytes; BT.601, video range */
+  MAQ_PIXEL_YUYV = 6,    /* one plane, Y0 U Y1 V for two pixels; rows of 4 * ceil(w / 2) bytes; BT.601, video range */
+  MAQ_PIXEL_DEPTH16 = 7, /* one plane, uint16_t a pixel: millimetres along the optical axis; 0, where nothing is known,
+                            and 65535, the end of the range, are unknown */
+  MAQ_PIXEL_DEPTH32F = 8 /* one plane, float a pixel: metres along the optical axis, unknown where it is 0, negative,
+                            infinite or NaN */
 } maq_pixel_format;
 
 /* The zero of a timestamp. */
@@ -46,6 +49,24 @@ typedef struct maq_frame_desc {
   uint64_t sequence; /* number of the frame in its source, from 0; gaps are frames that were dropped */
 } maq_frame_desc;
 
+/* An image in planes, as Android's cameras and video decoders give it (YUV_420_888): Y in full size, U and V of every
+ * second column and row, ceil(w / 2) x ceil(h / 2). U and V may be planes of their own, or lie in one in turns, in
+ * either order. */
+typedef struct maq_yuv_image {
+  uint32_t struct_size;
+  int32_t width_px;
+  int32_t height_px;
+  const uint8_t* planes[3];      /* Y, U, V */
+  size_t size_bytes[3];          /* of the memory there; the last row may end with its last value */
+  int32_t stride_bytes[3];       /* from one row to the next */
+  int32_t pixel_stride_bytes[3]; /* from one value of a row to the next; of Y 1 */
+  int32_t is_full_range;         /* 1 (default): values 0 to 255, as of cameras (JFIF); 0: video range, Y 16 to 235 */
+  int32_t rotation_deg;          /* clockwise, from the image to the frame: 0 (default), 90, 180, 270 */
+  int64_t timestamp_ns;
+  maq_clock clock; /* default MAQ_CLOCK_MONOTONIC */
+  uint64_t sequence;
+} maq_yuv_image;
+
 /* Called once, when the library no longer needs the pixels of a frame made by maq_frame_wrap, on the thread that
  * released it last. It must not throw: what it throws is caught, and maq_last_error(NULL) has it. */
 typedef void (*maq_frame_release_callback)(void* user_data);
@@ -62,6 +83,17 @@ MAQ_API maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_siz
  * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_UNSUPPORTED (format). Does not block. */
 MAQ_API maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* desc,
                                   maq_frame_release_callback release_callback, void* user_data, maq_frame** frame);
+
+/* Fills `image` with zeros, the defaults and struct_size. `struct_size` is sizeof(maq_yuv_image) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_yuv_image_init(maq_yuv_image* image, uint32_t struct_size);
+
+/* Makes a copy of an image in planes as a MAQ_PIXEL_NV12 frame, rotated: the planes are not needed afterwards. (Planes
+ * that are NV12 in video range already need no copy: maq_frame_wrap.)
+ * `*frame` is the caller's: give it back with maq_frame_release.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (NULL plane, strides or sizes that are not of such an image),
+ * MAQ_ERROR_IMAGE_SIZE. Does not block. */
+MAQ_API maq_status maq_frame_convert_yuv(maq_context* context, const maq_yuv_image* image, maq_frame** frame);
 
 /* Decodes an image that the app has in memory: a whole JPEG, PNG, WebP, BMP or TIFF file, as from an upload, a network
  * or the assets of an app. It is checked like the file of an image: source, made upright by its EXIF orientation, and
@@ -80,8 +112,9 @@ MAQ_API void maq_frame_release(maq_frame* frame);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc);
 
-/* Describes the depth image that came with the frame: MAQ_PIXEL_DEPTH16, aligned with the frame's picture (it may be
- * smaller and then covers the same view), valid until the frame is released. The caller sets desc->struct_size.
+/* Describes the frame's depth image: of a frame whose pixels are depth those, otherwise what came with the picture,
+ * MAQ_PIXEL_DEPTH16, aligned with it (it may be smaller and then covers the same view). Valid until the frame is
+ * released. The intrinsics of the source hold for both. The caller sets desc->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the frame has no depth).
  * Does not block. */
 MAQ_API maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc);
@@ -109,10 +142,14 @@ MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_forma
 MAQ_API maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, int32_t height_px, maq_frame** resized);
 
 /* Writes the frame's picture to a file, in the format of the path's extension: PNG (.png), lossless, or JPEG (.jpg,
- * .jpeg) at quality 95. Grey pictures stay grey, others are written as RGB, without alpha. The file is written
- * atomically and replaces an existing one; its folder must exist.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNSUPPORTED (a depth image),
- * MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is written. */
+ * .jpeg) at quality 95. Grey pictures stay grey, others are written as RGB, without alpha. A depth frame becomes a PNG
+ * of 16 bits in whole millimetres, 0 where nothing is known or it is over 65.534 m, or a TIFF (.tif, .tiff) of metres
+ * as floats; image: with depth_unit=0.001 or depth_unit=1 reads it again. The depth that came with a picture is not
+ * written: wrap maq_frame_get_depth for that. The file is written atomically and replaces an existing one; its folder
+ * must exist.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNSUPPORTED (depth in builds for
+ * Android), MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is
+ * written. */
 MAQ_API maq_status maq_frame_save(const maq_frame* frame, const char* path);
 
 #ifdef __cplusplus

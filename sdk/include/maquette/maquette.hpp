@@ -56,6 +56,12 @@ inline maq_densepose_config default_densepose_config() {
   return config;
 }
 
+inline maq_edges_config default_edges_config() {
+  maq_edges_config config;
+  check(maq_edges_config_init(&config, sizeof config));
+  return config;
+}
+
 inline maq_source_config default_source_config() {
   maq_source_config config;
   check(maq_source_config_init(&config, sizeof config));
@@ -104,6 +110,13 @@ class Frame {
   static Frame decode(const Context& context, const void* data, size_t size_bytes) {
     maq_frame* made = nullptr;
     check(maq_frame_decode(context.get(), data, size_bytes, &made));
+    return Frame(made);
+  }
+
+  // A copy of an image in planes of Y, U and V, which are not needed afterwards.
+  static Frame convert_yuv(const Context& context, const maq_yuv_image& image) {
+    maq_frame* made = nullptr;
+    check(maq_frame_convert_yuv(context.get(), &image, &made));
     return Frame(made);
   }
 
@@ -289,6 +302,13 @@ class DensePoseResult {
     return stats;
   }
 
+  // RGBA pixels of `drawing`, over `frame`, or on transparent ground where that is null.
+  void draw(const Frame* frame, const maq_densepose_drawing& drawing, uint8_t* rgba, size_t stride_bytes,
+            size_t size_bytes) const {
+    check(maq_densepose_result_draw(get(), frame == nullptr ? nullptr : frame->get(), &drawing, rgba, stride_bytes,
+                                    size_bytes));
+  }
+
   void save(const std::string& folder, const std::string& stem) const {
     check(maq_densepose_result_save(get(), folder.c_str(), stem.c_str()));
   }
@@ -341,6 +361,86 @@ class DensePose {
   }
 
   Owner<maq_densepose, maq_densepose_destroy> owner_;
+};
+
+class EdgesResult {
+ public:
+  // Takes over a result of the C API.
+  explicit EdgesResult(maq_edges_result* result) : owner_(result) {
+    field_.struct_size = sizeof field_;
+    check(maq_edges_result_get_field(get(), &field_));
+  }
+
+  maq_edges_result* get() const { return owner_.get(); }
+  const maq_edges_field& field() const { return field_; }
+  int32_t width_px() const { return field_.width_px; }
+  int32_t height_px() const { return field_.height_px; }
+
+  // width_px() * height_px() values, row by row.
+  const float* distance_r() const { return static_cast<const float*>(plane(MAQ_EDGES_PLANE_DISTANCE)); }
+  const float* spread_r() const { return static_cast<const float*>(plane(MAQ_EDGES_PLANE_SPREAD)); }
+  const uint8_t* kind() const { return static_cast<const uint8_t*>(plane(MAQ_EDGES_PLANE_KIND)); }
+  const float* depth_m() const { return static_cast<const float*>(plane(MAQ_EDGES_PLANE_DEPTH)); }
+
+  std::vector<float> distance_m() const {
+    std::vector<float> metres(size_t(width_px()) * size_t(height_px()));
+    check(maq_edges_result_copy_distance_m(get(), metres.data(), metres.size()));
+    return metres;
+  }
+
+  maq_edges_stats stats() const {
+    maq_edges_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_edges_result_get_stats(get(), &stats));
+    return stats;
+  }
+
+  void save(const std::string& folder, const std::string& stem) const {
+    check(maq_edges_result_save(get(), folder.c_str(), stem.c_str()));
+  }
+
+ private:
+  const void* plane(maq_edges_plane which) const {
+    const void* values = nullptr;
+    size_t stride_bytes = 0;
+    check(maq_edges_result_get_plane(get(), which, &values, &stride_bytes));
+    return values;
+  }
+
+  Owner<maq_edges_result, maq_edges_result_release> owner_;
+  maq_edges_field field_{};
+};
+
+class Edges {
+ public:
+  Edges(const Context& context, const maq_edges_config& config) { create(context, config); }
+  // The bundle installed with the library.
+  explicit Edges(const Context& context) { create(context, default_edges_config()); }
+  Edges(const Context& context, const std::string& bundle_path) {
+    maq_edges_config config = default_edges_config();
+    config.bundle_path = bundle_path.c_str();
+    create(context, config);
+  }
+
+  maq_edges* get() const { return owner_.get(); }
+
+  EdgesResult run(const Frame& frame, const maq_intrinsics& intrinsics) {
+    maq_edges_result* result = nullptr;
+    check(maq_edges_run(get(), frame.get(), &intrinsics, &result));
+    return EdgesResult(result);
+  }
+
+  // From any thread: the run that runs, or else the next, throws Error with MAQ_CANCELLED.
+  void cancel() { check(maq_edges_cancel(get())); }
+
+ private:
+  void create(const Context& context, const maq_edges_config& config) {
+    maq_edges* made = nullptr;
+    check(maq_edges_create(context.get(), &config, &made));
+    owner_.reset(made);
+  }
+
+  Owner<maq_edges, maq_edges_destroy> owner_;
 };
 
 inline maq_pipeline_config default_pipeline_config() {

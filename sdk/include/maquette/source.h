@@ -98,18 +98,19 @@ typedef struct maq_source_scheme {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size);
 
-/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec",
- * "stub:people?count=2&seed=7", "stub:pattern", "v4l2:/dev/video0" or "v4l2:0", "libcamera:0", "depthai:", and on
- * Android "android:back" or "android:0". "file:clip.mp4" chooses among the first three by the file's content, "camera:"
- * opens the first camera that can be opened. Without a scheme it is the path of a file or a camera, "clip.mp4" or
+/* Opens a source. `uri` is UTF-8: "image:photo.jpg", "video:clip.mp4", "rec:take.maqrec", "stub:people?count=2&seed=7",
+ * "stub:pattern", "stub:solids", "v4l2:/dev/video0" or "v4l2:0", "libcamera:0", "depthai:", and on Android
+ * "android:back" or "android:0". "file:clip.mp4" chooses among the first three by the file's content, "camera:" opens
+ * the first camera that can be opened. Without a scheme it is the path of a file or a camera, "clip.mp4" or
  * "/dev/video0", as it is: no options.
  * An image may also come out of a pipe (/dev/stdin); the other files are regular files.
  * "?size=640x480&fps=15" works with each: frames are scaled to that size, frames of a clip are dropped down to that
  * rate; a camera uses the nearest mode that it offers, which maq_source_get_info returns. For cameras, "format=MJPG"
- * selects a pixel format and "exposure=10000&focus=auto" sets controls. "live=1" plays a file or stub in real time
- * like a camera, and faults such as "drop=0.1" or "unplug=3s@5s" can be injected into any source
- * (docs/cameras/simulated.md). Behind a scheme, write a '?' of a file name as %3F and a '%' as %25. `config` may be
- * NULL. `*source` is the caller's, to be given to maq_source_destroy.
+ * selects a pixel format and "exposure=10000&focus=auto" sets controls. "live=1" plays a file or stub in real time like
+ * a camera. "depth_unit=0.001" reads an image as depth, and is the unit of "v4l2:0?format=Z16"; "fov=60" (degrees) or
+ * "fx=380&fy=381&cx=318&cy=242" (pixels) give the intrinsics of an image or a camera. Faults such as "drop=0.1" or
+ * "unplug=3s@5s" can be injected into any source (docs/cameras/simulated.md). Behind a scheme, write a '?' of a file
+ * name as %3F and a '%' as %25. `config` may be NULL. `*source` is the caller's, to be given to maq_source_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (ill-formed URI or option), MAQ_ERROR_UNSUPPORTED (scheme, format of
  * an image), MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_IMAGE_SIZE; for cameras MAQ_ERROR_DEVICE_LOST,
  * MAQ_ERROR_BUSY, MAQ_ERROR_NO_PERMISSION, MAQ_ERROR_RUNTIME_LIBRARY too. Blocks while files are read and devices

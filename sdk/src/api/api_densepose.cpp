@@ -6,7 +6,9 @@
 #include "api/frame_handle.h"
 #include "core/worker_threads.h"
 #include "densepose/body_parts.h"
+#include "densepose/painting.h"
 #include "densepose/result_files.h"
+#include "image/convert.h"
 
 using namespace maq;
 
@@ -24,6 +26,12 @@ maq_densepose_config default_config() {
   config.detail = MAQ_DENSEPOSE_DETAIL_SURFACE;
   config.allow_spinning = 1;
   return config;
+}
+
+maq_densepose_drawing default_drawing() {
+  maq_densepose_drawing drawing{};
+  drawing.opacity = 180;
+  return drawing;
 }
 
 // NULL for a number that is not a part's.
@@ -201,6 +209,48 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.is_key_frame = from.key_frame ? 1 : 0;
     filled.provider = from.provider;
     write_struct(stats, "stats", filled, sizeof(maq_densepose_stats));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_drawing_init(maq_densepose_drawing* drawing, uint32_t struct_size) {
+  return init_config(__func__, drawing, struct_size, default_drawing(), sizeof(maq_densepose_drawing), "drawing");
+}
+
+maq_status maq_densepose_result_draw(const maq_densepose_result* result, const maq_frame* frame,
+                                     const maq_densepose_drawing* given, uint8_t* rgba, size_t stride_bytes,
+                                     size_t size_bytes) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(rgba, "rgba");
+    if (frame != nullptr) require_argument(frame, "frame");
+    maq_densepose_drawing drawing = read_config(given, "drawing", default_drawing(), sizeof(maq_densepose_drawing));
+    const DensePlanes& planes = result->result.planes;
+    const ImageView* const image = frame == nullptr ? nullptr : &frame->frame.image;
+    if (image != nullptr && (image->width_px != planes.width_px || image->height_px != planes.height_px)) {
+      throw ArgumentError("frame has ", image->width_px, " x ", image->height_px,
+                          " pixels, but result is of a frame of ", planes.width_px, " x ", planes.height_px,
+                          "; give the frame that it was computed from.");
+    }
+    if (drawing.width_px == 0) drawing.width_px = planes.width_px - std::max(drawing.x_px, 0);
+    if (drawing.height_px == 0) drawing.height_px = planes.height_px - std::max(drawing.y_px, 0);
+    const auto is_inside = [](int begin, int size, int limit) {
+      return begin >= 0 && begin < limit && size >= 1 && size <= limit - begin;
+    };
+    if (!is_inside(drawing.x_px, drawing.width_px, planes.width_px) ||
+        !is_inside(drawing.y_px, drawing.height_px, planes.height_px)) {
+      throw ArgumentError("drawing asks for ", drawing.width_px, " x ", drawing.height_px, " pixels at (", drawing.x_px,
+                          ", ", drawing.y_px, "), which are not inside the frame of ", planes.width_px, " x ",
+                          planes.height_px, ".");
+    }
+    require_range("drawing.opacity", drawing.opacity, 0, 255);
+    require_range("drawing.is_mirrored", drawing.is_mirrored, 0, 1);
+    const size_t stride =
+        checked_stride(MAQ_PIXEL_RGBA8, drawing.width_px, drawing.height_px, stride_bytes, size_bytes);
+    paint_people(
+        planes, image,
+        {drawing.x_px, drawing.y_px, drawing.width_px, drawing.height_px, drawing.opacity, drawing.is_mirrored == 1},
+        rgba, stride);
     return MAQ_OK;
   });
 }

@@ -1,8 +1,10 @@
 #include "api/boundary.h"
 #include "api/frame_handle.h"
 #include "image/convert.h"
+#include "image/files/depth_file.h"
 #include "image/files/image_file.h"
 #include "image/geometry/resize.h"
+#include "image/yuv_planes.h"
 
 using namespace maq;
 
@@ -21,6 +23,13 @@ maq_frame_desc description(const ImageView& image, const Frame& frame) {
   desc.clock = frame.clock;
   desc.sequence = frame.sequence;
   return desc;
+}
+
+maq_yuv_image default_yuv_image() {
+  maq_yuv_image image{};
+  image.is_full_range = 1;
+  image.clock = MAQ_CLOCK_MONOTONIC;
+  return image;
 }
 
 }  // namespace
@@ -46,6 +55,41 @@ maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
     handle->frame.sequence = desc.sequence;
     handle->release_callback = release_callback;
     handle->user_data = user_data;
+    *frame = handle.release();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_yuv_image_init(maq_yuv_image* image, uint32_t struct_size) {
+  return init_config(__func__, image, struct_size, default_yuv_image(), sizeof(maq_yuv_image), "image");
+}
+
+maq_status maq_frame_convert_yuv(maq_context* context, const maq_yuv_image* image, maq_frame** frame) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(image, "image");
+    require_argument(frame, "frame");
+    const maq_yuv_image given = read_config(image, "image", default_yuv_image(), sizeof(maq_yuv_image));
+    require_range("image.is_full_range", given.is_full_range, 0, 1);
+    require_range("image.clock", number_in(given.clock), int32_t(MAQ_CLOCK_MEDIA), int32_t(MAQ_CLOCK_MONOTONIC));
+    if (given.rotation_deg % 90 != 0 || given.rotation_deg < 0 || given.rotation_deg > 270) {
+      throw ArgumentError("image.rotation_deg is ", given.rotation_deg, ", but must be 0, 90, 180 or 270.");
+    }
+    YuvImage from{given.width_px, given.height_px, {}, given.is_full_range == 1};
+    for (int i = 0; i < 3; ++i) {
+      from.planes[i] = {given.planes[i], given.size_bytes[i], given.stride_bytes[i], given.pixel_stride_bytes[i]};
+    }
+    check_image_size(given.width_px, given.height_px, "The image");
+    if (const auto problem = yuv_image_problem(from)) throw ArgumentError(*problem, ".");
+    const int turns = given.rotation_deg / 90;
+    const bool lies = turns % 2 == 1;
+    auto handle = std::make_unique<maq_frame>();
+    yuv_to_nv12(from, turns,
+                handle->frame.allocate(MAQ_PIXEL_NV12, lies ? given.height_px : given.width_px,
+                                       lies ? given.width_px : given.height_px));
+    handle->frame.timestamp_ns = given.timestamp_ns;
+    handle->frame.clock = given.clock;
+    handle->frame.sequence = given.sequence;
     *frame = handle.release();
     return MAQ_OK;
   });
@@ -83,8 +127,9 @@ maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
 maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
-    if (frame->frame.depth.width_px == 0) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame came without depth.");
-    write_struct(desc, "desc", description(frame->frame.depth, frame->frame), sizeof(maq_frame_desc));
+    const ImageView* depth = depth_of(frame->frame);
+    if (depth == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame came without depth.");
+    write_struct(desc, "desc", description(*depth, frame->frame), sizeof(maq_frame_desc));
     return MAQ_OK;
   });
 }
@@ -129,7 +174,12 @@ maq_status maq_frame_save(const maq_frame* frame, const char* path) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
     require_argument(path, "path");
-    write_image_file(frame->frame.image, path);
+    const ImageView& image = frame->frame.image;
+    if (is_depth(image.format)) {
+      write_depth_file(image, path);
+    } else {
+      write_image_file(image, path);
+    }
     return MAQ_OK;
   });
 }

@@ -24,7 +24,9 @@ enum class HandleKind : uint32_t {
   kScene,
   kSceneBuilder,
   kSceneRenderer,
-  kSceneImage
+  kSceneImage,
+  kEdges,
+  kEdgesResult
 };
 
 class HandleState {

@@ -29,6 +29,7 @@ const char* pixel_format_name(maq_pixel_format format) {
     case MAQ_PIXEL_NV12: return "NV12";
     case MAQ_PIXEL_YUYV: return "YUYV";
     case MAQ_PIXEL_DEPTH16: return "DEPTH16";
+    case MAQ_PIXEL_DEPTH32F: return "DEPTH32F";
   }
   return "unknown";
 }
@@ -45,6 +46,7 @@ size_t row_bytes(maq_pixel_format format, int plane, int width_px) {
     case MAQ_PIXEL_NV12: return plane == 0 ? width : (width + 1) / 2 * 2;
     case MAQ_PIXEL_YUYV: return (width + 1) / 2 * 4;
     case MAQ_PIXEL_DEPTH16: return width * 2;
+    case MAQ_PIXEL_DEPTH32F: return width * 4;
   }
   return 0;
 }
@@ -112,7 +114,7 @@ void check_image_size(int64_t width_px, int64_t height_px, const std::string& wh
 }
 
 ImageView checked_image_view(const maq_frame_desc& desc) {
-  if (desc.format < MAQ_PIXEL_RGB8 || desc.format > MAQ_PIXEL_DEPTH16) {
+  if (desc.format < MAQ_PIXEL_RGB8 || desc.format > MAQ_PIXEL_DEPTH32F) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(desc.format),
                 " is not known; use one of maq_pixel_format.");
   }

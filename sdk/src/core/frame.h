@@ -92,6 +92,12 @@ struct Frame {
 
 const char* pixel_format_name(maq_pixel_format format);
 int plane_count(maq_pixel_format format);
+inline bool is_depth(maq_pixel_format format) { return format == MAQ_PIXEL_DEPTH16 || format == MAQ_PIXEL_DEPTH32F; }
+// Of a depth frame its own pixels, otherwise what came with the picture; null when there is none.
+inline const ImageView* depth_of(const Frame& frame) {
+  if (is_depth(frame.image.format)) return &frame.image;
+  return frame.depth.width_px > 0 ? &frame.depth : nullptr;
+}
 // Bytes of pixels in a row of plane `plane`, without padding.
 size_t row_bytes(maq_pixel_format format, int plane, int width_px);
 int plane_rows(maq_pixel_format format, int plane, int height_px);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <optional>
 
 #include "core/rounding.h"
@@ -87,22 +86,6 @@ class ClassRow {
   int padded_;
   std::vector<float>& values_;
 };
-
-// exp(x) for x from -87 to 0 within 3e-7 of its value, without a call, so that a loop of it becomes vectors: 2^x by the
-// whole part in the exponent and a polynomial (Taylor) for the rest, which lies within half a unit.
-inline float exp_of_negative(float x) {
-  constexpr float kLog2E = 1.44269504f, kLn2 = 0.69314718f,
-                  kRound = 12582912.0f;  // 1.5 * 2^23: rounds what it is added to
-  const float scaled = x * kLog2E;
-  const float whole = (scaled + kRound) - kRound;
-  const float rest = (scaled - whole) * kLn2;
-  float sum = 1.0f / 720.0f;
-  for (const float factor : {1.0f / 120.0f, 1.0f / 24.0f, 1.0f / 6.0f, 0.5f, 1.0f, 1.0f}) sum = sum * rest + factor;
-  const int32_t bits = (int32_t(whole) + 127) << 23;
-  float power;
-  std::memcpy(&power, &bits, sizeof power);
-  return sum * power;
-}
 
 // Of each cell log(p / (1 - p)), p the probability that it shows the person, whichever part: the logits of all coarse
 // classes but the background, summed as probabilities, against the background's. A class that is NaN counts as absent.

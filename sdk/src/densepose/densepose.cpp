@@ -6,6 +6,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/rounding.h"
+#include "core/trace/trace_section.h"
 #include "nn/provider.h"
 
 namespace maq {
@@ -215,6 +216,7 @@ void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
   if (!stats.key_frame && tracks_crops_) {
     mapped_.swap(tracked_);
     for (MappedPerson& person : mapped_) person.labels = person.surface = nullptr;  // of the frame before
+    const TraceSection trace("maquette crops");
     run_crops(image, stats);
   } else if (stats.key_frame || !tracked_.empty()) {  // else nothing runs until the next key frame
     find_boxes(image, stats);
@@ -226,12 +228,15 @@ void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
 
 void DensePose::find_boxes(const ImageView& image, DensePoseStats& stats) {
   Stopwatch stage;
+  TraceSection trace("maquette resize");
   make_network_input(image, {stats.network_width_px, stats.network_height_px}, spec_.input, input_);
   stats.preprocess_ms = float(stage.lap_ms());
 
+  trace.next("maquette detector");
   stats.provider = run_trunk(whole_, input_.values, input_.padded_width_px, input_.padded_height_px);
   stats.trunk_ms = float(stage.lap_ms());
 
+  trace.next("maquette boxes");
   if (stats.key_frame) {
     propose(image.height_px, proposals_, &stats.dropped_boxes);
   } else {
@@ -345,6 +350,7 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_scor
 
 void DensePose::map_people(const ImageView& image, const DensePlanes& planes, DensePoseStats& stats) {
   Stopwatch stage;
+  TraceSection trace("maquette dense head");
   const DenseHeadSpec& spec = spec_.dense_head;
   const float scale_x = float(planes.width_px) / float(input_.width_px);
   const float scale_y = float(planes.height_px) / float(input_.height_px);
@@ -365,6 +371,7 @@ void DensePose::map_people(const ImageView& image, const DensePlanes& planes, De
   }
   stats.dense_head_ms = float(stage.lap_ms());
   if (settings_.crops == PersonCrops::kOff) return;
+  trace.next("maquette crops");
   choose_crops();
   run_crops(image, stats);
   stats.crops_ms = float(stage.lap_ms());
@@ -464,6 +471,7 @@ void DensePose::run_crops(const ImageView& image, DensePoseStats& stats) {
 
 void DensePose::paint_people(DensePoseResult& result) {
   Stopwatch stage;
+  const TraceSection trace("maquette decode");
   const DenseHeadSpec& spec = spec_.dense_head;
   tracked_.clear();
   tracks_crops_ = false;

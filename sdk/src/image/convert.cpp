@@ -186,7 +186,7 @@ ImageView as_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
   if (image.format == MAQ_PIXEL_BGR8) return image;
   const ConvertRow convert = row_to_bgr(image.format);
   if (convert == nullptr && image.format != MAQ_PIXEL_NV12) {
-    if (image.format == MAQ_PIXEL_DEPTH16) {
+    if (is_depth(image.format)) {
       throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours; give the picture.");
     }
     throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(image.format), " is not known.");
@@ -201,27 +201,32 @@ ImageView as_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
   return {MAQ_PIXEL_BGR8, image.width_px, image.height_px, {{memory.data(), stride}, {}}};
 }
 
+size_t checked_stride(maq_pixel_format format, int width_px, int height_px, size_t stride_bytes, size_t size_bytes) {
+  const size_t shortest = row_bytes(format, 0, width_px);
+  const size_t stride = stride_bytes == 0 ? shortest : stride_bytes;
+  if (stride < shortest) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes is ", stride, ", but a row of ", width_px, " pixels in ",
+                pixel_format_name(format), " takes ", shortest, " bytes.");
+  }
+  const std::optional<size_t> needed = bytes_of_rows(stride, height_px, shortest);
+  if (!needed) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes is ", stride, ", but ", height_px,
+                " rows that far apart fit into no memory; a row takes ", shortest, " bytes.");
+  }
+  if (size_bytes < *needed) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "size_bytes is ", size_bytes, ", but ", width_px, " x ", height_px,
+                " pixels in ", pixel_format_name(format), " take ", *needed, " bytes.");
+  }
+  return stride;
+}
+
 void copy_pixels(const ImageView& image, maq_pixel_format format, uint8_t* pixels, size_t stride_bytes,
                  size_t size_bytes) {
   if (format < MAQ_PIXEL_RGB8 || format > MAQ_PIXEL_GREY8) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "Pixels cannot be copied as ", pixel_format_name(format),
                 "; ask for RGB8, BGR8, RGBA8 or GREY8.");
   }
-  const size_t shortest = row_bytes(format, 0, image.width_px);
-  const size_t stride = stride_bytes == 0 ? shortest : stride_bytes;
-  if (stride < shortest) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes is ", stride, ", but a row of ", image.width_px,
-                " pixels in ", pixel_format_name(format), " takes ", shortest, " bytes.");
-  }
-  const std::optional<size_t> needed = bytes_of_rows(stride, image.height_px, shortest);
-  if (!needed) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "stride_bytes is ", stride, ", but ", image.height_px,
-                " rows that far apart fit into no memory; a row takes ", shortest, " bytes.");
-  }
-  if (size_bytes < *needed) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "size_bytes is ", size_bytes, ", but ", image.width_px, " x ",
-                image.height_px, " pixels in ", pixel_format_name(format), " take ", *needed, " bytes.");
-  }
+  const size_t stride = checked_stride(format, image.width_px, image.height_px, stride_bytes, size_bytes);
   std::vector<uint8_t> memory;
   convert_rows(as_bgr(image, memory), row_from_bgr(format), pixels, stride);
 }

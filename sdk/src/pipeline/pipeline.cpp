@@ -22,6 +22,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/thread.h"
+#include "core/trace/trace_section.h"
 #include "nn/bundle.h"
 #include "sources/recording/recording.h"
 #include "sources/registry.h"
@@ -348,6 +349,7 @@ struct Pipeline::State {
     if (!waiting_since) waiting_since = Clock::now();
     frame.clear();
     try {
+      const TraceSection trace("maquette acquire");
       const NextFrame next = source->next(kWaitSliceNs, frame);
       if (next == NextFrame::kTimeout) return;
       if (next == NextFrame::kEnd) {

@@ -15,12 +15,15 @@ namespace maq {
 // Asked of devices where the app asks for no size.
 constexpr int kDefaultCameraWidthPx = 640, kDefaultCameraHeightPx = 480;
 
+constexpr double kMillimetre = 0.001;  // the unit of DEPTH16
+
 // What the app asks for; 0 or empty: the device's default. The nearest that the device offers is taken.
 struct CameraRequest {
   std::string format;  // four letters, as the device calls it: "MJPG"
   int width_px = 0;
   int height_px = 0;
   double fps = 0;
+  double depth_unit_m = kMillimetre;  // of a device whose pixels are depth: metres of a stored 1, which it does not say
 };
 
 struct CameraFormat {
@@ -34,8 +37,9 @@ struct CameraFormat {
 
 // A filled buffer of the device, held until give_back().
 struct CameraBuffer {
-  ImageView image;                // of pixels as they come; of a JPEG image the size agreed on, or none
-  const uint8_t* jpeg = nullptr;  // of a JPEG image
+  ImageView image;                    // of pixels as they come; of a JPEG image the size agreed on, or none
+  double depth_unit_m = kMillimetre;  // of `image` as DEPTH16; frames get metres as floats where it is another
+  const uint8_t* jpeg = nullptr;      // of a JPEG image
   size_t jpeg_bytes = 0;
   ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the picture; no width when there is none
   int slot = 0;

@@ -13,6 +13,7 @@
 #include "core/rounding.h"
 #include "core/thread.h"
 #include "core/unique_fd.h"
+#include "image/depth.h"
 #include "image/files/jpeg.h"
 
 namespace maq {
@@ -352,7 +353,7 @@ struct LiveSource::State {
 };
 
 LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings& settings,
-                       const std::vector<ControlSetting>& controls)
+                       const std::vector<ControlSetting>& controls, const CalibrationOptions& calibration)
     : state_(std::make_shared<State>()) {
   state_->open = std::move(open);
   state_->name = std::move(name);
@@ -368,7 +369,8 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
   info_.fps = format.fps;
   info_.is_live = true;
   info_.clock = MAQ_CLOCK_MONOTONIC;
-  if (camera->intrinsics() != nullptr) intrinsics_ = *camera->intrinsics();
+  intrinsics_ = calibration.intrinsics(format.width_px, format.height_px);
+  if (!intrinsics_ && camera->intrinsics() != nullptr) intrinsics_ = *camera->intrinsics();
   state_->thread = start_thread(
       "maq source", [state = state_, camera = std::move(camera)]() mutable { state->run(std::move(camera)); });
 }
@@ -458,7 +460,11 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
     }
     const CameraBuffer& buffer = entry.buffer;
     if (buffer.seeks != seeks) continue;
-    if (buffer.jpeg == nullptr) {
+    if (buffer.image.format == MAQ_PIXEL_DEPTH16 && buffer.depth_unit_m != kMillimetre) {
+      uint8_t* metres = frame.allocate(MAQ_PIXEL_DEPTH32F, buffer.image.width_px, buffer.image.height_px);
+      depth_in_metres(buffer.image, buffer.depth_unit_m, reinterpret_cast<float*>(metres));
+      entry.lease.reset();
+    } else if (buffer.jpeg == nullptr) {
       frame.image = buffer.image;
     } else if (!state_->jpeg.decode(buffer.jpeg, buffer.jpeg_bytes, max_jpeg_pixels(buffer.image), frame)) {
       state_->drop_jpeg(buffer);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sources/calibration_options.h"
 #include "sources/camera_backend.h"
 #include "sources/source.h"
 
@@ -13,9 +14,10 @@ namespace maq {
 
 class LiveSource : public Source {
  public:
-  // Opens the camera at once and sets `controls`, and throws what they throw. `name` begins error texts.
+  // Opens the camera at once and sets `controls`, and throws what they throw. `name` begins error texts. A calibration
+  // that is given goes before the camera's own.
   LiveSource(CameraOpener open, std::string name, const SourceSettings& settings,
-             const std::vector<ControlSetting>& controls = {});
+             const std::vector<ControlSetting>& controls = {}, const CalibrationOptions& calibration = {});
   // Blocks at most 50 ms, also when the device hangs in a system call: the thread then ends by itself later.
   ~LiveSource() override;
 

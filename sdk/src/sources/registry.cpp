@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "sources/android/camera2_camera.h"
+#include "sources/calibration_options.h"
 #include "sources/control_options.h"
 #include "sources/depthai/depthai_backend.h"
 #include "sources/files/file_sources.h"
@@ -40,7 +41,9 @@ constexpr char kFile[] = "file", kCamera[] = "camera";
 const Entry kEntries[] = {
     {{kFile, "file:clip.mp4", "an image, a video file or a recording, by its content"}, nullptr, nullptr},
     {{kCamera, "camera:?size=640x480", "the first camera below that can be opened"}, nullptr, nullptr, false},
-    {{"image", "image:photo.jpg", "one image file: JPEG, PNG, WebP, BMP or TIFF"},
+    {{"image", "image:photo.jpg",
+      "one image file: JPEG, PNG, WebP, BMP or TIFF; ?depth_unit=0.001&fov=60: depth, a PNG of 16 bits or a float "
+      "TIFF"},
      without_log<open_image_source>,
      nullptr},
     {{"video", "video:clip.mp4", "a video file; ?fps=10 drops frames down to that rate"},
@@ -50,7 +53,8 @@ const Entry kEntries[] = {
      open_recording_source,
      nullptr},
     {{"stub", "stub:people?count=2&fps=30&seed=7",
-      "rendered frames: people (who walk; count, seed, frames) or pattern (colour bars)"},
+      "rendered frames: people (who walk; count, seed, frames), pattern (colour bars) or solids (depth; scene=box, "
+      "wall, shelf or room; noise=none, stereo or tof; seed)"},
      without_log<open_stub_source>,
      nullptr},
 #ifdef __ANDROID__
@@ -61,7 +65,7 @@ const Entry kEntries[] = {
 #else
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
       "a camera on Linux (Video4Linux2); takes the nearest size and rate that it offers; ?format=MJPG&exposure=10000 "
-      "(microseconds)"},
+      "(microseconds); ?format=Z16&depth_unit=0.001&fov=60: depth"},
      nullptr,
      v4l2_uri_opener},
     {{"libcamera", "libcamera:0?size=640x480&fps=30",
@@ -124,9 +128,11 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
   // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
   std::vector<ControlSetting> controls;
+  CalibrationOptions calibration;
   CameraOpener opener;
   if (entry.camera != nullptr) {
     controls = take_control_options(uri);
+    calibration = CalibrationOptions(uri);
     opener = entry.camera(std::move(uri), buffers, settings.log);
   } else {
     const bool must_be_live = !faults.is_empty() || uri.options.count("live") > 0;
@@ -140,7 +146,7 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
     opener = replay_opener(entry, std::move(uri), std::move(opened), options, settings.log);
   }
   if (!faults.is_empty()) opener = with_faults(std::move(opener), faults);
-  return std::make_unique<LiveSource>(std::move(opener), name, settings, controls);
+  return std::make_unique<LiveSource>(std::move(opener), name, settings, controls, calibration);
 }
 
 // The file of `uri`, with its options.

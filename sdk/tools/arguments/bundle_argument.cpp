@@ -22,4 +22,6 @@ std::string bundle_of(const char* variable, const char* name) {
 
 std::string default_bundle() { return bundle_of("MAQ_BUNDLE", "densepose-b-int8"); }
 
+std::string default_edges_bundle() { return bundle_of("MAQ_EDGES_BUNDLE", "edges-int8"); }
+
 std::string default_scene_bundle() { return bundle_of("MAQ_SCENE_BUNDLE", "scenes-int8"); }

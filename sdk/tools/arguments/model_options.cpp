@@ -14,14 +14,25 @@ const std::map<std::string, maq_provider> kProviders = {
 
 }  // namespace
 
-void add_model_options(CLI::App& command, ModelOptions& options) {
+void add_network_options(CLI::App& command, NetworkOptions& options, const std::string& variable) {
   command.add_option("--bundle", options.bundle,
-                     "Folder of the model bundle; default: MAQ_BUNDLE, then the one installed with this program");
+                     "Folder of the model bundle; default: " + variable + ", then the one installed with this program");
+  command.add_option("--threads", options.threads, "Threads of the networks; default: the large cores, at most 4")
+      ->check(CLI::Range(1, 64));
+  command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: saves energy, slower");
+  command
+      .add_option("--provider", options.provider,
+                  "What runs the networks' layers: cpu (default), or xnnpack or nnapi where ONNX Runtime has them")
+      ->check(CLI::IsMember(kProviders));
+}
+
+maq_provider provider_of(const NetworkOptions& options) { return kProviders.at(options.provider); }
+
+void add_model_options(CLI::App& command, ModelOptions& options) {
+  add_network_options(command, options, "MAQ_BUNDLE");
   command.add_option("--size", options.size, "Long side of the network's input in pixels; larger is finer and slower")
       ->check(CLI::Range(32, 2048));
   command.add_option("--threshold", options.threshold, "Minimum score of a person")->check(CLI::Range(0.0f, 1.0f));
-  command.add_option("--threads", options.threads, "Threads of the networks; default: the large cores, at most 4")
-      ->check(CLI::Range(1, 64));
   command
       .add_option("--max-proposals", options.max_proposals,
                   "Maximum number of boxes for the box head; fewer are faster and may miss people in a crowd")
@@ -42,11 +53,6 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
   command.add_option("--crop-size", options.crop_px, "Side of these crops in pixels (default 192)")
       ->check(CLI::Range(64, 512));
   command.add_flag("--no-surface", options.no_surface, "Compute only body parts, which is faster: U and V stay 0");
-  command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: saves energy, slower");
-  command
-      .add_option("--provider", options.provider,
-                  "What runs the networks' layers: cpu (default), or xnnpack or nnapi where ONNX Runtime has them")
-      ->check(CLI::IsMember(kProviders));
 }
 
 const char* name_of(maq_provider provider) {
@@ -79,6 +85,6 @@ maq_densepose_config config_of(const ModelOptions& options, const std::string& b
                         : options.crops == "all" ? MAQ_PERSON_CROPS_ALL
                                                  : MAQ_PERSON_CROPS_OFF;
   config.person_crop_px = options.crop_px;
-  config.provider = kProviders.at(options.provider);
+  config.provider = provider_of(options);
   return config;
 }

@@ -1,4 +1,4 @@
-// Options of the commands that find people: which bundle, and what may be left out.
+// Options of the commands that run networks: which bundle, what runs it, and for people what may be left out.
 #pragma once
 
 #include <maquette/maquette.h>
@@ -8,19 +8,27 @@ namespace CLI {
 class App;
 }
 
-struct ModelOptions {
+struct NetworkOptions {
   std::string bundle;
+  int threads = 0;
+  bool no_spin = false;
+  std::string provider = "cpu";
+};
+
+// `variable`: of the environment, where the bundle is without --bundle.
+void add_network_options(CLI::App& command, NetworkOptions& options, const std::string& variable);
+
+maq_provider provider_of(const NetworkOptions& options);
+
+struct ModelOptions : NetworkOptions {
   int size = 0;
   float threshold = -1;
-  int threads = 0;
   int max_proposals = 0;
   int key_frames = 1;
   int min_person_height_px = 0;
   std::string crops = "off";
   int crop_px = 0;
   bool no_surface = false;
-  bool no_spin = false;
-  std::string provider = "cpu";
 };
 
 void add_model_options(CLI::App& command, ModelOptions& options);

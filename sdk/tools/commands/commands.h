@@ -12,5 +12,6 @@ void add_doctor_command(CLI::App& app, int* exit_code);
 void add_play_command(CLI::App& app, int* exit_code);
 void add_record_command(CLI::App& app, int* exit_code);
 void add_densepose_command(CLI::App& app, int* exit_code);
+void add_edges_command(CLI::App& app, int* exit_code);
 void add_scene_command(CLI::App& app, int* exit_code);
 void add_bench_command(CLI::App& app, int* exit_code);

@@ -5,19 +5,15 @@
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
-#include <stdexcept>
 #include <vector>
 
 #include "arguments/model_options.h"
-#include "arguments/source_argument.h"
 #include "commands/commands.h"
-#include "interrupt.h"
+#include "commands/source_frames.h"
 #include "output/clip_file.h"
 #include "output/frame_image.h"
 #include "output/output_file.h"
 #include "output/overlay.h"
-#include "output/progress_bar.h"
 #include "print.h"
 #include "program.h"
 
@@ -25,16 +21,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int64_t kFramesOfEndlessSource = 100;
-
 struct DensePoseOptions {
   std::vector<std::string> sources;
   ModelOptions model;
   std::string out;
   bool overlay = false;
   bool json = false;
-  int64_t max_frames = 0;
-  int64_t every = 1;
+  FrameLimits limits;
 };
 
 // The stages of a run, in order, with their times of every frame.
@@ -76,13 +69,6 @@ class Timings {
   int64_t people_ = 0;
 };
 
-std::string frame_stem(const std::string& stem, bool is_clip, uint64_t sequence) {
-  if (!is_clip) return stem;
-  char number[32];
-  std::snprintf(number, sizeof number, "_%06llu", (unsigned long long)sequence);
-  return stem + number;
-}
-
 void print_frame(const DensePoseOptions& options, const std::string& stem, const maq_frame_desc& desc,
                  const maq_densepose_stats& stats) {
   if (options.json) {
@@ -114,99 +100,49 @@ void print_frame(const DensePoseOptions& options, const std::string& stem, const
 // Runs one source to its end and writes its files.
 void run_source(const DensePoseOptions& options, const SourceArgument& argument, const maquette::Context& context,
                 maquette::Source& source, maquette::DensePose& densepose, Timings& timings) {
-  const StoppedByInterrupt stopped(source);
   densepose.reset();
-  const maq_source_info info = source.info();
-  const bool is_clip = info.frame_count != 1;
-  int64_t limit = options.max_frames;
-  const bool endless = info.frame_count < 0 && argument.uri.rfind("stub:", 0) == 0;
-  if (limit == 0 && (endless || info.is_live != 0)) limit = kFramesOfEndlessSource;
-
-  int64_t expected = info.frame_count < 0 ? limit : (info.frame_count + options.every - 1) / options.every;
-  if (limit > 0) expected = expected > 0 ? std::min(expected, limit) : limit;
-  ProgressBar progress(argument.stem, is_clip && !options.json ? expected : 1);
-  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay"), info.fps / double(options.every));
-  int64_t done = 0;
-  for (int64_t index = 0; !interrupted() && (limit == 0 || done < limit); ++index) {
-    const auto frame = source.next();
-    if (!frame) break;
-    if (index % options.every != 0) continue;
-    const maq_frame_desc desc = frame->desc();
-    const maquette::DensePoseResult result = densepose.run(*frame);
+  const bool of_clip = is_clip(source);
+  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay"),
+                source.info().fps / double(options.limits.every));
+  const auto work = [&](const SourceFrame& given) {
+    const maquette::DensePoseResult result = densepose.run(given.frame);
     const maq_densepose_stats stats = result.stats();
-    const std::string stem = frame_stem(argument.stem, is_clip, desc.sequence);
     // Drawn before the first file is written, so that a frame has all its files or none.
-    const cv::Mat overlay = options.overlay ? draw_overlay(image_of(*frame), result) : cv::Mat();
-    make_folder_of(fs::path(options.out) / (stem + "_IUV.png"));
-    result.save(options.out, stem);
-    if (options.overlay && is_clip) clip.add(overlay);
-    if (options.overlay && !is_clip) {
-      frame_of(context, overlay).save((fs::path(options.out) / (stem + "_overlay.png")).string());
+    const cv::Mat overlay = options.overlay ? draw_overlay(image_of(given.frame), result) : cv::Mat();
+    make_folder_of(fs::path(options.out) / (given.stem + "_IUV.png"));
+    result.save(options.out, given.stem);
+    if (options.overlay && of_clip) clip.add(overlay);
+    if (options.overlay && !of_clip) {
+      frame_of(context, overlay).save((fs::path(options.out) / (given.stem + "_overlay.png")).string());
     }
     timings.add(stats);
-    ++done;
-    if (!is_clip || options.json) print_frame(options, stem, desc, stats);
-    if (is_clip && !options.json) progress.advance(done, std::to_string(stats.person_count) + " people");
-  }
-  progress.finish();
+    if (!of_clip || options.json) print_frame(options, given.stem, given.frame.desc(), stats);
+    return std::to_string(stats.person_count) + " people";
+  };
+  const int64_t done = run_frames(argument, source, options.limits, options.json, work);
   const fs::path overlay_path = clip.finish();
   if (!overlay_path.empty() && !options.json) {
     print_output("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());
-  } else if (is_clip && !options.json) {
+  } else if (of_clip && !options.json) {
     print_output("%s  %lld frames\n", argument.stem.c_str(), (long long)done);
   }
-}
-
-std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts) {
-  std::vector<SourceArgument> arguments;
-  std::set<std::string> stems;
-  for (const std::string& text : texts) {
-    arguments.push_back(parse_source_argument(text));
-    if (!stems.insert(arguments.back().stem).second) {
-      throw std::runtime_error("Two sources would write files named " + arguments.back().stem +
-                               "_…; run them one by one with different --out folders.");
-    }
-  }
-  return arguments;
-}
-
-// One bad file must not cost the rest of a batch.
-void tell(const std::exception& error) {
-  flush_output();
-  print_error("maquette: %s\n", printable(error.what()).c_str());
 }
 
 int run_densepose(const DensePoseOptions& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
   const std::string bundle = bundle_of(options.model);
   const maquette::Context context = open_context();
-  std::unique_ptr<maquette::DensePose> densepose;  // loaded when there is something to find people in
-
-  catch_interrupts();
+  std::unique_ptr<maquette::DensePose> densepose;
   Timings timings;
-  int failed = 0;
-  for (const SourceArgument& argument : arguments) {
-    if (interrupted()) break;
-    std::unique_ptr<maquette::Source> source;
-    try {
-      source = std::make_unique<maquette::Source>(context, argument.uri);
-    } catch (const std::exception& error) {
-      tell(error);
-      ++failed;
-      continue;
-    }
-    if (!densepose) densepose = std::make_unique<maquette::DensePose>(context, config_of(options.model, bundle));
-    try {
-      run_source(options, argument, context, *source, *densepose, timings);
-    } catch (const OutputLost&) {
-      throw;
-    } catch (const std::exception& error) {
-      tell(error);
-      ++failed;
-    }
-  }
+  const auto load = [&] {
+    densepose = std::make_unique<maquette::DensePose>(context, config_of(options.model, bundle));
+  };
+  const auto run = [&](const SourceArgument& argument, maquette::Source& source) {
+    run_source(options, argument, context, source, *densepose, timings);
+  };
+  const int exit_code = run_sources(context, arguments, load, run);
   if (timings.frames() > 0 && !options.json) timings.print();
-  return failed == 0 && !interrupted() ? 0 : 1;
+  return exit_code;
 }
 
 }  // namespace
@@ -224,12 +160,7 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
   command->add_flag("--json", options->json, "Print counts and times as one JSON line per frame");
   add_model_options(*command, options->model);
-  command
-      ->add_option("--max-frames", options->max_frames,
-                   "Stop after N frames; default: all, or 100 of an endless source")
-      ->check(CLI::Range(int64_t(1), int64_t(1) << 40));
-  command->add_option("--every", options->every, "Process only every N-th frame of a clip")
-      ->check(CLI::Range(int64_t(1), int64_t(1) << 30));
+  add_frame_limits(*command, options->limits);
   command->footer(
       "Writes for each image, in the DensePose convention:\n"
       "  <stem>_IUV.png   body part I, U * 255, V * 255 (channels B, G, R of the file)\n"

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -20,6 +22,26 @@ winsize terminal_size() {
   return size;
 }
 
+// In grey, near things bright: by inverse depth, from the nearest. Black where nothing is known.
+void draw_depth(const maq_frame_desc& depth, uint8_t* rgb) {
+  const size_t width = size_t(depth.width_px);
+  std::vector<float> inverse(width * size_t(depth.height_px));
+  for (size_t i = 0; i < inverse.size(); ++i) {
+    const uint8_t* row = depth.planes[0] + i / width * depth.stride_bytes[0];
+    float value = 0;
+    uint16_t steps = 0;
+    if (depth.format == MAQ_PIXEL_DEPTH16) {
+      std::memcpy(&steps, row + i % width * sizeof steps, sizeof steps);
+      value = steps == UINT16_MAX ? 0 : float(steps);
+    } else {
+      std::memcpy(&value, row + i % width * sizeof value, sizeof value);
+    }
+    inverse[i] = std::isnormal(value) && value > 0 ? 1 / value : 0;
+  }
+  const float largest = *std::max_element(inverse.begin(), inverse.end());
+  for (const float value : inverse) rgb = std::fill_n(rgb, 3, uint8_t(largest > 0 ? 255 * value / largest : 0));
+}
+
 }  // namespace
 
 bool terminal_shows_pictures() {
@@ -33,7 +55,11 @@ void TerminalPicture::show(const maquette::Frame& frame, const std::string& line
   last_drawn_ = now;
   const maq_frame_desc desc = frame.desc();
   pixels_.resize(size_t(desc.width_px) * size_t(desc.height_px) * 3);
-  frame.copy_pixels(MAQ_PIXEL_RGB8, pixels_.data(), 0, pixels_.size());
+  if (desc.format == MAQ_PIXEL_DEPTH16 || desc.format == MAQ_PIXEL_DEPTH32F) {
+    draw_depth(desc, pixels_.data());
+  } else {
+    frame.copy_pixels(MAQ_PIXEL_RGB8, pixels_.data(), 0, pixels_.size());
+  }
 
   // Characters are about twice as high as they are wide, so that half of one is a square pixel.
   const winsize size = terminal_size();

@@ -380,7 +380,7 @@ static_assert(sizeof(maq_intrinsics) == 104, "");
 static_assert(sizeof(maq_pixel_format) == 4 && sizeof(maq_status) == 4 && sizeof(maq_densepose_detail) == 4, "");
 static_assert(sizeof(maq_densepose_stats) == 88 && offsetof(maq_densepose_stats, provider) == 84, "");
 static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_RECONNECTED == 5 &&
-                  MAQ_PIXEL_DEPTH16 == 7 && MAQ_DENSEPOSE_PLANE_PERSON == 4,
+                  MAQ_PIXEL_DEPTH16 == 7 && MAQ_PIXEL_DEPTH32F == 8 && MAQ_DENSEPOSE_PLANE_PERSON == 4,
               "");
 
 }  // namespace

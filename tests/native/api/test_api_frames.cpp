@@ -140,8 +140,31 @@ TEST(ApiFrames, WrongDescriptionsAreStatusesOfTheContext) {
   EXPECT_EQ(status_of([](auto& desc) { desc.width_px = 20000; }), MAQ_ERROR_IMAGE_SIZE);
   EXPECT_EQ(status_of([](auto& desc) { desc.height_px = -1; }), MAQ_ERROR_IMAGE_SIZE);
   EXPECT_EQ(status_of([](auto& desc) { desc.format = maq_pixel_format(0); }), MAQ_ERROR_UNSUPPORTED);
+  EXPECT_EQ(status_of([](auto& desc) { desc.format = maq_pixel_format(9); }), MAQ_ERROR_UNSUPPORTED);
   EXPECT_EQ(status_of([](auto& desc) { desc.clock = maq_clock(3); }), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(status_of([](auto& desc) { desc.struct_size = 0; }), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(ApiFrames, OfDepthAreTheirOwnDepthImageAndHaveNoColours) {
+  const maquette::Context context;
+  const std::vector<uint8_t> pixels(3 * 48);
+  for (const auto& [format, row] : {std::pair{MAQ_PIXEL_DEPTH16, 20}, {MAQ_PIXEL_DEPTH32F, 40}}) {
+    maq_frame_desc desc = desc_of(pixels, 10, 3);
+    desc.format = format;
+    EXPECT_EQ(maquette::Frame(context, desc).desc().stride_bytes[0], size_t(row));
+    desc.stride_bytes[0] = 48;
+    const maquette::Frame frame(context, desc);
+    const std::optional<maq_frame_desc> depth = frame.depth();
+    ASSERT_TRUE(depth);
+    EXPECT_EQ(depth->format, format);
+    EXPECT_EQ(depth->planes[0], pixels.data());
+    EXPECT_EQ(depth->stride_bytes[0], 48u);
+    std::vector<uint8_t> rgb(90);
+    EXPECT_EQ(maq_frame_copy_pixels(frame.get(), MAQ_PIXEL_RGB8, rgb.data(), 0, rgb.size()), MAQ_ERROR_UNSUPPORTED);
+    desc.stride_bytes[0] = size_t(row) - 1;
+    maq_frame* refused = nullptr;
+    EXPECT_EQ(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &refused), MAQ_ERROR_INVALID_ARGUMENT);
+  }
 }
 
 // Bytes from the first row to the end of the last, modulo the largest number, are few for each of them.
@@ -214,6 +237,93 @@ TEST(ApiFrames, AreResized) {
   EXPECT_EQ(maq_frame_resize(frame->get(), 0, 10, &none), MAQ_ERROR_IMAGE_SIZE);
   EXPECT_EQ(maq_frame_resize(frame->get(), 10, 10, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_frame_resize(nullptr, 10, 10, &none), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+// 4 x 2 pixels, with V before U in one plane, as phones have it, and its description.
+struct PhoneImage {
+  PhoneImage() {
+    maq_yuv_image_init(&desc, sizeof desc);
+    desc.width_px = 4;
+    desc.height_px = 2;
+    const uint8_t* planes[] = {luma.data(), vu.data() + 1, vu.data()};
+    const size_t sizes[] = {luma.size(), vu.size() - 1, vu.size() - 1};
+    for (int i = 0; i < 3; ++i) {
+      desc.planes[i] = planes[i];
+      desc.size_bytes[i] = sizes[i];
+      desc.stride_bytes[i] = i == 0 ? 5 : 4;
+      desc.pixel_stride_bytes[i] = i == 0 ? 1 : 2;
+    }
+  }
+  std::vector<uint8_t> luma = {0, 51, 102, 153, 99, 204, 255, 128, 64};
+  std::vector<uint8_t> vu = {255, 0, 128, 64};
+  maq_yuv_image desc;
+};
+
+std::vector<uint8_t> nv12_of(const maquette::Frame& frame) {
+  const maq_frame_desc desc = frame.desc();
+  EXPECT_EQ(desc.format, MAQ_PIXEL_NV12);
+  EXPECT_EQ(desc.planes[1], desc.planes[0] + 8);
+  return {desc.planes[0], desc.planes[0] + 12};
+}
+
+TEST(ApiFrames, AreMadeOfImagesInPlanesInEitherRangeAndRotated) {
+  using Bytes = std::vector<uint8_t>;
+  const maquette::Context context;
+  PhoneImage image;
+  EXPECT_EQ(image.desc.clock, MAQ_CLOCK_MONOTONIC);
+  image.desc.timestamp_ns = 7;
+  image.desc.sequence = 3;
+  const maquette::Frame full = maquette::Frame::convert_yuv(context, image.desc);
+  EXPECT_EQ(nv12_of(full), (Bytes{16, 60, 104, 147, 191, 235, 126, 71, 16, 240, 72, 128}));
+  EXPECT_EQ(full.desc().timestamp_ns, 7);
+  EXPECT_EQ(full.desc().sequence, 3u);
+  EXPECT_EQ(full.desc().clock, MAQ_CLOCK_MONOTONIC);
+  image.desc.is_full_range = 0;
+  EXPECT_EQ(nv12_of(maquette::Frame::convert_yuv(context, image.desc)),
+            (Bytes{0, 51, 102, 153, 204, 255, 128, 64, 0, 255, 64, 128}));
+  image.desc.rotation_deg = 90;
+  const maquette::Frame upright = maquette::Frame::convert_yuv(context, image.desc);
+  EXPECT_EQ(upright.desc().width_px, 2);
+  EXPECT_EQ(upright.desc().height_px, 4);
+  EXPECT_EQ(nv12_of(upright), (Bytes{204, 0, 255, 51, 128, 102, 64, 153, 0, 255, 64, 128}));
+  image.desc.rotation_deg = 180;
+  EXPECT_EQ(nv12_of(maquette::Frame::convert_yuv(context, image.desc)),
+            (Bytes{64, 128, 255, 204, 153, 102, 51, 0, 64, 128, 0, 255}));
+}
+
+TEST(ApiFrames, AreNotMadeOfPlanesThatCannotBe) {
+  const maquette::Context context;
+  const auto expect_refused = [&](const char* what, maq_status status, auto change) {
+    PhoneImage image;
+    change(image.desc);
+    maq_frame* frame = nullptr;
+    EXPECT_EQ(maq_frame_convert_yuv(context.get(), &image.desc, &frame), status) << what;
+    EXPECT_NE(std::string(maq_last_error(nullptr)).find(what), std::string::npos) << maq_last_error(nullptr);
+    EXPECT_EQ(frame, nullptr);
+  };
+  const maq_status invalid = MAQ_ERROR_INVALID_ARGUMENT;
+  expect_refused("plane Y of an image of 4 x 2 pixels needs 9 bytes, but has 8", invalid,
+                 [](auto& image) { image.size_bytes[0] = 8; });
+  expect_refused("plane V of an image of 4 x 2 pixels needs 3 bytes, but has 2", invalid,
+                 [](auto& image) { image.size_bytes[2] = 2; });
+  expect_refused("plane U of an image of 4 x 2 pixels has no memory", invalid,
+                 [](auto& image) { image.planes[1] = nullptr; });
+  expect_refused("rows 3 bytes apart", invalid, [](auto& image) { image.stride_bytes[0] = 3; });
+  expect_refused("rows -5 bytes apart", invalid, [](auto& image) { image.stride_bytes[0] = -5; });
+  expect_refused("pixels 2 bytes apart", invalid, [](auto& image) { image.pixel_stride_bytes[0] = 2; });
+  expect_refused("pixels 0 bytes apart", invalid, [](auto& image) { image.pixel_stride_bytes[1] = 0; });
+  expect_refused("needs", invalid, [](auto& image) {
+    image.stride_bytes[1] = image.pixel_stride_bytes[1] = INT32_MAX;
+    image.width_px = 2;
+    image.height_px = 4;
+  });
+  expect_refused("image.rotation_deg is 45", invalid, [](auto& image) { image.rotation_deg = 45; });
+  expect_refused("image.rotation_deg is -90", invalid, [](auto& image) { image.rotation_deg = -90; });
+  expect_refused("image.is_full_range is 2", invalid, [](auto& image) { image.is_full_range = 2; });
+  expect_refused("image.clock is 0", invalid, [](auto& image) { image.clock = maq_clock(0); });
+  expect_refused("image.struct_size", invalid, [](auto& image) { image.struct_size -= 1; });
+  expect_refused("The image is 0 x 2", MAQ_ERROR_IMAGE_SIZE, [](auto& image) { image.width_px = 0; });
+  expect_refused("The image is 4 x 2147483647", MAQ_ERROR_IMAGE_SIZE, [](auto& image) { image.height_px = INT32_MAX; });
 }
 
 }  // namespace

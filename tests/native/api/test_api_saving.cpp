@@ -1,7 +1,9 @@
 // Pictures and results as files: what is in them, and that they are whole or not there.
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "support/file_size_limit.h"
@@ -108,10 +110,39 @@ TEST_F(ApiSaving, OtherEndingsAreRefusedAndNothingIsWritten) {
   EXPECT_EQ(maq_frame_save(nullptr, "a.png"), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(ApiSaving, ADepthImageIsNoPictureAndLeavesNoFile) {
-  const std::vector<uint8_t> pixels(8 * 8 * 2);
+TEST_F(ApiSaving, DepthIsWrittenAsDepthAndReadAgain) {
+  std::vector<uint8_t> pixels(8 * 8 * 2);
+  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = uint8_t(i * 3);
   const maquette::Frame frame(context_, describe(MAQ_PIXEL_DEPTH16, pixels, 8, 8));
-  expect_refused(frame, folder_.file("a.png"), MAQ_ERROR_UNSUPPORTED, "depth image");
+  frame.save(folder_.file("a.png"));
+  frame.save(folder_.file("a.tiff"));
+  const auto read = [&](const std::string& uri) {
+    const std::optional<maquette::Frame> back = maquette::Source(context_, "image:" + folder_.file(uri)).next();
+    const std::optional<maq_frame_desc> desc = back->depth();
+    const uint8_t* begin = desc->planes[0];
+    return std::pair(desc->format, std::vector<uint8_t>(begin, begin + desc->stride_bytes[0] * 8));
+  };
+  EXPECT_EQ(read("a.png?depth_unit=0.001"), std::pair(MAQ_PIXEL_DEPTH16, pixels));
+  const auto [format, metres] = read("a.tiff?depth_unit=1");
+  ASSERT_EQ(format, MAQ_PIXEL_DEPTH32F);
+  for (size_t i = 0; i < 64; ++i) {
+    float found = 0;
+    uint16_t stored = 0;
+    std::memcpy(&found, &metres[4 * i], 4);
+    std::memcpy(&stored, &pixels[2 * i], 2);
+    EXPECT_FLOAT_EQ(found, float(stored) * 0.001f) << i;
+  }
+}
+
+TEST_F(ApiSaving, DepthIsNoJpegAndLeavesNoFile) {
+  const std::vector<uint8_t> pixels(8 * 8 * 4);
+  for (const maq_pixel_format format : {MAQ_PIXEL_DEPTH16, MAQ_PIXEL_DEPTH32F}) {
+    const maquette::Frame frame(context_, describe(format, pixels, 8, 8));
+    for (const char* name : {"a.jpg", "a.webp", "a"}) {
+      expect_refused(frame, folder_.file(name), MAQ_ERROR_INVALID_ARGUMENT, "ends neither in .png nor in .tiff");
+    }
+    expect_refused(frame, folder_.file("none/a.png"), MAQ_ERROR_UNWRITABLE, "none/a.png cannot be made");
+  }
   EXPECT_EQ(files_in(folder_.path()), 0u);
 }
 

@@ -254,6 +254,18 @@ TEST_F(CommandLine, RecordsPlaysAndMeasures) {
   EXPECT_FALSE(std::filesystem::exists(folder_.file("other.maqrec")));
 }
 
+TEST_F(CommandLine, RecordsAndPlaysDepthAndRefusesItAsAPicture) {
+  const Outcome recorded =
+      run("record 'stub:solids?scene=room&noise=tof&size=64x48' take.maqrec --frames 5 --quality 90");
+  EXPECT_EQ(recorded.exit_code, 0) << recorded.err;
+  const Outcome played = run("play take.maqrec");
+  EXPECT_EQ(played.exit_code, 0) << played.err;
+  EXPECT_NE(played.out.find("5 frames of 64 x 48"), std::string::npos) << played.out;
+  const Outcome posed = run("densepose take.maqrec --out o");
+  EXPECT_EQ(posed.exit_code, 1);
+  EXPECT_NE(posed.err.find("A depth image has no colours"), std::string::npos) << posed.err;
+}
+
 TEST_F(CommandLine, PlayTellsOfLossAndReturnAndOfWhatStaysAway) {
   const Outcome played = run("play 'stub:pattern?frames=60&fps=100&unplug=100ms@200ms&drop=0.2' --json figures.json");
   EXPECT_EQ(played.exit_code, 0) << played.err;

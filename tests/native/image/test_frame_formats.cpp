@@ -46,7 +46,8 @@ class OneColour {
       case MAQ_PIXEL_RGBA8: return i % 4 == 3 ? 77 : rgb[i % 4];
       case MAQ_PIXEL_GREY8: return uint8_t(std::lround(0.299 * r + 0.587 * g + 0.114 * b));
       case MAQ_PIXEL_NV12: return plane == 0 ? y : i % 2 == 0 ? u : v;
-      case MAQ_PIXEL_DEPTH16: break;
+      case MAQ_PIXEL_DEPTH16:
+      case MAQ_PIXEL_DEPTH32F: break;
       case MAQ_PIXEL_YUYV: return i % 4 == 1 ? u : i % 4 == 3 ? v : y;
     }
     return 0;
@@ -180,7 +181,8 @@ cv::Mat by_opencv(const Noise& image) {
       cv::cvtColorTwoPlane(luma, image.mat(1, even_width / 2, CV_8UC2), bgr, cv::COLOR_YUV2BGR_NV12);
       break;
     }
-    case MAQ_PIXEL_DEPTH16: break;
+    case MAQ_PIXEL_DEPTH16:
+    case MAQ_PIXEL_DEPTH32F: break;
   }
   return bgr(cv::Rect(0, 0, width, height)).clone();
 }

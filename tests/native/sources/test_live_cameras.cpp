@@ -106,6 +106,70 @@ TEST_F(LiveCameras, PlanesInMemoryOfTheirOwnAreShownWhereTheyBegin) {
   EXPECT_EQ(frame.lease.dma_buf(), -1) << "one file cannot hold both planes";
 }
 
+TEST_F(LiveCameras, DepthComesWhereItIsAskedFor) {
+  fake_.modes = {{V4L2_PIX_FMT_Z16, 64, 48, 30}, {V4L2_PIX_FMT_YUYV, 64, 48, 30}};
+  EXPECT_EQ(camera()->format().pixels, MAQ_PIXEL_YUYV) << "a picture where there is one";
+  maq::CameraRequest request;
+  request.format = "Z16";
+  fake_.stride_bytes = 160;
+  const auto live = source(settings(), request);
+  fake_.deliver(4);
+  const maq::Frame frame = next(*live);
+  EXPECT_EQ(frame.image.format, MAQ_PIXEL_DEPTH16);
+  EXPECT_EQ(frame.image.width_px, 64);
+  EXPECT_EQ(frame.image.planes[0].stride_bytes, 160u);
+  EXPECT_GE(frame.lease.dma_buf(), 0) << "in the device's own memory";
+  EXPECT_EQ(maq::depth_of(frame), &frame.image);
+  fake_.modes = {{V4L2_PIX_FMT_Z16, 64, 48, 30}};
+  expect_error(MAQ_ERROR_UNSUPPORTED, "offers Z16, but none of them is a picture; open depth with format=Z16",
+               [&] { camera(); });
+  const std::vector<maq::CameraListing> listed = maq::list_v4l2_cameras(fake_);
+  ASSERT_EQ(listed.size(), 1u);
+  EXPECT_EQ(listed[0].modes.at(0).format, "Z16");
+  EXPECT_TRUE(listed[0].modes.at(0).usable);
+}
+
+TEST_F(LiveCameras, DepthInAnotherUnitBecomesMetresAndItsBufferGoesBackAtOnce) {
+  fake_.modes = {{V4L2_PIX_FMT_Z16, 64, 48, 30}};
+  fake_.stride_bytes = 160;
+  maq::CameraRequest request;
+  request.format = "Z16";
+  request.depth_unit_m = 0.00025;
+  const auto live = source(settings(), request);
+  const auto first_metres = [](const maq::Frame& frame) {
+    float metres = 0;
+    std::memcpy(&metres, frame.image.planes[0].data, sizeof metres);
+    return metres;
+  };
+  maq::Frame frame;
+  const size_t queued = fake_.queued();
+  for (const uint8_t value : {uint8_t(0), uint8_t(1), uint8_t(254), uint8_t(255)}) {
+    fake_.deliver(value);
+    ASSERT_EQ(live->next(kLimit, frame), NextFrame::kFrame);
+    ASSERT_EQ(frame.image.format, MAQ_PIXEL_DEPTH32F);
+    EXPECT_EQ(frame.image.planes[0].stride_bytes, 64u * 4);
+    EXPECT_FLOAT_EQ(first_metres(frame), value == 255 ? 0 : float(257 * value) * 0.00025f) << int(value);
+    EXPECT_EQ(fake_.queued(), queued);
+    EXPECT_EQ(frame.lease.dma_buf(), -1);
+  }
+}
+
+TEST_F(LiveCameras, TheCalibrationThatIsGivenIsThatOfTheAgreedSize) {
+  EXPECT_EQ(source(settings())->intrinsics(), nullptr);
+  maq::SourceUri uri = maq::parse_source_uri("v4l2:0?fov=90&cy=7");
+  const maq::CalibrationOptions calibration(uri);
+  maq::CameraRequest request;
+  request.width_px = 300;
+  request.height_px = 200;
+  const auto open = [&] { return maq::open_v4l2_camera(fake_, "/dev/video0", request, 4); };
+  const maq::LiveSource live(open, "/dev/video0", settings(), {}, calibration);
+  ASSERT_NE(live.intrinsics(), nullptr);
+  EXPECT_EQ(live.intrinsics()->width_px, 320);
+  EXPECT_NEAR(live.intrinsics()->fx_px, 160, 1e-9);
+  EXPECT_EQ(live.intrinsics()->cx_px, 159.5);
+  EXPECT_EQ(live.intrinsics()->cy_px, 7);
+}
+
 TEST_F(LiveCameras, BytesOfAPlaneAreCountedWithoutWhatIsBeforeThem) {
   fake_.planar = true;
   const auto live = source(settings(), {"", 320, 240, 0});

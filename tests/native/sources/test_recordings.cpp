@@ -87,7 +87,7 @@ TEST_F(Recordings, KeepEveryFormatDepthAndCalibration) {
   info.intrinsics->cx_px = -1e-7;
   info.intrinsics->distortion[7] = 0.1;
   maq::RecordingWriter writer(path_of(), info, 0);
-  for (int format = MAQ_PIXEL_RGB8; format <= MAQ_PIXEL_DEPTH16; ++format) {
+  for (int format = MAQ_PIXEL_RGB8; format <= MAQ_PIXEL_DEPTH32F; ++format) {
     maq::Frame frame = frame_of(format, maq_pixel_format(format), 31 + format, 5);
     if (format % 2 == 0) {
       frame.depth_storage.assign(size_t(7 * 3 * 2), uint8_t(format));
@@ -102,7 +102,7 @@ TEST_F(Recordings, KeepEveryFormatDepthAndCalibration) {
   EXPECT_EQ(source->intrinsics()->cx_px, -1e-7);
   EXPECT_EQ(source->intrinsics()->distortion[7], 0.1);
   maq::Frame frame;
-  for (int format = MAQ_PIXEL_RGB8; format <= MAQ_PIXEL_DEPTH16; ++format) {
+  for (int format = MAQ_PIXEL_RGB8; format <= MAQ_PIXEL_DEPTH32F; ++format) {
     frame.clear();
     ASSERT_EQ(source->next(0, frame), NextFrame::kFrame);
     EXPECT_EQ(frame.image.format, format);

@@ -179,7 +179,7 @@ TEST(Sources, WithoutACameraTheFirstOneIsNotFound) {
 
 TEST(Sources, UnknownThingsAreNamedWithWhatThereIs) {
   expect_error(MAQ_ERROR_UNSUPPORTED, "\"rtsp:\" is not a kind of source", [] { maq::open_source("rtsp:host"); });
-  expect_error(MAQ_ERROR_UNSUPPORTED, "stub:people and stub:pattern", [] { maq::open_source("stub:cats"); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "stub:pattern and stub:solids", [] { maq::open_source("stub:cats"); });
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "names nothing", [] { maq::open_source("image:"); });
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "Option colour", [] { maq::open_source("stub:people?colour=red"); });
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "count=31", [] { maq::open_source("stub:people?count=31"); });

@@ -313,7 +313,7 @@ class FakeV4l2 : public maq::SystemCalls {
     return 0;
   }
   static size_t row_of(uint32_t fourcc, int width) {
-    if (fourcc == V4L2_PIX_FMT_YUYV) return size_t(width) * 2;
+    if (fourcc == V4L2_PIX_FMT_YUYV || fourcc == V4L2_PIX_FMT_Z16) return size_t(width) * 2;
     if (fourcc == V4L2_PIX_FMT_RGB24 || fourcc == V4L2_PIX_FMT_BGR24) return size_t(width) * 3;
     return size_t(width);
   }

@@ -20,15 +20,21 @@ CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
-SYSTEMS = SCENE | {"densepose", "sources", "sources/recording"}
+CURVES = {"edges", "edges/curves"}
+SYSTEMS = SCENE | CURVES | {"densepose", "edges/files", "edges/measuring", "sources", "sources/recording"}
 MAY_INCLUDE = {
     "core": set(),
+    "core/trace": set(),
     "image": {"core", "image/geometry"},
     "image/files": {"core", "image"},
     "image/files/android": {"core", "image", "image/files"},
     "image/geometry": {"core", "image"},
     "nn": {"core"},
-    "densepose": BASE,
+    "densepose": BASE | {"core/trace"},
+    "edges": BASE,
+    "edges/curves": BASE - {"nn"} | {"edges"},
+    "edges/files": BASE - {"nn"} | CURVES,
+    "edges/measuring": BASE - {"nn"} | CURVES,
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
     "scene/networks": CAPTURE,
@@ -45,7 +51,7 @@ MAY_INCLUDE = {
     "sources/recording": BACKEND,
     "sources/files": BACKEND,
     "sources/synthetic": BACKEND | {"sources/recording"},
-    "pipeline": SYSTEMS,
+    "pipeline": SYSTEMS | {"core/trace"},
     "api": SYSTEMS | {"pipeline"},
 }  # fmt: skip
 
@@ -79,7 +85,6 @@ FOREIGN = {
 
 # Units under 60 lines that one other unit uses, each with its reason to be one.
 DEFENDED = {
-    "densepose/body_parts": "the names and colours of parts belong to dense pose; the C API only hands them out",
     "scene/render/refiner_roi": "geometry with tests of its own, against every pixel that the refiner reads",
 }
 

@@ -22,6 +22,7 @@ ALLOWED = {
     "export.photos": set(),
     "export.people": {"export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid"},
     "export.places": {"export.camera", "export.jobs", "export.people", "export.photos", "export.point_cloud"},
+    "export.solids": {"export.camera", "export.jobs"},
     "export.densepose": {
         "export.bundle", "export.shards", "export.surface", "export.surface_grid", "export.training",
     },
@@ -30,6 +31,7 @@ ALLOWED = {
         "export.surface",
     },
     "export.scenes": {"export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training"},
+    "export.edges": {"export.bundle", "export.densepose", "export.solids", "export.training"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
         "export.bundle", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/frame.h"
 #include "image/files/image_header.h"
 
@@ -51,7 +52,8 @@ class ClipEncoder {
   virtual bool write(const ImageView& image) = 0;
 };
 
-// None of these functions throws (core/module.h has the rule): damage is told by an empty result.
+// None of these functions throws (core/module.h has the rule): damage is told by an empty result. Those for depth do
+// where there are none, which the library says itself.
 class FileCodecs {
  public:
   virtual ~FileCodecs() = default;
@@ -60,11 +62,21 @@ class FileCodecs {
   // `extension`: ".png" or ".jpg"; the image is BGR8, GREY8 or, for PNG, RGBA8. False where it cannot be encoded.
   virtual bool encode_image(const std::string& extension, const ImageView& image,
                             std::vector<uint8_t>& bytes) const = 0;
+  // A grey PNG or TIFF image of 16 bits as DEPTH16, a grey TIFF image of floats as DEPTH32F, whatever their unit; one
+  // of other pixels has a size and no pixels, a damaged one no width.
+  virtual DecodedImage decode_depth(const EncodedBytes&, ImageFormat) const { refuse_depth(); }
+  // DEPTH16 as ".png", DEPTH32F as ".tiff". False where it cannot be encoded.
+  virtual bool encode_depth(const std::string&, const ImageView&, std::vector<uint8_t>&) const { refuse_depth(); }
   // Null for what is damaged or no video.
   virtual std::unique_ptr<ClipDecoder> open_clip(const std::string& path) const = 0;
   // `path` ends in .mp4 or .avi, like the format; sides are even. Null where this OpenCV does not write such clips.
   virtual std::unique_ptr<ClipEncoder> begin_clip(const std::string& path, ClipFormat format, double fps, int width_px,
                                                   int height_px) const = 0;
+
+ private:
+  [[noreturn]] static void refuse_depth() {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "This build has no codecs for files of depth; give depth as a frame.");
+  }
 };
 
 // Opens libmaquette_files.so at the first call. Throws MAQ_ERROR_RUNTIME_LIBRARY where it is missing or of another

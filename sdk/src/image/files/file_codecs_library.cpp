@@ -24,6 +24,19 @@ class MemoryCheckedCodecs : public FileCodecs {
     return codecs_.encode_image(extension, image, bytes);
   }
 
+  DecodedImage decode_depth(const EncodedBytes& bytes, ImageFormat format) const override {
+    DecodedImage image = codecs_.decode_depth(bytes, format);
+    if (image.view.width_px > 0) return image;
+    require_memory(kCodecBytes + kPixelsOfAByte * bytes.size);
+    return codecs_.decode_depth(bytes, format);
+  }
+
+  bool encode_depth(const std::string& extension, const ImageView& image, std::vector<uint8_t>& bytes) const override {
+    if (codecs_.encode_depth(extension, image, bytes)) return true;
+    require_memory(kCodecBytes + kBytesOfAPixel * size_t(image.width_px) * size_t(image.height_px));
+    return codecs_.encode_depth(extension, image, bytes);
+  }
+
   std::unique_ptr<ClipDecoder> open_clip(const std::string& path) const override {
     if (auto clip = codecs_.open_clip(path)) return clip;
     require_memory(kCodecBytes);

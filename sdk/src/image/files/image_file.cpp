@@ -35,13 +35,6 @@ ImageFormat format_of(const EncodedBytes& start, const std::string& origin) {
   return format;
 }
 
-// Throws for what cannot be decoded, by its first bytes.
-void check_start(const EncodedBytes& start, const std::string& origin) {
-  if (start.size == 0) throw Error(MAQ_ERROR_UNREADABLE, origin, " is empty; an image was expected.");
-  if (format_of(start, origin) == ImageFormat::kUnknown) fail_to_decode(origin);
-  if (const auto size = read_image_size(start)) check_image_size(size->width, size->height, origin);
-}
-
 // Makes the image of `frame`, BGR8 in its own memory, upright.
 void apply_orientation(Frame& frame, int orientation) {
   if (orientation == 1) return;
@@ -82,9 +75,19 @@ void decode_jpeg(const EncodedBytes& bytes, const std::string& origin, Frame& fr
 
 }  // namespace
 
+void check_image_start(const EncodedBytes& start, const std::string& origin) {
+  if (start.size == 0) throw Error(MAQ_ERROR_UNREADABLE, origin, " is empty; an image was expected.");
+  if (format_of(start, origin) == ImageFormat::kUnknown) fail_to_decode(origin);
+  if (const auto size = read_image_size(start)) check_image_size(size->width, size->height, origin);
+}
+
+std::vector<uint8_t> read_encoded_image(const std::string& path) {
+  return read_file(path, kMaxImageBytes, [&](const std::vector<uint8_t>& start) { check_image_start(start, path); });
+}
+
 void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& frame, Orientation orientation) {
   if (bytes.size > kMaxImageBytes) throw Error(MAQ_ERROR_UNREADABLE, origin, " is over 1 GiB; is it an image?");
-  check_start(bytes, origin);
+  check_image_start(bytes, origin);
   const ImageFormat format = recognise_format(bytes).format;
   if (format == ImageFormat::kJpeg) {
     decode_jpeg(bytes, origin, frame);
@@ -99,8 +102,7 @@ void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& f
 }
 
 void read_image_file(const std::string& path, Frame& frame, Orientation orientation) {
-  const StartCheck check = [&](const std::vector<uint8_t>& start) { check_start(start, path); };
-  decode_image(read_file(path, kMaxImageBytes, check), path, frame, orientation);
+  decode_image(read_encoded_image(path), path, frame, orientation);
 }
 
 SizePx read_image_file_size(const std::string& path) {

@@ -14,6 +14,13 @@ namespace maq {
 // Whether an image is rotated as its EXIF orientation says or left as it is stored.
 enum class Orientation { kUpright, kAsStored };
 
+// Throws what decode_image() throws for what cannot be decoded, as far as the first bytes of an encoded image tell.
+// `origin` names it in errors.
+void check_image_start(const EncodedBytes& start, const std::string& origin);
+
+// A file or a pipe, still encoded, whose first bytes were checked. Throws what read_file() throws too.
+std::vector<uint8_t> read_encoded_image(const std::string& path);
+
 // Decodes an image, a whole JPEG, PNG, WebP, BMP or TIFF file, into `frame` as BGR. `origin` names it in errors.
 // Throws MAQ_ERROR_UNREADABLE for what is damaged, truncated or no image, MAQ_ERROR_UNSUPPORTED for other formats,
 // MAQ_ERROR_IMAGE_SIZE, and, but for JPEG, what file_codecs() throws.

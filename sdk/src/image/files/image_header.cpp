@@ -86,6 +86,46 @@ std::optional<SizePx> webp_size(const Reader& in) {
   return {};
 }
 
+// Of a whole TIFF file (TIFF 6.0, section 2): its byte order, 42, where its first directory is, and that directory's
+// entries of 12 bytes each.
+class TiffDirectory {
+ public:
+  explicit TiffDirectory(const Reader& in) : in_(in), is_little_(in.equals(0, "II*")) {}
+
+  bool is_little() const { return is_little_; }
+  uint32_t number16(size_t offset) const { return is_little_ ? in_.little16(offset) : in_.big16(offset); }
+  uint32_t number32(size_t offset) const { return is_little_ ? in_.little32(offset) : in_.big32(offset); }
+
+  // Where the entry's value is; nothing where there is no such entry, or no TIFF file.
+  std::optional<size_t> find(uint32_t tag) const {
+    if (!in_.has(0, 8) || (!is_little_ && std::memcmp(in_.at(0), "MM\0*", 4) != 0)) return {};
+    const size_t directory = number32(4);
+    if (!in_.has(directory, 2)) return {};
+    const size_t count = number16(directory);
+    for (size_t i = 0; i < count && in_.has(directory + 2 + 12 * i, 12); ++i) {
+      const size_t entry = directory + 2 + 12 * i;
+      if (number16(entry) == tag) return entry + 8;
+    }
+    return {};
+  }
+
+ private:
+  const Reader& in_;
+  bool is_little_;
+};
+
+// A value has 16 bits or 32, as the entry's type says.
+std::optional<SizePx> tiff_size(const Reader& in) {
+  constexpr uint32_t kWidth = 256, kHeight = 257, kShort = 3;
+  const TiffDirectory directory(in);
+  const auto width = directory.find(kWidth), height = directory.find(kHeight);
+  if (!width || !height) return {};
+  const auto value = [&](size_t at) {
+    return directory.number16(at - 6) == kShort ? directory.number16(at) : directory.number32(at);
+  };
+  return SizePx{value(*width), value(*height)};
+}
+
 // Where EXIF data begin, behind the "Exif" that some put before them; 0: nowhere.
 size_t exif_offset(const Reader& in, ImageFormat format) {
   const auto behind_name = [&](size_t offset) {
@@ -188,6 +228,7 @@ std::optional<SizePx> read_image_size(const EncodedBytes& bytes) {
   if (in.equals(0, "\xff\xd8")) return jpeg_size(in);
   if (in.equals(0, "RIFF") && in.equals(8, "WEBP")) return webp_size(in);
   if (in.equals(0, "GIF8") && in.has(6, 4)) return SizePx{in.little16(6), in.little16(8)};
+  if (recognise_format(bytes).format == ImageFormat::kTiff) return tiff_size(in);
   if (in.equals(0, "BM") && in.has(18, 8)) {
     // The height is negative when rows go from top to bottom.
     return SizePx{int32_t(in.little32(18)), std::llabs(int32_t(in.little32(22)))};
@@ -199,19 +240,12 @@ std::optional<ExifOrientationPlace> find_exif_orientation(const EncodedBytes& by
   const Reader all(bytes);
   const size_t begin = exif_offset(all, recognise_format(bytes).format);
   if (begin == 0 || !all.has(begin, 8)) return {};
-  // A TIFF file: its byte order, 42, and where its first directory is (TIFF 6.0, section 2).
-  const Reader in({bytes.data + begin, bytes.size - begin});
-  const bool is_little = in.equals(0, "II*");
-  if (!is_little && std::memcmp(in.at(0), "MM\0*", 4) != 0) return {};
-  const auto number16 = [&](size_t offset) { return is_little ? in.little16(offset) : in.big16(offset); };
-  const size_t directory = is_little ? in.little32(4) : in.big32(4);
-  if (!in.has(directory, 2)) return {};
-  const size_t count = number16(directory);
-  for (size_t i = 0; i < count && in.has(directory + 2 + 12 * i, 12); ++i) {
-    const size_t entry = directory + 2 + 12 * i;
-    if (number16(entry) == 274) return ExifOrientationPlace{begin + entry + 8, is_little};
-  }
-  return {};
+  constexpr uint32_t kOrientation = 274;
+  const Reader in({bytes.data + begin, bytes.size - begin});  // a TIFF file
+  const TiffDirectory directory(in);
+  const auto place = directory.find(kOrientation);
+  if (!place) return {};
+  return ExifOrientationPlace{begin + *place, directory.is_little()};
 }
 
 int read_exif_orientation(const EncodedBytes& bytes) {

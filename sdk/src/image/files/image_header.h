@@ -40,7 +40,8 @@ struct SizePx {
   int64_t height = 0;
 };
 
-// Of PNG, JPEG, WebP, BMP and GIF; nothing for other formats and for truncated headers.
+// Of PNG, JPEG, WebP, BMP, GIF and TIFF, whose header may lie at the end of the file; nothing for other formats and for
+// truncated headers.
 std::optional<SizePx> read_image_size(const EncodedBytes& bytes);
 
 // The EXIF orientation (Exif 2.32, 4.6.4, tag 274) of a whole JPEG, PNG or WebP image: 1 to 8, and 1 where there is

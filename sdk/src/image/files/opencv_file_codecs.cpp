@@ -224,6 +224,32 @@ class OpenCvFileCodecs : public FileCodecs {
     }
   }
 
+  DecodedImage decode_depth(const EncodedBytes& bytes, ImageFormat format) const override {
+    try {
+      if (format == ImageFormat::kPng) return decode_depth_png(bytes.data, bytes.size);
+      const OpenCvSilence silence;
+      const ErrorStreamGate::Closed closed;
+      const cv::Mat encoded(1, int(bytes.size), CV_8UC1, const_cast<uint8_t*>(bytes.data));
+      const auto image = std::make_shared<cv::Mat>(cv::imdecode(encoded, int(cv::IMREAD_UNCHANGED)));
+      const bool is_float = image->type() == CV_32FC1;
+      ImageView view{is_float ? MAQ_PIXEL_DEPTH32F : MAQ_PIXEL_DEPTH16, image->cols, image->rows, {}};
+      if (is_float || image->type() == CV_16UC1) view.planes[0] = {image->data, image->step};
+      return {view, image};
+    } catch (const std::exception&) {
+      return {};
+    }
+  }
+
+  bool encode_depth(const std::string& extension, const ImageView& image, std::vector<uint8_t>& bytes) const override {
+    try {
+      const cv::Mat depth(image.height_px, image.width_px, image.format == MAQ_PIXEL_DEPTH16 ? CV_16UC1 : CV_32FC1,
+                          const_cast<uint8_t*>(image.planes[0].data), image.planes[0].stride_bytes);
+      return cv::imencode(extension, depth, bytes);
+    } catch (const std::exception&) {
+      return false;
+    }
+  }
+
   std::unique_ptr<ClipDecoder> open_clip(const std::string& path) const override {
     try {
       auto clip = std::make_unique<OpenCvClipDecoder>();

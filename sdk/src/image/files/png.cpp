@@ -40,7 +40,7 @@ struct Reader {
   png_infop info = nullptr;
 };
 
-// libpng leaves these two by longjmp(), so that nothing in them has a destructor.
+// libpng leaves these by longjmp(), so that nothing in them has a destructor.
 
 bool read_head(const Reader& reader) {
   png_structp png = reader.png;
@@ -60,11 +60,39 @@ bool read_head(const Reader& reader) {
   return true;
 }
 
+// Grey of 16 bits stays as it is; of other pixels the head is read and no more.
+bool read_depth_head(const Reader& reader) {
+  if (setjmp(png_jmpbuf(reader.png))) return false;
+  png_read_info(reader.png, reader.info);
+  png_set_swap(reader.png);  // PNG has the high byte first
+  png_set_interlace_handling(reader.png);
+  png_read_update_info(reader.png, reader.info);
+  return true;
+}
+
+bool is_grey_of_16_bits(const Reader& reader) {
+  return png_get_color_type(reader.png, reader.info) == PNG_COLOR_TYPE_GRAY &&
+         png_get_bit_depth(reader.png, reader.info) == 16;
+}
+
 bool read_pixels(const Reader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
   png_read_end(reader.png, nullptr);
   return true;
+}
+
+// Of a reader that has read the head.
+DecodedImage decode(const Reader& reader, maq_pixel_format format, size_t pixel_bytes) {
+  const size_t width = png_get_image_width(reader.png, reader.info);
+  const size_t height = png_get_image_height(reader.png, reader.info);
+  const size_t row = width * pixel_bytes;
+  if (width * height > size_t(MAQ_MAX_PIXELS) || png_get_rowbytes(reader.png, reader.info) != row) return {};
+  const auto pixels = std::make_shared<std::vector<uint8_t>>(height * row);
+  std::vector<png_bytep> rows(height);
+  for (size_t y = 0; y < height; ++y) rows[y] = pixels->data() + y * row;
+  if (!read_pixels(reader, rows.data())) return {};
+  return {{format, int(width), int(height), {{pixels->data(), row}, {}}}, pixels};
 }
 
 }  // namespace
@@ -74,14 +102,20 @@ DecodedImage decode_png(const uint8_t* bytes, size_t size_bytes) {
   const Reader reader(input);
   if (reader.info == nullptr) throw std::bad_alloc();
   if (!read_head(reader)) return {};
-  const size_t width = png_get_image_width(reader.png, reader.info);
-  const size_t height = png_get_image_height(reader.png, reader.info);
-  if (width * height > size_t(MAQ_MAX_PIXELS) || png_get_rowbytes(reader.png, reader.info) != width * 3) return {};
-  const auto pixels = std::make_shared<std::vector<uint8_t>>(width * height * 3);
-  std::vector<png_bytep> rows(height);
-  for (size_t y = 0; y < height; ++y) rows[y] = pixels->data() + y * width * 3;
-  if (!read_pixels(reader, rows.data())) return {};
-  return {{MAQ_PIXEL_BGR8, int(width), int(height), {{pixels->data(), width * 3}, {}}}, pixels};
+  return decode(reader, MAQ_PIXEL_BGR8, 3);
+}
+
+DecodedImage decode_depth_png(const uint8_t* bytes, size_t size_bytes) {
+  Input input{bytes, size_bytes};
+  const Reader reader(input);
+  if (reader.info == nullptr) throw std::bad_alloc();
+  if (!read_depth_head(reader)) return {};
+  if (is_grey_of_16_bits(reader)) return decode(reader, MAQ_PIXEL_DEPTH16, 2);
+  return {{MAQ_PIXEL_DEPTH16,
+           int(png_get_image_width(reader.png, reader.info)),
+           int(png_get_image_height(reader.png, reader.info)),
+           {}},
+          nullptr};
 }
 
 }  // namespace maq

@@ -14,10 +14,10 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "image/yuv_planes.h"
 #include "sources/android/camera2_characteristics.h"
 #include "sources/android/camera2_errors.h"
 #include "sources/android/camera2_mailbox.h"
-#include "sources/android/camera2_pixels.h"
 #include "sources/control_options.h"
 
 namespace maq {
@@ -260,7 +260,7 @@ class Camera2Camera final : public Camera {
 
   // What is wrong with the image, or nothing: then `slot` is held and `buffer` shows it.
   std::optional<std::string> read_image(const ndk::AImage& image, Slot& slot, CameraBuffer& buffer) {
-    Camera2Image found;
+    YuvImage found;
     int64_t stamp_ns = 0;
     ndk::media_status_t status = functions_.AImage_getWidth(&image, &found.width_px);
     const auto then = [&](auto read) {
@@ -269,20 +269,22 @@ class Camera2Camera final : public Camera {
     then([&] { return functions_.AImage_getHeight(&image, &found.height_px); });
     then([&] { return functions_.AImage_getTimestamp(&image, &stamp_ns); });
     for (int index = 0; index < 3; ++index) {
-      Camera2Plane& plane = found.planes[index];
+      YuvPlane& plane = found.planes[index];
       uint8_t* data = nullptr;
-      then([&] { return functions_.AImage_getPlaneData(&image, index, &data, &plane.bytes); });
+      int bytes = 0;
+      then([&] { return functions_.AImage_getPlaneData(&image, index, &data, &bytes); });
       then([&] { return functions_.AImage_getPlaneRowStride(&image, index, &plane.row_stride); });
       then([&] { return functions_.AImage_getPlanePixelStride(&image, index, &plane.pixel_stride); });
       plane.data = data;
+      plane.bytes = size_t(std::max(bytes, 0));
     }
     if (status != ndk::AMEDIA_OK) return concatenate("its images cannot be read: media_status_t ", int(status));
-    if (auto problem = camera2_image_problem(found)) return problem;
+    if (auto problem = yuv_image_problem(found)) return problem;
     // Other than agreed, if the device says so of its image.
     int width = found.width_px, height = found.height_px;
     if (quarter_turns_ % 2 == 1) std::swap(width, height);
     slot.pixels.resize(packed_bytes(MAQ_PIXEL_NV12, width, height));
-    camera2_to_nv12(found, quarter_turns_, slot.pixels.data());
+    yuv_to_nv12(found, quarter_turns_, slot.pixels.data());
     buffer.image = packed_view(MAQ_PIXEL_NV12, width, height, slot.pixels.data());
     const auto boottime_now = has_boottime_ ? std::optional<int64_t>(boottime_ns()) : std::nullopt;
     buffer.timestamp_ns = camera2_time_ns(stamp_ns, boottime_now, monotonic_ns());

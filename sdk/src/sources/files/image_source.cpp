@@ -1,5 +1,9 @@
+#include "core/error.h"
+#include "image/files/depth_file.h"
 #include "image/files/image_file.h"
+#include "image/geometry/intrinsics.h"
 #include "image/geometry/resize.h"
+#include "sources/calibration_options.h"
 #include "sources/files/file_sources.h"
 
 namespace maq {
@@ -8,12 +12,24 @@ namespace {
 class ImageSource : public Source {
  public:
   explicit ImageSource(SourceUri uri) {
-    uri.expect_no_more_options("size and fps");
-    read_image_file(uri.target, image_);
+    const std::optional<double> depth_unit_m = take_depth_unit(uri);
+    const CalibrationOptions calibration(uri);
+    uri.expect_no_more_options(std::string("size, fps, depth_unit, ") + kCalibrationOptions);
+    if (depth_unit_m && uri.width_px > 0) {
+      throw Error(MAQ_ERROR_UNSUPPORTED, uri.text, " is depth, which is not scaled, but is to be ", uri.width_px, " x ",
+                  uri.height_px, "; leave size out.");
+    }
+    if (depth_unit_m) {
+      read_depth_file(uri.target, *depth_unit_m, image_);
+    } else {
+      read_image_file(uri.target, image_);
+    }
+    intrinsics_ = calibration.intrinsics(image_.image.width_px, image_.image.height_px);
     if (uri.width_px > 0) {
-      Frame resized;
-      resize_to_bgr(image_.image, uri.width_px, uri.height_px, resized);
-      image_ = std::move(resized);
+      Frame scaled;
+      resize_to_bgr(image_.image, uri.width_px, uri.height_px, scaled);
+      image_ = std::move(scaled);
+      if (intrinsics_) intrinsics_ = resized(*intrinsics_, uri.width_px, uri.height_px);
     }
     info_.width_px = image_.image.width_px;
     info_.height_px = image_.image.height_px;
@@ -21,6 +37,7 @@ class ImageSource : public Source {
   }
 
   const SourceInfo& info() const override { return info_; }
+  const maq_intrinsics* intrinsics() const override { return intrinsics_ ? &*intrinsics_ : nullptr; }
 
   NextFrame next(int64_t, Frame& frame) override {
     if (delivered_) return NextFrame::kEnd;
@@ -32,6 +49,7 @@ class ImageSource : public Source {
  private:
   Frame image_;
   SourceInfo info_;
+  std::optional<maq_intrinsics> intrinsics_;
   bool delivered_ = false;
 };
 

@@ -36,7 +36,7 @@ bool is_valid(const FrameHead& head) {
   const bool has_depth = head.depth_width_px != 0 || head.depth_height_px != 0;
   if (has_depth && !is_allowed_size(head.depth_width_px, head.depth_height_px)) return false;
   if (head.encoding == kJpegEncoding) return head.picture_bytes <= size_t(MAQ_MAX_PIXELS) * 4;
-  if (head.encoding < MAQ_PIXEL_RGB8 || head.encoding > MAQ_PIXEL_DEPTH16) return false;
+  if (head.encoding < MAQ_PIXEL_RGB8 || head.encoding > MAQ_PIXEL_DEPTH32F) return false;
   return head.picture_bytes == packed_bytes(maq_pixel_format(head.encoding), head.width_px, head.height_px);
 }
 

@@ -112,7 +112,7 @@ void RecordingWriter::add(const Frame& frame) {
   if (frame.jpeg != nullptr) {
     head.encoding = kJpegEncoding;
     payload_.assign(frame.jpeg, frame.jpeg + frame.jpeg_bytes);
-  } else if (jpeg_quality_ > 0 && image.format != MAQ_PIXEL_DEPTH16) {
+  } else if (jpeg_quality_ > 0 && !is_depth(image.format)) {
     head.encoding = kJpegEncoding;
     jpeg_.encode(image, jpeg_quality_, payload_);
   } else {

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "image/sprite.h"
+#include "sources/synthetic/dice.h"
 #include "sources/synthetic/people_sheet.h"
 
 namespace maq {
@@ -16,25 +17,6 @@ constexpr int kPeople = 4;
 constexpr int kCycleFrames = 16;
 constexpr int kTileWidthPx = 128;
 constexpr int kTileHeightPx = 256;
-
-// SplitMix64: the same numbers on every platform, unlike the distributions of <random>.
-class Dice {
- public:
-  explicit Dice(uint64_t seed) : state_(seed) {}
-
-  double between(double low, double high) { return low + (high - low) * (double(next() >> 11) / 9007199254740992.0); }
-  int below(int limit) { return int(next() % uint64_t(limit)); }
-
- private:
-  uint64_t next() {
-    uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
-  }
-
-  uint64_t state_;
-};
 
 // A wall and a floor, each with a soft gradient.
 std::vector<uint8_t> draw_room(int width, int height, Dice& dice) {

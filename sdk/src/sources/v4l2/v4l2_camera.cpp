@@ -17,6 +17,7 @@
 #include "core/checked_arithmetic.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "sources/calibration_options.h"
 #include "sources/camera_errors.h"
 #include "sources/control_options.h"
 #include "sources/v4l2/v4l2_controls.h"
@@ -56,6 +57,7 @@ class V4l2Camera final : public Camera {
   }
 
   void start(const CameraRequest& request, int buffers) {
+    depth_unit_m_ = request.depth_unit_m;
     negotiate(request);
     make_buffers(buffers);
     int type = int(device_->buffer_type());
@@ -217,11 +219,16 @@ class V4l2Camera final : public Camera {
     };
     std::vector<Choice> choices;
     std::string offered;
+    bool offers_depth = false;
     for (const uint32_t fourcc : device_->formats()) {
       const std::string name = fourcc_name(fourcc);
       offered += (offered.empty() ? "" : ", ") + name;
       const V4l2Format* known = known_v4l2_format(fourcc);
       if (known == nullptr || (!request.format.empty() && request.format != name)) continue;
+      const bool shows_depth = is_depth(known->pixels);
+      offers_depth = offers_depth || shows_depth;
+      // Who wants pictures has no use for depth, so that has to be asked for.
+      if (shows_depth && request.format.empty()) continue;
       v4l2_format tried = format_request(*known, width, height);
       if (device_->call(VIDIOC_TRY_FMT, &tried) != 0) {
         if (is_device_lost(errno)) device_->fail("was lost while its formats were read", errno);
@@ -236,7 +243,9 @@ class V4l2Camera final : public Camera {
     }
     if (choices.empty()) {
       device_->fail(concatenate("offers ", offered.empty() ? "no format" : offered, ", but ",
-                                request.format.empty() ? "none of them is understood" : "not " + request.format),
+                                !request.format.empty() ? "not " + request.format
+                                : offers_depth          ? "none of them is a picture; open depth with format=Z16"
+                                                        : "none of them is understood"),
                     EINVAL);
     }
     const Choice best = *std::min_element(choices.begin(), choices.end(), [](const Choice& a, const Choice& b) {
@@ -356,6 +365,7 @@ class V4l2Camera final : public Camera {
       if (plane == 0) slot.begins_at = offset;
     }
     buffer.image = {format_.pixels, format_.width_px, format_.height_px, {}};
+    buffer.depth_unit_m = depth_unit_m_;
     if (format_.jpeg) {
       buffer.jpeg = data[0];
       buffer.jpeg_bytes = bytes[0];
@@ -375,6 +385,7 @@ class V4l2Camera final : public Camera {
   std::string identity_;
   const V4l2Format* known_ = nullptr;
   CameraFormat format_;
+  double depth_unit_m_ = kMillimetre;
   size_t stride_bytes_[2] = {};  // of each plane of the image
   size_t memory_bytes_[2] = {};  // that a picture takes of each plane of memory
   std::vector<Slot> slots_;
@@ -387,7 +398,9 @@ class V4l2Camera final : public Camera {
 
 CameraOpener v4l2_uri_opener(SourceUri uri, int buffers, const Log&) {
   CameraRequest request{uri.take_text("format"), uri.width_px, uri.height_px, uri.fps};
-  uri.expect_no_more_options(std::string("size, fps, format, ") + kControlOptions);
+  request.depth_unit_m = take_depth_unit(uri).value_or(kMillimetre);
+  uri.expect_no_more_options(
+      concatenate("size, fps, format, depth_unit, ", kCalibrationOptions, ", ", kControlOptions));
   const bool is_number = uri.target.find_first_not_of("0123456789") == std::string::npos;
   const std::string path = is_number ? "/dev/video" + uri.target : uri.target;
   return v4l2_opener(SystemCalls::real(), path, std::move(request), buffers);

@@ -13,10 +13,11 @@ namespace maq {
 namespace {
 
 constexpr V4l2Format kKnownFormats[] = {
-    {V4L2_PIX_FMT_NV12, MAQ_PIXEL_NV12, false, 1},  {V4L2_PIX_FMT_NV12M, MAQ_PIXEL_NV12, false, 2},
-    {V4L2_PIX_FMT_YUYV, MAQ_PIXEL_YUYV, false, 1},  {V4L2_PIX_FMT_BGR24, MAQ_PIXEL_BGR8, false, 1},
-    {V4L2_PIX_FMT_RGB24, MAQ_PIXEL_RGB8, false, 1}, {V4L2_PIX_FMT_GREY, MAQ_PIXEL_GREY8, false, 1},
-    {V4L2_PIX_FMT_MJPEG, MAQ_PIXEL_BGR8, true, 1},  {V4L2_PIX_FMT_JPEG, MAQ_PIXEL_BGR8, true, 1},
+    {V4L2_PIX_FMT_NV12, MAQ_PIXEL_NV12, false, 1},   {V4L2_PIX_FMT_NV12M, MAQ_PIXEL_NV12, false, 2},
+    {V4L2_PIX_FMT_YUYV, MAQ_PIXEL_YUYV, false, 1},   {V4L2_PIX_FMT_BGR24, MAQ_PIXEL_BGR8, false, 1},
+    {V4L2_PIX_FMT_RGB24, MAQ_PIXEL_RGB8, false, 1},  {V4L2_PIX_FMT_GREY, MAQ_PIXEL_GREY8, false, 1},
+    {V4L2_PIX_FMT_MJPEG, MAQ_PIXEL_BGR8, true, 1},   {V4L2_PIX_FMT_JPEG, MAQ_PIXEL_BGR8, true, 1},
+    {V4L2_PIX_FMT_Z16, MAQ_PIXEL_DEPTH16, false, 1},
 };
 // Against a driver whose lists never end, or whose calls are interrupted again and again.
 constexpr int kMaxEnumerated = 256;
@@ -48,6 +49,7 @@ const V4l2Format* known_v4l2_format(uint32_t fourcc) {
 std::string fourcc_name(uint32_t fourcc) {
   char name[5] = {};
   std::memcpy(name, &fourcc, 4);
+  for (int last = 3; last > 0 && name[last] == ' '; --last) name[last] = 0;
   return name;
 }
 

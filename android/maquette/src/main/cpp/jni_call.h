@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "maquette/maquette.h"
+#include "status_error.h"
 
 // A native method of an object of the package dev.maquette.
 #define MAQ_NATIVE_OF(object, type, name) extern "C" JNIEXPORT type JNICALL Java_dev_maquette_##object##_##name
@@ -18,20 +19,8 @@
 
 namespace maq_jni {
 
-// A call of the C API that did not return MAQ_OK.
-struct StatusError {
-  maq_status status;
-  std::string message;
-};
-
 // A Java exception is pending already.
 struct PendingException {};
-
-inline void check(maq_status status) {
-  if (status != MAQ_OK) throw StatusError{status, maq_last_error(nullptr)};
-}
-
-inline void refuse(const char* message) { throw StatusError{MAQ_ERROR_INVALID_ARGUMENT, message}; }
 
 inline void check_pending(JNIEnv* env) {
   if (env->ExceptionCheck()) throw PendingException();
@@ -113,6 +102,20 @@ inline jdoubleArray doubles_of(JNIEnv* env, const std::vector<jdouble>& values) 
   check_pending(env);
   env->SetDoubleArrayRegion(array, 0, jsize(values.size()), values.data());
   return array;
+}
+
+inline jfloatArray floats_of(JNIEnv* env, const jfloat* values, size_t count) {
+  jfloatArray array = env->NewFloatArray(jsize(count));
+  check_pending(env);
+  env->SetFloatArrayRegion(array, 0, jsize(count), values);
+  return array;
+}
+
+// The points of a body surface; null where the networks have none.
+inline jfloatArray points_of(JNIEnv* env, maq_status status, const maq_densepose_surface& surface) {
+  if (status == MAQ_ERROR_UNSUPPORTED) return nullptr;
+  check(status);
+  return floats_of(env, surface.points_m, size_t(24 * 3) * size_t(surface.nodes) * size_t(surface.nodes));
 }
 
 // The `count` numbers of a configuration, in the order of its struct.

@@ -39,8 +39,25 @@ MAQ_NATIVE(void, resetDensePose)(JNIEnv* env, jclass, jlong densepose) {
   call(env, [&] { check(maq_densepose_reset(object<maq_densepose>(densepose))); });
 }
 
+// [24][nodes][nodes][3]; null where the bundle has no surface.
+MAQ_NATIVE(jfloatArray, surfaceOfDensePose)(JNIEnv* env, jclass, jlong densepose) {
+  return call(env, [&] {
+    maq_densepose_surface surface{};
+    surface.struct_size = sizeof surface;
+    const maq_status status = maq_densepose_get_surface(object<maq_densepose>(densepose), &surface);
+    return maq_jni::points_of(env, status, surface);
+  });
+}
+
 MAQ_NATIVE(void, releaseResult)(JNIEnv*, jclass, jlong result) {
   maq_densepose_result_release(object<maq_densepose_result>(result));
+}
+
+MAQ_NATIVE(void, saveResult)(JNIEnv* env, jclass, jlong result, jbyteArray folder, jbyteArray stem) {
+  call(env, [&] {
+    const std::string to = maq_jni::text(env, folder), name = maq_jni::text(env, stem);
+    check(maq_densepose_result_save(object<maq_densepose_result>(result), to.c_str(), name.c_str()));
+  });
 }
 
 // Width and height.
@@ -67,10 +84,7 @@ MAQ_NATIVE(jfloatArray, peopleOfResult)(JNIEnv* env, jclass, jlong result) {
       values.insert(values.end(), person.box_px, person.box_px + 4);
       values.push_back(person.score);
     }
-    jfloatArray array = env->NewFloatArray(jsize(values.size()));
-    maq_jni::check_pending(env);
-    env->SetFloatArrayRegion(array, 0, jsize(values.size()), values.data());
-    return array;
+    return maq_jni::floats_of(env, values.data(), values.size());
   });
 }
 

@@ -1,4 +1,5 @@
 // Frames: decoded, or wrapped around direct buffers of the app.
+#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -31,11 +32,11 @@ void release_buffers(void* user_data) {
   if (attached.env != nullptr) held->release(attached.env);
 }
 
-int64_t rows_of(maq_pixel_format format, int plane, int64_t height_px) {
+int64_t rows_of(maq_pixel_format format, size_t plane, int64_t height_px) {
   return format == MAQ_PIXEL_NV12 && plane == 1 ? (height_px + 1) / 2 : height_px;
 }
 
-int64_t row_bytes(maq_pixel_format format, int plane, int64_t width_px) {
+int64_t row_bytes(maq_pixel_format format, size_t plane, int64_t width_px) {
   switch (format) {
     case MAQ_PIXEL_RGB8:
     case MAQ_PIXEL_BGR8: return 3 * width_px;
@@ -44,6 +45,7 @@ int64_t row_bytes(maq_pixel_format format, int plane, int64_t width_px) {
     case MAQ_PIXEL_NV12: return plane == 0 ? width_px : 2 * ((width_px + 1) / 2);
     case MAQ_PIXEL_YUYV: return 4 * ((width_px + 1) / 2);
     case MAQ_PIXEL_DEPTH16: return 2 * width_px;
+    case MAQ_PIXEL_DEPTH32F: return 4 * width_px;
   }
   maq_jni::refuse("unknown pixel format");
   return 0;
@@ -74,10 +76,10 @@ MAQ_NATIVE(jlong, wrapFrame)
     desc.timestamp_ns = timestamp_ns;
     desc.clock = maq_clock(clock);
     desc.sequence = uint64_t(sequence);
-    const jobject buffers[] = {first, second};
-    const jint strides[] = {first_stride, second_stride};
+    const std::array<jobject, 2> buffers = {first, second};
+    const std::array<jint, 2> strides = {first_stride, second_stride};
     auto held = std::make_unique<Held>();
-    for (int plane = 0; plane < (desc.format == MAQ_PIXEL_NV12 ? 2 : 1); ++plane) {
+    for (size_t plane = 0; plane < (desc.format == MAQ_PIXEL_NV12 ? 2u : 1u); ++plane) {
       const Memory memory = maq_jni::memory_of(env, buffers[plane]);
       const int64_t row = row_bytes(desc.format, plane, width_px);
       const int64_t stride = strides[plane] == 0 ? row : strides[plane];
@@ -85,14 +87,13 @@ MAQ_NATIVE(jlong, wrapFrame)
       desc.planes[plane] = memory.data;
       desc.stride_bytes[plane] = size_t(stride);
     }
-    for (size_t plane = 0; plane < held->buffers.size(); ++plane) {
-      if (buffers[plane] != nullptr) held->buffers[plane] = env->NewGlobalRef(buffers[plane]);
-    }
+    std::transform(buffers.begin(), buffers.end(), held->buffers.begin(),
+                   [&](jobject buffer) { return buffer == nullptr ? nullptr : env->NewGlobalRef(buffer); });
     maq_frame* frame = nullptr;
     const maq_status status = maq_frame_wrap(object<maq_context>(context), &desc, release_buffers, held.get(), &frame);
     if (status != MAQ_OK) held->release(env);
     check(status);
-    held.release();
+    static_cast<void>(held.release());  // the frame's
     return handle(frame);
   });
 }
@@ -129,6 +130,10 @@ MAQ_NATIVE(void, copyFramePixels)(JNIEnv* env, jclass, jlong frame, jint format,
     const Memory memory = maq_jni::memory_of(env, buffer);
     check(maq_frame_copy_pixels(object<maq_frame>(frame), maq_pixel_format(format), memory.data, 0, memory.size_bytes));
   });
+}
+
+MAQ_NATIVE(void, saveFrame)(JNIEnv* env, jclass, jlong frame, jbyteArray path) {
+  call(env, [&] { check(maq_frame_save(object<maq_frame>(frame), maq_jni::text(env, path).c_str())); });
 }
 
 MAQ_NATIVE(jlong, resizeFrame)(JNIEnv* env, jclass, jlong frame, jint width_px, jint height_px) {

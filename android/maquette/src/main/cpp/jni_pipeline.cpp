@@ -1,6 +1,4 @@
 // Pipelines: a source and dense pose on a thread of the library.
-#include <memory>
-
 #include "jni_config.h"
 #include "jni_threads.h"
 
@@ -11,16 +9,12 @@ using maq_jni::object;
 
 namespace {
 
-// A pipeline and whom it tells of changes.
-struct ListenedPipeline {
-  maq_jni::Listener listener;
-  maq_pipeline* pipeline = nullptr;
-};
+using ListenedPipeline = maq_jni::Listened<maq_pipeline>;
 
-maq_pipeline* pipeline_of(jlong listened) { return object<ListenedPipeline>(listened)->pipeline; }
+maq_pipeline* pipeline_of(jlong listened) { return ListenedPipeline::of(listened); }
 
 void tell(void* listened, maq_pipeline_state state, maq_status status, const char* problem) {
-  static_cast<ListenedPipeline*>(listened)->listener.tell(state, status, problem);
+  ListenedPipeline::tell(listened, state, status, problem);
 }
 
 }  // namespace
@@ -35,25 +29,21 @@ MAQ_NATIVE_OF(NativePipeline, jlong, create)
     const maq_source_config source = maq_jni::source_config(env, source_values);
     maq_pipeline_config config;
     check(maq_pipeline_config_init(&config, sizeof config));
-    auto listened = std::unique_ptr<ListenedPipeline>(new ListenedPipeline{{env, changes}});
     config.result_pool_size = uint32_t(result_pool_size);
     config.densepose = &densepose;
     config.source = &source;
     config.state_callback = tell;
-    config.state_user_data = listened.get();
     config.nice = nice;
     config.frame_budget_ms = frame_budget_ms;
-    const maq_status status = maq_pipeline_create(object<maq_context>(context), &config, &listened->pipeline);
-    if (status != MAQ_OK) listened->listener.release(env);
-    check(status);
-    return handle(listened.release());
+    return ListenedPipeline::create(env, changes, [&](void* listened, maq_pipeline** pipeline) {
+      config.state_user_data = listened;
+      return maq_pipeline_create(object<maq_context>(context), &config, pipeline);
+    });
   });
 }
 
 MAQ_NATIVE_OF(NativePipeline, void, destroy)(JNIEnv* env, jclass, jlong pipeline) {
-  const std::unique_ptr<ListenedPipeline> listened(object<ListenedPipeline>(pipeline));
-  maq_pipeline_destroy(listened->pipeline);
-  listened->listener.release(env);
+  ListenedPipeline::destroy(env, pipeline, maq_pipeline_destroy);
 }
 
 MAQ_NATIVE_OF(NativePipeline, void, setSource)(JNIEnv* env, jclass, jlong pipeline, jbyteArray uri) {
@@ -126,5 +116,15 @@ MAQ_NATIVE_OF(NativePipeline, jdoubleArray, stats)(JNIEnv* env, jclass, jlong pi
         env, {double(stats.result_count), double(stats.dropped_result_count), double(stats.dropped_frame_count),
               stats.results_per_second, stats.wait_ms, stats.run_ms, stats.age_ms, double(stats.key_frame_interval),
               double(stats.long_side_px)});
+  });
+}
+
+// [24][nodes][nodes][3]; null before networks are loaded, and where they have no surface.
+MAQ_NATIVE_OF(NativePipeline, jfloatArray, surface)(JNIEnv* env, jclass, jlong pipeline) {
+  return call(env, [&] {
+    maq_densepose_surface surface{};
+    surface.struct_size = sizeof surface;
+    const maq_status status = maq_pipeline_get_surface(pipeline_of(pipeline), &surface);
+    return maq_jni::points_of(env, status, surface);
   });
 }

@@ -1,4 +1,4 @@
-// Sources: cameras, files, recordings and stubs; the cameras that are connected.
+// Sources: cameras, files, recordings and stubs; the cameras that are connected; recorders.
 #include <memory>
 
 #include "jni_config.h"
@@ -11,16 +11,12 @@ using maq_jni::object;
 
 namespace {
 
-// A source and whom it tells of changes.
-struct ListenedSource {
-  maq_jni::Listener listener;
-  maq_source* source = nullptr;
-};
+using ListenedSource = maq_jni::Listened<maq_source>;
 
-maq_source* source_of(jlong listened) { return object<ListenedSource>(listened)->source; }
+maq_source* source_of(jlong listened) { return ListenedSource::of(listened); }
 
 void tell(void* listened, maq_source_state state, const char* reason) {
-  static_cast<ListenedSource*>(listened)->listener.tell(state, MAQ_OK, reason);
+  ListenedSource::tell(listened, state, MAQ_OK, reason);
 }
 
 }  // namespace
@@ -30,20 +26,16 @@ MAQ_NATIVE_OF(NativeSource, jlong, create)
   return call(env, [&] {
     const std::string from = maq_jni::text(env, uri);
     maq_source_config config = maq_jni::source_config(env, values);
-    auto listened = std::unique_ptr<ListenedSource>(new ListenedSource{{env, changes}});
     config.state_callback = tell;
-    config.state_user_data = listened.get();
-    const maq_status status = maq_source_create(object<maq_context>(context), from.c_str(), &config, &listened->source);
-    if (status != MAQ_OK) listened->listener.release(env);
-    check(status);
-    return handle(listened.release());
+    return ListenedSource::create(env, changes, [&](void* listened, maq_source** source) {
+      config.state_user_data = listened;
+      return maq_source_create(object<maq_context>(context), from.c_str(), &config, source);
+    });
   });
 }
 
 MAQ_NATIVE_OF(NativeSource, void, destroy)(JNIEnv* env, jclass, jlong source) {
-  const std::unique_ptr<ListenedSource> listened(object<ListenedSource>(source));
-  maq_source_destroy(listened->source);
-  listened->listener.release(env);
+  ListenedSource::destroy(env, source, maq_source_destroy);
 }
 
 MAQ_NATIVE_OF(NativeSource, void, stop)(JNIEnv* env, jclass, jlong source) {
@@ -165,5 +157,41 @@ MAQ_NATIVE_OF(NativeSource, jdoubleArray, cameraNumbers)(JNIEnv* env, jclass, jl
       numbers.insert(numbers.end(), {double(mode.is_usable), double(mode.width_px), double(mode.height_px), mode.fps});
     }
     return maq_jni::doubles_of(env, numbers);
+  });
+}
+
+// `source` may be 0.
+MAQ_NATIVE_OF(NativeSource, jlong, createRecorder)
+(JNIEnv* env, jclass, jlong context, jbyteArray path, jlong source, jint jpeg_quality) {
+  return call(env, [&] {
+    maq_recorder_config config;
+    check(maq_recorder_config_init(&config, sizeof config));
+    config.jpeg_quality = uint32_t(jpeg_quality);
+    maq_recorder* recorder = nullptr;
+    check(maq_recorder_create(object<maq_context>(context), maq_jni::text(env, path).c_str(),
+                              source == 0 ? nullptr : source_of(source), &config, &recorder));
+    return handle(recorder);
+  });
+}
+
+MAQ_NATIVE_OF(NativeSource, void, destroyRecorder)(JNIEnv*, jclass, jlong recorder) {
+  maq_recorder_destroy(object<maq_recorder>(recorder));
+}
+
+MAQ_NATIVE_OF(NativeSource, void, record)(JNIEnv* env, jclass, jlong recorder, jlong frame) {
+  call(env, [&] { check(maq_recorder_add_frame(object<maq_recorder>(recorder), object<maq_frame>(frame))); });
+}
+
+MAQ_NATIVE_OF(NativeSource, void, finishRecorder)(JNIEnv* env, jclass, jlong recorder) {
+  call(env, [&] { check(maq_recorder_finish(object<maq_recorder>(recorder))); });
+}
+
+// Frames and bytes.
+MAQ_NATIVE_OF(NativeSource, jdoubleArray, recorderInfo)(JNIEnv* env, jclass, jlong recorder) {
+  return call(env, [&] {
+    maq_recorder_info info{};
+    info.struct_size = sizeof info;
+    check(maq_recorder_get_info(object<maq_recorder>(recorder), &info));
+    return maq_jni::doubles_of(env, {double(info.frame_count), double(info.size_bytes)});
   });
 }

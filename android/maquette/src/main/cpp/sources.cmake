@@ -1,14 +1,19 @@
 # The native methods' sources, beside this file: for the AAR and for tests/android.
 set(MAQ_JNI_SOURCES
+  hardware_buffer.cpp
   jni_camera_image.cpp
   jni_capture.cpp
   jni_context.cpp
   jni_densepose.cpp
   jni_frame.cpp
+  jni_picture.cpp
   jni_pipeline.cpp
+  jni_preview.cpp
   jni_scene.cpp
   jni_scene_building.cpp
   jni_source.cpp
   jni_threads.cpp
+  ndk_graphics.cpp
+  preview.cpp
 )
 list(TRANSFORM MAQ_JNI_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/")

@@ -1,6 +1,7 @@
 package dev.maquette
 
 import android.graphics.Bitmap
+import android.hardware.HardwareBuffer
 import java.nio.ByteBuffer
 
 /** Finds people and maps each of their pixels to the body surface. Made by [Maquette.densePose]. */
@@ -97,6 +98,13 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
     /** The next frame begins another stream: a key frame. */
     fun reset() = handle.use(Native::resetDensePose)
 
+    /**
+     * The body that parts, U and V refer to; null if the bundle has none. Blocks briefly the first time.
+     *
+     * @throws MaquetteException with [Status.BAD_BUNDLE] if it is damaged.
+     */
+    fun surface(): BodySurface? = handle.use(Native::surfaceOfDensePose)?.let(::BodySurface)
+
     override fun close() = handle.close()
 
     companion object {
@@ -113,7 +121,7 @@ data class Person(val left: Float, val top: Float, val right: Float, val bottom:
 
 /** The people of a frame, best score first, and a byte for each pixel of the frame in four planes. */
 class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, Native::releaseResult)
+    internal val handle = Handle(this, pointer, Native::releaseResult)
 
     /** What is known of each pixel. */
     enum class Plane {
@@ -184,14 +192,47 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
      * @param opacity of the colours, 0 (invisible) to 255 (they cover the frame).
      * @throws IllegalArgumentException for another opacity.
      */
-    fun overlay(opacity: Int = 180): Bitmap {
-        require(opacity in 0..255) { "The opacity is $opacity; it must be 0 to 255." }
-        val colours = IntArray(25) { part -> DensePose.partColour(part) and 0xFFFFFF or (opacity shl 24) }
-        colours[0] = 0
-        val parts = copyPlane(Plane.PART)
-        val pixels = IntArray(parts.size) { colours[parts[it].toInt()] }
-        return Bitmap.createBitmap(pixels, widthPx, heightPx, Bitmap.Config.ARGB_8888)
+    fun overlay(opacity: Int = 180): Bitmap =
+        Bitmap.createBitmap(widthPx, heightPx, Bitmap.Config.ARGB_8888).also { draw(it, null, opacity) }
+
+    /**
+     * Draws into a bitmap of the app, of the frame's size, in place of its pixels: none is made anew.
+     *
+     * @param frame the one that the result is of, to be drawn below the people; null: as [overlay].
+     * @param opacity as of [overlay].
+     * @throws IllegalArgumentException for a bitmap that is not mutable, or not ARGB_8888, and for another opacity.
+     */
+    fun draw(onto: Bitmap, frame: Frame? = null, opacity: Int = 180) {
+        requireDrawable(onto)
+        draw(onto, true, frame, opacity)
     }
+
+    /**
+     * Draws into a hardware buffer of the app, of the frame's size, as RGBA_8888 or RGBX_8888.
+     *
+     * @param onto made with [HardwareBuffer.USAGE_CPU_WRITE_OFTEN] or [HardwareBuffer.USAGE_CPU_WRITE_RARELY].
+     */
+    fun draw(onto: HardwareBuffer, frame: Frame? = null, opacity: Int = 180) {
+        requireOpen(onto)
+        draw(onto, false, frame, opacity)
+    }
+
+    private fun draw(onto: Any, isBitmap: Boolean, frame: Frame?, opacity: Int) {
+        require(opacity in 0..255) { "The opacity is $opacity; it must be 0 to 255." }
+        val draw = { below: Long -> handle.use { NativePicture.drawResult(it, below, opacity, onto, isBitmap) } }
+        if (frame == null) draw(0) else frame.handle.use(draw)
+    }
+
+    /**
+     * Writes three files in the DensePose convention, `<stem>_IUV.png` (I, U and V as blue, green and red),
+     * `<stem>_INDS.png` ([Plane.PERSON]) and `<stem>.json` (size, boxes, scores), atomically, into a folder that
+     * exists. Needs Android 11. Blocks while they are written.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a stem that names a folder), [Status.UNSUPPORTED] (an
+     *   older Android) and [Status.UNWRITABLE].
+     */
+    fun save(folder: String, stem: String) =
+        handle.use { Native.saveResult(it, folder.toByteArray(), stem.toByteArray()) }
 
     /** Of the run that gave the result. */
     val stats: Stats

@@ -1,6 +1,7 @@
 package dev.maquette
 
 import android.graphics.Bitmap
+import android.hardware.HardwareBuffer
 import java.nio.ByteBuffer
 
 /** Rows from top to bottom, 8 bits a channel but for depth. */
@@ -16,6 +17,9 @@ enum class PixelFormat(internal val code: Int) {
 
     /** uint16 a pixel: millimetres, 0 where nothing is known. */
     DEPTH16(7),
+
+    /** float a pixel: metres; unknown where it is 0, negative, infinite or NaN. */
+    DEPTH32F(8),
     ;
 
     internal companion object {
@@ -61,10 +65,26 @@ class Frame internal constructor(pointer: Long) : AutoCloseable {
     ) = handle.use { Native.copyFramePixels(it, format.code, into) }
 
     /** A copy as an ARGB_8888 bitmap. */
-    fun toBitmap(): Bitmap {
-        val pixels = ByteBuffer.allocateDirect(4 * widthPx * heightPx)
-        copyPixels(PixelFormat.RGBA8, pixels)
-        return Bitmap.createBitmap(widthPx, heightPx, Bitmap.Config.ARGB_8888).apply { copyPixelsFromBuffer(pixels) }
+    fun toBitmap(): Bitmap = Bitmap.createBitmap(widthPx, heightPx, Bitmap.Config.ARGB_8888).also(::copyTo)
+
+    /**
+     * Copies the pixels into a bitmap of the app, of the frame's size: none is made anew.
+     *
+     * @throws IllegalArgumentException for a bitmap that is not mutable, or not ARGB_8888.
+     */
+    fun copyTo(bitmap: Bitmap) {
+        requireDrawable(bitmap)
+        handle.use { NativePicture.copyFrame(it, bitmap, true) }
+    }
+
+    /**
+     * Copies the pixels into a hardware buffer of the app, of the frame's size, as RGBA_8888 or RGBX_8888.
+     *
+     * @param buffer made with [HardwareBuffer.USAGE_CPU_WRITE_OFTEN] or [HardwareBuffer.USAGE_CPU_WRITE_RARELY].
+     */
+    fun copyTo(buffer: HardwareBuffer) {
+        requireOpen(buffer)
+        handle.use { NativePicture.copyFrame(it, buffer, false) }
     }
 
     /** A copy in another size, as BGR8. */
@@ -73,5 +93,21 @@ class Frame internal constructor(pointer: Long) : AutoCloseable {
         heightPx: Int,
     ): Frame = handle.use { Frame(Native.resizeFrame(it, widthPx, heightPx)) }
 
+    /**
+     * Writes the picture to a file in the format of its extension, PNG (.png) or JPEG (.jpg), atomically, in a folder
+     * that exists. Needs Android 11: before, use [toBitmap] and `Bitmap.compress`. Blocks while it is written.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (another extension), [Status.UNSUPPORTED] (a depth
+     *   image, an older Android) and [Status.UNWRITABLE].
+     */
+    fun save(path: String) = handle.use { Native.saveFrame(it, path.toByteArray()) }
+
     override fun close() = handle.close()
 }
+
+internal fun requireDrawable(bitmap: Bitmap) {
+    require(bitmap.isMutable) { "The bitmap is not mutable; make it with Bitmap.createBitmap or copy it." }
+    require(bitmap.config == Bitmap.Config.ARGB_8888) { "The bitmap is ${bitmap.config}; ARGB_8888 is needed." }
+}
+
+internal fun requireOpen(buffer: HardwareBuffer) = check(!buffer.isClosed) { "This HardwareBuffer is closed." }

@@ -3,6 +3,7 @@ package dev.maquette
 import android.content.res.AssetManager
 import android.graphics.Bitmap
 import android.graphics.ImageFormat
+import android.hardware.HardwareBuffer
 import android.media.Image
 import java.io.IOException
 import java.nio.ByteBuffer
@@ -36,10 +37,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     /** A copy of a bitmap as a frame. Its configuration must be ARGB_8888. */
     fun frame(bitmap: Bitmap, timestampNs: Long = 0): Frame {
         require(bitmap.config == Bitmap.Config.ARGB_8888) { "The bitmap is ${bitmap.config}; ARGB_8888 is needed." }
-        val pixels = ByteBuffer.allocateDirect(bitmap.rowBytes * bitmap.height)
-        bitmap.copyPixelsToBuffer(pixels)
-        val plane = Plane(pixels, bitmap.rowBytes)
-        return frame(PixelFormat.RGBA8, bitmap.width, bitmap.height, plane, timestampNs = timestampNs)
+        return handle.use { Frame(NativePicture.frameOfBitmap(it, bitmap, timestampNs)) }
     }
 
     /**
@@ -78,12 +76,13 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
 
     /**
      * A copy of an image of the camera or of a video decoder (YUV_420_888, with any strides) as an NV12 frame: the
-     * image may be closed when the call returns. It is neither rotated nor mirrored, and its crop rectangle is not used.
+     * image may be closed when the call returns. It is not mirrored, and its crop rectangle is not used.
      *
      * @param isFullRange true: brightness is 0 to 255, as of images of a camera (JFIF); false: 16 to 235, as of most
      *   videos.
      * @param clock of the image's timestamp: [Clock.MONOTONIC] for a camera, [Clock.MEDIA] for a video.
      * @param sequence its number, from 0.
+     * @param rotationDegrees clockwise, from the image to the frame: 0, 90, 180 or 270.
      * @throws IllegalArgumentException for another format.
      * @throws IllegalStateException if the image is closed.
      */
@@ -92,6 +91,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         isFullRange: Boolean = true,
         clock: Clock = Clock.MONOTONIC,
         sequence: Long = 0,
+        rotationDegrees: Int = 0,
     ): Frame {
         val format = image.format
         require(format == ImageFormat.YUV_420_888) { "The image has format $format; YUV_420_888 is needed." }
@@ -107,7 +107,46 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
                     buffers,
                     strides,
                     isFullRange,
+                    rotationDegrees,
                     image.timestamp,
+                    clock.code,
+                    sequence,
+                ),
+            )
+        }
+    }
+
+    /**
+     * A frame of a hardware buffer, of a camera, a decoder or a renderer. RGBA_8888, RGBX_8888 and RGB_888 are not copied:
+     * the frame keeps the buffer, which may be closed when the call returns, locked for reading until the frame is
+     * closed; its pixels must not change until then. YCBCR_420_888 is copied, but for buffers that are NV12 in video range
+     * already and not rotated.
+     *
+     * @param buffer made with [HardwareBuffer.USAGE_CPU_READ_OFTEN] or [HardwareBuffer.USAGE_CPU_READ_RARELY].
+     * @param isFullRange of YCBCR_420_888, as of an [Image].
+     * @param rotationDegrees of YCBCR_420_888, as of an [Image].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a buffer for the GPU alone), [Status.UNSUPPORTED]
+     *   (protected content, another format, several layers, YCBCR_420_888 before Android 10), [Status.UNREADABLE]
+     *   (Android does not lock it), [Status.IMAGE_SIZE].
+     * @throws IllegalStateException if the buffer is closed.
+     */
+    fun frame(
+        buffer: HardwareBuffer,
+        timestampNs: Long = 0,
+        clock: Clock = Clock.MEDIA,
+        sequence: Long = 0,
+        isFullRange: Boolean = true,
+        rotationDegrees: Int = 0,
+    ): Frame {
+        requireOpen(buffer)
+        return handle.use { context ->
+            Frame(
+                NativePicture.frameOfBuffer(
+                    context,
+                    buffer,
+                    isFullRange,
+                    rotationDegrees,
+                    timestampNs,
                     clock.code,
                     sequence,
                 ),
@@ -147,6 +186,17 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      */
     fun source(uri: String, config: Source.Config = Source.Config()): Source =
         handle.use { context -> Source(context, uri, config) }
+
+    /**
+     * Creates a recording (.maqrec), which must not exist yet. Blocks while the file is created.
+     *
+     * @param source where the frames will come from: its rate and intrinsics are recorded too.
+     * @param jpegQuality 1 to 100: pixels are compressed as JPEG of that quality, for which Android 11 is needed; 0:
+     *   they stay as they are, 14 MB a second at 640 x 480 (NV12) and 30 frames a second.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] and [Status.UNWRITABLE].
+     */
+    fun recorder(path: String, source: Source? = null, jpegQuality: Int = 0): Recorder =
+        handle.use { context -> Recorder(context, path, source, jpegQuality) }
 
     /** The cameras that are connected now. Blocks while devices answer: not on the main thread. */
     fun cameras(): List<Camera> = handle.use(Camera::all)

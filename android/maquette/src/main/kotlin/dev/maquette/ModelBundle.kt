@@ -26,16 +26,26 @@ class ModelBundle private constructor(folder: String?, files: Map<String, ByteBu
          * A bundle in a folder of the app's assets. Files that are stored without compression (`noCompress`) are
          * mapped, others are read into memory; nothing is written.
          *
-         * @throws IOException if the folder is not there.
+         * @throws IOException if the folder is not there; it says which are.
          */
         fun ofAssets(
             assets: AssetManager,
             folder: String,
         ): ModelBundle {
             val names = assets.list(folder).orEmpty()
-            if ("manifest.json" !in names) throw IOException("The assets have no $folder/manifest.json.")
+            if (MANIFEST !in names) throw IOException("The assets have no $folder/$MANIFEST. ${thoseThere(assets)}")
             return ofBuffers(names.associateWith { mappedOrRead(assets, "$folder/$it") })
         }
+
+        private fun thoseThere(assets: AssetManager): String {
+            // Folders; but the files in them in tests of an app by Robolectric.
+            val folders = assets.list("").orEmpty().map { it.substringBefore('/') }.toSet()
+            val others = folders.filter { MANIFEST in assets.list(it).orEmpty() }
+            if (others.isNotEmpty()) return "Networks are in ${others.sorted().joinToString()}."
+            return "No networks are in the assets: add folders of sdk/models to them, or a library that has them."
+        }
+
+        private const val MANIFEST = "manifest.json"
 
         internal fun mappedOrRead(
             assets: AssetManager,

@@ -3,8 +3,8 @@ package dev.maquette
 import java.nio.ByteBuffer
 
 /**
- * The C API (src/main/cpp): contexts, frames and dense pose; [NativeSource], [NativePipeline] and [NativeScene] have
- * the rest. Handles are numbers here; [Handle] keeps them. Texts are UTF-8. A bundle is a folder, or names and buffers.
+ * The C API (src/main/cpp): contexts, frames and dense pose; [NativeSource], [NativePipeline], [NativeScene],
+ * [NativePicture] and [NativePreview] have the rest. Handles are numbers here; [Handle] keeps them. Texts are UTF-8. A bundle is a folder, or names and buffers.
  * The values of a configuration are in the order of its properties.
  */
 internal object Native {
@@ -44,6 +44,7 @@ internal object Native {
         buffers: Array<ByteBuffer>,
         strides: IntArray,
         isFullRange: Boolean,
+        rotationDegrees: Int,
         timestampNs: Long,
         clock: Int,
         sequence: Long,
@@ -53,6 +54,7 @@ internal object Native {
     @JvmStatic external fun releaseFrame(frame: Long)
     @JvmStatic external fun describeFrame(frame: Long): LongArray
     @JvmStatic external fun copyFramePixels(frame: Long, format: Int, pixels: ByteBuffer)
+    @JvmStatic external fun saveFrame(frame: Long, path: ByteArray)
     @JvmStatic external fun resizeFrame(frame: Long, widthPx: Int, heightPx: Int): Long
 
     @JvmStatic
@@ -68,8 +70,10 @@ internal object Native {
     @JvmStatic external fun runDensePose(densePose: Long, frame: Long): Long
     @JvmStatic external fun cancelDensePose(densePose: Long)
     @JvmStatic external fun resetDensePose(densePose: Long)
+    @JvmStatic external fun surfaceOfDensePose(densePose: Long): FloatArray?
 
     @JvmStatic external fun releaseResult(result: Long)
+    @JvmStatic external fun saveResult(result: Long, folder: ByteArray, stem: ByteArray)
     @JvmStatic external fun sizeOfResult(result: Long): IntArray
     @JvmStatic external fun peopleOfResult(result: Long): FloatArray
     @JvmStatic external fun planeOfResult(result: Long, plane: Int): ByteBuffer

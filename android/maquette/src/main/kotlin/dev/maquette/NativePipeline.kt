@@ -44,4 +44,5 @@ internal object NativePipeline {
     /** Writes state and status; returns the problem and the source's URI. */
     @JvmStatic external fun info(pipeline: Long, codes: IntArray): Array<ByteArray>
     @JvmStatic external fun stats(pipeline: Long): DoubleArray
+    @JvmStatic external fun surface(pipeline: Long): FloatArray?
 }

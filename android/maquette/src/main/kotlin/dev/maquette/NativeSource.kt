@@ -1,6 +1,6 @@
 package dev.maquette
 
-/** The C API's sources, as [Native]. */
+/** The C API's sources and recorders, as [Native]. */
 internal object NativeSource {
     init {
         System.loadLibrary("maquette_jni")
@@ -19,6 +19,12 @@ internal object NativeSource {
     @JvmStatic external fun intrinsics(source: Long): DoubleArray?
     @JvmStatic external fun control(source: Long, control: Int): DoubleArray?
     @JvmStatic external fun setControl(source: Long, control: Int, value: Double)
+
+    @JvmStatic external fun createRecorder(context: Long, path: ByteArray, source: Long, jpegQuality: Int): Long
+    @JvmStatic external fun destroyRecorder(recorder: Long)
+    @JvmStatic external fun record(recorder: Long, frame: Long)
+    @JvmStatic external fun finishRecorder(recorder: Long)
+    @JvmStatic external fun recorderInfo(recorder: Long): DoubleArray
 
     @JvmStatic external fun schemeCount(): Int
     @JvmStatic external fun scheme(index: Int): Array<ByteArray>

@@ -168,6 +168,9 @@ class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: 
         stateChanges.tell(Change(State.STOPPED, Status.OK, "")) // the library tells nothing after a stop
     }
 
+    /** As [DensePose.surface]; null also before the networks are loaded. A result tells that they are. */
+    fun surface(): BodySurface? = handle.use(NativePipeline::surface)?.let(::BodySurface)
+
     /**
      * Takes the newest result that was not taken yet, or waits for the next: not on the main thread.
      *

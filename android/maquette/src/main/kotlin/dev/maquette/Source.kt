@@ -25,7 +25,7 @@ internal fun nanoseconds(timeoutMs: Long): Long =
 class Source internal constructor(context: Long, uri: String, config: Config) : AutoCloseable {
     internal val stateChanges =
         Changes { state, _, reason -> Change(State.entries.first { it.ordinal + 1 == state }, reason) }
-    private val handle =
+    internal val handle =
         Handle(
             this,
             NativeSource.create(context, uri.toByteArray(), config.values(), stateChanges),

@@ -85,11 +85,7 @@ class DensePoseTest : AndroidTest() {
                 assertEquals(5L, frame.timestampNs)
                 val bgr = ByteBuffer.allocateDirect(3 * 3 * 2)
                 frame.copyPixels(PixelFormat.BGR8, bgr)
-                // Phones keep R, G, B, A in memory (Bitmap.Config.ARGB_8888), which is what a frame takes them for;
-                // Robolectric's Skia keeps B, G, R, A.
-                val inMemory = ByteBuffer.allocateDirect(4 * 3 * 2).also(bitmap::copyPixelsToBuffer)
-                assertEquals(setOf<Byte>(10, 20, 30), (20..22).map { inMemory[it] }.toSet())
-                assertEquals((20..22).map { inMemory[it] }, (15..17).map { bgr[it] }.reversed())
+                assertEquals(listOf<Byte>(30, 20, 10), (15..17).map { bgr[it] })
                 assertEquals(Color.rgb(10, 20, 30), frame.toBitmap().getPixel(2, 1))
                 frame.resize(6, 4).use { assertEquals(6 to 4, it.widthPx to it.heightPx) }
             }
@@ -192,7 +188,7 @@ class DensePoseTest : AndroidTest() {
                         black(maquette, 1024, 1024).widthPx
                         break
                     } catch (error: OutOfMemoryError) {
-                        if (++waits > 20) throw error
+                        if (++waits > 600) throw error
                         System.gc()
                         Thread.sleep(100)
                     }

@@ -63,7 +63,7 @@ class FlowsTest : AndroidTest() {
 
     @Test
     fun cancellingEndsAWait() = runBlocking<Unit> {
-        maquette.source("stub:pattern?size=32x24&live=1&fps=0.1").use { source ->
+        maquette.source("stub:pattern?size=32x24&live=1&fps=0.01").use { source ->
             val begun = CompletableDeferred<Unit>()
             val collector = launch(Dispatchers.Default) {
                 source.frames().collect { frame ->
@@ -73,7 +73,7 @@ class FlowsTest : AndroidTest() {
             }
             begun.await()
             delay(100)
-            within(1000) { runBlocking { collector.cancelAndJoin() } }
+            soon { runBlocking { collector.cancelAndJoin() } }
             failure(Status.TIMEOUT) { source.acquireFrame(0) }
         }
     }
@@ -81,7 +81,7 @@ class FlowsTest : AndroidTest() {
     @Test
     fun closingTheSourceEndsItsFlows() = runBlocking<Unit> {
         repeat(5) { round ->
-            val source = maquette.source("stub:pattern?size=32x24&live=1&fps=0.1")
+            val source = maquette.source("stub:pattern?size=32x24&live=1&fps=0.01")
             val begun = CompletableDeferred<Unit>()
             val frames = launch(Dispatchers.Default) {
                 source.frames().collect { frame ->
@@ -93,7 +93,7 @@ class FlowsTest : AndroidTest() {
             begun.await()
             delay(20L * round)
             source.close()
-            withTimeout(2000) {
+            withTimeout(SOON_MS) {
                 frames.join()
                 changes.join()
             }
@@ -116,7 +116,7 @@ class FlowsTest : AndroidTest() {
 
     @Test
     fun changesOfACameraComeInOrderToEachCollector() = runBlocking<Unit> {
-        val uri = "stub:pattern?size=32x24&fps=50&unplug=300ms@20"
+        val uri = "stub:pattern?size=32x24&fps=50&unplug=300ms@100"
         maquette.source(uri).use { source ->
             val collectors = List(2) { index ->
                 val seen = CompletableDeferred<List<Source.State>>()
@@ -132,9 +132,13 @@ class FlowsTest : AndroidTest() {
                 seen
             }
             val frames = launch(Dispatchers.Default) { source.frames().collect(Frame::close) }
-            withTimeout(10_000) {
+            withTimeout(SOON_MS) {
+                // A collector that a busy machine starts late gets the latest state first.
                 val expected = listOf("STARTED", "LOST", "RECONNECTING", "RECONNECTED")
-                for (seen in collectors) assertEquals(expected, seen.await().map { it.name })
+                for (seen in collectors) {
+                    val names = seen.await().map { it.name }
+                    assertEquals(expected.takeLast(names.size), names)
+                }
                 frames.join()
             }
         }
@@ -144,14 +148,10 @@ class FlowsTest : AndroidTest() {
     fun threadsOfTheLibraryThatToldChangesEnd() = runBlocking<Unit> {
         fun openAndClose() = repeat(50) {
             maquette.source("stub:pattern?size=32x24&live=1").use { source ->
-                runBlocking { withTimeout(2000) { source.changes().first() } }
+                runBlocking { withTimeout(SOON_MS) { source.changes().first() } }
             }
         }
         openAndClose()
-        delay(300)
-        val before = threadCount()
-        openAndClose()
-        delay(300)
-        assertTrue("${threadCount() - before} threads more", threadCount() - before < 10)
+        until("no thread of the library is left", meanwhile = System::gc) { threadCount() == 0 }
     }
 }

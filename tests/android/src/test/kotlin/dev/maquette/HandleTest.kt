@@ -61,7 +61,7 @@ class HandleTest {
         var owner: Any? = object { val handle = Handle(this, 7) { isReleased.countDown() } }
         val gone = WeakReference(owner)
         owner = null
-        repeat(50) {
+        repeat(600) {
             System.gc()
             if (isReleased.await(100, TimeUnit.MILLISECONDS)) return
         }

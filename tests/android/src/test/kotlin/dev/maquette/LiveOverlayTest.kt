@@ -1,13 +1,10 @@
 package dev.maquette
 
 import android.Manifest.permission.CAMERA
-import android.graphics.drawable.BitmapDrawable
-import android.os.Looper
+import android.app.Activity
 import android.view.ViewGroup
-import android.widget.ImageView
 import java.io.File
 import org.junit.Assert.assertEquals
-import org.junit.Assert.assertNull
 import org.junit.Assert.assertTrue
 import org.junit.Test
 import org.robolectric.Robolectric
@@ -23,49 +20,49 @@ class OverlayOfStub : LiveOverlay() {
 class LiveOverlayTest : AndroidTest() {
     private val application = RuntimeEnvironment.getApplication()
 
-    private fun pictureOf(activity: LiveOverlay): BitmapDrawable? {
-        shadowOf(Looper.getMainLooper()).idle()
-        val content = activity.findViewById<ViewGroup>(android.R.id.content)
-        return (content.getChildAt(0) as ImageView?)?.drawable as BitmapDrawable?
-    }
+    private fun viewOf(activity: Activity) =
+        activity.findViewById<ViewGroup>(android.R.id.content).getChildAt(0) as LiveView
 
     @Test
     fun theActivityOfTheDocumentationShowsPeopleUntilItPauses() {
         shadowOf(application).grantPermissions(CAMERA)
         val controller = Robolectric.buildActivity(OverlayOfStub::class.java).setup()
-        var picture: BitmapDrawable? = null
-        within(30_000) {
-            while (picture == null) {
-                picture = pictureOf(controller.get())
-                Thread.sleep(10)
-            }
-        }
-        assertEquals(320, picture!!.bitmap.width)
-        val pixels = IntArray(320 * 240).also { picture!!.bitmap.getPixels(it, 0, 320, 0, 0, 320, 240) }
-        assertTrue("the frame is drawn", pixels.toSet().size > 1000)
+        val screen = FakeSurface(viewOf(controller.get()))
+        screen.appear(640, 960)
+        val picture = screen.picture { it.posts >= 3 }
+        assertEquals("all of the frame, between bars", 320 to 480, picture.widthPx to picture.heightPx)
+        assertEquals(0, picture.colour(160, 10))
+        assertTrue("the frame is drawn", picture.colours > 1000)
+        val threads = threadsOfView()
+        assertEquals(1, threads.size)
         controller.pause()
-        Thread.sleep(500)
-        val last = pictureOf(controller.get())
-        Thread.sleep(300)
-        assertEquals("no pictures after the pause", last, pictureOf(controller.get()))
-        controller.resume().pause().destroy()
+        threads.forEach { it.join(30_000) } // the pipeline is closed
+        assertEquals(0, threadsOfView().size)
+        controller.resume()
+        val before = screen.picture().posts
+        screen.picture { it.posts > before }
+        controller.pause()
+        screen.vanish()
+        controller.stop().destroy()
+        assertEquals("", FakeAndroid.misuse())
     }
 
     @Test
     fun withoutThePermissionNothingRuns() {
         shadowOf(application).denyPermissions(CAMERA)
         val controller = Robolectric.buildActivity(OverlayOfStub::class.java).setup()
-        assertNull(pictureOf(controller.get()))
+        assertEquals(0, threadsOfView().size)
         controller.pause().destroy()
     }
 
     @Test
-    fun itIsWhatTheDocumentationShows() {
+    fun itIsWhatTheDocumentationShowsInTwentyLines() {
         val root = File(System.getProperty("maquette.root")!!)
         val source = File(root, "tests/android/src/test/kotlin/dev/maquette/LiveOverlay.kt").readText()
-        val body = source.substringAfter("open class LiveOverlay").trimEnd()
+        val body = "open class LiveOverlay" + source.substringAfter("open class LiveOverlay").trimEnd()
+        assertTrue("${body.lines().size} lines", body.lines().size <= 20)
+        val lines = body.lines().joinToString("\n") { if (it.isEmpty()) it else "    $it" }
         val shown = File(root, "docs/android.md").readText()
-        val lines = "open class LiveOverlay$body".lines().joinToString("\n") { if (it.isEmpty()) it else "    $it" }
         assertTrue("docs/android.md shows another activity", shown.contains(lines))
     }
 }

@@ -2,15 +2,13 @@ package dev.maquette.sample
 
 import android.Manifest.permission.CAMERA
 import android.content.pm.PackageManager.PERMISSION_GRANTED
-import android.graphics.Bitmap
-import android.graphics.Canvas
 import android.os.Bundle
 import dev.maquette.Pipeline
 import dev.maquette.PipelineResult
 import kotlin.concurrent.thread
 
-/** The camera's people, each pixel in the colour of its body part. */
-open class LiveActivity : Screen() {
+/** The camera's people, painted by body part or dressed. */
+open class LiveActivity : PeopleScreen() {
     private var facing = "back"
     private var pipeline: Pipeline? = null
 
@@ -21,6 +19,7 @@ open class LiveActivity : Screen() {
             facing = if (facing == "back") "front" else "back"
             startCamera()
         }
+        addModeButtons()
         if (!mayUseCamera()) requestPermissions(arrayOf(CAMERA), 1)
     }
 
@@ -54,7 +53,8 @@ open class LiveActivity : Screen() {
         startCamera()
         // Ends when the pipeline is stopped.
         thread {
-            val problem = runCatching { generateSequence { running.acquireResult() }.forEach(::showResult) }
+            val problem =
+                runCatching { generateSequence { running.acquireResult() }.forEach { showResult(running, it) } }
             runOnUiThread { problem.exceptionOrNull()?.let { say(it.message ?: it.toString()) } }
             running.close()
         }
@@ -65,20 +65,19 @@ open class LiveActivity : Screen() {
         pipeline?.setSource(camera(facing, windowManager.defaultDisplay.rotation * 90))
     }
 
-    private fun showResult(result: PipelineResult) {
-        val people = people(result.densePose.people.size)
-        val bitmap = result.use { it.frame.toBitmap().also { frame -> drawParts(it, frame) } }
-        val stats = pipeline?.stats ?: return
+    private fun showResult(
+        running: Pipeline,
+        result: PipelineResult,
+    ) = result.use {
+        val people = people(it.densePose.people.size)
+        val bitmap = it.frame.toBitmap()
+        val how = paint(bitmap, it.densePose, running::surface)
+        val perSecond = running.stats.resultsPerSecond
         runOnUiThread {
-            show(bitmap, "The camera's picture, $people painted by body part")
-            say("%s, %.0f pictures a second".format(people, stats.resultsPerSecond))
+            show(bitmap, "The camera's picture, $people $how")
+            say("%s, %.0f pictures a second".format(people, perSecond))
         }
     }
-
-    private fun drawParts(
-        result: PipelineResult,
-        frame: Bitmap,
-    ) = Canvas(frame).drawBitmap(result.densePose.overlay(), 0f, 0f, null)
 
     private companion object {
         /** Of a camera of 30 pictures a second: on a device that throttles the networks do less. */

@@ -40,6 +40,7 @@ open class SceneActivity : Screen() {
             last = event.x to event.y
             true
         }
+        intent.data?.let(::load) // a scene that was captured
     }
 
     @Deprecated("the platform's way without androidx")
@@ -48,7 +49,10 @@ open class SceneActivity : Screen() {
         result: Int,
         data: Intent?,
     ) {
-        val file = data?.data ?: return
+        data?.data?.let(::load)
+    }
+
+    private fun load(file: Uri) {
         say("Opening …")
         inBackground({ open(read(file)) }) {
             say("Drag to look around.")

@@ -32,8 +32,15 @@ import org.robolectric.android.controller.ActivityController
 
 private fun fromFolder(name: String) = ModelBundle.ofFolder(TestFiles.bundle.resolveSibling(name).path)
 
+private val outfit = TestFiles.bundle.resolve("../../../desktop_demo/assets/outfit.png")
+
+private fun readBitmap(file: File): Bitmap =
+    BitmapFactory.decodeFile(file.path).copy(Bitmap.Config.ARGB_8888, true)
+
 class LiveOfStub : LiveActivity() {
     override fun networks(name: String) = fromFolder(name)
+
+    override fun defaultOutfit() = readBitmap(outfit)
 
     override fun camera(
         facing: String,
@@ -44,14 +51,29 @@ class LiveOfStub : LiveActivity() {
 class PhotoOfFile : PhotoActivity() {
     override fun networks(name: String) = fromFolder(name)
 
-    override fun decode(photo: Uri): Bitmap =
-        BitmapFactory.decodeFile(photo.path).copy(Bitmap.Config.ARGB_8888, true)
+    override fun defaultOutfit() = readBitmap(outfit)
+
+    override fun decode(image: Uri) = readBitmap(File(image.path!!))
 }
 
 class SceneOfFile : SceneActivity() {
     override fun networks(name: String) = fromFolder(name)
 
     override fun read(file: Uri): ByteArray = File(file.path!!).readBytes()
+}
+
+class CaptureOfRoom : CaptureActivity() {
+    override fun networks(name: String) = fromFolder(name)
+
+    override val longSidePx get() = 160
+
+    override fun openCamera() = PosedRoom(maquette, everyPhoto = 5)
+}
+
+class CaptureWithoutCamera : CaptureActivity() {
+    override val notice get() = "This device has a notice."
+
+    override fun openCamera() = error("This device has no ARCore: open a scene file.")
 }
 
 class ShortBenchmark : BenchmarkActivity() {
@@ -64,12 +86,14 @@ class ShortBenchmark : BenchmarkActivity() {
 
 /** The screens of the sample app, with files and rendered people in the place of cameras and pickers. */
 class SampleTest : AndroidTest() {
+    /** All, from top to bottom. */
     private fun views(activity: Activity): List<View> {
-        val rows = activity.findViewById<ViewGroup>(android.R.id.content).getChildAt(0) as ViewGroup
-        return List(rows.childCount, rows::getChildAt)
+        fun below(view: View): List<View> =
+            listOf(view) + if (view is ViewGroup) List(view.childCount, view::getChildAt).flatMap(::below) else listOf()
+        return below(activity.findViewById(android.R.id.content))
     }
 
-    private fun sentence(activity: Activity) = (views(activity)[0] as TextView).text.toString()
+    private fun sentence(activity: Activity) = views(activity).filterIsInstance<TextView>().first().text.toString()
 
     private fun picture(activity: Activity) = views(activity).filterIsInstance<ImageView>().single()
 
@@ -83,11 +107,10 @@ class SampleTest : AndroidTest() {
         what: String,
         condition: () -> Boolean,
     ) {
-        val end = System.nanoTime() + 60_000_000_000
-        while (!condition()) {
-            assertTrue("$what; it says: ${sentence(activity)}", System.nanoTime() < end)
-            shadowOf(Looper.getMainLooper()).idle()
-            Thread.sleep(5)
+        try {
+            until(what, meanwhile = { shadowOf(Looper.getMainLooper()).idle() }, condition)
+        } catch (error: AssertionError) {
+            throw AssertionError("${error.message}; it says: ${sentence(activity)}")
         }
     }
 
@@ -131,6 +154,10 @@ class SampleTest : AndroidTest() {
         screen(LiveOfStub::class.java) { live ->
             until(live, "people of the back camera") { picture(live).contentDescription?.contains("1 person") == true }
             assertEquals(1f, picture(live).scaleX)
+            button(live, "Try on").performClick()
+            until(live, "a dressed person") { picture(live).contentDescription.contains("1 person dressed") }
+            button(live, "Body parts").performClick()
+            until(live, "body parts") { picture(live).contentDescription.contains("1 person painted by body part") }
             button(live, "Other camera").performClick()
             until(live, "people of the front camera") { picture(live).contentDescription?.contains("2 people") == true }
             assertEquals(-1f, picture(live).scaleX)
@@ -153,6 +180,18 @@ class SampleTest : AndroidTest() {
             val shown = (picture(photo).drawable as BitmapDrawable).bitmap
             val original = BitmapFactory.decodeFile(TestFiles.photo.path)
             assertFalse("parts are painted", shown.sameAs(original))
+            fun shownAfter(words: String, picture: File?): Bitmap {
+                if (picture != null) answer(photo, picture)
+                until(photo, words) { picture(photo).contentDescription.contains(words) && " in " in sentence(photo) }
+                return (picture(photo).drawable as BitmapDrawable).bitmap
+            }
+            button(photo, "Try on").performClick()
+            val dressed = shownAfter("dressed by a picture", null)
+            assertFalse(dressed.sameAs(shown))
+            button(photo, "Body parts").performClick()
+            assertTrue(shownAfter("painted by body part", null).sameAs(shown))
+            button(photo, "Wear a picture").performClick()
+            assertFalse("another outfit", shownAfter("dressed by a picture", TestFiles.photo).sameAs(dressed))
         }
 
     @Test
@@ -186,6 +225,33 @@ class SampleTest : AndroidTest() {
                 }
             }
         }
+
+    @Test
+    fun aPlaceIsCapturedBuiltAndShown() {
+        shadowOf(RuntimeEnvironment.getApplication()).grantPermissions(CAMERA)
+        screen(CaptureOfRoom::class.java) { capture ->
+            until(capture, "five photos") { sentence(capture).startsWith("5 photos") }
+            assertTrue(picture(capture).contentDescription.contains("place"))
+            button(capture, "Build").performClick()
+            until(capture, "a scene") { sentence(capture).startsWith("Built") }
+            val shown = shadowOf(capture).nextStartedActivity
+            assertEquals(SceneActivity::class.java.name, shown.component!!.className)
+            val controller = Robolectric.buildActivity(SceneOfFile::class.java, shown).setup()
+            until(controller.get(), "a view") { picture(controller.get()).drawable != null }
+            controller.pause().stop().destroy()
+        }
+    }
+
+    @Test
+    fun whereNothingKnowsTheCamerasPlaceTheScreenSaysSo() {
+        shadowOf(RuntimeEnvironment.getApplication()).grantPermissions(CAMERA)
+        screen(CaptureWithoutCamera::class.java) { capture ->
+            until(capture, "the reason") { sentence(capture) == "This device has no ARCore: open a scene file." }
+            assertFalse(button(capture, "Build").isEnabled)
+        }
+        shadowOf(RuntimeEnvironment.getApplication()).denyPermissions(CAMERA)
+        screen(CaptureWithoutCamera::class.java) { assertTrue(sentence(it).startsWith("Allow the camera")) }
+    }
 
     @Test
     fun anOrbitLooksAtTheMiddleWhicheverWayIsUp() {

@@ -1,0 +1,36 @@
+"""What the network reads of a depth frame: slopes of inverse depth, and what is known. The reference for the C++.
+
+A plane's inverse depth is linear in pixels, so a crease is a step of the slope whichever way the plane leans. Depth
+itself in 8 bits would have no edge left: 4 m in 256 steps are 16 mm.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+
+def slopes(depth: Tensor, focal_px: Tensor) -> Tensor:
+    """Depth [N, H, W] in metres, 0 where unknown, and focal lengths [N, 2] (x, y) -> [N, 3, H, W] within -1..1.
+
+    Planes 0 and 1: g / (1 + |g|) of the surface's slope g = f z d(1/z) towards the next pixel in x and in y, metres of
+    depth a metre sideways (nearer: positive), 0 where either pixel is unknown and at the last column or row. Plane 2:
+    1 where depth is known.
+    """
+    known = depth > 0
+    inverse = torch.where(known, 1 / depth.clamp_min(1e-9), 0)
+    planes = []
+    for axis, focal in ((2, focal_px[:, 0]), (1, focal_px[:, 1])):
+        n = depth.shape[axis] - 1
+        here, there = (t.narrow(axis, 0, n) for t in (inverse, known)), (t.narrow(axis, 1, n) for t in (inverse, known))
+        (inverse_here, known_here), (inverse_there, known_there) = here, there
+        g = (inverse_there - inverse_here) * depth.narrow(axis, 0, n) * focal[:, None, None]
+        g = torch.where(known_here & known_there, g / (1 + g.abs()), 0)
+        planes.append(F.pad(g, (0, 1) if axis == 2 else (0, 0, 0, 1)))
+    return torch.stack([*planes, known.to(depth.dtype)], 1)
+
+
+def folded(planes: Tensor, fold: int) -> Tensor:
+    """[N, C, H, W] -> [N, C fold^2, H / fold, W / fold], as `torch.nn.functional.pixel_unshuffle` orders channels."""
+    return F.pixel_unshuffle(planes, fold)

@@ -1,0 +1,107 @@
+"""Exports the edge network as a fp32 ONNX graph, and compares it with torch.
+
+    python -m export.edges.export_onnx --checkpoint RUN/weights.pt --out .data/bundles/edges-fp32
+    python -m export.edges.export_onnx --random s --out .data/bundles/edges-random-fp32
+
+`field.onnx`: slopes [1, H / 2, W / 2, 12] -> planes [1, H / 2, W / 2, 16], channels last; pixel (y, x) of each 2 x 2 is
+channel 4 c + 2 y + x of plane c. H and W are open, multiples of `multiple_px` of the manifest (export.edges.bundle).
+Planes: distance / eps_r, logarithm of its spread / eps_r, logits of crease and of boundary.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import warnings
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from torch import Tensor, nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from export.bundle import OPSET, BundleInfo
+from export.densepose.export_onnx import channels_first, channels_last, doubled
+from export.densepose.graphs import session
+from export.edges.bundle import TRAINING_DATA, write_manifest
+from export.edges.config import FOLD, INPUT_PLANES, SIZES
+from export.edges.network import EdgeNetwork
+from export.edges.weights import load_network
+
+TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the output's largest value
+
+
+class FieldGraph(nn.Module):
+    """Channels last at both ends, batch normalisation folded."""
+
+    def __init__(self, network: EdgeNetwork) -> None:
+        super().__init__()
+        self.network = copy.deepcopy(network).eval().requires_grad_(False)
+        for module in self.network.modules():
+            if isinstance(module, nn.Sequential) and len(module) == 3 and isinstance(module[1], nn.BatchNorm2d):
+                module[0], module[1] = fuse_conv_bn_eval(module[0], module[1]), nn.Identity()
+        self.network.double = doubled
+
+    def forward(self, slopes: Tensor) -> Tensor:
+        return channels_last(self.network.features(channels_first(slopes)))
+
+
+def export(network: EdgeNetwork, folder: Path, multiple: int) -> float:
+    """Writes `field.onnx`; returns its parity. Raises ValueError where it is not what torch computes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "field.onnx"
+    graph = FieldGraph(network)
+    given = torch.rand(1, 2 * multiple, 3 * multiple, INPUT_PLANES * FOLD**2)
+    axes = {name: {1: "height", 2: "width"} for name in ("slopes", "planes")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the exporter that knows our own operations is called deprecated
+        torch.onnx.export(
+            graph,
+            (given,),
+            path,
+            input_names=["slopes"],
+            output_names=["planes"],
+            dynamic_axes=axes,
+            opset_version=OPSET,
+            dynamo=False,
+        )
+    model = onnx.load(path)
+    model.graph.name = path.stem
+    onnx.checker.check_model(model, full_check=True)
+    onnx.save(model, path)
+    shape = (1, 5 * multiple // 2, 4 * multiple // 2, INPUT_PLANES * FOLD**2)
+    values = np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32)
+    expected = graph(torch.from_numpy(values)).numpy()
+    (found,) = session(path).run(None, {"slopes": values})
+    error = float(np.abs(found - expected).max() / np.abs(expected).max())
+    if not error <= TOLERANCE:
+        raise ValueError(f"{path} differs from torch by {error:.1e} of its largest value")
+    return error
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--checkpoint", type=Path, help="weights.pt of export.edges.train")
+    source.add_argument("--random", choices=SIZES, help="random weights of this size, for measuring time")
+    parser.add_argument("--out", type=Path, default=Path(".data/bundles/edges-fp32"))
+    parser.add_argument("--name", help="default: the folder's name")
+    options = parser.parse_args()
+    torch.manual_seed(0)
+    if options.random:
+        config = SIZES[options.random]
+        network = EdgeNetwork(config).eval()
+    else:
+        network, config = load_network(options.checkpoint)
+    if config.bins:
+        raise SystemExit("Networks of the histogram loss are compared in torch and not shipped: train with --loss l1.")
+    error = export(network, options.out, config.multiple)
+    size = (options.out / "field.onnx").stat().st_size / 1e6
+    print(f"field: {size:.2f} MB, {error:.1e} from torch")
+    info = BundleInfo(options.name or options.out.name, "fp32", training_data=() if options.random else TRAINING_DATA)
+    write_manifest(options.out, info, config.multiple)
+
+
+if __name__ == "__main__":
+    main()

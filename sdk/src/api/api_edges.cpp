@@ -1,0 +1,196 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "api/boundary.h"
+#include "api/bundle_argument.h"
+#include "api/frame_handle.h"
+#include "core/worker_threads.h"
+#include "edges/edges.h"
+#include "edges/field_files.h"
+#include "maquette/edges.h"
+
+using namespace maq;
+
+struct maq_edges_result : HandleOf<HandleKind::kEdgesResult> {
+  EdgesResult result;
+  BoundedPool<maq_edges_result>::Deleter deleter;
+};
+
+struct maq_edges : HandleOf<HandleKind::kEdges> {
+  maq_edges(std::shared_ptr<ContextState> of, std::unique_ptr<Edges> made, size_t pool_size)
+      : state(std::move(of)), edges(std::move(made)), results(pool_size, "results") {}
+  std::shared_ptr<ContextState> state;
+  std::unique_ptr<Edges> edges;
+  BoundedPool<maq_edges_result> results;
+};
+
+namespace {
+
+// The bundle that a config without one means.
+constexpr char kEdgesBundle[] = "edges-int8";
+// Of the structs' first release.
+constexpr size_t kFirstConfigSize = sizeof(maq_edges_config), kFirstStatsSize = sizeof(maq_edges_stats);
+
+maq_edges_config default_config() {
+  maq_edges_config config{};
+  config.struct_size = sizeof config;
+  config.result_pool_size = 4;
+  config.allow_spinning = 1;
+  return config;
+}
+
+EdgesSettings edges_settings(const maq_edges_config& config) {
+  require_range("config.threads", config.threads, 0, kMaxThreads);
+  require_range("config.result_pool_size", config.result_pool_size, 1u, 64u);
+  require_range("config.allow_spinning", config.allow_spinning, 0, 1);
+  require_provider("config.provider", config.provider);
+  require_range("config.skip_planes", config.skip_planes, 0, 1);
+  EdgesSettings settings;
+  settings.threads = config.threads > 0 ? config.threads : default_threads();
+  settings.spin = config.allow_spinning == 1;
+  settings.provider = config.provider;
+  settings.skips_planes = config.skip_planes == 1;
+  return settings;
+}
+
+// Of the depth image, which the frame's picture may be larger than: they show the same view.
+Intrinsics intrinsics_of_depth(const Frame& frame, const ImageView& depth, const maq_intrinsics& given) {
+  const Intrinsics of_frame{given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
+  const bool is_of_picture = given.width_px == frame.image.width_px && given.height_px == frame.image.height_px;
+  return is_of_picture ? resized(of_frame, depth.width_px, depth.height_px) : of_frame;
+}
+
+}  // namespace
+
+maq_status maq_edges_config_init(maq_edges_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+}
+
+maq_status maq_edges_create(maq_context* context, const maq_edges_config* given, maq_edges** edges) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(edges, "edges");
+    const maq_edges_config config = read_config(given, "config", default_config(), kFirstConfigSize);
+    const EdgesSettings settings = edges_settings(config);
+    Bundle bundle = read_bundle_argument(config, "config", kEdgesBundle);
+    const Manifest manifest = bundle.manifest;
+    auto made = std::make_unique<Edges>(context->state->onnxruntime(), std::move(bundle), settings);
+    context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
+                                ") loaded, ", settings.threads, " thread(s)");
+    *edges = new maq_edges(context->state, std::move(made), config.result_pool_size);
+    return MAQ_OK;
+  });
+}
+
+void maq_edges_destroy(maq_edges* edges) { destroy(edges, "edges", __func__); }
+
+maq_status maq_edges_run(maq_edges* edges, const maq_frame* frame, const maq_intrinsics* intrinsics,
+                         maq_edges_result** result) {
+  return guarded_alone(edges, "edges", __func__, [&] {
+    require_argument(frame, "frame");
+    if (intrinsics == nullptr) {
+      throw ArgumentError(
+          "intrinsics is NULL, but lengths come from them; give those of the source (maq_source_get_intrinsics), or of "
+          "the camera's data sheet.");
+    }
+    require_argument(result, "result");
+    const ImageView* const depth = depth_of(frame->frame);
+    BoundedPool<maq_edges_result>::Pooled handle = edges->results.acquire();
+    const ImageView& image = depth == nullptr ? frame->frame.image : *depth;  // refused where it is no depth
+    edges->edges->run(image, intrinsics_of_depth(frame->frame, image, *intrinsics), handle->result);
+    *result = lend<maq_edges_result>(std::move(handle));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_edges_cancel(maq_edges* edges) {
+  return guarded(edges, __func__, [&] {
+    require_argument(edges, "edges");
+    edges->edges->cancel();
+    return MAQ_OK;
+  });
+}
+
+void maq_edges_result_release(maq_edges_result* result) {
+  return_handle(result, "result", __func__, return_to_pool<maq_edges_result>);
+}
+
+maq_status maq_edges_result_get_field(const maq_edges_result* result, maq_edges_field* field) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    const EdgeField& from = result->result.field;
+    const Intrinsics& camera = from.intrinsics;
+    maq_edges_field filled{};
+    filled.width_px = from.width;
+    filled.height_px = from.height;
+    filled.eps_r = from.eps_r;
+    filled.intrinsics = {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, {}};
+    write_struct(field, "field", filled, sizeof(maq_edges_field));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_edges_result_get_plane(const maq_edges_result* result, maq_edges_plane plane, const void** values,
+                                      size_t* stride_bytes) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(values, "values");
+    require_argument(stride_bytes, "stride_bytes");
+    const int32_t which = number_in(plane);
+    require_range("plane", which, int32_t(MAQ_EDGES_PLANE_DISTANCE), int32_t(MAQ_EDGES_PLANE_DEPTH));
+    const EdgeField& field = result->result.field;
+    const void* const all[] = {field.distance_r.data(), field.spread_r.data(), field.kind.data(), field.depth_m.data()};
+    *values = all[which - MAQ_EDGES_PLANE_DISTANCE];
+    *stride_bytes = size_t(field.width) * (which == MAQ_EDGES_PLANE_KIND ? sizeof(uint8_t) : sizeof(float));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_edges_result_copy_distance_m(const maq_edges_result* result, float* distance_m, size_t count) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(distance_m, "distance_m");
+    const EdgeField& field = result->result.field;
+    if (count < field.distance_r.size()) {
+      throw ArgumentError("count is ", count, ", but the field has ", field.distance_r.size(), " pixels.");
+    }
+    const float per_px = float(1 / std::sqrt(field.intrinsics.fx_px * field.intrinsics.fy_px));
+    std::transform(field.distance_r.begin(), field.distance_r.end(), field.depth_m.begin(), distance_m,
+                   [per_px](float distance_r, float depth_m) { return distance_r * (depth_m * per_px); });
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_stats* stats) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    const EdgesStats& from = result->result.stats;
+    maq_edges_stats filled{};
+    filled.depth_ms = from.depth_ms;
+    filled.skip_ms = from.skip_ms;
+    filled.slopes_ms = from.slopes_ms;
+    filled.network_ms = from.network_ms;
+    filled.decode_ms = from.decode_ms;
+    filled.total_ms = from.total_ms;
+    filled.known_pixel_count = from.known_pixels;
+    filled.network_pixel_count = from.network_pixels;
+    filled.broken_pixel_count = from.broken_pixels;
+    filled.provider = from.provider;
+    write_struct(stats, "stats", filled, kFirstStatsSize);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_edges_result_save(const maq_edges_result* result, const char* folder, const char* stem) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(folder, "folder");
+    require_argument(stem, "stem");
+    if (*stem == '\0' || std::strchr(stem, '/') != nullptr) {
+      throw ArgumentError("stem is \"", stem, "\", but must be the beginning of a file name, without a folder.");
+    }
+    write_field_files(result->result.field, folder, stem);
+    return MAQ_OK;
+  });
+}

@@ -1,0 +1,414 @@
+#include "edges/curves/curve_stations.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "edges/curves/small_solve.h"
+
+namespace maq {
+namespace {
+
+constexpr double kStraightSpacing_px = 6, kCurvedSpacing_px = 3, kCurvedHalfWindow_px = 4;
+constexpr double kMinShift_px = 1;          // pixels nearer to the edge are rounded by what the field was made of
+constexpr double kFallen_px = 3;            // nearer to the edge the field's noise could be taken for another edge
+constexpr double kFarthestShift_px = 5;     // the field's value is best near the edge
+constexpr double kBelief_px = 2.5;          // values that want to move it farther are of another edge
+constexpr double kClearly_r = 3;            // by which the field is lower on the side that a boundary belongs to
+constexpr double kBestAcross_px = 0.08;     // no place in the picture is believed to be known better
+constexpr double kFarthestPlanes_px = 0.6;  // surfaces that meet farther from the field's edge bend, or are others
+
+Vec3 on_ray(const Intrinsics& camera, double x, double y, double inverse_depth) {
+  const double z = 1 / inverse_depth;
+  return {(x - camera.cx_px) / camera.fx_px * z, (y - camera.cy_px) / camera.fy_px * z, z};
+}
+
+// Calls visit(pixel index, x, y, offset across) for the pixels from `least` to `most` px beside a station.
+template <class Visit>
+void for_band(const EdgeField& field, const CurveStation& s, int side, double half_window, double least, double most,
+              Visit&& visit) {
+  const double nx = side == 0 ? s.ty : -s.ty, ny = side == 0 ? -s.tx : s.tx;
+  const double reach_x = std::abs(s.tx) * half_window, reach_y = std::abs(s.ty) * half_window;
+  const double x0 = s.x + std::min(nx * least, nx * most) - reach_x;
+  const double x1 = s.x + std::max(nx * least, nx * most) + reach_x;
+  const double y0 = s.y + std::min(ny * least, ny * most) - reach_y;
+  const double y1 = s.y + std::max(ny * least, ny * most) + reach_y;
+  const int top = std::max(0, int(std::ceil(y0))), bottom = std::min(field.height - 1, int(std::floor(y1)));
+  const int left = std::max(0, int(std::ceil(x0))), right = std::min(field.width - 1, int(std::floor(x1)));
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x) {
+      const double dx = x - s.x, dy = y - s.y, across = dx * nx + dy * ny;
+      if (across < least || across > most || std::abs(dx * s.tx + dy * s.ty) > half_window) continue;
+      visit(size_t(y) * size_t(field.width) + size_t(x), x, y, across);
+    }
+  }
+}
+
+}  // namespace
+
+// Evenly along the chain; of a straight one on the line through it.
+void CurveStations::place(const RidgePoint* points, const RidgeChain& chain) {
+  stations.clear();
+  const RidgePoint* p = points + chain.first;
+  const int n = chain.count;
+  double sx = 0, sy = 0;
+  for (int i = 0; i < n; ++i) sx += p[i].x, sy += p[i].y;
+  const double cx = sx / n, cy = sy / n;
+  double xx = 0, xy = 0, yy = 0;
+  for (int i = 0; i < n; ++i) {
+    const double dx = p[i].x - cx, dy = p[i].y - cy;
+    xx += dx * dx, xy += dx * dy, yy += dy * dy;
+  }
+  const double angle = 0.5 * std::atan2(2 * xy, xx - yy);
+  double tx = std::cos(angle), ty = std::sin(angle);
+  if ((p[n - 1].x - p[0].x) * tx + (p[n - 1].y - p[0].y) * ty < 0) tx = -tx, ty = -ty;
+  // Against the parabola over the chord: noise bends neither, a curve bends one.
+  double s2 = 0, s3 = 0, s4 = 0, sv2 = 0, svv = 0, sv1 = 0, from = INFINITY, to = -INFINITY;
+  for (int i = 0; i < n; ++i) {
+    const double dx = p[i].x - cx, dy = p[i].y - cy, u = dx * tx + dy * ty, v = dy * tx - dx * ty;
+    from = std::min(from, u), to = std::max(to, u);
+    s2 += u * u, s3 += u * u * u, s4 += u * u * u * u, sv1 += u * v, sv2 += u * u * v, svv += v * v;
+  }
+  double left = svv;
+  double m[9] = {double(n), 0, 0, 0, s2, 0, s2, s3, s4}, right[3] = {0, sv1, sv2};
+  if (solve_positive(m, 3, 3, right, 1)) left -= right[1] * sv1 + right[2] * sv2;
+  const double straight = std::sqrt(std::max(0.0, svv) / n), bent = std::sqrt(std::max(0.0, left) / n);
+  is_straight = !chain.is_closed && straight <= 0.08 + 1.4 * bent && straight < 1;
+  half_window_px_ = is_straight ? kStraightSpacing_px / 2 : kCurvedHalfWindow_px;
+  if (is_straight) {
+    const int count = std::max(2, int(std::lround((to - from) / kStraightSpacing_px)));
+    half_window_px_ = (to - from) / count / 2;
+    for (int i = 0; i < count; ++i) {
+      const double u = from + (to - from) * (i + 0.5) / count;
+      CurveStation station{};
+      station.x = cx + u * tx, station.y = cy + u * ty, station.tx = tx, station.ty = ty;
+      stations.push_back(station);
+    }
+    return;
+  }
+  double since = kCurvedSpacing_px;
+  const int reach = std::min(3, (n - 1) / 2);
+  for (int i = 0; i < n; ++i) {
+    if (i > 0) since += std::hypot(p[i].x - p[i - 1].x, p[i].y - p[i - 1].y);
+    if (since < kCurvedSpacing_px && i != n - 1) continue;
+    since = 0;
+    CurveStation station{};
+    double weight = 0, ux = 0, uy = 0;
+    for (int k = -reach; k <= reach; ++k) {
+      const int j = chain.is_closed ? (i + k + n) % n : std::clamp(i + k, 0, n - 1);
+      ux += p[j].tx, uy += p[j].ty;
+      if (std::abs(k) > std::min({reach, chain.is_closed ? n : i, chain.is_closed ? n : n - 1 - i})) continue;
+      station.x += p[j].x, station.y += p[j].y, weight += 1;
+    }
+    const double size = std::hypot(ux, uy);
+    if (!(size > 0)) continue;
+    station.x /= weight, station.y /= weight, station.tx = ux / size, station.ty = uy / size;
+    stations.push_back(station);
+  }
+}
+
+// The pixels beside a station in rows away from it, each as far as no other edge lies in its way: there the field,
+// which grows with the distance from this edge, would have fallen again.
+void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, int side, double half_window_px,
+                                double from_px, double to_px) {
+  const double nx = side == 0 ? s.ty : -s.ty, ny = side == 0 ? -s.tx : s.tx;
+  const int half = int(std::max(half_window_px, 3.0));
+  for (int u = -half; u <= half; ++u) {
+    for (int across = 1; across <= to_px; ++across) {
+      const int x = int(std::lround(s.x + u * s.tx + across * nx)), y = int(std::lround(s.y + u * s.ty + across * ny));
+      if (x < 0 || y < 0 || x >= field.width || y >= field.height) break;
+      const size_t at = size_t(y) * size_t(field.width) + size_t(x);
+      if (across >= kFallen_px && !(field.distance_r[at] >= 0.5 * across)) break;
+      const float depth = field.depth_m[at];
+      if (across < from_px || !(depth > 0 && std::isfinite(depth))) continue;
+      band_.push_back({double(x), double(y), 1.0 / double(depth), 1});
+    }
+  }
+}
+
+SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
+                                     int side, double half_window_px, bool may_bend) {
+  // Away from what smears; where the surface is too narrow for that, nearer.
+  for (const double smear : {double(options.smear_px), 0.5 * options.smear_px}) {
+    band_.clear();
+    gather_band(field, s, side, half_window_px, smear + 0.5, options.smear_px + options.support_px);
+    if (band_.size() >= 12) break;
+  }
+  return fitter_.fit(band_, s.x, s.y, focal_px(field.intrinsics), may_bend);
+}
+
+void CurveStations::fit_sides(const EdgeField& field, const CurveOptions& options) {
+  sums_.assign(2 * stations.size(), PlaneSums());
+  // A short edge is one window: patches of a few pixels each would not agree on its slope along the ray.
+  const bool is_one = is_straight && stations.size() <= 3;
+  const double half_window = half_window_px_ * (is_one ? double(stations.size()) : 1.0);
+  const size_t middle = stations.size() / 2;
+  for (int side = 0; side < 2; ++side) {
+    const auto at = size_t(side);
+    // A surface that does not bend beside the middle of a straight edge is not asked again: that takes most of the
+    // time.
+    bool may_bend = true;
+    if (is_straight) may_bend = fit_side(field, options, stations[middle], side, half_window, true).terms == 6;
+    for (size_t k = is_one ? middle : 0; k < (is_one ? middle + 1 : stations.size()); ++k) {
+      CurveStation& s = stations[k];
+      s.side[at] = fit_side(field, options, s, side, half_window, may_bend);
+      if (s.side[at].terms == 0 || !is_straight) continue;
+      PlaneSums& sums = sums_[2 * k + at];
+      sums.begin(stations[0].x, stations[0].y, s.side[at].coefficient[0]);
+      for (const BandPixel& pixel : band_) sums.add(pixel);
+    }
+    for (size_t k = 0; is_one && k < stations.size(); ++k) {
+      stations[k].side[at] = stations[middle].side[at];
+      sums_[2 * k + at] = sums_[2 * middle + at];
+    }
+  }
+}
+
+// One plane for all of a straight chain where it is as near to the pixels as a patch at each station. Stations at its
+// ends may have seen other surfaces: those far worse than most are left out.
+void CurveStations::fit_whole_sides(const EdgeField& field) {
+  whole_side = {};
+  for (size_t side = 0; side < 2 && is_straight; ++side) {
+    residuals_.clear();
+    for (const CurveStation& s : stations) {
+      if (s.side[side].terms != 0) residuals_.push_back(s.side[side].rms_r);
+    }
+    if (residuals_.size() < (stations.size() + 1) / 2) continue;
+    const auto middle = residuals_.begin() + std::ptrdiff_t(residuals_.size() / 2);
+    std::nth_element(residuals_.begin(), middle, residuals_.end());
+    const double usual = 0.05 + 1.3 * *middle;
+    PlaneSums sums;
+    for (size_t k = 0; k < stations.size(); ++k) {
+      const SurfacePatch& patch = stations[k].side[side];
+      if (patch.terms != 0 && patch.rms_r <= 1.5 * usual) sums.add(sums_[2 * k + side]);
+    }
+    const CurveStation& centre = stations[stations.size() / 2];
+    const SurfacePatch whole = sums.solve(focal_px(field.intrinsics), centre.x, centre.y);
+    if (whole.terms == 0 || whole.rms_r > usual) continue;
+    whole_side[side] = whole;
+    for (CurveStation& s : stations) {
+      s.side[side] = whole;
+      s.side[side].edge_sigma_r = sums.solve(focal_px(field.intrinsics), s.x, s.y).edge_sigma_r;
+    }
+  }
+}
+
+// A crease where both surfaces reach the edge at one depth and the field does not say boundary; else the boundary of
+// the nearer one.
+void CurveStations::choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed) {
+  const auto n = int(stations.size());
+  votes_.assign(stations.size(), 0);  // for a boundary
+  for (int k = 0; k < n; ++k) {
+    for (int side = 0; side < 2; ++side) {
+      for_band(field, stations[size_t(k)], side, half_window_px_, 0, 2.5, [&](size_t at, int, int, double) {
+        votes_[size_t(k)] += (field.kind[at] == kBoundaryEdge) - (field.kind[at] == kCreaseEdge);
+      });
+      double sum = 0, count = 0;
+      for_band(field, stations[size_t(k)], side, half_window_px_, 0.5, 2, [&](size_t at, int, int, double) {
+        if (std::isfinite(field.distance_r[at])) sum += field.distance_r[at], count += 1;
+      });
+      const double mean = count > 0 ? sum / count : double(field.eps_r);
+      if (side == 0) {
+        stations[size_t(k)].field_gap_r = -mean;
+      } else {
+        stations[size_t(k)].field_gap_r += mean;
+      }
+    }
+  }
+  for (int k = 0; k < n; ++k) {
+    CurveStation& s = stations[size_t(k)];
+    int votes = 0;
+    for (int j = std::max(0, k - 1); j <= std::min(n - 1, k + 1); ++j) votes += votes_[size_t(j)];
+    s.is_boundary = votes > 0;
+    s.near_side = s.side[0].terms != 0 ? 0 : 1;
+    s.gap_r = 0;
+    if (s.side[0].terms == 0 || s.side[1].terms == 0) continue;
+    const double q0 = s.side[0].inverse_depth(s.x, s.y), q1 = s.side[1].inverse_depth(s.x, s.y);
+    s.gap_r = focal_px(field.intrinsics) * (q0 - q1) / std::max(q0, q1);
+    s.near_side = s.gap_r > 0 ? 0 : 1;
+    // An edge that is a pixel off makes a gap as well, where surfaces are steep.
+    const auto a = s.side[0].slope(s.x, s.y), b = s.side[1].slope(s.x, s.y);
+    const double slack = focal_px(field.intrinsics) * std::hypot(a[0] - b[0], a[1] - b[1]) / std::max(q0, q1);
+    const double sigma = std::hypot(s.side[0].edge_sigma_r, s.side[1].edge_sigma_r);
+    if (std::abs(s.gap_r) > options.gap_r + slack + 3 * sigma) s.is_boundary = true;
+  }
+  find_runs(is_closed);
+  // A run belongs to one side: where the field falls to 0 on one alone, to that; else to the nearer one of most of its
+  // stations.
+  for (const StationRun& run : runs) {
+    int first_side = 0;
+    double field_gap = 0;
+    for (int k = run.first; k < run.first + run.count; ++k) {
+      const CurveStation& s = stations[size_t(k)];
+      field_gap += s.field_gap_r / run.count;
+      if (s.side[0].terms != 0 && s.side[1].terms != 0) first_side += s.gap_r > 0 ? 1 : -1;
+    }
+    if (std::abs(field_gap) > kClearly_r) first_side = field_gap > 0 ? 1 : -1;
+    for (int k = run.first; k < run.first + run.count; ++k) {
+      CurveStation& s = stations[size_t(k)];
+      s.is_boundary = run.kind == kBoundaryEdge;
+      if (s.side[0].terms != 0 && s.side[1].terms != 0) s.near_side = first_side > 0 ? 0 : 1;
+    }
+  }
+}
+
+// A few stations among others of the other kind are taken for theirs. A closed chain begins where a run does.
+void CurveStations::find_runs(bool is_closed) {
+  const int least = is_straight ? 3 : 4;
+  const auto n = int(stations.size());
+  if (is_closed) {
+    int turn = 0;
+    for (int k = 1; k < n && turn == 0; ++k) {
+      bool is_new = stations[size_t(k)].is_boundary != stations[size_t(k) - 1].is_boundary;
+      for (int j = k + 1; j < k + least; ++j) {
+        is_new = is_new && stations[size_t(j % n)].is_boundary == stations[size_t(k)].is_boundary;
+      }
+      if (is_new) turn = k;
+    }
+    std::rotate(stations.begin(), stations.begin() + turn, stations.end());
+  }
+  runs.clear();
+  for (int k = 0; k < n; ++k) {
+    const EdgeKind kind = stations[size_t(k)].is_boundary ? kBoundaryEdge : kCreaseEdge;
+    if (runs.empty() || runs.back().kind != kind) runs.push_back({k, 0, kind});
+    ++runs.back().count;
+  }
+  while (runs.size() > 1) {
+    const auto shortest = std::min_element(runs.begin(), runs.end(),
+                                           [](const StationRun& a, const StationRun& b) { return a.count < b.count; });
+    if (shortest->count >= least) break;
+    shortest->kind = shortest->kind == kCreaseEdge ? kBoundaryEdge : kCreaseEdge;
+    size_t kept = 0;
+    for (size_t i = 1; i < runs.size(); ++i) {
+      if (runs[i].kind == runs[kept].kind) {
+        runs[kept].count += runs[i].count;
+      } else {
+        runs[++kept] = runs[i];
+      }
+    }
+    runs.resize(kept + 1);
+  }
+}
+
+// One step of Gauss-Newton at each station: the edge moves across so that the distances of the pixels beside it, each
+// on its surface, become those of the field.
+void CurveStations::move_across(const EdgeField& field) {
+  const Intrinsics& camera = field.intrinsics;
+  const double max_r = 0.9 * double(field.eps_r), focal = focal_px(camera);
+  shifts_.assign(stations.size(), 0);
+  for (size_t k = 0; k < stations.size(); ++k) {
+    CurveStation& s = stations[k];
+    double weight = 0, shift = 0;
+    for (int side = 0; side < 2; ++side) {
+      const SurfacePatch& patch = s.side[size_t(side)];
+      if (patch.terms == 0 || (s.is_boundary && side != s.near_side)) continue;
+      const double q = patch.inverse_depth(s.x, s.y), qa = patch.inverse_depth(s.x + s.tx, s.y + s.ty);
+      if (!(q > 0 && qa > 0)) continue;
+      const Vec3 edge = on_ray(camera, s.x, s.y, q);
+      const Vec3 along = normalized(on_ray(camera, s.x + s.tx, s.y + s.ty, qa) - edge);
+      for_band(field, s, side, half_window_px_, kMinShift_px, kFarthestShift_px,
+               [&](size_t at, int x, int y, double across) {
+                 const double q_here = patch.inverse_depth(x, y), value = field.distance_r[at];
+                 if (!(q_here > 0.2 * q && q_here < 5 * q && value >= 0)) return;
+                 const Vec3 to = on_ray(camera, x, y, q_here) - edge;
+                 const double predicted = length(cross(to, along)) * q_here * focal;
+                 const double slope = predicted / across, off = (predicted - value) / (kBelief_px * slope);
+                 if (predicted > max_r || !(std::abs(off) < 1)) return;
+                 const double spread = field.spread_r[at], robust = (1 - off * off) * (1 - off * off);
+                 const double w = robust * slope * slope / (1 + spread * spread);
+                 if (!(w > 0)) return;
+                 weight += w;
+                 shift += w * (side == 0 ? 1 : -1) * (predicted - value) / slope;
+               });
+    }
+    shifts_[k] = weight > 0 ? shift / weight : 0;
+    s.across_weight = weight;
+  }
+  for (size_t k = 0; k < stations.size(); ++k) {
+    CurveStation& s = stations[k];
+    const double shift = std::clamp(shifts_[k], -1.5, 1.5);
+    s.x += shift * s.ty;
+    s.y -= shift * s.tx;
+  }
+}
+
+// Back onto one line of least squares through the moved stations.
+void CurveStations::straighten() {
+  double w = 0, sx = 0, sy = 0;
+  for (const CurveStation& s : stations) {
+    w += s.across_weight, sx += s.across_weight * s.x, sy += s.across_weight * s.y;
+  }
+  if (!(w > 0)) return;
+  const double cx = sx / w, cy = sy / w;
+  double xx = 0, xy = 0, yy = 0;
+  for (const CurveStation& s : stations) {
+    const double dx = s.x - cx, dy = s.y - cy;
+    xx += s.across_weight * dx * dx, xy += s.across_weight * dx * dy, yy += s.across_weight * dy * dy;
+  }
+  const double angle = 0.5 * std::atan2(2 * xy, xx - yy);
+  double tx = std::cos(angle), ty = std::sin(angle);
+  if (tx * stations[0].tx + ty * stations[0].ty < 0) tx = -tx, ty = -ty;
+  if (tx * stations[0].tx + ty * stations[0].ty < 0.7) return;  // fewer than two stations say where it is
+  for (CurveStation& s : stations) {
+    const double u = (s.x - cx) * tx + (s.y - cy) * ty;
+    s.x = cx + u * tx, s.y = cy + u * ty, s.tx = tx, s.ty = ty;
+  }
+}
+
+// The point that is nearest to all three: the place across from the field, and the depth of either surface, each with
+// its variance. Surfaces that meet at a large angle say where the edge is better than the field does; at a small one
+// they say nothing about it, and the field has it.
+bool CurveStations::find_points(const EdgeField& field) {
+  const Intrinsics& camera = field.intrinsics;
+  const double focal = focal_px(camera);
+  int known = 0;
+  for (CurveStation& s : stations) {
+    s.is_known = false;
+    const double most = 1 / (kBestAcross_px * kBestAcross_px);
+    const double field_weight = s.across_weight > 0 ? std::min(s.across_weight, most) : 1;
+    double a00 = field_weight, a01 = 0, a11 = 0, b0 = 0, b1 = 0;
+    double unit = 0, sigma_r = 0;
+    for (size_t side = 0; side < 2; ++side) {
+      const SurfacePatch& patch = s.side[side];
+      if (patch.terms == 0 || (s.is_boundary && int(side) != s.near_side)) continue;
+      const double q = patch.inverse_depth(s.x, s.y);
+      if (!(q > 0)) continue;
+      if (unit == 0) unit = q;
+      // Unknowns: px across to the left, inverse depth / unit - 1. Depth known within sigma r is unit sigma / focal.
+      const double sigma = patch.edge_sigma_r / focal, w = 1 / (sigma * sigma);
+      const auto slope = patch.slope(s.x, s.y);
+      const double g = (slope[0] * s.ty - slope[1] * s.tx) / unit, value = q / unit - 1;
+      a00 += w * g * g, a01 -= w * g, a11 += w, b0 -= w * g * value, b1 += w * value;
+      sigma_r = std::max(sigma_r, patch.edge_sigma_r);
+    }
+    if (unit == 0) continue;
+    const double determinant = a00 * a11 - a01 * a01;
+    if (!(determinant > 0)) continue;
+    double shift = (a11 * b0 - a01 * b1) / determinant;
+    const double ratio = shift / (kFarthestPlanes_px + 2 / std::sqrt(field_weight));
+    shift /= 1 + ratio * ratio * ratio * ratio;
+    const double relative = (b1 - a01 * shift) / a11;
+    if (!(relative > -0.9 && relative < 10)) continue;
+    const double x = s.x + shift * s.ty, y = s.y - shift * s.tx;
+    s.point = on_ray(camera, x, y, unit * (1 + relative));
+    s.sigma_r = std::max(sigma_r, std::sqrt(a11 / determinant));
+    s.is_known = is_finite(s.point);
+    known += s.is_known;
+  }
+  return known >= 2;
+}
+
+bool CurveStations::measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain,
+                            const CurveOptions& options) {
+  place(points, chain);
+  if (stations.size() < 2) return false;
+  fit_sides(field, options);
+  fit_whole_sides(field);
+  choose_kinds(field, options, chain.is_closed);
+  for (int round = 0; round < 2; ++round) {
+    move_across(field);
+    if (is_straight) straighten();
+  }
+  return find_points(field);
+}
+
+}  // namespace maq

@@ -1,0 +1,66 @@
+// Places along one chain at which an edge is measured: where it is across, from the field; how far away, from the
+// surfaces on either side.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "edges/curves/edge_curves.h"
+#include "edges/curves/ridge_chains.h"
+#include "edges/curves/surface_patch.h"
+
+namespace maq {
+
+struct CurveStation {
+  double x, y, tx, ty;   // px: the edge, and its direction in the picture; to its left is (ty, -tx), side 0
+  double across_weight;  // one over the variance of its place across the edge, 1/px^2
+  std::array<SurfacePatch, 2> side;
+  bool is_boundary;
+  int near_side;       // the side that a boundary belongs to
+  double gap_r;        // of side 1 behind side 0 along the ray
+  double field_gap_r;  // of the field, from side 0 to side 1
+  bool is_known;       // it has a point
+  Vec3 point;
+  double sigma_r;  // of the point, the worst of its directions
+};
+
+// Stations that follow one another and are of one kind.
+struct StationRun {
+  int first, count;
+  EdgeKind kind;
+};
+
+class CurveStations {
+ public:
+  std::vector<CurveStation> stations;
+  std::vector<StationRun> runs;  // of all stations in turn
+  bool is_straight = false;      // in the picture
+  // Of a straight chain whose sides are planes all along.
+  std::array<SurfacePatch, 2> whole_side;
+
+  // False where no surface is known beside the chain.
+  bool measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain, const CurveOptions& options);
+
+ private:
+  void place(const RidgePoint* points, const RidgeChain& chain);
+  void gather_band(const EdgeField& field, const CurveStation& s, int side, double half_window_px, double from_px,
+                   double to_px);
+  SurfacePatch fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s, int side,
+                        double half_window_px, bool may_bend);
+  void fit_sides(const EdgeField& field, const CurveOptions& options);
+  void fit_whole_sides(const EdgeField& field);
+  void choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed);
+  void find_runs(bool is_closed);
+  void move_across(const EdgeField& field);
+  void straighten();
+  bool find_points(const EdgeField& field);
+
+  double half_window_px_ = 0;
+  PatchFitter fitter_;
+  std::vector<BandPixel> band_;
+  std::vector<PlaneSums> sums_;  // of each station's sides
+  std::vector<double> shifts_, residuals_;
+  std::vector<int> votes_;
+};
+
+}  // namespace maq

@@ -1,0 +1,61 @@
+// The surface beside an edge: inverse depth as a polynomial of the pixel, fitted beyond where depth smears.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "edges/curves/edge_curves.h"
+
+namespace maq {
+
+// The inverse depth of a plane is linear in the pixel, whatever its tilt; a patch that bends has squares as well.
+struct SurfacePatch {
+  int terms = 0;                        // 0: no surface is known, 3: a plane, 6: with squares
+  double x = 0, y = 0;                  // px: the place around which it was fitted
+  std::array<double, 6> coefficient{};  // of 1, u, v, uu, uv, vv with u, v = (pixel - place) / kPatchScale_px; 1/m
+  double rms_r = 0;                     // of the pixels' depth from it, along the ray
+  double edge_sigma_r = 0;              // of its depth at (x, y), along the ray
+
+  double inverse_depth(double at_x, double at_y) const;
+  // The change of inverse depth by one pixel in x and in y.
+  std::array<double, 2> slope(double at_x, double at_y) const;
+};
+
+inline constexpr double kPatchScale_px = 8;
+
+// A pixel beside an edge.
+struct BandPixel {
+  double x, y, inverse_depth;
+  double weight;
+};
+
+// Sums of a plane's normal equations, so that those of several bands can be added.
+struct PlaneSums {
+  double x = 0, y = 0, unit = 0;  // px: their place; 1/m: an inverse depth about that of the pixels
+  std::array<double, 6> a{};      // 1, u, v, uu, uv, vv
+  std::array<double, 3> b{};
+  double squares = 0, weight = 0;
+
+  void begin(double at_x, double at_y, double inverse_depth);
+  void add(const BandPixel& pixel);
+  void add(const PlaneSums& other);  // of the same place
+  // terms = 0 where they do not determine a plane. `edge`: the place for edge_sigma_r.
+  SurfacePatch solve(double focal_px, double edge_x, double edge_y) const;
+};
+
+class PatchFitter {
+ public:
+  // A plane, or where `may_bend` a patch with squares if that is much nearer to the pixels, with a robust weight: some
+  // of them may be of another surface. On return pixels have those weights.
+  SurfacePatch fit(std::vector<BandPixel>& pixels, double x, double y, double focal_px, bool may_bend);
+
+ private:
+  double scale_of_residuals(const std::vector<BandPixel>& pixels, const SurfacePatch& patch, double focal_px);
+
+  std::vector<double> residuals_;
+};
+
+// The plane of a patch of three terms, in camera coordinates.
+Plane plane_of(const SurfacePatch& patch, const Intrinsics& camera);
+
+}  // namespace maq

@@ -1,0 +1,82 @@
+#include "edges/depth_slopes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/rounding.h"
+#include "core/simd_clones.h"
+
+namespace maq {
+namespace {
+
+constexpr int kSlopeRowsOfTask = 16;  // folded
+constexpr size_t kDepthRows = 3, kPlaneRows = 6;
+
+inline float is_known(float depth) { return depth > 0 ? 1.0f : 0.0f; }
+
+// g / (1 + |g|) of g = f (z - z') / z', z' the depth of the neighbour, with one division. The difference of two close
+// depths is exact, which that of their inverses is not. Limited, so that no product overflows. A factor instead of a
+// branch, which would keep compilers from making vectors.
+inline float squashed_slope(float here, float there, float focal_px) {
+  constexpr float kLimit = 1e30f;
+  const float both_known = is_known(here) * is_known(there);
+  const float rise = std::min(std::max(focal_px * (here - there), -kLimit), kLimit);
+  return both_known * rise / (there + std::abs(rise) + (1 - both_known));
+}
+
+// Of `count` pixels; `here` has one more.
+MAQ_SIMD_CLONES void planes_of_row(const float* __restrict here, const float* __restrict below, size_t count,
+                                   float fx_px, float fy_px, float* __restrict across, float* __restrict down,
+                                   float* __restrict known) {
+  for (size_t x = 0; x < count; ++x) {
+    across[x] = squashed_slope(here[x], here[x + 1], fx_px);
+    down[x] = squashed_slope(here[x], below[x], fy_px);
+    known[x] = is_known(here[x]);
+  }
+}
+
+// The part of row `y` that the window and one more pixel to the right see, unknown where there is no pixel.
+void copy_row(const DepthPlane& depth, const FieldWindow& window, int y, float* row) {
+  const int wanted = window.width_px + 1;
+  const int inside = y < depth.height_px ? std::clamp(depth.width_px - window.left_px, 0, wanted) : 0;
+  if (inside > 0) {
+    std::copy_n(depth.metres + size_t(y) * size_t(depth.width_px) + size_t(window.left_px), inside, row);
+  }
+  std::fill(row + inside, row + wanted, 0.0f);
+}
+
+}  // namespace
+
+const float* DepthSlopes::make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window,
+                               WorkerThreads& threads) {
+  const size_t width = size_t(window.width_px), cells = width / kFold;
+  const int rows = window.height_px / kFold;
+  values_.resize(size_t(rows) * cells * kChannels);
+  const size_t scratch = kDepthRows * (width + 1) + kPlaneRows * width;
+  rows_.resize(scratch * size_t(threads.count()));
+  const float fx = float(intrinsics.fx_px), fy = float(intrinsics.fy_px);
+  threads.run(size_t(divide_up(rows, kSlopeRowsOfTask)), [&](size_t task, int worker) {
+    float* depths[kDepthRows];
+    for (size_t i = 0; i < kDepthRows; ++i) depths[i] = rows_.data() + scratch * size_t(worker) + i * (width + 1);
+    float* const planes = depths[2] + width + 1;  // plane 0 of both rows, plane 1 of both, plane 2
+    const int first = int(task) * kSlopeRowsOfTask, last = std::min(rows, first + kSlopeRowsOfTask);
+    copy_row(depth, window, window.top_px + kFold * first, depths[0]);
+    for (int row = first; row < last; ++row) {
+      for (int y = 0; y < kFold; ++y) {
+        copy_row(depth, window, window.top_px + kFold * row + y + 1, depths[y + 1]);
+        planes_of_row(depths[y], depths[y + 1], width, fx, fy, planes + size_t(y) * width,
+                      planes + size_t(2 + y) * width, planes + size_t(4 + y) * width);
+      }
+      float* cell = values_.data() + size_t(row) * cells * kChannels;
+      for (size_t x = 0; x < width; x += kFold, cell += kChannels) {
+        for (size_t i = 0; i < kPlaneRows; ++i)
+          std::memcpy(cell + kFold * i, planes + i * width + x, 2 * sizeof(float));
+      }
+      std::swap(depths[0], depths[2]);
+    }
+  });
+  return values_.data();
+}
+
+}  // namespace maq

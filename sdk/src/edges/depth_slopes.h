@@ -1,0 +1,42 @@
+// What the edge network reads of a depth frame: slopes of inverse depth, and what is known
+// (export/edges/depth_input.py).
+//
+// A plane's inverse depth is linear in pixels, so a crease is a step of the slope whichever way the plane leans.
+#pragma once
+
+#include <vector>
+
+#include "core/worker_threads.h"
+#include "image/geometry/intrinsics.h"
+
+namespace maq {
+
+// Rows without padding, in metres; 0 where unknown, no NaN, infinity or negative number.
+struct DepthPlane {
+  const float* metres = nullptr;
+  int width_px = 0, height_px = 0;
+};
+
+// A part of a frame, which may reach beyond its right and lower border: nothing is known there.
+struct FieldWindow {
+  int left_px = 0, top_px = 0, width_px = 0, height_px = 0;
+};
+
+class DepthSlopes {
+ public:
+  static constexpr int kFold = 2;       // each way: pixels that become channels
+  static constexpr int kChannels = 12;  // 3 planes of 2 x 2 pixels
+
+  // The network's input for a window of even sides, [height / 2][width / 2][kChannels]: channel 4 c + 2 y + x is pixel
+  // (x, y) of 2 x 2 in plane c. Planes 0 and 1: g / (1 + |g|) of the slope g = f z d(1/z) towards the next pixel in x
+  // and in y, in metres of depth a metre sideways, 0 where either pixel is unknown or outside of the frame. Plane 2: 1
+  // where depth is known. Stays until the next call; takes no memory for a window no larger than those before.
+  const float* make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window,
+                    WorkerThreads& threads);
+
+ private:
+  std::vector<float> values_;
+  std::vector<float> rows_;  // scratch of each worker
+};
+
+}  // namespace maq

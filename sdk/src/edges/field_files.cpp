@@ -1,0 +1,60 @@
+#include "edges/field_files.h"
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "core/memory.h"
+#include "image/files/file_codecs.h"
+#include "image/files/image_file.h"
+
+namespace maq {
+namespace {
+
+constexpr double kUnit_r = 0.001;  // of a stored 1
+constexpr size_t kMaxFieldJsonBytes = 4 << 10;
+
+std::string json_of(const EdgeField& field) {
+  // Where a few bytes fail, the JSON library ends the process.
+  require_memory(kMaxFieldJsonBytes);
+  const Intrinsics& camera = field.intrinsics;
+  nlohmann::ordered_json document;
+  document["width"] = field.width;
+  document["height"] = field.height;
+  document["distance_unit_r"] = kUnit_r;
+  document["eps_r"] = double(field.eps_r);
+  document["intrinsics"] = {
+      {"fx_px", camera.fx_px}, {"fy_px", camera.fy_px}, {"cx_px", camera.cx_px}, {"cy_px", camera.cy_px}};
+  return document.dump(2) + "\n";
+}
+
+std::vector<uint8_t> distance_png(const EdgeField& field) {
+  std::vector<uint16_t> units(field.distance_r.size());
+  for (size_t i = 0; i < units.size(); ++i) units[i] = uint16_t(std::lround(double(field.distance_r[i]) / kUnit_r));
+  const auto* const bytes = reinterpret_cast<const uint8_t*>(units.data());
+  std::vector<uint8_t> png;
+  if (!file_codecs().encode_depth(".png", packed_view(MAQ_PIXEL_DEPTH16, field.width, field.height, bytes), png)) {
+    throw Error(MAQ_ERROR_INTERNAL, "The distances could not be encoded as PNG.");
+  }
+  return png;
+}
+
+}  // namespace
+
+void write_field_files(const EdgeField& field, const std::string& folder, const std::string& stem) {
+  const auto path_of = [&](const char* suffix) { return (std::filesystem::path(folder) / (stem + suffix)).string(); };
+  AtomicFile distance_file(path_of("_distance.png")), kind_file(path_of("_kind.png")),
+      json_file(path_of("_edges.json"));
+  const std::vector<uint8_t> distance = distance_png(field);
+  const ImageView kinds = packed_view(MAQ_PIXEL_GREY8, field.width, field.height, field.kind.data());
+  const std::vector<uint8_t> kind = encode_image(kinds, ".png");
+  const std::string json = json_of(field);
+  distance_file.append(distance.data(), distance.size());
+  kind_file.append(kind.data(), kind.size());
+  json_file.append(json.data(), json.size());
+  for (AtomicFile* file : {&distance_file, &kind_file, &json_file}) file->commit();
+}
+
+}  // namespace maq

@@ -1,0 +1,17 @@
+// The JSON of curves (docs/formats.md): every parameter, so that nothing has to be fitted again.
+#pragma once
+
+#include <string>
+
+#include "edges/curves/edge_curves.h"
+
+namespace maq {
+
+std::string curves_as_json(const EdgeCurves& curves);
+
+// "crease" or "boundary"; "convex", "concave" or "unknown"; "line", "arc" or "spline".
+const char* name_of(EdgeKind kind);
+const char* name_of(Bend bend);
+const char* name_of(CurveType type);
+
+}  // namespace maq

@@ -1,0 +1,119 @@
+// `maquette edges` as a person meets it: files, overlays, sentences.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+#include <set>
+
+#include "support/program_run.h"
+
+namespace {
+
+class EdgesCommandLine : public ::testing::Test {
+ protected:
+  EdgesCommandLine() {
+    cv::Mat depth(30, 40, CV_16UC1, cv::Scalar(1500));
+    depth(cv::Rect(10, 8, 12, 10)) = 900;
+    depth(cv::Rect(0, 0, 5, 30)) = 0;
+    cv::imwrite(folder_.file("depth.png"), depth);
+    cv::imwrite(folder_.file("grey.png"), cv::Mat(30, 40, CV_8UC1, cv::Scalar(100)));
+  }
+
+  Outcome run(const std::string& arguments) const { return run_program(folder_, environment_, "edges " + arguments); }
+  // Exit code 1, and the last line on standard error is one sentence with `text`.
+  void expect_failure(const std::string& arguments, const std::string& text) const {
+    const Outcome result = run(arguments);
+    EXPECT_EQ(result.exit_code, 1) << arguments;
+    const size_t last = result.err.rfind("maquette: ");
+    ASSERT_NE(last, std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(text, last), std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find('\n', last), result.err.size() - 1) << result.err;
+  }
+  std::set<std::string> files(const std::string& folder) const {
+    std::set<std::string> names;
+    if (!std::filesystem::exists(folder_.file(folder))) return names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.file(folder))) {
+      names.insert(entry.path().filename().string());
+    }
+    return names;
+  }
+  cv::Mat image(const std::string& name) const { return cv::imread(folder_.file(name), cv::IMREAD_UNCHANGED); }
+
+  TempFolder folder_;
+  std::string environment_ = "MAQ_BUNDLE= MAQ_EDGES_BUNDLE='" MAQ_TEST_DATA "/tiny_edges/bundle'";
+};
+
+TEST_F(EdgesCommandLine, ADepthPictureGivesItsFieldAndAnOverlay) {
+  const Outcome result = run("'image:depth.png?depth_unit=0.001&fov=60' --out o/p --overlay");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out.rfind("depth  40 x 30  depth of 88 %", 0), 0u) << result.out;
+  EXPECT_EQ(files("o/p"),
+            (std::set<std::string>{"depth_distance.png", "depth_kind.png", "depth_edges.json", "depth_overlay.png"}));
+  const cv::Mat distance = image("o/p/depth_distance.png"), kind = image("o/p/depth_kind.png");
+  ASSERT_EQ(distance.type(), CV_16UC1);
+  ASSERT_EQ(kind.type(), CV_8UC1);
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 40; ++x) {
+      ASSERT_LE(distance.at<uint16_t>(y, x), 16000);
+      ASSERT_TRUE(x >= 5 || distance.at<uint16_t>(y, x) == 16000) << "nothing is known there";
+      ASSERT_EQ(kind.at<uint8_t>(y, x) == 0, distance.at<uint16_t>(y, x) == 16000) << x << " " << y;
+    }
+  }
+  const cv::Mat overlay = image("o/p/depth_overlay.png");
+  EXPECT_EQ(overlay.size(), cv::Size(160, 120)) << "small pictures are enlarged";
+  EXPECT_EQ(overlay.at<cv::Vec3b>(60, 8), cv::Vec3b(0, 0, 0)) << "unknown is black";
+  EXPECT_NE(overlay.at<cv::Vec3b>(60, 120), cv::Vec3b(0, 0, 0));
+  const auto document = nlohmann::json::parse(read_text(folder_.file("o/p/depth_edges.json")));
+  EXPECT_NEAR(document["intrinsics"]["fx_px"].get<double>(), 20 / std::tan(30 * 3.14159265358979 / 180), 1e-6);
+}
+
+TEST_F(EdgesCommandLine, AStubGivesFramesAndAClip) {
+  const Outcome result =
+      run("'stub:solids?scene=box&noise=stereo&size=160x120' --out o --overlay --max-frames 4 --every 2 --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream lines(result.out);
+  std::string line;
+  std::vector<nlohmann::json> frames;
+  while (std::getline(lines, line)) frames.push_back(nlohmann::json::parse(line));
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_EQ(frames[1]["frame"], "stub_solids_000002");
+  EXPECT_EQ(frames[1]["size"], (nlohmann::json{160, 120}));
+  EXPECT_GT(frames[1]["known_pixels"], 1000);
+  EXPECT_EQ(frames[1]["network_pixels"], 160 * 120);
+  EXPECT_EQ(frames[1]["broken_pixels"], 0);
+  EXPECT_GE(frames[1]["ms"]["total"], frames[1]["ms"]["network"]);
+  EXPECT_EQ(files("o").size(), 4u * 3 + 1);
+  EXPECT_TRUE(files("o").count("stub_solids_overlay.mp4") + files("o").count("stub_solids_overlay.avi") == 1);
+}
+
+TEST_F(EdgesCommandLine, WhatHasNoDepthNoCalibrationOrNoBundleIsASentence) {
+  expect_failure("grey.png --out o", "fov=60");
+  expect_failure("'image:depth.png?depth_unit=0.001' --out o", "image:depth.png?depth_unit=0.001&fov=60");
+  expect_failure("'image:grey.png?fov=60' --out o", "depth_unit");
+  expect_failure("'image:grey.png?fov=60&depth_unit=0.001' --out o", "grey.png");
+  expect_failure("missing.png --out o", "missing.png");
+  expect_failure("'image:depth.png?depth_unit=0.001&fov=60' --out o --bundle " MAQ_TEST_DATA "/tiny_bundle",
+                 "densepose");
+  EXPECT_EQ(files("o"), std::set<std::string>()) << "nothing is half written";
+  const Outcome wrong = run("'image:depth.png?depth_unit=0.001&fov=60'");
+  EXPECT_EQ(wrong.exit_code, 2) << "--out is required";
+}
+
+TEST_F(EdgesCommandLine, ABadSourceDoesNotCostTheRest) {
+  const Outcome result =
+      run("'image:grey.png?fov=60&depth_unit=0.001' 'image:depth.png?depth_unit=0.001&fov=60' --out o");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.err.find("grey.png"), std::string::npos);
+  EXPECT_EQ(files("o").count("depth_distance.png"), 1u);
+}
+
+TEST_F(EdgesCommandLine, HelpSaysWhatIsWrittenAndHowDepthIsGiven) {
+  const Outcome result = run("--help");
+  EXPECT_EQ(result.exit_code, 0);
+  for (const char* text : {"<stem>_distance.png", "depth_unit=0.001", "fov=60", "stub:solids"}) {
+    EXPECT_NE(result.out.find(text), std::string::npos) << text;
+  }
+}
+
+}  // namespace

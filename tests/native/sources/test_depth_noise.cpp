@@ -1,0 +1,110 @@
+// Noise of depth cameras, against the statistics that it is defined by.
+#include "sources/synthetic/depth_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace {
+
+size_t unknown(const std::vector<float>& metres) { return size_t(std::count(metres.begin(), metres.end(), 0.0f)); }
+
+class DepthNoise : public ::testing::Test {
+ protected:
+  static constexpr maq::SolidsPicture kSize{320, 240};
+
+  // Of a plane at that depth that fills the left part of the picture, and one at another depth.
+  static std::vector<float> two_planes(float left, float right, int border = 160) {
+    std::vector<float> metres(320 * 240);
+    for (size_t i = 0; i < metres.size(); ++i) metres[i] = int(i % 320) < border ? left : right;
+    return metres;
+  }
+  static std::vector<float> seen(const std::string& noise, std::vector<float> metres, uint64_t frame = 0) {
+    maq::DepthNoise(noise, 7).apply(kSize, frame, metres.data());
+    return metres;
+  }
+  template <class Value>
+  static std::pair<double, double> mean_and_deviation(const std::vector<float>& metres, Value value) {
+    double sum = 0, squares = 0;
+    for (const float depth : metres) {
+      sum += value(double(depth));
+      squares += value(double(depth)) * value(double(depth));
+    }
+    const double mean = sum / double(metres.size());
+    return {mean, std::sqrt(squares / double(metres.size()) - mean * mean)};
+  }
+};
+
+TEST_F(DepthNoise, OfStereoIsAnErrorOfDisparityInSteps) {
+  for (const float depth : {0.5f, 1.0f, 3.0f}) {
+    const std::vector<float> found = seen("stereo", two_planes(depth, depth));
+    const auto disparity = [](double metres) { return kSize.focal_px() * 0.05 / metres; };
+    const auto [mean, deviation] = mean_and_deviation(found, disparity);
+    EXPECT_NEAR(mean, disparity(double(depth)), 0.01);
+    EXPECT_NEAR(deviation, std::hypot(0.08, 0.0625 / std::sqrt(12)), 0.01) << depth;
+    for (const float metres : found) {
+      const double steps = disparity(double(metres)) * 16;
+      ASSERT_NEAR(steps, std::round(steps), 1e-3);
+    }
+  }
+}
+
+TEST_F(DepthNoise, OfStereoFattensTheForegroundAndHidesWhatOneCameraDoesNotSee) {
+  const double jump_px = kSize.focal_px() * 0.05 * (1 / 0.5 - 1 / 2.0);  // 22.5
+  // The other camera is to the right: what is hidden lies at the left of the foreground.
+  const std::vector<float> hidden = seen("stereo", two_planes(2, 0.5f));
+  const std::vector<float> seen_by_both = seen("stereo", two_planes(0.5f, 2));
+  EXPECT_NEAR(double(unknown(hidden)) / 240, jump_px, 1);
+  EXPECT_EQ(unknown(seen_by_both), 0u);
+  for (size_t y = 5; y < 235; ++y) {
+    EXPECT_NEAR(hidden[y * 320 + 158], 0.5, 0.02) << "two pixels of the background have the foreground's depth";
+    EXPECT_EQ(hidden[y * 320 + 157], 0);
+    EXPECT_NEAR(seen_by_both[y * 320 + 161], 0.5, 0.02);
+    EXPECT_NEAR(seen_by_both[y * 320 + 162], 2, 0.3);
+  }
+}
+
+TEST_F(DepthNoise, OfTimeOfFlightGrowsWithTheRangeAndEndsWithIt) {
+  for (const float depth : {0.5f, 2.0f, 5.0f}) {
+    const auto [mean, deviation] =
+        mean_and_deviation(seen("tof", two_planes(depth, depth)), [](double metres) { return metres; });
+    const double expected = 0.001 + 0.0005 * double(depth) * double(depth);
+    EXPECT_NEAR(mean, double(depth), expected * 0.05);
+    EXPECT_NEAR(deviation, expected, expected * 0.05);
+  }
+  EXPECT_EQ(unknown(seen("tof", two_planes(6.5f, 6.5f))), 320u * 240);
+}
+
+TEST_F(DepthNoise, OfTimeOfFlightMixesDepthsAtJumpsAndLosesSome) {
+  const std::vector<float> found = seen("tof", two_planes(1, 2));
+  int mixed = 0, holes = 0;
+  for (size_t i = 0; i < found.size(); ++i) {
+    const size_t x = i % 320;
+    const bool is_between = found[i] > 1.05f && found[i] < 1.95f;
+    if (x != 159 && x != 160) {
+      ASSERT_FALSE(is_between || found[i] == 0) << "away from the jump";
+    }
+    mixed += is_between ? 1 : 0;
+    holes += found[i] == 0 ? 1 : 0;
+  }
+  EXPECT_NEAR(mixed, 480 * 0.6 * 0.9, 40);
+  EXPECT_NEAR(holes, 480 * 0.15, 30);
+}
+
+TEST_F(DepthNoise, IsAnotherInEachFrameAndNeverMakesDepthOfNothing) {
+  for (const char* noise : {"stereo", "tof"}) {
+    const std::vector<float> plane = two_planes(1, 1);
+    EXPECT_EQ(seen(noise, plane, 5), seen(noise, plane, 5));
+    EXPECT_NE(seen(noise, plane, 5), seen(noise, plane, 6));
+    const std::vector<float> nothing = seen(noise, two_planes(0, 0));
+    EXPECT_EQ(unknown(nothing), nothing.size());
+    for (const float metres : seen(noise, two_planes(0, 1))) ASSERT_TRUE(std::isfinite(metres) && metres >= 0);
+  }
+  EXPECT_EQ(seen("none", two_planes(1, 2)), two_planes(1, 2));
+}
+
+}  // namespace

@@ -1,0 +1,98 @@
+"""The edge networks: shapes, sizes, losses and decodings, and the ONNX graph against torch."""
+
+import numpy as np
+import pytest
+import torch
+
+from export.bundle import read_manifest
+from export.edges.bundle import write_manifest
+from export.edges.config import EPS_R, SIZES, NetworkConfig
+from export.edges.export_onnx import BundleInfo, export
+from export.edges.graph_field import field_of_planes, slopes_of
+from export.edges.losses import FieldTarget, LossWeights, bin_centres, decoded, field_terms, histogram_target
+from export.edges.network import EdgeNetwork, PublishedNetwork
+from export.edges.validation import field_of
+
+pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
+TINY = NetworkConfig((8, 8, 8))
+
+
+def target(distance: torch.Tensor) -> FieldTarget:
+    return FieldTarget(distance, (distance < EPS_R).long(), torch.ones_like(distance, dtype=torch.bool))
+
+
+def test_the_published_network_has_the_published_number_of_parameters():
+    count = sum(p.numel() for p in PublishedNetwork().parameters())
+    assert count == pytest.approx(78.63e6, rel=0.02)
+
+
+def test_the_published_network_answers_at_full_resolution():
+    with torch.no_grad():
+        assert PublishedNetwork().eval()(torch.zeros(1, 1, 32, 16)).shape == (1, 244, 32, 16)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_network_answers_for_each_pixel(size):
+    config = SIZES[size]
+    network = EdgeNetwork(config).eval()
+    with torch.no_grad():
+        out = network(torch.zeros(1, 12, config.multiple, config.multiple // 2))
+    assert out.shape == (1, config.planes, 2 * config.multiple, config.multiple)
+
+
+@pytest.mark.parametrize(("loss", "bins"), [("l1", 0), ("l2", 0), ("histogram", 16)])
+def test_each_loss_is_smallest_at_the_truth(loss, bins):
+    distance = torch.tensor([[[0.25, 3.1, 9.0, 16.0]]])
+    right = torch.zeros(1, (bins or 2) + 2, 1, 4)
+    if bins:
+        right[:, :bins] = histogram_target(distance, bins).clamp_min(1e-9).log()
+    else:
+        right[:, 0] = distance / EPS_R
+    weights = LossWeights(spread=0, kind=0)
+    smallest = field_terms(right, target(distance), bins, loss, weights)["distance"]
+    for _ in range(5):
+        other = right + 0.3 * torch.randn_like(right)
+        assert field_terms(other, target(distance), bins, loss, weights)["distance"] > smallest
+
+
+def test_what_is_beyond_reach_may_be_called_farther():
+    distance = torch.full((1, 1, 2), EPS_R)
+    planes = torch.zeros(1, 4, 1, 2)
+    planes[:, 0] = torch.tensor([1.0, 1.7])
+    assert field_terms(planes, target(distance), 0, "l1", LossWeights())["distance"] == 0
+    planes[:, 0] = torch.tensor([1.0, 0.7])
+    assert field_terms(planes, target(distance), 0, "l1", LossWeights())["distance"] > 0
+
+
+def test_pixels_that_do_not_count_change_nothing():
+    distance = torch.rand(1, 4, 4) * EPS_R
+    kind, counts = torch.ones(1, 4, 4, dtype=torch.long), torch.rand(1, 4, 4) < 0.5
+    planes = torch.randn(1, 4, 4, 4)
+    first = field_terms(planes, FieldTarget(distance, kind, counts), 0, "l1", LossWeights())
+    other = torch.where(counts[:, None], planes, torch.randn_like(planes))
+    second = field_terms(other, FieldTarget(distance, kind, counts), 0, "l1", LossWeights())
+    assert {k: v.item() for k, v in first.items()} == pytest.approx({k: v.item() for k, v in second.items()})
+
+
+@pytest.mark.parametrize("decoding", ["expectation", "median", "mode"])
+def test_a_histogram_is_decoded_to_where_its_mass_lies(decoding):
+    bins, distance = 64, torch.tensor([[[4.0, 7.9, 12.3]]])
+    logits = histogram_target(distance, bins).clamp_min(1e-12).log()
+    found, spread = decoded(torch.cat([logits, torch.zeros(1, 2, 1, 3)], 1), bins, decoding)
+    assert (found - distance).abs().max() <= EPS_R / bins / 2 + 1e-4
+    assert (spread < 2 * EPS_R / bins).all()
+    assert bin_centres(bins, logits)[0] == EPS_R / bins / 2
+
+
+def test_the_graph_is_what_torch_computes(tmp_path):
+    network = EdgeNetwork(TINY).eval()
+    assert export(network, tmp_path, TINY.multiple) < 1e-4
+    write_manifest(tmp_path, BundleInfo("tiny", "fp32"), TINY.multiple)
+    manifest = read_manifest(tmp_path)
+    assert (manifest["task"], manifest["field"]) == ("edges", {"eps_r": EPS_R, "multiple_px": 8})
+    import onnxruntime
+
+    session = onnxruntime.InferenceSession(tmp_path / "field.onnx", providers=["CPUExecutionProvider"])
+    depth = 1 + np.random.default_rng(0).random((16, 24), np.float32)
+    field = field_of_planes(session.run(None, {"slopes": slopes_of(depth, 120.0)})[0])
+    assert np.abs(field - field_of(network, 0)(depth, 120.0)).max() < 1e-3

@@ -1,0 +1,107 @@
+"""Training of the edge network learns, resumes where it stopped, and its figures tell good fields from bad ones."""
+
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+from box_crops import write_crops
+
+from export.edges import train
+from export.edges.data import Batches, RecordError, read_frames
+from export.edges.metrics import cuts, frame_figures, summary
+from export.edges.validation import figures_of
+from export.edges.weights import load_network
+
+pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed", "signal_handlers")
+
+
+@pytest.fixture(scope="module")
+def crops(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("solids")
+    write_crops(folder / "train", 0, 12)
+    write_crops(folder / "val", 1, 3)
+    return folder
+
+
+def run(monkeypatch, crops, out, *options, stop_after=None) -> list[float]:
+    """Losses of the steps of one call of the training's main program."""
+    losses, terms_of = [], train.field_terms
+
+    def recorded(*given):
+        terms = terms_of(*given)
+        losses.append(sum(terms.values()).item())
+        if len(losses) == stop_after:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return terms
+
+    with monkeypatch.context() as patch:
+        patch.setattr(train, "field_terms", recorded)
+        given = ["train", "--data", str(crops), "--out", str(out), "--size", "xs", "--batch", "4", "--crop", "48"]
+        patch.setattr("sys.argv", [*given, "--threads", "1", *options])
+        train.main()
+    return losses
+
+
+def test_a_resumed_run_goes_on_exactly_as_one_that_never_stopped(monkeypatch, crops, tmp_path):
+    straight = run(monkeypatch, crops, tmp_path / "straight", "--steps", "4")
+    first = run(monkeypatch, crops, tmp_path / "stopped", "--steps", "4", stop_after=2)
+    second = run(monkeypatch, crops, tmp_path / "stopped", "--steps", "4")
+    assert len(first) == len(second) == 2
+    assert first + second == pytest.approx(straight, rel=1e-5)
+    assert run(monkeypatch, crops, tmp_path / "stopped", "--steps", "4") == []
+
+
+def test_it_learns_and_leaves_weights_curves_and_a_sample(monkeypatch, crops, tmp_path):
+    losses = run(monkeypatch, crops, tmp_path, "--steps", "120")
+    assert np.mean(losses[-5:]) < 0.7 * np.mean(losses[:5])
+    network, config = load_network(tmp_path / "weights.pt")
+    assert not network.training
+    assert config.bins == 0
+    assert {"log.json", "curves.png", "sample.png", "checkpoint.pt"} <= {path.name for path in tmp_path.iterdir()}
+    assert json.loads((tmp_path / "log.json").read_text())[-1]["rmse_r/clean"] > 0
+
+
+def test_a_run_of_another_size_is_not_overwritten(monkeypatch, crops, tmp_path):
+    run(monkeypatch, crops, tmp_path, "--steps", "1")
+    with pytest.raises(SystemExit, match="another --out"):
+        run(monkeypatch, crops, tmp_path, "--steps", "2", "--loss", "histogram")
+
+
+def test_a_batch_depends_on_the_seed_and_its_number_alone(crops):
+    first, second = (Batches(crops / "train", 48, 4, seed=3) for _ in range(2))
+    first.draw(0, "cpu")
+    depth, focal_px, target = first.draw(5, "cpu")
+    again = second.draw(5, "cpu")
+    assert depth.equal(again[0])
+    assert focal_px.equal(again[1])
+    assert target.distance.equal(again[2].distance)
+    assert not depth.equal(first.draw(6, "cpu")[0])
+
+
+@pytest.mark.parametrize(("crop", "batch", "wanted"), [(48, 40, "fewer than a batch"), (50, 4, "multiples of 16")])
+def test_crops_that_do_not_fit_are_refused(crops, crop, batch, wanted):
+    with pytest.raises(RecordError, match=wanted):
+        Batches(crops / "train", crop, batch, seed=0)
+
+
+def test_the_true_field_is_perfect_and_none_finds_nothing(crops):
+    frames = read_frames(crops / "val")
+    true = iter(frames)
+    perfect = figures_of(lambda depth, focal_px: next(true).distance, frames, "clean")
+    figures = summary(perfect, cuts(perfect))
+    assert figures["rmse_r"] == figures["q95_r"] == 0
+    assert figures["recall_1r"] == figures["recall_4r"] == 1
+    nothing = figures_of(lambda depth, focal_px: np.full(depth.shape, 16.0), frames, "clean")
+    assert summary(nothing, cuts(nothing))["recall_4r"] == 0
+
+
+def test_figures_count_only_pixels_with_a_label():
+    true = np.array([[0.5, 3.0], [16.0, 16.0]])
+    found = np.array([[0.5, 5.0], [16.0, 1.0]])
+    counts = np.array([[True, True], [True, False]])
+    figures = frame_figures(found, true, counts)
+    assert figures["rmse_r"] == pytest.approx(np.sqrt(4 / 3))
+    assert figures["found_4r"][64] == pytest.approx(0.5)  # cut at 4 r: of two sharp pixels one
+    assert figures["false_4r"][64] == 0

@@ -1,5 +1,5 @@
-// The time from the distance field of a frame to its curves, on one thread, with that of its first steps: the minimum of
-// many runs, for exact scenes with and without noise. One JSON object a line.
+// The time from the distance field of a frame to its curves, on one thread, with that of its first steps: the minimum
+// of many runs, for exact scenes with and without noise. One JSON object a line.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -40,10 +40,11 @@ void measure(const char* name, SolidScene scene, int width, int height, double n
   const double all_ms = milliseconds([&] { extractor.extract(seen.field); });
   const maq::EdgeCurves& found = extractor.extract(seen.field);
   const double boxes_ms = milliseconds([&] { box_finder.find(seen.field, found, boxes); });
-  std::printf("{\"scene\": \"%s\", \"width\": %d, \"height\": %d, \"noise_r\": %.1f, \"curves\": %zu, \"votes_ms\": %.3f, "
-              "\"chains_ms\": %.3f, \"curves_ms\": %.3f, \"boxes_ms\": %.3f, \"f_score\": %.4f}\n",
-              name, width, height, noise_r, found.curves.size(), votes_ms, chains_ms, all_ms, boxes_ms,
-              score(seen, found).f_score);
+  std::printf(
+      "{\"scene\": \"%s\", \"width\": %d, \"height\": %d, \"noise_r\": %.1f, \"curves\": %zu, \"votes_ms\": %.3f, "
+      "\"chains_ms\": %.3f, \"curves_ms\": %.3f, \"boxes_ms\": %.3f, \"f_score\": %.4f}\n",
+      name, width, height, noise_r, found.curves.size(), votes_ms, chains_ms, all_ms, boxes_ms,
+      score(seen, found).f_score);
 }
 
 }  // namespace

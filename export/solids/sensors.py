@@ -2,8 +2,7 @@
 
 A sensor takes exact depth (float [H, W], metres, 0 where nothing is) and the focal length in pixels and returns what
 the camera would report, float32, 0 where it reports nothing. Nothing else of the scene is asked for: slopes and
-silhouettes come from the depth itself. Sources of the figures stand beside them; `python -m export.solids.sensors`
-draws a sheet, and the noise of a wall against its distance.
+silhouettes come from the depth itself. Sources of the figures stand beside them.
 """
 
 from __future__ import annotations

@@ -18,15 +18,14 @@ def slopes(depth: Tensor, focal_px: Tensor) -> Tensor:
     depth a metre sideways (nearer: positive), 0 where either pixel is unknown and at the last column or row. Plane 2:
     1 where depth is known.
     """
-    known = depth > 0
-    inverse = torch.where(known, 1 / depth.clamp_min(1e-9), 0)
-    planes = []
+    known, planes = depth > 0, []
     for axis, focal in ((2, focal_px[:, 0]), (1, focal_px[:, 1])):
         n = depth.shape[axis] - 1
-        here, there = (t.narrow(axis, 0, n) for t in (inverse, known)), (t.narrow(axis, 1, n) for t in (inverse, known))
-        (inverse_here, known_here), (inverse_there, known_there) = here, there
-        g = (inverse_there - inverse_here) * depth.narrow(axis, 0, n) * focal[:, None, None]
-        g = torch.where(known_here & known_there, g / (1 + g.abs()), 0)
+        here, there = depth.narrow(axis, 0, n), depth.narrow(axis, 1, n)
+        both = (here > 0) & (there > 0)
+        # By the difference of depths: that of close inverses would lose the digits of long focal lengths.
+        g = focal[:, None, None] * (here - there) / torch.where(both, there, 1)
+        g = torch.where(both, g / (1 + g.abs()), 0)
         planes.append(F.pad(g, (0, 1) if axis == 2 else (0, 0, 0, 1)))
     return torch.stack([*planes, known.to(depth.dtype)], 1)
 

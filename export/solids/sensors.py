@@ -46,12 +46,6 @@ def _blobs(rng: np.random.Generator, shape: tuple[int, int], share: float, size_
     return field > np.quantile(field, 1 - min(share, 1.0))
 
 
-def in_steps(depth: np.ndarray, step_m: float = 0.001) -> np.ndarray:
-    """Depth in whole steps, as cameras send it; 16 bits end at 65,535."""
-    steps = np.rint(depth / step_m)
-    return np.where(steps <= 65535, steps * step_m, 0).astype(np.float32)
-
-
 @dataclass(frozen=True)
 class Plain:
     """The paper's noise: normal, along the ray, of so many footprints (arXiv 2011.15081: 1/8 to 4)."""
@@ -103,7 +97,7 @@ class Stereo:
         steep = 1 + 0.5 * np.minimum(lateral_slope(depth, focal_px), 6)
         disparity = disparity + self.sigma_px * noise * steep
         disparity = np.rint(disparity / self.step_px) * self.step_px
-        lost = hidden | _blobs(rng, depth.shape, self.holes, 3) | (disparity <= 0.5) | (disparity <= 0)
+        lost = hidden | _blobs(rng, depth.shape, self.holes, 3) | (disparity <= 0.5)
         return np.where(lost, 0, strength / np.where(lost, 1, disparity)).astype(np.float32)
 
 

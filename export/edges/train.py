@@ -25,7 +25,7 @@ from export.edges.depth_input import folded, slopes
 from export.edges.losses import LOSSES, LossWeights, field_terms
 from export.edges.network import EdgeNetwork
 from export.edges.validation import sheet, validate
-from export.edges.weights import save_network
+from export.edges.weights import save_network, start_from
 from export.training import (
     SAVE_EVERY_S,
     Ema,
@@ -53,6 +53,7 @@ class TrainingConfig:
 
     data: Path = Path(".data/solids")
     out: Path = Path(".data/runs/edges")
+    init: Path | None = None
     size: str = "s"
     loss: str = "l1"
     bins: int = 16
@@ -80,7 +81,10 @@ class Run:
     def __init__(self, config: TrainingConfig, device: torch.device) -> None:
         self.config, self.checkpoint = config, config.out / "checkpoint.pt"
         config.out.mkdir(parents=True, exist_ok=True)
-        self.network = EdgeNetwork(config.network).to(device, memory_format=torch.channels_last)
+        self.network = EdgeNetwork(config.network)
+        if config.init and not self.checkpoint.exists():
+            start_from(config.init, self.network)
+        self.network = self.network.to(device, memory_format=torch.channels_last)
         self.mean = Ema(self.network, EMA_DECAY)
         self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=config.lr, weight_decay=1e-4)
         self.step, self.spent_s, self.log = 0, 0.0, []
@@ -121,11 +125,11 @@ def train(config: TrainingConfig) -> None:
         torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    run = Run(config, device)
     try:
+        run = Run(config, device)
         batches = Batches(config.data / "train", config.crop, config.batch, config.seed, config.crops)
         frames = read_frames(config.data / "val", limit=VALIDATION_FRAMES)
-    except RecordError as error:
+    except (RecordError, FileNotFoundError, ValueError) as error:
         raise SystemExit(str(error)) from None
     schedule, stopped = Schedule(config.minutes, config.steps), StopSignal()
     if schedule.finished(run.step, run.spent_s):
@@ -181,6 +185,7 @@ def parsed() -> TrainingConfig:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=default.data, help="holds train and val of export.solids.dataset")
     parser.add_argument("--out", type=Path, default=default.out)
+    parser.add_argument("--init", type=Path, help="weights.pt of a network as wide or narrower, to start from")
     parser.add_argument("--size", choices=SIZES, default=default.size)
     parser.add_argument("--loss", choices=LOSSES, default=default.loss)
     parser.add_argument("--bins", type=int, default=default.bins, help="of the histogram loss")

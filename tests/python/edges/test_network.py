@@ -1,5 +1,7 @@
 """The edge networks: shapes, sizes, losses and decodings, and the ONNX graph against torch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -12,6 +14,7 @@ from export.edges.graph_field import field_of_planes, slopes_of
 from export.edges.losses import FieldTarget, LossWeights, bin_centres, decoded, field_terms, histogram_target
 from export.edges.network import EdgeNetwork, PublishedNetwork
 from export.edges.validation import field_of
+from export.edges.weights import save_network, start_from
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 TINY = NetworkConfig((8, 8, 8))
@@ -96,3 +99,25 @@ def test_the_graph_is_what_torch_computes(tmp_path):
     depth = 1 + np.random.default_rng(0).random((16, 24), np.float32)
     field = field_of_planes(session.run(None, {"slopes": slopes_of(depth, 120.0)})[0])
     assert np.abs(field - field_of(network, 0)(depth, 120.0)).max() < 1e-3
+
+
+def test_a_wider_network_starts_with_the_field_of_the_trained_one(tmp_path):
+    narrow = EdgeNetwork(SIZES["xs"])
+    for module in narrow.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            torch.nn.init.uniform_(module.weight, 0.5, 1.5)
+            module.running_mean.uniform_(-0.2, 0.2)
+    save_network(narrow, SIZES["xs"], tmp_path / "weights.pt")
+    wide = EdgeNetwork(SIZES["s"])
+    start_from(tmp_path / "weights.pt", wide)
+    planes = torch.rand(1, 12, 32, 32)
+    torch.testing.assert_close(wide.eval()(planes), narrow.eval()(planes), atol=1e-5, rtol=1e-5)
+    assert wide.stem[0][0].weight[16:].abs().min() > 0  # new channels can learn
+
+
+def test_a_start_from_another_network_is_refused(tmp_path):
+    save_network(EdgeNetwork(SIZES["s"]), SIZES["s"], tmp_path / "weights.pt")
+    with pytest.raises(ValueError, match="larger --size"):
+        start_from(tmp_path / "weights.pt", EdgeNetwork(SIZES["xs"]))
+    with pytest.raises(ValueError, match="other planes"):
+        start_from(tmp_path / "weights.pt", EdgeNetwork(replace(SIZES["s"], bins=16)))

@@ -26,10 +26,30 @@ from export.densepose.export_onnx import channels_first, channels_last, doubled
 from export.densepose.graphs import session
 from export.edges.bundle import TRAINING_DATA, write_manifest
 from export.edges.config import FOLD, INPUT_PLANES, SIZES
+from export.edges.losses import LOG_SPREAD
 from export.edges.network import EdgeNetwork
 from export.edges.weights import load_network
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the output's largest value
+
+
+# The ranges of planes that matter: beyond them decoding cuts off, or a kind is sure. The last convolution answers in
+# fractions of them, cut off at 0 and 1. In int8 all its channels have one scale: so a step of the distance is 1/16 r.
+# Without it logits set the scale, and a step was 1.2 r.
+PLANE_RANGES = ((0.0, 1.0), LOG_SPREAD, (-8.0, 8.0), (-8.0, 8.0))
+
+
+class PlaneRanges(nn.Module):
+    """Fractions of PLANE_RANGES, channels last -> planes. Stays float in int8 graphs."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        low, high = torch.tensor(PLANE_RANGES).repeat_interleave(FOLD**2, 0).T
+        self.register_buffer("low", low.contiguous())
+        self.register_buffer("size", (high - low).contiguous())
+
+    def forward(self, fractions: Tensor) -> Tensor:
+        return fractions * self.size + self.low
 
 
 class FieldGraph(nn.Module):
@@ -42,9 +62,14 @@ class FieldGraph(nn.Module):
             if isinstance(module, nn.Sequential) and len(module) == 3 and isinstance(module[1], nn.BatchNorm2d):
                 module[0], module[1] = fuse_conv_bn_eval(module[0], module[1]), nn.Identity()
         self.network.double = doubled
+        self.ranges = PlaneRanges()
+        head = self.network.head
+        head.weight.div_(self.ranges.size[:, None, None, None])
+        head.bias.sub_(self.ranges.low).div_(self.ranges.size)
 
     def forward(self, slopes: Tensor) -> Tensor:
-        return channels_last(self.network.features(channels_first(slopes)))
+        fractions = self.network.features(channels_first(slopes)).clamp(0, 1)
+        return self.ranges(channels_last(fractions))
 
 
 def export(network: EdgeNetwork, folder: Path, multiple: int) -> float:

@@ -1,6 +1,7 @@
 """The edge networks: shapes, sizes, losses and decodings, and the ONNX graph against torch."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -121,3 +122,14 @@ def test_a_start_from_another_network_is_refused(tmp_path):
         start_from(tmp_path / "weights.pt", EdgeNetwork(SIZES["xs"]))
     with pytest.raises(ValueError, match="other planes"):
         start_from(tmp_path / "weights.pt", EdgeNetwork(replace(SIZES["s"], bins=16)))
+
+
+def test_the_shipped_int8_graph_has_fine_steps_of_distance():
+    import onnxruntime
+
+    path = Path(__file__).parents[3] / "sdk/models/edges-int8/field.onnx"
+    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    depth = np.where(np.arange(128) < 60, 1.0, 1.2)[None].repeat(96, 0).astype(np.float32)
+    found = field_of_planes(session.run(None, {"slopes": slopes_of(depth, 120.0)})[0])
+    assert len(np.unique(found)) > 40
+    assert np.diff(np.unique(found)).min() < 0.1  # r

@@ -7,7 +7,7 @@ import numpy as np
 from export.camera import Camera
 from export.solids.curves import curves_json
 from export.solids.labels import Labeller, Labels
-from export.solids.recipe import FRAME_PX, generator, make
+from export.solids.recipe import FRAME_PX, Made, generator, make
 from export.solids.records import LIMIT_R, NO_PATCH, Record, packed
 from export.solids.views import Seen, View
 
@@ -16,6 +16,7 @@ VIEWS, CROPS_OF_VIEW = 3, 2
 CROPS_OF_SEED = VIEWS * CROPS_OF_VIEW
 WHOLE_VIEWS = {"train": 2, "val": 3, "test": 2}
 WHOLE_PX = (FRAME_PX, (640, 480))  # each whole view in both sizes
+MAGNIFIED = max(width / FRAME_PX[0] for width, _ in WHOLE_PX)
 _ANYWHERE = 0.2  # of the crops; the others lie about a curve
 _TRIES = 6
 _MIN_SEEN = 0.04  # of a crop's pixels
@@ -52,7 +53,11 @@ def crops_of(split: str, seed: int, again: int = 0) -> list[Record]:
 
 def whole_views_of(split: str, seed: int, again: int = 0) -> list[Record]:
     """Each view in 320 x 240 and 640 x 480, with its curves."""
-    made = make(split, seed, WHOLE_VIEWS[split], again, max(w / FRAME_PX[0] for w, _ in WHOLE_PX))
+    return whole_views(f"{split}/{seed:06d}", make(split, seed, WHOLE_VIEWS[split], again, MAGNIFIED))
+
+
+def whole_views(name: str, made: Made) -> list[Record]:
+    """Records of WHOLE_PX of each camera, named {name}/{camera}/{size}/{family}/{stage}."""
     found = []
     for number, camera in enumerate(made.cameras):
         seen = Seen(made.solid, camera)
@@ -60,9 +65,9 @@ def whole_views_of(split: str, seed: int, again: int = 0) -> list[Record]:
         for size in WHOLE_PX:
             view = seen.rendered(camera.resized(*size))
             labels = labeller.of(view)
-            name = f"{split}/{seed:06d}/{number}/{size[0]}x{size[1]}/{made.family}/{made.stage}"
+            own = f"{name}/{number}/{size[0]}x{size[1]}/{made.family}/{made.stage}"
             curves = curves_json(labeller, labels.pieces)
-            found.append(packed(name, _planes(view, labels), _intrinsics(view.camera), curves))
+            found.append(packed(own, _planes(view, labels), _intrinsics(view.camera), curves))
     return found
 
 

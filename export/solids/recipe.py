@@ -83,14 +83,21 @@ def without_crashes(function: Callable[[int], Value]) -> Value:
 def _make(split: str, rng: Rng, views: int, magnified: float) -> Made:
     pixels = spread(rng, 60, 450)  # that the thing spans in a view
     stage = str(rng.choice(list(_STAGES), p=list(_STAGES.values())))
-    near, far = (distance * pixels / _USUAL_FOCAL_PX for distance in RANGE_M)
-    size = spread(rng, max(SIZE_M[0], near), min(SIZE_M[1], far))
+    size = size_spanning(rng, pixels)
     scale = Scale(size, size / pixels)
     family, shape = _thing(split, rng, scale)
     if stage == "group":
         shape = _group(split, rng, scale, shape)
     elif rng.random() < (0.7 if stage == "alone" else 0.12):
         shape = s.moved(shape, Rotation.random(random_state=int(rng.integers(2**31))).as_matrix())
+    return placed(rng, family, shape, stage, pixels, views, magnified)
+
+
+def placed(
+    rng: Rng, family: str, shape: TopoDS_Shape, stage: str, pixels: float, views: int, magnified: float = 1.0
+) -> Made:
+    """A shape set down where the stage says, with cameras in which it spans about so many pixels of FRAME_PX; meshed
+    for frames `magnified` times as large. Raises ShapeError."""
     shape = standing(shape)
     bounds = s.bounds(shape)
     if stage in ("ground", "group"):
@@ -103,6 +110,12 @@ def _make(split: str, rng: Rng, views: int, magnified: float) -> Made:
     cameras = [_camera(rng, stage, bounds, pixels) for _ in range(views)]
     solid = solid_of(shape, DEVIATION_R * _min_footprint(cameras, bounds) / magnified)
     return Made(solid, family, stage, cameras)
+
+
+def size_spanning(rng: Rng, pixels: float) -> float:
+    """How large, in metres, a thing is that spans so many pixels in a view of a depth camera."""
+    near, far = (distance * pixels / _USUAL_FOCAL_PX for distance in RANGE_M)
+    return spread(rng, max(SIZE_M[0], near), min(SIZE_M[1], far))
 
 
 def _thing(split: str, rng: Rng, scale: Scale) -> tuple[str, TopoDS_Shape]:

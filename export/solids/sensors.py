@@ -192,6 +192,19 @@ def clean(depth: np.ndarray, focal_px: float, rng: np.random.Generator) -> np.nd
     return depth.astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Steps:
+    """A sensor whose depth is stored in 16 bits, in whole units: 1 mm (OAK, Kinect, most RealSense), 0.25 mm (L515),
+    0.1 mm (D405). What does not fit into 65,534 units is unknown."""
+
+    unit_m: float = 0.001
+    of: Sensor = clean
+
+    def __call__(self, depth: np.ndarray, focal_px: float, rng: np.random.Generator) -> np.ndarray:
+        units = np.rint(np.asarray(self.of(depth, focal_px, rng), np.float64) / self.unit_m)
+        return np.where(units < 65535, units * self.unit_m, 0).astype(np.float32)
+
+
 # Named levels: what evaluation reports.
 LEVELS: dict[str, Sensor] = {
     "clean": clean,
@@ -205,6 +218,10 @@ LEVELS: dict[str, Sensor] = {
     "tof-dim": TimeOfFlight(sigma_m=0.006, rounding_px=3, holes=0.02),
     "structured-light": StructuredLight(),
     "phone": Phone(),
+    "steps-0.1mm": Steps(0.0001),
+    "steps-0.25mm": Steps(0.00025),
+    "steps-1mm": Steps(0.001),
+    "stereo-1mm": Steps(0.001, Stereo()),
 }
 
 

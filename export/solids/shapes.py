@@ -123,6 +123,13 @@ def moved(shape: TopoDS_Shape, rotation: np.ndarray | None = None, shift: Sequen
     return Transform(shape, transform, True).Shape()
 
 
+def scaled(shape: TopoDS_Shape, factor: float) -> TopoDS_Shape:
+    """Enlarged about the origin."""
+    transform = gp_Trsf()
+    transform.SetScale(gp_Pnt(0, 0, 0), float(factor))
+    return Transform(shape, transform, True).Shape()
+
+
 def _list(shapes: Iterable[TopoDS_Shape]) -> TopTools_ListOfShape:
     out = TopTools_ListOfShape()
     for shape in shapes:

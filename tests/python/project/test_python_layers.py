@@ -22,7 +22,7 @@ ALLOWED = {
     "export.photos": set(),
     "export.people": {"export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid"},
     "export.places": {"export.camera", "export.jobs", "export.people", "export.photos", "export.point_cloud"},
-    "export.solids": {"export.camera", "export.jobs"},
+    "export.solids": {"export.camera", "export.jobs", "export.photos"},
     "export.densepose": {
         "export.bundle", "export.shards", "export.surface", "export.surface_grid", "export.training",
     },

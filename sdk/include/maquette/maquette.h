@@ -16,8 +16,8 @@
  *
  *     _create                                 _destroy   contexts, sources, lists, models, builders, renderers, writers
  *     _open, _open_memory, _build, _finish    _close     captures and scenes
- *     _acquire_…, _run, _load_…, _wrap,       _release   frames, results and images, most from a pool of fixed size
- *     _decode, _resize, _convert_yuv
+ *     _acquire_…, _run, _find_…, _load_…,     _release   frames, results and images, most from a pool of fixed size
+ *     _wrap, _decode, _resize, _convert_yuv
  *
  *   (_finish of a builder returns a scene; _finish of a clip or a recorder completes its file and returns nothing.)
  *   What `_get_…` returns belongs to the object that it was called with.
@@ -61,6 +61,7 @@
 #include "maquette/clip.h"
 #include "maquette/context.h"
 #include "maquette/densepose.h"
+#include "maquette/edge_curves.h"
 #include "maquette/edges.h"
 #include "maquette/frame.h"
 #include "maquette/pipeline.h"

@@ -13,6 +13,7 @@
 #ifndef MAQUETTE_MAQUETTE_HPP_
 #define MAQUETTE_MAQUETTE_HPP_
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -59,6 +60,12 @@ inline maq_densepose_config default_densepose_config() {
 inline maq_edges_config default_edges_config() {
   maq_edges_config config;
   check(maq_edges_config_init(&config, sizeof config));
+  return config;
+}
+
+inline maq_edges_curves_config default_edges_curves_config() {
+  maq_edges_curves_config config;
+  check(maq_edges_curves_config_init(&config, sizeof config));
   return config;
 }
 
@@ -363,6 +370,62 @@ class DensePose {
   Owner<maq_densepose, maq_densepose_destroy> owner_;
 };
 
+// Curves of a result, which may be released before them.
+class EdgesCurves {
+ public:
+  // Takes over curves of the C API.
+  explicit EdgesCurves(maq_edges_curves* curves) : owner_(curves) {}
+
+  maq_edges_curves* get() const { return owner_.get(); }
+
+  // Their pointers are this object's.
+  std::vector<maq_edges_curve> curves() const {
+    return items(maq_edges_curves_get_curve_count, maq_edges_curves_get_curve);
+  }
+  std::vector<maq_edges_corner> corners() const {
+    return items(maq_edges_curves_get_corner_count, maq_edges_curves_get_corner);
+  }
+  // The largest first.
+  std::vector<maq_edges_box> boxes() const { return items(maq_edges_curves_get_box_count, maq_edges_curves_get_box); }
+
+  maq_edges_curves_stats stats() const {
+    maq_edges_curves_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_edges_curves_get_stats(get(), &stats));
+    return stats;
+  }
+
+  maq_edges_snap snap_to_pixel(double x_px, double y_px, double radius_px) const {
+    maq_edges_snap snap{};
+    snap.struct_size = sizeof snap;
+    check(maq_edges_curves_snap_to_pixel(get(), x_px, y_px, radius_px, &snap));
+    return snap;
+  }
+  maq_edges_snap snap_to_ray(const std::array<double, 3>& origin_m, const std::array<double, 3>& direction,
+                             double max_angle_rad) const {
+    maq_edges_snap snap{};
+    snap.struct_size = sizeof snap;
+    check(maq_edges_curves_snap_to_ray(get(), origin_m.data(), direction.data(), max_angle_rad, &snap));
+    return snap;
+  }
+
+  void save(const std::string& path) const { check(maq_edges_curves_save(get(), path.c_str())); }
+
+ private:
+  template <class T>
+  std::vector<T> items(uint32_t (*count)(const maq_edges_curves*),
+                       maq_status (*read)(const maq_edges_curves*, uint32_t, T*)) const {
+    std::vector<T> all(count(get()));
+    for (uint32_t i = 0; i < all.size(); ++i) {
+      all[i].struct_size = sizeof(T);
+      check(read(get(), i, &all[i]));
+    }
+    return all;
+  }
+
+  Owner<maq_edges_curves, maq_edges_curves_release> owner_;
+};
+
 class EdgesResult {
  public:
   // Takes over a result of the C API.
@@ -393,6 +456,12 @@ class EdgesResult {
     stats.struct_size = sizeof stats;
     check(maq_edges_result_get_stats(get(), &stats));
     return stats;
+  }
+
+  EdgesCurves find_curves(const maq_edges_curves_config& config = default_edges_curves_config()) const {
+    maq_edges_curves* curves = nullptr;
+    check(maq_edges_result_find_curves(get(), &config, &curves));
+    return EdgesCurves(curves);
   }
 
   void save(const std::string& folder, const std::string& stem) const {

@@ -4,31 +4,15 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
+#include "api/edges_handle.h"
 #include "api/frame_handle.h"
 #include "core/worker_threads.h"
-#include "edges/edges.h"
 #include "edges/field_files.h"
-#include "maquette/edges.h"
 
 using namespace maq;
 
-struct maq_edges_result : HandleOf<HandleKind::kEdgesResult> {
-  EdgesResult result;
-  BoundedPool<maq_edges_result>::Deleter deleter;
-};
-
-struct maq_edges : HandleOf<HandleKind::kEdges> {
-  maq_edges(std::shared_ptr<ContextState> of, std::unique_ptr<Edges> made, size_t pool_size)
-      : state(std::move(of)), edges(std::move(made)), results(pool_size, "results") {}
-  std::shared_ptr<ContextState> state;
-  std::unique_ptr<Edges> edges;
-  BoundedPool<maq_edges_result> results;
-};
-
 namespace {
 
-// The bundle that a config without one means.
-constexpr char kEdgesBundle[] = "edges-int8";
 // Of the structs' first release.
 constexpr size_t kFirstConfigSize = sizeof(maq_edges_config), kFirstStatsSize = sizeof(maq_edges_stats);
 
@@ -40,20 +24,6 @@ maq_edges_config default_config() {
   return config;
 }
 
-EdgesSettings edges_settings(const maq_edges_config& config) {
-  require_range("config.threads", config.threads, 0, kMaxThreads);
-  require_range("config.result_pool_size", config.result_pool_size, 1u, 64u);
-  require_range("config.allow_spinning", config.allow_spinning, 0, 1);
-  require_provider("config.provider", config.provider);
-  require_range("config.skip_planes", config.skip_planes, 0, 1);
-  EdgesSettings settings;
-  settings.threads = config.threads > 0 ? config.threads : default_threads();
-  settings.spin = config.allow_spinning == 1;
-  settings.provider = config.provider;
-  settings.skips_planes = config.skip_planes == 1;
-  return settings;
-}
-
 // Of the depth image, which the frame's picture may be larger than: they show the same view.
 Intrinsics intrinsics_of_depth(const Frame& frame, const ImageView& depth, const maq_intrinsics& given) {
   const Intrinsics of_frame{given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
@@ -63,6 +33,25 @@ Intrinsics intrinsics_of_depth(const Frame& frame, const ImageView& depth, const
 
 }  // namespace
 
+maq_edges_config maq::read_edges_config(const maq_edges_config* given, const char* name) {
+  return read_config(given, name, default_config(), kFirstConfigSize);
+}
+
+EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* name) {
+  const std::string prefix = std::string(name) + ".";
+  require_range(prefix + "threads", config.threads, 0, kMaxThreads);
+  require_range(prefix + "result_pool_size", config.result_pool_size, 1u, 64u);
+  require_range(prefix + "allow_spinning", config.allow_spinning, 0, 1);
+  require_provider(prefix + "provider", config.provider);
+  require_range(prefix + "skip_planes", config.skip_planes, 0, 1);
+  EdgesSettings settings;
+  settings.threads = config.threads > 0 ? config.threads : default_threads();
+  settings.spin = config.allow_spinning == 1;
+  settings.provider = config.provider;
+  settings.skips_planes = config.skip_planes == 1;
+  return settings;
+}
+
 maq_status maq_edges_config_init(maq_edges_config* config, uint32_t struct_size) {
   return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
 }
@@ -71,8 +60,8 @@ maq_status maq_edges_create(maq_context* context, const maq_edges_config* given,
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(edges, "edges");
-    const maq_edges_config config = read_config(given, "config", default_config(), kFirstConfigSize);
-    const EdgesSettings settings = edges_settings(config);
+    const maq_edges_config config = read_edges_config(given, "config");
+    const EdgesSettings settings = edges_settings(config, "config");
     Bundle bundle = read_bundle_argument(config, "config", kEdgesBundle);
     const Manifest manifest = bundle.manifest;
     auto made = std::make_unique<Edges>(context->state->onnxruntime(), std::move(bundle), settings);
@@ -99,6 +88,7 @@ maq_status maq_edges_run(maq_edges* edges, const maq_frame* frame, const maq_int
     BoundedPool<maq_edges_result>::Pooled handle = edges->results.acquire();
     const ImageView& image = depth == nullptr ? frame->frame.image : *depth;  // refused where it is no depth
     edges->edges->run(image, intrinsics_of_depth(frame->frame, image, *intrinsics), handle->result);
+    handle->curves = edges->curves;
     *result = lend<maq_edges_result>(std::move(handle));
     return MAQ_OK;
   });

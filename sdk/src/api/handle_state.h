@@ -26,7 +26,8 @@ enum class HandleKind : uint32_t {
   kSceneRenderer,
   kSceneImage,
   kEdges,
-  kEdgesResult
+  kEdgesResult,
+  kEdgesCurves
 };
 
 class HandleState {

@@ -47,7 +47,7 @@ class BoundedPool {
   size_t capacity() const { return capacity_; }
 
   // Throws MAQ_ERROR_POOL_EMPTY when every object is held. The object comes as its last user left it.
-  Pooled acquire() {
+  Pooled acquire() const {
     std::lock_guard<std::mutex> lock(state_->mutex);
     std::unique_ptr<T> object;
     if (!state_->idle.empty()) {

@@ -87,6 +87,52 @@ TEST_F(EdgesCommandLine, AStubGivesFramesAndAClip) {
   EXPECT_TRUE(files("o").count("stub_solids_overlay.mp4") + files("o").count("stub_solids_overlay.avi") == 1);
 }
 
+TEST_F(EdgesCommandLine, CurvesAreWrittenInEachFormatAndBoxesAreMeasured) {
+  environment_ = "MAQ_BUNDLE= MAQ_EDGES_BUNDLE='" MAQ_TEST_MODELS "/edges-int8'";
+  const std::string source = "'stub:solids?scene=box&seed=1&fps=1&size=640x480&frames=4' --out o --boxes";
+  const Outcome result = run(source + " --format json,obj --format dxf,ply,step --overlay --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream lines(result.out);
+  std::string line;
+  size_t count = 0, boxes = 0;
+  for (; std::getline(lines, line); ++count) {
+    const auto frame = nlohmann::json::parse(line);
+    const std::string stem = "o/" + frame["frame"].get<std::string>();
+    const auto curves = nlohmann::json::parse(read_text(folder_.file(stem + "_curves.json")));
+    EXPECT_EQ(curves["curves"].size(), frame["curves"]);
+    EXPECT_EQ(curves["corners"].size(), frame["corners"]);
+    EXPECT_GT(frame["ms"]["curves"], 0);
+    for (const char* ending : {"obj", "ply", "dxf", "step"}) {
+      EXPECT_GT(std::filesystem::file_size(folder_.file(stem + "_curves." + ending)), 100u);
+    }
+    for (const auto& box : frame["boxes"]) {
+      ++boxes;
+      EXPECT_NEAR(box["size_m"][0].get<double>(), 0.441, 0.04);
+      EXPECT_GT(box["plus_minus_m"][2], 0);
+    }
+  }
+  EXPECT_EQ(count, 4u);
+  EXPECT_GE(boxes, 1u);
+  const Outcome text = run(source + " --overlay");
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_NE(text.out.find(" curves, "), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("  box of 4"), std::string::npos) << text.out;
+}
+
+TEST_F(EdgesCommandLine, AWrongFormatNothingToDoAndTheNetworkAreToldInWords) {
+  const Outcome wrong = run("'image:depth.png?depth_unit=0.001&fov=60' --out o --format stl");
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("stl"), std::string::npos) << wrong.err;
+  EXPECT_EQ(run("").exit_code, 2);
+  EXPECT_NE(run("").err.find("source"), std::string::npos) << run("").err;
+  const Outcome info = run("info");
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_NE(info.out.find("up to 16 r"), std::string::npos) << info.out;
+  const Outcome json = run("info --json --bundle '" MAQ_TEST_MODELS "/edges-int8'");
+  EXPECT_EQ(nlohmann::json::parse(json.out)["name"], "edges-int8");
+  expect_failure("info --bundle /nowhere", "/nowhere");
+}
+
 TEST_F(EdgesCommandLine, WhatHasNoDepthNoCalibrationOrNoBundleIsASentence) {
   expect_failure("grey.png --out o", "fov=60");
   expect_failure("'image:depth.png?depth_unit=0.001' --out o", "image:depth.png?depth_unit=0.001&fov=60");
@@ -111,7 +157,8 @@ TEST_F(EdgesCommandLine, ABadSourceDoesNotCostTheRest) {
 TEST_F(EdgesCommandLine, HelpSaysWhatIsWrittenAndHowDepthIsGiven) {
   const Outcome result = run("--help");
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* text : {"<stem>_distance.png", "depth_unit=0.001", "fov=60", "stub:solids"}) {
+  for (const char* text : {"<stem>_distance.png", "<stem>_curves.<format>", "depth_unit=0.001", "fov=60", "stub:solids",
+                           "--boxes", "json, obj, ply, dxf or step", "edges info"}) {
     EXPECT_NE(result.out.find(text), std::string::npos) << text;
   }
 }

@@ -47,18 +47,30 @@ EdgeCurves example() {
   spline.bend = maq::Bend::kConcave;
   spline.type = maq::CurveType::kSpline;
   spline.first_point = 33, spline.point_count = 9;
-  spline.control_count = 4;
-  curves.controls = {{0, 0, 2}, {0.1, 0.2, 2}, {0.3, -0.1, 2.125}, {0.5, 0, 2}};
-  for (int i = 0; i <= 8; ++i) curves.points.push_back(maq::spline_point(curves.controls.data(), 4, i / 8.0));
+  spline.control_count = 6;
+  curves.controls = {{0, 0, 2}, {0.1, 0.2, 2}, {0.3, -0.1, 2.125}, {0.5, 0, 2}, {0.7, 0.1, 1.875}, {0.75, 0.3, 2}};
+  for (int i = 0; i <= 8; ++i) curves.points.push_back(maq::spline_point(curves.controls.data(), 6, i / 8.0));
   for (int i = 33; i < 41; ++i) spline.length_m += maq::length(curves.points[size_t(i) + 1] - curves.points[size_t(i)]);
   curves.curves.push_back(spline);
+  EdgeCurve circle;
+  circle.type = maq::CurveType::kArc;
+  circle.is_closed = true;
+  circle.centre = {0.5, 0.5, 1}, circle.x_axis = {0, 0.1, 0}, circle.y_axis = {0, 0, 0.1};
+  circle.sweep_rad = 2 * 3.141592653589793;
+  circle.length_m = 0.1 * circle.sweep_rad;
+  circle.first_point = 42, circle.point_count = 101;
+  for (int i = 0; i <= 100; ++i) {
+    const double a = circle.sweep_rad * i / 100;
+    curves.points.push_back(circle.centre + std::cos(a) * circle.x_axis + std::sin(a) * circle.y_axis);
+  }
+  curves.curves.push_back(circle);
   return curves;
 }
 
 TEST(CurveFiles, AreTheOnesThatOtherProgramsRead) {
   const std::string kept = std::string(MAQ_TEST_DATA) + "/curves/";
   const TempFolder folder;
-  for (const char* name : {"example.obj", "example.ply", "example.dxf", "example.json"}) {
+  for (const char* name : {"example.obj", "example.ply", "example.dxf", "example.step", "example.json"}) {
     const std::string path = folder.file(name);
     maq::write_curve_file(example(), path);
     EXPECT_EQ(read_text(path), read_text(kept + name)) << name;
@@ -67,7 +79,7 @@ TEST(CurveFiles, AreTheOnesThatOtherProgramsRead) {
 
 TEST(CurveFiles, TheJsonHasEveryParameter) {
   const auto document = nlohmann::json::parse(maq::curves_as_json(example()));
-  ASSERT_EQ(document["curves"].size(), 3u);
+  ASSERT_EQ(document["curves"].size(), 4u);
   const auto& line = document["curves"][0];
   EXPECT_EQ(line["kind"], "crease");
   EXPECT_EQ(line["bend"], "convex");
@@ -78,13 +90,13 @@ TEST(CurveFiles, TheJsonHasEveryParameter) {
   EXPECT_EQ(arc["type"], "arc");
   EXPECT_EQ(arc["kind"], "boundary");
   EXPECT_EQ(arc["sweep_rad"], 1.5);
-  EXPECT_EQ(document["curves"][2]["controls"].size(), 4u);
+  EXPECT_EQ(document["curves"][2]["controls"].size(), 6u);
   EXPECT_EQ(document["corners"][0]["curves"], 2);
 }
 
 TEST(CurveFiles, NoCurvesAreFilesAsWell) {
   const TempFolder folder;
-  for (const char* name : {"none.obj", "none.ply", "none.dxf", "none.json"}) {
+  for (const char* name : {"none.obj", "none.ply", "none.dxf", "none.step", "none.json"}) {
     const std::string path = folder.file(name);
     maq::write_curve_file(EdgeCurves(), path);
     EXPECT_GT(std::filesystem::file_size(path), 0u);

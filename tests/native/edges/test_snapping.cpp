@@ -60,4 +60,28 @@ TEST_F(Snapping, BesideTheBoxAndOutsideThePictureIsNothing) {
   EXPECT_EQ(snap_to(seen_.field, curves_, NAN, 3).target, SnapTarget::kNothing);
 }
 
+TEST_F(Snapping, ARayFromElsewhereHitsTheFaceThatItMeetsFirst) {
+  const Snap seen = snap_to(seen_.field, curves_, 190, 145);
+  ASSERT_EQ(seen.target, SnapTarget::kPlane);
+  const Vec3 from{0.3, -0.4, 0.2};
+  const Snap hit = maq::snap_to_ray(seen_.field, curves_, from, 5.0 * (seen.point - from), 0.001);
+  ASSERT_EQ(hit.target, SnapTarget::kPlane);
+  EXPECT_LT(maq::length(hit.point - seen.point), 0.002);
+  EXPECT_EQ(maq::snap_to_ray(seen_.field, curves_, from, from - seen.point, 0.001).target, SnapTarget::kNothing);
+  maq::EdgeField without_depth = seen_.field;
+  without_depth.depth_m.clear();
+  EXPECT_EQ(maq::snap_to_ray(without_depth, curves_, from, seen.point - from, 0.001).target, SnapTarget::kNothing);
+}
+
+TEST_F(Snapping, AnAngleIsMeasuredAtTheOriginOfTheRay) {
+  const Vec3 corner = curves_.corners[0].point, ahead = maq::normalized(corner);
+  const Vec3 beside = corner + 0.02 * maq::any_orthogonal(ahead);
+  for (const double back : {0.0, 1.0}) {
+    const Vec3 from = -back * ahead;
+    const double angle = std::atan2(0.02, maq::length(corner - from));
+    EXPECT_NEAR(maq::snap_to_ray(seen_.field, curves_, from, beside - from, angle + 1e-6).angle_rad, angle, 1e-9);
+    EXPECT_NE(maq::snap_to_ray(seen_.field, curves_, from, beside - from, angle - 1e-6).target, SnapTarget::kCorner);
+  }
+}
+
 }  // namespace

@@ -46,8 +46,54 @@ def test_trimesh_reads_the_edges_of_the_ply(expected):
 def test_ezdxf_reads_lines_and_polylines_on_the_layers_of_their_kind(expected):
     ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed: pip install -e .[dev]")
     entities = list(ezdxf.readfile(DATA / "example.dxf").modelspace())
-    assert [e.dxftype() for e in entities] == ["LINE", "POLYLINE", "POLYLINE"]
-    assert [e.dxf.layer for e in entities] == ["CREASE_CONVEX", "BOUNDARY", "CREASE_CONCAVE"]
+    assert [e.dxftype() for e in entities] == ["LINE", "POLYLINE", "POLYLINE", "POLYLINE"]
+    assert [e.dxf.layer for e in entities] == ["CREASE_CONVEX", "BOUNDARY", "CREASE_CONCAVE", "CREASE"]
     line = np.array([entities[0].dxf.start, entities[0].dxf.end])
     lengths = [length(line)] + [length(np.array([v.dxf.location for v in e.vertices])) for e in entities[1:]]
     assert lengths == pytest.approx([length(points) for points in expected], abs=1e-6)
+
+
+def step_edges(path: Path) -> list:
+    """The edges that OpenCascade makes of a STEP file, in metres, with the lengths of their curves."""
+    pytest.importorskip("OCP", reason="OpenCascade is not installed: pip install -e .[solids]")
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.GCPnts import GCPnts_AbscissaPoint
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_EDGE
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    reader = STEPControl_Reader()
+    assert reader.ReadFile(str(path)) == IFSelect_RetDone
+    reader.TransferRoots()
+    explorer, found = TopExp_Explorer(reader.OneShape(), TopAbs_EDGE), []
+    while explorer.More():
+        curve = BRepAdaptor_Curve(TopoDS.Edge_s(explorer.Current()))
+        found.append((curve, GCPnts_AbscissaPoint.Length_s(curve, 1e-9) / 1000))  # it reads as millimetres
+        explorer.Next()
+    return found
+
+
+def test_opencascade_reads_lines_circles_and_splines_of_the_step_exactly():
+    curves = json.loads((DATA / "example.json").read_text())["curves"]
+    edges = step_edges(DATA / "example.step")
+    assert [str(curve.GetType()).rsplit("_", 1)[1] for curve, _ in edges] == [
+        "Line",
+        "Circle",
+        "BSplineCurve",
+        "Circle",
+    ]
+    line, arc, spline, circle = (length for _, length in edges)
+    assert line == pytest.approx(curves[0]["length_m"], abs=1e-6)
+    assert arc == pytest.approx(np.linalg.norm(curves[1]["x_axis"]) * curves[1]["sweep_rad"], abs=1e-6)
+    assert circle == pytest.approx(0.2 * np.pi, abs=1e-6)
+    polyline = np.array(curves[2]["points"])
+    assert spline == pytest.approx(length(polyline), rel=2e-2)
+    assert spline > length(polyline)
+    for (curve, _), expected in zip(edges, curves, strict=True):
+        first, last = curve.FirstParameter(), curve.LastParameter()
+        count = len(expected["points"])
+        for i, point in enumerate(expected["points"]):
+            value = curve.Value(first + (last - first) * i / (count - 1))
+            assert np.array([value.X(), value.Y(), value.Z()]) / 1000 == pytest.approx(np.array(point), abs=1e-6)

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 HEADERS = sorted((ROOT / "sdk/include/maquette").glob("*.h"))
-SOURCES = sorted((ROOT / "sdk/src/api").glob("api_*.cpp"))
+SOURCES = sorted((ROOT / "sdk/src/api").rglob("api_*.cpp"))
 
 NAMED = re.compile(
     r"""(?:require_argument|require_struct_size|require_range|require_index|write_struct|read_config|destroy|return_handle

@@ -53,6 +53,7 @@ MAY_INCLUDE = {
     "sources/synthetic": BACKEND | {"sources/recording"},
     "pipeline": SYSTEMS | {"core/trace"},
     "api": SYSTEMS | {"pipeline"},
+    "api/scene": SCENE | {"api"},
 }  # fmt: skip
 
 # Each folder of sdk/tools, and those that its files may include beside their own; "." is sdk/tools itself, without the

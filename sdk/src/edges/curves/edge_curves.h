@@ -24,6 +24,12 @@ struct CurveOptions {
   float gap_r = 2.5f;        // surfaces that are farther apart along the ray do not meet in a crease
   float join_px = 12;        // ends so near the place where their curves meet share a corner
   int max_curves = 1024;     // more are left out, and counted
+
+  bool operator==(const CurveOptions& o) const {
+    return select_px == o.select_px && min_votes == o.min_votes && smear_px == o.smear_px &&
+           support_px == o.support_px && break_deg == o.break_deg && min_length_px == o.min_length_px &&
+           tolerance_r == o.tolerance_r && gap_r == o.gap_r && join_px == o.join_px && max_curves == o.max_curves;
+  }
 };
 
 enum class CurveType : uint8_t { kLine, kArc, kSpline };

@@ -1,30 +1,15 @@
 #include "edges/files/curve_files.h"
 
-#include <locale>
-#include <sstream>
+#include <ostream>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "edges/files/curve_json.h"
+#include "edges/files/curve_step.h"
+#include "edges/files/curve_text.h"
 
 namespace maq {
 namespace {
-
-std::ostringstream numbers() {
-  std::ostringstream text;
-  text.exceptions(std::ios::badbit);  // what throws without memory, where the text would end early
-  text.imbue(std::locale::classic());
-  text.precision(9);
-  return text;
-}
-
-// A layer or group: its kind, and of a crease its bend where that is known.
-std::string layer_of(const EdgeCurve& curve) {
-  std::string name = curve.kind == kBoundaryEdge ? "BOUNDARY" : "CREASE";
-  if (curve.bend == Bend::kConvex) name += "_CONVEX";
-  if (curve.bend == Bend::kConcave) name += "_CONCAVE";
-  return name;
-}
 
 void put_dxf_point(std::ostringstream& text, Vec3 p, int add = 0) {
   text << 10 + add << '\n' << p.x << '\n' << 20 + add << '\n' << p.y << '\n' << 30 + add << '\n' << p.z << '\n';
@@ -38,7 +23,7 @@ bool ends_with(const std::string& path, const char* ending) {
 }  // namespace
 
 std::string curves_as_obj(const EdgeCurves& curves) {
-  std::ostringstream text = numbers();
+  std::ostringstream text = text_of_numbers();
   text << "# sharp feature curves, metres; x right, y down, z along the optical axis\n";
   for (const Vec3& p : curves.points) text << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
   for (size_t i = 0; i < curves.curves.size(); ++i) {
@@ -53,7 +38,7 @@ std::string curves_as_obj(const EdgeCurves& curves) {
 std::string curves_as_ply(const EdgeCurves& curves) {
   size_t edges = 0;
   for (const EdgeCurve& curve : curves.curves) edges += size_t(curve.point_count - 1);
-  std::ostringstream text = numbers();
+  std::ostringstream text = text_of_numbers();
   text << "ply\nformat ascii 1.0\ncomment sharp feature curves, metres; x right, y down, z along the optical axis\n"
           "element vertex "
        << curves.points.size() << "\nproperty double x\nproperty double y\nproperty double z\nelement edge " << edges
@@ -69,7 +54,7 @@ std::string curves_as_ply(const EdgeCurves& curves) {
 
 // Release 12 has neither arcs nor splines in space: they are polylines. Entities alone are a whole file.
 std::string curves_as_dxf(const EdgeCurves& curves) {
-  std::ostringstream text = numbers();
+  std::ostringstream text = text_of_numbers();
   text << "0\nSECTION\n2\nENTITIES\n";
   for (const EdgeCurve& curve : curves.curves) {
     const std::string layer = layer_of(curve);
@@ -99,9 +84,10 @@ void write_curve_file(const EdgeCurves& curves, const std::string& path) {
   if (ends_with(path, ".obj")) make = curves_as_obj;
   if (ends_with(path, ".ply")) make = curves_as_ply;
   if (ends_with(path, ".dxf")) make = curves_as_dxf;
+  if (ends_with(path, ".step") || ends_with(path, ".stp")) make = curves_as_step;
   if (make == nullptr) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Curves cannot be written as \"", path,
-                "\": its ending must be .json, .obj, .ply or .dxf.");
+                "\": its ending must be .json, .obj, .ply, .dxf or .step.");
   }
   AtomicFile file(path);
   const std::string text = make(curves);

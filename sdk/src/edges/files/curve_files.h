@@ -7,8 +7,8 @@
 
 namespace maq {
 
-// Writes .json, .obj, .ply or .dxf, by the ending of `path` in small letters; it appears atomically. Throws
-// MAQ_ERROR_INVALID_ARGUMENT for another ending, and what AtomicFile throws.
+// Writes .json, .obj, .ply, .dxf or .step (.stp), by the ending of `path` in small letters; it appears atomically.
+// Throws MAQ_ERROR_INVALID_ARGUMENT for another ending, and what AtomicFile throws.
 void write_curve_file(const EdgeCurves& curves, const std::string& path);
 
 // What each has written in it.

@@ -9,7 +9,7 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
-#include "api/scene_handles.h"
+#include "api/scene/scene_handles.h"
 #include "core/worker_threads.h"
 #include "image/geometry/lens.h"
 #include "nn/provider.h"

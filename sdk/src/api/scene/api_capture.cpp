@@ -2,7 +2,7 @@
 
 #include "api/boundary.h"
 #include "api/frame_handle.h"
-#include "api/scene_conversions.h"
+#include "api/scene/scene_conversions.h"
 
 using namespace maq;
 

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "api/boundary.h"
-#include "api/scene_conversions.h"
+#include "api/scene/scene_conversions.h"
 #include "image/files/image_file.h"
 #include "scene/render/scene_renderer.h"
 

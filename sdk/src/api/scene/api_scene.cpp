@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "api/boundary.h"
-#include "api/scene_handles.h"
+#include "api/scene/scene_handles.h"
 #include "scene/format/ply_writer.h"
 #include "scene/format/scene_file.h"
 

@@ -1,0 +1,22 @@
+#include "edges/files/curve_text.h"
+
+#include <locale>
+
+namespace maq {
+
+std::ostringstream text_of_numbers() {
+  std::ostringstream text;
+  text.exceptions(std::ios::badbit);  // what throws without memory, where the text would end early
+  text.imbue(std::locale::classic());
+  text.precision(9);
+  return text;
+}
+
+std::string layer_of(const EdgeCurve& curve) {
+  std::string name = curve.kind == kBoundaryEdge ? "BOUNDARY" : "CREASE";
+  if (curve.bend == Bend::kConvex) name += "_CONVEX";
+  if (curve.bend == Bend::kConcave) name += "_CONCAVE";
+  return name;
+}
+
+}  // namespace maq

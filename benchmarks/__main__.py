@@ -8,7 +8,7 @@
 Parts: frames (people, pixels, threads; start, memory), start (libraries, their size, CPU time), window (what an app
 with a window waits for), sweep (error against run time), person_sizes (the same for small, tilted and crowded people),
 frame_budget (a device that throttles), agreement (int8 against fp32), peers (other runtimes and the roofline), cameras
-(how frames get to the app), scenes (new views of captured scenes).
+(how frames get to the app), scenes (new views of captured scenes), edges (fields of depth frames).
 The report holds the parts that were measured, now or in the last run.
 Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
@@ -25,6 +25,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks import cameras, frame_budget, frame_time, gates, report, start, window
+from benchmarks.edges import measure as edges
 from benchmarks.scenes import measure as scenes
 from benchmarks.scenes.command import SceneCommandError
 from export.evaluation.maquette_api import MaquetteError
@@ -32,7 +33,7 @@ from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-4"
 PARTS = ("frames", "start", "window", "sweep", "person_sizes", "frame_budget", "agreement", "peers", "cameras",
-         "scenes")  # fmt: skip
+         "scenes", "edges")  # fmt: skip
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -67,6 +68,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--publish", action="store_true")
     parser.add_argument("--no-guest", action="store_true", help="cameras: without the virtual machine")
     scenes.add_arguments(parser)
+    edges.add_arguments(parser)
     options = parser.parse_args(argv)
     options.out.mkdir(parents=True, exist_ok=True)
     try:
@@ -136,6 +138,11 @@ def measure(options: argparse.Namespace) -> dict:
         given = scenes.sources_of(options)
         document["scenes"], found, why = scenes.measure(given, options.out, options.threads, options.quick)
         replace(figures, missing, scenes.FIGURES, found, why)
+    if "edges" in options.only:
+        document["edges"], found, why = edges.measure(
+            edges.sources_of(options), options.out, options.threads, options.quick
+        )
+        replace(figures, missing, edges.FIGURES, found, why)
     return document
 
 

@@ -12,6 +12,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from benchmarks import camera_section, frame_budget, person_sizes, start, window
+from benchmarks.edges import pictures as edge_pictures
+from benchmarks.edges import section as edge_section
 from benchmarks.scenes import pictures as scene_pictures
 from benchmarks.scenes import section as scene_section
 from benchmarks.sweep import pareto
@@ -33,6 +35,8 @@ def write(document: dict, folder: Path) -> list[Path]:
             written.append(folder / name)
     if "scenes" in document:
         written += scene_pictures.write(document["scenes"], folder)
+    if "edges" in document:
+        written += edge_pictures.write(document["edges"], folder)
     sections = text_sections(document)
     (folder / "report.md").write_text(markdown(sections))
     (folder / "index.html").write_text(page(sections, folder))
@@ -221,6 +225,7 @@ SECTIONS = {
     "agreement": agreement_section,
     "cameras": camera_section.section,
     "scenes": scene_section.section,
+    "edges": edge_section.section,
 }
 
 
@@ -230,7 +235,7 @@ def warnings_of(document: dict) -> set[str]:
     runs = [frames[name] for name in ("people", "sizes", "one_thread") if name in frames]
     found = {text for run in runs for text in run["warnings"]}
     found |= {text for run in runs for case in run["cases"] for text in case["warnings"]}
-    others = ("start", "window", "cameras", "scenes")
+    others = ("start", "window", "cameras", "scenes", "edges")
     return found.union(*(document[name]["warnings"] for name in others if name in document))
 
 

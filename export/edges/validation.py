@@ -59,7 +59,7 @@ def validate(
     return out
 
 
-def _coloured(distance: np.ndarray) -> np.ndarray:
+def field_picture(distance: np.ndarray) -> np.ndarray:
     """[H, W] in r -> RGB, bright at edges."""
     return (matplotlib.colormaps["magma"](1 - np.clip(distance / EPS_R, 0, 1))[..., :3] * 255).astype(np.uint8)
 
@@ -75,10 +75,10 @@ def sheet(network: EdgeNetwork, bins: int, frames: Sequence[Frame], levels: Sequ
     """RGB, uint8: a row a frame: the true field, then by level what the sensor sees and the network's field."""
     field, rows = field_of(network, bins), []
     for frame in frames:
-        tiles = [np.where(frame.counts[..., None], _coloured(frame.distance), 60).astype(np.uint8)]
+        tiles = [np.where(frame.counts[..., None], field_picture(frame.distance), 60).astype(np.uint8)]
         for level in levels:
             seen = frame_through(level, frame)
-            made = np.where((seen > 0)[..., None], _coloured(field(seen, frame.focal_px)), 0).astype(np.uint8)
+            made = np.where((seen > 0)[..., None], field_picture(field(seen, frame.focal_px)), 0).astype(np.uint8)
             tiles += [slope_picture(seen, frame.focal_px), made]
         rows.append(np.hstack([cv2.resize(t, (320, 240), interpolation=cv2.INTER_AREA) for t in tiles]))
     return np.vstack(rows)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from ctypes import POINTER, byref, c_char_p, c_float, c_int32, c_int64, c_size_t, c_uint8, c_uint32, c_uint64
 from ctypes import c_void_p as Handle
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +25,7 @@ class MaquetteError(RuntimeError):
 
 
 class _DenseposeConfig(ctypes.Structure):
+    c_name = "maq_densepose_config"
     _fields_ = (
         ("struct_size", c_uint32),
         ("threads", c_int32),
@@ -43,7 +47,7 @@ class _DenseposeConfig(ctypes.Structure):
     )
 
 
-class _FrameDesc(ctypes.Structure):
+class FrameDesc(ctypes.Structure):
     _fields_ = (
         ("struct_size", c_uint32),
         ("format", c_int32),
@@ -121,35 +125,101 @@ class DensePoseResult:
     stats: Stats
 
 
-def _signatures(library: ctypes.CDLL) -> None:
-    """Argument types of the functions used here; every one returns maq_status unless said otherwise."""
-    table = {
-        "maq_context_create": (c_uint32, Handle, POINTER(Handle)),
-        "maq_densepose_config_init": (POINTER(_DenseposeConfig), c_uint32),
-        "maq_densepose_create": (Handle, POINTER(_DenseposeConfig), POINTER(Handle)),
-        "maq_densepose_run": (Handle, Handle, POINTER(Handle)),
-        "maq_densepose_result_get_person": (Handle, c_uint32, POINTER(_Person)),
-        "maq_densepose_result_get_plane": (Handle, c_int32, POINTER(POINTER(c_uint8)), POINTER(c_size_t)),
-        "maq_densepose_result_get_stats": (Handle, POINTER(_Stats)),
-        "maq_densepose_reset": (Handle,),
-        "maq_frame_desc_init": (POINTER(_FrameDesc), c_uint32),
-        "maq_frame_wrap": (Handle, POINTER(_FrameDesc), Handle, Handle, POINTER(Handle)),
-    }
-    for name, arguments in table.items():
-        function = getattr(library, name)
-        function.argtypes, function.restype = arguments, c_int32
-    for name in (
-        "maq_context_destroy",
-        "maq_densepose_destroy",
-        "maq_densepose_result_release",
-        "maq_frame_release",
-    ):
-        function = getattr(library, name)
-        function.argtypes, function.restype = (Handle,), None
-    count = library.maq_densepose_result_get_person_count
-    count.argtypes, count.restype = (Handle,), c_uint32
-    library.maq_last_error.argtypes, library.maq_last_error.restype = (Handle,), c_char_p
-    library.maq_status_get_name.argtypes, library.maq_status_get_name.restype = (c_int32,), c_char_p
+Config = TypeVar("Config", bound=ctypes.Structure)
+Values = TypeVar("Values")
+Signatures = Mapping[str, tuple[type, ...]]
+
+_SHARED: Signatures = {
+    "maq_context_create": (c_uint32, Handle, POINTER(Handle)),
+    "maq_frame_desc_init": (POINTER(FrameDesc), c_uint32),
+    "maq_frame_wrap": (Handle, POINTER(FrameDesc), Handle, Handle, POINTER(Handle)),
+}
+_DENSEPOSE: Signatures = {
+    "maq_densepose_config_init": (POINTER(_DenseposeConfig), c_uint32),
+    "maq_densepose_create": (Handle, POINTER(_DenseposeConfig), POINTER(Handle)),
+    "maq_densepose_run": (Handle, Handle, POINTER(Handle)),
+    "maq_densepose_result_get_person": (Handle, c_uint32, POINTER(_Person)),
+    "maq_densepose_result_get_plane": (Handle, c_int32, POINTER(Handle), POINTER(c_size_t)),
+    "maq_densepose_result_get_stats": (Handle, POINTER(_Stats)),
+    "maq_densepose_reset": (Handle,),
+}
+
+
+class Library:
+    """libmaquette with a context, for the wrappers of its models.
+
+    path: libmaquette.so (None: MAQ_LIBRARY or the release build). functions: argument types of those used that return
+    maq_status. released: those that free a handle and return nothing.
+    """
+
+    def __init__(self, path: Path | None, functions: Signatures, released: Sequence[str]) -> None:
+        self.context = Handle()
+        path = path or Path(os.environ.get("MAQ_LIBRARY", LIBRARY))
+        if not path.exists():
+            raise MaquetteError(f"{path} is not there. Build the SDK (make build), or set MAQ_LIBRARY.")
+        self.functions = ctypes.CDLL(str(path.resolve()))
+        for name, arguments in {**_SHARED, **functions}.items():
+            function = getattr(self.functions, name)
+            function.argtypes, function.restype = arguments, c_int32
+        for name in ("maq_context_destroy", "maq_frame_release", *released):
+            function = getattr(self.functions, name)
+            function.argtypes, function.restype = (Handle,), None
+        self.functions.maq_last_error.argtypes, self.functions.maq_last_error.restype = (Handle,), c_char_p
+        name_of = self.functions.maq_status_get_name
+        name_of.argtypes, name_of.restype = (c_int32,), c_char_p
+        self.call("maq_context_create", HEADER_VERSION, None, byref(self.context))
+
+    def close(self) -> None:
+        self.functions.maq_context_destroy(self.context)
+        self.context = Handle()
+
+    def call(self, function: str, *arguments: object) -> None:
+        """Calls the library; a status other than MAQ_OK becomes MaquetteError with the library's text."""
+        status = getattr(self.functions, function)(*arguments)
+        if status:
+            text = self.functions.maq_last_error(None)
+            name = self.functions.maq_status_get_name(status).decode()
+            raise MaquetteError(f"{function}: {(text or b'').decode() or name} ({name})")
+
+    def free(self, function: str, handle: Handle) -> None:
+        getattr(self.functions, function)(handle)
+
+    def filled(self, config: type[Config], settings: Mapping[str, object]) -> Config:
+        """A config struct `maq_NAME_config` with its defaults and the settings, by the names of its fields."""
+        filled = config()
+        self.call(f"{config.c_name}_init", byref(filled), ctypes.sizeof(filled))
+        for name, value in settings.items():
+            if name not in (field for field, _ in config._fields_):
+                raise TypeError(f"{config.c_name} has no field {name}")
+            setattr(filled, name, value)
+        return filled
+
+    @contextmanager
+    def frame(self, pixels: np.ndarray, pixel_format: int) -> Iterator[Handle]:
+        """A frame over contiguous pixels [H, W, ..], which must outlive it."""
+        description = FrameDesc()
+        self.call("maq_frame_desc_init", byref(description), ctypes.sizeof(description))
+        description.format = pixel_format
+        description.height_px, description.width_px = pixels.shape[:2]
+        description.planes[0] = pixels.ctypes.data
+        frame = Handle()
+        self.call("maq_frame_wrap", self.context, byref(description), None, None, byref(frame))
+        try:
+            yield frame
+        finally:
+            self.free("maq_frame_release", frame)
+
+    def plane(self, getter: str, result: Handle, plane: int, shape: tuple[int, int], kind: type) -> np.ndarray:
+        """A copy of a result's plane [H, W]."""
+        values, stride = Handle(), c_size_t()
+        self.call(getter, result, plane, byref(values), byref(stride))
+        size = np.dtype(kind).itemsize
+        data = (c_uint8 * ((shape[0] - 1) * stride.value + shape[1] * size)).from_address(values.value)
+        return np.ndarray(shape, kind, data, strides=(stride.value, size)).copy()
+
+
+def values_of(struct: ctypes.Structure, dataclass_type: type[Values]) -> Values:
+    return dataclass_type(**{field.name: getattr(struct, field.name) for field in fields(dataclass_type)})
 
 
 class DensePose:
@@ -168,24 +238,15 @@ class DensePose:
         library: Path | None = None,
         **settings: int,
     ) -> None:
-        self._context, self._densepose = Handle(), Handle()
-        path = library or Path(os.environ.get("MAQ_LIBRARY", LIBRARY))
-        if not path.exists():
-            raise MaquetteError(f"{path} is not there. Build the SDK (make build), or set MAQ_LIBRARY.")
-        self._library = ctypes.CDLL(str(path.resolve()))
-        _signatures(self._library)
-        self._call("maq_context_create", HEADER_VERSION, None, byref(self._context))
-        config = _DenseposeConfig()
-        self._call("maq_densepose_config_init", byref(config), ctypes.sizeof(config))
-        config.bundle_path = os.fsencode(bundle)
-        config.threads = threads
+        released = ("maq_densepose_destroy", "maq_densepose_result_release")
+        self._library, self._densepose = Library(library, _DENSEPOSE, released), Handle()
+        count = self._library.functions.maq_densepose_result_get_person_count
+        count.argtypes, count.restype = (Handle,), c_uint32
+        given: dict[str, object] = {"bundle_path": os.fsencode(bundle), "threads": threads, **settings}
         if score_threshold is not None:
-            config.score_threshold = score_threshold
-        for name, value in settings.items():
-            if name not in (field for field, _ in config._fields_):
-                raise TypeError(f"maq_densepose_config has no field {name}")
-            setattr(config, name, value)
-        self._call("maq_densepose_create", self._context, byref(config), byref(self._densepose))
+            given["score_threshold"] = score_threshold
+        config = self._library.filled(_DenseposeConfig, given)
+        self._library.call("maq_densepose_create", self._library.context, byref(config), byref(self._densepose))
 
     def __enter__(self) -> DensePose:
         return self
@@ -194,54 +255,35 @@ class DensePose:
         self.close()
 
     def close(self) -> None:
-        self._library.maq_densepose_destroy(self._densepose)
-        self._library.maq_context_destroy(self._context)
-        self._densepose, self._context = Handle(), Handle()
+        self._library.free("maq_densepose_destroy", self._densepose)
+        self._library.close()
+        self._densepose = Handle()
 
     def reset(self) -> None:
         """The next image starts a new stream (key_frame_interval above 1)."""
-        self._call("maq_densepose_reset", self._densepose)
+        self._library.call("maq_densepose_reset", self._densepose)
 
     def run(self, image: np.ndarray) -> DensePoseResult:
         """image: uint8 [H, W, 3] RGB. Raises MaquetteError."""
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
             raise ValueError(f"an image is uint8 [H, W, 3], not {image.dtype} {image.shape}")
-        image = np.ascontiguousarray(image)
-        description = _FrameDesc()
-        self._call("maq_frame_desc_init", byref(description), ctypes.sizeof(description))
-        description.format = PIXEL_RGB8
-        description.height_px, description.width_px = image.shape[:2]
-        description.planes[0] = image.ctypes.data
-        frame, result = Handle(), Handle()
-        self._call("maq_frame_wrap", self._context, byref(description), None, None, byref(frame))
-        try:
-            self._call("maq_densepose_run", self._densepose, frame, byref(result))
-            return self._copy(result, image.shape[0], image.shape[1])
-        finally:
-            self._library.maq_densepose_result_release(result)
-            self._library.maq_frame_release(frame)
+        image, result = np.ascontiguousarray(image), Handle()
+        with self._library.frame(image, PIXEL_RGB8) as frame:
+            try:
+                self._library.call("maq_densepose_run", self._densepose, frame, byref(result))
+                return self._copy(result, image.shape[0], image.shape[1])
+            finally:
+                self._library.free("maq_densepose_result_release", result)
 
     def _copy(self, result: Handle, height: int, width: int) -> DensePoseResult:
-        found = np.empty((self._library.maq_densepose_result_get_person_count(result), 5), np.float32)
+        count = self._library.functions.maq_densepose_result_get_person_count(result)
+        found = np.empty((count, 5), np.float32)
         person = _Person(struct_size=ctypes.sizeof(_Person))
         for k, row in enumerate(found):
-            self._call("maq_densepose_result_get_person", result, k, byref(person))
+            self._library.call("maq_densepose_result_get_person", result, k, byref(person))
             row[:4], row[4] = person.box_px, person.score
-        planes = np.empty((height, width, 4), np.uint8)
-        for channel, plane in enumerate((PLANE_PART, PLANE_U, PLANE_V, PLANE_PERSON)):
-            pixels, stride = POINTER(c_uint8)(), c_size_t()
-            self._call("maq_densepose_result_get_plane", result, plane, byref(pixels), byref(stride))
-            rows = np.ctypeslib.as_array(pixels, ((height - 1) * stride.value + width,))
-            planes[..., channel] = np.lib.stride_tricks.as_strided(rows, (height, width), (stride.value, 1))
+        getter, numbers = "maq_densepose_result_get_plane", (PLANE_PART, PLANE_U, PLANE_V, PLANE_PERSON)
+        planes = [self._library.plane(getter, result, number, (height, width), np.uint8) for number in numbers]
         stats = _Stats(struct_size=ctypes.sizeof(_Stats))
-        self._call("maq_densepose_result_get_stats", result, byref(stats))
-        values = Stats(**{field.name: getattr(stats, field.name) for field in fields(Stats)})
-        return DensePoseResult(found[:, :4], found[:, 4], planes, values)
-
-    def _call(self, function: str, *arguments: object) -> None:
-        """Calls the library; a status other than MAQ_OK becomes MaquetteError with the library's text."""
-        status = getattr(self._library, function)(*arguments)
-        if status:
-            text = self._library.maq_last_error(None)
-            name = self._library.maq_status_get_name(status).decode()
-            raise MaquetteError(f"{function}: {(text or b'').decode() or name} ({name})")
+        self._library.call("maq_densepose_result_get_stats", result, byref(stats))
+        return DensePoseResult(found[:, :4], found[:, 4], np.stack(planes, -1), values_of(stats, Stats))

@@ -2,7 +2,8 @@
 
 In the camera's coordinates, metres. JSON, so that it can be stored beside the view and read without this package:
 {"curves": [{"type": "line" | "arc" | "spline", "kind": 1 convex crease | 2 concave crease | 3 boundary, "sure": false
-where a rounding is neither sharp nor smooth, "points": [[x, y, z], ..], "centre", "axis", "radius" of arcs}, ..],
+where a rounding is neither sharp nor smooth, "angle_deg" between its surfaces at its middle, "rounding_m" its radius
+there, 0 of an edge without one, "points": [[x, y, z], ..], "centre", "axis", "radius" of arcs}, ..],
 "corners": [[x, y, z], ..]}. An arc's points are its start, middle and end.
 """
 
@@ -27,6 +28,8 @@ def _curve(labeller: Labeller, piece: Piece) -> dict:
     c = labeller.curves
     kind = c.kind[piece.edge]
     entry = {"type": {LINE: "line", ARC: "arc"}.get(kind, "spline"), "kind": piece.kind, "sure": bool(piece.sure)}
+    angle, rounding = labeller.angle_and_rounding(piece)
+    entry |= {"angle_deg": round(float(np.degrees(angle)), 2), "rounding_m": float(rounding)}
     if kind == ARC:
         x, y = c.x[piece.edge], c.y[piece.edge]
         axis = np.cross(x, y)

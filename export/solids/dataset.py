@@ -21,7 +21,7 @@ from export.solids.crops import CROPS_OF_SEED, crops_of, whole_views_of
 from export.solids.recipe import SPLITS, without_crashes
 from export.solids.records import Record, write_shard
 
-VERSION = "solids-3"
+VERSION = "solids-4"
 SEEDS_OF_SHARD = 100
 MAX_S = 600.0  # of a solid, which takes a second; `recipe.CPU_S` comes first
 

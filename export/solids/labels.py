@@ -264,6 +264,14 @@ class Labeller:
         t = np.concatenate([[piece.start], knots[(knots > piece.start) & (knots < piece.end)], [piece.end]])
         return c.at(np.full(len(t), piece.edge), t)[0]
 
+    def angle_and_rounding(self, piece: Piece) -> tuple[float, float]:
+        """Radians between the normals of the surfaces at the piece's middle, and metres of its rounding's radius, 0 of
+        an edge without one."""
+        middle = np.array([(piece.start + piece.end) / 2])
+        a, b = self.curves.at(np.array([piece.edge]), middle)[1][0]
+        angle = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
+        return float(angle), float(self._radius[piece.edge])
+
     def _nearest(self, piece: Piece, point: np.ndarray) -> np.ndarray:
         """The piece's nearest points [n, 3] to points [n, 3]."""
         c, e = self.curves, piece.edge

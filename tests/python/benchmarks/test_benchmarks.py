@@ -10,6 +10,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from benchmarks import __main__ as benchmark
 from benchmarks import cameras, compare, gates, graphs, report, roofline, start, sweep, window
+from benchmarks.edges import measure as edges
 from benchmarks.scenes import measure as scenes
 
 MACHINE = {"architecture": "x86_64", "cores": 2, "instruction_sets": ["avx2", "fma"], "processor": "P",
@@ -84,7 +85,8 @@ def test_a_part_that_is_measured_again_leaves_nothing_of_before():
 def test_the_shipped_targets_can_be_read():
     names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "peak_memory_mb", "first_result_ms",
              "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8", "time_by_pytorch_fp32",
-             "roofline_fraction", *start.FIGURES, *window.FIGURES, *cameras.FIGURES, *scenes.FIGURES}  # fmt: skip
+             "roofline_fraction", *start.FIGURES, *window.FIGURES, *cameras.FIGURES, *scenes.FIGURES,
+             *edges.FIGURES}  # fmt: skip
     assert {v.figure for v in gates.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
 
 
@@ -199,13 +201,29 @@ def document():
     view = {"open_ms": 1.0, "first_view_ms": 2.0, "longest_call_ms": 0.5}
     waits = {"first": [live], "next": [live], "scene": [view], "capture": [view], "demo": {},
              "demo_missing": "there is no <Xvfb>", "warnings": []}  # fmt: skip
-    return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "window": waits,
+    return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "edges": edges_document(), "window": waits,
             "start": {"processes": processes, "files": {"library": file}, "warnings": []},
             "frames": frames, "sweep": rows, "person_sizes": sizes, "threads": 2,
             "frame_budget": {"missing": "no control group can be made: <mkdir>"},
             "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
+
+
+def edges_document():
+    figures = dict.fromkeys(("rmse_r", "rmse_near_r", "q95_r", "recall_1r", "fpr_1r", "recall_4r", "fpr_4r"), 0.5)
+    levels = dict.fromkeys(("clean", "tof", "stereo"), 1.0)
+    ways = ("int8, as shipped", "fp32, the same weights")
+    errors = [figures | {"level": level, "way": way, "ms": 2.0} for level in levels for way in ways]
+    groups = [figures | {"level": "clean", "axis": "kind", "group": name, "pixels": 5000, "recall_1r": None}
+              for name in ("creases", "boundaries")]  # fmt: skip
+    speed = [{"setting": "a field, 640 x 480", "axis": "shipped", "width_px": 640, "ms": 10.0, "ms_p90": 11.0,
+              "rmse_r": 1.0, "by_level": levels}]  # fmt: skip
+    saving = {"scene": "wall", "noise": "tof", "option": "skip planes", "ms_without": 2.0, "ms": 0.5,
+              "difference_r": 0.01, "other_side": 0.0, "network_fraction": 0.0}  # fmt: skip
+    return {"views": {"val": 2, "test": 3, "solids": 3}, "errors": errors, "groups": groups, "speed": speed,
+            "agreement": [{"level": "clean", "same_side": 0.99}], "savings": [saving], "sheet": "", "warnings": ["few"],
+            "sets": {"kicad": [figures | {"level": "clean"}]}, "missing": {"PCL": "no <header>"}}  # fmt: skip
 
 
 @pytest.mark.parametrize("part", benchmark.PARTS)
@@ -228,6 +246,6 @@ def test_a_report_holds_its_figures_and_pictures(tmp_path):
     assert "fp32 &lt;slow&gt;" in page
     assert "Not measured in the virtual machine: not run: no <qemu>." in text
     assert "Time of a frame was not measured: no <networks>." in text
-    assert page.count("data:image/png;base64,") == 5
+    assert page.count("data:image/png;base64,") == 7
     assert "| as shipped | 10.0 | 0.600 | 6.0 | 0.500 | 0.600 | ● |" in text
     assert "| fp32 <slow> | 20.0 | 0.610 | 6.1 | 0.500 | 0.600 |  |" in text

@@ -1,0 +1,196 @@
+"""Edges: how far fields and curves of depth frames are from the true ones, against run time, beside other ways.
+
+    python -m benchmarks --only edges            `make build` first
+    python -m benchmarks --only edges --quick    a few views, to see that it runs
+
+Figures come from whole views of solids whose families neither training nor the choice of thresholds saw. A gate that
+could not be measured is said to be so, with the reason.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.edges import pictures, quality, speed
+from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
+from benchmarks.edges.views import View, read_views
+from benchmarks.frame_time import MAX_OTHERS, OthersFraction
+from export.bundle import BundleInfo
+from export.edges.bundle import write_manifest
+from export.edges.export_onnx import export
+from export.edges.weights import load_network
+from export.solids.sensors import LEVELS
+
+SOLIDS, BUNDLE, WEIGHTS = Path(".data/solids"), Path("sdk/models/edges-int8"), Path("export/weights/edges.pt")
+SOLIDS_OF = {"val": 40, "test": 200}
+WIDTH_PX = 320  # of the views that errors are measured on
+MIN_VIEWS = 200
+SPEED_VIEWS, SAVING_FRAMES = 24, 40
+QUICK_VIEWS, QUICK_FRAMES = 8, 4
+CAD_PARTS = "kicad"  # the set of real parts, whose errors are compared with those of own solids
+
+FIELD_FIGURES = (
+    *(f"edges_rmse_{level}" for level in quality.LEVELS), "edges_rmse_by_rival", "edges_rmse_by_solids",
+    "edges_recall_r_clean", *(f"edges_recall_4r_{level}" for level in quality.LEVELS), "edges_int8_rmse_percent",
+    "edges_int8_same_side", "edges_fps_320", "edges_fps_640", "edges_bundle_mb", "edges_memory_mb", "edges_allocations",
+)  # fmt: skip
+NOT_YET = {
+    **dict.fromkeys(("edges_fps_wall", "edges_fps_box", "edges_fps_shelf", "edges_curves_true", "edges_curves_clean",
+                     "edges_curves_tof", "edges_curves_stereo", "edges_box_mm_tof", "edges_box_mm_stereo",
+                     "edges_box_deviation_mm"), "curves are in no function of the C API"),
+    **dict.fromkeys(("edges_fusion_s", "edges_fusion_memory_mb", "edges_fusion_rmse"),
+                    "fused views are measured by no part of this run"),
+    **dict.fromkeys(("edges_carton_edges", "edges_carton_px", "edges_carton_angle_deg"),
+                    "no carton with edges marked by hand is among the sets"),
+    "edges_round_percent": "no scans of round things are among the sets",
+}  # fmt: skip
+FIGURES = (*FIELD_FIGURES, *NOT_YET)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """solids: folder with `val` and `test`. bundle: the shipped one; weights: its own, in float. others: further
+    weights by name. bundles: further bundles by name. sets: further folders of whole views, by name. views: of each,
+    at most."""
+
+    solids: Path
+    bundle: Path
+    weights: Path
+    others: dict[str, Path]
+    bundles: dict[str, Path]
+    sets: dict[str, Path]
+    views: int | None
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where views and networks are."""
+    named = {"nargs": "+", "default": [], "type": _named}
+    parser.add_argument("--solids", type=Path, default=SOLIDS, metavar="DIR",
+                        help=f"rendered solids with val and test, made if not there; default: {SOLIDS}")  # fmt: skip
+    parser.add_argument("--solid-views", type=int, metavar="N", help="of each set, evenly; default: all")
+    parser.add_argument("--edge-bundle", type=Path, default=BUNDLE, metavar="BUNDLE", help=f"default: {BUNDLE}")
+    parser.add_argument("--edge-weights", type=Path, default=WEIGHTS, metavar="FILE",
+                        help=f"the same network in float; default: {WEIGHTS}")  # fmt: skip
+    parser.add_argument("--other-edge-weights", **named, metavar="NAME=FILE", help="in float, to compare with: m=m.pt")
+    parser.add_argument("--other-edge-bundles", **named, metavar="NAME=BUNDLE", help="to compare with: m-int8=DIR")
+    default = f"{CAD_PARTS}={SOLIDS / CAD_PARTS} if there"
+    parser.add_argument("--edge-sets", **named, metavar="NAME=DIR", help=f"further whole views; default: {default}")
+
+
+def _named(text: str) -> tuple[str, Path]:
+    name, separator, path = text.partition("=")
+    if not (name and separator and path):
+        raise argparse.ArgumentTypeError(f"{text} is not NAME=PATH")
+    return name, Path(path)
+
+
+def sources_of(options: argparse.Namespace) -> Sources:
+    """What the arguments say. Renders solids where there are none."""
+    for split, count in SOLIDS_OF.items():
+        if not list((options.solids / split).glob("solids-*.npz")):
+            count = 10 if options.quick else count
+            print(f"Rendering {count} solids into {options.solids / split}: some {-(-count // 10)} minutes")
+            subprocess.run([sys.executable, "-m", "export.solids.dataset", split, "--whole", "--count", str(count),
+                            "--out", str(options.solids / split)], check=True)  # fmt: skip
+    sets = dict(options.edge_sets)
+    if not sets and (options.solids / CAD_PARTS).is_dir():
+        sets = {CAD_PARTS: options.solids / CAD_PARTS}
+    return Sources(options.solids, options.edge_bundle, options.edge_weights, dict(options.other_edge_weights),
+                   dict(options.other_edge_bundles), sets, options.solid_views)  # fmt: skip
+
+
+def networks_of(given: Sources, folder: Path) -> Networks:
+    """Bundles of all networks; those of weights are exported into `folder`."""
+    bundles, histograms, missing = {SHIPPED: given.bundle}, {}, {}
+    for name, path in {FLOAT: given.weights, **given.others}.items():
+        if not path.exists():
+            missing[name] = f"no weights {path}"
+            continue
+        network, config = load_network(path)
+        if config.bins:
+            histograms[name] = path
+            continue
+        label = name if name == FLOAT else f"{name}, fp32"
+        target = folder / f"edges-{'shipped' if name == FLOAT else name}-fp32"
+        export(network, target, config.multiple)
+        write_manifest(target, BundleInfo(target.name, "fp32"), config.multiple)
+        bundles[label] = target
+    return Networks({**bundles, **given.bundles}, histograms, missing)
+
+
+def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict[str, str]]:
+    """What was measured, the figures that are gates, and why others are missing. The sheet of pictures is written into
+    `folder`: pictures are in no JSON."""
+    others, networks = OthersFraction(), networks_of(given, folder)
+    views = min(QUICK_VIEWS, given.views or QUICK_VIEWS) if quick else given.views
+    val, test = (read_views(given.solids / split, WIDTH_PX, views) for split in ("val", "test"))
+    levels = [level for level in LEVELS if level not in quality.LEVELS]
+    with ExitStack() as stack:
+        ways = opened(networks, threads, stack)
+        errors = quality.measure(val, test, ways, levels[:1] if quick else levels)
+        sets = {name: quality.of_set(read_views(path, WIDTH_PX, views), ways[SHIPPED], cuts_of(errors.cuts))
+                for name, path in given.sets.items()}  # fmt: skip
+    count = 2 if quick else min(SPEED_VIEWS, given.views or SPEED_VIEWS)
+    large_val, large = (read_views(given.solids / split, speed.FULL_PX[0], count) for split in ("val", "test"))
+    rows = speed.measure(large, networks.bundles, rivals_of(large_val), threads)
+    savings = speed.measure_savings(given.bundle, threads, QUICK_FRAMES if quick else SAVING_FRAMES)
+    fraction = others.now()
+    sheet = pictures.write_sheet(errors.shown, folder)
+    document = {
+        "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
+        "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "speed": rows,
+        "savings": savings, "missing": {**networks.missing, **errors.missing, **programs_missing()},
+        "sheet": sheet.name, "warnings": [],
+    }  # fmt: skip
+    if len(test) < MIN_VIEWS:
+        document["warnings"].append(f"{len(test)} test views, {MIN_VIEWS} are wanted")
+    if fraction > MAX_OTHERS:
+        document["warnings"].append(f"other processes used {fraction:.0%} of the CPU (edges)")
+    figures = quality.figures_from(errors.rows, errors.agreement) | speed.figures_from(rows)
+    figures["edges_bundle_mb"] = sum(path.stat().st_size for path in given.bundle.iterdir()) / 1e6
+    figures |= speed.stream_cost(given.bundle, threads, folder)
+    missing = dict(NOT_YET)
+    if CAD_PARTS in sets:
+        figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
+    else:
+        missing["edges_rmse_by_solids"] = f"no set of real parts: --edge-sets {CAD_PARTS}=DIR"
+    missing |= dict.fromkeys(("edges_int8_rmse_percent", "edges_int8_same_side"), networks.missing.get(FLOAT, ""))
+    figures = {name: round(value, 4) for name, value in figures.items()}
+    return document, figures, {name: why for name, why in missing.items() if name not in figures}
+
+
+def cuts_of(cuts: dict[str, dict[float, int]]) -> dict[str, dict[float, int]]:
+    return {level: cuts[level] for level in quality.LEVELS}
+
+
+def rivals_of(val: Sequence[View]) -> dict[str, dict]:
+    """Tuned on views of the size that times are measured at."""
+    return {level: tuned_rivals(val, [view.seen(level) for view in val])[0] for level in quality.LEVELS}
+
+
+def solid_of(view: View) -> str:
+    return "/".join(view.name.split("/")[:2])
+
+
+def set_ratio(rows: Sequence[dict], own: Sequence[dict]) -> float:
+    """The largest RMSE on a set by that on own solids, over levels."""
+    ours = {row["level"]: row["rmse_r"] for row in own if row["way"] == SHIPPED}
+    return max(row["rmse_r"] / ours[row["level"]] for row in rows if row["rmse_r"] is not None)
+
+
+def programs_missing() -> dict[str, str]:
+    """Rivals that other libraries bring, and why they are not here."""
+    found = {}
+    for name, header in (
+        ("Voronoi covariance (CGAL)", "CGAL/vcm_estimate_edges.h"),
+        ("OrganizedEdgeFromNormals (PCL)", "pcl-1.13/pcl/features/organized_edge_detection.h"),
+    ):
+        here = (Path("/usr/include") / header).exists()
+        found[name] = "this benchmark has no program for it" if here else f"{header} is not installed"
+    return found

@@ -1,0 +1,103 @@
+"""Fields by every way that is compared: the network in the shipped library, in torch, and rivals without a network."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from benchmarks.edges import rivals
+from benchmarks.edges.views import View
+from export.edges.config import EPS_R
+from export.edges.losses import DECODINGS
+from export.edges.validation import field_of
+from export.edges.weights import load_network
+from export.evaluation.edges_api import Edges, EdgesResult, Pinhole
+
+SHIPPED, FLOAT, NOTHING = "int8, as shipped", "fp32, the same weights", "no edges anywhere"
+
+
+class Method(Protocol):
+    def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
+        """Distance [H, W] in r, and the milliseconds that it took."""
+
+
+@dataclass
+class LibraryField:
+    """A bundle in the shipped C library. last: of the latest frame."""
+
+    edges: Edges
+    last: EdgesResult | None = None
+
+    def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
+        self.last = self.edges.run(depth, camera)
+        return self.last.distance, self.last.stats.total_ms
+
+
+@dataclass(frozen=True)
+class TorchField:
+    """A network that no bundle can hold: of the histogram loss."""
+
+    field: object
+
+    def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
+        start = time.perf_counter()
+        distance = self.field(depth, camera.focal_px)
+        return distance, 1000 * (time.perf_counter() - start)
+
+
+@dataclass(frozen=True)
+class NoEdges:
+    """The field of a frame without edges: what any way must beat."""
+
+    def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
+        return np.full(depth.shape, EPS_R, np.float32), 0.0
+
+
+@dataclass(frozen=True)
+class RivalField:
+    tuned: rivals.TunedRival
+
+    def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
+        return self.tuned.run(depth, camera.focal_px)
+
+
+@dataclass(frozen=True)
+class Networks:
+    """bundles: folders by the name of the way, SHIPPED first. histograms: weights of the histogram loss by name.
+    missing: why others are not measured, by name."""
+
+    bundles: Mapping[str, Path]
+    histograms: Mapping[str, Path] = field(default_factory=dict)
+    missing: Mapping[str, str] = field(default_factory=dict)
+
+
+def opened(networks: Networks, threads: int, stack: ExitStack) -> dict[str, Method]:
+    """Every network, until the stack closes them."""
+    found: dict[str, Method] = {}
+    for name, path in networks.bundles.items():
+        found[name] = LibraryField(stack.enter_context(Edges(path, threads)))
+    for name, path in networks.histograms.items():
+        network, config = load_network(path)
+        for decoding in DECODINGS:
+            found[f"{name}, {decoding}"] = TorchField(field_of(network, config.bins, decoding))
+    return found
+
+
+def tuned_rivals(views: Sequence[View], seen: Sequence[np.ndarray]) -> tuple[dict[str, Method], dict[str, str]]:
+    """Rivals with what suits these views best, and why others are missing. seen: what the sensor reports of each."""
+    found, missing = {}, {}
+    counts = [view.frame.counts & (depth > 0) for view, depth in zip(views, seen, strict=True)]
+    for name, rival in rivals.RIVALS.items():
+        why = rival.missing()
+        if why:
+            missing[name] = why
+            continue
+        focal, truth = [view.camera.focal_px for view in views], [view.frame.distance for view in views]
+        found[name] = RivalField(rivals.tuned(rival, seen, focal, truth, counts))
+    return found, missing

@@ -1,0 +1,137 @@
+"""The part of the report that tells of edges."""
+
+from __future__ import annotations
+
+from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
+from benchmarks.edges.pictures import front_of
+from benchmarks.edges.quality import LEVELS
+from benchmarks.edges.speed import SCENES
+
+COLUMNS = {"rmse_r": ("RMSE, r", 1, ".2f"), "rmse_near_r": ("near edges, r", 1, ".2f"), "q95_r": ("95 %, r", 1, ".1f"),
+           "recall_1r": ("recall at r, %", 100, ".1f"), "fpr_1r": ("false, %", 100, ".2f"),
+           "recall_4r": ("at 4 r, %", 100, ".1f"), "fpr_4r": ("false, %", 100, ".2f")}  # fmt: skip
+SAYS = {"clean": "exact depth", "tof": "time of flight", "stereo": "stereo (0.08 px)"}
+ANCHORS = [
+    ["another data set, second-hand", "RMSE, r", "recall, %", "false, %"],
+    ["DEF (78.6 M parameters), clean synthetic patches, at r", "0.56", "80.0", "0.02"],
+    ["Voronoi covariance (VCM), the same patches, at r", "", "about 40", "about 5"],
+    ["DEF, real scans by structured light, at 4 r", "3", "91.7", ""],
+]
+
+
+def section(measured: dict) -> tuple[str, list]:
+    """Title and parts, as benchmarks.report has them, of what edges.measure returned."""
+    views = measured["views"]
+    parts: list = [
+        "How far each pixel of a depth frame is from the nearest sharp feature curve, in r = depth / focal length: on "
+        f"{views['test']} views (320 x 240) of {views['solids']} rendered solids whose families neither training nor "
+        f"the choice of thresholds saw. Thresholds of all ways are chosen on {views['val']} validation views."
+    ]
+    parts += [f"Warnings of the measurement: {'; '.join(measured['warnings'])}."] if measured["warnings"] else []
+    parts += [
+        error_rows(measured["errors"]),
+        "Means over views of each view's figure. Near edges: pixels within 4 r of one. A pixel is called sharp where "
+        "its distance is below a threshold, so chosen that at most 0.5 % (for r) or 2 % (for 4 r) of the validation "
+        "pixels that are farther than r or 4 r from an edge are called sharp. Recall: of the test pixels nearer than "
+        "r or 4 r, those called sharp; false: of the others, those called sharp. Ways without a network find edges "
+        "with thresholds of the smallest RMSE; what is nearer to these than r or 4 r is called sharp. Time: the "
+        "library's own for our networks; of the ways without a network, Python's and OpenCV's.",
+        ANCHORS,
+        *sheet_parts(measured["sheet"]),
+    ]
+    missing = [f"{name} ({why})" for name, why in measured["missing"].items() if why]
+    parts += [f"Not measured: {'; '.join(missing)}."] if missing else []
+    if measured["agreement"]:
+        parts.append(agreement_rows(measured))
+    parts += [noise_rows(measured["errors"])]
+    parts += set_parts(measured["sets"])
+    parts += [
+        *group_parts(measured["groups"]),
+        *speed_parts(measured["speed"]),
+        saving_rows(measured["savings"]),
+        "Work that is left out, 320 x 240: the time with the option by that without, the part of the frame that the "
+        "network ran on, and how far the field is from the one without it (root mean square, and pixels on the other "
+        "side of r).",
+    ]
+    return "Edges", parts
+
+
+def cells(row: dict) -> list[str]:
+    return ["" if row[key] is None else format(scale * row[key], form) for key, (_, scale, form) in COLUMNS.items()]
+
+
+def heads() -> list[str]:
+    return [head for head, _, _ in COLUMNS.values()]
+
+
+def error_rows(rows: list[dict]) -> list[list[str]]:
+    table = [["depth, way", *heads(), "ms"]]
+    for level in LEVELS:
+        of_level = [row for row in rows if row["level"] == level]
+        for row in of_level:
+            ms = "" if row["way"] == NOTHING else f"{row['ms']:.1f}"
+            table.append([f"{SAYS[level]}: {row['way']}", *cells(row), ms])
+    return table
+
+
+def agreement_rows(measured: dict) -> list[list[str]]:
+    rmse = {(row["level"], row["way"]): row["rmse_r"] for row in measured["errors"]}
+    table = [["int8 against fp32", "RMSE of int8 by fp32", "pixels on the same side of r, %"]]
+    for row in measured["agreement"]:
+        level = row["level"]
+        change = rmse[level, SHIPPED] / rmse[level, FLOAT] - 1
+        table.append([SAYS[level], f"{change:+.1%}", f"{100 * row['same_side']:.2f}"])
+    return table
+
+
+def noise_rows(rows: list[dict]) -> list[list[str]]:
+    table = [["sensor, shipped network", *heads()]]
+    return table + [[row["level"], *cells(row)] for row in rows if row["way"] == SHIPPED]
+
+
+def set_parts(sets: dict) -> list:
+    if not sets:
+        return []
+    table = [["other views, shipped network", *heads()]]
+    for name, rows in sets.items():
+        table += [[f"{name}, {row['level']}", *cells(row)] for row in rows]
+    return [table, "The same thresholds on further sets of views."]
+
+
+def sheet_parts(name: str) -> list:
+    caption = ("Test views, what is read of them, and their fields: bright at edges, black where depth is unknown, "
+               "grey where there is no label. Under each, its RMSE.")  # fmt: skip
+    return [(name, caption)] if name else []
+
+
+def group_parts(rows: list[dict]) -> list:
+    if not rows:
+        return []
+    table = [["pixels by", "", "depth", "pixels", *heads()]]
+    order = list(dict.fromkeys(row["axis"] for row in rows))
+    for row in sorted(rows, key=lambda row: order.index(row["axis"])):
+        table.append([row["axis"], row["group"], row["level"], f"{row['pixels']:,}", *cells(row)])
+    return [("edges-groups.png", "The shipped network by what is particular about pixels."), table]
+
+
+def speed_parts(rows: list[dict]) -> list:
+    front = [row["setting"] for row in front_of(rows)]
+    table = [
+        ["frames of 640 x 480, reduced to", "ms", "p90", *(f"{SAYS[level]}, r" for level in LEVELS), "mean, r", ""]
+    ]
+    for row in sorted(rows, key=lambda row: row["ms"]):
+        table.append([row["setting"], f"{row['ms']:.1f}", f"{row['ms_p90']:.1f}",
+                      *(f"{row['by_level'][level]:.2f}" for level in LEVELS), f"{row['rmse_r']:.2f}",
+                      "front" if row["setting"] in front else ""])  # fmt: skip
+    caption = "Error against run time of frames of 640 x 480: fields of reduced frames are brought back to full size."
+    return [("edges-error-against-run-time.png", caption), table,
+            f"RMSE in r of the full frame. No other is faster and better: {'; '.join(front)}."]  # fmt: skip
+
+
+def saving_rows(rows: list[dict]) -> list[list[str]]:
+    table = [["scene, depth, option", "ms without", "ms with", "by it", "network on", "differs by, r", "other side, %"]]
+    for row in rows:
+        table.append([f"{SCENES[row['scene']]}, {row['noise']}, {row['option']}", f"{row['ms_without']:.2f}",
+                      f"{row['ms']:.2f}", f"{row['ms'] / row['ms_without']:.2f}", f"{row['network_fraction']:.0%}",
+                      f"{row['difference_r']:.2f}", f"{100 * row['other_side']:.2f}"])  # fmt: skip
+    return table

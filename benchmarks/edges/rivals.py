@@ -85,11 +85,11 @@ def surface_variation(
         count, *rest = (cv2.boxFilter(plane, -1, size, normalize=False) for plane in planes)
         mean = [m / np.maximum(count, 1) for m in rest]
         xx, xy, xz, yy, yz, zz = (mean[3 + k] - mean[i] * mean[j] for k, (i, j) in enumerate(pairs))
-        total += np.sqrt(_smallest_share(xx, xy, xz, yy, yz, zz))
+        total += np.sqrt(_smallest_fraction(xx, xy, xz, yy, yz, zz))
     return np.where(depth > 0, total / len(radii_px), 0)
 
 
-def _smallest_share(xx: np.ndarray, xy: np.ndarray, xz: np.ndarray, yy: np.ndarray, yz: np.ndarray, zz: np.ndarray):
+def _smallest_fraction(xx: np.ndarray, xy: np.ndarray, xz: np.ndarray, yy: np.ndarray, yz: np.ndarray, zz: np.ndarray):
     """The smallest eigenvalue of symmetric 3 x 3 matrices by their trace, in closed form (Smith 1961)."""
     trace = np.maximum(xx + yy + zz, 1e-30)
     q = trace / 3

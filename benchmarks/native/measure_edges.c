@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the program alone: getrusage() begins with the peak of whoever started it. */
+/* Of the program alone: getrusage() begins with the peak of the process that started it. */
 static double peak_mb(void) {
   char line[128];
   double kib = 0;

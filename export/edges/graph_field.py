@@ -7,6 +7,7 @@ import torch
 
 from export.edges.config import EPS_R, FOLD
 from export.edges.depth_input import folded, slopes
+from export.edges.losses import LOG_SPREAD
 
 
 def slopes_of(depth: np.ndarray, focal_px: float) -> np.ndarray:
@@ -17,6 +18,16 @@ def slopes_of(depth: np.ndarray, focal_px: float) -> np.ndarray:
 
 def field_of_planes(planes: np.ndarray) -> np.ndarray:
     """`planes` of the graph [1, H / 2, W / 2, 16] -> distance [H, W] in r."""
+    return np.clip(_unfolded(planes, 0) * EPS_R, 0, EPS_R)
+
+
+def spread_of_planes(planes: np.ndarray) -> np.ndarray:
+    """`planes` of the graph -> the mean absolute error that it expects of the distance, [H, W] in r."""
+    return np.exp(np.clip(_unfolded(planes, 1), *LOG_SPREAD)) * EPS_R
+
+
+def _unfolded(planes: np.ndarray, which: int) -> np.ndarray:
     _, height, width, _ = planes.shape
-    distance = planes[0, :, :, : FOLD**2].reshape(height, width, FOLD, FOLD).transpose(0, 2, 1, 3)
-    return np.clip(distance.reshape(height * FOLD, width * FOLD) * EPS_R, 0, EPS_R)
+    own = planes[0, :, :, FOLD**2 * which : FOLD**2 * (which + 1)]
+    own = own.reshape(height, width, FOLD, FOLD).transpose(0, 2, 1, 3)
+    return own.reshape(height * FOLD, width * FOLD)

@@ -227,6 +227,10 @@ class Labeller:
         patch = np.where(view.face >= 0, patches[view.face], -1)
         return Labels(*first, ignore, patch, pieces)
 
+    def field(self, view: View, pieces: list[Piece]) -> np.ndarray:
+        """Distance [H, W] in r to the nearest of any pieces of this solid's edges, those of other views as well."""
+        return self._field(view, pieces, self._patches(view.camera, SHARP_UNDER_R))[0]
+
     def _field(self, view: View, pieces: list[Piece], patches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         frame = view.camera
         height, width = view.depth.shape

@@ -4,10 +4,13 @@
 
 #include <array>
 
+#include "image/geometry/pinhole_camera.h"
 #include "image/geometry/warp.h"
-#include "scene/pinhole_camera.h"
 
 namespace maq {
+
+// The camera rotated about its optical axis so that `up` of the world points up in the picture. As it is where the world's up is along the optical axis, and continuous near that.
+PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<double, 3>& up);
 
 // The camera rotated about its axis until up is up, with the smallest frame that holds its whole picture and has sides
 // that are multiples of `multiple`. Throws MAQ_ERROR_INVALID_ARGUMENT where that is a million pixels away from the

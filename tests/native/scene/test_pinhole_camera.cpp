@@ -1,9 +1,10 @@
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "scene/gravity_alignment.h"
 #include "support/expect_error.h"
 #include "support/synthetic_scene.h"
 

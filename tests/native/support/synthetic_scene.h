@@ -5,7 +5,7 @@
 #include <random>
 
 #include "scene/format/fitted_points.h"
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 
 // Around (0, 0, 3) in units of `unit`, moved by `origin`; all depths differ unless `copies` points
 // are to be at each position.

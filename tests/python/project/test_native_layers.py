@@ -21,7 +21,7 @@ FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
 CURVES = {"edges", "edges/curves"}
-SYSTEMS = SCENE | CURVES | {"densepose", "edges/files", "edges/measuring", "sources", "sources/recording"}
+SYSTEMS = SCENE | CURVES | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
 MAY_INCLUDE = {
     "core": set(),
     "core/trace": set(),
@@ -34,6 +34,7 @@ MAY_INCLUDE = {
     "edges": BASE,
     "edges/curves": BASE - {"nn"} | {"edges"},
     "edges/files": BASE - {"nn"} | CURVES,
+    "edges/fusion": BASE - {"nn"} | CURVES,
     "edges/measuring": BASE - {"nn"} | CURVES,
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,

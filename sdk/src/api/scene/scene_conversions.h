@@ -14,7 +14,7 @@
 #include "image/geometry/lens.h"
 #include "nn/provider.h"
 #include "scene/networks/scene_networks.h"
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 
 namespace maq {
 

@@ -16,7 +16,7 @@
 #include "scene/build/regression_store.h"
 #include "scene/format/fitted_points.h"
 #include "scene/networks/scene_networks.h"
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 #include "scene/point_cloud.h"
 #include "scene/visibility/z_buffer.h"
 

@@ -6,7 +6,7 @@
 
 #include "scene/build/regression_store.h"
 #include "scene/networks/view_basis.h"
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 #include "scene/point_cloud.h"
 
 namespace maq {

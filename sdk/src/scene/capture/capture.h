@@ -9,7 +9,7 @@
 #include "core/frame.h"
 #include "image/geometry/lens.h"
 #include "scene/capture/import_report.h"
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 #include "scene/point_cloud.h"
 
 namespace maq {

@@ -7,7 +7,7 @@
 #include "core/frame.h"
 #include "image/geometry/lens.h"
 #include "scene/capture/capture.h"
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 
 namespace maq {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "scene/format/scene.h"
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 
 namespace maq {
 

@@ -1,32 +1,11 @@
-#include "scene/pinhole_camera.h"
+#include "image/geometry/pinhole_camera.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
 #include "core/frame.h"
 
 namespace maq {
-
-PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<double, 3>& up) {
-  const auto& r = camera.rotation;
-  const double length = std::sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]);
-  if (!(length > 0) || !std::isfinite(length)) return camera;
-  // The world's up as the camera sees it, across its axis.
-  const double across = (r[0] * up[0] + r[1] * up[1] + r[2] * up[2]) / length;
-  const double down = (r[3] * up[0] + r[4] * up[1] + r[5] * up[2]) / length;
-  const double seen = std::hypot(across, down);
-  // Nearly along the axis its direction in the picture says less and less; the rotation fades out.
-  constexpr double kFaintest = 0.05;
-  const double angle = std::atan2(across, -down) * std::min(1.0, seen / kFaintest);
-  const double cosine = std::cos(angle), sine = std::sin(angle);
-  PinholeCamera made = camera;
-  for (size_t i = 0; i < 3; ++i) {
-    made.rotation[i] = cosine * r[i] + sine * r[3 + i];
-    made.rotation[3 + i] = cosine * r[3 + i] - sine * r[i];
-  }
-  return made;
-}
 
 void check_camera(const PinholeCamera& camera, const char* what) {
   check_image_size(camera.width_px, camera.height_px, what);

@@ -13,10 +13,6 @@ struct PinholeCamera : Intrinsics {
   std::array<double, 3> centre = {0, 0, 0};                      // in the world
 };
 
-// The camera rotated about its optical axis so that `up` of the world points up in the picture (NPBG++, arXiv
-// 2203.13318, section 3.2). As it is where the world's up is along the optical axis, and continuous near that.
-PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<double, 3>& up);
-
 // Throws MAQ_ERROR_INVALID_ARGUMENT unless every number is finite, the focal lengths are positive, the size is allowed
 // and the rotation is one to within 1e-3. `what` begins the sentence.
 void check_camera(const PinholeCamera& camera, const char* what);

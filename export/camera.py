@@ -1,5 +1,6 @@
 """The pinhole camera of all renderers and captures, in the convention of OpenCV and of the SDK
-(sdk/src/image/geometry/pinhole_camera.h): x to the right, y down, z forward; the centre of the top left pixel is (0, 0)."""
+(sdk/src/image/geometry/pinhole_camera.h): x to the right, y down, z forward; the centre of the top left pixel is
+(0, 0)."""
 
 from __future__ import annotations
 

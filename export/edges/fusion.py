@@ -51,7 +51,7 @@ class FieldView:
     @cached_property
     def normals(self) -> np.ndarray:
         """[H, W, 3], camera coordinates, of length 1 and towards the camera: of the plane through inverse depth
-        (which is linear in the pixel) within WINDOW_PX, by least squares over pixels within REACH_R in depth; the way to
+        (which is linear in the pixel) within WINDOW_PX, by least squares over pixels that are near in depth; the way to
         the camera where they do not determine one."""
         c, z = self.camera, self.depth
         known = z > 0
@@ -102,8 +102,8 @@ class Targets:
 
 def grid_targets(views: Sequence[FieldView], cell_m: float | None = None) -> tuple[Targets, np.ndarray, float]:
     """Points of all views, their mean and mean normal in each cell of a grid, in the order of z, y, x; r_m is the
-    smallest. Relative to the origin, which comes next, amid the cameras; last the cell's width: without cell_m the median
-    of the views' median footprints. Cells whose normals point apart (both sides of something thin) are left out."""
+    smallest. Relative to the origin, which comes next, amid the cameras; last the cell's width: without cell_m the
+    median of the views' median footprints. Cells whose normals point apart (two sides of a thing) are left out."""
     known = [view.depth > 0 for view in views]
     origin = np.array([_middle([view.camera.centre[axis] for view in views]) for axis in range(3)])
     if cell_m is None:
@@ -185,8 +185,8 @@ def _bilinear(view: FieldView, at: np.ndarray, reach_r: float) -> tuple[np.ndarr
     front = z > 0
     safe = np.where(front, z, 1)
     x, y = at[:, 0] / safe * c.fx_px + c.cx_px, at[:, 1] / safe * c.fy_px + c.cy_px
-    inside = front & (x >= 0) & (y >= 0) & (x <= c.width_px - 1) & (y <= c.height_px - 1)
-    x, y = np.where(inside, x, 0), np.where(inside, y, 0)
+    inside = front & (x >= -0.5) & (y >= -0.5) & (x <= c.width_px - 0.5) & (y <= c.height_px - 0.5)
+    x, y = (np.clip(np.where(inside, p, 0), 0, size - 1) for p, size in ((x, c.width_px), (y, c.height_px)))
     left = np.minimum(np.floor(x).astype(int), max(c.width_px - 2, 0))
     top = np.minimum(np.floor(y).astype(int), max(c.height_px - 2, 0))
     u, v = x - left, y - top

@@ -1,4 +1,4 @@
-"""Several labelled views of one solid with their cameras, and its curves that any of them sees: what fusion is judged on.
+"""Several labelled views of one solid with their cameras, and its curves that any of them sees, to judge fusion.
 
 A view's own label knows the curves that this view sees. Fused, a point also knows those that are hidden from it in one
 view and seen in another, so that it has a second label.
@@ -35,7 +35,7 @@ class PosedView:
 
 @dataclass(frozen=True, eq=False)
 class MultiView:
-    """curves: polylines [n, 3] in the world, of sharp curves that a view sees. family, stage: of export.solids.recipe."""
+    """curves: polylines [n, 3] in the world, of sharp curves that a view sees. family, stage: as of `recipe.Made`."""
 
     views: list[PosedView]
     curves: list[np.ndarray]

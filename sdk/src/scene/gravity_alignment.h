@@ -9,7 +9,8 @@
 
 namespace maq {
 
-// The camera rotated about its optical axis so that `up` of the world points up in the picture. As it is where the world's up is along the optical axis, and continuous near that.
+// The camera rotated about its optical axis so that `up` of the world points up in the picture. As it is where the
+// world's up is along the optical axis, and continuous near that.
 PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<double, 3>& up);
 
 // The camera rotated about its axis until up is up, with the smallest frame that holds its whole picture and has sides

@@ -1,4 +1,4 @@
-"""Writes data/edge_fusion/views.json: three views of a box with their fields, and the points of their fusion in float64.
+"""Writes data/edge_fusion/views.json: three views of a box with their fields, and their fusion in float64.
 
 Fields are the true distances to the box's edges with errors, so that views disagree. The points are those of
 export.edges.fusion, which the C++ is compared with. Run from the project's root:

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "scene/format/fitted_points.h"
 #include "image/geometry/pinhole_camera.h"
+#include "scene/format/fitted_points.h"
 
 // Around (0, 0, 3) in units of `unit`, moved by `origin`; all depths differ unless `copies` points
 // are to be at each position.

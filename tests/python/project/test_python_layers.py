@@ -31,7 +31,7 @@ ALLOWED = {
         "export.surface",
     },
     "export.scenes": {"export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training"},
-    "export.edges": {"export.bundle", "export.densepose", "export.solids", "export.training"},
+    "export.edges": {"export.bundle", "export.camera", "export.densepose", "export.solids", "export.training"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
         "export.bundle", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",

@@ -12,9 +12,9 @@
 #include "api/scene/scene_handles.h"
 #include "core/worker_threads.h"
 #include "image/geometry/lens.h"
+#include "image/geometry/pinhole_camera.h"
 #include "nn/provider.h"
 #include "scene/networks/scene_networks.h"
-#include "image/geometry/pinhole_camera.h"
 
 namespace maq {
 

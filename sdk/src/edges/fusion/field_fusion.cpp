@@ -63,11 +63,12 @@ void FieldFusion::add_view(const EdgeField& field, const PinholeCamera& pose) {
   check_camera(pose, "The view's camera");
   if (pose.width_px != field.width || pose.height_px != field.height) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The view's camera is of ", pose.width_px, " x ", pose.height_px,
-                " pixels, but its field has ", field.width, " x ", field.height, "; give the camera of the depth image.");
+                " pixels, but its field has ", field.width, " x ", field.height,
+                "; give the camera of the depth image.");
   }
   if (eps_r_ != 0 && field.eps_r != eps_r_) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The view's field is cut off at ", field.eps_r,
-                " r, but those before at ", eps_r_, "; fuse fields of one bundle.");
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The view's field is cut off at ", field.eps_r, " r, but those before at ",
+                eps_r_, "; fuse fields of one bundle.");
   }
   const auto pixels = int64_t(field.distance_r.size());
   if (pixels_ + pixels > options_.max_pixels) {
@@ -172,8 +173,7 @@ void FieldFusion::fuse(WorkerThreads& threads, const std::atomic<bool>& is_cance
   constexpr size_t kTasksOfRound = 32;
   for (size_t begin = 0; begin < tasks; begin += kTasksOfRound) {
     report(kShareOfGrid + (1 - kShareOfGrid) * float(begin) / float(tasks));
-    threads.run(std::min(kTasksOfRound, tasks - begin),
-                [&](size_t task, int) { find_distances(begin + task); });
+    threads.run(std::min(kTasksOfRound, tasks - begin), [&](size_t task, int) { find_distances(begin + task); });
   }
   report(1);
 }

@@ -73,9 +73,11 @@ Vec3 FusionView::normal(int x, int y) const {
 double FusionView::distance_m(Vec3 at, double r_m, double reach_r) const {
   constexpr double kUnseen = -1;
   if (!(at.z > 0)) return kUnseen;
-  const double x = at.x / at.z * camera_.fx_px + camera_.cx_px, y = at.y / at.z * camera_.fy_px + camera_.cy_px;
+  double x = at.x / at.z * camera_.fx_px + camera_.cx_px, y = at.y / at.z * camera_.fy_px + camera_.cy_px;
   const int width = camera_.width_px, height = camera_.height_px;
-  if (!(x >= 0 && y >= 0 && x <= width - 1 && y <= height - 1)) return kUnseen;
+  if (!(x >= -0.5 && y >= -0.5 && x <= width - 0.5 && y <= height - 0.5)) return kUnseen;
+  x = std::clamp(x, 0.0, width - 1.0);
+  y = std::clamp(y, 0.0, height - 1.0);
   const int left = std::min(int(x), std::max(width - 2, 0)), top = std::min(int(y), std::max(height - 2, 0));
   const double u = x - left, v = y - top;
   double distance = 0, depth_here = 0, total = 0;

@@ -17,7 +17,7 @@ class PointGrid {
   enum class Added { kYes, kOutside, kFull };
 
   struct Cell {
-    uint64_t key;  // its place: cells in the order of keys are in the order of z, y, x
+    uint64_t key;                     // its place: cells in the order of keys are in the order of z, y, x
     std::array<int64_t, 3> offset{};  // sum over points, 1/kFine of a cell from its corner
     std::array<int32_t, 3> normal{};  // sum, kFine a unit vector
     uint32_t count = 0;

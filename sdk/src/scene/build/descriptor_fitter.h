@@ -12,11 +12,11 @@
 
 #include "core/frame.h"
 #include "core/worker_threads.h"
+#include "image/geometry/pinhole_camera.h"
 #include "scene/build/background_colour.h"
 #include "scene/build/regression_store.h"
 #include "scene/format/fitted_points.h"
 #include "scene/networks/scene_networks.h"
-#include "image/geometry/pinhole_camera.h"
 #include "scene/point_cloud.h"
 #include "scene/visibility/z_buffer.h"
 

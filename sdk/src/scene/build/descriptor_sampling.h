@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "image/geometry/pinhole_camera.h"
 #include "scene/build/regression_store.h"
 #include "scene/networks/view_basis.h"
-#include "image/geometry/pinhole_camera.h"
 #include "scene/point_cloud.h"
 
 namespace maq {

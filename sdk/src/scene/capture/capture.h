@@ -8,8 +8,8 @@
 
 #include "core/frame.h"
 #include "image/geometry/lens.h"
-#include "scene/capture/import_report.h"
 #include "image/geometry/pinhole_camera.h"
+#include "scene/capture/import_report.h"
 #include "scene/point_cloud.h"
 
 namespace maq {

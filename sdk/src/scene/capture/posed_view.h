@@ -6,8 +6,8 @@
 
 #include "core/frame.h"
 #include "image/geometry/lens.h"
-#include "scene/capture/capture.h"
 #include "image/geometry/pinhole_camera.h"
+#include "scene/capture/capture.h"
 
 namespace maq {
 

@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "scene/format/scene.h"
 #include "image/geometry/pinhole_camera.h"
+#include "scene/format/scene.h"
 
 namespace maq {
 

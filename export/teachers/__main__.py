@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import functools
 import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
-from tqdm import tqdm
 
-from export.jobs import Workers, results
+from export.jobs import Workers
 from export.photos.packages import PackageError
-from export.teachers.label import PhotoLabels, draw, label_photo
+from export.teachers.label import draw
+from export.teachers.label_files import label_all
 
 EPILOG = """\
 example:
@@ -48,7 +47,7 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     try:
         found = label_all(photos, arguments.out, Workers.of(arguments), arguments.force)
-    except (PackageError, OSError, RuntimeError) as error:
+    except (PackageError, OSError, RuntimeError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1
     tiles = [tile(draw(cv2.imread(str(path)), labels)) for path, labels in found.items()]
@@ -59,31 +58,6 @@ def main(argv: list[str] | None = None) -> int:
         f"{len(found)} photos, {people} people found, {sure} of them with landmarks and mask; {arguments.out}/sheet.jpg"
     )
     return 0
-
-
-def label_all(photos: list[Path], out: Path, workers: Workers, force: bool = False) -> dict[Path, PhotoLabels]:
-    """Labels of every photo, made now or earlier, in `out`."""
-    out.mkdir(parents=True, exist_ok=True)
-    files = {photo: out / f"{photo.stem}.npz" for photo in photos}
-    jobs = [(photo, path) for photo, path in files.items() if force or not path.exists()]
-    with tqdm(total=len(photos), initial=len(photos) - len(jobs), desc="labelling", unit="photo", disable=None) as bar:
-        for _ in results(workers.run(_label, jobs)):
-            bar.update()
-    return {photo: PhotoLabels.load(path) for photo, path in files.items()}
-
-
-def _label(job: tuple[Path, Path]) -> None:
-    photo, path = job
-    label_photo(cv2.imread(str(photo)), *_teachers()).save(path)
-
-
-@functools.cache
-def _teachers():
-    from export.teachers.detector import PersonDetector
-    from export.teachers.landmarks import LandmarkNetwork
-    from export.teachers.matte import MatteNetwork
-
-    return PersonDetector().detect, LandmarkNetwork().find, MatteNetwork().find
 
 
 def tile(image: np.ndarray) -> np.ndarray:

@@ -1,5 +1,8 @@
 """Labels from teachers are kept where the teachers agree. The teachers here are stand-ins: no model is fetched."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -281,3 +284,10 @@ def test_limbs_that_are_not_seen_give_no_labels():
     assert np.isin([5, 6, 8], label).all()
     assert not coarse_labels(point, 0 * visible, mask)[mask].min() < SOMEWHERE
     assert not coarse_labels(point, visible, 0 * mask > 0).any()
+
+
+def test_the_command_labels_in_other_processes_and_names_a_file_that_is_no_photo(tmp_path):
+    (tmp_path / "torn.jpg").write_bytes(b"not a photo")
+    command = [sys.executable, "-m", "export.teachers", "--processes", "1", "--photos", str(tmp_path), "--out"]
+    ended = subprocess.run([*command, str(tmp_path / "labels")], capture_output=True, text=True, timeout=300)
+    assert (ended.returncode, ended.stderr.count("torn.jpg is not an image")) == (1, 1), ended.stderr

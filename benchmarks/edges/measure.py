@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.edges import pictures, quality, speed
+from benchmarks.edges import curves, pictures, quality, speed
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -25,6 +25,7 @@ from export.bundle import BundleInfo
 from export.edges.bundle import write_manifest
 from export.edges.export_onnx import export
 from export.edges.weights import load_network
+from export.evaluation.edges_api import Edges
 from export.solids.sensors import LEVELS
 
 SOLIDS, BUNDLE, WEIGHTS = Path(".data/solids"), Path("sdk/models/edges-int8"), Path("export/weights/edges.pt")
@@ -32,6 +33,7 @@ SOLIDS_OF = {"val": 40, "test": 200}
 WIDTH_PX = 320  # of the views that errors are measured on
 MIN_VIEWS = 200
 SPEED_VIEWS, SAVING_FRAMES = 24, 40
+CURVE_VIEWS = 100  # of the test views, evenly
 QUICK_VIEWS, QUICK_FRAMES = 8, 4
 CAD_PARTS = "kicad"  # the set of real parts, whose errors are compared with those of own solids
 
@@ -40,17 +42,19 @@ FIELD_FIGURES = (
     "edges_recall_r_clean", *(f"edges_recall_4r_{level}" for level in quality.LEVELS), "edges_int8_rmse_percent",
     "edges_int8_same_side", "edges_fps_320", "edges_fps_640", "edges_bundle_mb", "edges_memory_mb", "edges_allocations",
 )  # fmt: skip
+CURVE_FIGURES = (
+    *(f"edges_fps_{scene}" for scene in speed.SCENES), *(f"edges_curves_{level}" for level in quality.LEVELS),
+    "edges_box_mm_tof", "edges_box_mm_stereo", "edges_box_deviation_mm",
+)  # fmt: skip
 NOT_YET = {
-    **dict.fromkeys(("edges_fps_wall", "edges_fps_box", "edges_fps_shelf", "edges_curves_true", "edges_curves_clean",
-                     "edges_curves_tof", "edges_curves_stereo", "edges_box_mm_tof", "edges_box_mm_stereo",
-                     "edges_box_deviation_mm"), "curves are in no function of the C API"),
+    "edges_curves_true": "the C API takes no fields",
     **dict.fromkeys(("edges_fusion_s", "edges_fusion_memory_mb", "edges_fusion_rmse"),
                     "fused views are measured by no part of this run"),
     **dict.fromkeys(("edges_carton_edges", "edges_carton_px", "edges_carton_angle_deg"),
                     "no carton with edges marked by hand is among the sets"),
     "edges_round_percent": "no scans of round things are among the sets",
 }  # fmt: skip
-FIGURES = (*FIELD_FIGURES, *NOT_YET)
+FIGURES = (*FIELD_FIGURES, *CURVE_FIGURES, *NOT_YET)
 
 
 @dataclass(frozen=True)
@@ -140,12 +144,18 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     large_val, large = (read_views(given.solids / split, speed.FULL_PX[0], count) for split in ("val", "test"))
     rows = speed.measure(large, networks.bundles, rivals_of(large_val), threads)
     savings = speed.measure_savings(given.bundle, threads, QUICK_FRAMES if quick else SAVING_FRAMES)
+    with Edges(given.bundle, threads) as shipped:
+        of_solids = curves.measure_solids(test[:: max(1, len(test) // CURVE_VIEWS)], shipped)
+    of_scenes = curves.measure_scenes(given.bundle, threads, QUICK_FRAMES if quick else curves.SCENE_FRAMES)
+    amounts = (2, 2, 5) if quick else (curves.BOX_SEEDS, curves.BOX_FRAMES, curves.STEADY_FRAMES)
+    boxes = curves.measure_boxes(given.bundle, threads, *amounts)
     fraction = others.now()
     sheet = pictures.write_sheet(errors.shown, folder)
     document = {
         "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
         "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "speed": rows,
-        "savings": savings, "missing": {**networks.missing, **errors.missing, **programs_missing()},
+        "savings": savings, "curves": of_solids, "curves_of_scenes": of_scenes, "boxes": boxes,
+        "missing": {**networks.missing, **errors.missing, **programs_missing()},
         "sheet": sheet.name, "warnings": [],
     }  # fmt: skip
     if len(test) < MIN_VIEWS:
@@ -155,7 +165,9 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     figures = quality.figures_from(errors.rows, errors.agreement) | speed.figures_from(rows)
     figures["edges_bundle_mb"] = sum(path.stat().st_size for path in given.bundle.iterdir()) / 1e6
     figures |= speed.stream_cost(given.bundle, threads, folder)
-    missing = dict(NOT_YET)
+    found, why = curves.figures_from(of_solids, of_scenes, boxes)
+    figures |= found
+    missing = NOT_YET | why
     if CAD_PARTS in sets:
         figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
     else:

@@ -16,6 +16,7 @@ from export.evaluation.maquette_api import FrameDesc, Library, MaquetteError, Si
 
 PIXEL_DEPTH32F = 8
 PLANE_DISTANCE, PLANE_SPREAD, PLANE_KIND, PLANE_DEPTH = 1, 2, 3, 4
+LINE, ARC, SPLINE = 0, 1, 2
 _NO_WAIT_NS = 0
 
 
@@ -31,6 +32,58 @@ class _Config(ctypes.Structure):
         ("allow_spinning", c_int32),
         ("provider", c_int32),
         ("skip_planes", c_int32),
+    )
+
+
+class _Side(ctypes.Structure):
+    _fields_ = (("is_known", c_int32), ("normal", c_double * 3), ("offset_m", c_double))
+
+
+class _Curve(ctypes.Structure):
+    _fields_ = (
+        ("struct_size", c_uint32),
+        ("type", c_int32),
+        ("kind", c_int32),
+        ("bend", c_int32),
+        ("is_closed", c_int32),
+        ("corners", c_int32 * 2),
+        ("length_m", c_double),
+        ("rms_r", c_double),
+        ("points_m", POINTER(c_double)),
+        ("point_count", c_uint32),
+        ("control_count", c_uint32),
+        ("controls_m", POINTER(c_double)),
+        ("centre_m", c_double * 3),
+        ("x_axis_m", c_double * 3),
+        ("y_axis_m", c_double * 3),
+        ("sweep_rad", c_double),
+        ("sides", _Side * 2),
+    )
+
+
+class _Box(ctypes.Structure):
+    _fields_ = (
+        ("struct_size", c_uint32),
+        ("corner_count", c_int32),
+        ("size_m", c_double * 3),
+        ("plus_minus_m", c_double * 3),
+        ("axes", c_double * 9),
+        ("centre_m", c_double * 3),
+    )
+
+
+class _CurvesStats(ctypes.Structure):
+    _fields_ = (
+        ("struct_size", c_uint32),
+        ("curves_ms", c_float),
+        ("boxes_ms", c_float),
+        ("bad_pixel_count", c_int32),
+        ("voting_pixel_count", c_int32),
+        ("chain_count", c_int32),
+        ("short_chain_count", c_int32),
+        ("without_depth_count", c_int32),
+        ("not_fitted_count", c_int32),
+        ("over_limit_count", c_int32),
     )
 
 
@@ -80,12 +133,27 @@ class EdgesStats:
 
 @dataclass(frozen=True, eq=False)
 class EdgesResult:
-    """Planes [H, W]: distance and spread float32 in r, kind uint8 (0 none, 1 crease, 2 boundary)."""
+    """Planes [H, W]: distance and spread float32 in r, kind uint8 (0 none, 1 crease, 2 boundary). curves: if asked
+    for."""
 
     distance: np.ndarray
     spread: np.ndarray
     kind: np.ndarray
     stats: EdgesStats
+    curves: Curves | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """types: LINE, ARC or SPLINE of each curve; kinds: 1 crease, 2 boundary; points: its polyline, float64 [n, 3] in
+    metres. boxes_m: the three sides of each box, the longest first. Times in milliseconds."""
+
+    types: list[int]
+    kinds: list[int]
+    points: list[np.ndarray]
+    boxes_m: list[tuple[float, float, float]]
+    curves_ms: float
+    boxes_ms: float
 
 
 @dataclass(frozen=True)
@@ -108,6 +176,10 @@ _EDGES: Signatures = {
     "maq_edges_run": (Handle, Handle, POINTER(_Intrinsics), POINTER(Handle)),
     "maq_edges_result_get_plane": (Handle, c_int32, POINTER(Handle), POINTER(c_size_t)),
     "maq_edges_result_get_stats": (Handle, POINTER(_Stats)),
+    "maq_edges_result_find_curves": (Handle, Handle, POINTER(Handle)),
+    "maq_edges_curves_get_curve": (Handle, c_uint32, POINTER(_Curve)),
+    "maq_edges_curves_get_box": (Handle, c_uint32, POINTER(_Box)),
+    "maq_edges_curves_get_stats": (Handle, POINTER(_CurvesStats)),
 }
 _SOURCES: Signatures = {
     "maq_source_create": (Handle, c_char_p, Handle, POINTER(Handle)),
@@ -125,7 +197,11 @@ class Edges:
     """
 
     def __init__(self, bundle: Path, threads: int = 0, library: Path | None = None, **settings: int) -> None:
-        self._library = Library(library, _EDGES, ("maq_edges_destroy", "maq_edges_result_release"))
+        released = ("maq_edges_destroy", "maq_edges_result_release", "maq_edges_curves_release")
+        self._library = Library(library, _EDGES, released)
+        for name in ("maq_edges_curves_get_curve_count", "maq_edges_curves_get_box_count"):
+            count = getattr(self._library.functions, name)
+            count.argtypes, count.restype = (Handle,), c_uint32
         self._edges = Handle()
         config = self._library.filled(_Config, {"bundle_path": os.fsencode(bundle), "threads": threads, **settings})
         self._library.call("maq_edges_create", self._library.context, byref(config), byref(self._edges))
@@ -141,8 +217,8 @@ class Edges:
         self._library.close()
         self._edges = Handle()
 
-    def run(self, depth: np.ndarray, camera: Pinhole) -> EdgesResult:
-        """depth: float32 [H, W] in metres, 0 where unknown. Raises MaquetteError."""
+    def run(self, depth: np.ndarray, camera: Pinhole, curves: bool = False) -> EdgesResult:
+        """depth: float32 [H, W] in metres, 0 where unknown. curves: find them and boxes too. Raises MaquetteError."""
         if depth.dtype != np.float32 or depth.ndim != 2:
             raise ValueError(f"depth is float32 [H, W], not {depth.dtype} {depth.shape}")
         depth, result = np.ascontiguousarray(depth), Handle()
@@ -151,16 +227,36 @@ class Edges:
         with self._library.frame(depth, PIXEL_DEPTH32F) as frame:
             try:
                 self._library.call("maq_edges_run", self._edges, frame, byref(given), byref(result))
-                return self._copy(result, depth.shape)
+                return self._copy(result, depth.shape, self._find_curves(result) if curves else None)
             finally:
                 self._library.free("maq_edges_result_release", result)
 
-    def _copy(self, result: Handle, shape: tuple[int, int]) -> EdgesResult:
+    def _find_curves(self, result: Handle) -> Curves:
+        library, found = self._library, Handle()
+        library.call("maq_edges_result_find_curves", result, None, byref(found))
+        try:
+            types, kinds, points, boxes = [], [], [], []
+            curve, box = _Curve(struct_size=ctypes.sizeof(_Curve)), _Box(struct_size=ctypes.sizeof(_Box))
+            for k in range(library.functions.maq_edges_curves_get_curve_count(found)):
+                library.call("maq_edges_curves_get_curve", found, k, byref(curve))
+                types.append(curve.type)
+                kinds.append(curve.kind)
+                points.append(np.ctypeslib.as_array(curve.points_m, (curve.point_count, 3)).copy())
+            for k in range(library.functions.maq_edges_curves_get_box_count(found)):
+                library.call("maq_edges_curves_get_box", found, k, byref(box))
+                boxes.append(tuple(box.size_m))
+            stats = _CurvesStats(struct_size=ctypes.sizeof(_CurvesStats))
+            library.call("maq_edges_curves_get_stats", found, byref(stats))
+            return Curves(types, kinds, points, boxes, stats.curves_ms, stats.boxes_ms)
+        finally:
+            library.free("maq_edges_curves_release", found)
+
+    def _copy(self, result: Handle, shape: tuple[int, int], curves: Curves | None) -> EdgesResult:
         planes = ((PLANE_DISTANCE, np.float32), (PLANE_SPREAD, np.float32), (PLANE_KIND, np.uint8))
         copied = [self._library.plane("maq_edges_result_get_plane", result, n, shape, kind) for n, kind in planes]
         stats = _Stats(struct_size=ctypes.sizeof(_Stats))
         self._library.call("maq_edges_result_get_stats", result, byref(stats))
-        return EdgesResult(*copied, values_of(stats, EdgesStats))
+        return EdgesResult(*copied, values_of(stats, EdgesStats), curves)
 
 
 def depth_frames(uri: str, count: int, library: Path | None = None) -> Iterator[tuple[np.ndarray, Pinhole]]:

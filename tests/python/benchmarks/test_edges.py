@@ -8,12 +8,13 @@ import pytest
 
 from benchmarks import __main__ as benchmark
 from benchmarks import gates
+from benchmarks.edges import curves, quality, rivals, section, speed
 from benchmarks.edges import measure as edges
-from benchmarks.edges import quality, rivals, section, speed
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
 from benchmarks.edges.views import View, bending_radius_r, bins, incidence_deg, polyline, read_views
 from export.edges.data import Frame
-from export.evaluation.edges_api import Pinhole
+from export.evaluation import maquette_api
+from export.evaluation.edges_api import LINE, SPLINE, Curves, Edges, Pinhole, depth_frames
 from export.solids.records import packed, write_shard
 
 WIDTH, HEIGHT, FOCAL_PX = 96, 72, 90.0
@@ -235,3 +236,65 @@ def test_a_view_without_curves_has_no_groups_by_angle():
     frame = Frame(depth, distance.astype(np.float32), np.ones(depth.shape, int), np.ones(depth.shape, bool), FOCAL_PX)
     assert "angle between the surfaces" not in View("a", frame, CAMERA, None).groups
     assert section.SAYS.keys() == set(quality.LEVELS)
+
+
+def found_curves(*lines, types=None):
+    points = [np.array(line, np.float64) for line in lines]
+    return Curves(types or [LINE] * len(points), [1] * len(points), points, [], 1.0, 0.1)
+
+
+def test_curves_that_are_not_surely_sharp_need_not_be_found_and_are_not_wrong(solids):
+    view = read_views(solids / "test", WIDTH, None)[0]
+    (curve,) = view.curves["curves"]
+    bottom, top = np.array(curve["points"])
+    unsure = curve | {"sure": False, "points": [[0.1, 0, 0.6], [0.2, 0, 0.6]]}
+    both = View(view.name, view.frame, view.camera, {"curves": [curve, unsure]})
+    alone = curves.view_score(found_curves([bottom, top]), both)
+    assert (alone["precision"], alone["recall"], alone["f_score"]) == (1, 1, 1)
+    assert alone["angle_deg"] == pytest.approx(0, abs=1e-4)
+    more = curves.view_score(found_curves([bottom, top], unsure["points"]), both)
+    assert more["precision"] == 1
+    half = curves.view_score(found_curves([bottom, (bottom + top) / 2]), both)
+    assert half["recall"] == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_angle_of_a_line_is_that_to_the_true_line_which_it_lies_along():
+    true = [np.array([[0, -0.5, 1], [0, 0.5, 1]]), np.array([[0.3, -0.5, 1], [0.3, 0.5, 1]])]
+    lean = np.tan(np.radians(2)) * 0.4
+    found = found_curves([[0.3 - lean, -0.4, 1], [0.3 + lean, 0.4, 1]], [[0, 0, 1], [0.1, 0, 1]], types=[LINE, SPLINE])
+    assert curves.line_angle_deg(found, true, 300.0) == pytest.approx(2, abs=0.01)
+    assert np.isnan(curves.line_angle_deg(found_curves(), true, 300.0))
+
+
+def test_gates_of_curves_say_why_they_are_missing():
+    box = {"noise": "tof", "frames": 4, "median_mm": 3.0, "deviation_mm": None, "steady_frames": 1, "turned_frames": 9}
+    boxes = [box, box | {"noise": "stereo", "median_mm": None}]
+    solid = [{"level": level, "f_score": 0.8} for level in ("clean", "tof")]
+    scenes = [{"scene": "box", "noise": noise, "ms": ms} for noise, ms in (("tof", 10.0), ("none", 5.0))]
+    figures, missing = curves.figures_from(solid, scenes, boxes)
+    assert figures == {"edges_curves_clean": 0.8, "edges_curves_tof": 0.8, "edges_box_mm_tof": 3, "edges_fps_box": 100}
+    assert missing["edges_box_mm_stereo"] == "no box was found in 4 frames"
+    assert missing["edges_box_deviation_mm"] == "a box was found in 1 of 9 frames"
+    assert missing["edges_curves_stereo"] == "the test views have no curves stored"
+
+
+@pytest.mark.skipif(not maquette_api.LIBRARY.exists(), reason=f"{maquette_api.LIBRARY} is not built: run `make build`")
+def test_the_library_gives_planes_curves_and_times_of_a_simulated_camera():
+    frames = list(depth_frames("stub:solids?scene=box&size=160x120", 2))
+    depth, camera = frames[0]
+    assert depth.shape == (120, 160)
+    assert camera.focal_px == pytest.approx(150)
+    with Edges(edges.BUNDLE, threads=1) as model:
+        result = model.run(depth, camera, curves=True)
+        again = model.run(depth, camera)
+    assert np.array_equal(result.distance, again.distance)
+    assert result.distance.max() <= 16
+    assert set(np.unique(result.kind)) <= {0, 1, 2}
+    assert result.stats.total_ms > 0
+    assert again.curves is None
+    assert all(points.shape == (len(points), 3) for points in result.curves.points)
+    assert len(result.curves.points) == len(result.curves.types) > 0
+    with pytest.raises(maquette_api.MaquetteError, match=r"nowhere.*MAQ_ERROR_NOT_FOUND"):
+        Edges(edges.Path("nowhere"))
+    with pytest.raises(maquette_api.MaquetteError, match="intrinsics"):
+        next(depth_frames("stub:people", 1))

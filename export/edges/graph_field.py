@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import torch
 
+from export.densepose.graphs import session
 from export.edges.config import EPS_R, FOLD
 from export.edges.depth_input import folded, slopes
 from export.edges.losses import LOG_SPREAD
@@ -14,6 +18,13 @@ def slopes_of(depth: np.ndarray, focal_px: float) -> np.ndarray:
     """Depth [H, W] in metres -> `slopes` of the graph: [1, H / 2, W / 2, 12]."""
     planes = slopes(torch.from_numpy(depth)[None], torch.full((1, 2), focal_px))
     return np.ascontiguousarray(folded(planes, FOLD).permute(0, 2, 3, 1).numpy())
+
+
+def field_of_bundle(path: Path) -> Callable[[np.ndarray, float], np.ndarray]:
+    """The field of `field.onnx` in a bundle of any precision: from depth [H, W] in metres, H and W multiples of 16, and
+    the focal length in pixels to distance in r."""
+    graph = session(path / "field.onnx")
+    return lambda depth, focal_px: field_of_planes(graph.run(None, {"slopes": slopes_of(depth, focal_px)})[0])
 
 
 def field_of_planes(planes: np.ndarray) -> np.ndarray:

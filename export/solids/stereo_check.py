@@ -33,7 +33,7 @@ DISPARITIES_PX = 128
 BLOCK_PX = 5
 _FINER = 3  # pictures are rendered so many times as large
 _DOTS_PX = 1400  # of the projector's square picture
-_DOT_SHARE = 0.06
+_DOT_RATIO = 0.06
 _PROJECTED_SLOPE = 1.3  # from the middle to the border of that picture: sideways by depth
 _GREY_NOISE = 2.5
 _MARGIN_PX = 12  # from jumps, for noise
@@ -52,7 +52,7 @@ class Pair:
 
 
 def _dots(rng: np.random.Generator) -> np.ndarray:
-    dots = (rng.random((_DOTS_PX, _DOTS_PX)) < _DOT_SHARE).astype(np.float32)
+    dots = (rng.random((_DOTS_PX, _DOTS_PX)) < _DOT_RATIO).astype(np.float32)
     return np.clip(cv2.GaussianBlur(dots, (0, 0), 0.8) * 3, 0, 1)
 
 

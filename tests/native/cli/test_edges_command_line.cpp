@@ -146,6 +146,29 @@ TEST_F(EdgesCommandLine, WhatHasNoDepthNoCalibrationOrNoBundleIsASentence) {
   EXPECT_EQ(wrong.exit_code, 2) << "--out is required";
 }
 
+// Cut files, a head that promises more pixels than there is memory for, a focal length of 0, a file where the folder
+// should be: a sentence, and nothing is written.
+TEST_F(EdgesCommandLine, DamagedDepthAndBadNumbersAreASentence) {
+  const std::string whole = read_text(folder_.file("depth.png"));
+  for (const size_t bytes : {size_t(0), size_t(7), size_t(30), whole.size() / 2}) {
+    write_text(folder_.file("cut.png"), whole.substr(0, bytes));
+    expect_failure("'image:cut.png?depth_unit=0.001&fov=60' --out o", "cut.png");
+  }
+  std::string giant = whole;
+  for (const size_t at : {16u, 20u}) giant.replace(at, 4, std::string("\x00\x0f\x00\x00", 4));
+  write_text(folder_.file("giant.png"), giant);
+  expect_failure("'image:giant.png?depth_unit=0.001&fov=60' --out o", "giant.png");
+  for (const char* given :
+       {"fx=0", "fx=-5", "fx=nan", "fov=0", "fov=180", "depth_unit=0&fov=60", "depth_unit=x&fov=60"}) {
+    const std::string unit = std::string(given).find("depth_unit") == 0 ? "" : "depth_unit=0.001&";
+    EXPECT_NE(run("'image:depth.png?" + unit + given + "' --out o").exit_code, 0) << given;
+  }
+  EXPECT_EQ(files("o"), std::set<std::string>());
+  write_text(folder_.file("file"), "here already");
+  EXPECT_NE(run("'image:depth.png?depth_unit=0.001&fov=60' --out file").exit_code, 0);
+  EXPECT_EQ(read_text(folder_.file("file")), "here already");
+}
+
 TEST_F(EdgesCommandLine, ABadSourceDoesNotCostTheRest) {
   const Outcome result =
       run("'image:grey.png?fov=60&depth_unit=0.001' 'image:depth.png?depth_unit=0.001&fov=60' --out o");

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <random>
 
@@ -91,7 +92,8 @@ TEST(Edges, FramesOfAnySizeTakeTurns) {
 TEST(Edges, FramesThatAreTooLargeAreRefusedBeforeMemoryIsTaken) {
   const auto edges = tiny_edges::edges();
   const uint8_t pixel[4] = {};
-  for (const auto& [width, height] : {std::pair{4096, 3072}, {16384, 4096}}) {
+  for (const auto& size : {std::pair{4096, 3072}, {16384, 4096}}) {
+    const int width = size.first, height = size.second;
     const maq::ImageView depth{MAQ_PIXEL_DEPTH16, width, height, {{pixel, 0}, {}}};
     maq::EdgesResult result;
     expect_error(MAQ_ERROR_IMAGE_SIZE, std::to_string(width) + " x " + std::to_string(height),
@@ -132,6 +134,62 @@ TEST(Edges, HolesStayHolesAndDoNotSpread) {
   for (size_t i = 0; i < depth.size(); ++i) {
     ASSERT_EQ(result.field.spread_r[i] == kEps_r, depth[i] == 0);
     ASSERT_TRUE(depth[i] > 0 || is_clear(result.field, i));
+  }
+}
+
+// One known pixel, one row, one column, and 1 pixel in 100: what is known has an answer, and nothing else.
+TEST(Edges, AFewKnownPixelsHaveAnAnswerAndNoOthers) {
+  const auto edges = tiny_edges::edges();
+  constexpr int kWidth = 61, kHeight = 45;
+  std::mt19937 random(11);
+  std::vector<bool> sparse(size_t(kWidth * kHeight));
+  for (size_t i = 0; i < sparse.size(); ++i) sparse[i] = random() % 100 == 0;
+  const std::function<bool(int, int)> masks[] = {
+      [](int x, int y) { return x == 30 && y == 20; },
+      [](int, int y) { return y == 20; },
+      [](int x, int) { return x == kWidth - 1; },
+      [&](int x, int y) { return bool(sparse[size_t(y * kWidth + x)]); },
+      [](int x, int y) { return (x / 8 + y / 8) % 2 == 0; },
+      [](int x, int y) { return int(std::hypot(x - 30, y - 22)) % 3 == 0; },
+  };
+  for (const auto& is_known : masks) {
+    std::vector<float> depth(size_t(kWidth * kHeight));
+    int64_t known = 0;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        if (!is_known(x, y)) continue;
+        depth[size_t(y * kWidth + x)] = 1.5f + 0.01f * float(x);
+        ++known;
+      }
+    }
+    const maq::EdgesResult result = run(*edges, depth, kWidth, kHeight);
+    EXPECT_EQ(result.stats.known_pixels, known);
+    EXPECT_EQ(result.stats.broken_pixels, 0);
+    for (size_t i = 0; i < depth.size(); ++i) {
+      if (depth[i] > 0) {
+        ASSERT_TRUE(std::isfinite(result.field.distance_r[i]) && result.field.spread_r[i] < 3 * kEps_r);
+      } else {
+        ASSERT_TRUE(is_clear(result.field, i));
+      }
+    }
+  }
+}
+
+// Units that differ by powers of two, so that not even rounding may differ.
+TEST(Edges, TheUnitOf16BitDepthIsWithoutEffect) {
+  const auto edges = tiny_edges::edges();
+  std::vector<float> depth;
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) depth.push_back(std::rint(1000 + (x > 20 && y > 25 ? -200 : 3 * float(x))));
+  }
+  const maq::EdgesResult expected = run(*edges, depth, 64, 48);
+  for (const float unit : {1.0f / 1024, 1.0f / 4096, 1.0f / 16384}) {
+    std::vector<float> scaled = depth;
+    for (float& z : scaled) z *= unit;
+    const maq::EdgesResult result = run(*edges, scaled, 64, 48);
+    EXPECT_EQ(result.field.distance_r, expected.field.distance_r);
+    EXPECT_EQ(result.field.spread_r, expected.field.spread_r);
+    EXPECT_EQ(result.field.kind, expected.field.kind);
   }
 }
 

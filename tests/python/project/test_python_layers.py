@@ -32,6 +32,7 @@ ALLOWED = {
     },
     "export.scenes": {"export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training"},
     "export.edges": {"export.bundle", "export.camera", "export.densepose", "export.solids", "export.training"},
+    "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
         "export.bundle", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "edges/curves/curve_drawing.h"
 
 namespace maq {
 namespace {
@@ -15,7 +16,6 @@ constexpr double kMaxBeyond_px = 6;   // of a curve's ends beyond its first and 
 constexpr int kMaxOffEnds = 3;
 constexpr int kLengthen_px = 6;       // votes are followed so far beyond a free end
 constexpr double kLongestStep_r = 6;  // of a pixel along a curve that runs away from the camera
-constexpr double kArcStep_rad = 0.07;
 
 void require(bool is_right, const char* name, double value, const char* range) {
   if (!is_right) {
@@ -99,7 +99,7 @@ const EdgeCurves& CurveExtractor::extract(const EdgeField& field) {
   chains_.trace(votes_, options_, found_.counts);
   for (const RidgeChain& chain : chains_.chains) draft_curves(field, chain);
   join_corners(field);
-  for (Draft& draft : drafts_) write_points(draft);
+  for (Draft& draft : drafts_) append_curve(draft.curve, draft.end, found_);
   return found_;
 }
 
@@ -363,33 +363,6 @@ void CurveExtractor::move_end(Draft& draft, int which, Vec3 to) {
   if (curve.type == CurveType::kSpline) {
     found_.controls[size_t(curve.first_control + (which == 0 ? 0 : curve.control_count - 1))] = to;
   }
-}
-
-void CurveExtractor::write_points(Draft& draft) {
-  EdgeCurve& curve = draft.curve;
-  curve.first_point = int(found_.points.size());
-  if (curve.type == CurveType::kLine) {
-    found_.points.push_back(draft.end[0]);
-    found_.points.push_back(draft.end[1]);
-  } else if (curve.type == CurveType::kArc) {
-    const int steps = std::max(1, int(std::ceil(curve.sweep_rad / kArcStep_rad)));
-    for (int i = 0; i <= steps; ++i) {
-      const double a = curve.sweep_rad * i / steps;
-      found_.points.push_back(curve.centre + std::cos(a) * curve.x_axis + std::sin(a) * curve.y_axis);
-    }
-  } else {
-    const int steps = 8 * (curve.control_count - 3);
-    for (int i = 0; i <= steps; ++i) {
-      const double t = double(i) / steps;
-      found_.points.push_back(spline_point(&found_.controls[size_t(curve.first_control)], curve.control_count, t));
-    }
-  }
-  curve.point_count = int(found_.points.size()) - curve.first_point;
-  for (size_t i = size_t(curve.first_point) + 1; i < found_.points.size(); ++i) {
-    curve.length_m += length(found_.points[i] - found_.points[i - 1]);
-  }
-  if (curve.type == CurveType::kArc) curve.length_m = curve.sweep_rad * length(curve.x_axis);
-  found_.curves.push_back(curve);
 }
 
 }  // namespace maq

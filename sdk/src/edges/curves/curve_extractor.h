@@ -41,7 +41,6 @@ class CurveExtractor {
   void lengthen_end(const EdgeField& field, Draft& draft, int which) const;
   void join_corners(const EdgeField& field);
   void move_end(Draft& draft, int which, Vec3 to);
-  void write_points(Draft& draft);
 
   CurveOptions options_;
   RidgeVotes votes_;

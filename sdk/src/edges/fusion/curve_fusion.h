@@ -1,0 +1,62 @@
+// Sharp feature curves of several posed views as one set: what lies side by side in space is one curve.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "edges/curves/arc_fit.h"
+#include "edges/curves/corners.h"
+#include "edges/curves/edge_curves.h"
+#include "edges/curves/line_fit.h"
+#include "edges/curves/spline_fit.h"
+#include "image/geometry/pinhole_camera.h"
+
+namespace maq {
+
+// r: a footprint of the view that saw a curve.
+struct CurveFusionOptions {
+  double match_r = 3;        // curves of two views are one where they are so near
+  double match_deg = 20;     // and run the same way
+  double gap_r = 6;          // a curve goes on over gaps of so much
+  double tolerance_r = 1;    // the simplest type is taken that is so near its points (root of the mean square)
+  double min_length_r = 10;  // shorter curves are left out
+  double join_r = 12;        // ends so near the place where their curves meet share a corner
+  int min_views = 2;         // that saw a curve, or it is left out; of two views and fewer, one is enough
+  int max_curves = 4096;     // more are left out, the shortest
+};
+
+class CurveFusion {
+ public:
+  explicit CurveFusion(const CurveFusionOptions& options = {}) : options_(options) {}
+
+  // Curves of a view, in the coordinates of its camera.
+  void add_view(const EdgeCurves& curves, const PinholeCamera& pose);
+
+  // Curves of all views, in the world; what is computed is computed from `origin`, which is amid the cameras. The order
+  // of views has no effect but on rounding. Fused curves know no planes.
+  void fuse(const std::array<double, 3>& origin, EdgeCurves& result) const;
+
+ private:
+  // A place on a view's curve; the direction has length 1.
+  struct Place {
+    Vec3 point, direction;
+    double r_m;
+    int view;
+    EdgeKind kind;
+    Bend bend;
+  };
+  struct Piece {
+    size_t first, count;  // of places_
+    double length_r;
+    bool is_closed;
+  };
+  class Merger;
+
+  CurveFusionOptions options_;
+  std::vector<std::array<double, 3>> centres_;  // of the views
+  std::vector<Place> places_;                   // axes of the world, from the view's camera
+  std::vector<Piece> pieces_;
+};
+
+}  // namespace maq

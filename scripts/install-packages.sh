@@ -108,6 +108,8 @@ if [ "$(id -u)" -ne 0 ]; then
     fi
     as_root=(sudo env DEBIAN_FRONTEND=noninteractive)
 fi
+exec 9<"$0"  # one at a time: groups of tests run beside each other, and apt refuses when another one is at work
+flock 9
 echo "Installing Debian packages: ${missing[*]}"
 export DEBIAN_FRONTEND=noninteractive  # sudo passes nothing on
 "${as_root[@]}" apt-get update -qq

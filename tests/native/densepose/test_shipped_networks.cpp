@@ -403,7 +403,9 @@ TEST_F(ShippedNetworks, PeopleHaveACropIfTheyAreSmallInTheNetworkOrLean) {
   EXPECT_GE(rotated.stats.crops, 1);
   expect_sane(rotated, leaning);
 
-  settings.long_side_px = 96;
+  // At 64 pixels a crop labels .064 to .071 more of the pixels as the full input does, with and without noise of one
+  // level. At 96 it is .001 to .009, -.008 when the photo is moved by four pixels, -.002 by the rounding of aarch64.
+  settings.long_side_px = 64;
   const maq::DensePoseResult small = run(photo_, settings);
   EXPECT_EQ(small.stats.crops, 1);
   settings.crops = maq::PersonCrops::kOff;
@@ -413,7 +415,7 @@ TEST_F(ShippedNetworks, PeopleHaveACropIfTheyAreSmallInTheNetworkOrLean) {
     for (size_t i = 0; i < photo_.total(); ++i) equal += result.planes.part[i] == upright.planes.part[i];
     return double(equal) / double(photo_.total());
   };
-  EXPECT_GT(agreement(small), agreement(coarse)) << "with a crop the small input labels as the large one";
+  EXPECT_GT(agreement(small), agreement(coarse) + 0.03) << "with a crop the small input labels as the large one";
 }
 
 TEST_F(ShippedNetworks, FramesOfExtremeSizeWithCropsGiveSaneResults) {

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the built SDK on the bundled photo, clip and room, and on a real place: scripts/demo.sh [OUTPUT_FOLDER]
+# Runs the built SDK on the bundled photo, clip, depth picture and room, and on a real place: scripts/demo.sh [OUTPUT_FOLDER]
 #
 # The real place is fetched once (box, or what is in .data/places/real), which needs Python 3.11 and some minutes; without a
 # network the demo says so and goes on. REAL=no leaves it out.
@@ -19,6 +19,12 @@ for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
     printf '\n== maquette densepose %s --out %s --overlay\n' "$source" "$out"
     "$maquette" densepose "$source" --out "$out" --overlay
 done
+
+# The edges of a carton that a depth camera sees, and its size beside the true one.
+depth='image:tests/media/box_depth.png?depth_unit=0.001&fx=600'
+printf "\n== maquette edges '%s' --out %s --overlay --boxes --format json,step,dxf\n" "$depth" "$out"
+"$maquette" edges "$depth" --out "$out" --overlay --boxes --format json,step,dxf
+echo "  in truth    441 x 427 x 411 mm (tests/media/box_depth.json)"
 
 # A real place takes a while to come, so the bundled one is shown first.
 fetch_real() {
@@ -49,4 +55,5 @@ fi
 
 printf '\nPictures to look at, in %s:\n' "$out"
 find "$out" -name '*_overlay.*' -o -name '*.mp4' | sort | sed 's/^/  /'
-printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/formats.md); <place>.maqs, scenes.\n'
+printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/formats.md); <place>.maqs, scenes;\n'
+printf 'box_depth_distance.png and box_depth_kind.png, the field of edges; box_depth_curves.step, .dxf and .json, its curves.\n'

@@ -273,7 +273,7 @@ class DensePoseResult {
  public:
   // Takes over a result of the C API.
   explicit DensePoseResult(maq_densepose_result* result) : owner_(result) {
-    check(maq_densepose_result_get_size(get(), &width_px_, &height_px_));
+    if (result != nullptr) check(maq_densepose_result_get_size(get(), &width_px_, &height_px_));
   }
 
   maq_densepose_result* get() const { return owner_.get(); }
@@ -527,10 +527,15 @@ struct PipelineResult {
         number(result.number),
         wait_ms(result.wait_ms),
         run_ms(result.run_ms),
-        age_ms(result.age_ms) {}
+        age_ms(result.age_ms) {
+    if (result.curves != nullptr) curves.emplace(result.curves);
+    if (result.edges != nullptr) edges.emplace(result.edges);
+  }
 
   Frame frame;
-  DensePoseResult densepose;
+  DensePoseResult densepose;          // get() is null where edges are found
+  std::optional<EdgesResult> edges;   // nothing where dense pose runs
+  std::optional<EdgesCurves> curves;  // nothing where they were not asked for
   uint64_t number;
   double wait_ms, run_ms, age_ms;
 };
@@ -547,6 +552,10 @@ class Pipeline {
 
   void set_source(const std::string& uri) { check(maq_pipeline_set_source(get(), uri.c_str())); }
   void set_densepose(const maq_densepose_config& config) { check(maq_pipeline_set_densepose(get(), &config)); }
+  // Edges in place of the current model; without curves where `curves` is null.
+  void set_edges(const maq_edges_config& config, const maq_edges_curves_config* curves = nullptr) {
+    check(maq_pipeline_set_edges(get(), &config, curves));
+  }
   void set_paused(bool is_paused) { check(maq_pipeline_set_paused(get(), is_paused ? 1 : 0)); }
   // "" ends the recording.
   void set_recording(const std::string& path) {

@@ -1,6 +1,6 @@
-/* Pipeline: runs a source and a dense pose model on a thread of the library, for apps that must not block. The newest
- * frame is processed; frames that come while the model is busy are dropped. Source, model and recording can be changed
- * while it runs.
+/* Pipeline: runs a source and a model on a thread of the library, for apps that must not block: dense pose, or edges of
+ * a depth camera with their curves. The newest frame is processed; frames that come while the model is busy are
+ * dropped. Source, model and recording can be changed while it runs.
  *
  *   maq_pipeline_create(context, &config, &pipeline);
  *   maq_pipeline_set_source(pipeline, "camera:");
@@ -14,6 +14,7 @@
 #define MAQUETTE_PIPELINE_H_
 
 #include "maquette/densepose.h"
+#include "maquette/edge_curves.h"
 #include "maquette/source.h"
 
 #ifdef __cplusplus
@@ -39,15 +40,18 @@ typedef enum maq_pipeline_state {
 typedef struct maq_pipeline_result {
   uint32_t struct_size;
   maq_frame* frame;                /* the caller's: for maq_frame_release or maq_pipeline_release_result */
-  maq_densepose_result* densepose; /* the caller's: for maq_densepose_result_release or maq_pipeline_release_result */
+  maq_densepose_result* densepose; /* the caller's: for maq_densepose_result_release or maq_pipeline_release_result;
+                                      NULL where edges are found */
   uint64_t number;                 /* counts the results of the pipeline, from 1; gaps are results that were dropped */
   double wait_ms;                  /* time that the pipeline waited for the frame */
   double run_ms;                   /* time that the model took; see maq_densepose_result_get_stats for its stages */
   double age_ms;                   /* from the capture of a camera's frame to the result; -1 if unknown */
+  maq_edges_result* edges;         /* the caller's, as densepose; NULL where dense pose runs */
+  maq_edges_curves* curves;        /* the caller's; NULL where they were not asked for */
 } maq_pipeline_result;
 
 /* Receives each result on the pipeline's thread, which waits meanwhile: return promptly. `result` is valid during the
- * call; the frame and the dense pose result in it are the callee's from then on, to be released now or later. The
+ * call; the objects in it are the callee's from then on, to be released now or later. The
  * callback may call any function of this header; it must not throw. */
 typedef void (*maq_pipeline_result_callback)(void* user_data, const maq_pipeline_result* result);
 
@@ -76,6 +80,12 @@ typedef struct maq_pipeline_config {
    * (key_frame_interval), then long_side_px is lowered, in steps of 32 pixels, to no less than half. Both come back,
    * step by step, when there has been time for some seconds. */
   double frame_budget_ms;
+  /* NULL (default): dense pose runs. Otherwise edges are found instead, in frames with depth of a source that gives its
+   * intrinsics (source.h), with these options; densepose must be NULL then, and frame_budget_ms has no effect. Copied,
+   * result_pool_size unused. */
+  const maq_edges_config* edges;
+  const maq_edges_curves_config* curves; /* with edges: curves are found too, with these options; NULL (default): not.
+                                            Copied. */
 } maq_pipeline_config;
 
 typedef struct maq_pipeline_info {
@@ -94,7 +104,8 @@ typedef struct maq_pipeline_stats {
   uint64_t dropped_frame_count;  /* of the current source: lost by the camera, or while the model was busy */
   double results_per_second;     /* over the last second */
   double wait_ms, run_ms, age_ms; /* of the latest result, as in maq_pipeline_result */
-  int32_t key_frame_interval;     /* of the model's config, or what frame_budget_ms makes of it; 0 before a result */
+  int32_t key_frame_interval;     /* of the model's config, or what frame_budget_ms makes of it; 0 before a result, and
+                                     with edges */
   int32_t long_side_px;           /* the same */
 } maq_pipeline_stats;
 
@@ -126,6 +137,12 @@ MAQ_API maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* u
  * block. */
 MAQ_API maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_densepose_config* config);
 
+/* The same with edges of depth frames in place of the current model. `config` NULL: the defaults. `curves` NULL: none
+ * are found; otherwise with these options. Both are copied. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT;
+ * maq_pipeline_info has errors of the loading. Does not block. */
+MAQ_API maq_status maq_pipeline_set_edges(maq_pipeline* pipeline, const maq_edges_config* config,
+                                          const maq_edges_curves_config* curves);
+
 /* Pauses with 1, resumes with 0. A paused pipeline finishes the current frame, then takes no more. The source stays
  * open.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
@@ -145,13 +162,13 @@ MAQ_API maq_status maq_pipeline_set_recording(maq_pipeline* pipeline, const char
 MAQ_API maq_status maq_pipeline_stop(maq_pipeline* pipeline);
 
 /* Takes the newest result that was not taken yet, or waits for the next one for at most `timeout_ns` (MAQ_WAIT_FOREVER:
- * without limit). The caller sets result->struct_size; frame and densepose are the caller's afterwards.
+ * without limit). The caller sets result->struct_size; the objects in it are the caller's afterwards.
  * Any thread. Errors: MAQ_TIMEOUT, MAQ_END_OF_STREAM, MAQ_CANCELLED (the pipeline is stopped), MAQ_ERROR_POOL_EMPTY
  * (all results are held), MAQ_ERROR_UNSUPPORTED (it has a result_callback), MAQ_ERROR_INVALID_ARGUMENT; when the
  * pipeline failed, the status of maq_pipeline_info. Blocks until there is a result. */
 MAQ_API maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_ns, maq_pipeline_result* result);
 
-/* Releases `frame` and `densepose` of the result, unless NULL, and sets them to NULL (a NULL `result` is fine).
+/* Releases the objects of the result, unless NULL, and sets them to NULL (a NULL `result` is fine).
  * Once for each result, from any thread. Does not block. */
 MAQ_API void maq_pipeline_release_result(maq_pipeline_result* result);
 
@@ -165,7 +182,7 @@ MAQ_API maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipe
 
 /* Gets the surface that the model's labels refer to, once a model is loaded; like maq_densepose_get_surface. The points
  * live as long as the pipeline, also when the model is replaced.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (no model is loaded, or it has none),
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (no model is loaded, or it has none, as edges),
  * MAQ_ERROR_BAD_BUNDLE (it is damaged). Blocks briefly the first time, while it is decoded. */
 MAQ_API maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surface* surface);
 

@@ -2,7 +2,6 @@
 
 #include "api/boundary.h"
 #include "api/edges_handle.h"
-#include "core/clock.h"
 #include "edges/files/curve_files.h"
 #include "edges/measuring/snap.h"
 
@@ -76,25 +75,8 @@ CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char
   request.finds_boxes = config.find_boxes == 1;
   request.options = {config.select_px,     config.min_votes,   config.smear_px, config.support_px, config.break_deg,
                      config.min_length_px, config.tolerance_r, config.gap_r,    config.join_px,    config.max_curves};
+  (void)CurveExtractor(request.options);  // checks them
   return request;
-}
-
-void maq_edges_curves::find(const EdgeField& field, const CurveRequest& request) {
-  Stopwatch stage;
-  found = nullptr;
-  boxes.clear();
-  if (!extractor_ || !(options_ == request.options)) {
-    extractor_.emplace(request.options);
-    options_ = request.options;
-  }
-  found = &extractor_->extract(field);
-  curves_ms = float(stage.lap_ms());
-  if (request.finds_boxes) box_finder_.find(field, *found, boxes);
-  boxes_ms = request.finds_boxes ? float(stage.lap_ms()) : 0;
-  seen.width = field.width;
-  seen.height = field.height;
-  seen.intrinsics = field.intrinsics;
-  seen.depth_m = field.depth_m;
 }
 
 maq_status maq_edges_curves_config_init(maq_edges_curves_config* config, uint32_t struct_size) {
@@ -108,7 +90,7 @@ maq_status maq_edges_result_find_curves(const maq_edges_result* result, const ma
     require_argument(curves, "curves");
     const CurveRequest request = curve_request(config, "config");
     BoundedPool<maq_edges_curves>::Pooled handle = result->curves->acquire();
-    handle->find(result->result.field, request);
+    handle->finder.find(result->result.field, request, handle->found);
     *curves = lend<maq_edges_curves>(std::move(handle));
     return MAQ_OK;
   });
@@ -119,21 +101,21 @@ void maq_edges_curves_release(maq_edges_curves* curves) {
 }
 
 uint32_t maq_edges_curves_get_curve_count(const maq_edges_curves* curves) {
-  return curves == nullptr ? 0 : uint32_t(curves->found->curves.size());
+  return curves == nullptr ? 0 : uint32_t(curves->found.curves.curves.size());
 }
 
 uint32_t maq_edges_curves_get_corner_count(const maq_edges_curves* curves) {
-  return curves == nullptr ? 0 : uint32_t(curves->found->corners.size());
+  return curves == nullptr ? 0 : uint32_t(curves->found.curves.corners.size());
 }
 
 uint32_t maq_edges_curves_get_box_count(const maq_edges_curves* curves) {
-  return curves == nullptr ? 0 : uint32_t(curves->boxes.size());
+  return curves == nullptr ? 0 : uint32_t(curves->found.boxes.size());
 }
 
 maq_status maq_edges_curves_get_curve(const maq_edges_curves* curves, uint32_t index, maq_edges_curve* curve) {
   return guarded(curves, __func__, [&] {
     require_argument(curves, "curves");
-    const EdgeCurves& all = *curves->found;
+    const EdgeCurves& all = curves->found.curves;
     require_index("index", index, all.curves.size());
     const EdgeCurve& from = all.curves[index];
     maq_edges_curve filled{};
@@ -168,8 +150,8 @@ maq_status maq_edges_curves_get_curve(const maq_edges_curves* curves, uint32_t i
 maq_status maq_edges_curves_get_corner(const maq_edges_curves* curves, uint32_t index, maq_edges_corner* corner) {
   return guarded(curves, __func__, [&] {
     require_argument(curves, "curves");
-    require_index("index", index, curves->found->corners.size());
-    const EdgeCorner& from = curves->found->corners[index];
+    require_index("index", index, curves->found.curves.corners.size());
+    const EdgeCorner& from = curves->found.curves.corners[index];
     maq_edges_corner filled{};
     filled.curve_count = from.curve_count;
     write_vector(from.point, filled.point_m);
@@ -181,8 +163,8 @@ maq_status maq_edges_curves_get_corner(const maq_edges_curves* curves, uint32_t 
 maq_status maq_edges_curves_get_box(const maq_edges_curves* curves, uint32_t index, maq_edges_box* box) {
   return guarded(curves, __func__, [&] {
     require_argument(curves, "curves");
-    require_index("index", index, curves->boxes.size());
-    const MeasuredBox& from = curves->boxes[index];
+    require_index("index", index, curves->found.boxes.size());
+    const MeasuredBox& from = curves->found.boxes[index];
     maq_edges_box filled{};
     filled.corner_count = from.corners;
     write_vector(from.centre, filled.centre_m);
@@ -199,10 +181,10 @@ maq_status maq_edges_curves_get_box(const maq_edges_curves* curves, uint32_t ind
 maq_status maq_edges_curves_get_stats(const maq_edges_curves* curves, maq_edges_curves_stats* stats) {
   return guarded(curves, __func__, [&] {
     require_argument(curves, "curves");
-    const CurveCounts& from = curves->found->counts;
+    const CurveCounts& from = curves->found.curves.counts;
     maq_edges_curves_stats filled{};
-    filled.curves_ms = curves->curves_ms;
-    filled.boxes_ms = curves->boxes_ms;
+    filled.curves_ms = curves->found.curves_ms;
+    filled.boxes_ms = curves->found.boxes_ms;
     filled.bad_pixel_count = from.bad_pixels;
     filled.voting_pixel_count = from.voting_pixels;
     filled.chain_count = from.chains;
@@ -220,7 +202,7 @@ maq_status maq_edges_curves_snap_to_pixel(const maq_edges_curves* curves, double
   return guarded(curves, __func__, [&] {
     require_argument(curves, "curves");
     require_range("radius_px", radius_px, 0.0, kMaxRadiusPx);
-    write_snap(snap_to(curves->seen, *curves->found, x_px, y_px, radius_px), snap);
+    write_snap(snap_to(curves->found.seen, curves->found.curves, x_px, y_px, radius_px), snap);
     return MAQ_OK;
   });
 }
@@ -234,7 +216,7 @@ maq_status maq_edges_curves_snap_to_ray(const maq_edges_curves* curves, const do
       throw ArgumentError("direction has the length ", length(along), ", but must lead somewhere.");
     }
     require_range("max_angle_rad", max_angle_rad, 0.0, 1.0);
-    write_snap(snap_to_ray(curves->seen, *curves->found, from, along, max_angle_rad), snap);
+    write_snap(snap_to_ray(curves->found.seen, curves->found.curves, from, along, max_angle_rad), snap);
     return MAQ_OK;
   });
 }
@@ -243,7 +225,7 @@ maq_status maq_edges_curves_save(const maq_edges_curves* curves, const char* pat
   return guarded(curves, __func__, [&] {
     require_argument(curves, "curves");
     require_argument(path, "path");
-    write_curve_file(*curves->found, path);
+    write_curve_file(curves->found.curves, path);
     return MAQ_OK;
   });
 }

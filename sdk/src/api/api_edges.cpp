@@ -24,13 +24,6 @@ maq_edges_config default_config() {
   return config;
 }
 
-// Of the depth image, which the frame's picture may be larger than: they show the same view.
-Intrinsics intrinsics_of_depth(const Frame& frame, const ImageView& depth, const maq_intrinsics& given) {
-  const Intrinsics of_frame{given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
-  const bool is_of_picture = given.width_px == frame.image.width_px && given.height_px == frame.image.height_px;
-  return is_of_picture ? resized(of_frame, depth.width_px, depth.height_px) : of_frame;
-}
-
 }  // namespace
 
 maq_edges_config maq::read_edges_config(const maq_edges_config* given, const char* name) {
@@ -84,10 +77,8 @@ maq_status maq_edges_run(maq_edges* edges, const maq_frame* frame, const maq_int
           "the camera's data sheet.");
     }
     require_argument(result, "result");
-    const ImageView* const depth = depth_of(frame->frame);
     BoundedPool<maq_edges_result>::Pooled handle = edges->results.acquire();
-    const ImageView& image = depth == nullptr ? frame->frame.image : *depth;  // refused where it is no depth
-    edges->edges->run(image, intrinsics_of_depth(frame->frame, image, *intrinsics), handle->result);
+    edges->edges->run(frame->frame, *intrinsics, handle->result);
     handle->curves = edges->curves;
     *result = lend<maq_edges_result>(std::move(handle));
     return MAQ_OK;

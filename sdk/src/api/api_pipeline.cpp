@@ -3,6 +3,7 @@
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
 #include "api/densepose_handle.h"
+#include "api/edges_handle.h"
 #include "api/source_handle.h"
 #include "maquette/pipeline.h"
 #include "pipeline/pipeline.h"
@@ -16,6 +17,8 @@ constexpr double kMaxFrameBudgetMs = 60000;
 // Of the structs without the frame budget.
 constexpr size_t kFirstConfigSize = offsetof(maq_pipeline_config, nice) + sizeof(int32_t);
 constexpr size_t kFirstStatsSize = offsetof(maq_pipeline_stats, key_frame_interval);
+// Of the struct without edges.
+constexpr size_t kFirstResultSize = offsetof(maq_pipeline_result, edges);
 
 // Of the thread that asked, as with maq_last_error.
 thread_local std::string given_problem, given_uri;
@@ -33,28 +36,65 @@ PipelineModel model_of(const maq_densepose_config* given, const char* name) {
   return {bundle_reader(config, name, kDensePoseBundle), settings};
 }
 
+PipelineModel model_of(const maq_edges_config* given, const char* name, const maq_edges_curves_config* curves,
+                       const char* curves_name) {
+  const maq_edges_config config = read_edges_config(given, name);
+  LiveEdgesSettings settings{edges_settings(config, name), std::nullopt};
+  if (curves != nullptr) settings.curves = curve_request(curves, curves_name);
+  return {bundle_reader(config, name, kEdgesBundle), settings};
+}
+
 // The handles of results. A copy has the same pools.
 struct ResultPools {
-  explicit ResultPools(uint32_t size) : frames(size, "frames"), results(size, "results") {}
+  explicit ResultPools(uint32_t size)
+      : frames(size, "frames"), densepose(size, "results"), edges(size, "results"), curves(size, "curves") {}
 
   BoundedPool<maq_frame> frames;
-  BoundedPool<maq_densepose_result> results;
+  BoundedPool<maq_densepose_result> densepose;
+  BoundedPool<maq_edges_result> edges;
+  BoundedPool<maq_edges_curves> curves;
 };
 
 // A result of the pipeline in handles of the caller.
 struct ResultHandles {
-  explicit ResultHandles(ResultPools& pools) : frame(pools.frames.acquire()), densepose(pools.results.acquire()) {}
+  // Before it is known which model the next result is of. Throws MAQ_ERROR_POOL_EMPTY.
+  explicit ResultHandles(const ResultPools& given)
+      : pools(given),
+        frame(given.frames.acquire()),
+        densepose(given.densepose.acquire()),
+        edges(given.edges.acquire()),
+        curves(given.curves.acquire()) {}
 
-  maq_pipeline_result hand_over(const PipelineTimes& times) {
-    maq_pipeline_result result{sizeof result, nullptr,      nullptr,     times.number,
-                               times.wait_ms, times.run_ms, times.age_ms};
+  // Memory goes back and forth.
+  void swap(PipelineOutput& made) {
+    std::swap(densepose->result, made.densepose);
+    std::swap(edges->result, made.edges);
+    std::swap(curves->found, made.curves);
+  }
+
+  maq_pipeline_result hand_over(const PipelineOutput& made, const PipelineTimes& times) {
+    maq_pipeline_result result{};
+    result.struct_size = sizeof result;
+    result.number = times.number;
+    result.wait_ms = times.wait_ms;
+    result.run_ms = times.run_ms;
+    result.age_ms = times.age_ms;
     result.frame = lend<maq_frame>(std::move(frame));
-    result.densepose = lend<maq_densepose_result>(std::move(densepose));
+    if (made.is_edges) {
+      edges->curves = pools.curves;
+      result.edges = lend<maq_edges_result>(std::move(edges));
+      if (made.has_curves) result.curves = lend<maq_edges_curves>(std::move(curves));
+    } else {
+      result.densepose = lend<maq_densepose_result>(std::move(densepose));
+    }
     return result;
   }
 
+  const ResultPools& pools;
   BoundedPool<maq_frame>::Pooled frame;
   BoundedPool<maq_densepose_result>::Pooled densepose;
+  BoundedPool<maq_edges_result>::Pooled edges;
+  BoundedPool<maq_edges_curves>::Pooled curves;
 };
 
 PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std::shared_ptr<ContextState>& state,
@@ -66,7 +106,14 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
     throw ArgumentError("config.source.state_callback is not NULL; use config.state_callback.");
   }
   PipelineSettings settings;
-  settings.model = model_of(config.densepose, "config.densepose");
+  if (config.edges != nullptr && config.densepose != nullptr) {
+    throw ArgumentError("config.densepose and config.edges are both given, but a pipeline runs one model.");
+  }
+  if (config.edges == nullptr && config.curves != nullptr) {
+    throw ArgumentError("config.curves is given without config.edges, in which they are found.");
+  }
+  settings.model = config.edges != nullptr ? model_of(config.edges, "config.edges", config.curves, "config.curves")
+                                           : model_of(config.densepose, "config.densepose");
   settings.source = source_settings(source, "config.source", state->log());
   // Those that the app holds, one that waits for it and one that is being mapped.
   settings.source.pool_size = int(config.result_pool_size) + 2;
@@ -75,8 +122,8 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
   settings.runtime = [state] { return state->onnxruntime(); };
   if (config.result_callback != nullptr) {
     settings.on_result = [pools = ResultPools(pools), call = config.result_callback,
-                          user_data = config.result_user_data](Frame& frame, DensePoseResult& densepose,
-                                                               const PipelineTimes& times) mutable {
+                          user_data = config.result_user_data](Frame& frame, PipelineOutput& output,
+                                                               const PipelineTimes& times) {
       std::optional<ResultHandles> handles;
       try {
         handles.emplace(pools);
@@ -85,8 +132,8 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
         return false;  // the app holds them all
       }
       std::swap(handles->frame->frame, frame);
-      std::swap(handles->densepose->result, densepose);
-      const maq_pipeline_result result = handles->hand_over(times);
+      handles->swap(output);
+      const maq_pipeline_result result = handles->hand_over(output, times);
       call(user_data, &result);
       return true;
     };
@@ -147,6 +194,15 @@ maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_densepos
   });
 }
 
+maq_status maq_pipeline_set_edges(maq_pipeline* pipeline, const maq_edges_config* config,
+                                  const maq_edges_curves_config* curves) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    pipeline->pipeline.set_model(model_of(config, "config", curves, "curves"));
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_paused) {
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");
@@ -177,14 +233,16 @@ maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_n
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");
     require_argument(result, "result");
-    require_struct_size("result", result->struct_size, sizeof(maq_pipeline_result), sizeof(maq_pipeline_result));
+    require_struct_size("result", result->struct_size, kFirstResultSize, sizeof(maq_pipeline_result));
     if (pipeline->has_callback) {
       throw Error(MAQ_ERROR_UNSUPPORTED, "The pipeline gives its results to config.result_callback.");
     }
     ResultHandles handles(pipeline->pools);
+    PipelineOutput output;
     PipelineTimes times;
-    const maq_status status =
-        pipeline->pipeline.acquire(timeout_ns, handles.frame->frame, handles.densepose->result, times);
+    handles.swap(output);  // whose memory the pipeline gets for the next one
+    const maq_status status = pipeline->pipeline.acquire(timeout_ns, handles.frame->frame, output, times);
+    handles.swap(output);
     if (status == MAQ_TIMEOUT) {
       return keep_error(pipeline, status, nullptr,
                         concatenate("No result came within ", timeout_ns / 1000000, " ms.").c_str());
@@ -192,7 +250,7 @@ maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_n
     if (status == MAQ_CANCELLED) {
       return keep_error(pipeline, status, nullptr, "The pipeline is stopped; start it with maq_pipeline_set_source.");
     }
-    if (status == MAQ_OK) *result = handles.hand_over(times);
+    if (status == MAQ_OK) write_struct(result, "result", handles.hand_over(output, times), kFirstResultSize);
     return status;
   });
 }
@@ -201,6 +259,9 @@ void maq_pipeline_release_result(maq_pipeline_result* result) {
   if (result == nullptr) return;
   maq_frame_release(std::exchange(result->frame, nullptr));
   maq_densepose_result_release(std::exchange(result->densepose, nullptr));
+  if (result->struct_size < sizeof *result) return;  // of an app that knows no edges
+  maq_edges_result_release(std::exchange(result->edges, nullptr));
+  maq_edges_curves_release(std::exchange(result->curves, nullptr));
 }
 
 maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info* info) {

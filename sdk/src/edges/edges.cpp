@@ -72,6 +72,14 @@ void Edges::run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResul
   }
 }
 
+void Edges::run(const Frame& frame, const maq_intrinsics& camera, EdgesResult& result) {
+  const ImageView* const depth = depth_of(frame);
+  const ImageView& image = depth == nullptr ? frame.image : *depth;  // refused where it is no depth
+  const Intrinsics given{camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px};
+  const bool is_of_picture = given.width_px == frame.image.width_px && given.height_px == frame.image.height_px;
+  run(image, is_of_picture ? resized(given, image.width_px, image.height_px) : given, result);
+}
+
 void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   EdgeField& field = result.field;
   EdgesStats& stats = result.stats;

@@ -10,6 +10,7 @@
 #include "edges/edge_field.h"
 #include "edges/edge_network.h"
 #include "edges/field_decode.h"
+#include "maquette/source.h"
 
 namespace maq {
 
@@ -54,6 +55,9 @@ class Edges {
   // another size, or that are not finite with positive focal lengths; MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_BAD_BUNDLE,
   // MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
   void run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result);
+  // Of a frame's own pixels, or of the depth that came with its picture: then `camera` may be that of the picture,
+  // which shows the same view. Distortion is left out of account.
+  void run(const Frame& frame, const maq_intrinsics& camera, EdgesResult& result);
   // From any thread: ends the run that runs, or else the next.
   void cancel() noexcept { cancel_.cancel(); }
 

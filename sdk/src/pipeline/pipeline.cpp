@@ -108,9 +108,9 @@ struct Pipeline::State {
   std::deque<PipelineStatus> reports;
   bool has_result = false;
   Frame newest_frame;
-  DensePoseResult newest_densepose;
+  PipelineOutput newest_output;
   PipelineStats counts;
-  std::shared_ptr<DensePose> model;  // none before the first is loaded; networks are run by the thread alone
+  std::shared_ptr<LiveModel> model;  // none before the first is loaded; networks are run by the thread alone
   std::list<SurfaceGrid> surfaces;   // that were asked for
 
   // Of the thread alone. Source and model are done when their numbers are those of the request.
@@ -122,7 +122,7 @@ struct Pipeline::State {
   std::unique_ptr<RecordingWriter> recording;
   uint64_t recording_number = 0;
   Frame frame;
-  DensePoseResult densepose;
+  PipelineOutput output;
   std::optional<Clock::time_point> waiting_since;
   EventRate rate;
   std::optional<FrameBudget> budget;  // of the model that is loaded
@@ -294,7 +294,7 @@ struct Pipeline::State {
     }
     source_number = now.source_number;
     waiting_since.reset();
-    if (model != nullptr) model->reset();
+    if (model != nullptr) model->forget();
     std::lock_guard<std::mutex> lock(mutex);
     is_photo = source->info().frame_count == 1 && !source->info().is_live;
     counts.dropped_frames = 0;
@@ -320,7 +320,7 @@ struct Pipeline::State {
     note_change();
   }
 
-  void show_model(std::shared_ptr<DensePose> next) {
+  void show_model(std::shared_ptr<LiveModel> next) {
     std::lock_guard<std::mutex> lock(mutex);
     model.swap(next);
   }
@@ -331,15 +331,15 @@ struct Pipeline::State {
     while (report_a_change()) {
     }
     show_model(nullptr);  // before the next one takes memory
-    const Bundle bundle = now.model.read_bundle();
-    const auto loaded = std::make_shared<DensePose>(settings.runtime(), bundle, now.model.settings);
-    settings.source.log.write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
-                              bundle.manifest.precision, ") loaded, ", now.model.settings.threads, " thread(s)");
+    Bundle bundle = now.model.read_bundle();
+    const Manifest manifest = bundle.manifest;
+    const auto loaded = make_live_model(settings.runtime(), std::move(bundle), now.model);
+    settings.source.log.write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
+                              ") loaded, ", now.model.threads(), " thread(s)");
     show_model(loaded);
     budget.reset();
-    if (settings.frame_budget_ms > 0) {
-      budget.emplace(settings.frame_budget_ms, FrameEffort{loaded->key_frame_interval(), loaded->long_side_px()});
-    }
+    const FrameEffort full = loaded->effort();
+    if (settings.frame_budget_ms > 0 && full.key_frame_interval > 0) budget.emplace(settings.frame_budget_ms, full);
     model_number = now.model_number;
     std::lock_guard<std::mutex> lock(mutex);
     return is_current();
@@ -363,7 +363,7 @@ struct Pipeline::State {
     }
     record_frame();
     const auto begin = Clock::now();
-    model->run(frame.image, densepose);
+    model->run(frame, source->intrinsics(), output);
     deliver(ms_between(*std::exchange(waiting_since, std::nullopt), begin), begin);
   }
 
@@ -380,15 +380,15 @@ struct Pipeline::State {
     counts.dropped_frames = dropped_frames;
     counts.results_per_second = rate.add(end);
     counts.latest = times;
-    counts.effort = {model->key_frame_interval(), model->long_side_px()};
+    counts.effort = model->effort();
     if (settings.on_result) {
       bool taken = false;
-      call_back(lock, [&] { taken = settings.on_result(frame, densepose, times); });
+      call_back(lock, [&] { taken = settings.on_result(frame, output, times); });
       counts.dropped_results += taken ? 0 : 1;
     } else {
       counts.dropped_results += has_result ? 1 : 0;
       std::swap(newest_frame, frame);
-      std::swap(newest_densepose, densepose);
+      std::swap(newest_output, output);
       has_result = true;
       changed.notify_all();
     }
@@ -400,7 +400,7 @@ struct Pipeline::State {
   void keep_budget(Clock::time_point end, double run_ms) {
     if (!budget || !budget->add(end, run_ms)) return;
     const FrameEffort& effort = budget->effort();
-    model->set_effort(effort.key_frame_interval, effort.long_side_px);
+    model->set_effort(effort);
     settings.source.log.write(MAQ_LOG_INFO, "A frame took ", run_ms, " ms, of ", settings.frame_budget_ms,
                               ": from now on one key frame in ", effort.key_frame_interval, ", long side ",
                               effort.long_side_px, " px");
@@ -532,7 +532,7 @@ void Pipeline::stop() {
   state.changed.wait(lock, [&] { return !state.in_callback; });
 }
 
-maq_status Pipeline::acquire(int64_t timeout_ns, Frame& frame, DensePoseResult& densepose, PipelineTimes& times) {
+maq_status Pipeline::acquire(int64_t timeout_ns, Frame& frame, PipelineOutput& output, PipelineTimes& times) {
   const std::shared_ptr<State> state = state_;
   std::unique_lock<std::mutex> lock(state->mutex);
   const auto is_over = [&] {
@@ -546,7 +546,7 @@ maq_status Pipeline::acquire(int64_t timeout_ns, Frame& frame, DensePoseResult& 
   }
   if (state->has_result) {
     std::swap(frame, state->newest_frame);
-    std::swap(densepose, state->newest_densepose);
+    std::swap(output, state->newest_output);
     times = state->counts.latest;
     state->has_result = false;
     return MAQ_OK;
@@ -575,7 +575,7 @@ PipelineStats Pipeline::stats() const {
 }
 
 const SurfaceGrid& Pipeline::surface() {
-  std::shared_ptr<DensePose> model;
+  std::shared_ptr<LiveModel> model;
   {
     std::lock_guard<std::mutex> lock(state_->mutex);
     model = state_->model;

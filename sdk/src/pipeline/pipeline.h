@@ -1,4 +1,4 @@
-// A source and a dense pose model on a thread of their own: the newest frame wins, and callers never wait for either.
+// A source and a model on a thread of their own: the newest frame wins, and callers never wait for either.
 #pragma once
 
 #include <cstdint>
@@ -7,12 +7,11 @@
 #include <string>
 
 #include "core/frame.h"
-#include "densepose/densepose.h"
 #include "densepose/surface_grid.h"
 #include "maquette/pipeline.h"
-#include "nn/bundle.h"
 #include "nn/onnxruntime_library.h"
 #include "pipeline/frame_budget.h"
+#include "pipeline/live_model.h"
 #include "sources/source.h"
 
 namespace maq {
@@ -42,20 +41,15 @@ struct PipelineStats {
   FrameEffort effort{0, 0};  // of the next frame
 };
 
-struct PipelineModel {
-  std::function<Bundle()> read_bundle;  // on the thread
-  DensePoseSettings settings;
-};
-
 struct PipelineSettings {
   PipelineModel model;
   SourceSettings source;  // on_state is not used
   int nice = 0;
-  double frame_budget_ms = 0;                                          // 0: none
+  double frame_budget_ms = 0;                                          // 0: none; of dense pose alone
   std::function<std::shared_ptr<const OnnxRuntimeLibrary>()> runtime;  // on the thread, before a model is loaded
   // Called on the thread; may call every function of the pipeline. `on_result` takes what it wants to keep out of its
   // arguments by swapping, and returns false when the result is dropped; without it results wait for acquire().
-  std::function<bool(Frame&, DensePoseResult&, const PipelineTimes&)> on_result;
+  std::function<bool(Frame&, PipelineOutput&, const PipelineTimes&)> on_result;
   std::function<void(const PipelineStatus&)> on_state;
 };
 
@@ -75,7 +69,7 @@ class Pipeline {
 
   // Swaps the newest result with the arguments. MAQ_OK, MAQ_TIMEOUT, MAQ_END_OF_STREAM or MAQ_CANCELLED; throws the
   // failure of the pipeline.
-  maq_status acquire(int64_t timeout_ns, Frame& frame, DensePoseResult& densepose, PipelineTimes& times);
+  maq_status acquire(int64_t timeout_ns, Frame& frame, PipelineOutput& output, PipelineTimes& times);
 
   PipelineStatus status() const;
   std::string source_uri() const;

@@ -119,6 +119,19 @@ TEST_F(EdgesCommandLine, CurvesAreWrittenInEachFormatAndBoxesAreMeasured) {
   EXPECT_NE(text.out.find("  box of 4"), std::string::npos) << text.out;
 }
 
+TEST_F(EdgesCommandLine, TheBundledDepthPictureGivesTheSizeOfItsCarton) {
+  environment_ = "MAQ_BUNDLE= MAQ_EDGES_BUNDLE='" MAQ_TEST_MODELS "/edges-int8'";
+  std::filesystem::create_directory_symlink(MAQ_TEST_MEDIA "/..", folder_.file("tests"));
+  const auto truth = nlohmann::json::parse(read_text(MAQ_TEST_MEDIA "/box_depth.json"));
+  const Outcome result = run("'" + truth["source"].get<std::string>() + "' --out o --boxes --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto boxes = nlohmann::json::parse(result.out)["boxes"];
+  ASSERT_EQ(boxes.size(), 1u);
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(boxes[0]["size_m"][i].get<double>(), truth["size_m"][i].get<double>(), 0.02);
+  }
+}
+
 TEST_F(EdgesCommandLine, AWrongFormatNothingToDoAndTheNetworkAreToldInWords) {
   const Outcome wrong = run("'image:depth.png?depth_unit=0.001&fov=60' --out o --format stl");
   EXPECT_EQ(wrong.exit_code, 2);

@@ -1,0 +1,73 @@
+#include "pipeline/live_model.h"
+
+#include "core/error.h"
+
+namespace maq {
+namespace {
+
+class LiveDensePose : public LiveModel {
+ public:
+  LiveDensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle,
+                const DensePoseSettings& settings)
+      : densepose_(std::move(runtime), bundle, settings) {}
+
+  void run(const Frame& frame, const maq_intrinsics*, PipelineOutput& output) override {
+    densepose_.run(frame.image, output.densepose);
+    output.is_edges = output.has_curves = false;
+  }
+  void cancel() noexcept override { densepose_.cancel(); }
+  void forget() override { densepose_.reset(); }
+  FrameEffort effort() const override { return {densepose_.key_frame_interval(), densepose_.long_side_px()}; }
+  void set_effort(const FrameEffort& effort) override {
+    densepose_.set_effort(effort.key_frame_interval, effort.long_side_px);
+  }
+  const SurfaceGrid& surface() override { return densepose_.surface(); }
+
+ private:
+  DensePose densepose_;
+};
+
+class LiveEdges : public LiveModel {
+ public:
+  LiveEdges(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const LiveEdgesSettings& settings)
+      : edges_(std::move(runtime), std::move(bundle), settings.edges), curves_(settings.curves) {}
+
+  void run(const Frame& frame, const maq_intrinsics* camera, PipelineOutput& output) override {
+    if (camera == nullptr) {
+      throw Error(MAQ_ERROR_UNSUPPORTED,
+                  "The source does not say how its camera maps directions to pixels, from which lengths come; add the "
+                  "horizontal field of view in degrees to its URI, or focal lengths in pixels: fov=60, fx=380&fy=380.");
+    }
+    edges_.run(frame, *camera, output.edges);
+    if (curves_) finder_.find(output.edges.field, *curves_, output.curves);
+    output.is_edges = true;
+    output.has_curves = curves_.has_value();
+  }
+  void cancel() noexcept override { edges_.cancel(); }
+
+ private:
+  Edges edges_;
+  std::optional<CurveRequest> curves_;
+  CurveFinder finder_;
+};
+
+}  // namespace
+
+int PipelineModel::threads() const {
+  const auto* const edges = std::get_if<LiveEdgesSettings>(&settings);
+  return edges != nullptr ? edges->edges.threads : std::get<DensePoseSettings>(settings).threads;
+}
+
+const SurfaceGrid& LiveModel::surface() {
+  throw Error(MAQ_ERROR_UNSUPPORTED, "The model of the pipeline has no body surface; dense pose has.");
+}
+
+std::shared_ptr<LiveModel> make_live_model(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle,
+                                           const PipelineModel& model) {
+  if (const auto* const edges = std::get_if<LiveEdgesSettings>(&model.settings)) {
+    return std::make_shared<LiveEdges>(std::move(runtime), std::move(bundle), *edges);
+  }
+  return std::make_shared<LiveDensePose>(std::move(runtime), bundle, std::get<DensePoseSettings>(model.settings));
+}
+
+}  // namespace maq

@@ -128,6 +128,23 @@ def test_recall_grows_with_the_angle_of_a_crease(shipped, sign):
     assert means[-2] < 1
 
 
+def rounded_roof(radius_r: float) -> np.ndarray:
+    """Two planes at a right angle with a rounding of so many r between them."""
+    radius = radius_r / FOCAL_PX
+    middle, u = 1 + radius * np.sqrt(2), np.abs(X)
+    # Circle: (u t)² + (t - middle)² = radius²; planes: t = 1 + u t.
+    rest = middle**2 - (1 + u**2) * (middle**2 - radius**2)
+    bent = (middle - np.sqrt(np.maximum(rest, 0))) / (1 + u**2)
+    return np.where((rest > 0) & (u * bent < radius / np.sqrt(2)), bent, 1 / (1 - u))
+
+
+def test_an_edge_fades_as_it_is_rounded(shipped):
+    means = [shipped(rounded_roof(r))[:, 158:162].mean() for r in (0.1, 0.5, 1, 2, 4, 8, 16, 40)]
+    assert (np.diff(means) > -0.1).all(), means
+    assert means[0] < 1.5  # 0.1 r is sharp; its four columns are 1.4 r away in the mean
+    assert means[-1] > 12, means  # 40 r is smooth
+
+
 @pytest.mark.parametrize("degrees", [45, 90, 120])
 def test_a_shift_of_a_tenth_of_a_pixel_does_not_flicker(shipped, degrees):
     before = None

@@ -8,63 +8,28 @@ from __future__ import annotations
 import json
 import statistics
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
+from benchmarks.edges import planes
+from benchmarks.edges.curve_scores import line_angle_deg, view_score, with_f_score
+from benchmarks.edges.methods import SHIPPED
+from benchmarks.edges.planes import Planes
 from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.speed import SCENES, SMALL_PX
-from benchmarks.edges.views import View, polyline
+from benchmarks.edges.views import View
 from export.edges.curve_metrics import score
-from export.evaluation.edges_api import LINE, Curves, Edges, depth_frames
+from export.evaluation.edges_api import Curves, Edges, Pinhole, depth_frames
 
 TRUTH = Path("build/release/benchmarks/native/print_solids_truth")
-MIN_LINE_R = 20.0  # shorter lines have no angle to speak of
-SAME_LINE_R = 3.0  # from a found line's middle to the true line that it is compared with
+TUNING_VIEWS = 16  # validation views that the planes' threshold is chosen on
+PLANES = "planes found and intersected"
 NOISES = {"none": "clean", "tof": "tof", "stereo": "stereo"}  # of stub:solids, and the level of each
 BOX_SEEDS, BOX_FRAMES, STEADY_FRAMES = 20, 5, 100
 SCENE_FRAMES = 20
-
-
-def view_score(found: Curves, view: View) -> dict[str, float]:
-    """Scores of export.edges.curve_metrics: what is found may lie on any true curve, but only those have to be found
-    that are surely sharp; with the median angle of lines, degrees."""
-    focal_px = view.camera.focal_px
-    true = [polyline(c) for c in view.curves["curves"]]
-    sure = [polyline(c) for c in view.curves["curves"] if c["sure"]]
-    figures = score(found.points, sure, focal_px)
-    figures["precision"] = score(found.points, true, focal_px)["precision"]
-    lines = [polyline(c) for c in view.curves["curves"] if c["type"] == "line"]
-    return with_f_score(figures) | {"angle_deg": line_angle_deg(found, lines, focal_px)}
-
-
-def with_f_score(figures: dict[str, float]) -> dict[str, float]:
-    both = figures["precision"] + figures["recall"]
-    return figures | {"f_score": 2 * figures["precision"] * figures["recall"] / both if both > 0 else 0.0}
-
-
-def line_angle_deg(found: Curves, true: Sequence[np.ndarray], focal_px: float) -> float:
-    """Median angle between found lines and the true ones that they lie along; NaN without such lines."""
-    angles = []
-    for points in (p for p, kind in zip(found.points, found.types, strict=True) if kind == LINE):
-        middle, along = (points[0] + points[-1]) / 2, points[-1] - points[0]
-        r = middle[2] / focal_px
-        if np.linalg.norm(along) < MIN_LINE_R * r:
-            continue
-        off = [_from_segment(middle, line) / r for line in true]
-        if off and min(off) <= SAME_LINE_R:
-            other = np.diff(true[int(np.argmin(off))][[0, -1]], axis=0)[0]
-            cosine = abs(along @ other) / np.linalg.norm(along) / max(np.linalg.norm(other), 1e-12)
-            angles.append(float(np.degrees(np.arccos(min(cosine, 1.0)))))
-    return statistics.median(angles) if angles else np.nan
-
-
-def _from_segment(point: np.ndarray, ends: np.ndarray) -> float:
-    along = ends[-1] - ends[0]
-    t = np.clip((point - ends[0]) @ along / max(along @ along, 1e-30), 0, 1)
-    return float(np.linalg.norm(point - ends[0] - t * along))
 
 
 def mean_of(rows: Sequence[Mapping[str, float]]) -> dict[str, float | None]:
@@ -76,19 +41,38 @@ def mean_of(rows: Sequence[Mapping[str, float]]) -> dict[str, float | None]:
     return found
 
 
-def measure_solids(views: Sequence[View], edges: Edges) -> list[dict]:
-    """Rows by sensor, means over views with a curve that is surely sharp."""
-    rows = []
-    wanted = [view for view in views if any(c["sure"] for c in (view.curves or {"curves": []})["curves"])]
-    for level in tqdm(LEVELS, desc="edges: curves", unit="level", disable=None):
-        scores, ms = [], []
-        for view in wanted:
-            found = edges.run(view.seen(level), view.camera, curves=True).curves
-            scores.append(view_score(found, view))
-            ms.append(found.curves_ms)
-        if scores:
-            rows.append({"level": level, "views": len(scores), **mean_of(scores), "ms": statistics.median(ms)})
+def tuned_planes(val: Sequence[View]) -> dict[str, Planes]:
+    """By level; none where OpenCV has no planes."""
+    if planes.missing():
+        return {}
+    chosen = with_curves(val)
+    chosen = chosen[:: max(1, len(chosen) // TUNING_VIEWS)]
+    return {level: planes.tuned(chosen, [view.seen(level) for view in chosen]) for level in LEVELS if chosen}
+
+
+def with_curves(views: Sequence[View]) -> list[View]:
+    """Those with a curve that is surely sharp."""
+    return [view for view in views if any(c["sure"] for c in (view.curves or {"curves": []})["curves"])]
+
+
+def measure_solids(views: Sequence[View], edges: Edges, rivals: Mapping[str, Planes]) -> list[dict]:
+    """Rows by sensor and way, means over views with a curve that is surely sharp."""
+    rows, wanted = [], with_curves(views)
+    for level in tqdm(LEVELS if wanted else (), desc="edges: curves", unit="level", disable=None):
+        for way, find in ways_of(edges, rivals.get(level)).items():
+            scores, ms = [], []
+            for view in wanted:
+                found = find(view.seen(level), view.camera)
+                scores.append(view_score(found, view))
+                ms.append(found.curves_ms)
+            figures = {"views": len(scores), **mean_of(scores), "ms": statistics.median(ms)}
+            rows.append({"level": level, "way": way, **figures})
     return rows
+
+
+def ways_of(edges: Edges, rival: Planes | None) -> dict[str, Callable[[np.ndarray, Pinhole], Curves]]:
+    found = {SHIPPED: lambda depth, camera: edges.run(depth, camera, curves=True).curves}
+    return found | ({PLANES: rival.find} if rival else {})
 
 
 def truth_of(scene: str, seed: int, frames: int) -> dict:
@@ -129,26 +113,27 @@ def measure_scenes(bundle: Path, threads: int, frames: int) -> list[dict]:
     return rows
 
 
-def measure_boxes(bundle: Path, threads: int, seeds: int, frames: int, steady_frames: int) -> list[dict]:
-    """Rows by noise: of `seeds` cartons of stub:solids?scene=box, seen in `frames` frames each, how many frames have a
-    box, the median error of its sides in mm, and the largest standard deviation of a side of one carton while the
-    camera turns around it for `steady_frames`."""
+def measure_boxes(
+    edges: Edges, rivals: Mapping[str, Planes], seeds: int, frames: int, steady_frames: int
+) -> list[dict]:
+    """Rows by noise and way: of `seeds` cartons of stub:solids?scene=box, seen in `frames` frames each, how many frames
+    have a box, the median error of its sides in mm, and the largest standard deviation of a side of one carton while
+    the camera turns around it for `steady_frames`."""
     rows = []
-    with Edges(bundle, threads) as edges:
-        for noise in tqdm(NOISES, desc="edges: boxes", unit="noise", disable=None):
+    for noise in tqdm(NOISES, desc="edges: boxes", unit="noise", disable=None):
+        for way, find in ways_of(edges, rivals.get(NOISES[noise])).items():
             errors, found, looked = [], 0, 0
             for seed in range(1, seeds + 1):
                 true = np.sort(truth_of("box", seed, 0)["cartons_m"][0])[::-1]
                 for depth, camera in frames_of("box", noise, seed, frames):
-                    boxes = edges.run(depth, camera, curves=True).curves.boxes_m
+                    boxes = find(depth, camera).boxes_m
                     looked += 1
                     found += bool(boxes)
                     errors += list(1000 * np.abs(np.array(boxes[0]) - true)) if boxes else []
-            sides = [edges.run(depth, camera, curves=True).curves.boxes_m[:1]
-                     for depth, camera in frames_of("box", noise, 1, steady_frames)]  # fmt: skip
-            sides = np.array([boxes[0] for boxes in sides if boxes])
-            rows.append({"noise": noise, "frames": looked, "with_box": found / looked,
-                         "median_mm": statistics.median(errors) if errors else None,
+            each = [find(depth, camera).boxes_m for depth, camera in frames_of("box", noise, 1, steady_frames)]
+            sides = np.array([boxes[0] for boxes in each if boxes])
+            rows.append({"noise": noise, "way": way, "frames": looked, "with_box": found / looked,
+                         "median_mm": float(np.median(errors)) if errors else None,
                          "p90_mm": float(np.percentile(errors, 90)) if errors else None,
                          "steady_frames": len(sides), "turned_frames": steady_frames,
                          "deviation_mm": float(1000 * sides.std(0).max()) if len(sides) > 1 else None})  # fmt: skip
@@ -163,9 +148,9 @@ def figures_from(
     solids: Sequence[Mapping], scenes: Sequence[Mapping], boxes: Sequence[Mapping]
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Those that are gates, and why others are missing."""
-    figures = {f"edges_curves_{row['level']}": row["f_score"] for row in solids}
+    figures = {f"edges_curves_{row['level']}": row["f_score"] for row in solids if row["way"] == SHIPPED}
     figures |= {f"edges_fps_{row['scene']}": 1000 / row["ms"] for row in scenes if row["noise"] == "tof"}
-    missing, by_noise = {}, {row["noise"]: row for row in boxes}
+    missing, by_noise = {}, {row["noise"]: row for row in boxes if row["way"] == SHIPPED}
     for noise in ("tof", "stereo"):
         row, name = by_noise[noise], f"edges_box_mm_{noise}"
         if row["median_mm"] is None:

@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.edges import curves, pictures, quality, speed
+from benchmarks.edges import curves, pictures, planes, quality, speed
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -144,11 +144,12 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     large_val, large = (read_views(given.solids / split, speed.FULL_PX[0], count) for split in ("val", "test"))
     rows = speed.measure(large, networks.bundles, rivals_of(large_val), threads)
     savings = speed.measure_savings(given.bundle, threads, QUICK_FRAMES if quick else SAVING_FRAMES)
-    with Edges(given.bundle, threads) as shipped:
-        of_solids = curves.measure_solids(test[:: max(1, len(test) // CURVE_VIEWS)], shipped)
-    of_scenes = curves.measure_scenes(given.bundle, threads, QUICK_FRAMES if quick else curves.SCENE_FRAMES)
     amounts = (2, 2, 5) if quick else (curves.BOX_SEEDS, curves.BOX_FRAMES, curves.STEADY_FRAMES)
-    boxes = curves.measure_boxes(given.bundle, threads, *amounts)
+    tuned = curves.tuned_planes(val)
+    with Edges(given.bundle, threads) as shipped:
+        of_solids = curves.measure_solids(test[:: max(1, len(test) // CURVE_VIEWS)], shipped, tuned)
+        boxes = curves.measure_boxes(shipped, tuned, *amounts)
+    of_scenes = curves.measure_scenes(given.bundle, threads, QUICK_FRAMES if quick else curves.SCENE_FRAMES)
     fraction = others.now()
     sheet = pictures.write_sheet(errors.shown, folder)
     document = {
@@ -205,4 +206,6 @@ def programs_missing() -> dict[str, str]:
     ):
         here = (Path("/usr/include") / header).exists()
         found[name] = "this benchmark has no program for it" if here else f"{header} is not installed"
+    if planes.missing():
+        found[curves.PLANES] = planes.missing()
     return found

@@ -223,11 +223,11 @@ def edges_document():
               "difference_r": 0.01, "other_side": 0.0, "network_fraction": 0.0}  # fmt: skip
     curve = dict.fromkeys(("precision", "recall", "f_score", "chamfer_r", "hausdorff_r"), 0.5) | {"angle_deg": None}
     times = dict.fromkeys(("field_ms", "curves_ms", "boxes_ms", "ms"), 2.0)
-    box = {"noise": "stereo", "frames": 10, "with_box": 0.0, "median_mm": None, "p90_mm": None, "steady_frames": 0,
-           "turned_frames": 10, "deviation_mm": None}  # fmt: skip
+    box = {"noise": "stereo", "way": ways[0], "frames": 10, "with_box": 0.0, "median_mm": None, "p90_mm": None,
+           "steady_frames": 0, "turned_frames": 10, "deviation_mm": None}  # fmt: skip
     return {"views": {"val": 2, "test": 3, "solids": 3}, "errors": errors, "groups": groups, "speed": speed,
             "agreement": [{"level": "clean", "same_side": 0.99}], "savings": [saving], "sheet": "", "warnings": ["few"],
-            "curves": [curve | {"level": "clean", "views": 3, "ms": 2.0}], "boxes": [box],
+            "curves": [curve | {"level": "clean", "way": ways[0], "views": 3, "ms": 2.0}], "boxes": [box],
             "curves_of_scenes": [curve | {"scene": "box", "noise": "tof"} | times],
             "sets": {"kicad": [figures | {"level": "clean"}]}, "missing": {"PCL": "no <header>"}}  # fmt: skip
 

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks import __main__ as benchmark
 from benchmarks import gates
-from benchmarks.edges import curves, quality, rivals, section, speed
+from benchmarks.edges import curve_scores, curves, planes, quality, rivals, section, speed
 from benchmarks.edges import measure as edges
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
 from benchmarks.edges.views import View, bending_radius_r, bins, incidence_deg, polyline, read_views
@@ -249,12 +249,12 @@ def test_curves_that_are_not_surely_sharp_need_not_be_found_and_are_not_wrong(so
     bottom, top = np.array(curve["points"])
     unsure = curve | {"sure": False, "points": [[0.1, 0, 0.6], [0.2, 0, 0.6]]}
     both = View(view.name, view.frame, view.camera, {"curves": [curve, unsure]})
-    alone = curves.view_score(found_curves([bottom, top]), both)
+    alone = curve_scores.view_score(found_curves([bottom, top]), both)
     assert (alone["precision"], alone["recall"], alone["f_score"]) == (1, 1, 1)
     assert alone["angle_deg"] == pytest.approx(0, abs=1e-4)
-    more = curves.view_score(found_curves([bottom, top], unsure["points"]), both)
+    more = curve_scores.view_score(found_curves([bottom, top], unsure["points"]), both)
     assert more["precision"] == 1
-    half = curves.view_score(found_curves([bottom, (bottom + top) / 2]), both)
+    half = curve_scores.view_score(found_curves([bottom, (bottom + top) / 2]), both)
     assert half["recall"] == pytest.approx(0.5, abs=0.05)
 
 
@@ -262,14 +262,22 @@ def test_the_angle_of_a_line_is_that_to_the_true_line_which_it_lies_along():
     true = [np.array([[0, -0.5, 1], [0, 0.5, 1]]), np.array([[0.3, -0.5, 1], [0.3, 0.5, 1]])]
     lean = np.tan(np.radians(2)) * 0.4
     found = found_curves([[0.3 - lean, -0.4, 1], [0.3 + lean, 0.4, 1]], [[0, 0, 1], [0.1, 0, 1]], types=[LINE, SPLINE])
-    assert curves.line_angle_deg(found, true, 300.0) == pytest.approx(2, abs=0.01)
-    assert np.isnan(curves.line_angle_deg(found_curves(), true, 300.0))
+    assert curve_scores.line_angle_deg(found, true, 300.0) == pytest.approx(2, abs=0.01)
+    assert np.isnan(curve_scores.line_angle_deg(found_curves(), true, 300.0))
 
 
 def test_gates_of_curves_say_why_they_are_missing():
-    box = {"noise": "tof", "frames": 4, "median_mm": 3.0, "deviation_mm": None, "steady_frames": 1, "turned_frames": 9}
-    boxes = [box, box | {"noise": "stereo", "median_mm": None}]
-    solid = [{"level": level, "f_score": 0.8} for level in ("clean", "tof")]
+    box = {
+        "noise": "tof",
+        "way": SHIPPED,
+        "frames": 4,
+        "median_mm": 3.0,
+        "deviation_mm": None,
+        "steady_frames": 1,
+        "turned_frames": 9,
+    }
+    boxes = [box, box | {"noise": "stereo", "median_mm": None}, box | {"way": curves.PLANES, "median_mm": 9.0}]
+    solid = [{"level": level, "way": SHIPPED, "f_score": 0.8} for level in ("clean", "tof")]
     scenes = [{"scene": "box", "noise": noise, "ms": ms} for noise, ms in (("tof", 10.0), ("none", 5.0))]
     figures, missing = curves.figures_from(solid, scenes, boxes)
     assert figures == {"edges_curves_clean": 0.8, "edges_curves_tof": 0.8, "edges_box_mm_tof": 3, "edges_fps_box": 100}
@@ -298,3 +306,28 @@ def test_the_library_gives_planes_curves_and_times_of_a_simulated_camera():
         Edges(edges.Path("nowhere"))
     with pytest.raises(maquette_api.MaquetteError, match="intrinsics"):
         next(depth_frames("stub:people", 1))
+
+
+def box_in_front(size_m=(0.4, 0.5, 0.3)):
+    """A box seen onto one of its corners, on nothing: exact depth, and the camera."""
+    width, height, focal_px = 160, 120, 150.0
+    ray = rays(width, height, focal_px)
+    turn = np.array([[0.8, 0.0, 0.6], [0.36, 0.8, -0.48], [-0.48, 0.6, 0.64]])  # rows: the axes of the box
+    half, origin = np.array(size_m) / 2, -turn @ np.array([0, 0, 1.1])
+    way = ray @ turn.T
+    near, far = (-np.sign(way) * half - origin) / way, (np.sign(way) * half - origin) / way
+    depth = np.where(near.max(-1) < far.min(-1), near.max(-1), 0)
+    return depth.astype(np.float32), Pinhole.centred((height, width), focal_px)
+
+
+def test_planes_measure_a_box_and_its_creases():
+    if planes.missing():
+        pytest.skip(planes.missing())
+    depth, camera = box_in_front()
+    found = planes.Planes(1.0).find(depth, camera)
+    assert len(found.points) == 3
+    assert np.array(found.boxes_m[0]) == pytest.approx([0.5, 0.4, 0.3], abs=0.03)
+    ends = np.concatenate(found.points)
+    corner = np.array([0, 0, 1.1])
+    assert np.linalg.norm(ends - corner, axis=1).min() < np.linalg.norm([0.4, 0.5, 0.3])
+    assert planes.Planes(1.0).find(np.zeros_like(depth), camera).points == []

@@ -29,8 +29,8 @@ if(WAY STREQUAL "find_package")
   if(NOT head MATCHES "^89504e470d0a1a0a0000000d494844520000004800000038")  # 72 x 56 pixels
     message(FATAL_ERROR "new_view wrote ${head}")
   endif()
-  run(build/box_size "stub:solids?scene=box&noise=tof&size=640x480")
-  if(NOT output MATCHES "^(no box|4[0-9][0-9] x 4[0-9][0-9] x 4[0-9][0-9] mm, each within [0-9]+, [0-9]+ and [0-9]+ mm)\n$")
+  run(build/box_size "image:${CMAKE_CURRENT_LIST_DIR}/../media/box_depth.png?depth_unit=0.001&fx=600")
+  if(NOT output MATCHES "^4[0-9][0-9] x 4[0-9][0-9] x 4[0-9][0-9] mm, each within [0-9]+, [0-9]+ and [0-9]+ mm\n$")
     message(FATAL_ERROR "box_size printed ${output}")  # the carton is 441 x 427 x 411 mm
   endif()
 else()

@@ -129,7 +129,7 @@ class PersonCropping:
             torch.from_numpy(box[None].astype(np.float32)), torch.tensor([number], dtype=torch.uint8),
             torch.zeros(1, dtype=torch.bool), torch.from_numpy(label), torch.full((1, 2), torch.nan),
         )  # fmt: skip
-        return _recoloured(image, rng), truth
+        return recoloured(image, rng), truth
 
 
 ANY_CROPPING = Cropping()
@@ -181,7 +181,7 @@ def augmented(
         label = label[:, ::-1].copy()
         label[..., :3] = mirror_iuv(label[..., :3])
         axis = None if axis is None else axis * np.float32([-1, 1])
-    return _recoloured(np.ascontiguousarray(image), rng), label, axis
+    return recoloured(np.ascontiguousarray(image), rng), label, axis
 
 
 def _corner(label: np.ndarray, size: int, focus: int, rng: np.random.Generator) -> tuple[int, int]:
@@ -207,7 +207,8 @@ def _crop(array: np.ndarray, corner: tuple[int, int], size: int, fill: np.ndarra
     return out
 
 
-def _recoloured(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def recoloured(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """image: uint8 [H, W, 3]; the same with other contrast, brightness and colour balance, some grey or blurred."""
     colour = image.astype(np.float32)
     if rng.random() < 0.8:
         colour = (colour - 128) * rng.uniform(0.7, 1.3) + 128 + rng.normal(0, 15)

@@ -3,11 +3,12 @@
 `CLOSE` is what the shipped weights were trained and tested on: 320 x 256, mostly alone, upright and facing the camera.
 `WIDE` shows what a webcam in a room and a phone video show: 640 x 512, people from 1/14 of the picture's height up,
 tilted pictures, a third of the people from behind, crowds in which boxes overlap.
+`ANIMALS` shows animals and nobody, for a detector of people to learn the difference (`export.densepose.train_boxes`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,4 +97,6 @@ WIDE = Variety(
     animals_beside=0.07,
 )
 
-VARIETIES = {"close": CLOSE, "wide": WIDE}
+ANIMALS = replace(WIDE, generator="animals-1", layouts={"empty": (1.0, ())}, animals_alone=1.0)
+
+VARIETIES = {"close": CLOSE, "wide": WIDE, "animals": ANIMALS}

@@ -1,21 +1,27 @@
 """Several labelled views of one solid with their cameras, and its curves that any of them sees, to judge fusion.
 
+    python -m export.solids.multiview val 3 --views 24 --out .data/solids/scan    # for `maquette edges build`
+
 A view's own label knows the curves that this view sees. Fused, a point also knows those that are hidden from it in one
 view and seen in another, so that it has a second label.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
+import cv2
 import numpy as np
 
 from export.camera import Camera
 from export.solids.labels import Labeller, Labels, Piece
-from export.solids.recipe import FRAME_PX, make, without_crashes
+from export.solids.recipe import FRAME_PX, SPLITS, make, without_crashes
 from export.solids.views import Seen, View
 
 _AMBIGUOUS_R = 0.25
@@ -82,3 +88,39 @@ def _posed(labeller: Labeller, view: View, labels: Labels, pieces: Sequence[Piec
         counts &= np.abs(surely - labeller.field(view, list(pieces))) <= _AMBIGUOUS_R
     depth, distance, of_all = (p.astype(np.float32) for p in (view.depth, labels.distance, surely))
     return PosedView(view.camera, depth, distance, np.minimum(of_all, distance), counts)
+
+
+def write_capture(solid: MultiView, folder: Path, depths: Sequence[np.ndarray] | None = None) -> None:
+    """A folder that `maquette edges build` reads: transforms.json, depth as TIFF in metres, photos of slopes, and
+    curves.json, {"curves": polylines in the world}. depths: float32 [H, W] instead of the exact ones."""
+    folder.mkdir(parents=True, exist_ok=True)
+    frames = []
+    for k, view in enumerate(solid.views):
+        c, depth = view.camera, view.depth if depths is None else depths[k]
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = c.rotation.T * [1, -1, -1], c.centre
+        slopes = np.stack([np.gradient(np.log(np.maximum(depth, 1e-6)), axis=a) * c.fx_px for a in (0, 1)])
+        shade = (255 / (1 + np.abs(slopes).sum(0)) * (depth > 0)).astype(np.uint8)
+        cv2.imwrite(str(folder / f"{k:03d}.png"), shade)
+        cv2.imwrite(str(folder / f"{k:03d}_depth.tiff"), depth.astype(np.float32))
+        frames.append({
+            "file_path": f"{k:03d}.png", "depth_file_path": f"{k:03d}_depth.tiff", "transform_matrix": pose.tolist(),
+            "w": c.width_px, "h": c.height_px, "fl_x": c.fx_px, "fl_y": c.fy_px, "cx": c.cx_px + 0.5,
+            "cy": c.cy_px + 0.5,
+        })  # fmt: skip
+    (folder / "transforms.json").write_text(json.dumps({"frames": frames}, indent=1) + "\n")
+    (folder / "curves.json").write_text(json.dumps({"curves": [curve.tolist() for curve in solid.curves]}) + "\n")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("split", choices=SPLITS)
+    parser.add_argument("seed", type=int)
+    parser.add_argument("--views", type=int, default=12, help="(default %(default)s)")
+    parser.add_argument("--out", type=Path, required=True)
+    options = parser.parse_args()
+    write_capture(multiview(options.split, options.seed, options.views), options.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -35,6 +35,7 @@ typedef struct maq_capture_view {
   int32_t is_held_out;       /* 1: for comparison only; maq_scene_build does not use it by default */
   const char* name;          /* of the photo in the capture */
   maq_pinhole_camera camera; /* of the photo after undistortion */
+  int32_t has_depth;         /* 1: a depth image of the same view comes with it: maq_capture_load_depth */
 } maq_capture_view;
 
 /* Parts of the capture that cannot be used. The text is the capture's. */
@@ -45,11 +46,11 @@ typedef struct maq_capture_drop {
 } maq_capture_drop;
 
 /* Opens a folder: a COLMAP model (text or binary, in sparse/0, sparse, colmap/sparse/0 or the folder itself) with
- * its photos, or transforms.json as nerfstudio and Instant-NGP write it, with a PLY cloud. Photos are read when they
- * are needed. `*capture` is the caller's, to be given to maq_capture_close.
+ * its photos, or transforms.json as nerfstudio and Instant-NGP write it, with a PLY cloud, or with depth
+ * images. Photos and depth are read when they are needed. `*capture` is the caller's, to be given to maq_capture_close.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the folder does not exist, or has no capture
- * or no cloud), MAQ_ERROR_UNREADABLE (damaged, or without a usable photo or point), MAQ_ERROR_UNSUPPORTED (camera
- * models, sizes). Blocks while cameras and cloud are read. */
+ * or neither cloud nor depth), MAQ_ERROR_UNREADABLE (damaged, or without a usable photo or point),
+ * MAQ_ERROR_UNSUPPORTED (camera models, sizes). Blocks while cameras and cloud are read. */
 MAQ_API maq_status maq_capture_open(maq_context* context, const char* folder, maq_capture** capture);
 
 /* Closes the capture (NULL is fine). Scenes built from it and frames loaded from it stay valid.
@@ -74,6 +75,14 @@ MAQ_API maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t ind
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED,
  * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the photo is read. */
 MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq_frame** frame);
+
+/* Reads the depth image of a view, MAQ_PIXEL_DEPTH16 or MAQ_PIXEL_DEPTH32F in units of the scene, and its camera, which
+ * differs from the photo's by the size. The caller sets camera->struct_size. `*frame` is the caller's: give it back
+ * with maq_frame_release. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (also: the view has no
+ * depth), MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED (an image that is no depth, a lens that distorts),
+ * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the image is read. */
+MAQ_API maq_status maq_capture_load_depth(const maq_capture* capture, uint32_t index, maq_pinhole_camera* camera,
+                                          maq_frame** frame);
 
 #ifdef __cplusplus
 }

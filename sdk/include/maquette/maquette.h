@@ -63,6 +63,7 @@
 #include "maquette/densepose.h"
 #include "maquette/edge_curves.h"
 #include "maquette/edges.h"
+#include "maquette/edges_fusion.h"
 #include "maquette/frame.h"
 #include "maquette/pipeline.h"
 #include "maquette/recorder.h"

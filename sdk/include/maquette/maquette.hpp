@@ -69,6 +69,12 @@ inline maq_edges_curves_config default_edges_curves_config() {
   return config;
 }
 
+inline maq_edges_fusion_config default_edges_fusion_config() {
+  maq_edges_fusion_config config;
+  check(maq_edges_fusion_config_init(&config, sizeof config));
+  return config;
+}
+
 inline maq_source_config default_source_config() {
   maq_source_config config;
   check(maq_source_config_init(&config, sizeof config));
@@ -614,6 +620,44 @@ inline maq_scene_renderer_config default_scene_renderer_config() {
   return config;
 }
 
+// Edges of several views as one: see edges_fusion.h.
+class EdgesFusion {
+ public:
+  explicit EdgesFusion(const Context& context, const maq_edges_fusion_config& config = default_edges_fusion_config()) {
+    maq_edges_fusion* created = nullptr;
+    check(maq_edges_fusion_create(context.get(), &config, &created));
+    owner_.reset(created);
+  }
+
+  maq_edges_fusion* get() const { return owner_.get(); }
+
+  void add_view(const EdgesResult& result, const maq_pinhole_camera& camera) {
+    check(maq_edges_fusion_add_view(get(), result.get(), &camera));
+  }
+  void finish() { check(maq_edges_fusion_finish(get())); }
+  void cancel() { check(maq_edges_fusion_cancel(get())); }
+
+  maq_edges_fusion_info info() const {
+    maq_edges_fusion_info info{};
+    info.struct_size = sizeof info;
+    check(maq_edges_fusion_get_info(get(), &info));
+    return info;
+  }
+  std::vector<maq_edges_fusion_point> points() const {
+    std::vector<maq_edges_fusion_point> points(size_t(info().point_count));
+    check(maq_edges_fusion_copy_points(get(), points.data(), points.size()));
+    return points;
+  }
+  EdgesCurves find_curves() const {
+    maq_edges_curves* curves = nullptr;
+    check(maq_edges_fusion_find_curves(get(), &curves));
+    return EdgesCurves(curves);
+  }
+
+ private:
+  Owner<maq_edges_fusion, maq_edges_fusion_destroy> owner_;
+};
+
 class Capture {
  public:
   Capture(const Context& context, const std::string& folder) {
@@ -645,6 +689,15 @@ class Capture {
     drop.struct_size = sizeof drop;
     check(maq_capture_get_drop(get(), index, &drop));
     return drop;
+  }
+
+  // With its camera.
+  std::pair<Frame, maq_pinhole_camera> load_depth(uint32_t index) const {
+    maq_frame* frame = nullptr;
+    maq_pinhole_camera camera{};
+    camera.struct_size = sizeof camera;
+    check(maq_capture_load_depth(get(), index, &camera, &frame));
+    return {Frame(frame), camera};
   }
 
   // BGR, undistorted.

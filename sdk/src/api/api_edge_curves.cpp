@@ -202,6 +202,11 @@ maq_status maq_edges_curves_snap_to_pixel(const maq_edges_curves* curves, double
   return guarded(curves, __func__, [&] {
     require_argument(curves, "curves");
     require_range("radius_px", radius_px, 0.0, kMaxRadiusPx);
+    if (curves->found.seen.width == 0) {
+      throw ArgumentError(
+          "curves are of several views, which have no pixels in common; use "
+          "maq_edges_curves_snap_to_ray.");
+    }
     write_snap(snap_to(curves->found.seen, curves->found.curves, x_px, y_px, radius_px), snap);
     return MAQ_OK;
   });

@@ -27,7 +27,8 @@ enum class HandleKind : uint32_t {
   kSceneImage,
   kEdges,
   kEdgesResult,
-  kEdgesCurves
+  kEdgesCurves,
+  kEdgesFusion
 };
 
 class HandleState {

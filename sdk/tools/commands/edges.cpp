@@ -229,8 +229,10 @@ void add_edges_command(CLI::App& app, int* exit_code) {
       "  maquette edges 'image:scan.tiff?depth_unit=1&fx=570&fy=570' --out results --format step,dxf\n"
       "  maquette edges 'stub:solids?scene=shelf&noise=tof' --out results --overlay --max-frames 60\n"
       "  maquette edges rec:desk.maqrec --out results --boxes --json\n"
+      "  maquette edges build scan --out model.dxf\n"
       "  maquette edges info");
   command->require_subcommand(0, 1);
+  add_edges_build_command(*command, exit_code);
   add_edges_info_command(*command, exit_code);
   command->callback([=] {
     if (!command->get_subcommands().empty()) return;

@@ -45,6 +45,7 @@ maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_
     filled.is_held_out = from.is_held_out ? 1 : 0;
     filled.name = from.name.c_str();
     filled.camera = camera_of(from.camera);
+    filled.has_depth = from.depth_path.empty() ? 0 : 1;
     write_struct(view, "view", filled, sizeof(maq_capture_view));
     return MAQ_OK;
   });
@@ -69,6 +70,23 @@ maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq
     std::vector<uint8_t> valid;
     load_view(capture->capture.views[index], made->frame, valid);
     made->frame.sequence = index;
+    *frame = made.release();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_capture_load_depth(const maq_capture* capture, uint32_t index, maq_pinhole_camera* camera,
+                                  maq_frame** frame) {
+  return guarded(capture, __func__, [&] {
+    require_argument(capture, "capture");
+    require_argument(camera, "camera");
+    require_argument(frame, "frame");
+    require_index("index", index, capture->capture.views.size());
+    auto made = std::make_unique<maq_frame>();
+    PinholeCamera of_depth;
+    load_depth(capture->capture.views[index], made->frame, of_depth);
+    made->frame.sequence = index;
+    write_struct(camera, "camera", camera_of(of_depth), sizeof(maq_pinhole_camera));
     *frame = made.release();
     return MAQ_OK;
   });

@@ -16,7 +16,7 @@ constexpr int kMaxSteps = 20000;    // along one curve, and as many when it is m
 constexpr double kTwoPi = 6.283185307179586;
 constexpr double kBeside = 1.3;  // of match_r: so near a fused curve nothing else is another one
 // A crease in a quarter of what was seen of a curve is one: for the rest one side was hidden.
-constexpr double kCreaseShare = 0.25;
+constexpr double kCreaseFraction = 0.25;
 
 Vec3 in_world(const PinholeCamera& camera, Vec3 d) {
   const auto& r = camera.rotation;
@@ -193,7 +193,7 @@ class CurveFusion::Merger {
     for (const size_t i : beside_) is_taken_[i] = 1;
     if (int(views.size()) < min_views_) return;
     EdgeCurve& curve = draft.curve;
-    curve.kind = double(creases) >= kCreaseShare * double(found_.size()) ? kCreaseEdge : kBoundaryEdge;
+    curve.kind = double(creases) >= kCreaseFraction * double(found_.size()) ? kCreaseEdge : kBoundaryEdge;
     if (curve.kind == kCreaseEdge && convex != concave) curve.bend = convex > concave ? Bend::kConvex : Bend::kConcave;
     drafts_.push_back(draft);
   }

@@ -14,7 +14,7 @@ namespace {
 constexpr double kFacing = 0.1;  // cosine between a surface and the way to a camera that sees it, at least
 constexpr double kMixed = 0.3;   // length of the mean normal of a cell, at least
 constexpr int64_t kPointsOfTask = 2048;
-constexpr float kShareOfGrid = 0.3f;  // of the time
+constexpr float kFractionOfGrid = 0.3f;  // of the time
 
 template <class Value>
 Value median_of(std::vector<Value> values) {
@@ -121,7 +121,7 @@ void FieldFusion::fuse(WorkerThreads& threads, const std::atomic<bool>& is_cance
     return Vec3{centre[0] - result.origin[0], centre[1] - result.origin[1], centre[2] - result.origin[2]};
   };
   for (size_t i = 0; i < kept_.size(); ++i) {
-    report(kShareOfGrid * float(i) / float(kept_.size()));
+    report(kFractionOfGrid * float(i) / float(kept_.size()));
     const FusionView& view = kept_[i];
     const Vec3 centre = from_origin(view);
     for (int y = 0; y < view.camera().height_px; ++y) {
@@ -172,7 +172,7 @@ void FieldFusion::fuse(WorkerThreads& threads, const std::atomic<bool>& is_cance
   // Between rounds of tasks there is time to report and to stop.
   constexpr size_t kTasksOfRound = 32;
   for (size_t begin = 0; begin < tasks; begin += kTasksOfRound) {
-    report(kShareOfGrid + (1 - kShareOfGrid) * float(begin) / float(tasks));
+    report(kFractionOfGrid + (1 - kFractionOfGrid) * float(begin) / float(tasks));
     threads.run(std::min(kTasksOfRound, tasks - begin), [&](size_t task, int) { find_distances(begin + task); });
   }
   report(1);

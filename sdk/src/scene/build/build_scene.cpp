@@ -102,6 +102,11 @@ SceneBuildStats SceneBuilder::stats() const {
 std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_ptr<SceneNetworks>& networks,
                                       const SceneBuildOptions& options, const BuildProgress& progress) {
   const std::vector<const CaptureView*> views = chosen_views(capture, options);
+  if (capture.cloud.count() == 0) {
+    throw Error(MAQ_ERROR_NOT_FOUND,
+                "The capture has depth images but no point cloud, from which scenes are built; name a "
+                "PLY file in its transforms.json as \"ply_file_path\".");
+  }
   SceneBuilder builder(capture.cloud, capture.up, networks, options);
   ImportReport report;
   size_t unusable = 0;

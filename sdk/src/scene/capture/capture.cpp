@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "image/files/depth_file.h"
 #include "image/files/image_file.h"
 #include "image/geometry/undistort.h"
 #include "scene/capture/colmap_model.h"
@@ -64,7 +65,7 @@ class ViewMaker {
     if (!names_.insert(photo.name).second) return "photos that are named twice";
     if (const char* reason = fault_of(photo.lens)) return reason;
     if (const char* reason = fault_of_pose(photo)) return reason;
-    CaptureView view{photo.name, folder_ + "/" + photo.name, {}, {}, photo.is_held_out};
+    CaptureView view{photo.name, folder_ + "/" + photo.name, {}, {}, photo.is_held_out, "", 0};
     try {
       const SizePx size = read_image_file_size(view.image_path);
       check_image_size(size.width, size.height, view.image_path);
@@ -87,8 +88,23 @@ class ViewMaker {
     }
     if (!undistorted_) return "photos whose distortion is not invertible, or whose axis is outside of them";
     view.camera = camera_of(*undistorted_, photo);
+    add_depth(photo, view);
     views.push_back(std::move(view));
     return nullptr;
+  }
+
+  // A photo without its depth is one all the same.
+  void add_depth(const PosedPhoto& photo, CaptureView& view) {
+    if (photo.depth_name.empty()) return;
+    const std::string path = folder_ + "/" + photo.depth_name;
+    if (!stays_inside(photo.depth_name)) {
+      report_.add(kDepthOutside, photo.depth_name);
+    } else if (!file_exists(path)) {
+      report_.add(kDepthMissing, photo.depth_name);
+    } else {
+      view.depth_path = path;
+      view.depth_unit_m = photo.depth_unit_m;
+    }
   }
 
   std::string folder_;
@@ -134,6 +150,11 @@ std::array<double, 3> middle_of(const std::vector<CaptureView>& views) {
   return middle;
 }
 
+bool has_depth(const Capture& capture) {
+  return std::any_of(capture.views.begin(), capture.views.end(),
+                     [](const CaptureView& view) { return !view.depth_path.empty(); });
+}
+
 Capture open_colmap(const std::string& folder, const ColmapFiles& files) {
   ImportReport report;
   Capture capture;
@@ -161,15 +182,16 @@ Capture open_transforms(const std::string& folder, const std::string& file_name)
   } else {
     cloud = first_file(folder, {"sparse_pc.ply", "points3d.ply", "points3D.ply", "pointcloud.ply", "cloud.ply"});
   }
-  if (cloud.empty()) {
+  capture.views = views_of(folder, file.photos, folder, report);
+  if (cloud.empty() && !has_depth(capture)) {
     throw Error(
         MAQ_ERROR_NOT_FOUND, folder, "/", file_name,
         " names no point cloud (\"ply_file_path\"), and there is no sparse_pc.ply, points3d.ply, pointcloud.ply or "
-        "cloud.ply beside it; a scene needs one.");
+        "cloud.ply beside it; a scene needs one. (Edges need depth images instead: \"depth_file_path\" of each "
+        "frame.)");
   }
-  capture.views = views_of(folder, file.photos, folder, report);
   capture.up = up_by_convention({0, 0, 1}, rotations_of(capture.views));
-  capture.cloud = read_ply_file(cloud, middle_of(capture.views), report);
+  if (!cloud.empty()) capture.cloud = read_ply_file(cloud, middle_of(capture.views), report);
   capture.dropped = report.list();
   return capture;
 }
@@ -192,7 +214,7 @@ Capture open_any(const std::string& folder) {
 Capture open_capture(const std::string& folder) {
   if (!is_folder(folder)) throw Error(MAQ_ERROR_NOT_FOUND, folder, " is not a folder; check the path.");
   Capture capture = open_any(folder);
-  if (capture.cloud.count() == 0) {
+  if (capture.cloud.count() == 0 && !has_depth(capture)) {
     std::string text;
     for (const Dropped& dropped : capture.dropped) {
       if (dropped.reason == kPointsNotFinite || dropped.reason == kColoursNotFinite) {
@@ -202,6 +224,23 @@ Capture open_capture(const std::string& folder) {
     throw Error(MAQ_ERROR_UNREADABLE, folder, " has a cloud without a point that can be used", text, ".");
   }
   return capture;
+}
+
+void load_depth(const CaptureView& view, Frame& depth, PinholeCamera& camera) {
+  if (view.depth_path.empty()) {
+    throw Error(MAQ_ERROR_NOT_FOUND, view.name,
+                " has no depth image; name it in the capture's transforms.json as "
+                "\"depth_file_path\".");
+  }
+  if (view.lens.distortion != Distortion::kNone) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, view.name,
+                " was taken with a lens that distorts, and so is its depth; "
+                "rectify the depth images first, and give the camera without distortion.");
+  }
+  const bool is_png = view.depth_path.size() > 4 && view.depth_path.substr(view.depth_path.size() - 4) == ".png";
+  constexpr double kMillimetre = 0.001;
+  read_depth_file(view.depth_path, view.depth_unit_m > 0 ? view.depth_unit_m : is_png ? kMillimetre : 1, depth);
+  camera = resized(view.camera, depth.image.width_px, depth.image.height_px);
 }
 
 void load_view(const CaptureView& view, Frame& picture, std::vector<uint8_t>& valid) {

@@ -15,16 +15,18 @@
 namespace maq {
 
 struct CaptureView {
-  std::string name;        // as the capture names the photo
-  std::string image_path;  // on this machine
-  Lens lens;               // of the photo as it lies there, with its distortion
-  PinholeCamera camera;    // of the photo after undistortion
-  bool is_held_out;        // kept to compare with: no scene is made of it
+  std::string name;         // as the capture names the photo
+  std::string image_path;   // on this machine
+  Lens lens;                // of the photo as it lies there, with its distortion
+  PinholeCamera camera;     // of the photo after undistortion
+  bool is_held_out;         // kept to compare with: no scene is made of it
+  std::string depth_path;   // of the depth image of the same view; "" without one
+  double depth_unit_m = 0;  // as PosedPhoto has it
 };
 
 struct Capture {
   std::vector<CaptureView> views;  // one at least
-  PointCloud cloud;                // of one point at least; its origin is amid the cameras
+  PointCloud cloud;                // its origin is amid the cameras; without a point only where a view has depth
   std::array<double, 3> up = {0, 0, 1};
   std::vector<Dropped> dropped;
 };
@@ -39,14 +41,18 @@ struct Capture {
 // dropped and counted. Up is the cameras' for COLMAP (scene_up.h); +z for transforms.json, unless the cameras say
 // otherwise by over 45 degrees.
 //
-// Throws MAQ_ERROR_NOT_FOUND when there is no such folder, no capture in it or no cloud, MAQ_ERROR_UNREADABLE for
-// damaged files and when no photo or no point is left, MAQ_ERROR_UNSUPPORTED for camera models, versions and numbers of
-// points that are not read.
+// Throws MAQ_ERROR_NOT_FOUND when there is no such folder, no capture in it or neither a cloud nor a depth image,
+// MAQ_ERROR_UNREADABLE for damaged files and when no photo or no point is left, MAQ_ERROR_UNSUPPORTED for camera
+// models, versions and numbers of points that are not read.
 Capture open_capture(const std::string& folder);
 
 // Reads a view's photo and undistorts it: `picture` is BGR of the size of view.camera; `valid` has 255 for pixels that
 // the photo has, 0 for others. Throws what read_image_file() throws, MAQ_ERROR_UNREADABLE also when the photo's size
 // changed since the capture was opened.
 void load_view(const CaptureView& view, Frame& picture, std::vector<uint8_t>& valid);
+
+// Reads a view's depth image: DEPTH16 or DEPTH32F of any size, and `camera`, its camera. Throws what read_depth_file()
+// throws, MAQ_ERROR_NOT_FOUND for a view without depth, MAQ_ERROR_UNSUPPORTED where the view's lens is distorted.
+void load_depth(const CaptureView& view, Frame& depth, PinholeCamera& camera);
 
 }  // namespace maq

@@ -19,6 +19,8 @@ using nlohmann::json;
 // Some 25,000 frames. Parsed, a hostile file takes twenty times as much.
 constexpr uint64_t kMaxBytes = 16 << 20;
 
+constexpr double kLargestDepthUnit = 1e6;
+
 // What is said of a frame: by itself, or by the file for all.
 class Facts {
  public:
@@ -192,6 +194,13 @@ TransformsFile read_transforms_file(const std::string& folder, const std::string
     photo.name = facts.text("file_path");
     if (photo.name.empty()) facts.fail("\"file_path\" is missing");
     photo.is_held_out = held_out.count(photo.name) != 0;
+    photo.depth_name = facts.text("depth_file_path");
+    if (const auto unit = facts.number("depth_unit_scale_factor")) {
+      photo.depth_unit_m = *unit;
+      if (!(*unit > 0 && *unit <= kLargestDepthUnit)) {
+        facts.fail("\"depth_unit_scale_factor\" is ", *unit, ", but must be above 0, at most ", kLargestDepthUnit);
+      }
+    }
     read_pose(facts, photo);
     if (!stays_inside(photo.name)) {
       report.add(kPhotosOutside, photo.name);

@@ -1,0 +1,133 @@
+#include <CLI/CLI.hpp>
+#include <cinttypes>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <stdexcept>
+
+#include "arguments/model_options.h"
+#include "commands/edges_commands.h"
+#include "interrupt.h"
+#include "output/output_file.h"
+#include "output/progress_bar.h"
+#include "print.h"
+#include "program.h"
+
+namespace {
+
+struct BuildOptions {
+  std::string capture;
+  std::string out;
+  NetworkOptions network;
+  int min_views = 2;
+  double cell_m = 0;
+};
+
+constexpr int64_t kStepsOfView = 10, kStepsOfFusion = 100;
+
+struct Progress {
+  ProgressBar bar;
+  int64_t before;  // steps
+};
+
+int32_t show_progress(void* progress, double done) {
+  auto* const shown = static_cast<Progress*>(progress);
+  shown->bar.advance(shown->before + int64_t(done * double(kStepsOfFusion)), "fusing");
+  return interrupted() ? 0 : 1;
+}
+
+void fail_if_interrupted(const std::string& out) {
+  if (interrupted()) throw std::runtime_error("Interrupted; " + out + " is as it was before.");
+}
+
+int build(const BuildOptions& options) {
+  catch_interrupts();
+  const std::string bundle = edges_bundle_or_default(options.network.bundle);
+  const maquette::Context context = open_context();
+  const maquette::Capture capture(context, options.capture);
+  const maq_capture_info info = capture.info();
+  std::vector<uint32_t> views;
+  for (uint32_t i = 0; i < info.view_count; ++i) {
+    if (capture.view(i).has_depth == 1) views.push_back(i);
+  }
+  for (uint32_t i = 0; i < info.drop_count; ++i) {
+    const maq_capture_drop drop = capture.drop(i);
+    print_error("  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
+  }
+  if (views.empty()) {
+    throw std::runtime_error(options.capture +
+                             " has no depth images, in which edges are found; name one for each frame of its "
+                             "transforms.json as \"depth_file_path\" (16-bit PNG in millimetres, or TIFF in metres).");
+  }
+  print_error("%s: %zu of %u views have depth\n", options.capture.c_str(), views.size(), info.view_count);
+  make_folder_of(options.out);
+  require_writable(options.out);
+
+  const int64_t of_views = kStepsOfView * int64_t(views.size());
+  Progress progress{ProgressBar("building", of_views + kStepsOfFusion), of_views};
+  maq_edges_config of_edges = maquette::default_edges_config();
+  of_edges.bundle_path = bundle.c_str();
+  of_edges.threads = options.network.threads;
+  of_edges.allow_spinning = options.network.no_spin ? 0 : 1;
+  of_edges.provider = provider_of(options.network);
+  maquette::Edges edges(context, of_edges);
+  maq_edges_fusion_config config = maquette::default_edges_fusion_config();
+  config.threads = options.network.threads;
+  config.cell_m = options.cell_m;
+  config.min_views = options.min_views;
+  config.progress_callback = show_progress;
+  config.progress_user_data = &progress;
+  maquette::EdgesFusion fusion(context, config);
+  for (size_t i = 0; i < views.size(); ++i) {
+    fail_if_interrupted(options.out);
+    progress.bar.advance(kStepsOfView * int64_t(i), capture.view(views[i]).name);
+    const auto [depth, camera] = capture.load_depth(views[i]);
+    fusion.add_view(edges.run(depth, camera.intrinsics), camera);
+  }
+  try {
+    fusion.finish();
+  } catch (const maquette::Error&) {
+    fail_if_interrupted(options.out);
+    throw;
+  }
+  progress.bar.finish();
+  const maquette::EdgesCurves curves = fusion.find_curves();
+  curves.save(options.out);
+  const maq_edges_fusion_info made = fusion.info();
+  double length_m = 0;
+  for (const maq_edges_curve& curve : curves.curves()) length_m += curve.length_m;
+  print_output("%s: %zu curves, %.2f m long, %zu corners of %u views and %" PRIu64 " points; fused in %.0f ms\n",
+               options.out.c_str(), curves.curves().size(), length_m, curves.corners().size(), made.view_count,
+               made.point_count, double(made.fusion_ms));
+  return 0;
+}
+
+}  // namespace
+
+void add_edges_build_command(CLI::App& edges, int* exit_code) {
+  auto options = std::make_shared<BuildOptions>();
+  CLI::App* command =
+      edges.add_subcommand("build", "Find the sharp edges of a place or a thing from depth images with known cameras");
+  command
+      ->add_option("capture", options->capture,
+                   "Folder with a transforms.json whose frames name depth images (\"depth_file_path\")")
+      ->required();
+  command
+      ->add_option("-o,--out", options->out,
+                   "File of the curves, by its ending json, obj, ply, dxf or step; replaces an existing one")
+      ->required();
+  command
+      ->add_option("--min-views", options->min_views,
+                   "Leave out curves that fewer views have seen (default 2; 1: none)")
+      ->check(CLI::Range(1, 1000));
+  command
+      ->add_option("--cell", options->cell_m, "Distance of the points that are fused, metres; default: that of pixels")
+      ->check(CLI::PositiveNumber);
+  add_network_options(*command, options->network, "MAQ_EDGES_BUNDLE");
+  command->footer(
+      "Curves are in the world of the cameras, in metres. What one view hides another shows; an edge that only one of\n"
+      "three views and more has seen is left out.\n\n"
+      "Examples:\n"
+      "  maquette edges build scan --out model.dxf\n"
+      "  maquette edges build scan --out model.step --min-views 3");
+  command->callback([=] { *exit_code = build(*options); });
+}

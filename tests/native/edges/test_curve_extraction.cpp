@@ -291,6 +291,47 @@ TEST(CurveExtraction, NoiseChequerboardsAndMissingDepthEnd) {
   }
 }
 
+// Where one surface ends before another that ends at the same pixels, there are two edges.
+TEST(CurveExtraction, AnEdgeRightBehindAnotherIsFoundAsWell) {
+  EdgeField field = plain_field(320, 240, 16);
+  for (size_t i = 0; i < field.distance_r.size(); ++i) {
+    const float off = float(i % 320) - 160.3f;
+    field.distance_r[i] = std::min(16.0f, std::abs(off));
+    field.depth_m[i] = off < 0 ? 1.0f : 1.5f;
+    field.kind[i] = maq::kBoundaryEdge;
+  }
+  CurveExtractor extractor;
+  const EdgeCurves& found = extractor.extract(field);
+  ASSERT_EQ(found.curves.size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(found.curves[i].kind, maq::kBoundaryEdge);
+    EXPECT_NEAR(found.points[size_t(found.curves[i].first_point)].z, i == 0 ? 1 : 1.5, 1e-3);
+  }
+  // The farther surface goes on behind the nearer one: it has no edge there.
+  for (size_t i = 0; i < field.distance_r.size(); ++i) {
+    if (i % 320 > 160) field.distance_r[i] = 16;
+  }
+  EXPECT_EQ(extractor.extract(field).curves.size(), 1u);
+}
+
+// The ends of a bar pass from a surface to another far behind it: what lies between them is no line through the air.
+TEST(CurveExtraction, ALineEndsWhereItsSurfaceDoes) {
+  EdgeField field = plain_field(320, 240, 16);
+  for (size_t i = 0; i < field.distance_r.size(); ++i) {
+    const float off = float(i / 320) - 120.3f;
+    field.distance_r[i] = off < 0 ? std::min(16.0f, -off) : 16.0f;
+    field.depth_m[i] = off >= 0 ? 0.0f : i % 320 < 160 ? 1.0f : 3.0f;
+    field.kind[i] = maq::kBoundaryEdge;
+  }
+  CurveExtractor extractor;
+  const EdgeCurves& found = extractor.extract(field);
+  ASSERT_EQ(found.curves.size(), 2u);
+  for (const EdgeCurve& curve : found.curves) {
+    const Vec3 a = found.points[size_t(curve.first_point)], b = found.points[size_t(curve.first_point) + 1];
+    EXPECT_NEAR(a.z, b.z, 0.02);
+  }
+}
+
 TEST(CurveExtraction, MoreCurvesThanTheLimitAreCounted) {
   EdgeField field = plain_field(320, 240, 16);
   for (size_t i = 0; i < field.distance_r.size(); ++i)

@@ -14,8 +14,7 @@ constexpr double kBestSigma_r = 0.1;  // no station counts for more than one kno
 constexpr double kMisplaced_px = 2;   // of a line's ends from where they are seen
 constexpr double kMaxBeyond_px = 6;   // of a curve's ends beyond its first and last station
 constexpr int kMaxOffEnds = 3;
-constexpr int kLengthen_px = 6;       // votes are followed so far beyond a free end
-constexpr double kLongestStep_r = 6;  // of a pixel along a curve that runs away from the camera
+constexpr int kLengthen_px = 6;  // votes are followed so far beyond a free end
 
 void require(bool is_right, const char* name, double value, const char* range) {
   if (!is_right) {
@@ -108,6 +107,11 @@ void CurveExtractor::draft_curves(const EdgeField& field, const RidgeChain& chai
     ++found_.counts.without_depth;
     return;
   }
+  draft_runs(field, chain);
+  if (stations_.measure_far_side(field)) draft_runs(field, chain);
+}
+
+void CurveExtractor::draft_runs(const EdgeField& field, const RidgeChain& chain) {
   // An arc goes on where its kind changes: the rim of a cup is one circle, its far half a boundary.
   if (!stations_.is_straight && stations_.runs.size() > 1 && draft_arcs(field, chain)) return;
   for (const StationRun& run : stations_.runs) {
@@ -145,7 +149,7 @@ void CurveExtractor::gather_points(const EdgeField& field, const StationRun& run
 // One circle through all runs, and of each its part.
 bool CurveExtractor::draft_arcs(const EdgeField& field, const RidgeChain& chain) {
   const auto n = int(stations_.stations.size());
-  gather_points(field, {0, n, kCreaseEdge});
+  gather_points(field, {0, n, kCreaseEdge, -1});
   const auto arc = arc_fitter_.fit(fit_points_.data(), fit_points_.size());
   if (!arc || !(arc->rms <= options_.tolerance_r)) return false;
   const auto angle_of = [&](int k) {
@@ -283,7 +287,7 @@ void CurveExtractor::describe_sides(const EdgeField& field, const StationRun& ru
   int convex = 0;
   for (int k = run.first; k < run.first + run.count; ++k) {
     const CurveStation& s = stations_.stations[size_t(k)];
-    if (s.side[0].terms == 0 || s.side[1].terms == 0 || s.is_boundary) continue;
+    if (s.side[0].terms == 0 || s.side[1].terms == 0 || s.near_side >= 0) continue;
     const double x = s.x + kPatchScale_px * s.ty, y = s.y - kPatchScale_px * s.tx;
     const auto a = s.side[0].slope(s.x, s.y), b = s.side[1].slope(s.x, s.y);
     const double own = a[0] * (x - s.x) + a[1] * (y - s.y), other = b[0] * (x - s.x) + b[1] * (y - s.y);
@@ -295,7 +299,7 @@ void CurveExtractor::describe_sides(const EdgeField& field, const StationRun& ru
   const CurveStation& middle = stations_.stations[size_t(run.first + run.count / 2)];
   for (size_t side = 0; side < 2; ++side) {
     const SurfacePatch& patch = stations_.whole_side[side];
-    if (patch.terms != 3 || (curve.kind == kBoundaryEdge && int(side) != middle.near_side)) continue;
+    if (patch.terms != 3 || (middle.near_side >= 0 && int(side) != middle.near_side)) continue;
     curve.has_plane[side] = true;
     curve.plane[side] = plane_of(patch, field.intrinsics);
   }

@@ -31,6 +31,7 @@ class CurveExtractor {
     std::array<double, 2> r_m, step_m;  // a footprint, and a pixel along the curve, at its ends
   };
   void draft_curves(const EdgeField& field, const RidgeChain& chain);
+  void draft_runs(const EdgeField& field, const RidgeChain& chain);
   bool draft_arcs(const EdgeField& field, const RidgeChain& chain);
   bool fit_run(const EdgeField& field, const RidgeChain& chain, const StationRun& run, Draft& draft);
   void gather_points(const EdgeField& field, const StationRun& run);

@@ -10,11 +10,14 @@ namespace {
 
 constexpr double kStraightSpacing_px = 6, kCurvedSpacing_px = 3, kCurvedHalfWindow_px = 4;
 constexpr double kMinShift_px = 1;          // pixels nearer to the edge are rounded by what the field was made of
-constexpr double kFallen_px = 3;            // nearer to the edge the field's noise could be taken for another edge
+constexpr double kFallen_px = 3;            // nearer to the edge the field says nothing about another one
 constexpr double kFarthestShift_px = 5;     // the field's value is best near the edge
 constexpr double kBelief_px = 2.5;          // values that want to move it farther are of another edge
-constexpr double kClearly_r = 3;            // by which the field is lower on the side that a boundary belongs to
+constexpr double kClearly_px = 2;           // by which the field has the edge nearer on the side that it belongs to
 constexpr double kBestAcross_px = 0.08;     // no place in the picture is believed to be known better
+constexpr double kSamePlace_px = 1;         // edges of a near and a far surface so near in the picture are one chain
+constexpr double kApart_r = 2;              // nearer surfaces' edges are one
+constexpr int kStray = 2;                   // stations that may have seen something else
 constexpr double kFarthestPlanes_px = 0.6;  // surfaces that meet farther from the field's edge bend, or are others
 
 Vec3 on_ray(const Intrinsics& camera, double x, double y, double inverse_depth) {
@@ -41,6 +44,29 @@ void for_band(const EdgeField& field, const CurveStation& s, int side, double ha
       visit(size_t(y) * size_t(field.width) + size_t(x), x, y, across);
     }
   }
+}
+
+// Calls visit(px) for the pixels of a band: by how much farther away than the station the field puts the edge, where
+// distances grow as they do on the surface of that side, or by 1 r a pixel where none is known.
+template <class Visit>
+void for_offsets(const EdgeField& field, const CurveStation& s, int side, double half_window, double least, double most,
+                 Visit&& visit) {
+  const SurfacePatch& patch = s.side[size_t(side)];
+  const Intrinsics& camera = field.intrinsics;
+  const double q = patch.terms != 0 ? patch.inverse_depth(s.x, s.y) : 0;
+  const double qa = patch.terms != 0 ? patch.inverse_depth(s.x + s.tx, s.y + s.ty) : 0;
+  const bool has_surface = q > 0 && qa > 0;
+  const Vec3 edge = has_surface ? on_ray(camera, s.x, s.y, q) : Vec3{};
+  const Vec3 along = has_surface ? normalized(on_ray(camera, s.x + s.tx, s.y + s.ty, qa) - edge) : Vec3{};
+  for_band(field, s, side, half_window, least, most, [&](size_t at, int x, int y, double across) {
+    if (!std::isfinite(field.distance_r[at])) return;
+    const double q_here = has_surface ? patch.inverse_depth(x, y) : 0;
+    double slope = 1;
+    if (q_here > 0.2 * q && has_surface) {
+      slope = length(cross(on_ray(camera, x, y, q_here) - edge, along)) * q_here * focal_px(camera) / across;
+    }
+    visit(field.distance_r[at] / std::max(slope, 0.5) - across);
+  });
 }
 
 }  // namespace
@@ -117,9 +143,10 @@ void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, i
       const int x = int(std::lround(s.x + u * s.tx + across * nx)), y = int(std::lround(s.y + u * s.ty + across * ny));
       if (x < 0 || y < 0 || x >= field.width || y >= field.height) break;
       const size_t at = size_t(y) * size_t(field.width) + size_t(x);
+      const double off = (x - s.x) * nx + (y - s.y) * ny;
       if (across >= kFallen_px && !(field.distance_r[at] >= 0.5 * across)) break;
       const float depth = field.depth_m[at];
-      if (across < from_px || !(depth > 0 && std::isfinite(depth))) continue;
+      if (off < from_px || !(depth > 0 && std::isfinite(depth))) continue;
       band_.push_back({double(x), double(y), 1.0 / double(depth), 1});
     }
   }
@@ -128,7 +155,7 @@ void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, i
 SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
                                      int side, double half_window_px, bool may_bend) {
   // Away from what smears; where the surface is too narrow for that, nearer.
-  for (const double smear : {double(options.smear_px), 0.5 * options.smear_px}) {
+  for (const double smear : {double(options.smear_px), 0.5 * options.smear_px, 0.15 * options.smear_px}) {
     band_.clear();
     gather_band(field, s, side, half_window_px, smear + 0.5, options.smear_px + options.support_px);
     if (band_.size() >= 12) break;
@@ -192,75 +219,78 @@ void CurveStations::fit_whole_sides(const EdgeField& field) {
   }
 }
 
-// A crease where both surfaces reach the edge at one depth and the field does not say boundary; else the boundary of
-// the nearer one.
-void CurveStations::choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed) {
-  const auto n = int(stations.size());
-  votes_.assign(stations.size(), 0);  // for a boundary
-  for (int k = 0; k < n; ++k) {
+// By how many px farther away than the station the field puts an edge beside it, on side 1 more than on side 0: an edge
+// that one surface ends in has small distances on its side alone.
+void CurveStations::measure_field_gaps(const EdgeField& field) {
+  for (CurveStation& s : stations) {
+    s.field_gap_px = 0;
     for (int side = 0; side < 2; ++side) {
-      for_band(field, stations[size_t(k)], side, half_window_px_, 0, 2.5, [&](size_t at, int, int, double) {
-        votes_[size_t(k)] += (field.kind[at] == kBoundaryEdge) - (field.kind[at] == kCreaseEdge);
-      });
       double sum = 0, count = 0;
-      for_band(field, stations[size_t(k)], side, half_window_px_, 0.5, 2, [&](size_t at, int, int, double) {
-        if (std::isfinite(field.distance_r[at])) sum += field.distance_r[at], count += 1;
-      });
-      const double mean = count > 0 ? sum / count : double(field.eps_r);
-      if (side == 0) {
-        stations[size_t(k)].field_gap_r = -mean;
-      } else {
-        stations[size_t(k)].field_gap_r += mean;
-      }
-    }
-  }
-  for (int k = 0; k < n; ++k) {
-    CurveStation& s = stations[size_t(k)];
-    int votes = 0;
-    for (int j = std::max(0, k - 1); j <= std::min(n - 1, k + 1); ++j) votes += votes_[size_t(j)];
-    s.is_boundary = votes > 0;
-    s.near_side = s.side[0].terms != 0 ? 0 : 1;
-    s.gap_r = 0;
-    if (s.side[0].terms == 0 || s.side[1].terms == 0) continue;
-    const double q0 = s.side[0].inverse_depth(s.x, s.y), q1 = s.side[1].inverse_depth(s.x, s.y);
-    s.gap_r = focal_px(field.intrinsics) * (q0 - q1) / std::max(q0, q1);
-    s.near_side = s.gap_r > 0 ? 0 : 1;
-    // An edge that is a pixel off makes a gap as well, where surfaces are steep.
-    const auto a = s.side[0].slope(s.x, s.y), b = s.side[1].slope(s.x, s.y);
-    const double slack = focal_px(field.intrinsics) * std::hypot(a[0] - b[0], a[1] - b[1]) / std::max(q0, q1);
-    const double sigma = std::hypot(s.side[0].edge_sigma_r, s.side[1].edge_sigma_r);
-    if (std::abs(s.gap_r) > options.gap_r + slack + 3 * sigma) s.is_boundary = true;
-  }
-  find_runs(is_closed);
-  // A run belongs to one side: where the field falls to 0 on one alone, to that; else to the nearer one of most of its
-  // stations.
-  for (const StationRun& run : runs) {
-    int first_side = 0;
-    double field_gap = 0;
-    for (int k = run.first; k < run.first + run.count; ++k) {
-      const CurveStation& s = stations[size_t(k)];
-      field_gap += s.field_gap_r / run.count;
-      if (s.side[0].terms != 0 && s.side[1].terms != 0) first_side += s.gap_r > 0 ? 1 : -1;
-    }
-    if (std::abs(field_gap) > kClearly_r) first_side = field_gap > 0 ? 1 : -1;
-    for (int k = run.first; k < run.first + run.count; ++k) {
-      CurveStation& s = stations[size_t(k)];
-      s.is_boundary = run.kind == kBoundaryEdge;
-      if (s.side[0].terms != 0 && s.side[1].terms != 0) s.near_side = first_side > 0 ? 0 : 1;
+      for_offsets(field, s, side, half_window_px_, 0.5, 2, [&](double off_px) { sum += off_px, count += 1; });
+      s.field_gap_px += (side == 0 ? -1 : 1) * (count > 0 ? sum / count : double(field.eps_r));
     }
   }
 }
 
-// A few stations among others of the other kind are taken for theirs. A closed chain begins where a run does.
+// A crease where both surfaces reach the edge at one depth and the field does not say boundary; else the boundary of
+// the nearer one. What the field falls to 0 on one side of belongs to that side.
+void CurveStations::choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed) {
+  const auto n = int(stations.size());
+  measure_field_gaps(field);
+  for (CurveStation& s : stations) {
+    for (int side = 0; side < 2; ++side) {
+      s.boundary_votes[size_t(side)] = 0;
+      for_band(field, s, side, half_window_px_, 0, 2.5, [&](size_t at, int, int, double) {
+        s.boundary_votes[size_t(side)] += (field.kind[at] == kBoundaryEdge) - (field.kind[at] == kCreaseEdge);
+      });
+    }
+  }
+  for (int k = 0; k < n; ++k) {
+    CurveStation& s = stations[size_t(k)];
+    int votes[2] = {0, 0};
+    double field_gap = 0, count = 0;
+    for (int j = std::max(0, k - 1); j <= std::min(n - 1, k + 1); ++j) {
+      for (size_t side = 0; side < 2; ++side) votes[side] += stations[size_t(j)].boundary_votes[side];
+      field_gap += stations[size_t(j)].field_gap_px, count += 1;
+    }
+    field_gap /= count;
+    s.is_boundary = votes[0] + votes[1] > 0;
+    s.gap_r = 0;
+    const bool has_both = s.side[0].terms != 0 && s.side[1].terms != 0;
+    if (has_both) {
+      const double q0 = s.side[0].inverse_depth(s.x, s.y), q1 = s.side[1].inverse_depth(s.x, s.y);
+      s.gap_r = focal_px(field.intrinsics) * (q0 - q1) / std::max(q0, q1);
+      // An edge that is a pixel off makes a gap as well, where surfaces are steep.
+      const auto a = s.side[0].slope(s.x, s.y), b = s.side[1].slope(s.x, s.y);
+      const double slack = focal_px(field.intrinsics) * std::hypot(a[0] - b[0], a[1] - b[1]) / std::max(q0, q1);
+      const double sigma = std::hypot(s.side[0].edge_sigma_r, s.side[1].edge_sigma_r);
+      if (std::abs(s.gap_r) > options.gap_r + slack + 3 * sigma) s.is_boundary = true;
+    }
+    const bool is_one_sided = std::abs(field_gap) > kClearly_px;
+    if (is_one_sided) {
+      s.near_side = field_gap > 0 ? 0 : 1;
+    } else if (s.is_boundary) {
+      s.near_side = has_both ? (s.gap_r > 0 ? 0 : 1) : (s.side[0].terms != 0 ? 0 : 1);
+    } else {
+      s.near_side = -1;
+    }
+  }
+  find_runs(is_closed);
+}
+
+// A few stations among others of another kind are taken for theirs. A closed chain begins where a run does.
 void CurveStations::find_runs(bool is_closed) {
   const int least = is_straight ? 3 : 4;
   const auto n = int(stations.size());
+  const auto is_same = [](const CurveStation& a, const CurveStation& b) {
+    return a.is_boundary == b.is_boundary && a.near_side == b.near_side;
+  };
   if (is_closed) {
     int turn = 0;
     for (int k = 1; k < n && turn == 0; ++k) {
-      bool is_new = stations[size_t(k)].is_boundary != stations[size_t(k) - 1].is_boundary;
+      bool is_new = !is_same(stations[size_t(k)], stations[size_t(k) - 1]);
       for (int j = k + 1; j < k + least; ++j) {
-        is_new = is_new && stations[size_t(j % n)].is_boundary == stations[size_t(k)].is_boundary;
+        is_new = is_new && is_same(stations[size_t(j % n)], stations[size_t(k)]);
       }
       if (is_new) turn = k;
     }
@@ -268,24 +298,35 @@ void CurveStations::find_runs(bool is_closed) {
   }
   runs.clear();
   for (int k = 0; k < n; ++k) {
-    const EdgeKind kind = stations[size_t(k)].is_boundary ? kBoundaryEdge : kCreaseEdge;
-    if (runs.empty() || runs.back().kind != kind) runs.push_back({k, 0, kind});
+    const CurveStation& s = stations[size_t(k)];
+    if (k == 0 || !is_same(s, stations[size_t(k) - 1])) {
+      runs.push_back({k, 0, s.is_boundary ? kBoundaryEdge : kCreaseEdge, s.near_side});
+    }
     ++runs.back().count;
   }
   while (runs.size() > 1) {
     const auto shortest = std::min_element(runs.begin(), runs.end(),
                                            [](const StationRun& a, const StationRun& b) { return a.count < b.count; });
     if (shortest->count >= least) break;
-    shortest->kind = shortest->kind == kCreaseEdge ? kBoundaryEdge : kCreaseEdge;
+    const bool has_before = shortest != runs.begin(), has_after = shortest + 1 != runs.end();
+    const StationRun& other =
+        !has_before || (has_after && (shortest + 1)->count > (shortest - 1)->count) ? *(shortest + 1) : *(shortest - 1);
+    shortest->kind = other.kind, shortest->near_side = other.near_side;
     size_t kept = 0;
     for (size_t i = 1; i < runs.size(); ++i) {
-      if (runs[i].kind == runs[kept].kind) {
+      if (runs[i].kind == runs[kept].kind && runs[i].near_side == runs[kept].near_side) {
         runs[kept].count += runs[i].count;
       } else {
         runs[++kept] = runs[i];
       }
     }
     runs.resize(kept + 1);
+  }
+  for (const StationRun& run : runs) {
+    for (int k = run.first; k < run.first + run.count; ++k) {
+      stations[size_t(k)].is_boundary = run.kind == kBoundaryEdge;
+      stations[size_t(k)].near_side = run.near_side;
+    }
   }
 }
 
@@ -300,7 +341,7 @@ void CurveStations::move_across(const EdgeField& field) {
     double weight = 0, shift = 0;
     for (int side = 0; side < 2; ++side) {
       const SurfacePatch& patch = s.side[size_t(side)];
-      if (patch.terms == 0 || (s.is_boundary && side != s.near_side)) continue;
+      if (patch.terms == 0 || (s.near_side >= 0 && side != s.near_side)) continue;
       const double q = patch.inverse_depth(s.x, s.y), qa = patch.inverse_depth(s.x + s.tx, s.y + s.ty);
       if (!(q > 0 && qa > 0)) continue;
       const Vec3 edge = on_ray(camera, s.x, s.y, q);
@@ -369,7 +410,7 @@ bool CurveStations::find_points(const EdgeField& field) {
     double unit = 0, sigma_r = 0;
     for (size_t side = 0; side < 2; ++side) {
       const SurfacePatch& patch = s.side[side];
-      if (patch.terms == 0 || (s.is_boundary && int(side) != s.near_side)) continue;
+      if (patch.terms == 0 || (s.near_side >= 0 && int(side) != s.near_side)) continue;
       const double q = patch.inverse_depth(s.x, s.y);
       if (!(q > 0)) continue;
       if (unit == 0) unit = q;
@@ -397,6 +438,91 @@ bool CurveStations::find_points(const EdgeField& field) {
   return known >= 2;
 }
 
+// Whether the surface behind an edge ends there as well: its field falls to 0 at the same place.
+bool CurveStations::has_far_edge(const EdgeField& field, const CurveStation& s) const {
+  if (s.near_side < 0 || s.side[0].terms == 0 || s.side[1].terms == 0) return false;
+  double agree = 0, count = 0;
+  for_offsets(field, s, 1 - s.near_side, half_window_px_, 0.5, 3,
+              [&](double off_px) { agree += std::abs(off_px) < kSamePlace_px, count += 1; });
+  return count >= 6 && agree >= 0.7 * count;
+}
+
+bool CurveStations::measure_far_side(const EdgeField& field) {
+  bool has_one = false;
+  for (CurveStation& s : stations) {
+    s.is_known = std::abs(s.gap_r) > kApart_r && has_far_edge(field, s);
+    has_one = has_one || s.is_known;
+    if (s.near_side >= 0) s.near_side = 1 - s.near_side;
+  }
+  if (!has_one) return false;
+  // Runs of stations that have one, others among them left out.
+  runs.clear();
+  for (size_t k = 0; k < stations.size(); ++k) {
+    const CurveStation& s = stations[k];
+    if (!s.is_known) continue;
+    if (runs.empty() || runs.back().first + runs.back().count + 1 < int(k) || runs.back().near_side != s.near_side) {
+      runs.push_back({int(k), 0, kBoundaryEdge, s.near_side});
+    }
+    runs.back().count = int(k) + 1 - runs.back().first;
+  }
+  const int least = is_straight ? 2 : 4;
+  size_t kept = 0;
+  for (const StationRun& run : runs) {
+    if (run.count < least) continue;
+    int votes = 0;
+    for (int k = run.first; k < run.first + run.count; ++k) {
+      CurveStation& s = stations[size_t(k)];
+      s.near_side = run.near_side, s.is_known = false;
+      votes += s.boundary_votes[size_t(run.near_side)];
+    }
+    runs[kept] = run;
+    runs[kept++].kind = votes >= 0 ? kBoundaryEdge : kCreaseEdge;
+  }
+  runs.resize(kept);
+  if (runs.empty()) return false;
+  move_across(field);
+  if (is_straight) straighten();
+  if (!find_points(field)) return false;
+  part_at_gaps(field);
+  return true;
+}
+
+// Where a chain passes from one surface to another behind it, points jump along the ray: there are two edges. A station
+// or two that jump by themselves saw something else.
+void CurveStations::part_at_gaps(const EdgeField& field) {
+  const double focal = focal_px(field.intrinsics);
+  const auto is_near = [&](const CurveStation& a, const CurveStation& b) {
+    const double size_px = 1 + std::hypot(a.x - b.x, a.y - b.y);
+    return length(a.point - b.point) <= kLongestStep_r * size_px * std::min(a.point.z, b.point.z) / focal;
+  };
+  parts_.clear();
+  for (const StationRun& run : runs) {
+    const int end = run.first + run.count;
+    int first = -1, last = -1;
+    for (int k = run.first; k < end; ++k) {
+      CurveStation& s = stations[size_t(k)];
+      if (!s.is_known) continue;
+      if (last >= 0 && !is_near(stations[size_t(last)], s)) {
+        bool is_stray = false;
+        for (int j = k + 1; j < std::min(end, k + 1 + kStray) && !is_stray; ++j) {
+          is_stray = stations[size_t(j)].is_known && is_near(stations[size_t(last)], stations[size_t(j)]) &&
+                     !is_near(s, stations[size_t(j)]);
+        }
+        if (is_stray) {
+          s.is_known = false;
+          continue;
+        }
+        parts_.push_back({first, last + 1 - first, run.kind, run.near_side});
+        first = -1;
+      }
+      if (first < 0) first = k;
+      last = k;
+    }
+    if (first >= 0) parts_.push_back({first, last + 1 - first, run.kind, run.near_side});
+  }
+  runs.swap(parts_);
+}
+
 bool CurveStations::measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain,
                             const CurveOptions& options) {
   place(points, chain);
@@ -408,7 +534,9 @@ bool CurveStations::measure(const EdgeField& field, const RidgePoint* points, co
     move_across(field);
     if (is_straight) straighten();
   }
-  return find_points(field);
+  if (!find_points(field)) return false;
+  part_at_gaps(field);
+  return true;
 }
 
 }  // namespace maq

@@ -11,35 +11,43 @@
 
 namespace maq {
 
+inline constexpr double kLongestStep_r = 6;  // of a pixel along a curve that runs away from the camera
+
 struct CurveStation {
   double x, y, tx, ty;   // px: the edge, and its direction in the picture; to its left is (ty, -tx), side 0
   double across_weight;  // one over the variance of its place across the edge, 1/px^2
   std::array<SurfacePatch, 2> side;
   bool is_boundary;
-  int near_side;       // the side that a boundary belongs to
-  double gap_r;        // of side 1 behind side 0 along the ray
-  double field_gap_r;  // of the field, from side 0 to side 1
-  bool is_known;       // it has a point
+  int near_side;                      // the one side that the edge is the end of; -1: both
+  double gap_r;                       // of side 1 behind side 0 along the ray
+  double field_gap_px;                // by how much farther away the field has an edge on side 1 than on side 0
+  std::array<int, 2> boundary_votes;  // pixels of the field near it that say boundary, less those that say crease
+  bool is_known;                      // it has a point
   Vec3 point;
   double sigma_r;  // of the point, the worst of its directions
 };
 
-// Stations that follow one another and are of one kind.
+// Stations that follow one another and are of one kind, at the end of the same surfaces.
 struct StationRun {
   int first, count;
   EdgeKind kind;
+  int near_side;  // of all its stations
 };
 
 class CurveStations {
  public:
   std::vector<CurveStation> stations;
-  std::vector<StationRun> runs;  // of all stations in turn
+  std::vector<StationRun> runs;  // in turn; stations between them are of no edge
   bool is_straight = false;      // in the picture
   // Of a straight chain whose sides are planes all along.
   std::array<SurfacePatch, 2> whole_side;
 
   // False where no surface is known beside the chain.
   bool measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain, const CurveOptions& options);
+
+  // After measure(): two edges, one behind the other, are one chain. Stations and runs become those of the farther one;
+  // false where there is none.
+  bool measure_far_side(const EdgeField& field);
 
  private:
   void place(const RidgePoint* points, const RidgeChain& chain);
@@ -50,17 +58,20 @@ class CurveStations {
   void fit_sides(const EdgeField& field, const CurveOptions& options);
   void fit_whole_sides(const EdgeField& field);
   void choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed);
+  void measure_field_gaps(const EdgeField& field);
   void find_runs(bool is_closed);
   void move_across(const EdgeField& field);
   void straighten();
   bool find_points(const EdgeField& field);
+  void part_at_gaps(const EdgeField& field);
+  bool has_far_edge(const EdgeField& field, const CurveStation& s) const;
 
   double half_window_px_ = 0;
   PatchFitter fitter_;
   std::vector<BandPixel> band_;
   std::vector<PlaneSums> sums_;  // of each station's sides
   std::vector<double> shifts_, residuals_;
-  std::vector<int> votes_;
+  std::vector<StationRun> parts_;
 };
 
 }  // namespace maq

@@ -30,11 +30,11 @@ maq_edges_fusion_config default_config() {
 }
 
 FusionOptions fusion_options(const maq_edges_fusion_config& config) {
-  constexpr uint64_t kMost = uint64_t(1) << 32;
+  constexpr uint64_t kMaxCount = uint64_t(1) << 32;
   require_range("config.threads", config.threads, 0, kMaxThreads);
   require_range("config.cell_m", config.cell_m, 0.0, 1e9);
-  require_range("config.max_pixels", config.max_pixels, uint64_t(1), kMost);
-  require_range("config.max_points", config.max_points, uint64_t(1), kMost - 2);
+  require_range("config.max_pixels", config.max_pixels, uint64_t(1), kMaxCount);
+  require_range("config.max_points", config.max_points, uint64_t(1), kMaxCount - 2);
   require_range("config.min_views", config.min_views, 1, 1000);
   FusionOptions options;
   options.cell_m = config.cell_m;

@@ -30,6 +30,26 @@ def slopes(depth: Tensor, focal_px: Tensor) -> Tensor:
     return torch.stack([*planes, known.to(depth.dtype)], 1)
 
 
+def mirrored(planes: Tensor, multiple: int) -> Tensor:
+    """Slopes [N, 3, H, W] -> sides that are multiples of `multiple`, with mirrors beyond the last column and row.
+
+    Surfaces go on there, where unknown depth would look like their end. A slope along an axis stands between two
+    pixels: its mirror is between the last two, which replaces the 0 of the last pixel, which has no neighbour.
+    """
+    for axis, along in ((3, 0), (2, 1)):
+        n = planes.shape[axis]
+        size = -(-n // multiple) * multiple
+        if size == n:
+            continue
+        at = torch.arange(size, device=planes.device)
+        pixel = torch.where(at < n, at, 2 * n - 1 - at).clamp_min(0)
+        between = torch.where(at < n - 1, at, 2 * n - 3 - at).clamp_min(0)
+        planes = torch.stack(
+            [planes[:, k].index_select(axis - 1, between if k == along else pixel) for k in range(planes.shape[1])], 1
+        )
+    return planes
+
+
 def folded(planes: Tensor, fold: int) -> Tensor:
     """[N, C, H, W] -> [N, C fold^2, H / fold, W / fold], as `torch.nn.functional.pixel_unshuffle` orders channels."""
     return F.pixel_unshuffle(planes, fold)

@@ -10,13 +10,14 @@ import torch
 
 from export.densepose.graphs import session
 from export.edges.config import EPS_R, FOLD
-from export.edges.depth_input import folded, slopes
+from export.edges.depth_input import folded, mirrored, slopes
 from export.edges.losses import LOG_SPREAD
 
 
-def slopes_of(depth: np.ndarray, focal_px: float) -> np.ndarray:
-    """Depth [H, W] in metres -> `slopes` of the graph: [1, H / 2, W / 2, 12]."""
-    planes = slopes(torch.from_numpy(depth)[None], torch.full((1, 2), focal_px))
+def slopes_of(depth: np.ndarray, focal_px: float, multiple: int = FOLD) -> np.ndarray:
+    """Depth [H, W] in metres -> `slopes` of the graph: [1, H' / 2, W' / 2, 12]; H' and W' are rounded up to multiples
+    of `multiple`."""
+    planes = mirrored(slopes(torch.from_numpy(depth)[None], torch.full((1, 2), focal_px)), multiple)
     return np.ascontiguousarray(folded(planes, FOLD).permute(0, 2, 3, 1).numpy())
 
 

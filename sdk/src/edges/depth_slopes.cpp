@@ -11,7 +11,7 @@ namespace maq {
 namespace {
 
 constexpr int kSlopeRowsOfTask = 16;  // folded
-constexpr size_t kDepthRows = 3, kPlaneRows = 6;
+constexpr size_t kDepthRows = 3, kMirroredRows = 2, kPlaneRows = 6;
 
 inline float is_known(float depth) { return depth > 0 ? 1.0f : 0.0f; }
 
@@ -46,6 +46,17 @@ void copy_row(const DepthPlane& depth, const FieldWindow& window, int y, float* 
   std::fill(row + inside, row + wanted, 0.0f);
 }
 
+// Planes of a row, `count` pixels of which the frame has the first `inside`: the others mirror them. A slope has no
+// value at the frame's last pixel, which has no neighbour, so that its mirror stands between the last two.
+void mirror_columns(int inside, int count, float* across, float* down, float* known) {
+  for (int x = inside - 1; x < count; ++x) across[x] = across[std::max(0, 2 * inside - 3 - x)];
+  for (int x = inside; x < count; ++x) {
+    const int mirrored = std::max(0, 2 * inside - 1 - x);
+    down[x] = down[mirrored];
+    known[x] = known[mirrored];
+  }
+}
+
 }  // namespace
 
 const float* DepthSlopes::make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window,
@@ -53,20 +64,39 @@ const float* DepthSlopes::make(const DepthPlane& depth, const Intrinsics& intrin
   const size_t width = size_t(window.width_px), cells = width / kFold;
   const int rows = window.height_px / kFold;
   values_.resize(size_t(rows) * cells * kChannels);
-  const size_t scratch = kDepthRows * (width + 1) + kPlaneRows * width;
+  const size_t scratch = (kDepthRows + kMirroredRows) * (width + 1) + (1 + kPlaneRows) * width;
   rows_.resize(scratch * size_t(threads.count()));
   const float fx = float(intrinsics.fx_px), fy = float(intrinsics.fy_px);
+  const int inside = depth.width_px - window.left_px, height = depth.height_px;
+  const bool is_wider = inside<window.width_px, is_higher = window.top_px + window.height_px> height;
   threads.run(size_t(divide_up(rows, kSlopeRowsOfTask)), [&](size_t task, int worker) {
     float* depths[kDepthRows];
     for (size_t i = 0; i < kDepthRows; ++i) depths[i] = rows_.data() + scratch * size_t(worker) + i * (width + 1);
-    float* const planes = depths[2] + width + 1;  // plane 0 of both rows, plane 1 of both, plane 2
+    float* const mirrored = depths[2] + width + 1;
+    float* const mirrored_below = mirrored + width + 1;
+    float* const unused = mirrored_below + width + 1;
+    float* const planes = unused + width;  // plane 0 of both rows, plane 1 of both, plane 2
     const int first = int(task) * kSlopeRowsOfTask, last = std::min(rows, first + kSlopeRowsOfTask);
     copy_row(depth, window, window.top_px + kFold * first, depths[0]);
     for (int row = first; row < last; ++row) {
       for (int y = 0; y < kFold; ++y) {
-        copy_row(depth, window, window.top_px + kFold * row + y + 1, depths[y + 1]);
-        planes_of_row(depths[y], depths[y + 1], width, fx, fy, planes + size_t(y) * width,
-                      planes + size_t(2 + y) * width, planes + size_t(4 + y) * width);
+        const int at = window.top_px + kFold * row + y;
+        float* const across = planes + size_t(y) * width;
+        float* const down = planes + size_t(2 + y) * width;
+        float* const known = planes + size_t(4 + y) * width;
+        copy_row(depth, window, at + 1, depths[y + 1]);
+        if (is_higher && at >= height - 1) {
+          // Below the frame its rows are mirrored, as its columns are.
+          const int above = std::max(0, 2 * height - 3 - at);
+          copy_row(depth, window, above, mirrored);
+          copy_row(depth, window, above + 1, mirrored_below);
+          planes_of_row(mirrored, mirrored_below, width, fx, fy, across, down, known);
+          copy_row(depth, window, at < height ? at : std::max(0, 2 * height - 1 - at), mirrored);
+          planes_of_row(mirrored, mirrored_below, width, fx, fy, across, unused, known);
+        } else {
+          planes_of_row(depths[y], depths[y + 1], width, fx, fy, across, down, known);
+        }
+        if (is_wider) mirror_columns(inside, window.width_px, across, down, known);
       }
       float* cell = values_.data() + size_t(row) * cells * kChannels;
       for (size_t x = 0; x < width; x += kFold, cell += kChannels) {

@@ -17,7 +17,7 @@ struct DepthPlane {
   int width_px = 0, height_px = 0;
 };
 
-// A part of a frame, which may reach beyond its right and lower border: nothing is known there.
+// A part of a frame, which may reach beyond its right and lower border by less than what it has of the frame.
 struct FieldWindow {
   int left_px = 0, top_px = 0, width_px = 0, height_px = 0;
 };
@@ -29,8 +29,10 @@ class DepthSlopes {
 
   // The network's input for a window of even sides, [height / 2][width / 2][kChannels]: channel 4 c + 2 y + x is pixel
   // (x, y) of 2 x 2 in plane c. Planes 0 and 1: g / (1 + |g|) of the slope g = f z d(1/z) towards the next pixel in x
-  // and in y, in metres of depth a metre sideways, 0 where either pixel is unknown or outside of the frame. Plane 2: 1
-  // where depth is known. Stays until the next call; takes no memory for a window no larger than those before.
+  // and in y, in metres of depth a metre sideways, 0 where either pixel is unknown and where the window ends with the
+  // frame. Plane 2: 1 where depth is known. Beyond the frame's border the planes are mirrored, so that surfaces go on
+  // there: unknown depth would look like their end. Stays until the next call; takes no memory for a window no larger
+  // than those before.
   const float* make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window,
                     WorkerThreads& threads);
 

@@ -19,7 +19,7 @@ from export.bundle import BundleInfo
 from export.densepose.graphs import session
 from export.edges.bundle import write_manifest
 from export.edges.config import FOLD, NetworkConfig
-from export.edges.depth_input import folded, slopes
+from export.edges.depth_input import folded, mirrored, slopes
 from export.edges.export_onnx import export
 from export.edges.network import EdgeNetwork
 
@@ -56,10 +56,10 @@ def main() -> None:
     graph = session(FOLDER / "bundle" / "field.onnx")
     for width, height in SIZES:
         depth = depth_frame(width, height)
-        padded = np.zeros([-(-side // CONFIG.multiple) * CONFIG.multiple for side in depth.shape])
-        padded[:height, :width] = depth
-        planes = slopes(torch.from_numpy(padded)[None], torch.tensor([FOCAL_PX], dtype=torch.float64))
-        given = np.ascontiguousarray(folded(planes, FOLD).permute(0, 2, 3, 1).numpy().astype(np.float32))
+        planes = slopes(torch.from_numpy(depth.astype(np.float64))[None], torch.tensor([FOCAL_PX], dtype=torch.float64))
+        given = np.ascontiguousarray(
+            folded(mirrored(planes, CONFIG.multiple), FOLD).permute(0, 2, 3, 1).numpy().astype(np.float32)
+        )
         (found,) = graph.run(None, {"slopes": given})
         for name, values in (("depth", depth), ("slopes", given), ("planes", found)):
             values.astype("<f4").tofile(FOLDER / f"{width}x{height}_{name}.f32")

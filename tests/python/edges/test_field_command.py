@@ -55,9 +55,8 @@ def found_by_command(bundle: Path, folder: Path, source: str, *options: str) -> 
 
 
 def found_by_graph(bundle: Path, depth: np.ndarray) -> np.ndarray:
-    padded = np.zeros([-(-side // CONFIG.multiple) * CONFIG.multiple for side in depth.shape], np.float32)
-    padded[: depth.shape[0], : depth.shape[1]] = depth
-    (planes,) = session(bundle / "field.onnx").run(None, {"slopes": slopes_of(padded, FOCAL_PX)})
+    given = slopes_of(depth, FOCAL_PX, CONFIG.multiple)
+    (planes,) = session(bundle / "field.onnx").run(None, {"slopes": given})
     field = field_of_planes(planes)[: depth.shape[0], : depth.shape[1]]
     return np.where(depth > 0, field, EPS_R)
 
@@ -86,3 +85,12 @@ def test_planes_are_skipped_when_asked_for(bundle, tmp_path):
     found, line = found_by_command(bundle, tmp_path, source, "--skip-planes", "--max-frames", "1")
     assert line["network_pixels"] == 0
     assert (found == EPS_R).all()
+
+
+def test_the_lower_border_of_a_frame_that_is_no_multiple_is_no_edge(tmp_path):
+    y, x = np.mgrid[:120, :212]  # 424 x 240 halved: 120 = 7.5 x 16, 212 = 13.25 x 16
+    depth = (1 / (0.5 + 0.0018 * x - 0.0012 * y)).astype(np.float32)
+    cv2.imwrite(str(tmp_path / "plane.tiff"), depth)
+    shipped = Path(__file__).parents[3] / "sdk/models/edges-int8"
+    found, _ = found_by_command(shipped, tmp_path, f"image:{tmp_path}/plane.tiff?depth_unit=1&fx=170")
+    assert (found > 12).mean() > 0.99

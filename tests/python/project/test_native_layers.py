@@ -21,7 +21,9 @@ FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
 CURVES = {"edges", "edges/curves"}
-SYSTEMS = SCENE | CURVES | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
+SYSTEMS = (
+    SCENE | CURVES | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
+)
 MAY_INCLUDE = {
     "core": set(),
     "core/trace": set(),

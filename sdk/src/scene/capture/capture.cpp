@@ -187,8 +187,8 @@ Capture open_transforms(const std::string& folder, const std::string& file_name)
     throw Error(
         MAQ_ERROR_NOT_FOUND, folder, "/", file_name,
         " names no point cloud (\"ply_file_path\"), and there is no sparse_pc.ply, points3d.ply, pointcloud.ply or "
-        "cloud.ply beside it; a scene needs one. (Edges need depth images instead: \"depth_file_path\" of each "
-        "frame.)");
+        "cloud.ply beside it: a scene needs one, and edges need a depth image of each frame (\"depth_file_path\") "
+        "instead.");
   }
   capture.up = up_by_convention({0, 0, 1}, rotations_of(capture.views));
   if (!cloud.empty()) capture.cloud = read_ply_file(cloud, middle_of(capture.views), report);

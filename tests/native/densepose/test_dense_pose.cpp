@@ -9,10 +9,9 @@
 #include "nn/sha256.h"
 #include "support/bundle_copy.h"
 #include "support/expect_error.h"
+#include "support/tiny_people.h"
 
 namespace {
-
-const cv::Scalar kRed(0, 0, 255), kGreen(0, 255, 0), kBlue(255, 0, 0);
 
 class DensePose : public ::testing::Test {
  protected:
@@ -80,8 +79,6 @@ TEST_F(DensePose, AManifestThatDoesNotFitItsGraphsIsRefusedWhenTheyAreLoaded) {
     }
   }
 }
-
-cv::Mat black(int width, int height) { return cv::Mat::zeros(height, width, CV_8UC3); }
 
 TEST_F(DensePose, OneCellOfColourIsOnePersonInItsAnchor) {
   cv::Mat image = black(320, 256);

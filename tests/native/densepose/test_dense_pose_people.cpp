@@ -5,10 +5,9 @@
 #include <opencv2/core.hpp>
 
 #include "densepose/densepose.h"
+#include "support/tiny_people.h"
 
 namespace {
-
-const cv::Scalar kRed(0, 0, 255), kBlue(255, 0, 0);
 
 class DensePosePeople : public ::testing::Test {
  protected:
@@ -32,8 +31,6 @@ class DensePosePeople : public ::testing::Test {
 };
 
 std::shared_ptr<const maq::OnnxRuntimeLibrary> DensePosePeople::runtime_;
-
-cv::Mat black(int width, int height) { return cv::Mat::zeros(height, width, CV_8UC3); }
 
 TEST_F(DensePosePeople, EachOfNoneOneTwoAndThirtyIsFoundWhereItIsAndPainted) {
   for (const int count : {0, 1, 2, 30}) {

@@ -9,7 +9,7 @@ namespace {
 using maq::Box;
 using maq::Point;
 
-constexpr int kCells = 64, kCoarse = 15, kIndex = 25;
+constexpr int kCells = 64, kCoarseParts = 15, kIndexParts = 25;
 constexpr double kRadians = 0.017453292519943295;
 
 // A doll in an image: a torso whose U falls from 1 at the hips to 0 at the neck, and a head above it, about `middle`,
@@ -17,23 +17,23 @@ constexpr double kRadians = 0.017453292519943295;
 class Doll : public maq::ChartValues {
  public:
   Doll(const Point& middle, double lean, const Box& box) : middle_(middle), lean_(lean), box_(box) {
-    labels_.resize(size_t(kCells * kCells * (kCoarse + kIndex)));
+    labels_.resize(size_t(kCells * kCells * (kCoarseParts + kIndexParts)));
     for (int row = 0; row < kCells; ++row) {
       for (int column = 0; column < kCells; ++column) {
         const Point at = on_body(row, column);
         const bool is_torso = std::abs(at.x) < 20 && std::abs(at.y) < 40;
         const bool is_head = std::abs(at.x) < 10 && at.y > 40 && at.y < 65;
         const size_t four = size_t((row / 2) * (kCells / 2) + column / 2);
-        float* cell = labels_.data() + (four * 4 + size_t(row % 2 * 2 + column % 2)) * (kCoarse + kIndex);
+        float* cell = labels_.data() + (four * 4 + size_t(row % 2 * 2 + column % 2)) * (kCoarseParts + kIndexParts);
         cell[1] = is_torso || is_head ? 5.0f : -50.0f;
-        for (int c = 2; c < kCoarse; ++c) cell[c] = -50;
-        cell[kCoarse + (is_head ? 23 : is_torso ? 2 : 5)] = 5;
+        for (int c = 2; c < kCoarseParts; ++c) cell[c] = -50;
+        cell[kCoarseParts + (is_head ? 23 : is_torso ? 2 : 5)] = 5;
       }
     }
     classify_cells(logits(), memory_);
   }
 
-  maq::DenseLogits logits() { return {labels_.data(), this, kCoarse, kIndex, kCells}; }
+  maq::DenseLogits logits() { return {labels_.data(), this, kCoarseParts, kIndexParts, kCells}; }
   maq::ChartPoint at(int part, int row, int column) override {
     if (part != 1) return {0.5f, 0.5f};
     return {has_u_ ? float(0.5 - on_body(row, column).y / 80) : NAN, 0.5f};

@@ -44,25 +44,25 @@ void expect_definition(const cv::Mat& bgr, int width, int height, int interpolat
   }
 }
 
-cv::Mat noise(int width, int height) {
+cv::Mat colour_noise(int width, int height) {
   cv::Mat image(height, width, CV_8UC3);
   cv::theRNG().state = 42;
   cv::randu(image, 0, 256);
   return image;
 }
 
-TEST(NetworkInput, ShrinksByAreaAndNormalises) { expect_definition(noise(640, 427), 320, 214, cv::INTER_AREA); }
+TEST(NetworkInput, ShrinksByAreaAndNormalises) { expect_definition(colour_noise(640, 427), 320, 214, cv::INTER_AREA); }
 
-TEST(NetworkInput, GrowsBilinearly) { expect_definition(noise(100, 160), 200, 320, cv::INTER_LINEAR); }
+TEST(NetworkInput, GrowsBilinearly) { expect_definition(colour_noise(100, 160), 200, 320, cv::INTER_LINEAR); }
 
-TEST(NetworkInput, LeavesAnImageOfTheRightSizeAsItIs) { expect_definition(noise(320, 256), 320, 256, -1); }
+TEST(NetworkInput, LeavesAnImageOfTheRightSizeAsItIs) { expect_definition(colour_noise(320, 256), 320, 256, -1); }
 
 TEST(NetworkInput, TakesOddSizesDownToOnePixel) {
-  expect_definition(noise(31, 33), 301, 320, cv::INTER_LINEAR);
-  expect_definition(noise(1, 1), 320, 320, cv::INTER_LINEAR);
-  expect_definition(noise(1, 4000), 1, 320, cv::INTER_AREA);
-  expect_definition(noise(4000, 1), 320, 1, cv::INTER_AREA);
-  expect_definition(noise(16, 16), 320, 320, cv::INTER_LINEAR);
+  expect_definition(colour_noise(31, 33), 301, 320, cv::INTER_LINEAR);
+  expect_definition(colour_noise(1, 1), 320, 320, cv::INTER_LINEAR);
+  expect_definition(colour_noise(1, 4000), 1, 320, cv::INTER_AREA);
+  expect_definition(colour_noise(4000, 1), 320, 1, cv::INTER_AREA);
+  expect_definition(colour_noise(16, 16), 320, 320, cv::INTER_LINEAR);
 }
 
 TEST(NetworkInput, RoundsHalvesToEvenLikeTheReference) {
@@ -72,15 +72,15 @@ TEST(NetworkInput, RoundsHalvesToEvenLikeTheReference) {
 
 TEST(NetworkInput, WhatAnEarlierFrameOfAnotherSizeLeftDoesNotMatter) {
   maq::NetworkInput used, fresh;
-  for (const cv::Mat& image : {noise(640, 480), noise(333, 500), noise(640, 480)}) {
+  for (const cv::Mat& image : {colour_noise(640, 480), colour_noise(333, 500), colour_noise(640, 480)}) {
     make(image, used);
   }
-  make(noise(640, 480), fresh);
+  make(colour_noise(640, 480), fresh);
   EXPECT_EQ(used.values, fresh.values);
 }
 
 TEST(NetworkInput, ReadsRowsByTheirStride) {
-  const cv::Mat large = noise(400, 300);
+  const cv::Mat large = colour_noise(400, 300);
   const cv::Mat part = large(cv::Rect(7, 3, 320, 256));
   expect_definition(part, 320, 256, -1);
 }

@@ -21,7 +21,7 @@ using maq::Vector3;
 
 constexpr maq::SolidsPicture kPicture{160, 120};
 
-std::vector<float> frame_of(const std::string& options, int index = 0) {
+std::vector<float> solids_frame(const std::string& options, int index = 0) {
   const auto source = maq::open_source("stub:solids?size=160x120" + options);
   maq::Frame frame;
   for (int i = 0; i <= index; ++i) EXPECT_EQ(source->next(0, frame), maq::NextFrame::kFrame);
@@ -219,17 +219,17 @@ TEST(Solids, AWallHasNoEdgeInView) {
 
 TEST(Solids, FramesAreAFunctionOfTheUriAndTheirNumber) {
   for (const char* options : {"&scene=box", "&scene=shelf&noise=stereo&seed=7", "&scene=room&noise=tof&seed=7"}) {
-    const std::vector<float> fourth = frame_of(options, 3);
-    EXPECT_EQ(fourth, frame_of(options, 3)) << options;
+    const std::vector<float> fourth = solids_frame(options, 3);
+    EXPECT_EQ(fourth, solids_frame(options, 3)) << options;
     const auto source = maq::open_source("stub:solids?size=160x120" + std::string(options));
     source->seek(100000000);
     maq::Frame frame;
     ASSERT_EQ(source->next(0, frame), maq::NextFrame::kFrame);
     EXPECT_EQ(std::memcmp(frame.storage.data(), fourth.data(), frame.storage.size()), 0) << options;
-    EXPECT_NE(fourth, frame_of(options, 4)) << "it turns";
+    EXPECT_NE(fourth, solids_frame(options, 4)) << "it turns";
   }
-  EXPECT_NE(frame_of("&seed=1"), frame_of("&seed=2"));
-  EXPECT_NE(frame_of("&noise=tof&scene=wall", 0), frame_of("&noise=tof&scene=wall", 1));
+  EXPECT_NE(solids_frame("&seed=1"), solids_frame("&seed=2"));
+  EXPECT_NE(solids_frame("&noise=tof&scene=wall", 0), solids_frame("&noise=tof&scene=wall", 1));
 }
 
 // The numbers themselves: a change of them, or a processor with other rounding, is seen.
@@ -241,9 +241,9 @@ TEST(Solids, HaveTheSameBitsOnEveryProcessor) {
     }
     return value;
   };
-  EXPECT_EQ(hash(frame_of("&scene=box&seed=7", 10)), 728746732071266879u);
-  EXPECT_EQ(hash(frame_of("&scene=room&noise=stereo&seed=7", 10)), 13809155310891668852u);
-  EXPECT_EQ(hash(frame_of("&scene=shelf&noise=tof&seed=7", 10)), 17276720831738072764u);
+  EXPECT_EQ(hash(solids_frame("&scene=box&seed=7", 10)), 728746732071266879u);
+  EXPECT_EQ(hash(solids_frame("&scene=room&noise=stereo&seed=7", 10)), 13809155310891668852u);
+  EXPECT_EQ(hash(solids_frame("&scene=shelf&noise=tof&seed=7", 10)), 17276720831738072764u);
 }
 
 TEST(Solids, HaveTheCalibrationThatTheyAreDrawnWith) {

@@ -2,7 +2,7 @@
 #
 # -ffp-contract=off: where a processor can multiply and add at once (aarch64), compilers use that, and it rounds once
 # instead of twice. A last bit of the networks' input then changes, int8 layers round some values to the other side, and
-# in the end 0.8 % of the labels of a photo are others than on x86-64 (benchmarks.label_agreement).
+# in the end 0.8 % of the labels of a photo are others than on x86-64 (benchmarks.processors.label_agreement).
 add_library(maq_compiler_settings INTERFACE)
 target_compile_options(maq_compiler_settings INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -fvisibility=hidden -ffp-contract=off

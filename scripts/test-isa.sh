@@ -3,10 +3,10 @@
 #
 #   scripts/test-isa.sh [JOBS] [core]
 #
-# Builds for aarch64, runs the native tests there, and compares the labels of the shipped bundle on x86-64 with AVX2 but
-# without VNNI, and on aarch64 with and without dot product, with those on this processor. Needs build/release.
-# core: aarch64 only, the tests of files, images and dense pose, and the labels; when they have passed with the
-# same sources, compiler and emulator on this machine before, in whatever checkout, that result counts.
+# Builds for aarch64, runs the native tests there, and compares the labels and the edges of the shipped bundles on x86-64
+# with AVX2 but without VNNI, and on aarch64 with and without dot product, with those on this processor. Needs
+# build/release. core: aarch64 only, the tests of files, images and dense pose, labels and edges; when they have passed
+# with the same sources, compiler and emulator on this machine before, in whatever checkout, that result counts.
 # Exit status 77: it could not be run, and the last line says why.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -34,7 +34,7 @@ for tool in qemu-aarch64 qemu-x86_64 aarch64-linux-gnu-g++ mvn; do
     command -v "$tool" >/dev/null || not_run "$tool is missing"
 done
 if [ "$part" = core ]; then
-    inputs=(CMakeLists.txt CMakePresets.json cmake sdk tests/native tests/media benchmarks/label_agreement.py
+    inputs=(CMakeLists.txt CMakePresets.json cmake sdk tests/native tests/media benchmarks/processors
         benchmarks/native/processor_features.c scripts/aarch64-sysroot.sh scripts/test-isa.sh)
     hash="$({ git ls-files -co --exclude-standard -z "${inputs[@]}" | xargs -0 sha256sum
         aarch64-linux-gnu-g++ --version; qemu-aarch64 --version; } | sha256sum | cut -c1-32)"
@@ -63,9 +63,11 @@ if [ "$part" = core ]; then
             "build/aarch64/tests/native/native_${folder}_tests" --gtest_brief=1 --gtest_filter='-ShippedNetworks.*' \
             --gtest_output="xml:$PWD/$results/isa-$folder.xml" || status=1
     done
-    printf '\n== labels of the bundled pictures on aarch64\n'
-    .venv/bin/python -m benchmarks.label_agreement --jobs "$jobs" --only asimd --only asimddp \
-        --junit "$results/isa-labels.xml" || status=1
+    printf '\n== labels of the bundled pictures, and edges of rendered solids, on aarch64\n'
+    for what in label field; do
+        .venv/bin/python -m "benchmarks.processors.${what}_agreement" --jobs "$jobs" --only asimd --only asimddp \
+            --junit "$results/isa-$what.xml" || status=1
+    done
     if [ $status -eq 0 ]; then
         mkdir -p "$passed.$$" && cp "$results"/isa-*.xml "$passed.$$" && mv -T "$passed.$$" "$passed"
     fi
@@ -78,6 +80,8 @@ echo "Left out: programs of users, which this machine's compiler builds, and wha
 ctest --test-dir build/aarch64 -j "$jobs" --output-on-failure --no-tests=error \
     --output-junit "$PWD/$results/isa-ctest-aarch64.xml" || status=1
 
-printf '\n== labels on other processors (emulated: some minutes)\n'
-.venv/bin/python -m benchmarks.label_agreement --jobs "$jobs" --junit "$results/isa-labels.xml" || status=1
+printf '\n== labels and edges on other processors (emulated: some minutes)\n'
+for what in label field; do
+    .venv/bin/python -m "benchmarks.processors.${what}_agreement" --jobs "$jobs" --junit "$results/isa-$what.xml" || status=1
+done
 exit $status

@@ -1,6 +1,6 @@
 /* Prints, one a line, which of the instructions that matter to int8 networks this processor offers to programs, by the
-   names of Linux. benchmarks.label_agreement runs it in each emulator, so that no processor is compared that is not the
-   one it is said to be. */
+   names of Linux. benchmarks/processors runs it in each emulator, so that no processor is compared that is not the one
+   it is said to be. */
 #include <stdio.h>
 
 #if defined(__aarch64__)

@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 
-from benchmarks import instruction_counts
-from benchmarks.label_agreement import OTHERS
+from benchmarks.processors import instruction_counts
+from benchmarks.processors.emulated import OTHERS
 
 LOOP = """
 #include <stdio.h>

@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks import label_agreement
-from benchmarks.label_agreement import HERE, Agreement, Processor
+from benchmarks.processors import emulated, label_agreement
+from benchmarks.processors.emulated import HERE, OTHERS, Processor, check_features, write_junit
+from benchmarks.processors.label_agreement import Agreement
 
 
 def write_results(folder, parts, boxes, stem="photo"):
@@ -96,7 +97,9 @@ def test_other_pictures_sizes_and_empty_ones_are_no_agreement(tmp_path, parts):
 def test_the_report_of_each_processor_can_be_counted(tmp_path):
     good = Agreement(pictures=1, people=1, pixels=10, equal=10, person_pixels=5, person_equal=5)
     bad = Agreement(pictures=1, people=1, pixels=10, equal=9, person_pixels=5, person_equal=4, worst_picture=0.8)
-    label_agreement.write_junit(tmp_path / "x.xml", {"good": good, "bad": bad, "broken": "It did not start."}, 0.995)
+    results = {"good": good, "bad": bad, "broken": "It did not start."}
+    failures = {title: label_agreement.failure_of(found, 0.995) for title, found in results.items()}
+    write_junit(tmp_path / "x.xml", "label_agreement", failures)
     cases = list(ElementTree.parse(tmp_path / "x.xml").iter("testcase"))
     assert [case.get("name") for case in cases] == ["good", "bad", "broken"]
     failures = [case.find("failure") for case in cases]
@@ -109,13 +112,13 @@ def test_a_processor_that_is_not_the_one_it_is_said_to_be_is_refused(monkeypatch
     def offers(features):
         monkeypatch.setattr(subprocess, "run", lambda *a, **k: subprocess.CompletedProcess(a, 0, features, ""))
 
-    avx2 = next(p for p in label_agreement.OTHERS if p.name == "avx2")
+    avx2 = next(p for p in OTHERS if p.name == "avx2")
     offers("avx2\nfma\n")
-    assert label_agreement.check_features(avx2) == ["avx2", "fma"]
+    assert check_features(avx2) == ["avx2", "fma"]
     for wrong in ("avx2\nfma\navx512_vnni\n", "avx2\nfma\navx_vnni\n", "fma\n", ""):
         offers(wrong)
         with pytest.raises(ValueError, match="AVX2 without VNNI should offer"):
-            label_agreement.check_features(avx2)
+            check_features(avx2)
 
 
 def test_frames_of_the_clip_are_the_ones_asked_for(tmp_path):
@@ -128,13 +131,13 @@ def test_frames_of_the_clip_are_the_ones_asked_for(tmp_path):
 
 def test_a_failing_program_is_one_sentence_and_exit_code_one(tmp_path, monkeypatch, capsys):
     broken = Processor(HERE.name, HERE.title, "no-such-build")
-    monkeypatch.setattr(label_agreement, "HERE", broken)
+    monkeypatch.setattr(emulated, "HERE", broken)
     assert label_agreement.main(["--out", str(tmp_path), "x.png"]) == 1
     assert "no-such-build" in capsys.readouterr().err
 
 
 def test_other_processors_are_compared_by_their_results(tmp_path, monkeypatch, parts, capsys):
-    other = label_agreement.OTHERS[0]
+    other = OTHERS[0]
 
     def run(processor, bundle, sources, out):
         if processor is HERE:
@@ -142,7 +145,7 @@ def test_other_processors_are_compared_by_their_results(tmp_path, monkeypatch, p
         else:
             write_results(out, parts * (2 if "wrong.png" in sources else 1), [BOX])
 
-    monkeypatch.setattr(label_agreement, "check_features", lambda processor: ["avx2"])
+    monkeypatch.setattr(emulated, "check_features", lambda processor: ["avx2"])
     monkeypatch.setattr(label_agreement, "run", run)
     report = tmp_path / "x.xml"
     arguments = ["--out", str(tmp_path), "--only", other.name, "--junit", str(report)]

@@ -12,7 +12,7 @@ from ai_edge_litert.interpreter import Interpreter
 
 from benchmarks import tflite
 from benchmarks.graphs import feeds_of, four_by_three
-from benchmarks.provider_counts import signed
+from benchmarks.processors.provider_counts import signed
 from export.densepose.graphs import open_bundle
 
 BUNDLE = Path("sdk/models/densepose-b-int8")

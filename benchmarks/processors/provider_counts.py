@@ -1,6 +1,6 @@
 """ONNX Runtime's own kernels beside XNNPACK's, in instructions on emulated processors: what would a provider gain?
 
-    python -m benchmarks.provider_counts      the graphs of the shipped bundle and of its fp32 twin, on a photo
+    python -m benchmarks.processors.provider_counts      graphs of the shipped bundle and of its fp32 twin, on a photo
 
 No build of ONNX Runtime for Linux has the XNNPACK provider. LiteRT runs the same graphs (benchmarks/tflite.py) with
 XNNPACK's kernels, on one thread. "Signed": the int8 graphs with signed activations, the only ones that the provider
@@ -27,8 +27,8 @@ from onnx import numpy_helper
 from tqdm import tqdm
 
 from benchmarks.graphs import Feed, feeds_of, four_by_three
-from benchmarks.instruction_counts import emulated, prepare
-from benchmarks.label_agreement import OTHERS, ROOT, SYSROOT, Processor, check_features
+from benchmarks.processors.emulated import OTHERS, ROOT, SYSROOT, Processor, check_features
+from benchmarks.processors.instruction_counts import emulated, prepare
 from export.densepose.graphs import open_bundle
 
 WHEELS = ROOT / ".deps/aarch64-wheels"
@@ -96,7 +96,7 @@ def counted(processor: Processor, networks: Path) -> dict[str, float]:
         command = [
             *emulated(processor, counter),
             *python,
-            str(ROOT / "benchmarks/count_runs.py"),
+            str(ROOT / "benchmarks/processors/count_runs.py"),
             str(networks),
             str(counter),
         ]
@@ -124,7 +124,7 @@ def lines_of(counts: dict[str, float], names: Sequence[str]) -> list[str]:
 
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.provider_counts",
+        prog="python -m benchmarks.processors.provider_counts",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

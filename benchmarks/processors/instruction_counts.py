@@ -1,6 +1,6 @@
 """Instructions of a frame of dense pose, stage by stage, on emulated processors: a figure that needs no phone.
 
-    python -m benchmarks.instruction_counts             the bundled photo, all processors; writes a table
+    python -m benchmarks.processors.instruction_counts             the bundled photo, all processors; writes a table
 
 Runs `maquette bench` of the builds `release` and `aarch64` (scripts/test-isa.sh makes them) on one thread, with a clock
 that counts instructions: a plugin of qemu counts, and a library preloaded into the program tells its count as the time.
@@ -21,7 +21,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from benchmarks.label_agreement import OTHERS, ROOT, Processor, check_features
+from benchmarks.processors.emulated import OTHERS, ROOT, Processor, check_features
 
 BUILD = ROOT / "build/instruction-counts"
 PLUGIN = BUILD / "count_instructions.so"
@@ -108,7 +108,7 @@ def lines_of(counts: dict[str, dict[str, float]]) -> list[str]:
 
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.instruction_counts",
+        prog="python -m benchmarks.processors.instruction_counts",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

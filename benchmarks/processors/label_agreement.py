@@ -8,13 +8,10 @@ aarch64 without and with the dot product and matrix instructions. Needs both bui
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
 import json
-import os
 import shutil
 import subprocess
 import sys
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +20,10 @@ import cv2
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
+from benchmarks.processors.emulated import ROOT, Processor, add_arguments, compared, run_maquette, write_junit
 from export.evaluation.average_precision import box_iou
 
-ROOT = Path(__file__).parents[1]
-SYSROOT = ROOT / ".deps/aarch64-sysroot"
 CLIP = ROOT / "tests/media/clip.mp4"
 CLIP_FRAMES = (10, 50)
 SOURCES = (str(ROOT / "tests/media/photo.jpg"), "stub:people?count=3&seed=7&size=480x270")
@@ -38,48 +33,10 @@ SAME_PERSON_IOU = 0.5
 
 EPILOG = """\
 examples:
-  python -m benchmarks.label_agreement                                five bundled pictures, all processors
-  python -m benchmarks.label_agreement --only avx2 my-photo.jpg       one processor, a picture of one's own
-  python -m benchmarks.label_agreement --bundle .data/bundles/other   another bundle
+  python -m benchmarks.processors.label_agreement                                five bundled pictures, all processors
+  python -m benchmarks.processors.label_agreement --only avx2 my-photo.jpg       one processor, a picture of one's own
+  python -m benchmarks.processors.label_agreement --bundle .data/bundles/other   another bundle
 """
-
-
-@dataclass(frozen=True)
-class Processor:
-    """A processor, how to run programs on it, and the features (names of Linux) that it must and must not offer."""
-
-    name: str
-    title: str
-    build: str
-    emulator: tuple[str, ...] = ()
-    has: frozenset[str] = frozenset()
-    lacks: frozenset[str] = frozenset()
-
-    def command(self, program: str) -> list[str]:
-        """The command that runs a program of the build folder on this processor."""
-        return [*self.emulator, str(ROOT / "build" / self.build / program)]
-
-
-def _arm(name: str, title: str, cpu: str, has: set[str], lacks: set[str]) -> Processor:
-    emulator = ("qemu-aarch64", "-L", str(SYSROOT), "-cpu", cpu)
-    return Processor(name, title, "aarch64", emulator, frozenset(has), frozenset(lacks))
-
-
-HERE = Processor("here", "this processor", "release")
-VNNI = {"avx512f", "avx512_vnni", "avx_vnni", "amx_int8"}
-OTHERS = (
-    Processor(
-        "avx2",
-        "x86-64, AVX2 without VNNI",
-        "release",
-        ("qemu-x86_64", "-cpu", "Haswell"),
-        frozenset({"avx2", "fma"}),
-        frozenset(VNNI),
-    ),
-    _arm("asimd", "aarch64 without dot product", "cortex-a72", {"asimd"}, {"asimddp", "i8mm"}),
-    _arm("asimddp", "aarch64 with dot product", "neoverse-n1", {"asimd", "asimddp"}, {"i8mm"}),
-    _arm("i8mm", "aarch64 with 8-bit matrix product", "max,sve=off,sme=off", {"asimd", "asimddp", "i8mm"}, set()),
-)
 
 
 @dataclass
@@ -182,34 +139,14 @@ def clip_frames(clip: Path, numbers: Sequence[int], folder: Path) -> list[str]:
     return paths
 
 
-def check_features(processor: Processor) -> list[str]:
-    """The features that programs see on this processor. Raises ValueError if they are not those it is here for."""
-    done = subprocess.run(
-        processor.command("benchmarks/native/processor_features"), capture_output=True, text=True, check=True
-    )
-    seen = set(done.stdout.split())
-    if not processor.has <= seen or processor.lacks & seen:
-        raise ValueError(
-            f"{processor.title} should offer {', '.join(sorted(processor.has))} and not "
-            f"{', '.join(sorted(processor.lacks))}, but offers {', '.join(sorted(seen)) or 'nothing'}. "
-            f"Check that {processor.emulator[0]} is version 7.2 or newer."
-        )
-    return sorted(seen)
-
-
 def run(processor: Processor, bundle: Path, sources: Sequence[str], out: Path) -> None:
     """Writes the results of the pictures into `out`, which is emptied first. Raises ValueError with what went wrong."""
     shutil.rmtree(out, ignore_errors=True)
-    command = [
-        *processor.command("stage/bin/maquette"), "densepose", *sources, "--bundle", str(bundle), "--out", str(out),
-        "--threads", "1", "--max-frames", str(STUB_FRAMES),
-    ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        raise ValueError(f"{processor.title}: maquette densepose failed ({done.returncode}).\n{done.stderr.strip()}")
+    settings = ["--bundle", str(bundle), "--out", str(out), "--threads", "1", "--max-frames", str(STUB_FRAMES)]
+    run_maquette(processor, ["densepose", *sources, *settings])
 
 
-def print_table(bundle: Path, results: dict[str, Agreement | str], features: dict[str, list[str]], bar: float) -> None:
+def print_table(bundle: Path, results: dict[str, Agreement | str], bar: float) -> None:
     title = f"Labels of {bundle.name} against those on this processor"
     table = Table(title=title, title_justify="left")
     table.add_column("processor", no_wrap=True)
@@ -227,13 +164,8 @@ def print_table(bundle: Path, results: dict[str, Agreement | str], features: dic
     Console(width=110).print(table)
     print(
         f"same: pixels with the same part, of all (bar: {100 * bar:g} %); worst: of the worst picture; on people: of "
-        "those painted in either;\nbox: the largest difference of a coordinate. What programs see of each processor:"
+        "those painted in either;\nbox: the largest difference of a coordinate."
     )
-    for name, seen in features.items():
-        print(f"  {name}: {' '.join(seen)}")
-    for name, found in results.items():
-        if isinstance(found, str):
-            print(f"{name}: {found}", file=sys.stderr)
 
 
 def failure_of(found: Agreement | str, bar: float) -> str | None:
@@ -248,21 +180,9 @@ def failure_of(found: Agreement | str, bar: float) -> str | None:
     )
 
 
-def write_junit(path: Path, results: dict[str, Agreement | str], bar: float) -> None:
-    """One test case a processor, which scripts/sum_test_results.py counts."""
-    suite = ElementTree.Element("testsuite", name="label_agreement", tests=str(len(results)))
-    for title, found in results.items():
-        case = ElementTree.SubElement(suite, "testcase", name=title, classname="label_agreement")
-        failure = failure_of(found, bar)
-        if failure is not None:
-            ElementTree.SubElement(case, "failure", message=failure)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    ElementTree.ElementTree(suite).write(path, encoding="unicode")
-
-
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.label_agreement",
+        prog="python -m benchmarks.processors.label_agreement",
         description=__doc__,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -271,50 +191,24 @@ def main(argv: list[str] | None = None) -> int:
         "pictures", nargs="*", help="default: the bundled photo, frames of the bundled clip, stub:people"
     )
     parser.add_argument("--bundle", type=Path, default=ROOT / "sdk/models/densepose-b-int8")
-    parser.add_argument("--out", type=Path, default=ROOT / "build/label-agreement", help="folder for the results")
-    parser.add_argument("--only", action="append", choices=[processor.name for processor in OTHERS])
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processors at a time (default: the cores)")
     parser.add_argument(
         "--bar", type=float, default=BAR, help="min. fraction of equal pixels, of all pictures (default %(default)s)"
     )
-    parser.add_argument("--junit", type=Path, help="also write the outcome as JUnit XML")
+    add_arguments(parser, ROOT / "build/label-agreement")
     options = parser.parse_args(argv)
 
     options.out.mkdir(parents=True, exist_ok=True)
     sources = options.pictures or [*SOURCES, *clip_frames(CLIP, CLIP_FRAMES, options.out)]
-    others = [processor for processor in OTHERS if not options.only or processor.name in options.only]
-    results: dict[str, Agreement | str] = {}
-    features: dict[str, list[str]] = {}
-
-    def labels_on(processor: Processor) -> Agreement:
-        features[processor.title] = check_features(processor)
-        run(processor, options.bundle, sources, options.out / processor.name)
-        return compare(options.out / HERE.name, options.out / processor.name)
-
     try:
-        print(f"This processor offers {' '.join(check_features(HERE)) or 'none of the features asked about'}.")
-        run(HERE, options.bundle, sources, options.out / HERE.name)
+        results = compared(options, lambda processor, out: run(processor, options.bundle, sources, out), compare)
     except (ValueError, OSError, subprocess.CalledProcessError) as error:
         print(f"label_agreement: {error}", file=sys.stderr)
         return 1
-    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        running = {pool.submit(labels_on, processor): processor for processor in others}
-        for future in tqdm(
-            concurrent.futures.as_completed(running),
-            total=len(running),
-            desc="emulating",
-            unit="processor",
-            disable=None,
-        ):
-            try:
-                results[running[future].title] = future.result()
-            except (ValueError, OSError, subprocess.CalledProcessError) as error:
-                results[running[future].title] = str(error)
-    results = {processor.title: results[processor.title] for processor in others}
-    print_table(options.bundle, results, features, options.bar)
+    print_table(options.bundle, results, options.bar)
+    failures = {title: failure_of(found, options.bar) for title, found in results.items()}
     if options.junit:
-        write_junit(options.junit, results, options.bar)
-    return 1 if any(failure_of(found, options.bar) for found in results.values()) else 0
+        write_junit(options.junit, "label_agreement", failures)
+    return 1 if any(failures.values()) else 0
 
 
 if __name__ == "__main__":

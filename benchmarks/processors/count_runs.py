@@ -4,8 +4,8 @@
 
 prints {"xnnpack-int8/trunk.tflite": 123.4, ...}, in millions, of the second run of each.
 
-benchmarks.provider_counts starts it with an interpreter of the emulated processor, so it needs no more than NumPy and
-the two runtimes. COUNTER: the file that count_instructions.c writes.
+provider_counts starts it with an interpreter of the emulated processor, so it needs no more than NumPy and the two
+runtimes. COUNTER: the file that count_instructions.c writes.
 """
 
 import json

@@ -48,9 +48,38 @@ fly() {
     "$maquette" scene render "$scene.maqs" --capture "$1" --path through --seconds 6 --size 640x480 --out "$scene.mp4"
 }
 
+# first_depth FOLDER: the first depth image of a capture as a source.
+first_depth() {
+    python3 - "$1" <<'PYTHON'
+import json, sys
+capture = json.load(open(sys.argv[1] + "/transforms.json"))
+frame = next((f for f in capture["frames"] if "depth_file_path" in f), None)
+if frame:
+    lens = "&".join(f"{to}={frame[of] - less:.3f}" for to, of, less in
+                    (("fx", "fl_x", 0), ("fy", "fl_y", 0), ("cx", "cx", 0.5), ("cy", "cy", 0.5)))
+    unit = capture.get("depth_unit_scale_factor", 0.001)
+    print(f"image:{sys.argv[1]}/{frame['depth_file_path']}?depth_unit={unit:.9f}&{lens}")
+PYTHON
+}
+
+# edges FOLDER: the edges of a real thing, in the depth of one photo, and of all photos as one.
+edges() {
+    local name source
+    name="$(basename "$1")" source="$(first_depth "$1")"
+    [ -n "$source" ] || return 0
+    printf "\n== maquette edges '%s' --out %s --overlay --boxes --format step\n" "$source" "$out/${name}_edges"
+    "$maquette" edges "$source" --out "$out/${name}_edges" --overlay --boxes --format step
+    printf '\n== maquette edges build %s --out %s_edges/all.dxf\n' "$1" "$out/$name"
+    "$maquette" edges build "$1" --out "$out/${name}_edges/all.dxf"
+    echo "  lengths in units of the capture: photos alone do not tell metres"
+}
+
 fly tests/media/room
 if fetch_real; then
-    for transforms in "$places"/*/transforms.json; do fly "$(dirname "$transforms")"; done
+    for transforms in "$places"/*/transforms.json; do
+        fly "$(dirname "$transforms")"
+        edges "$(dirname "$transforms")"
+    done
 fi
 
 printf '\nPictures to look at, in %s:\n' "$out"

@@ -19,6 +19,7 @@ from export.photos.packages import load_packages
 from export.point_cloud import write_ply
 
 HELD_OUT_EVERY = 8
+DEPTH_STEPS = 60_000  # of a stored depth, for the farthest of a capture
 _TO_OPENGL = np.diag([1.0, -1.0, -1.0])
 
 
@@ -82,16 +83,20 @@ def pose_and_sweep(original: Original, partial: Path) -> tuple[int, int, Sources
     sources = [k for k in range(len(views)) if k not in held_out]
     of_sources = [[part[k] for k in sources] for part in (cameras, images, masks, seen)]
     depths = depth_maps(*of_sources, places)
+    names = [f"images/{view.name}" for view in views]
+    depth_names, depth_unit = write_depths(partial, [names[k] for k in sources], depths)
     (flat / "images").rename(partial / "images")
     shutil.rmtree(flat)
     shutil.rmtree(colmap / "masks")
-    names = [f"images/{view.name}" for view in views]
     package = load_packages()[original.package]
     table = {
         "camera_model": "PINHOLE",
         "ply_file_path": "cloud.ply",
         "up": [0, 0, 1],
-        "frames": [_entry(name, camera) for name, camera in zip(names, cameras, strict=True)],
+        "depth_unit_scale_factor": depth_unit,
+        "frames": [
+            _entry(name, camera) | depth_names.get(name, {}) for name, camera in zip(names, cameras, strict=True)
+        ],
         "train_filenames": [names[k] for k in sources],
         "test_filenames": [names[k] for k in held_out],
         "shows": original.shows,
@@ -101,6 +106,19 @@ def pose_and_sweep(original: Original, partial: Path) -> tuple[int, int, Sources
     }
     (partial / "transforms.json").write_text(json.dumps(table, indent=1) + "\n")
     return len(photos), len(views), Sources(of_sources[0], of_sources[1], depths, turn, scale, middle)
+
+
+def write_depths(folder: Path, names: list[str], depths: list[np.ndarray]) -> tuple[dict[str, dict[str, str]], float]:
+    """Writes the depth of photos as PNG of 16 bits, 0: unknown. Gives the entries of their frames by name of the photo,
+    and what a stored 1 means in units of the capture."""
+    unit = max([float(depth.max()) for depth in depths] + [1e-9]) / DEPTH_STEPS
+    entries = {}
+    (folder / "depth").mkdir()
+    for name, depth in zip(names, depths, strict=True):
+        path = f"depth/{Path(name).stem}.png"
+        cv2.imwrite(str(folder / path), np.round(depth / unit).astype(np.uint16))
+        entries[name] = {"depth_file_path": path}
+    return entries, unit
 
 
 def _camera(view) -> Camera:

@@ -60,6 +60,12 @@ TEST_F(ApiEdgesFusion, AViewBecomesPointsAndCurvesOfTheWorld) {
   const TempFolder folder;
   fused.save(folder.file("model.dxf"));
   EXPECT_GT(std::filesystem::file_size(folder.file("model.dxf")), 500u);
+  const auto axes_of = [&](const maquette::EdgesCurves& curves) {
+    curves.save(folder.file("curves.json"));
+    return nlohmann::json::parse(std::ifstream(folder.file("curves.json"))).at("axes").get<std::string>();
+  };
+  EXPECT_EQ(axes_of(fused), "metres; in the world of the cameras");
+  EXPECT_EQ(axes_of(own), "metres; x right, y down, z along the optical axis");
   maq_edges_snap snap{};
   snap.struct_size = sizeof snap;
   EXPECT_EQ(maq_edges_curves_snap_to_pixel(fused.get(), 1, 1, 8, &snap), MAQ_ERROR_INVALID_ARGUMENT);

@@ -9,6 +9,7 @@ import pytest
 
 from export.camera import Camera
 from export.captures.dense import depth_maps, fused, neighbours_of
+from export.captures.folder import write_depths
 from export.captures.originals import ORIGINALS, Photo, box_mask
 from export.captures.plane_sweep import GreyView, depth_of
 from export.captures.structure import CaptureError, up_of_cameras
@@ -118,6 +119,18 @@ def test_the_mask_is_the_hull_of_the_yellow_box():
 def test_every_original_names_a_package_whose_licence_permits():
     packages = load_packages()
     assert {packages[original.package].licence for original in ORIGINALS} <= {"Apache-2.0", "MIT", "CC0-1.0"}
+
+
+def test_depth_is_written_for_the_photos_that_have_it(tmp_path):
+    near, far = np.full((4, 6), 0.5, np.float32), np.zeros((4, 6), np.float32)
+    far[1:3, 2] = 3.25
+    entries, unit = write_depths(tmp_path, ["images/007.jpg", "images/009.jpg"], [near, far])
+    assert entries["images/009.jpg"] == {"depth_file_path": "depth/009.png"}
+    for depth, name in ((near, "007"), (far, "009")):
+        stored = cv2.imread(str(tmp_path / f"depth/{name}.png"), cv2.IMREAD_UNCHANGED)
+        assert stored.dtype == np.uint16
+        np.testing.assert_allclose(stored * unit, depth, atol=3.25 / 60_000)
+        assert ((stored == 0) == (depth == 0)).all()
 
 
 def test_the_cameras_of_the_rendered_room_are_found_again(tmp_path, monkeypatch):

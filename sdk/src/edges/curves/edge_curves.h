@@ -1,5 +1,5 @@
-// Sharp feature curves of one depth frame: lines, circular arcs and cubic B-splines in camera coordinates, and the
-// corners in which they meet.
+// Sharp feature curves of one depth frame, or of several: lines, circular arcs and cubic B-splines in camera coordinates,
+// or in those of the world; and the corners in which they meet.
 #pragma once
 
 #include <array>
@@ -86,6 +86,7 @@ struct EdgeCurves {
   std::vector<EdgeCorner> corners;
   std::vector<Vec3> points, controls;  // of all curves
   CurveCounts counts;
+  bool in_world = false;  // coordinates are those of the world of several cameras, not of one camera
 };
 
 }  // namespace maq

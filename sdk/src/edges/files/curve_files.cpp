@@ -24,7 +24,7 @@ bool ends_with(const std::string& path, const char* ending) {
 
 std::string curves_as_obj(const EdgeCurves& curves) {
   std::ostringstream text = text_of_numbers();
-  text << "# sharp feature curves, metres; x right, y down, z along the optical axis\n";
+  text << "# sharp feature curves, " << axes_of(curves) << '\n';
   for (const Vec3& p : curves.points) text << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
   for (size_t i = 0; i < curves.curves.size(); ++i) {
     const EdgeCurve& curve = curves.curves[i];
@@ -39,8 +39,7 @@ std::string curves_as_ply(const EdgeCurves& curves) {
   size_t edges = 0;
   for (const EdgeCurve& curve : curves.curves) edges += size_t(curve.point_count - 1);
   std::ostringstream text = text_of_numbers();
-  text << "ply\nformat ascii 1.0\ncomment sharp feature curves, metres; x right, y down, z along the optical axis\n"
-          "element vertex "
+  text << "ply\nformat ascii 1.0\ncomment sharp feature curves, " << axes_of(curves) << "\nelement vertex "
        << curves.points.size() << "\nproperty double x\nproperty double y\nproperty double z\nelement edge " << edges
        << "\nproperty int vertex1\nproperty int vertex2\nproperty uchar kind\nend_header\n";
   for (const Vec3& p : curves.points) text << p.x << ' ' << p.y << ' ' << p.z << '\n';

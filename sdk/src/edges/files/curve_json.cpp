@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/memory.h"
+#include "edges/files/curve_text.h"
 
 namespace maq {
 namespace {
@@ -68,7 +69,7 @@ std::string curves_as_json(const EdgeCurves& curves) {
                  kBytesOfPoint * (curves.points.size() + curves.controls.size()));
   Json document;
   document["version"] = kVersion;
-  document["axes"] = "metres; x right, y down, z along the optical axis";
+  document["axes"] = axes_of(curves);
   document["corners"] = Json::array();
   for (const EdgeCorner& corner : curves.corners) {
     document["corners"].push_back({{"point", json_of(corner.point)}, {"curves", corner.curve_count}});

@@ -12,6 +12,10 @@ std::ostringstream text_of_numbers() {
   return text;
 }
 
+std::string axes_of(const EdgeCurves& curves) {
+  return curves.in_world ? "metres; in the world of the cameras" : "metres; x right, y down, z along the optical axis";
+}
+
 std::string layer_of(const EdgeCurve& curve) {
   std::string name = curve.kind == kBoundaryEdge ? "BOUNDARY" : "CREASE";
   if (curve.bend == Bend::kConvex) name += "_CONVEX";

@@ -371,6 +371,7 @@ class CurveFusion::Merger {
 
 void CurveFusion::fuse(const std::array<double, 3>& origin, EdgeCurves& result) const {
   result = {};
+  result.in_world = true;
   Merger(*this, origin, result).run();
   const Vec3 o{origin[0], origin[1], origin[2]};
   for (EdgeCurve& curve : result.curves) {

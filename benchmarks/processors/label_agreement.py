@@ -87,8 +87,8 @@ def read_boxes(path: Path) -> np.ndarray:
 def compare(reference: Path, other: Path) -> Agreement:
     """Compares two folders of results of the same pictures.
 
-    Raises ValueError when they are not of the same pictures, or when the reference shows nobody: then there is nothing
-    to compare.
+    Raises ValueError when they are not of the same pictures, or when the reference shows no people: then there is
+    nothing to compare.
     """
     agreement = Agreement()
     names = sorted(path.name for path in reference.glob("*_IUV.png"))
@@ -109,7 +109,7 @@ def compare(reference: Path, other: Path) -> Agreement:
         stem = name.removesuffix("_IUV.png")
         compare_boxes(read_boxes(reference / f"{stem}.json"), read_boxes(other / f"{stem}.json"), agreement)
     if agreement.people == 0:
-        raise ValueError(f"{reference} shows nobody, so there is nothing to compare. Take pictures of people.")
+        raise ValueError(f"{reference} shows no people, so there is nothing to compare. Take pictures of people.")
     return agreement
 
 

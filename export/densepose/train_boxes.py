@@ -1,7 +1,7 @@
 """Trains the box head alone: who is a person, and where the box lies.
 
     python -m export.densepose.train_boxes --out .data/runs/boxes --kind .3 shards .data/people-wide/train \
-        --kind .3 photos .data/photos/train --kind .2 nobody .data/backgrounds/train \
+        --kind .3 photos .data/photos/train --kind .2 background .data/backgrounds/train \
         --kind .2 shards .data/people-animals/train
 
 Everything else stays as `--init` has it, so that the surface of a person in a given box stays the same to the bit. What
@@ -10,7 +10,7 @@ backbone, neck and RPN once, the features of its boxes are kept in half precisio
 the two convolutions and two linear layers of the head: minutes of one core.
 
 Boxes of a view are the RPN's proposals, where the first pass of the box head moves them (the second pass sees those),
-and true boxes shaken. Boxes of nobody are drawn the oftener the likelier the head takes them for a person.
+and true boxes shaken. Boxes of background are drawn more often the likelier the head takes them for a person.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ PROPOSALS = 50  # of a view, as many as at inference; each once more as the firs
 SHAKEN = 6  # of each person
 SHAKES = 0.25  # how far a shaken box is off at most, in fractions of its size
 POSITIVE_IOU = 0.5
-IGNORED = 0.5  # fraction of a box of nobody that may lie on somebody whom nobody is sure of
+IGNORED = 0.5  # fraction of a background box that may lie on a person whom no label is sure of
 OVERLAP_IOU, OVERLAP_WEIGHT = 0.3, 2.0  # people whose boxes overlap by more are drawn the oftener
-PEOPLE, NOBODY = 64, 144  # boxes in a step
-MINE_EVERY = 200  # steps after which the scores of nobody's boxes are taken anew
+PEOPLE, BACKGROUND = 64, 144  # boxes in a step
+MINE_EVERY = 200  # steps after which background boxes are scored again
 
 
 @dataclass(frozen=True)
 class Boxes:
     """Boxes to learn from. roi: float16 [R, C, 7, 7]; person: bool [R]; target: float32 [R, 4], deltas to the true box
-    (0 for nobody); weight: float32 [R], how often a box is drawn."""
+    (0 for background); weight: float32 [R], how often a box is drawn."""
 
     roi: Tensor
     person: Tensor
@@ -72,7 +72,7 @@ class Boxes:
 @dataclass(frozen=True)
 class Picture:
     """image: an encoded picture; box: float32 [n, 4] of its people, pixels; ignore: bool [n], somebody or not.
-    complete: whether there is nobody else; the teachers overlook people."""
+    complete: whether there are no other people; the teachers overlook some."""
 
     image: bytes
     box: np.ndarray
@@ -120,8 +120,8 @@ def _photos(folder: Path) -> Iterator[tuple[Path, bytes]]:
 
 def without_people(folder: Path) -> list[Picture]:
     """The photographs of a folder."""
-    nobody = np.zeros((0, 4), np.float32), np.zeros(0, bool)
-    return [Picture(encoded, *nobody) for _, encoded in _photos(folder)]
+    no_people = np.zeros((0, 4), np.float32), np.zeros(0, bool)
+    return [Picture(encoded, *no_people) for _, encoded in _photos(folder)]
 
 
 def view_of(picture: Picture, size: int, rng: np.random.Generator) -> tuple[np.ndarray, People]:
@@ -200,8 +200,8 @@ def shaken(boxes: Tensor, size: tuple[int, int]) -> Tensor:
 def matched(candidates: Tensor, truth: People) -> tuple[Tensor, Tensor, Tensor]:
     """Of each box: whether it shows a person, whom, and whether both are known (bool, index, bool, [K])."""
     if not len(truth.box):
-        nobody = torch.zeros(len(candidates), dtype=torch.bool)
-        return nobody, nobody.long(), ~nobody
+        no_person = torch.zeros(len(candidates), dtype=torch.bool)
+        return no_person, no_person.long(), ~no_person
     best, match = box_iou(candidates, truth.box).max(1)
     person = best >= POSITIVE_IOU
     known = ~(person & truth.ignore[match])
@@ -238,15 +238,15 @@ def fit(net: MobileParsingRCNN, boxes: Boxes, steps: int, rate: float, seed: int
     head, averaged = net.box_head, copy.deepcopy(net.box_head).requires_grad_(False)
     optimiser = torch.optim.AdamW(head.parameters(), lr=rate, weight_decay=0.01)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    people, nobody = boxes.person.nonzero()[:, 0], (~boxes.person).nonzero()[:, 0]
+    people, background = boxes.person.nonzero()[:, 0], (~boxes.person).nonzero()[:, 0]
     bar, means = trange(steps, unit="step", disable=None), {}
     for step in bar:
         if step % MINE_EVERY == 0:
-            likely = scores_of(averaged, boxes.roi[nobody]) + 0.02
+            likely = scores_of(averaged, boxes.roi[background]) + 0.02
         drawn = torch.cat([
             people[torch.multinomial(boxes.weight[people], PEOPLE, replacement=True)],
-            nobody[torch.multinomial(likely, NOBODY // 2, replacement=True)],
-            nobody[torch.randint(len(nobody), (NOBODY // 2,))],
+            background[torch.multinomial(likely, BACKGROUND // 2, replacement=True)],
+            background[torch.randint(len(background), (BACKGROUND // 2,))],
         ])  # fmt: skip
         logits, deltas = head(boxes.roi[drawn].float())
         person = boxes.person[drawn]
@@ -277,7 +277,7 @@ def main() -> int:
     parser.add_argument(
         "--kind", action="append", nargs=3, required=True, metavar=("FRACTION", "WHAT", "DIR"),
         help="how often, what and where: `shards` (rendered or composed people), `photos` (of people; their labels in "
-             "--labels), `nobody` (photographs without people)",
+             "--labels), `background` (photographs without people)",
     )  # fmt: skip
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"))
     parser.add_argument("--views", type=int, default=500)
@@ -294,7 +294,11 @@ def main() -> int:
     if options.features and options.features.exists():
         boxes = Boxes(**torch.load(options.features))
     else:
-        readers = {"shards": from_shards, "nobody": without_people, "photos": lambda f: from_photos(f, options.labels)}
+        readers = {
+            "shards": from_shards,
+            "background": without_people,
+            "photos": lambda f: from_photos(f, options.labels),
+        }
         unknown = {what for _, what, _ in options.kind} - readers.keys()
         if unknown:
             parser.error(f"--kind is one of {', '.join(readers)}, not {', '.join(sorted(unknown))}")
@@ -306,7 +310,7 @@ def main() -> int:
         boxes = views(net, kinds, options.views, options.seed)
         if options.features:
             torch.save(vars(boxes), options.features)
-    print(f"{int(boxes.person.sum())} boxes of people, {int((~boxes.person).sum())} of nobody")
+    print(f"{int(boxes.person.sum())} boxes of people, {int((~boxes.person).sum())} of background")
     head = fit(net, boxes, options.steps, options.lr, options.seed)
     trained = {f"box_head.{name}": value.half() for name, value in head.state_dict().items()}
     options.out.mkdir(parents=True, exist_ok=True)

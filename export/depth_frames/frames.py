@@ -1,6 +1,6 @@
 """A real depth frame, and how it becomes a whole view of `export.solids.records`.
 
-Nobody knows the distance to the nearest edge in a real frame. Where surfaces are known to be smooth (round figures, a
+The distance to the nearest edge is not known in a real frame. Where surfaces are known to be smooth (round figures, a
 flat board) the label is "no edge within 16 r", elsewhere there is none.
 """
 

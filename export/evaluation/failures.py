@@ -9,7 +9,7 @@ from export.evaluation.people import FalseAlarm, PersonRecord
 
 KINDS = {
     "missed": "people without a box (IoU .5), the tallest first",
-    "false": "boxes that fit nobody, the best score first",
+    "false": "boxes that fit no person, the best score first",
     "mask": "people with a box, the lowest mask IoU first",
     "side": "left and right confused, the smallest correct fraction first",
 }

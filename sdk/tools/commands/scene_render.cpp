@@ -94,7 +94,7 @@ float median(std::vector<float> values) {
 maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
                            nlohmann::ordered_json& ms) {
   std::vector<float> total, project, shade, refine, resample;
-  // The first prepares networks for its size; its time is nobody's who looks at more than one picture.
+  // The first prepares networks for its size; it is left out of the times.
   if (repeat > 1) renderer.run(camera);
   std::unique_ptr<maquette::SceneImage> image;
   for (int i = 0; i < repeat; ++i) {

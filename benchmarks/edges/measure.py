@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.edges import curves, pictures, planes, quality, speed
+from benchmarks.edges import carton, curves, pictures, planes, quality, speed
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -50,11 +50,9 @@ NOT_YET = {
     "edges_curves_true": "the C API takes no fields",
     **dict.fromkeys(("edges_fusion_s", "edges_fusion_memory_mb", "edges_fusion_rmse"),
                     "fused views are measured by no part of this run"),
-    **dict.fromkeys(("edges_carton_edges", "edges_carton_px", "edges_carton_angle_deg"),
-                    "no carton with edges marked by hand is among the sets"),
     "edges_round_percent": "no scans of round things are among the sets",
 }  # fmt: skip
-FIGURES = (*FIELD_FIGURES, *CURVE_FIGURES, *NOT_YET)
+FIGURES = (*FIELD_FIGURES, *CURVE_FIGURES, *carton.FIGURES, *NOT_YET)
 
 
 @dataclass(frozen=True)
@@ -150,12 +148,13 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
         of_solids = curves.measure_solids(test[:: max(1, len(test) // CURVE_VIEWS)], shipped, tuned)
         boxes = curves.measure_boxes(shipped, tuned, *amounts)
     of_scenes = curves.measure_scenes(given.bundle, threads, QUICK_FRAMES if quick else curves.SCENE_FRAMES)
+    of_carton, why_no_carton = carton.found_in(given.bundle)
     fraction = others.now()
     sheet = pictures.write_sheet(errors.shown, folder)
     document = {
         "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
         "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "speed": rows,
-        "savings": savings, "curves": of_solids, "curves_of_scenes": of_scenes, "boxes": boxes,
+        "savings": savings, "curves": of_solids, "curves_of_scenes": of_scenes, "boxes": boxes, "carton": of_carton,
         "missing": {**networks.missing, **errors.missing, **programs_missing()},
         "sheet": sheet.name, "warnings": [],
     }  # fmt: skip
@@ -168,7 +167,8 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     figures |= speed.stream_cost(given.bundle, threads, folder)
     found, why = curves.figures_from(of_solids, of_scenes, boxes)
     figures |= found
-    missing = NOT_YET | why
+    figures |= carton.figures_from(of_carton)
+    missing = NOT_YET | why | dict.fromkeys(carton.FIGURES, why_no_carton or "too little of the carton was found")
     if CAD_PARTS in sets:
         figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
     else:

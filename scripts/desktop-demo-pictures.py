@@ -1,4 +1,4 @@
-"""Opens every view of the desktop demo, on rendered people, a clip and a room: the pictures of docs/desktop-demo.md.
+"""Opens every view of the desktop demo, on rendered people, a clip, a room and solids: the pictures of its guide.
 
 scripts/install-packages.sh test && make build && scripts/make-venv.sh
 .venv/bin/python scripts/desktop-demo-pictures.py
@@ -22,6 +22,9 @@ VIEWS = ["camera", "parts", "contours", "mask", "boxes", "try-on"]
 PEOPLE = ("stub:people?count=2&seed=3", 99)
 CLIP = ("tests/media/clip.mp4", 24)
 ROOM = ("tests/media/room", 20)
+# With the pointer near a corner of a carton on the table.
+SOLIDS = ("stub:solids?scene=room&seed=2&size=640x480", 1)
+POINTER = ("--pointer", "260,126")
 
 
 def shown(source: str, frames: int, folder: Path, *options: str) -> np.ndarray:
@@ -53,7 +56,7 @@ def main() -> None:
     def keep(name: str, picture: np.ndarray) -> None:
         cv2.imwrite(str(options.out / name), picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
-    with tempfile.TemporaryDirectory() as temporary, tqdm(total=16, unit="picture") as progress:
+    with tempfile.TemporaryDirectory() as temporary, tqdm(total=17, unit="picture") as progress:
 
         def run(source: tuple[str, int], *arguments: str) -> np.ndarray:
             picture = shown(*source, Path(temporary), *arguments)
@@ -69,6 +72,7 @@ def main() -> None:
             "desktop-scene.jpg",
             sheet([run(ROOM, "--compare", c)[44:756, :950] for c in ("none", "slider", "error")], 3, 520),
         )
+        keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 
 
 if __name__ == "__main__":

@@ -23,9 +23,11 @@ App::App(const Options& options)
       painter_(window_),
       panel_(window_),
       people_(context_, options, window_, painter_),
+      edges_(context_, options, window_, painter_),
       scene_(context_, options, window_, painter_),
       saver_(context_, options.out) {
   if (!options.texture.empty()) load_outfit(options.texture);
+  if (options.edges) live_ = &edges_;
   open(options.source);
 }
 
@@ -85,6 +87,7 @@ void App::take_keys() {
       case GLFW_KEY_F2: perform(Action::kSnapshot); break;
       case GLFW_KEY_F3: perform(Action::kClip); break;
       case GLFW_KEY_F4: perform(Action::kRecord); break;
+      case GLFW_KEY_F5: perform(Action::kOtherView); break;
       case GLFW_KEY_F6: ImGui::SetWindowFocus(ImGui::GetIO().NavActive ? nullptr : "panel"); break;
       case GLFW_KEY_F11: window_.toggle_full_screen(); break;
       case GLFW_KEY_ESCAPE: shows_help_ = false; break;
@@ -127,23 +130,36 @@ void App::draw_message(const Rect& area) {
 void App::perform(Action action) {
   switch (action) {
     case Action::kNone: break;
-    case Action::kOpenCamera: open(kFirstCamera); break;
-    case Action::kLeaveScene: open(people_.has_source() ? "" : kFirstCamera); break;
+    case Action::kOpenCamera: live_->open_camera(); break;
+    case Action::kOtherView: view_ == &edges_ ? show(people_) : show(edges_); break;
+    case Action::kLeaveScene: show(*live_); break;
     case Action::kHelp: shows_help_ = !shows_help_; break;
-    case Action::kSnapshot: saver_.save_snapshot(window_.read_pixels(view_->image_rect()), view_->result()); break;
+    case Action::kSnapshot: saver_.save_snapshot(window_.read_pixels(view_->image_rect()), view_->companions()); break;
     case Action::kClip: saver_.has_clip() ? saver_.end_clip() : saver_.begin_clip(view_->images_per_second()); break;
-    case Action::kRecord: people_.toggle_recording(saver_); break;
+    case Action::kRecord: live_->toggle_recording(saver_); break;
   }
 }
 
-// "": the people that were shown before the scene.
+void App::show(LiveView& view) {
+  view_ = live_ = &view;
+  scene_.open("");
+  for (LiveView* const each : {static_cast<LiveView*>(&people_), static_cast<LiveView*>(&edges_)}) {
+    each->set_visible(each == &view);
+  }
+  if (!view.has_source()) view.open_first();
+}
+
 void App::open(const std::string& path_or_uri) {
   std::error_code error;
   const bool is_scene = fs::is_directory(path_or_uri, error) || fs::path(path_or_uri).extension() == ".maqs";
-  view_ = is_scene ? static_cast<MainView*>(&scene_) : &people_;
-  people_.set_visible(!is_scene);
-  scene_.open(is_scene ? path_or_uri : "");
-  if (!is_scene && !path_or_uri.empty()) people_.open(path_or_uri);
+  if (!is_scene) {
+    live_->open(path_or_uri);
+    return show(*live_);
+  }
+  view_ = &scene_;
+  people_.set_visible(false);
+  edges_.set_visible(false);
+  scene_.open(path_or_uri);
 }
 
 void App::load_outfit(const std::string& path) {

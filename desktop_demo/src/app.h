@@ -5,6 +5,7 @@
 #include <app/triple_buffer.h>
 #include <string>
 
+#include "edges_view.h"
 #include "options.h"
 #include "painter.h"
 #include "panel.h"
@@ -25,6 +26,7 @@ class App {
   void steer(float seconds, const Rect& area);
   void draw_message(const Rect& area);
   void perform(Action action);
+  void show(LiveView& view);  // in place of the one that is shown
   void open(const std::string& path_or_uri);
   void load_outfit(const std::string& path);
   int report(const maquette::RgbaImage& screenshot);
@@ -36,8 +38,10 @@ class App {
   Painter painter_;
   Panel panel_;
   PeopleView people_;
+  EdgesView edges_;
   SceneView scene_;
-  MainView* view_ = &people_;  // or &scene_
+  LiveView* live_ = &people_;  // or &edges_: shown, or behind the scene
+  MainView* view_ = &people_;  // live_ or &scene_
   bool shows_panel_ = true, shows_help_ = false;
   maquette::TripleBuffer<maquette::RgbaImage> outfits_;
   maquette::Saver saver_;  // last: its jobs use the others

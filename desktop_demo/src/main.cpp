@@ -1,4 +1,4 @@
-// maquette-demo: a person's own body surface, live from a webcam.
+// maquette-demo: a person's own body surface, live from a webcam; scenes; edges of a depth camera.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -24,24 +24,38 @@ int main(int argc, char** argv) try {
   Options options;
   options.bundle = shared_file("MAQ_BUNDLE", "models/densepose-b-int8");
   options.scene_bundle = shared_file("MAQ_SCENE_BUNDLE", "models/scenes-int8");
+  options.edges_bundle = shared_file("MAQ_EDGES_BUNDLE", "models/edges-int8");
   options.texture = shared_file("MAQ_DEMO_OUTFIT", "demo/outfit.png");
   if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
-  options.model.allow_spinning = 0;  // a thread that stays awake takes a core from the window
-  bool part_only = false;
-  std::string path, view = "parts", compare = "none", size = "1280x800";
+  // A thread that stays awake takes a core from the window.
+  options.model.allow_spinning = options.edges_model.edges.allow_spinning = 0;
+  bool part_only = false, skip_planes = false;
+  std::string path, view = "parts", compare = "none", layer = "depth", size = "1280x800";
 
   CLI::App cli(
-      "Shows the body surface of the people before the camera, live, on the processor alone.\n\n"
+      "Shows the body surface of the people before the camera, live, on the processor alone; flies through scenes;\n"
+      "shows sharp edges in depth.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
       "  maquette-demo room.maqs --capture room --compare slider\n"
+      "  maquette-demo --edges               edges and sizes of solids; or of a depth camera, a recording, a picture:\n"
+      "  maquette-demo --edges 'image:depth.png?depth_unit=0.001&fov=60'\n"
       "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
       "In the window F1 shows the keys. Files can be dropped on it.",
       "maquette-demo");
   cli.add_option("PATH", path, "A photo, clip, recording, scene file or capture folder");
-  cli.add_option("--source", options.source, "A source by its URI")->excludes("PATH");
+  auto* const source = cli.add_option("--source", options.source, "A source by its URI")->excludes("PATH");
+  cli.add_flag(
+      "--edges", options.edges,
+      "Sharp edges of a depth camera, a recording or a depth picture; default: " + std::string(kRenderedSolids));
+  cli.add_option("--layer", layer, "Of edges, under their curves")
+      ->capture_default_str()
+      ->check(CLI::IsMember(maquette::kEdgeLayerNames));
+  cli.add_flag("--curves,!--no-curves", options.edges_model.finds_curves, "Of edges, with corners and boxes");
+  cli.add_flag("--boxes,!--no-boxes", options.edges_model.finds_boxes, "Measured, of edges");
+  cli.add_flag("--skip-planes", skip_planes, "Edges: the network runs where depth is not plane; faster");
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");
@@ -54,6 +68,7 @@ int main(int argc, char** argv) try {
       ->check(CLI::IsMember(kCompareNames));
   cli.add_option("--bundle", options.bundle, "Folder of the dense pose networks");
   cli.add_option("--scene-bundle", options.scene_bundle, "Folder of the scene networks");
+  cli.add_option("--edges-bundle", options.edges_bundle, "Folder of the edge network");
   cli.add_option("--threads", options.model.threads, "Of the networks; 0: all cores")->check(CLI::Range(0, 64));
   cli.add_option("--key-frames", options.model.key_frame_interval, "People are looked for in one of so many frames")
       ->check(CLI::Range(1, 1000));
@@ -69,10 +84,16 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->needs(headless)
       ->check(CLI::Range(1, 1000000));
+  cli.add_option("--pointer", options.pointer_px, "Where the pointer is, as X,Y in pixels of the depth (edges)")
+      ->expected(2)
+      ->delimiter(',')
+      ->needs(headless);
   cli.add_option("--screenshot", options.screenshot, "PNG of the window at the end")->needs(headless);
   CLI11_PARSE(cli, argc, argv);
 
   options.view = View(std::find(kViewNames.begin(), kViewNames.end(), view) - kViewNames.begin());
+  const auto& layers = maquette::kEdgeLayerNames;
+  options.layer = maquette::EdgeLayer(std::find(layers.begin(), layers.end(), layer) - layers.begin());
   options.compare = Compare(std::find(kCompareNames.begin(), kCompareNames.end(), compare) - kCompareNames.begin());
   const bool is_size = std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
   if (!is_size || std::min(options.width_px, options.height_px) < 64 ||
@@ -80,12 +101,16 @@ int main(int argc, char** argv) try {
     throw std::runtime_error("--size " + size + " is no size of a window: write it as 1280x800, each 64 to 16384.");
   }
   options.model.bundle_path = options.bundle.c_str();
+  options.edges_model.edges.bundle_path = options.edges_bundle.c_str();
+  options.edges_model.edges.threads = options.model.threads;
+  options.edges_model.edges.skip_planes = skip_planes ? 1 : 0;
   options.model.detail = part_only ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
   if (options.headless) {
     options.live.real_time = false;
     options.live.max_results = options.frames;
     options.live.reconnect_ms = 4000;
   }
+  if (options.edges && source->empty()) options.source = kRenderedSolids;
   if (!path.empty()) options.source = path;
   return App(options).run();
 } catch (const std::exception& error) {

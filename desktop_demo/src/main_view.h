@@ -1,7 +1,7 @@
-// What fills the window beside the panel: people (PeopleView) or a scene (SceneView).
+// What fills the window beside the panel: people (PeopleView), edges (EdgesView) or a scene (SceneView).
 #pragma once
 
-#include <memory>
+#include <app/saver.h>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -11,7 +11,7 @@
 #include "window.h"
 
 // What the user wants that is not the view's own business, by a key or a button.
-enum class Action { kNone, kOpenCamera, kLeaveScene, kSnapshot, kClip, kRecord, kHelp };
+enum class Action { kNone, kOpenCamera, kOtherView, kLeaveScene, kSnapshot, kClip, kRecord, kHelp };
 
 // What pointer and arrow keys did since the last frame.
 struct Steering {
@@ -37,8 +37,8 @@ class MainView {
   virtual std::string message() const = 0;          // what the user must know
   Rect image_rect() const { return image_rect_; }
   virtual double images_per_second() const = 0;
-  // Of the people in the image, for a snapshot.
-  virtual std::shared_ptr<const maquette::DensePoseResult> result() const { return nullptr; }
+  // Writes what was found in the image, for a snapshot; null where nothing was.
+  virtual maquette::Saver::Companions companions() const { return nullptr; }
 
   // Without a user: once a frame, does what one would; true at the end.
   virtual bool act_alone() = 0;

@@ -1,11 +1,15 @@
 // What the demo is started with.
 #pragma once
 
+#include <app/edge_picture.h>
 #include <app/live_densepose.h>
+#include <app/live_edges.h>
 #include <array>
 #include <string>
+#include <vector>
 
 constexpr char kFirstCamera[] = "camera:";
+constexpr char kRenderedSolids[] = "stub:solids";
 
 // The views of people, and a scene's photo against its rendering.
 enum class View { kCamera, kParts, kContours, kMask, kBoxes, kTryOn };
@@ -15,15 +19,20 @@ constexpr std::array<const char*, 3> kCompareNames = {"none", "slider", "error"}
 
 struct Options {
   std::string source = kFirstCamera;  // or a file, a folder with a capture
+  bool edges = false;                 // of the source, rather than people
   View view = View::kParts;
   bool mesh = true;
   std::string texture, capture, scene_bundle;
   Compare compare = Compare::kNone;
   std::string bundle;
+  maquette::EdgeLayer layer = maquette::EdgeLayer::kDepth;
+  std::string edges_bundle;
+  maquette::EdgesModel edges_model;
   maq_densepose_config model = maquette::default_densepose_config();
-  maquette::LiveDensePoseOptions live;
+  maquette::LiveOptions live;
   int width_px = 1280, height_px = 800;
   bool headless = false;
-  uint64_t frames = 30;  // when headless
+  uint64_t frames = 30;            // when headless
+  std::vector<double> pointer_px;  // when headless: x and y; or nothing
   std::string screenshot, out;
 };

@@ -11,16 +11,15 @@
 
 namespace {
 
-constexpr char kRenderedPeople[] = "stub:people?count=2";
+constexpr OwnSources kSources = {kFirstCamera, kFirstCamera, "stub:people?count=2",
+                                 "These people are rendered; drop a photo, a clip or a recording here."};
 constexpr const char* kStages[] = {"trunk",  "proposals", "box head", "dense head", "crops",
                                    "decode", "resize",    "copy",     "wait"};
-constexpr const char* kStateNames[] = {"stopped", "opening",      "loading", "running", "paused",
-                                       "stalled", "reconnecting", "ended",   "failed"};
 
 }  // namespace
 
 PeopleView::PeopleView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
-    : MainView(options, window, painter),
+    : LiveView(options, window, painter, kSources),
       model_(options.model),
       view_(options.view),
       shows_mesh_(options.mesh),
@@ -32,28 +31,10 @@ PeopleView::PeopleView(const maquette::Context& context, const Options& options,
             Window::wake();
           },
           Window::wake, options.live) {
+  set_live(&live_);
   // Software OpenGL compiles a shader when it draws with it first: now, before the user waits.
   for (const View view : {View::kCamera, View::kParts}) painter_.draw_people(view, {0, 0, 8, 8});
   painter_.draw_body({0, 0, 8, 8}, 0, 0);
-}
-
-void PeopleView::open(const std::string& uri) {
-  stages_.clear();
-  seeks_camera_ = uri == kFirstCamera;
-  recording_.clear();  // it ends with its source
-  live_.open(maquette::source_uri(uri), seeks_camera_ ? kRenderedPeople : "");
-}
-
-void PeopleView::set_visible(bool is_visible) {
-  is_visible_ = is_visible;
-  stages_.clear();
-  apply_pause();
-}
-
-void PeopleView::toggle_recording(maquette::Saver& saver) {
-  const std::string ended = std::exchange(recording_, recording_.empty() ? saver.new_path(".maqrec") : "");
-  live_.set_recording(recording_);
-  saver.run([text = ended.empty() ? "Recording " + recording_ : "Saved " + ended] { return text; });
 }
 
 bool PeopleView::update() {
@@ -64,7 +45,7 @@ bool PeopleView::update() {
       has_surface_ = true;
     }
   }
-  has_ended_ = live_.status().has_ended;  // asked before the frame is taken, which then is the last
+  note_end();
   if (!frames_.take()) return false;
   painter_.set_frame(frame());
   const maq_densepose_stats& s = frame().stats;
@@ -76,11 +57,7 @@ bool PeopleView::update() {
 Action PeopleView::press(int key) {
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) view_ = View(key - GLFW_KEY_1);
   if (key == GLFW_KEY_M) shows_mesh_ = !shows_mesh_;
-  if (key == GLFW_KEY_P) {
-    is_paused_ = !is_paused_;
-    apply_pause();
-  }
-  return Action::kNone;
+  return LiveView::press(key);
 }
 
 void PeopleView::steer(const Steering& steering, const Rect&) {
@@ -119,18 +96,19 @@ void PeopleView::draw_boxes() const {
   }
 }
 
-std::string PeopleView::failure() const {
-  const maquette::LiveDensePoseStatus status = live_.status();
-  return status.has_failed ? status.problem : "";
+maquette::Saver::Companions PeopleView::companions() const {
+  if (frame().result == nullptr) return nullptr;
+  return [result = frame().result](const std::string& folder, const std::string& stem) {
+    result->save(folder, stem);
+    return "_IUV.png, _INDS.png and .json";
+  };
 }
 
 void PeopleView::add_to_report(nlohmann::ordered_json* report) const {
-  const maquette::LiveDensePoseStatus status = live_.status();
+  LiveView::add_to_report(report);
   nlohmann::ordered_json& json = *report;
   json["frames"] = frame().number;
-  json["source"] = status.uri;
   json["view"] = kViewNames[size_t(view_)];
-  json["picture_px"] = window_.in_pixels(image_rect_).numbers();
   json["mesh_px"] = nullptr;
   if (mesh_rect_.width > 0) json["mesh_px"] = window_.in_pixels(mesh_rect_).numbers();
   json["frame_px"] = {frame().camera.width_px, frame().camera.height_px};
@@ -138,31 +116,12 @@ void PeopleView::add_to_report(nlohmann::ordered_json* report) const {
   for (const maq_person& person : frame().people) {
     json["people"].push_back({{"box", person.box_px}, {"score", person.score}});
   }
-  json["dropped_frames"] = status.dropped_frames;
-  json["states"] = nlohmann::json::array();
-  for (const maq_pipeline_state state : status.states) json["states"].push_back(kStateNames[state]);
-  json["problem"] = status.problem;
   json["scene"] = nullptr;
 }
 
-std::string PeopleView::message() const {
-  const maquette::LiveDensePoseStatus status = live_.status();
-  const std::string text = status.problem.empty() ? status.activity : status.problem;
-  const bool shows_stand_ins = seeks_camera_ && status.uri == kRenderedPeople && !text.empty();
-  return text + (shows_stand_ins ? " These people are rendered; drop a photo, a clip or a recording here." : "");
-}
-
 Action PeopleView::draw_panel() {
-  Action action = Action::kNone;
-  const maquette::LiveDensePoseStatus status = live_.status();
+  Action action = draw_source(frame().results_per_second);
   const maq_densepose_stats& stats = frame().stats;
-  ImGui::TextWrapped("%s", status.uri.c_str());
-  if (ImGui::SmallButton(recording_.empty() ? "Record the source (F4)" : "End recording (F4)"))
-    action = Action::kRecord;
-  ImGui::SameLine();
-  if (ImGui::SmallButton("Look for a camera")) action = Action::kOpenCamera;
-  ImGui::Text("%.1f frames a second, %llu dropped", frame().results_per_second,
-              static_cast<unsigned long long>(status.dropped_frames));
   ImGui::Text("%.1f ms a frame, %d %s%s", double(stats.total_ms), stats.person_count,
               stats.person_count == 1 ? "person" : "people", stats.is_key_frame != 0 ? "" : ", tracked");
   if (frame().age_ms >= 0) ImGui::Text("from camera to result: %.0f ms", frame().age_ms);
@@ -172,6 +131,7 @@ Action PeopleView::draw_panel() {
   ImGui::TextWrapped("%s, %d x %d", options_.bundle.substr(options_.bundle.rfind('/') + 1).c_str(),
                      stats.network_width_px, stats.network_height_px);
   draw_model_options();
+  if (ImGui::Button("Edges of a depth camera (F5)")) action = Action::kOtherView;
   return action;
 }
 
@@ -183,7 +143,7 @@ void PeopleView::draw_views() {
   }
   ImGui::Checkbox("body surface (M)", &shows_mesh_);
   ImGui::SameLine();
-  if (ImGui::Checkbox("pause (P)", &is_paused_)) apply_pause();
+  draw_pause();
   if (view_ == View::kTryOn) ImGui::TextWrapped("Drop a picture to wear it.");
 }
 

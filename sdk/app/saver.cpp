@@ -18,12 +18,12 @@ std::string Saver::new_path(const char* extension) {
   return (fs::path(folder_) / name).string() + "-" + std::to_string(++file_count_) + extension;
 }
 
-void Saver::save_snapshot(RgbaImage image, std::shared_ptr<const DensePoseResult> people) {
+void Saver::save_snapshot(RgbaImage image, Companions companions) {
   const auto kept = std::make_shared<RgbaImage>(std::move(image));
-  run([this, path = new_path(""), kept, people = std::move(people)] {
+  run([this, path = new_path(""), kept, companions = std::move(companions)] {
     kept->as_frame(context_).save(path + ".png");
-    if (people != nullptr) people->save(folder_, fs::path(path).filename().string());
-    return "Saved " + path + ".png" + (people != nullptr ? ", _IUV.png, _INDS.png and .json" : "");
+    if (companions == nullptr) return "Saved " + path + ".png";
+    return "Saved " + path + ".png, " + companions(folder_, fs::path(path).filename().string());
   });
 }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,8 +25,11 @@ class Saver {  // all calls by one thread
   Saver(const Saver&) = delete;
   Saver& operator=(const Saver&) = delete;
 
-  // A PNG of the image; of `people`, which may be null, the three DensePose files.
-  void save_snapshot(RgbaImage image, std::shared_ptr<const DensePoseResult> people);
+  // Writes what belongs to a snapshot into the folder, in files whose names begin with the stem; returns how these go
+  // on, for the message.
+  using Companions = std::function<std::string(const std::string& folder, const std::string& stem)>;
+  // A PNG of the image, and `companions`, which may be null.
+  void save_snapshot(RgbaImage image, Companions companions);
 
   // `fps`: how often images will be added.
   void begin_clip(double fps);

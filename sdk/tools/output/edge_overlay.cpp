@@ -1,5 +1,6 @@
 #include "output/edge_overlay.h"
 
+#include <app/edge_picture.h>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -12,55 +13,14 @@ constexpr int kLargestEnlargement = 4;
 constexpr float kLine_r = 1.5f;         // half the width of a line
 constexpr float kFieldStrength = 0.4f;  // under curves
 const cv::Vec3f kCrease(60, 235, 255), kBoundary(255, 255, 255), kInk(30, 20, 20);
-const cv::Scalar kConvexLine(60, 235, 255), kConcaveLine(90, 255, 90), kBoundaryLine(255, 255, 255), kDark(20, 15, 15),
-    kCorner(80, 80, 255), kBox(255, 120, 255);
+const cv::Scalar kDark(20, 15, 15);
 constexpr int kSubpixelBits = 4;
 
 cv::Mat plane_of(const maquette::EdgesResult& result, int type, const void* values) {
   return cv::Mat(result.height_px(), result.width_px(), type, const_cast<void*>(values));
 }
 
-// Depths from the nearest to the farthest but for 2 % on either side, which may be faults of the sensor; inverse, since
-// that is how precise they are.
-cv::Mat depth_in_colours(const cv::Mat& depth_m) {
-  std::vector<float> inverse;
-  for (auto z = depth_m.begin<float>(); z != depth_m.end<float>(); ++z) {
-    if (*z > 0) inverse.push_back(1 / *z);
-  }
-  cv::Mat level = cv::Mat::zeros(depth_m.size(), CV_8U), colours;
-  if (inverse.empty()) return cv::Mat::zeros(depth_m.size(), CV_8UC3);
-  std::sort(inverse.begin(), inverse.end());
-  const float low = inverse[inverse.size() / 50], high = inverse[inverse.size() - 1 - inverse.size() / 50];
-  const float scale = 255 / std::max(high - low, 1e-3f * high);
-  for (int y = 0; y < depth_m.rows; ++y) {
-    for (int x = 0; x < depth_m.cols; ++x) {
-      const float z = depth_m.at<float>(y, x);
-      if (z > 0) level.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>((1 / z - low) * scale);
-    }
-  }
-  cv::applyColorMap(level, colours, cv::COLORMAP_TURBO);
-  return colours;
-}
-
-// As if light came from the upper left: how bright the surface is, from its slopes.
-cv::Mat shading(const cv::Mat& depth_m, const maq_intrinsics& camera) {
-  cv::Mat bright(depth_m.size(), CV_32F, cv::Scalar(0));
-  for (int y = 0; y < depth_m.rows; ++y) {
-    for (int x = 0; x < depth_m.cols; ++x) {
-      const float z = depth_m.at<float>(y, x);
-      if (!(z > 0)) continue;
-      const auto slope = [&](int dx, int dy, double focal_px) {
-        if (x + dx >= depth_m.cols || y + dy >= depth_m.rows) return 0.0f;
-        const float next = depth_m.at<float>(y + dy, x + dx);
-        return next > 0 ? float(focal_px) * (z - next) / next : 0.0f;
-      };
-      const float across = slope(1, 0, camera.fx_px), down = slope(0, 1, camera.fy_px);
-      const float facing = (1 + 0.5f * across + 0.7f * down) / std::sqrt(1 + across * across + down * down);
-      bright.at<float>(y, x) = std::clamp(0.45f + 0.4f * facing, 0.25f, 1.0f);
-    }
-  }
-  return bright;
-}
+cv::Scalar bgr(const maquette::Rgb& colour) { return {double(colour.b), double(colour.g), double(colour.r)}; }
 
 // Draws what is in space onto the enlarged picture.
 class Drawing {
@@ -86,22 +46,14 @@ class Drawing {
     cv::circle(canvas_, fixed(point_m), radius << kSubpixelBits, colour, cv::FILLED, cv::LINE_AA, kSubpixelBits);
   }
 
-  // Its outline, or each length at that of the four edges which is nearest.
-  void box(const maq_edges_box& box, bool is_outline) {
+  void outline(const maquette::BoxLines& lines) {
+    for (const auto& edge : lines.edges) polyline(edge[0].data(), 2, bgr(maquette::kBoxColour), 1);  // six doubles
+  }
+
+  void lengths(const maquette::BoxLines& lines, const maq_edges_box& box) {
     for (size_t axis = 0; axis < 3; ++axis) {
-      const size_t others[] = {(axis + 1) % 3, (axis + 2) % 3};
-      cv::Vec3d nearest(0, 0, INFINITY);
-      for (int which = 0; which < 4; ++which) {
-        cv::Vec3d middle(box.centre_m);
-        const cv::Vec3d half = cv::Vec3d(box.axes[axis]) * (0.5 * box.size_m[axis]);
-        for (size_t k = 0; k < 2; ++k) {
-          middle += cv::Vec3d(box.axes[others[k]]) * ((which >> k & 1 ? 0.5 : -0.5) * box.size_m[others[k]]);
-        }
-        const cv::Vec3d ends[] = {middle - half, middle + half};  // six doubles
-        if (is_outline) polyline(ends[0].val, 2, kBox, 1);
-        if (middle[2] < nearest[2]) nearest = middle;
-      }
-      if (!is_outline && nearest[2] > 0) label(nearest.val, cv::format("%.0f", 1e3 * box.size_m[axis]));
+      const double* const at = lines.labels[axis].data();
+      if (at[2] > 0) label(at, cv::format("%.0f", 1e3 * box.size_m[axis]));
     }
   }
 
@@ -117,11 +69,12 @@ class Drawing {
 
   // Pixels of the field are squares of `scale` pixels; what is far outside of the picture is drawn no farther.
   cv::Point fixed(const double* p) const {
-    const auto at = [&](double focal, double along, double centre, int side) {
-      const double px = ((focal * along / p[2] + centre + 0.5) * scale_ - 0.5);
+    const auto at = [&](double field_px, int side) {
+      const double px = (field_px + 0.5) * scale_ - 0.5;
       return int(std::lround(std::clamp(px, -4.0 * side, 5.0 * side) * (1 << kSubpixelBits)));
     };
-    return {at(camera_.fx_px, p[0], camera_.cx_px, canvas_.cols), at(camera_.fy_px, p[1], camera_.cy_px, canvas_.rows)};
+    const maquette::Pixel seen = maquette::pixel_of(camera_, p);
+    return {at(seen[0], canvas_.cols), at(seen[1], canvas_.rows)};
   }
 
   cv::Mat& canvas_;
@@ -133,12 +86,10 @@ class Drawing {
 
 cv::Mat draw_edge_overlay(const maquette::EdgesResult& result, const std::vector<maq_edges_curve>& curves,
                           const std::vector<maq_edges_corner>& corners, const std::vector<maq_edges_box>& boxes) {
-  const cv::Mat depth_m = plane_of(result, CV_32F, result.depth_m());
-  const cv::Mat bright = shading(depth_m, result.field().intrinsics);
-  cv::Mat picture = depth_in_colours(depth_m);
-  for (int y = 0; y < picture.rows; ++y) {
-    for (int x = 0; x < picture.cols; ++x) picture.at<cv::Vec3b>(y, x) *= bright.at<float>(y, x);
-  }
+  maquette::RgbaImage layer;
+  maquette::draw_edge_layer(result, maquette::EdgeLayer::kDepth, &layer);
+  cv::Mat picture;
+  cv::cvtColor(plane_of(result, CV_8UC4, layer.rgba.data()), picture, cv::COLOR_RGBA2BGR);
   const int scale = std::clamp(kReadableSidePx / std::max(picture.cols, picture.rows), 1, kLargestEnlargement);
   const cv::Size size = picture.size() * scale;
   cv::Mat canvas, distance, kind;
@@ -161,14 +112,12 @@ cv::Mat draw_edge_overlay(const maquette::EdgesResult& result, const std::vector
     }
   }
   Drawing drawing(canvas, result.field().intrinsics, scale);
-  for (const maq_edges_box& box : boxes) drawing.box(box, true);
+  for (const maq_edges_box& box : boxes) drawing.outline(maquette::lines_of(box));
   for (const maq_edges_curve& curve : curves) {
-    const cv::Scalar& colour = curve.kind == MAQ_EDGE_BOUNDARY       ? kBoundaryLine
-                               : curve.bend == MAQ_EDGE_BEND_CONCAVE ? kConcaveLine
-                                                                     : kConvexLine;
-    drawing.curve(curve.points_m, curve.point_count, colour);
+    const auto group = size_t(maquette::group_of(curve));
+    drawing.curve(curve.points_m, curve.point_count, bgr(maquette::kEdgeGroupColours[group]));
   }
-  for (const maq_edges_corner& corner : corners) drawing.dot(corner.point_m, kCorner, 3);
-  for (const maq_edges_box& box : boxes) drawing.box(box, false);
+  for (const maq_edges_corner& corner : corners) drawing.dot(corner.point_m, bgr(maquette::kCornerColour), 3);
+  for (const maq_edges_box& box : boxes) drawing.lengths(maquette::lines_of(box), box);
   return canvas;
 }

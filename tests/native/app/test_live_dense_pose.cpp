@@ -15,8 +15,8 @@ namespace {
 const std::string kTinyBundle = MAQ_TEST_DATA "/tiny_bundle";
 const std::string kPhoto = "image:" MAQ_TEST_MEDIA "/photo.jpg";
 
-maquette::LiveDensePoseOptions as_fast_as_it_goes(uint64_t max_results) {
-  maquette::LiveDensePoseOptions options;
+maquette::LiveOptions as_fast_as_it_goes(uint64_t max_results) {
+  maquette::LiveOptions options;
   options.real_time = false;
   options.max_results = max_results;
   options.reconnect_ms = 300;
@@ -26,7 +26,7 @@ maquette::LiveDensePoseOptions as_fast_as_it_goes(uint64_t max_results) {
 // What came from the pipeline, and what waits until something holds.
 class Live {
  public:
-  explicit Live(const maquette::LiveDensePoseOptions& options = {}, const std::string& bundle = kTinyBundle)
+  explicit Live(const maquette::LiveOptions& options = {}, const std::string& bundle = kTinyBundle)
       : live(
             context, config_of(bundle), [this](maquette::PipelineResult result, double) { keep(std::move(result)); },
             nullptr, options) {}
@@ -109,7 +109,7 @@ TEST(LiveDensePose, APhotoIsMappedAgainWithOtherSettings) {
 }
 
 TEST(LiveDensePose, LargePicturesOfFilesAreMadeSmaller) {
-  maquette::LiveDensePoseOptions options;
+  maquette::LiveOptions options;
   options.max_side_px = 100;
   Live people(options);
   people.live.open(kPhoto);

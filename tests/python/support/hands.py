@@ -1,4 +1,4 @@
-"""Keyboard, drag and drop and eyes of a person before a window of the desktop demo, through the X protocol."""
+"""Keyboard, pointer, drag and drop and eyes of a person before a window of the desktop demo, through the X protocol."""
 
 import subprocess
 import time
@@ -52,6 +52,12 @@ class Hands:
                 xtest.fake_input(self._display, kind, code)
             self._display.sync()
             time.sleep(0.15)
+
+    def point(self, x: int, y: int) -> None:
+        """The pointer, at a place of the window."""
+        at = self._window.translate_coords(self._root, 0, 0)
+        xtest.fake_input(self._display, X.MotionNotify, x=x - at.x, y=y - at.y)
+        self._display.sync()
 
     def drop(self, path: Path) -> None:
         """A file, as file managers do (XDND, version 5)."""

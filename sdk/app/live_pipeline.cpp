@@ -1,4 +1,4 @@
-#include "app/live_densepose.h"
+#include "app/live_pipeline.h"
 
 #include <filesystem>
 #include <utility>
@@ -19,34 +19,32 @@ std::string source_uri(const std::string& path_or_uri) {
   return uri;
 }
 
-LiveDensePose::LiveDensePose(const Context& context, const maq_densepose_config& config,
-                             std::function<void(PipelineResult, double)> on_result, std::function<void()> on_change,
-                             const LiveDensePoseOptions& options)
+LivePipeline::LivePipeline(const Context& context, maq_pipeline_config model,
+                           std::function<void(PipelineResult, double)> on_result, std::function<void()> on_change,
+                           const LiveOptions& options)
     : on_result_(std::move(on_result)), on_change_(std::move(on_change)), max_results_(options.max_results) {
   maq_source_config source = default_source_config();
   source.reconnect_ms = options.reconnect_ms;
   source.real_time = source.loop = options.real_time ? 1 : 0;
   source.max_side_px = options.max_side_px;
-  maq_pipeline_config pipeline = default_pipeline_config();
-  pipeline.densepose = &config;
-  pipeline.source = &source;
-  pipeline.result_pool_size = kResultsHeld;
-  pipeline.nice = options.nice;
-  pipeline.frame_budget_ms = options.frame_budget_ms;
-  pipeline.result_user_data = pipeline.state_user_data = this;
-  pipeline.result_callback = [](void* self, const maq_pipeline_result* result) {
-    static_cast<LiveDensePose*>(self)->take_result(PipelineResult(*result));
+  model.source = &source;
+  model.result_pool_size = kResultsHeld;
+  model.nice = options.nice;
+  model.frame_budget_ms = options.frame_budget_ms;
+  model.result_user_data = model.state_user_data = this;
+  model.result_callback = [](void* self, const maq_pipeline_result* result) {
+    static_cast<LivePipeline*>(self)->take_result(PipelineResult(*result));
   };
-  pipeline.state_callback = [](void* self, maq_pipeline_state state, maq_status, const char* problem) {
-    static_cast<LiveDensePose*>(self)->take_state(state, problem);
+  model.state_callback = [](void* self, maq_pipeline_state state, maq_status, const char* problem) {
+    static_cast<LivePipeline*>(self)->take_state(state, problem);
   };
-  pipeline_.emplace(context, pipeline);
+  pipeline_.emplace(context, model);
 }
 
 // Here, so that no callback runs when other members go. By the C function, which does not throw.
-LiveDensePose::~LiveDensePose() { maq_pipeline_stop(pipeline_->get()); }
+LivePipeline::~LivePipeline() { maq_pipeline_stop(pipeline_->get()); }
 
-void LiveDensePose::open(const std::string& uri, const std::string& fallback) {
+void LivePipeline::open(const std::string& uri, const std::string& fallback) {
   std::lock_guard<std::mutex> lock(mutex_);
   uri_ = uri;
   fallback_ = fallback;
@@ -57,7 +55,7 @@ void LiveDensePose::open(const std::string& uri, const std::string& fallback) {
   pipeline_->set_source(uri);
 }
 
-void LiveDensePose::take_result(PipelineResult result) {
+void LivePipeline::take_result(PipelineResult result) {
   if (max_results_ != 0 && result_count_ >= max_results_) return;
   on_result_(std::move(result), pipeline_->stats().results_per_second);
   if (++result_count_ != max_results_) return;
@@ -65,7 +63,7 @@ void LiveDensePose::take_result(PipelineResult result) {
   if (on_change_) on_change_();
 }
 
-void LiveDensePose::take_state(maq_pipeline_state state, const char* problem) {
+void LivePipeline::take_state(maq_pipeline_state state, const char* problem) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
     // Reports are queued: the last ones of the source before may come after open().
@@ -82,10 +80,10 @@ void LiveDensePose::take_state(maq_pipeline_state state, const char* problem) {
   if (on_change_) on_change_();
 }
 
-LiveDensePoseStatus LiveDensePose::status() const {
+LiveStatus LivePipeline::status() const {
   const maq_pipeline_info info = pipeline_->info();
   std::lock_guard<std::mutex> lock(mutex_);
-  LiveDensePoseStatus status;
+  LiveStatus status;
   status.state = info.state;
   status.uri = uri_;
   status.states = states_;

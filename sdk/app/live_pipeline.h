@@ -1,0 +1,86 @@
+// A pipeline (maquette/pipeline.h) for programs with a window: options that suit one, another source where one cannot
+// be opened, and what the user is told. Used as LiveDensePose or LiveEdges, which say what
+// runs.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <maquette/maquette.hpp>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace maquette {
+
+// A file's path as a URI (maquette/source.h); what is one already, as it is.
+std::string source_uri(const std::string& path_or_uri);
+
+struct LiveStatus {
+  maq_pipeline_state state = MAQ_PIPELINE_STOPPED;
+  std::string uri;         // what plays
+  std::string activity;    // "Opening v4l2:/dev/video0"; "" when results come or nothing is to be done
+  std::string problem;     // why no results come, or what could not be done; a sentence
+  bool has_ended = false;  // no more results: a photo, the end of a clip, max_results, or has_failed
+  bool has_failed = false;
+  uint64_t dropped_frames = 0;
+  std::vector<maq_pipeline_state> states;  // of the source, in order
+};
+
+struct LiveOptions {
+  bool real_time = true;     // clips and stubs play at their own pace and begin anew; else as fast as the model runs
+  uint64_t max_results = 0;  // 0: no end
+  int32_t reconnect_ms = 86400000;  // how long a lost camera is waited for
+  int32_t max_side_px = 2048;       // larger pictures of files are made smaller
+  int32_t nice = 5;                 // so that the thread that draws goes first
+  double frame_budget_ms = 0;       // as in maq_pipeline_config
+};
+
+class LivePipeline {
+ public:
+  // `model`: what runs, densepose or edges with curves; the other fields are set here. `on_result` is called on the
+  // pipeline's thread with each result and how many there are a second; `on_change`, which may be null, on that thread
+  // with each change of the status. Neither may throw or destroy this.
+  LivePipeline(const Context& context, maq_pipeline_config model, std::function<void(PipelineResult, double)> on_result,
+               std::function<void()> on_change, const LiveOptions& options);
+  ~LivePipeline();
+  LivePipeline(const LivePipeline&) = delete;
+  LivePipeline& operator=(const LivePipeline&) = delete;
+
+  // These return at once; what goes wrong is in status().
+
+  // Plays a source in place of the present one. `fallback`: what plays when it cannot be opened; the reason stays in
+  // `problem`.
+  void open(const std::string& uri, const std::string& fallback = "");
+  void set_paused(bool is_paused) { pipeline_->set_paused(is_paused); }
+  // Begins a recording of the source (.maqrec), or ends it with "".
+  void set_recording(const std::string& path) { pipeline_->set_recording(path); }
+
+  LiveStatus status() const;
+
+ protected:
+  Pipeline& pipeline() { return *pipeline_; }
+  const Pipeline& pipeline() const { return *pipeline_; }
+
+ private:
+  void take_result(PipelineResult result);
+  void take_state(maq_pipeline_state state, const char* problem);
+  bool falls_back(maq_pipeline_state now) const {
+    return now == MAQ_PIPELINE_FAILED && !is_open_ && !fallback_.empty();
+  }
+
+  const std::function<void(PipelineResult, double)> on_result_;
+  const std::function<void()> on_change_;
+  const uint64_t max_results_;
+  std::atomic<uint64_t> result_count_{0};
+
+  mutable std::mutex mutex_;  // of what follows to the next line
+  std::string uri_, fallback_, fallback_reason_;
+  bool is_open_ = false;     // the source was opened
+  bool is_awaited_ = false;  // no state of the source was reported yet
+  std::vector<maq_pipeline_state> states_;
+
+  std::optional<Pipeline> pipeline_;  // last: its callbacks use the others
+};
+
+}  // namespace maquette

@@ -69,7 +69,8 @@ int main(int argc, char** argv) try {
   cli.add_option("--bundle", options.bundle, "Folder of the dense pose networks");
   cli.add_option("--scene-bundle", options.scene_bundle, "Folder of the scene networks");
   cli.add_option("--edges-bundle", options.edges_bundle, "Folder of the edge network");
-  cli.add_option("--threads", options.model.threads, "Of the networks; 0: all cores")->check(CLI::Range(0, 64));
+  cli.add_option("--threads", options.model.threads, "Of the networks; 0: the large cores, at most 4")
+      ->check(CLI::Range(0, 64));
   cli.add_option("--key-frames", options.model.key_frame_interval, "People are looked for in one of so many frames")
       ->check(CLI::Range(1, 1000));
   cli.add_option("--frame-budget", options.live.frame_budget_ms,

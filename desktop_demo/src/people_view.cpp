@@ -155,7 +155,7 @@ void PeopleView::draw_model_options() {
     ImGui::SliderInt(name, value, min, max, format, ImGuiSliderFlags_AlwaysClamp);
     changed |= ImGui::IsItemDeactivatedAfterEdit();
   };
-  slider("threads", &model_.threads, 0, cores, model_.threads == 0 ? "all cores" : "%d");
+  slider("threads", &model_.threads, 0, cores, model_.threads == 0 ? "large cores" : "%d");
   slider("key frames", &model_.key_frame_interval, 1, 30, model_.key_frame_interval == 1 ? "every" : "one in %d");
   slider("long side", &model_.long_side_px, 0, 1024, model_.long_side_px == 0 ? "the model's" : "%d px");
   if (model_.long_side_px > 0) model_.long_side_px = std::max(64, model_.long_side_px);

@@ -112,6 +112,8 @@ class _Stats(ctypes.Structure):
         ("network_pixel_count", c_int64),
         ("broken_pixel_count", c_int64),
         ("provider", c_int32),
+        ("threads", c_int32),
+        ("is_threads_measured", c_int32),
     )
 
 
@@ -129,6 +131,8 @@ class EdgesStats:
     network_pixel_count: int
     broken_pixel_count: int
     provider: int
+    threads: int
+    is_threads_measured: int
 
 
 @dataclass(frozen=True, eq=False)

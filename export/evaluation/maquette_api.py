@@ -86,6 +86,8 @@ class _Stats(ctypes.Structure):
         ("clamped_pixel_count", c_int64),
         ("is_key_frame", c_int32),
         ("provider", c_int32),
+        ("threads", c_int32),
+        ("is_threads_measured", c_int32),
     )
 
 
@@ -111,6 +113,8 @@ class Stats:
     clamped_pixel_count: int
     is_key_frame: int
     provider: int
+    threads: int
+    is_threads_measured: int
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ struct Options {
 };
 
 using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
 
 double ms_between(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
@@ -108,6 +109,7 @@ class Case {
     return sorted[low] + (sorted[high] - sorted[low]) * (at - double(low));
   }
   double frame_ms() const { return percentile(kStageCount - 1, 50); }
+  const maq_densepose_stats& latest() const { return stats_; }
   double people() const { return double(people_) / double(std::max<size_t>(1, runs())); }
   double cpu_ms() const { return 1e3 * cpu_s_ / double(std::max<size_t>(1, runs())); }
 
@@ -128,8 +130,8 @@ class Case {
     return reasons;
   }
 
-  nlohmann::ordered_json json(const Options& options) const {
-    nlohmann::ordered_json ms;
+  Json json(const Options& options) const {
+    Json ms;
     for (size_t i = 0; i < kStageCount; ++i) {
       for (const int percent : {50, 90, 99}) {
         ms[kStages[i]]["p" + std::to_string(percent)] = rounded_ms(percentile(i, percent));
@@ -140,6 +142,8 @@ class Case {
             {"size_px", size_px_},
             {"network_px", {stats_.network_width_px, stats_.network_height_px}},
             {"provider", name_of(stats_.provider)},
+            {"threads", stats_.threads},
+            {"threads_measured", stats_.is_threads_measured != 0},
             {"runs", runs()},
             {"seconds", seconds_},
             {"people", people()},
@@ -236,7 +240,7 @@ int run_bench(const Options& options) {
   const double others_s = others_processor_seconds() - others_before_s;
   const double wall_s = ms_between(measured_from, Clock::now()) / 1e3;
 
-  nlohmann::ordered_json machine = describe_machine();
+  Json machine = describe_machine();
   const double others = std::max(0.0, others_s) / (std::max(1e-3, wall_s) * machine.at("cores").get<double>());
   std::vector<std::string> reasons;
   if (others > kMaxOthers) {
@@ -244,7 +248,7 @@ int run_bench(const Options& options) {
     std::snprintf(text, sizeof text, "other processes used %.0f %% of the CPU", 100 * others);
     reasons.emplace_back(text);
   }
-  nlohmann::ordered_json document;
+  Json document;
   document["schema"] = kSchema;
   document["machine"] = machine;
   document["build"] = {{"sdk", maq_get_sdk_version()},
@@ -252,7 +256,8 @@ int run_bench(const Options& options) {
                        {"options", maq_get_build_options()},
                        {"onnxruntime", context.onnxruntime_version()}};
   document["bundle"] = bundle;
-  document["settings"] = {{"threads", options.model.threads},
+  const bool measures_threads = options.model.threads == MAQ_THREADS_MEASURED;
+  document["settings"] = {{"threads", measures_threads ? Json("measured") : Json(options.model.threads)},
                           {"size", options.model.size},
                           {"threshold", options.model.threshold},
                           {"max_proposals", options.model.max_proposals},
@@ -273,12 +278,13 @@ int run_bench(const Options& options) {
   document["other_processes_cpu_fraction"] = others;
   document["valid"] = reasons.empty();
   document["warnings"] = reasons;
-  document["cases"] = nlohmann::ordered_json::array();
+  document["cases"] = Json::array();
   for (const auto& timed : cases) document["cases"].push_back(timed->json(options));
 
   print_table(cases);
   print_output("create %.0f ms, first frame %.0f ms, program start to first result %.0f ms, peak memory %.0f MiB\n",
                create_ms, first_frame_ms, first_result_ms, double(peak_memory_bytes()) / kMibibyte);
+  if (measures_threads) print_output("Threads, measured: %d\n", cases[0]->latest().threads);
   for (const std::string& reason : reasons) print_output("Warning: %s\n", reason.c_str());
   for (const auto& timed : cases) {
     for (const std::string& reason : timed->warnings(options)) {

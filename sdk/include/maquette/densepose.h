@@ -28,7 +28,8 @@ typedef enum maq_person_crops {
 
 typedef struct maq_densepose_config {
   uint32_t struct_size;
-  int32_t threads;         /* for the networks; 0 (default): the machine's large cores, at most 4 */
+  int32_t threads;         /* for the networks, 1 to 64; 0 (default): the machine's large cores, at most 4;
+                              MAQ_THREADS_MEASURED: as many of these as pay, measured */
   const char* bundle_path; /* folder with manifest.json; NULL (default): bundle_files, or without them the bundle
                                  installed with the library (share/maquette/models/densepose-b-int8). Copied. */
   const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
@@ -98,6 +99,8 @@ typedef struct maq_densepose_stats {
   int64_t clamped_pixel_count; /* of these, pixels where the network's U or V was outside 0 to 1 */
   int32_t is_key_frame;        /* 1: people were detected; 0: boxes of the frame before were propagated */
   maq_provider provider;       /* in use for the trunk */
+  int32_t threads;             /* of the networks; fewer where the system starts no more, as the log says then */
+  int32_t is_threads_measured; /* 1: that number was chosen by MAQ_THREADS_MEASURED */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
@@ -107,7 +110,7 @@ MAQ_API maq_status maq_densepose_config_init(maq_densepose_config* config, uint3
 /* Loads a model bundle: checks every file's size and SHA-256, and the networks' inputs and outputs, against its
  * manifest. `config` may be NULL for the defaults. `*densepose` is the caller's, to be given to maq_densepose_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE,
- * MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read and networks are prepared. */
+ * MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read and networks are prepared, and measured. */
 MAQ_API maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* config,
                                         maq_densepose** densepose);
 

@@ -16,7 +16,8 @@ typedef struct maq_edges_result maq_edges_result;
 
 typedef struct maq_edges_config {
   uint32_t struct_size;
-  int32_t threads;         /* 0 (default): the machine's large cores, at most 4 */
+  int32_t threads;         /* 1 to 64; 0 (default): the machine's large cores, at most 4; MAQ_THREADS_MEASURED: as
+                              many of these as pay, measured with a frame of 320 x 240 */
   const char* bundle_path; /* folder with manifest.json; NULL (default): bundle_files, or without them the bundle
                                  installed with the library (share/maquette/models/edges-int8). Copied. */
   const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
@@ -69,6 +70,8 @@ typedef struct maq_edges_stats {
                                   skipped */
   int64_t broken_pixel_count;  /* for which the network gave no number, but NaN: they have the distance eps_r */
   maq_provider provider;       /* in use for the network */
+  int32_t threads;             /* of the network; fewer where the system starts no more, as the log says then */
+  int32_t is_threads_measured; /* 1: that number was chosen by MAQ_THREADS_MEASURED */
 } maq_edges_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_edges_config) of the caller.
@@ -78,7 +81,7 @@ MAQ_API maq_status maq_edges_config_init(maq_edges_config* config, uint32_t stru
 /* Loads a model bundle of the task "edges" and checks its files' sizes and SHA-256. `config` may be NULL for the
  * defaults. `*edges` is the caller's, to be given to maq_edges_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_UNSUPPORTED (a
- * bundle of another task), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read. */
+ * bundle of another task), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read, and while threads are measured. */
 MAQ_API maq_status maq_edges_create(maq_context* context, const maq_edges_config* config, maq_edges** edges);
 
 /* Frees the network (NULL is fine). Results still held stay valid until they are released.

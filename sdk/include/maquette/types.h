@@ -54,6 +54,12 @@ typedef enum maq_status {
 /* The id of a person who is not tracked. */
 #define MAQ_NO_ID (-1)
 
+/* For `threads` of dense pose and edges: the number is measured when the networks are made, on the machine as it is
+ * then. One of them runs on zeros with 1, 2, and so on up to the default's number of threads, and the fewest are taken
+ * that are within 5 % of the fastest: the others would cost energy for nothing. This takes up to about half a second,
+ * more where preparing the network and running it twice on each number takes longer; with one large core, nothing. */
+#define MAQ_THREADS_MEASURED (-1)
+
 /* What runs the layers of networks. Values never change meaning; new ones are added at the end. */
 typedef enum maq_provider {
   MAQ_PROVIDER_CPU = 0,     /* ONNX Runtime's own kernels */

@@ -16,6 +16,8 @@ namespace {
 
 // Of the struct without what came after the crops of people.
 constexpr size_t kFirstConfigSize = offsetof(maq_densepose_config, provider);
+// Without the threads.
+constexpr size_t kFirstStatsSize = offsetof(maq_densepose_stats, threads);
 
 maq_densepose_config default_config() {
   maq_densepose_config config{};
@@ -49,7 +51,7 @@ maq_densepose_config read_densepose_config(const maq_densepose_config* given, co
 
 DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name) {
   const auto field = [name](const char* of) { return concatenate(name, ".", of); };
-  require_range(field("threads"), config.threads, 0, kMaxThreads);
+  require_threads(field("threads"), config.threads, kMaxThreads);
   if (config.long_side_px != 0) require_range(field("long_side_px"), config.long_side_px, 32, 2048);
   if (!(config.score_threshold < 0)) require_range(field("score_threshold"), config.score_threshold, 0.0f, 1.0f);
   if (config.max_people != 0) require_range(field("max_people"), config.max_people, 1, 255);
@@ -65,7 +67,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   if (config.person_crop_px != 0) require_range(field("person_crop_px"), config.person_crop_px, 64, 512);
   require_provider(field("provider"), config.provider);
   DensePoseSettings settings;
-  settings.threads = config.threads > 0 ? config.threads : default_threads();
+  settings.threads = config.threads != 0 ? config.threads : default_threads();
   settings.long_side_px = config.long_side_px;
   settings.score_threshold = config.score_threshold;
   settings.max_people = config.max_people;
@@ -108,7 +110,7 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     const Bundle bundle = read_bundle_argument(config, "config", kDensePoseBundle);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
-                                bundle.manifest.precision, ") loaded, ", settings.threads, " thread(s)");
+                                bundle.manifest.precision, ") loaded, ", networks->threads(), " thread(s)");
     *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size);
     return MAQ_OK;
   });
@@ -208,7 +210,9 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.clamped_pixel_count = from.decoded.clamped_uv;
     filled.is_key_frame = from.key_frame ? 1 : 0;
     filled.provider = from.provider;
-    write_struct(stats, "stats", filled, sizeof(maq_densepose_stats));
+    filled.threads = from.threads;
+    filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
+    write_struct(stats, "stats", filled, kFirstStatsSize);
     return MAQ_OK;
   });
 }

@@ -13,8 +13,8 @@ using namespace maq;
 
 namespace {
 
-// Of the structs' first release.
-constexpr size_t kFirstConfigSize = sizeof(maq_edges_config), kFirstStatsSize = sizeof(maq_edges_stats);
+// Of the structs' first release; that of the stats without the threads.
+constexpr size_t kFirstConfigSize = sizeof(maq_edges_config), kFirstStatsSize = offsetof(maq_edges_stats, threads);
 
 maq_edges_config default_config() {
   maq_edges_config config{};
@@ -32,13 +32,13 @@ maq_edges_config maq::read_edges_config(const maq_edges_config* given, const cha
 
 EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* name) {
   const std::string prefix = std::string(name) + ".";
-  require_range(prefix + "threads", config.threads, 0, kMaxThreads);
+  require_threads(prefix + "threads", config.threads, kMaxThreads);
   require_range(prefix + "result_pool_size", config.result_pool_size, 1u, 64u);
   require_range(prefix + "allow_spinning", config.allow_spinning, 0, 1);
   require_provider(prefix + "provider", config.provider);
   require_range(prefix + "skip_planes", config.skip_planes, 0, 1);
   EdgesSettings settings;
-  settings.threads = config.threads > 0 ? config.threads : default_threads();
+  settings.threads = config.threads != 0 ? config.threads : default_threads();
   settings.spin = config.allow_spinning == 1;
   settings.provider = config.provider;
   settings.skips_planes = config.skip_planes == 1;
@@ -59,7 +59,7 @@ maq_status maq_edges_create(maq_context* context, const maq_edges_config* given,
     const Manifest manifest = bundle.manifest;
     auto made = std::make_unique<Edges>(context->state->onnxruntime(), std::move(bundle), settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
-                                ") loaded, ", settings.threads, " thread(s)");
+                                ") loaded, ", made->threads(), " thread(s)");
     *edges = new maq_edges(context->state, std::move(made), config.result_pool_size);
     return MAQ_OK;
   });
@@ -158,6 +158,8 @@ maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_
     filled.network_pixel_count = from.network_pixels;
     filled.broken_pixel_count = from.broken_pixels;
     filled.provider = from.provider;
+    filled.threads = from.threads;
+    filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
     write_struct(stats, "stats", filled, kFirstStatsSize);
     return MAQ_OK;
   });

@@ -141,6 +141,14 @@ void require_provider(const Name& name, const maq_provider& provider) {
   require_range(name, number_in(provider), int32_t(MAQ_PROVIDER_CPU), int32_t(MAQ_PROVIDER_NNAPI));
 }
 
+// Of configs that take MAQ_THREADS_MEASURED.
+template <class Name>
+void require_threads(const Name& name, int32_t threads, int32_t max) {
+  if (threads == MAQ_THREADS_MEASURED || (threads >= 0 && threads <= max)) return;
+  throw ArgumentError(name, " is ", threads, ", but must be 0 to ", max, ", or MAQ_THREADS_MEASURED (",
+                      MAQ_THREADS_MEASURED, ").");
+}
+
 // The caller's config on top of the defaults.
 template <class T>
 T read_config(const T* given, const char* name, const T& defaults, size_t smallest) {

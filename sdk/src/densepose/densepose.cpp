@@ -8,6 +8,7 @@
 #include "core/rounding.h"
 #include "core/trace/trace_section.h"
 #include "nn/provider.h"
+#include "nn/thread_choice.h"
 
 namespace maq {
 namespace {
@@ -109,6 +110,7 @@ float first_of_two(const float* logits) { return 1.0f / (1.0f + std::exp(logits[
 DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle,
                      const DensePoseSettings& settings)
     : spec_(read_densepose_spec(bundle.manifest)),
+      measures_threads_(settings.threads == MAQ_THREADS_MEASURED),
       settings_(resolved(settings, spec_)),
       charts_(bundle.files.at(spec_.charts_file), spec_.dense_head.index_classes - 1,
               bundle.path_of(spec_.charts_file)),
@@ -116,9 +118,15 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
                bundle.path_of(spec_.surface_file)) {
   cancel_ = std::make_unique<RunCancel>(runtime);
   const Manifest& manifest = bundle.manifest;
-  const SessionSettings on_cpu{settings_.threads, settings_.spin};
-  SessionSettings on_provider = on_cpu;
+  const int first = kFirstLevel, last = kFirstLevel + int(kRpnLevels) - 1;
+  const GraphSpec trunk = graph_with(manifest, "trunk", {"image"}, at_levels("p", first, last));
+  channels_ = feature_channels(trunk, manifest.name);
+  SessionSettings on_provider{settings_.threads, settings_.spin};
   on_provider.provider = available_provider(*runtime, settings_.provider);
+  if (measures_threads_) {
+    on_provider.threads = settings_.threads = measured_threads(runtime, bundle, trunk, on_provider);
+  }
+  const SessionSettings on_cpu{settings_.threads, settings_.spin};
   // A graph, whose inputs and outputs have these shapes.
   const auto make_checked = [&](const std::string& name, GraphSpec graph, const std::vector<int64_t>& input,
                                 const std::vector<std::vector<int64_t>>& outputs, const SessionSettings& with) {
@@ -129,9 +137,6 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
     }
     return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file), with);
   };
-  const int first = kFirstLevel, last = kFirstLevel + int(kRpnLevels) - 1;
-  const GraphSpec trunk = graph_with(manifest, "trunk", {"image"}, at_levels("p", first, last));
-  channels_ = feature_channels(trunk, manifest.name);
   const std::vector<int64_t> features = {1, kAnySize, kAnySize, channels_};
   trunk_ = make_checked("trunk", trunk, {1, 3, kAnySize, kAnySize}, {features}, on_cpu);
   const std::vector<int64_t> anchors = {1, kAnySize, kAnySize, 5 * int64_t(spec_.rpn.aspect_ratios.size())};
@@ -209,6 +214,8 @@ void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
   frames_since_key_ = stats.key_frame ? 1 : frames_since_key_ + 1;
   if (frames_since_key_ >= settings_.key_frame_interval) frames_since_key_ = 0;
   const NetworkSize size = network_size(image.width_px, image.height_px, settings_.long_side_px);
+  stats.threads = settings_.threads;
+  stats.is_threads_measured = measures_threads_;
   stats.network_width_px = size.width_px;
   stats.network_height_px = size.height_px;
 
@@ -268,15 +275,29 @@ void DensePose::set_effort(int key_frame_interval, int long_side_px) {
   settings_.long_side_px = long_side_px;
 }
 
-maq_provider DensePose::run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px) {
-  const int64_t height = height_px, width = width_px;
-  const auto cells = [](int64_t side, int stride) { return (side + stride - 1) / stride; };
+void DensePose::set_level_shapes(int width_px, int height_px, size_t levels) {
   shapes_.clear();
-  for (size_t l = 0; l < mapper.levels; ++l) {
+  for (size_t l = 0; l < levels; ++l) {
     const int stride = spec_.rpn.strides[l];
-    shapes_.push_back({1, cells(height, stride), cells(width, stride), channels_});
+    shapes_.push_back({1, divide_up(height_px, stride), divide_up(width_px, stride), channels_});
   }
-  inputs_.assign(1, {values.data(), {1, 3, height, width}});
+}
+
+int DensePose::measured_threads(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const Bundle& bundle,
+                                const GraphSpec& trunk, SessionSettings settings) {
+  // Of a frame as most cameras give it, 4 to 3.
+  const int width = round_up(settings_.long_side_px, spec_.input.multiple_of);
+  const int height = round_up(3 * settings_.long_side_px / 4, spec_.input.multiple_of);
+  set_level_shapes(width, height, kRpnLevels);
+  return measure_threads(
+      runtime,
+      {bundle.files.at(trunk.file), trunk, bundle.path_of(trunk.file), width, height, {1, 3, height, width}, shapes_},
+      std::move(settings));
+}
+
+maq_provider DensePose::run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px) {
+  set_level_shapes(width_px, height_px, mapper.levels);
+  inputs_.assign(1, {values.data(), {1, 3, height_px, width_px}});
   Session& trunk = mapper.sized_trunk == nullptr ? *mapper.trunk : mapper.sized_trunk->at(width_px, height_px);
   pyramid_ = trunk.run(inputs_, shapes_, cancel_.get());
   features_.clear();

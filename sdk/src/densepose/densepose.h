@@ -27,7 +27,7 @@ enum class PersonCrops { kOff, kAuto, kAll };  // as maq_person_crops
 
 // As in maq_densepose_config, whose comments say what they mean; 0 (a negative threshold): the bundle's value.
 struct DensePoseSettings {
-  int threads = 1;
+  int threads = 1;  // or MAQ_THREADS_MEASURED
   int long_side_px = 0;
   float score_threshold = -1;
   int max_people = 0;
@@ -59,6 +59,8 @@ struct DensePoseStats {
   int network_height_px = 0;
   bool key_frame = false;
   maq_provider provider = MAQ_PROVIDER_CPU;  // of the trunk
+  int threads = 1;
+  bool is_threads_measured = false;
   int proposals = 0;
   int dropped_boxes = 0;
   int crops = 0;
@@ -89,6 +91,8 @@ class DensePose {
   // The next image begins another stream.
   void reset();
 
+  // In use: where the settings have MAQ_THREADS_MEASURED, what was measured when this was made.
+  int threads() const { return settings_.threads; }
   int long_side_px() const { return settings_.long_side_px; }
   int key_frame_interval() const { return settings_.key_frame_interval; }
   // Between two runs: takes effect with the next, which is a key frame where the long side changes. No network is made
@@ -122,6 +126,11 @@ class DensePose {
   };
 
   void find_people(const ImageView& image, DensePoseResult& result);
+  // Of the trunk's outputs for such an input, into `shapes_`.
+  void set_level_shapes(int width_px, int height_px, size_t levels);
+  // How many threads the trunk, which takes the longest, is fastest on.
+  int measured_threads(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const Bundle& bundle,
+                       const GraphSpec& trunk, SessionSettings settings);
   // `values`: [3, height_px, width_px], normalised; the sides are multiples of the spec's. Into `features_`.
   // Returns the provider in use.
   maq_provider run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px);
@@ -152,7 +161,8 @@ class DensePose {
   const FeatureMap& level_for(const Box& box) const;
 
   DensePoseSpec spec_;
-  DensePoseSettings settings_;  // none is 0 that stands for the bundle's value
+  bool measures_threads_;
+  DensePoseSettings settings_;  // none is 0 that stands for the bundle's value, and threads are those in use
   int channels_ = 0;
   std::unique_ptr<RunCancel> cancel_;
   std::unique_ptr<Session> trunk_;

@@ -1,8 +1,10 @@
 #include "edges/edge_network.h"
 
 #include "core/error.h"
+#include "core/rounding.h"
 #include "edges/depth_slopes.h"
 #include "edges/field_decode.h"
+#include "nn/thread_choice.h"
 
 namespace maq {
 namespace {
@@ -35,26 +37,59 @@ Bundle checked_edges(Bundle bundle) {
   return bundle;
 }
 
+int checked_multiple_px(const Manifest& manifest) {
+  const auto& node = manifest.root.at("field").at("multiple_px");
+  const int multiple_px = node.integer(kFold, 256);
+  if (multiple_px % kFold != 0) node.fail("is ", multiple_px, ", but must be even");
+  return multiple_px;
+}
+
+Shape input_shape(int width_px, int height_px) {
+  return {1, height_px / kFold, width_px / kFold, DepthSlopes::kChannels};
+}
+
+Shape output_shape(int width_px, int height_px) {
+  return {1, height_px / kFold, width_px / kFold, FieldDecode::kChannels};
+}
+
+int threads_of(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const Bundle& bundle, int multiple_px,
+               const SessionSettings& settings) {
+  if (settings.threads != MAQ_THREADS_MEASURED) return settings.threads;
+  // Between what phones and what depth cameras give.
+  const int width = round_up(320, multiple_px), height = round_up(240, multiple_px);
+  const GraphSpec& graph = bundle.manifest.graphs.at(kGraph);
+  return measure_threads(runtime,
+                         {bundle.files.at(graph.file),
+                          graph,
+                          bundle.path_of(graph.file),
+                          width / kFold,
+                          height / kFold,
+                          input_shape(width, height),
+                          {output_shape(width, height)}},
+                         settings);
+}
+
+SessionSettings with_threads(SessionSettings settings, int threads) {
+  settings.threads = threads;
+  return settings;
+}
+
 }  // namespace
 
 EdgeNetwork::EdgeNetwork(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle,
                          const SessionSettings& settings)
     : bundle_(checked_edges(std::move(bundle))),
       eps_r_(bundle_.manifest.root.at("field").at("eps_r").number(1, kMaxEps_r)),
-      multiple_px_(bundle_.manifest.root.at("field").at("multiple_px").integer(kFold, 256)),
+      multiple_px_(checked_multiple_px(bundle_.manifest)),
+      threads_(threads_of(runtime, bundle_, multiple_px_, settings)),
       sessions_(std::move(runtime), bundle_.files.at(bundle_.manifest.graphs.at(kGraph).file),
-                bundle_.manifest.graphs.at(kGraph), bundle_.path_of(bundle_.manifest.graphs.at(kGraph).file), settings,
-                kSessionsKept) {
-  if (multiple_px_ % kFold != 0) {
-    bundle_.manifest.root.at("field").at("multiple_px").fail("is ", multiple_px_, ", but must be even");
-  }
-}
+                bundle_.manifest.graphs.at(kGraph), bundle_.path_of(bundle_.manifest.graphs.at(kGraph).file),
+                with_threads(settings, threads_), kSessionsKept) {}
 
 const float* EdgeNetwork::run(const float* slopes, int width_px, int height_px, const RunCancel& cancel) {
-  const int64_t width = width_px / kFold, height = height_px / kFold;
-  inputs_.assign(1, {slopes, {1, height, width, DepthSlopes::kChannels}});
-  shapes_.assign(1, {1, height, width, FieldDecode::kChannels});
-  Session& session = sessions_.at(int(width), int(height));
+  inputs_.assign(1, {slopes, input_shape(width_px, height_px)});
+  shapes_.assign(1, output_shape(width_px, height_px));
+  Session& session = sessions_.at(width_px / kFold, height_px / kFold);
   provider_ = session.provider();
   return session.run(inputs_, shapes_, &cancel)[0].data;
 }

@@ -13,11 +13,13 @@ class EdgeNetwork {
  public:
   // A session is made for each size when it is needed first. Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task,
   // and MAQ_ERROR_BAD_BUNDLE where the manifest lacks what is read, or the graph's input or output is not that of the
-  // format.
+  // format; what Session throws where threads are measured.
   EdgeNetwork(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const SessionSettings& settings);
   EdgeNetwork(const EdgeNetwork&) = delete;
   EdgeNetwork& operator=(const EdgeNetwork&) = delete;
 
+  // In use: where the settings have MAQ_THREADS_MEASURED, what was measured when this was made.
+  int threads() const { return threads_; }
   // Where distances are cut off, in footprints.
   float eps_r() const { return eps_r_; }
   // Sides of what it is run on are multiples of it.
@@ -35,6 +37,7 @@ class EdgeNetwork {
   Bundle bundle_;
   float eps_r_ = 0;
   int multiple_px_ = 0;
+  int threads_ = 0;
   SizedSessions sessions_;
   maq_provider provider_ = MAQ_PROVIDER_CPU;
   std::vector<TensorView> inputs_;

@@ -50,9 +50,10 @@ void check_input(const ImageView& depth, const Intrinsics& intrinsics) {
 
 Edges::Edges(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const EdgesSettings& settings)
     : skips_planes_(settings.skips_planes),
+      measures_threads_(settings.threads == MAQ_THREADS_MEASURED),
       network_(runtime, std::move(bundle), session_settings(*runtime, settings)),
       cancel_(runtime),
-      threads_(settings.threads) {}
+      threads_(network_.threads()) {}
 
 void Edges::run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result) {
   check_input(depth, intrinsics);
@@ -120,6 +121,8 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   }
   stats.decode_ms = float(stage.lap_ms());
   stats.provider = network_.provider();
+  stats.threads = network_.threads();
+  stats.is_threads_measured = measures_threads_;
   stats.total_ms = float(total.elapsed_ms());
 }
 

@@ -16,7 +16,7 @@ namespace maq {
 
 // As in maq_edges_config, whose comments say what they mean.
 struct EdgesSettings {
-  int threads = 1;
+  int threads = 1;  // or MAQ_THREADS_MEASURED
   bool spin = true;
   maq_provider provider = MAQ_PROVIDER_CPU;
   bool skips_planes = false;
@@ -33,6 +33,8 @@ struct EdgesStats {
   int64_t network_pixels = 0;  // that it was run on
   int64_t broken_pixels = 0;   // for which it gave no number
   maq_provider provider = MAQ_PROVIDER_CPU;
+  int threads = 1;
+  bool is_threads_measured = false;
 };
 
 struct EdgesResult {
@@ -58,13 +60,15 @@ class Edges {
   // Of a frame's own pixels, or of the depth that came with its picture: then `camera` may be that of the picture,
   // which shows the same view. Distortion is left out of account.
   void run(const Frame& frame, const maq_intrinsics& camera, EdgesResult& result);
+  // In use.
+  int threads() const { return network_.threads(); }
   // From any thread: ends the run that runs, or else the next.
   void cancel() noexcept { cancel_.cancel(); }
 
  private:
   void find_field(const ImageView& depth, EdgesResult& result);
 
-  bool skips_planes_;
+  bool skips_planes_, measures_threads_;
   EdgeNetwork network_;
   RunCancel cancel_;
   WorkerThreads threads_;

@@ -17,6 +17,7 @@ class LiveDensePose : public LiveModel {
   }
   void cancel() noexcept override { densepose_.cancel(); }
   void forget() override { densepose_.reset(); }
+  int threads() const override { return densepose_.threads(); }
   FrameEffort effort() const override { return {densepose_.key_frame_interval(), densepose_.long_side_px()}; }
   void set_effort(const FrameEffort& effort) override {
     densepose_.set_effort(effort.key_frame_interval, effort.long_side_px);
@@ -44,6 +45,7 @@ class LiveEdges : public LiveModel {
     output.has_curves = curves_.has_value();
   }
   void cancel() noexcept override { edges_.cancel(); }
+  int threads() const override { return edges_.threads(); }
 
  private:
   Edges edges_;
@@ -52,11 +54,6 @@ class LiveEdges : public LiveModel {
 };
 
 }  // namespace
-
-int PipelineModel::threads() const {
-  const auto* const edges = std::get_if<LiveEdgesSettings>(&settings);
-  return edges != nullptr ? edges->edges.threads : std::get<DensePoseSettings>(settings).threads;
-}
 
 const SurfaceGrid& LiveModel::surface() {
   throw Error(MAQ_ERROR_UNSUPPORTED, "The model of the pipeline has no body surface; dense pose has.");

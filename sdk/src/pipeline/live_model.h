@@ -24,8 +24,6 @@ struct LiveEdgesSettings {
 struct PipelineModel {
   std::function<Bundle()> read_bundle;  // on the thread
   std::variant<DensePoseSettings, LiveEdgesSettings> settings;
-
-  int threads() const;
 };
 
 // Of one of the models; the rest is as it was.
@@ -44,6 +42,7 @@ class LiveModel {
   virtual void run(const Frame& frame, const maq_intrinsics* camera, PipelineOutput& output) = 0;
   virtual void cancel() noexcept = 0;  // from any thread
   virtual void forget() {}             // the source before
+  virtual int threads() const = 0;     // in use
   // What it does for a frame; of a model that cannot do less, 0 and 0.
   virtual FrameEffort effort() const { return {0, 0}; }
   virtual void set_effort(const FrameEffort&) {}

@@ -335,7 +335,7 @@ struct Pipeline::State {
     const Manifest manifest = bundle.manifest;
     const auto loaded = make_live_model(settings.runtime(), std::move(bundle), now.model);
     settings.source.log.write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
-                              ") loaded, ", now.model.threads(), " thread(s)");
+                              ") loaded, ", loaded->threads(), " thread(s)");
     show_model(loaded);
     budget.reset();
     const FrameEffort full = loaded->effort();

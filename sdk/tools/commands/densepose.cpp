@@ -80,6 +80,8 @@ void print_frame(const DensePoseOptions& options, const std::string& stem, const
                                          {"crops", stats.crop_count},
                                          {"network", {stats.network_width_px, stats.network_height_px}},
                                          {"provider", name_of(stats.provider)},
+                                         {"threads", stats.threads},
+                                         {"threads_measured", stats.is_threads_measured != 0},
                                          {"ms",
                                           {{"preprocess", rounded_ms(double(stats.preprocess_ms))},
                                            {"trunk", rounded_ms(double(stats.trunk_ms))},

@@ -105,6 +105,8 @@ void print_frame(const EdgesOptions& options, const std::string& stem, const maq
                                  {"network_pixels", stats.network_pixel_count},
                                  {"broken_pixels", stats.broken_pixel_count},
                                  {"provider", name_of(stats.provider)},
+                                 {"threads", stats.threads},
+                                 {"threads_measured", stats.is_threads_measured != 0},
                                  {"ms",
                                   {{"depth", rounded_ms(double(stats.depth_ms))},
                                    {"skip", rounded_ms(double(stats.skip_ms))},

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cinttypes>
 #include <maquette/maquette.hpp>
 #include <memory>
@@ -71,7 +72,7 @@ int build(const BuildOptions& options) {
   of_edges.provider = provider_of(options.network);
   maquette::Edges edges(context, of_edges);
   maq_edges_fusion_config config = maquette::default_edges_fusion_config();
-  config.threads = options.network.threads;
+  config.threads = std::max(0, options.network.threads);  // which measures nothing
   config.cell_m = options.cell_m;
   config.min_views = options.min_views;
   config.progress_callback = show_progress;

@@ -235,7 +235,8 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
     config.bundle_path = nullptr;
     config.bundle_file_count = 1;
   });
-  expect_refused("threads", [](auto& config) { config.threads = -1; });
+  expect_refused("config.threads is -2, but must be 0 to 64, or MAQ_THREADS_MEASURED (-1).",
+                 [](auto& config) { config.threads = -2; });
   expect_refused("threads", [](auto& config) { config.threads = 65; });
   expect_refused("long_side_px", [](auto& config) { config.long_side_px = 31; });
   expect_refused("long_side_px", [](auto& config) { config.long_side_px = 2049; });
@@ -285,7 +286,7 @@ TEST_F(ApiArguments, FieldsOfAConfigInAConfigAreNamedWithBoth) {
     maq_pipeline* pipeline = nullptr;
     expect_error(maq_pipeline_create(context_, &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT, nullptr, text);
   };
-  expect_refused("config.densepose.threads is -1", [](auto& densepose, auto&) { densepose.threads = -1; });
+  expect_refused("config.densepose.threads is -2", [](auto& densepose, auto&) { densepose.threads = -2; });
   expect_refused("config.densepose.bundle_files is NULL",
                  [](auto& densepose, auto&) { densepose.bundle_file_count = 1; });
   expect_refused("config.source.queue_length is 0", [](auto&, auto& source) { source.queue_length = 0; });
@@ -378,7 +379,7 @@ static_assert(sizeof(void*) != 8 || sizeof(maq_frame_desc) == 72, "");
 static_assert(sizeof(maq_person) == 32 && offsetof(maq_person, id) == 24, "");
 static_assert(sizeof(maq_intrinsics) == 104, "");
 static_assert(sizeof(maq_pixel_format) == 4 && sizeof(maq_status) == 4 && sizeof(maq_densepose_detail) == 4, "");
-static_assert(sizeof(maq_densepose_stats) == 88 && offsetof(maq_densepose_stats, provider) == 84, "");
+static_assert(offsetof(maq_densepose_stats, provider) == 84 && offsetof(maq_densepose_stats, threads) == 88, "");
 static_assert(MAQ_END_OF_STREAM == 13 && MAQ_ERROR_UNWRITABLE == 18 && MAQ_SOURCE_RECONNECTED == 5 &&
                   MAQ_PIXEL_DEPTH16 == 7 && MAQ_PIXEL_DEPTH32F == 8 && MAQ_DENSEPOSE_PLANE_PERSON == 4,
               "");

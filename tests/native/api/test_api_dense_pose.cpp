@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <cstring>
 #include <filesystem>
@@ -66,6 +67,60 @@ TEST(ApiDensePose, AConfigFromBeforeProvidersIsTaken) {
   config.bundle_path = kBundle;
   const maquette::Context context;
   EXPECT_NO_THROW(maquette::DensePose(context, config));
+}
+
+maquette::DensePose with_threads(const maquette::Context& context, int threads) {
+  maq_densepose_config config = maquette::default_densepose_config();
+  config.bundle_path = kBundle;
+  config.threads = threads;
+  return maquette::DensePose(context, config);
+}
+
+TEST(ApiDensePose, MeasuredThreadsAreAFewAndGiveTheSame) {
+  const maquette::Context context;
+  const RedCell image;
+  const maquette::Frame frame(context, image.desc);
+  maquette::DensePose fixed = with_threads(context, 3), measured = with_threads(context, MAQ_THREADS_MEASURED);
+  const maquette::DensePoseResult expected = fixed.run(frame), found = measured.run(frame);
+  EXPECT_EQ(expected.stats().threads, 3);
+  EXPECT_EQ(expected.stats().is_threads_measured, 0);
+  EXPECT_GE(found.stats().threads, 1);
+  EXPECT_LE(found.stats().threads, 4);
+  EXPECT_EQ(found.stats().is_threads_measured, 1);
+  ASSERT_EQ(found.people().size(), expected.people().size());
+  EXPECT_EQ(found.people()[0].score, expected.people()[0].score);
+  for (const maq_densepose_plane plane :
+       {MAQ_DENSEPOSE_PLANE_PART, MAQ_DENSEPOSE_PLANE_U, MAQ_DENSEPOSE_PLANE_PERSON}) {
+    size_t stride = 0;
+    EXPECT_EQ(std::memcmp(found.plane(plane, &stride), expected.plane(plane, &stride), 320 * 256), 0);
+  }
+}
+
+TEST(ApiDensePose, OnOneCoreOneThreadIsMeasured) {
+  cpu_set_t all, one;
+  ASSERT_EQ(sched_getaffinity(0, sizeof all, &all), 0);
+  CPU_ZERO(&one);
+  CPU_SET(sched_getcpu(), &one);
+  ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+  const maquette::Context context;
+  maquette::DensePose densepose = with_threads(context, MAQ_THREADS_MEASURED);
+  ASSERT_EQ(sched_setaffinity(0, sizeof all, &all), 0);
+  const RedCell image;
+  const maq_densepose_stats stats = densepose.run(maquette::Frame(context, image.desc)).stats();
+  EXPECT_EQ(stats.threads, 1);
+  EXPECT_EQ(stats.is_threads_measured, 1);
+}
+
+TEST(ApiDensePose, StatsFromBeforeThreadsAreFilled) {
+  const maquette::Context context;
+  maquette::DensePose densepose = with_threads(context, 2);
+  const RedCell image;
+  const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
+  maq_densepose_stats stats{};
+  stats.struct_size = offsetof(maq_densepose_stats, threads);
+  ASSERT_EQ(maq_densepose_result_get_stats(result.get(), &stats), MAQ_OK);
+  EXPECT_EQ(stats.person_count, 1);
+  EXPECT_EQ(stats.threads, 0) << "behind the older struct";
 }
 
 TEST(ApiDensePose, ALogCallbackThatThrowsFailsNothing) {

@@ -128,6 +128,8 @@ TEST_F(ApiEdges, SettingsOutOfRangeAreRefused) {
     EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
   };
   maq_edges_config config = maquette::default_edges_config();
+  config.threads = -2;
+  refused(config, "config.threads is -2, but must be 0 to 64, or MAQ_THREADS_MEASURED (-1).");
   config.threads = 65;
   refused(config, "config.threads is 65");
   config = maquette::default_edges_config();
@@ -144,6 +146,26 @@ TEST_F(ApiEdges, SettingsOutOfRangeAreRefused) {
   refused(config, "config.struct_size is 4");
   EXPECT_EQ(maq_edges_config_init(nullptr, sizeof config), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_edges_config_init(&config, 4), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(ApiEdges, MeasuredThreadsAreAFewAndGiveTheSame) {
+  maq_edges_config config = maquette::default_edges_config();
+  config.bundle_path = kEdgesBundle;
+  config.threads = 3;
+  const maquette::EdgesResult expected = maquette::Edges(context, config).run(frame, image.intrinsics);
+  config.threads = MAQ_THREADS_MEASURED;
+  const maquette::EdgesResult found = maquette::Edges(context, config).run(frame, image.intrinsics);
+  EXPECT_EQ(expected.stats().threads, 3);
+  EXPECT_EQ(expected.stats().is_threads_measured, 0);
+  EXPECT_GE(found.stats().threads, 1);
+  EXPECT_LE(found.stats().threads, 4);
+  EXPECT_EQ(found.stats().is_threads_measured, 1);
+  EXPECT_EQ(std::memcmp(found.distance_r(), expected.distance_r(), image.pixels.size() * sizeof(float)), 0);
+  maq_edges_stats older{};
+  older.struct_size = offsetof(maq_edges_stats, threads);
+  ASSERT_EQ(maq_edges_result_get_stats(found.get(), &older), MAQ_OK);
+  EXPECT_EQ(older.network_pixel_count, 96 * 72);
+  EXPECT_EQ(older.threads, 0) << "behind the older struct";
 }
 
 TEST_F(ApiEdges, ABundleInMemoryGivesTheSame) {

@@ -122,6 +122,26 @@ TEST_F(CommandLine, PrintsJsonLinesWhenAsked) {
   EXPECT_GT(line["ms"]["total"].get<double>(), 0);
 }
 
+TEST_F(CommandLine, ThreadsAreANumberOrMeasured) {
+  const auto line_of = [&](const std::string& threads) {
+    const Outcome result = run("densepose two.png --out o --json --threads " + threads);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out);
+  };
+  const auto fixed = line_of("2"), measured = line_of("measured");
+  EXPECT_EQ(fixed["threads"], 2);
+  EXPECT_EQ(fixed["threads_measured"], false);
+  EXPECT_GE(measured["threads"], 1);
+  EXPECT_LE(measured["threads"], 4);
+  EXPECT_EQ(measured["threads_measured"], true);
+  for (const char* wrong : {"0", "65", "-1", "many", "measure"}) {
+    const Outcome result = run(std::string("densepose two.png --out other --threads ") + wrong);
+    EXPECT_NE(result.exit_code, 0) << wrong;
+    EXPECT_NE(result.err.find(std::string(wrong) + " is neither 1 to 64 nor \"measured\""), std::string::npos)
+        << result.err;
+  }
+}
+
 TEST_F(CommandLine, BadImagesAreOneSentenceAndNothingIsWritten) {
   expect_failure("densepose none.jpg --out o", "none.jpg does not exist; check the path");
   expect_failure("densepose image:none.jpg --out o", "none.jpg does not exist; check the path");
@@ -196,7 +216,8 @@ TEST_F(CommandLine, AFolderThatCannotBeWrittenIsNamed) {
 TEST_F(CommandLine, MeasuresItsSourcesAndWritesDownEverything) {
   write_clip("clip.avi", 4);
   const Outcome result =
-      run("bench image:two.png clip.avi --runs 12 --seconds 0 --warm-up 1 --provider xnnpack --json bench.json");
+      run("bench image:two.png clip.avi --runs 12 --seconds 0 --warm-up 1 --provider xnnpack --threads measured "
+          "--json bench.json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("image:two.png"), std::string::npos) << result.out;
   const auto document = nlohmann::json::parse(read_text(folder_.file("bench.json")));
@@ -208,8 +229,12 @@ TEST_F(CommandLine, MeasuresItsSourcesAndWritesDownEverything) {
   EXPECT_EQ(document.at("valid"), document.at("warnings").empty());
   ASSERT_EQ(document.at("cases").size(), 2U);
   EXPECT_EQ(document.at("settings").at("provider"), "xnnpack");
+  EXPECT_EQ(document.at("settings").at("threads"), "measured");
+  EXPECT_NE(result.out.find("Threads, measured: "), std::string::npos) << result.out;
   for (const auto& timed : document.at("cases")) {
     EXPECT_EQ(timed.at("provider"), "cpu") << "in use: ONNX Runtime for Linux has no other";
+    EXPECT_GE(timed.at("threads"), 1);
+    EXPECT_EQ(timed.at("threads_measured"), true);
     EXPECT_GE(timed.at("runs"), 12);  // the clip of four frames is begun anew
     EXPECT_EQ(timed.at("dropped_frames"), 0);
     EXPECT_GT(timed.at("cpu_ms"), 0);

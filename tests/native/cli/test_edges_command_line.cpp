@@ -70,7 +70,8 @@ TEST_F(EdgesCommandLine, ADepthPictureGivesItsFieldAndAnOverlay) {
 
 TEST_F(EdgesCommandLine, AStubGivesFramesAndAClip) {
   const Outcome result =
-      run("'stub:solids?scene=box&noise=stereo&size=160x120' --out o --overlay --max-frames 4 --every 2 --json");
+      run("'stub:solids?scene=box&noise=stereo&size=160x120' --out o --overlay --max-frames 4 --every 2 --json "
+          "--threads measured");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   std::istringstream lines(result.out);
   std::string line;
@@ -82,6 +83,8 @@ TEST_F(EdgesCommandLine, AStubGivesFramesAndAClip) {
   EXPECT_GT(frames[1]["known_pixels"], 1000);
   EXPECT_EQ(frames[1]["network_pixels"], 160 * 120);
   EXPECT_EQ(frames[1]["broken_pixels"], 0);
+  EXPECT_GE(frames[1]["threads"], 1);
+  EXPECT_EQ(frames[1]["threads_measured"], true);
   EXPECT_GE(frames[1]["ms"]["total"], frames[1]["ms"]["network"]);
   EXPECT_EQ(files("o").size(), 4u * 3 + 1);
   EXPECT_TRUE(files("o").count("stub_solids_overlay.mp4") + files("o").count("stub_solids_overlay.avi") == 1);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstring>
 #include <maquette/maquette.hpp>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -139,6 +140,38 @@ TEST_F(EdgesPipeline, ModelsTakeTurns) {
   const auto result = live.next(kLongEnoughNs);
   EXPECT_TRUE(result->edges);
   EXPECT_FALSE(result->curves);
+}
+
+TEST_F(EdgesPipeline, ThreadsThatWereMeasuredAreInTheLogAndTheStats) {
+  struct Lines {
+    std::mutex mutex;
+    std::string text;
+  } lines;
+  maq_context_config of_context;
+  ASSERT_EQ(maq_context_config_init(&of_context, sizeof of_context), MAQ_OK);
+  of_context.log_level = MAQ_LOG_INFO;
+  of_context.log_user_data = &lines;
+  of_context.log_callback = [](void* to, maq_log_level, const char* text) {
+    Lines& all = *static_cast<Lines*>(to);
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    all.text += std::string(text) + "\n";
+  };
+  const maquette::Context logged(of_context);
+  maq_edges_config edges = edges_config();
+  edges.threads = MAQ_THREADS_MEASURED;
+  maq_pipeline_config config = maquette::default_pipeline_config();
+  config.edges = &edges;
+  maquette::Pipeline live(logged, config);
+  live.set_source(kStub);
+  const auto result = live.next(kLongEnoughNs);
+  ASSERT_TRUE(result && result->edges);
+  const maq_edges_stats stats = result->edges->stats();
+  EXPECT_GE(stats.threads, 1);
+  EXPECT_LE(stats.threads, 4);
+  EXPECT_EQ(stats.is_threads_measured, 1);
+  const std::lock_guard<std::mutex> lock(lines.mutex);
+  EXPECT_NE(lines.text.find("loaded, " + std::to_string(stats.threads) + " thread(s)"), std::string::npos)
+      << lines.text;
 }
 
 TEST_F(EdgesPipeline, WrongArgumentsAreRefused) {

@@ -109,10 +109,25 @@ MAQ_NATIVE(jdoubleArray, statsOfResult)(JNIEnv* env, jclass, jlong result) {
     maq_densepose_stats s;
     s.struct_size = sizeof s;
     check(maq_densepose_result_get_stats(object<maq_densepose_result>(result), &s));
-    return maq_jni::doubles_of(
-        env, {s.preprocess_ms, s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms,
-              s.total_ms, double(s.network_width_px), double(s.network_height_px), double(s.proposal_count),
-              double(s.person_count), double(s.crop_count), double(s.dropped_box_count), double(s.body_pixel_count),
-              double(s.clamped_pixel_count), double(s.is_key_frame), double(s.provider)});
+    return maq_jni::doubles_of(env, {s.preprocess_ms,
+                                     s.trunk_ms,
+                                     s.proposals_ms,
+                                     s.box_head_ms,
+                                     s.dense_head_ms,
+                                     s.crops_ms,
+                                     s.decode_ms,
+                                     s.total_ms,
+                                     double(s.network_width_px),
+                                     double(s.network_height_px),
+                                     double(s.proposal_count),
+                                     double(s.person_count),
+                                     double(s.crop_count),
+                                     double(s.dropped_box_count),
+                                     double(s.body_pixel_count),
+                                     double(s.clamped_pixel_count),
+                                     double(s.is_key_frame),
+                                     double(s.provider),
+                                     double(s.threads),
+                                     double(s.is_threads_measured)});
   });
 }

@@ -39,8 +39,10 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * Zeros stand for the bundle's values, and [threads] 0 for the cores, at most 4.
+     * Zeros stand for the bundle's values.
      *
+     * @property threads 0: the large cores, at most 4; [THREADS_MEASURED]: as many of these as pay, measured while the
+     *   networks are made, which takes up to about half a second longer. [DensePoseResult.Stats.threads] tells.
      * @property scoreThreshold min score of a person; negative: the bundle's.
      * @property resultPoolSize results that the app may hold at once.
      * @property keyFrameInterval 1: people are looked for in each frame; N: in every N-th frame of a stream.
@@ -108,6 +110,9 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
     override fun close() = handle.close()
 
     companion object {
+        /** For [Config.threads]. */
+        const val THREADS_MEASURED = -1
+
         /** The name of a body part, 1 to 24; "background" for 0. */
         fun partName(part: Int): String = Native.partName(part)
 
@@ -158,6 +163,8 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
         val clampedPixels: Long,
         val isKeyFrame: Boolean,
         val provider: DensePose.Provider,
+        val threads: Int,
+        val isThreadsMeasured: Boolean,
     )
 
     val widthPx: Int
@@ -243,7 +250,7 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
             return Stats(
                 s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], width, height, proposals, found, crops,
                 counts[5].toInt(), counts[6], counts[7], counts[8] != 0L,
-                DensePose.Provider.entries[counts[9].toInt()],
+                DensePose.Provider.entries[counts[9].toInt()], counts[10].toInt(), counts[11] != 0L,
             )
         }
 

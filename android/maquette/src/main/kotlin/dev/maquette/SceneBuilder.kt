@@ -22,7 +22,7 @@ internal class Progress(private val progress: SceneProgress) {
 /**
  * How scenes are built. Lengths are in units of the scene.
  *
- * @property threads 0: the cores, at most 4.
+ * @property threads 0: the large cores, at most 4.
  * @property longSidePx larger photos are scaled down to this long side; 0: they are not scaled.
  * @property coefficientBits of the scene's descriptors: 8, 16, or 32 (floats, positions then too).
  * @property minVariation points whose descriptors vary less between photos (RMS, for colours of 0 to 1) are stored

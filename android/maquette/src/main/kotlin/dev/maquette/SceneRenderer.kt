@@ -34,7 +34,7 @@ class SceneRenderer internal constructor(
         )
 
     /**
-     * @property threads 0: the cores, at most 4.
+     * @property threads 0: the large cores, at most 4.
      * @property background a colour as of `android.graphics.Color`, that pictures are composed over by their alpha; its
      *   own alpha is not used. null: where no points are near they get the mean colour that the photos show there.
      * @property nearDepth points nearer to the camera, along its axis, are not drawn; units of the scene.

@@ -97,6 +97,19 @@ class PipelineTest : AndroidTest() {
     }
 
     @Test
+    fun threadsAreANumberOrMeasured() {
+        for (threads in listOf(2, DensePose.THREADS_MEASURED)) {
+            maquette.densePose(bundle, small.copy(threads = threads)).use { densePose ->
+                val stats = maquette.decode(TestFiles.photo.readBytes()).use { frame ->
+                    densePose.run(frame).use { it.stats }
+                }
+                assertEquals(threads == DensePose.THREADS_MEASURED, stats.isThreadsMeasured)
+                assertTrue(stats.threads == 2 || stats.isThreadsMeasured && stats.threads in 1..4)
+            }
+        }
+    }
+
+    @Test
     fun changesComeInOrderUntilItIsClosed() = runBlocking<Unit> {
         val pipeline = maquette.pipeline(bundle, Pipeline.Config(densePose = small))
         val isListening = CompletableDeferred<Unit>()

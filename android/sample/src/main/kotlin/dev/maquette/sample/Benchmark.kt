@@ -77,6 +77,8 @@ class TimedSource(private val maquette: Maquette, val uri: String) : AutoCloseab
             .put("size_px", JSONArray(listOf(size.first, size.second)))
             .put("network_px", JSONArray(listOf(s.networkWidthPx, s.networkHeightPx)))
             .put("provider", s.provider.name.lowercase())
+            .put("threads", s.threads)
+            .put("threads_measured", s.isThreadsMeasured)
             .put("runs", runs)
             .put("seconds", seconds)
             .put("people", people.toDouble() / runs)

@@ -44,7 +44,9 @@ void attempt(Candidate& candidate, int threads, Work&& work) {
 
 int choose_threads(const std::vector<double>& median_ms) {
   double shortest = std::numeric_limits<double>::infinity();
-  for (const double ms : median_ms) shortest = std::fmin(shortest, ms);
+  for (const double ms : median_ms) {
+    if (ms < shortest) shortest = ms;  // which no NaN is
+  }
   if (std::isinf(shortest)) return 1;
   const auto chosen =
       std::find_if(median_ms.begin(), median_ms.end(), [=](double ms) { return ms <= kWorthwhile * shortest; });

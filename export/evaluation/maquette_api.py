@@ -230,7 +230,8 @@ class DensePose:
     """One bundle, loaded by libmaquette. Use it in a `with` statement, or call close().
 
     bundle: folder with manifest.json. score_threshold: people below it are dropped (None: the bundle's).
-    threads: 0 lets the library choose, -1 lets it measure. library: libmaquette.so (default: MAQ_LIBRARY or the release build).
+    threads: 0 lets the library choose, -1 lets it measure.
+    library: libmaquette.so (default: MAQ_LIBRARY or the release build).
     settings: further fields of maq_densepose_config by their names.
     """
 

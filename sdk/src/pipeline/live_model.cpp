@@ -34,12 +34,13 @@ class LiveEdges : public LiveModel {
       : edges_(std::move(runtime), std::move(bundle), settings.edges), curves_(settings.curves) {}
 
   void run(const Frame& frame, const maq_intrinsics* camera, PipelineOutput& output) override {
-    if (camera == nullptr) {
+    if (camera == nullptr && depth_of(frame) != nullptr) {
       throw Error(MAQ_ERROR_UNSUPPORTED,
                   "The source does not say how its camera maps directions to pixels, from which lengths come; add the "
                   "horizontal field of view in degrees to its URI, or focal lengths in pixels: fov=60, fx=380&fy=380.");
     }
-    edges_.run(frame, *camera, output.edges);
+    // What has no depth is refused there, with or without a camera.
+    edges_.run(frame, camera == nullptr ? maq_intrinsics{} : *camera, output.edges);
     if (curves_) finder_.find(output.edges.field, *curves_, output.curves);
     output.is_edges = true;
     output.has_curves = curves_.has_value();

@@ -105,17 +105,19 @@ TEST(LiveEdges, StartsWithWhatItWasTold) {
 
 TEST(LiveEdges, ASourceWithoutDepthIsSaidInASentence) {
   EdgesRun edges;
-  edges.live.open("image:" MAQ_TEST_MEDIA "/photo.jpg?fov=60");
-  ASSERT_TRUE(wait_until([&] { return edges.live.status().has_failed; }));
-  const std::string photo = edges.live.status().problem;
-  EXPECT_NE(photo.find("depth"), std::string::npos) << photo;
+  const auto failure_of = [&](const std::string& uri) {
+    edges.live.open(uri);
+    EXPECT_TRUE(wait_until([&] {
+      const maquette::LiveStatus status = edges.live.status();
+      return status.uri == uri && status.has_failed;
+    }));
+    return edges.live.status().problem;
+  };
+  const std::string photo = failure_of("image:" MAQ_TEST_MEDIA "/photo.jpg");
+  EXPECT_NE(photo.find("without depth"), std::string::npos) << photo;
   EXPECT_EQ(photo.back(), '.');
-  edges.live.open("stub:pattern");
-  ASSERT_TRUE(wait_until([&] {
-    const maquette::LiveStatus status = edges.live.status();
-    return status.has_failed && status.problem != photo;
-  }));
-  EXPECT_NE(edges.live.status().problem.find("fov"), std::string::npos) << edges.live.status().problem;
+  const std::string unknown = failure_of("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001");
+  EXPECT_NE(unknown.find("field of view"), std::string::npos) << unknown;
   // A depth camera goes on from there.
   edges.live.open("stub:solids?frames=1");
   ASSERT_TRUE(wait_until([&] { return edges.seen().size() == 1; }));

@@ -115,7 +115,9 @@ TEST_F(EdgesPipeline, ACallbackGetsEachFrameAndMayKeepSome) {
 TEST_F(EdgesPipeline, ASourceWithoutDepthOrCalibrationFailsWithItsSentence) {
   maquette::Pipeline live = pipeline(true);
   live.set_source("stub:pattern?size=64x48");
-  EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("fov=60"), std::string::npos);
+  EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("without depth"), std::string::npos);
+  live.set_source("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001");
+  EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("does not say how its camera"), std::string::npos);
   live.set_source("image:" MAQ_TEST_MEDIA "/photo.jpg?fov=60");
   EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("without depth"), std::string::npos);
   live.set_source(kStub);

@@ -141,8 +141,8 @@ def test_without_a_source_solids_are_shown(tmp_path):
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (("--source", f"image:{ROOT}/tests/media/photo.jpg?fov=60"), "without depth"),
-        (("--source", "stub:pattern"), "fov"),
+        ((ROOT / "tests/media/photo.jpg",), "without depth"),
+        ((f"image:{ROOT}/tests/media/box_depth.png?depth_unit=0.001",), "field of view"),
         (("--source", "stub:solids?unplug@3"), "solids"),
         (("--edges-bundle", "missing-bundle"), "missing-bundle"),
         (("--layer", "x-ray"), "x-ray"),

@@ -22,9 +22,9 @@ VIEWS = ["camera", "parts", "contours", "mask", "boxes", "try-on"]
 PEOPLE = ("stub:people?count=2&seed=3", 99)
 CLIP = ("tests/media/clip.mp4", 24)
 ROOM = ("tests/media/room", 20)
-# With the pointer near a corner of a carton on the table.
-SOLIDS = ("stub:solids?scene=room&seed=2&size=640x480", 1)
-POINTER = ("--pointer", "260,126")
+# With the pointer near a corner of a carton.
+SOLIDS = ("stub:solids?scene=room&seed=2&size=640x480", 20)
+POINTER = ("--pointer", "581,402")
 
 
 def shown(source: str, frames: int, folder: Path, *options: str) -> np.ndarray:

@@ -1,4 +1,4 @@
-// Sharp feature curves of one depth frame, or of several: lines, circular arcs and cubic B-splines in camera coordinates,
+// Sharp feature curves of a depth frame, or of several: lines, circular arcs and cubic B-splines in camera coordinates,
 // or in those of the world; and the corners in which they meet.
 #pragma once
 

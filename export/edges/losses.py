@@ -1,7 +1,7 @@
 """What becomes small: the distance's error, its own idea of it, and the kind of edge.
 
-The paper's histogram loss (arXiv 2011.15081, section 4.3 of its code's description) stands beside L1 and L2 on one
-distance a pixel; docs/edges.md has the comparison.
+The paper's histogram loss (arXiv 2011.15081, section 4.3 of its code's description) stands beside L1, L2 and a mixture
+of both on one distance a pixel; docs/edges.md has the comparison.
 """
 
 from __future__ import annotations
@@ -12,18 +12,19 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from export.edges.config import EPS_R, KINDS
+from export.edges.config import EPS_R, KINDS, SHARP_R
 
-LOSSES = ("l1", "l2", "histogram")
+LOSSES = ("mixed", "l1", "l2", "histogram")
 DECODINGS = ("expectation", "median", "mode")
+NEAR_R = SHARP_R[-1]  # of an edge: pixels that say where it is
 LOG_SPREAD = (-7.0, 1.0)  # of the spread in EPS_R: 0.015 to 43 r
 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """near: pixels within 4 r of an edge count so many times more. spread, kind: against the distance's own term."""
+    """near: pixels within NEAR_R of an edge count so many times more. spread, kind: against the distance's own term."""
 
-    near: float = 1.0
+    near: float = 8.0
     spread: float = 0.02
     kind: float = 0.05
 
@@ -74,7 +75,8 @@ def decoded(planes: Tensor, bins: int, decoding: str = "expectation") -> tuple[T
 def field_terms(planes: Tensor, target: FieldTarget, bins: int, loss: str, weights: LossWeights) -> dict[str, Tensor]:
     """The loss's terms over pixels that count. planes: [N, P, H, W], float32."""
     counts = target.counts.float()
-    weight = counts * (1 + weights.near * (target.distance < 4))
+    near = target.distance < NEAR_R
+    weight = counts * (1 + weights.near * near)
     total = weight.sum().clamp_min(1)
     if bins:
         pixel = F.cross_entropy(planes[:, :bins], histogram_target(target.distance, bins), reduction="none")
@@ -83,7 +85,10 @@ def field_terms(planes: Tensor, target: FieldTarget, bins: int, loss: str, weigh
         error = planes[:, 0] - target.distance / EPS_R
         # Beyond EPS_R nothing is known: what is above 1 is right there.
         error = torch.where(target.distance >= EPS_R, error.clamp_max(0), error)
-        pixel = 8 * error**2 if loss == "l2" else error.abs()
+        pixel = error.abs() if loss == "l1" else 8 * error**2
+        if loss == "mixed":
+            # Beside an edge the median is sharp and the mean is not; farther away the mean makes the smaller RMSE.
+            pixel = torch.where(near, error.abs(), pixel)
         spread = planes[:, 1].clamp(*LOG_SPREAD)
         own = error.detach().abs() * torch.exp(-spread) + spread
         terms = {"distance": (pixel * weight).sum() / total}

@@ -55,9 +55,9 @@ class TrainingConfig:
     out: Path = Path(".data/runs/edges")
     init: Path | None = None
     size: str = "s"
-    loss: str = "l1"
+    loss: str = "mixed"
     bins: int = 16
-    near: float = 1.0
+    near: float = 8.0
     minutes: float = 120
     steps: int | None = None
     batch: int = 16

@@ -44,7 +44,7 @@ def test_a_network_answers_for_each_pixel(size):
     assert out.shape == (1, config.planes, 2 * config.multiple, config.multiple)
 
 
-@pytest.mark.parametrize(("loss", "bins"), [("l1", 0), ("l2", 0), ("histogram", 16)])
+@pytest.mark.parametrize(("loss", "bins"), [("l1", 0), ("l2", 0), ("mixed", 0), ("histogram", 16)])
 def test_each_loss_is_smallest_at_the_truth(loss, bins):
     distance = torch.tensor([[[0.25, 3.1, 9.0, 16.0]]])
     right = torch.zeros(1, (bins or 2) + 2, 1, 4)
@@ -57,6 +57,19 @@ def test_each_loss_is_smallest_at_the_truth(loss, bins):
     for _ in range(5):
         other = right + 0.3 * torch.randn_like(right)
         assert field_terms(other, target(distance), bins, loss, weights)["distance"] > smallest
+
+
+def test_the_mixed_loss_is_absolute_beside_an_edge_and_squared_far_from_it():
+    weights = LossWeights(near=0, spread=0, kind=0)
+
+    def loss_of(distance_r, error_r):
+        distance = torch.full((1, 1, 1), distance_r)
+        planes = torch.zeros(1, 4, 1, 1)
+        planes[:, 0] = (distance + error_r) / EPS_R
+        return field_terms(planes, target(distance), 0, "mixed", weights)["distance"].item()
+
+    assert loss_of(3.9, 4.0) == pytest.approx(2 * loss_of(3.9, 2.0))
+    assert loss_of(4.1, 4.0) == pytest.approx(4 * loss_of(4.1, 2.0))
 
 
 def test_what_is_beyond_reach_may_be_called_farther():

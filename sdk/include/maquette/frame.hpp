@@ -1,0 +1,77 @@
+// Frames, for C++17; a part of maquette.hpp.
+#ifndef MAQUETTE_FRAME_HPP_
+#define MAQUETTE_FRAME_HPP_
+
+#include <optional>
+#include <string>
+
+#include "maquette/context.hpp"
+#include "maquette/frame.h"
+
+namespace maquette {
+
+class Frame {
+ public:
+  // Takes over a frame of the C API.
+  explicit Frame(maq_frame* frame) : owner_(frame) {}
+
+  // Pixels of the app, which must stay until the frame is gone.
+  Frame(const Context& context, const maq_frame_desc& desc) {
+    maq_frame* made = nullptr;
+    check(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &made));
+    owner_.reset(made);
+  }
+
+  // An image file in memory, of `size_bytes` at `data`, which is not needed afterwards.
+  static Frame decode(const Context& context, const void* data, size_t size_bytes) {
+    maq_frame* made = nullptr;
+    check(maq_frame_decode(context.get(), data, size_bytes, &made));
+    return Frame(made);
+  }
+
+  // A copy of an image in planes of Y, U and V, which are not needed afterwards.
+  static Frame convert_yuv(const Context& context, const maq_yuv_image& image) {
+    maq_frame* made = nullptr;
+    check(maq_frame_convert_yuv(context.get(), &image, &made));
+    return Frame(made);
+  }
+
+  maq_frame* get() const { return owner_.get(); }
+
+  maq_frame_desc desc() const {
+    maq_frame_desc desc{};
+    desc.struct_size = sizeof desc;
+    check(maq_frame_get_desc(get(), &desc));
+    return desc;
+  }
+
+  // Nothing when the frame came without depth.
+  std::optional<maq_frame_desc> depth() const {
+    maq_frame_desc desc{};
+    desc.struct_size = sizeof desc;
+    const maq_status status = maq_frame_get_depth(get(), &desc);
+    if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
+    check(status);
+    return desc;
+  }
+
+  void copy_pixels(maq_pixel_format format, uint8_t* pixels, size_t stride_bytes, size_t size_bytes) const {
+    check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes));
+  }
+
+  // In BGR.
+  Frame resized(int32_t width_px, int32_t height_px) const {
+    maq_frame* made = nullptr;
+    check(maq_frame_resize(get(), width_px, height_px, &made));
+    return Frame(made);
+  }
+
+  void save(const std::string& path) const { check(maq_frame_save(get(), path.c_str())); }
+
+ private:
+  Owner<maq_frame, maq_frame_release> owner_;
+};
+
+}  // namespace maquette
+
+#endif  // MAQUETTE_FRAME_HPP_

@@ -1,0 +1,209 @@
+// Captures, scenes and their pictures, for C++17; a part of maquette.hpp.
+#ifndef MAQUETTE_SCENE_HPP_
+#define MAQUETTE_SCENE_HPP_
+
+#include <string>
+#include <utility>
+
+#include "maquette/capture.h"
+#include "maquette/frame.hpp"
+#include "maquette/scene.h"
+
+namespace maquette {
+
+inline maq_scene_build_config default_scene_build_config() {
+  maq_scene_build_config config;
+  check(maq_scene_build_config_init(&config, sizeof config));
+  return config;
+}
+
+inline maq_scene_renderer_config default_scene_renderer_config() {
+  maq_scene_renderer_config config;
+  check(maq_scene_renderer_config_init(&config, sizeof config));
+  return config;
+}
+
+class Capture {
+ public:
+  Capture(const Context& context, const std::string& folder) {
+    maq_capture* opened = nullptr;
+    check(maq_capture_open(context.get(), folder.c_str(), &opened));
+    owner_.reset(opened);
+  }
+
+  maq_capture* get() const { return owner_.get(); }
+
+  maq_capture_info info() const {
+    maq_capture_info info{};
+    info.struct_size = sizeof info;
+    check(maq_capture_get_info(get(), &info));
+    return info;
+  }
+
+  // Its texts are the capture's.
+  maq_capture_view view(uint32_t index) const {
+    maq_capture_view view{};
+    view.struct_size = sizeof view;
+    check(maq_capture_get_view(get(), index, &view));
+    return view;
+  }
+
+  // Its text is the capture's.
+  maq_capture_drop drop(uint32_t index) const {
+    maq_capture_drop drop{};
+    drop.struct_size = sizeof drop;
+    check(maq_capture_get_drop(get(), index, &drop));
+    return drop;
+  }
+
+  // With its camera.
+  std::pair<Frame, maq_pinhole_camera> load_depth(uint32_t index) const {
+    maq_frame* frame = nullptr;
+    maq_pinhole_camera camera{};
+    camera.struct_size = sizeof camera;
+    check(maq_capture_load_depth(get(), index, &camera, &frame));
+    return {Frame(frame), camera};
+  }
+
+  // BGR, undistorted.
+  Frame load_view(uint32_t index) const {
+    maq_frame* frame = nullptr;
+    check(maq_capture_load_view(get(), index, &frame));
+    return Frame(frame);
+  }
+
+ private:
+  Owner<maq_capture, maq_capture_close> owner_;
+};
+
+class Scene {
+ public:
+  // Takes over a scene of the C API.
+  explicit Scene(maq_scene* scene) : owner_(scene) {}
+
+  Scene(const Context& context, const std::string& path) {
+    maq_scene* opened = nullptr;
+    check(maq_scene_open(context.get(), path.c_str(), &opened));
+    owner_.reset(opened);
+  }
+
+  // A scene file in memory, which is copied.
+  Scene(const Context& context, const void* data, size_t size_bytes) {
+    maq_scene* opened = nullptr;
+    check(maq_scene_open_memory(context.get(), data, size_bytes, &opened));
+    owner_.reset(opened);
+  }
+
+  // `stats` may be null.
+  Scene(const Context& context, const maq_scene_build_config& config, const Capture& capture,
+        maq_scene_build_stats* stats = nullptr) {
+    if (stats != nullptr) stats->struct_size = sizeof *stats;
+    maq_scene* built = nullptr;
+    check(maq_scene_build(context.get(), &config, capture.get(), stats, &built));
+    owner_.reset(built);
+  }
+
+  maq_scene* get() const { return owner_.get(); }
+
+  void save(const std::string& path) const { check(maq_scene_save(get(), path.c_str())); }
+  void save_ply(const std::string& path) const { check(maq_scene_save_ply(get(), path.c_str())); }
+
+  maq_scene_info info() const {
+    maq_scene_info info{};
+    info.struct_size = sizeof info;
+    check(maq_scene_get_info(get(), &info));
+    return info;
+  }
+
+ private:
+  Owner<maq_scene, maq_scene_close> owner_;
+};
+
+class SceneBuilder {
+ public:
+  SceneBuilder(const Context& context, const maq_scene_build_config& config, const maq_point_cloud& cloud) {
+    maq_scene_builder* made = nullptr;
+    check(maq_scene_builder_create(context.get(), &config, &cloud, &made));
+    owner_.reset(made);
+  }
+
+  maq_scene_builder* get() const { return owner_.get(); }
+
+  // Returns how many points the photo saw.
+  uint64_t add_view(const Frame& photo, const maq_pinhole_camera& camera) {
+    uint64_t seen_point_count = 0;
+    check(maq_scene_builder_add_view(get(), photo.get(), &camera, &seen_point_count));
+    return seen_point_count;
+  }
+
+  void cancel() { check(maq_scene_builder_cancel(get())); }
+
+  maq_scene_build_stats stats() const {
+    maq_scene_build_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_scene_builder_get_stats(get(), &stats));
+    return stats;
+  }
+
+  Scene finish() {
+    maq_scene* scene = nullptr;
+    check(maq_scene_builder_finish(get(), &scene));
+    return Scene(scene);
+  }
+
+ private:
+  Owner<maq_scene_builder, maq_scene_builder_destroy> owner_;
+};
+
+class SceneImage {
+ public:
+  // Takes over an image of the C API.
+  explicit SceneImage(maq_scene_image* image) : owner_(image) {}
+
+  maq_scene_image* get() const { return owner_.get(); }
+
+  // Rows of *stride_bytes.
+  const void* plane(maq_scene_plane plane, size_t* stride_bytes) const {
+    const void* pixels = nullptr;
+    check(maq_scene_image_get_plane(get(), plane, &pixels, stride_bytes));
+    return pixels;
+  }
+
+  maq_scene_image_stats stats() const {
+    maq_scene_image_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_scene_image_get_stats(get(), &stats));
+    return stats;
+  }
+
+  void save(const std::string& path, bool with_alpha = false) const {
+    check(maq_scene_image_save(get(), path.c_str(), with_alpha ? 1 : 0));
+  }
+
+ private:
+  Owner<maq_scene_image, maq_scene_image_release> owner_;
+};
+
+class SceneRenderer {
+ public:
+  SceneRenderer(const Context& context, const maq_scene_renderer_config& config, const Scene& scene) {
+    maq_scene_renderer* made = nullptr;
+    check(maq_scene_renderer_create(context.get(), &config, scene.get(), &made));
+    owner_.reset(made);
+  }
+
+  maq_scene_renderer* get() const { return owner_.get(); }
+
+  SceneImage run(const maq_pinhole_camera& camera) {
+    maq_scene_image* image = nullptr;
+    check(maq_scene_renderer_run(get(), &camera, &image));
+    return SceneImage(image);
+  }
+
+ private:
+  Owner<maq_scene_renderer, maq_scene_renderer_destroy> owner_;
+};
+
+}  // namespace maquette
+
+#endif  // MAQUETTE_SCENE_HPP_

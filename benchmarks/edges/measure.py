@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.edges import carton, curves, pictures, planes, quality, speed
+from benchmarks.edges import carton, curves, fused, pictures, planes, quality, round_scans, speed
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -46,13 +46,8 @@ CURVE_FIGURES = (
     *(f"edges_fps_{scene}" for scene in speed.SCENES), *(f"edges_curves_{level}" for level in quality.LEVELS),
     "edges_box_mm_tof", "edges_box_mm_stereo", "edges_box_deviation_mm",
 )  # fmt: skip
-NOT_YET = {
-    "edges_curves_true": "the C API takes no fields",
-    **dict.fromkeys(("edges_fusion_s", "edges_fusion_memory_mb", "edges_fusion_rmse"),
-                    "fused views are measured by no part of this run"),
-    "edges_round_percent": "no scans of round things are among the sets",
-}  # fmt: skip
-FIGURES = (*FIELD_FIGURES, *CURVE_FIGURES, *carton.FIGURES, *NOT_YET)
+NOT_YET = {"edges_curves_true": "the C API takes no fields"}
+FIGURES = (*FIELD_FIGURES, *CURVE_FIGURES, *fused.FIGURES, *carton.FIGURES, round_scans.FIGURE, *NOT_YET)
 
 
 @dataclass(frozen=True)
@@ -148,13 +143,16 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
         of_solids = curves.measure_solids(test[:: max(1, len(test) // CURVE_VIEWS)], shipped, tuned)
         boxes = curves.measure_boxes(shipped, tuned, *amounts)
     of_scenes = curves.measure_scenes(given.bundle, threads, QUICK_FRAMES if quick else curves.SCENE_FRAMES)
+    of_fusion, why_no_fusion = fused.found_in(given.bundle, threads, quick, folder)
     of_carton, why_no_carton = carton.found_in(given.bundle)
+    of_round, why_no_round = round_scans.found_in(given.bundle, threads)
     fraction = others.now()
     sheet = pictures.write_sheet(errors.shown, folder)
     document = {
         "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
         "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "speed": rows,
-        "savings": savings, "curves": of_solids, "curves_of_scenes": of_scenes, "boxes": boxes, "carton": of_carton,
+        "savings": savings, "curves": of_solids, "curves_of_scenes": of_scenes, "boxes": boxes, "fusion": of_fusion,
+        "carton": of_carton, "round": of_round,
         "missing": {**networks.missing, **errors.missing, **programs_missing()},
         "sheet": sheet.name, "warnings": [],
     }  # fmt: skip
@@ -167,8 +165,11 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     figures |= speed.stream_cost(given.bundle, threads, folder)
     found, why = curves.figures_from(of_solids, of_scenes, boxes)
     figures |= found
-    figures |= carton.figures_from(of_carton)
+    figures |= fused.figures_from(of_fusion) | carton.figures_from(of_carton) | round_scans.figures_from(of_round)
     missing = NOT_YET | why | dict.fromkeys(carton.FIGURES, why_no_carton or "too little of the carton was found")
+    missing |= dict.fromkeys(fused.FIGURES, why_no_fusion or "no solid could be made") | {
+        round_scans.FIGURE: why_no_round
+    }
     if CAD_PARTS in sets:
         figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
     else:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
 from benchmarks.edges.pictures import front_of
 from benchmarks.edges.quality import LEVELS
+from benchmarks.edges.section_of_views import SAYS, carton_parts, fusion_parts, round_parts
 from benchmarks.edges.speed import SCENES
 
 COLUMNS = {"rmse_r": ("RMSE, r", 1, ".2f"), "rmse_near_r": ("near edges, r", 1, ".2f"), "q95_r": ("95 %, r", 1, ".1f"),
            "recall_1r": ("recall at r, %", 100, ".1f"), "fpr_1r": ("false, %", 100, ".2f"),
            "recall_4r": ("at 4 r, %", 100, ".1f"), "fpr_4r": ("false, %", 100, ".2f")}  # fmt: skip
-SAYS = {"clean": "exact depth", "tof": "time of flight", "stereo": "stereo (0.08 px)"}
 ANCHORS = [
     ["another data set, second-hand", "RMSE, r", "recall, %", "false, %"],
     ["DEF (78.6 M parameters), clean synthetic patches, at r", "0.56", "80.0", "0.02"],
@@ -54,7 +54,9 @@ def section(measured: dict) -> tuple[str, list]:
         "side of r).",
     ]
     parts += curve_parts(measured)
+    parts += fusion_parts(measured["fusion"])
     parts += carton_parts(measured["carton"])
+    parts += round_parts(measured["round"])
     return "Edges", parts
 
 
@@ -175,23 +177,4 @@ def curve_parts(measured: dict) -> list:
         boxes,
         "The largest box of a frame with the sides of the true carton, both by size; frames without a box have no "
         "error and are in the percentage alone.",
-    ]
-
-
-def carton_parts(found: dict | None) -> list:
-    if found is None:
-        return []
-    table = [["real carton, depth from 42 photos, fused: edge", "found of it, %", "off, px (median)"]]
-    for row in found["edges"]:
-        off = "" if row["median_px"] is None else f"{row['median_px']:.1f}"
-        table.append([row["edge"], f"{100 * row['part']:.0f}", off])
-    angles = "no angle" if found["angle_deg"] is None else (
-        f"{found['angles']} angles between found lines that meet, off 90 degrees by "
-        f"{found['median_angle_deg']:.1f} in the median and {found['angle_deg']:.1f} at most"
-    )  # fmt: skip
-    return [
-        table,
-        f"{found['found']} of 12 edges have a curve within 3 px along half of their length "
-        f"({found['curves']} curves in all); {angles}. A to D are the corners in front, clockwise from above on the "
-        "left, E to H those behind them. Corners were marked by hand in three photos; the photos show nine edges.",
     ]

@@ -23,8 +23,9 @@ from tqdm import tqdm
 from export.densepose.graphs import session
 from export.edges.config import EPS_R
 from export.edges.data import seen_by
-from export.edges.fusion import RULES, FieldView, Values, fused, paper_values_of, targets_of, values_of
+from export.edges.fusion import RULES, FieldView, Values, fused, paper_values_of, values_of
 from export.edges.graph_field import field_of_planes, slopes_of, spread_of_planes
+from export.edges.judged_pixels import STEP_PX, judged_pixels
 from export.solids.multiview import MultiView, PosedView, multiview
 from export.solids.recipe import RecipeError
 from export.solids.sensors import LEVELS
@@ -33,7 +34,6 @@ DAMAGED = "damaged truth"
 VIEWS = 12
 COUNTS = (1, 2, 4, 8, VIEWS)
 PAPER = "published: 8 samples within 6 r, minimum"
-STEP_PX = 4  # between the pixels that are judged
 
 
 def damaged(view: PosedView, rng: np.random.Generator) -> FieldView:
@@ -69,33 +69,26 @@ class NetworkView:
 
 def errors_of(solid: MultiView, views: Sequence[FieldView], with_paper: bool) -> Iterator[tuple[str, int, float]]:
     """(rule, number of views, RMSE in r), for each view as the target."""
-    part = np.s_[::STEP_PX, ::STEP_PX]
     for k, (view, posed) in enumerate(zip(views, solid.views, strict=True)):
-        targets = targets_of(view, STEP_PX)
-        known = view.depth[part] > 0
-        counts = posed.counts[part][known]
-        true = posed.distance_of_all[part][known].astype(np.float64)
-        own = view.distance[part][known]
-        if not counts.any():
+        pixels = judged_pixels(view, posed)
+        if not pixels.counts.any():
             continue
-        yield "one view, against what it sees", 1, _rmse(own - posed.distance[part][known], counts)
-        yield "one view", 1, _rmse(own - true, counts)
+        targets, true = pixels.targets, pixels.true
+        yield "one view, against what it sees", 1, pixels.rmse(pixels.own - pixels.true_own)
+        yield "one view", 1, pixels.rmse(pixels.own - true)
         order = [k, *(j for j in range(len(views)) if j != k)]
         values = values_of([views[j] for j in order], targets)
         # Its own view is copied: no neighbour may change that a pixel has been seen.
-        values.distance[0], values.spread[0] = own * targets.r_m, view.spread[part][known] * targets.r_m
+        spread = view.spread[::STEP_PX, ::STEP_PX][pixels.known]
+        values.distance[0], values.spread[0] = pixels.own * targets.r_m, spread * targets.r_m
         for count in COUNTS[1:]:
             some = Values(values.distance[:count], values.spread[:count])
             for rule in RULES:
-                yield rule, count, _rmse(fused(some, rule) / targets.r_m - true, counts)
+                yield rule, count, pixels.rmse(fused(some, rule) / targets.r_m - true)
         if with_paper:
             paper = paper_values_of([views[j] for j in order], targets)
             paper.distance[0] = values.distance[0]
-            yield PAPER, VIEWS, _rmse(fused(paper, "minimum") / targets.r_m - true, counts)
-
-
-def _rmse(error: np.ndarray, counts: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(error[counts] ** 2)))
+            yield PAPER, VIEWS, pixels.rmse(fused(paper, "minimum") / targets.r_m - true)
 
 
 def main() -> None:

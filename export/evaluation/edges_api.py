@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from ctypes import POINTER, byref, c_char_p, c_double, c_float, c_int32, c_int64, c_size_t, c_uint32
 from ctypes import c_void_p as Handle
 from dataclasses import dataclass
@@ -87,7 +88,7 @@ class _CurvesStats(ctypes.Structure):
     )
 
 
-class _Intrinsics(ctypes.Structure):
+class Intrinsics(ctypes.Structure):
     _fields_ = (
         ("width_px", c_int32),
         ("height_px", c_int32),
@@ -177,7 +178,7 @@ class Pinhole:
 _EDGES: Signatures = {
     "maq_edges_config_init": (POINTER(_Config), c_uint32),
     "maq_edges_create": (Handle, POINTER(_Config), POINTER(Handle)),
-    "maq_edges_run": (Handle, Handle, POINTER(_Intrinsics), POINTER(Handle)),
+    "maq_edges_run": (Handle, Handle, POINTER(Intrinsics), POINTER(Handle)),
     "maq_edges_result_get_plane": (Handle, c_int32, POINTER(Handle), POINTER(c_size_t)),
     "maq_edges_result_get_stats": (Handle, POINTER(_Stats)),
     "maq_edges_result_find_curves": (Handle, Handle, POINTER(Handle)),
@@ -187,7 +188,7 @@ _EDGES: Signatures = {
 }
 _SOURCES: Signatures = {
     "maq_source_create": (Handle, c_char_p, Handle, POINTER(Handle)),
-    "maq_source_get_intrinsics": (Handle, POINTER(_Intrinsics)),
+    "maq_source_get_intrinsics": (Handle, POINTER(Intrinsics)),
     "maq_source_acquire_frame": (Handle, c_int64, POINTER(Handle)),
     "maq_frame_get_desc": (Handle, POINTER(FrameDesc)),
 }
@@ -198,17 +199,19 @@ class Edges:
 
     bundle: folder with manifest.json. threads: 0 lets the library choose. library: libmaquette.so (default: MAQ_LIBRARY
     or the release build). settings: further fields of maq_edges_config by their names. Raises MaquetteError.
+
+    `library` and `result_of` are for wrappers of what the C API makes of results.
     """
 
     def __init__(self, bundle: Path, threads: int = 0, library: Path | None = None, **settings: int) -> None:
         released = ("maq_edges_destroy", "maq_edges_result_release", "maq_edges_curves_release")
-        self._library = Library(library, _EDGES, released)
+        self.library = Library(library, _EDGES, released)
         for name in ("maq_edges_curves_get_curve_count", "maq_edges_curves_get_box_count"):
-            count = getattr(self._library.functions, name)
+            count = getattr(self.library.functions, name)
             count.argtypes, count.restype = (Handle,), c_uint32
         self._edges = Handle()
-        config = self._library.filled(_Config, {"bundle_path": os.fsencode(bundle), "threads": threads, **settings})
-        self._library.call("maq_edges_create", self._library.context, byref(config), byref(self._edges))
+        config = self.library.filled(_Config, {"bundle_path": os.fsencode(bundle), "threads": threads, **settings})
+        self.library.call("maq_edges_create", self.library.context, byref(config), byref(self._edges))
 
     def __enter__(self) -> Edges:
         return self
@@ -217,57 +220,69 @@ class Edges:
         self.close()
 
     def close(self) -> None:
-        self._library.free("maq_edges_destroy", self._edges)
-        self._library.close()
+        self.library.free("maq_edges_destroy", self._edges)
+        self.library.close()
         self._edges = Handle()
 
     def run(self, depth: np.ndarray, camera: Pinhole, curves: bool = False) -> EdgesResult:
         """depth: float32 [H, W] in metres, 0 where unknown. curves: find them and boxes too. Raises MaquetteError."""
+        with self.result_of(depth, camera) as result:
+            return self.copied(result, depth.shape, self._find_curves(result) if curves else None)
+
+    @contextmanager
+    def result_of(self, depth: np.ndarray, camera: Pinhole) -> Iterator[Handle]:
+        """The library's own result of a frame as that of `run`, which is released at the end. Raises MaquetteError."""
         if depth.dtype != np.float32 or depth.ndim != 2:
             raise ValueError(f"depth is float32 [H, W], not {depth.dtype} {depth.shape}")
         depth, result = np.ascontiguousarray(depth), Handle()
         height, width = depth.shape
-        given = _Intrinsics(width, height, camera.focal_px, camera.focal_px, camera.cx_px, camera.cy_px)
-        with self._library.frame(depth, PIXEL_DEPTH32F) as frame:
+        given = Intrinsics(width, height, camera.focal_px, camera.focal_px, camera.cx_px, camera.cy_px)
+        with self.library.frame(depth, PIXEL_DEPTH32F) as frame:
             try:
-                self._library.call("maq_edges_run", self._edges, frame, byref(given), byref(result))
-                return self._copy(result, depth.shape, self._find_curves(result) if curves else None)
+                self.library.call("maq_edges_run", self._edges, frame, byref(given), byref(result))
+                yield result
             finally:
-                self._library.free("maq_edges_result_release", result)
+                self.library.free("maq_edges_result_release", result)
 
     def _find_curves(self, result: Handle) -> Curves:
-        library, found = self._library, Handle()
-        library.call("maq_edges_result_find_curves", result, None, byref(found))
-        try:
-            types, kinds, points, boxes = [], [], [], []
-            curve, box = _Curve(struct_size=ctypes.sizeof(_Curve)), _Box(struct_size=ctypes.sizeof(_Box))
-            for k in range(library.functions.maq_edges_curves_get_curve_count(found)):
-                library.call("maq_edges_curves_get_curve", found, k, byref(curve))
-                types.append(curve.type)
-                kinds.append(curve.kind)
-                points.append(np.ctypeslib.as_array(curve.points_m, (curve.point_count, 3)).copy())
-            for k in range(library.functions.maq_edges_curves_get_box_count(found)):
-                library.call("maq_edges_curves_get_box", found, k, byref(box))
-                boxes.append(tuple(box.size_m))
-            stats = _CurvesStats(struct_size=ctypes.sizeof(_CurvesStats))
-            library.call("maq_edges_curves_get_stats", found, byref(stats))
-            return Curves(types, kinds, points, boxes, stats.curves_ms, stats.boxes_ms)
-        finally:
-            library.free("maq_edges_curves_release", found)
+        found = Handle()
+        self.library.call("maq_edges_result_find_curves", result, None, byref(found))
+        return curves_of(self.library, found)
 
-    def _copy(self, result: Handle, shape: tuple[int, int], curves: Curves | None) -> EdgesResult:
+    def copied(self, result: Handle, shape: tuple[int, int], curves: Curves | None = None) -> EdgesResult:
+        """What the library's result of a frame [H, W] holds."""
         planes = ((PLANE_DISTANCE, np.float32), (PLANE_SPREAD, np.float32), (PLANE_KIND, np.uint8))
-        copied = [self._library.plane("maq_edges_result_get_plane", result, n, shape, kind) for n, kind in planes]
+        copied = [self.library.plane("maq_edges_result_get_plane", result, n, shape, kind) for n, kind in planes]
         stats = _Stats(struct_size=ctypes.sizeof(_Stats))
-        self._library.call("maq_edges_result_get_stats", result, byref(stats))
+        self.library.call("maq_edges_result_get_stats", result, byref(stats))
         return EdgesResult(*copied, values_of(stats, EdgesStats), curves)
+
+
+def curves_of(library: Library, found: Handle) -> Curves:
+    """What a handle of curves holds, which is released."""
+    try:
+        types, kinds, points, boxes = [], [], [], []
+        curve, box = _Curve(struct_size=ctypes.sizeof(_Curve)), _Box(struct_size=ctypes.sizeof(_Box))
+        for k in range(library.functions.maq_edges_curves_get_curve_count(found)):
+            library.call("maq_edges_curves_get_curve", found, k, byref(curve))
+            types.append(curve.type)
+            kinds.append(curve.kind)
+            points.append(np.ctypeslib.as_array(curve.points_m, (curve.point_count, 3)).copy())
+        for k in range(library.functions.maq_edges_curves_get_box_count(found)):
+            library.call("maq_edges_curves_get_box", found, k, byref(box))
+            boxes.append(tuple(box.size_m))
+        stats = _CurvesStats(struct_size=ctypes.sizeof(_CurvesStats))
+        library.call("maq_edges_curves_get_stats", found, byref(stats))
+        return Curves(types, kinds, points, boxes, stats.curves_ms, stats.boxes_ms)
+    finally:
+        library.free("maq_edges_curves_release", found)
 
 
 def depth_frames(uri: str, count: int, library: Path | None = None) -> Iterator[tuple[np.ndarray, Pinhole]]:
     """The first frames of a source of MAQ_PIXEL_DEPTH32F, such as stub:solids: depth float32 [H, W] in metres, 0 where
     it is unknown, and the camera. Raises MaquetteError."""
     opened = Library(library, _SOURCES, ("maq_source_destroy",))
-    source, frame, intrinsics = Handle(), Handle(), _Intrinsics()
+    source, frame, intrinsics = Handle(), Handle(), Intrinsics()
     try:
         opened.call("maq_source_create", opened.context, uri.encode(), None, byref(source))
         opened.call("maq_source_get_intrinsics", source, byref(intrinsics))

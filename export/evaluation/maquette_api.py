@@ -162,16 +162,20 @@ class Library:
         if not path.exists():
             raise MaquetteError(f"{path} is not there. Build the SDK (make build), or set MAQ_LIBRARY.")
         self.functions = ctypes.CDLL(str(path.resolve()))
-        for name, arguments in {**_SHARED, **functions}.items():
-            function = getattr(self.functions, name)
-            function.argtypes, function.restype = arguments, c_int32
-        for name in ("maq_context_destroy", "maq_frame_release", *released):
-            function = getattr(self.functions, name)
-            function.argtypes, function.restype = (Handle,), None
+        self.declare({**_SHARED, **functions}, ("maq_context_destroy", "maq_frame_release", *released))
         self.functions.maq_last_error.argtypes, self.functions.maq_last_error.restype = (Handle,), c_char_p
         name_of = self.functions.maq_status_get_name
         name_of.argtypes, name_of.restype = (c_int32,), c_char_p
         self.call("maq_context_create", HEADER_VERSION, None, byref(self.context))
+
+    def declare(self, functions: Signatures, released: Sequence[str]) -> None:
+        """Further functions, as of the constructor."""
+        for name, arguments in functions.items():
+            function = getattr(self.functions, name)
+            function.argtypes, function.restype = arguments, c_int32
+        for name in released:
+            function = getattr(self.functions, name)
+            function.argtypes, function.restype = (Handle,), None
 
     def close(self) -> None:
         self.functions.maq_context_destroy(self.context)

@@ -1,0 +1,151 @@
+"""Edges fused over views of solids, beside one view: error, time and memory.
+
+Solids are of the split `val`, as in export.edges.compare_fusion, which compares rules of fusion in float64; here it is
+the library that fuses, and its points are judged.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+from tqdm import tqdm
+
+from benchmarks.edges.fusion_api import Fusion, FusionInfo
+from benchmarks.edges.fusion_memory import in_child
+from benchmarks.edges.quality import LEVELS
+from export.edges.config import EPS_R
+from export.edges.data import seen_by
+from export.edges.fusion import FieldView
+from export.edges.judged_pixels import JudgedPixels, judged_pixels
+from export.evaluation.edges_api import Edges, EdgesResult
+from export.solids import sensors
+
+if TYPE_CHECKING:
+    from export.solids.multiview import MultiView
+
+FIGURES = ("edges_fusion_s", "edges_fusion_memory_mb", "edges_fusion_rmse")
+SOLIDS, QUICK_SOLIDS = 6, 2
+VIEWS, TIMED_VIEWS = 12, 24
+TIMED_LEVEL = "tof"
+LARGE_PX, MANY = (640, 480), 1_000_000  # views for the measurement of memory, and points
+NEAR_CELLS = 2.0  # from a pixel's place to the point that it became part of, at most
+INSTALL = "scripts/make-venv.sh dev,solids"
+
+
+def distances_at(pixels: JudgedPixels, points: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Fused distances [N] in r of the pixels, those of the nearest of POINT, and how far these say distances [N]: as
+    far as the view that was nearest to a point, which may be less than EPS_R of this one's. NaN where no point is near:
+    it has been left out."""
+    if not len(points):
+        return np.full((2, len(pixels.own)), np.nan)
+    metres, nearest = cKDTree(points["point_m"]).query(pixels.targets.point)
+    distance, r_m = (points[key][nearest] / pixels.targets.r_m for key in ("distance_m", "r_m"))
+    reach = np.where(metres <= NEAR_CELLS * cell_m, np.minimum(EPS_R * r_m, EPS_R), np.nan)
+    return np.minimum(distance, reach), reach
+
+
+def errors_of(
+    solid: MultiView, depths: Sequence[np.ndarray], results: Sequence[EdgesResult], points: np.ndarray, cell_m: float
+) -> list[dict[str, float]]:
+    """By view: RMSE in r of the view alone and of the fused points, against the nearest sharp curve that any view sees:
+    over the pixels that have a point, all distances cut where the point's end. known: of the pixels that count, the
+    fraction that have one."""
+    rows = []
+    for posed, depth, result in zip(solid.views, depths, results, strict=True):
+        view = FieldView(posed.camera, *(p.astype(np.float64) for p in (depth, result.distance, result.spread)))
+        pixels = judged_pixels(view, posed)
+        fused, reach = distances_at(pixels, points, cell_m)
+        known, true = ~np.isnan(fused), np.minimum(pixels.true, reach)
+        if (pixels.counts & known).any():
+            rows.append({"one_r": pixels.rmse(np.minimum(pixels.own, reach) - true, known),
+                         "fused_r": pixels.rmse(fused - true, known),
+                         "known": float(known[pixels.counts].mean())})  # fmt: skip
+    return rows
+
+
+def fused_views(
+    solid: MultiView, level: str, seed: int, edges: Edges, threads: int
+) -> tuple[list[np.ndarray], list[EdgesResult], np.ndarray, FusionInfo, float]:
+    """What the sensor of a level reports, what is found in that, the points, what the fusion says, and its seconds."""
+    depths, results = [], []
+    rng = np.random.default_rng([24, seed, len(level)])  # as in export.edges.compare_fusion
+    with Fusion(edges, threads=max(threads, 0)) as fusion:
+        for view in solid.views:
+            depths.append(seen_by(sensors.LEVELS[level], view.depth, view.camera.fx_px, rng))
+            results.append(fusion.add_view(depths[-1], view.camera))
+        fusion.finish()
+        return depths, results, fusion.points(), fusion.info, fusion.seconds
+
+
+def measure(bundle: Path, threads: int, quick: bool, folder: Path) -> dict:
+    """errors: by level, means over views of all solids. times: by solid. memory: of the first solid that there is, in
+    LARGE_PX. Raises ImportError without OpenCascade and Embree, CalledProcessError where the child process fails."""
+    from export.solids.multiview import multiview
+    from export.solids.recipe import RecipeError
+
+    rows: dict[str, list[dict]] = {level: [] for level in LEVELS}
+    times, memory, missing = [], None, []
+    with Edges(bundle, threads) as edges:
+        for seed in tqdm(range(QUICK_SOLIDS if quick else SOLIDS), desc="edges: fusion", unit="solid", disable=None):
+            try:
+                solid, timed = (multiview("val", seed, count) for count in (VIEWS, TIMED_VIEWS))
+                large = None if memory else multiview("val", seed, TIMED_VIEWS, LARGE_PX)
+            except RecipeError as error:
+                missing.append(f"val {seed}: {error}")
+                continue
+            for level in LEVELS:
+                depths, results, points, info, _ = fused_views(solid, level, seed, edges, threads)
+                rows[level] += errors_of(solid, depths, results, points, info.cell_m)
+            *_, info, seconds = fused_views(timed, TIMED_LEVEL, seed, edges, threads)
+            times.append({"solid": f"{timed.family} {seed}", "points": int(info.point_count), "s": seconds})
+            if large:
+                memory = memory_of(large, bundle, threads, folder)
+    return {"errors": summed(rows), "times": times, "memory": memory, "missing": missing}
+
+
+def memory_of(solid: MultiView, bundle: Path, threads: int, folder: Path) -> dict:
+    """Of cells so wide that there are about MANY points."""
+    depths, cameras = [view.depth for view in solid.views], [view.camera for view in solid.views]
+    usual = in_child(depths, cameras, bundle, threads, folder)
+    return in_child(depths, cameras, bundle, threads, folder, usual["cell_m"] * (usual["points"] / MANY) ** 0.5)
+
+
+def summed(rows: Mapping[str, Sequence[Mapping[str, float]]]) -> list[dict]:
+    """Means by level, and the one of fused views by that of one."""
+    found = []
+    for level, of_level in rows.items():
+        if of_level:
+            means = {key: float(np.mean([row[key] for row in of_level])) for key in of_level[0]}
+            found.append({"level": level, "views": len(of_level), **means, "ratio": means["fused_r"] / means["one_r"]})
+    return found
+
+
+def found_in(bundle: Path, threads: int, quick: bool, folder: Path) -> tuple[dict | None, str]:
+    """What `measure` says, or None and why it cannot be measured."""
+    try:
+        return measure(bundle, threads, quick, folder), ""
+    except ImportError as error:
+        return None, f"{error.name} is not installed: {INSTALL}"
+    except subprocess.CalledProcessError as error:
+        return None, error.stderr.strip().splitlines()[-1]
+
+
+def figures_from(found: Mapping | None) -> dict[str, float]:
+    """Those of FIGURES that are known: the seconds of the median solid, megabytes of MANY points in proportion to those
+    that there were, and the ratio of the level that gains the least."""
+    if found is None:
+        return {}
+    figures = {}
+    if found["times"]:
+        figures["edges_fusion_s"] = statistics.median(row["s"] for row in found["times"])
+    if found["memory"] and found["memory"]["points"]:
+        figures["edges_fusion_memory_mb"] = found["memory"]["memory_mb"] * MANY / found["memory"]["points"]
+    if found["errors"]:
+        figures["edges_fusion_rmse"] = max(row["ratio"] for row in found["errors"])
+    return figures

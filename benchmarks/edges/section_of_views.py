@@ -1,0 +1,68 @@
+"""The parts of the report on edges that tell of fused views, of the real carton and of real scans."""
+
+from __future__ import annotations
+
+import statistics
+
+from benchmarks.edges import fused
+
+SAYS = {"clean": "exact depth", "tof": "time of flight", "stereo": "stereo (0.08 px)"}
+
+
+def carton_parts(found: dict | None) -> list:
+    if found is None:
+        return []
+    table = [["real carton, depth from 42 photos, fused: edge", "found of it, %", "off, px (median)"]]
+    for row in found["edges"]:
+        off = "" if row["median_px"] is None else f"{row['median_px']:.1f}"
+        table.append([row["edge"], f"{100 * row['part']:.0f}", off])
+    angles = "no angle" if found["angle_deg"] is None else (
+        f"{found['angles']} angles between found lines that meet, off 90 degrees by "
+        f"{found['median_angle_deg']:.1f} in the median and {found['angle_deg']:.1f} at most"
+    )  # fmt: skip
+    return [
+        table,
+        f"{found['found']} of 12 edges have a curve within 3 px along half of their length "
+        f"({found['curves']} curves in all); {angles}. A to D are the corners in front, clockwise from above on the "
+        "left, E to H those behind them. Corners were marked by hand in three photos; the photos show nine edges.",
+    ]
+
+
+def fusion_parts(found: dict | None) -> list:
+    if found is None:
+        return []
+    errors = [["fused views, 320 x 240", "one view, RMSE, r", f"{fused.VIEWS} fused, r", "by it"]]
+    for row in found["errors"]:
+        errors.append([SAYS[row["level"]], f"{row['one_r']:.2f}", f"{row['fused_r']:.2f}", f"{row['ratio']:.2f}"])
+    seconds = [row["s"] for row in found["times"]]
+    points = [row["points"] for row in found["times"]]
+    says = [
+        f"Pixels of {len(found['times'])} solids of `val`, each seen from {fused.VIEWS} places, against the nearest "
+        "sharp curve that any of the views sees; a fused point stands for the pixels that it was made of, and all "
+        "distances are cut where its own ends, 16 footprints of the view that was nearest to it."
+    ]
+    if seconds:
+        says.append(
+            f"Fusing {fused.TIMED_VIEWS} views, time of flight, took {statistics.median(seconds):.1f} s in the median "
+            f"({min(seconds):.1f} to {max(seconds):.1f}), {min(points):,} to {max(points):,} points: curves of each "
+            "view, points, and curves in the world, without the network."
+        )
+    if found["memory"]:
+        says.append(
+            f"{found['memory']['points']:,} points of {fused.TIMED_VIEWS} views of 640 x 480 added "
+            f"{found['memory']['memory_mb']:.0f} MB to the peak of a process whose network had run before."
+        )
+    if found["missing"]:
+        says.append(f"Left out: {'; '.join(found['missing'])}.")
+    return [errors, " ".join(says)]
+
+
+def round_parts(found: dict | None) -> list:
+    if found is None:
+        return []
+    table = [["scans of round toys", "pixels", "within r of an edge, %", "within 4 r, %"]]
+    for row in [*found["scans"], {"name": "both", **found}]:
+        table.append(
+            [row["name"], f"{row['pixels']:,}", f"{100 * row['under_1r']:.2f}", f"{100 * row['under_4r']:.1f}"]
+        )
+    return [table, "Real scans without an edge, 17 px and more from their borders: what is found there is wrong."]

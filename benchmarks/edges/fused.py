@@ -71,8 +71,9 @@ def errors_of(
 
 def fused_views(
     solid: MultiView, level: str, seed: int, edges: Edges, threads: int
-) -> tuple[list[np.ndarray], list[EdgesResult], np.ndarray, FusionInfo, float]:
-    """What the sensor of a level reports, what is found in that, the points, what the fusion says, and its seconds."""
+) -> tuple[list[np.ndarray], list[EdgesResult], np.ndarray, FusionInfo, dict[str, float]]:
+    """What the sensor of a level reports, what is found in that, the points, what the fusion says, and its seconds: `s`
+    wall-clock, `cpu_s` of all threads."""
     depths, results = [], []
     rng = np.random.default_rng([24, seed, len(level)])  # as in export.edges.compare_fusion
     with Fusion(edges, threads=max(threads, 0)) as fusion:
@@ -80,7 +81,7 @@ def fused_views(
             depths.append(seen_by(sensors.LEVELS[level], view.depth, view.camera.fx_px, rng))
             results.append(fusion.add_view(depths[-1], view.camera))
         fusion.finish()
-        return depths, results, fusion.points(), fusion.info, fusion.seconds
+        return depths, results, fusion.points(), fusion.info, {"s": fusion.seconds, "cpu_s": fusion.cpu_seconds}
 
 
 def measure(bundle: Path, threads: int, quick: bool, folder: Path) -> dict:
@@ -103,7 +104,7 @@ def measure(bundle: Path, threads: int, quick: bool, folder: Path) -> dict:
                 depths, results, points, info, _ = fused_views(solid, level, seed, edges, threads)
                 rows[level] += errors_of(solid, depths, results, points, info.cell_m)
             *_, info, seconds = fused_views(timed, TIMED_LEVEL, seed, edges, threads)
-            times.append({"solid": f"{timed.family} {seed}", "points": int(info.point_count), "s": seconds})
+            times.append({"solid": f"{timed.family} {seed}", "points": int(info.point_count), **seconds})
             if large:
                 memory = memory_of(large, bundle, threads, folder)
     return {"errors": summed(rows), "times": times, "memory": memory, "missing": missing}

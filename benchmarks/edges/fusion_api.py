@@ -72,11 +72,13 @@ class Fusion:
     """Views of one thing, found by `edges`, which must outlive it. Use it in a `with` statement, or call close().
 
     settings: fields of maq_edges_fusion_config by their names. seconds: what add_view, finish and find_curves of the
-    library have taken, wall-clock, without the network. Raises MaquetteError, as all methods do.
+    library have taken, wall-clock, without the network; cpu_seconds: of all threads of the process in that time. Raises
+    MaquetteError, as all methods do.
     """
 
     def __init__(self, edges: Edges, **settings: float) -> None:
-        self._edges, self._library, self._fusion, self.seconds = edges, edges.library, Handle(), 0.0
+        self._edges, self._library, self._fusion = edges, edges.library, Handle()
+        self.seconds = self.cpu_seconds = 0.0
         self._library.declare(_FUSION, ("maq_edges_fusion_destroy",))
         config = self._library.filled(_Config, settings)
         self._library.call("maq_edges_fusion_create", self._library.context, byref(config), byref(self._fusion))
@@ -120,6 +122,7 @@ class Fusion:
         return copied
 
     def _timed(self, function: str, *arguments: object) -> None:
-        start = time.perf_counter()
+        start, cpu_start = time.perf_counter(), time.process_time()
         self._library.call(function, self._fusion, *arguments)
         self.seconds += time.perf_counter() - start
+        self.cpu_seconds += time.process_time() - cpu_start

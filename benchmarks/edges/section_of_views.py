@@ -34,8 +34,7 @@ def fusion_parts(found: dict | None) -> list:
     errors = [["fused views, 320 x 240", "one view, RMSE, r", f"{fused.VIEWS} fused, r", "by it"]]
     for row in found["errors"]:
         errors.append([SAYS[row["level"]], f"{row['one_r']:.2f}", f"{row['fused_r']:.2f}", f"{row['ratio']:.2f}"])
-    seconds = [row["s"] for row in found["times"]]
-    points = [row["points"] for row in found["times"]]
+    seconds, cpu_seconds, points = ([row[key] for row in found["times"]] for key in ("s", "cpu_s", "points"))
     says = [
         f"Pixels of {len(found['times'])} solids of `val`, each seen from {fused.VIEWS} places, against the nearest "
         "sharp curve that any of the views sees; a fused point stands for the pixels that it was made of, and all "
@@ -44,8 +43,9 @@ def fusion_parts(found: dict | None) -> list:
     if seconds:
         says.append(
             f"Fusing {fused.TIMED_VIEWS} views, time of flight, took {statistics.median(seconds):.1f} s in the median "
-            f"({min(seconds):.1f} to {max(seconds):.1f}), {min(points):,} to {max(points):,} points: curves of each "
-            "view, points, and curves in the world, without the network."
+            f"({min(seconds):.1f} to {max(seconds):.1f}; of the CPU {statistics.median(cpu_seconds):.1f}, "
+            f"{min(cpu_seconds):.1f} to {max(cpu_seconds):.1f}), {min(points):,} to {max(points):,} points: curves of "
+            "each view, points, and curves in the world, without the network."
         )
     if found["memory"]:
         says.append(

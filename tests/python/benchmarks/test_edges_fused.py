@@ -100,7 +100,9 @@ def test_judged_pixels_are_every_fourth_whose_depth_is_known():
 def measured():
     rows = {"clean": [{"one_r": 2.0, "fused_r": 1.0, "known": 1.0}, {"one_r": 4.0, "fused_r": 2.0, "known": 1.0}],
             "tof": [{"one_r": 2.0, "fused_r": 1.8, "known": 1.0}]}  # fmt: skip
-    times = [{"solid": f"crate {k}", "points": 300_000 + k, "s": s} for k, s in enumerate((3.0, 1.0, 2.0))]
+    times = [
+        {"solid": f"crate {k}", "points": 300_000 + k, "s": s, "cpu_s": 2 * s} for k, s in enumerate((3.0, 1.0, 2.0))
+    ]
     memory = {"points": 800_000, "cell_m": 0.001, "memory_mb": 200.0}
     return {"errors": fused.summed(rows), "times": times, "memory": memory, "missing": ["val 4: lost"]}
 
@@ -118,7 +120,7 @@ def test_gates_are_the_worst_level_the_median_solid_and_a_million_points():
 def test_the_report_tells_what_was_measured_and_nothing_without_it():
     table, text = section_of_views.fusion_parts(measured())
     assert table[1] == ["exact depth", "3.00", "1.50", "0.50"]
-    assert "2.0 s in the median (1.0 to 3.0)" in text
+    assert "2.0 s in the median (1.0 to 3.0; of the CPU 4.0, 2.0 to 6.0)" in text
     assert "800,000 points" in text
     assert "val 4: lost" in text
     assert section_of_views.fusion_parts(None) == []
@@ -154,6 +156,7 @@ def test_the_library_fuses_posed_views():
             curves = fusion.finish()
             points, info = fusion.points(), fusion.info
         assert fusion.seconds > added > 0
+        assert fusion.cpu_seconds > 0
         alone = edges.run(corner_from(cameras[1]), Pinhole.centred((HEIGHT, WIDTH), FOCAL_PX))
         with pytest.raises(maquette_api.MaquetteError, match="min_views"):
             Fusion(edges, min_views=0)

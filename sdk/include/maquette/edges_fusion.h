@@ -31,7 +31,7 @@ typedef struct maq_edges_fusion_config {
   int32_t threads;     /* 0 (default): the machine's large cores, at most 4 */
   double cell_m;       /* points are so far from each other, about; 0 (default): the footprint of the median pixel */
   uint64_t max_pixels; /* of all views, which take six bytes each; default 33,554,432 */
-  uint64_t max_points; /* which take some 110 bytes each while they are made; default 4,000,000 */
+  uint64_t max_points; /* which take some 240 bytes each at the peak; default 4,000,000 */
   int32_t min_views;   /* of three views and more, a curve that fewer have seen is left out; 1 to 1000; default 2 */
   maq_edges_fusion_progress_callback progress_callback; /* may be NULL */
   void* progress_user_data;                             /* passed to progress_callback */

@@ -1,6 +1,5 @@
 // A pipeline (maquette/pipeline.h) for programs with a window: options that suit one, another source where one cannot
-// be opened, and what the user is told. Used as LiveDensePose or LiveEdges, which say what
-// runs.
+// be opened, and what the user is told. Used as LiveDensePose or LiveEdges, which say what runs.
 #pragma once
 
 #include <atomic>

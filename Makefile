@@ -28,6 +28,11 @@ build: packages-demo  ## configure and build the SDK and its command line (relea
 	@[ -f build/release/CMakeCache.txt ] || cmake --preset release -DMAQ_BUILD_TESTS=OFF
 	@cmake --build --preset release -j $(JOBS)
 
+.PHONY: wheel
+wheel: build  ## the Python package with library and networks inside, into build/wheel
+	@scripts/make-venv.sh
+	@scripts/make-wheel.sh
+
 .PHONY: desktop-demo
 desktop-demo: packages-desktop build  ## the webcam demo with a window: builds it and starts it
 	@cmake --preset release -DMAQ_BUILD_DESKTOP_DEMO=ON >/dev/null

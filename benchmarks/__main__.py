@@ -24,11 +24,12 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
+from maquette import MaquetteError
+
 from benchmarks import cameras, frame_budget, frame_time, gates, report, start, window
 from benchmarks.edges import measure as edges
 from benchmarks.scenes import measure as scenes
 from benchmarks.scenes.command import SceneCommandError
-from export.evaluation.maquette_api import MaquetteError
 from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-4"

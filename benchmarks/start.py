@@ -13,10 +13,10 @@ import statistics
 import subprocess
 from pathlib import Path
 
+from maquette import library_path
 from tqdm import tqdm
 
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
-from export.evaluation.maquette_api import LIBRARY
 
 FIGURES = ("library_mb", "files_library_mb", "libraries_context", "libraries_densepose", "context_cpu_ms",
            "first_result_cpu_ms")  # fmt: skip
@@ -27,7 +27,7 @@ NAMES = {"context": "a context alone", "densepose": "a dense pose model, to the 
 
 def library_files() -> dict[str, Path]:
     """What is shipped: libmaquette, and the part that reads files and clips, which is loaded when one is opened."""
-    library = LIBRARY.resolve()
+    library = library_path().resolve()
     return {"library": library, "files_library": library.parent / "maquette/libmaquette_files.so"}
 
 

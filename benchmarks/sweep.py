@@ -10,10 +10,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from maquette import DensePose
 from tqdm import tqdm
 
-from export.evaluation.backends import Prediction
-from export.evaluation.maquette_api import DensePose
+from export.evaluation.backends import Prediction, prediction_of
 from export.evaluation.measure import Tally
 from export.evaluation.surface_accuracy import SurfaceTable
 from export.shards import LabelledImage
@@ -101,12 +101,12 @@ class Column:
         self._densepose.reset(), self._timed.reset()
         total = 0.0
         for frame in moving(image, self.setting.frames):
-            result = self._densepose.run(frame)
-            total += self._timed.run(frame).stats.total_ms
+            found = prediction_of(self._densepose.run(frame))
+            total += self._timed.run(frame).stats["total_ms"]
         if counted:
             self.ms.append(total / self.setting.frames)
-        planes = result.planes
-        self._results.append((result.box, result.score, planes.shape, zlib.compress(planes.tobytes(), 1)))
+        planes = np.dstack([found.iuv, found.inds])
+        self._results.append((found.box, found.score, planes.shape, zlib.compress(planes.tobytes(), 1)))
 
     def predictions(self) -> Iterator[Prediction]:
         for box, score, shape, packed in self._results:

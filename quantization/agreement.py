@@ -16,13 +16,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from maquette import MaquetteError
 from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
 from export.bundle import MANIFEST, read_manifest, signed
 from export.evaluation.backends import DEFAULT_PATHS, Backend, Prediction, open_backend
-from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
 from export.evaluation.sheet import pictures
 from export.evaluation.surface_accuracy import fraction

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 import onnxruntime
+from maquette import MaquetteError
 from onnxruntime.quantization.calibrate import TensorsData
 from rich.console import Console
 from rich.table import Table
@@ -30,7 +31,6 @@ from tqdm import tqdm
 from export.bundle import BundleInfo, bytes_of
 from export.densepose import bundle as bundle_format
 from export.densepose.graphs import Bundle, open_bundle
-from export.evaluation.maquette_api import MaquetteError
 from export.shards import load_records
 from quantization import agreement
 from quantization.analysis.errors import output_sqnr

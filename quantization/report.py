@@ -16,12 +16,12 @@ from pathlib import Path
 
 import onnx
 import onnxruntime
+from maquette import MaquetteError
 from rich.console import Console
 from rich.table import Table
 
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.backends import fingerprint
-from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.plain import plain
 from export.shards import load_records
 from quantization import agreement, check

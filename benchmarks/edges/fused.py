@@ -10,13 +10,13 @@ import statistics
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 from tqdm import tqdm
 
-from benchmarks.edges.fusion_api import Fusion, FusionInfo
+from benchmarks.edges.fusion_api import Fusion
 from benchmarks.edges.fusion_memory import in_child
 from benchmarks.edges.quality import LEVELS
 from export.edges.config import EPS_R
@@ -71,7 +71,7 @@ def errors_of(
 
 def fused_views(
     solid: MultiView, level: str, seed: int, edges: Edges, threads: int
-) -> tuple[list[np.ndarray], list[EdgesResult], np.ndarray, FusionInfo, dict[str, float]]:
+) -> tuple[list[np.ndarray], list[EdgesResult], np.ndarray, Any, dict[str, float]]:
     """What the sensor of a level reports, what is found in that, the points, what the fusion says, and its seconds: `s`
     wall-clock, `cpu_s` of all threads."""
     depths, results = [], []

@@ -9,9 +9,10 @@ import argparse
 import sys
 from pathlib import Path
 
+from maquette import MaquetteError
+
 from export.evaluation import photos, report
 from export.evaluation.backends import fingerprint, open_backend
-from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.measure import Figures, image_ranges, measure
 from export.evaluation.picture import write_picture
 from export.jobs import Workers

@@ -15,11 +15,14 @@ import hashlib
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from export.bundle import MANIFEST, read_manifest
+
+if TYPE_CHECKING:
+    from maquette import DensePoseResult
 
 DEFAULT_PATHS = {
     "torch": Path("export/weights/densepose-b.pt"),
@@ -124,7 +127,7 @@ class CApiBackend:
     kind = "capi"
 
     def __init__(self, path: Path, score_floor: float, **settings: int) -> None:
-        from export.evaluation.maquette_api import DensePose
+        from maquette import DensePose
 
         manifest = read_manifest(path)
         self.path = path
@@ -135,8 +138,14 @@ class CApiBackend:
             self.kind = "capi?" + "&".join(f"{name}={value}" for name, value in settings.items())
 
     def predict(self, image: np.ndarray) -> Prediction:
-        result = self._densepose.run(image)
-        return Prediction(result.box, result.score, result.planes[..., :3], result.planes[..., 3])
+        return prediction_of(self._densepose.run(image))
+
+
+def prediction_of(result: DensePoseResult) -> Prediction:
+    """What libmaquette found, in the form that all backends share."""
+    box = np.array([person.box_px for person in result.people], np.float32).reshape(-1, 4)
+    score = np.array([person.score for person in result.people], np.float32)
+    return Prediction(box, score, np.stack([result.part, result.u, result.v], -1), result.person)
 
 
 def open_backend(text: str, score_floor: float) -> Backend:

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from maquette import MaquetteError
 
 from export.evaluation.backends import Backend, fingerprint, open_backend
 from export.evaluation.failures import KINDS
-from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.paint import labelled_tile, mosaic, paint
 from export.evaluation.photos import read_photo
 from export.evaluation.report import column_of

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from maquette import MaquetteError
 from tqdm import tqdm
 
 from export.evaluation.average_precision import ImageMatches, ranked
@@ -21,7 +22,6 @@ from export.evaluation.breakdown import GroupFigures, breakdown, left_right, mea
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
 from export.evaluation.machine import describe_machine
-from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.people import (
     LONG_SIDE_PX,
     MATCH_IOU,

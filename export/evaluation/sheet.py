@@ -8,10 +8,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from maquette import MaquetteError
 from tqdm import tqdm
 
 from export.evaluation.backends import Prediction, open_backend
-from export.evaluation.maquette_api import MaquetteError
 from export.evaluation.paint import labelled_tile, mosaic, paint
 from export.shards import read_images
 

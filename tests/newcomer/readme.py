@@ -26,6 +26,7 @@ PROMISES = {
     "scene build": "room.maqs",
     "scene render": "room.mp4",
     "./people": PRINTS + r"person 0\.\d+ at x \d+ y \d+",
+    "make wheel": "build/wheel/maquette-*.whl",
     "maquette play": PRINTS + r"\d+ frames",
 }
 

@@ -3,6 +3,7 @@
 import json
 import tomllib
 
+import maquette
 import numpy as np
 import pytest
 
@@ -13,7 +14,6 @@ from benchmarks.edges import measure as edges
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
 from benchmarks.edges.views import View, bending_radius_r, bins, incidence_deg, polyline, read_views
 from export.edges.data import Frame
-from export.evaluation import maquette_api
 from export.evaluation.edges_api import LINE, SPLINE, Curves, Edges, Pinhole, depth_frames
 from export.solids.records import packed, write_shard
 
@@ -286,7 +286,9 @@ def test_gates_of_curves_say_why_they_are_missing():
     assert missing["edges_curves_stereo"] == "the test views have no curves stored"
 
 
-@pytest.mark.skipif(not maquette_api.LIBRARY.exists(), reason=f"{maquette_api.LIBRARY} is not built: run `make build`")
+@pytest.mark.skipif(
+    not maquette.library_path().exists(), reason=f"{maquette.library_path()} is not built: run `make build`"
+)
 def test_the_library_gives_planes_curves_and_times_of_a_simulated_camera():
     frames = list(depth_frames("stub:solids?scene=box&size=160x120", 2))
     depth, camera = frames[0]
@@ -302,9 +304,9 @@ def test_the_library_gives_planes_curves_and_times_of_a_simulated_camera():
     assert again.curves is None
     assert all(points.shape == (len(points), 3) for points in result.curves.points)
     assert len(result.curves.points) == len(result.curves.types) > 0
-    with pytest.raises(maquette_api.MaquetteError, match=r"nowhere.*MAQ_ERROR_NOT_FOUND"):
+    with pytest.raises(maquette.MaquetteError, match=r"nowhere.*MAQ_ERROR_NOT_FOUND"):
         Edges(edges.Path("nowhere"))
-    with pytest.raises(maquette_api.MaquetteError, match="intrinsics"):
+    with pytest.raises(maquette.MaquetteError, match="intrinsics"):
         next(depth_frames("stub:people", 1))
 
 

@@ -4,23 +4,24 @@ import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
+import maquette
 import numpy as np
 import pytest
+from maquette.fusion import POINT
 
 from benchmarks.edges import fused, fusion_memory, section_of_views
-from benchmarks.edges.fusion_api import POINT, Fusion
+from benchmarks.edges.fusion_api import Fusion
 from benchmarks.edges.measure import BUNDLE
 from export.camera import Camera
 from export.edges.config import EPS_R
 from export.edges.fusion import FieldView
 from export.edges.judged_pixels import STEP_PX, judged_pixels
-from export.evaluation import maquette_api
 from export.evaluation.edges_api import Edges, Pinhole
 
 WIDTH, HEIGHT, FOCAL_PX = 64, 48, 60.0
 R_M = 1 / FOCAL_PX  # of a wall at 1 m
 BUILT = pytest.mark.skipif(
-    not maquette_api.LIBRARY.exists(), reason=f"{maquette_api.LIBRARY} is not built: run `make build`"
+    not maquette.library_path().exists(), reason=f"{maquette.library_path()} is not built: run `make build`"
 )
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -158,7 +159,7 @@ def test_the_library_fuses_posed_views():
         assert fusion.seconds > added > 0
         assert fusion.cpu_seconds > 0
         alone = edges.run(corner_from(cameras[1]), Pinhole.centred((HEIGHT, WIDTH), FOCAL_PX))
-        with pytest.raises(maquette_api.MaquetteError, match="min_views"):
+        with pytest.raises(maquette.MaquetteError, match="min_views"):
             Fusion(edges, min_views=0)
     np.testing.assert_array_equal(results[1].distance, alone.distance)
     assert (info.view_count, info.blind_view_count, info.point_count) == (3, 0, len(points))

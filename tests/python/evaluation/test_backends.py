@@ -5,17 +5,18 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import maquette
 import numpy as np
 import pytest
+from maquette.native import Native
 
 from export.bundle import read_manifest
-from export.evaluation import maquette_api
 from export.evaluation.backends import CApiBackend, OnnxBackend
 
 BUNDLE = Path("tests/native/data/tiny_bundle")
 
 needs_library = pytest.mark.skipif(
-    not maquette_api.LIBRARY.exists(), reason=f"{maquette_api.LIBRARY} is not built: run `make build`"
+    not maquette.library_path().exists(), reason=f"{maquette.library_path()} is not built: run `make build`"
 )
 
 
@@ -31,45 +32,36 @@ def picture(width=320, height=256):
 @needs_library
 def test_the_c_api_finds_the_people_of_the_tiny_bundle():
     image = picture()
-    with maquette_api.DensePose(BUNDLE) as model:
-        result = model.run(image)
-        empty = model.run(np.zeros_like(image))
-    assert result.box.shape == (3, 4)
-    sides = sorted(np.round(result.box[:, 2] - result.box[:, 0]).tolist())
+    model = CApiBackend(BUNDLE, 0.05)
+    found, none = model.predict(image), model.predict(np.zeros_like(image))
+    assert found.box.shape == (3, 4)
+    sides = sorted(np.round(found.box[:, 2] - found.box[:, 0]).tolist())
     assert sides == [32, 64, 128]
-    assert set(np.unique(result.planes[..., 0])) == {0, 3, 7}
-    assert set(np.unique(result.planes[..., 3])) == {0, 1, 2, 3}
-    assert result.stats.person_count == 3
-    assert result.stats.total_ms > 0
-    assert len(empty.box) == 0
-    assert not empty.planes.any()
+    assert set(np.unique(found.iuv[..., 0])) == {0, 3, 7}
+    assert set(np.unique(found.inds)) == {0, 1, 2, 3}
+    assert none.box.shape == (0, 4)
+    assert not none.iuv.any()
 
 
 @needs_library
 def test_a_model_card_beside_the_manifest_does_no_harm(tmp_path):
     bundle = shutil.copytree(BUNDLE, tmp_path / "bundle")
     (bundle / "MODEL_CARD.md").write_text("# Model card\n")
-    with maquette_api.DensePose(bundle) as model:
-        assert len(model.run(picture()).box) == 3
+    assert len(maquette.DensePose(bundle).run(picture()).people) == 3
 
 
 @needs_library
 def test_rows_with_padding_and_views_are_read_right():
-    image = picture()
-    with maquette_api.DensePose(BUNDLE) as model:
-        whole = model.run(image)
-        view = model.run(np.flip(np.flip(image, 1).copy(), 1))
-    assert np.array_equal(whole.planes, view.planes)
+    image, model = picture(), maquette.DensePose(BUNDLE)
+    whole, view = model.run(image), model.run(np.flip(np.flip(image, 1).copy(), 1))
+    assert np.array_equal(whole.part, view.part)
+    assert np.array_equal(whole.person, view.person)
 
 
 @needs_library
-def test_wrong_images_and_missing_bundles_are_explained():
-    with maquette_api.DensePose(BUNDLE) as model, pytest.raises(ValueError, match="uint8"):
-        model.run(np.zeros((4, 4, 3), np.float32))
-    with pytest.raises(maquette_api.MaquetteError, match=r"nowhere.*MAQ_ERROR_NOT_FOUND"):
-        maquette_api.DensePose(Path("nowhere"))
-    with pytest.raises(maquette_api.MaquetteError, match="make build"):
-        maquette_api.DensePose(BUNDLE, library=Path("nothing.so"))
+def test_a_missing_library_is_explained():
+    with pytest.raises(maquette.MaquetteError, match="make build"):
+        Native(Path("nothing.so"))
 
 
 @pytest.fixture

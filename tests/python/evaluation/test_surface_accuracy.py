@@ -353,7 +353,7 @@ def test_unknown_backend_and_missing_model_are_explained(tmp_path):
 
 def test_settings_of_the_sdk_are_part_of_the_backends_name(monkeypatch):
     given = {}
-    monkeypatch.setattr("export.evaluation.maquette_api.DensePose", lambda path, **settings: given.update(settings))
+    monkeypatch.setattr("maquette.DensePose", lambda path, **settings: given.update(settings))
     backend = open_backend("capi?person_crops=1&long_side_px=384", 0.05)
     assert given == {"score_threshold": 0.05, "person_crops": 1, "long_side_px": 384}
     assert backend.kind == "capi?person_crops=1&long_side_px=384"

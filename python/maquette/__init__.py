@@ -1,0 +1,27 @@
+"""Maquette: a camera into 3D on two CPU cores. Dense pose, scenes and edges, over numpy arrays.
+
+    import maquette
+    result = maquette.DensePose().run(rgb)          # uint8 [H, W, 3]
+
+Errors of the SDK are MaquetteError. README.md of the package shows each system.
+"""
+
+from maquette.densepose import DensePose, DensePoseResult, Person, part_colours, part_name
+from maquette.edges import Box, Curve, Curves, Edges, EdgesResult
+from maquette.frames import Camera, Frame, Intrinsics, PixelFormat, Source, list_cameras
+from maquette.fusion import EdgesFusion
+from maquette.native import MaquetteError, library_path, native
+from maquette.scenes import Capture, PinholeCamera, Scene, SceneImage, SceneRenderer, View
+
+__all__ = [
+    "Box", "Camera", "Capture", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
+    "EdgesResult", "Frame", "Intrinsics", "MaquetteError", "Person", "PinholeCamera", "PixelFormat", "Scene",
+    "SceneImage", "SceneRenderer", "Source", "View", "library_path", "list_cameras", "part_colours", "part_name",
+    "sdk_version",
+]  # fmt: skip
+
+
+def sdk_version() -> str:
+    """The version of the library found at run time: "0.2.0"."""
+    n = native()
+    return n.ffi.string(n.lib.maq_get_sdk_version()).decode()

@@ -1,0 +1,51 @@
+"""The C API as cffi reads it: the SDK's own headers without what is for compilers alone, so that no struct is written
+twice.
+
+A wheel holds what `write_module` made of them; in a checkout they are read when the package is imported.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from cffi import FFI
+
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_FOR_CPLUSPLUS = re.compile(r"^#ifdef __cplusplus$.*?^#endif$", re.DOTALL | re.MULTILINE)
+_DEFINE = re.compile(r"^#define (MAQ_(?!API\b|HEADER_VERSION\b)\w+) (.+)$", re.MULTILINE)
+_DIRECTIVE = re.compile(r"^#.*$", re.MULTILINE)
+
+
+def declarations(headers: Path) -> str:
+    """What cffi's `cdef` takes, out of the folder of maquette.h. Constants come as enumerators, since `cdef` reads no
+    expressions in a #define."""
+    parts = []
+    for name in re.findall(r'^#include "maquette/(\w+\.h)"$', (headers / "maquette.h").read_text(), re.MULTILINE):
+        parts += _with_what_it_includes(headers, name, parts)
+    return "\n".join(parts)
+
+
+def read_headers(headers: Path) -> FFI:
+    ffi = FFI()
+    ffi.cdef(declarations(headers))
+    return ffi
+
+
+def write_module(headers: Path, path: Path) -> None:
+    """Writes a Python module whose `ffi` has the declarations, and is imported without parsing them."""
+    ffi = read_headers(headers)
+    ffi.set_source(path.stem, None)
+    ffi.emit_python_code(str(path))
+
+
+def _with_what_it_includes(headers: Path, name: str, before: list[str]) -> list[str]:
+    """The declarations of a header that are not in `before`, after those of the headers that it includes."""
+    text = (headers / name).read_text()
+    parts: list[str] = []
+    for included in re.findall(r'^#include "maquette/(\w+\.h)"$', text, re.MULTILINE):
+        parts += _with_what_it_includes(headers, included, before + parts)
+    text = _FOR_CPLUSPLUS.sub("", _COMMENT.sub("", text))
+    constants = "".join(f"enum {{ {constant} = {value} }};\n" for constant, value in _DEFINE.findall(text))
+    body = constants + _DIRECTIVE.sub("", re.sub(r"\bMAQ_API\b", "", text)).strip()
+    return parts if body in before + parts else parts + [body]

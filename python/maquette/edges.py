@@ -1,0 +1,171 @@
+"""Edges: from a depth image to its sharp feature curves, corners and boxes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from maquette.frames import Frame, Intrinsics, as_frame
+from maquette.native import native
+
+KINDS = ("none", "crease", "boundary")
+TYPES = ("line", "arc", "spline")
+BENDS = ("unknown", "convex", "concave")
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """points_m: float64 [n, 3], the polyline that is drawn of it, in the camera's coordinates. type: "line", "arc" or
+    "spline". kind: "crease" or "boundary". bend: of a crease "convex", "concave" or "unknown". corners: index of the
+    corner at its start and its end, -1 where it ends freely."""
+
+    points_m: np.ndarray
+    type: str
+    kind: str
+    bend: str
+    corners: tuple[int, int]
+    length_m: float
+    rms_r: float
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """size_m, plus_minus_m: float64 [3], the longest side first; two standard deviations. axes: float64 [3, 3], a row a
+    side. centre_m: float64 [3]. corner_count: how many of its eight corners were seen."""
+
+    size_m: np.ndarray
+    plus_minus_m: np.ndarray
+    axes: np.ndarray
+    centre_m: np.ndarray
+    corner_count: int
+
+
+class Curves:
+    """The curves of a depth image: `curves`, `corners_m` float64 [n, 3], `boxes`, the largest first; curves_ms,
+    boxes_ms: how long it took to find them. Hold no more than 16 at once (result_pool_size)."""
+
+    def __init__(self, handle: Any) -> None:
+        n = native()
+        self.handle = handle
+        found = n.indexed("maq_edges_curves_get_curve", handle, "maq_edges_curve",
+                          n.lib.maq_edges_curves_get_curve_count(handle))  # fmt: skip
+        self.curves = [
+            Curve(
+                _doubles(c.points_m, c.point_count, 3), TYPES[c.type], KINDS[c.kind], BENDS[c.bend], tuple(c.corners),
+                c.length_m, c.rms_r,
+            )
+            for c in found
+        ]  # fmt: skip
+        found = n.indexed("maq_edges_curves_get_corner", handle, "maq_edges_corner",
+                          n.lib.maq_edges_curves_get_corner_count(handle))  # fmt: skip
+        self.corners_m = np.array([list(c.point_m) for c in found], np.float64).reshape(-1, 3)
+        found = n.indexed("maq_edges_curves_get_box", handle, "maq_edges_box",
+                          n.lib.maq_edges_curves_get_box_count(handle))  # fmt: skip
+        self.boxes = [
+            Box(
+                np.array(list(b.size_m)), np.array(list(b.plus_minus_m)), np.array([list(a) for a in b.axes]),
+                np.array(list(b.centre_m)), b.corner_count,
+            )
+            for b in found
+        ]  # fmt: skip
+
+        stats = n.stats("maq_edges_curves_stats", "maq_edges_curves_get_stats", handle)
+        self.curves_ms, self.boxes_ms = stats["curves_ms"], stats["boxes_ms"]
+
+    def save(self, path: str | Path) -> None:
+        """Writes .json, .obj, .ply, .dxf or .step. Raises MaquetteError."""
+        native().call("maq_edges_curves_save", self.handle, str(path).encode())
+
+    def snap(self, x_px: float, y_px: float, radius_px: float = 8) -> tuple[str, np.ndarray] | None:
+        """What is at a pixel of the depth image: ("corner" | "curve" | "plane", its point float64 [3] in metres), the
+        nearest corner within the radius first; None: nothing."""
+        n = native()
+        found = n.sized("maq_edges_snap")
+        n.call("maq_edges_curves_snap_to_pixel", self.handle, x_px, y_px, radius_px, found)
+        targets = ("nothing", "corner", "curve", "plane")
+        return (targets[found.target], np.array(list(found.point_m))) if found.target else None
+
+
+@dataclass(frozen=True, eq=False)
+class EdgesResult:
+    """Planes [H, W] of a depth image: distance_r, spread_r float32 (to the nearest sharp curve in footprints r, and how
+    far that may be wrong; eps_r: none is nearer), kind uint8 (0 none, 1 crease, 2 boundary), distance_m float32 (0
+    where depth is unknown). curves: if asked for. stats: the fields of maq_edges_stats."""
+
+    distance_r: np.ndarray
+    spread_r: np.ndarray
+    kind: np.ndarray
+    distance_m: np.ndarray
+    eps_r: float
+    curves: Curves | None
+    stats: dict[str, float]
+
+
+class Edges:
+    """The network, loaded once and used for many depth images.
+
+        result = maquette.Edges().run(depth_m, maquette.Intrinsics.centred(640, 480, fov_deg=60), curves=True)
+        print(result.curves.boxes[0].size_m)
+
+    bundle: a folder with manifest.json (default: the one that comes with the package). settings: fields of
+    maq_edges_config by their names: skip_planes, threads, ... Raises MaquetteError.
+    """
+
+    def __init__(self, bundle: str | Path | None = None, **settings: Any) -> None:
+        n = native()
+        if bundle is not None:
+            settings["bundle_path"] = Path(bundle)
+        settings.setdefault("result_pool_size", 16)
+        self.handle = n.create("maq_edges", n.context, n.config("maq_edges_config", settings))
+
+    def close(self) -> None:
+        """Frees the network at once; without it, that happens when the object is freed."""
+        native().ffi.release(self.handle)
+
+    def run(
+        self, depth: Frame | np.ndarray, intrinsics: Intrinsics, curves: bool = False, **curve_settings: Any
+    ) -> EdgesResult:
+        """depth: a Frame, float32 [H, W] in metres or uint16 [H, W] in millimetres. curves: find them, corners and
+        boxes, too; curve_settings: fields of maq_edges_curves_config. One call at a time. Raises MaquetteError."""
+        result = self.run_native(depth, intrinsics)
+        found = None
+        if curves:
+            n = native()
+            config = n.config("maq_edges_curves_config", curve_settings)
+            find, release = "maq_edges_result_find_curves", "maq_edges_curves_release"
+            found = Curves(n.create("maq_edges_curves", result, config, function=find, release=release))
+        return self.copied(result, found)
+
+    def run_native(self, depth: Frame | np.ndarray, intrinsics: Intrinsics) -> Any:
+        """The library's own result (maq_edges_result) of a depth image, for calls of the C API that this package does
+        not have. It goes back to its pool when the object is freed."""
+        n = native()
+        frame, given = as_frame(depth), n.ffi.new("maq_intrinsics *")
+        intrinsics.write_to(given)
+        run, release = "maq_edges_run", "maq_edges_result_release"
+        return n.create("maq_edges_result", self.handle, frame.handle, given, function=run, release=release)
+
+    def copied(self, result: Any, curves: Curves | None = None) -> EdgesResult:
+        """What a result of `run_native` holds, as arrays; it goes back to its pool."""
+        n = native()
+        field = n.sized("maq_edges_field")
+        n.call("maq_edges_result_get_field", result, field)
+        shape = field.height_px, field.width_px
+        wanted = (
+            (n.lib.MAQ_EDGES_PLANE_DISTANCE, np.float32), (n.lib.MAQ_EDGES_PLANE_SPREAD, np.float32),
+            (n.lib.MAQ_EDGES_PLANE_KIND, np.uint8),
+        )  # fmt: skip
+        planes = [n.plane("maq_edges_result_get_plane", result, plane, shape, kind) for plane, kind in wanted]
+        metres = np.empty(shape, np.float32)
+        n.call("maq_edges_result_copy_distance_m", result, n.ffi.from_buffer("float[]", metres), metres.size)
+        stats = n.stats("maq_edges_stats", "maq_edges_result_get_stats", result)
+        n.ffi.release(result)
+        return EdgesResult(*planes, metres, field.eps_r, curves, stats)
+
+
+def _doubles(pointer: Any, *shape: int) -> np.ndarray:
+    data = native().ffi.buffer(pointer, 8 * int(np.prod(shape)))
+    return np.frombuffer(data, np.float64).reshape(shape).copy()

@@ -1,0 +1,76 @@
+"""Edges of one thing seen from several places: fields of posed depth images fused into points and curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from maquette.edges import Curves, Edges, EdgesResult
+from maquette.frames import Frame
+from maquette.native import native
+from maquette.scenes import PinholeCamera
+
+# maq_edges_fusion_point
+POINT = np.dtype([("point_m", "<f8", 3), ("normal", "<f4", 3), ("distance_m", "<f4"), ("r_m", "<f4"),
+                  ("view_count", "<u4")])  # fmt: skip
+
+
+class EdgesFusion:
+    """Add views, finish, then ask for points and curves, in the world of the cameras.
+
+    edges: the network. progress: called by `finish` with the fraction done; returns False to cancel. settings: fields
+    of maq_edges_fusion_config by their names: cell_m, min_views, max_points, ... Raises MaquetteError, as all methods
+    do.
+    """
+
+    def __init__(
+        self, edges: Edges, progress: Callable[[float], bool | None] | None = None, **settings: Any
+    ) -> None:  # fmt: skip
+        n = native()
+        self._edges = edges
+        told = None if progress is None else lambda _, done: 0 if progress(done) is False else 1
+        self._callback = n.ffi.NULL if told is None else n.ffi.callback("int32_t(void *, double)", told, error=0)
+        config = n.config("maq_edges_fusion_config", {**settings, "progress_callback": self._callback})
+        self.handle = n.create("maq_edges_fusion", n.context, config)
+
+    def close(self) -> None:
+        """Frees views and points at once; without it, that happens when the object is freed."""
+        native().ffi.release(self.handle)
+
+    def add_view(self, depth: Frame | np.ndarray, camera: PinholeCamera) -> EdgesResult:
+        """Runs the network on a depth image in metres and adds its field; the field."""
+        result = self._edges.run_native(depth, camera.intrinsics)
+        self.add_native(result, camera)
+        return self._edges.copied(result)
+
+    def add_native(self, result: Any, camera: PinholeCamera) -> None:
+        """The same for a result of `Edges.run_native`."""
+        native().call("maq_edges_fusion_add_view", self.handle, result, camera.to_struct())
+
+    def finish(self) -> None:
+        """Makes points and curves of the views so far; more can be added afterwards."""
+        native().call("maq_edges_fusion_finish", self.handle)
+
+    def curves(self) -> Curves:
+        """Those of the latest `finish`; without boxes, and with nothing to snap to. Hold no more than 4 at once."""
+        n = native()
+        return Curves(
+            n.create("maq_edges_curves", self.handle, function="maq_edges_fusion_find_curves",
+                     release="maq_edges_curves_release")
+        )  # fmt: skip
+
+    @property
+    def info(self) -> dict[str, float]:
+        """Counts and times: the fields of maq_edges_fusion_info."""
+        return native().stats("maq_edges_fusion_info", "maq_edges_fusion_get_info", self.handle)
+
+    def points(self) -> np.ndarray:
+        """POINT [N] of the latest `finish`: place, normal, distance to the nearest edge, footprint, number of views."""
+        n = native()
+        out = np.empty(int(self.info["point_count"]), POINT)
+        if len(out):
+            points = n.ffi.cast("maq_edges_fusion_point *", n.ffi.from_buffer(out))
+            n.call("maq_edges_fusion_copy_points", self.handle, points, len(out))
+        return out

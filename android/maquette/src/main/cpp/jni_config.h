@@ -101,19 +101,28 @@ inline std::vector<jdouble> values_of(const maq_pinhole_camera& from) {
   return values;
 }
 
+// From the first 14 values, which are as in Intrinsics.
+inline maq_intrinsics intrinsics_of(const std::vector<jdouble>& values) {
+  maq_intrinsics intrinsics{};
+  intrinsics.width_px = int32_t(values[0]);
+  intrinsics.height_px = int32_t(values[1]);
+  intrinsics.fx_px = values[2];
+  intrinsics.fy_px = values[3];
+  intrinsics.cx_px = values[4];
+  intrinsics.cy_px = values[5];
+  std::copy_n(&values[6], 8, intrinsics.distortion);
+  return intrinsics;
+}
+
+// `values` as in Intrinsics.
+inline maq_intrinsics intrinsics(JNIEnv* env, jdoubleArray values) { return intrinsics_of(numbers(env, values, 14)); }
+
 // `values` as in PinholeCamera.
 inline maq_pinhole_camera pinhole_camera(JNIEnv* env, jdoubleArray values) {
   const std::vector<jdouble> from = numbers(env, values, 26);
   maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;
-  maq_intrinsics& intrinsics = camera.intrinsics;
-  intrinsics.width_px = int32_t(from[0]);
-  intrinsics.height_px = int32_t(from[1]);
-  intrinsics.fx_px = from[2];
-  intrinsics.fy_px = from[3];
-  intrinsics.cx_px = from[4];
-  intrinsics.cy_px = from[5];
-  std::copy_n(&from[6], 8, intrinsics.distortion);
+  camera.intrinsics = intrinsics_of(from);
   std::copy_n(&from[14], 9, camera.rotation);
   std::copy_n(&from[23], 3, camera.centre);
   return camera;

@@ -1,6 +1,7 @@
 // Frames: decoded, or wrapped around direct buffers of the app.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 
 #include "jni_call.h"
@@ -129,6 +130,32 @@ MAQ_NATIVE(void, copyFramePixels)(JNIEnv* env, jclass, jlong frame, jint format,
   call(env, [&] {
     const Memory memory = maq_jni::memory_of(env, buffer);
     check(maq_frame_copy_pixels(object<maq_frame>(frame), maq_pixel_format(format), memory.data, 0, memory.size_bytes));
+  });
+}
+
+// Metres, 0 where unknown; null of a frame without depth. Writes width and height to `size`.
+MAQ_NATIVE(jfloatArray, depthOfFrame)(JNIEnv* env, jclass, jlong frame, jintArray size) {
+  return call(env, [&]() -> jfloatArray {
+    maq_frame_desc desc;
+    check(maq_frame_desc_init(&desc, sizeof desc));
+    const maq_status status = maq_frame_get_depth(object<maq_frame>(frame), &desc);
+    if (status == MAQ_ERROR_UNSUPPORTED) return nullptr;
+    check(status);
+    std::vector<jfloat> metres(size_t(desc.width_px) * size_t(desc.height_px));
+    for (size_t y = 0; y < size_t(desc.height_px); ++y) {
+      const uint8_t* const row = desc.planes[0] + y * desc.stride_bytes[0];
+      jfloat* const to = &metres[y * size_t(desc.width_px)];
+      if (desc.format == MAQ_PIXEL_DEPTH32F) {
+        const auto* const from = reinterpret_cast<const float*>(row);
+        std::transform(from, from + desc.width_px, to, [](float z) { return std::isfinite(z) && z > 0 ? z : 0.0f; });
+      } else {
+        const auto* const from = reinterpret_cast<const uint16_t*>(row);
+        std::transform(from, from + desc.width_px, to, [](uint16_t z) { return z == 65535 ? 0.0f : z * 0.001f; });
+      }
+    }
+    const jint sides[] = {desc.width_px, desc.height_px};
+    env->SetIntArrayRegion(size, 0, 2, sides);
+    return maq_jni::floats_of(env, metres.data(), metres.size());
   });
 }
 

@@ -5,6 +5,7 @@ set(MAQ_JNI_SOURCES
   jni_capture.cpp
   jni_context.cpp
   jni_densepose.cpp
+  jni_edges.cpp
   jni_frame.cpp
   jni_picture.cpp
   jni_pipeline.cpp

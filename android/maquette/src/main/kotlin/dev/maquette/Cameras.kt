@@ -23,6 +23,9 @@ data class Intrinsics(
         require(distortion.size == 8) { "The distortion has ${distortion.size} numbers; it needs 8." }
     }
 
+    internal fun values(): DoubleArray =
+        doubleArrayOf(widthPx.toDouble(), heightPx.toDouble(), fxPx, fyPx, cxPx, cyPx) + distortion
+
     internal companion object {
         fun of(v: DoubleArray) =
             Intrinsics(v[0].toInt(), v[1].toInt(), v[2], v[3], v[4], v[5], v.slice(6 until 14))
@@ -41,11 +44,7 @@ data class PinholeCamera(val intrinsics: Intrinsics, val rotation: List<Double>,
         require(centre.size == 3) { "The centre has ${centre.size} numbers; it needs 3." }
     }
 
-    internal fun values(): DoubleArray =
-        with(intrinsics) {
-            doubleArrayOf(widthPx.toDouble(), heightPx.toDouble(), fxPx, fyPx, cxPx, cyPx) +
-                distortion + rotation + centre
-        }
+    internal fun values(): DoubleArray = intrinsics.values() + rotation + centre
 
     internal companion object {
         fun of(v: DoubleArray) = PinholeCamera(Intrinsics.of(v), v.slice(14 until 23), v.slice(23 until 26))

@@ -94,6 +94,16 @@ class Frame internal constructor(pointer: Long) : AutoCloseable {
     ): Frame = handle.use { Frame(Native.resizeFrame(it, widthPx, heightPx)) }
 
     /**
+     * A copy of the frame's depth: of its own pixels, or of the depth image that came with the picture; null if it has
+     * none.
+     */
+    fun copyDepth(): DepthImage? {
+        val size = IntArray(2)
+        val metres = handle.use { Native.depthOfFrame(it, size) } ?: return null
+        return DepthImage(size[0], size[1], metres)
+    }
+
+    /**
      * Writes the picture to a file in the format of its extension, PNG (.png) or JPEG (.jpg), atomically, in a folder
      * that exists. Needs Android 11: before, use [toBitmap] and `Bitmap.compress`. Blocks while it is written.
      *
@@ -111,3 +121,6 @@ internal fun requireDrawable(bitmap: Bitmap) {
 }
 
 internal fun requireOpen(buffer: HardwareBuffer) = check(!buffer.isClosed) { "This HardwareBuffer is closed." }
+
+/** [heightPx] rows of [widthPx] depths along the optical axis, in metres; 0 where it is unknown. */
+class DepthImage(val widthPx: Int, val heightPx: Int, val metres: FloatArray)

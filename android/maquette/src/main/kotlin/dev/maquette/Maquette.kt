@@ -175,6 +175,12 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
             )
         }
 
+    /** Loads the network of edges; takes some 10 ms, so not on the main thread. */
+    fun edges(bundle: ModelBundle, config: Edges.Config = Edges.Config()): Edges =
+        handle.use { context ->
+            Edges(NativeEdges.create(context, bundle.folder, bundle.names, bundle.buffers, config.values()))
+        }
+
     /**
      * Opens a source by a URI: "android:back" (a camera), "image:photo.jpg", "rec:take.maqrec" or
      * "stub:people?count=2&seed=7", with options as "?size=640x480&fps=15"; [Source.schemes] lists the kinds of this build.

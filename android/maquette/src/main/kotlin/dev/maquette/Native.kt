@@ -4,7 +4,8 @@ import java.nio.ByteBuffer
 
 /**
  * The C API (src/main/cpp): contexts, frames and dense pose; [NativeSource], [NativePipeline], [NativeScene],
- * [NativePicture] and [NativePreview] have the rest. Handles are numbers here; [Handle] keeps them. Texts are UTF-8. A bundle is a folder, or names and buffers.
+ * [NativeEdges], [NativePicture] and [NativePreview] have the rest. Handles are numbers here; [Handle] keeps them. Texts
+ * are UTF-8. A bundle is a folder, or names and buffers.
  * The values of a configuration are in the order of its properties.
  */
 internal object Native {
@@ -54,6 +55,9 @@ internal object Native {
     @JvmStatic external fun releaseFrame(frame: Long)
     @JvmStatic external fun describeFrame(frame: Long): LongArray
     @JvmStatic external fun copyFramePixels(frame: Long, format: Int, pixels: ByteBuffer)
+
+    /** Depth in metres; writes its width and height. Null: the frame has none. */
+    @JvmStatic external fun depthOfFrame(frame: Long, size: IntArray): FloatArray?
     @JvmStatic external fun saveFrame(frame: Long, path: ByteArray)
     @JvmStatic external fun resizeFrame(frame: Long, widthPx: Int, heightPx: Int): Long
 

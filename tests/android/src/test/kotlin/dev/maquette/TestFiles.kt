@@ -9,6 +9,7 @@ object TestFiles {
     private val root = File(System.getProperty("maquette.root")!!)
     val bundle = File(root, "sdk/models/densepose-b-int8")
     val scenesBundle = File(root, "sdk/models/scenes-int8")
+    val edgesBundle = File(root, "sdk/models/edges-int8")
     val photo = File(root, "tests/media/photo.jpg")
     val clip = File(root, "tests/media/clip.mp4")
     val room = File(root, "tests/media/room")

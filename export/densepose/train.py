@@ -101,6 +101,7 @@ RECIPES = {
     ),
     "crops": (Stage(0.0, (), crops=True),),
     "both": (Stage(0.0, (320, 384, 448), data.WIDE_CROPPING, crops=True),),
+    "usual": (Stage(0.0, (288, 320, 384), data.USUAL_CROPPING, crops=True),),
 }  # fmt: skip
 HELD_OUT_IMAGES = 100
 CROP_SEED = 500_000  # apart from the pictures' seed
@@ -369,7 +370,8 @@ def parsed() -> TrainingConfig:
     parser.add_argument(
         "--recipe", choices=RECIPES, default=default.recipe,
         help="scratch: surface, then the whole network; crops: person crops alone; both: them and whole "
-             "pictures of 320 to 448 pixels (default %(default)s)",
+             "pictures of 320 to 448 pixels; usual: the same at 288 to 384 pixels, with people as photographs show them "
+             "(default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--crops", type=int, default=default.crops, help="person crops a step and process")
     parser.add_argument("--crop-size", type=int, default=default.crop_size, help="their side, pixels")

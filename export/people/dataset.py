@@ -59,7 +59,8 @@ def main() -> int:
     parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
     parser.add_argument(
         "--variety", choices=VARIETIES, default="close",
-        help="close: 320 x 256, mostly upright; wide: 640 x 512, small, tilted, crowded people (default %(default)s)",
+        help="close: 320 x 256, mostly upright; wide: 640 x 512, small, tilted, crowded people; usual: 640 x 512, as "
+             "photographs show them; animals: nobody (default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--bare", action="store_true", help="nobody wears clothes (export.evaluation.ablation)")
     options = parser.parse_args()

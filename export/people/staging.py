@@ -20,7 +20,6 @@ from export.people.render import Person
 from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model, brim, dress
 
-PHOTO_POSE_FRACTION = 0.25  # of the people scattered or before a webcam, where there are poses of photographs
 _LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])  # camera axes in the world before pitch and roll
 _MIN_DEPTH = 0.9  # metres from the camera to a person who is not framed
 
@@ -155,7 +154,7 @@ class Director:
 
     def _photographed(self, rng: np.random.Generator) -> bool:
         """Whether the next pose is one of a photograph; only the split to train on has any."""
-        return len(self.photo_poses.root) > 0 and rng.random() < PHOTO_POSE_FRACTION
+        return len(self.photo_poses.root) > 0 and rng.random() < self.variety.photo_poses
 
     def _anybody(self, rng: np.random.Generator) -> Actor:
         if self._photographed(rng):

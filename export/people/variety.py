@@ -3,6 +3,7 @@
 `CLOSE` is what the shipped weights were trained and tested on: 320 x 256, mostly alone, upright and facing the camera.
 `WIDE` shows what a webcam in a room and a phone video show: 640 x 512, people from 1/14 of the picture's height up,
 tilted pictures, a third of the people from behind, crowds in which boxes overlap.
+`USUAL` shows people at the size of `WIDE` as photographs usually do: most upright and facing the camera, one in eight small.
 `ANIMALS` shows animals and nobody, for a detector of people to learn the difference (`export.densepose.train_boxes`).
 """
 
@@ -26,6 +27,8 @@ class Variety:
     turned_around: fraction of the people who are turned by half a turn after their yaw was drawn.
     bare_chest, hat, hood: fractions of the people.
     animals_alone, animals_beside: fractions of the pictures without and with people that show animals.
+    photo_poses: fraction of the people scattered or before a webcam that stand as people of photographs do
+        (`photo_poses.json`), where there are such poses.
     """
 
     generator: str
@@ -39,6 +42,7 @@ class Variety:
     hood: float = 0.05
     animals_alone: float = 0.0
     animals_beside: float = 0.0
+    photo_poses: float = 0.25
 
     def draw_roll(self, rng: np.random.Generator) -> float:
         """Degrees by which the camera is rolled, either way; nothing is drawn where there are no `rolls`."""
@@ -97,6 +101,32 @@ WIDE = Variety(
     animals_beside=0.07,
 )
 
+USUAL = replace(
+    WIDE,
+    generator="people-6",
+    layouts={
+        "empty": (0.08, ()),
+        "scattered": (0.36, (0.5, 0.26, 0.12, 0.06, 0.04, 0.02)),
+        "group": (0.14, (0, 0.24, 0.24, 0.18, 0.12, 0.09, 0.07, 0.06)),
+        "crowd": (0.12, (0, 0.28, 0.22, 0.16, 0.12, 0.09, 0.07, 0.06)),
+        "webcam": (0.3, (0.54, 0.28, 0.12, 0.06)),
+    },
+    framings=(
+        (0.3, 0.5, 1.05, 1.7),
+        (0.17, 0.66, 0.75, 0.95),
+        (0.18, 0.78, 0.42, 0.65),
+        (0.13, 0.9, 0.22, 0.4),
+        (0.16, 0.5, 1.8, 4.5),
+        (0.06, 0.5, 4.5, 8.0),
+    ),
+    rolls=((0.76, 0, 12), (0.19, 12, 45), (0.05, 45, 180)),
+    turned_around=0.08,
+    bare_chest=0.1,
+    hat=0.1,
+    hood=0.05,
+    photo_poses=0.5,
+)
+
 ANIMALS = replace(WIDE, generator="animals-1", layouts={"empty": (1.0, ())}, animals_alone=1.0)
 
-VARIETIES = {"close": CLOSE, "wide": WIDE, "animals": ANIMALS}
+VARIETIES = {"close": CLOSE, "wide": WIDE, "usual": USUAL, "animals": ANIMALS}

@@ -24,11 +24,12 @@ from export.people.animals import load_animals
 from export.people.motion import load_clips
 from export.people.wardrobe import Fabrics
 from export.shards import Record, load_records
-from export.teachers.shards import LONG_SIDE, write_training_set
+from export.teachers.shards import write_training_set
 
 DATA = Path(".data")
 SPLITS = ("train", "val")
 SKIN_PX = 1024  # what the renderer uses
+LONG_SIDE = 512  # of photographs: a pack is to stay below 60 MiB
 QUALITY = 88
 _BODY = ("3dobjs/base.obj", "rigs/standard/rig.default.json", "rigs/standard/weights.default.json")
 

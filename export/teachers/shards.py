@@ -19,14 +19,16 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.people.variety import CLOSE
+from export.people.variety import USUAL
 from export.shards import BOX_ALONE, PERSON, REGION, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
-from export.surface import PART_COUNT
+from export.surface import PART_COUNT, PART_TO_COARSE
 from export.teachers.coarse import SOMEWHERE, coarse_labels
+from export.teachers.consistency import Consensus
 from export.teachers.fit import PhotoFits
+from export.teachers.hands import SIDES, Hand, HandNetwork, hands_of
 from export.teachers.label import PhotoLabels
 
-LONG_SIDE = 512
+LONG_SIDE = 800  # people are then as sharp in training as in a camera's picture at the size of the networks' input
 MIN_SCORE = 0.5  # of the detector; less sure boxes are regions that training leaves out
 _BORDER = 0.012  # of the person's height: this close to the mask's edge a pixel may be the person or not
 MIN_CROP_PX = 60  # height of people worth cutting out
@@ -36,10 +38,14 @@ _SIZES_APART = (0.5, 0.3, 0.15, 0.05, 0.0, 0.0)  # of 1, 2, ... 6 people
 _GROUP_SIZES = (0.0, 0.4, 0.25, 0.15, 0.1, 0.1)
 
 
-def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | None = None) -> np.ndarray:
+def weak_label(
+    labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | None = None,
+    hands: dict[tuple[int, str], Hand] | None = None,
+) -> np.ndarray:  # fmt: skip
     """uint8 [H, W, 4] = (I, U, V, instance) of a photo of `shape` pixels, with I as in `export.shards`.
 
-    People with a good fit of the body have its labels, others the coarse regions of their landmarks.
+    People with a good fit of the body have its labels, others the coarse regions of their landmarks; over both lie the
+    hands that were seen, by person and side.
 
     Boxes without a mask are filled with UNSURE; masks lie over them. Instances: 1.. with a mask, BOX_ALONE.. with a
     box alone, UNCERTAIN.. where the detector itself is not sure.
@@ -69,6 +75,12 @@ def weak_label(labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | No
             out[mask & ~known, 0] = PERSON
             out[known, :3] = fitted[known]
         out[mask, 3] = k + 1
+        for side in SIDES:
+            if hands and (k, side) in hands:
+                shown = hands[k, side].mask(shape) & np.isin(out[..., 3], (0, k + 1))
+                # A fitted body knows more of its hand than that it is one.
+                shown &= ~np.isin(out[..., 0], np.flatnonzero(PART_TO_COARSE == SIDES[side]))
+                out[shown] = (REGION + SIDES[side], 0, 0, k + 1)
     return out
 
 
@@ -200,7 +212,7 @@ def write_training_set(
     rng.shuffle(every)  # so that every shard holds both kinds
     count = composed_images if people and empty else 0
     more = (
-        composed(empty[rng.integers(len(empty))][0], people, CLOSE.sizes[rng.integers(len(CLOSE.sizes))], rng)
+        composed(empty[rng.integers(len(empty))][0], people, USUAL.sizes[rng.integers(len(USUAL.sizes))], rng)
         for _ in range(count)
     )  # fmt: skip
     write_shards(itertools.chain(every, more), len(every) + count, out)
@@ -224,6 +236,10 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--fits", type=Path, default=Path(".data/teachers/fits"), metavar="DIR", help="if there are any"
     )
+    parser.add_argument(
+        "--consistent", type=Path, nargs="+", default=[], metavar="WEIGHTS",
+        help="weights.pt of trainings: what they agree on about people seen large completes the labels",
+    )  # fmt: skip
     parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/train"), metavar="DIR", help="no people")
     parser.add_argument(
         "--composed", type=int, default=2400, metavar="N",
@@ -242,12 +258,20 @@ def main(argv: list[str] | None = None) -> int:
         print(f"No labels for {missing} of {len(photos)} photos in {arguments.photos}: run "
               f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip
         return 1
-    pictures, fitted = [], 0
-    for path, labels in photos:
+    pictures, fitted, seen_hands = [], 0, 0
+    hand_network = HandNetwork()
+    consensus = Consensus.of_files(arguments.consistent) if arguments.consistent else None
+    for path, labels in tqdm(photos, desc="labels", unit="photo", disable=None):
         image = read(path)
         fits = PhotoFits.load(kept) if (kept := arguments.fits / labels.name).exists() else None
         fitted += 0 if fits is None else int(fits.accepted.sum())
-        pictures.append(shrunk(image, weak_label(PhotoLabels.load(labels), image.shape[:2], fits)))
+        told = PhotoLabels.load(labels)
+        hands = hands_of(hand_network, image, told)
+        seen_hands += len(hands)
+        label = weak_label(told, image.shape[:2], fits, hands)
+        if consensus:
+            label = consensus.complete(image, label)
+        pictures.append(shrunk(image, label))
     known = np.concatenate([instance[~ignore] for _, instance, ignore in (visible_boxes(p[1]) for p in pictures)])
     empty = []
     for path in sorted(arguments.empty.glob("*.jpg")):
@@ -255,7 +279,7 @@ def main(argv: list[str] | None = None) -> int:
         empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
     people, count = write_training_set(pictures, empty, arguments.repeat, arguments.composed, arguments.out)
     print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
-          f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body), "
+          f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body, {seen_hands} hands), "
           f"{int((known >= BOX_ALONE).sum())} with a box alone; each {arguments.repeat} times; "
           f"{count} images composed of {people} people cut out")  # fmt: skip
     return 0

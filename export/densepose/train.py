@@ -370,8 +370,8 @@ def parsed() -> TrainingConfig:
     parser.add_argument(
         "--recipe", choices=RECIPES, default=default.recipe,
         help="scratch: surface, then the whole network; crops: person crops alone; both: them and whole "
-             "pictures of 320 to 448 pixels; usual: the same at 288 to 384 pixels, with people as photographs show them "
-             "(default %(default)s)",
+             "pictures of 320 to 448 pixels; usual: the same at 288 to 384 pixels, with people as photographs show "
+             "them (default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--crops", type=int, default=default.crops, help="person crops a step and process")
     parser.add_argument("--crop-size", type=int, default=default.crop_size, help="their side, pixels")

@@ -3,7 +3,8 @@
 `CLOSE` is what the shipped weights were trained and tested on: 320 x 256, mostly alone, upright and facing the camera.
 `WIDE` shows what a webcam in a room and a phone video show: 640 x 512, people from 1/14 of the picture's height up,
 tilted pictures, a third of the people from behind, crowds in which boxes overlap.
-`USUAL` shows people at the size of `WIDE` as photographs usually do: most upright and facing the camera, one in eight small.
+`USUAL` shows people at the size of `WIDE` as photographs usually do: most upright and facing the camera, one in eight
+small, half of those scattered or before a webcam in poses of photographs.
 `ANIMALS` shows animals and nobody, for a detector of people to learn the difference (`export.densepose.train_boxes`).
 """
 

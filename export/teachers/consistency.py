@@ -1,8 +1,8 @@
-"""What a trained network itself says of people in photographs, seen large, upright and several times: labels for the same
-people turned, shrunk and blurred.
+"""What a trained network itself says of people in photographs, seen large, upright and several times: labels for the
+same people turned, shrunk and blurred.
 
-The teachers know a region here and there (`coarse.py`) and for the rest of a mask only that it is a person. Where weights
-that are asked several times agree with themselves, and with what the teachers leave possible, their answer becomes the
+The teachers know a region here and there (`coarse.py`) and for the rest of a mask only that it is a person. Where
+weights that are asked several times agree with themselves, and with what the teachers leave possible, their answer becomes the
 label, so that training keeps on hard views what was right on easy ones.
 """
 

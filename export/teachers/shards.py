@@ -79,7 +79,7 @@ def weak_label(
             if hands and (k, side) in hands:
                 shown = hands[k, side].mask(shape) & np.isin(out[..., 3], (0, k + 1))
                 # A fitted body knows more of its hand than that it is one.
-                shown &= ~np.isin(out[..., 0], np.flatnonzero(PART_TO_COARSE == SIDES[side]))
+                shown &= ~np.isin(out[..., 0], np.flatnonzero(SIDES[side] == PART_TO_COARSE))
                 out[shown] = (REGION + SIDES[side], 0, 0, k + 1)
     return out
 
@@ -279,8 +279,8 @@ def main(argv: list[str] | None = None) -> int:
         empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
     people, count = write_training_set(pictures, empty, arguments.repeat, arguments.composed, arguments.out)
     print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
-          f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body, {seen_hands} hands), "
-          f"{int((known >= BOX_ALONE).sum())} with a box alone; each {arguments.repeat} times; "
+          f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body, "
+          f"{seen_hands} hands), {int((known >= BOX_ALONE).sum())} with a box alone; each {arguments.repeat} times; "
           f"{count} images composed of {people} people cut out")  # fmt: skip
     return 0
 

@@ -9,7 +9,9 @@ import pytest
 from export import surface
 from export.densepose import data
 from export.shards import BOX_ALONE, PERSON, POSSIBLE_PARTS, REGION, UNCERTAIN, UNSURE, load_records, mirror_iuv
+from export.teachers import shards
 from export.teachers.fit import PhotoFits
+from export.teachers.hands import Hand
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
 from export.teachers.shards import LONG_SIDE, composed, cut_outs, main, weak_label
@@ -58,6 +60,36 @@ def test_a_fitted_body_gives_part_u_and_v_where_it_is_believed():
     assert found[50, 70].tolist() == [PERSON, 0, 0, 2]  # not believed
 
 
+def open_hand(middle: tuple[float, float], size: float = 16) -> Hand:
+    """Upright: the wrist below, five fingers side by side."""
+    point = np.zeros((21, 2))
+    for finger in range(5):
+        x = -0.4 + 0.2 * finger
+        point[1 + 4 * finger : 5 + 4 * finger] = [(x, 0.1 - 0.2 * joint) for joint in range(4)]
+    point[0] = 0, 0.5
+    return Hand(np.array(middle) + size * point, 0.9)
+
+
+def test_a_hand_that_was_seen_is_labelled_as_one():
+    hands = {(0, "left"): open_hand((40, 74)), (1, "right"): open_hand((64, 40))}
+    label = weak_label(photo_labels(), SHAPE, None, hands)
+    assert label[74, 40].tolist() == [REGION + 3, 0, 0, 1]
+    assert label[40, 66].tolist() == [REGION + 2, 0, 0, 2]
+    assert label[40, 63].tolist() == [REGION + 2, 0, 0, 2]  # beside the mask, which had lost it
+    assert label[40, 75].tolist() == [PERSON, 0, 0, 2]
+    assert np.array_equal(label[:30], weak_label(photo_labels(), SHAPE)[:30])
+
+
+def test_a_fitted_hand_stays():
+    label = np.zeros((1, *SHAPE, 3), np.uint8)
+    label[0, 20:80, 15:45] = (4, 50, 60)
+    label[0, 74, 38] = (2, 50, 60)
+    fits = PhotoFits(np.array([0]), np.ones(1), np.zeros(1), np.array([""]), label, np.zeros((1, 19, 3, 3)))
+    found = weak_label(photo_labels(), SHAPE, fits, {(0, "left"): open_hand((40, 74))})
+    assert found[74, 40].tolist() == [4, 50, 60, 1]
+    assert found[74, 38].tolist() == [REGION + 3, 0, 0, 1]
+
+
 def test_boxes_and_masks_become_people_and_doubtful_boxes_are_ignored():
     truth = data.truth_of(weak_label(photo_labels(), SHAPE))
     assert truth.instance.tolist() == [1, 2, BOX_ALONE + 2, UNCERTAIN + 3]
@@ -89,16 +121,22 @@ def arguments(folder) -> list[str]:
     return [text for option, name in names.items() for text in (f"--{option}", str(folder / name))]
 
 
+@pytest.fixture(autouse=True)
+def no_hands(monkeypatch):
+    monkeypatch.setattr(shards, "HandNetwork", lambda: None)
+    monkeypatch.setattr(shards, "hands_of", lambda network, image, labels: {})
+
+
 def test_shards_are_read_by_the_training(folders, capsys):
     photo_labels().save(folders / "labels" / "a.npz")
     assert main([*arguments(folders), "--composed", "3", "--repeat", "2"]) == 0
     told = capsys.readouterr().out
-    assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body)" in told
+    assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body, 0 hands)" in told
     assert "1 with a box alone; each 2 times; 3 images composed" in told
     records = load_records(folders / "shards")
     sizes = sorted(record.decoded()[0].shape[:2] for record in records)
     assert sizes[0] == SHAPE
-    assert sizes[-1] == (round(600 * LONG_SIDE / 900), LONG_SIDE)
+    assert (round(600 * LONG_SIDE / 900), LONG_SIDE) in sizes
     assert len(sizes) == 2 * 2 + 3
     batches = data.Batches(records[:1] * 4, 8, 0, photos=records, photo_fraction=1.0)
     image, truths = batches.make(0, (64,))

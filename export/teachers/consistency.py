@@ -2,8 +2,8 @@
 same people turned, shrunk and blurred.
 
 The teachers know a region here and there (`coarse.py`) and for the rest of a mask only that it is a person. Where
-weights that are asked several times agree with themselves, and with what the teachers leave possible, their answer becomes the
-label, so that training keeps on hard views what was right on easy ones.
+weights that are asked several times agree with themselves, and with what the teachers leave possible, their answer
+becomes the label, so that training keeps on hard views what was right on easy ones.
 """
 
 from __future__ import annotations

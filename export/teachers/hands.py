@@ -65,7 +65,7 @@ class HandNetwork:
 
     def find(self, image: np.ndarray, wrist: np.ndarray, knuckles: np.ndarray) -> Hand | None:
         """image: uint8 [H, W, 3] BGR; wrist: [2], knuckles: [2], the middle of index and little finger's, pixels. None
-        where no hand is seen. The second look is at the square that the first one's points ask for."""
+        where no hand is seen. It runs twice: at the end on the square that its first points ask for."""
         along = knuckles - wrist
         centre, size = wrist + along, _FIRST_MARGIN * float(np.linalg.norm(along))
         for _ in range(2):

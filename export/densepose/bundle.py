@@ -34,7 +34,7 @@ TRAINING_DATA = (
         "used_for": "training, calibration",
     },
     {
-        "name": "labels of these by SSD MobileNetV2, BlazePose heavy and MediaPipe selfie segmentation",
+        "name": "labels of these by SSD MobileNetV2, BlazePose heavy, MediaPipe selfie segmentation and hand landmarks",
         "licence": "Apache-2.0",
         "used_for": "training",
     },

@@ -52,7 +52,7 @@ class DecodeConfig:
     pre_nms_top_k: int = 1000
     post_nms_top_k: int = 50  # half of the paper's 100: the same AP and a millisecond less
     rpn_nms_iou: float = 0.7
-    score_threshold: float = 0.7
+    score_threshold: float = 0.6
     box_nms_iou: float = 0.5
     # Boxes with more than this score go through the box head again, from where its first pass put them (None: one
     # pass). The second pass depends less on which proposals there were: recall .72 -> .74 at the same precision, box

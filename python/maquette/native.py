@@ -115,7 +115,7 @@ class Native:
 
     def plane(self, function: str, handle: Any, plane: int, shape: tuple[int, ...], kind: type) -> np.ndarray:
         """A copy of a plane of a result, of the shape [H, W] or [H, W, C]."""
-        pointer = "const uint8_t **" if "densepose" in function else "const void **"
+        pointer = self.ffi.typeof(getattr(self.lib, function)).args[2]  # bytes of one system, void of another
         values, stride = self.ffi.new(pointer), self.ffi.new("size_t *")
         self.call(function, handle, plane, values, stride)
         size = np.dtype(kind).itemsize

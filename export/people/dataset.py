@@ -60,7 +60,7 @@ def main() -> int:
     parser.add_argument(
         "--variety", choices=VARIETIES, default="close",
         help="close: 320 x 256, mostly upright; wide: 640 x 512, small, tilted, crowded people; usual: 640 x 512, as "
-             "photographs show them; animals: nobody (default %(default)s)",
+             "photographs show them; animals: without people (default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--bare", action="store_true", help="nobody wears clothes (export.evaluation.ablation)")
     options = parser.parse_args()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from maquette.frames import Frame, as_frame
-from maquette.native import native
+from maquette.native import NativeObject, native
 
 PART_COUNT = 24
 
@@ -45,7 +45,7 @@ class DensePoseResult:
         return out
 
 
-class DensePose:
+class DensePose(NativeObject):
     """The networks, loaded once and used for many images.
 
         result = maquette.DensePose().run(rgb)
@@ -59,11 +59,7 @@ class DensePose:
         n = native()
         if bundle is not None:
             settings["bundle_path"] = Path(bundle)
-        self.handle = n.create("maq_densepose", n.context, n.config("maq_densepose_config", settings))
-
-    def close(self) -> None:
-        """Frees the networks at once; without it, that happens when the object is freed."""
-        native().ffi.release(self.handle)
+        super().__init__(n.create("maq_densepose", n.context, n.config("maq_densepose_config", settings)))
 
     def run(self, image: Frame | np.ndarray) -> DensePoseResult:
         """image: a Frame, or uint8 [H, W, 3] RGB. One call at a time. Raises MaquetteError."""

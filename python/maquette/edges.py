@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from maquette.frames import Frame, Intrinsics, as_frame
-from maquette.native import native
+from maquette.native import NativeObject, native
 
 KINDS = ("none", "crease", "boundary")
 TYPES = ("line", "arc", "spline")
@@ -43,13 +43,13 @@ class Box:
     corner_count: int
 
 
-class Curves:
+class Curves(NativeObject):
     """The curves of a depth image: `curves`, `corners_m` float64 [n, 3], `boxes`, the largest first; curves_ms,
     boxes_ms: how long it took to find them. Hold no more than 16 at once (result_pool_size)."""
 
     def __init__(self, handle: Any) -> None:
         n = native()
-        self.handle = handle
+        super().__init__(handle)
         found = n.indexed("maq_edges_curves_get_curve", handle, "maq_edges_curve",
                           n.lib.maq_edges_curves_get_curve_count(handle))  # fmt: skip
         self.curves = [
@@ -104,7 +104,7 @@ class EdgesResult:
     stats: dict[str, float]
 
 
-class Edges:
+class Edges(NativeObject):
     """The network, loaded once and used for many depth images.
 
         result = maquette.Edges().run(depth_m, maquette.Intrinsics.centred(640, 480, fov_deg=60), curves=True)
@@ -119,11 +119,7 @@ class Edges:
         if bundle is not None:
             settings["bundle_path"] = Path(bundle)
         settings.setdefault("result_pool_size", 16)
-        self.handle = n.create("maq_edges", n.context, n.config("maq_edges_config", settings))
-
-    def close(self) -> None:
-        """Frees the network at once; without it, that happens when the object is freed."""
-        native().ffi.release(self.handle)
+        super().__init__(n.create("maq_edges", n.context, n.config("maq_edges_config", settings)))
 
     def run(
         self, depth: Frame | np.ndarray, intrinsics: Intrinsics, curves: bool = False, **curve_settings: Any

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from maquette.native import MaquetteError, native
+from maquette.native import NativeObject, native
 
 
 class PixelFormat(enum.IntEnum):
@@ -66,7 +66,7 @@ class Intrinsics:
         )  # fmt: skip
 
 
-class Frame:
+class Frame(NativeObject):
     """One image with its format and time.
 
     `Frame(pixels)` wraps an array without a copy: uint8 [H, W, 3] (RGB unless `format` says otherwise), uint8 [H, W]
@@ -88,13 +88,14 @@ class Frame:
         description.format, description.timestamp_ns = int(format), timestamp_ns
         description.height_px, description.width_px = pixels.shape[:2]
         description.planes[0] = n.ffi.cast("const uint8_t *", n.ffi.from_buffer(self._pixels))
-        self.handle = n.create("maq_frame", n.context, description, n.ffi.NULL, n.ffi.NULL,
-                               function="maq_frame_wrap", release="maq_frame_release")  # fmt: skip
+        wrap, release = "maq_frame_wrap", "maq_frame_release"
+        null = n.ffi.NULL
+        super().__init__(n.create("maq_frame", n.context, description, null, null, function=wrap, release=release))
 
     @staticmethod
     def of_handle(handle: Any) -> Frame:
         frame = Frame.__new__(Frame)
-        frame._pixels, frame.handle = None, handle
+        frame._pixels, frame._handle = None, handle
         return frame
 
     @staticmethod
@@ -175,7 +176,7 @@ def as_frame(image: Frame | np.ndarray) -> Frame:
     return image if isinstance(image, Frame) else Frame(image)
 
 
-class Source:
+class Source(NativeObject):
     """A camera, file, recording or simulated scene, opened by a URI; iterate over it.
 
     `Source("camera:")`, `Source("clip.mp4")`, `Source("stub:people?count=2")`: docs/cameras.md has all of them.
@@ -185,36 +186,19 @@ class Source:
     def __init__(self, uri: str | Path, **settings: Any) -> None:
         n = native()
         config = n.config("maq_source_config", settings)
-        self.handle = n.create("maq_source", n.context, str(uri).encode(), config)
-
-    def __enter__(self) -> Source:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Stops the source and frees the camera; frames that are held stay valid."""
-        if self.handle is not None:
-            native().ffi.release(self.handle)
-            self.handle = None
-
-    def _opened(self) -> Any:
-        if self.handle is None:
-            raise MaquetteError("The source is closed.", "MAQ_ERROR_INVALID_ARGUMENT")
-        return self.handle
+        super().__init__(n.create("maq_source", n.context, str(uri).encode(), config))
 
     @property
     def info(self) -> dict[str, float]:
         """Size, rate, number of frames and what was dropped: the fields of maq_source_info."""
-        return native().stats("maq_source_info", "maq_source_get_info", self._opened())
+        return native().stats("maq_source_info", "maq_source_get_info", self.handle)
 
     @property
     def intrinsics(self) -> Intrinsics:
         """Raises MaquetteError where they are unknown."""
         n = native()
         struct = n.ffi.new("maq_intrinsics *")
-        n.call("maq_source_get_intrinsics", self._opened(), struct)
+        n.call("maq_source_get_intrinsics", self.handle, struct)
         return Intrinsics.of_struct(struct)
 
     def read(self, timeout_s: float | None = None) -> Frame | None:
@@ -223,7 +207,7 @@ class Source:
         n = native()
         out = n.ffi.new("maq_frame **")
         limit = n.lib.MAQ_WAIT_FOREVER if timeout_s is None else round(timeout_s * 1e9)
-        status = n.ask("maq_source_acquire_frame", self._opened(), limit, out)
+        status = n.ask("maq_source_acquire_frame", self.handle, limit, out)
         if status == n.lib.MAQ_END_OF_STREAM:
             return None
         if status == n.lib.MAQ_TIMEOUT:

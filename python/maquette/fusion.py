@@ -9,7 +9,7 @@ import numpy as np
 
 from maquette.edges import Curves, Edges, EdgesResult
 from maquette.frames import Frame
-from maquette.native import native
+from maquette.native import NativeObject, native
 from maquette.scenes import PinholeCamera
 
 # maq_edges_fusion_point
@@ -17,7 +17,7 @@ POINT = np.dtype([("point_m", "<f8", 3), ("normal", "<f4", 3), ("distance_m", "<
                   ("view_count", "<u4")])  # fmt: skip
 
 
-class EdgesFusion:
+class EdgesFusion(NativeObject):
     """Add views, finish, then ask for points and curves, in the world of the cameras.
 
     edges: the network. progress: called by `finish` with the fraction done; returns False to cancel. settings: fields
@@ -33,11 +33,7 @@ class EdgesFusion:
         told = None if progress is None else lambda _, done: 0 if progress(done) is False else 1
         self._callback = n.ffi.NULL if told is None else n.ffi.callback("int32_t(void *, double)", told, error=0)
         config = n.config("maq_edges_fusion_config", {**settings, "progress_callback": self._callback})
-        self.handle = n.create("maq_edges_fusion", n.context, config)
-
-    def close(self) -> None:
-        """Frees views and points at once; without it, that happens when the object is freed."""
-        native().ffi.release(self.handle)
+        super().__init__(n.create("maq_edges_fusion", n.context, config))
 
     def add_view(self, depth: Frame | np.ndarray, camera: PinholeCamera) -> EdgesResult:
         """Runs the network on a depth image in metres and adds its field; the field."""

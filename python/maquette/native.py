@@ -8,7 +8,7 @@ import os
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -130,6 +130,31 @@ class Native:
         for index in range(count):
             self.call(function, handle, index, struct)
             yield struct
+
+
+class NativeObject:
+    """An object of the library: freed by close(), at the end of a `with` statement, or with the Python object."""
+
+    def __init__(self, handle: Any) -> None:
+        self._handle = handle
+
+    @property
+    def handle(self) -> Any:
+        """For calls of the C API. Raises MaquetteError when it is closed."""
+        if self._handle is None:
+            raise MaquetteError(f"This {type(self).__name__} is closed.", "MAQ_ERROR_INVALID_ARGUMENT")
+        return self._handle
+
+    def close(self) -> None:
+        if self._handle is not None:
+            native().ffi.release(self._handle)
+            self._handle = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 @functools.cache

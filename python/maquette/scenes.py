@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from maquette.frames import Intrinsics
-from maquette.native import native, progress_callback
+from maquette.native import NativeObject, native, progress_callback
 
 _PROGRESS = "int32_t(void *, double, const char *)"
 
@@ -51,14 +51,14 @@ class View:
     held_out: bool
 
 
-class Capture:
+class Capture(NativeObject):
     """A folder with posed photos and a point cloud: COLMAP, or transforms.json as nerfstudio and Instant-NGP write it
     (docs/formats.md). drops: what cannot be used, and why. Raises MaquetteError."""
 
     def __init__(self, folder: str | Path) -> None:
         n = native()
-        self.handle = n.create("maq_capture", n.context, str(folder).encode(), function="maq_capture_open",
-                               release="maq_capture_close")  # fmt: skip
+        opened, release = "maq_capture_open", "maq_capture_close"
+        super().__init__(n.create("maq_capture", n.context, str(folder).encode(), function=opened, release=release))
         info = n.sized("maq_capture_info")
         n.call("maq_capture_get_info", self.handle, info)
         self.up = np.array(list(info.up))
@@ -68,11 +68,8 @@ class Capture:
         self.drops = [f"{d.count} {n.ffi.string(d.reason).decode()}" for d in drops]
 
 
-class Scene:
+class Scene(NativeObject):
     """Points with descriptors, ready to be rendered: `Scene.build(folder)` or `Scene.open("place.maqs")`."""
-
-    def __init__(self, handle: Any) -> None:
-        self.handle = handle
 
     @staticmethod
     def build(
@@ -144,13 +141,13 @@ class SceneImage:
     stats: dict[str, float] = field(default_factory=dict)
 
 
-class SceneRenderer:
+class SceneRenderer(NativeObject):
     """settings: fields of maq_scene_renderer_config by their names. Raises MaquetteError."""
 
     def __init__(self, scene: Scene, **settings: Any) -> None:
         n = native()
         config = n.config("maq_scene_renderer_config", settings)
-        self.handle = n.create("maq_scene_renderer", n.context, config, scene.handle)
+        super().__init__(n.create("maq_scene_renderer", n.context, config, scene.handle))
 
     def run(self, camera: PinholeCamera) -> SceneImage:
         """The view of a camera. One call at a time. Raises MaquetteError."""

@@ -208,6 +208,26 @@ def test_what_is_wrong_is_said(call, error, text):
         call()
 
 
+def test_what_is_closed_is_said_and_nothing_reaches_the_library(densepose, person, box):
+    depth, intrinsics = box
+    with maquette.Edges(threads=1) as edges:
+        curves = edges.run(depth, intrinsics, curves=True).curves
+    other = maquette.DensePose(threads=1)
+    frame = maquette.Frame(person.pixels())
+    fusion = maquette.EdgesFusion(maquette.Edges(threads=1))
+    for closed in (edges, other, frame, fusion, curves):
+        closed.close()
+        closed.close()
+    calls = (
+        lambda: edges.run(depth, intrinsics), lambda: other.run(person), lambda: other.reset(), lambda: frame.pixels(),
+        lambda: densepose.run(frame), lambda: fusion.finish(), lambda: curves.snap(0, 0),
+    )  # fmt: skip
+    for call in calls:
+        with pytest.raises(maquette.MaquetteError, match=r"This \w+ is closed"):
+            call()
+    assert curves.boxes  # copies stay
+
+
 def test_depth_is_wanted_for_edges(person):
     with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_UNSUPPORTED"):
         maquette.Edges(threads=1).run(person, maquette.Intrinsics.centred(320, 240, fov_deg=60))

@@ -1,0 +1,23 @@
+// A triangle mesh in the head frame: decimetres, x to the person's left, y to the back, z up.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace maq::head {
+
+// What is empty is not known. All arrays but the triangles are by vertex.
+struct HeadMesh {
+  std::vector<float> positions;            // x, y, z, decimetres
+  std::vector<float> normals;              // x, y, z, of length 1, outwards
+  std::vector<uint8_t> colours;            // R, G, B (sRGB)
+  std::vector<float> template_points;      // x, y, z on the template head, decimetres
+  std::vector<float> texture_coordinates;  // u to the right, v down, 0 to 1
+  std::vector<uint32_t> triangles;         // three vertices each, counter-clockwise seen from outside
+
+  size_t vertex_count() const { return positions.size() / 3; }
+  size_t triangle_count() const { return triangles.size() / 3; }
+};
+
+}  // namespace maq::head

@@ -38,6 +38,7 @@ MAY_INCLUDE = {
     "edges/files": BASE - {"nn"} | CURVES,
     "edges/fusion": BASE - {"nn"} | CURVES,
     "edges/measuring": BASE - {"nn"} | CURVES,
+    "head/field": {"core"},
     "head/mesh": BASE - {"nn"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,

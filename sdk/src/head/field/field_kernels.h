@@ -1,0 +1,60 @@
+// What the field engine computes in vectors, once for each instruction set. The sources that define these are compiled
+// with flags of their own, so they include nothing that other sources could take a function from: plain numbers only.
+//
+// Points lie in blocks of kFieldBlock columns: a matrix [rows][kFieldBlock] has a row for each input or output of a
+// layer. All memory is aligned to 64 bytes. With tangents, a block holds kTangentPoints points, and its columns are
+// four groups: the value, then its derivatives by x, y and z.
+#pragma once
+
+#include <cstddef>
+
+namespace maq::head {
+
+inline constexpr int kFieldBlock = 64, kTangentPoints = 16;
+
+struct FieldKernels {
+  // points: [3][kFieldBlock] -> encoding [3 + 6 octaves][kFieldBlock]. A point that is not finite is NaN in all rows
+  // that depend on it. Within 2e-7 for coordinates up to 64 / 2^octaves · 64.
+  void (*encode)(const float* points, int octaves, float* encoding);
+  // points: [3][kTangentPoints]
+  void (*encode_tangents)(const float* points, int octaves, float* encoding);
+  // Adds the gradient by the points, from that by the encoding: [3][kFieldBlock].
+  void (*encode_backward)(const float* encoding, const float* gradient, int octaves, float* points_gradient);
+
+  // Weights [rows][stride], of which `depth` columns, in the order in which multiply() reads them: rows * depth floats.
+  void (*pack)(const float* weights, size_t stride, int rows, int depth, float* packed);
+  // The same of the transpose of weights [depth][stride]: rows * depth floats.
+  void (*pack_transposed)(const float* weights, size_t stride, int rows, int depth, float* packed);
+  // out [rows][block] = packed [rows][depth] · in [depth][block], of which the first `used` of the depth.
+  void (*multiply)(const float* packed, int rows, int depth, int used, const float* in, float* out);
+  // The same plus bias [rows] in each column; of the first `rows` rows.
+  void (*affine)(const float* packed, const float* bias, int rows, int depth, const float* in, float* out);
+  // The same through squareplus.
+  void (*affine_activated)(const float* packed, const float* bias, int rows, int depth, float smoothing,
+                           const float* in, float* out);
+  // The affine layer and squareplus of a block with tangents. slopes [rows][block] gets a', a'' v_x, a'' v_y, a'' v_z.
+  void (*affine_activated_tangents)(const float* packed, const float* bias, int rows, int depth, float smoothing,
+                                    const float* in, float* out, float* slopes);
+
+  // gradient: by what squareplus gave (out) -> by what it was given.
+  void (*activation_backward)(const float* out, int rows, float smoothing, float* gradient);
+  void (*activation_backward_tangents)(const float* slopes, int rows, float* gradient);
+
+  // Adds gradient [outputs][block] · transpose of in [inputs][block] to weights [outputs][stride], and the sums of
+  // the first bias_columns of the rows of gradient to bias. scratch: kFieldBlock * stride floats.
+  void (*weight_gradient)(const float* gradient, int outputs, const float* in, int inputs, size_t stride,
+                          int bias_columns, float* scratch, float* weights, float* bias);
+
+  // Arrays of `count` floats, a multiple of 64: out = constant + Σ codes[k] bases[k]; the dot product of two.
+  void (*combine)(const float* constant, const float* bases, const float* codes, int codes_count, size_t count,
+                  float* out);
+  float (*dot)(const float* a, const float* b, size_t count);
+};
+
+const FieldKernels& field_kernels_portable();
+#if defined(__x86_64__)
+const FieldKernels& field_kernels_avx2();
+const FieldKernels& field_kernels_avx512();
+#endif
+
+}  // namespace maq::head

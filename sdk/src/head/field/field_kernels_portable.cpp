@@ -1,0 +1,2 @@
+#define MAQ_FIELD_KERNELS field_kernels_portable
+#include "head/field/field_kernels_body.h"

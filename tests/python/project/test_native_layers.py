@@ -14,7 +14,7 @@ MAX_FILES, SMALL_UNIT_LINES = 25, 60
 
 # Each folder of sdk/src, and the folders that its files may include beside their own. A folder in a folder is a room of
 # its own: "scene" means the files of sdk/src/scene, not those of its rooms.
-BASE = {"core", "image", "image/geometry", "image/files", "nn"}
+BASE = {"core", "core/math", "image", "image/geometry", "image/files", "nn"}
 BACKEND = BASE - {"nn"} | {"sources"}
 CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
@@ -22,10 +22,11 @@ SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
 CURVES = {"edges", "edges/curves"}
 SYSTEMS = (
-    SCENE | CURVES | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
+    SCENE | CURVES | {"head/camera", "densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
 )
 MAY_INCLUDE = {
     "core": set(),
+    "core/math": set(),
     "core/trace": set(),
     "image": {"core", "image/geometry"},
     "image/files": {"core", "image"},
@@ -38,6 +39,7 @@ MAY_INCLUDE = {
     "edges/files": BASE - {"nn"} | CURVES,
     "edges/fusion": BASE - {"nn"} | CURVES,
     "edges/measuring": BASE - {"nn"} | CURVES,
+    "head/camera": {"core", "core/math"},
     "head/field": {"core"},
     "head/mesh": BASE - {"nn"},
     "scene": BASE - {"nn"},

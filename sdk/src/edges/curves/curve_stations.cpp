@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "edges/curves/small_solve.h"
+#include "core/math/small_solve.h"
 
 namespace maq {
 namespace {

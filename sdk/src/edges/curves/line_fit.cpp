@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "edges/curves/small_solve.h"
+#include "core/math/small_solve.h"
 
 namespace maq {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "edges/curves/vec3.h"
+#include "core/math/vec3.h"
 
 namespace maq {
 

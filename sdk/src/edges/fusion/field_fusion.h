@@ -7,8 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "core/math/vec3.h"
 #include "core/worker_threads.h"
-#include "edges/curves/vec3.h"
 #include "edges/edge_field.h"
 #include "edges/fusion/fusion_view.h"
 #include "image/geometry/pinhole_camera.h"

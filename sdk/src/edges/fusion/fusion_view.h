@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "edges/curves/vec3.h"
+#include "core/math/vec3.h"
 #include "edges/edge_field.h"
 #include "image/geometry/pinhole_camera.h"
 

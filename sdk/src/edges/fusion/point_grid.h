@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "edges/curves/vec3.h"
+#include "core/math/vec3.h"
 
 namespace maq {
 

@@ -1,4 +1,4 @@
-// Points and directions in camera coordinates: x right, y down, z along the optical axis, metres.
+// Points and directions in space, float64.
 #pragma once
 
 #include <cmath>

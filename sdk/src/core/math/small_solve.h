@@ -1,11 +1,12 @@
-// Dense systems of a handful of unknowns, without a library: the fits of this room need nothing else of linear algebra.
+// Dense systems of a handful of unknowns, without a library: the fits of all systems need nothing else of linear
+// algebra.
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <utility>
 
-#include "edges/curves/vec3.h"
+#include "core/math/vec3.h"
 
 namespace maq {
 

@@ -1,0 +1,63 @@
+// The camera of a photo from points of the head and the pixels where they are seen: robust PnP, float64.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "head/camera/se3.h"
+
+namespace maq::head {
+
+// x right, y down, z forward; pixel = focal_px * (x, y) / z + (cx_px, cy_px), the centre of the first pixel is (0, 0).
+struct HeadCamera {
+  RigidMotion head_to_camera;  // decimetres
+  double focal_px = 0, cx_px = 0, cy_px = 0;
+};
+
+struct Correspondence {
+  Vec3 point_dm;  // on the head
+  double x_px = 0, y_px = 0;
+  double sigma_px = 1;  // standard deviation of each coordinate; the shape's error belongs to it too
+  double weight = 1;    // multiplies its squared residuals: less than 1 where neighbours say the same
+};
+
+struct CameraPoseOptions {
+  double focal_px = 0;         // the prior's median
+  double log_focal_sigma = 0;  // of the log-normal prior, 0..3; 0: the focal length is known
+  double cx_px = 0, cy_px = 0;
+  double min_inlier_fraction = 0.3;  // of the usable correspondences
+};
+
+enum class PoseStatus {
+  kFound,
+  kAmbiguous,     // another rotation explains the points almost as well: the better one is given
+  kTooFewPoints,  // less than 4 usable correspondences
+  kCollinear,     // the points do not hold the rotation: on a line, in one place, or too close for their noise
+  kNoConsensus,   // no camera explains enough of them
+  kMirrored,      // only a mirrored picture does, or, the same to the pixels, a head behind the camera
+};
+
+// A sentence for the log.
+const char* pose_status_text(PoseStatus status);
+
+struct CameraPose {
+  PoseStatus status = PoseStatus::kTooFewPoints;
+  // With kFound and kAmbiguous only, as all below:
+  HeadCamera camera;
+  // 7x7, row by row: w (rad), t (dm), log focal, where the true camera is (exp_rotation(w) R, t0 + t, focal e^l); from
+  // the sigmas of the inliers. The last row and column are 0 where the focal length is known.
+  std::array<double, 49> covariance{};
+  std::vector<char> is_inlier;  // of each correspondence: within 3.7 sigma (99.9 %)
+  size_t inliers = 0;
+  double rms_px = 0, rms_sigma = 0;  // of the inliers, per coordinate
+  size_t unusable = 0;               // with any status: not finite, out of range, or with no positive weight and sigma
+};
+
+// Deterministic. Up to 60 % of the correspondences may be outliers. Those with numbers that are not finite or beyond
+// 1e6, or whose weight or sigma is not positive, are left out and counted. All inliers lie in front of the camera.
+// Throws MAQ_ERROR_INVALID_ARGUMENT unless the options are finite, the focal length positive, its sigma within 0..3 and
+// the fraction within 0..1.
+CameraPose find_camera_pose(const std::vector<Correspondence>& points, const CameraPoseOptions& options);
+
+}  // namespace maq::head

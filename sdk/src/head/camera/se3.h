@@ -1,0 +1,92 @@
+// Rigid motions and their exponential map, float64: the corrections of a camera in the fit, and rotations in pose
+// estimation. Accurate at any angle, 0 and pi included (T. Barfoot, State Estimation for Robotics, chapter 7).
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "core/math/vec3.h"
+
+namespace maq::head {
+
+struct Mat3 : std::array<double, 9> {};  // row by row
+
+inline constexpr Mat3 kIdentity3 = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+inline Vec3 operator*(const Mat3& m, Vec3 p) {
+  return {m[0] * p.x + m[1] * p.y + m[2] * p.z, m[3] * p.x + m[4] * p.y + m[5] * p.z,
+          m[6] * p.x + m[7] * p.y + m[8] * p.z};
+}
+
+inline Mat3 operator*(const Mat3& a, const Mat3& b) {
+  Mat3 product;
+  for (size_t i = 0; i < 9; i += 3) {
+    for (size_t j = 0; j < 3; ++j) product[i + j] = a[i] * b[j] + a[i + 1] * b[3 + j] + a[i + 2] * b[6 + j];
+  }
+  return product;
+}
+
+inline Mat3 operator*(double s, Mat3 m) {
+  for (double& value : m) value *= s;
+  return m;
+}
+
+inline Mat3 operator+(Mat3 a, const Mat3& b) {
+  for (size_t i = 0; i < 9; ++i) a[i] += b[i];
+  return a;
+}
+
+inline Mat3 transposed(const Mat3& m) { return {m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]}; }
+
+// The matrix W with W p = w x p.
+inline Mat3 cross_matrix(Vec3 w) { return {0, -w.z, w.y, w.z, 0, -w.x, -w.y, w.x, 0}; }
+
+// p_camera = rotation p_head + translation, or any other such pair of frames.
+struct RigidMotion {
+  Mat3 rotation = kIdentity3;
+  Vec3 translation;
+};
+
+inline Vec3 operator*(const RigidMotion& m, Vec3 p) { return m.rotation * p + m.translation; }
+
+// First b, then a.
+inline RigidMotion operator*(const RigidMotion& a, const RigidMotion& b) {
+  return {a.rotation * b.rotation, a * b.translation};
+}
+
+inline RigidMotion inverse(const RigidMotion& m) {
+  const Mat3 back = transposed(m.rotation);
+  return {back, -(back * m.translation)};
+}
+
+// (angle - sin) / angle^3 and its two next of kin, which cancel near 0: what exp's derivatives are made of.
+struct AngleFactors {
+  double cubic, quartic, quintic;
+};
+AngleFactors angle_factors(double angle);
+
+// Rodrigues' formula: the rotation by |w| radians about w.
+Mat3 exp_rotation(Vec3 w);
+
+// The shortest w with exp_rotation(w) = r, |w| <= pi; at pi either sign.
+Vec3 log_rotation(const Mat3& r);
+
+// J with exp(w + d) = exp(J d) exp(w) for small d; exp_rotation(w) p changes by -cross_matrix(exp_rotation(w) p) J d.
+Mat3 left_jacobian(Vec3 w);
+
+// A change of a rigid motion: w radians, v in the motion's unit of length.
+struct Twist {
+  Vec3 w, v;
+};
+
+// The rotation is exp_rotation(w), the translation left_jacobian(w) v.
+RigidMotion exp_motion(const Twist& twist);
+
+// How the point exp_motion(twist) p changes with w and with v, each 3x3, for any twist. At 0: -cross_matrix(p) and the
+// identity.
+struct PointJacobian {
+  Mat3 by_w, by_v;
+};
+PointJacobian point_jacobian(const Twist& twist, Vec3 p);
+
+}  // namespace maq::head

@@ -346,8 +346,6 @@ TEST(FieldEngine, NoPointsAreNoWork) {
     engine.distances_and_gradients(none, workspace, nullptr, {});
     engine.forward(none, workspace, batch.values());
     engine.backward(workspace, {}, WeightGradient::kAll, &gradient);
-    engine.forward_normals(none, workspace, nullptr, {});
-    engine.backward_normals(workspace, nullptr, {}, WeightGradient::kAll, gradient);
     EXPECT_EQ(*std::max_element(gradient.values().begin(), gradient.values().end()), 0.0f);
   }
 }
@@ -362,8 +360,9 @@ TEST(FieldEngine, WhatWasNotKeptIsSaid) {
   expect_error(MAQ_ERROR_INTERNAL, "was kept", backward);
   engine.forward(as_points(batch.points), workspace, {batch.distance.data(), {}, {}});
   expect_error(MAQ_ERROR_INTERNAL, "not run forwards", backward);
-  expect_error(MAQ_ERROR_INTERNAL, "No normals",
-               [&] { engine.backward_normals(workspace, nullptr, {}, WeightGradient::kAll, gradient); });
+  expect_error(MAQ_ERROR_INTERNAL, "No normals", [&] {
+    engine.backward(workspace, {nullptr, {}, {}, as_const_planes(batch.by_rgb)}, WeightGradient::kAll, &gradient);
+  });
   engine.forward(as_points(batch.points), workspace, batch.values());
   expect_error(MAQ_ERROR_INTERNAL, "another shape",
                [&] { engine.backward(workspace, batch.gradient(), WeightGradient::kAll, &other); });

@@ -14,28 +14,40 @@ using namespace maq::head;        // NOLINT
 using namespace reference_field;  // NOLINT
 
 struct Normals {
-  explicit Normals(const FieldWeights& weights, FieldIsa isa, size_t count)
+  Normals(const FieldWeights& weights, FieldIsa isa, size_t count)
       : points(random_columns(count, 21, 2.2f)),
         by_distance(random_columns(count, 22, 1.0f)),
         by_normal(random_columns(count, 23, 1.0f)),
+        by_rgb(random_columns(count, 24, 1.0f)),
+        by_template(random_columns(count, 25, 1.0f)),
         normal(points),
+        rgb(points),
+        template_point(points),
+        by_points(points),
         distance(count),
         engine(weights.shape(), isa) {
     engine.set_weights(weights);
-    engine.forward_normals(as_points(points), workspace, distance.data(), as_planes(normal));
+    forward(true);
   }
 
-  Columns points, by_distance, by_normal, normal;
+  void forward(bool has_surface) {
+    FieldValues values{distance.data(), {}, {}, as_planes(normal)};
+    if (has_surface) values = {distance.data(), as_planes(rgb), as_planes(template_point), as_planes(normal)};
+    engine.forward(as_points(points), workspace, values);
+  }
+
+  Columns points, by_distance, by_normal, by_rgb, by_template, normal, rgb, template_point, by_points;
   std::vector<float> distance;
   FieldEngine engine;
   FieldWorkspace workspace;
 };
 
-void expect_normals(const FieldShape& shape, FieldIsa isa, size_t count) {
+void expect_normals(const FieldShape& shape, FieldIsa isa, size_t count, bool has_surface) {
   SCOPED_TRACE(std::string(field_isa_name(isa)) + ", width " + std::to_string(shape.width) + ", points " +
-               std::to_string(count));
+               std::to_string(count) + (has_surface ? ", surface" : ", geometry"));
   const FieldWeights weights = random_weights(shape, 20);
   Normals at(weights, isa, count);
+  at.forward(has_surface);
   std::vector<double> distance;
   std::array<std::vector<double>, 3> normal;
   for (size_t i = 0; i < count; ++i) {
@@ -48,15 +60,29 @@ void expect_normals(const FieldShape& shape, FieldIsa isa, size_t count) {
   for (size_t c = 0; c < 3; ++c) EXPECT_LE(relative_error(at.normal[c], normal[c]), 1e-4);
 
   FieldWeights gradient(shape);
-  at.engine.backward_normals(at.workspace, at.by_distance[0].data(), as_const_planes(at.by_normal),
-                             WeightGradient::kAll, gradient);
-  const Gradients expected = gradients(weights, at.points, false, [&](size_t i) {
-    return std::array<double, 10>{double(at.by_distance[0][i]), double(at.by_normal[0][i]), double(at.by_normal[1][i]),
-                                  double(at.by_normal[2][i])};
+  FieldValueGradient given{at.by_distance[0].data(), {}, {}, as_const_planes(at.by_normal)};
+  if (has_surface) {
+    given.rgb = as_const_planes(at.by_rgb);
+    given.template_point = as_const_planes(at.by_template);
+  }
+  at.engine.backward(at.workspace, given, WeightGradient::kAll, &gradient, as_planes(at.by_points));
+  const Gradients expected = gradients(weights, at.points, has_surface, [&](size_t i) {
+    std::array<double, 10> seed{double(at.by_distance[0][i])};
+    for (size_t c = 0; c < 3; ++c) {
+      seed[1 + c] = double(at.by_normal[c][i]);
+      seed[4 + c] = double(at.by_rgb[c][i]);
+      seed[7 + c] = double(at.by_template[c][i]);
+    }
+    return seed;
   });
   const auto lists = as_lists(gradient);
   for (size_t layer = 0; layer < lists.size(); ++layer) {
     EXPECT_LE(relative_error(lists[layer], expected.weights[layer]), 1e-4) << "layer " << layer;
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    std::vector<double> by_point;
+    for (const std::array<double, 3>& point : expected.points) by_point.push_back(point[c]);
+    EXPECT_LE(relative_error(at.by_points[c], by_point), 1e-4) << "axis " << c;
   }
 }
 
@@ -65,7 +91,7 @@ TEST(FieldNormals, AreThoseOfFloat64AtEachWidthAndInstructionSet) {
     for (const int width : {48, 64, 96, 128}) {
       FieldShape shape;
       shape.width = width;
-      expect_normals(shape, isa, 6);
+      for (const bool has_surface : {true, false}) expect_normals(shape, isa, 6, has_surface);
     }
   }
 }
@@ -75,7 +101,8 @@ TEST(FieldNormals, TailsOf1To33PointsAreAsGood) {
   shape.width = 14;
   shape.geometry_layers = 3;
   for (const FieldIsa isa : supported_field_isas()) {
-    for (size_t tail = 1; tail <= 33; ++tail) expect_normals(shape, isa, tail);
+    for (size_t tail = 1; tail <= 33; ++tail) expect_normals(shape, isa, tail, tail % 2 == 0);
+    expect_normals(shape, isa, 64 + 33, true);
   }
 }
 
@@ -105,7 +132,7 @@ TEST(FieldNormals, FiniteDifferencesOfTheEikonalTermAgree) {
     Columns by_normal = at.normal;
     EXPECT_NEAR(eikonal_loss(20, as_const_planes(at.normal), 1.0f, as_planes(by_normal)), loss(0), 1e-4 * loss(0));
     FieldWeights gradient(shape);
-    at.engine.backward_normals(at.workspace, nullptr, as_const_planes(by_normal), WeightGradient::kAll, gradient);
+    at.engine.backward(at.workspace, {nullptr, {}, {}, as_const_planes(by_normal)}, WeightGradient::kAll, &gradient);
     double product = 0;
     for (size_t i = 0; i < gradient.values().size(); ++i) {
       product += double(gradient.values()[i]) * double(direction.values()[i]);
@@ -123,11 +150,11 @@ TEST(FieldNormals, GradientsAreAddedInOneOrderAndToPersonalLayersWhereOnlyTheyAr
     Normals at(weights, isa, 77);
     FieldWeights first(shape), second(shape), personal(shape);
     for (FieldWeights* to : {&first, &second}) {
-      at.engine.backward_normals(at.workspace, nullptr, as_const_planes(at.by_normal), WeightGradient::kAll, *to);
+      at.engine.backward(at.workspace, {nullptr, {}, {}, as_const_planes(at.by_normal)}, WeightGradient::kAll, to);
     }
     EXPECT_EQ(std::memcmp(first.values().data(), second.values().data(), first.values().size() * 4), 0);
-    at.engine.backward_normals(at.workspace, nullptr, as_const_planes(at.by_normal), WeightGradient::kPersonal,
-                               personal);
+    at.engine.backward(at.workspace, {nullptr, {}, {}, as_const_planes(at.by_normal)}, WeightGradient::kPersonal,
+                       &personal);
     for (int index = 0; index < shape.layers(); ++index) {
       auto expected = as_lists(first)[size_t(index)];
       if (!shape.is_personal(index)) std::fill(expected.begin(), expected.end(), 0.0);
@@ -157,7 +184,7 @@ TEST(FieldNormals, APointThatIsNotFiniteIsNanAndTheOthersStay) {
     Normals good(weights, isa, 20), at(weights, isa, 20);
     at.points[1][3] = NAN;
     at.points[2][17] = INFINITY;
-    at.engine.forward_normals(as_points(at.points), at.workspace, at.distance.data(), as_planes(at.normal));
+    at.forward(true);
     for (size_t i = 0; i < 20; ++i) {
       if (i == 3 || i == 17) {
         EXPECT_TRUE(std::isnan(at.distance[i]) && std::isnan(at.normal[0][i]));

@@ -12,27 +12,24 @@ namespace {
 
 constexpr size_t kBlock = kFieldBlock;
 
-// Points from `begin` on into rows of `width`; those beyond the last are 0.
-void gather(const FieldPoints& points, size_t begin, size_t width, float* rows) {
-  const size_t count = std::min(width, points.count - begin);
-  const float* const axes[3] = {points.x, points.y, points.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    float* row = rows + size_t(axis) * width;
-    std::copy_n(axes[axis] + begin, count, row);
-    std::fill(row + count, row + width, 0.0f);
-  }
-}
-
-// The first `count` of a row; null: not wanted.
-void put(const float* row, size_t count, size_t begin, float* to) {
+// The first `count` of a row, to the array from `begin` on; null: not wanted.
+void put(const float* row, size_t begin, size_t count, float* to) {
   if (to != nullptr) std::copy_n(row, count, to + begin);
 }
 
-// Null: zeros.
-void take(const float* from, size_t begin, size_t count, float* row, size_t width) {
+void put(const float* rows, size_t begin, size_t count, const Planes& to) {
+  for (size_t i = 0; i < 3; ++i) put(rows + i * kBlock, begin, count, to[i]);
+}
+
+// From `begin` on, and zeros after them to the end of the row; null: zeros.
+void take(const float* from, size_t begin, size_t count, float* row) {
   if (from == nullptr) count = 0;
   if (count > 0) std::copy_n(from + begin, count, row);
-  std::fill(row + count, row + width, 0.0f);
+  std::fill(row + count, row + kBlock, 0.0f);
+}
+
+void take(const ConstPlanes& from, size_t begin, size_t count, float* rows) {
+  for (size_t i = 0; i < 3; ++i) take(from[i], begin, count, rows + i * kBlock);
 }
 
 template <class Pointer>
@@ -50,14 +47,13 @@ FieldEngine::FieldEngine(const FieldShape& shape, FieldIsa isa)
     Layer next;
     next.inputs = shape.inputs(index);
     next.outputs = shape.outputs(index);
-    next.stride = places[size_t(index)].stride;
     const size_t size = size_t(next.inputs) * size_t(next.outputs);
     next.forward = end;
     next.backward = end + size;
     next.bias = end + 2 * size;
     end = next.bias + size_t(next.outputs);
     max_rows_ = std::max({max_rows_, size_t(next.inputs), size_t(next.outputs)});
-    max_stride_ = std::max(max_stride_, next.stride);
+    max_stride_ = std::max(max_stride_, places[size_t(index)].stride);
     layers_.push_back(next);
   }
   distance_row_ = end;
@@ -76,295 +72,316 @@ void FieldEngine::set_weights(const FieldWeights& weights) {
   std::copy_n(weights.layer(shape_.geometry_layers).weights, shape_.width, packed_.data() + distance_row_);
 }
 
-// --- memory
-// -----------------------------------------------------------------------------------------------------------
+// --- memory ----------------------------------------------------------------------------------------------------------
 
-FieldEngine::Scratch FieldEngine::scratch(FieldWorkspace& workspace) const {
-  const size_t size = (3 + 2 * max_rows_ + max_stride_) * kBlock;
+FieldEngine::Scratch FieldEngine::scratch(FieldWorkspace& workspace, bool has_tangents) const {
+  const size_t rows = max_rows_ * kBlock, points = 3 * kBlock;
+  const size_t hidden_rows = size_t(shape_.geometry_layers) * size_t(shape_.width) * kBlock;
+  const size_t tangents = size_t(shape_.encoding()) * kBlock + hidden_rows;
+  size_t size = 3 * rows + max_stride_ * kBlock + 2 * points;
+  if (has_tangents) size += tangents + hidden_rows;
   if (workspace.scratch_.size() < size) workspace.scratch_.resize(size);
-  float* begin = workspace.scratch_.data();
-  float* a = begin + 3 * kBlock;
-  return {begin, a, a + max_rows_ * kBlock, a + 2 * max_rows_ * kBlock};
+  Scratch at{};
+  float* next = workspace.scratch_.data();
+  const auto give = [&next](size_t floats) { return std::exchange(next, next + floats); };
+  at.a = give(rows);
+  at.b = give(rows);
+  at.c = give(rows);
+  at.transposed = give(max_stride_ * kBlock);
+  at.points = give(points);
+  at.direction = give(points);
+  if (has_tangents) {
+    at.tangents = give(tangents);
+    at.bends = give(hidden_rows);
+  }
+  return at;
 }
 
-size_t FieldEngine::kept_rows(FieldWorkspace::Kept kept) const {
-  const size_t hidden = size_t(shape_.geometry_layers) * size_t(shape_.width);
-  size_t rows = size_t(shape_.encoding()) + hidden;
-  if (kept == FieldWorkspace::Kept::kTangents) rows += hidden;
-  if (kept == FieldWorkspace::Kept::kSurface) {
+size_t FieldEngine::kept_rows(bool has_surface, bool has_normals) const {
+  const size_t hidden_rows = size_t(shape_.geometry_layers) * size_t(shape_.width);
+  size_t rows = size_t(shape_.encoding()) + hidden_rows;
+  if (has_normals) rows += hidden_rows;
+  if (has_surface) {
     rows += size_t(shape_.surface_inputs()) + size_t(shape_.surface_layers) * size_t(shape_.surface_width);
   }
   return rows;
 }
 
-// Memory for the blocks of so many points; workspace.kept_ is to be set when they are filled.
-float* FieldEngine::keep(FieldWorkspace& workspace, FieldWorkspace::Kept kept, size_t count) const {
-  const size_t width = kept == FieldWorkspace::Kept::kTangents ? size_t(kTangentPoints) : kBlock;
-  const size_t size = (count + width - 1) / width * kept_rows(kept) * kBlock;
-  workspace.kept_ = FieldWorkspace::Kept::kNothing;
+void FieldEngine::keep(FieldWorkspace& workspace, size_t count, bool has_surface, bool has_normals) const {
+  workspace.is_kept_ = false;
+  const size_t size = (count + kBlock - 1) / kBlock * kept_rows(has_surface, has_normals) * kBlock;
   if (workspace.blocks_.size() < size) workspace.blocks_.resize(size);
   workspace.count_ = count;
-  return workspace.blocks_.data();
+  workspace.has_surface_ = has_surface;
+  workspace.has_normals_ = has_normals;
 }
 
-FieldEngine::Hidden FieldEngine::geometry(float* block, bool has_tangents) const {
-  float* activations = block + size_t(shape_.encoding()) * kBlock;
-  float* end = activations + size_t(shape_.geometry_layers) * size_t(shape_.width) * kBlock;
-  return {0, shape_.geometry_layers, shape_.width, block, activations, has_tangents ? end : nullptr};
-}
-
-FieldEngine::Hidden FieldEngine::surface(float* block) const {
-  float* input = block + kept_rows(FieldWorkspace::Kept::kGeometry) * kBlock;
-  float* activations = input + size_t(shape_.surface_inputs()) * kBlock;
-  return {shape_.first_surface_layer(), shape_.surface_layers, shape_.surface_width, input, activations, nullptr};
-}
-
-// --- forwards
-// ---------------------------------------------------------------------------------------------------------
-
-void FieldEngine::run_hidden(const Hidden& hidden) const {
-  const float* in = hidden.input;
-  const size_t size = size_t(hidden.rows) * kBlock;
-  for (int i = 0; i < hidden.layers; ++i) {
-    const Layer& at = layer(hidden.first_layer + i);
-    float* out = hidden.activations + size_t(i) * size;
-    const float* weights = packed_.data() + at.forward;
-    const float* bias = packed_.data() + at.bias;
-    if (hidden.slopes == nullptr) {
-      kernels_->affine_activated(weights, bias, at.outputs, at.inputs, shape_.smoothing, in, out);
-    } else {
-      kernels_->affine_activated_tangents(weights, bias, at.outputs, at.inputs, shape_.smoothing, in, out,
-                                          hidden.slopes + size_t(i) * size);
-    }
-    in = out;
+FieldEngine::Block FieldEngine::block(FieldWorkspace& workspace, size_t begin) const {
+  const size_t rows = kept_rows(workspace.has_surface_, workspace.has_normals_);
+  const size_t hidden_rows = size_t(shape_.geometry_layers) * size_t(shape_.width);
+  Block at{};
+  at.encoding = workspace.blocks_.data() + begin * rows;
+  at.geometry = at.encoding + size_t(shape_.encoding()) * kBlock;
+  float* next = at.geometry + hidden_rows * kBlock;
+  if (workspace.has_normals_) at.slopes = std::exchange(next, next + hidden_rows * kBlock);
+  if (workspace.has_surface_) {
+    at.surface_input = next;
+    at.surface = next + size_t(shape_.surface_inputs()) * kBlock;
   }
+  return at;
 }
 
-void FieldEngine::run_output(int index, const float* in, float* out) const {
+// --- forwards --------------------------------------------------------------------------------------------------------
+
+void FieldEngine::run_activated(int index, const float* in, float* out) const {
+  const Layer& at = layer(index);
+  kernels_->affine_activated(packed_.data() + at.forward, packed_.data() + at.bias, at.outputs, at.inputs,
+                             shape_.smoothing, in, out);
+}
+
+void FieldEngine::run_affine(int index, const float* in, float* out) const {
   const Layer& at = layer(index);
   kernels_->affine(packed_.data() + at.forward, packed_.data() + at.bias, at.outputs, at.inputs, in, out);
 }
 
-// One row; of a block with tangents, without the bias.
-void FieldEngine::run_distance(const Hidden& geometry, float* out) const {
-  const float* in = last_activations(geometry);
-  const float* row = packed_.data() + distance_row_;
-  if (geometry.slopes != nullptr) {
-    kernels_->multiply(row, 1, shape_.width, shape_.width, in, out);
-  } else {
-    kernels_->affine(row, packed_.data() + layer(shape_.geometry_layers).bias, 1, shape_.width, in, out);
+void FieldEngine::run_transposed(int index, int used, const float* gradient, float* out) const {
+  const Layer& at = layer(index);
+  kernels_->multiply(packed_.data() + at.backward, at.inputs, at.outputs, used, gradient, out);
+}
+
+void FieldEngine::run_geometry(const Block& at) const {
+  const float* in = at.encoding;
+  for (int i = 0; i < shape_.geometry_layers; ++i) {
+    float* out = hidden(at.geometry, i);
+    run_activated(i, in, out);
+    in = out;
   }
 }
 
+void FieldEngine::run_distance(const Block& at, float* out) const {
+  const int index = shape_.geometry_layers;
+  kernels_->affine(packed_.data() + distance_row_, packed_.data() + layer(index).bias, 1, shape_.width,
+                   hidden(at.geometry, index - 1), out);
+}
+
+void FieldEngine::run_surface(const Block& at, float* out) const {
+  run_affine(shape_.geometry_layers, hidden(at.geometry, shape_.geometry_layers - 1), at.surface_input);
+  // The encoding begins with the point itself.
+  std::copy_n(at.encoding, 3 * kBlock, at.surface_input + size_t(1 + shape_.feature) * kBlock);
+  const float* in = at.surface_input;
+  for (int i = 0; i < shape_.surface_layers; ++i) {
+    float* to = surface_hidden(at.surface, i);
+    run_activated(shape_.first_surface_layer() + i, in, to);
+    in = to;
+  }
+  run_affine(shape_.layers() - 1, in, out);
+}
+
+// The gradient of the distance by each hidden layer's activations (at.slopes), and by the point (scratch.points).
+void FieldEngine::run_slopes(const Block& at, const Scratch& scratch) const {
+  std::fill_n(scratch.a, kBlock, 1.0f);
+  run_transposed(shape_.geometry_layers, 1, scratch.a, hidden(at.slopes, shape_.geometry_layers - 1));
+  for (int i = shape_.geometry_layers - 1; i >= 0; --i) {
+    kernels_->activation_backward(hidden(at.geometry, i), shape_.width, shape_.smoothing, hidden(at.slopes, i),
+                                  scratch.a);
+    run_transposed(i, shape_.width, scratch.a, i > 0 ? hidden(at.slopes, i - 1) : scratch.b);
+  }
+  std::fill_n(scratch.points, 3 * kBlock, 0.0f);
+  kernels_->encode_backward(at.encoding, scratch.b, shape_.octaves, scratch.points);
+}
+
 void FieldEngine::distances(const FieldPoints& points, FieldWorkspace& workspace, float* distance) const {
-  const Scratch at = scratch(workspace);
-  const Hidden hidden =
-      geometry(keep(workspace, FieldWorkspace::Kept::kGeometry, std::min(points.count, kBlock)), false);
+  const Scratch memory = scratch(workspace, false);
+  keep(workspace, std::min(points.count, kBlock), false, false);
+  const Block at = block(workspace, 0);
   for (size_t begin = 0; begin < points.count; begin += kBlock) {
-    gather(points, begin, kBlock, at.points);
-    kernels_->encode(at.points, shape_.octaves, hidden.input);
-    run_hidden(hidden);
-    run_distance(hidden, at.a);
-    put(at.a, std::min(kBlock, points.count - begin), begin, distance);
+    const size_t count = std::min(kBlock, points.count - begin);
+    take({points.x, points.y, points.z}, begin, count, memory.points);
+    kernels_->encode(memory.points, shape_.octaves, at.encoding);
+    run_geometry(at);
+    run_distance(at, memory.a);
+    put(memory.a, begin, count, distance);
   }
 }
 
 void FieldEngine::distances_and_gradients(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
                                           const Planes& gradient) const {
-  const Scratch at = scratch(workspace);
-  const Hidden hidden =
-      geometry(keep(workspace, FieldWorkspace::Kept::kGeometry, std::min(points.count, kBlock)), false);
-  const Layer& output = layer(shape_.geometry_layers);
-  const Sums none{WeightGradient::kNone, nullptr, nullptr, 0};
+  const Scratch memory = scratch(workspace, false);
+  keep(workspace, std::min(points.count, kBlock), false, true);
+  const Block at = block(workspace, 0);
   for (size_t begin = 0; begin < points.count; begin += kBlock) {
     const size_t count = std::min(kBlock, points.count - begin);
-    gather(points, begin, kBlock, at.points);
-    kernels_->encode(at.points, shape_.octaves, hidden.input);
-    run_hidden(hidden);
-    run_distance(hidden, at.a);
-    put(at.a, count, begin, distance);
-
-    std::fill_n(at.b, kBlock, 1.0f);
-    kernels_->multiply(packed_.data() + output.backward, output.inputs, output.outputs, 1, at.b, at.a);
-    float* gradients = run_backward(hidden, none, at.a, at.b);
-    put_points_gradient(hidden, gradients, gradients == at.a ? at.b : at.a, false, at.points, count, begin, gradient);
+    take({points.x, points.y, points.z}, begin, count, memory.points);
+    kernels_->encode(memory.points, shape_.octaves, at.encoding);
+    run_geometry(at);
+    run_distance(at, memory.a);
+    put(memory.a, begin, count, distance);
+    run_slopes(at, memory);
+    put(memory.points, begin, count, gradient);
   }
 }
 
 void FieldEngine::forward(const FieldPoints& points, FieldWorkspace& workspace, const FieldValues& values) const {
   const bool has_surface = has_any(values.rgb) || has_any(values.template_point);
-  const auto kept = has_surface ? FieldWorkspace::Kept::kSurface : FieldWorkspace::Kept::kGeometry;
-  const Scratch at = scratch(workspace);
-  float* block = keep(workspace, kept, points.count);
-  for (size_t begin = 0; begin < points.count; begin += kBlock, block += kept_rows(kept) * kBlock) {
+  const bool has_normals = has_any(values.normal);
+  const Scratch memory = scratch(workspace, false);
+  keep(workspace, points.count, has_surface, has_normals);
+  for (size_t begin = 0; begin < points.count; begin += kBlock) {
     const size_t count = std::min(kBlock, points.count - begin);
-    const Hidden hidden = geometry(block, false);
-    gather(points, begin, kBlock, at.points);
-    kernels_->encode(at.points, shape_.octaves, hidden.input);
-    run_hidden(hidden);
-    if (!has_surface) {
-      run_distance(hidden, at.a);
-      put(at.a, count, begin, values.distance);
-      continue;
+    const Block at = block(workspace, begin);
+    take({points.x, points.y, points.z}, begin, count, memory.points);
+    kernels_->encode(memory.points, shape_.octaves, at.encoding);
+    run_geometry(at);
+    if (has_surface) {
+      run_surface(at, memory.a);
+      put(at.surface_input, begin, count, values.distance);
+      put(memory.a, begin, count, values.rgb);
+      put(memory.a + 3 * kBlock, begin, count, values.template_point);
+    } else {
+      run_distance(at, memory.a);
+      put(memory.a, begin, count, values.distance);
     }
-    const Hidden colours = surface(block);
-    run_output(shape_.geometry_layers, last_activations(hidden), colours.input);
-    put(colours.input, count, begin, values.distance);
-    // The encoding begins with the point itself.
-    std::copy_n(hidden.input, 3 * kBlock, colours.input + size_t(1 + shape_.feature) * kBlock);
-    run_hidden(colours);
-    run_output(shape_.layers() - 1, last_activations(colours), at.a);
-    for (size_t i = 0; i < 3; ++i) {
-      put(at.a + i * kBlock, count, begin, values.rgb[i]);
-      put(at.a + (3 + i) * kBlock, count, begin, values.template_point[i]);
+    if (has_normals) {
+      run_slopes(at, memory);
+      put(memory.points, begin, count, values.normal);
     }
   }
-  workspace.kept_ = kept;
+  workspace.is_kept_ = true;
 }
 
-void FieldEngine::forward_normals(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
-                                  const Planes& normal) const {
-  constexpr size_t kWidth = kTangentPoints;
-  const auto kept = FieldWorkspace::Kept::kTangents;
-  const Scratch at = scratch(workspace);
-  const float bias = packed_[layer(shape_.geometry_layers).bias];
-  float* block = keep(workspace, kept, points.count);
-  for (size_t begin = 0; begin < points.count; begin += kWidth, block += kept_rows(kept) * kBlock) {
-    const size_t count = std::min(kWidth, points.count - begin);
-    const Hidden hidden = geometry(block, true);
-    gather(points, begin, kWidth, at.points);
-    kernels_->encode_tangents(at.points, shape_.octaves, hidden.input);
-    run_hidden(hidden);
-    run_distance(hidden, at.a);
-    for (size_t i = 0; i < kWidth; ++i) at.a[i] += bias;
-    put(at.a, count, begin, distance);
-    for (size_t axis = 0; axis < 3; ++axis) put(at.a + (1 + axis) * kWidth, count, begin, normal[axis]);
+// --- backwards -------------------------------------------------------------------------------------------------------
+
+void FieldEngine::check_backward(const FieldWorkspace& workspace, const FieldValueGradient& gradient,
+                                 const Sums& sums) const {
+  if (!workspace.is_kept_) {
+    throw Error(MAQ_ERROR_INTERNAL, "Nothing of a head's field was kept to go back from.");
   }
-  workspace.kept_ = kept;
-}
-
-// --- backwards
-// --------------------------------------------------------------------------------------------------------
-
-void FieldEngine::check_sums(const Sums& sums) const {
-  if (sums.which == WeightGradient::kNone) return;
-  if (sums.weights == nullptr || sums.weights->shape() != shape_) {
+  if (!workspace.has_surface_ && (has_any(gradient.rgb) || has_any(gradient.template_point))) {
+    throw Error(MAQ_ERROR_INTERNAL, "The surface network of a head's field was not run forwards.");
+  }
+  if (!workspace.has_normals_ && has_any(gradient.normal)) {
+    throw Error(MAQ_ERROR_INTERNAL, "No normals of a head's field were computed to go back from.");
+  }
+  if (sums.which != WeightGradient::kNone && (sums.weights == nullptr || sums.weights->shape() != shape_)) {
     throw Error(MAQ_ERROR_INTERNAL, "A gradient of a head's field is missing, or of another shape.");
   }
 }
 
-void FieldEngine::add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient,
-                                      const float* in) const {
-  if (sums.which == WeightGradient::kNone) return;
-  if (sums.which == WeightGradient::kPersonal && !shape_.is_personal(index)) return;
+bool FieldEngine::wants(const Sums& sums, int index) const {
+  return sums.which == WeightGradient::kAll || (sums.which == WeightGradient::kPersonal && shape_.is_personal(index));
+}
+
+void FieldEngine::add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in,
+                                      bool has_bias) const {
+  if (!wants(sums, index)) return;
   const FieldLayer to = sums.weights->layer(index);
-  kernels_->weight_gradient(gradient, outputs, in, to.inputs, to.stride, sums.bias_columns, sums.transposed, to.weights,
-                            to.bias);
+  kernels_->weight_gradient(gradient, outputs, in, to.inputs, to.stride, sums.transposed, to.weights,
+                            has_bias ? to.bias : nullptr);
 }
 
-float* FieldEngine::run_backward(const Hidden& hidden, const Sums& sums, float* gradient, float* other) const {
-  const size_t size = size_t(hidden.rows) * kBlock;
-  for (int i = hidden.layers - 1; i >= 0; --i) {
-    const float* out = hidden.activations + size_t(i) * size;
-    if (hidden.slopes == nullptr) {
-      kernels_->activation_backward(out, hidden.rows, shape_.smoothing, gradient);
-    } else {
-      kernels_->activation_backward_tangents(hidden.slopes + size_t(i) * size, hidden.rows, gradient);
-    }
-    const int index = hidden.first_layer + i;
-    add_weight_gradient(sums, index, hidden.rows, gradient, i == 0 ? hidden.input : out - size);
-    if (i == 0) break;
-    const Layer& at = layer(index);
-    kernels_->multiply(packed_.data() + at.backward, at.inputs, at.outputs, at.outputs, gradient, other);
-    std::swap(gradient, other);
+void FieldEngine::surface_backward(const Block& at, const Sums& sums, Scratch& scratch) const {
+  const int last = shape_.surface_layers - 1, rows = shape_.surface_width;
+  add_weight_gradient(sums, shape_.layers() - 1, kSurfaceOutputs, scratch.a, surface_hidden(at.surface, last));
+  run_transposed(shape_.layers() - 1, kSurfaceOutputs, scratch.a, scratch.b);
+  std::swap(scratch.a, scratch.b);
+  for (int i = last; i >= 0; --i) {
+    const int index = shape_.first_surface_layer() + i;
+    kernels_->activation_backward(surface_hidden(at.surface, i), rows, shape_.smoothing, scratch.a, scratch.a);
+    add_weight_gradient(sums, index, rows, scratch.a, i > 0 ? surface_hidden(at.surface, i - 1) : at.surface_input);
+    run_transposed(index, rows, scratch.a, scratch.b);
+    std::swap(scratch.a, scratch.b);
   }
-  return gradient;
 }
 
-void FieldEngine::put_points_gradient(const Hidden& geometry, const float* gradient, float* other, bool adds,
-                                      float* points, size_t count, size_t begin, const Planes& points_gradient) const {
-  const Layer& at = layer(0);
-  kernels_->multiply(packed_.data() + at.backward, at.inputs, at.outputs, at.outputs, gradient, other);
-  if (!adds) std::fill_n(points, 3 * kBlock, 0.0f);
-  kernels_->encode_backward(geometry.input, other, shape_.octaves, points);
-  for (size_t axis = 0; axis < 3; ++axis) put(points + axis * kBlock, count, begin, points_gradient[axis]);
+void FieldEngine::geometry_backward(const Block& at, const Sums& sums, int used, bool to_input,
+                                    Scratch& scratch) const {
+  const int last = shape_.geometry_layers - 1, rows = shape_.width;
+  add_weight_gradient(sums, last + 1, used, scratch.a, hidden(at.geometry, last));
+  run_transposed(last + 1, used, scratch.a, scratch.b);
+  std::swap(scratch.a, scratch.b);
+  for (int i = last; i >= 0; --i) {
+    kernels_->activation_backward(hidden(at.geometry, i), rows, shape_.smoothing, scratch.a, scratch.a);
+    add_weight_gradient(sums, i, rows, scratch.a, i > 0 ? hidden(at.geometry, i - 1) : at.encoding);
+    if (i == 0 && !to_input) break;
+    run_transposed(i, rows, scratch.a, scratch.b);
+    std::swap(scratch.a, scratch.b);
+  }
+}
+
+// A loss L(n) of the normal n, the gradient of the distance f by the point: with u = dL/dn held fast, L's gradient by
+// the weights is that of u · n, which is the derivative of f as the point moves along u. So one tangent, along u, is
+// carried forwards through the geometry and differentiated backwards. The gradient by the activations' tangents is that
+// of f by the activations, which forward() kept (slopes).
+void FieldEngine::run_tangents(const Block& at, const Scratch& scratch) const {
+  kernels_->encode_tangent(at.encoding, scratch.direction, shape_.octaves, scratch.tangents);
+  const float* in = scratch.tangents;
+  float* tangents = scratch.tangents + size_t(shape_.encoding()) * kBlock;
+  for (int i = 0; i < shape_.geometry_layers; ++i) {
+    float* out = hidden(tangents, i);
+    const Layer& to = layer(i);
+    kernels_->multiply(packed_.data() + to.forward, to.outputs, to.inputs, to.inputs, in, out);
+    kernels_->activation_tangent(hidden(at.geometry, i), shape_.width, shape_.smoothing, out, hidden(scratch.bends, i));
+    in = out;
+  }
+}
+
+void FieldEngine::tangents_backward(const Block& at, const Sums& sums, int used, bool to_input,
+                                    Scratch& scratch) const {
+  const int last = shape_.geometry_layers - 1, rows = shape_.width;
+  float* tangents = scratch.tangents + size_t(shape_.encoding()) * kBlock;
+  add_weight_gradient(sums, last + 1, used, scratch.a, hidden(at.geometry, last));
+  std::fill_n(scratch.c, kBlock, 1.0f);
+  add_weight_gradient(sums, last + 1, 1, scratch.c, hidden(tangents, last), false);
+  run_transposed(last + 1, used, scratch.a, scratch.b);
+  std::swap(scratch.a, scratch.b);
+  for (int i = last; i >= 0; --i) {
+    kernels_->activation_tangent_backward(hidden(at.geometry, i), hidden(scratch.bends, i), rows, shape_.smoothing,
+                                          hidden(at.slopes, i), scratch.a, scratch.c);
+    add_weight_gradient(sums, i, rows, scratch.a, i > 0 ? hidden(at.geometry, i - 1) : at.encoding);
+    add_weight_gradient(sums, i, rows, scratch.c, i > 0 ? hidden(tangents, i - 1) : scratch.tangents, false);
+    if (i == 0 && !to_input) return;
+    run_transposed(i, rows, scratch.a, scratch.b);
+    std::swap(scratch.a, scratch.b);
+  }
+  run_transposed(0, rows, scratch.c, scratch.b);
+  std::swap(scratch.b, scratch.c);
 }
 
 void FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
                            FieldWeights* weights, const Planes& points_gradient) const {
-  const auto kept = workspace.kept_;
-  if (kept != FieldWorkspace::Kept::kSurface && kept != FieldWorkspace::Kept::kGeometry) {
-    throw Error(MAQ_ERROR_INTERNAL, "Nothing of a head's field was kept to go back from.");
-  }
   const bool has_surface = has_any(gradient.rgb) || has_any(gradient.template_point);
-  if (has_surface && kept != FieldWorkspace::Kept::kSurface) {
-    throw Error(MAQ_ERROR_INTERNAL, "The surface network of a head's field was not run forwards.");
-  }
-  const Scratch at = scratch(workspace);
-  const Sums sums{which, weights, at.transposed, kFieldBlock};
-  check_sums(sums);
-  const Layer& output = layer(shape_.geometry_layers);
-  float* block = workspace.blocks_.data();
-  for (size_t begin = 0; begin < workspace.count_; begin += kBlock, block += kept_rows(kept) * kBlock) {
+  const bool has_normals = has_any(gradient.normal), to_points = has_any(points_gradient);
+  Scratch memory = scratch(workspace, has_normals);
+  const Sums sums{which, weights, memory.transposed};
+  check_backward(workspace, gradient, sums);
+  for (size_t begin = 0; begin < workspace.count_; begin += kBlock) {
     const size_t count = std::min(kBlock, workspace.count_ - begin);
-    const Hidden hidden = geometry(block, false);
-    float *here = at.a, *other = at.b;  // here: the gradient by what the output layer of the geometry gave
+    const Block at = block(workspace, begin);
     int used = 1;
+    std::fill_n(memory.points, 3 * kBlock, 0.0f);
     if (has_surface) {
-      const Hidden colours = surface(block);
-      const Layer& last = layer(shape_.layers() - 1);
-      for (size_t i = 0; i < 3; ++i) {
-        take(gradient.rgb[i], begin, count, here + i * kBlock, kBlock);
-        take(gradient.template_point[i], begin, count, here + (3 + i) * kBlock, kBlock);
-      }
-      add_weight_gradient(sums, shape_.layers() - 1, kSurfaceOutputs, here, last_activations(colours));
-      kernels_->multiply(packed_.data() + last.backward, last.inputs, last.outputs, last.outputs, here, other);
-      here = run_backward(colours, sums, other, here);
-      other = here == at.a ? at.b : at.a;
-      const Layer& first = layer(colours.first_layer);
-      kernels_->multiply(packed_.data() + first.backward, first.inputs, first.outputs, first.outputs, here, other);
-      std::swap(here, other);
-      std::copy_n(here + size_t(1 + shape_.feature) * kBlock, 3 * kBlock, at.points);
-      used = output.outputs;
-      if (gradient.distance != nullptr) {
-        for (size_t i = 0; i < count; ++i) here[i] += gradient.distance[begin + i];
-      }
+      take(gradient.rgb, begin, count, memory.a);
+      take(gradient.template_point, begin, count, memory.a + 3 * kBlock);
+      surface_backward(at, sums, memory);
+      used = 1 + shape_.feature;
+      std::copy_n(memory.a + size_t(used) * kBlock, 3 * kBlock, memory.points);
+      for (size_t i = 0; gradient.distance != nullptr && i < count; ++i) memory.a[i] += gradient.distance[begin + i];
     } else {
-      take(gradient.distance, begin, count, here, kBlock);
+      take(gradient.distance, begin, count, memory.a);
     }
-    add_weight_gradient(sums, shape_.geometry_layers, used, here, last_activations(hidden));
-    kernels_->multiply(packed_.data() + output.backward, output.inputs, output.outputs, used, here, other);
-    here = run_backward(hidden, sums, other, here);
-    other = here == at.a ? at.b : at.a;
-    if (has_any(points_gradient)) {
-      put_points_gradient(hidden, here, other, has_surface, at.points, count, begin, points_gradient);
+    if (has_normals) {
+      take(gradient.normal, begin, count, memory.direction);
+      run_tangents(at, memory);
+      tangents_backward(at, sums, used, to_points, memory);
+    } else {
+      geometry_backward(at, sums, used, to_points, memory);
     }
-  }
-}
-
-void FieldEngine::backward_normals(FieldWorkspace& workspace, const float* distance_gradient,
-                                   const ConstPlanes& normal_gradient, WeightGradient which,
-                                   FieldWeights& weights) const {
-  constexpr size_t kWidth = kTangentPoints;
-  const auto kept = FieldWorkspace::Kept::kTangents;
-  if (workspace.kept_ != kept) {
-    throw Error(MAQ_ERROR_INTERNAL, "No normals of a head's field were kept to go back from.");
-  }
-  const Scratch at = scratch(workspace);
-  const Sums sums{which, &weights, at.transposed, kTangentPoints};
-  check_sums(sums);
-  const Layer& output = layer(shape_.geometry_layers);
-  float* block = workspace.blocks_.data();
-  for (size_t begin = 0; begin < workspace.count_; begin += kWidth, block += kept_rows(kept) * kBlock) {
-    const size_t count = std::min(kWidth, workspace.count_ - begin);
-    const Hidden hidden = geometry(block, true);
-    take(distance_gradient, begin, count, at.a, kWidth);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      take(normal_gradient[axis], begin, count, at.a + (1 + axis) * kWidth, kWidth);
+    if (!to_points) continue;
+    kernels_->encode_backward(at.encoding, memory.a, shape_.octaves, memory.points);
+    if (has_normals) {
+      kernels_->encode_tangent_backward(at.encoding, memory.direction, memory.c, shape_.octaves, memory.points);
     }
-    add_weight_gradient(sums, shape_.geometry_layers, 1, at.a, last_activations(hidden));
-    kernels_->multiply(packed_.data() + output.backward, output.inputs, output.outputs, 1, at.a, at.b);
-    run_backward(hidden, sums, at.b, at.a);
+    put(memory.points, begin, count, points_gradient);
   }
 }
 

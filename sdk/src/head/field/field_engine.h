@@ -22,12 +22,13 @@ struct FieldPoints {
 using Planes = std::array<float*, 3>;
 using ConstPlanes = std::array<const float*, 3>;
 
-// What forward() fills in: arrays of as many as there are points. Planes that are null are left out; where all six of
-// the surface are, its network does not run.
+// What forward() fills in: arrays of as many as there are points. Planes that are null are left out. Where all six of
+// the surface are, its network does not run; where all three of `normal` are, it is not computed.
 struct FieldValues {
   float* distance = nullptr;
   Planes rgb{};  // logits
   Planes template_point{};
+  Planes normal{};  // the gradient of the distance by the point: not of length 1
 };
 
 // The gradient of a loss by FieldValues; null: 0.
@@ -35,6 +36,7 @@ struct FieldValueGradient {
   const float* distance = nullptr;
   ConstPlanes rgb{};
   ConstPlanes template_point{};
+  ConstPlanes normal{};
 };
 
 enum class WeightGradient { kNone, kPersonal, kAll };
@@ -43,19 +45,18 @@ enum class WeightGradient { kNone, kPersonal, kAll };
 class FieldWorkspace {
  private:
   friend class FieldEngine;
-  enum class Kept { kNothing, kGeometry, kSurface, kTangents };
 
-  AlignedFloats blocks_;   // activations of all blocks
+  AlignedFloats blocks_;   // of all blocks, what backward() needs
   AlignedFloats scratch_;  // of one block
   size_t count_ = 0;       // of points that are kept
-  Kept kept_ = Kept::kNothing;
+  bool is_kept_ = false, has_surface_ = false, has_normals_ = false;
 };
 
 // Calls are const and know no state but the workspace's, so that threads may share an engine. Results do not depend on
 // how points are split into batches, but for sums over points; these are in the order of the points.
 //
 // Nothing allocates once a workspace has seen a batch as large. A batch that backward() follows keeps some 2 KB a point
-// (width 64), so that one of 500 points stays in a core's second cache.
+// (width 64), 3 KB with normals, so that one of 256 points stays in a core's second cache.
 class FieldEngine {
  public:
   // Throws as check_field_shape() and field_kernels() do. Weights are 0.
@@ -64,7 +65,7 @@ class FieldEngine {
   const FieldShape& shape() const { return shape_; }
   FieldIsa isa() const { return isa_; }
 
-  // Copies the weights into the order in which they are read, forwards and backwards; some 20 us at width 64. Throws
+  // Copies the weights into the order in which they are read, forwards and backwards; some 15 us at width 64. Throws
   // MAQ_ERROR_INTERNAL where they are of another shape.
   void set_weights(const FieldWeights& weights);
 
@@ -75,65 +76,65 @@ class FieldEngine {
 
   // Keeps what backward() needs in the workspace, until the next call with it.
   void forward(const FieldPoints& points, FieldWorkspace& workspace, const FieldValues& values) const;
-  // Adds to `weights` (may be null for kNone), writes the gradient by the points (null planes: left out). May be called
-  // more than once. Points with a gradient that is not finite spoil sums. Throws MAQ_ERROR_INTERNAL where forward()
-  // kept nothing, or no surface and a gradient by it is given.
+  // Adds to `weights` (may be null for kNone), writes the gradient by the points (null planes: left out). A gradient by
+  // the normal needs second derivatives: it costs as much again as the geometry's other part. May be called more than
+  // once. A point whose gradient is not finite spoils the sums of all. Throws MAQ_ERROR_INTERNAL where forward() kept
+  // nothing, or did not compute what a gradient is given by.
   void backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
                 FieldWeights* weights, const Planes& points_gradient = {}) const;
-
-  // The distance and its gradient by the point (not of length 1), by forward differentiation: keeps what
-  // backward_normals() needs.
-  void forward_normals(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
-                       const Planes& normal) const;
-  // From the gradient of a loss by the distance (null: 0) and by the normal, adds that by the weights of the geometry
-  // layers. Throws as backward() does.
-  void backward_normals(FieldWorkspace& workspace, const float* distance_gradient, const ConstPlanes& normal_gradient,
-                        WeightGradient which, FieldWeights& weights) const;
 
  private:
   struct Layer {
     size_t forward, backward, bias;  // in packed_
-    size_t stride;
     int inputs, outputs;
   };
-  // Blocks of one call, within the workspace.
+  // Blocks of one call, within the workspace: of max_rows_ rows, of 3, and those of tangents.
   struct Scratch {
-    float *points, *a, *b, *transposed;
+    float *a, *b, *c, *transposed, *points, *direction, *tangents, *bends;
   };
-  // The hidden layers of one of the two networks in a block that is kept. slopes: null without tangents.
-  struct Hidden {
-    int first_layer, layers, rows;
-    float *input, *activations, *slopes;
+  // A block that is kept: rows of the encoding, of the hidden layers of the geometry, of the gradients of the distance
+  // by these (has_normals), of the input and the hidden layers of the surface (has_surface).
+  struct Block {
+    float *encoding, *geometry, *slopes, *surface_input, *surface;
   };
-  // Where weight gradients go; bias_columns: of a block, those of values.
   struct Sums {
     WeightGradient which;
     FieldWeights* weights;
     float* transposed;
-    int bias_columns;
   };
 
-  static float* last_activations(const Hidden& hidden) {
-    return hidden.activations + size_t(hidden.layers - 1) * size_t(hidden.rows) * kFieldBlock;
-  }
-  Scratch scratch(FieldWorkspace& workspace) const;
-  float* keep(FieldWorkspace& workspace, FieldWorkspace::Kept kept, size_t count) const;
-  size_t kept_rows(FieldWorkspace::Kept kept) const;
-  Hidden geometry(float* block, bool has_tangents) const;
-  Hidden surface(float* block) const;
+  Scratch scratch(FieldWorkspace& workspace, bool has_tangents) const;
+  // Memory for so many points.
+  void keep(FieldWorkspace& workspace, size_t count, bool has_surface, bool has_normals) const;
+  size_t kept_rows(bool has_surface, bool has_normals) const;
+  Block block(FieldWorkspace& workspace, size_t begin) const;
 
   const Layer& layer(int index) const { return layers_[size_t(index)]; }
-  void run_hidden(const Hidden& hidden) const;
-  void run_output(int index, const float* in, float* out) const;
-  void run_distance(const Hidden& geometry, float* out) const;
-  void check_sums(const Sums& sums) const;
-  void add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in) const;
-  // From the gradient by the last hidden layer's activations to that by the first one's affine result: `gradient` or
-  // `other`, whichever is returned.
-  float* run_backward(const Hidden& hidden, const Sums& sums, float* gradient, float* other) const;
-  // `gradient`: by the first layer's affine result. points: [3][kFieldBlock], what is added where `adds`.
-  void put_points_gradient(const Hidden& geometry, const float* gradient, float* other, bool adds, float* points,
-                           size_t count, size_t begin, const Planes& points_gradient) const;
+  // The activations of the i-th hidden layer of the geometry, or what lies as they do.
+  float* hidden(float* rows, int i) const { return rows + size_t(i) * size_t(shape_.width * kFieldBlock); }
+  float* surface_hidden(float* rows, int i) const {
+    return rows + size_t(i) * size_t(shape_.surface_width * kFieldBlock);
+  }
+  void run_activated(int index, const float* in, float* out) const;
+  void run_affine(int index, const float* in, float* out) const;
+  void run_transposed(int index, int used, const float* gradient, float* out) const;
+  void run_geometry(const Block& at) const;
+  void run_distance(const Block& at, float* out) const;
+  void run_surface(const Block& at, float* out) const;
+  void run_slopes(const Block& at, const Scratch& scratch) const;
+
+  void check_backward(const FieldWorkspace& workspace, const FieldValueGradient& gradient, const Sums& sums) const;
+  bool wants(const Sums& sums, int index) const;
+  void add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in,
+                           bool has_bias = true) const;
+  // From scratch.a, the gradient by what the network gave, to that by its input, again in scratch.a.
+  void surface_backward(const Block& at, const Sums& sums, Scratch& scratch) const;
+  // From scratch.a, the gradient by what the output layer gave (of which `used` rows), to that by the encoding, unless
+  // that is not asked for.
+  void geometry_backward(const Block& at, const Sums& sums, int used, bool to_input, Scratch& scratch) const;
+  void run_tangents(const Block& at, const Scratch& scratch) const;
+  // The same with scratch.direction, the gradient by the normal; scratch.c gets the gradient by the encoding's tangent.
+  void tangents_backward(const Block& at, const Sums& sums, int used, bool to_input, Scratch& scratch) const;
 
   FieldShape shape_;
   FieldIsa isa_;

@@ -2,24 +2,28 @@
 // with flags of their own, so they include nothing that other sources could take a function from: plain numbers only.
 //
 // Points lie in blocks of kFieldBlock columns: a matrix [rows][kFieldBlock] has a row for each input or output of a
-// layer. All memory is aligned to 64 bytes. With tangents, a block holds kTangentPoints points, and its columns are
-// four groups: the value, then its derivatives by x, y and z.
+// layer. All memory is aligned to 64 bytes. A tangent is the derivative of such a matrix where each point moves along a
+// vector of its own.
 #pragma once
 
 #include <cstddef>
 
 namespace maq::head {
 
-inline constexpr int kFieldBlock = 64, kTangentPoints = 16;
+inline constexpr int kFieldBlock = 64;
 
 struct FieldKernels {
   // points: [3][kFieldBlock] -> encoding [3 + 6 octaves][kFieldBlock]. A point that is not finite is NaN in all rows
   // that depend on it. Within 2e-7 for coordinates up to 64 / 2^octaves · 64.
   void (*encode)(const float* points, int octaves, float* encoding);
-  // points: [3][kTangentPoints]
-  void (*encode_tangents)(const float* points, int octaves, float* encoding);
+  // What the encoding changes by where the points move along direction [3][kFieldBlock].
+  void (*encode_tangent)(const float* encoding, const float* direction, int octaves, float* tangent);
   // Adds the gradient by the points, from that by the encoding: [3][kFieldBlock].
   void (*encode_backward)(const float* encoding, const float* gradient, int octaves, float* points_gradient);
+
+  // The same from the gradient by the tangent of the encoding.
+  void (*encode_tangent_backward)(const float* encoding, const float* direction, const float* gradient, int octaves,
+                                  float* points_gradient);
 
   // Weights [rows][stride], of which `depth` columns, in the order in which multiply() reads them: rows * depth floats.
   void (*pack)(const float* weights, size_t stride, int rows, int depth, float* packed);
@@ -32,18 +36,20 @@ struct FieldKernels {
   // The same through squareplus.
   void (*affine_activated)(const float* packed, const float* bias, int rows, int depth, float smoothing,
                            const float* in, float* out);
-  // The affine layer and squareplus of a block with tangents. slopes [rows][block] gets a', a'' v_x, a'' v_y, a'' v_z.
-  void (*affine_activated_tangents)(const float* packed, const float* bias, int rows, int depth, float smoothing,
-                                    const float* in, float* out, float* slopes);
 
-  // gradient: by what squareplus gave (out) -> by what it was given.
-  void (*activation_backward)(const float* out, int rows, float smoothing, float* gradient);
-  void (*activation_backward_tangents)(const float* slopes, int rows, float* gradient);
+  // Of squareplus a, from what it gave (out): from the gradient by that to the gradient by what it was given.
+  void (*activation_backward)(const float* out, int rows, float smoothing, const float* gradient, float* result);
+  // tangent: of what it was given -> of what it gave; bend gets a'' times the former.
+  void (*activation_tangent)(const float* out, int rows, float smoothing, float* tangent, float* bend);
+  // activation_backward() of both: by_tangent, from the gradient by the tangent to `result`, and in `gradient` that by
+  // the value, which has a part by the tangent's slope.
+  void (*activation_tangent_backward)(const float* out, const float* bend, int rows, float smoothing,
+                                      const float* by_tangent, float* gradient, float* result);
 
   // Adds gradient [outputs][block] · transpose of in [inputs][block] to weights [outputs][stride], and the sums of
-  // the first bias_columns of the rows of gradient to bias. scratch: kFieldBlock * stride floats.
+  // gradient's rows to bias, unless that is null. scratch: kFieldBlock * stride floats.
   void (*weight_gradient)(const float* gradient, int outputs, const float* in, int inputs, size_t stride,
-                          int bias_columns, float* scratch, float* weights, float* bias);
+                          float* scratch, float* weights, float* bias);
 
   // Arrays of `count` floats, a multiple of 64: out = constant + Σ codes[k] bases[k]; the dot product of two.
   void (*combine)(const float* constant, const float* bases, const float* codes, int codes_count, size_t count,

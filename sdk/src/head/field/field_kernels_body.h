@@ -31,7 +31,6 @@ constexpr int kLanes = 4, kTileRows = 8;
 constexpr int kLanes = 4, kTileRows = 4;
 #endif
 constexpr int kTileVectors = 2;
-constexpr int kGroup = kTangentPoints;
 
 typedef float Vector __attribute__((vector_size(kLanes * 4), may_alias));
 typedef int32_t Mask __attribute__((vector_size(kLanes * 4), may_alias));
@@ -71,8 +70,7 @@ inline Vector squareplus(Vector v, Vector smoothing) {
   return (v + square_root(multiply_add(v, v, smoothing))) * broadcast(0.5f);
 }
 
-// --- products of matrices
-// ---------------------------------------------------------------------------------------------
+// --- products of matrices --------------------------------------------------------------------------------------------
 
 enum class From { kZero, kBias, kSum };
 
@@ -173,62 +171,40 @@ void affine_activated(const float* packed, const float* bias, int rows, int dept
   packed_product<From::kBias, true>(packed, bias, rows, depth, depth, in, out, smoothing);
 }
 
-// --- squareplus
-// -------------------------------------------------------------------------------------------------------
+// --- squareplus ------------------------------------------------------------------------------------------------------
 
-void affine_activated_tangents(const float* packed, const float* bias, int rows, int depth, float smoothing,
-                               const float* in, float* out, float* slopes) {
-  multiply(packed, rows, depth, depth, in, out);
-  const Vector smooth = broadcast(smoothing), half = broadcast(0.5f), one = broadcast(1.0f);
-  for (int row = 0; row < rows; ++row) {
-    const Vector shift = broadcast(bias[row]);
-    for (int column = 0; column < kGroup; column += kLanes) {
-      float* h = out + size_t(row) * kFieldBlock + column;
-      float* slope = slopes + size_t(row) * kFieldBlock + column;
-      const Vector v = load(h) + shift;
-      const Vector root = square_root(multiply_add(v, v, smooth));
-      const Vector inverse = one / root;
-      const Vector first = multiply_add(v * inverse, half, half);
-      const Vector second = smooth * half * inverse * inverse * inverse;
-      store(h, (v + root) * half);
-      store(slope, first);
-      for (int axis = 1; axis <= 3; ++axis) {
-        const Vector tangent = load(h + axis * kGroup);
-        store(h + axis * kGroup, first * tangent);
-        store(slope + axis * kGroup, second * tangent);
-      }
-    }
-  }
-}
+// From out = a(v) > 0: out (out - v) = b / 4, so 1 / sqrt(v v + b) = out / (out out + b / 4), and with that
+// a' = out / sqrt(v v + b), a'' = b / (2 sqrt(v v + b)^3).
+inline Vector inverse_root(Vector out, Vector quarter) { return out / multiply_add(out, out, quarter); }
 
-// a' = h / sqrt(v v + b) and h (h - v) = b / 4, so a' = h h / (h h + b / 4).
-void activation_backward(const float* out, int rows, float smoothing, float* gradient) {
+void activation_backward(const float* out, int rows, float smoothing, const float* gradient, float* result) {
   const Vector quarter = broadcast(0.25f * smoothing);
   for (int i = 0; i < rows * kFieldBlock; i += kLanes) {
-    const Vector h = load(out + i), square = h * h;
-    store(gradient + i, load(gradient + i) * square / (square + quarter));
+    const Vector h = load(out + i);
+    store(result + i, load(gradient + i) * (h * inverse_root(h, quarter)));
   }
 }
 
-void activation_backward_tangents(const float* slopes, int rows, float* gradient) {
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < kGroup; column += kLanes) {
-      const float* slope = slopes + size_t(row) * kFieldBlock + column;
-      float* to = gradient + size_t(row) * kFieldBlock + column;
-      const Vector first = load(slope);
-      Vector sum = load(to) * first;
-      for (int axis = 1; axis <= 3; ++axis) {
-        const Vector along = load(to + axis * kGroup);
-        sum = multiply_add(load(slope + axis * kGroup), along, sum);
-        store(to + axis * kGroup, first * along);
-      }
-      store(to, sum);
-    }
+void activation_tangent(const float* out, int rows, float smoothing, float* tangent, float* bend) {
+  const Vector quarter = broadcast(0.25f * smoothing), half = broadcast(0.5f * smoothing);
+  for (int i = 0; i < rows * kFieldBlock; i += kLanes) {
+    const Vector h = load(out + i), along = load(tangent + i), inverse = inverse_root(h, quarter);
+    store(bend + i, half * inverse * (inverse * inverse) * along);
+    store(tangent + i, h * inverse * along);
   }
 }
 
-// --- the gradient of weights
-// ------------------------------------------------------------------------------------------
+void activation_tangent_backward(const float* out, const float* bend, int rows, float smoothing,
+                                 const float* by_tangent, float* gradient, float* result) {
+  const Vector quarter = broadcast(0.25f * smoothing);
+  for (int i = 0; i < rows * kFieldBlock; i += kLanes) {
+    const Vector h = load(out + i), slope = h * inverse_root(h, quarter), by = load(by_tangent + i);
+    store(gradient + i, multiply_add(load(bend + i), by, slope * load(gradient + i)));
+    store(result + i, slope * by);
+  }
+}
+
+// --- the gradient of weights -----------------------------------------------------------------------------------------
 
 #if defined(__clang__) || __GNUC__ >= 12
 #define MAQ_SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
@@ -270,8 +246,8 @@ inline void sum_tiles(const float* gradient, const float* in, size_t stride, flo
   }
 }
 
-void weight_gradient(const float* gradient, int outputs, const float* in, int inputs, size_t stride, int bias_columns,
-                     float* scratch, float* weights, float* bias) {
+void weight_gradient(const float* gradient, int outputs, const float* in, int inputs, size_t stride, float* scratch,
+                     float* weights, float* bias) {
   transpose(in, inputs, stride, scratch);
   for (int row = 0; row < outputs;) {
     const int height = tile_rows(outputs - row);
@@ -288,9 +264,9 @@ void weight_gradient(const float* gradient, int outputs, const float* in, int in
     }
     row += height;
   }
-  for (int row = 0; row < outputs; ++row) {
+  for (int row = 0; row < outputs && bias != nullptr; ++row) {
     Vector sum{};
-    for (int column = 0; column < bias_columns; column += kLanes) {
+    for (int column = 0; column < kFieldBlock; column += kLanes) {
       sum += load(gradient + size_t(row) * kFieldBlock + column);
     }
     float total = 0.0f;
@@ -299,8 +275,7 @@ void weight_gradient(const float* gradient, int outputs, const float* in, int in
   }
 }
 
-// --- the encoding
-// -----------------------------------------------------------------------------------------------------
+// --- the encoding ----------------------------------------------------------------------------------------------------
 
 // Of the angle less the nearest multiple of pi / 2, which is taken off in three parts (Cody and Waite), by polynomials
 // of Cephes (sinf, cosf).
@@ -354,28 +329,39 @@ void encode(const float* points, int octaves, float* encoding) {
   }
 }
 
-void encode_tangents(const float* points, int octaves, float* encoding) {
-  for (size_t i = 0; i < size_t(3 + 6 * octaves) * kFieldBlock; i += kLanes) store(encoding + i, Vector{});
+void encode_tangent(const float* encoding, const float* direction, int octaves, float* tangent) {
   for (int axis = 0; axis < 3; ++axis) {
-    const int tangents = (1 + axis) * kGroup;
-    for (int column = 0; column < kGroup; column += kLanes) {
-      Vector x = load(points + axis * kGroup + column);
-      x += x - x;
-      store(encoding + axis * kFieldBlock + column, x);
-      store(encoding + axis * kFieldBlock + tangents + column, broadcast(1.0f));
-      Vector frequency = broadcast(1.0f);
+    for (int column = 0; column < kFieldBlock; column += kLanes) {
+      const Vector along = load(direction + axis * kFieldBlock + column);
+      store(tangent + axis * kFieldBlock + column, along);
+      Vector turn = along;
       for (int octave = 0; octave < octaves; ++octave) {
-        Vector sine, cosine;
-        sine_and_cosine(x, sine, cosine);
-        float* sines = encoding_row(encoding, octave, 0, axis) + column;
-        float* cosines = encoding_row(encoding, octave, 1, axis) + column;
-        store(sines, sine);
-        store(sines + tangents, frequency * cosine);
-        store(cosines, cosine);
-        store(cosines + tangents, -frequency * sine);
-        x += x;
-        frequency += frequency;
+        const Vector sine = load(encoding_row(encoding, octave, 0, axis) + column);
+        const Vector cosine = load(encoding_row(encoding, octave, 1, axis) + column);
+        store(encoding_row(tangent, octave, 0, axis) + column, turn * cosine);
+        store(encoding_row(tangent, octave, 1, axis) + column, -(turn * sine));
+        turn += turn;
       }
+    }
+  }
+}
+
+void encode_tangent_backward(const float* encoding, const float* direction, const float* gradient, int octaves,
+                             float* points_gradient) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int column = 0; column < kFieldBlock; column += kLanes) {
+      Vector turn = load(direction + axis * kFieldBlock + column);
+      Vector sum{};
+      for (int octave = 0; octave < octaves; ++octave) {
+        const Vector by_sine = load(encoding_row(gradient, octave, 0, axis) + column);
+        const Vector by_cosine = load(encoding_row(gradient, octave, 1, axis) + column);
+        const Vector sine = load(encoding_row(encoding, octave, 0, axis) + column);
+        const Vector cosine = load(encoding_row(encoding, octave, 1, axis) + column);
+        sum = multiply_add(turn, multiply_add(sine, by_sine, cosine * by_cosine), sum);
+        turn *= broadcast(4.0f);
+      }
+      float* to = points_gradient + axis * kFieldBlock + column;
+      store(to, load(to) - sum);
     }
   }
 }
@@ -399,8 +385,7 @@ void encode_backward(const float* encoding, const float* gradient, int octaves, 
   }
 }
 
-// --- bases
-// ------------------------------------------------------------------------------------------------------------
+// --- bases -----------------------------------------------------------------------------------------------------------
 
 constexpr size_t kStep = 4 * kLanes;
 
@@ -431,16 +416,17 @@ float dot(const float* a, const float* b, size_t count) {
 }
 
 constexpr FieldKernels kKernels = {encode,
-                                   encode_tangents,
+                                   encode_tangent,
                                    encode_backward,
+                                   encode_tangent_backward,
                                    pack,
                                    pack_transposed,
                                    multiply,
                                    affine,
                                    affine_activated,
-                                   affine_activated_tangents,
                                    activation_backward,
-                                   activation_backward_tangents,
+                                   activation_tangent,
+                                   activation_tangent_backward,
                                    weight_gradient,
                                    combine,
                                    dot};

@@ -10,7 +10,7 @@
 
 namespace maq::head {
 
-// Coordinates in the head's frame (dm), each an array of `count`. The encoding is exact to 2e-7 within 64 dm at six
+// Coordinates in the head's frame (dm), each an array of `count`. The encoding is exact to 2e-7 within 60 dm at six
 // octaves; a point that is not finite has NaN as its values, and no effect on others' values.
 struct FieldPoints {
   const float* x;

@@ -13,8 +13,8 @@ namespace maq::head {
 inline constexpr int kFieldBlock = 64;
 
 struct FieldKernels {
-  // points: [3][kFieldBlock] -> encoding [3 + 6 octaves][kFieldBlock]. A point that is not finite is NaN in all rows
-  // that depend on it. Within 2e-7 for coordinates up to 64 / 2^octaves · 64.
+  // points: [3][kFieldBlock] -> encoding [3 + 6 octaves][kFieldBlock], sines and cosines within 2e-7 for angles up to
+  // 2,000. A point that is not finite is NaN in all rows that depend on it.
   void (*encode)(const float* points, int octaves, float* encoding);
   // What the encoding changes by where the points move along direction [3][kFieldBlock].
   void (*encode_tangent)(const float* encoding, const float* direction, int octaves, float* tangent);
@@ -31,7 +31,7 @@ struct FieldKernels {
   void (*pack_transposed)(const float* weights, size_t stride, int rows, int depth, float* packed);
   // out [rows][block] = packed [rows][depth] · in [depth][block], of which the first `used` of the depth.
   void (*multiply)(const float* packed, int rows, int depth, int used, const float* in, float* out);
-  // The same plus bias [rows] in each column; of the first `rows` rows.
+  // The same, of the whole depth, plus bias [rows] in each column.
   void (*affine)(const float* packed, const float* bias, int rows, int depth, const float* in, float* out);
   // The same through squareplus.
   void (*affine_activated)(const float* packed, const float* bias, int rows, int depth, float smoothing,

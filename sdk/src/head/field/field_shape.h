@@ -41,7 +41,7 @@ inline constexpr int kMaxOctaves = 8, kMaxFieldWidth = 256, kMaxFieldLayers = 8;
 // Throws MAQ_ERROR_UNSUPPORTED where a size is beyond what the engine takes.
 void check_field_shape(const FieldShape& shape);
 
-// Columns that all points of a block have in the engine, and the number that rows of weights are padded to.
+// Rows of weights are padded to a multiple of this.
 inline constexpr size_t kFieldRowPadding = 16;
 
 }  // namespace maq::head

@@ -360,4 +360,33 @@ TEST(CameraPose, TheInformationIsThatOfFiniteDifferences) {
   }
 }
 
+TEST(CameraPose, ARefinedPoseIsAMinimumOfItsCostWithTheFocalLengthsPrior) {
+  using namespace maq::head;
+  Random random(14);
+  const HeadCamera camera = camera_at(4, 500, {0.2, 0.3, 0.1});
+  std::vector<PosePoint> points;
+  std::vector<size_t> chosen;
+  for (const Correspondence& p : head_points(camera, 30, 2, random)) {
+    chosen.push_back(points.size());
+    points.push_back({p.point_dm, p.x_px - 320, p.y_px - 240, p.sigma_px, 1});
+  }
+  const FocalPrior prior = {std::log(800.0), 0.1};
+  for (const double limit : {9.0, double(INFINITY)}) {
+    ScaledPose pose;
+    pose.rotation = camera.head_to_camera.rotation;
+    pose.log_scale = std::log(125.0), pose.log_focal = std::log(650.0);
+    const double cost = refine_pose(pose, points, chosen.data(), 30, prior, limit, 50);
+    for (int i = 0; i < 14; ++i) {
+      const double d = i % 2 == 0 ? 1e-4 : -1e-4;
+      ScaledPose near = pose;
+      near.rotation = exp_rotation({d * (i / 2 == 0), d * (i / 2 == 1), d * (i / 2 == 2)}) * pose.rotation;
+      near.u_px += 100 * d * (i / 2 == 3), near.v_px += 100 * d * (i / 2 == 4);
+      near.log_scale += d * (i / 2 == 5), near.log_focal += 10 * d * (i / 2 == 6);
+      EXPECT_GT(refine_pose(near, points, chosen.data(), 30, prior, limit, 0), cost) << i;
+    }
+    EXPECT_GT(pose.log_focal, std::log(550.0));  // between what the points say and the prior
+    EXPECT_LT(pose.log_focal, std::log(790.0));
+  }
+}
+
 }  // namespace

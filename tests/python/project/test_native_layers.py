@@ -41,6 +41,7 @@ MAY_INCLUDE = {
     "edges/measuring": BASE - {"nn"} | CURVES,
     "head/camera": {"core", "core/math"},
     "head/field": {"core"},
+    "head/fit": set(),
     "head/mesh": BASE - {"nn"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,

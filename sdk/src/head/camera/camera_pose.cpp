@@ -17,8 +17,10 @@ constexpr double kMaxValue = 1e6;
 constexpr double kInlierLimit = 13.8;  // squared sigmas of two coordinates: 99.9 %
 constexpr double kRobustLimit = 9;
 constexpr size_t kScored = 128, kRefined = 256;  // points that hypotheses, and the best of them, are measured by
-constexpr int kMinTrials = 40, kMaxTrials = 500;
+constexpr int kMinTrials = 40, kMaxTrials = 400;
+constexpr int kMirroredTrials = 120;  // that a mirrored head is not missed which explains far more than another's pose
 constexpr size_t kCandidates = 6;
+constexpr double kAmbiguousCost = 9;  // a pose worse by 3 sigmas is not in doubt
 constexpr double kMaxRotationSigma_rad = 0.5;
 
 class Dice {  // SplitMix64
@@ -111,8 +113,12 @@ void keep(std::vector<Hypothesis>& best, const Hypothesis& found, double apart_r
 
 class PoseSearch {
  public:
-  PoseSearch(std::vector<PosePoint> points, const FocalPrior& prior, size_t min_inliers)
-      : points_(std::move(points)), prior_(prior), min_inliers_(min_inliers), all_(points_.size()) {
+  PoseSearch(std::vector<PosePoint> points, const FocalPrior& prior, size_t min_inliers, int max_trials)
+      : points_(std::move(points)),
+        prior_(prior),
+        min_inliers_(min_inliers),
+        max_trials_(max_trials),
+        all_(points_.size()) {
     std::iota(all_.begin(), all_.end(), size_t(0));
     centre_x_ = median_of(points_, [](const PosePoint& p) { return p.x; });
     centre_y_ = median_of(points_, [](const PosePoint& p) { return p.y; });
@@ -143,7 +149,10 @@ class PoseSearch {
       keep(refined, start, 0.05);
     }
     std::sort(refined.begin(), refined.end(), [](auto& a, auto& b) { return a.cost < b.cost; });
-    if (refined.size() > 2) refined.resize(2);
+    // Another as good as the best shows in a sample.
+    while (refined.size() > 2 || (refined.size() == 2 && refined[1].cost > refined[0].cost + 3 * kAmbiguousCost)) {
+      refined.pop_back();
+    }
     for (Hypothesis& pose : refined) {
       pose.cost = refine_pose(pose.pose, points_, all_.data(), all_.size(), prior_, kRobustLimit, 20);
       if (is_consensus(inliers_of(pose.pose).size())) found.push_back(pose);
@@ -171,7 +180,7 @@ class PoseSearch {
     const size_t count = points_.size(), scored = std::min(kScored, sample_.size());
     const int focals = prior_.sigma > 0 ? 2 * int(std::ceil(2 * prior_.sigma / 0.35)) + 1 : 1;
     double needed = kMinTrials;
-    for (int trial = 0; trial < kMaxTrials && trial < needed; ++trial) {
+    for (int trial = 0; trial < max_trials_ && trial < needed; ++trial) {
       size_t chosen[3];
       for (size_t i = 0; i < 3; ++i) {
         do chosen[i] = dice.below(count);
@@ -196,9 +205,9 @@ class PoseSearch {
         keep(best, found, 0.15);
         best_fraction_ = std::max(best_fraction_, double(near) / double(scored));
       }
-      // Of the triples that are right, half may be too small or have another focal length.
-      const double good = 0.4 * best_fraction_ * best_fraction_ * best_fraction_;
-      needed = std::max(double(kMinTrials), good > 1e-3 ? std::log(1e-5) / std::log(1 - good) : double(kMaxTrials));
+      // Some of the right triples are too small, or have another focal length.
+      const double good = 0.8 * best_fraction_ * best_fraction_ * best_fraction_;
+      needed = std::max(double(kMinTrials), good > 1e-3 ? std::log(1e-5) / std::log(1 - good) : double(max_trials_));
     }
     return best;
   }
@@ -214,12 +223,13 @@ class PoseSearch {
       return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1);
     };
     const double n = double(count), k = double(inliers);
-    return std::log(2) + log_choose(n, 3) + log_choose(n, k) + (k - 3) * log_chance < 0;
+    return std::log(2) + log_choose(n, 3) + log_choose(n, k) + (k - 3) * log_chance < std::log(0.1);
   }
 
   std::vector<PosePoint> points_;
   FocalPrior prior_;
   size_t min_inliers_;
+  int max_trials_;
   std::vector<size_t> all_, sample_;
   double centre_x_ = 0, centre_y_ = 0, radius_px_ = 0, sigma_px_ = 1, coarse_limit_ = 0, best_fraction_ = 0;
 };
@@ -344,14 +354,14 @@ CameraPose find_camera_pose(const std::vector<Correspondence>& given, const Came
   const FocalPrior prior = {std::log(options.focal_px), options.log_focal_sigma};
   const size_t min_inliers =
       std::max(size_t(4), size_t(std::ceil(options.min_inlier_fraction * double(points.size()))));
-  PoseSearch search(points, prior, min_inliers);
+  PoseSearch search(points, prior, min_inliers, kMaxTrials);
   std::vector<Hypothesis> found = search.run();
   const size_t agreeing = found.empty() ? 0 : search.inliers_of(found[0].pose).size();
   if (2 * agreeing < points.size()) {
     // A mirrored picture of the head is the picture of the mirrored head. Part of it may fit in front, too.
     std::vector<PosePoint> mirrored = points;
     for (PosePoint& point : mirrored) point.p.x = -point.p.x;
-    PoseSearch other(std::move(mirrored), prior, min_inliers);
+    PoseSearch other(std::move(mirrored), prior, min_inliers, found.empty() ? kMaxTrials : kMirroredTrials);
     const std::vector<Hypothesis> behind = other.run();
     const size_t mirrored_inliers = behind.empty() ? 0 : other.inliers_of(behind[0].pose).size();
     if (4 * mirrored_inliers > 5 * agreeing || found.empty()) {
@@ -375,8 +385,8 @@ CameraPose find_camera_pose(const std::vector<Correspondence>& given, const Came
     result.covariance.fill(0);
     return result;
   }
-  const bool is_ambiguous =
-      found.size() > 1 && found[1].cost - found[0].cost < 9 && angle_between(found[0].pose, found[1].pose) > 0.1;
+  const bool is_ambiguous = found.size() > 1 && found[1].cost - found[0].cost < kAmbiguousCost &&
+                            angle_between(found[0].pose, found[1].pose) > 0.1;
   result.status = is_ambiguous ? PoseStatus::kAmbiguous : PoseStatus::kFound;
   const double s = std::exp(pose.log_scale);
   result.camera = {{pose.rotation, Vec3{pose.u_px / s, pose.v_px / s, std::exp(pose.log_focal - pose.log_scale)} -

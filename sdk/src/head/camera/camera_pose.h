@@ -54,8 +54,9 @@ struct CameraPose {
   size_t unusable = 0;               // with any status: not finite, out of range, or with no positive weight and sigma
 };
 
-// Deterministic. Up to 60 % of the correspondences may be outliers. Those with numbers that are not finite or beyond
-// 1e6, or whose weight or sigma is not positive, are left out and counted. All inliers lie in front of the camera.
+// Deterministic. Up to 60 % of the correspondences may be outliers, as long as more are left than chance would bring
+// together: that takes some 20 points; of 10 points 30 % may be. Those with numbers that are not finite or beyond 1e6,
+// or whose weight or sigma is not positive, are left out and counted. All inliers lie in front of the camera.
 // Throws MAQ_ERROR_INVALID_ARGUMENT unless the options are finite, the focal length positive, its sigma within 0..3 and
 // the fraction within 0..1.
 CameraPose find_camera_pose(const std::vector<Correspondence>& points, const CameraPoseOptions& options);

@@ -96,27 +96,30 @@ void expect_values(const FieldWeights& weights, FieldIsa isa, size_t count) {
   }
 }
 
-void expect_gradients(const FieldWeights& weights, FieldIsa isa, size_t count, bool has_surface) {
-  SCOPED_TRACE(std::string(field_isa_name(isa)) + ", width " + std::to_string(weights.shape().width) + ", points " +
-               std::to_string(count) + (has_surface ? ", surface" : ", geometry"));
-  const FieldEngine engine = engine_of(weights, isa);
-  FieldWorkspace workspace;
+// On each instruction set.
+void expect_gradients(const FieldWeights& weights, size_t count, bool has_surface) {
   Batch batch(count);
-  FieldWeights gradient(weights.shape());
   FieldValueGradient given = batch.gradient();
-  if (!has_surface) given = {given.distance, {}, {}};
-  engine.forward(as_points(batch.points), workspace,
-                 has_surface ? batch.values() : FieldValues{batch.distance.data(), {}, {}});
-  engine.backward(workspace, given, WeightGradient::kAll, &gradient, as_planes(batch.by_points));
+  if (!has_surface) given = {given.distance, {}, {}, {}};
   const Gradients expected = gradients(weights, batch.points, has_surface, [&](size_t i) { return batch.seeds(i); });
-  const auto lists = as_lists(gradient);
-  for (size_t layer = 0; layer < lists.size(); ++layer) {
-    EXPECT_LE(relative_error(lists[layer], expected.weights[layer]), 1e-4) << "layer " << layer;
-  }
-  for (size_t c = 0; c < 3; ++c) {
-    std::vector<double> by_point;
-    for (const std::array<double, 3>& point : expected.points) by_point.push_back(point[c]);
-    EXPECT_LE(relative_error(batch.by_points[c], by_point), 1e-4) << "axis " << c;
+  for (const FieldIsa isa : supported_field_isas()) {
+    SCOPED_TRACE(std::string(field_isa_name(isa)) + ", width " + std::to_string(weights.shape().width) + ", points " +
+                 std::to_string(count) + (has_surface ? ", surface" : ", geometry"));
+    const FieldEngine engine = engine_of(weights, isa);
+    FieldWorkspace workspace;
+    FieldWeights gradient(weights.shape());
+    engine.forward(as_points(batch.points), workspace,
+                   has_surface ? batch.values() : FieldValues{batch.distance.data(), {}, {}, {}});
+    engine.backward(workspace, given, WeightGradient::kAll, &gradient, as_planes(batch.by_points));
+    const auto lists = as_lists(gradient);
+    for (size_t layer = 0; layer < lists.size(); ++layer) {
+      EXPECT_LE(relative_error(lists[layer], expected.weights[layer]), 1e-4) << "layer " << layer;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      std::vector<double> by_point;
+      for (const std::array<double, 3>& point : expected.points) by_point.push_back(point[c]);
+      EXPECT_LE(relative_error(batch.by_points[c], by_point), 1e-4) << "axis " << c;
+    }
   }
 }
 
@@ -127,26 +130,23 @@ TEST(FieldEngine, ValuesAreThoseOfFloat64AtEachWidthAndInstructionSet) {
 }
 
 TEST(FieldEngine, GradientsAreThoseOfFloat64AtEachWidthAndInstructionSet) {
-  for (const FieldIsa isa : supported_field_isas()) {
-    for (const int width : {48, 64, 96, 128}) {
-      const FieldWeights weights = random_weights(shape_of_width(width), 2);
-      expect_gradients(weights, isa, 10, true);
-      expect_gradients(weights, isa, 10, false);
-    }
+  for (const int width : {48, 64, 96, 128}) {
+    const FieldWeights weights = random_weights(shape_of_width(width), 2);
+    expect_gradients(weights, 10, true);
+    expect_gradients(weights, 10, false);
   }
 }
 
 TEST(FieldEngine, TailsOf1To33PointsAreAsGood) {
-  FieldShape shape = shape_of_width(16);
-  for (const FieldIsa isa : supported_field_isas()) {
-    for (size_t tail = 1; tail <= 33; ++tail) {
-      const FieldWeights weights = random_weights(shape, 3);
+  const FieldWeights weights = random_weights(shape_of_width(16), 3);
+  for (size_t tail = 1; tail <= 33; ++tail) {
+    for (const FieldIsa isa : supported_field_isas()) {
       expect_values(weights, isa, tail);
       expect_values(weights, isa, 64 + tail);
-      expect_gradients(weights, isa, tail, true);
     }
-    expect_gradients(random_weights(shape, 3), isa, 64 + 33, true);
+    expect_gradients(weights, tail, true);
   }
+  expect_gradients(weights, 64 + 33, true);
 }
 
 TEST(FieldEngine, OddSizesOfEachPartAreAsGood) {
@@ -162,11 +162,10 @@ TEST(FieldEngine, OddSizesOfEachPartAreAsGood) {
   FieldShape smallest;
   smallest.octaves = smallest.feature = smallest.personal_geometry_layers = smallest.personal_surface_layers = 0;
   smallest.width = smallest.surface_width = smallest.geometry_layers = smallest.surface_layers = 1;
-  for (const FieldIsa isa : supported_field_isas()) {
-    for (const FieldShape& one : {shape, smallest}) {
-      expect_values(random_weights(one, 4), isa, 70);
-      expect_gradients(random_weights(one, 4), isa, 70, true);
-    }
+  for (const FieldShape& one : {shape, smallest}) {
+    const FieldWeights weights = random_weights(one, 4);
+    for (const FieldIsa isa : supported_field_isas()) expect_values(weights, isa, 70);
+    expect_gradients(weights, 70, true);
   }
 }
 
@@ -291,31 +290,43 @@ TEST(FieldEngine, APointsValuesDependOnNoOtherAndNotOnTheBatch) {
 }
 
 TEST(FieldEngine, APointThatIsNotFiniteIsNanAndTheOthersStay) {
-  const FieldWeights weights = random_weights(shape_of_width(48), 11);
   const float bad[] = {std::numeric_limits<float>::quiet_NaN(), INFINITY, -INFINITY};
-  for (const FieldIsa isa : supported_field_isas()) {
-    const FieldEngine engine = engine_of(weights, isa);
-    FieldWorkspace workspace;
-    Batch good(70), batch(70);
-    for (size_t i = 0; i < 3; ++i) batch.points[i][20 * i + 5] = bad[i];
-    Columns good_slopes = good.rgb, slopes = good.rgb;
-    engine.forward(as_points(good.points), workspace, good.values());
-    engine.distances_and_gradients(as_points(good.points), workspace, good.distance.data(), as_planes(good_slopes));
-    engine.forward(as_points(batch.points), workspace, batch.values());
-    engine.distances_and_gradients(as_points(batch.points), workspace, batch.distance.data(), as_planes(slopes));
-    for (size_t i = 0; i < 70; ++i) {
-      const bool is_bad = i == 5 || i == 25 || i == 45;
-      for (const auto& [got, expected] : {std::pair(&batch.distance, &good.distance),
-                                          {&batch.rgb[1], &good.rgb[1]},
-                                          {&batch.template_point[2], &good.template_point[2]},
-                                          {&slopes[0], &good_slopes[0]}}) {
-        if (is_bad) {
-          EXPECT_TRUE(std::isnan((*got)[i])) << i;
-        } else {
-          EXPECT_EQ((*got)[i], (*expected)[i]) << i;
+  for (const int octaves : {0, 6}) {
+    for (const FieldIsa isa : supported_field_isas()) {
+      FieldShape shape = shape_of_width(48);
+      shape.octaves = octaves;
+      const FieldWeights weights = random_weights(shape, 11);
+      const FieldEngine engine = engine_of(weights, isa);
+      FieldWorkspace workspace;
+      Batch good(70), batch(70);
+      for (size_t i = 0; i < 3; ++i) batch.points[i][20 * i + 5] = bad[i];
+      Columns good_slopes = good.rgb, slopes = good.rgb;
+      engine.forward(as_points(good.points), workspace, good.values());
+      engine.distances_and_gradients(as_points(good.points), workspace, good.distance.data(), as_planes(good_slopes));
+      engine.forward(as_points(batch.points), workspace, batch.values());
+      engine.distances_and_gradients(as_points(batch.points), workspace, batch.distance.data(), as_planes(slopes));
+      for (size_t i = 0; i < 70; ++i) {
+        const bool is_bad = i == 5 || i == 25 || i == 45;
+        for (const auto& [got, expected] : {std::pair(&batch.distance, &good.distance),
+                                            {&batch.rgb[1], &good.rgb[1]},
+                                            {&batch.template_point[2], &good.template_point[2]},
+                                            {&slopes[0], &good_slopes[0]}}) {
+          if (is_bad) {
+            EXPECT_TRUE(std::isnan((*got)[i])) << i;
+          } else {
+            EXPECT_EQ((*got)[i], (*expected)[i]) << i;
+          }
         }
       }
     }
+  }
+}
+
+TEST(FieldEngine, InfinityIsNanFromTheEncodingOn) {
+  for (const FieldIsa isa : supported_field_isas()) {
+    AlignedFloats points(3 * kFieldBlock, INFINITY), encoding(9 * kFieldBlock);
+    field_kernels(isa).encode(points.data(), 1, encoding.data());
+    for (const float value : encoding) EXPECT_TRUE(std::isnan(value));
   }
 }
 

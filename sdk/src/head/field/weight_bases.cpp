@@ -46,9 +46,10 @@ FieldLayer WeightBases::basis_layer(int layer, int code) {
   for (Bases* bases : {&geometry_, &surface_}) {
     const int within = layer - bases->first_layer;
     if (within < 0 || within >= bases->layers || code < 0 || code >= bases->codes) continue;
-    float* values = bases->values.data() + size_t(code) * bases->count - bases->begin;
+    float* values = bases->values.data() + size_t(code) * bases->count;
     const FieldLayerPlace& place = constant_.place(layer);
-    return {values + place.weights, values + place.bias, place.stride, shape().inputs(layer), shape().outputs(layer)};
+    return {values + (place.weights - bases->begin), values + (place.bias - bases->begin), place.stride,
+            shape().inputs(layer), shape().outputs(layer)};
   }
   throw Error(MAQ_ERROR_INTERNAL, "Layer ", layer, " of a head's field has no basis ", code, ".");
 }

@@ -22,7 +22,9 @@ SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
 CURVES = {"edges", "edges/curves"}
 SYSTEMS = (
-    SCENE | CURVES | {"head/camera", "densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
+    SCENE
+    | CURVES
+    | {"head/camera", "densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
 )
 MAY_INCLUDE = {
     "core": set(),

@@ -205,6 +205,20 @@ class Steps:
         return np.where(units < 65535, units * self.unit_m, 0).astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Outliers:
+    """A sensor of whose known pixels a share, alone or a few together, are wrong by up to half: bad matches, dust."""
+
+    share: float = 0.01
+    size_px: float = 0.5  # of the Gaussian that makes neighbours wrong together; 0: single pixels
+    of: Sensor = clean
+
+    def __call__(self, depth: np.ndarray, focal_px: float, rng: np.random.Generator) -> np.ndarray:
+        seen = np.asarray(self.of(depth, focal_px, rng), np.float32)
+        wrong = _blobs(rng, seen.shape, self.share, self.size_px)
+        return np.where(wrong, seen * rng.uniform(0.5, 1.5, seen.shape), seen).astype(np.float32)
+
+
 # Named levels: what evaluation reports.
 LEVELS: dict[str, Sensor] = {
     "clean": clean,
@@ -226,7 +240,15 @@ LEVELS: dict[str, Sensor] = {
 
 
 def drawn(rng: np.random.Generator) -> Sensor:
-    """A sensor to train on, of any kind and strength between the named levels and a little beyond."""
+    """A sensor to train on, of any kind and strength between the named levels and a little beyond; one in five with
+    wrong pixels, since no level has them and a network must not take each for an edge."""
+    sensor = _without_outliers(rng)
+    if rng.random() < 0.8:
+        return sensor
+    return Outliers(float(2 ** rng.uniform(-9, -4)), float(rng.choice([0, 0.5, 1])), sensor)
+
+
+def _without_outliers(rng: np.random.Generator) -> Sensor:
     kind = rng.choice(6, p=[0.15, 0.1, 0.3, 0.25, 0.1, 0.1])
     if kind == 0:
         return clean

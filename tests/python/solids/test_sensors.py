@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from export.solids.sensors import LEVELS, Plain, Steps, Stereo, StructuredLight, TimeOfFlight, drawn
+from export.solids.sensors import LEVELS, Outliers, Plain, Steps, Stereo, StructuredLight, TimeOfFlight, drawn
 
 FOCAL_PX = 300.0
 
@@ -77,6 +77,19 @@ def test_time_of_flight_stays_under_the_random_error_of_a_published_camera():
         assert (TimeOfFlight(holes=0)(wall(at_m), FOCAL_PX, np.random.default_rng(2)) - at_m).std() <= 0.017
 
 
+@pytest.mark.parametrize("size_px", [0, 0.5, 1])
+def test_a_share_of_pixels_is_wrong_by_up_to_half_and_none_appears_where_nothing_is(size_px):
+    depth = wall(2.0)
+    depth[:, 100:] = 0
+    seen = Outliers(0.05, size_px)(depth, FOCAL_PX, np.random.default_rng(5))
+    assert not seen[:, 100:].any()
+    wrong = seen[:, :100] != 2.0
+    assert wrong.mean() == pytest.approx(0.05, rel=0.2)
+    assert seen[:, :100].min() >= 1.0
+    assert seen[:, :100].max() <= 3.0
+    assert abs(seen[:, :100][wrong] - 2.0).mean() == pytest.approx(0.5, rel=0.15)  # evenly between 1 and 3
+
+
 def test_a_sensor_to_train_on_is_drawn_from_all_kinds():
     rng = np.random.default_rng(0)
-    assert len({type(drawn(rng)) for _ in range(100)}) == 6
+    assert len({type(drawn(rng)) for _ in range(100)}) == 7  # Outliers among them

@@ -126,7 +126,7 @@ TEST(LiveEdges, ASourceWithoutDepthIsSaidInASentence) {
 
 TEST(LiveEdges, ADepthCameraThatStaysAwayEndsInASentence) {
   EdgesRun edges;
-  edges.live.open("stub:solids?fps=50&size=160x120&unplug@5");
+  edges.live.open("stub:solids?fps=10&size=160x120&unplug@10");
   ASSERT_TRUE(edges.until_ended());
   EXPECT_TRUE(edges.live.status().has_failed);
   EXPECT_FALSE(edges.live.status().problem.empty());

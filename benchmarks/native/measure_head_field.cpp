@@ -60,7 +60,7 @@ void measure(FieldIsa isa, int width) {
                 microseconds(work) / double(kPoints));
   };
   print("distance", [&] { engine.distances(points, workspace, p(3)); });
-  print("distance and gradient", [&] { engine.distances_and_gradients(points, workspace, p(3), {p(4), p(5), p(6)}); });
+  print("distance and gradient", [&] { engine.distances(points, workspace, p(3), {p(4), p(5), p(6)}); });
   print("geometry forward, back to all weights", [&] {
     engine.forward(points, workspace, {p(3), {}, {}});
     engine.backward(workspace, {p(10), {}, {}}, WeightGradient::kAll, &gradient);

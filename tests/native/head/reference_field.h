@@ -2,6 +2,8 @@
 // compared with.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -229,6 +231,20 @@ double relative_error(const A& a, const B& b) {
     size = std::max(size, std::abs(double(b[i])));
   }
   return difference / size;
+}
+
+// A gradient by all weights and by the points [3][n], within 1e-4 of the reference.
+inline void expect_gradients(const FieldWeights& by_weights, const std::array<std::vector<float>, 3>& by_points,
+                             const Gradients& expected) {
+  const auto lists = as_lists(by_weights);
+  for (size_t layer = 0; layer < lists.size(); ++layer) {
+    EXPECT_LE(relative_error(lists[layer], expected.weights[layer]), 1e-4) << "layer " << layer;
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    std::vector<double> by_point;
+    for (const std::array<double, 3>& point : expected.points) by_point.push_back(point[c]);
+    EXPECT_LE(relative_error(by_points[c], by_point), 1e-4) << "axis " << c;
+  }
 }
 
 }  // namespace reference_field

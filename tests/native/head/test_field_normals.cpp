@@ -79,15 +79,7 @@ void expect_normals(const FieldShape& shape, size_t count, bool has_surface) {
     for (size_t c = 0; c < 3; ++c) EXPECT_LE(relative_error(at.normal[c], normal[c]), 1e-4);
     FieldWeights gradient(shape);
     at.engine.backward(at.workspace, given, WeightGradient::kAll, &gradient, as_planes(at.by_points));
-    const auto lists = as_lists(gradient);
-    for (size_t layer = 0; layer < lists.size(); ++layer) {
-      EXPECT_LE(relative_error(lists[layer], expected.weights[layer]), 1e-4) << "layer " << layer;
-    }
-    for (size_t c = 0; c < 3; ++c) {
-      std::vector<double> by_point;
-      for (const std::array<double, 3>& point : expected.points) by_point.push_back(point[c]);
-      EXPECT_LE(relative_error(at.by_points[c], by_point), 1e-4) << "axis " << c;
-    }
+    expect_gradients(gradient, at.by_points, expected);
   }
 }
 

@@ -190,9 +190,11 @@ void FieldEngine::run_slopes(const Block& at, const Scratch& scratch) const {
   kernels_->encode_backward(at.encoding, scratch.b, shape_.octaves, scratch.points);
 }
 
-void FieldEngine::distances(const FieldPoints& points, FieldWorkspace& workspace, float* distance) const {
+void FieldEngine::distances(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
+                            const Planes& gradient) const {
+  const bool has_gradient = has_any(gradient);
   const Scratch memory = scratch(workspace, false);
-  keep(workspace, std::min(points.count, kBlock), false, false);
+  keep(workspace, std::min(points.count, kBlock), false, has_gradient);
   const Block at = block(workspace, 0);
   for (size_t begin = 0; begin < points.count; begin += kBlock) {
     const size_t count = std::min(kBlock, points.count - begin);
@@ -201,21 +203,7 @@ void FieldEngine::distances(const FieldPoints& points, FieldWorkspace& workspace
     run_geometry(at);
     run_distance(at, memory.a);
     put(memory.a, begin, count, distance);
-  }
-}
-
-void FieldEngine::distances_and_gradients(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
-                                          const Planes& gradient) const {
-  const Scratch memory = scratch(workspace, false);
-  keep(workspace, std::min(points.count, kBlock), false, true);
-  const Block at = block(workspace, 0);
-  for (size_t begin = 0; begin < points.count; begin += kBlock) {
-    const size_t count = std::min(kBlock, points.count - begin);
-    take({points.x, points.y, points.z}, begin, count, memory.points);
-    kernels_->encode(memory.points, shape_.octaves, at.encoding);
-    run_geometry(at);
-    run_distance(at, memory.a);
-    put(memory.a, begin, count, distance);
+    if (!has_gradient) continue;
     run_slopes(at, memory);
     put(memory.points, begin, count, gradient);
   }

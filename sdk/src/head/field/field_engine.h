@@ -69,10 +69,9 @@ class FieldEngine {
   // MAQ_ERROR_INTERNAL where they are of another shape.
   void set_weights(const FieldWeights& weights);
 
-  void distances(const FieldPoints& points, FieldWorkspace& workspace, float* distance) const;
-  // gradient: of the distance, by the point.
-  void distances_and_gradients(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
-                               const Planes& gradient) const;
+  // gradient: of the distance, by the point; null planes are left out, and where all are, it is not computed.
+  void distances(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
+                 const Planes& gradient = {}) const;
 
   // Keeps what backward() needs in the workspace, until the next call with it.
   void forward(const FieldPoints& points, FieldWorkspace& workspace, const FieldValues& values) const;

@@ -41,6 +41,7 @@ MAY_INCLUDE = {
     "edges/files": BASE - {"nn"} | CURVES,
     "edges/fusion": BASE - {"nn"} | CURVES,
     "edges/measuring": BASE - {"nn"} | CURVES,
+    "head": {"core", "core/math", "head/field"},
     "head/camera": {"core", "core/math"},
     "head/field": {"core"},
     "head/fit": set(),

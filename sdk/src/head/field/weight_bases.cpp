@@ -8,12 +8,16 @@
 namespace maq::head {
 namespace {
 
+bool are_finite(const float* values, size_t count) {
+  return std::all_of(values, values + count, [](float value) { return std::isfinite(value); });
+}
+
 void check_codes(const char* name, const std::vector<float>& codes, int expected) {
   if (codes.size() != size_t(expected)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "There are ", codes.size(), " ", name, " codes of a head, but ", expected,
                 " bases. Use codes that were made with the same bundle.");
   }
-  if (!std::all_of(codes.begin(), codes.end(), [](float code) { return std::isfinite(code); })) {
+  if (!are_finite(codes.data(), codes.size())) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "One of the ", name, " codes of a head is not a finite number.");
   }
 }
@@ -52,6 +56,12 @@ FieldLayer WeightBases::basis_layer(int layer, int code) {
             shape().inputs(layer), shape().outputs(layer)};
   }
   throw Error(MAQ_ERROR_INTERNAL, "Layer ", layer, " of a head's field has no basis ", code, ".");
+}
+
+bool WeightBases::is_finite() const {
+  return are_finite(constant_.values().data(), constant_.values().size()) &&
+         are_finite(geometry_.values.data(), geometry_.values.size()) &&
+         are_finite(surface_.values.data(), surface_.values.size());
 }
 
 void WeightBases::combine(const FieldCodes& codes, FieldWeights& weights) const {

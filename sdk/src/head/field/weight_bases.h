@@ -32,6 +32,9 @@ class WeightBases {
   // What `code` adds to a personal layer. Throws MAQ_ERROR_INTERNAL for a layer that is not, or a code too high.
   FieldLayer basis_layer(int layer, int code);
 
+  // W0 and all bases are finite numbers.
+  bool is_finite() const;
+
   // Throws MAQ_ERROR_INVALID_ARGUMENT unless there are as many codes as bases, all of them finite numbers. `weights`
   // must have the shape of the bases (MAQ_ERROR_INTERNAL), and does not allocate.
   void combine(const FieldCodes& codes, FieldWeights& weights) const;

@@ -1,0 +1,90 @@
+#include "head/head_prior.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/error.h"
+
+namespace maq::head {
+namespace {
+
+template <class... Parts>
+[[noreturn]] void refuse(const Parts&... parts) {
+  throw Error(MAQ_ERROR_BAD_BUNDLE, "The prior of heads cannot be used: ", parts..., ". Install the bundle again.");
+}
+
+bool are_within(const float* values, size_t count, float limit) {
+  return std::all_of(values, values + count, [&](float value) { return std::abs(value) <= limit; });
+}
+
+void check_bounds(const HeadBounds& bounds) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const float low = bounds.min[axis], high = bounds.max[axis];
+    if (!(low >= -kMaxHeadExtent_dm && low < 0 && high > 0 && high <= kMaxHeadExtent_dm)) {
+      refuse("its domain is ", low, " to ", high, " dm along axis ", axis, ", but must hold 0 and end within ",
+             kMaxHeadExtent_dm);
+    }
+  }
+}
+
+void check_cut(const CutPlane& cut) {
+  const Vec3 p = cut.point;
+  const double reach = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  if (!is_finite(p) || !(reach <= double(kMaxHeadExtent_dm)) || !(std::abs(length(cut.normal) - 1) <= 1e-3)) {
+    refuse("its cut plane has no point in the domain, or no normal of length 1");
+  }
+}
+
+void check_anchors(const HeadAnchors& anchors, size_t codes) {
+  const size_t count = anchors.count();
+  if (count < kMinHeadAnchors || count > kMaxHeadAnchors) {
+    refuse("it has ", count, " anchors, but must have ", kMinHeadAnchors, " to ", kMaxHeadAnchors);
+  }
+  if (anchors.template_points.size() != 3 * count || anchors.mean.size() != 3 * count ||
+      anchors.linear.size() != 3 * count * codes) {
+    refuse("the arrays of its anchors are not of one size");
+  }
+  constexpr float kReach = 2 * kMaxHeadExtent_dm;
+  if (!are_within(anchors.template_points.data(), 3 * count, kReach) ||
+      !are_within(anchors.mean.data(), 3 * count, kReach) ||
+      !are_within(anchors.linear.data(), anchors.linear.size(), kReach)) {
+    refuse("one of its anchors is not finite, or farther than ", kReach, " dm away");
+  }
+  if (!std::all_of(anchors.sigma.begin(), anchors.sigma.end(), [](float s) { return s >= 1e-5f && s <= 10; })) {
+    refuse("the standard deviation of one of its anchors is not within 1e-5 to 10 dm");
+  }
+}
+
+void check_places(const std::vector<NamedPoint>& places) {
+  if (places.size() > kMaxNamedPoints) refuse("it has ", places.size(), " places, but may have ", kMaxNamedPoints);
+  std::set<std::string> names;
+  for (const NamedPoint& place : places) {
+    if (place.name.empty() || place.name.size() > kMaxPlaceName) refuse("one of its places has no name or a long one");
+    if (!names.insert(place.name).second) refuse("two of its places are named \"", place.name, "\"");
+    if (!are_within(place.template_point.data(), 3, 2 * kMaxHeadExtent_dm)) {
+      refuse("its place \"", place.name, "\" is not finite, or far away");
+    }
+  }
+}
+
+}  // namespace
+
+void check_head_prior(const HeadPrior& prior) {
+  if (!(prior.sharpness >= 0.1f && prior.sharpness <= 1e5f)) {
+    refuse("its sharpness is ", prior.sharpness, ", but must be 0.1 to 1e5");
+  }
+  if (!prior.bases.is_finite()) refuse("one of its weights is not finite");
+  check_cut(prior.cut);
+  check_bounds(prior.bounds);
+  check_anchors(prior.anchors, size_t(prior.shape_codes()));
+  check_places(prior.places);
+}
+
+const NamedPoint* find_place(const HeadPrior& prior, const std::string& name) {
+  const auto found = std::find_if(prior.places.begin(), prior.places.end(),
+                                  [&](const NamedPoint& place) { return place.name == name; });
+  return found == prior.places.end() ? nullptr : &*found;
+}
+
+}  // namespace maq::head

@@ -12,9 +12,9 @@
 namespace {
 
 using maq::WorkerThreads;
+using maq::head::HeadCamera;
 using maq::head::HeadMesh;
 using maq::head::MeshRaster;
-using maq::head::RasterCamera;
 using maq::head::RasterImage;
 
 HeadMesh raster_ball(float cell) {
@@ -32,12 +32,12 @@ HeadMesh raster_ball(float cell) {
 }
 
 // From the front, 6 away: x of the head to the right, z up.
-RasterCamera front(int width_px, int height_px) {
-  RasterCamera camera;
+HeadCamera front(int width_px, int height_px) {
+  HeadCamera camera;
   camera.width_px = width_px, camera.height_px = height_px;
-  camera.rotation = {1, 0, 0, 0, 0, -1, 0, 1, 0};
-  camera.translation = {0, 0, 6};
-  camera.focal_px = 2.2 * height_px, camera.centre_x_px = width_px / 2.0, camera.centre_y_px = height_px / 2.0;
+  camera.head_to_camera.rotation = {1, 0, 0, 0, 0, -1, 0, 1, 0};
+  camera.head_to_camera.translation = {0, 0, 6};
+  camera.focal_px = 2.2 * height_px, camera.cx_px = width_px / 2.0, camera.cy_px = height_px / 2.0;
   return camera;
 }
 
@@ -53,15 +53,14 @@ TEST(MeshRaster, ShowsABallWhereRaysMeetIt) {
   MeshRaster raster;
   RasterImage image;
   const HeadMesh mesh = raster_ball(0.02f);
-  const RasterCamera camera = front(160, 120);
+  const HeadCamera camera = front(160, 120);
   maq::head::RasterOptions options;
   options.ambient = 1;
   raster.draw(mesh, camera, options, threads, image);
   int wrong = 0, seen = 0;
   for (int row = 0; row < 120; ++row) {
     for (int column = 0; column < 160; ++column) {
-      const double x = (column - camera.centre_x_px) / camera.focal_px,
-                   y = (row - camera.centre_y_px) / camera.focal_px;
+      const double x = (column - camera.cx_px) / camera.focal_px, y = (row - camera.cy_px) / camera.focal_px;
       const double a = x * x + y * y + 1, root = 36 - a * 35;
       const size_t pixel = size_t(row * 160 + column);
       if (std::abs(root) < 0.3) continue;  // its rim
@@ -101,8 +100,8 @@ TEST(MeshRaster, ClosedMeshesHaveNoHoles) {
   MeshRaster raster;
   RasterImage image;
   const HeadMesh mesh = raster_ball(0.1f);
-  RasterCamera camera = front(320, 320);
-  camera.centre_x_px = camera.centre_y_px = 160;  // grid lines of the mesh fall on pixels
+  HeadCamera camera = front(320, 320);
+  camera.cx_px = camera.cy_px = 160;  // grid lines of the mesh fall on pixels
   raster.draw(mesh, camera, {}, threads, image);
   for (int row = 0; row < 320; ++row) {
     for (int column = 0; column < 320; ++column) {
@@ -117,8 +116,8 @@ TEST(MeshRaster, TheGroundToTheHorizonIsCutAtTheNearPlane) {
   WorkerThreads threads(1);
   MeshRaster raster;
   RasterImage image;
-  RasterCamera camera;
-  camera.width_px = 41, camera.height_px = 40, camera.focal_px = 20, camera.centre_x_px = 20, camera.centre_y_px = 20;
+  HeadCamera camera;
+  camera.width_px = 41, camera.height_px = 40, camera.focal_px = 20, camera.cx_px = 20, camera.cy_px = 20;
   // One triangle in y = 1 that begins behind the camera.
   raster.draw(one_triangle({-1000, 1, -5, 1000, 1, -5, 0, 1, 1000}), camera, {}, threads, image);
   for (int row = 0; row < 40; ++row) {
@@ -140,8 +139,8 @@ TEST(MeshRaster, WhatIsDegenerateOrBehindIsSkipped) {
   WorkerThreads threads(1);
   MeshRaster raster;
   RasterImage image;
-  RasterCamera camera;
-  camera.width_px = 16, camera.height_px = 16, camera.focal_px = 8, camera.centre_x_px = 8, camera.centre_y_px = 8;
+  HeadCamera camera;
+  camera.width_px = 16, camera.height_px = 16, camera.focal_px = 8, camera.cx_px = 8, camera.cy_px = 8;
   for (const HeadMesh& mesh :
        {HeadMesh(), one_triangle({0, 0, 2, 0, 0, 2, 0, 0, 2}), one_triangle({-1, 0, 2, 0, 0, 2, 1, 0, 2}),
         one_triangle({0, -1, 2, 0, 0, 3, 0, 1, 2}), one_triangle({-1, -1, -2, 1, -1, -2, 0, 1, -2}),
@@ -157,10 +156,10 @@ TEST(MeshRaster, CamerasThatCannotBeAreRefused) {
   WorkerThreads threads(1);
   MeshRaster raster;
   RasterImage image;
-  RasterCamera camera = front(0, 10);
+  HeadCamera camera = front(0, 10);
   expect_error(MAQ_ERROR_IMAGE_SIZE, "0x10 pixels", [&] { raster.draw({}, camera, {}, threads, image); });
   camera = front(10, 10);
-  camera.translation[1] = std::nan("");
+  camera.head_to_camera.translation.y = std::nan("");
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "not finite", [&] { raster.draw({}, camera, {}, threads, image); });
   camera = front(10, 10);
   camera.focal_px = -1;

@@ -5,15 +5,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "head/camera/se3.h"
+#include "head/camera/head_camera.h"
 
 namespace maq::head {
-
-// x right, y down, z forward; pixel = focal_px * (x, y) / z + (cx_px, cy_px), the centre of the first pixel is (0, 0).
-struct HeadCamera {
-  RigidMotion head_to_camera;  // decimetres
-  double focal_px = 0, cx_px = 0, cy_px = 0;
-};
 
 struct Correspondence {
   Vec3 point_dm;  // on the head

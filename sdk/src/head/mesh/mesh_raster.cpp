@@ -24,10 +24,9 @@ struct Plane {
 // homogeneous coordinates, 1997: no clipping). The other way round it is the negative, to the bit: so of triangles that
 // share an edge, each pixel on it belongs to one at least.
 template <class Vertex>
-Plane edge_plane(const Vertex& p, const Vertex& q, const RasterCamera& camera) {
+Plane edge_plane(const Vertex& p, const Vertex& q, const HeadCamera& camera) {
   const double x = p.y * q.z - p.z * q.y, y = p.z * q.x - p.x * q.z, z = p.x * q.y - p.y * q.x;
-  return {x / camera.focal_px, y / camera.focal_px,
-          z - (x * camera.centre_x_px + y * camera.centre_y_px) / camera.focal_px};
+  return {x / camera.focal_px, y / camera.focal_px, z - (x * camera.cx_px + y * camera.cy_px) / camera.focal_px};
 }
 
 struct Setup {
@@ -37,7 +36,7 @@ struct Setup {
 };
 
 template <class Vertex>
-Setup set_up(const std::array<const Vertex*, 3>& corners, const RasterCamera& camera) {
+Setup set_up(const std::array<const Vertex*, 3>& corners, const HeadCamera& camera) {
   Setup made;
   for (size_t k = 0; k < 3; ++k) {
     made.edges[k] = edge_plane(*corners[(k + 1) % 3], *corners[(k + 2) % 3], camera);
@@ -58,15 +57,15 @@ Setup set_up(const std::array<const Vertex*, 3>& corners, const RasterCamera& ca
   return made;
 }
 
-void check(const RasterCamera& camera) {
+void check(const HeadCamera& camera) {
   if (camera.width_px < 1 || camera.height_px < 1 || camera.width_px > kMaxSide || camera.height_px > kMaxSide) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of a mesh is asked for with ", camera.width_px, "x", camera.height_px,
                 " pixels. Give each side 1 to ", kMaxSide, ".");
   }
-  bool is_finite = std::isfinite(camera.focal_px) && camera.focal_px > 0 && std::isfinite(camera.centre_x_px) &&
-                   std::isfinite(camera.centre_y_px);
-  for (const double value : camera.rotation) is_finite = is_finite && std::isfinite(value);
-  for (const double value : camera.translation) is_finite = is_finite && std::isfinite(value);
+  bool is_finite = std::isfinite(camera.focal_px) && camera.focal_px > 0 && std::isfinite(camera.cx_px) &&
+                   std::isfinite(camera.cy_px);
+  is_finite = is_finite && maq::is_finite(camera.head_to_camera.translation);
+  for (const double value : camera.head_to_camera.rotation) is_finite = is_finite && std::isfinite(value);
   if (!is_finite) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The camera of a mesh's picture has a focal length of ", camera.focal_px,
                 " pixels, or a number that is not finite. Give a positive one and finite numbers.");
@@ -80,21 +79,18 @@ std::array<int, 2> pixels_between(double low, double high, int size) {
 
 }  // namespace
 
-void MeshRaster::project(const HeadMesh& mesh, const RasterCamera& camera, double near, WorkerThreads& threads) {
+void MeshRaster::project(const HeadMesh& mesh, const HeadCamera& camera, double near, WorkerThreads& threads) {
   vertices_.resize(mesh.vertex_count());
   rows_.resize(mesh.triangle_count());
   threads.run((vertices_.size() + kTask - 1) / kTask, [&](size_t task, int) {
     for (size_t i = task * kTask; i < std::min((task + 1) * kTask, vertices_.size()); ++i) {
       const float* const p = &mesh.positions[3 * i];
-      const auto row = [&](size_t r) {
-        return camera.rotation[3 * r] * double(p[0]) + camera.rotation[3 * r + 1] * double(p[1]) +
-               camera.rotation[3 * r + 2] * double(p[2]) + camera.translation[r];
-      };
+      const Vec3 seen = camera.head_to_camera * Vec3{double(p[0]), double(p[1]), double(p[2])};
       Vertex& vertex = vertices_[i];
-      vertex.x = row(0), vertex.y = row(1), vertex.z = row(2);
+      vertex.x = seen.x, vertex.y = seen.y, vertex.z = seen.z;
       if (vertex.z < near) continue;
-      vertex.column_px = camera.focal_px * vertex.x / vertex.z + camera.centre_x_px;
-      vertex.row_px = camera.focal_px * vertex.y / vertex.z + camera.centre_y_px;
+      vertex.column_px = camera.focal_px * vertex.x / vertex.z + camera.cx_px;
+      vertex.row_px = camera.focal_px * vertex.y / vertex.z + camera.cy_px;
     }
   });
   threads.run((rows_.size() + kTask - 1) / kTask, [&](size_t task, int) {
@@ -118,7 +114,7 @@ void MeshRaster::project(const HeadMesh& mesh, const RasterCamera& camera, doubl
   });
 }
 
-void MeshRaster::draw_band(const HeadMesh& mesh, const RasterCamera& camera, double near, int top, int bottom) {
+void MeshRaster::draw_band(const HeadMesh& mesh, const HeadCamera& camera, double near, int top, int bottom) {
   const size_t width = size_t(camera.width_px);
   std::fill(inverse_depth_.begin() + std::ptrdiff_t(size_t(top) * width),
             inverse_depth_.begin() + std::ptrdiff_t(size_t(bottom) * width), 0.0f);
@@ -155,7 +151,7 @@ void MeshRaster::draw_band(const HeadMesh& mesh, const RasterCamera& camera, dou
   }
 }
 
-void MeshRaster::shade_band(const HeadMesh& mesh, const RasterCamera& camera, const RasterOptions& options, int top,
+void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top,
                             int bottom, RasterImage& image) const {
   const size_t width = size_t(camera.width_px);
   uint32_t last = kNoTriangle;
@@ -189,6 +185,7 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const RasterCamera& camera, co
       const Vector a = {q.x - p.x, q.y - p.y, q.z - p.z}, b = {r.x - p.x, r.y - p.y, r.z - p.z};
       normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     } else {
+      const Mat3& rotation = camera.head_to_camera.rotation;
       Vector head{};
       for (size_t k = 0; k < 3; ++k) {
         for (size_t axis = 0; axis < 3; ++axis) {
@@ -196,7 +193,7 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const RasterCamera& camera, co
         }
       }
       for (size_t r = 0; r < 3; ++r) {
-        for (size_t axis = 0; axis < 3; ++axis) normal[r] += camera.rotation[3 * r + axis] * head[axis];
+        for (size_t axis = 0; axis < 3; ++axis) normal[r] += rotation[3 * r + axis] * head[axis];
       }
     }
     const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
@@ -220,7 +217,7 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const RasterCamera& camera, co
   }
 }
 
-void MeshRaster::draw(const HeadMesh& mesh, const RasterCamera& camera, const RasterOptions& options,
+void MeshRaster::draw(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options,
                       WorkerThreads& threads, RasterImage& image) {
   check(camera);
   const double near = double(options.near);

@@ -6,18 +6,10 @@
 #include <vector>
 
 #include "core/worker_threads.h"
+#include "head/camera/head_camera.h"
 #include "head/mesh/head_mesh.h"
 
 namespace maq::head {
-
-// p in the camera = R p + t, with x to the right, y down and z forward; a pixel is at focal * xy / z + centre, and the
-// centre of the top left one is (0, 0).
-struct RasterCamera {
-  int width_px = 0, height_px = 0;
-  std::array<double, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row by row
-  std::array<double, 3> translation = {0, 0, 0};
-  double focal_px = 0, centre_x_px = 0, centre_y_px = 0;
-};
 
 struct RasterOptions {
   float near = 0.05f;  // what is nearer is not drawn; in the mesh's unit
@@ -43,13 +35,13 @@ class MeshRaster {
   // an area are skipped. The same for any number of threads.
   // Throws MAQ_ERROR_INVALID_ARGUMENT for a camera that is not finite, MAQ_ERROR_IMAGE_SIZE for pictures of no pixels
   // or more than 16384 a side.
-  void draw(const HeadMesh& mesh, const RasterCamera& camera, const RasterOptions& options, WorkerThreads& threads,
+  void draw(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, WorkerThreads& threads,
             RasterImage& image);
 
  private:
-  void project(const HeadMesh& mesh, const RasterCamera& camera, double near, WorkerThreads& threads);
-  void draw_band(const HeadMesh& mesh, const RasterCamera& camera, double near, int top, int bottom);
-  void shade_band(const HeadMesh& mesh, const RasterCamera& camera, const RasterOptions& options, int top, int bottom,
+  void project(const HeadMesh& mesh, const HeadCamera& camera, double near, WorkerThreads& threads);
+  void draw_band(const HeadMesh& mesh, const HeadCamera& camera, double near, int top, int bottom);
+  void shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top, int bottom,
                   RasterImage& image) const;
 
   struct Vertex {

@@ -2,21 +2,19 @@
 
 The layout is that of sdk/src/scene/format/scene_file_format.h and scene.h, version 1. Points, blocks and kinds of
 numbers stay as `maquette scene build` chose them: what is written differs in coefficients, their steps, and the
-networks' identity. Checks are 64-bit XXH3 hashes by libxxhash, which comes with the header that the SDK is built with
-(scripts/install-packages.sh).
+networks' identity. Checks are 64-bit XXH3 hashes (export/xxh3.py).
 """
 
 from __future__ import annotations
 
-import ctypes
 import os
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from export.scenes.config import BASIS, FEATURES
+from export.xxh3 import xxh3
 
 MAGIC, VERSION, ALIGNMENT = b"MAQSCN\r\n", 1, 64
 MAX_POINTS, MAX_BLOCK_POINTS = 30_000_000, 1024
@@ -204,21 +202,6 @@ def write_scene_file(scene: SceneFile, path: Path) -> None:
         file.flush()
         os.fsync(file.fileno())
     beside.replace(path)
-
-
-@cache
-def _library() -> ctypes.CDLL:
-    try:
-        library = ctypes.CDLL("libxxhash.so.0")
-    except OSError:
-        raise SceneFileError("libxxhash.so.0 was not found; scripts/install-packages.sh installs it.") from None
-    library.XXH3_64bits.argtypes, library.XXH3_64bits.restype = (ctypes.c_char_p, ctypes.c_size_t), ctypes.c_uint64
-    return library
-
-
-def xxh3(data: bytes) -> int:
-    """64-bit XXH3, seed 0."""
-    return _library().XXH3_64bits(data, len(data))
 
 
 def _filled_up(size: int) -> int:

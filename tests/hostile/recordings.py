@@ -4,7 +4,7 @@ import json
 import struct
 from random import Random
 
-from export.scenes.scene_file import xxh3
+from export.xxh3 import xxh3
 from tests.hostile.damage import INTEGERS, cut, damaged_json, flip
 from tests.hostile.samples import DENSEPOSE, Samples
 from tests.hostile.trial import EITHER, REFUSED, Trial

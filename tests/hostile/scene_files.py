@@ -4,7 +4,8 @@ from random import Random
 
 import numpy as np
 
-from export.scenes.scene_file import BLOCK, CHECKED, HEAD, xxh3
+from export.scenes.scene_file import BLOCK, CHECKED, HEAD
+from export.xxh3 import xxh3
 from tests.hostile.damage import FLOATS, INTEGERS, cut, flip
 from tests.hostile.samples import SCENE_BUNDLE, Samples
 from tests.hostile.trial import EITHER, REFUSED, Trial

@@ -44,6 +44,7 @@ MAY_INCLUDE = {
     "head": {"core", "core/math", "head/field"},
     "head/camera": {"core", "core/math"},
     "head/field": {"core"},
+    "head/files": {"core", "core/math", "head", "head/field"},
     "head/fit": BASE - {"nn"} | {"head", "head/camera", "head/field"},
     "head/mesh": BASE - {"nn"} | {"head/camera"},
     "scene": BASE - {"nn"},

@@ -19,6 +19,7 @@ ALLOWED = {
     "export.training": set(),
     "export.jobs": set(),
     "export.bundle": set(),
+    "export.xxh3": set(),
     "export.photos": set(),
     "export.people": {"export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid"},
     "export.places": {"export.camera", "export.jobs", "export.people", "export.photos", "export.point_cloud"},
@@ -30,8 +31,11 @@ ALLOWED = {
         "export.camera", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",
         "export.surface",
     },
-    "export.scenes": {"export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training"},
+    "export.scenes": {
+        "export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training", "export.xxh3",
+    },
     "export.edges": {"export.bundle", "export.camera", "export.densepose", "export.solids", "export.training"},
+    "export.heads": {"export.bundle", "export.xxh3"},
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {

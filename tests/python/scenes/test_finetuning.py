@@ -24,8 +24,9 @@ from export.scenes.losses import LossWeights
 from export.scenes.networks.feature_scale import scaled
 from export.scenes.networks.system import Networks, load_networks, save_networks
 from export.scenes.picture_quality import psnr_db
-from export.scenes.scene_file import HEAD, SceneFileError, read_scene_file, write_scene_file, xxh3
+from export.scenes.scene_file import HEAD, SceneFileError, read_scene_file, write_scene_file
 from export.scenes.tuning import Rates, TunedScene, Tuning
+from export.xxh3 import xxh3
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 

@@ -1,0 +1,54 @@
+// The bytes of a prior (.maqp) and of a stored head (.maqh). Numbers are little-endian, as on every machine that the
+// SDK runs on. Behind the head of either file follow, without gaps, what its comment lists.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace maq::head {
+
+inline constexpr uint32_t kPriorFileVersion = 1, kHeadFileVersion = 1;
+inline constexpr char kPriorFileMagic[8] = {'M', 'A', 'Q', 'P', 'R', 'I', '\r', '\n'};
+inline constexpr char kHeadFileMagic[8] = {'M', 'A', 'Q', 'H', 'E', 'D', '\r', '\n'};
+
+// How floats are stored.
+enum class StoredFormat : uint8_t {
+  kFloat32,
+  kFloat16,
+  kInt8,  // of bases alone: float32 scale of each row, then the steps of all rows, then float16 biases
+};
+
+struct FileStart {
+  char magic[8];
+  uint32_t version;
+  uint32_t head_bytes;  // of the whole struct that begins with this
+  uint64_t check;       // 64-bit XXH3 of all that follows in the file
+  uint64_t file_bytes;
+};
+inline constexpr size_t kCheckedFrom = offsetof(FileStart, file_bytes);
+
+// FieldShape.
+struct StoredShape {
+  uint32_t octaves, width, geometry_layers, feature, surface_width, surface_layers;
+  uint32_t personal_geometry_layers, personal_surface_layers;
+  float smoothing;
+};
+
+// constant: each layer's weights [outputs][inputs] and bias [outputs].
+// bases: of each personal geometry layer weights [shape codes][outputs][inputs] and bias [shape codes][outputs]; then
+// of each personal surface layer likewise, for colour codes.
+// anchors: float32 template points [anchors][3], mean [anchors][3]; float16 linear [anchors][3][shape codes];
+// float32 sigma [anchors].
+// places: of each u8 length of its name, the name, float32 template point [3].
+struct PriorFileHead {
+  FileStart start;
+  StoredShape shape;
+  uint32_t shape_codes, colour_codes, anchors, places;
+  StoredFormat constant_format, bases_format;
+  uint8_t zero[2];
+  float sharpness, cut_point[3], cut_normal[3], bounds_min[3], bounds_max[3];
+  uint8_t more_zeros[4];
+};
+static_assert(sizeof(PriorFileHead) == 144 && offsetof(PriorFileHead, sharpness) == 88);
+
+}  // namespace maq::head

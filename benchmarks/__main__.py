@@ -158,14 +158,15 @@ def replace(figures: dict, missing: dict, names: Iterable[str], found: dict, why
 
 def float_bundle_in(folder: Path) -> Path:
     """The fp32 bundle of the shipped weights, exported once and again when these change."""
-    from export import bundle
+    from export import bundle, onnx_graphs
     from export.densepose import bundle as densepose_bundle
-    from export.densepose import export_onnx
+    from export.densepose import export_onnx, simplified
     from quantization.check import fp32_bundle
 
     target, stamp = folder / "densepose-b-fp32", folder / "densepose-b-fp32.made-from"
     # The exporter decides too what the graphs look like.
-    sources = (CHECKPOINT, export_onnx.__file__, densepose_bundle.__file__, bundle.__file__)
+    modules = (export_onnx, simplified, onnx_graphs, densepose_bundle, bundle)
+    sources = (CHECKPOINT, *(module.__file__ for module in modules))
     made_from = "".join(str(Path(path).stat().st_mtime_ns) for path in sources)
     if not (target / "manifest.json").exists() or not stamp.exists() or stamp.read_text() != made_from:
         print(f"Exporting {CHECKPOINT} as fp32 graphs")

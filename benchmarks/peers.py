@@ -152,8 +152,9 @@ def torch_modules(checkpoint: Path, feeds: dict[str, Feed]) -> dict[str, tuple]:
     import torch
 
     from export.densepose.config import NetworkConfig
-    from export.densepose.export_onnx import graph_modules, simplified
+    from export.densepose.export_onnx import graph_modules
     from export.densepose.network import MobileParsingRCNN
+    from export.densepose.simplified import simplified
 
     saved = torch.load(checkpoint, map_location="cpu", weights_only=True)
     net = MobileParsingRCNN(NetworkConfig.of(saved))

@@ -5,9 +5,8 @@
         --out .data/bundles/densepose-full-fp32
     python -m export.densepose.export_onnx --random --out .data/bundles/random-fp32
 
-The graphs compute the same as the network, written more simply: batch normalisation is folded into the
-convolutions, the fusion weights are constants, and the image-wide ASPP branch is added after its part of the
-1x1 mixture instead of being spread over the map first. Sizes of images and the number of people stay open.
+The graphs compute the same as the network, written more simply (export.densepose.simplified). Sizes of images and the
+number of people stay open.
 
 `--crops` adds networks for the crop pass alone (`--recipe crops` of export.densepose.train): a trunk up to P2 and a
 dense head.
@@ -18,92 +17,25 @@ from __future__ import annotations
 import argparse
 import copy
 import functools
-import itertools
-import warnings
 from pathlib import Path
 
 import numpy as np
-import onnx
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
-from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from export.bundle import OPSET, BundleInfo, bytes_of
+from export.bundle import BundleInfo, bytes_of
 from export.densepose import bundle
 from export.densepose import targets as tg
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.decode import Graphs, detect
 from export.densepose.graphs import chart_maps, read_charts, session
-from export.densepose.network import Aspp, DenseHead, Fusion, MobileParsingRCNN
+from export.densepose.network import DenseHead, MobileParsingRCNN
+from export.densepose.simplified import simplified
+from export.onnx_graphs import channels_first, channels_last, write_graph
 from export.shards import load_records
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the tensor's largest value
-
-
-class FixedFusion(nn.Module):
-    """`Fusion` with its normalised weights as plain numbers."""
-
-    def __init__(self, fusion: Fusion) -> None:
-        super().__init__()
-        weight = F.relu(fusion.weight.detach().double())
-        self.weight = (weight / (weight.sum() + 1e-4)).tolist()
-
-    def forward(self, *maps: Tensor) -> Tensor:
-        return sum(weight * x for weight, x in zip(self.weight, maps, strict=True))
-
-
-class SplitAspp(nn.Module):
-    """`Aspp`, its batch normalisation folded, whose mixture takes the maps and the context apart, then adds."""
-
-    def __init__(self, aspp: Aspp) -> None:
-        super().__init__()
-        self.branches, self.context = aspp.branches, aspp.context
-        width, mix = aspp.context.out_channels, aspp.mix[0]
-        maps, weight = width * len(aspp.branches), mix.weight.detach()
-        self.mix_maps = nn.Conv2d(maps, width, 1)
-        self.mix_context = nn.Conv2d(width, width, 1, bias=False)
-        self.mix_maps.weight.data.copy_(weight[:, :maps])
-        self.mix_maps.bias.data.copy_(mix.bias.detach())
-        self.mix_context.weight.data.copy_(weight[:, maps:])
-
-    def forward(self, x: Tensor) -> Tensor:
-        maps = torch.cat([branch(x) for branch in self.branches], 1)
-        context = F.relu(self.context(F.adaptive_avg_pool2d(x, 1)))
-        return F.relu(self.mix_maps(maps) + self.mix_context(context))
-
-
-def channels_last(x: Tensor) -> Tensor:
-    """[N, C, h, w] as [N, h, w, C]: the layout at the graphs' borders, which int8 kernels and RoIAlign work in."""
-    return x.permute(0, 2, 3, 1).contiguous()
-
-
-def channels_first(x: Tensor) -> Tensor:
-    return x.permute(0, 3, 1, 2)
-
-
-class Doubled(torch.autograd.Function):
-    """Nearest upsampling of [N, C, h, w] by two to the size of `like`, by writing cells and rows twice.
-
-    ONNX Runtime's Resize takes ten times as long on channels-last bytes.
-    """
-
-    @staticmethod
-    def forward(ctx: object, x: Tensor, like: Tensor) -> Tensor:
-        return F.interpolate(x, size=like.shape[2:], mode="nearest")
-
-    @staticmethod
-    def symbolic(g: object, x: object, like: object) -> object:
-        cells = g.op("Transpose", x, perm_i=[0, 2, 3, 1])
-        line = g.op("Constant", value_t=torch.tensor([0, 0, 1, -1]))
-        rows = g.op("Reshape", g.op("Concat", cells, cells, axis_i=3), line)
-        shape = g.op("Shape", g.op("Transpose", like, perm_i=[0, 2, 3, 1]))
-        twice = g.op("Reshape", g.op("Concat", rows, rows, axis_i=2), shape)
-        return g.op("Transpose", twice, perm_i=[0, 3, 1, 2])
-
-
-def doubled(x: Tensor, like: Tensor) -> Tensor:
-    return Doubled.apply(x, like) if torch.onnx.is_in_onnx_export() else Doubled.forward(None, x, like)
 
 
 class Trunk(nn.Module):
@@ -223,33 +155,6 @@ def chart_weights(net: MobileParsingRCNN) -> np.ndarray:
     return torch.cat([weight.flatten(), bias.flatten()]).float().cpu().numpy()
 
 
-def simplified(net: MobileParsingRCNN) -> MobileParsingRCNN:
-    """A copy in evaluation mode that computes the same with fewer operations (see the head of this file)."""
-    net = copy.deepcopy(net).cpu().float().eval().requires_grad_(False)
-    for module in list(net.modules()):
-        if isinstance(module, nn.Sequential):
-            _fold_batch_norm(module)
-    for module in list(net.modules()):
-        for name, child in module.named_children():
-            if isinstance(child, Fusion):
-                setattr(module, name, FixedFusion(child))
-            elif isinstance(child, Aspp):
-                setattr(module, name, SplitAspp(child))
-    net.neck.up = doubled
-    left = [name for name, module in net.named_modules() if isinstance(module, nn.BatchNorm2d)]
-    if left:
-        raise ValueError(f"batch normalisation without a convolution before it: {', '.join(left)}")
-    return net.eval().requires_grad_(False)
-
-
-def _fold_batch_norm(layers: nn.Sequential) -> None:
-    children = list(layers.named_children())
-    for (name, conv), (norm_name, norm) in itertools.pairwise(children):
-        if isinstance(conv, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d):
-            setattr(layers, name, fuse_conv_bn_eval(conv, norm))
-            setattr(layers, norm_name, nn.Identity())
-
-
 def graph_modules(net: MobileParsingRCNN, crop_net: MobileParsingRCNN | None = None) -> dict[str, nn.Module]:
     """The parts that become graphs. crop_net: the network of the crop pass, where it has one of its own."""
     rpn = Rpn(net)
@@ -286,37 +191,7 @@ def export_graphs(net: MobileParsingRCNN, folder: Path, crop_net: MobileParsingR
             for side in tensors.values()
             for tensor, sizes in side.items()
         }
-        path = folder / f"{name}.onnx"
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)
-            torch.onnx.export(
-                modules[name],
-                tuple(given),
-                path,
-                input_names=list(tensors["inputs"]),
-                output_names=list(tensors["outputs"]),
-                dynamic_axes=axes,
-                opset_version=OPSET,
-                dynamo=False,
-            )
-        _finish(path, name)
-
-
-def _finish(path: Path, name: str) -> None:
-    """Names and checks a graph; takes out the Identity nodes by which the exporter shares equal constants."""
-    model = onnx.load(path)
-    model.graph.name = name
-    shared = {node.output[0]: node.input[0] for node in model.graph.node if node.op_type == "Identity"}
-    kept = [node for node in model.graph.node if node.op_type != "Identity"]
-    for node in kept:
-        for k, tensor in enumerate(node.input):
-            while tensor in shared:
-                tensor = shared[tensor]
-            node.input[k] = tensor
-    del model.graph.node[:]
-    model.graph.node.extend(kept)
-    onnx.checker.check_model(model, full_check=True)
-    onnx.save(model, path)
+        write_graph(modules[name], given, folder / f"{name}.onnx", tensors["inputs"], tensors["outputs"], axes)
 
 
 def tuple_of(outputs: Tensor | tuple[Tensor, ...]) -> tuple[Tensor, ...]:

@@ -12,23 +12,27 @@ from __future__ import annotations
 
 import argparse
 import copy
-import warnings
 from pathlib import Path
 
 import numpy as np
-import onnx
 import torch
 from torch import Tensor, nn
-from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from export.bundle import OPSET, BundleInfo
-from export.densepose.export_onnx import channels_first, channels_last, doubled
+from export.bundle import BundleInfo
 from export.densepose.graphs import session
 from export.edges.bundle import TRAINING_DATA, write_manifest
 from export.edges.config import FOLD, INPUT_PLANES, SIZES
 from export.edges.losses import LOG_SPREAD
 from export.edges.network import EdgeNetwork
 from export.edges.weights import load_network
+from export.onnx_graphs import (
+    channels_first,
+    channels_last,
+    doubled,
+    fold_batch_norm,
+    largest_difference,
+    write_graph,
+)
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the output's largest value
 
@@ -58,9 +62,7 @@ class FieldGraph(nn.Module):
     def __init__(self, network: EdgeNetwork) -> None:
         super().__init__()
         self.network = copy.deepcopy(network).eval().requires_grad_(False)
-        for module in self.network.modules():
-            if isinstance(module, nn.Sequential) and len(module) == 3 and isinstance(module[1], nn.BatchNorm2d):
-                module[0], module[1] = fuse_conv_bn_eval(module[0], module[1]), nn.Identity()
+        fold_batch_norm(self.network)
         self.network.double = doubled
         self.ranges = PlaneRanges()
         head = self.network.head
@@ -79,27 +81,12 @@ def export(network: EdgeNetwork, folder: Path, multiple: int) -> float:
     graph = FieldGraph(network)
     given = torch.rand(1, 2 * multiple, 3 * multiple, INPUT_PLANES * FOLD**2)
     axes = {name: {1: "height", 2: "width"} for name in ("slopes", "planes")}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the exporter that knows our own operations is called deprecated
-        torch.onnx.export(
-            graph,
-            (given,),
-            path,
-            input_names=["slopes"],
-            output_names=["planes"],
-            dynamic_axes=axes,
-            opset_version=OPSET,
-            dynamo=False,
-        )
-    model = onnx.load(path)
-    model.graph.name = path.stem
-    onnx.checker.check_model(model, full_check=True)
-    onnx.save(model, path)
+    write_graph(graph, (given,), path, ["slopes"], ["planes"], axes)
     shape = (1, 5 * multiple // 2, 4 * multiple // 2, INPUT_PLANES * FOLD**2)
     values = np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32)
     expected = graph(torch.from_numpy(values)).numpy()
     (found,) = session(path).run(None, {"slopes": values})
-    error = float(np.abs(found - expected).max() / np.abs(expected).max())
+    error = largest_difference(expected, found)
     if not error <= TOLERANCE:
         raise ValueError(f"{path} differs from torch by {error:.1e} of its largest value")
     return error

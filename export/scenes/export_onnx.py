@@ -20,20 +20,18 @@ from __future__ import annotations
 
 import argparse
 import copy
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import onnx
 import torch
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from export.bundle import OPSET, BundleInfo
-from export.densepose.export_onnx import Doubled, channels_first, channels_last
+from export.bundle import BundleInfo
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
+from export.onnx_graphs import Doubled, channels_first, channels_last, largest_difference, write_graph
 from export.scenes.bundle import training_data, write_manifest
 from export.scenes.captures import Capture, read_captures
 from export.scenes.config import FEATURES, RASTER, SIZES
@@ -114,7 +112,7 @@ def export_extractor(extractor: Extractor, path: Path) -> None:
     """Writes the graph of the extractor."""
     axes = {name: {1: "height", 2: "width"} for name in ("image", "features")}
     given = torch.rand(1, 2 * STRIDE, 3 * STRIDE, 3)
-    _export(ExtractorGraph(extractor), (given,), path, ["image"], ["features"], axes)
+    write_graph(ExtractorGraph(extractor), (given,), path, ["image"], ["features"], axes)
 
 
 def export_refiner(refiner: Refiner, path: Path) -> None:
@@ -125,33 +123,7 @@ def export_refiner(refiner: Refiner, path: Path) -> None:
     names[height], names[width] = "height", "width"
     axes = {name: {axis: names[shape[axis]] for axis in (1, 2)} for name, shape in shapes.items()}
     axes["rgb"] = axes["raster0"]
-    _export(RefinerGraph(refiner), tuple(torch.rand(s) for s in shapes.values()), path, list(shapes), ["rgb"], axes)
-
-
-def _export(
-    module: nn.Module,
-    given: tuple[Tensor, ...],
-    path: Path,
-    inputs: list[str],
-    outputs: list[str],
-    axes: dict[str, dict[int, str]],
-) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the exporter that knows our own operations is called deprecated
-        torch.onnx.export(
-            module.eval(),
-            given,
-            path,
-            input_names=inputs,
-            output_names=outputs,
-            dynamic_axes=axes,
-            opset_version=OPSET,
-            dynamo=False,
-        )
-    model = onnx.load(path)
-    model.graph.name = path.stem
-    onnx.checker.check_model(model, full_check=True)
-    onnx.save(model, path)
+    write_graph(RefinerGraph(refiner), tuple(torch.rand(s) for s in shapes.values()), path, list(shapes), ["rgb"], axes)
 
 
 def write_basis(basis: Basis, path: Path) -> None:
@@ -165,7 +137,7 @@ def parity(module: nn.Module, path: Path, given: dict[str, np.ndarray]) -> float
     """Largest |ONNX - torch| over the output, relative to its largest value. module: what the graph was made of."""
     expected = module.eval()(*(torch.from_numpy(x) for x in given.values())).numpy()
     (found,) = session(path).run(None, given)
-    return float(np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-9))
+    return largest_difference(expected, found)
 
 
 def export(networks: Networks, folder: Path) -> dict[str, float]:

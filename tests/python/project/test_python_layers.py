@@ -20,22 +20,30 @@ ALLOWED = {
     "export.jobs": set(),
     "export.bundle": set(),
     "export.xxh3": set(),
+    "export.onnx_graphs": {"export.bundle"},
     "export.photos": set(),
     "export.people": {"export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid"},
     "export.places": {"export.camera", "export.jobs", "export.people", "export.photos", "export.point_cloud"},
     "export.solids": {"export.camera", "export.jobs", "export.photos"},
     "export.densepose": {
-        "export.bundle", "export.shards", "export.surface", "export.surface_grid", "export.training",
+        "export.bundle", "export.onnx_graphs", "export.shards", "export.surface", "export.surface_grid",
+        "export.training",
     },
     "export.teachers": {
         "export.camera", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",
         "export.surface",
     },
     "export.scenes": {
-        "export.bundle", "export.camera", "export.densepose", "export.point_cloud", "export.training", "export.xxh3",
+        "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.point_cloud",
+        "export.training", "export.xxh3",
     },
-    "export.edges": {"export.bundle", "export.camera", "export.densepose", "export.solids", "export.training"},
-    "export.heads": {"export.bundle", "export.xxh3"},
+    "export.edges": {
+        "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.solids", "export.training",
+    },
+    "export.heads": {
+        "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.people", "export.training",
+        "export.xxh3",
+    },
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {

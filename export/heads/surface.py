@@ -53,7 +53,7 @@ class HeadMaker:
         self.caps = np.concatenate(caps)
 
     def _seen_from_outside(self) -> np.ndarray:
-        """Of the template's skin, what is not inside of mouth and eye sockets: seen from some side at which it faces."""
+        """Of the template's skin, all but what is inside of mouth and eye sockets."""
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 

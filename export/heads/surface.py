@@ -192,14 +192,15 @@ class Head:
         skin, eye, hair = kind == SKIN, kind == EYE, kind == HAIR
         uv = (self.uv[place.face[skin]] * place.weight[skin][..., None]).sum(1)
         shade = self._mix(self._shade, Place(place.face[skin], place.weight[skin]))[:, 0]
-        out[skin] = self._skin_colours(uv, template[skin], shade)
+        out[skin] = self.skin_colours(uv, template[skin], shade)
         out[eye] = self._eye_colours(template[eye])
         rng = np.random.default_rng(self.seed + 1)
         strands = 1 + 0.14 * slow_noise(point[hair] * [1, 1, 0.12], 7.0, rng) + 0.1 * slow_noise(point[hair], 0.8, rng)
         out[hair] = self.style.colour * np.clip(strands, 0.4, 1.7)[:, None]
         return np.clip(out, 0, 255)
 
-    def _skin_colours(self, uv: np.ndarray, template: np.ndarray, shade: np.ndarray) -> np.ndarray:
+    def skin_colours(self, uv: np.ndarray, template: np.ndarray, shade: np.ndarray) -> np.ndarray:
+        """RGB of skin at places of the texture [N, 2] and the template [N, 3]; `shade` [N]: share of the hair's colour."""
         image = self.maker.skin
         height, width = image.shape[:2]
         x = np.clip(uv[:, 0] * width - 0.5, 0, width - 1.001)

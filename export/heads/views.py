@@ -9,8 +9,9 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from export.camera import Camera
-from export.heads.shapes import CUT_NORMAL, CUT_POINT
-from export.heads.surface import Head, Place
+from export.heads.hair import slow_noise
+from export.heads.shapes import vertex_normals
+from export.heads.surface import Head, Place, cut_distance
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,12 @@ def sample_lamps(rng: np.random.Generator) -> Lamps:
 
 @dataclass(frozen=True)
 class Seen:
-    """rgb float32 [H, W, 3] 0..255 (0: no head), mask float32 [H, W] 0..1, depth float32 [H, W] dm (0: nothing),
-    normal float32 [H, W, 3] and template float32 [H, W, 3] (dm) of each pixel's middle; camera: in decimetres."""
+    """rgb float32 [H, W, 3] 0..255; present bool [H, W]: head or bust; mask bool [H, W]: head, above its cut; depth
+    float32 [H, W] along the optical axis, dm; normal [H, W, 3] in the head's frame and template [H, W, 3], dm, float32
+    (0 where nothing is present); camera: in decimetres."""
 
     rgb: np.ndarray
+    present: np.ndarray
     mask: np.ndarray
     depth: np.ndarray
     normal: np.ndarray
@@ -55,73 +58,111 @@ class Seen:
     camera: Camera
 
 
+@dataclass(frozen=True)
+class Extras:
+    """What a picture shows and the head does not have: clothes below it, glasses."""
+
+    cloth: np.ndarray  # RGB
+    collar: float  # dm: skin ends at this height of the template
+    seed: int
+    lens: float  # how much of the light glasses take, 0..1; 0: none are worn
+    rim: float  # half the width of their rims, dm; 0: no rims
+    frame: np.ndarray  # RGB
+    size: np.ndarray  # half sizes of a lens, dm
+
+
+def sample_extras(rng: np.random.Generator) -> Extras:
+    worn = rng.random() < 0.25
+    dark = rng.random() < 0.3
+    return Extras(
+        rng.uniform(10, 240, 3) * rng.uniform(0.3, 1),
+        float(rng.uniform(-2.9, -1.6)),
+        int(rng.integers(1 << 31)),
+        float(rng.uniform(0.5, 0.95) if dark else rng.uniform(0.02, 0.15)) if worn else 0.0,
+        float(rng.uniform(0.008, 0.04)) if worn else 0.0,
+        rng.uniform(0, 160, 3) * rng.uniform(0.1, 1),
+        np.array([rng.uniform(0.2, 0.29), rng.uniform(0.13, 0.24)]),
+    )
+
+
 class HeadViews:
-    """A head ready to be seen by many cameras."""
+    """A head ready to be seen by many cameras, above its bust."""
 
-    def __init__(self, head: Head) -> None:
-        self.head = head
+    def __init__(self, head: Head, extras: Extras | None = None) -> None:
+        self.head, self.extras = head, extras or sample_extras(np.random.default_rng(0))
+        shapes = head.maker.shapes
+        count = len(head.positions)
+        self._positions = np.concatenate([head.positions, head.vertices])
+        self._faces = np.concatenate([head.faces, shapes.bust_faces + count])
+        self._template = np.concatenate([head.template_points, shapes.template])
+        both = np.concatenate([shapes.faces, shapes.bust_faces])
+        self._normals = np.concatenate([head.normals, vertex_normals(head.vertices, both)])
         self._scene = EmbreeScene(robust=True)
-        TriangleMesh(self._scene, head.positions.astype(np.float32), head.faces.astype(np.int32))
+        TriangleMesh(self._scene, self._positions.astype(np.float32), self._faces.astype(np.int32))
 
-    def _hits(self, origins: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, Place]:
-        """Which rays [N] hit the head above the cut, how far along, and where."""
-        found = self._scene.run(
-            np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(rays, np.float32), output=1
-        )
-        face, far = found["primID"], found["tfar"].astype(np.float64)
-        hit = face >= 0
-        below = ((origins + rays * np.where(hit, far, 0)[:, None]) - CUT_POINT) @ CUT_NORMAL > 0
-        hit &= ~below
-        u, v = found["u"], found["v"]
-        weight = np.stack([1 - u - v, u, v], 1).astype(np.float64)
-        return hit, far, Place(np.where(hit, face, 0), weight)
+    def _mix(self, values: np.ndarray, place: Place) -> np.ndarray:
+        return (values[self._faces[place.face]] * place.weight[..., None]).sum(1)
 
-    def seen(self, camera: Camera, lamps: Lamps, samples: int = 2) -> Seen:
-        """camera: in decimetres, the head's frame its world. `samples`: rays a pixel and axis for colour and mask."""
+    def _colours(self, place: Place) -> np.ndarray:
+        head, extras = self.head, self.extras
+        out = np.zeros((len(place.face), 3))
+        own = place.face < len(head.faces)
+        out[own] = head.colours_at(Place(place.face[own], place.weight[own]))
+        template = self._mix(self._template, place)
+        bust = place.face[~own] - len(head.faces)
+        if len(bust):
+            uv = (head.maker.shapes.bust_uv[bust] * place.weight[~own][..., None]).sum(1)
+            out[~own] = head.skin_colours(uv, template[~own], np.zeros(len(bust)))
+        clothed = (template[:, 2] < extras.collar + 0.35 * np.abs(template[:, 0])) & (template[:, 2] < -1.5)
+        rng = np.random.default_rng(extras.seed)
+        folds = 1 + 0.12 * slow_noise(template[clothed], 0.7, rng) + 0.1 * slow_noise(template[clothed], 3.0, rng)
+        out[clothed] = extras.cloth * folds[:, None]
+        if extras.lens or extras.rim:
+            x, z = np.abs(template[:, 0]), template[:, 2]
+            front = template[:, 1] < -0.45
+            box = np.abs(np.stack([x - 0.33, z - 0.01], 1)) - extras.size
+            edge = np.linalg.norm(np.maximum(box + 0.1, 0), axis=1) + np.minimum((box + 0.1).max(1), 0) - 0.1
+            lens, rim = front & (edge < 0), front & (np.abs(edge) < extras.rim)
+            rim |= front & (x < 0.12) & (np.abs(z - 0.05) < extras.rim)
+            rim |= (x > 0.5) & (template[:, 1] < 0.1) & (np.abs(z - 0.08) < extras.rim)
+            out[lens] *= 1 - extras.lens
+            out[rim] = extras.frame
+        return np.clip(out, 0, 255)
+
+    def seen(self, camera: Camera, lamps: Lamps) -> Seen:
+        """camera: in decimetres, the head's frame its world. One ray through the middle of each pixel."""
         height, width = camera.height_px, camera.width_px
-        head = self.head
-
-        def shoot(x: np.ndarray, y: np.ndarray):
-            pixels = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-            rays = camera.lifted(pixels, np.ones(len(pixels))) - camera.centre
-            return rays, *self._hits(np.repeat(camera.centre[None], len(rays), 0), rays)
-
-        offsets = (np.arange(samples) + 0.5) / samples - 0.5
-        x = (np.arange(width)[:, None] + offsets).reshape(-1)
-        y = (np.arange(height)[:, None] + offsets).reshape(-1)
-        rays, hit, far, place = shoot(x, y)
-        rgb = np.zeros((len(rays), 3))
-        some = Place(place.face[hit], place.weight[hit])
-        normal = head.normals_at(some)
-        at = camera.centre + rays[hit] * far[hit, None]
-        away = rays[hit] / np.linalg.norm(rays[hit], axis=1, keepdims=True)
-        normal = np.where((normal * away).sum(1, keepdims=True) > 0, -normal, normal)
+        pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).reshape(-1, 2)
+        rays = camera.lifted(pixels, np.ones(len(pixels))) - camera.centre
+        origins = np.repeat(camera.centre[None].astype(np.float32), len(rays), 0)
+        found = self._scene.run(origins, rays.astype(np.float32), output=1)
+        hit = found["primID"] >= 0
+        far, u, v = (found[name][hit].astype(np.float64) for name in ("tfar", "u", "v"))
+        place = Place(found["primID"][hit], np.stack([1 - u - v, u, v], 1))
+        at, away = camera.centre + rays[hit] * far[:, None], rays[hit]
+        away = away / np.linalg.norm(away, axis=1, keepdims=True)
+        normal = self._mix(self._normals, place)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        shown = np.where((normal * away).sum(1, keepdims=True) > 0, -normal, normal)
         lit = np.ones((len(at), len(lamps.directions)))
         for k, direction in enumerate(lamps.directions):
-            facing = normal @ direction > 0
-            start = at[facing] + 0.03 * normal[facing]
-            shadow = self._scene.run(
-                start.astype(np.float32), np.repeat(direction[None], len(start), 0).astype(np.float32)
-            )
+            facing = shown @ direction > 0
+            start = (at[facing] + 0.03 * shown[facing]).astype(np.float32)
+            shadow = self._scene.run(start, np.repeat(direction[None].astype(np.float32), len(start), 0))
             lit[facing, k] = np.where(shadow >= 0, 0.25, 1.0)
         half = lamps.directions[0] - away
         half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
-        shine = lamps.gloss * np.maximum((normal * half).sum(1), 0) ** 25 * lit[:, 0]
-        rgb[hit] = head.colours_at(some) * lamps.on(normal, lit) + 255 * shine[:, None] * lamps.colours[0]
-
-        def mean(values: np.ndarray) -> np.ndarray:
-            shaped = values.reshape(height, samples, width, samples, -1)
-            return shaped.mean((1, 3)).astype(np.float32)
-
-        _, middle_hit, middle_far, middle = shoot(np.arange(width), np.arange(height))
-        some = Place(middle.face[middle_hit], middle.weight[middle_hit])
-        planes = np.zeros((height * width, 7), np.float32)
-        planes[middle_hit, 0] = middle_far[middle_hit]
-        planes[middle_hit, 1:4] = head.normals_at(some)
-        planes[middle_hit, 4:] = head.template_at(some)
-        planes = planes.reshape(height, width, 7)
-        mask = mean(hit[:, None].astype(np.float64))[..., 0]
-        return Seen(mean(np.clip(rgb, 0, 255)), mask, planes[..., 0], planes[..., 1:4], planes[..., 4:], camera)
+        shine = lamps.gloss * np.maximum((shown * half).sum(1), 0) ** 25 * lit[:, 0]
+        planes = np.zeros((height * width, 11), np.float32)
+        planes[hit, :3] = self._colours(place) * lamps.on(shown, lit) + 255 * shine[:, None] * lamps.colours[0]
+        above = cut_distance(at) < 0
+        planes[hit, 3] = above
+        planes[hit, 4] = far
+        planes[hit, 5:8] = normal
+        planes[hit, 8:] = self._mix(self._template, place)
+        p = planes.reshape(height, width, 11)
+        present = hit.reshape(height, width)
+        return Seen(np.clip(p[..., :3], 0, 255), present, p[..., 3] > 0, p[..., 4], p[..., 5:8], p[..., 8:], camera)
 
 
 def look_at(

@@ -68,7 +68,8 @@ def points_of(head: Head, rng: np.random.Generator) -> HeadPoints:
     return HeadPoints(
         surface.astype(single), normal.astype(single), head.template_at(place).astype(single), colour,
         near.astype(single), head.distances(near)[0].astype(single),
-        far.astype(single), head.distances(far)[0].astype(single), head.vertices[: head.maker.shapes.head_vertices].astype(single),
+        far.astype(single), head.distances(far)[0].astype(single),
+        head.vertices[: head.maker.shapes.head_vertices].astype(single),
     )  # fmt: skip
 
 

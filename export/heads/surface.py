@@ -200,7 +200,7 @@ class Head:
         return np.clip(out, 0, 255)
 
     def skin_colours(self, uv: np.ndarray, template: np.ndarray, shade: np.ndarray) -> np.ndarray:
-        """RGB of skin at places of the texture [N, 2] and the template [N, 3]; `shade` [N]: share of the hair's colour."""
+        """RGB [N, 3] of skin at places of texture [N, 2] and template [N, 3]; `shade` [N]: how much hair it has."""
         image = self.maker.skin
         height, width = image.shape[:2]
         x = np.clip(uv[:, 0] * width - 0.5, 0, width - 1.001)

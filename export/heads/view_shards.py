@@ -1,0 +1,115 @@
+"""Pictures of made heads for the encoder, one file a head: colour, masks, template points, normals, cameras.
+
+    python -m export.heads.view_shards train --count 600 --out .data/heads/views
+
+Everything of head k of a split depends on split and k alone. Existing files are kept, so it resumes by itself. What is
+behind the head is left to the encoder's training (`masks` says where), and so are cropping and what cameras do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import zlib
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from export.camera import Camera
+from export.heads.points import SPLITS, make_head, make_maker
+from export.heads.surface import Head
+from export.heads.views import HeadViews, Seen, look_at, sample_extras, sample_lamps
+
+SIDE = 256  # px
+LABEL_STEP = 2  # template points and normals are stored for every second pixel of every second row
+POINT_SCALE = 8000.0  # int16 a dm
+CROP_SIDES = 1.6  # side of a picture by the longer side of the head's box; a training cuts smaller ones out of it
+
+
+@dataclass(frozen=True)
+class HeadPictures:
+    """K pictures of a head. rgb uint8 [K, 256, 256, 3]; masks uint8 [K, 256, 256]: 255 head, 128 bust, 0 nothing;
+    template int16 [K, 128, 128, 3], dm times 8,000; normal int8 [K, 128, 128, 3], camera's axes, times 127;
+    rotation [K, 3, 3] and shift [K, 3] from the head's frame (dm) to the camera's; intrinsics [K, 3]: focal, cx,
+    cy, px."""
+
+    rgb: np.ndarray
+    masks: np.ndarray
+    template: np.ndarray
+    normal: np.ndarray
+    rotation: np.ndarray
+    shift: np.ndarray
+    intrinsics: np.ndarray
+
+
+def sample_camera(head: Head, rng: np.random.Generator) -> Camera:
+    """Mostly of faces from the front and sides, from 35 cm to 3 m; the picture is a square around the head."""
+    u = rng.random()
+    yaw = rng.normal(0, 0.45) if u < 0.55 else rng.uniform(-1.9, 1.9) if u < 0.88 else rng.uniform(-np.pi, np.pi)
+    pitch, roll = np.clip(rng.normal(0, 0.22), -0.8, 0.8), np.clip(rng.normal(0, 0.22), -0.9, 0.9)
+    distance = float(np.exp(rng.uniform(np.log(3.5), np.log(30))))
+    camera = look_at(yaw, pitch, roll, distance, np.zeros(3), 100.0, SIDE)
+    kept = head.positions[np.unique(head.faces)]
+    pixels, _ = camera.projected(kept[kept[:, 2] > -1.6])
+    low, high = pixels.min(0), pixels.max(0)
+    zoom = SIDE / (CROP_SIDES * (high - low).max() * rng.uniform(0.85, 1.15))
+    # Crops are seldom in the middle of the photos that they are cut from: the principal point is wherever it is.
+    middle = ((low + high) / 2 - camera.cx_px) * zoom + rng.normal(0, 0.04 * SIDE, 2)
+    centre = (SIDE - 1) / 2 - middle
+    intrinsics = np.array([[100.0 * zoom, 0, centre[0]], [0, 100.0 * zoom, centre[1]], [0, 0, 1]])
+    return Camera.of_intrinsics(SIDE, SIDE, intrinsics, camera.rotation, camera.centre)
+
+
+def pictures_of(head: Head, count: int, rng: np.random.Generator) -> HeadPictures:
+    """Draws `count` pictures of a head, each in other light."""
+    extras = sample_extras(rng)
+    views = HeadViews(head, extras)
+    rows: list[tuple] = []
+    for _ in range(count):
+        camera = sample_camera(head, rng)
+        rows.append(_row(views.seen(camera, sample_lamps(rng))))
+    return HeadPictures(*(np.stack(column) for column in zip(*rows, strict=True)))
+
+
+def _row(seen: Seen) -> tuple:
+    camera, step = seen.camera, slice(None, None, LABEL_STEP)
+    masks = np.where(seen.mask, 255, np.where(seen.present, 128, 0)).astype(np.uint8)
+    normal = (seen.normal[step, step] @ camera.rotation.T) * 127
+    template = np.clip(seen.template[step, step] * POINT_SCALE, -32767, 32767)
+    return (
+        seen.rgb.round().astype(np.uint8), masks, template.round().astype(np.int16), normal.round().astype(np.int8),
+        camera.rotation, camera.world_to_camera[:, 3], np.array([camera.fx_px, camera.cx_px, camera.cy_px]),
+    )  # fmt: skip
+
+
+def read_pictures(path: Path) -> HeadPictures:
+    with np.load(path) as stored:
+        return HeadPictures(**{f.name: stored[f.name] for f in fields(HeadPictures)})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("split", choices=SPLITS)
+    parser.add_argument("--count", type=int, default=600, help="heads")
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--views", type=int, default=16, help="pictures a head")
+    parser.add_argument("--out", type=Path, default=Path(".data/heads/views"))
+    arguments = parser.parse_args()
+    folder = arguments.out / arguments.split
+    folder.mkdir(parents=True, exist_ok=True)
+    maker = make_maker()
+    for number in tqdm(range(arguments.first, arguments.first + arguments.count), unit="head"):
+        path = folder / f"head-{number:05}.npz"
+        if path.exists():
+            continue
+        head = make_head(maker, arguments.split, number)
+        rng = np.random.default_rng([zlib.crc32(b"views"), number])
+        pictures = pictures_of(head, arguments.views, rng)
+        part = path.with_suffix(".part.npz")
+        np.savez(part, **{f.name: getattr(pictures, f.name) for f in fields(pictures)})
+        part.rename(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""The encoder of heads: a crop of a photo to a grid of template points, matte and normals.
+
+The trunk and neck are those of the person detector (`export.densepose.network`), whose weights it begins with.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from export.densepose.config import NetworkConfig
+from export.densepose.data import MEAN, STD
+from export.densepose.network import BiFPN, ConvBn, MobileNetV2
+from export.training import save_atomically
+
+CROP_PX, CELL_PX = 192, 4
+CELLS = CROP_PX // CELL_PX
+CROP_SIDES = 1.6  # side of the crop by the longer side of the head's box
+OUTPUTS = 8  # template point (dm), log of its sigma (dm), logit of the matte, normal in the camera's axes
+POINT, LOG_SIGMA, MATTE, NORMAL = slice(0, 3), 3, 4, slice(5, 8)
+WIDTH = 64
+
+
+class HeadEncoder(nn.Module):
+    """[N, 192, 192, 3] RGB 0..255 -> [N, 48, 48, 8]; cell (i, j) stands for the crop's pixel (4 j + 1.5, 4 i + 1.5)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.backbone = MobileNetV2()
+        self.neck = BiFPN(NetworkConfig.BACKBONES["mobilenet_v2"], WIDTH)
+        self.head = nn.Sequential(ConvBn(WIDTH, WIDTH, 3), ConvBn(WIDTH, WIDTH, 3), nn.Conv2d(WIDTH, OUTPUTS, 1))
+        self.register_buffer("mean", torch.from_numpy(MEAN), persistent=False)
+        self.register_buffer("scale", torch.from_numpy(1 / STD), persistent=False)
+
+    def forward(self, image: Tensor) -> Tensor:
+        normalised = ((image - self.mean) * self.scale).permute(0, 3, 1, 2)
+        return self.head(self.neck.finest(self.backbone(normalised))).permute(0, 2, 3, 1)
+
+
+def start_from_detector(encoder: HeadEncoder, path: Path) -> None:
+    """Takes trunk and neck from the weights of a person detector (`export/weights/densepose-b.pt`)."""
+    state = torch.load(path, map_location="cpu", weights_only=True)["ema"]
+    own = {n: v.float() for n, v in state.items() if n.startswith(("backbone.", "neck."))}
+    _, unexpected = encoder.load_state_dict(own, strict=False)
+    if unexpected or not own:
+        raise ValueError(f"{path} holds no MobileNetV2 with a neck of {WIDTH} channels.")
+    encoder.backbone.freeze()
+
+
+def losses(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> dict[str, Tensor]:
+    """Negative log likelihoods: template points (Laplace, of their own sigma), matte; and 1 - cosine of normals.
+
+    cells [N, 48, 48, 8]; template [N, 48, 48, 3] dm, matte [N, 48, 48] 0..1, normal [N, 48, 48, 3] or 0 where unknown.
+    """
+    on = matte > 0.6
+    away = (cells[..., POINT] - template).abs().sum(-1)[on]
+    log_sigma = cells[..., LOG_SIGMA][on].clamp(-5, 1)
+    # The mean of |x| of a Laplace distribution is sigma over the root of 2.
+    point = (away * (2**0.5) * (-log_sigma).exp() / 3 + log_sigma).mean()
+    cosine = F.cosine_similarity(cells[..., NORMAL][on], normal[on], dim=-1)
+    return {
+        "point": point,
+        "coarse": away.mean(),
+        "matte": F.binary_cross_entropy_with_logits(cells[..., MATTE], matte),
+        "normal": (1 - cosine).mean(),
+    }
+
+
+SCALES = {"point": 0.3, "coarse": 1.0, "matte": 1.0, "normal": 0.3}
+
+
+@torch.no_grad()
+def figures(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> dict[str, float]:
+    """Mean and median error of template points (mm), those within two of their sigmas, IoU of mattes, degrees."""
+    on = matte > 0.6
+    away = (cells[..., POINT] - template).norm(dim=-1)[on] * 100
+    sigma = cells[..., LOG_SIGMA][on].exp() * 100 * 3**0.5
+    found = cells[..., MATTE] > 0
+    cosine = F.cosine_similarity(cells[..., NORMAL][on], normal[on], dim=-1)
+    both, either = (found & (matte > 0.5)).sum(), (found | (matte > 0.5)).sum()
+    return {
+        "point_mm": float(away.mean()),
+        "median_mm": float(away.median()),
+        "within_2_sigma": float((away < 2 * sigma).float().mean()),
+        "matte_iou": float(both / either.clamp(min=1)),
+        "normal_deg": float(torch.rad2deg(cosine.clamp(-1, 1).acos()).mean()),
+    }
+
+
+def save_encoder(encoder: HeadEncoder, path: Path) -> None:
+    save_atomically({"state": encoder.state_dict()}, path)
+
+
+def load_encoder(path: Path) -> HeadEncoder:
+    """In evaluation mode. Raises FileNotFoundError, and what torch raises for other files."""
+    encoder = HeadEncoder()
+    encoder.load_state_dict(torch.load(path, map_location="cpu", weights_only=True)["state"])
+    return encoder.eval()
+
+
+def run_encoder(encoder: HeadEncoder, crop: np.ndarray) -> np.ndarray:
+    """Crop RGB [192, 192, 3] -> cells float32 [48, 48, 8]."""
+    with torch.no_grad():
+        return encoder(torch.from_numpy(np.ascontiguousarray(crop, np.float32))[None])[0].numpy()

@@ -1,0 +1,150 @@
+"""What the encoder is trained on: made heads, cropped and turned, in front of photographs, as cameras see them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from torch.utils.data import IterableDataset
+
+from export.heads.encoder import CELL_PX, CELLS, CROP_PX
+from export.heads.view_shards import LABEL_STEP, POINT_SCALE, SIDE, HeadPictures, read_pictures
+from export.people.imaging import camera_faults
+
+
+@dataclass(frozen=True)
+class Crop:
+    """image uint8 RGB [192, 192, 3]; template float32 [48, 48, 3] dm; matte float32 [48, 48]; normal [48, 48, 3]."""
+
+    image: np.ndarray
+    template: np.ndarray
+    matte: np.ndarray
+    normal: np.ndarray
+
+
+class Backgrounds:
+    """Photographs without people, small, in memory."""
+
+    def __init__(self, folder: Path, limit: int = 200) -> None:
+        paths = sorted(p for p in folder.rglob("*") if p.suffix in (".jpg", ".png"))[:limit]
+        if not paths:
+            raise FileNotFoundError(f"{folder} holds no photos: run `python -m export.photos backgrounds` first")
+        self.images = []
+        for path in paths:
+            image = cv2.imread(str(path))
+            scale = 480 / min(image.shape[:2])
+            self.images.append(cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)[..., ::-1])
+
+    def crop(self, rng: np.random.Generator, side: int) -> np.ndarray:
+        """A random square of a random photo, RGB uint8 [side, side, 3]."""
+        image = self.images[rng.integers(len(self.images))]
+        size = int(rng.uniform(60, min(image.shape[:2])))
+        y, x = rng.integers(image.shape[0] - size + 1), rng.integers(image.shape[1] - size + 1)
+        out = cv2.resize(image[y : y + size, x : x + size], (side, side), interpolation=cv2.INTER_LINEAR)
+        return out[:, ::-1] if rng.random() < 0.5 else out
+
+
+def crop_of(
+    pictures: HeadPictures, k: int, backgrounds: Backgrounds, rng: np.random.Generator, augment: bool = True
+) -> Crop:
+    """A training crop of picture k: other place, size and turn, mirrored half of the time, occluded now and then."""
+    u = rng.uniform
+    side = SIDE * (u(0.72, 1.12) if augment else 0.92)
+    turn = np.radians(rng.normal(0, 12)) if augment else 0.0
+    shift = rng.normal(0, 0.05 * SIDE, 2) if augment else np.zeros(2)
+    mirror = augment and u() < 0.5
+    zoom = side / CROP_PX
+    cos, sin = zoom * np.cos(turn), zoom * np.sin(turn)
+    linear = np.array([[cos, -sin], [sin, cos]])
+    if mirror:
+        linear = linear @ np.diag([-1.0, 1.0])
+    middle = (SIDE - 1) / 2 + shift
+    to_picture = np.concatenate([linear, (middle - linear @ np.full(2, (CROP_PX - 1) / 2))[:, None]], 1)
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    masks = pictures.masks[k]
+    planes = np.dstack([pictures.rgb[k], (masks > 200) * np.uint8(255)])
+    rgb = cv2.warpAffine(planes, to_picture, (CROP_PX, CROP_PX), flags=flags).astype(np.float32)
+    present = (masks > 0).astype(np.uint8) * 255
+    alpha = cv2.warpAffine(present, to_picture, (CROP_PX, CROP_PX), flags=flags).astype(np.float32)[..., None] / 255
+    matte = rgb[..., 3] / 255
+    image = rgb[..., :3] + (1 - alpha) * backgrounds.crop(rng, CROP_PX)
+    if augment and u() < 0.3:
+        image, matte = _occluded(image, matte, backgrounds, rng)
+    # Labels are picked at the middle of each cell, never mixed.
+    j = CELL_PX * np.arange(CELLS) + (CELL_PX - 1) / 2
+    x, y = np.meshgrid(j, j)
+    source = np.stack([x, y], -1) @ linear.T + to_picture[:, 2]
+    at = np.round(source / LABEL_STEP).astype(int)
+    limit = SIDE // LABEL_STEP - 1
+    inside = ((at >= 0) & (at <= limit)).all(-1)
+    at = np.clip(at, 0, limit)
+    template = pictures.template[k][at[..., 1], at[..., 0]].astype(np.float32) / POINT_SCALE
+    normal = pictures.normal[k][at[..., 1], at[..., 0]].astype(np.float32) / 127
+    known = (pictures.normal[k][at[..., 1], at[..., 0]] != 0).any(-1) & inside
+    cells = matte.reshape(CELLS, CELL_PX, CELLS, CELL_PX).mean((1, 3)) * known
+    normal[..., :2] = normal[..., :2] @ (linear / zoom)  # the crop's axes are turned against the picture's
+    if mirror:
+        template[..., 0] *= -1
+    if augment:
+        image = _as_cameras_see(image, rng)
+    return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal)
+
+
+def _occluded(
+    image: np.ndarray, matte: np.ndarray, backgrounds: Backgrounds, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Something before the head: an ellipse or a bar that shows another photo."""
+    cover = np.zeros(matte.shape, np.uint8)
+    middle = tuple(int(v) for v in rng.uniform(0.1, 0.9, 2) * CROP_PX)
+    axes = tuple(int(v) for v in rng.uniform(0.05, 0.25, 2) * CROP_PX)
+    if rng.random() < 0.6:
+        cv2.ellipse(cover, middle, axes, rng.uniform(0, 180), 0, 360, 255, -1)
+    else:
+        end = tuple(int(v) for v in rng.uniform(-0.2, 1.2, 2) * CROP_PX)
+        cv2.line(cover, middle, end, 255, int(rng.uniform(0.03, 0.15) * CROP_PX))
+    part = cv2.GaussianBlur(cover, (0, 0), 0.8).astype(np.float32)[..., None] / 255
+    texture = backgrounds.crop(rng, CROP_PX) if rng.random() < 0.6 else rng.uniform(0, 255, 3)
+    return image * (1 - part) + part * texture, matte * (1 - part[..., 0])
+
+
+def _as_cameras_see(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Colours, low resolution and what else cameras do; RGB in and out."""
+    image = image * np.exp(rng.normal(0, 0.1, 3)).astype(np.float32)
+    if rng.random() < 0.4:
+        small = int(np.exp(rng.uniform(np.log(40), np.log(CROP_PX))))
+        image = cv2.resize(image, (small, small), interpolation=cv2.INTER_AREA)
+        image = cv2.resize(image, (CROP_PX, CROP_PX), interpolation=cv2.INTER_LINEAR)
+    return camera_faults(rng, np.clip(image, 0, 255)[..., ::-1])[..., ::-1]
+
+
+def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadPictures]:
+    paths = sorted((folder / split).glob("head-[0-9]*[0-9].npz"))[:limit]
+    if not paths:
+        raise FileNotFoundError(f"{folder / split} holds no pictures: run `python -m export.heads.view_shards {split}`")
+    return [read_pictures(path) for path in paths]
+
+
+class CropStream(IterableDataset):
+    """Endless random batches: image float32 [B, 192, 192, 3], template, matte, normal."""
+
+    def __init__(self, heads: list[HeadPictures], backgrounds: Backgrounds, batch: int, seed: int) -> None:
+        self.heads, self.backgrounds, self.batch, self.seed = heads, backgrounds, batch, seed
+
+    def __iter__(self):
+        info = torch.utils.data.get_worker_info()
+        rng = np.random.default_rng([self.seed, info.id if info else 0])
+        cv2.setNumThreads(1)
+        while True:
+            crops = []
+            for _ in range(self.batch):
+                pictures = self.heads[rng.integers(len(self.heads))]
+                crops.append(crop_of(pictures, int(rng.integers(len(pictures.rgb))), self.backgrounds, rng))
+            yield batched(crops)
+
+
+def batched(crops: list[Crop]) -> tuple[torch.Tensor, ...]:
+    columns = zip(*((c.image.astype(np.float32), c.template, c.matte, c.normal) for c in crops), strict=True)
+    return tuple(torch.from_numpy(np.stack(column)) for column in columns)

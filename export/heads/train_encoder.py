@@ -1,0 +1,175 @@
+"""Trains the encoder of heads on pictures of made heads.
+
+    python -m export.heads.view_shards train --count 600
+    python -m export.heads.train_encoder --data .data/heads/views --out .data/runs/heads-encoder --minutes 40
+
+It resumes from `--out` by itself. Writes checkpoint.pt, weights.pt (for export.heads.export_onnx), log.json, curves.png
+and sample.png: crops of held-out heads, true template points, ours, matte.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from torch.utils.data import DataLoader
+
+from export.heads.encoder import (
+    MATTE,
+    POINT,
+    SCALES,
+    HeadEncoder,
+    figures,
+    losses,
+    save_encoder,
+    start_from_detector,
+)
+from export.heads.encoder_data import Backgrounds, Crop, CropStream, batched, crop_of, read_heads
+from export.training import (
+    SAVE_EVERY_S,
+    Ema,
+    Interval,
+    Schedule,
+    SmoothedTerms,
+    StopSignal,
+    Stopwatch,
+    rate_at,
+    save_atomically,
+    write_log,
+)
+
+
+def held_out_crops(folder: Path, backgrounds: Backgrounds, views: int = 6) -> list[Crop]:
+    """The same crops of validation heads each time, with and without what cameras do."""
+    rng = np.random.default_rng(1)
+    heads = read_heads(folder, "val")
+    return [crop_of(p, k, backgrounds, rng, augment=k % 2 == 1) for p in heads for k in range(views)]
+
+
+@torch.no_grad()
+def validate(encoder: HeadEncoder, crops: list[Crop]) -> dict[str, float]:
+    image, template, matte, normal = batched(crops)
+    cells = torch.cat([encoder(image[k : k + 16]) for k in range(0, len(image), 16)])
+    return figures(cells, template, matte, normal)
+
+
+@torch.no_grad()
+def write_sample(encoder: HeadEncoder, crops: list[Crop], path: Path) -> None:
+    """Crops, true template points, found ones, found matte."""
+    rows = []
+    for crop in crops[:: max(1, len(crops) // 8)][:8]:
+        cells = encoder(batched([crop])[0])[0].numpy()
+
+        def shown(points: np.ndarray, mask: np.ndarray) -> np.ndarray:
+            colour = np.clip((points / 3 + 0.5) * 255, 0, 255) * mask[..., None]
+            return cv2.resize(colour, (192, 192), interpolation=cv2.INTER_NEAREST)
+
+        matte = 1 / (1 + np.exp(-cells[..., MATTE]))
+        grey = cv2.resize(matte * 255, (192, 192), interpolation=cv2.INTER_NEAREST)
+        true = shown(crop.template, crop.matte > 0.5)
+        ours = shown(cells[..., POINT], matte > 0.5)
+        rows.append(np.concatenate([crop.image, true, ours, np.repeat(grey[..., None], 3, 2)], 1))
+    cv2.imwrite(str(path), np.concatenate(rows)[..., ::-1].astype(np.uint8))
+
+
+def parsed() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=Path(".data/heads/views"))
+    parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
+    parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder"))
+    parser.add_argument("--init", type=Path, default=Path("export/weights/densepose-b.pt"), help="of a person detector")
+    parser.add_argument("--minutes", type=float, default=40, help="of the whole schedule, over resumes")
+    parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
+    parser.add_argument("--batch", type=int, default=16)
+    parser.add_argument("--rate", type=float, default=1e-3)
+    parser.add_argument("--heads", type=int, help="use only so many heads")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--threads", type=int, help="default: one a core")
+    parser.add_argument("--precision", choices=("float32", "bfloat16"), default="float32")
+    parser.add_argument("--validate-minutes", type=float, default=10)
+    return parser.parse_args()
+
+
+def train(arguments: argparse.Namespace) -> None:
+    """Runs or resumes a training."""
+    if arguments.threads:
+        torch.set_num_threads(arguments.threads)
+    torch.manual_seed(arguments.seed)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    heads = read_heads(arguments.data, "train", arguments.heads)
+    held_out = held_out_crops(arguments.data, Backgrounds(arguments.backgrounds / "val"))
+    encoder = HeadEncoder()
+    start_from_detector(encoder, arguments.init)
+    encoder.to(memory_format=torch.channels_last)
+    mean = Ema(encoder, 0.998)
+    optimizer = torch.optim.AdamW(encoder.parameters(), arguments.rate, weight_decay=1e-4)
+    step, spent_s, log = 0, 0.0, []
+    path = arguments.out / "checkpoint.pt"
+    if path.exists():
+        state = torch.load(path, weights_only=True)
+        encoder.load_state_dict(state["net"])
+        mean.net.load_state_dict(state["mean"])
+        optimizer.load_state_dict(state["optimizer"])
+        step, spent_s, log = state["step"], state["spent_s"], state["log"]
+    encoder.train()
+    stream = CropStream(heads, Backgrounds(arguments.backgrounds / "train"), arguments.batch, arguments.seed + step)
+    batches = iter(DataLoader(stream, batch_size=None, num_workers=1, prefetch_factor=4))
+    schedule, stop = Schedule(arguments.minutes, arguments.steps), StopSignal()
+    clock, smoothed = Stopwatch(spent_s), SmoothedTerms()
+    save, due = Interval(SAVE_EVERY_S), Interval(arguments.validate_minutes * 60)
+    bar = schedule.bar(step, spent_s)
+
+    def checkpoint() -> None:
+        save_atomically(
+            {"net": encoder.state_dict(), "mean": mean.net.state_dict(), "optimizer": optimizer.state_dict(),
+             "step": step, "spent_s": spent_s, "log": log}, path,
+        )  # fmt: skip
+        save_encoder(mean.net, arguments.out / "weights.pt")
+
+    def validated() -> None:
+        found = validate(mean.net, held_out)
+        log.append({"step": step, "spent": spent_s} | found)
+        write_log(log, arguments.out, ["point_mm", "median_mm", "normal_deg"], "spent", "held-out heads, mm")
+        write_sample(mean.net, held_out, arguments.out / "sample.png")
+        bar.write(" ".join(f"{k}={v:.4g}" for k, v in log[-1].items()))
+
+    while not schedule.finished(step, spent_s) and not stop:
+        for group in optimizer.param_groups:
+            group["lr"] = rate_at(step, schedule.fraction(step, spent_s), arguments.rate)
+        image, template, matte, normal = next(batches)
+        with torch.autocast("cpu", torch.bfloat16, enabled=arguments.precision == "bfloat16"):
+            cells = encoder(image)
+        terms = losses(cells.float(), template, matte, normal)
+        optimizer.zero_grad(set_to_none=True)
+        sum(SCALES[name] * value for name, value in terms.items()).backward()
+        torch.nn.utils.clip_grad_norm_(encoder.parameters(), 5.0)
+        optimizer.step()
+        step += 1
+        mean.update(encoder, step)
+        smoothed.update(terms)
+        clock.lap()
+        spent_s = clock.spent_s
+        schedule.advance(bar, step, spent_s)
+        if step % 20 == 0:
+            log.append({"step": step, "loss": smoothed.loss, "terms": dict(smoothed.values)})
+            bar.set_postfix(step=step, coarse=f"{smoothed.values['coarse']:.3f}", refresh=False)
+        if save.due():
+            checkpoint()
+            save.restart()
+        if due.due():
+            validated()
+            due.restart()
+            clock.skip()
+    validated()
+    checkpoint()
+
+
+def main() -> None:
+    train(parsed())
+
+
+if __name__ == "__main__":
+    main()

@@ -10,45 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-SURFACE_OUTPUTS = 6
-
-
-@dataclass(frozen=True)
-class FieldShape:
-    """Sizes; as `sdk/src/head/field/field_shape.h`."""
-
-    octaves: int = 6
-    width: int = 64
-    geometry_layers: int = 4
-    feature: int = 31
-    surface_width: int = 64
-    surface_layers: int = 2
-    smoothing: float = 2e-4
-    personal_geometry_layers: int = 3
-    personal_surface_layers: int = 1
-
-    def sizes(self) -> list[tuple[int, int]]:
-        """(inputs, outputs) of each layer: hidden ones of the geometry, its output, then the same of the surface."""
-        out = [(3 + 6 * self.octaves, self.width)]
-        out += [(self.width, self.width)] * (self.geometry_layers - 1) + [(self.width, 1 + self.feature)]
-        out += [(1 + self.feature + 3, self.surface_width)]
-        out += [(self.surface_width, self.surface_width)] * (self.surface_layers - 1)
-        return [*out, (self.surface_width, SURFACE_OUTPUTS)]
-
-    @property
-    def first_surface_layer(self) -> int:
-        return self.geometry_layers + 1
-
-    def is_personal(self, layer: int) -> bool:
-        if layer < self.first_surface_layer:
-            return layer < self.personal_geometry_layers
-        return layer - self.first_surface_layer < self.personal_surface_layers
-
+from export.heads.prior import FieldShape
 
 Weights = Sequence[Tensor]  # of each layer, [..., outputs, inputs + 1]: the last column is the bias
 
@@ -97,16 +63,18 @@ class FieldBases(nn.Module):
         super().__init__()
         self.shape, self.shape_codes, self.colour_codes = shape, shape_codes, colour_codes
         self.constant, self.bases = nn.ParameterList(), nn.ParameterDict()
-        for layer, (inputs, outputs) in enumerate(shape.sizes()):
+        personal = sum(shape.personal, [])
+        for layer in range(shape.layers):
+            inputs, outputs = shape.inputs(layer), shape.outputs(layer)
             weights = torch.randn(outputs, inputs + 1) * math.sqrt(2 / inputs)
             weights[:, -1] = 0
             if layer == 0:  # low frequencies first: a head is smooth at the start
                 for octave in range(shape.octaves):
                     weights[:, 3 + 6 * octave : 9 + 6 * octave] *= 0.5**octave
-            if layer in (shape.geometry_layers, len(shape.sizes()) - 1):
+            if layer in (shape.geometry_layers, shape.layers - 1):
                 weights *= 0.3
             self.constant.append(nn.Parameter(weights))
-            if shape.is_personal(layer):
+            if layer in personal:
                 count = self.codes_of(layer)
                 scale = 0.15 * weights.std() / math.sqrt(count)
                 self.bases[str(layer)] = nn.Parameter(torch.randn(count, outputs, inputs + 1) * scale)

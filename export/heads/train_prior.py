@@ -1,7 +1,7 @@
 """Trains the prior of heads: bases of the field network, the codes of the heads to train on, and linear anchors.
 
     python -m export.heads.points train --count 600
-    python -m export.heads.prior --data .data/heads/points --out .data/runs/heads-prior --minutes 30
+    python -m export.heads.train_prior --data .data/heads/points --out .data/runs/heads-prior --minutes 30
 
 Codes begin as principal components of the skin's vertices, so they stay nearly linear in where places of the skin lie:
 anchors. At the end codes are whitened (each N(0, 1) over the heads to train on). It resumes from `--out` by itself.
@@ -19,8 +19,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from export.heads.field import FieldBases, FieldShape, geometry, surface
+from export.heads.field import FieldBases, geometry, surface
 from export.heads.points import HeadPoints, read_points
+from export.heads.prior import FieldShape
 from export.training import (
     SAVE_EVERY_S,
     Interval,

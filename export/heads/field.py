@@ -63,7 +63,7 @@ class FieldBases(nn.Module):
         super().__init__()
         self.shape, self.shape_codes, self.colour_codes = shape, shape_codes, colour_codes
         self.constant, self.bases = nn.ParameterList(), nn.ParameterDict()
-        personal = sum(shape.personal, [])
+        personal = [*shape.personal[0], *shape.personal[1]]
         for layer in range(shape.layers):
             inputs, outputs = shape.inputs(layer), shape.outputs(layer)
             weights = torch.randn(outputs, inputs + 1) * math.sqrt(2 / inputs)

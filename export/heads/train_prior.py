@@ -94,7 +94,7 @@ def losses(bases: FieldBases, data: HeadTensors, heads: Tensor, z: Tensor, c: Te
     }
 
 
-SCALES = {"surface": 2.0, "near": 1.0, "far": 0.15, "normal": 0.02, "eikonal": 0.01, "colour": 0.08, "template": 0.3}
+SCALES = {"surface": 1.0, "near": 1.0, "far": 0.3, "normal": 0.1, "eikonal": 0.05, "colour": 0.08, "template": 0.3}
 
 
 class Anchors(nn.Module):
@@ -188,8 +188,10 @@ class Training:
         self.anchors = Anchors(mean, padded)
         self.optimizer = torch.optim.Adam(
             [
-                {"params": self.bases.parameters(), "scale": 1.0},
-                {"params": [self.z, self.c], "scale": 3.0},
+                {"params": self.bases.constant.parameters(), "scale": 1.0},
+                # A step moves all bases of a layer, which add up over the codes: about the root of their number.
+                {"params": self.bases.bases.parameters(), "scale": 1 / 8},
+                {"params": [self.z, self.c], "scale": 1.0},
                 {"params": self.anchors.parameters(), "scale": 0.1},
             ],
             rate,
@@ -224,6 +226,7 @@ class Training:
         loss = loss + 2e-5 * (self.z[heads].square().sum(1).mean() + self.c[heads].square().sum(1).mean())
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
+        nn.utils.clip_grad_norm_([*self.bases.parameters(), self.z, self.c], 1.0)
         self.optimizer.step()
         self.step += 1
         return terms | {"anchors": linear.sqrt()}

@@ -4,7 +4,7 @@
 #   scripts/make-venv.sh            the light set: evaluation, pictures, reports
 #   scripts/make-venv.sh dev        + pytest and ruff
 #   scripts/make-venv.sh train,dev  + torch and moderngl (about 6 GB on disk); `teachers`: + LiteRT, `captures`: + COLMAP,
-#                                   `cluster`: + Dask, `solids`: + OpenCascade and Embree
+#                                   `cluster`: + Dask, `solids`: + OpenCascade and Embree, `heads`: + libigl and Embree
 #
 # PYTHON chooses the interpreter (default python3, 3.11 or newer).
 set -euo pipefail

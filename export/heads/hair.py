@@ -24,11 +24,13 @@ COLOURS = np.array(
 
 @dataclass(frozen=True)
 class Shell:
-    """A closed volume on a head: vertices [N, 3], faces [M, 3], and the head's vertex below each of its own [N]."""
+    """A closed volume on a head: vertices [N, 3], faces [M, 3], the head's vertex below each of its own [N]; `outer`:
+    those of its vertices of which each lies above another vertex of the head."""
 
     vertices: np.ndarray
     faces: np.ndarray
     below: np.ndarray
+    outer: slice
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ def _shell(
         walls.append(np.stack([following, loop, loop + count], 1))
         walls.append(np.stack([following, loop + count, following + count], 1))
     closed = np.concatenate([faces, faces[:, ::-1] + count, *walls])
-    return Shell(np.concatenate([outer, inner]), closed, np.concatenate([used, used]))
+    return Shell(np.concatenate([outer, inner]), closed, np.concatenate([used, used]), slice(0, count))
 
 
 def _ball(middle: np.ndarray, radius: float, vertices: np.ndarray) -> Shell:
@@ -189,4 +191,4 @@ def _ball(middle: np.ndarray, radius: float, vertices: np.ndarray) -> Shell:
             a, b, d, e = r * columns + c, r * columns + n, (r + 1) * columns + c, (r + 1) * columns + n
             faces += [(a, d, e), (a, e, b)]
     nearest = int(np.argmin(np.linalg.norm(vertices - middle, axis=1)))
-    return Shell(points, np.array(faces), np.full(len(points), nearest))
+    return Shell(points, np.array(faces), np.full(len(points), nearest), slice(0, 0))

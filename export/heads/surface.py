@@ -105,7 +105,7 @@ class Head:
     def __init__(
         self, maker: HeadMaker, vertices: np.ndarray, style: Style, shells: list[Shell], rng: np.random.Generator
     ) -> None:
-        self.maker, self.vertices, self.style = maker, vertices, style
+        self.maker, self.vertices, self.style, self.shells = maker, vertices, style, shells
         template = maker.shapes.template
 
         def with_caps(points: np.ndarray) -> np.ndarray:
@@ -152,6 +152,17 @@ class Head:
         self.seed = int(rng.integers(1 << 31))
         extra = len(self.positions) - len(self.style.shade)
         self._shade = np.concatenate([self.style.shade, np.zeros(extra)])[:, None]
+
+    def visible_vertices(self) -> np.ndarray:
+        """The head's vertices [V, 3]; those under hair are replaced by the point of the hair above them."""
+        out, height = self.vertices.copy(), np.zeros(len(self.vertices))
+        for shell in self.shells:
+            outer = shell.outer
+            away = np.linalg.norm(shell.vertices[outer] - self.vertices[shell.below[outer]], axis=1)
+            higher = away > height[shell.below[outer]]
+            at = shell.below[outer][higher]
+            out[at], height[at] = shell.vertices[outer][higher], away[higher]
+        return out
 
     def nearest(self, points: np.ndarray) -> tuple[Place, np.ndarray]:
         """The places nearest to points [N, 3], and how far they are, dm [N]."""

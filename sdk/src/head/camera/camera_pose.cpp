@@ -388,12 +388,7 @@ CameraPose find_camera_pose(const std::vector<Correspondence>& given, const Came
   const bool is_ambiguous = found.size() > 1 && found[1].cost - found[0].cost < kAmbiguousCost &&
                             angle_between(found[0].pose, found[1].pose) > 0.1;
   result.status = is_ambiguous ? PoseStatus::kAmbiguous : PoseStatus::kFound;
-  const double s = std::exp(pose.log_scale);
-  result.camera = {{pose.rotation, Vec3{pose.u_px / s, pose.v_px / s, std::exp(pose.log_focal - pose.log_scale)} -
-                                       pose.rotation * origin},
-                   std::exp(pose.log_focal),
-                   options.cx_px,
-                   options.cy_px};
+  result.camera = camera_of(pose, origin, options.cx_px, options.cy_px);
   result.is_inlier.assign(given.size(), 0);
   result.inliers = inliers.size();
   double squares_px = 0, squares_sigma = 0;

@@ -1,22 +1,13 @@
-// Levenberg-Marquardt over the camera of points, in parameters that stay well conditioned without perspective.
+// Levenberg-Marquardt over the camera of points.
 #pragma once
 
 #include <cstddef>
 #include <optional>
 #include <vector>
 
-#include "head/camera/se3.h"
+#include "head/camera/scaled_pose.h"
 
 namespace maq::head {
-
-// A camera by what it does at the origin of the points, at depth z: N = (u, v) + s q_xy, pixel = N / (1 + q_z s / f),
-// with q = R p and s = f / z. Far away, f leaves the equations and only its prior holds it, while u, v and s stay.
-struct ScaledPose {
-  Mat3 rotation = kIdentity3;
-  double u_px = 0, v_px = 0;  // of the origin, from the principal point
-  double log_scale = 0;       // of s, pixels a decimetre
-  double log_focal = 0;
-};
 
 struct PosePoint {
   Vec3 p;       // from the origin, decimetres
@@ -31,7 +22,7 @@ struct FocalPrior {
 // The squared residual of both coordinates in sigmas; infinite at or behind the camera's plane.
 double squared_error(const ScaledPose& pose, const PosePoint& point);
 
-using PoseInformation = double[7][7];  // rotation (3), u, v, log scale, log focal
+using PoseInformation = double[kPoseUnknowns][kPoseUnknowns];
 
 // Minimises sum weight * e / (1 + e / limit) + prior over the chosen points (Geman-McClure; `limit` in squared sigmas,
 // INFINITY: least squares), at most `rounds` steps. Returns the cost, infinite where the start has a chosen point

@@ -18,24 +18,6 @@ bool are_within(const float* values, size_t count, float limit) {
   return std::all_of(values, values + count, [&](float value) { return std::abs(value) <= limit; });
 }
 
-void check_bounds(const HeadBounds& bounds) {
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const float low = bounds.min[axis], high = bounds.max[axis];
-    if (!(low >= -kMaxHeadExtent_dm && low < 0 && high > 0 && high <= kMaxHeadExtent_dm)) {
-      refuse("its domain is ", low, " to ", high, " dm along axis ", axis, ", but must hold 0 and end within ",
-             kMaxHeadExtent_dm);
-    }
-  }
-}
-
-void check_cut(const CutPlane& cut) {
-  const Vec3 p = cut.point;
-  const double reach = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-  if (!is_finite(p) || !(reach <= double(kMaxHeadExtent_dm)) || !(std::abs(length(cut.normal) - 1) <= 1e-3)) {
-    refuse("its cut plane has no point in the domain, or no normal of length 1");
-  }
-}
-
 void check_anchors(const HeadAnchors& anchors, size_t codes) {
   const size_t count = anchors.count();
   if (count < kMinHeadAnchors || count > kMaxHeadAnchors) {
@@ -56,29 +38,54 @@ void check_anchors(const HeadAnchors& anchors, size_t codes) {
   }
 }
 
-void check_places(const std::vector<NamedPoint>& places) {
-  if (places.size() > kMaxNamedPoints) refuse("it has ", places.size(), " places, but may have ", kMaxNamedPoints);
-  std::set<std::string> names;
-  for (const NamedPoint& place : places) {
-    if (place.name.empty() || place.name.size() > kMaxPlaceName) refuse("one of its places has no name or a long one");
-    if (!names.insert(place.name).second) refuse("two of its places are named \"", place.name, "\"");
-    if (!are_within(place.template_point.data(), 3, 2 * kMaxHeadExtent_dm)) {
-      refuse("its place \"", place.name, "\" is not finite, or far away");
-    }
-  }
+// Throws unless nothing is wrong.
+void check_fault(const std::string& fault) {
+  if (!fault.empty()) refuse(fault);
 }
 
 }  // namespace
+
+std::string cut_fault(const CutPlane& cut) {
+  const Vec3 p = cut.point;
+  const double reach = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  const bool is_plane = is_finite(p) && reach <= double(kMaxHeadExtent_dm) && std::abs(length(cut.normal) - 1) <= 1e-3;
+  return is_plane ? "" : "its cut plane has no point in the domain, or no normal of length 1";
+}
+
+std::string bounds_fault(const HeadBounds& bounds) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const float low = bounds.min[axis], high = bounds.max[axis];
+    if (low >= -kMaxHeadExtent_dm && low < 0 && high > 0 && high <= kMaxHeadExtent_dm) continue;
+    return concatenate("its domain is ", low, " to ", high, " dm along axis ", axis,
+                       ", but must hold 0 and end within ", kMaxHeadExtent_dm);
+  }
+  return "";
+}
+
+std::string places_fault(const std::vector<NamedPoint>& places) {
+  if (places.size() > kMaxNamedPoints) {
+    return concatenate("it has ", places.size(), " places, but may have ", kMaxNamedPoints);
+  }
+  std::set<std::string> names;
+  for (const NamedPoint& place : places) {
+    if (place.name.empty() || place.name.size() > kMaxPlaceName) return "one of its places has no name or a long one";
+    if (!names.insert(place.name).second) return concatenate("two of its places are named \"", place.name, "\"");
+    if (!are_within(place.template_point.data(), 3, 2 * kMaxHeadExtent_dm)) {
+      return concatenate("its place \"", place.name, "\" is not finite, or far away");
+    }
+  }
+  return "";
+}
 
 void check_head_prior(const HeadPrior& prior) {
   if (!(prior.sharpness >= 0.1f && prior.sharpness <= 1e5f)) {
     refuse("its sharpness is ", prior.sharpness, ", but must be 0.1 to 1e5");
   }
   if (!prior.bases.is_finite()) refuse("one of its weights is not finite");
-  check_cut(prior.cut);
-  check_bounds(prior.bounds);
+  check_fault(cut_fault(prior.cut));
+  check_fault(bounds_fault(prior.bounds));
   check_anchors(prior.anchors, size_t(prior.shape_codes()));
-  check_places(prior.places);
+  check_fault(places_fault(prior.places));
 }
 
 const NamedPoint* find_place(const HeadPrior& prior, const std::string& name) {

@@ -60,6 +60,13 @@ struct HeadPrior {
   int colour_codes() const { return bases.colour_codes(); }
 };
 
+// What is wrong with such a part of a prior or of a head: "its domain is …"; empty where nothing is. A cut's normal has
+// length 1 (within 1e-3); bounds hold 0 and end within kMaxHeadExtent_dm; names have 1 to kMaxPlaceName bytes, no two
+// are alike, and places lie within twice kMaxHeadExtent_dm.
+std::string cut_fault(const CutPlane& cut);
+std::string bounds_fault(const HeadBounds& bounds);
+std::string places_fault(const std::vector<NamedPoint>& places);
+
 // Throws MAQ_ERROR_BAD_BUNDLE, with what is wrong, unless all numbers are finite and sizes agree: sharpness 0.1 to 1e5,
 // the cut's normal of length 1 (within 1e-3), bounds within kMaxHeadExtent_dm around the origin, anchors within twice
 // that (the template's, the mean's), kMinHeadAnchors to kMaxHeadAnchors of them with sigmas in 1e-5..10 dm, names of 1

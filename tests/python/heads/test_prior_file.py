@@ -7,15 +7,8 @@ import pytest
 from small_prior import SMALL, small_prior
 
 from export.heads.prior import FieldShape, Layer, Prior, PriorError, check_prior, combined
-from export.heads.prior_file import (
-    CHECKED,
-    HEAD,
-    bases_errors,
-    prior_bytes,
-    prior_from_bytes,
-    read_prior,
-    write_prior,
-)
+from export.heads.prior_file import HEAD, bases_errors, prior_bytes, prior_from_bytes, read_prior, write_prior
+from export.heads.stored_numbers import CHECKED
 from export.xxh3 import xxh3
 
 

@@ -51,4 +51,27 @@ struct PriorFileHead {
 };
 static_assert(sizeof(PriorFileHead) == 144 && offsetof(PriorFileHead, sharpness) == 88);
 
+// weights: of each layer, float16: weights [outputs][inputs] and bias [outputs].
+// codes: float32 shape codes, colour codes.
+// cameras: StoredCamera.
+// anchors: float16 template points [anchors][3], points [anchors][3], sigma [anchors].
+// places: as of a prior.
+struct HeadFileHead {
+  FileStart start;
+  StoredShape shape;
+  uint32_t shape_codes, colour_codes, cameras, anchors, places;
+  float sharpness;
+  uint8_t scale_source, zero[3];
+  double metres_per_unit, metres_sigma, cut_point[3], cut_normal[3];
+  float bounds_min[3], bounds_max[3];
+  uint8_t prior_sha256[32];
+};
+static_assert(sizeof(HeadFileHead) == 216 && offsetof(HeadFileHead, metres_per_unit) == 96);
+
+struct StoredCamera {
+  int32_t width_px, height_px;
+  double focal_px, cx_px, cy_px, rotation[9], translation[3];
+};
+static_assert(sizeof(StoredCamera) == 128);
+
 }  // namespace maq::head

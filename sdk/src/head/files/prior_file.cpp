@@ -72,12 +72,7 @@ HeadPrior read_prior(const void* bytes, size_t count, const std::string& name) {
   prior.anchors.mean = file.floats(StoredFormat::kFloat32, 3 * anchors);
   prior.anchors.linear = file.floats(StoredFormat::kFloat16, 3 * anchors * head.shape_codes);
   prior.anchors.sigma = file.floats(StoredFormat::kFloat32, anchors);
-  for (uint32_t i = 0; i < head.places; ++i) {
-    NamedPoint place;
-    place.name = file.text(file.number<uint8_t>());
-    file.floats(StoredFormat::kFloat32, place.template_point.data(), 3);
-    prior.places.push_back(std::move(place));
-  }
+  prior.places = file.places(head.places);
   file.end();
   check_head_prior(prior);
   return prior;

@@ -109,6 +109,18 @@ void StoredBytes::layers(StoredFormat format, const std::vector<FieldLayer>& of_
   for (const FieldLayer& layer : of_codes) floats(is_int8 ? StoredFormat::kFloat16 : format, layer.bias, outputs);
 }
 
+std::vector<NamedPoint> StoredBytes::places(size_t count) {
+  std::vector<NamedPoint> places;
+  for (size_t i = 0; i < count; ++i) {
+    NamedPoint place;
+    const size_t length = number<uint8_t>();
+    place.name.assign(reinterpret_cast<const char*>(take(length)), length);
+    floats(StoredFormat::kFloat32, place.template_point.data(), 3);
+    places.push_back(std::move(place));
+  }
+  return places;
+}
+
 void StoredBytes::end() const {
   if (left_ > 0) fail(" has ", left_, " bytes that belong to nothing.");
 }

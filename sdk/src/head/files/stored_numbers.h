@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "head/field/field_weights.h"
 #include "head/files/file_format.h"
+#include "head/head_prior.h"
 
 namespace maq::head {
 
@@ -41,11 +42,11 @@ class StoredBytes {
     std::memcpy(&number, take(sizeof number), sizeof number);
     return number;
   }
-  std::string text(size_t count) { return {reinterpret_cast<const char*>(take(count)), count}; }
   void floats(StoredFormat format, float* to, size_t count);  // of kFloat32 or kFloat16
   std::vector<float> floats(StoredFormat format, size_t count);
   // The weights and biases of one layer of some heads, in order.
   void layers(StoredFormat format, const std::vector<FieldLayer>& of_codes);
+  std::vector<NamedPoint> places(size_t count);
 
   // Throws unless everything was read.
   void end() const;

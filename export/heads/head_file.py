@@ -1,0 +1,126 @@
+"""Head files (.maqh) in numpy: read. The layout is that of sdk/src/head/files/file_format.h, version 1
+(docs/formats.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from export.heads.prior import MAX_ANCHORS, MAX_CODES, MAX_PLACES, FieldShape, Layer, PriorError
+from export.heads.stored_numbers import FLOATS, SHAPE, START, NumberReader, checked_head, shape_of
+
+MAGIC, VERSION, MAX_CAMERAS = b"MAQHED\r\n", 1, 256
+SCALE_SOURCES = ("prior", "given", "depth")
+HEAD = np.dtype(
+    [
+        *START,
+        ("shape", SHAPE),
+        ("shape_codes", "<u4"),
+        ("colour_codes", "<u4"),
+        ("cameras", "<u4"),
+        ("anchors", "<u4"),
+        ("places", "<u4"),
+        ("sharpness", "<f4"),
+        ("scale_source", "u1"),
+        ("zero", "u1", 3),
+        ("metres_per_unit", "<f8"),
+        ("metres_sigma", "<f8"),
+        ("cut_point", "<f8", 3),
+        ("cut_normal", "<f8", 3),
+        ("bounds_min", "<f4", 3),
+        ("bounds_max", "<f4", 3),
+        ("prior_sha256", "u1", 32),
+    ]
+)
+# x right, y down, z forward; in the camera = rotation p + translation; pixel = focal_px * (x, y) / z + (cx_px, cy_px).
+CAMERA = np.dtype(
+    [
+        ("width_px", "<i4"),
+        ("height_px", "<i4"),
+        ("focal_px", "<f8"),
+        ("cx_px", "<f8"),
+        ("cy_px", "<f8"),
+        ("rotation", "<f8", (3, 3)),
+        ("translation", "<f8", 3),
+    ]
+)
+
+
+class HeadFileError(PriorError):
+    """A file is not a head that can be read; the sentence says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredHead:
+    """One fitted head. Lengths in dm but for the scale; M anchors; arrays are float32 where nothing else is said."""
+
+    shape: FieldShape
+    layers: list[Layer]  # of the field, combined
+    shape_codes: np.ndarray
+    colour_codes: np.ndarray
+    cameras: np.ndarray  # CAMERA [photos]
+    metres_per_unit: float
+    metres_sigma: float
+    scale_source: str  # of SCALE_SOURCES
+    sharpness: float  # s of the opacity along rays, 1/dm
+    cut_point: np.ndarray  # float64 [3]
+    cut_normal: np.ndarray  # float64 [3], out of the head
+    bounds_min: np.ndarray
+    bounds_max: np.ndarray
+    template_points: np.ndarray  # [M, 3]
+    anchor_points: np.ndarray  # [M, 3]: where they lie on this head
+    anchor_sigma: np.ndarray  # [M]
+    places: dict[str, np.ndarray]  # name -> [3] on the template head
+    prior_sha256: str  # of the prior's file, which the codes belong to; zeros: not known
+
+
+def head_from_bytes(data: bytes, name: str = "The head in memory") -> StoredHead:
+    """name: begins the sentence of errors. Raises HeadFileError for what is damaged or no head."""
+    try:
+        return _read(data, name)
+    except PriorError as error:
+        raise HeadFileError(str(error)) from None
+
+
+def read_head(path: Path) -> StoredHead:
+    """Raises HeadFileError for what is damaged or no head, OSError for what cannot be read."""
+    return head_from_bytes(path.read_bytes(), str(path))
+
+
+def _read(data: bytes, name: str) -> StoredHead:
+    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a head (.maqh)")
+    shape = shape_of(head["shape"])
+    counts = [int(head[key]) for key in ("shape_codes", "colour_codes", "cameras", "anchors", "places")]
+    if any(
+        n > limit for n, limit in zip(counts, (MAX_CODES, MAX_CODES, MAX_CAMERAS, MAX_ANCHORS, MAX_PLACES), strict=True)
+    ):
+        raise HeadFileError(f"{name} claims more codes, cameras, anchors or places than a head may have.")
+    if head["zero"].any() or head["scale_source"] >= len(SCALE_SOURCES):
+        raise HeadFileError(f"{name} stores its numbers in a way that version {VERSION} does not have.")
+    single, half = FLOATS[0], FLOATS[1]
+    read = NumberReader(data, HEAD.itemsize, name)
+    layers = [read.layer(shape, index, (), 1) for index in range(shape.layers)]
+    codes = [read.numbers((count,), single) for count in counts[:2]]
+    cameras = read.records(counts[2], CAMERA)
+    points, on_head = (read.numbers((counts[3], 3), half) for _ in range(2))
+    sigma = read.numbers((counts[3],), half)
+    places = dict(read.place() for _ in range(counts[4]))
+    read.end()
+    return StoredHead(
+        shape,
+        layers,
+        *codes,
+        cameras,
+        float(head["metres_per_unit"]),
+        float(head["metres_sigma"]),
+        SCALE_SOURCES[head["scale_source"]],
+        float(head["sharpness"]),
+        *(head[key].copy() for key in ("cut_point", "cut_normal", "bounds_min", "bounds_max")),
+        points,
+        on_head,
+        sigma,
+        places,
+        head["prior_sha256"].tobytes().hex(),
+    )

@@ -1,0 +1,151 @@
+#include "head/files/head_file.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/atomic_file.h"
+#include "core/file.h"
+#include "head/files/file_format.h"
+#include "head/files/stored_numbers.h"
+
+namespace maq::head {
+namespace {
+
+constexpr char kKind[] = "a head (.maqh)";
+constexpr char kRemedy[] = "Fit the head again, or use the Maquette that it was made with.";
+constexpr StoredFormat kHalf = StoredFormat::kFloat16, kFloat = StoredFormat::kFloat32;
+constexpr float kMaxHalf = 65504;
+
+Vec3 vector_of(const double (&values)[3]) { return {values[0], values[1], values[2]}; }
+
+void put(Vec3 vector, double (&values)[3]) {
+  values[0] = vector.x;
+  values[1] = vector.y;
+  values[2] = vector.z;
+}
+
+StoredCamera stored(const HeadCamera& camera) {
+  StoredCamera made{camera.width_px, camera.height_px, camera.focal_px, camera.cx_px, camera.cy_px, {}, {}};
+  std::copy(camera.head_to_camera.rotation.begin(), camera.head_to_camera.rotation.end(), made.rotation);
+  put(camera.head_to_camera.translation, made.translation);
+  return made;
+}
+
+HeadCamera camera_of(const StoredCamera& stored) {
+  HeadCamera camera;
+  camera.width_px = stored.width_px;
+  camera.height_px = stored.height_px;
+  camera.focal_px = stored.focal_px;
+  camera.cx_px = stored.cx_px;
+  camera.cy_px = stored.cy_px;
+  std::copy_n(stored.rotation, 9, camera.head_to_camera.rotation.begin());
+  camera.head_to_camera.translation = vector_of(stored.translation);
+  return camera;
+}
+
+// Throws unless what the head claims is what the file has room for.
+void check_counts(const HeadFileHead& head, const FieldShape& shape, const StoredBytes& file) {
+  if (head.shape_codes > uint32_t(kMaxFieldCodes) || head.colour_codes > uint32_t(kMaxFieldCodes) ||
+      head.cameras > kMaxStoredCameras || head.anchors > kMaxHeadAnchors || head.places > kMaxNamedPoints) {
+    file.fail(" claims ", head.shape_codes, " and ", head.colour_codes, " codes, ", head.cameras, " cameras, ",
+              head.anchors, " anchors and ", head.places, " places: more than a head may have.");
+  }
+  if (head.zero[0] + head.zero[1] + head.zero[2] > 0) {
+    file.fail(" stores its numbers in a way that version ", kHeadFileVersion, " does not have.");
+  }
+  uint64_t weights = 0;
+  for (int layer = 0; layer < shape.layers(); ++layer) weights += stored_layer_bytes(shape, layer, kHalf, 1);
+  if (weights > file.left()) {
+    file.fail(" has ", file.left(), " bytes behind its head, but the weights that it claims take ", weights, ".");
+  }
+}
+
+}  // namespace
+
+std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
+  if (const std::string fault = stored_head_fault(head); !fault.empty()) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The head cannot be stored: ", fault, ". Fit it again.");
+  }
+  const AlignedFloats& weights = head.weights.values();
+  if (!std::all_of(weights.begin(), weights.end(), [](float value) { return std::abs(value) <= kMaxHalf; })) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The head cannot be stored: one of its weights is beyond ", kMaxHalf,
+                ". Fit it again.");
+  }
+  HeadFileHead file_head{};
+  file_head.shape = stored_shape(head.weights.shape());
+  file_head.shape_codes = uint32_t(head.codes.shape.size());
+  file_head.colour_codes = uint32_t(head.codes.colour.size());
+  file_head.cameras = uint32_t(head.cameras.size());
+  file_head.anchors = uint32_t(head.anchors.count());
+  file_head.places = uint32_t(head.places.size());
+  file_head.sharpness = head.sharpness;
+  file_head.scale_source = uint8_t(head.scale.source);
+  file_head.metres_per_unit = head.scale.metres_per_unit;
+  file_head.metres_sigma = head.scale.sigma;
+  put(head.cut.point, file_head.cut_point);
+  put(head.cut.normal, file_head.cut_normal);
+  std::copy(head.bounds.min.begin(), head.bounds.min.end(), file_head.bounds_min);
+  std::copy(head.bounds.max.begin(), head.bounds.max.end(), file_head.bounds_max);
+  std::copy(head.prior_sha256.begin(), head.prior_sha256.end(), file_head.prior_sha256);
+
+  BytesWriter writer;
+  writer.number(file_head);
+  for (int layer = 0; layer < head.weights.shape().layers(); ++layer) writer.layer(kHalf, head.weights.layer(layer));
+  for (const auto* codes : {&head.codes.shape, &head.codes.colour}) writer.floats(kFloat, codes->data(), codes->size());
+  for (const HeadCamera& camera : head.cameras) writer.number(stored(camera));
+  for (const auto* values : {&head.anchors.template_points, &head.anchors.points, &head.anchors.sigma}) {
+    writer.floats(kHalf, values->data(), values->size());
+  }
+  for (const NamedPoint& place : head.places) {
+    writer.number(uint8_t(place.name.size()));
+    writer.text(place.name);
+    writer.floats(kFloat, place.template_point.data(), 3);
+  }
+  writer.finish(sizeof file_head, kHeadFileMagic, kHeadFileVersion);
+  return writer.bytes();
+}
+
+void write_head_file(const StoredHead& head, const std::string& path) {
+  const std::vector<uint8_t> bytes = head_file_bytes(head);
+  AtomicFile file(path);
+  file.append(bytes.data(), bytes.size());
+  file.commit();
+}
+
+StoredHead read_head(const void* bytes, size_t count, const std::string& name) {
+  if (count > kMaxHeadFileBytes) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, name, " has ", count, " bytes; a head has at most ", kMaxHeadFileBytes, ".");
+  }
+  StoredBytes file(bytes, count, name, MAQ_ERROR_UNREADABLE);
+  const auto file_head = file.head<HeadFileHead>(kHeadFileMagic, kHeadFileVersion, kKind, kRemedy);
+  const FieldShape shape = checked_shape(file_head.shape, file);
+  check_counts(file_head, shape, file);
+
+  StoredHead head{FieldWeights(shape)};
+  for (int layer = 0; layer < shape.layers(); ++layer) file.layers(kHalf, {head.weights.layer(layer)});
+  head.codes.shape = file.floats(kFloat, file_head.shape_codes);
+  head.codes.colour = file.floats(kFloat, file_head.colour_codes);
+  for (uint32_t i = 0; i < file_head.cameras; ++i) head.cameras.push_back(camera_of(file.number<StoredCamera>()));
+  head.anchors.template_points = file.floats(kHalf, 3 * size_t(file_head.anchors));
+  head.anchors.points = file.floats(kHalf, 3 * size_t(file_head.anchors));
+  head.anchors.sigma = file.floats(kHalf, file_head.anchors);
+  head.places = file.places(file_head.places);
+  file.end();
+  head.scale = {file_head.metres_per_unit, file_head.metres_sigma, ScaleSource(file_head.scale_source)};
+  head.sharpness = file_head.sharpness;
+  head.cut = {vector_of(file_head.cut_point), vector_of(file_head.cut_normal)};
+  std::copy_n(file_head.bounds_min, 3, head.bounds.min.begin());
+  std::copy_n(file_head.bounds_max, 3, head.bounds.max.begin());
+  std::copy_n(file_head.prior_sha256, 32, head.prior_sha256.begin());
+  if (const std::string fault = stored_head_fault(head); !fault.empty()) {
+    file.fail(" cannot be used: ", fault, ". Fit the head again.");
+  }
+  return head;
+}
+
+StoredHead read_head_file(const std::string& path) {
+  const std::vector<uint8_t> bytes = read_file(path, kMaxHeadFileBytes);
+  return read_head(bytes.data(), bytes.size(), path);
+}
+
+}  // namespace maq::head

@@ -9,7 +9,8 @@ from onnx import helper, numpy_helper
 
 from export.evaluation.backends import Prediction
 from quantization.agreement import Agreement, Tally, compare, load_images
-from quantization.choose import Candidate, Workpiece, block_of, candidates, pick, with_float_nodes
+from quantization.blocks import Candidate, Workpiece, block_of, candidates
+from quantization.choose import pick, with_float_nodes
 from quantization.graphs.prepare import prepare
 from quantization.quantize import calibrate
 from quantization.settings import DensePoseSettings, GraphSettings, read_settings

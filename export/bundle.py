@@ -1,6 +1,6 @@
 """The manifest of a model bundle (docs/formats.md): what bundles of all tasks have in common, written and read.
 
-What belongs to one task is added by `export.densepose.bundle` and `export.scenes.bundle`.
+What belongs to one task is added by the `bundle` of its package, such as `export.scenes.bundle`.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ from export.training import save_atomically
 
 CROP_PX, CELL_PX = 192, 4
 CELLS = CROP_PX // CELL_PX
-CROP_SIDES = 1.6  # side of the crop by the longer side of the head's box
 OUTPUTS = 8  # template point (dm), log of its sigma (dm), logit of the matte, normal in the camera's axes
 POINT, LOG_SIGMA, MATTE, NORMAL = slice(0, 3), 3, 4, slice(5, 8)
 WIDTH = 64

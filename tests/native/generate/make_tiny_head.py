@@ -1,8 +1,10 @@
-"""Writes data/tiny_head: a small prior of heads with random numbers, and what numpy reads in it.
+"""Writes data/tiny_head: a bundle for heads with random numbers, and what Python makes of it.
 
 `priors/<format>.maqp`: with bases in float32, float16 and int8; `priors/<format>.f32`, little-endian floats: each layer
 of the head with codes SHAPE_CODES and COLOUR_CODES (weights, bias), sharpness, cut (point, normal), bounds (min, max),
 anchors (template points, mean, linear, sigma), template points of the places.
+`bundle`: an encoder of one convolution, crops of 32 px and cells of 4 px, and the prior with int8 bases. `photo.bgr`:
+32 x 32 pixels of noise, B, G, R bytes; `cells.f32`: what the encoder says of it [8][8][8].
 
     python -m tests.native.generate.make_tiny_head
 """
@@ -12,12 +14,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
 
+from export.bundle import OPSET, BundleInfo
+from export.densepose.graphs import session
+from export.heads.bundle import write_bundle
 from export.heads.prior import combined
 from export.heads.prior_file import FORMATS, read_prior, write_prior
 from tests.python.support.small_prior import small_prior
 
 FOLDER = Path(__file__).parents[1] / "data" / "tiny_head"
+CROP_PX, CELL_PX = 32, 4
 SHAPE_CODES, COLOUR_CODES = (0.5, -1.25, 2.0), (-0.75, 1.5)
 
 
@@ -35,8 +43,44 @@ def write_priors(folder: Path) -> None:
         np.concatenate([array.ravel() for array in arrays]).astype("<f4").tofile(path.with_suffix(".f32"))
 
 
+def write_encoder(path: Path) -> None:
+    """A convolution of each cell's pixels: 3 colours -> 8 channels."""
+    rng = np.random.default_rng(3)
+    side = CROP_PX // CELL_PX
+    scales = np.array([1, 1, 1, 2, 4, 1, 1, 1])  # mattes of both signs
+    weights = rng.normal(0, 0.3, (8, 3, CELL_PX, CELL_PX)) * scales[:, None, None, None] / 255
+    weights -= weights.mean((1, 2, 3), keepdims=True)  # of even grey nothing is said but the bias
+    bias = np.array([0.1, -1.0, 0.2, -2.5, 0.5, 0.0, 0.0, -1.0])
+    nodes = [
+        helper.make_node("Transpose", ["image"], ["planes"], perm=[0, 3, 1, 2]),
+        helper.make_node("Conv", ["planes", "weights", "bias"], ["found"], strides=[CELL_PX, CELL_PX]),
+        helper.make_node("Transpose", ["found"], ["cells"], perm=[0, 2, 3, 1]),
+    ]
+    graph = helper.make_graph(
+        nodes,
+        "encoder",
+        [helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, CROP_PX, CROP_PX, 3])],
+        [helper.make_tensor_value_info("cells", TensorProto.FLOAT, [1, side, side, 8])],
+        [
+            numpy_helper.from_array(values.astype(np.float32), name)
+            for name, values in (("weights", weights), ("bias", bias))
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
+    onnx.checker.check_model(model, full_check=True)
+    onnx.save(model, path)
+
+
 def main() -> None:
     write_priors(FOLDER / "priors")
+    bundle = FOLDER / "bundle"
+    bundle.mkdir(exist_ok=True)
+    write_encoder(bundle / "encoder.onnx")
+    write_bundle(bundle, bundle / "encoder.onnx", small_prior(), BundleInfo("tiny-heads", "fp32"))
+    photo = np.random.default_rng(9).integers(0, 256, (CROP_PX, CROP_PX, 3), np.uint8)  # B, G, R
+    (cells,) = session(bundle / "encoder.onnx").run(None, {"image": photo[None, :, :, ::-1].astype(np.float32)})
+    (FOLDER / "photo.bgr").write_bytes(photo.tobytes())
+    cells.astype("<f4").tofile(FOLDER / "cells.f32")
 
 
 if __name__ == "__main__":

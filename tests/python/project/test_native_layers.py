@@ -42,6 +42,7 @@ MAY_INCLUDE = {
     "edges/fusion": BASE - {"nn"} | CURVES,
     "edges/measuring": BASE - {"nn"} | CURVES,
     "head": {"core", "core/math", "head/camera", "head/field"},
+    "head/bundle": BASE | {"head", "head/field", "head/files", "head/fit"},
     "head/camera": {"core", "core/math"},
     "head/field": {"core"},
     "head/files": {"core", "core/math", "head", "head/camera", "head/field"},

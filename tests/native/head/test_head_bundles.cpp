@@ -1,0 +1,132 @@
+// Bundles for heads that are not what they should be.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "nn/sha256.h"
+#include "support/expect_error.h"
+#include "support/tiny_head.h"
+
+namespace head_bundles {
+namespace {
+
+using nlohmann::json;
+
+class HeadBundles : public testing::Test {
+ protected:
+  HeadBundles() { std::filesystem::copy(tiny_head::kBundle, folder_.path(), std::filesystem::copy_options::recursive); }
+
+  void open() const { maq::head::HeadBundle(maq::read_bundle(folder_.path().string())); }
+  void expect_refused(const json& manifest, maq_status status, const char* text) const {
+    write_text(folder_.file("manifest.json"), manifest.dump());
+    expect_error(status, text, [&] { open(); });
+  }
+  // With another prior, whose size and digest the manifest has.
+  json with_prior(const std::string& bytes) const {
+    write_text(folder_.file("prior.maqp"), bytes);
+    json changed = manifest_;
+    changed["files"]["prior.maqp"] = {{"sha256", maq::sha256_hex(bytes.data(), bytes.size())}, {"bytes", bytes.size()}};
+    return changed;
+  }
+
+  TempFolder folder_;
+  const json manifest_ = json::parse(read_text(tiny_head::kBundle + "/manifest.json"));
+};
+
+TEST_F(HeadBundles, HaveTheEncodersSizesAndThePrior) {
+  const maq::head::HeadBundle bundle(maq::read_bundle(folder_.path().string()));
+  EXPECT_EQ(bundle.encoder.crop_px(), 32);
+  EXPECT_EQ(bundle.encoder.cells.side, 8);
+  EXPECT_EQ(bundle.encoder.cells.cell_px, 4);
+  EXPECT_FLOAT_EQ(float(bundle.encoder.crop_sides), 1.6f);
+  EXPECT_EQ(bundle.prior.anchors.count(), 7u);
+  EXPECT_EQ(bundle.prior.shape_codes(), 3);
+  EXPECT_EQ(bundle.bundle.files.count("prior.maqp"), 0u);
+  std::string digest;
+  for (const uint8_t byte : bundle.prior_sha256) {
+    for (const int digit : {byte >> 4, byte & 15}) digest += "0123456789abcdef"[digit];
+  }
+  EXPECT_EQ(manifest_["files"]["prior.maqp"]["sha256"], digest);
+}
+
+TEST_F(HeadBundles, OfAnotherTaskOrWithoutWhatIsReadAreRefused) {
+  json changed = manifest_;
+  changed["task"] = "edges";
+  expect_refused(changed, MAQ_ERROR_UNSUPPORTED, "edges");
+  for (const char* key : {"encoder", "prior"}) {
+    changed = manifest_;
+    changed.erase(key);
+    expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, key);
+  }
+  changed = manifest_;
+  changed["graphs"].erase("encoder");
+  expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "graphs.encoder");
+  const auto with = [&](const char* key, const json& value) {
+    json made = manifest_;
+    made["encoder"][key] = value;
+    return made;
+  };
+  for (const json& value : {json(0), json(-32), json(2048), json("32"), json(32.5), json(34)}) {
+    expect_refused(with("crop_px", value), MAQ_ERROR_BAD_BUNDLE, "encoder.crop_px");
+  }
+  for (const json& value : {json(0), json(65), json(nullptr)}) {
+    expect_refused(with("cell_px", value), MAQ_ERROR_BAD_BUNDLE, "encoder.cell_px");
+  }
+  for (const json& value : {json(0), json(0.5), json(9), json("1.6")}) {
+    expect_refused(with("crop_sides", value), MAQ_ERROR_BAD_BUNDLE, "encoder.crop_sides");
+  }
+  changed = manifest_;
+  changed["prior"]["file"] = "../prior.maqp";
+  expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "prior.file");
+}
+
+TEST_F(HeadBundles, WithAnotherGraphAreRefused) {
+  for (const auto& [side, text] :
+       {std::pair{"inputs", "one input, image [1, 32, 32, 3]"}, {"outputs", "one output, cells [1, 8, 8, 8]"}}) {
+    for (const auto& [key, value] : {std::pair<std::string, json>{"name", "other"},
+                                     {"shape", {1, 32, 32, 7}},
+                                     {"shape", {1, 12}},
+                                     {"shape", {1, "height", "width", 3}}}) {
+      json changed = manifest_;
+      changed["graphs"]["encoder"][side][0][key] = value;
+      expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, text);
+    }
+    json changed = manifest_;
+    changed["graphs"]["encoder"][side].push_back(changed["graphs"]["encoder"][side][0]);
+    expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, text);
+  }
+  json changed = manifest_;
+  changed["encoder"]["cell_px"] = 8;
+  expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "cells [1, 4, 4, 8]");
+}
+
+TEST_F(HeadBundles, WithADamagedFileAreRefusedAlsoWhereItsDigestIsRight) {
+  const std::string prior = read_text(folder_.file("prior.maqp"));
+  std::string damaged = prior;
+  damaged[300] = char(damaged[300] ^ 1);
+  expect_refused(with_prior(damaged), MAQ_ERROR_BAD_BUNDLE, "prior.maqp is damaged");
+  expect_refused(with_prior(prior.substr(0, 100)), MAQ_ERROR_BAD_BUNDLE, "prior.maqp is too short");
+  damaged = prior;
+  damaged[8] = 2;
+  expect_refused(with_prior(damaged), MAQ_ERROR_UNSUPPORTED, "version 2");
+  write_text(folder_.file("prior.maqp"), damaged);
+  expect_refused(manifest_, MAQ_ERROR_BAD_BUNDLE, "SHA-256");
+  std::filesystem::remove(folder_.file("prior.maqp"));
+  expect_refused(manifest_, MAQ_ERROR_BAD_BUNDLE, "is missing");
+}
+
+TEST_F(HeadBundles, InMemoryAreTheSame) {
+  const std::string files[] = {"manifest.json", "encoder.onnx", "prior.maqp"};
+  std::vector<std::string> bytes;
+  std::vector<maq::NamedBuffer> buffers;
+  bytes.reserve(std::size(files));
+  for (const std::string& name : files) {
+    bytes.push_back(read_text(folder_.file(name)));
+    buffers.push_back({name, bytes.back().data(), bytes.back().size()});
+  }
+  const maq::head::HeadBundle bundle(maq::read_bundle(buffers));
+  EXPECT_EQ(bundle.prior.places.size(), 2u);
+}
+
+}  // namespace
+}  // namespace head_bundles

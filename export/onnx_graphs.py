@@ -66,6 +66,14 @@ def fold_batch_norm(net: nn.Module) -> None:
         raise ValueError(f"batch normalisation without a convolution before it: {', '.join(left)}")
 
 
+def joined(*layers: nn.Module) -> nn.Linear:
+    """One matrix that gives the outputs of all layers (nn.Linear, or nn.Conv2d of kernel 1), in their order."""
+    weight = torch.cat([layer.weight.detach().flatten(1) for layer in layers])
+    linear = nn.Linear(weight.shape[1], weight.shape[0])
+    linear.weight.data, linear.bias.data = weight, torch.cat([layer.bias.detach() for layer in layers])
+    return linear
+
+
 def write_graph(
     module: nn.Module,
     given: Sequence[Tensor],

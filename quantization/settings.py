@@ -9,9 +9,12 @@ from typing import ClassVar, TypeVar
 
 from export.densepose import bundle as densepose
 from export.edges import bundle as edges
+from export.heads import bundle as heads
 from export.scenes import bundle as scenes
 
-DENSEPOSE, EDGES, SCENES = (Path(__file__).with_name(f"{system}.toml") for system in ("densepose", "edges", "scenes"))
+DENSEPOSE, EDGES, HEADS, SCENES = (
+    Path(__file__).with_name(f"{system}.toml") for system in ("densepose", "edges", "heads", "scenes")
+)
 METHODS = ("minmax", "percentile", "entropy")
 
 
@@ -75,7 +78,22 @@ class EdgeSettings:
     held_out_frames: int
 
 
-Settings = TypeVar("Settings", DensePoseSettings, EdgeSettings, SceneSettings)
+@dataclass(frozen=True)
+class HeadSettings:
+    """graphs: settings by graph name. bases: how those of the prior are stored, of export.heads.prior_file.FORMATS.
+    crops, held_out_crops: how many crops calibrate, and measure the error. fitted_heads: how many heads measure what
+    stored bases lose."""
+
+    GRAPHS: ClassVar[tuple[str, ...]] = heads.GRAPHS
+
+    graphs: dict[str, GraphSettings]
+    bases: str
+    crops: int
+    held_out_crops: int
+    fitted_heads: int
+
+
+Settings = TypeVar("Settings", DensePoseSettings, EdgeSettings, HeadSettings, SceneSettings)
 
 
 def read_settings(path: Path, kind: type[Settings]) -> Settings:

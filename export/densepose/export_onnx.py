@@ -32,7 +32,7 @@ from export.densepose.decode import Graphs, detect
 from export.densepose.graphs import chart_maps, read_charts, session
 from export.densepose.network import DenseHead, MobileParsingRCNN
 from export.densepose.simplified import simplified
-from export.onnx_graphs import channels_first, channels_last, write_graph
+from export.onnx_graphs import channels_first, channels_last, joined, write_graph
 from export.shards import load_records
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the tensor's largest value
@@ -137,14 +137,6 @@ def phase_weights(weight: Tensor, row: int, column: int) -> Tensor:
     weight: [in, out, 4, 4].
     """
     return weight[:, :, _TAPS[row]][..., _TAPS[column]].transpose(0, 1).contiguous()
-
-
-def joined(*layers: nn.Module) -> nn.Linear:
-    """One matrix that gives the outputs of all layers (nn.Linear, or nn.Conv2d of kernel 1), in their order."""
-    weight = torch.cat([layer.weight.detach().flatten(1) for layer in layers])
-    linear = nn.Linear(weight.shape[1], weight.shape[0])
-    linear.weight.data, linear.bias.data = weight, torch.cat([layer.bias.detach() for layer in layers])
-    return linear
 
 
 def chart_weights(net: MobileParsingRCNN) -> np.ndarray:

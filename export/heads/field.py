@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
-from export.heads.prior import FieldShape
+from export.heads.prior import FieldShape, Layer, Prior
 
 Weights = Sequence[Tensor]  # of each layer, [..., outputs, inputs + 1]: the last column is the bias
 
@@ -101,3 +102,18 @@ class FieldBases(nn.Module):
                 bases = self.bases[str(layer)]
                 self.constant[layer] += torch.tensordot(mean, bases, 1)
                 self.bases[str(layer)] = nn.Parameter(torch.tensordot(root.T, bases, 1))
+
+
+def bases_of(prior: Prior) -> FieldBases:
+    """The field of a prior; without gradients."""
+
+    def weights_of(layer: Layer) -> Tensor:
+        return torch.from_numpy(np.concatenate([layer.weights, layer.bias[..., None]], -1).astype(np.float32))
+
+    bases = FieldBases(prior.shape, prior.shape_codes, prior.colour_codes).requires_grad_(False)
+    for stored, layer in zip(bases.constant, prior.constant, strict=True):
+        stored.data = weights_of(layer)
+    shape_layers, colour_layers = prior.shape.personal
+    for index, layer in zip(shape_layers + colour_layers, prior.shape_bases + prior.colour_bases, strict=True):
+        bases.bases[str(index)].data = weights_of(layer)
+    return bases

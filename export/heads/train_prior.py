@@ -136,13 +136,11 @@ def is_face(points: Tensor) -> Tensor:
     return (points - torch.tensor([0.0, -1.24, -0.35])).norm(dim=-1) < 0.95
 
 
-def fit_to_points(bases: FieldBases, data: HeadTensors, steps: int = 250) -> FitFigures:
-    """Fits codes to held-out heads' true distances and colours, from the mean, with a prior of N(0, 1)."""
+def fitted_codes(bases: FieldBases, data: HeadTensors, steps: int = 250) -> tuple[Tensor, Tensor]:
+    """Codes [H, K] and [H, C] of heads, fitted to true distances and colours from the mean, with a prior of N(0, 1)."""
     heads = torch.arange(len(data))
     z = torch.zeros(len(data), bases.shape_codes, requires_grad=True)
     c = torch.zeros(len(data), bases.colour_codes, requires_grad=True)
-    with torch.no_grad():
-        before = _distance_mm(bases, data, z, c)
     optimizer = torch.optim.Adam([z, c], 0.05)
     for step in range(steps):
         for group in optimizer.param_groups:
@@ -160,7 +158,14 @@ def fit_to_points(bases: FieldBases, data: HeadTensors, steps: int = 250) -> Fit
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
+    return z.detach(), c.detach()
+
+
+def fit_to_points(bases: FieldBases, data: HeadTensors, steps: int = 250) -> FitFigures:
+    """Fits codes to held-out heads' true points, and measures the fit."""
+    z, c = fitted_codes(bases, data, steps)
     with torch.no_grad():
+        before = _distance_mm(bases, data, torch.zeros_like(z), torch.zeros_like(c))
         after = _distance_mm(bases, data, z, c)
         weights = bases.combine(z, c)
         logits, template = surface(bases.shape, weights, data.surface, geometry(bases.shape, weights, data.surface))

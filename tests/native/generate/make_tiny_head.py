@@ -3,30 +3,39 @@
 `priors/<format>.maqp`: with bases in float32, float16 and int8; `priors/<format>.f32`, little-endian floats: each layer
 of the head with codes SHAPE_CODES and COLOUR_CODES (weights, bias), sharpness, cut (point, normal), bounds (min, max),
 anchors (template points, mean, linear, sigma), template points of the places.
+
 `bundle`: an encoder of one convolution, crops of 32 px and cells of 4 px, and the prior with int8 bases. `photo.bgr`:
 32 x 32 pixels of noise, B, G, R bytes; `cells.f32`: what the encoder says of it [8][8][8].
+
+`field/usual.maqp`: a field of the usual size. `field/<name>.f32`, of it and of two of those priors: POINTS points [3]
+(dm), then what torch finds there in float64 for the head of the same codes: distance (dm), logits of red, green and
+blue [3], template point [3] (dm).
 
     python -m tests.native.generate.make_tiny_head
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import onnx
+import torch
 from onnx import TensorProto, helper, numpy_helper
 
 from export.bundle import OPSET, BundleInfo
 from export.densepose.graphs import session
 from export.heads.bundle import write_bundle
-from export.heads.prior import combined
+from export.heads.field import bases_of, geometry, surface
+from export.heads.prior import FieldShape, Layer, Prior, combined
 from export.heads.prior_file import FORMATS, read_prior, write_prior
 from tests.python.support.small_prior import small_prior
 
 FOLDER = Path(__file__).parents[1] / "data" / "tiny_head"
 CROP_PX, CELL_PX = 32, 4
 SHAPE_CODES, COLOUR_CODES = (0.5, -1.25, 2.0), (-0.75, 1.5)
+POINTS = 70
 
 
 def write_priors(folder: Path) -> None:
@@ -71,6 +80,38 @@ def write_encoder(path: Path) -> None:
     onnx.save(model, path)
 
 
+def field_at(prior: Prior, points: np.ndarray) -> list[np.ndarray]:
+    """Points [N, 3], float64 -> distance [N], logits [N, 3], template points [N, 3] of the head of those codes."""
+    bases = bases_of(prior).double()
+    with torch.no_grad():
+        weights = bases.combine(*(torch.tensor(codes, dtype=torch.float64) for codes in (SHAPE_CODES, COLOUR_CODES)))
+        at = torch.from_numpy(points)
+        out = geometry(prior.shape, weights, at)
+        return [tensor.numpy() for tensor in (out[:, 0], *surface(prior.shape, weights, at, out))]
+
+
+def usual_prior() -> Prior:
+    """Of the usual size, with values as those of heads: wide layers of random numbers would multiply them."""
+
+    def scaled(layers: list[Layer], by: float) -> list[Layer]:
+        return [Layer(by * layer.weights, by * layer.bias) for layer in layers]
+
+    prior = small_prior(FieldShape(), len(SHAPE_CODES), len(COLOUR_CODES), seed=6)
+    bases = {"shape_bases": scaled(prior.shape_bases, 0.05), "colour_bases": scaled(prior.colour_bases, 0.05)}
+    return replace(prior, constant=scaled(prior.constant, 0.6), **bases)
+
+
+def write_fields(folder: Path, priors: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    write_prior(usual_prior(), folder / "usual.maqp")
+    for path in (folder / "usual.maqp", priors / "float32.maqp", priors / "int8.maqp"):
+        prior = read_prior(path)
+        points = np.random.default_rng(7).uniform(prior.bounds_min, prior.bounds_max, (POINTS, 3)).astype(np.float32)
+        found = field_at(prior, points.astype(np.float64))
+        numbers = np.concatenate([array.ravel() for array in (points, *found)])
+        numbers.astype("<f4").tofile(folder / f"{path.stem}.f32")
+
+
 def main() -> None:
     write_priors(FOLDER / "priors")
     bundle = FOLDER / "bundle"
@@ -81,6 +122,7 @@ def main() -> None:
     (cells,) = session(bundle / "encoder.onnx").run(None, {"image": photo[None, :, :, ::-1].astype(np.float32)})
     (FOLDER / "photo.bgr").write_bytes(photo.tobytes())
     cells.astype("<f4").tofile(FOLDER / "cells.f32")
+    write_fields(FOLDER / "field", FOLDER / "priors")
 
 
 if __name__ == "__main__":

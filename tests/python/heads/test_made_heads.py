@@ -30,7 +30,8 @@ def test_heads_depend_on_split_and_number_alone(maker, head):
     from export.heads.points import make_head
 
     again, other = make_head(maker, "val", 4), make_head(maker, "train", 4)
-    assert np.array_equal(again.positions, head.positions) and np.array_equal(again.faces, head.faces)
+    assert np.array_equal(again.positions, head.positions)
+    assert np.array_equal(again.faces, head.faces)
     assert np.abs(other.vertices - head.vertices).max() > 0.05
 
 

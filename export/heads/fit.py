@@ -25,7 +25,7 @@ BOUND_DM = 2.0  # rays are followed within this distance of the origin
 
 @dataclass(frozen=True)
 class Photo:
-    """A crop that the encoder has seen: rgb [S, S, 3] 0..255, cells [G, G, 8]; intrinsics of the crop: focal, cx, cy."""
+    """A crop that the encoder has seen: rgb [S, S, 3] 0..255, cells [G, G, 8]; the principal point in it."""
 
     rgb: np.ndarray
     cells: np.ndarray

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from tqdm import tqdm
 
 from export.heads.field import FieldBases
-from export.heads.points import make_head, make_maker
+from export.heads.points import make_maker, read_points
 from export.heads.prior import FieldShape, Layer, Prior
 from export.heads.prior_file import write_prior
 from export.heads.shapes import CUT_NORMAL, CUT_POINT, DOMAIN, HeadShapes
@@ -66,11 +65,6 @@ def places(shapes: HeadShapes, skin: np.ndarray) -> dict[str, np.ndarray]:
     return out
 
 
-def visible_vertices(maker: HeadMaker, split: str, count: int) -> np.ndarray:
-    """Of heads 0..count - 1: vertices [count, V, 3], those under hair replaced by the hair's surface above them."""
-    return np.stack([make_head(maker, split, k).visible_vertices() for k in tqdm(range(count), unit="head")])
-
-
 def linear_anchors(codes: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Codes [H, K] (whitened), points [H, M, 3] -> mean [M, 3], linear [M, 3, K], sigma [M] (each coordinate)."""
     mean = points.mean(0)
@@ -88,8 +82,8 @@ def layers_of(weights: list[torch.Tensor]) -> list[Layer]:
     return [Layer(a[..., :-1].copy(), a[..., -1].copy()) for a in arrays]
 
 
-def make_prior(saved: dict, maker: HeadMaker) -> Prior:
-    """saved: what `export.heads.train_prior` wrote as weights.pt."""
+def make_prior(saved: dict, maker: HeadMaker, visible: np.ndarray) -> Prior:
+    """saved: what `export.heads.train_prior` wrote as weights.pt; visible [H, V, 3]: of the heads it was trained on."""
     shape = FieldShape(**saved["shape"])
     codes = saved["z"].double().numpy()
     bases = FieldBases(shape, codes.shape[1], saved["c"].shape[1])
@@ -98,7 +92,7 @@ def make_prior(saved: dict, maker: HeadMaker) -> Prior:
     skin = np.unique(maker.faces)
     skin = skin[cut_distance(shapes.template[skin]) < 0]
     skin = skin[spread(shapes.template[skin], ANCHORS)]
-    mean, linear, sigma = linear_anchors(codes, visible_vertices(maker, "train", len(codes))[:, skin])
+    mean, linear, sigma = linear_anchors(codes, visible[:, skin].astype(np.float64))
     single = np.float32
     personal = [[bases.bases[str(layer)] for layer in part] for part in shape.personal]
     return Prior(
@@ -122,10 +116,12 @@ def make_prior(saved: dict, maker: HeadMaker) -> Prior:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--weights", type=Path, default=Path(".data/runs/heads-prior/weights.pt"))
+    parser.add_argument("--data", type=Path, default=Path(".data/heads/points"))
     parser.add_argument("--out", type=Path, default=Path(".data/heads/prior.maqp"))
     parser.add_argument("--bases", choices=("int8", "float16", "float32"), default="int8")
     arguments = parser.parse_args()
-    prior = make_prior(torch.load(arguments.weights, weights_only=True), make_maker())
+    visible = np.stack([head.visible for head in read_points(arguments.data, "train")])
+    prior = make_prior(torch.load(arguments.weights, weights_only=True), make_maker(), visible)
     write_prior(prior, arguments.out, arguments.bases)
     print(
         f"{arguments.out}: {arguments.out.stat().st_size / 1e6:.2f} MB, {len(prior.anchor_sigma)} anchors, their sigma"

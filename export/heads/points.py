@@ -29,7 +29,8 @@ NEAR_SIGMA = (0.03, 0.15)  # dm, half of the near points each
 @dataclass(frozen=True)
 class HeadPoints:
     """surface, normal, template: float32 [S, 3], dm; colour: uint8 [S, 3], RGB under the head's light.
-    near: float32 [N, 3] and near_distance [N], dm; far and far_distance the same. vertices: float32 [V, 3], dm."""
+    near: float32 [N, 3] and near_distance [N], dm; far and far_distance the same. vertices: float32 [V, 3], dm; visible
+    [V, 3]: those under hair replaced by the hair's surface above."""
 
     surface: np.ndarray
     normal: np.ndarray
@@ -40,6 +41,7 @@ class HeadPoints:
     far: np.ndarray
     far_distance: np.ndarray
     vertices: np.ndarray
+    visible: np.ndarray
 
 
 def make_maker() -> HeadMaker:
@@ -64,12 +66,12 @@ def points_of(head: Head, rng: np.random.Generator) -> HeadPoints:
     start = head.points_at(head.samples(NEAR, rng))
     near = start + rng.normal(size=start.shape) * np.repeat(NEAR_SIGMA, NEAR // 2)[:, None]
     far = rng.uniform(-DOMAIN, DOMAIN, (FAR, 3))
-    single = np.float32
+    single, own = np.float32, head.maker.shapes.head_vertices
     return HeadPoints(
         surface.astype(single), normal.astype(single), head.template_at(place).astype(single), colour,
         near.astype(single), head.distances(near)[0].astype(single),
         far.astype(single), head.distances(far)[0].astype(single),
-        head.vertices[: head.maker.shapes.head_vertices].astype(single),
+        head.vertices[:own].astype(single), head.visible_vertices()[:own].astype(single),
     )  # fmt: skip
 
 

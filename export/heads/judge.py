@@ -60,11 +60,14 @@ def _aligned(shape: FieldShape, weights: list[Tensor], points: Tensor, steps: in
     return p, total
 
 
-def judge(shape: FieldShape, weights: list[Tensor], surface: np.ndarray, template: np.ndarray) -> Distances:
-    """weights: of one head, [outputs, inputs + 1] each. surface [N, 3]: true points above the cut, dm; template [N, 3]:
-    their template points, by which a point belongs to the face."""
-    points = torch.from_numpy(np.asarray(surface, np.float32))
-    face = torch.from_numpy(np.linalg.norm(template - NOSE_TIP, axis=1) < FACE_RADIUS_DM)
+def is_face(template: np.ndarray) -> np.ndarray:
+    """Which points belong to the face, by their template points [N, 3]."""
+    return np.linalg.norm(template - NOSE_TIP, axis=1) < FACE_RADIUS_DM
+
+
+def judge(shape: FieldShape, weights: list[Tensor], surface: np.ndarray, is_face: np.ndarray) -> Distances:
+    """weights: of one head, [outputs, inputs + 1] each. surface [N, 3]: true points above the cut, dm; is_face [N]."""
+    points, face = torch.from_numpy(np.asarray(surface, np.float32)), torch.from_numpy(is_face)
     before, _ = _distances(shape, weights, points)
     whole, scale = _aligned(shape, weights, points)
     near, _ = _aligned(shape, weights, points[face])

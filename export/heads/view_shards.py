@@ -43,15 +43,14 @@ class HeadPictures:
     intrinsics: np.ndarray
 
 
-def sample_camera(head: Head, rng: np.random.Generator) -> Camera:
-    """Mostly of faces from the front and sides, from 35 cm to 3 m; the picture is a square around the head."""
+def sample_camera(points: np.ndarray, rng: np.random.Generator) -> Camera:
+    """Mostly of faces from the front and sides, from 35 cm to 3 m; the picture is a square around a head's points."""
     u = rng.random()
     yaw = rng.normal(0, 0.45) if u < 0.55 else rng.uniform(-1.9, 1.9) if u < 0.88 else rng.uniform(-np.pi, np.pi)
     pitch, roll = np.clip(rng.normal(0, 0.22), -0.8, 0.8), np.clip(rng.normal(0, 0.22), -0.9, 0.9)
     distance = float(np.exp(rng.uniform(np.log(3.5), np.log(30))))
     camera = look_at(yaw, pitch, roll, distance, np.zeros(3), 100.0, SIDE)
-    kept = head.positions[np.unique(head.faces)]
-    pixels, _ = camera.projected(kept[kept[:, 2] > -1.6])
+    pixels, _ = camera.projected(points)
     low, high = pixels.min(0), pixels.max(0)
     zoom = SIDE / (CROP_SIDES * (high - low).max() * rng.uniform(0.85, 1.15))
     # Crops are seldom in the middle of the photos that they are cut from: the principal point is wherever it is.
@@ -66,13 +65,16 @@ def pictures_of(head: Head, count: int, rng: np.random.Generator) -> HeadPicture
     extras = sample_extras(rng)
     views = HeadViews(head, extras)
     rows: list[tuple] = []
+    points = head.positions[np.unique(head.faces)]
+    points = points[points[:, 2] > -1.6]
     for _ in range(count):
-        camera = sample_camera(head, rng)
-        rows.append(_row(views.seen(camera, sample_lamps(rng))))
+        camera = sample_camera(points, rng)
+        rows.append(picture_row(views.seen(camera, sample_lamps(rng))))
     return HeadPictures(*(np.stack(column) for column in zip(*rows, strict=True)))
 
 
-def _row(seen: Seen) -> tuple:
+def picture_row(seen: Seen) -> tuple:
+    """The fields of `HeadPictures` of one picture."""
     camera, step = seen.camera, slice(None, None, LABEL_STEP)
     masks = np.where(seen.mask, 255, np.where(seen.present, 128, 0)).astype(np.uint8)
     normal = (seen.normal[step, step] @ camera.rotation.T) * 127

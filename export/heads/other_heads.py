@@ -34,7 +34,7 @@ PACKAGE = Package(
     "CC-BY-3.0",
     "heads to judge with",
 )
-# Upright people, and how far they are turned from looking at the camera of their catalogue (degrees about the vertical).
+# Upright people, and how far each is turned about the vertical to face -y, degrees.
 PEOPLE = {
     "female01": -90, "female02": 0, "female03": 0, "male01": 0, "male02": 25, "male03": 0, "boyStanding": 0,
     "girlStanding": 0, "holdingFemale01": 0, "holdingFemale02": 0, "holdingMale01": 0, "sitFemale01": 0,

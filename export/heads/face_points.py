@@ -127,7 +127,7 @@ def asymmetry(points: FacePoints) -> float:
 
 
 def collect(folder: Path, count: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """Template points and normals [K, 468, 3] of the first `count` heads on which a face is found, and pictures shown."""
+    """Template points and normals [K, 468, 3] of the first `count` heads with a face found, and how many were shown."""
     from export.teachers.faces import POINTS, FaceDetector, FaceNetwork, faces_of
 
     detector, network = FaceDetector(), FaceNetwork()
@@ -184,7 +184,8 @@ def main() -> None:
     spread = points.spread * 100
     print(
         f"{len(template)} of {asked} faces found; {points.used.sum()} points used; spread of all "
-        f"{np.median(spread):.1f} mm, of used {np.median(spread[points.used]):.1f}; asymmetry {made['asymmetry'] * 100:.1f}"
+        f"{np.median(spread):.1f} mm, of used {np.median(spread[points.used]):.1f}; "
+        f"asymmetry {100 * asymmetry(points):.1f}"
     )
 
 

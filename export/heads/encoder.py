@@ -90,6 +90,47 @@ def figures(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> d
     }
 
 
+def at_pixels(cells: Tensor, pixel: Tensor) -> Tensor:
+    """cells [N, 48, 48, C] between their middles, at pixels [N, P, 2] of the crop: [N, P, C]."""
+    grid = (pixel + 0.5) * (2 / CROP_PX) - 1
+    return F.grid_sample(
+        cells.permute(0, 3, 1, 2), grid[:, None], padding_mode="border", align_corners=False
+    )[:, :, 0].transpose(1, 2)  # fmt: skip
+
+
+def photo_losses(cells: Tensor, pixel: Tensor, template: Tensor, weight: Tensor, matte: Tensor) -> dict[str, Tensor]:
+    """Terms as of `losses`, of photos: template points [N, P, 3] at pixels [N, P, 2] with weights [N, P], and mattes
+    [N, 48, 48] where they are known (>= 0). No normals."""
+    found = at_pixels(cells, pixel)
+    away = (found[..., POINT] - template).abs().sum(-1)
+    log_sigma = found[..., LOG_SIGMA].clamp(-5, 1)
+    total = weight.sum().clamp(min=1e-6)
+    known = matte >= 0
+    entropy = F.binary_cross_entropy_with_logits(cells[..., MATTE], matte.clamp(min=0), reduction="none")
+    return {
+        "point": (weight * (away * (2**0.5) * (-log_sigma).exp() / 3 + log_sigma)).sum() / total,
+        "coarse": (weight * away).sum() / total,
+        "matte": (entropy * known).sum() / known.sum().clamp(min=1),
+    }
+
+
+@torch.no_grad()
+def photo_figures(cells: Tensor, pixel: Tensor, template: Tensor, weight: Tensor, matte: Tensor) -> dict[str, float]:
+    """Weighted mean and median (mm) of how far template points at the face points are from the teacher's, those within
+    two sigmas, IoU of mattes where known."""
+    found = at_pixels(cells, pixel)
+    on = weight > 0.3
+    away = (found[..., POINT] - template).norm(dim=-1) * 100
+    sigma = found[..., LOG_SIGMA].exp() * 100 * 3**0.5
+    head, mine = matte > 0.5, (cells[..., MATTE] > 0) & (matte >= 0)
+    return {
+        "photo_mm": float((weight * away).sum() / weight.sum().clamp(min=1e-6)),
+        "photo_median_mm": float(away[on].median()),
+        "photo_within_2_sigma": float((away < 2 * sigma)[on].float().mean()),
+        "photo_matte_iou": float((head & mine).sum() / (head | mine).sum().clamp(min=1)),
+    }
+
+
 def save_encoder(encoder: HeadEncoder, path: Path) -> None:
     save_atomically({"state": encoder.state_dict()}, path)
 

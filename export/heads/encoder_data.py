@@ -47,10 +47,9 @@ class Backgrounds:
         return out[:, ::-1] if rng.random() < 0.5 else out
 
 
-def crop_of(
-    pictures: HeadPictures, k: int, backgrounds: Backgrounds, rng: np.random.Generator, augment: bool = True
-) -> Crop:
-    """A training crop of picture k: other place, size and turn, mirrored half of the time, occluded now and then."""
+def placing(rng: np.random.Generator, augment: bool) -> tuple[np.ndarray, np.ndarray, bool]:
+    """A crop's place in a picture of `SIDE` pixels: linear [2, 2] and the whole map [2, 3] from pixels of the crop to
+    pixels of the picture, and whether it is mirrored."""
     u = rng.uniform
     side = SIDE * (u(0.72, 1.12) if augment else 0.92)
     turn = np.radians(rng.normal(0, 12)) if augment else 0.0
@@ -62,7 +61,15 @@ def crop_of(
     if mirror:
         linear = linear @ np.diag([-1.0, 1.0])
     middle = (SIDE - 1) / 2 + shift
-    to_picture = np.concatenate([linear, (middle - linear @ np.full(2, (CROP_PX - 1) / 2))[:, None]], 1)
+    return linear, np.concatenate([linear, (middle - linear @ np.full(2, (CROP_PX - 1) / 2))[:, None]], 1), mirror
+
+
+def crop_of(
+    pictures: HeadPictures, k: int, backgrounds: Backgrounds, rng: np.random.Generator, augment: bool = True
+) -> Crop:
+    """A training crop of picture k: other place, size and turn, mirrored half of the time, occluded now and then."""
+    linear, to_picture, mirror = placing(rng, augment)
+    zoom = float(np.linalg.norm(linear[:, 0]))
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     masks = pictures.masks[k]
     planes = np.dstack([pictures.rgb[k], (masks > 200) * np.uint8(255)])
@@ -71,8 +78,9 @@ def crop_of(
     alpha = cv2.warpAffine(present, to_picture, (CROP_PX, CROP_PX), flags=flags).astype(np.float32)[..., None] / 255
     matte = rgb[..., 3] / 255
     image = rgb[..., :3] + (1 - alpha) * backgrounds.crop(rng, CROP_PX)
-    if augment and u() < 0.3:
-        image, matte = _occluded(image, matte, backgrounds, rng)
+    if augment and rng.random() < 0.3:
+        image, part = occluded(image, backgrounds, rng)
+        matte = matte * (1 - part)
     # Labels are picked at the middle of each cell, never mixed.
     j = CELL_PX * np.arange(CELLS) + (CELL_PX - 1) / 2
     x, y = np.meshgrid(j, j)
@@ -89,15 +97,13 @@ def crop_of(
     if mirror:
         template[..., 0] *= -1
     if augment:
-        image = _as_cameras_see(image, rng)
+        image = as_cameras_see(image, rng)
     return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal)
 
 
-def _occluded(
-    image: np.ndarray, matte: np.ndarray, backgrounds: Backgrounds, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """Something before the head: an ellipse or a bar that shows another photo."""
-    cover = np.zeros(matte.shape, np.uint8)
+def occluded(image: np.ndarray, backgrounds: Backgrounds, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Something before the head: an ellipse or a bar that shows another photo; and how much of each pixel it covers."""
+    cover = np.zeros(image.shape[:2], np.uint8)
     middle = tuple(int(v) for v in rng.uniform(0.1, 0.9, 2) * CROP_PX)
     axes = tuple(int(v) for v in rng.uniform(0.05, 0.25, 2) * CROP_PX)
     if rng.random() < 0.6:
@@ -107,10 +113,10 @@ def _occluded(
         cv2.line(cover, middle, end, 255, int(rng.uniform(0.03, 0.15) * CROP_PX))
     part = cv2.GaussianBlur(cover, (0, 0), 0.8).astype(np.float32)[..., None] / 255
     texture = backgrounds.crop(rng, CROP_PX) if rng.random() < 0.6 else rng.uniform(0, 255, 3)
-    return image * (1 - part) + part * texture, matte * (1 - part[..., 0])
+    return image * (1 - part) + part * texture, part[..., 0]
 
 
-def _as_cameras_see(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def as_cameras_see(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Colours, low resolution and what else cameras do; RGB in and out."""
     image = image * np.exp(rng.normal(0, 0.1, 3)).astype(np.float32)
     if rng.random() < 0.4:
@@ -128,7 +134,7 @@ def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadP
 
 
 class CropStream(IterableDataset):
-    """Endless random batches: image float32 [B, 192, 192, 3], template, matte, normal."""
+    """Endless random batches of made heads: image float32 [B, 192, 192, 3], template, matte, normal."""
 
     def __init__(self, heads: list[HeadPictures], backgrounds: Backgrounds, batch: int, seed: int) -> None:
         self.heads, self.backgrounds, self.batch, self.seed = heads, backgrounds, batch, seed
@@ -138,11 +144,14 @@ class CropStream(IterableDataset):
         rng = np.random.default_rng([self.seed, info.id if info else 0])
         cv2.setNumThreads(1)
         while True:
-            crops = []
-            for _ in range(self.batch):
-                pictures = self.heads[rng.integers(len(self.heads))]
-                crops.append(crop_of(pictures, int(rng.integers(len(pictures.rgb))), self.backgrounds, rng))
-            yield batched(crops)
+            yield self.random_batch(rng, self.batch)
+
+    def random_batch(self, rng: np.random.Generator, count: int) -> tuple[torch.Tensor, ...]:
+        crops = []
+        for _ in range(count):
+            pictures = self.heads[rng.integers(len(self.heads))]
+            crops.append(crop_of(pictures, int(rng.integers(len(pictures.rgb))), self.backgrounds, rng))
+        return batched(crops)
 
 
 def batched(crops: list[Crop]) -> tuple[torch.Tensor, ...]:

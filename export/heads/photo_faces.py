@@ -35,6 +35,7 @@ _STEADY = 0.012  # of the face's size: a point that wanders so far weighs 0.6 ti
 # The head as an ellipsoid of the template's frame (dm), where no mask tells more.
 _CENTRE, _RADII = np.array([0.0, -0.1, 0.0]), np.array([0.85, 1.05, 1.35])
 _CHIN, _BODY = -1.1, -2.3  # dm up: what is higher is head, what is lower is not; the neck is left open
+_JAW, _SHOULDER = 0.75, -0.6  # dm: farther from the middle than the jaw, shoulders may reach so high
 _WIDE, _TOP = 1.5, 1.9  # dm from the middle: farther parts of the person may be arms or hats
 _HAND = 0.6  # dm around a hand's points
 
@@ -72,10 +73,15 @@ class FacePose:
     def pixels(self, points: np.ndarray) -> np.ndarray:
         return self.scale * (points @ self.rotation[:2].T) + self.shift
 
-    def plane(self, pixels: np.ndarray) -> np.ndarray:
-        """x and z [N, 2] (dm) of what is seen at pixels [N, 2] if it lies in the middle of the head (y = 0)."""
-        across = self.rotation[:2, [0, 2]]
-        return ((pixels - self.shift) / self.scale) @ np.linalg.inv(across).T
+    def up(self, pixels: np.ndarray) -> np.ndarray:
+        """z [N] (dm) of what is seen at pixels [N, 2] if it lies in the middle of the head (y = 0)."""
+        plane = self.rotation[:2, [0, 2]]
+        return ((pixels - self.shift) / self.scale) @ np.linalg.inv(plane)[1]
+
+    def aside(self, pixels: np.ndarray) -> np.ndarray:
+        """How far [N] (dm) pixels [N, 2] lie beside the line through the middle of the head along its up axis."""
+        up = self.rotation[:2, 2] / np.linalg.norm(self.rotation[:2, 2])
+        return abs((pixels - self.pixels(_CENTRE[None])) @ [-up[1], up[0]]) / self.scale
 
 
 def pose_of(template: np.ndarray, pixel: np.ndarray) -> FacePose:
@@ -129,11 +135,12 @@ def matte_of(face: Face, pose: FacePose, labels: PhotoLabels | None, shape: tupl
     near = cv2.dilate(anyone.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     out[~near] = NOTHING
     y, x = np.nonzero(near)
-    across, up = pose.plane(np.stack([x, y], 1)).T
+    pixels = np.stack([x, y], 1)
+    up, aside = pose.up(pixels), pose.aside(pixels)
     out[y[up < _BODY], x[up < _BODY]] = NOTHING
     core = cv2.erode(labels.mask[own].astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     sure = core & ~labels.doubt[own]
-    head = sure[y, x] & (up > _CHIN) & (up < _TOP) & (abs(across) < _WIDE)
+    head = sure[y, x] & (up > np.where(aside < _JAW, _CHIN, _SHOULDER)) & (up < _TOP) & (aside < _WIDE)
     hands = [k for k, name in enumerate(NAMES) if "wrist" in name or "finger" in name or "thumb" in name]
     for person in np.flatnonzero(labels.sure):
         for hand in labels.point[person, hands]:

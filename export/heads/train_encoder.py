@@ -3,8 +3,10 @@
     python -m export.heads.view_shards train --count 600
     python -m export.heads.train_encoder --data .data/heads/views --out .data/runs/heads-encoder --minutes 40
 
-It resumes from `--out` by itself. Writes checkpoint.pt, weights.pt (for export.heads.export_onnx), log.json, curves.png
-and sample.png: crops of held-out heads, true template points, ours, matte.
+With `--photos` (of export.heads.photo_faces) a share of each batch are real faces, of which template points are known
+at MediaPipe's face points alone. It resumes from `--out` by itself. Writes checkpoint.pt, weights.pt (for
+export.heads.export_onnx), log.json, curves.png and sample.png: crops of held-out heads, true template points, ours,
+matte.
 """
 
 from __future__ import annotations
@@ -23,11 +25,16 @@ from export.heads.encoder import (
     SCALES,
     HeadEncoder,
     figures,
+    load_encoder,
     losses,
+    photo_figures,
+    photo_losses,
     save_encoder,
     start_from_detector,
 )
 from export.heads.encoder_data import Backgrounds, Crop, CropStream, batched, crop_of, read_heads
+from export.heads.photo_crops import MixedStream, PhotoCrop, batched_photos, crop_photo
+from export.heads.photo_faces import read_photos
 from export.training import (
     SAVE_EVERY_S,
     Ema,
@@ -49,11 +56,24 @@ def held_out_crops(folder: Path, backgrounds: Backgrounds, views: int = 6) -> li
     return [crop_of(p, k, backgrounds, rng, augment=k % 2 == 1) for p in heads for k in range(views)]
 
 
+def held_out_faces(folder: Path) -> list[PhotoCrop]:
+    """The faces of the validation photos, upright in the middle of their crops."""
+    rng = np.random.default_rng(1)
+    return [crop_photo(f, k, None, rng, augment=False) for f in read_photos(folder, "val") for k in range(len(f.rgb))]
+
+
 @torch.no_grad()
-def validate(encoder: HeadEncoder, crops: list[Crop]) -> dict[str, float]:
-    image, template, matte, normal = batched(crops)
-    cells = torch.cat([encoder(image[k : k + 16]) for k in range(0, len(image), 16)])
-    return figures(cells, template, matte, normal)
+def run(encoder: HeadEncoder, image: torch.Tensor) -> torch.Tensor:
+    return torch.cat([encoder(image[k : k + 16]) for k in range(0, len(image), 16)])
+
+
+def validate(encoder: HeadEncoder, crops: list[Crop], faces: list[PhotoCrop]) -> dict[str, float]:
+    image, *labels = batched(crops)
+    found = figures(run(encoder, image), *labels)
+    if faces:
+        image, *labels = batched_photos(faces)
+        found |= photo_figures(run(encoder, image), *labels)
+    return found
 
 
 @torch.no_grad()
@@ -75,9 +95,29 @@ def write_sample(encoder: HeadEncoder, crops: list[Crop], path: Path) -> None:
     cv2.imwrite(str(path), np.concatenate(rows)[..., ::-1].astype(np.uint8))
 
 
+def batch_losses(encoder: HeadEncoder, batch: tuple, precision: str) -> dict[str, torch.Tensor]:
+    """Terms of a batch of `CropStream` or `MixedStream`; each crop of a mixed one counts the same."""
+    made, photos = batch if isinstance(batch[0], (tuple, list)) else (batch, None)
+    image = made[0] if photos is None else torch.cat([made[0], photos[0]])
+    with torch.autocast("cpu", torch.bfloat16, enabled=precision == "bfloat16"):
+        cells = encoder(image).float()
+    count = len(made[0])
+    terms = losses(cells[:count], *made[1:])
+    if photos is None:
+        return terms
+    share = count / len(image)
+    real = photo_losses(cells[count:], *photos[1:])
+    return {name: share * value for name, value in terms.items()} | {
+        f"photo_{name}": (1 - share) * value for name, value in real.items()
+    }
+
+
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/heads/views"))
+    parser.add_argument("--photos", type=Path, help="faces of photos, such as .data/heads/photos; default: none")
+    parser.add_argument("--photo-share", type=float, default=0.2, help="of the crops of a batch, with --photos")
+    parser.add_argument("--start", type=Path, help="weights.pt of an encoder to go on from, instead of --init")
     parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder"))
     parser.add_argument("--init", type=Path, default=Path("export/weights/densepose-b.pt"), help="of a person detector")
@@ -101,8 +141,11 @@ def train(arguments: argparse.Namespace) -> None:
     arguments.out.mkdir(parents=True, exist_ok=True)
     heads = read_heads(arguments.data, "train", arguments.heads)
     held_out = held_out_crops(arguments.data, Backgrounds(arguments.backgrounds / "val"))
+    held_out_photos = held_out_faces(arguments.photos) if arguments.photos else []
     encoder = HeadEncoder()
     start_from_detector(encoder, arguments.init)
+    if arguments.start:
+        encoder.load_state_dict(load_encoder(arguments.start).state_dict())
     encoder.to(memory_format=torch.channels_last)
     mean = Ema(encoder, 0.998)
     optimizer = torch.optim.AdamW(encoder.parameters(), arguments.rate, weight_decay=1e-4)
@@ -115,7 +158,9 @@ def train(arguments: argparse.Namespace) -> None:
         optimizer.load_state_dict(state["optimizer"])
         step, spent_s, log = state["step"], state["spent_s"], state["log"]
     encoder.train()
-    stream = CropStream(heads, Backgrounds(arguments.backgrounds / "train"), arguments.batch, arguments.seed + step)
+    made = (heads, Backgrounds(arguments.backgrounds / "train"), arguments.batch, arguments.seed + step)
+    photos = read_photos(arguments.photos, "train") if arguments.photos else []
+    stream = MixedStream(*made, photos=photos, share=arguments.photo_share) if photos else CropStream(*made)
     batches = iter(DataLoader(stream, batch_size=None, num_workers=1, prefetch_factor=4))
     schedule, stop = Schedule(arguments.minutes, arguments.steps), StopSignal()
     clock, smoothed = Stopwatch(spent_s), SmoothedTerms()
@@ -130,21 +175,19 @@ def train(arguments: argparse.Namespace) -> None:
         save_encoder(mean.net, arguments.out / "weights.pt")
 
     def validated() -> None:
-        found = validate(mean.net, held_out)
+        found = validate(mean.net, held_out, held_out_photos)
         log.append({"step": step, "spent": spent_s} | found)
-        write_log(log, arguments.out, ["point_mm", "median_mm", "normal_deg"], "spent", "held-out heads, mm")
+        names = ["point_mm", "median_mm", "normal_deg"] + ["photo_mm"] * bool(held_out_photos)
+        write_log(log, arguments.out, names, "spent", "held-out heads, mm")
         write_sample(mean.net, held_out, arguments.out / "sample.png")
         bar.write(" ".join(f"{k}={v:.4g}" for k, v in log[-1].items()))
 
     while not schedule.finished(step, spent_s) and not stop:
         for group in optimizer.param_groups:
             group["lr"] = rate_at(step, schedule.fraction(step, spent_s), arguments.rate)
-        image, template, matte, normal = next(batches)
-        with torch.autocast("cpu", torch.bfloat16, enabled=arguments.precision == "bfloat16"):
-            cells = encoder(image)
-        terms = losses(cells.float(), template, matte, normal)
+        terms = batch_losses(encoder, next(batches), arguments.precision)
         optimizer.zero_grad(set_to_none=True)
-        sum(SCALES[name] * value for name, value in terms.items()).backward()
+        sum(SCALES[name.removeprefix("photo_")] * value for name, value in terms.items()).backward()
         torch.nn.utils.clip_grad_norm_(encoder.parameters(), 5.0)
         optimizer.step()
         step += 1

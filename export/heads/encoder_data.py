@@ -17,12 +17,14 @@ from export.people.imaging import camera_faults
 
 @dataclass(frozen=True)
 class Crop:
-    """image uint8 RGB [192, 192, 3]; template float32 [48, 48, 3] dm; matte float32 [48, 48]; normal [48, 48, 3]."""
+    """image uint8 RGB [192, 192, 3]; template float32 [48, 48, 3] dm; matte float32 [48, 48]; normal [48, 48, 3];
+    mirrored: whether left and right are exchanged."""
 
     image: np.ndarray
     template: np.ndarray
     matte: np.ndarray
     normal: np.ndarray
+    mirrored: bool
 
 
 class Backgrounds:
@@ -98,7 +100,7 @@ def crop_of(
         template[..., 0] *= -1
     if augment:
         image = as_cameras_see(image, rng)
-    return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal)
+    return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal, mirror)
 
 
 def occluded(image: np.ndarray, backgrounds: Backgrounds, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -134,10 +136,13 @@ def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadP
 
 
 class CropStream(IterableDataset):
-    """Endless random batches of made heads: image float32 [B, 192, 192, 3], template, matte, normal."""
+    """Endless random batches of made heads: image float32 [B, 192, 192, 3], template, matte, normal, and shape codes
+    [B, K], NaN where the crop is mirrored. codes: of the heads, [H, K]."""
 
-    def __init__(self, heads: list[HeadPictures], backgrounds: Backgrounds, batch: int, seed: int) -> None:
-        self.heads, self.backgrounds, self.batch, self.seed = heads, backgrounds, batch, seed
+    def __init__(
+        self, heads: list[HeadPictures], codes: np.ndarray, backgrounds: Backgrounds, batch: int, seed: int
+    ) -> None:
+        self.heads, self.codes, self.backgrounds, self.batch, self.seed = heads, codes, backgrounds, batch, seed
 
     def __iter__(self):
         info = torch.utils.data.get_worker_info()
@@ -147,11 +152,12 @@ class CropStream(IterableDataset):
             yield self.random_batch(rng, self.batch)
 
     def random_batch(self, rng: np.random.Generator, count: int) -> tuple[torch.Tensor, ...]:
-        crops = []
-        for _ in range(count):
-            pictures = self.heads[rng.integers(len(self.heads))]
+        crops, codes = [], []
+        for number in rng.integers(len(self.heads), size=count):
+            pictures = self.heads[number]
             crops.append(crop_of(pictures, int(rng.integers(len(pictures.rgb))), self.backgrounds, rng))
-        return batched(crops)
+            codes.append(np.where(crops[-1].mirrored, np.nan, self.codes[number]).astype(np.float32))
+        return *batched(crops), torch.from_numpy(np.stack(codes))
 
 
 def batched(crops: list[Crop]) -> tuple[torch.Tensor, ...]:

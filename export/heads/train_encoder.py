@@ -12,6 +12,7 @@ matte.
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -24,11 +25,13 @@ from export.heads.encoder import (
     POINT,
     SCALES,
     HeadEncoder,
+    code_figures,
+    code_losses,
     figures,
-    load_encoder,
     losses,
     photo_figures,
     photo_losses,
+    run_encoder,
     save_encoder,
     start_from_detector,
 )
@@ -49,11 +52,24 @@ from export.training import (
 )
 
 
-def held_out_crops(folder: Path, backgrounds: Backgrounds, views: int = 6) -> list[Crop]:
-    """The same crops of validation heads each time, with and without what cameras do."""
+@dataclass(frozen=True)
+class HeldOut:
+    """What is validated on: crops of made heads with their shape codes [N, K] (NaN: mirrored), faces of photos."""
+
+    crops: list[Crop]
+    codes: torch.Tensor
+    faces: list[PhotoCrop]
+
+
+def held_out_crops(folder: Path, codes: torch.Tensor, backgrounds: Backgrounds, faces: list[PhotoCrop]) -> HeldOut:
+    """The same crops of validation heads each time, six a head, with and without what cameras do."""
     rng = np.random.default_rng(1)
-    heads = read_heads(folder, "val")
-    return [crop_of(p, k, backgrounds, rng, augment=k % 2 == 1) for p in heads for k in range(views)]
+    crops, known = [], []
+    for pictures, code in zip(read_heads(folder, "val"), codes, strict=True):
+        for k in range(6):
+            crops.append(crop_of(pictures, k, backgrounds, rng, augment=k % 2 == 1))
+            known.append(torch.full_like(code, torch.nan) if crops[-1].mirrored else code)
+    return HeldOut(crops, torch.stack(known), faces)
 
 
 def held_out_faces(folder: Path) -> list[PhotoCrop]:
@@ -63,16 +79,19 @@ def held_out_faces(folder: Path) -> list[PhotoCrop]:
 
 
 @torch.no_grad()
-def run(encoder: HeadEncoder, image: torch.Tensor) -> torch.Tensor:
-    return torch.cat([encoder(image[k : k + 16]) for k in range(0, len(image), 16)])
+def run(encoder: HeadEncoder, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    parts = [encoder(image[k : k + 16]) for k in range(0, len(image), 16)]
+    return tuple(torch.cat(column) for column in zip(*parts, strict=True))
 
 
-def validate(encoder: HeadEncoder, crops: list[Crop], faces: list[PhotoCrop]) -> dict[str, float]:
-    image, *labels = batched(crops)
-    found = figures(run(encoder, image), *labels)
-    if faces:
-        image, *labels = batched_photos(faces)
-        found |= photo_figures(run(encoder, image), *labels)
+def validate(encoder: HeadEncoder, held_out: HeldOut) -> dict[str, float]:
+    image, *labels = batched(held_out.crops)
+    cells, codes = run(encoder, image)
+    known = held_out.codes.isfinite().all(1)
+    found = figures(cells, *labels) | code_figures(codes[known], held_out.codes[known])
+    if held_out.faces:
+        image, *labels = batched_photos(held_out.faces)
+        found |= photo_figures(run(encoder, image)[0], *labels)
     return found
 
 
@@ -81,7 +100,7 @@ def write_sample(encoder: HeadEncoder, crops: list[Crop], path: Path) -> None:
     """Crops, true template points, found ones, found matte."""
     rows = []
     for crop in crops[:: max(1, len(crops) // 8)][:8]:
-        cells = encoder(batched([crop])[0])[0].numpy()
+        cells, _ = run_encoder(encoder, crop.image)
 
         def shown(points: np.ndarray, mask: np.ndarray) -> np.ndarray:
             colour = np.clip((points / 3 + 0.5) * 255, 0, 255) * mask[..., None]
@@ -100,9 +119,9 @@ def batch_losses(encoder: HeadEncoder, batch: tuple, precision: str) -> dict[str
     made, photos = batch if isinstance(batch[0], (tuple, list)) else (batch, None)
     image = made[0] if photos is None else torch.cat([made[0], photos[0]])
     with torch.autocast("cpu", torch.bfloat16, enabled=precision == "bfloat16"):
-        cells = encoder(image).float()
+        cells, codes = (out.float() for out in encoder(image))
     count = len(made[0])
-    terms = losses(cells[:count], *made[1:])
+    terms = losses(cells[:count], *made[1:-1]) | code_losses(codes[:count], made[-1])
     if photos is None:
         return terms
     share = count / len(image)
@@ -115,6 +134,9 @@ def batch_losses(encoder: HeadEncoder, batch: tuple, precision: str) -> dict[str
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/heads/views"))
+    parser.add_argument(
+        "--prior", type=Path, default=Path(".data/runs/heads-prior/weights.pt"), help="codes of the heads"
+    )
     parser.add_argument("--photos", type=Path, help="faces of photos, such as .data/heads/photos; default: none")
     parser.add_argument("--photo-share", type=float, default=0.2, help="of the crops of a batch, with --photos")
     parser.add_argument("--start", type=Path, help="weights.pt of an encoder to go on from, instead of --init")
@@ -140,12 +162,17 @@ def train(arguments: argparse.Namespace) -> None:
     torch.manual_seed(arguments.seed)
     arguments.out.mkdir(parents=True, exist_ok=True)
     heads = read_heads(arguments.data, "train", arguments.heads)
-    held_out = held_out_crops(arguments.data, Backgrounds(arguments.backgrounds / "val"))
-    held_out_photos = held_out_faces(arguments.photos) if arguments.photos else []
+    prior = torch.load(arguments.prior, weights_only=True)
+    held_out = held_out_crops(
+        arguments.data,
+        prior["held_out_z"],
+        Backgrounds(arguments.backgrounds / "val"),
+        held_out_faces(arguments.photos) if arguments.photos else [],
+    )
     encoder = HeadEncoder()
     start_from_detector(encoder, arguments.init)
     if arguments.start:
-        encoder.load_state_dict(load_encoder(arguments.start).state_dict())
+        encoder.load_state_dict(torch.load(arguments.start, weights_only=True)["state"], strict=False)
     encoder.to(memory_format=torch.channels_last)
     mean = Ema(encoder, 0.998)
     optimizer = torch.optim.AdamW(encoder.parameters(), arguments.rate, weight_decay=1e-4)
@@ -158,7 +185,13 @@ def train(arguments: argparse.Namespace) -> None:
         optimizer.load_state_dict(state["optimizer"])
         step, spent_s, log = state["step"], state["spent_s"], state["log"]
     encoder.train()
-    made = (heads, Backgrounds(arguments.backgrounds / "train"), arguments.batch, arguments.seed + step)
+    made = (
+        heads,
+        prior["z"][: len(heads)].numpy(),
+        Backgrounds(arguments.backgrounds / "train"),
+        arguments.batch,
+        arguments.seed + step,
+    )
     photos = read_photos(arguments.photos, "train") if arguments.photos else []
     stream = MixedStream(*made, photos=photos, share=arguments.photo_share) if photos else CropStream(*made)
     batches = iter(DataLoader(stream, batch_size=None, num_workers=1, prefetch_factor=4))
@@ -175,11 +208,11 @@ def train(arguments: argparse.Namespace) -> None:
         save_encoder(mean.net, arguments.out / "weights.pt")
 
     def validated() -> None:
-        found = validate(mean.net, held_out, held_out_photos)
+        found = validate(mean.net, held_out)
         log.append({"step": step, "spent": spent_s} | found)
-        names = ["point_mm", "median_mm", "normal_deg"] + ["photo_mm"] * bool(held_out_photos)
+        names = ["point_mm", "median_mm", "normal_deg"] + ["photo_mm"] * bool(held_out.faces)
         write_log(log, arguments.out, names, "spent", "held-out heads, mm")
-        write_sample(mean.net, held_out, arguments.out / "sample.png")
+        write_sample(mean.net, held_out.crops, arguments.out / "sample.png")
         bar.write(" ".join(f"{k}={v:.4g}" for k, v in log[-1].items()))
 
     while not schedule.finished(step, spent_s) and not stop:

@@ -137,7 +137,7 @@ def is_face(points: Tensor) -> Tensor:
 
 
 def fitted_codes(bases: FieldBases, data: HeadTensors, steps: int = 250) -> tuple[Tensor, Tensor]:
-    """Codes [H, K] and [H, C] of heads, fitted to true distances and colours from the mean, with a prior of N(0, 1)."""
+    """Shape codes [H, K] and colour codes [H, C] of heads by their true distances and colours, with a prior of N(0, 1)."""
     heads = torch.arange(len(data))
     z = torch.zeros(len(data), bases.shape_codes, requires_grad=True)
     c = torch.zeros(len(data), bases.colour_codes, requires_grad=True)
@@ -161,16 +161,15 @@ def fitted_codes(bases: FieldBases, data: HeadTensors, steps: int = 250) -> tupl
     return z.detach(), c.detach()
 
 
-def fit_to_points(bases: FieldBases, data: HeadTensors, steps: int = 250) -> FitFigures:
-    """Fits codes to held-out heads' true points, and measures the fit."""
-    z, c = fitted_codes(bases, data, steps)
-    with torch.no_grad():
-        before = _distance_mm(bases, data, torch.zeros_like(z), torch.zeros_like(c))
-        after = _distance_mm(bases, data, z, c)
-        weights = bases.combine(z, c)
-        logits, template = surface(bases.shape, weights, data.surface, geometry(bases.shape, weights, data.surface))
-        colour = (logits.sigmoid() - data.colour.float() / 255).abs().mean()
-        away = (template - data.template).norm(dim=-1).mean() * 100
+@torch.no_grad()
+def fit_figures(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> FitFigures:
+    """Of heads with these codes, beside the mean head."""
+    before = _distance_mm(bases, data, torch.zeros_like(z), torch.zeros_like(c))
+    after = _distance_mm(bases, data, z, c)
+    weights = bases.combine(z, c)
+    logits, template = surface(bases.shape, weights, data.surface, geometry(bases.shape, weights, data.surface))
+    colour = (logits.sigmoid() - data.colour.float() / 255).abs().mean()
+    away = (template - data.template).norm(dim=-1).mean() * 100
     return FitFigures(*after, *before, float(colour), float(away))
 
 
@@ -238,8 +237,8 @@ class Training:
 
 
 @torch.no_grad()
-def whitened(training: Training, data: HeadTensors) -> tuple[FieldBases, Tensor, Tensor, Anchors]:
-    """Bases for whitened codes, the heads' codes z [H, K] and c [H, C], and anchors fitted to these codes."""
+def whitened(training: Training) -> tuple[FieldBases, Tensor, Tensor]:
+    """Bases for whitened codes, and the heads' codes z [H, K] and c [H, C]."""
     bases = FieldBases(training.bases.shape, training.bases.shape_codes, training.bases.colour_codes)
     bases.load_state_dict(training.bases.state_dict())
     surface_layer, layers = bases.shape.first_surface_layer, len(bases.constant)
@@ -252,14 +251,7 @@ def whitened(training: Training, data: HeadTensors) -> tuple[FieldBases, Tensor,
         root = vectors * deviation
         bases.whiten(mean.float(), root.float(), first, last)
         codes.append((((code - mean) @ vectors) / deviation).float())
-    z = codes[0].double()
-    target = data.vertices.double()
-    mean = target.mean(0)
-    flat = (target - mean).reshape(len(z), -1)
-    # Ridge regression: of 600 heads and 64 codes.
-    slopes = torch.linalg.solve(z.T @ z + 2.0 * torch.eye(z.shape[1], dtype=torch.float64), z.T @ flat)
-    anchors = Anchors(mean.float(), slopes.T.reshape(-1, 3, z.shape[1]).float())
-    return bases, codes[0], codes[1], anchors
+    return bases, codes[0], codes[1]
 
 
 def parsed() -> argparse.Namespace:
@@ -297,8 +289,8 @@ def train(arguments: argparse.Namespace) -> None:
 
     def validated() -> None:
         begun = time.monotonic()
-        bases, *_ = whitened(training, data)
-        figures = asdict(fit_to_points(bases, held_out))
+        bases, *_ = whitened(training)
+        figures = asdict(fit_figures(bases, held_out, *fitted_codes(bases, held_out)))
         row = {"step": training.step, "spent": training.spent_s} | figures
         training.log.append(row)
         write_log(training.log, arguments.out, list(figures), "spent", "held-out heads, mm")
@@ -324,9 +316,10 @@ def train(arguments: argparse.Namespace) -> None:
             clock.skip()
     save_atomically(training.state(), path)
     validated()
-    bases, z, c, anchors = whitened(training, data)
+    bases, z, c = whitened(training)
+    held_out_z, _ = fitted_codes(bases, held_out)
     save_atomically(
-        {"shape": asdict(shape), "bases": bases.state_dict(), "z": z, "c": c, "anchors": anchors.state_dict()},
+        {"shape": asdict(shape), "bases": bases.state_dict(), "z": z, "c": c, "held_out_z": held_out_z},
         arguments.out / "weights.pt",
     )
 

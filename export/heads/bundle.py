@@ -4,7 +4,8 @@
 
 `encoder.onnx`: `image` float32 [1, crop, crop, 3], R, G, B in 0..255 -> `cells` float32 [1, crop / cell, crop / cell,
 8]: template point x, y, z (dm), log of its sigma (dm), logit of the matte, normal x, y, z in the camera's axes. A cell
-stands for the middle of its cell x cell pixels.
+stands for the middle of its cell x cell pixels. And `codes` float32 [1, shape codes, 2]: what the whole crop says of the
+head's shape codes, their means and log sigmas.
 """
 
 from __future__ import annotations
@@ -40,18 +41,19 @@ TRAINING_DATA = (
 )
 
 
-def crop_and_cell(graph: Signature, path: Path) -> tuple[int, int]:
-    """Sides in pixels of the crop and of a cell. Raises ValueError for a graph that is not an encoder's."""
+def crop_and_cell(graph: Signature, path: Path, codes: int) -> tuple[int, int]:
+    """Sides in pixels of the crop and of a cell. Raises ValueError for a graph that is no encoder of a prior of so many
+    shape codes."""
     shapes = {name: list(shape) for side in ("inputs", "outputs") for name, shape in graph[side].items()}
     sizes = [size for shape in shapes.values() for size in shape]
-    if list(shapes) == ["image", "cells"] and len(sizes) == 8 and all(isinstance(n, int) and n > 0 for n in sizes):
+    if list(shapes) == ["image", "cells", "codes"] and len(sizes) == 11 and all(isinstance(n, int) and n > 0 for n in sizes):
         crop, side = shapes["image"][1], shapes["cells"][1]
-        wanted = {"image": [1, crop, crop, 3], "cells": [1, side, side, CELL_CHANNELS]}
+        wanted = {"image": [1, crop, crop, 3], "cells": [1, side, side, CELL_CHANNELS], "codes": [1, codes, 2]}
         if shapes == wanted and crop % side == 0:
             return crop, crop // side
     raise ValueError(
-        f"{path} has {shapes}; the format asks for image [1, crop, crop, 3] and cells [1, crop / cell, crop / cell, "
-        f"{CELL_CHANNELS}], in numbers."
+        f"{path} has {shapes}; the format asks for image [1, crop, crop, 3], cells [1, crop / cell, crop / cell, "
+        f"{CELL_CHANNELS}] and codes [1, {codes}, 2], in numbers."
     )
 
 
@@ -59,8 +61,8 @@ def write_manifest(folder: Path, info: BundleInfo, crop_sides: float = CROP_SIDE
     """Describes `encoder.onnx` and `prior.maqp` that lie in `folder`, of any precision, and writes `manifest.json`,
     which it returns. Raises ValueError for a graph of other shapes, PriorError for a file that is no prior."""
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
-    crop, cell = crop_and_cell(graphs["encoder"], folder / "encoder.onnx")
-    read_prior(folder / PRIOR)
+    codes = read_prior(folder / PRIOR).shape_codes
+    crop, cell = crop_and_cell(graphs["encoder"], folder / "encoder.onnx", codes)
     task_keys = {
         "encoder": {"crop_px": crop, "cell_px": cell, "crop_sides": crop_sides},
         "prior": {"file": PRIOR},

@@ -74,7 +74,7 @@ def samples(crops: Sequence[Crop]) -> list[Sample]:
 def cells_of(encoder: Path, given: Sequence[Sample]) -> Tensor:
     """What an encoder's graph makes of them, [N, 48, 48, 8]."""
     run = session(encoder)
-    return torch.from_numpy(np.concatenate([run.run(None, sample)[0] for sample in given]))
+    return torch.from_numpy(np.concatenate([run.run(["cells"], sample)[0] for sample in given]))
 
 
 def figures_of(cells: Tensor, crops: Sequence[Crop]) -> dict[str, float]:

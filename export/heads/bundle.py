@@ -4,8 +4,8 @@
 
 `encoder.onnx`: `image` float32 [1, crop, crop, 3], R, G, B in 0..255 -> `cells` float32 [1, crop / cell, crop / cell,
 8]: template point x, y, z (dm), log of its sigma (dm), logit of the matte, normal x, y, z in the camera's axes. A cell
-stands for the middle of its cell x cell pixels. And `codes` float32 [1, shape codes, 2]: what the whole crop says of the
-head's shape codes, their means and log sigmas.
+stands for the middle of its cell x cell pixels. And, where an encoder says them, `codes` float32 [1, shape codes, 2]:
+what the whole crop tells of the head's shape codes, their means and log sigmas.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ def crop_and_cell(graph: Signature, path: Path, codes: int) -> tuple[int, int]:
     shape codes."""
     shapes = {name: list(shape) for side in ("inputs", "outputs") for name, shape in graph[side].items()}
     sizes = [size for shape in shapes.values() for size in shape]
-    if list(shapes) == ["image", "cells", "codes"] and len(sizes) == 11 and all(isinstance(n, int) and n > 0 for n in sizes):
+    if list(shapes)[:2] == ["image", "cells"] and all(isinstance(n, int) and n > 0 for n in sizes):
         crop, side = shapes["image"][1], shapes["cells"][1]
-        wanted = {"image": [1, crop, crop, 3], "cells": [1, side, side, CELL_CHANNELS], "codes": [1, codes, 2]}
-        if shapes == wanted and crop % side == 0:
+        wanted = {"image": [1, crop, crop, 3], "cells": [1, side, side, CELL_CHANNELS]}
+        if shapes in (wanted, wanted | {"codes": [1, codes, 2]}) and crop % side == 0:
             return crop, crop // side
     raise ValueError(
         f"{path} has {shapes}; the format asks for image [1, crop, crop, 3], cells [1, crop / cell, crop / cell, "
-        f"{CELL_CHANNELS}] and codes [1, {codes}, 2], in numbers."
+        f"{CELL_CHANNELS}] and, if there are codes, [1, {codes}, 2], in numbers."
     )
 
 

@@ -169,8 +169,9 @@ def save_encoder(encoder: HeadEncoder, path: Path) -> None:
 
 def load_encoder(path: Path) -> HeadEncoder:
     """In evaluation mode. Raises FileNotFoundError, and what torch raises for other files."""
-    encoder = HeadEncoder()
-    encoder.load_state_dict(torch.load(path, map_location="cpu", weights_only=True)["state"])
+    state = torch.load(path, map_location="cpu", weights_only=True)["state"]
+    encoder = HeadEncoder(len(state["code.bias"]) // 2)
+    encoder.load_state_dict(state)
     return encoder.eval()
 
 

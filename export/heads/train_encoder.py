@@ -51,6 +51,8 @@ from export.training import (
     write_log,
 )
 
+VIEWS = 6  # of a held-out head
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -61,15 +63,17 @@ class HeldOut:
     faces: list[PhotoCrop]
 
 
-def held_out_crops(folder: Path, codes: torch.Tensor, backgrounds: Backgrounds, faces: list[PhotoCrop]) -> HeldOut:
-    """The same crops of validation heads each time, six a head, with and without what cameras do."""
+def held_out_crops(folder: Path, backgrounds: Backgrounds) -> list[Crop]:
+    """The same crops of validation heads each time, VIEWS a head, with and without what cameras do."""
     rng = np.random.default_rng(1)
-    crops, known = [], []
-    for pictures, code in zip(read_heads(folder, "val"), codes, strict=True):
-        for k in range(6):
-            crops.append(crop_of(pictures, k, backgrounds, rng, augment=k % 2 == 1))
-            known.append(torch.full_like(code, torch.nan) if crops[-1].mirrored else code)
-    return HeldOut(crops, torch.stack(known), faces)
+    heads = read_heads(folder, "val")
+    return [crop_of(p, k, backgrounds, rng, augment=k % 2 == 1) for p in heads for k in range(VIEWS)]
+
+
+def codes_of_crops(crops: list[Crop], codes: torch.Tensor) -> torch.Tensor:
+    """Of `held_out_crops`, by the codes of their heads [H, K]: [N, K], NaN where mirrored."""
+    mirrored = torch.tensor([crop.mirrored for crop in crops])
+    return codes.repeat_interleave(VIEWS, 0).masked_fill(mirrored[:, None], torch.nan)
 
 
 def held_out_faces(folder: Path) -> list[PhotoCrop]:
@@ -163,13 +167,10 @@ def train(arguments: argparse.Namespace) -> None:
     arguments.out.mkdir(parents=True, exist_ok=True)
     heads = read_heads(arguments.data, "train", arguments.heads)
     prior = torch.load(arguments.prior, weights_only=True)
-    held_out = held_out_crops(
-        arguments.data,
-        prior["held_out_z"],
-        Backgrounds(arguments.backgrounds / "val"),
-        held_out_faces(arguments.photos) if arguments.photos else [],
-    )
-    encoder = HeadEncoder()
+    crops = held_out_crops(arguments.data, Backgrounds(arguments.backgrounds / "val"))
+    faces = held_out_faces(arguments.photos) if arguments.photos else []
+    held_out = HeldOut(crops, codes_of_crops(crops, prior["held_out_z"]), faces)
+    encoder = HeadEncoder(prior["z"].shape[1])
     start_from_detector(encoder, arguments.init)
     if arguments.start:
         encoder.load_state_dict(torch.load(arguments.start, weights_only=True)["state"], strict=False)

@@ -137,7 +137,7 @@ def is_face(points: Tensor) -> Tensor:
 
 
 def fitted_codes(bases: FieldBases, data: HeadTensors, steps: int = 250) -> tuple[Tensor, Tensor]:
-    """Shape codes [H, K] and colour codes [H, C] of heads by their true distances and colours, with a prior of N(0, 1)."""
+    """Shape codes [H, K] and colour codes [H, C] of heads by their true distances and colours; a priori N(0, 1)."""
     heads = torch.arange(len(data))
     z = torch.zeros(len(data), bases.shape_codes, requires_grad=True)
     c = torch.zeros(len(data), bases.colour_codes, requires_grad=True)

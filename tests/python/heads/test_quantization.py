@@ -57,7 +57,7 @@ def ball_points(seed: int) -> HeadPoints:
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     near, far = normal * rng.normal(1.2, 0.1, (300, 1)), rng.uniform(-2, 2, (50, 3))
     distances = [np.linalg.norm(points, axis=1) - 1.2 for points in (near, far)]
-    floats = [1.2 * normal, normal, 1.2 * normal, near, distances[0], far, distances[1], normal[:20]]
+    floats = [1.2 * normal, normal, 1.2 * normal, near, distances[0], far, distances[1], normal[:20], normal[:20]]
     floats = [array.astype(np.float32) for array in floats]
     return HeadPoints(*floats[:3], np.full((300, 3), 90, np.uint8), *floats[3:])
 
@@ -82,7 +82,7 @@ def data(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fp32(lively_encoder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("fp32")
-    export_encoder(lively_encoder(0), folder / "encoder.onnx")
+    export_encoder(lively_encoder(0, 3), folder / "encoder.onnx")
     write_prior(small_prior(), folder / "prior.maqp", bases="float32")
     write_manifest(folder, BundleInfo("heads-fp32", "fp32", training_data=({"name": "balls"},)))
     return folder
@@ -102,7 +102,7 @@ def test_the_bundle_says_what_int8_costs(fp32, data, tmp_path, monkeypatch, caps
     assert (manifest["task"], manifest["precision"], manifest["name"]) == ("heads", "int8", "heads-int8")
     assert manifest["training_data"] == [{"name": "balls"}]
     measured = manifest["measured"]
-    assert set(measured["sqnr_db"]["encoder"]) == {"cells", "template_point", "log_sigma", "matte", "normal"}
+    assert set(measured["sqnr_db"]["encoder"]) == {"cells", "codes", "template_point", "log_sigma", "matte", "normal"}
     assert min(measured["sqnr_db"]["encoder"].values()) > 10
     assert measured["int8_cost"]["crops"] == 4
     costs = [measured["int8_cost"][name] for name in ("fp32", "int8")]
@@ -174,7 +174,7 @@ def test_the_noise_of_template_points_is_told_apart_from_that_of_logits():
 def test_figures_are_in_millimetres_and_degrees():
     template = np.random.default_rng(0).normal(size=(48, 48, 3)).astype(np.float32)
     normal = np.broadcast_to(np.float32([0, 0, -1]), (48, 48, 3))
-    crop = Crop(np.zeros((192, 192, 3), np.uint8), template, np.ones((48, 48), np.float32), normal)
+    crop = Crop(np.zeros((192, 192, 3), np.uint8), template, np.ones((48, 48), np.float32), normal, False)
     cells = torch.zeros(1, 48, 48, 8)
     cells[..., :3] = torch.from_numpy(template) + torch.tensor([0.03, 0.0, 0.04])
     cells[..., 4] = 1.0

@@ -34,8 +34,8 @@ StoredHead example(const FieldShape& shape, int anchors, int cameras) {
   head.codes = {{0.1f, -1.7f, 2.3f}, {0.3f, -0.01f}};
   for (int i = 0; i < cameras; ++i) {
     HeadCamera camera;
-    const Mat3 looks_to_y = {1, 0, 0, 0, 0, -1, 0, 1, 0};
-    camera.head_to_camera = {i % 2 == 0 ? looks_to_y : looks_to_y * Mat3{0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1},
+    const Mat3 facing_y = {1, 0, 0, 0, 0, -1, 0, 1, 0};
+    camera.head_to_camera = {i % 2 == 0 ? facing_y : facing_y * Mat3{0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1},
                              {0.1, -0.2, 9.5 + i}};
     camera.focal_px = 812.25 + i, camera.cx_px = 319.5, camera.cy_px = 239.5;
     camera.width_px = 640, camera.height_px = 480;

@@ -82,7 +82,7 @@ TEST_F(HeadBundles, OfAnotherTaskOrWithoutWhatIsReadAreRefused) {
 
 TEST_F(HeadBundles, WithAnotherGraphAreRefused) {
   for (const auto& [side, text] :
-       {std::pair{"inputs", "one input, image [1, 32, 32, 3]"}, {"outputs", "one output, cells [1, 8, 8, 8]"}}) {
+       {std::pair{"inputs", "the input image [1, 32, 32, 3]"}, {"outputs", "the output cells [1, 8, 8, 8]"}}) {
     for (const auto& [key, value] : {std::pair<std::string, json>{"name", "other"},
                                      {"shape", {1, 32, 32, 7}},
                                      {"shape", {1, 12}},
@@ -92,8 +92,15 @@ TEST_F(HeadBundles, WithAnotherGraphAreRefused) {
       expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, text);
     }
     json changed = manifest_;
-    changed["graphs"]["encoder"][side].push_back(changed["graphs"]["encoder"][side][0]);
+    json& tensors = changed["graphs"]["encoder"][side];
+    for (int i = 0; i < 2; ++i) tensors.push_back(tensors[0]);
     expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, text);
+  }
+  for (const json& codes : {json{{"name", "codes"}, {"type", "float32"}, {"shape", {1, 4, 2}}},
+                            json{{"name", "other"}, {"type", "float32"}, {"shape", {1, 3, 2}}}}) {
+    json changed = manifest_;
+    changed["graphs"]["encoder"]["outputs"].push_back(codes);
+    expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "codes [1, 3, 2]");
   }
   json changed = manifest_;
   changed["encoder"]["cell_px"] = 8;

@@ -17,11 +17,15 @@ Bundle checked_task(Bundle bundle) {
   return bundle;
 }
 
-void require_tensor(const Manifest& manifest, const std::vector<TensorSpec>& side, const char* what, const char* name,
-                    int64_t side_px, int64_t channels) {
-  const std::vector<Dimension> wanted = {int64_t(1), side_px, side_px, channels};
-  if (side.size() == 1 && side[0].name == name && side[0].shape == wanted) return;
-  throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": graph ", kGraph, " must have one ", what, ", ", name,
+bool is_tensor(const TensorSpec& tensor, const char* name, const std::vector<Dimension>& shape) {
+  return tensor.name == name && tensor.shape == shape;
+}
+
+// The first of `side`, which must have no more than `count`.
+void require_tensor(const Manifest& manifest, const std::vector<TensorSpec>& side, size_t count, const char* what,
+                    const char* name, int64_t side_px, int64_t channels) {
+  if (side.size() == count && is_tensor(side[0], name, {int64_t(1), side_px, side_px, channels})) return;
+  throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": graph ", kGraph, " must have the ", what, " ", name,
               " [1, ", side_px, ", ", side_px, ", ", channels, "]. Export the bundle again.");
 }
 
@@ -34,8 +38,10 @@ EncoderSpec checked_encoder(const Manifest& manifest) {
   encoder.cells.side = crop_px / encoder.cells.cell_px;
   encoder.crop_sides = double(node.at("crop_sides").number(1, 8));
   const GraphSpec& graph = manifest.graphs.at(kGraph);
-  require_tensor(manifest, graph.inputs, "input", "image", crop_px, 3);
-  require_tensor(manifest, graph.outputs, "output", "cells", encoder.cells.side, int64_t(kCellChannels));
+  encoder.says_codes = graph.outputs.size() == 2;
+  require_tensor(manifest, graph.inputs, 1, "input", "image", crop_px, 3);
+  require_tensor(manifest, graph.outputs, encoder.says_codes ? 2 : 1, "output", "cells", encoder.cells.side,
+                 int64_t(kCellChannels));
   return encoder;
 }
 
@@ -62,6 +68,11 @@ HeadBundle::HeadBundle(Bundle opened)
       prior(prior_of(bundle)),
       prior_sha256(digest_of(bundle.manifest.files.at(prior_name(bundle.manifest)).sha256)) {
   bundle.files.erase(prior_name(bundle.manifest));
+  if (encoder.says_codes &&
+      !is_tensor(encoder_graph().outputs[1], "codes", {int64_t(1), int64_t(prior.shape_codes()), int64_t(2)})) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", bundle.manifest.name, ": the second output of graph ", kGraph,
+                " must be codes [1, ", prior.shape_codes(), ", 2], as the prior has them. Export the bundle again.");
+  }
 }
 
 const GraphSpec& HeadBundle::encoder_graph() const { return bundle.manifest.graphs.at(kGraph); }

@@ -55,6 +55,7 @@ def flat_pictures() -> HeadPictures:
     template = np.stack([columns / 100, np.full(rows.shape, -1.0), -rows / 100], -1)
     normal = np.zeros((1, 128, 128, 3), np.int8)
     normal[:, :, :64] = [0, 0, -127]  # towards the camera
+    template[:, 50:] += [0, 1, 0]  # from column 100 on something behind is seen
     masks = np.zeros((1, 256, 256), np.uint8)
     masks[:, :, :128] = 255
     rotation = np.array([[[1, 0, 0], [0, 0, -1], [0, 1, 0]]], np.float64)  # the head's y is the camera's z
@@ -65,11 +66,14 @@ def flat_pictures() -> HeadPictures:
 
 
 def test_template_points_are_read_between_the_stored_pixels_and_nowhere_off_the_head():
-    place, normal = on_template(flat_pictures(), 0, np.array([[51.0, 40.5], [200.0, 40.0], [-5.0, 3.0], [126.9, 9.0]]))
+    place, normal = on_template(
+        flat_pictures(), 0, np.array([[51.0, 40.5], [200.0, 40.0], [-5.0, 3.0], [126.9, 9.0], [98.8, 9.0]])
+    )
     assert np.allclose(place[0], [0.51, -1, -0.405], atol=2e-4)
     assert np.allclose(normal[0], [0, -1, 0], atol=1e-6)
     assert np.isnan(place[1:3]).all()
     assert place[3, 0] == pytest.approx(1.26, abs=0.01)  # what lies beyond the border is not mixed in
+    assert place[4, 1] == pytest.approx(-1)  # nor what lies behind an edge
 
 
 def test_the_middle_over_heads_is_not_led_astray_and_wandering_points_are_not_used():

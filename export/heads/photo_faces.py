@@ -37,6 +37,7 @@ _CENTRE, _RADII = np.array([0.0, -0.1, 0.0]), np.array([0.85, 1.05, 1.35])
 _CHIN, _BODY = -1.1, -2.3  # dm up: what is higher is head, what is lower is not; the neck is left open
 _JAW, _SHOULDER = 0.75, -0.6  # dm: farther from the middle than the jaw, shoulders may reach so high
 _WIDE, _TOP = 1.5, 1.9  # dm from the middle: farther parts of the person may be arms or hats
+_WIDEST, _MAX_WIDE = 1.25, 0.35  # dm, and the share of the two strips from there to `_WIDE` that may be head
 _HAND = 0.6  # dm around a hand's points
 
 
@@ -145,6 +146,10 @@ def matte_of(face: Face, pose: FacePose, labels: PhotoLabels | None, shape: tupl
     for person in np.flatnonzero(labels.sure):
         for hand in labels.point[person, hands]:
             head &= np.hypot(x - hand[0], y - hand[1]) > _HAND * pose.scale
+    # Heads are not so wide: a mask that is wide on one side up there shows a hat, arms, somebody else or a thing.
+    ring = (aside > _WIDEST) & (aside < _WIDE) & (up > -0.2) & (up < 1.0)
+    if np.count_nonzero(head & ring) > _MAX_WIDE * 2 * (_WIDE - _WIDEST) * 1.2 * pose.scale**2:
+        return out
     out[y[head], x[head]] = HEAD
     return out
 

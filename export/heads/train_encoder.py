@@ -142,7 +142,9 @@ def parsed() -> argparse.Namespace:
         "--prior", type=Path, default=Path(".data/runs/heads-prior/weights.pt"), help="codes of the heads"
     )
     parser.add_argument("--photos", type=Path, help="faces of photos, such as .data/heads/photos; default: none")
-    parser.add_argument("--photo-share", type=float, default=0.2, help="of the crops of a batch, with --photos")
+    parser.add_argument(
+        "--photo-share", dest="photo_fraction", type=float, default=0.2, help="of a batch, with --photos"
+    )
     parser.add_argument("--start", type=Path, help="weights.pt of an encoder to go on from, instead of --init")
     parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder"))
@@ -194,7 +196,7 @@ def train(arguments: argparse.Namespace) -> None:
         arguments.seed + step,
     )
     photos = read_photos(arguments.photos, "train") if arguments.photos else []
-    stream = MixedStream(*made, photos=photos, share=arguments.photo_share) if photos else CropStream(*made)
+    stream = MixedStream(*made, photos=photos, share=arguments.photo_fraction) if photos else CropStream(*made)
     batches = iter(DataLoader(stream, batch_size=None, num_workers=1, prefetch_factor=4))
     schedule, stop = Schedule(arguments.minutes, arguments.steps), StopSignal()
     clock, smoothed = Stopwatch(spent_s), SmoothedTerms()

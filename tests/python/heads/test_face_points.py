@@ -153,6 +153,14 @@ def test_a_matte_knows_head_surroundings_and_body_and_leaves_the_neck_open():
     assert matte_of(seen(points, pose), pose, labels, (300, 300))[100, 150] == UNKNOWN
 
 
+def test_of_a_mask_too_wide_for_a_head_none_is_head():
+    points, pose, labels = read_face_points(), turned(0.0), labelled()
+    labels.mask[0, 60:190, 60:240] = True
+    matte = matte_of(seen(points, pose), pose, labels, (300, 300))
+    assert not (matte == HEAD).any()
+    assert matte[100, 50] == NOTHING
+
+
 def test_without_a_mask_of_this_person_nothing_is_known():
     points, pose, labels = read_face_points(), turned(0.0), labelled()
     assert (matte_of(seen(points, pose), pose, None, (300, 300)) == UNKNOWN).all()

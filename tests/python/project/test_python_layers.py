@@ -41,8 +41,8 @@ ALLOWED = {
         "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.solids", "export.training",
     },
     "export.heads": {
-        "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.people", "export.training",
-        "export.xxh3",
+        "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.people", "export.teachers",
+        "export.training", "export.xxh3",
     },
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},

@@ -313,6 +313,52 @@ TEST(FieldEngine, APointThatIsNotFiniteIsNanAndTheOthersStay) {
   }
 }
 
+// Where a value or a gradient is not finite, the point is left out: the sums are those of the others.
+TEST(FieldEngine, PointsThatAreNotFiniteHaveNoPartInGradients) {
+  const float bad[] = {std::numeric_limits<float>::quiet_NaN(), INFINITY, -INFINITY};
+  for (const FieldIsa isa : supported_field_isas()) {
+    const FieldShape shape = shape_of_width(48);
+    const FieldWeights weights = random_weights(shape, 21);
+    const FieldEngine engine = engine_of(weights, isa);
+    Columns by = random_columns(70, 22, 1.0f), by_rgb = random_columns(70, 23, 1.0f),
+            by_normal = random_columns(70, 24, 1.0f);
+    const auto run = [&](Batch& batch, FieldWeights& sum, Columns& by_points) {
+      FieldWorkspace workspace;
+      FieldValues values = batch.values();
+      Columns normals = by_points;
+      values.normal = as_planes(normals);
+      engine.forward(as_points(batch.points), workspace, values);
+      size_t left_out = 0;
+      for (int round = 0; round < 2; ++round) {  // the second sees what the first left
+        left_out = engine.backward(workspace, {by[0].data(), as_const_planes(by_rgb), {}, as_const_planes(by_normal)},
+                                   WeightGradient::kAll, &sum, as_planes(by_points));
+      }
+      return left_out;
+    };
+    // The same with these points' gradients of 0.
+    const size_t points[] = {5, 25, 45, 64, 65, 66};
+    Columns kept_by = by, kept_rgb = by_rgb, kept_normal = by_normal;
+    for (const size_t i : points) {
+      by[0][i] = 0;
+      for (size_t c = 0; c < 3; ++c) by_rgb[c][i] = by_normal[c][i] = 0;
+    }
+    Batch good(70);
+    FieldWeights expected(shape), sum(shape);
+    Columns expected_points = by, by_points = by;
+    EXPECT_EQ(run(good, expected, expected_points), 0u);
+    by = kept_by, by_rgb = kept_rgb, by_normal = kept_normal;
+    Batch batch(70);
+    for (size_t k = 0; k < 3; ++k) batch.points[k][points[k]] = bad[k];
+    by[0][points[3]] = bad[0];
+    by_rgb[1][points[4]] = bad[1];
+    by_normal[2][points[5]] = bad[2];
+    EXPECT_EQ(run(batch, sum, by_points), 6u);
+    EXPECT_EQ(sum.values(), expected.values());
+    EXPECT_EQ(by_points, expected_points);
+    for (const size_t i : points) EXPECT_EQ(by_points[0][i], 0.0f);
+  }
+}
+
 TEST(FieldEngine, InfinityIsNanFromTheEncodingOn) {
   for (const FieldIsa isa : supported_field_isas()) {
     AlignedFloats points(3 * kFieldBlock, INFINITY), encoding(9 * kFieldBlock);

@@ -32,6 +32,34 @@ void take(const ConstPlanes& from, size_t begin, size_t count, float* rows) {
   for (size_t i = 0; i < 3; ++i) take(from[i], begin, count, rows + i * kBlock);
 }
 
+static_assert(kFieldBlock == 64, "points of a block are bits of a number");
+
+// The points of which one of some rows is not finite.
+uint64_t not_finite(const float* rows, size_t row_count) {
+  constexpr float kMax = std::numeric_limits<float>::max();
+  int bad[kBlock] = {}, any = 0;
+  for (size_t row = 0; row < row_count; ++row) {
+    for (size_t i = 0; i < kBlock; ++i) bad[i] |= int(!(std::abs(rows[row * kBlock + i]) <= kMax));
+  }
+  for (const int is_bad : bad) any |= is_bad;
+  uint64_t points = 0;
+  for (size_t i = 0; any != 0 && i < kBlock; ++i) points |= uint64_t(bad[i]) << i;
+  return points;
+}
+
+void clear(uint64_t points, float* rows, size_t row_count) {
+  for (size_t i = 0; points != 0; ++i, points >>= 1) {
+    if ((points & 1) == 0) continue;
+    for (size_t row = 0; row < row_count; ++row) rows[row * kBlock + i] = 0;
+  }
+}
+
+size_t count_of(uint64_t points) {
+  size_t count = 0;
+  for (; points != 0; points &= points - 1) ++count;
+  return count;
+}
+
 template <class Pointer>
 bool has_any(const std::array<Pointer, 3>& planes) {
   return planes[0] != nullptr || planes[1] != nullptr || planes[2] != nullptr;
@@ -111,6 +139,7 @@ void FieldEngine::keep(FieldWorkspace& workspace, size_t count, bool has_surface
   workspace.is_kept_ = false;
   const size_t size = (count + kBlock - 1) / kBlock * kept_rows(has_surface, has_normals) * kBlock;
   if (workspace.blocks_.size() < size) workspace.blocks_.resize(size);
+  workspace.left_out_.assign((count + kBlock - 1) / kBlock, 0);
   workspace.count_ = count;
   workspace.has_surface_ = has_surface;
   workspace.has_normals_ = has_normals;
@@ -220,19 +249,25 @@ void FieldEngine::forward(const FieldPoints& points, FieldWorkspace& workspace, 
     take({points.x, points.y, points.z}, begin, count, memory.points);
     kernels_->encode(memory.points, shape_.octaves, at.encoding);
     run_geometry(at);
+    uint64_t& left_out = workspace.left_out_[begin / kBlock];
     if (has_surface) {
       run_surface(at, memory.a);
+      left_out = not_finite(at.surface_input, 1) | not_finite(memory.a, kSurfaceOutputs);
       put(at.surface_input, begin, count, values.distance);
       put(memory.a, begin, count, values.rgb);
       put(memory.a + 3 * kBlock, begin, count, values.template_point);
     } else {
       run_distance(at, memory.a);
+      left_out = not_finite(memory.a, 1);
       put(memory.a, begin, count, values.distance);
     }
     if (has_normals) {
       run_slopes(at, memory);
+      left_out |= not_finite(memory.points, 3);
       put(memory.points, begin, count, values.normal);
     }
+    // So that a gradient of 0 times what is kept is 0.
+    clear(left_out, at.encoding, kept_rows(has_surface, has_normals));
   }
   workspace.is_kept_ = true;
 }
@@ -335,30 +370,45 @@ void FieldEngine::tangents_backward(const Block& at, const Sums& sums, int used,
   std::swap(scratch.b, scratch.c);
 }
 
-void FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
-                           FieldWeights* weights, const Planes& points_gradient) const {
+size_t FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
+                             FieldWeights* weights, const Planes& points_gradient) const {
   const bool has_surface = has_any(gradient.rgb) || has_any(gradient.template_point);
   const bool has_normals = has_any(gradient.normal), to_points = has_any(points_gradient);
   Scratch memory = scratch(workspace, has_normals);
   const Sums sums{which, weights, memory.transposed};
   check_backward(workspace, gradient, sums);
+  size_t all_left_out = 0;
   for (size_t begin = 0; begin < workspace.count_; begin += kBlock) {
     const size_t count = std::min(kBlock, workspace.count_ - begin);
     const Block at = block(workspace, begin);
     int used = 1;
-    std::fill_n(memory.points, 3 * kBlock, 0.0f);
+    uint64_t left_out = workspace.left_out_[begin / kBlock];
+    std::array<float, kBlock> by_distance;
+    take(gradient.distance, begin, count, by_distance.data());
+    left_out |= not_finite(by_distance.data(), 1);
+    if (has_normals) {
+      take(gradient.normal, begin, count, memory.direction);
+      left_out |= not_finite(memory.direction, 3);
+    }
     if (has_surface) {
       take(gradient.rgb, begin, count, memory.a);
       take(gradient.template_point, begin, count, memory.a + 3 * kBlock);
+      left_out |= not_finite(memory.a, kSurfaceOutputs);
+      clear(left_out, memory.a, kSurfaceOutputs);
+    }
+    clear(left_out, by_distance.data(), 1);
+    clear(left_out, memory.direction, has_normals ? 3 : 0);
+    all_left_out += count_of(left_out);
+    std::fill_n(memory.points, 3 * kBlock, 0.0f);
+    if (has_surface) {
       surface_backward(at, sums, memory);
       used = 1 + shape_.feature;
       std::copy_n(memory.a + size_t(used) * kBlock, 3 * kBlock, memory.points);
-      for (size_t i = 0; gradient.distance != nullptr && i < count; ++i) memory.a[i] += gradient.distance[begin + i];
+      for (size_t i = 0; i < kBlock; ++i) memory.a[i] += by_distance[i];
     } else {
-      take(gradient.distance, begin, count, memory.a);
+      std::copy(by_distance.begin(), by_distance.end(), memory.a);
     }
     if (has_normals) {
-      take(gradient.normal, begin, count, memory.direction);
       run_tangents(at, memory);
       tangents_backward(at, sums, used, to_points, memory);
     } else {
@@ -371,6 +421,7 @@ void FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient& 
     }
     put(memory.points, begin, count, points_gradient);
   }
+  return all_left_out;
 }
 
 double eikonal_loss(size_t count, const ConstPlanes& g, float scale, const Planes& gradient) {

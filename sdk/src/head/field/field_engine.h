@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "head/field/field_isa.h"
@@ -46,9 +47,10 @@ class FieldWorkspace {
  private:
   friend class FieldEngine;
 
-  AlignedFloats blocks_;   // of all blocks, what backward() needs
-  AlignedFloats scratch_;  // of one block
-  size_t count_ = 0;       // of points that are kept
+  AlignedFloats blocks_;            // of all blocks, what backward() needs
+  AlignedFloats scratch_;           // of one block
+  std::vector<uint64_t> left_out_;  // of each block that is kept: its points that have a value that is not finite
+  size_t count_ = 0;                // of points that are kept
   bool is_kept_ = false, has_surface_ = false, has_normals_ = false;
 };
 
@@ -77,10 +79,11 @@ class FieldEngine {
   void forward(const FieldPoints& points, FieldWorkspace& workspace, const FieldValues& values) const;
   // Adds to `weights` (may be null for kNone), writes the gradient by the points (null planes: left out). A gradient by
   // the normal needs second derivatives: it costs as much again as the geometry's other part. May be called more than
-  // once. A point whose gradient is not finite spoils the sums of all. Throws MAQ_ERROR_INTERNAL where forward() kept
+  // once. Points that have a value or a gradient that is not finite are left out: they have no part in the sums, and 0
+  // as their gradient; returns how many. Throws MAQ_ERROR_INTERNAL where forward() kept
   // nothing, or did not compute what a gradient is given by.
-  void backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
-                FieldWeights* weights, const Planes& points_gradient = {}) const;
+  size_t backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
+                  FieldWeights* weights, const Planes& points_gradient = {}) const;
 
  private:
   struct Layer {

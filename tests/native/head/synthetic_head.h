@@ -87,6 +87,10 @@ inline FieldWeights train_mean_head() {
     // The colour and the template point know the point by the feature alone, so that they move with the codes.
     const maq::head::FieldLayer first = weights.layer(shape.first_surface_layer());
     for (int o = 0; o < first.outputs; ++o) std::fill_n(first.row(o) + 1 + shape.feature, 3, 0.0f);
+    // The first half of the hidden layer makes the colour, the other the template point: colour codes move no point.
+    const maq::head::FieldLayer last = weights.layer(shape.layers() - 1);
+    for (int o = 0; o < last.outputs; ++o)
+      std::fill_n(last.row(o) + (o < 3 ? last.inputs / 2 : 0), last.inputs / 2, 0.0f);
     engine.set_weights(weights);
     engine.forward({columns[0].data(), columns[1].data(), columns[2].data(), kCount}, workspace,
                    {values[0].data(),
@@ -125,7 +129,8 @@ inline void add_stretch(int code, double s[3][3], double amount) {
   if (code < 3) {
     s[code][code] += 0.07 * amount;
   } else {
-    s[1][2] += 0.1 * amount;
+    s[1][2] += 0.07 * amount;
+    s[2][1] += 0.07 * amount;
   }
 }
 
@@ -186,7 +191,7 @@ inline HeadPrior make_prior() {
   std::normal_distribution<float> normal(0.0f, 0.15f);
   for (int code = 0; code < kColourCodes; ++code) {
     const maq::head::FieldLayer basis = prior.bases.basis_layer(field_shape().first_surface_layer(), code);
-    for (int o = 0; o < basis.outputs; ++o) basis.bias[o] = normal(random);
+    for (int o = 0; o < basis.outputs / 2; ++o) basis.bias[o] = normal(random);
   }
   // Anchors: where rays from the middle leave the mean head.
   constexpr int kAnchors = 240;

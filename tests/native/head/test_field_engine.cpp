@@ -226,20 +226,29 @@ TEST(FieldEngine, OnlyThePersonalLayersGetGradientsWhereOnlyTheyAreAsked) {
   const FieldEngine engine = engine_of(weights, fastest_field_isa());
   FieldWorkspace workspace;
   Batch batch(40);
-  FieldWeights all(weights.shape()), personal(weights.shape());
+  FieldWeights all(weights.shape());
   engine.forward(as_points(batch.points), workspace, batch.values());
   engine.backward(workspace, batch.gradient(), WeightGradient::kAll, &all);
-  engine.backward(workspace, batch.gradient(), WeightGradient::kPersonal, &personal);
   engine.backward(workspace, batch.gradient(), WeightGradient::kNone, nullptr, as_planes(batch.by_points));
-  int personal_layers = 0;
-  for (int index = 0; index < weights.shape().layers(); ++index) {
-    auto expected = as_lists(all)[size_t(index)];
-    if (!weights.shape().is_personal(index)) std::fill(expected.begin(), expected.end(), 0.0);
-    EXPECT_EQ(as_lists(personal)[size_t(index)], expected) << index;
-    personal_layers += weights.shape().is_personal(index);
-  }
-  EXPECT_EQ(personal_layers, 4);
   EXPECT_NE(batch.by_points[0][0], 0.0f);
+  for (const auto& [which, count] : {std::pair(WeightGradient::kPersonal, 4),
+                                     {WeightGradient::kPersonalGeometry, 3},
+                                     {WeightGradient::kPersonalSurface, 1}}) {
+    FieldWeights personal(weights.shape());
+    engine.backward(workspace, batch.gradient(), which, &personal);
+    int personal_layers = 0;
+    for (int index = 0; index < weights.shape().layers(); ++index) {
+      auto expected = as_lists(all)[size_t(index)];
+      const bool is_surface = index >= weights.shape().first_surface_layer();
+      const bool is_asked =
+          which == WeightGradient::kPersonal || is_surface == (which == WeightGradient::kPersonalSurface);
+      const bool is_expected = is_asked && weights.shape().is_personal(index);
+      if (!is_expected) std::fill(expected.begin(), expected.end(), 0.0);
+      EXPECT_EQ(as_lists(personal)[size_t(index)], expected) << index;
+      personal_layers += is_expected;
+    }
+    EXPECT_EQ(personal_layers, count);
+  }
 }
 
 TEST(FieldEngine, GradientsAreAddedInOneOrder) {

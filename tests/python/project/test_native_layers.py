@@ -103,6 +103,8 @@ FOREIGN = {
 
 # Units under 60 lines that one other unit uses, each with its reason to be one.
 DEFENDED = {
+    "head/fit/adam": "an algorithm of the literature, with a test of its own",
+    "head/fit/pose_rays": "geometry with a test of its own, against finite differences",
     "scene/render/refiner_roi": "geometry with tests of its own, against every pixel that the refiner reads",
 }
 

@@ -291,7 +291,15 @@ void FieldEngine::check_backward(const FieldWorkspace& workspace, const FieldVal
 }
 
 bool FieldEngine::wants(const Sums& sums, int index) const {
-  return sums.which == WeightGradient::kAll || (sums.which == WeightGradient::kPersonal && shape_.is_personal(index));
+  const bool is_surface = index >= shape_.first_surface_layer();
+  switch (sums.which) {
+    case WeightGradient::kNone: return false;
+    case WeightGradient::kPersonal: return shape_.is_personal(index);
+    case WeightGradient::kPersonalGeometry: return !is_surface && shape_.is_personal(index);
+    case WeightGradient::kPersonalSurface: return is_surface && shape_.is_personal(index);
+    case WeightGradient::kAll: return true;
+  }
+  return false;
 }
 
 void FieldEngine::add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in,
@@ -408,6 +416,7 @@ size_t FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient
     } else {
       std::copy(by_distance.begin(), by_distance.end(), memory.a);
     }
+    if (which == WeightGradient::kPersonalSurface && !to_points) continue;
     if (has_normals) {
       run_tangents(at, memory);
       tangents_backward(at, sums, used, to_points, memory);

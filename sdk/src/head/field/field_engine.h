@@ -40,7 +40,13 @@ struct FieldValueGradient {
   ConstPlanes normal{};
 };
 
-enum class WeightGradient { kNone, kPersonal, kAll };
+enum class WeightGradient {
+  kNone,
+  kPersonal,
+  kPersonalGeometry,  // the personal layers of one of the networks
+  kPersonalSurface,   // and what this costs: the geometry is gone through for the points alone
+  kAll
+};
 
 // The memory that calls share: grows to the largest batch and is not given back. One a thread.
 class FieldWorkspace {

@@ -1,0 +1,39 @@
+// What a ray of a photo says of the field, as losses with their derivatives: negative log likelihoods, where each error
+// e in squared sigmas costs 1/2 e / (1 + e / limit) (Geman-McClure): far off, it no longer pulls.
+#pragma once
+
+#include "core/math/vec3.h"
+#include "head/camera/se3.h"
+
+namespace maq::head {
+
+struct ThreeLoss {
+  double loss = 0;
+  double by[3] = {};
+};
+
+// The colour of logits against red, green and blue in 0..1, each with this sigma. By the logits.
+ThreeLoss colour_loss(const float* logits, const float* rgb, double sigma, double limit);
+
+// Of two points of the template head, each coordinate with this sigma (dm). By the first.
+ThreeLoss template_loss(const float* point, const float* observed, double sigma_dm, double limit);
+
+// The normal that the camera sees, rotation g / |g| of the distance's gradient g, against one of length 1; each
+// coordinate with this sigma. A gradient of 0 has no loss.
+struct NormalLoss {
+  double loss = 0;
+  Vec3 by_gradient;  // by g
+  Vec3 by_turn;      // by w, where the rotation is exp_rotation(w) rotation
+};
+NormalLoss normal_loss(Vec3 gradient, const Mat3& rotation, Vec3 observed, double sigma, double limit);
+
+// Cross entropy of the opacity 1 - e^log_transmittance with a matte in 0..1, of which a fraction `error_rate` is wrong
+// whatever it says: so a wrong one costs -log error_rate at most, and pulls at nothing far away. With a rate of 0 it is
+// matte_cross_entropy(). A matte that is not a number has no loss.
+struct OpacityLoss {
+  double loss = 0;
+  double by_log_transmittance = 0;
+};
+OpacityLoss matte_loss(double log_transmittance, double matte, double error_rate);
+
+}  // namespace maq::head

@@ -88,7 +88,7 @@ struct HeadFit {
 };
 
 // Deterministic for options, as long as it is not time that ends it; the same for any number of threads. Memory grows
-// with the photos (some 1 MB each), not with the steps. A step after which a number is not finite, or the loss far
+// with the photos (some 3 MB each), not with the steps. A step after which a number is not finite, or the loss far
 // higher, is refused: the best head so far is taken up again with half the rates.
 // Throws as fit_anchors() does, and MAQ_ERROR_INVALID_ARGUMENT for options that are not finite or out of range.
 HeadFit fit_head(const HeadPrior& prior, const std::vector<HeadPhoto>& photos, const HeadFitOptions& options,

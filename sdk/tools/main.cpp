@@ -7,8 +7,8 @@
 
 int main(int argc, char** argv) try {
   CLI::App app(
-      "Maquette: dense pose of people in images, clips and cameras, edges in frames of depth cameras, and scenes from "
-      "photos, on the CPU.");
+      "Maquette: dense pose of people in images, clips and cameras, edges in frames of depth cameras, heads and "
+      "scenes from photos, on the CPU.");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("maquette ") + maq_get_sdk_version());
   app.footer(
@@ -22,6 +22,7 @@ int main(int argc, char** argv) try {
   add_record_command(app, &exit_code);
   add_densepose_command(app, &exit_code);
   add_edges_command(app, &exit_code);
+  add_head_command(app, &exit_code);
   add_scene_command(app, &exit_code);
   add_bench_command(app, &exit_code);
   return run_program(app, argc, argv, &exit_code);

@@ -33,6 +33,12 @@ if(WAY STREQUAL "find_package")
   if(NOT output MATCHES "^4[0-9][0-9] x 4[0-9][0-9] x 4[0-9][0-9] mm, each within [0-9]+, [0-9]+ and [0-9]+ mm\n$")
     message(FATAL_ERROR "box_size printed ${output}")  # the carton is 441 x 427 x 411 mm
   endif()
+  run(build/head "image:${CMAKE_CURRENT_LIST_DIR}/../media/photo.jpg" head.glb
+    "${CMAKE_CURRENT_LIST_DIR}/../native/data/round_heads/bundle")
+  file(READ "${WORK_DIR}/head.glb" head LIMIT 4)
+  if(NOT output MATCHES "the nose ends [0-9]+ mm before" OR NOT head STREQUAL "glTF")
+    message(FATAL_ERROR "head printed ${output} and wrote ${head}")
+  endif()
 else()
   set(ENV{PKG_CONFIG_PATH} "${moved}/${LIBDIR}/pkgconfig")
   run(pkg-config --cflags --libs "maquette >= 0.2")

@@ -152,6 +152,13 @@ MAQ_API uint32_t maq_densepose_result_get_person_count(const maq_densepose_resul
 MAQ_API maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index,
                                                    maq_person* person);
 
+/* Gets a box around the pixels of the person at `index` that show the head (parts 23 and 24), in pixels of the frame:
+ * left, top, right, bottom, the latter two exclusive. For maq_head_photo.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range), MAQ_ERROR_NOT_FOUND (none of the head is seen).
+ * Does not block. */
+MAQ_API maq_status maq_densepose_result_get_head_box(const maq_densepose_result* result, uint32_t index,
+                                                     float box_px[4]);
+
 /* Gets a plane: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one with the
  * better score is in front.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */

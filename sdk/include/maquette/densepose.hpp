@@ -2,6 +2,7 @@
 #ifndef MAQUETTE_DENSEPOSE_HPP_
 #define MAQUETTE_DENSEPOSE_HPP_
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +42,15 @@ class DensePoseResult {
     std::vector<maq_person> people;
     for (uint32_t i = 0; i < person_count(); ++i) people.push_back(person(i));
     return people;
+  }
+
+  // Left, top, right, bottom; nothing where none of the head is seen.
+  std::optional<std::array<float, 4>> head_box_px(uint32_t index) const {
+    std::array<float, 4> box_px{};
+    const maq_status status = maq_densepose_result_get_head_box(get(), index, box_px.data());
+    if (status == MAQ_ERROR_NOT_FOUND) return std::nullopt;
+    check(status);
+    return box_px;
   }
 
   // height_px() rows of *stride_bytes.

@@ -16,6 +16,7 @@
  *
  *     _create                                 _destroy   contexts, sources, lists, models, builders, renderers, writers
  *     _open, _open_memory, _build, _finish    _close     captures and scenes
+ *     _open, _fit                             _destroy   heads
  *     _acquire_…, _run, _find_…, _load_…,     _release   frames, results and images, most from a pool of fixed size
  *     _wrap, _decode, _resize, _convert_yuv
  *
@@ -65,6 +66,7 @@
 #include "maquette/edges.h"
 #include "maquette/edges_fusion.h"
 #include "maquette/frame.h"
+#include "maquette/head.h"
 #include "maquette/pipeline.h"
 #include "maquette/recorder.h"
 #include "maquette/scene.h"

@@ -17,6 +17,7 @@
 #include "maquette/densepose.hpp"
 #include "maquette/edges.hpp"
 #include "maquette/frame.hpp"
+#include "maquette/head.hpp"
 #include "maquette/maquette.h"
 #include "maquette/pipeline.hpp"
 #include "maquette/scene.hpp"

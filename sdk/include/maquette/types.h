@@ -32,7 +32,7 @@ typedef enum maq_status {
   MAQ_OK = 0,
   MAQ_ERROR_INVALID_ARGUMENT = 1, /* a NULL, an out-of-range value, a wrong struct_size, an ill-formed URI */
   MAQ_ERROR_VERSION_MISMATCH = 2, /* the app's headers do not fit this library */
-  MAQ_ERROR_NOT_FOUND = 3,        /* a file or folder does not exist */
+  MAQ_ERROR_NOT_FOUND = 3,        /* a file, a folder, or what a call looks for does not exist */
   MAQ_ERROR_UNREADABLE = 4,       /* a file is there but cannot be decoded: damaged, truncated or another format */
   MAQ_ERROR_IMAGE_SIZE = 5,       /* an image has no pixels, or more than the limits in frame.h */
   MAQ_ERROR_BAD_BUNDLE = 6,       /* a model bundle is incomplete, changed, or not what its manifest says */
@@ -54,10 +54,11 @@ typedef enum maq_status {
 /* The id of a person who is not tracked. */
 #define MAQ_NO_ID (-1)
 
-/* For `threads` of dense pose and edges: the number is measured when the networks are made, on the machine as it is
- * then. One of them runs on zeros with 1, 2, and so on up to the default's number of threads, and the fewest are taken
- * that are within 5 % of the fastest: the others would cost energy for nothing. This takes up to about half a second,
- * more where preparing the network and running it twice on each number takes longer; with one large core, nothing. */
+/* For `threads` of dense pose, edges and heads: the number is measured when the networks are made, on the machine as it
+ * is then. One of them runs on zeros with 1, 2, and so on up to the default's number of threads, and the fewest are
+ * taken that are within 5 % of the fastest: the others would cost energy for nothing. This takes up to about half a
+ * second, more where preparing the network and running it twice on each number takes longer; with one large core,
+ * nothing. */
 #define MAQ_THREADS_MEASURED (-1)
 
 /* What runs the layers of networks. Values never change meaning; new ones are added at the end. */

@@ -172,6 +172,19 @@ maq_status maq_densepose_result_get_person(const maq_densepose_result* result, u
   });
 }
 
+maq_status maq_densepose_result_get_head_box(const maq_densepose_result* result, uint32_t index, float box_px[4]) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(box_px, "box_px");
+    require_index("index", index, result->result.people.size());
+    const std::optional<Box> box = head_bounds(result->result.planes, uint8_t(index + 1));
+    if (!box) throw Error(MAQ_ERROR_NOT_FOUND, "Person ", index, " shows no part of the head; choose another person.");
+    const float sides[] = {box->x0, box->y0, box->x1, box->y1};
+    std::copy_n(sides, 4, box_px);
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
                                           const uint8_t** pixels, size_t* stride_bytes) {
   return guarded(result, __func__, [&] {

@@ -28,7 +28,9 @@ enum class HandleKind : uint32_t {
   kEdges,
   kEdgesResult,
   kEdgesCurves,
-  kEdgesFusion
+  kEdgesFusion,
+  kHead,
+  kHeadBuilder
 };
 
 class HandleState {

@@ -307,6 +307,22 @@ void DensePlanes::reset(int width, int height) {
   for (std::vector<uint8_t>* plane : {&part, &u, &v, &person}) plane->assign(size_t(width) * size_t(height), 0);
 }
 
+std::optional<Box> head_bounds(const DensePlanes& planes, uint8_t person) {
+  constexpr uint8_t kHeadRight = 23, kHeadLeft = 24;
+  int left = planes.width_px, top = planes.height_px, right = 0, bottom = 0;
+  for (int y = 0; y < planes.height_px; ++y) {
+    const size_t row = size_t(y) * size_t(planes.width_px);
+    for (int x = 0; x < planes.width_px; ++x) {
+      const uint8_t part = planes.part[row + size_t(x)];
+      if ((part != kHeadRight && part != kHeadLeft) || planes.person[row + size_t(x)] != person) continue;
+      left = std::min(left, x), right = std::max(right, x + 1);
+      top = std::min(top, y), bottom = y + 1;
+    }
+  }
+  if (right == 0) return std::nullopt;
+  return Box{float(left), float(top), float(right), float(bottom)};
+}
+
 PixelRect pixel_rect(const Box& box) {
   const int x = int(std::floor(box.x0));
   const int y = int(std::floor(box.y0));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "densepose/box.h"
@@ -35,6 +36,9 @@ struct DensePlanes {
 
   void reset(int width, int height);
 };
+
+// Around the pixels of a person, counted from 1, that show the head (parts 23 and 24); nothing without any.
+std::optional<Box> head_bounds(const DensePlanes& planes, uint8_t person);
 
 struct DecodeCounts {
   int64_t body_pixels = 0;

@@ -24,4 +24,6 @@ std::string default_bundle() { return bundle_of("MAQ_BUNDLE", "densepose-b-int8"
 
 std::string default_edges_bundle() { return bundle_of("MAQ_EDGES_BUNDLE", "edges-int8"); }
 
+std::string default_heads_bundle() { return bundle_of("MAQ_HEADS_BUNDLE", "heads-int8"); }
+
 std::string default_scene_bundle() { return bundle_of("MAQ_SCENE_BUNDLE", "scenes-int8"); }

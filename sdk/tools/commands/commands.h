@@ -13,5 +13,6 @@ void add_play_command(CLI::App& app, int* exit_code);
 void add_record_command(CLI::App& app, int* exit_code);
 void add_densepose_command(CLI::App& app, int* exit_code);
 void add_edges_command(CLI::App& app, int* exit_code);
+void add_head_command(CLI::App& app, int* exit_code);
 void add_scene_command(CLI::App& app, int* exit_code);
 void add_bench_command(CLI::App& app, int* exit_code);

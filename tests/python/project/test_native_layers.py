@@ -21,11 +21,14 @@ FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
 CURVES = {"edges", "edges/curves"}
+HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh"}
 SYSTEMS = (
     SCENE
     | CURVES
-    | {"head/camera", "densepose", "edges/files", "edges/fusion", "edges/measuring", "sources", "sources/recording"}
-)
+    | HEAD
+    | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/build", "head/bundle", "head/files",
+       "sources", "sources/recording"}
+)  # fmt: skip
 MAY_INCLUDE = {
     "core": set(),
     "core/math": set(),
@@ -43,6 +46,7 @@ MAY_INCLUDE = {
     "edges/measuring": BASE - {"nn"} | CURVES,
     "head": {"core", "core/math", "head/camera", "head/field"},
     "head/bundle": BASE | {"head", "head/field", "head/files", "head/fit"},
+    "head/build": BASE | {"head/bundle"} | HEAD,
     "head/camera": {"core", "core/math"},
     "head/field": {"core"},
     "head/files": {"core", "core/math", "head", "head/camera", "head/field"},

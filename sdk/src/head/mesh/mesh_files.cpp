@@ -98,6 +98,10 @@ void append_bytes(std::string& to, const T* values, size_t count) {
   to.append(reinterpret_cast<const char*>(values), count * sizeof(T));  // every system of the SDK is little endian
 }
 
+bool ends_with(const std::string& path, const char* extension) {
+  return path.size() > 4 && path.compare(path.size() - 4, 4, extension) == 0;
+}
+
 }  // namespace
 
 std::string mesh_as_obj(const HeadMesh& mesh, const std::string& material) {
@@ -166,18 +170,18 @@ std::string mesh_as_ply(const HeadMesh& mesh) {
   return text;
 }
 
-void write_mesh_file(const HeadMesh& mesh, const std::string& path, const std::vector<uint8_t>& texture) {
-  const auto ends_with = [&path](const char* extension) {
-    return path.size() > 4 && path.compare(path.size() - 4, 4, extension) == 0;
-  };
-  const bool is_glb = ends_with(".glb"), is_obj = ends_with(".obj");
-  if (!is_glb && !is_obj && !ends_with(".ply")) {
+void require_mesh_file_name(const std::string& path) {
+  if (!ends_with(path, ".glb") && !ends_with(path, ".obj") && !ends_with(path, ".ply")) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The mesh cannot be written as ", path,
                 ": choose a name that ends with .glb, .obj or .ply.");
   }
+}
+
+void write_mesh_file(const HeadMesh& mesh, const std::string& path, const std::vector<uint8_t>& texture) {
+  require_mesh_file_name(path);
   check_mesh(mesh, texture);
-  if (is_obj) return write_obj(mesh, path, texture);
-  if (is_glb) {
+  if (ends_with(path, ".obj")) return write_obj(mesh, path, texture);
+  if (ends_with(path, ".glb")) {
     const std::vector<uint8_t> bytes = mesh_as_glb(mesh, texture);
     return write_file(path, bytes.data(), bytes.size());
   }

@@ -3,15 +3,15 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <nlohmann/json.hpp>
+#include <locale>
+#include <sstream>
 
+#include "core/error.h"
 #include "head/mesh/file_axes.h"
 #include "head/mesh/mesh_files.h"
 
 namespace maq::head {
 namespace {
-
-using nlohmann::json;
 
 enum ComponentType { kUnsignedByte = 5121, kUnsignedInt = 5125, kFloat = 5126 };
 enum BufferTarget { kNoTarget = 0, kVertices = 34962, kIndices = 34963 };
@@ -21,44 +21,44 @@ void append_word(std::vector<uint8_t>& to, uint32_t word) {
   to.insert(to.end(), bytes, bytes + sizeof word);
 }
 
-// Braces around one value are that value to some compilers, and a list to others.
-json array_of(json value) {
-  json made = json::array();
-  made.push_back(std::move(value));
-  return made;
+// Numbers as C writes them; exactly those of the floats.
+std::string text_of(const std::array<float, 3>& values) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text.precision(17);
+  text << '[' << double(values[0]) << ',' << double(values[1]) << ',' << double(values[2]) << ']';
+  return text.str();
 }
 
+// The JSON is written as text: its names are ours, and all else in it are numbers. (A library for it costs more bytes
+// than the rest of this file.)
 class GlbWriter {
  public:
-  // The number of the accessor.
+  // The number of the accessor. `more` ends its text: ",\"min\":…".
   template <class T>
-  size_t add_accessor(const std::vector<T>& values, size_t each, ComponentType type, BufferTarget target) {
+  size_t add_accessor(const std::vector<T>& values, size_t each, ComponentType type, BufferTarget target,
+                      const std::string& more = "") {
     static constexpr const char* kTypes[] = {"", "SCALAR", "VEC2", "VEC3", "VEC4"};
-    json accessor = {{"bufferView", add_view(values.data(), values.size() * sizeof(T), target)},
-                     {"componentType", int(type)},
-                     {"count", values.size() / each},
-                     {"type", kTypes[each]}};
-    if (type == kUnsignedByte) accessor["normalized"] = true;
-    json& accessors = file_["accessors"];
-    accessors.push_back(std::move(accessor));
-    return accessors.size() - 1;
+    add(accessors_, concatenate("{\"bufferView\":", add_view(values.data(), values.size() * sizeof(T), target),
+                                ",\"componentType\":", int(type), ",\"count\":", values.size() / each, ",\"type\":\"",
+                                kTypes[each], '"', type == kUnsignedByte ? ",\"normalized\":true" : "", more, '}'));
+    return accessor_count_++;
   }
 
   size_t add_view(const void* data, size_t bytes, BufferTarget target) {
-    json view = {{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bytes}};
-    if (target != kNoTarget) view["target"] = int(target);
+    std::string view = concatenate("{\"buffer\":0,\"byteOffset\":", bytes_.size(), ",\"byteLength\":", bytes);
+    if (target != kNoTarget) view += concatenate(",\"target\":", int(target));
+    add(views_, view + '}');
     bytes_.insert(bytes_.end(), static_cast<const uint8_t*>(data), static_cast<const uint8_t*>(data) + bytes);
     bytes_.resize((bytes_.size() + 3) / 4 * 4);
-    json& views = file_["bufferViews"];
-    views.push_back(std::move(view));
-    return views.size() - 1;
+    return view_count_++;
   }
 
-  json& file() { return file_; }
-
-  std::vector<uint8_t> finish() {
-    file_["buffers"] = array_of({{"byteLength", bytes_.size()}});
-    std::string text = file_.dump();
+  // `rest`: the other members of the file, ",\"meshes\":…".
+  std::vector<uint8_t> finish(const std::string& rest) {
+    std::string text =
+        concatenate("{\"asset\":{\"version\":\"2.0\",\"generator\":\"Maquette\"},\"accessors\":[", accessors_,
+                    "],\"bufferViews\":[", views_, "],\"buffers\":[{\"byteLength\":", bytes_.size(), "}]", rest, '}');
     text.resize((text.size() + 3) / 4 * 4, ' ');
     std::vector<uint8_t> made;
     made.reserve(28 + text.size() + bytes_.size());
@@ -75,7 +75,10 @@ class GlbWriter {
   }
 
  private:
-  json file_ = json::object();
+  static void add(std::string& list, const std::string& item) { list += (list.empty() ? "" : ",") + item; }
+
+  std::string accessors_, views_;
+  size_t accessor_count_ = 0, view_count_ = 0;
   std::vector<uint8_t> bytes_;
 };
 
@@ -107,47 +110,40 @@ std::vector<uint8_t> linear_colours(const std::vector<uint8_t>& colours) {
 std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t>& texture) {
   GlbWriter glb;
   const std::vector<float> positions = positions_in_file(mesh);
-  json attributes;
-  const size_t position = glb.add_accessor(positions, 3, kFloat, kVertices);
-  attributes["POSITION"] = position;
   std::array<float, 3> low{}, high{};
   for (size_t i = 0; i < positions.size(); ++i) {
     const size_t axis = i % 3;
     low[axis] = i < 3 ? positions[i] : std::min(low[axis], positions[i]);
     high[axis] = i < 3 ? positions[i] : std::max(high[axis], positions[i]);
   }
-  glb.file()["accessors"][position]["min"] = low;
-  glb.file()["accessors"][position]["max"] = high;
+  const std::string limits = ",\"min\":" + text_of(low) + ",\"max\":" + text_of(high);
+  std::string attributes = concatenate("\"POSITION\":", glb.add_accessor(positions, 3, kFloat, kVertices, limits));
   if (!mesh.normals.empty()) {
-    attributes["NORMAL"] = glb.add_accessor(normals_in_file(mesh), 3, kFloat, kVertices);
+    attributes += concatenate(",\"NORMAL\":", glb.add_accessor(normals_in_file(mesh), 3, kFloat, kVertices));
   }
-  json material = {
-      {"name", "head"},
-      {"pbrMetallicRoughness",
-       {{"baseColorFactor", json::array({1, 1, 1, 1})}, {"metallicFactor", 0}, {"roughnessFactor", 0.75}}}};
+  std::string of_material, of_file;
   if (!texture.empty()) {
-    attributes["TEXCOORD_0"] = glb.add_accessor(mesh.texture_coordinates, 2, kFloat, kVertices);
-    material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+    attributes += concatenate(",\"TEXCOORD_0\":", glb.add_accessor(mesh.texture_coordinates, 2, kFloat, kVertices));
+    of_material = ",\"baseColorTexture\":{\"index\":0}";
   } else if (!mesh.colours.empty()) {
-    attributes["COLOR_0"] = glb.add_accessor(linear_colours(mesh.colours), 4, kUnsignedByte, kVertices);
+    attributes +=
+        concatenate(",\"COLOR_0\":", glb.add_accessor(linear_colours(mesh.colours), 4, kUnsignedByte, kVertices));
   }
   const size_t indices = glb.add_accessor(mesh.triangles, 1, kUnsignedInt, kIndices);
-  json& file = glb.file();
   if (!texture.empty()) {
     const size_t view = glb.add_view(texture.data(), texture.size(), kNoTarget);
-    json image = {{"bufferView", view}, {"mimeType", is_png(texture) ? "image/png" : "image/jpeg"}};
-    file["images"] = array_of(std::move(image));
-    file["samplers"] = array_of({{"magFilter", 9729}, {"minFilter", 9987}});  // linear, with mip maps
-    file["textures"] = array_of({{"sampler", 0}, {"source", 0}});
+    of_file =
+        concatenate(",\"images\":[{\"bufferView\":", view, ",\"mimeType\":\"image/", is_png(texture) ? "png" : "jpeg",
+                    "\"}],\"samplers\":[{\"magFilter\":9729,\"minFilter\":9987}]"  // linear, with mip maps
+                    ",\"textures\":[{\"sampler\":0,\"source\":0}]");
   }
-  file["asset"] = {{"version", "2.0"}, {"generator", "Maquette"}};
-  file["materials"] = array_of(std::move(material));
-  json primitive = {{"attributes", std::move(attributes)}, {"indices", indices}, {"material", 0}};
-  file["meshes"] = array_of({{"name", "head"}, {"primitives", array_of(std::move(primitive))}});
-  file["nodes"] = array_of({{"name", "head"}, {"mesh", 0}});
-  file["scenes"] = array_of({{"nodes", array_of(0)}});
-  file["scene"] = 0;
-  return glb.finish();
+  return glb.finish(concatenate(
+      of_file,
+      ",\"materials\":[{\"name\":\"head\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,1],"
+      "\"metallicFactor\":0,\"roughnessFactor\":0.75",
+      of_material, "}}],\"meshes\":[{\"name\":\"head\",\"primitives\":[{\"attributes\":{", attributes,
+      "},\"indices\":", indices,
+      ",\"material\":0}]}],\"nodes\":[{\"name\":\"head\",\"mesh\":0}],\"scenes\":[{\"nodes\":[0]}],\"scene\":0"));
 }
 
 }  // namespace maq::head

@@ -1,0 +1,124 @@
+#include <algorithm>
+
+#include "api/boundary.h"
+#include "api/head_handle.h"
+#include "core/worker_threads.h"
+#include "head/build/head_surface.h"
+#include "head/files/head_file.h"
+#include "head/mesh/mesh_files.h"
+
+using namespace maq;
+
+namespace {
+
+constexpr float kDecimetre_m = 0.1f;
+
+std::vector<float> in_metres(std::vector<float> decimetres) {
+  for (float& value : decimetres) value *= kDecimetre_m;
+  return decimetres;
+}
+
+// Makes the mesh, unless it is there.
+const head::HeadMesh& mesh_of(maq_head& head, double cell_m) {
+  if (cell_m != 0) require_range("cell_m", cell_m, head::kMinSurfaceCell_m, head::kMaxSurfaceCell_m);
+  const double wanted_m = cell_m != 0 ? cell_m : head::kDefaultSurfaceCell_m;
+  if (head.mesh_cell_m == wanted_m) return head.mesh;
+  WorkerThreads threads(head.threads);
+  head::HeadMesh mesh = head::head_surface(head.head, wanted_m, threads);
+  std::vector<float> positions_m = in_metres(mesh.positions), template_points_m = in_metres(mesh.template_points);
+  head.mesh = std::move(mesh);
+  head.positions_m = std::move(positions_m);
+  head.template_points_m = std::move(template_points_m);
+  head.mesh_cell_m = wanted_m;
+  return head.mesh;
+}
+
+}  // namespace
+
+maq_status maq_head_open(maq_context* context, const char* path, maq_head** head) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(path, "path");
+    require_argument(head, "head");
+    *head = new maq_head(head::read_head_file(path), default_threads());
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_save(const maq_head* head, const char* path) {
+  return guarded(head, __func__, [&] {
+    require_argument(head, "head");
+    require_argument(path, "path");
+    head::write_head_file(head->head, path);
+    return MAQ_OK;
+  });
+}
+
+void maq_head_destroy(maq_head* head) { destroy(head, "head", __func__); }
+
+maq_status maq_head_get_info(const maq_head* head, maq_head_info* info) {
+  return guarded(head, __func__, [&] {
+    require_argument(head, "head");
+    const head::StoredHead& from = head->head;
+    maq_head_info filled{};
+    filled.photo_count = uint32_t(from.cameras.size());
+    filled.landmark_count = uint32_t(from.places.size());
+    filled.scale = maq_head_scale(from.scale.source);
+    filled.scale_sigma = float(from.scale.sigma / from.scale.metres_per_unit);
+    write_struct(info, "info", filled, sizeof(maq_head_info));
+    return MAQ_OK;
+  });
+}
+
+const char* maq_head_get_landmark_name(const maq_head* head, uint32_t index) {
+  const char* name = nullptr;
+  guarded(head, __func__, [&] {
+    require_argument(head, "head");
+    if (index < head->head.places.size()) name = head->head.places[index].name.c_str();
+    return MAQ_OK;
+  });
+  return name;
+}
+
+maq_status maq_head_get_landmark(const maq_head* head, const char* name, maq_head_landmark* landmark) {
+  return guarded(head, __func__, [&] {
+    require_argument(head, "head");
+    require_argument(name, "name");
+    const head::HeadPlace place = head::find_head_place(head->head, name);
+    const double metres = head->head.scale.metres_per_unit;
+    maq_head_landmark filled{};
+    filled.sigma_m = float(place.sigma * metres);
+    filled.point_m[0] = place.point.x * metres;
+    filled.point_m[1] = place.point.y * metres;
+    filled.point_m[2] = place.point.z * metres;
+    write_struct(landmark, "landmark", filled, sizeof(maq_head_landmark));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_get_mesh(maq_head* head, double cell_m, maq_head_mesh* mesh) {
+  return guarded_alone(head, "head", __func__, [&] {
+    require_argument(mesh, "mesh");
+    require_struct_size("mesh", mesh->struct_size, sizeof(maq_head_mesh), sizeof(maq_head_mesh));
+    const head::HeadMesh& made = mesh_of(*head, cell_m);
+    maq_head_mesh filled{};
+    filled.vertex_count = uint32_t(made.vertex_count());
+    filled.triangle_count = uint32_t(made.triangle_count());
+    filled.positions_m = head->positions_m.data();
+    filled.normals = made.normals.data();
+    filled.colours_rgb = made.colours.data();
+    filled.template_points_m = head->template_points_m.data();
+    filled.triangles = made.triangles.data();
+    write_struct(mesh, "mesh", filled, sizeof(maq_head_mesh));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_export(maq_head* head, const char* path, double cell_m) {
+  return guarded_alone(head, "head", __func__, [&] {
+    require_argument(path, "path");
+    head::require_mesh_file_name(path);
+    head::write_mesh_file(mesh_of(*head, cell_m), path);
+    return MAQ_OK;
+  });
+}

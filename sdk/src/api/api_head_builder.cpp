@@ -1,0 +1,148 @@
+#include <algorithm>
+#include <memory>
+
+#include "api/boundary.h"
+#include "api/bundle_argument.h"
+#include "api/frame_handle.h"
+#include "api/head_handle.h"
+#include "core/worker_threads.h"
+#include "head/build/head_builder.h"
+#include "nn/provider.h"
+
+using namespace maq;
+
+namespace {
+
+// Of the structs' first release.
+constexpr size_t kFirstConfigSize = sizeof(maq_head_config), kFirstPhotoSize = sizeof(maq_head_photo);
+constexpr char kHeadsBundle[] = "heads-int8";  // of a config without one
+
+maq_head_config default_config() {
+  maq_head_config config{};
+  config.struct_size = sizeof config;
+  config.allow_spinning = 1;
+  return config;
+}
+
+maq_head_photo default_photo() {
+  maq_head_photo photo{};
+  photo.struct_size = sizeof photo;
+  return photo;
+}
+
+SessionSettings session_settings(const maq_head_config& config) {
+  require_threads("config.threads", config.threads, kMaxThreads);
+  require_range("config.allow_spinning", config.allow_spinning, 0, 1);
+  require_provider("config.provider", config.provider);
+  return {config.threads != 0 ? config.threads : default_threads(), config.allow_spinning == 1};
+}
+
+}  // namespace
+
+struct maq_head_builder : HandleOf<HandleKind::kHeadBuilder> {
+  maq_head_builder(std::shared_ptr<ContextState> of, std::unique_ptr<head::HeadBuilder> made)
+      : state(std::move(of)), builder(std::move(made)) {}
+  std::shared_ptr<ContextState> state;
+  std::unique_ptr<head::HeadBuilder> builder;
+};
+
+maq_status maq_head_config_init(maq_head_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+}
+
+maq_status maq_head_photo_init(maq_head_photo* photo, uint32_t struct_size) {
+  return init_config(__func__, photo, struct_size, default_photo(), kFirstPhotoSize, "photo");
+}
+
+maq_status maq_head_builder_create(maq_context* context, const maq_head_config* given, maq_head_builder** builder) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(builder, "builder");
+    const maq_head_config config = read_config(given, "config", default_config(), kFirstConfigSize);
+    SessionSettings settings = session_settings(config);
+    Bundle bundle = read_bundle_argument(config, "config", kHeadsBundle);
+    const Manifest manifest = bundle.manifest;
+    const auto runtime = context->state->onnxruntime();
+    settings.provider = available_provider(*runtime, config.provider);
+    auto made = std::make_unique<head::HeadBuilder>(runtime, std::move(bundle), settings);
+    context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
+                                ") loaded, ", made->threads(), " thread(s)");
+    *builder = new maq_head_builder(context->state, std::move(made));
+    return MAQ_OK;
+  });
+}
+
+void maq_head_builder_destroy(maq_head_builder* builder) { destroy(builder, "builder", __func__); }
+
+maq_status maq_head_builder_add_photo(maq_head_builder* builder, const maq_frame* frame, const maq_head_photo* photo) {
+  return guarded_alone(builder, "builder", __func__, [&] {
+    require_argument(frame, "frame");
+    const maq_head_photo known = read_config(photo, "photo", default_photo(), kFirstPhotoSize);
+    head::PhotoHints hints;
+    std::copy_n(known.box_px, 4, hints.box_px.begin());
+    hints.roll_rad = double(known.roll_rad);
+    hints.focal_px = double(known.focal_px);
+    builder->builder->add_photo(frame->frame.image, hints);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_builder_clear(maq_head_builder* builder) {
+  return guarded_alone(builder, "builder", __func__, [&] {
+    builder->builder->clear();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_builder_fit(maq_head_builder* builder, double seconds, maq_head_progress_callback progress,
+                                void* user_data, maq_head** head) {
+  return guarded_alone(builder, "builder", __func__, [&] {
+    require_argument(head, "head");
+    head::HeadBuilder::Progress report;
+    if (progress != nullptr) report = [&](double done) { return progress(user_data, done) != 0; };
+    head::StoredHead fitted = builder->builder->fit(seconds, report);
+    *head = new maq_head(std::move(fitted), builder->builder->threads());
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_builder_cancel(maq_head_builder* builder) {
+  return guarded(builder, __func__, [&] {
+    require_argument(builder, "builder");
+    builder->builder->cancel();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_builder_get_stats(const maq_head_builder* builder, maq_head_stats* stats) {
+  return guarded_alone(builder, "builder", __func__, [&] {
+    const head::HeadBuildStats& from = builder->builder->stats();
+    maq_head_stats filled{};
+    filled.photo_count = uint32_t(builder->builder->photo_count());
+    filled.used_photo_count = uint32_t(from.used_photos);
+    filled.encode_ms = float(from.encode_ms);
+    filled.pose_ms = float(from.pose_ms);
+    filled.fit_ms = float(from.fit_ms);
+    filled.total_ms = float(from.total_ms);
+    filled.step_count = from.steps;
+    filled.provider = builder->builder->provider();
+    filled.threads = builder->builder->threads();
+    write_struct(stats, "stats", filled, sizeof(maq_head_stats));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_builder_get_photo(const maq_head_builder* builder, uint32_t index, maq_head_photo_info* info) {
+  return guarded_alone(builder, "builder", __func__, [&] {
+    require_index("index", index, builder->builder->photo_count());
+    const head::PhotoFound& from = builder->builder->found(index);
+    maq_head_photo_info filled{};
+    std::copy(from.box_px.begin(), from.box_px.end(), filled.box_px);
+    filled.head_fraction = float(from.head_fraction);
+    filled.is_used = from.is_used ? 1 : 0;
+    filled.focal_px = float(from.focal_px);
+    filled.rms_px = float(from.rms_px);
+    write_struct(info, "info", filled, sizeof(maq_head_photo_info));
+    return MAQ_OK;
+  });
+}

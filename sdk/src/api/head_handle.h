@@ -1,0 +1,19 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "api/handle.h"
+#include "head/mesh/head_mesh.h"
+#include "head/stored_head.h"
+#include "maquette/head.h"
+
+// A head stays what it is while the app has it; its mesh is made when it is asked for.
+struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
+  maq_head(maq::head::StoredHead of, int thread_count) : head(std::move(of)), threads(thread_count) {}
+  const maq::head::StoredHead head;
+  const int threads;
+  maq::head::HeadMesh mesh;
+  std::vector<float> positions_m, template_points_m;  // of the mesh
+  double mesh_cell_m = 0;                             // 0: none was made
+};

@@ -1,0 +1,265 @@
+#include "head/build/head_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/clock.h"
+#include "core/error.h"
+
+namespace maq::head {
+namespace {
+
+// Less is no head, or one that tells nothing: of 48 x 48 cells a head fills some 600.
+constexpr size_t kMinHeadCells = 40;
+constexpr double kMinMatte = 0.5;
+// Of the found cells, so many may be strays on each side of the head's box.
+constexpr double kStrayFraction = 0.01;
+constexpr int kLooksAround = 2;  // once a head was found somewhere in a photo
+// A box that moved by less of its size is the same.
+constexpr float kSameBox = 0.15f;
+
+// Of a camera that is not known: that of phones and of portrait lenses is 0.7 to 2 times the long side.
+constexpr double kFocalOfLongSide = 1.0, kLogFocalSigma = 0.35;
+
+bool is_given(const std::array<float, 4>& box) {
+  return std::any_of(box.begin(), box.end(), [](float side) { return side != 0; });
+}
+
+void check_hints(const ImageView& photo, const PhotoHints& hints) {
+  const std::array<float, 4>& box = hints.box_px;
+  const auto refuse = [&](const char* what) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The box of the head is (", box[0], ", ", box[1], ") to (", box[2], ", ",
+                box[3], "), ", what, "; the photo has ", photo.width_px, " x ", photo.height_px,
+                " pixels. Give left, top, right and bottom of the head, or zeros to have it found.");
+  };
+  if (is_given(box)) {
+    if (!std::all_of(box.begin(), box.end(), [](float side) { return std::isfinite(side); }))
+      refuse("which is not finite");
+    if (!(box[2] > box[0]) || !(box[3] > box[1])) refuse("which is empty");
+    if (box[2] <= 0 || box[3] <= 0 || box[0] >= float(photo.width_px) || box[1] >= float(photo.height_px)) {
+      refuse("which is outside of the photo");
+    }
+  }
+  if (!(std::abs(hints.roll_rad) <= 7)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The roll of the head is ", hints.roll_rad,
+                ", but must be -7 to 7 radians; upright is 0.");
+  }
+  if (hints.focal_px != 0 && !(hints.focal_px >= 1e-3 && hints.focal_px <= 1e9)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The focal length is ", hints.focal_px,
+                ", but must be 0.001 to 1e9 pixels, or 0 where it is not known.");
+  }
+}
+
+bool shows_head(const HeadCell& cell) { return cell.is_usable && cell.matte > kMinMatte; }
+
+// Around the cells that show the head, without strays.
+std::array<float, 4> box_of(const HeadObservations& seen) {
+  std::vector<double> x, y;
+  for (const HeadCell& cell : seen.cells) {
+    if (!shows_head(cell)) continue;
+    x.push_back(cell.x_px);
+    y.push_back(cell.y_px);
+  }
+  const auto ends = [&](std::vector<double>& values) {
+    std::sort(values.begin(), values.end());
+    const size_t strays = size_t(kStrayFraction * double(values.size()));
+    // Half a cell on each side, and pixels end half a pixel from their middle.
+    return std::pair{float(values[strays] + 0.5 - seen.cell_px / 2),
+                     float(values[values.size() - 1 - strays] + 0.5 + seen.cell_px / 2)};
+  };
+  const auto [left, right] = ends(x);
+  const auto [top, bottom] = ends(y);
+  return {left, top, right, bottom};
+}
+
+bool is_same(const std::array<float, 4>& a, const std::array<float, 4>& b) {
+  const float limit = kSameBox * std::max(b[2] - b[0], b[3] - b[1]);
+  for (size_t side = 0; side < 4; ++side) {
+    if (std::abs(a[side] - b[side]) > limit) return false;
+  }
+  return true;
+}
+
+// How much the size of heads differs, as a fraction of it: what the codes, whitened, do to the anchors' mean distance
+// from their middle.
+double size_sigma(const HeadPrior& prior) {
+  const HeadAnchors& anchors = prior.anchors;
+  const size_t count = anchors.count(), codes = size_t(prior.shape_codes());
+  std::array<double, 3> middle{};
+  for (size_t i = 0; i < 3 * count; ++i) middle[i % 3] += double(anchors.mean[i]) / double(count);
+  double squares = 0;
+  std::vector<double> by_code(codes);
+  for (size_t i = 0; i < 3 * count; ++i) {
+    const double from_middle = double(anchors.mean[i]) - middle[i % 3];
+    squares += from_middle * from_middle;
+    for (size_t k = 0; k < codes; ++k) by_code[k] += from_middle * double(anchors.linear[i * codes + k]);
+  }
+  double sum = 0;
+  for (const double value : by_code) sum += value * value;
+  return squares > 0 ? std::sqrt(sum) / squares : 0;
+}
+
+StoredAnchors anchors_of(const HeadPrior& prior, const std::vector<float>& shape) {
+  StoredAnchors stored{prior.anchors.template_points, prior.anchors.mean, prior.anchors.sigma};
+  for (size_t i = 0; i < stored.points.size(); ++i) {
+    double point = double(stored.points[i]);
+    for (size_t k = 0; k < shape.size(); ++k) point += double(prior.anchors.linear[i * shape.size() + k] * shape[k]);
+    stored.points[i] = float(point);
+  }
+  return stored;
+}
+
+[[noreturn]] void refuse_photos(const std::vector<PhotoFit>& photos) {
+  throw Error(MAQ_ERROR_NOT_FOUND, photos.size() == 1 ? "The photo" : "None of the photos",
+              photos.size() == 1 ? " does not show a head that can be fitted: " : " shows a head that can be fitted: ",
+              pose_status_text(photos.front().status),
+              " Use a photo where the face is seen, 64 pixels or more across, and give its box.");
+}
+
+}  // namespace
+
+HeadBuilder::HeadBuilder(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, Bundle bundle,
+                         const SessionSettings& settings)
+    : bundle_(std::move(bundle)), encoder_(runtime, bundle_, settings), cancel_(runtime) {}
+
+void HeadBuilder::add_photo(const ImageView& photo, const PhotoHints& hints) {
+  check_hints(photo, hints);
+  if (photos_.size() >= kMaxFitPhotos) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "There are ", photos_.size(),
+                " photos already, which is the most for one head; fit them, or clear them for another head.");
+  }
+  const Stopwatch watch;
+  const size_t before = found_.size();
+  try {
+    cancel_.check();
+    look_at(photo, hints);
+    cancel_.check();  // one that comes later is of the next call
+  } catch (...) {
+    cancel_.reset();
+    photos_.resize(before);
+    found_.resize(before);
+    throw;
+  }
+  stats_.encode_ms += watch.elapsed_ms();
+}
+
+void HeadBuilder::clear() {
+  photos_.clear();
+  found_.clear();
+  encoding_ = {};
+  stats_ = {};
+}
+
+HeadBuilder::Seen HeadBuilder::look(const ImageView& photo, const HeadSquare& square) {
+  encoder_.run(photo, square, cancel_, encoding_);
+  Seen seen;
+  seen.cells = read_observations(encoding_.cells.data(), encoder_.spec().cells, encoding_.crop_to_photo, photo.width_px,
+                                 photo.height_px);
+  seen.head_cells = size_t(std::count_if(seen.cells.cells.begin(), seen.cells.cells.end(), shows_head));
+  return seen;
+}
+
+std::array<float, 4> HeadBuilder::find_head(const ImageView& photo, double roll_rad) {
+  const double middle_x = photo.width_px / 2.0, middle_y = photo.height_px / 2.0;
+  // A square in the middle, then one with all of the photo.
+  for (const int side : {std::min(photo.width_px, photo.height_px), std::max(photo.width_px, photo.height_px)}) {
+    const Seen seen = look(photo, {middle_x, middle_y, std::max(2.0, double(side)), roll_rad});
+    if (seen.head_cells >= kMinHeadCells) return box_of(seen.cells);
+  }
+  throw Error(MAQ_ERROR_NOT_FOUND, "No head is seen in the photo of ", photo.width_px, " x ", photo.height_px,
+              " pixels. Give the box of the head, or a photo where it is larger.");
+}
+
+void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
+  const bool was_given = is_given(hints.box_px);
+  std::array<float, 4> box = was_given ? hints.box_px : find_head(photo, hints.roll_rad);
+  Seen seen;
+  for (int looks = was_given ? 1 : kLooksAround; looks > 0; --looks) {
+    seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), hints.roll_rad,
+                                     encoder_.spec()));
+    if (seen.head_cells < kMinHeadCells) {
+      throw Error(MAQ_ERROR_NOT_FOUND, "No head is seen in the box (", box[0], ", ", box[1], ") to (", box[2], ", ",
+                  box[3], ") of the photo. Give the box of the head with its hair, and its roll where it leans.");
+    }
+    if (looks == 1) break;
+    const std::array<float, 4> around = box_of(seen.cells);
+    if (is_same(around, box)) break;
+    box = around;
+  }
+  const double long_side = std::max(photo.width_px, photo.height_px);
+  HeadPhoto made;
+  made.seen = std::move(seen.cells);
+  made.width_px = photo.width_px, made.height_px = photo.height_px;
+  made.focal_px = hints.focal_px > 0 ? hints.focal_px : kFocalOfLongSide * long_side;
+  made.log_focal_sigma = hints.focal_px > 0 ? 0 : kLogFocalSigma;
+  made.cx_px = (photo.width_px - 1) / 2.0, made.cy_px = (photo.height_px - 1) / 2.0;
+  made.rgb_side = encoder_.spec().crop_px();
+  made.rgb = encoding_.rgb;
+  const double cells = double(made.seen.cells.size());
+  photos_.push_back(std::move(made));
+  found_.push_back({box, double(seen.head_cells) / cells, false, 0, 0});
+}
+
+StoredHead HeadBuilder::fit(double seconds, const Progress& progress) {
+  if (!(seconds >= 0 && seconds <= 3600)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The time for the fit is ", seconds, " s, but must be 0 to 3600.");
+  }
+  if (photos_.empty()) throw Error(MAQ_ERROR_INVALID_ARGUMENT, "There are no photos; add one before the fit.");
+  for (PhotoFound& found : found_) found.is_used = false, found.focal_px = found.rms_px = 0;
+  stats_ = {stats_.encode_ms};
+  const Stopwatch watch;
+  try {
+    cancel_.check();
+    StoredHead head = fit_photos(seconds, progress);
+    cancel_.check();
+    stats_.total_ms = watch.elapsed_ms();
+    return head;
+  } catch (...) {
+    cancel_.reset();
+    throw;
+  }
+}
+
+StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
+  const auto report = [&](double done) {
+    if (progress && !progress(done)) cancel_.cancel();
+    cancel_.check();
+  };
+  report(0);
+  const HeadPrior& prior = bundle_.prior;
+  HeadFitOptions options;
+  options.seconds = seconds;
+  WorkerThreads threads(encoder_.threads());
+  HeadFit fit = fit_head(prior, photos_, options, threads, [&](const HeadFitProgress& now) {
+    report(std::min(1.0, std::max(now.seconds / seconds, double(now.steps) / options.max_steps)));
+    return true;
+  });
+  stats_.pose_ms = 1e3 * fit.stats.anchor_seconds;
+  stats_.fit_ms = 1e3 * (fit.stats.seconds - fit.stats.anchor_seconds);
+  stats_.steps = fit.stats.steps;
+  stats_.used_photos = fit.start.used();
+  if (!fit.start.is_found()) refuse_photos(fit.start.photos);
+
+  StoredHead head(std::move(fit.weights));
+  for (size_t i = 0; i < photos_.size(); ++i) {
+    const PhotoFit& photo = fit.photos[i];
+    if (!photo.is_used()) continue;
+    found_[i].is_used = true;
+    found_[i].focal_px = photo.camera.focal_px;
+    found_[i].rms_px = photo.rms_px;
+    head.cameras.push_back(photo.camera);
+  }
+  head.scale.sigma = size_sigma(prior) * head.scale.metres_per_unit;
+  head.sharpness = prior.sharpness;
+  head.cut = prior.cut;
+  head.bounds = prior.bounds;
+  head.anchors = anchors_of(prior, fit.codes.shape);
+  head.places = prior.places;
+  head.prior_sha256 = bundle_.prior_sha256;
+  head.codes = std::move(fit.codes);
+  report(1);
+  return head;
+}
+
+}  // namespace maq::head

@@ -1,0 +1,88 @@
+// From photos to a head: the encoder looks at each, cameras and codes are found, then fitted to the pixels.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/worker_threads.h"
+#include "head/bundle/head_bundle.h"
+#include "head/bundle/head_encoder.h"
+#include "head/fit/head_fit.h"
+#include "head/fit/observations.h"
+#include "head/stored_head.h"
+#include "nn/session.h"
+
+namespace maq::head {
+
+// As in maq_head_photo, whose comments say what they mean.
+struct PhotoHints {
+  std::array<float, 4> box_px{};
+  double roll_rad = 0;
+  double focal_px = 0;
+};
+
+// As in maq_head_photo_info.
+struct PhotoFound {
+  std::array<float, 4> box_px{};
+  double head_fraction = 0;
+  bool is_used = false;
+  double focal_px = 0, rms_px = 0;
+};
+
+struct HeadBuildStats {
+  double encode_ms = 0;  // over all photos
+  double pose_ms = 0, fit_ms = 0, total_ms = 0;
+  int steps = 0;
+  size_t used_photos = 0;
+};
+
+class HeadBuilder {
+ public:
+  // Throws what HeadBundle and HeadEncoder throw.
+  HeadBuilder(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, Bundle bundle, const SessionSettings& settings);
+  HeadBuilder(const HeadBuilder&) = delete;
+  HeadBuilder& operator=(const HeadBuilder&) = delete;
+
+  // On failure nothing changes. Throws MAQ_ERROR_INVALID_ARGUMENT for hints that no photo of that size can have, and
+  // for more than kMaxFitPhotos; MAQ_ERROR_NOT_FOUND where no head is seen; what HeadEncoder::run() throws.
+  void add_photo(const ImageView& photo, const PhotoHints& hints);
+  void clear();
+  size_t photo_count() const { return photos_.size(); }
+  const PhotoFound& found(size_t index) const { return found_[index]; }
+  const HeadBuildStats& stats() const { return stats_; }
+
+  // Gets the fraction that is done; false: no further.
+  using Progress = std::function<bool(double done)>;
+  // Throws MAQ_ERROR_INVALID_ARGUMENT without photos, MAQ_ERROR_NOT_FOUND where no photo shows a head, MAQ_CANCELLED.
+  StoredHead fit(double seconds, const Progress& progress);
+
+  // From any thread: ends the call that runs, or else the next.
+  void cancel() noexcept { cancel_.cancel(); }
+
+  int threads() const { return encoder_.threads(); }
+  maq_provider provider() const { return encoder_.provider(); }
+
+ private:
+  struct Seen {
+    HeadObservations cells;
+    size_t head_cells = 0;  // of which the matte says that they show the head
+  };
+  void look_at(const ImageView& photo, const PhotoHints& hints);
+  Seen look(const ImageView& photo, const HeadSquare& square);
+  // Where the head is in a photo whose app does not know. Throws MAQ_ERROR_NOT_FOUND.
+  std::array<float, 4> find_head(const ImageView& photo, double roll_rad);
+  StoredHead fit_photos(double seconds, const Progress& progress);
+
+  HeadBundle bundle_;
+  HeadEncoder encoder_;
+  RunCancel cancel_;
+  HeadEncoding encoding_;
+  std::vector<HeadPhoto> photos_;
+  std::vector<PhotoFound> found_;
+  HeadBuildStats stats_;
+};
+
+}  // namespace maq::head

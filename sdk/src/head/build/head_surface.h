@@ -1,0 +1,29 @@
+// The surface of a fitted head as a mesh, with normals, colours and template points; and where its named places lie.
+#pragma once
+
+#include <string>
+
+#include "core/worker_threads.h"
+#include "head/mesh/head_mesh.h"
+#include "head/stored_head.h"
+
+namespace maq::head {
+
+inline constexpr double kDefaultSurfaceCell_m = 0.0016, kMinSurfaceCell_m = 0.0005, kMaxSurfaceCell_m = 0.02;
+
+// Marching cubes of max(the field's distance, that to the cut plane), so that the head is closed below the chin; of
+// this the largest piece. Normals are the gradient of what is larger of the two. Lengths are true decimetres: those of
+// the head's frame times its scale. `cell_m`: the edge of a cube in metres. The same for any number of threads.
+// Throws MAQ_ERROR_INVALID_ARGUMENT for a cell beyond the limits, or of which more than kMaxCellsPerAxis would be
+// needed; MAQ_ERROR_UNSUPPORTED where the field has no surface in its domain; what marching_cubes() throws.
+HeadMesh head_surface(const StoredHead& head, double cell_m, WorkerThreads& threads);
+
+struct HeadPlace {
+  Vec3 point;        // in the head's frame and unit
+  double sigma = 0;  // standard deviation of each coordinate, as the anchors around it have
+};
+
+// By the anchors around the place. Throws MAQ_ERROR_NOT_FOUND for a name that the head does not have.
+HeadPlace find_head_place(const StoredHead& head, const std::string& name);
+
+}  // namespace maq::head

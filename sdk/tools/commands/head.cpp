@@ -1,0 +1,376 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "arguments/bundle_argument.h"
+#include "arguments/model_options.h"
+#include "arguments/source_argument.h"
+#include "commands/commands.h"
+#include "commands/head_commands.h"
+#include "interrupt.h"
+#include "output/output_file.h"
+#include "output/progress_bar.h"
+#include "print.h"
+#include "program.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using BoxPx = std::array<float, 4>;
+
+struct HeadOptions {
+  std::vector<std::string> photos;
+  std::string out, save;
+  double seconds = 3;
+  std::string person = "1";
+  std::vector<float> box;
+  double roll_deg = 0;
+  float focal_px = 0;
+  double cell_mm = 0;
+  std::string densepose;
+  NetworkOptions network;
+  bool json = false;
+};
+
+constexpr int kHeadPermille = 1000;
+constexpr double kRadians = 3.14159265358979323846 / 180;
+
+class LapTimer {
+ public:
+  // Milliseconds since the last call, or since this was made.
+  double lap_ms() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - start_).count();
+    start_ = now;
+    return ms;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+struct Photo {
+  SourceArgument argument;
+  maquette::Frame frame;
+  float focal_px;            // 0: not known
+  std::vector<BoxPx> heads;  // the largest first; empty: none was found
+};
+
+// One head to be fitted, and its files.
+struct Task {
+  size_t person;  // from 0
+  std::string out, save;
+};
+
+struct Stages {
+  double find_ms = 0, look_ms = 0, pose_ms = 0, fit_ms = 0, mesh_ms = 0;
+};
+
+Photo read_photo(const HeadOptions& options, const maquette::Context& context, const std::string& text) {
+  SourceArgument argument = parse_source_argument(text);
+  maquette::Source source(context, argument.uri);
+  const StoppedByInterrupt stopped(source);
+  std::optional<maquette::Frame> frame = source.next();
+  if (!frame) throw std::runtime_error(argument.uri + " has no picture.");
+  float focal_px = options.focal_px;
+  if (focal_px == 0) {
+    if (const auto intrinsics = source.intrinsics()) focal_px = float(intrinsics->fx_px);
+  }
+  return {std::move(argument), std::move(*frame), focal_px, {}};
+}
+
+// Heads of the people in the photos.
+void find_heads(const HeadOptions& options, const maquette::Context& context, std::vector<Photo>& photos) {
+  if (!options.box.empty()) {
+    for (Photo& photo : photos) photo.heads = {{options.box[0], options.box[1], options.box[2], options.box[3]}};
+    return;
+  }
+  const std::string bundle = options.densepose.empty() ? default_bundle() : options.densepose;
+  if (bundle.empty()) {
+    print_error(
+        "No bundle of dense pose was found, so the head is looked for in the middle; see --densepose, --box.\n");
+    return;
+  }
+  maq_densepose_config config = maquette::default_densepose_config();
+  config.bundle_path = bundle.c_str();
+  config.threads = options.network.threads;
+  config.detail = MAQ_DENSEPOSE_DETAIL_PART;
+  maquette::DensePose densepose(context, config);
+  for (Photo& photo : photos) {
+    const maquette::DensePoseResult result = densepose.run(photo.frame);
+    for (uint32_t i = 0; i < result.person_count(); ++i) {
+      if (const auto box = result.head_box_px(i)) photo.heads.push_back(*box);
+    }
+    const auto area = [](const BoxPx& box) { return (box[2] - box[0]) * (box[3] - box[1]); };
+    std::stable_sort(photo.heads.begin(), photo.heads.end(),
+                     [&](const BoxPx& a, const BoxPx& b) { return area(a) > area(b); });
+  }
+}
+
+// head.glb -> head_2.glb.
+std::string with_number(const std::string& path, size_t number) {
+  if (path.empty()) return path;
+  const fs::path given(path);
+  return (given.parent_path() / (given.stem().string() + "_" + std::to_string(number) + given.extension().string()))
+      .string();
+}
+
+std::vector<Task> tasks_of(const HeadOptions& options, const std::vector<Photo>& photos) {
+  const Photo& first = photos.front();
+  if (options.person != "all") {
+    const size_t person = size_t(std::stoul(options.person)) - 1;
+    if (person > 0 && person >= first.heads.size()) {
+      throw std::runtime_error(first.argument.uri + " shows " + std::to_string(first.heads.size()) +
+                               " heads, so there is no person " + options.person + "; name another, or --box.");
+    }
+    return {{person, options.out, options.save}};
+  }
+  if (first.heads.empty()) throw std::runtime_error(first.argument.uri + " shows no heads of people.");
+  std::vector<Task> tasks;
+  for (size_t i = 0; i < first.heads.size(); ++i) {
+    tasks.push_back({i, with_number(options.out, i + 1), with_number(options.save, i + 1)});
+  }
+  return tasks;
+}
+
+void add_photos(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
+                maquette::HeadBuilder& builder) {
+  for (const Photo& photo : photos) {
+    maq_head_photo known = maquette::default_head_photo();
+    if (!photo.heads.empty()) {
+      const BoxPx& box = photo.heads[std::min(task.person, photo.heads.size() - 1)];
+      std::copy(box.begin(), box.end(), known.box_px);
+    }
+    known.roll_rad = float(options.roll_deg * kRadians);
+    known.focal_px = photo.focal_px;
+    try {
+      builder.add_photo(photo.frame, known);
+    } catch (const maquette::Error& error) {
+      throw std::runtime_error(photo.argument.uri + ": " + error.what());
+    }
+  }
+}
+
+nlohmann::ordered_json describe_photo(const Photo& photo, const maq_head_photo_info& found) {
+  return {{"photo", photo.argument.uri},       {"box_px", found.box_px},
+          {"used", found.is_used != 0},        {"focal_px", found.focal_px},
+          {"focal_known", photo.focal_px > 0}, {"rms_px", found.rms_px}};
+}
+
+void print_photo(const Photo& photo, const maq_head_photo_info& found) {
+  const float* const box = found.box_px;
+  print_output("%s  head of %.0f x %.0f px", photo.argument.uri.c_str(), double(box[2] - box[0]),
+               double(box[3] - box[1]));
+  if (found.is_used == 0) {
+    print_output("  left out: it shows no head, or another than the other photos\n");
+    return;
+  }
+  print_output("  focal length %.0f px (%s)  points within %.1f px\n", double(found.focal_px),
+               photo.focal_px > 0 ? "given" : "estimated", double(found.rms_px));
+}
+
+void print_result(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
+                  const maquette::HeadBuilder& builder, maquette::Head& head, const maq_head_mesh* mesh,
+                  const Stages& stages) {
+  const maq_head_info info = head.info();
+  const maq_head_stats stats = builder.stats();
+  const double pupils_m = pupil_distance_m(head);
+  if (options.json) {
+    nlohmann::ordered_json document = {{"person", task.person + 1}, {"photos", nlohmann::ordered_json::array()}};
+    for (uint32_t i = 0; i < photos.size(); ++i)
+      document["photos"].push_back(describe_photo(photos[i], builder.photo(i)));
+    if (!task.out.empty()) document["out"] = task.out;
+    if (!task.save.empty()) document["save"] = task.save;
+    if (mesh != nullptr) document["vertices"] = mesh->vertex_count, document["triangles"] = mesh->triangle_count;
+    document["scale_sigma"] = info.scale_sigma;
+    if (pupils_m > 0) document["pupil_distance_m"] = pupils_m;
+    document["steps"] = stats.step_count;
+    document["threads"] = stats.threads;
+    document["provider"] = name_of(stats.provider);
+    document["ms"] = {{"find", rounded_ms(stages.find_ms)},
+                      {"look", rounded_ms(stages.look_ms)},
+                      {"pose", rounded_ms(stages.pose_ms)},
+                      {"fit", rounded_ms(stages.fit_ms)},
+                      {"mesh", rounded_ms(stages.mesh_ms)}};
+    print_output("%s\n", json_text(document).c_str());
+    flush_output();
+    return;
+  }
+  for (uint32_t i = 0; i < photos.size(); ++i) print_photo(photos[i], builder.photo(i));
+  print_output("  size %s", text_of_scale(info).c_str());
+  if (pupils_m > 0) print_output("; pupils %.0f mm apart", 1e3 * pupils_m);
+  print_output("\n  find people %.0f | look %.0f | pose %.0f | fit %.0f (%d steps) | mesh and files %.0f ms\n",
+               stages.find_ms, stages.look_ms, stages.pose_ms, stages.fit_ms, stats.step_count, stages.mesh_ms);
+  if (mesh != nullptr) {
+    print_output("%s: %u vertices, %u triangles\n", task.out.c_str(), mesh->vertex_count, mesh->triangle_count);
+  }
+  if (!task.save.empty()) print_output("%s: the head itself; see `maquette head info`\n", task.save.c_str());
+}
+
+void fit_one(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
+             maquette::HeadBuilder& builder, Stages stages) {
+  builder.clear();
+  LapTimer timer;
+  add_photos(options, photos, task, builder);
+  stages.look_ms = timer.lap_ms();
+  ProgressBar progress("fitting", kHeadPermille);
+  const auto show = [&](double done) {
+    progress.advance(int64_t(done * kHeadPermille), "");
+    return !interrupted();
+  };
+  maquette::Head head(nullptr);
+  try {
+    head = builder.fit(options.seconds, show);
+  } catch (const maquette::Error&) {
+    if (!interrupted()) throw;
+    throw std::runtime_error("Interrupted; no file was written.");
+  }
+  progress.finish();
+  const maq_head_stats stats = builder.stats();
+  stages.pose_ms = double(stats.pose_ms), stages.fit_ms = double(stats.fit_ms);
+  timer.lap_ms();
+  const double cell_m = options.cell_mm * 1e-3;
+  std::optional<maq_head_mesh> mesh;
+  if (!task.out.empty()) {
+    head.export_mesh(task.out, cell_m);
+    mesh = head.mesh(cell_m);
+  }
+  if (!task.save.empty()) head.save(task.save);
+  stages.mesh_ms = timer.lap_ms();
+  print_result(options, photos, task, builder, head, mesh ? &*mesh : nullptr, stages);
+}
+
+void require_files(const HeadOptions& options, const std::vector<Task>& tasks) {
+  for (const Task& task : tasks) {
+    for (const std::string* path : {&task.out, &task.save}) {
+      if (path->empty()) continue;
+      make_folder_of(*path);
+      require_writable(*path);
+    }
+  }
+  if (!options.save.empty() && options.save == options.out) {
+    throw std::runtime_error("--out and --save are the same file; give each a name of its own.");
+  }
+}
+
+int run_head(const HeadOptions& options) {
+  catch_interrupts();
+  const std::string bundle = options.network.bundle.empty() ? default_heads_bundle() : options.network.bundle;
+  if (bundle.empty()) {
+    throw std::runtime_error("No bundle of heads was found; name its folder with --bundle or MAQ_HEADS_BUNDLE.");
+  }
+  const maquette::Context context = open_context();
+  std::vector<Photo> photos;
+  for (const std::string& text : options.photos) photos.push_back(read_photo(options, context, text));
+  maq_head_config config = maquette::default_head_config();
+  config.bundle_path = bundle.c_str();
+  config.threads = options.network.threads;
+  config.allow_spinning = options.network.no_spin ? 0 : 1;
+  config.provider = provider_of(options.network);
+  maquette::HeadBuilder builder(context, config);
+  Stages stages;
+  LapTimer timer;
+  find_heads(options, context, photos);
+  stages.find_ms = timer.lap_ms();
+  const std::vector<Task> tasks = tasks_of(options, photos);
+  require_files(options, tasks);
+  int failed = 0;
+  for (const Task& task : tasks) {
+    if (tasks.size() == 1) {
+      fit_one(options, photos, task, builder, stages);
+      continue;
+    }
+    try {
+      if (!interrupted()) fit_one(options, photos, task, builder, stages);
+    } catch (const OutputLost&) {
+      throw;
+    } catch (const std::exception& error) {
+      flush_output();
+      print_error("maquette: person %zu: %s\n", task.person + 1, printable(error.what()).c_str());
+      ++failed;
+    }
+  }
+  return failed == 0 && !interrupted() ? 0 : 1;
+}
+
+std::string check_mesh_name(const std::string& path) {
+  const std::string ending = fs::path(path).extension().string();
+  return ending == ".glb" || ending == ".obj" || ending == ".ply" ? std::string()
+                                                                  : path + " must end with .glb, .obj or .ply";
+}
+
+std::string check_person(const std::string& text) {
+  return text == "all" || CLI::Range(1, 255)(text).empty() ? std::string() : text + " is neither 1 to 255 nor \"all\"";
+}
+
+}  // namespace
+
+void add_head_command(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<HeadOptions>();
+  CLI::App* command = app.add_subcommand("head", "Make a 3D head from one photo of a person, or from several");
+  CLI::Option* const photos =
+      command->add_option("photo", options->photos, "Photos of one person: photo.jpg, 'image:photo.jpg?fov=60'");
+  command->add_option("-o,--out", options->out, "Mesh to write: .glb (for most programs), .obj or .ply")
+      ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
+  command->add_option("--save", options->save, "Also keep the head itself, some 60 KB: head.maqh");
+  command
+      ->add_option("--seconds", options->seconds,
+                   "Time for the fit to the pixels (default 3); 0: only what the network sees at a glance")
+      ->check(CLI::Range(0.0, 3600.0));
+  command
+      ->add_option("--person", options->person,
+                   "Whose head, where the photo shows several: 1 has the largest head (default), 2 the next, or all "
+                   "(head_1.glb, head_2.glb)")
+      ->check(CLI::Validator(check_person, "1 to 255, or all"));
+  command
+      ->add_option("--box", options->box,
+                   "Where the head with its hair is, in pixels: left,top,right,bottom; people are not looked for then")
+      ->delimiter(',')
+      ->expected(4);
+  command->add_option("--roll", options->roll_deg, "How far the head is turned clockwise in the photo, degrees")
+      ->check(CLI::Range(-360.0, 360.0));
+  command
+      ->add_option("--focal-px", options->focal_px,
+                   "Focal length of the camera in pixels of the photo; default: estimated, or by the photo's fov=")
+      ->check(CLI::Range(1e-3f, 1e9f));
+  command->add_option("--cell", options->cell_mm, "Distance of the mesh's vertices, mm (default 1.6)")
+      ->check(CLI::Range(0.5, 20.0));
+  command->add_option("--densepose", options->densepose,
+                      "Folder of the bundle that finds people; default: MAQ_BUNDLE, then the installed one");
+  command->add_flag("--json", options->json, "Print what was found as one JSON line per head");
+  add_network_options(*command, options->network, "MAQ_HEADS_BUNDLE");
+  command->footer(
+      "The mesh is closed, coloured and in metres, with y up and the face to the front, and ends below the chin. A "
+      "photo\n"
+      "does not tell how large a head is: it is taken to be of average size. What the photo does not show, the back "
+      "of\n"
+      "the head above all, is made up as heads are that look alike. More photos of the same person, from the sides,\n"
+      "help; each may be from another camera. Faces should be 64 pixels or more across.\n\n"
+      "A face is biometric data: ask the person. Nothing leaves this machine, and a saved head holds no photo.\n\n"
+      "Examples:\n"
+      "  maquette head photo.jpg --out head.glb\n"
+      "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
+      "  maquette head group.jpg --out heads/head.ply --person all\n"
+      "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
+      "  maquette head info head.maqh");
+  command->require_subcommand(0, 1);
+  add_head_info_command(*command, exit_code);
+  command->callback([=] {
+    if (!command->get_subcommands().empty()) return;
+    if (photos->empty()) throw CLI::RequiredError(photos->get_name());
+    if (options->out.empty() && options->save.empty()) throw CLI::RequiredError("--out or --save");
+    if (options->photos.size() > 1 && (options->person != "1" || !options->box.empty())) {
+      throw CLI::ValidationError("--person and --box", "are for a single photo");
+    }
+    *exit_code = run_head(*options);
+  });
+}

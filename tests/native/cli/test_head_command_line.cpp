@@ -1,0 +1,116 @@
+// `maquette head` as a person meets it: files, what is printed, sentences.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "support/program_run.h"
+
+namespace {
+
+class HeadCommandLine : public ::testing::Test {
+ protected:
+  HeadCommandLine() {
+    cv::imwrite(folder_.file("grey.png"), cv::Mat(240, 320, CV_8UC3, cv::Scalar(120, 130, 140)));
+    cv::imwrite(folder_.file("blue.png"), cv::Mat(240, 320, CV_8UC3, cv::Scalar(200, 60, 20)));
+    cv::imwrite(folder_.file("black.png"), cv::Mat(240, 320, CV_8UC3, cv::Scalar(0, 0, 0)));
+  }
+
+  Outcome run(const std::string& arguments) const { return run_program(folder_, environment_, "head " + arguments); }
+  void expect_error(const std::string& arguments, int exit_code, const std::string& text) const {
+    const Outcome result = run(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << arguments << "\n" << result.err;
+    EXPECT_NE((result.err + result.out).find(text), std::string::npos) << result.err << result.out;
+  }
+  bool exists(const std::string& name) const { return std::filesystem::exists(folder_.file(name)); }
+
+  TempFolder folder_;
+  std::string environment_ =
+      "MAQ_BUNDLE='" MAQ_TEST_MODELS "/densepose-b-int8' MAQ_HEADS_BUNDLE='" MAQ_TEST_DATA "/round_heads/bundle'";
+};
+
+TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
+  const Outcome result = run("grey.png --box 110,60,200,180 --out o/head.glb --save o/head.maqh --seconds 0 --cell 8");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out.rfind("file:grey.png  head of 90 x 120 px  focal length ", 0), 0u) << result.out;
+  for (const char* text : {"px (estimated)", "size as heads are on average, give or take 4.1 %; pupils ", "mm apart",
+                           "look ", "pose ", "o/head.glb: ", " triangles", "o/head.maqh"}) {
+    EXPECT_NE(result.out.find(text), std::string::npos) << text << "\n" << result.out;
+  }
+  EXPECT_EQ(read_text(folder_.file("o/head.glb")).substr(0, 4), "glTF");
+
+  const Outcome info = run("info o/head.maqh");
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  for (const char* text : {"photos     1", "as heads are on average", "pupils     ", "nose_tip", "crown"}) {
+    EXPECT_NE(info.out.find(text), std::string::npos) << text << "\n" << info.out;
+  }
+  const auto document = nlohmann::json::parse(run("info o/head.maqh --json").out);
+  EXPECT_EQ(document["photos"], 1);
+  EXPECT_EQ(document["scale"], "prior");
+  EXPECT_EQ(document["landmarks"].size(), 5u);
+  EXPECT_GT(document["landmarks"]["crown"]["point_m"][2], 0.08);
+}
+
+TEST_F(HeadCommandLine, JsonSaysWhatWasFound) {
+  const Outcome result =
+      run("grey.png 'image:grey.png?fov=60' blue.png --out head.ply --seconds 0 --cell 8 --json --threads 1");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto document = nlohmann::json::parse(result.out);
+  ASSERT_EQ(document["photos"].size(), 3u);
+  EXPECT_EQ(document["photos"][0]["used"], true);
+  EXPECT_EQ(document["photos"][0]["focal_known"], false);
+  EXPECT_EQ(document["photos"][1]["focal_known"], true);
+  EXPECT_NEAR(document["photos"][1]["focal_px"].get<double>(), 160 / std::tan(30 * 3.14159265358979 / 180), 0.01);
+  EXPECT_EQ(document["photos"][2]["used"], false) << "another head";
+  EXPECT_EQ(document["out"], "head.ply");
+  EXPECT_GT(document["vertices"], 100);
+  EXPECT_EQ(document["threads"], 1);
+  for (const char* stage : {"find", "look", "pose", "fit", "mesh"}) EXPECT_GE(document["ms"][stage], 0) << stage;
+  const Outcome text = run("grey.png grey.png blue.png --out head.ply --seconds 0 --cell 8");
+  EXPECT_NE(text.out.find("file:blue.png  head of "), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("left out: it shows no head, or another than the other photos"), std::string::npos);
+}
+
+TEST_F(HeadCommandLine, PeopleAreFoundByDensePose) {
+  const Outcome one = run("'" MAQ_TEST_MEDIA "/photo.jpg' --save a.maqh --seconds 0 --json");
+  ASSERT_EQ(one.exit_code, 0) << one.err;
+  const auto box = nlohmann::json::parse(one.out)["photos"][0]["box_px"];
+  EXPECT_LT(box[2].get<double>() - box[0].get<double>(), 300) << "the head, not the photo";
+  const Outcome all =
+      run("'" MAQ_TEST_MEDIA "/photo.jpg' --save b/a.maqh --out b/a.obj --person all --seconds 0 --cell 8");
+  ASSERT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_TRUE(exists("b/a_1.maqh"));
+  EXPECT_TRUE(exists("b/a_1.obj"));
+  EXPECT_TRUE(exists("b/a_1.mtl"));
+  expect_error("'" MAQ_TEST_MEDIA "/photo.jpg' --out c.glb --person 99", 1, "heads, so there is no person 99");
+}
+
+TEST_F(HeadCommandLine, ErrorsSayWhatToDo) {
+  expect_error("", 2, "photo is required");
+  expect_error("grey.png", 2, "--out or --save is required");
+  expect_error("grey.png --out head.stl", 2, "must end with .glb, .obj or .ply");
+  expect_error("grey.png --out a.glb --box 1,2,3", 2, "--box");
+  expect_error("grey.png --out a.glb --seconds -1", 2, "--seconds");
+  expect_error("grey.png --out a.glb --focal-px -3", 2, "--focal-px");
+  expect_error("grey.png --out a.glb --focal-px nan", 1, "The focal length is nan");
+  expect_error("grey.png --out a.glb --person nobody", 2, "neither 1 to 255 nor");
+  expect_error("grey.png blue.png --out a.glb --person 2", 2, "are for a single photo");
+  expect_error("none.png --out a.glb", 1, "none.png does not exist");
+  expect_error("grey.png --out a.glb --box 400,60,500,180", 1, "outside of the photo");
+  expect_error("black.png --out a.glb --box 110,60,200,180", 1, "file:black.png: No head is seen in the box");
+  expect_error("blue.png --out a.glb --seconds 0", 1, "does not show a head that can be fitted");
+  expect_error("grey.png --out a.glb --bundle /nowhere", 1, "/nowhere");
+  expect_error("grey.png --out a.glb --save a.glb", 1, "are the same file");
+  expect_error("info grey.png", 1, "grey.png");
+  EXPECT_FALSE(exists("a.glb"));
+}
+
+TEST_F(HeadCommandLine, HelpTeachesWithExamples) {
+  const Outcome result = run("--help");
+  EXPECT_EQ(result.exit_code, 0);
+  for (const char* text : {"maquette head photo.jpg --out head.glb", "--person all", "biometric", "info"}) {
+    EXPECT_NE(result.out.find(text), std::string::npos) << text;
+  }
+}
+
+}  // namespace

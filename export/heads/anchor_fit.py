@@ -2,8 +2,8 @@
 
 The point of a head with codes z that a pixel shows is x(τ; z) = τ + Σ w_k (a_k(z) - t_k), τ the template point seen
 there, a_k the four anchors nearest to it and t_k their own template points. Levenberg-Marquardt over rotation,
-translation, log focal length and z, with a prior on z (N(0, 1)) and on the focal length (log-normal), robust against
-outliers (Geman-McClure).
+translation, log focal length and z, with a prior on z (what the encoder says of codes) and on the focal
+length (log-normal), robust against outliers (Geman-McClure).
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ NEIGHBOURS = 4
 
 @dataclass(frozen=True)
 class Observations:
-    """Of one photo: template points [N, 3] dm, their sigma [N] dm, pixels [N, 2] of the photo."""
+    """Of one photo: template points [N, 3] dm, their sigma [N] dm, pixels [N, 2] of the photo; shape codes [K, 2]: what
+    the encoder says of them, means and log sigmas."""
 
     template: np.ndarray
     sigma: np.ndarray
     pixels: np.ndarray
+    codes: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ def fit_anchors(prior: Prior, seen: Observations, options: AnchorFitOptions) -> 
     centre = np.array(options.centre_px)
     rotation, shift = start(mean, seen.pixels, options.focal_px, centre)
     count = linear.shape[2]
-    z, log_focal, damping = np.zeros(count), np.log(options.focal_px), 1e-3
+    expected, inverse = seen.codes[:, 0].astype(np.float64), np.exp(-2 * seen.codes[:, 1].astype(np.float64))
+    z, log_focal, damping = expected.copy(), np.log(options.focal_px), 1e-3
     sigma_dm = np.hypot(seen.sigma, model_sigma)
 
     def residuals(rotation, shift, log_focal, z):
@@ -110,7 +113,7 @@ def fit_anchors(prior: Prior, seen: Observations, options: AnchorFitOptions) -> 
 
     def cost(r, z, log_focal):
         prior_focal = (log_focal - np.log(options.focal_px)) / options.log_focal_sigma
-        return options.weight * robust(r)[0].sum() + z @ z + prior_focal**2
+        return options.weight * robust(r)[0].sum() + (z - expected) ** 2 @ inverse + prior_focal**2
 
     r, points, sigma = residuals(rotation, shift, log_focal, z)
     now = cost(r, z, log_focal)
@@ -133,8 +136,8 @@ def fit_anchors(prior: Prior, seen: Observations, options: AnchorFitOptions) -> 
         j = (jacobian * np.sqrt(weight)[:, None, None]).reshape(-1, 7 + count)
         v = (r * np.sqrt(weight)[:, None]).reshape(-1)
         normal, gradient = j.T @ j, j.T @ v
-        normal[7:, 7:] += np.eye(count)
-        gradient[7:] += z
+        normal[7:, 7:] += np.diag(inverse)
+        gradient[7:] += inverse * (z - expected)
         normal[6, 6] += options.log_focal_sigma**-2
         gradient[6] += (log_focal - np.log(options.focal_px)) / options.log_focal_sigma**2
         if step < 2:  # first the camera alone

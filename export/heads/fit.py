@@ -3,7 +3,7 @@
 Stage 0 is `export.heads.anchor_fit`. Stage 1 goes on from there: Adam over shape codes, colour codes and the camera.
 Each step draws rays through pixels; a ray has 12 sections around the surface that a search along it finds, and NeuS
 opacity in its log form. Terms, each the negative log of a probability: colours (robust), matte (cross entropy), normals
-of the surface against the encoder's, the terms of stage 0, and N(0, 1) of the codes. Colours move colour codes alone:
+of the surface against the encoder's, the terms of stage 0 and its prior of the codes. Colours move colour codes alone:
 one photo does not hold depth, and a shape that follows colours goes wrong while the picture gets better.
 """
 
@@ -130,6 +130,8 @@ class Fit:
         self._anchor = tuple(
             torch.tensor(a[keep], dtype=torch.float32) for a in (mean, linear, np.hypot(seen.sigma, sigma), seen.pixels)
         )
+        codes = torch.tensor(seen.codes, dtype=torch.float32)
+        self._expected, self._inverse = codes[:, 0], (-2 * codes[:, 1]).exp()
         self._pixels(photo)
         self.losses: list[dict[str, float]] = []
 
@@ -186,7 +188,8 @@ class Fit:
             group["lr"] = rate * (1 - 0.9 * fraction)
         terms = self._terms()
         self.optimizer.zero_grad()
-        loss = sum(terms.values()) + 0.5 * (self.z.square().sum() + self.c.square().sum())
+        z = (self._inverse * (self.z - self._expected).square()).sum()
+        loss = sum(terms.values()) + 0.5 * (z + self.c.square().sum())
         loss.backward()
         self.optimizer.step()
         row = {name: float(value) for name, value in terms.items()}

@@ -7,6 +7,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "head/fit/adam.h"
+#include "head/fit/code_prior.h"
 
 namespace maq::head {
 namespace {
@@ -78,6 +79,9 @@ class Fitter {
                         photos[i].log_focal_sigma});
       parts_.back().terms.set_noise(now_.poses.back(), z.data(), 0);
     }
+    std::vector<const HeadPhoto*> seen;
+    for (const Part& part : parts_) seen.push_back(&photos[part.photo]);
+    code_prior_ = code_prior(seen, shape_codes_);
     const size_t unknowns = shape_codes_ + colour_codes_ + kPoseUnknowns * parts_.size();
     full_gradient_.resize(unknowns);
     change_.resize(unknowns);
@@ -200,14 +204,15 @@ class Fitter {
   // Stage 0's terms and priors; adds their gradient where it is asked for.
   void add_priors(const State& state, HeadLosses& losses, double* gradient) {
     const std::vector<double> z = as_doubles(state.codes.shape);
-    const auto add_codes = [&](const std::vector<float>& codes, double* by) {
-      for (size_t k = 0; k < codes.size(); ++k) {
-        losses.prior += 0.5 * double(codes[k]) * double(codes[k]);
-        if (by != nullptr) by[k] += double(codes[k]);
-      }
-    };
-    add_codes(state.codes.shape, gradient);
-    add_codes(state.codes.colour, gradient == nullptr ? nullptr : gradient + shape_codes_);
+    losses.prior += 0.5 * code_prior_.cost(z.data());
+    for (size_t k = 0; gradient != nullptr && k < shape_codes_; ++k) {
+      gradient[k] += code_prior_.inverse_variances[k] * (z[k] - code_prior_.means[k]);
+    }
+    for (size_t k = 0; k < colour_codes_; ++k) {
+      const auto code = double(state.codes.colour[k]);
+      losses.prior += 0.5 * code * code;
+      if (gradient != nullptr) gradient[shape_codes_ + k] += code;
+    }
     std::vector<double> by_codes(shape_codes_);
     for (size_t i = 0; i < parts_.size(); ++i) {
       const Part& part = parts_[i];
@@ -359,6 +364,7 @@ class Fitter {
   RayGradient gradient_;
   size_t shape_codes_, colour_codes_;
   Shuffle shuffle_;
+  CodePrior code_prior_;
   std::vector<Part> parts_;
   State now_, best_;
   HeadLosses best_losses_;

@@ -13,8 +13,8 @@
 
 namespace maq::head {
 
-// What is minimised is a negative log posterior: 1/2 |z|^2 for codes that are normal a priori, the focal length's
-// prior, `anchor_weight` times the terms of stage 0, and those of rays (RayTermOptions), of which
+// What is minimised is a negative log posterior: code_prior() for shape codes, 1/2 |c|^2 for colour codes, the focal
+// length's prior, `anchor_weight` times the terms of stage 0, and those of rays (RayTermOptions), of which
 // `anchors.terms.cell_weight` a cell of the encoder count: its neighbours say the same.
 struct HeadFitOptions {
   AnchorFitOptions anchors;

@@ -1,0 +1,167 @@
+"""Photos of heads whose shape is known, made from stored pictures (`export.heads.view_shards`, `other_heads`): in front
+of photographs without people, framed as cameras frame them, so that the principal point is the photo's middle."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from benchmarks.heads.distances import TruePoints
+from export.camera import Camera
+from export.heads.judge import is_face
+from export.heads.surface import cut_distance
+from export.heads.view_shards import HeadPictures, read_pictures
+
+MM_PER_DM = 100
+HEAD = 255  # of masks
+MAX_YAW_DEG, MAX_PITCH_DEG = 45.0, 35.0
+FRONT_YAW_DEG, SIDE_YAW_DEG = 20.0, (35.0, 110.0)
+# Focal length by the photo's long side, of phones (wide to telephoto) and portrait lenses.
+FOCAL_OF_LONG_SIDE = (0.7, 1.6)
+NARROW_BY_LONG = 0.75
+MARGIN = 1.1  # a photo is so much larger than what it must show of the head
+NOISE = 1.5  # standard deviation, of 0..255
+
+
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """rgb: uint8 [H, W, 3]; box: of the head with its hair, left, top, right, bottom; camera: the true one, in dm of
+    the head's frame; mask: bool [H, W]: the head above its cut."""
+
+    rgb: np.ndarray
+    box: np.ndarray
+    camera: Camera
+    mask: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class TrueHead:
+    """Pictures of a head, and points of its surface."""
+
+    name: str
+    pictures: HeadPictures
+    true: TruePoints
+
+    def front(self) -> int | None:
+        """The first picture from less than 45 degrees to the side; None: there is none."""
+        shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
+        return next((k for k in shown if _is_from(self.pictures, k, -MAX_YAW_DEG, MAX_YAW_DEG)), None)
+
+    def front_and_sides(self) -> tuple[int, int, int] | None:
+        """The first pictures from the front, the left and the right; None: there are none of one of these."""
+        near, far = SIDE_YAW_DEG
+        spans = ((-FRONT_YAW_DEG, FRONT_YAW_DEG), (near, far), (-far, -near))
+        shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
+        found = [next((k for k in shown if _is_from(self.pictures, k, *span)), None) for span in spans]
+        return None if None in found else tuple(found)
+
+
+class PhotoBackgrounds:
+    """Photographs without people, cut to any size."""
+
+    def __init__(self, folder: Path) -> None:
+        self.paths = sorted(p for p in folder.rglob("*") if p.suffix in (".jpg", ".png"))
+        if not self.paths:
+            raise FileNotFoundError(f"{folder} holds no photos: run `python -m export.photos fetch` first")
+
+    def cut(self, rng: np.random.Generator, width: int, height: int) -> np.ndarray:
+        """A random part of a random photo, RGB uint8 [height, width, 3]."""
+        image = cv2.imread(str(self.paths[rng.integers(len(self.paths))]))[..., ::-1]
+        scale = max(width / image.shape[1], height / image.shape[0]) * rng.uniform(1, 1.4)
+        image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else 1)
+        x = int(rng.integers(max(image.shape[1] - width, 0) + 1))
+        y = int(rng.integers(max(image.shape[0] - height, 0) + 1))
+        return cv2.resize(image[y : y + height, x : x + width], (width, height))
+
+
+def yaw_pitch_deg(rotation: np.ndarray) -> tuple[float, float]:
+    """From where a camera sees the head: 0, 0 from the front, positive from the person's left and from above."""
+    away = -rotation[2]
+    return float(np.degrees(np.arctan2(away[0], -away[1]))), float(np.degrees(np.arcsin(np.clip(away[2], -1, 1))))
+
+
+def _is_from(pictures: HeadPictures, k: int, low: float, high: float) -> bool:
+    yaw, pitch = yaw_pitch_deg(pictures.rotation[k])
+    return low <= yaw <= high and abs(pitch) < MAX_PITCH_DEG
+
+
+def _is_whole(pictures: HeadPictures, k: int) -> bool:
+    """Whether the picture shows the head and its border does not cut it off, but at the neck."""
+    mask = pictures.masks[k] == HEAD
+    return bool(mask.any() and not mask[0].any() and not mask[:, 0].any() and not mask[:, -1].any())
+
+
+def camera_of(pictures: HeadPictures, k: int) -> Camera:
+    focal, cx, cy = pictures.intrinsics[k]
+    rotation, shift = pictures.rotation[k], pictures.shift[k]
+    side = pictures.rgb.shape[1]
+    return Camera(side, side, focal, focal, cx, cy, rotation, -rotation.T @ shift)
+
+
+def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng: np.random.Generator) -> Photo:
+    """Picture k as a camera takes it. What the picture shows of the bust goes on beyond its border."""
+    camera, mask = camera_of(pictures, k), pictures.masks[k] == HEAD
+    y, x = np.nonzero(mask)
+    box = np.array([x.min(), y.min(), x.max() + 1, y.max() + 1], np.float64)
+    # Half the photo reaches from the principal point over the head's box.
+    reach = MARGIN * np.abs(box.reshape(2, 2) - 0.5 - [camera.cx_px, camera.cy_px]).max(0)
+    long = camera.fx_px / np.exp(rng.uniform(*np.log(FOCAL_OF_LONG_SIDE)))
+    width = 2 * int(np.ceil(max(NARROW_BY_LONG * long / 2, reach[0])))
+    height = 2 * int(np.ceil(max(long / 2, reach[1])))
+    # The picture moves by less than half a pixel, so that it need not be sampled anew; the camera knows of it.
+    left = round(camera.cx_px - (width - 1) / 2)
+    top = round(camera.cy_px - (height - 1) / 2)
+    side = pictures.rgb.shape[1]
+    from_x, from_y = np.arange(left, left + width), np.arange(top, top + height)
+    columns, rows = np.clip(from_x, 0, side - 1), np.clip(from_y, 0, side - 1)
+    above = from_y < 0
+    alpha = (pictures.masks[k] > 0)[rows[:, None], columns] & ~above[:, None]
+    own = (from_y == rows)[:, None] & (from_x == columns)
+    rgb = np.where(
+        alpha[..., None], pictures.rgb[k][rows[:, None], columns], backgrounds.cut(rng, width, height)
+    ).astype(np.float64)
+    rgb += rng.normal(0, NOISE, rgb.shape)
+    return Photo(
+        np.clip(rgb, 0, 255).round().astype(np.uint8),
+        box - [left, top, left, top],
+        camera.reframed(left, top, width, height),
+        mask[rows[:, None], columns] & own,
+    )
+
+
+def generator(name: str, k: int) -> np.random.Generator:
+    """Of what is random about a photo: depends on the head's name and the picture's number alone."""
+    return np.random.default_rng([zlib.crc32(f"heads-report/{name}".encode()), k])
+
+
+def read_made_heads(data: Path, count: int | None = None, split: str = "test") -> list[TrueHead]:
+    """Heads of this project's maker: pictures in data/views, points in data/points."""
+    heads = []
+    for path in sorted((data / "views" / split).glob("head-*[0-9].npz"))[:count]:
+        with np.load(data / "points" / split / path.name) as stored:
+            points, normals, template = (stored[name] for name in ("surface", "normal", "template"))
+        own = cut_distance(points) < 0
+        true = TruePoints(
+            points[own].astype(np.float64) * MM_PER_DM, is_face(template[own]), normals[own].astype(np.float64)
+        )
+        heads.append(TrueHead(path.stem, read_pictures(path), true))
+    if not heads:
+        raise FileNotFoundError(
+            f"{data / 'views' / split} holds no pictures: run `python -m export.heads.view_shards {split}` and "
+            f"`python -m export.heads.points {split}` first"
+        )
+    return heads
+
+
+def read_other_heads(data: Path, count: int | None = None) -> list[TrueHead]:
+    """Heads of another maker in data/other (`python -m export.heads.other_heads`); none where they were not fetched."""
+    heads = []
+    for path in sorted((data / "other").glob("*.npz"))[:count]:
+        with np.load(path) as stored:
+            true = TruePoints(stored["surface"].astype(np.float64) * MM_PER_DM, stored["face"])
+        heads.append(TrueHead(path.stem, read_pictures(path), true))
+    return heads

@@ -52,7 +52,7 @@ class TrueHead:
         return next((k for k in shown if _is_from(self.pictures, k, -MAX_YAW_DEG, MAX_YAW_DEG)), None)
 
     def front_and_sides(self) -> tuple[int, int, int] | None:
-        """The first pictures from the front, the left and the right; None: there are none of one of these."""
+        """The first pictures from the front, the left and the right; None: one of these is missing."""
         near, far = SIDE_YAW_DEG
         spans = ((-FRONT_YAW_DEG, FRONT_YAW_DEG), (near, far), (-far, -near))
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
@@ -158,7 +158,7 @@ def read_made_heads(data: Path, count: int | None = None, split: str = "test") -
 
 
 def read_other_heads(data: Path, count: int | None = None) -> list[TrueHead]:
-    """Heads of another maker in data/other (`python -m export.heads.other_heads`); none where they were not fetched."""
+    """Heads of another maker in data/other (`python -m benchmarks.heads.other_heads`); none where they were not fetched."""
     heads = []
     for path in sorted((data / "other").glob("*.npz"))[:count]:
         with np.load(path) as stored:

@@ -1,6 +1,6 @@
 """Heads of another maker, to judge with: people of the Debian package sweethome3d-furniture (Reallusion, CC-BY 3.0).
 
-    python -m export.heads.other_heads --out .data/heads/other
+    python -m benchmarks.heads.other_heads --out .data/heads/other
 
 Nothing is trained on them: other shapes, photographed skins, hair as meshes with textures. Writes pictures as
 `export.heads.view_shards` does, without template points, and beside them the points of the surface that cameras see.

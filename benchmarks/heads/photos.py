@@ -158,7 +158,7 @@ def read_made_heads(data: Path, count: int | None = None, split: str = "test") -
 
 
 def read_other_heads(data: Path, count: int | None = None) -> list[TrueHead]:
-    """Heads of another maker in data/other (`python -m benchmarks.heads.other_heads`); none where they were not fetched."""
+    """Heads of another maker in data/other (`benchmarks.heads.other_heads`); none where they were not fetched."""
     heads = []
     for path in sorted((data / "other").glob("*.npz"))[:count]:
         with np.load(path) as stored:

@@ -3,8 +3,8 @@
     python -m benchmarks.heads.quality --data .data/heads --heads 20 --seconds 0 0.5 1 2 5 10
 
 In: `make build`, the bundle, pictures and points of test heads (`export.heads.view_shards test`, `export.heads.points
-test`), heads of another maker (`benchmarks.heads.other_heads`), photos without people (`export.photos fetch`). Out: tables
-(Markdown) and all figures (JSON). The camera is not known to the library; the head's box is given.
+test`), heads of another maker (`benchmarks.heads.other_heads`), photos without people (`export.photos fetch`). Out:
+tables (Markdown) and all figures (JSON). The camera is not known to the library; the head's box is given.
 """
 
 from __future__ import annotations

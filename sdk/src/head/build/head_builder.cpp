@@ -196,6 +196,7 @@ void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
   made.cx_px = (photo.width_px - 1) / 2.0, made.cy_px = (photo.height_px - 1) / 2.0;
   made.rgb_side = encoder_.spec().crop_px();
   made.rgb = encoding_.rgb;
+  made.codes = encoding_.codes;
   const double cells = double(made.seen.cells.size());
   photos_.push_back(std::move(made));
   found_.push_back({box, double(seen.head_cells) / cells, false, 0, 0});

@@ -232,6 +232,16 @@ TEST(HeadFit, StepsThatExplodeAreRefusedAndTheBestHeadIsKept) {
   }
 }
 
+TEST(HeadFit, AfterARefusedStepItGoesOnFromTheBestHead) {
+  HeadFitOptions options = independent_cells(100);
+  options.shape_rate = 10;
+  const HeadFit fit = fit_of({photo_for_fit(camera_at(6, 900, 0.2), 1)}, options);
+  EXPECT_GT(fit.stats.refused, 0);
+  EXPECT_NE(fit.stats.end, HeadFitEnd::kRefused);
+  EXPECT_LT(fit.stats.last.colour, 0.5 * fit.stats.first.colour);
+  EXPECT_LT(fit.stats.last.total(), 0.95 * fit.stats.first.total());
+}
+
 TEST(HeadFit, OptionsOutOfRangeAreRefused) {
   const HeadPhoto photo = photo_for_fit(camera_at(6, 900, 0), 1);
   const auto refuse = [&](const char* text, auto&& change) {

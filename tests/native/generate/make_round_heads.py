@@ -156,7 +156,7 @@ def write_encoder(path: Path) -> None:
         helper.make_node("Add", ["seen", "unseen"], ["cells"]),
         # How green: 0 to 1.
         helper.make_node("Mul", ["colour", "to_green"], ["green"]),
-        helper.make_node("ReduceSum", ["green", "most_axes"], ["greenness"], keepdims=1),
+        helper.make_node("ReduceSum", ["green", "inner_axes"], ["greenness"], keepdims=1),
         helper.make_node("Clip", ["greenness", "zero", "one"], ["fraction"]),
         helper.make_node("Reshape", ["fraction", "three_axes"], ["knows"]),
         helper.make_node("Mul", ["knows", "known"], ["codes"]),
@@ -172,7 +172,7 @@ def write_encoder(path: Path) -> None:
         constant("to_green", [-0.1, 0.2, -0.1]),
         constant("known", np.stack([SAID_CODES, np.full(3, np.log(0.05))], 1)[None]),
         numpy_helper.from_array(np.array([3], np.int64), "last_axis"),
-        numpy_helper.from_array(np.array([1, 2, 3], np.int64), "most_axes"),
+        numpy_helper.from_array(np.array([1, 2, 3], np.int64), "inner_axes"),
         numpy_helper.from_array(np.array([1, 1, 1], np.int64), "three_axes"),
     ]
     inputs = [helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, CROP_PX, CROP_PX, 3])]

@@ -29,6 +29,7 @@ HEAD, UNKNOWN, NOTHING = 255, 128, 0  # of mattes
 MIN_SIZE_PX = 40
 MIN_PRESENCE = 0.8
 MAX_SPREAD = 0.02  # of the face's size: median of the points used
+MIN_INSIDE = 0.8  # of the points used: share that lies in the photo
 MAX_YAW = np.radians(60)
 MAX_RESIDUAL = 0.15  # dm, root mean square: a face that no turn of the template explains
 _STEADY = 0.012  # of the face's size: a point that wanders so far weighs 0.6 times as much
@@ -106,13 +107,20 @@ def weights_of(face: Face, points: FacePoints, pose: FacePose) -> np.ndarray:
     return points.used * facing * steady * face.presence
 
 
-def refused(face: Face, points: FacePoints, pose: FacePose) -> str:
-    """Why the face is not taken, or an empty string."""
+def inside(pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """bool [N]: which pixels [N, 2] lie in a picture of H x W."""
+    return ((pixels >= 0) & (pixels <= np.array(shape[::-1]) - 1)).all(1)
+
+
+def refused(face: Face, points: FacePoints, pose: FacePose, shape: tuple[int, int]) -> str:
+    """Why the face of a photo of H x W is not taken, or an empty string."""
     wander = float(np.median(face.spread[points.used])) / face.size
     if face.size < MIN_SIZE_PX:
         return "small"
     if face.presence < MIN_PRESENCE:
         return "unsure"
+    if inside(face.point[points.used], shape).mean() < MIN_INSIDE:
+        return "cut"
     if wander > MAX_SPREAD:
         return "unsteady"
     if abs(pose.yaw) > MAX_YAW:
@@ -181,7 +189,7 @@ def crop_face(
     cut = np.where(inside_y[:, None] & inside_x, cut, np.uint8(NOTHING))
     pixel = ((face.point - square.centre) / square.size + 0.5) * SIDE - 0.5
     weight = weights_of(face, points, pose)
-    weight = weight * ((pixel >= 0) & (pixel <= SIDE - 1)).all(1)
+    weight = weight * inside(pixel, (SIDE, SIDE)) * inside(face.point, image.shape[:2])
     return rgb, pixel.astype(np.float32), weight.astype(np.float32), cut, np.append(square.centre, square.size)
 
 
@@ -203,7 +211,7 @@ def photo_faces(
     rows, fates = [], []
     for face in faces_of(*teachers, image, head_squares(labels)):
         pose = pose_of(points.template[points.used], face.point[points.used])
-        fates.append(refused(face, points, pose))
+        fates.append(refused(face, points, pose, image.shape[:2]))
         if not fates[-1]:
             rows.append(crop_face(image, face, points, pose, labels))
     if not rows:

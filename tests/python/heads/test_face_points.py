@@ -206,3 +206,16 @@ def test_bad_faces_are_refused_by_rule(change, why):
     face = Face(face.point, face.depth, change.get("spread", face.spread), change.get("presence", face.presence))
     made = OneFace(face)
     assert photo_faces(np.zeros((300, 300, 3), np.uint8), None, points, (made, made)) == (None, [why])
+
+
+def test_of_a_face_at_the_border_only_what_the_photo_shows_counts():
+    points, pose = read_face_points(), turned(0.0)
+    face = seen(points, pose)
+    made = OneFace(face)
+    right = int(np.quantile(face.point[points.used, 0], 0.9))
+    faces, _ = photo_faces(np.zeros((300, right, 3), np.uint8), None, points, (made, made))
+    outside = face.point[:, 0] > right - 1
+    assert not faces.weight[0, outside].any()
+    assert faces.weight[0, ~outside].any()
+    half = int(np.median(face.point[:, 0]))
+    assert photo_faces(np.zeros((300, half, 3), np.uint8), None, points, (made, made)) == (None, ["cut"])

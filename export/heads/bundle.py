@@ -34,6 +34,16 @@ TRAINING_DATA = (
         "used_for": "rendering",
     },
     {
+        "name": "photographs of people in export/photos/photographs.toml (train)",
+        "licence": "MIT, BSD-3-Clause, Apache-2.0",
+        "used_for": "training of the encoder (--photos)",
+    },
+    {
+        "name": "labels of these by MediaPipe's face detector and face landmarks, selfie segmentation, BlazePose heavy",
+        "licence": "Apache-2.0",
+        "used_for": "training of the encoder (--photos)",
+    },
+    {
         "name": "the person detector's weights (export/weights/densepose-b.pt)",
         "licence": LICENCE,
         "used_for": "first weights of the encoder",

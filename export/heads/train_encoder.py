@@ -3,7 +3,7 @@
     python -m export.heads.view_shards train --count 600
     python -m export.heads.train_encoder --data .data/heads/views --out .data/runs/heads-encoder --minutes 40
 
-With `--photos` (of export.heads.photo_faces) a share of each batch are real faces, of which template points are known
+With `--photos` (of export.heads.photos.faces) a share of each batch are real faces, of which template points are known
 at MediaPipe's face points alone. It resumes from `--out` by itself. Writes checkpoint.pt, weights.pt (for
 export.heads.export_onnx), log.json, curves.png and sample.png: crops of held-out heads, true template points, ours,
 matte.
@@ -36,8 +36,8 @@ from export.heads.encoder import (
     start_from_detector,
 )
 from export.heads.encoder_data import Backgrounds, Crop, CropStream, batched, crop_of, read_heads
-from export.heads.photo_crops import MixedStream, PhotoCrop, batched_photos, crop_photo
-from export.heads.photo_faces import read_photos
+from export.heads.photos.crops import MixedStream, PhotoCrop, batched_photos, crop_photo
+from export.heads.photos.faces import read_photos
 from export.training import (
     SAVE_EVERY_S,
     Ema,

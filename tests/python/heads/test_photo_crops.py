@@ -6,8 +6,8 @@ import pytest
 torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from export.heads.encoder import CELL_PX, CELLS, OUTPUTS, at_pixels, photo_figures, photo_losses  # noqa: E402
-from export.heads.photo_crops import MixedStream, batched_photos, crop_photo  # noqa: E402
-from export.heads.photo_faces import HEAD, NOTHING, UNKNOWN, PhotoFaces  # noqa: E402
+from export.heads.photos.crops import MixedStream, batched_photos, crop_photo  # noqa: E402
+from export.heads.photos.faces import HEAD, NOTHING, UNKNOWN, PhotoFaces  # noqa: E402
 
 
 class Grey:
@@ -31,8 +31,8 @@ def faces() -> PhotoFaces:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_points_stay_on_their_pixels(seed, monkeypatch):
-    monkeypatch.setattr("export.heads.photo_crops.as_cameras_see", lambda image, rng: image)
-    monkeypatch.setattr("export.heads.photo_crops.occluded", lambda image, *rest: (image, np.zeros(image.shape[:2])))
+    monkeypatch.setattr("export.heads.photos.crops.as_cameras_see", lambda image, rng: image)
+    monkeypatch.setattr("export.heads.photos.crops.occluded", lambda image, *rest: (image, np.zeros(image.shape[:2])))
     crop = crop_photo(faces(), 0, Grey(), np.random.default_rng(seed))
     white = np.where((crop.image > 180).all(-1), 1.0, 0.0)
     white[:, :2] = white[:, -2:] = 0
@@ -62,7 +62,7 @@ def test_mattes_know_what_is_known():
 
 def test_what_is_covered_or_outside_weighs_nothing(monkeypatch):
     everything = np.ones((192, 192), np.float32)
-    monkeypatch.setattr("export.heads.photo_crops.occluded", lambda image, *rest: (image, everything))
+    monkeypatch.setattr("export.heads.photos.crops.occluded", lambda image, *rest: (image, everything))
     covered = [crop_photo(faces(), 0, Grey(), np.random.default_rng(seed)) for seed in range(20)]
     assert {float(crop.weight[1]) for crop in covered} == {0.0, 1.0}
     for crop in covered:

@@ -1,6 +1,6 @@
 """How far an encoder's template points lie from the face teacher's, on faces of held-out photos.
 
-    python -m export.heads.photo_judge --encoder .data/runs/heads-encoder/weights.pt --split val --sheet faces.png
+    python -m export.heads.photos.judge --encoder .data/runs/heads-encoder/weights.pt --split val --sheet faces.png
 
 The sheet shows each crop; the points where the teacher sees them, as bright as they weigh; the encoder's template
 points there in the same colours; its own points and matte all over; and lines from where the teacher sees each point to
@@ -17,8 +17,8 @@ import numpy as np
 import torch
 
 from export.heads.encoder import CROP_PX, MATTE, POINT, at_pixels, load_encoder, photo_figures, run_encoder
-from export.heads.photo_crops import PhotoCrop, batched_photos, crop_photo
-from export.heads.photo_faces import SPLITS, read_photos
+from export.heads.photos.crops import PhotoCrop, batched_photos, crop_photo
+from export.heads.photos.faces import SPLITS, read_photos
 
 _ZOOM = 2
 _DRAWN_PX = 100.0  # a dm of error

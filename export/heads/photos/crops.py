@@ -1,4 +1,4 @@
-"""Training crops of real faces (`photo_faces`), and batches that mix them with made heads."""
+"""Training crops of real faces (`faces`), and batches that mix them with made heads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import torch
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX
 from export.heads.encoder_data import Backgrounds, CropStream, as_cameras_see, occluded, placing
-from export.heads.photo_faces import HEAD, NOTHING, UNKNOWN, PhotoFaces
+from export.heads.photos.faces import HEAD, NOTHING, UNKNOWN, PhotoFaces
 
 _GREY = 127
 UNKNOWN_MATTE = -1.0

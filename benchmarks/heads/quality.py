@@ -3,8 +3,9 @@
     python -m benchmarks.heads.quality --data .data/heads --heads 20 --seconds 0 0.5 1 2 5 10
 
 In: `make build`, the bundle, pictures and points of test heads (`export.heads.view_shards test`, `export.heads.points
-test`), heads of another maker (`benchmarks.heads.other_heads`), photos without people (`export.photos backgrounds`). Out:
-tables (Markdown) and all figures (JSON). The head's box is given to the library, its camera only with --known-focal.
+test`), heads of another maker (`benchmarks.heads.other_heads`), photos without people (`export.photos backgrounds`).
+Out: tables (Markdown) and all figures (JSON). The library is given the head's box, and its focal length only with
+--known-focal.
 """
 
 from __future__ import annotations

@@ -171,8 +171,8 @@ def page(measured: Mapping, sheet: str = "") -> str:
         parts += [
             "## To look at",
             f"![Photo, mesh over it, its normals, two new views, and the true head from there]({sheet})",
-            f"Of each set with one photo the best, the median and the worst by the whole head, after {at_s:g} s; then real "
-            "photographs.",
+            f"Of each set with one photo the best, the median and the worst by the whole head, after {at_s:g} s; then "
+            "real photographs.",
         ]
     if len(bundles) > 1:
         parts += [f"## Other bundles, after {at_s:g} s", beside(measured["rows"], bundles, at_s)]

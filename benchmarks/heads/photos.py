@@ -11,9 +11,11 @@ import cv2
 import numpy as np
 
 from benchmarks.heads.distances import TruePoints
+from benchmarks.heads.visible import seen_from_outside
 from export.camera import Camera
 from export.heads.judge import is_face
-from export.heads.surface import cut_distance
+from export.heads.points import make_head
+from export.heads.surface import HeadMaker, cut_distance
 from export.heads.view_shards import HeadPictures, read_pictures
 
 MM_PER_DM = 100
@@ -30,12 +32,11 @@ NOISE = 1.5  # standard deviation, of 0..255
 @dataclass(frozen=True, eq=False)
 class Photo:
     """rgb: uint8 [H, W, 3]; box: of the head with its hair, left, top, right, bottom; camera: the true one, in dm of
-    the head's frame; mask: bool [H, W]: the head above its cut."""
+    the head's frame."""
 
     rgb: np.ndarray
     box: np.ndarray
     camera: Camera
-    mask: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +117,9 @@ def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng:
     left = round(camera.cx_px - (width - 1) / 2)
     top = round(camera.cy_px - (height - 1) / 2)
     side = pictures.rgb.shape[1]
-    from_x, from_y = np.arange(left, left + width), np.arange(top, top + height)
-    columns, rows = np.clip(from_x, 0, side - 1), np.clip(from_y, 0, side - 1)
-    above = from_y < 0
-    alpha = (pictures.masks[k] > 0)[rows[:, None], columns] & ~above[:, None]
-    own = (from_y == rows)[:, None] & (from_x == columns)
+    columns, from_y = np.arange(left, left + width).clip(0, side - 1), np.arange(top, top + height)
+    rows = from_y.clip(0, side - 1)
+    alpha = (pictures.masks[k] > 0)[rows[:, None], columns] & (from_y >= 0)[:, None]
     rgb = np.where(
         alpha[..., None], pictures.rgb[k][rows[:, None], columns], backgrounds.cut(rng, width, height)
     ).astype(np.float64)
@@ -129,7 +128,6 @@ def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng:
         np.clip(rgb, 0, 255).round().astype(np.uint8),
         box - [left, top, left, top],
         camera.reframed(left, top, width, height),
-        mask[rows[:, None], columns] & own,
     )
 
 
@@ -138,13 +136,19 @@ def generator(name: str, k: int) -> np.random.Generator:
     return np.random.default_rng([zlib.crc32(f"heads-report/{name}".encode()), k])
 
 
-def read_made_heads(data: Path, count: int | None = None, split: str = "test") -> list[TrueHead]:
-    """Heads of this project's maker: pictures in data/views, points in data/points."""
+def read_made_heads(
+    data: Path, count: int | None = None, maker: HeadMaker | None = None, split: str = "test"
+) -> list[TrueHead]:
+    """Heads of this project's maker: pictures in data/views, points in data/points. With the maker they are made again,
+    and points that cannot be seen from outside are left out."""
     heads = []
     for path in sorted((data / "views" / split).glob("head-*[0-9].npz"))[:count]:
         with np.load(data / "points" / split / path.name) as stored:
             points, normals, template = (stored[name] for name in ("surface", "normal", "template"))
         own = cut_distance(points) < 0
+        if maker:
+            head = make_head(maker, split, int(path.stem.rpartition("-")[2]))
+            own &= seen_from_outside(head.positions, head.faces, points, normals)
         true = TruePoints(
             points[own].astype(np.float64) * MM_PER_DM, is_face(template[own]), normals[own].astype(np.float64)
         )

@@ -3,9 +3,9 @@
     python -m benchmarks.heads.quality --data .data/heads --heads 20 --seconds 0 0.5 1 2 5 10
 
 In: `make build`, the bundle, pictures and points of test heads (`export.heads.view_shards test`, `export.heads.points
-test`), heads of another maker (`benchmarks.heads.other_heads`), photos without people (`export.photos backgrounds`).
-Out: tables (Markdown) and all figures (JSON). The library is given the head's box, and its focal length only with
---known-focal.
+test`), what they are made from (`export.people.assets`), heads of another maker (`benchmarks.heads.other_heads`),
+photos without people (`export.photos backgrounds`). Out: tables (Markdown) and all figures (JSON). The library is given
+the head's box, and its focal length only with --known-focal.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from benchmarks.heads.photos import (
 )  # fmt: skip
 from export.evaluation.heads_api import HeadBuilder, MaquetteError
 from export.evaluation.machine import describe_machine
+from export.heads.points import make_maker
 
 ONE, THREE, OTHER = "one photo", "three photos", "other maker's heads, one photo"
 BUNDLE, DATA, BACKGROUNDS = Path("sdk/models/heads-int8"), Path(".data/heads"), Path(".data/backgrounds/test")
@@ -118,7 +119,7 @@ def measure_set(
 
 def sets_of(options: argparse.Namespace) -> dict[str, list[tuple[TrueHead, Sequence[int]]]]:
     """The sets that are asked for and there, with the pictures that each head is fitted to."""
-    made, found = read_made_heads(options.data, options.heads), {}
+    made, found = read_made_heads(options.data, options.heads, make_maker()), {}
     if "one" in options.sets:
         found[ONE] = [(head, [k]) for head in made if (k := head.front()) is not None]
     if "three" in options.sets:

@@ -1,0 +1,32 @@
+"""Which points of a surface can be seen from outside. Made heads have eyeballs that are closed, and skin under hair:
+no photo shows what lies inside, and no surface of a head should go there."""
+
+from __future__ import annotations
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+
+DIRECTIONS, MIN_FREE = 96, 2
+MIN_COSINE = 0.1  # to the normal
+START = 0.005  # above the surface; dm
+
+
+def seen_from_outside(
+    positions: np.ndarray, faces: np.ndarray, points: np.ndarray, normals: np.ndarray, directions: int = DIRECTIONS
+) -> np.ndarray:
+    """Whether each of the points [N, 3] (dm) of the mesh is free to at least MIN_FREE of evenly spread directions: bool
+    [N]."""
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, positions.astype(np.float32), faces.astype(np.int32))
+    free = np.zeros(len(points), int)
+    # Fibonacci's sphere.
+    z = 1 - (2 * np.arange(directions) + 1) / directions
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(directions)
+    flat = np.sqrt(1 - z**2)
+    for towards in np.stack([flat * np.cos(angle), flat * np.sin(angle), z], 1):
+        facing = np.flatnonzero(normals @ towards > MIN_COSINE)
+        start = (points[facing] + START * normals[facing]).astype(np.float32)
+        hit = scene.run(start, np.repeat(towards[None].astype(np.float32), len(start), 0))
+        free[facing] += hit < 0
+    return free >= MIN_FREE

@@ -163,6 +163,7 @@ def parsed() -> argparse.Namespace:
 
 def train(arguments: argparse.Namespace) -> None:
     """Runs or resumes a training."""
+    cv2.setNumThreads(1)  # before its first use: OpenCV's threads do not survive the fork of the loader's worker
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
     torch.manual_seed(arguments.seed)

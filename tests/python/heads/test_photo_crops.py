@@ -137,3 +137,20 @@ def test_the_training_counts_each_crop_of_a_mixed_batch_the_same(monkeypatch):
     terms = train_encoder.batch_losses(encoder, (made, real), "float32")
     assert {name: float(value) for name, value in terms.items()} == {"coarse": 9.0, "code": 0.0, "photo_coarse": 0.25}
     assert set(train_encoder.batch_losses(encoder, made, "float32")) == {"coarse", "code"}
+
+
+def test_the_training_makes_no_threads_that_its_worker_would_wait_for(tmp_path, monkeypatch):
+    """OpenCV's pool of threads, made before the loader's fork, hangs the worker."""
+    import cv2
+
+    from export.heads import train_encoder
+
+    monkeypatch.setattr("sys.argv", ["train_encoder", "--data", str(tmp_path), "--out", str(tmp_path / "run")])
+    before = cv2.getNumThreads()
+    try:
+        cv2.setNumThreads(2)
+        with pytest.raises(FileNotFoundError):
+            train_encoder.main()
+        assert cv2.getNumThreads() == 1
+    finally:
+        cv2.setNumThreads(before)

@@ -1,6 +1,6 @@
 """The whole report of heads: distances by seconds of fitting (`quality.py`), and a sheet to look at (`sheet.py`).
 
-python -m benchmarks.heads --out docs/benchmarks/heads.md        half an hour with all heads and times
+python -m benchmarks.heads --out docs/benchmarks/heads.md        10 to 30 minutes with all heads and times
 python -m benchmarks.heads --heads 2 --seconds 0 1               does it run?
 """
 

@@ -18,7 +18,7 @@ _HOW = """Distances go from points of the true surface, above the cut and seen f
 library gives, after the true head was moved, rotated and scaled to where it fits best: by its face for the face (95 mm
 around the tip of the nose), by all for the head; *not aligned*: as the library gives it. All are means over heads. *By
 mean head*: divided by the same of the head that the prior has before it sees a photo. *Normals*: the true mesh itself
-has 7 to 12 degrees, since its normals are smooth and its triangles flat. *Size off by*: the median over heads, with the
+has 6 to 10 degrees, since its normals are smooth and its triangles flat. *Size off by*: the median over heads, with the
 sign left out; *camera rotated by*: the median angle to the true camera, in frames that hold a head by its skull. Photos
 are rendered, in front of photographs, from up to 45° to the side; the library is given the head's box"""
 

@@ -4,7 +4,7 @@
     python -m benchmarks.heads.sheet --out build/benchmarks/heads-sheet.jpg
 
 Of each set with one photo the best, the median and the worst head by what `quality.py` measured (whole head, by mean
-head), then real photographs of faces, which have no truth (`export.photos people`, `export.heads.photo_faces test`).
+head), then real photographs of faces, which have no truth (`export.photos people`, `export.heads.photos.faces test`).
 Needs what heads are made from: `python -m export.people.assets`.
 """
 
@@ -122,7 +122,7 @@ def rendered_cases(measured: Mapping, data: Path, backgrounds: PhotoBackgrounds,
 
 
 def photo_cases(photos: Path, faces: Path, count: int) -> list[Case]:
-    """Real photographs, with boxes around the faces that `export.heads.photo_faces` found in them."""
+    """Real photographs, with boxes around the faces that `export.heads.photos.faces` found in them."""
     cases = []
     for path in sorted(faces.glob("*.npz"))[:count]:
         picture = next((p for p in photos.glob(f"{path.stem}.*") if p.suffix in (".jpg", ".png")), None)

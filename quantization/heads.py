@@ -38,7 +38,7 @@ from export.heads.points import read_points
 from export.heads.prior import Prior, PriorError
 from export.heads.prior_file import FORMATS, HEAD, prior_bytes, prior_from_bytes, write_prior
 from export.heads.train_encoder import held_out_crops
-from export.heads.train_prior import HeadTensors, fitted_codes, is_face
+from export.heads.train_prior import HeadTensors, fitted_codes
 from quantization.analysis.errors import sqnr_db
 from quantization.blocks import Workpiece, blocks
 from quantization.graphs.prepare import prepare
@@ -108,7 +108,7 @@ def bases_cost(prior: Prior, bases: str, heads: HeadTensors, steps: int = 250) -
         distances[form] = geometry(prior.shape, field.combine(*codes), heads.surface)[..., 0] * 100
     difference = (distances[bases] - distances["float16"]).abs()
     out = {}
-    for name, at in (("head", torch.ones_like(difference, dtype=torch.bool)), ("face", is_face(heads.surface))):
+    for name, at in (("head", torch.ones_like(difference, dtype=torch.bool)), ("face", heads.is_face)):
         out[name] = {f"{form}_mm": round(float(mm[at].abs().mean()), 3) for form, mm in distances.items()}
         out[name]["difference_mm"] = round(float(difference[at].mean()), 4)
     return out

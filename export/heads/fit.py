@@ -34,7 +34,7 @@ class Photo:
 
 @dataclass(frozen=True)
 class FitOptions:
-    steps: int = 100
+    steps: int = 50
     rays: int = 384
     sections: int = 12
     reach_dm: float = 0.12  # sections lie within this distance of the surface found
@@ -42,8 +42,8 @@ class FitOptions:
     rate: float = 0.03  # of whitened codes
     # How much all pixels together count, in observations that are independent of each other.
     colour_weight: float = 60.0
-    matte_weight: float = 40.0
-    normal_weight: float = 10.0
+    matte_weight: float = 200.0
+    normal_weight: float = 0.0  # the encoder errs alike over whole cheeks
     anchor_weight: float = 0.1
     colour_sigma: float = 0.12
     colour_moves_shape: bool = False

@@ -61,8 +61,8 @@ def _aligned(shape: FieldShape, weights: list[Tensor], points: Tensor, steps: in
 
 
 def is_face(template: np.ndarray) -> np.ndarray:
-    """Which points belong to the face, by their template points [N, 3]."""
-    return np.linalg.norm(template - NOSE_TIP, axis=1) < FACE_RADIUS_DM
+    """Which points belong to the face, by their template points [..., 3]."""
+    return np.linalg.norm(template - NOSE_TIP, axis=-1) < FACE_RADIUS_DM
 
 
 def judge(shape: FieldShape, weights: list[Tensor], surface: np.ndarray, is_face: np.ndarray) -> Distances:

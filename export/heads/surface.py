@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 
 from export.heads.hair import Barber, Shell, Style, slow_noise
 from export.heads.shapes import (
     CUT_NORMAL,
     CUT_POINT,
-    DOMAIN,
     HeadShapes,
     Identity,
     boundary_loops,
@@ -39,7 +40,6 @@ class HeadMaker:
 
     def __init__(self, shapes: HeadShapes, skin: np.ndarray) -> None:
         self.shapes, self.skin = shapes, skin.astype(np.float32)
-        self.skin_mean = self.skin[self.skin.shape[0] // 2, self.skin.shape[1] * 3 // 4].mean()
         self.barber = Barber(shapes)
         outer = self._seen_from_outside()
         self.faces, self.uv = shapes.faces[outer], shapes.uv[outer]
@@ -54,9 +54,6 @@ class HeadMaker:
 
     def _seen_from_outside(self) -> np.ndarray:
         """Of the template's skin, all but what is inside of mouth and eye sockets."""
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         s = self.shapes
         scene = EmbreeScene(robust=True)
         faces = np.concatenate([s.faces, s.eye_faces])
@@ -270,7 +267,3 @@ def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 def cut_distance(points: np.ndarray) -> np.ndarray:
     """Signed distance (dm) to the plane at which heads end: positive below it. [N]"""
     return (points - CUT_POINT) @ CUT_NORMAL
-
-
-def in_domain(points: np.ndarray) -> np.ndarray:
-    return (np.abs(points) < DOMAIN).all(-1)

@@ -20,6 +20,7 @@ import torch
 from torch import Tensor, nn
 
 from export.heads.field import FieldBases, geometry, surface
+from export.heads.judge import is_face
 from export.heads.points import HeadPoints, read_points
 from export.heads.prior import FieldShape
 from export.training import (
@@ -51,6 +52,7 @@ class HeadTensors:
         self.near, self.near_distance = stacked("near"), stacked("near_distance")
         self.far, self.far_distance = stacked("far"), stacked("far_distance")
         self.vertices = stacked("vertices")
+        self.is_face = torch.from_numpy(is_face(self.template.numpy()))  # of the surface's points
 
     def __len__(self) -> int:
         return len(self.surface)
@@ -104,10 +106,6 @@ class Anchors(nn.Module):
         super().__init__()
         self.mean, self.slopes = nn.Parameter(mean), nn.Parameter(slopes)  # [M, 3], [M, 3, K]
 
-    def forward(self, z: Tensor) -> Tensor:
-        """[H, K] -> [H, M, 3]"""
-        return self.mean + torch.tensordot(z, self.slopes, ([1], [2]))
-
 
 def principal_codes(vertices: Tensor, count: int) -> tuple[Tensor, Tensor, Tensor]:
     """Whitened principal components of heads [H, V, 3]: codes [H, count], mean [V, 3], slopes [V, 3, count]."""
@@ -129,11 +127,6 @@ class FitFigures:
     mean_face_mm: float
     colour: float
     template_mm: float
-
-
-def is_face(points: Tensor) -> Tensor:
-    """Of true points [..., 3]: within 0.95 dm of the nose's tip, as the paper counts a face."""
-    return (points - torch.tensor([0.0, -1.24, -0.35])).norm(dim=-1) < 0.95
 
 
 def fitted_codes(bases: FieldBases, data: HeadTensors, steps: int = 250) -> tuple[Tensor, Tensor]:
@@ -175,7 +168,7 @@ def fit_figures(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> F
 
 def _distance_mm(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> tuple[float, float]:
     distance = geometry(bases.shape, bases.combine(z, c), data.surface)[..., 0].abs() * 100
-    return float(distance.mean()), float(distance[is_face(data.surface)].mean())
+    return float(distance.mean()), float(distance[data.is_face].mean())
 
 
 class Training:

@@ -25,6 +25,7 @@ HeadPhoto photo_for_fit(const HeadCamera& camera, unsigned seed, double point_dm
 // The noise of these tests differs from cell to cell, and no time ends them.
 HeadFitOptions independent_cells(int max_steps) {
   HeadFitOptions options;
+  options.rays.normal_weight = 1;  // those of these photos are right
   options.seconds = 1e6, options.max_steps = max_steps;
   options.anchors.terms.cell_weight = 1, options.anchors.terms.pixel_sigma = 0.02;
   options.rays.point_sigma_dm = 0.02;

@@ -22,7 +22,9 @@ namespace maq::head {
 
 // Each term is a negative log likelihood a ray, with the noise that is named here, times its weight.
 struct RayTermOptions {
-  double colour_weight = 1, matte_weight = 1, point_weight = 1, normal_weight = 1;
+  double colour_weight = 1, matte_weight = 1, point_weight = 1;
+  // The encoder errs by some 16 degrees, alike over whole cheeks: without its normals held-out heads are nearer.
+  double normal_weight = 0;
   double colour_sigma = 0.12;      // of 0..1, each channel: mostly light that the prior does not know
   double matte_error_rate = 0.05;  // the fraction of mattes that say nothing
   double point_sigma_dm = 0.03;    // of the field's template points, beside the encoder's own

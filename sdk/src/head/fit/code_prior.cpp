@@ -10,7 +10,7 @@ namespace {
 
 // The encoder is a little too sure of heads that it was not trained on.
 constexpr double kSigmaFactor = 1.2;
-constexpr double kMinLogSigma = -3, kMaxLogSigma = 1, kMaxMean = 10;
+constexpr double kMinLogCodeSigma = -3, kMaxLogCodeSigma = 1, kMaxMean = 10;
 
 }  // namespace
 
@@ -31,7 +31,7 @@ CodePrior code_prior(const std::vector<const HeadPhoto*>& photos, size_t codes) 
     for (size_t k = 0; k < codes; ++k) {
       const double mean = double(photo->codes[2 * k]), log_sigma = double(photo->codes[2 * k + 1]);
       if (!std::isfinite(mean) || !std::isfinite(log_sigma)) continue;
-      const double sigma = kSigmaFactor * std::exp(std::clamp(log_sigma, kMinLogSigma, kMaxLogSigma));
+      const double sigma = kSigmaFactor * std::exp(std::clamp(log_sigma, kMinLogCodeSigma, kMaxLogCodeSigma));
       const double inverse = 1 / (sigma * sigma);
       if (!(inverse > 1)) continue;
       // means holds the sum of mean / variance until all photos are in.

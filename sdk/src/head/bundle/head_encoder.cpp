@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/math/finite.h"
 #include "nn/thread_choice.h"
 
 namespace maq::head {
@@ -18,10 +19,6 @@ std::vector<Shape> output_shapes(const HeadBundle& bundle) {
   std::vector<Shape> shapes = {{1, side, side, int64_t(kCellChannels)}};
   if (bundle.encoder.says_codes) shapes.push_back({1, bundle.prior.shape_codes(), 2});
   return shapes;
-}
-
-bool are_finite(const float* values, size_t count) {
-  return std::all_of(values, values + count, [](float value) { return std::isfinite(value); });
 }
 
 void check_numbers(const HeadSquare& square) {

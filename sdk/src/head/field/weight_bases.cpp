@@ -4,13 +4,10 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/math/finite.h"
 
 namespace maq::head {
 namespace {
-
-bool are_finite(const float* values, size_t count) {
-  return std::all_of(values, values + count, [](float value) { return std::isfinite(value); });
-}
 
 void check_codes(const char* name, const std::vector<float>& codes, int expected) {
   if (codes.size() != size_t(expected)) {

@@ -11,8 +11,8 @@
 namespace maq::head {
 namespace {
 
-constexpr char kKind[] = "a head (.maqh)";
-constexpr char kRemedy[] = "Fit the head again, or use the Maquette that it was made with.";
+constexpr char kHeadKind[] = "a head (.maqh)";
+constexpr char kHeadRemedy[] = "Fit the head again, or use the Maquette that it was made with.";
 constexpr StoredFormat kHalf = StoredFormat::kFloat16, kFloat = StoredFormat::kFloat32;
 constexpr float kMaxHalf = 65504;
 
@@ -117,7 +117,7 @@ StoredHead read_head(const void* bytes, size_t count, const std::string& name) {
     throw Error(MAQ_ERROR_UNSUPPORTED, name, " has ", count, " bytes; a head has at most ", kMaxHeadFileBytes, ".");
   }
   StoredBytes file(bytes, count, name, MAQ_ERROR_UNREADABLE);
-  const auto file_head = file.head<HeadFileHead>(kHeadFileMagic, kHeadFileVersion, kKind, kRemedy);
+  const auto file_head = file.head<HeadFileHead>(kHeadFileMagic, kHeadFileVersion, kHeadKind, kHeadRemedy);
   const FieldShape shape = checked_shape(file_head.shape, file);
   check_counts(file_head, shape, file);
 

@@ -10,8 +10,8 @@
 namespace maq::head {
 namespace {
 
-constexpr char kKind[] = "a prior of heads (.maqp)";
-constexpr char kRemedy[] = "Export the bundle again, or use the Maquette that it was made for.";
+constexpr char kPriorKind[] = "a prior of heads (.maqp)";
+constexpr char kPriorRemedy[] = "Export the bundle again, or use the Maquette that it was made for.";
 
 Vec3 vector_of(const float (&values)[3]) { return {values[0], values[1], values[2]}; }
 
@@ -48,7 +48,7 @@ HeadPrior read_prior(const void* bytes, size_t count, const std::string& name) {
                 kMaxPriorFileBytes, ".");
   }
   StoredBytes file(bytes, count, name, MAQ_ERROR_BAD_BUNDLE);
-  const auto head = file.head<PriorFileHead>(kPriorFileMagic, kPriorFileVersion, kKind, kRemedy);
+  const auto head = file.head<PriorFileHead>(kPriorFileMagic, kPriorFileVersion, kPriorKind, kPriorRemedy);
   const FieldShape shape = checked_shape(head.shape, file);
   check_counts(head, shape, file);
 

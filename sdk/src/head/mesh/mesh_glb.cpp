@@ -13,7 +13,7 @@
 namespace maq::head {
 namespace {
 
-enum ComponentType { kUnsignedByte = 5121, kUnsignedInt = 5125, kFloat = 5126 };
+enum class Component { kUnsignedByte = 5121, kUnsignedInt = 5125, kFloat = 5126 };
 enum BufferTarget { kNoTarget = 0, kVertices = 34962, kIndices = 34963 };
 
 void append_word(std::vector<uint8_t>& to, uint32_t word) {
@@ -36,12 +36,12 @@ class GlbWriter {
  public:
   // The number of the accessor. `more` ends its text: ",\"min\":…".
   template <class T>
-  size_t add_accessor(const std::vector<T>& values, size_t each, ComponentType type, BufferTarget target,
+  size_t add_accessor(const std::vector<T>& values, size_t each, Component type, BufferTarget target,
                       const std::string& more = "") {
     static constexpr const char* kTypes[] = {"", "SCALAR", "VEC2", "VEC3", "VEC4"};
     add(accessors_, concatenate("{\"bufferView\":", add_view(values.data(), values.size() * sizeof(T), target),
                                 ",\"componentType\":", int(type), ",\"count\":", values.size() / each, ",\"type\":\"",
-                                kTypes[each], '"', type == kUnsignedByte ? ",\"normalized\":true" : "", more, '}'));
+                                kTypes[each], '"', type == Component::kUnsignedByte ? ",\"normalized\":true" : "", more, '}'));
     return accessor_count_++;
   }
 
@@ -117,19 +117,19 @@ std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t
     high[axis] = i < 3 ? positions[i] : std::max(high[axis], positions[i]);
   }
   const std::string limits = ",\"min\":" + text_of(low) + ",\"max\":" + text_of(high);
-  std::string attributes = concatenate("\"POSITION\":", glb.add_accessor(positions, 3, kFloat, kVertices, limits));
+  std::string attributes = concatenate("\"POSITION\":", glb.add_accessor(positions, 3, Component::kFloat, kVertices, limits));
   if (!mesh.normals.empty()) {
-    attributes += concatenate(",\"NORMAL\":", glb.add_accessor(normals_in_file(mesh), 3, kFloat, kVertices));
+    attributes += concatenate(",\"NORMAL\":", glb.add_accessor(normals_in_file(mesh), 3, Component::kFloat, kVertices));
   }
   std::string of_material, of_file;
   if (!texture.empty()) {
-    attributes += concatenate(",\"TEXCOORD_0\":", glb.add_accessor(mesh.texture_coordinates, 2, kFloat, kVertices));
+    attributes += concatenate(",\"TEXCOORD_0\":", glb.add_accessor(mesh.texture_coordinates, 2, Component::kFloat, kVertices));
     of_material = ",\"baseColorTexture\":{\"index\":0}";
   } else if (!mesh.colours.empty()) {
     attributes +=
-        concatenate(",\"COLOR_0\":", glb.add_accessor(linear_colours(mesh.colours), 4, kUnsignedByte, kVertices));
+        concatenate(",\"COLOR_0\":", glb.add_accessor(linear_colours(mesh.colours), 4, Component::kUnsignedByte, kVertices));
   }
-  const size_t indices = glb.add_accessor(mesh.triangles, 1, kUnsignedInt, kIndices);
+  const size_t indices = glb.add_accessor(mesh.triangles, 1, Component::kUnsignedInt, kIndices);
   if (!texture.empty()) {
     const size_t view = glb.add_view(texture.data(), texture.size(), kNoTarget);
     of_file =

@@ -36,7 +36,7 @@ from export.training import (
     write_log,
 )
 
-PRINCIPAL = 40  # shape codes that begin as principal components of the skin
+PRINCIPAL = 0.625  # fraction of the shape codes that begin as principal components of the skin
 HEADS, ON, NEAR, FAR, SLOPES = 8, 384, 448, 96, 128  # a step: heads, and points of each
 
 
@@ -174,14 +174,15 @@ def _distance_mm(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> 
 class Training:
     """Everything of a run that its checkpoint holds."""
 
-    def __init__(self, shape: FieldShape, data: HeadTensors, rate: float) -> None:
-        self.bases = FieldBases(shape)
-        codes, mean, slopes = principal_codes(data.vertices, PRINCIPAL)
-        z = 0.3 * torch.randn(len(data), self.bases.shape_codes)
-        z[:, :PRINCIPAL] = codes
+    def __init__(self, shape: FieldShape, data: HeadTensors, rate: float, shape_codes: int = 64) -> None:
+        self.bases = FieldBases(shape, shape_codes)
+        principal = round(PRINCIPAL * shape_codes)
+        codes, mean, slopes = principal_codes(data.vertices, principal)
+        z = 0.3 * torch.randn(len(data), shape_codes)
+        z[:, :principal] = codes
         self.z = nn.Parameter(z)
         self.c = nn.Parameter(0.3 * torch.randn(len(data), self.bases.colour_codes))
-        padded = torch.cat([slopes, torch.zeros(*slopes.shape[:2], self.bases.shape_codes - PRINCIPAL)], 2)
+        padded = torch.cat([slopes, torch.zeros(*slopes.shape[:2], shape_codes - principal)], 2)
         self.anchors = Anchors(mean, padded)
         self.optimizer = torch.optim.Adam(
             [
@@ -252,6 +253,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, default=Path(".data/heads/points"))
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-prior"))
     parser.add_argument("--width", type=int, default=64, help="of geometry and surface layers")
+    parser.add_argument("--codes", type=int, default=64, help="shape codes of a head")
     parser.add_argument("--octaves", type=int, default=6)
     parser.add_argument("--minutes", type=float, default=30, help="of the whole schedule, over resumes")
     parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
@@ -270,7 +272,7 @@ def train(arguments: argparse.Namespace) -> None:
     data, held_out = HeadTensors(read_points(arguments.data, "train")), HeadTensors(read_points(arguments.data, "val"))
     print(f"{len(data)} heads to train on, {len(held_out)} held out", flush=True)
     shape = FieldShape(octaves=arguments.octaves, width=arguments.width, surface_width=arguments.width)
-    training = Training(shape, data, arguments.rate)
+    training = Training(shape, data, arguments.rate, arguments.codes)
     path = arguments.out / "checkpoint.pt"
     arguments.out.mkdir(parents=True, exist_ok=True)
     if path.exists():

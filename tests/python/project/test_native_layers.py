@@ -48,7 +48,7 @@ MAY_INCLUDE = {
     "head/bundle": BASE | {"head", "head/field", "head/files", "head/fit"},
     "head/build": BASE | {"head/bundle"} | HEAD,
     "head/camera": {"core", "core/math"},
-    "head/field": {"core"},
+    "head/field": {"core", "core/math"},
     "head/files": {"core", "core/math", "head", "head/camera", "head/field"},
     "head/fit": BASE - {"nn"} | {"head", "head/camera", "head/field"},
     "head/mesh": BASE - {"nn"} | {"head/camera"},

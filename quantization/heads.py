@@ -34,7 +34,7 @@ from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, figures
 from export.heads.encoder_data import Backgrounds, Crop, batched, crop_of, read_heads
 from export.heads.export_onnx import ENCODER
 from export.heads.field import bases_of, geometry
-from export.heads.points import read_points
+from export.heads.head_shards import read_points
 from export.heads.prior import Prior, PriorError
 from export.heads.prior_file import FORMATS, HEAD, prior_bytes, prior_from_bytes, write_prior
 from export.heads.train_encoder import held_out_crops

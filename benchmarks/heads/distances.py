@@ -1,4 +1,4 @@
-"""How far a mesh lies from a true head: `export.heads.judge` for meshes instead of fields.
+"""How far a mesh lies from a true head.
 
 One-sided, from true points to the nearest points of the mesh's triangles. The true points are first moved, rotated and
 scaled to where they fit the mesh best, those of the face for the face's figure and all for the head's. All in mm.

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.heads.other_heads import PEOPLE, load_head
 from export.camera import Camera
 from export.evaluation.heads_api import HeadMesh
-from export.heads.points import make_head
+from export.heads.made_heads import make_head
 from export.heads.surface import HeadMaker, Place
 from export.heads.view_shards import sample_camera
 from export.heads.views import HeadViews, Lamps, Scene, Seen, look_at, sample_extras, sample_lamps

@@ -18,10 +18,11 @@ import numpy as np
 import trimesh
 from tqdm import tqdm
 
-from export.heads.judge import FACE_RADIUS_DM
+from export.heads.face import FACE_RADIUS_DM
+from export.heads.head_shards import HeadPictures
 from export.heads.shapes import vertex_normals
 from export.heads.surface import Place
-from export.heads.view_shards import HeadPictures, picture_row, sample_camera
+from export.heads.view_shards import picture_row, sample_camera
 from export.heads.views import Scene, look_at, sample_lamps
 from export.people.assets import Package, fetch
 

@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.heads.distances import TruePoints
 from benchmarks.heads.visible import seen_from_outside
 from export.camera import Camera
-from export.heads.judge import is_face
-from export.heads.points import make_head
+from export.heads.face import is_face
+from export.heads.head_shards import HeadPictures, read_pictures
+from export.heads.made_heads import make_head
 from export.heads.surface import HeadMaker, cut_distance
-from export.heads.view_shards import HeadPictures, read_pictures
 
 MM_PER_DM = 100
 HEAD = 255  # of masks

@@ -36,7 +36,7 @@ from benchmarks.heads.photos import (
 )  # fmt: skip
 from export.evaluation.heads_api import HeadBuilder, MaquetteError
 from export.evaluation.machine import describe_machine
-from export.heads.points import make_maker
+from export.heads.made_heads import make_maker
 
 ONE, THREE, OTHER = "one photo", "three photos", "other maker's heads, one photo"
 BUNDLE, DATA, BACKGROUNDS = Path("sdk/models/heads-int8"), Path(".data/heads"), Path(".data/backgrounds/test")

@@ -29,8 +29,8 @@ from benchmarks.heads.quality import BACKGROUNDS, BUNDLE, DATA, FIGURES, ONE, OT
 from export.camera import Camera
 from export.evaluation.heads_api import HeadBuilder, MaquetteError
 from export.evaluation.paint import labelled_tile, mosaic
-from export.heads.points import make_maker
-from export.heads.view_shards import CROP_SIDES
+from export.heads.head_shards import CROP_SIDES
+from export.heads.made_heads import make_maker
 
 TILE_PX = 224
 PHOTOS = Path(".data/photos/test")

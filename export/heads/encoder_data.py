@@ -11,7 +11,7 @@ import torch
 from torch.utils.data import IterableDataset
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX
-from export.heads.view_shards import LABEL_STEP, POINT_SCALE, SIDE, HeadPictures, read_pictures
+from export.heads.head_shards import LABEL_STEP, POINT_SCALE, SIDE, HeadPictures, head_paths, read_pictures
 from export.people.imaging import camera_faults
 
 
@@ -129,7 +129,7 @@ def as_cameras_see(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadPictures]:
-    paths = sorted((folder / split).glob("head-[0-9]*[0-9].npz"))[:limit]
+    paths = head_paths(folder, split)[:limit]
     if not paths:
         raise FileNotFoundError(f"{folder / split} holds no pictures: run `python -m export.heads.view_shards {split}`")
     return [read_pictures(path) for path in paths]

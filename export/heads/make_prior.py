@@ -15,7 +15,8 @@ import numpy as np
 import torch
 
 from export.heads.field import FieldBases
-from export.heads.points import make_maker, read_points
+from export.heads.head_shards import read_points
+from export.heads.made_heads import make_maker
 from export.heads.prior import FieldShape, Layer, Prior
 from export.heads.prior_file import write_prior
 from export.heads.shapes import CUT_NORMAL, CUT_POINT, DOMAIN, HeadShapes

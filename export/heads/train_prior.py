@@ -19,9 +19,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from export.heads.face import is_face
 from export.heads.field import FieldBases, geometry, surface
-from export.heads.judge import is_face
-from export.heads.points import HeadPoints, read_points
+from export.heads.head_shards import HeadPoints, read_points
 from export.heads.prior import FieldShape
 from export.training import (
     SAVE_EVERY_S,

@@ -8,39 +8,15 @@ behind the head is left to the encoder's training (`masks` says where), and so a
 
 from __future__ import annotations
 
-import argparse
-import zlib
-from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from export.camera import Camera
-from export.heads.points import SPLITS, make_head, make_maker
+from export.heads.head_shards import CROP_SIDES, LABEL_STEP, POINT_SCALE, SIDE, HeadPictures
+from export.heads.made_heads import shard_parser, write_shards
 from export.heads.surface import Head
 from export.heads.views import HeadViews, Seen, look_at, sample_extras, sample_lamps
-
-SIDE = 256  # px
-LABEL_STEP = 2  # template points and normals are stored for every second pixel of every second row
-POINT_SCALE = 8000.0  # int16 a dm
-CROP_SIDES = 1.6  # side of a picture by the longer side of the head's box; a training cuts smaller ones out of it
-
-
-@dataclass(frozen=True)
-class HeadPictures:
-    """K pictures of a head. rgb uint8 [K, 256, 256, 3]; masks uint8 [K, 256, 256]: 255 head, 128 bust, 0 nothing;
-    template int16 [K, 128, 128, 3], dm times 8,000; normal int8 [K, 128, 128, 3], camera's axes, times 127;
-    rotation [K, 3, 3] and shift [K, 3] from the head's frame (dm) to the camera's; intrinsics [K, 3]: focal, cx,
-    cy, px."""
-
-    rgb: np.ndarray
-    masks: np.ndarray
-    template: np.ndarray
-    normal: np.ndarray
-    rotation: np.ndarray
-    shift: np.ndarray
-    intrinsics: np.ndarray
 
 
 def sample_camera(points: np.ndarray, rng: np.random.Generator) -> Camera:
@@ -85,32 +61,11 @@ def picture_row(seen: Seen) -> tuple:
     )  # fmt: skip
 
 
-def read_pictures(path: Path) -> HeadPictures:
-    with np.load(path) as stored:
-        return HeadPictures(**{f.name: stored[f.name] for f in fields(HeadPictures)})
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("split", choices=SPLITS)
-    parser.add_argument("--count", type=int, default=600, help="heads")
-    parser.add_argument("--first", type=int, default=0)
+    parser = shard_parser(__doc__, Path(".data/heads/views"))
     parser.add_argument("--views", type=int, default=16, help="pictures a head")
-    parser.add_argument("--out", type=Path, default=Path(".data/heads/views"))
     arguments = parser.parse_args()
-    folder = arguments.out / arguments.split
-    folder.mkdir(parents=True, exist_ok=True)
-    maker = make_maker()
-    for number in tqdm(range(arguments.first, arguments.first + arguments.count), unit="head"):
-        path = folder / f"head-{number:05}.npz"
-        if path.exists():
-            continue
-        head = make_head(maker, arguments.split, number)
-        rng = np.random.default_rng([zlib.crc32(b"views"), number])
-        pictures = pictures_of(head, arguments.views, rng)
-        part = path.with_suffix(".part.npz")
-        np.savez(part, **{f.name: getattr(pictures, f.name) for f in fields(pictures)})
-        part.rename(path)
+    write_shards(arguments, "views", lambda head, rng: pictures_of(head, arguments.views, rng))
 
 
 if __name__ == "__main__":

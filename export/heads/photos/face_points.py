@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.heads.view_shards import LABEL_STEP, POINT_SCALE, HeadPictures, read_pictures
+from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures, read_pictures
 
 FILE = Path(__file__).with_name("face_points.json")
 MAX_YAW, MAX_PITCH, MAX_ROLL = np.radians(30), np.radians(25), np.radians(25)

@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export.heads.head_shards import CROP_SIDES, SIDE
 from export.heads.photos.face_points import FacePoints, read_face_points
-from export.heads.view_shards import CROP_SIDES, SIDE
 from export.teachers.faces import Face, FaceDetector, FaceNetwork, Square, faces_of
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES

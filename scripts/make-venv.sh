@@ -4,12 +4,13 @@
 #   scripts/make-venv.sh            the light set: evaluation, pictures, reports
 #   scripts/make-venv.sh dev        + pytest and ruff
 #   scripts/make-venv.sh train,dev  + torch and moderngl (about 6 GB on disk); `teachers`: + LiteRT, `captures`: + COLMAP,
-#                                   `cluster`: + Dask, `solids`: + OpenCascade and Embree, `heads`: + libigl and Embree
+#                                   `cluster`: + Dask, `solids`: + OpenCascade and Embree, `heads`: + libigl and Embree,
+#                                   `clips`: + PyBullet
 #
 # PYTHON chooses the interpreter (default python3, 3.11 or newer).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-case "${1:-}" in -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case "${1:-}" in -h | --help) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
 extras="${1:-}"
 python="${PYTHON:-python3}"

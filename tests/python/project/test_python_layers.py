@@ -34,6 +34,7 @@ ALLOWED = {
         "export.camera", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",
         "export.surface",
     },
+    "export.prediction": {"export.clips", "export.training"},
     "export.scenes": {
         "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.point_cloud",
         "export.training", "export.xxh3",
@@ -134,6 +135,7 @@ def test_the_table_of_packages_has_no_circle():
 
 
 READERS = (
+    "export.prediction.train_autoencoder",
     "export.densepose.train", "export.densepose.export_onnx", "export.scenes.train", "export.teachers.shards",
     "export.evaluation.__main__", "export.evaluation.gallery", "export.heads.train_prior", "export.heads.train_encoder",
     "export.heads.export_onnx", "export.heads.bundle", "quantization.quantize", "quantization.choose",

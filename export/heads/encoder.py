@@ -44,6 +44,11 @@ class HeadEncoder(nn.Module):
         self.register_buffer("mean", torch.from_numpy(MEAN), persistent=False)
         self.register_buffer("scale", torch.from_numpy(1 / STD), persistent=False)
 
+    @property
+    def code_parts(self) -> tuple[nn.Module, ...]:
+        """What says codes and nothing else."""
+        return self.whole, self.code
+
     def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
         taps = self.backbone(((image - self.mean) * self.scale).permute(0, 3, 1, 2))
         cells = self.head(self.neck.finest(taps)).permute(0, 2, 3, 1)

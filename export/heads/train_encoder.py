@@ -135,6 +135,14 @@ def batch_losses(encoder: HeadEncoder, batch: tuple, precision: str) -> dict[str
     }
 
 
+def go_on_from(encoder: HeadEncoder, path: Path) -> None:
+    """Takes the weights of another training. The last layer of codes begins anew where their number is another."""
+    state = torch.load(path, weights_only=True)["state"]
+    if state["code.bias"].shape != encoder.code.bias.shape:
+        state = {name: value for name, value in state.items() if not name.startswith("code.")}
+    encoder.load_state_dict(state, strict=False)
+
+
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/heads/views"))
@@ -146,6 +154,9 @@ def parsed() -> argparse.Namespace:
         "--photo-share", dest="photo_fraction", type=float, default=0.2, help="of a batch, with --photos"
     )
     parser.add_argument("--start", type=Path, help="weights.pt of an encoder to go on from, instead of --init")
+    parser.add_argument(
+        "--codes-only", action="store_true", help="train what says shape codes alone, for another --prior"
+    )
     parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder"))
     parser.add_argument("--init", type=Path, default=Path("export/weights/densepose-b.pt"), help="of a person detector")
@@ -176,10 +187,15 @@ def train(arguments: argparse.Namespace) -> None:
     encoder = HeadEncoder(prior["z"].shape[1])
     start_from_detector(encoder, arguments.init)
     if arguments.start:
-        encoder.load_state_dict(torch.load(arguments.start, weights_only=True)["state"], strict=False)
+        go_on_from(encoder, arguments.start)
+    if arguments.codes_only:
+        encoder.requires_grad_(False)
+        for part in encoder.code_parts:
+            part.requires_grad_(True)
     encoder.to(memory_format=torch.channels_last)
     mean = Ema(encoder, 0.998)
-    optimizer = torch.optim.AdamW(encoder.parameters(), arguments.rate, weight_decay=1e-4)
+    trained = [p for p in encoder.parameters() if p.requires_grad]
+    optimizer = torch.optim.AdamW(trained, arguments.rate, weight_decay=1e-4)
     step, spent_s, log = 0, 0.0, []
     path = arguments.out / "checkpoint.pt"
     if path.exists():
@@ -189,6 +205,9 @@ def train(arguments: argparse.Namespace) -> None:
         optimizer.load_state_dict(state["optimizer"])
         step, spent_s, log = state["step"], state["spent_s"], state["log"]
     encoder.train()
+    if arguments.codes_only:
+        for part in (encoder.backbone, encoder.neck, encoder.head):
+            part.eval()
     made = (
         heads,
         prior["z"][: len(heads)].numpy(),
@@ -223,9 +242,11 @@ def train(arguments: argparse.Namespace) -> None:
         for group in optimizer.param_groups:
             group["lr"] = rate_at(step, schedule.fraction(step, spent_s), arguments.rate)
         terms = batch_losses(encoder, next(batches), arguments.precision)
+        if arguments.codes_only:
+            terms = {"code": terms["code"]}
         optimizer.zero_grad(set_to_none=True)
         sum(SCALES[name.removeprefix("photo_")] * value for name, value in terms.items()).backward()
-        torch.nn.utils.clip_grad_norm_(encoder.parameters(), 5.0)
+        torch.nn.utils.clip_grad_norm_(trained, 5.0)
         optimizer.step()
         step += 1
         mean.update(encoder, step)
@@ -235,7 +256,7 @@ def train(arguments: argparse.Namespace) -> None:
         schedule.advance(bar, step, spent_s)
         if step % 20 == 0:
             log.append({"step": step, "loss": smoothed.loss, "terms": dict(smoothed.values)})
-            bar.set_postfix(step=step, coarse=f"{smoothed.values['coarse']:.3f}", refresh=False)
+            bar.set_postfix(step=step, loss=f"{smoothed.loss:.3f}", refresh=False)
         if save.due():
             checkpoint()
             save.restart()

@@ -1,7 +1,8 @@
 """How far a mesh lies from a true head.
 
-One-sided, from true points to the nearest points of the mesh's triangles. The true points are first moved, rotated and
-scaled to where they fit the mesh best, those of the face for the face's figure and all for the head's. All in mm.
+From true points to the nearest points of the mesh's triangles. The true points are first moved, rotated and scaled to
+where they fit the mesh best, those of the face for the face's figure and all for the head's; for other parts of the
+head the alignment is that of the head. `back_mm` goes the other way, from the mesh to the true surface. All in mm.
 """
 
 from __future__ import annotations
@@ -13,6 +14,11 @@ import igl
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from export.heads.surface import cut_distance
+
+MM_PER_DM = 100
+BACK_POINTS = 4000
+CUT_MARGIN_DM = 0.05  # so near the cut a mesh ends or closes
 ICP_STEPS, ICP_POINTS = 12, 1000
 # Farther points weigh less: hair that is not there must not pull the face away.
 OUTLIER_MM = 3.0
@@ -48,23 +54,32 @@ class Triangles:
 
 @dataclass(frozen=True, eq=False)
 class TruePoints:
-    """points: float64 [N, 3] of the surface above the cut, mm; is_face: [N]; normals: [N, 3], None where not known."""
+    """points: float64 [N, 3] of the surface above the cut, mm; is_face: [N]. None where not known: normals [N, 3];
+    is_inner_face [N], which of them the points of a face network cover (`face_mesh.py`); mesh, the whole surface."""
 
     points: np.ndarray
     is_face: np.ndarray
     normals: np.ndarray | None = None
+    is_inner_face: np.ndarray | None = None
+    mesh: Triangles | None = None
 
 
 @dataclass(frozen=True)
 class Distances:
     """Means in mm after alignment; unaligned_mm: of the whole head as it is; scale: the mesh's size by the true one's;
-    normals_deg: mean angle between normals, whole head; None where the true ones are not known."""
+    None where what is true is not known: normals_deg: mean angle between normals, whole head; inner_face_mm: aligned by
+    the inner face alone; seen_mm, unseen_mm: of what photos show and do not show; back_mm: from the mesh to the true
+    surface."""
 
     face_mm: float
     head_mm: float
     unaligned_mm: float
     scale: float
     normals_deg: float | None
+    inner_face_mm: float | None = None
+    seen_mm: float | None = None
+    unseen_mm: float | None = None
+    back_mm: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +92,9 @@ class Similarity:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         return self.scale * points @ self.rotation.T + self.shift
+
+    def inverse(self) -> Similarity:
+        return Similarity(1 / self.scale, self.rotation.T, -self.rotation.T @ self.shift / self.scale)
 
 
 def aligned(mesh: Triangles, points: np.ndarray, steps: int = ICP_STEPS) -> Similarity:
@@ -105,7 +123,8 @@ def aligned(mesh: Triangles, points: np.ndarray, steps: int = ICP_STEPS) -> Simi
     return found
 
 
-def measure(mesh: Triangles, true: TruePoints) -> Distances:
+def measure(mesh: Triangles, true: TruePoints, seen: np.ndarray | None = None) -> Distances:
+    """seen: [N], which of the true points photos show."""
     whole, face = aligned(mesh, true.points), aligned(mesh, true.points[true.is_face])
     head_mm, normal = mesh.nearest(whole(true.points))
     face_mm, _ = mesh.nearest(face(true.points[true.is_face]))
@@ -114,4 +133,32 @@ def measure(mesh: Triangles, true: TruePoints) -> Distances:
     if true.normals is not None:
         cosine = np.clip((normal * (true.normals @ whole.rotation.T)).sum(1), -1, 1)
         angle = float(np.degrees(np.arccos(cosine)).mean())
-    return Distances(float(face_mm.mean()), float(head_mm.mean()), float(before_mm.mean()), whole.scale, angle)
+    parts = (None, None) if seen is None else (_mean(head_mm[seen]), _mean(head_mm[~seen]))
+    return Distances(
+        float(face_mm.mean()), float(head_mm.mean()), float(before_mm.mean()), whole.scale, angle,
+        inner_face_mm(mesh, true), *parts, None if true.mesh is None else back_mm(mesh, true.mesh, whole.inverse()),
+    )  # fmt: skip
+
+
+def inner_face_mm(mesh: Triangles, true: TruePoints) -> float | None:
+    """Of the inner face alone, aligned by it; None where it is not known."""
+    if true.is_inner_face is None:
+        return None
+    points = true.points[true.is_inner_face]
+    return float(mesh.nearest(aligned(mesh, points)(points))[0].mean())
+
+
+def back_mm(mesh: Triangles, true: Triangles, to_true: Similarity) -> float | None:
+    """From evenly spread points of the mesh above the cut to the true surface."""
+    a, b, c = (mesh.points[mesh.faces[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    rng = np.random.default_rng(0)
+    face = rng.choice(len(area), BACK_POINTS, p=area / area.sum())
+    u, v = np.sqrt(rng.random((BACK_POINTS, 1))), rng.random((BACK_POINTS, 1))
+    points = to_true((1 - u) * a[face] + u * (1 - v) * b[face] + u * v * c[face])
+    points = points[cut_distance(points / MM_PER_DM) < -CUT_MARGIN_DM]
+    return _mean(np.linalg.norm(true.offsets(points), axis=1)) if len(points) else None
+
+
+def _mean(values: np.ndarray) -> float | None:
+    return float(values.mean()) if len(values) else None

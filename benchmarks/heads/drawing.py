@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -33,25 +34,40 @@ class DrawnMesh:
 
     @staticmethod
     def of(mesh: HeadMesh, metres_per_unit: float) -> DrawnMesh:
-        colours = mesh.colours.astype(np.float64)
+        vertex_colours = mesh.colours.astype(np.float64)
         faces = mesh.triangles.astype(np.int64)
 
         def mixed(place: Place) -> np.ndarray:
-            return (colours[faces[place.face]] * place.weight[..., None]).sum(1)
+            return (vertex_colours[faces[place.face]] * place.weight[..., None]).sum(1)
+
+        positions = mesh.positions_m.astype(np.float64) / metres_per_unit
+        return DrawnMesh.coloured(positions, faces, mesh.normals.astype(np.float64), mixed)
+
+    @staticmethod
+    def coloured(
+        positions: np.ndarray, faces: np.ndarray, normals: np.ndarray, colours: Callable[[Place], np.ndarray]
+    ) -> DrawnMesh:
+        """positions, normals: [V, 3] in dm; faces: int64 [F, 3]; colours: RGB 0..255 of places on them."""
 
         def everywhere(points: np.ndarray) -> np.ndarray:
             return np.ones(len(points), bool)
 
-        positions = mesh.positions_m.astype(np.float64) / metres_per_unit
-        normals, template = (values.astype(np.float64) for values in (mesh.normals, mesh.template_points_m))
-        return DrawnMesh(Scene(positions, faces, normals, template, mixed, everywhere))
+        return DrawnMesh(Scene(positions, faces, normals, np.zeros_like(positions), colours, everywhere))
 
     def colours(self, camera: Camera, behind: np.ndarray | None = None) -> np.ndarray:
         """Without further light, uint8 RGB [H, W, 3]; behind: a picture of that size."""
+        rgb, present = self._lit(camera)
+        return _before(rgb, present, behind)
+
+    def shown(self, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+        """The same before grey, and which pixels show the mesh, bool [H, W]."""
+        rgb, present = self._lit(camera)
+        return _before(rgb, present, None), present
+
+    def _lit(self, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
         seen = self.scene.seen(camera, FLAT)
         up = np.where((seen.normal * _towards(camera, seen)).sum(-1) > 0, -1, 1) * seen.normal[..., 2]
-        rgb = seen.rgb / (_DIM * (1 + 0.25 * up[..., None]))
-        return _before(rgb, seen.present, behind)
+        return seen.rgb / (_DIM * (1 + 0.25 * up[..., None])), seen.present
 
     def normals(self, camera: Camera) -> np.ndarray:
         """Of the camera's axes, as colours: red to the right, green up, blue towards the camera."""

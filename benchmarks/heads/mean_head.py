@@ -11,7 +11,7 @@ from scipy.ndimage import zoom
 from scipy.sparse.csgraph import connected_components
 
 from benchmarks.heads.distances import Triangles
-from export.heads.field import bases_of, geometry
+from export.heads.field import bases_of, geometry, surface
 from export.heads.prior import Prior
 from export.heads.prior_file import read_prior
 
@@ -57,11 +57,20 @@ def mesh_of(prior: Prior, cell_dm: float = CELL_DM) -> Triangles:
     flat = np.ascontiguousarray(values.transpose(order)).ravel().astype(np.float64)
     points, faces, _ = igl.marching_cubes(flat, grid, *(int(n) for n in fine), 0.0)
     faces = np.asarray(faces, np.int64)
-    mesh = Triangles(np.asarray(points) * MM_PER_DM, _outwards(np.asarray(points), faces))
+    mesh = Triangles(np.asarray(points) * MM_PER_DM, outwards(np.asarray(points), faces))
     return largest_piece(mesh)
 
 
-def _outwards(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+@torch.no_grad()
+def template_points(prior: Prior, points: np.ndarray) -> np.ndarray:
+    """Of points [N, 3] (dm) of the mean head where they lie on the template head, float64 [N, 3], dm."""
+    weights, found = _weights(prior), []
+    for part in torch.from_numpy(points.astype(np.float32)).split(CHUNK):
+        found.append(surface(prior.shape, weights, part, geometry(prior.shape, weights, part))[1])
+    return torch.cat(found).numpy().astype(np.float64)
+
+
+def outwards(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Triangles counter-clockwise from outside: those of a closed surface whose volume is positive."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     return faces if (a * np.cross(b, c)).sum() > 0 else faces[:, ::-1].copy()

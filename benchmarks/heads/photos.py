@@ -4,21 +4,23 @@ of photographs without people, framed as cameras frame them, so that the princip
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from benchmarks.heads.distances import TruePoints
-from benchmarks.heads.visible import seen_from_outside
+from benchmarks.heads.distances import MM_PER_DM, Triangles, TruePoints
+from benchmarks.heads.face_mesh import is_inner_face
+from benchmarks.heads.visible import seen_from, seen_from_outside
 from export.camera import Camera
 from export.heads.face import is_face
 from export.heads.head_shards import HeadPictures, read_pictures
 from export.heads.made_heads import make_head
-from export.heads.surface import HeadMaker, cut_distance
+from export.heads.surface import Head, HeadMaker, cut_distance
+from export.heads.views import sample_extras
 
-MM_PER_DM = 100
 HEAD = 255  # of masks
 MAX_YAW_DEG, MAX_PITCH_DEG = 45.0, 35.0
 FRONT_YAW_DEG, SIDE_YAW_DEG = 20.0, (35.0, 110.0)
@@ -26,6 +28,7 @@ FRONT_YAW_DEG, SIDE_YAW_DEG = 20.0, (35.0, 110.0)
 FOCAL_OF_LONG_SIDE = (0.7, 1.6)
 NARROW_BY_LONG = 0.75
 MARGIN = 1.1  # a photo is so much larger than what it must show of the head
+DARK_SKIN, LIGHT_SKIN = 110, 180  # grey values between kinds of skin
 NOISE = 1.5  # standard deviation, of 0..255
 
 
@@ -46,6 +49,7 @@ class TrueHead:
     name: str
     pictures: HeadPictures
     true: TruePoints
+    traits: Mapping[str, str] = field(default_factory=dict)  # what is known of it: hair, skin, glasses
 
     def front(self) -> int | None:
         """The first picture from less than 45 degrees to the side; None: there is none."""
@@ -59,6 +63,19 @@ class TrueHead:
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
         found = [next((k for k in shown if _is_from(self.pictures, k, *span)), None) for span in spans]
         return None if None in found else tuple(found)
+
+    def all_around(self, count: int) -> tuple[int, ...] | None:
+        """The first `count` pictures from anywhere; None: there are fewer."""
+        shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
+        return tuple(shown[:count]) if len(shown) >= count else None
+
+    def seen_by(self, cameras: Sequence[Camera]) -> np.ndarray | None:
+        """Which of the true points, [N], these cameras see; None where the whole surface is not known."""
+        true = self.true
+        if true.mesh is None or true.normals is None:
+            return None
+        centres = np.array([camera.centre for camera in cameras])
+        return seen_from(true.mesh.points / MM_PER_DM, true.mesh.faces, true.points / MM_PER_DM, true.normals, centres)
 
 
 class PhotoBackgrounds:
@@ -139,26 +156,42 @@ def generator(name: str, k: int) -> np.random.Generator:
 def read_made_heads(
     data: Path, count: int | None = None, maker: HeadMaker | None = None, split: str = "test"
 ) -> list[TrueHead]:
-    """Heads of this project's maker: pictures in data/views, points in data/points. With the maker they are made again,
-    and points that cannot be seen from outside are left out."""
+    """Heads of this project's maker: pictures in data/views, points in data/points. With the maker they are made again:
+    then points that cannot be seen from outside are left out, and surface and traits are known."""
     heads = []
     for path in sorted((data / "views" / split).glob("head-*[0-9].npz"))[:count]:
         with np.load(data / "points" / split / path.name) as stored:
             points, normals, template = (stored[name] for name in ("surface", "normal", "template"))
-        own = cut_distance(points) < 0
+        own, mesh, traits = cut_distance(points) < 0, None, {}
         if maker:
-            head = make_head(maker, split, int(path.stem.rpartition("-")[2]))
+            number = int(path.stem.rpartition("-")[2])
+            head = make_head(maker, split, number)
             own &= seen_from_outside(head.positions, head.faces, points, normals)
+            mesh = Triangles(head.positions.astype(np.float64) * MM_PER_DM, head.faces.astype(np.int64))
+            traits = traits_of(head, number)
         true = TruePoints(
-            points[own].astype(np.float64) * MM_PER_DM, is_face(template[own]), normals[own].astype(np.float64)
-        )
-        heads.append(TrueHead(path.stem, read_pictures(path), true))
+            points[own].astype(np.float64) * MM_PER_DM, is_face(template[own]), normals[own].astype(np.float64),
+            is_inner_face(template[own]), mesh,
+        )  # fmt: skip
+        heads.append(TrueHead(path.stem, read_pictures(path), true, traits))
     if not heads:
         raise FileNotFoundError(
             f"{data / 'views' / split} holds no pictures: run `python -m export.heads.view_shards {split}` and "
             f"`python -m export.heads.points {split}` first"
         )
     return heads
+
+
+def traits_of(head: Head, number: int) -> dict[str, str]:
+    """What reports group made heads by; number: of its file, on which its glasses depend."""
+    light = float(head.tone @ [0.299, 0.587, 0.114])
+    extras = sample_extras(np.random.default_rng([zlib.crc32(b"views"), number]))
+    return {
+        "hair": head.style.name,
+        "skin": "dark" if light < DARK_SKIN else "light" if light > LIGHT_SKIN else "medium",
+        "glasses": "dark glasses" if extras.lens > 0.4 else "glasses" if extras.lens else "no glasses",
+        "beard": "beard" if head.style.beard.max() > 0 else "no beard",
+    }
 
 
 def read_other_heads(data: Path, count: int | None = None) -> list[TrueHead]:

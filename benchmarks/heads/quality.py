@@ -12,18 +12,24 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 from benchmarks.heads import report
-from benchmarks.heads.distances import Distances, Triangles, measure
-from benchmarks.heads.fitted import angle_deg, cameras_of, stored, triangles_of
+from benchmarks.heads.distances import MM_PER_DM, Triangles, aligned, inner_face_mm, measure
+from benchmarks.heads.drawing import DrawnMesh
+from benchmarks.heads.face_mesh import FaceMeshes
+from benchmarks.heads.fitted import MM_PER_M, angle_deg, cameras_of, stored, triangles_of
+from benchmarks.heads.linear_head import LinearHeads, read_visible
 from benchmarks.heads.mean_head import read_mean_head
+from benchmarks.heads.new_views import View, psnr_db, true_views, with_photo
 from benchmarks.heads.photos import (
     Photo,
     PhotoBackgrounds,
@@ -34,58 +40,121 @@ from benchmarks.heads.photos import (
     read_other_heads,
     yaw_pitch_deg,
 )  # fmt: skip
+from benchmarks.heads.targets import ONE, OTHER, THREE
 from export.evaluation.heads_api import HeadBuilder, MaquetteError
 from export.evaluation.machine import describe_machine
 from export.heads.made_heads import make_maker
+from export.heads.surface import HeadMaker
+from export.photos.packages import PackageError
 
-ONE, THREE, OTHER = "one photo", "three photos", "other maker's heads, one photo"
+KNOWN, EIGHT = "one photo, focal length known", "eight photos"
 BUNDLE, DATA, BACKGROUNDS = Path("sdk/models/heads-int8"), Path(".data/heads"), Path(".data/backgrounds/test")
 FIGURES = Path("build/benchmarks/heads.json")
 SECONDS = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class HeadSet:
+    """Heads, each with the numbers of the pictures that it is fitted to, at these times of fitting."""
+
+    name: str
+    heads: Sequence[tuple[TrueHead, Sequence[int]]]
+    seconds: Sequence[float]
+    known_focal: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Baselines:
+    """What heads are measured beside, besides the mean head; None is left out. maker: draws new views."""
+
+    linear: LinearHeads | None = None
+    face: FaceMeshes | None = None
+    maker: HeadMaker | None = None
+
+
+NOTHING_ELSE = Baselines()
 
 
 def photos_of(head: TrueHead, numbers: Iterable[int], backgrounds: PhotoBackgrounds) -> list[Photo]:
     return [photo_of(head.pictures, k, backgrounds, generator(head.name, k)) for k in numbers]
 
 
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Photos of a head, and what is true of them. seen: which of the true points the photos show; views: new ones."""
+
+    head: TrueHead
+    photos: Sequence[Photo]
+    seen: np.ndarray | None = None
+    views: Sequence[View] = ()
+
+    @staticmethod
+    def of(head: TrueHead, numbers: Sequence[int], backgrounds: PhotoBackgrounds, maker: HeadMaker | None) -> Case:
+        photos = photos_of(head, numbers, backgrounds)
+        seen = head.seen_by([photo.camera for photo in photos])
+        drawable = maker is not None and head.true.mesh is not None and len(photos) == 1
+        views = true_views(maker, head.name, numbers[0], photos[0].camera) if drawable else ()
+        return Case(head, photos, seen, views)
+
+
+def measure_baselines(case: Case, mean: Triangles, others: Baselines, known_focal: bool = False) -> dict:
+    """`mean_...` of the mean head; of one photo also `linear_...` and `face_mesh_inner_face_mm`."""
+    true, photo = case.head.true, case.photos[0]
+    found = {f"mean_{key}": value for key, value in asdict(measure(mesh=mean, true=true, seen=case.seen)).items()}
+    if case.views:
+        to_mean = aligned(mean, true.points)
+        found["mean_view_psnr_db"] = psnr_db(with_photo(mean, to_mean, photo), to_mean, case.views)
+    if len(case.photos) > 1:
+        return found
+    if others.linear:
+        mesh = others.linear.mesh(photo, photo.camera.fx_px if known_focal else 0)
+        if mesh:
+            found |= {f"linear_{key}": value for key, value in asdict(measure(mesh, true, case.seen)).items()}
+    if others.face and true.is_inner_face is not None:
+        mesh = others.face.mesh(photo.rgb, photo.box)
+        found["face_mesh_inner_face_mm"] = inner_face_mm(mesh, true) if mesh else None
+    return found
+
+
 def measure_head(
-    builder: HeadBuilder,
-    head: TrueHead,
-    photos: Sequence[Photo],
-    mean: Distances,
-    seconds: Sequence[float],
-    known_focal: bool = False,
+    builder: HeadBuilder, case: Case, baselines: dict, seconds: Sequence[float], known_focal: bool = False
 ) -> list[dict]:
     """One row for each time of fitting. A row of a head that was not found has `missing`, which says why."""
+    photos = case.photos
     about = {
-        "head": head.name,
+        "head": case.head.name,
         "yaw_deg": round(yaw_pitch_deg(photos[0].camera.rotation)[0], 1),
         "head_px": float(np.ptp(photos[0].box.reshape(2, 2), 0).max()),
-        "mean_face_mm": mean.face_mm,
-        "mean_head_mm": mean.head_mm,
-        "mean_unaligned_mm": mean.unaligned_mm,
-        "mean_normals_deg": mean.normals_deg,
+        **case.head.traits,
+        **baselines,
     }
     try:
         builder.clear()
         for photo in photos:
             builder.add_photo(photo.rgb, photo.box, photo.camera.fx_px if known_focal else 0)
-        return [about | {"asked_s": asked} | fitted(builder, head, photos, asked) for asked in seconds]
+        return [about | {"asked_s": asked} | fitted(builder, case, asked) for asked in seconds]
     except MaquetteError as error:
         return [about | {"asked_s": asked, "missing": str(error)} for asked in seconds]
 
 
-def fitted(builder: HeadBuilder, head: TrueHead, photos: Sequence[Photo], asked_s: float) -> dict:
+def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
     """Figures of a fit to the photos that the builder has. Raises MaquetteError."""
+    true = case.head.true
     with builder.fit(asked_s) as result:
         start = time.perf_counter()
         mesh = result.mesh()
         mesh_ms = 1000 * (time.perf_counter() - start)
-        cameras = cameras_of(stored(result))
+        file = stored(result)
     stats = builder.stats
-    used = [photo for k, photo in enumerate(photos) if builder.photo(k).is_used]
-    pairs = list(zip(cameras, used, strict=True))
-    return asdict(measure(triangles_of(mesh), head.true)) | {
+    used = [photo for k, photo in enumerate(case.photos) if builder.photo(k).is_used]
+    pairs = list(zip(cameras_of(file), used, strict=True))
+    triangles = triangles_of(mesh)
+    found = asdict(measure(triangles, true, case.seen))
+    if case.views:
+        # In decimetres of the true head, whatever the unit of the head's file.
+        drawn = DrawnMesh.of(mesh, MM_PER_DM / MM_PER_M)
+        found["view_psnr_db"] = psnr_db(drawn, aligned(triangles, true.points), case.views)
+    return found | {
         "fit_s": stats.total_ms / 1000,
         "steps": stats.step_count,
         "encode_ms": stats.encode_ms,
@@ -94,40 +163,54 @@ def fitted(builder: HeadBuilder, head: TrueHead, photos: Sequence[Photo], asked_
         "focal_ratio": float(np.median([camera.fx_px / photo.camera.fx_px for camera, photo in pairs])),
         # Frames of heads of another maker lie otherwise in their heads.
         "rotation_deg": float(np.median([angle_deg(camera.rotation, photo.camera.rotation) for camera, photo in pairs]))
-        if head.true.normals is not None
+        if true.normals is not None
         else None,
     }
 
 
 def measure_set(
-    builder: HeadBuilder,
-    name: str,
-    heads: Sequence[tuple[TrueHead, Sequence[int]]],
-    backgrounds: PhotoBackgrounds,
-    mean: Triangles,
-    seconds: Sequence[float],
-    known_focal: bool = False,
+    builder: HeadBuilder, own: HeadSet, backgrounds: PhotoBackgrounds, mean: Triangles, others: Baselines = NOTHING_ELSE
 ) -> list[dict]:
-    """heads: each with the numbers of its pictures."""
     rows = []
-    for head, numbers in tqdm(heads, desc=name, unit="head", disable=None):
-        photos = photos_of(head, numbers, backgrounds)
-        of_mean = measure(mean, head.true)
-        rows += [{"set": name} | row for row in measure_head(builder, head, photos, of_mean, seconds, known_focal)]
+    for head, numbers in tqdm(own.heads, desc=own.name, unit="head", disable=None):
+        case = Case.of(head, numbers, backgrounds, others.maker)
+        beside = measure_baselines(case, mean, others, own.known_focal)
+        rows += [{"set": own.name} | row for row in measure_head(builder, case, beside, own.seconds, own.known_focal)]
     return rows
 
 
-def sets_of(options: argparse.Namespace) -> dict[str, list[tuple[TrueHead, Sequence[int]]]]:
+def sets_of(options: argparse.Namespace, maker: HeadMaker | None = None) -> list[HeadSet]:
     """The sets that are asked for and there, with the pictures that each head is fitted to."""
-    made, found = read_made_heads(options.data, options.heads, make_maker()), {}
+    made, seconds = read_made_heads(options.data, options.heads, maker), sorted(options.seconds)
+    front = [(head, [k]) for head in made if (k := head.front()) is not None]
+    found = []
     if "one" in options.sets:
-        found[ONE] = [(head, [k]) for head in made if (k := head.front()) is not None]
+        found.append(HeadSet(ONE, front, seconds, options.known_focal))
+        if not options.known_focal:
+            found.append(HeadSet(KNOWN, front, [options.at], True))
     if "three" in options.sets:
-        found[THREE] = [(head, three) for head in made if (three := head.front_and_sides()) is not None]
+        three = [(head, numbers) for head in made if (numbers := head.front_and_sides()) is not None]
+        eight = [(head, numbers) for head in made if (numbers := head.all_around(8)) is not None]
+        found += [HeadSet(THREE, three, seconds, options.known_focal), HeadSet(EIGHT, eight, [options.at])]
     if "other" in options.sets:
         others = read_other_heads(options.data, options.heads)
-        found[OTHER] = [(head, [k]) for head in others if (k := head.front()) is not None]
-    return {name: heads for name, heads in found.items() if heads}
+        heads = [(head, [k]) for head in others if (k := head.front()) is not None]
+        found.append(HeadSet(OTHER, heads, seconds, options.known_focal))
+    return [own for own in found if own.heads]
+
+
+def baselines_of(options: argparse.Namespace, bundle: Path, maker: HeadMaker) -> Baselines:
+    """Those whose data are there; a warning names the others."""
+    linear = face = None
+    try:
+        linear = LinearHeads(bundle, maker, read_visible(options.data / "points/train"))
+    except (FileNotFoundError, ValueError) as error:
+        print(f"No linear head: {error}", file=sys.stderr)
+    try:
+        face = FaceMeshes()
+    except (ImportError, PackageError) as error:
+        print(f"No mesh of MediaPipe's face network: {error} (scripts/make-venv.sh teachers)", file=sys.stderr)
+    return Baselines(linear, face, maker)
 
 
 def parser_of(description: str) -> argparse.ArgumentParser:
@@ -156,29 +239,31 @@ def parsed(arguments: Sequence[str] | None = None, parser: argparse.ArgumentPars
 
 def run(options: argparse.Namespace) -> dict:
     """Measures all that `parsed` says, and writes the figures."""
-    sets, backgrounds, rows = sets_of(options), PhotoBackgrounds(options.backgrounds), []
-    for bundle in options.bundles:
-        mean = read_mean_head(bundle)
+    maker = make_maker()
+    sets, backgrounds, rows = sets_of(options, maker), PhotoBackgrounds(options.backgrounds), []
+    for number, bundle in enumerate(options.bundles):
+        mean, others = read_mean_head(bundle), baselines_of(options, bundle, maker) if not number else NOTHING_ELSE
         with HeadBuilder(bundle, threads=options.threads) as builder:
-            for name, heads in sets.items():
-                found = measure_set(
-                    builder, name, heads, backgrounds, mean, sorted(options.seconds), options.known_focal
-                )
-                rows += [{"bundle": bundle.name} | row for row in found]
+            for own in sets:
+                rows += [{"bundle": bundle.name} | row for row in measure_set(builder, own, backgrounds, mean, others)]
     measured = {
         "machine": describe_machine(),
         "bundles": [bundle.name for bundle in options.bundles],
         "at_s": options.at,
         "known_focal": options.known_focal,
-        "rows": [{key: _short(value) for key, value in row.items()} for row in rows],
+        "rows": shortened(rows),
     }
     options.figures.parent.mkdir(parents=True, exist_ok=True)
     options.figures.write_text(json.dumps(measured, indent=1) + "\n")
     return measured
 
 
-def _short(value: object) -> object:
+def shortened(value: Any) -> Any:
     """Numbers with the digits that mean something."""
+    if isinstance(value, dict):
+        return {key: shortened(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [shortened(part) for part in value]
     return float(f"{value:.5g}") if isinstance(value, float) else value
 
 

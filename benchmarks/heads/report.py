@@ -1,18 +1,14 @@
-"""Tables of what `quality.py` measured."""
+"""The page of what `python -m benchmarks.heads` measured."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
-from statistics import fmean, median
+from collections.abc import Mapping, Sequence
+from statistics import fmean
 
-FOCAL_WITHIN = 0.2
-LONG_ENOUGH_S = 1.0  # from then on more time must not make it worse
-YAWS_DEG = (0, 15, 30, 45)
-_HEADER = (
-    "seconds", "found", "face, mm", "by mean head", "head, mm", "by mean head", "not aligned, mm", "by mean head",
-    "normals, deg", "size off by", "focal within 20 %", "camera rotated by", "steps", "fit, s",
-)  # fmt: skip
+from benchmarks.heads.engine import engine_table
+from benchmarks.heads.savings import settings_table
+from benchmarks.heads.tables import by_baseline, by_group, by_real_face, by_seconds, found, size_of, table, yaw_of
+from benchmarks.heads.targets import targets
 
 _HOW = """Distances go from points of the true surface, above the cut and seen from outside, to the mesh that the
 library gives, after the true head was moved, rotated and scaled to where it fits best: by its face for the face (95 mm
@@ -22,114 +18,26 @@ has 6 to 10 degrees, since its normals are smooth and its triangles flat. *Size 
 sign left out; *camera rotated by*: the median angle to the true camera, in frames that hold a head by its skull. Photos
 are rendered, in front of photographs, from up to 45° to the side; the library is given the head's box"""
 
+_TIME = """A fit ends by its time, by 300 steps, or when the pixels held out gain no more. Where time ends it, the
+figures depend on the machine and on what else it does: the column of steps says how far it came."""
 
-def table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *lines))
+_BASELINES = """*Linear head*: the 64 principal components of the vertices of the training heads, fitted to what the
+same encoder sees (template points, and its estimate of the codes carried over to the components) with the same camera
+model and prior. *MediaPipe's 468 points*: its face network's points with their depth, as a mesh; it covers the inner
+face alone, and is aligned by it, as all others are for that column. *Seen side*: true points that the photos show,
+after the alignment of the whole head; *unseen side*: the others. *Result to truth*: from points of the mesh to the true
+surface. *New views*: PSNR inside of both silhouettes of six views 30° to 60° around from the photo, in its light,
+before grey; the mean head has the photo projected onto it by the true camera, and where the photo does not see it the
+colour of the nearest place that it does. NeuS from a sphere is not among them: the library has no such fit, as its
+prior is part of the network. A perceptual measure of new views is missing."""
 
+_REAL = """Faces of photographs that training never saw (those of the validation split told when to end it). Points:
+mean distance in the photo from where MediaPipe's face network sees its points to where the same places of the fitted
+mesh are drawn; also by the distance between the outer corners of the eyes. Silhouette: IoU of the mesh, drawn into the
+photo, with the person's mask above the chin, where it is certain. Neither is told to the fit."""
 
-def found(rows: Sequence[Mapping]) -> list[Mapping]:
-    """Rows of heads that were fitted."""
-    return [row for row in rows if "missing" not in row]
-
-
-def ratio(rows: Sequence[Mapping], what: str) -> float:
-    """Mean distance by that of the mean head on the same heads."""
-    return fmean(row[what] for row in rows) / fmean(row[f"mean_{what}"] for row in rows)
-
-
-def focal_within(rows: Sequence[Mapping]) -> float:
-    """The fraction of heads whose focal length is right to 20 %."""
-    return fmean(abs(row["focal_ratio"] - 1) <= FOCAL_WITHIN for row in rows if row["focal_ratio"])
-
-
-def over(values: Mapping[float, float]) -> float:
-    """How far the error, by seconds, rises above its lowest once there was time enough, as a fraction."""
-    long = [value for asked, value in values.items() if asked >= LONG_ENOUGH_S]
-    return max(long) / min(long) - 1 if long else 0.0
-
-
-def by_seconds(rows: Sequence[Mapping]) -> str:
-    """One line a time of fitting, after the mean head's."""
-    times = sorted({row["asked_s"] for row in rows})
-    first = found([row for row in rows if row["asked_s"] == times[0]])
-    lines = []
-    if first:
-        mean = {key: fmean(row[f"mean_{key}"] for row in first) for key in ("face_mm", "head_mm", "unaligned_mm")}
-        degrees = [row["mean_normals_deg"] for row in first if row["mean_normals_deg"] is not None]
-        lines.append(
-            ["mean head", "", f"{mean['face_mm']:.2f}", "1", f"{mean['head_mm']:.2f}", "1",
-             f"{mean['unaligned_mm']:.2f}", "1", f"{fmean(degrees):.1f}" if degrees else "", *[""] * 5]
-        )  # fmt: skip
-    for asked in times:
-        every = [row for row in rows if row["asked_s"] == asked]
-        own = found(every)
-        line = [f"{asked:g}", f"{len(own)} of {len(every)}"]
-        if own:
-            degrees = [row["normals_deg"] for row in own if row["normals_deg"] is not None]
-            for what in ("face_mm", "head_mm", "unaligned_mm"):
-                line += [f"{fmean(row[what] for row in own):.2f}", f"{ratio(own, what):.2f}"]
-            line += [
-                f"{fmean(degrees):.1f}" if degrees else "",
-                f"{100 * median(abs(row['scale'] - 1) for row in own):.1f} %",
-                f"{100 * focal_within(own):.0f} %",
-                "" if own[0]["rotation_deg"] is None else f"{median(row['rotation_deg'] for row in own):.1f}°",
-                f"{median(row['steps'] for row in own):.0f}",
-                f"{median(row['fit_s'] for row in own):.2f}",
-            ]
-        lines.append(line + [""] * (len(_HEADER) - len(line)))
-    return table(_HEADER, lines)
-
-
-def by_yaw(rows: Sequence[Mapping], at_s: float) -> str:
-    """From how far to the side the photo was taken, at one time of fitting."""
-    own = found([row for row in rows if row["asked_s"] == at_s])
-    lines = []
-    for low, high in pairwise(YAWS_DEG):
-        some = [row for row in own if low <= abs(row["yaw_deg"]) < high or abs(row["yaw_deg"]) == high == YAWS_DEG[-1]]
-        if some:
-            lines.append(
-                [f"{low} to {high}°", str(len(some)), f"{fmean(r['face_mm'] for r in some):.2f}",
-                 f"{ratio(some, 'face_mm'):.2f}", f"{fmean(r['head_mm'] for r in some):.2f}",
-                 f"{ratio(some, 'head_mm'):.2f}"]
-            )  # fmt: skip
-    return table(("yaw", "heads", "face, mm", "by mean head", "head, mm", "by mean head"), lines)
-
-
-def targets(rows: Sequence[Mapping], at_s: float) -> str:
-    """Figures beside what is aimed at; what was not measured is left out."""
-    sets: dict[str, list[Mapping]] = {}
-    for row in found(rows):
-        sets.setdefault(row["set"], []).append(row)
-    lines = []
-
-    def add(name: str, what: str, figure: Callable[[list[Mapping]], float], gate: float, stretch: float, sign: str):
-        own = [row for row in sets.get(name, []) if row["asked_s"] == at_s]
-        if not own:
-            return
-        value = figure(own)
-        kept = value >= gate if sign == "≥" else value <= gate
-        best = value >= stretch if sign == "≥" else value <= stretch
-        state = "stretch" if best else "met" if kept else "missed"
-        lines.append([f"{name}: {what}", f"{value:.2f}", f"{sign} {gate:g}", f"{sign} {stretch:g}", state])
-
-    one, three, other = "one photo", "three photos", "other maker's heads, one photo"
-    add(one, "face, mm", lambda own: fmean(r["face_mm"] for r in own), 1.8, 1.3, "≤")
-    add(one, "face by mean head", lambda own: ratio(own, "face_mm"), 0.7, 0.5, "≤")
-    add(one, "head by mean head", lambda own: ratio(own, "head_mm"), 0.65, 0.5, "≤")
-    add(three, "face, mm", lambda own: fmean(r["face_mm"] for r in own), 1.5, 1.0, "≤")
-    add(three, "head by mean head", lambda own: ratio(own, "head_mm"), 0.5, 0.4, "≤")
-    add(other, "face by mean head", lambda own: ratio(own, "face_mm"), 0.9, 0.75, "≤")
-    add(one, "focal length within 20 %, of photos", focal_within, 0.7, 0.85, "≥")
-    add(one, "rotation of the camera, median, deg", lambda own: median(r["rotation_deg"] for r in own), 4, 2, "≤")
-    for what in ("face", "head"):
-        by_time: dict[float, list[float]] = {}
-        for row in sets.get(one, []):
-            by_time.setdefault(row["asked_s"], []).append(row[f"{what}_mm"])
-        means = {asked: fmean(values) for asked, values in by_time.items()}
-        if sum(asked >= LONG_ENOUGH_S for asked in means) > 1:
-            rise = f"{what}, error after 1 s or more above its lowest, %"
-            add(one, rise, lambda _, means=means: 100 * over(means), 5, 2, "≤")
-    return table(("what", "figure", "gate", "stretch", "state"), lines)
+_GROUPS = (("yaw", yaw_of), ("size of the head", size_of))
+_TRAITS = ("hair", "beard", "skin", "glasses")
 
 
 def beside(rows: Sequence[Mapping], bundles: Sequence[str], at_s: float) -> str:
@@ -149,6 +57,75 @@ def beside(rows: Sequence[Mapping], bundles: Sequence[str], at_s: float) -> str:
     return table((f"{bundles[0]} beside", "set", "heads", "face, mm more", "head, mm more"), lines)
 
 
+def _title(text: str) -> str:
+    return f"## {text[0].upper()}{text[1:]}"
+
+
+def _set_parts(name: str, own: Sequence[Mapping], at_s: float) -> list[str]:
+    """What is said of one set."""
+    parts = [_title(name), by_seconds(own)]
+    now = [row for row in own if row["asked_s"] == at_s]
+    if name == "one photo":
+        parts += [f"### Beside baselines, after {at_s:g} s", by_baseline(own, at_s), _BASELINES]
+        groups = [by_group(now, header, of) for header, of in _GROUPS]
+        groups += [by_group(now, trait, lambda row, trait=trait: row.get(trait)) for trait in _TRAITS]
+        parts += [f"### By what heads and photos have in common, after {at_s:g} s", *groups]
+    else:
+        parts.append(by_baseline(own, at_s))
+    lost = {row["head"]: row["missing"] for row in own if "missing" in row}
+    return [part for part in parts if part] + [f"Not found: {head}: {why}" for head, why in lost.items()]
+
+
+def _real_parts(rows: Sequence[Mapping], at_s: float) -> list[str]:
+    lost = [row for row in rows if "missing" in row and row["asked_s"] == at_s]
+    return [
+        _title("real photographs"), by_real_face(rows), _REAL,
+        *(f"Not found: {row['face']}: {row['missing']}" for row in lost),
+    ]  # fmt: skip
+
+
+def _program_parts(rows: Sequence[Mapping]) -> list[str]:
+    stages = ("look", "pose", "fit", "mesh")
+    lines = [
+        [row["what"], f"{row['seconds']:.2f}", *(f"{row['ms'][stage]:.0f}" for stage in stages),
+         f"{row['peak_mb']:.0f}", f"{row['glb_mb']:.2f}", f"{row['maqh_kb']:.0f}"]
+        for row in rows
+    ]  # fmt: skip
+    header = ("`maquette head`", "whole, s", "encoder, ms", "pose, ms", "fit, ms", "mesh and files, ms")
+    return [_title("the program"), table((*header, "peak memory, MB", "GLB, MB", ".maqh, KB"), lines)]
+
+
+def _more_parts(measured: Mapping, sheet: str) -> list[str]:
+    """Real photographs, settings, the program, the engine, the sheet: those that were measured."""
+    at_s, parts = measured["at_s"], []
+    if measured.get("real"):
+        parts += _real_parts(measured["real"], at_s)
+    if measured.get("savings"):
+        parts += [
+            _title("what settings cost and gain"),
+            settings_table(measured["savings"]),
+            "One photo, one setting changed at a time; times are medians from the photo to the mesh. What the engine "
+            "leaves out of itself (empty blocks, rays that miss) has no switch.",
+        ]
+    if measured.get("program"):
+        parts += _program_parts(measured["program"])
+    if measured.get("engine"):
+        parts += [
+            _title("the engine, one thread"),
+            engine_table(measured["engine"]),
+            "Both in turn, the fastest runs; PyTorch in the batch size that suits it best. *Of the float peak*: "
+            "multiply-adds by the rate of the fastest matrix product on this machine.",
+        ]
+    if sheet:
+        parts += [
+            "## To look at",
+            f"![Photo, mesh over it, its normals, two new views, and the true head from there]({sheet})",
+            f"Of each set with one photo the best, the median and the worst by the whole head, after {at_s:g} s; then "
+            "real photographs.",
+        ]
+    return parts
+
+
 def page(measured: Mapping, sheet: str = "") -> str:
     """The whole report, Markdown. sheet: the picture's name, in the page's folder."""
     at_s, bundles, machine = measured["at_s"], measured["bundles"], measured["machine"]
@@ -158,23 +135,13 @@ def page(measured: Mapping, sheet: str = "") -> str:
         f"Bundle {bundles[0]}; {machine['processor']}, {machine['cores']} cores. Written by `python -m "
         "benchmarks.heads` ([benchmarks/heads](../../benchmarks/heads/README.md)).",
         f"{_HOW} {'and the focal length' if measured.get('known_focal') else 'and knows nothing of the camera'}.",
+        _TIME,
         f"## Targets, after {at_s:g} s",
-        targets(rows, at_s),
+        targets(measured),
     ]
     for name in dict.fromkeys(row["set"] for row in rows):
-        own = [row for row in rows if row["set"] == name]
-        parts += [f"## {name[0].upper()}{name[1:]}", by_seconds(own)]
-        if "three" not in name:
-            parts += [f"By the camera's yaw, after {at_s:g} s:", by_yaw(own, at_s)]
-        lost = {row["head"]: row["missing"] for row in own if "missing" in row}
-        parts += [f"Not found: {head}: {why}" for head, why in lost.items()]
-    if sheet:
-        parts += [
-            "## To look at",
-            f"![Photo, mesh over it, its normals, two new views, and the true head from there]({sheet})",
-            f"Of each set with one photo the best, the median and the worst by the whole head, after {at_s:g} s; then "
-            "real photographs.",
-        ]
+        parts += _set_parts(name, [row for row in rows if row["set"] == name], at_s)
+    parts += _more_parts(measured, sheet)
     if len(bundles) > 1:
         parts += [f"## Other bundles, after {at_s:g} s", beside(measured["rows"], bundles, at_s)]
     return "\n\n".join(parts) + "\n"

@@ -1,5 +1,5 @@
-"""Which points of a surface can be seen from outside. Made heads have eyeballs that are closed, and skin under hair:
-no photo shows what lies inside, and no surface of a head should go there."""
+"""Which points of a surface can be seen: from outside at all, by certain cameras. Made heads have eyeballs that are
+closed, and skin under hair: no photo shows what lies inside, and no surface of a head should go there."""
 
 from __future__ import annotations
 
@@ -12,13 +12,19 @@ MIN_COSINE = 0.1  # to the normal
 START = 0.005  # above the surface; dm
 
 
+def _scene(positions: np.ndarray, faces: np.ndarray) -> EmbreeScene:
+    scene = EmbreeScene(robust=True)
+    # Embree reads the scene's mesh as long as the scene is there.
+    TriangleMesh(scene, positions.astype(np.float32), faces.astype(np.int32))
+    return scene
+
+
 def seen_from_outside(
     positions: np.ndarray, faces: np.ndarray, points: np.ndarray, normals: np.ndarray, directions: int = DIRECTIONS
 ) -> np.ndarray:
     """Whether each of the points [N, 3] (dm) of the mesh is free to at least MIN_FREE of evenly spread directions: bool
     [N]."""
-    scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, positions.astype(np.float32), faces.astype(np.int32))
+    scene = _scene(positions, faces)
     free = np.zeros(len(points), int)
     # Fibonacci's sphere.
     z = 1 - (2 * np.arange(directions) + 1) / directions
@@ -30,3 +36,18 @@ def seen_from_outside(
         hit = scene.run(start, np.repeat(towards[None].astype(np.float32), len(start), 0))
         free[facing] += hit < 0
     return free >= MIN_FREE
+
+
+def seen_from(
+    positions: np.ndarray, faces: np.ndarray, points: np.ndarray, normals: np.ndarray, centres: np.ndarray
+) -> np.ndarray:
+    """Whether each of the points [N, 3] (dm) of the mesh faces one of the cameras at `centres` [K, 3] with nothing
+    between: bool [N]."""
+    scene, seen = _scene(positions, faces), np.zeros(len(points), bool)
+    for centre in centres:
+        towards = centre - points
+        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        facing = np.flatnonzero((normals * towards).sum(1) > MIN_COSINE)
+        start = (points[facing] + START * normals[facing]).astype(np.float32)
+        seen[facing] |= scene.run(start, towards[facing].astype(np.float32)) < 0
+    return seen

@@ -1,8 +1,10 @@
 // Microseconds a point of the head field's engine, one thread, for each width and instruction set: the minimum of many
 // runs of a batch that stays in the core's second cache.
+//   measure_head_field [WIDTH...]
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <random>
 #include <vector>
@@ -97,8 +99,17 @@ void measure(FieldIsa isa, int width) {
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  std::vector<int> widths;
+  for (int i = 1; i < argc; ++i) widths.push_back(std::atoi(argv[i]));
+  if (widths.empty()) widths = {48, 64, 96, 128};
+  for (const int width : widths) {
+    if (width < 1 || width > maq::head::kMaxFieldWidth) {
+      std::fprintf(stderr, "The width is %d, but must be 1 to %d.\n", width, maq::head::kMaxFieldWidth);
+      return 2;
+    }
+  }
   for (const FieldIsa isa : maq::head::supported_field_isas()) {
-    for (const int width : {48, 64, 96, 128}) measure(isa, width);
+    for (const int width : widths) measure(isa, width);
   }
 }

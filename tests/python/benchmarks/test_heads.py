@@ -7,9 +7,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
-import igl
 import numpy as np
 import pytest
+from ellipsoid_heads import RADII_MM, ellipsoid, pictures_of_ellipsoid, true_ellipsoid, true_head
 from maquette import MaquetteError
 from scipy.spatial.transform import Rotation
 from small_prior import small_prior
@@ -17,39 +17,17 @@ from small_prior import small_prior
 from benchmarks.heads import __main__ as whole_report
 from benchmarks.heads import distances, drawing, fitted, mean_head, photos, quality, report, sheet, visible
 from benchmarks.heads.distances import Triangles, TruePoints, measure
-from benchmarks.heads.photos import PhotoBackgrounds, TrueHead, photo_of
+from benchmarks.heads.photos import PhotoBackgrounds, photo_of
 from export.camera import Camera
 from export.evaluation.heads_api import FittedHead, HeadBuilder, HeadMesh, has_heads
 from export.heads.field import geometry
 from export.heads.head_file import CAMERA, read_head
-from export.heads.head_shards import HeadPictures, HeadPoints
+from export.heads.head_shards import HeadPoints
 from export.heads.views import look_at
 from export.people import assets
 
-RADII_MM = np.array([80.0, 100.0, 130.0])
 TINY, TINY_HEAD = Path("tests/native/data/tiny_head/bundle"), Path("tests/native/data/tiny_head/example.maqh")
 pytestmark = pytest.mark.usefixtures("one_thread")
-
-
-def ball_points(count, seed=0):
-    points = np.random.default_rng(seed).normal(size=(count, 3))
-    return points / np.linalg.norm(points, axis=1, keepdims=True)
-
-
-def ellipsoid(cells=40, radii=RADII_MM):
-    """A closed mesh, counter-clockwise from outside, in mm."""
-    axis = np.linspace(-1.2, 1.2, cells)
-    z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
-    at = np.stack([x, y, z], -1).reshape(-1, 3)
-    points, faces, _ = igl.marching_cubes(np.linalg.norm(at, axis=1) - 1, at, cells, cells, cells, 0.0)
-    mesh = Triangles(points * radii, np.asarray(faces, np.int64))
-    return Triangles(mesh.points, mean_head._outwards(mesh.points, mesh.faces))
-
-
-def true_ellipsoid(count=3000):
-    points = ball_points(count)
-    normals = points / RADII_MM
-    return TruePoints(points * RADII_MM, points[:, 1] < -0.7, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def test_distances_go_to_triangles_and_not_to_their_corners():
@@ -118,31 +96,6 @@ def test_only_the_largest_piece_of_a_mesh_is_kept():
     )
     kept = mean_head.largest_piece(both)
     np.testing.assert_array_equal(kept.points[kept.faces], ball.points[ball.faces])
-
-
-def pictures_of_ellipsoid(yaws_deg, distance_dm=6.0, shift_px=0.0):
-    """Pictures of 256 px, as `export.heads.view_shards` stores them: a white ellipsoid above a red bust."""
-    points = ball_points(60000) * RADII_MM / photos.MM_PER_DM
-    rows = []
-    for yaw in np.radians(yaws_deg):
-        camera = look_at(yaw, 0.1, 0.0, distance_dm, np.zeros(3), 60.0 * distance_dm, 256)
-        intrinsics = camera.intrinsics + [[0, 0, shift_px], [0, 0, -shift_px], [0, 0, 0]]
-        camera = Camera.of_intrinsics(256, 256, intrinsics, camera.rotation, camera.centre)
-        pixel = np.round(camera.projected(points)[0]).astype(int)
-        masks = np.zeros((256, 256), np.uint8)
-        masks[190:, 40:220] = 128
-        masks[pixel[:, 1], pixel[:, 0]] = 255
-        masks = np.maximum(masks, cv2.morphologyEx(masks, cv2.MORPH_CLOSE, np.ones((3, 3))))
-        rgb = np.where(masks[..., None] == 255, [255, 255, 255], np.where(masks[..., None] == 128, [200, 0, 0], 0))
-        rows.append(
-            (rgb.astype(np.uint8), masks, np.zeros((128, 128, 3), np.int16), np.zeros((128, 128, 3), np.int8),
-             camera.rotation, camera.world_to_camera[:, 3], np.array([camera.fx_px, camera.cx_px, camera.cy_px]))
-        )  # fmt: skip
-    return HeadPictures(*(np.stack(column) for column in zip(*rows, strict=True)))
-
-
-def true_head(yaws_deg, name="head-00000", **settings):
-    return TrueHead(name, pictures_of_ellipsoid(yaws_deg, **settings), true_ellipsoid())
 
 
 @pytest.fixture(scope="module")
@@ -250,10 +203,14 @@ class FakeBuilder:
         pass
 
 
+def one_photo(heads, seconds, known_focal=False):
+    return quality.HeadSet(quality.ONE, [(head, [0]) for head in heads], seconds, known_focal)
+
+
 @pytest.mark.usefixtures("known_cameras")
 def test_heads_are_measured_by_seconds_beside_the_mean_head(backgrounds):
     head, mean = true_head([0]), ellipsoid(radii=RADII_MM * [1.2, 1, 1])
-    rows = quality.measure_set(FakeBuilder({0: 1.1, 2: 1.0}), quality.ONE, [(head, [0])], backgrounds, mean, [0, 2])
+    rows = quality.measure_set(FakeBuilder({0: 1.1, 2: 1.0}), one_photo([head], [0, 2]), backgrounds, mean)
     first, last = rows
     assert first["mean_head_mm"] > first["head_mm"] > last["head_mm"]
     assert last["head_mm"] < 0.15
@@ -269,13 +226,13 @@ def test_heads_are_measured_by_seconds_beside_the_mean_head(backgrounds):
 @pytest.mark.parametrize("known", [False, True])
 def test_the_library_gets_the_focal_length_only_if_it_is_to_know_it(backgrounds, known):
     builder = FakeBuilder({0: 1.0})
-    quality.measure_set(builder, quality.ONE, [(true_head([0]), [0])], backgrounds, ellipsoid(), [0], known)
+    quality.measure_set(builder, one_photo([true_head([0])], [0], known), backgrounds, ellipsoid())
     assert builder.focals_px == pytest.approx([360.0 if known else 0.0])
 
 
 def test_a_head_that_is_not_found_is_said_to_be_missing(backgrounds):
     head = true_head([0])
-    lost = quality.measure_set(FakeBuilder({}, True), quality.ONE, [(head, [0])], backgrounds, ellipsoid(), [0, 1])
+    lost = quality.measure_set(FakeBuilder({}, True), one_photo([head], [0, 1]), backgrounds, ellipsoid())
     assert ["No head is seen." in row["missing"] for row in lost] == [True, True]
     page = report.page({"machine": {"processor": "a", "cores": 2}, "bundles": ["b"], "at_s": 1,
                         "rows": [{"bundle": "b"} | row for row in lost]})  # fmt: skip
@@ -333,7 +290,8 @@ def test_stored_heads_are_read_above_their_cut_and_in_millimetres(data):
     assert other.name == "somebody"
     assert other.true.normals is None
     options = quality.parsed(["--data", str(data), "--sets", "one", "three", "other", "--seconds", "0", "1"])
-    assert list(quality.sets_of(options)) == [quality.ONE, quality.OTHER]
+    names = [own.name for own in quality.sets_of(options)]
+    assert names == [quality.ONE, quality.KNOWN, quality.OTHER]
     assert options.at == 1
     with pytest.raises(FileNotFoundError, match="view_shards"):
         photos.read_made_heads(data / "other")
@@ -350,9 +308,16 @@ def test_what_lies_inside_a_head_does_not_count(data, monkeypatch):
     assert seen[:count].all()
     assert not seen[count:].any()
     # The stored points lie in a made head that is larger: none of them is seen.
-    monkeypatch.setattr(photos, "make_head", lambda *_: SimpleNamespace(positions=1.2 * positions, faces=faces))
+    style = SimpleNamespace(name="tied", beard=np.array([0, 0.1]))
+    larger = SimpleNamespace(positions=1.2 * positions, faces=faces, tone=np.full(3, 200.0), style=style)
+    monkeypatch.setattr(photos, "make_head", lambda *_: larger)
     assert len(photos.read_made_heads(data, 1)[0].true.points) > 100
-    assert len(photos.read_made_heads(data, 1, object())[0].true.points) == 0
+    (made,) = photos.read_made_heads(data, 1, object())
+    assert len(made.true.points) == 0
+    np.testing.assert_allclose(made.true.mesh.points, 120 * positions)
+    assert made.traits["hair"] == "tied"
+    assert made.traits["skin"] == "light"
+    assert made.traits["beard"] == "beard"
 
 
 def test_a_time_that_is_not_measured_gives_way_to_the_nearest():
@@ -434,11 +399,11 @@ def test_the_whole_report_is_written_with_its_sheet(tmp_path, data, backgrounds,
     monkeypatch.setattr(quality, "HeadBuilder", lambda *_, **__: FakeBuilder({0: 1.1, 1: 1.0}))
     monkeypatch.setattr(quality, "read_mean_head", lambda _: ellipsoid(radii=RADII_MM * [1.2, 1, 1]))
     drawn = []
-    monkeypatch.setattr(sheet, "draw", lambda measured, *_: drawn.append(measured) or 2)
+    monkeypatch.setattr(sheet, "draw", lambda measured, *args: args[2].touch() or drawn.append(measured) or 2)
     out, figures = tmp_path / "made/heads.md", tmp_path / "made/heads.json"
     whole_report.main(
         ["--data", str(data), "--backgrounds", str(backgrounds.paths[0].parent), "--seconds", "0", "1", "--at", "1",
-         "--out", str(out), "--figures", str(figures)]
+         "--out", str(out), "--figures", str(figures), "--parts", "quality", "sheet"]
     )  # fmt: skip
     text = out.read_text()
     assert "| 1 | 1 of 1 | 0.0" in text

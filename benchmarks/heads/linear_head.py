@@ -1,0 +1,100 @@
+"""A linear head as a baseline: principal components of the vertices of the heads that the prior was trained on, fitted
+to what the same encoder sees in a photo, with the same camera model and losses as the library's first stage.
+
+The components are whitened, so they are normal a priori. What the encoder says of the prior's codes is carried over to
+them through the anchors, which are linear in the codes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from benchmarks.heads.distances import MM_PER_DM, Triangles
+from benchmarks.heads.encoding import Encoder
+from benchmarks.heads.photos import Photo
+from export.heads.anchor_fit import fit_anchors
+from export.heads.prior import Prior
+from export.heads.prior_file import read_prior
+from export.heads.surface import HeadMaker
+
+COMPONENTS = 64
+MIN_SIGMA_DM = 0.01
+
+
+def read_visible(folder: Path) -> np.ndarray:
+    """Vertices [H, V, 3] (dm) of the heads in a folder of `export.heads.points`, hair included."""
+    paths = sorted(folder.glob("head-*[0-9].npz"))
+    if len(paths) < 2:
+        raise FileNotFoundError(f"{folder} holds no heads: run `python -m export.heads.points train` first")
+    visible = []
+    for path in paths:
+        with np.load(path) as stored:
+            visible.append(stored["visible"])
+    return np.stack(visible)
+
+
+def principal_components(vertices: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of heads [H, V, 3]: mean [V, 3], what a standard deviation of each component adds [V, 3, count], and sigma [V],
+    each coordinate, of what they leave."""
+    flat = vertices.reshape(len(vertices), -1).astype(np.float64)
+    mean = flat.mean(0)
+    flat = flat - mean
+    # Fewer heads than coordinates: the eigenvectors come from the products of heads.
+    values, vectors = np.linalg.eigh(flat @ flat.T)
+    best = np.argsort(values)[::-1][:count]
+    linear = (vectors[:, best].T @ flat).T / np.sqrt(len(flat))
+    left = flat - (vectors[:, best] @ (vectors[:, best].T @ flat))
+    freedom = max(len(flat) - count, 1)
+    sigma = np.sqrt((left**2).reshape(len(flat), -1, 3).sum((0, 2)) / 3 / freedom)
+    return mean.reshape(-1, 3), linear.reshape(-1, 3, len(best)), sigma
+
+
+def carried_over(prior: Prior, template: np.ndarray, mean: np.ndarray, linear: np.ndarray, codes: np.ndarray):
+    """Means and log sigmas [K, 2] of components from those of the prior's codes [C, 2]; template [V, 3]: where the
+    linear head's vertices lie on the template head."""
+    away, at = cKDTree(template).query(prior.template_points)
+    same = away < 1e-3
+    if same.sum() < 100:
+        raise ValueError("The anchors of the prior are no vertices of these heads: they were made by another version.")
+    shape = linear[at[same]].reshape(-1, linear.shape[2])
+    anchors = prior.anchor_linear[same].reshape(-1, prior.shape_codes).astype(np.float64)
+    offset = (prior.anchor_mean[same] - mean[at[same]]).reshape(-1)
+    noise = np.repeat(prior.anchor_sigma[same].astype(np.float64), 3)
+    solve = np.linalg.solve(shape.T @ shape + 1e-6 * np.eye(shape.shape[1]), shape.T)
+    expected = solve @ (anchors @ codes[:, 0] + offset)
+    variance = ((solve @ anchors) ** 2) @ np.exp(2 * codes[:, 1].astype(np.float64)) + (solve**2) @ noise**2
+    return np.stack([expected, 0.5 * np.log(variance)], 1)
+
+
+class LinearHeads:
+    """The linear head of `visible` [H, V, 3], fitted to photos through a bundle's encoder."""
+
+    def __init__(self, bundle: Path, maker: HeadMaker, visible: np.ndarray, count: int = COMPONENTS) -> None:
+        shapes = maker.shapes
+        faces = np.concatenate([maker.faces, shapes.eye_faces])
+        own = np.unique(faces)
+        number = np.full(len(shapes.template), -1)
+        number[own] = np.arange(len(own))
+        self.faces = number[faces].astype(np.int64)
+        self.template = shapes.template[own]
+        self.mean, self.linear, sigma = principal_components(visible[:, own], min(count, len(visible) - 1))
+        self._encoder, self._prior = Encoder(bundle), read_prior(bundle / "prior.maqp")
+        single = np.float32
+        self._model = replace(
+            self._prior, template_points=self.template.astype(single), anchor_mean=self.mean.astype(single),
+            anchor_linear=self.linear.astype(single), anchor_sigma=np.maximum(sigma, MIN_SIGMA_DM).astype(single),
+        )  # fmt: skip
+
+    def mesh(self, photo: Photo, focal_px: float = 0) -> Triangles | None:
+        """Of the head of a photo, mm; None where the encoder sees none. focal_px: 0 where it is not known."""
+        seen, options = self._encoder.seen(photo.rgb, photo.box, focal_px)
+        codes = carried_over(self._prior, self.template, self.mean, self.linear, seen.codes)
+        try:
+            found = fit_anchors(self._model, replace(seen, codes=codes), options)
+        except ValueError:
+            return None
+        return Triangles((self.mean + self.linear @ found.codes) * MM_PER_DM, self.faces)

@@ -1,0 +1,168 @@
+"""Real photographs held out of training: where points of the fitted head are drawn beside where MediaPipe's face
+network sees them, and its silhouette beside the person's mask. Neither is told to the fit.
+
+The network's points are places of the template head (`export.heads.photos`), and so is each point of a fitted mesh. The
+baseline is the mean head, posed by the same encoder's template points, with the same camera model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import igl
+import numpy as np
+from maquette.frames import Frame
+from tqdm import tqdm
+
+from benchmarks.heads.drawing import DrawnMesh, framed
+from benchmarks.heads.encoding import Encoder
+from benchmarks.heads.fitted import cameras_of, stored
+from benchmarks.heads.mean_head import MM_PER_DM, mesh_of, template_points
+from export.camera import Camera
+from export.evaluation.heads_api import HeadBuilder, MaquetteError
+from export.heads.anchor_fit import fit_anchors
+from export.heads.head_shards import CROP_SIDES, SIDE
+from export.heads.photos.faces import HEAD, UNKNOWN, PhotoFaces
+from export.heads.prior_file import read_prior
+from export.heads.shapes import vertex_normals
+from export.teachers.faces import LEFT_EYE, RIGHT_EYE
+
+SPLITS = ("val", "test")  # the encoder's training saw neither; val told when to end it
+PINNED = -12.0  # log sigma of codes that stay where they are
+
+
+@dataclass(frozen=True, eq=False)
+class RealFace:
+    """rgb: the photo, uint8 [H, W, 3]; box: of the head; square: middle x, y and side of its crop, pixels of the photo;
+    pixel [P, 2] of the photo where the template points [P, 3] (dm) are seen, as far as weight [P] is above 0; matte: as
+    `PhotoFaces` has it; eyes_px: between the outer corners of the eyes."""
+
+    name: str
+    split: str
+    rgb: np.ndarray
+    box: np.ndarray
+    square: np.ndarray
+    pixel: np.ndarray
+    template: np.ndarray
+    weight: np.ndarray
+    matte: np.ndarray
+    eyes_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class PosedMesh:
+    """A mesh in front of a photo's camera: points, template [V, 3] dm, faces [F, 3]."""
+
+    points: np.ndarray
+    template: np.ndarray
+    faces: np.ndarray
+    camera: Camera
+
+    def at(self, template: np.ndarray) -> np.ndarray:
+        """Its points [N, 3] that are these template points, or are nearest to them on the template."""
+        _, face, near = igl.point_mesh_squared_distance(
+            np.ascontiguousarray(template, np.float64), self.template, self.faces
+        )
+        corners = (np.ascontiguousarray(self.template[self.faces[face, k]]) for k in range(3))
+        weight = igl.barycentric_coordinates(np.ascontiguousarray(near), *corners)
+        # A triangle that is a point on the template has no such coordinates.
+        weight = np.where(np.isfinite(weight).all(1, keepdims=True), weight, 1 / 3)
+        return (self.points[self.faces[face]] * weight[..., None]).sum(1)
+
+
+def real_faces(photos: Path, faces: Path, splits: Sequence[str] = SPLITS) -> Iterator[RealFace]:
+    """photos: of `export.photos people`; faces: of `export.heads.photos.faces`."""
+    for split in splits:
+        for path in sorted((faces / split).glob("*.npz")):
+            picture = next((p for p in (photos / split).glob(f"{path.stem}.*") if p.suffix in (".jpg", ".png")), None)
+            if picture is None:
+                continue
+            found = PhotoFaces.load(path)
+            with Frame.decode(picture.read_bytes()) as frame:
+                rgb = frame.pixels()
+            for k, (x, y, side) in enumerate(found.square.astype(np.float64)):
+                half = side / CROP_SIDES / 2
+                pixel = [x, y] + ((found.pixel[k].astype(np.float64) + 0.5) / SIDE - 0.5) * side
+                yield RealFace(
+                    f"{path.stem}/{k}", split, rgb, np.array([x, y, x, y]) + 0.5 + half * np.array([-1, -1, 1, 1]),
+                    found.square[k], pixel, found.template.astype(np.float64), found.weight[k], found.matte[k],
+                    float(np.linalg.norm(pixel[LEFT_EYE] - pixel[RIGHT_EYE])),
+                )  # fmt: skip
+
+
+def figures_of(face: RealFace, mesh: PosedMesh) -> dict:
+    """points_px: mean distance of its points from where the network sees them; points: the same by the distance of the
+    eyes' corners; matte_iou: None where the person's mask says nothing of the head."""
+    used = face.weight > 0
+    away = np.linalg.norm(mesh.camera.projected(mesh.at(face.template[used]))[0] - face.pixel[used], axis=1)
+    points_px = float(np.average(away, weights=face.weight[used]))
+    return {"points_px": points_px, "points": points_px / face.eyes_px, "matte_iou": matte_iou(face, mesh)}
+
+
+def matte_iou(face: RealFace, mesh: PosedMesh) -> float | None:
+    x, y, side = face.square
+    square = np.array([x, y, x, y]) + 0.5 + side / 2 * np.array([-1, -1, 1, 1])
+    camera, _ = framed(mesh.camera, square, 1.0, SIDE)
+    normals = vertex_normals(mesh.points, mesh.faces)
+    grey = DrawnMesh.coloured(mesh.points, mesh.faces, normals, lambda place: np.full((len(place.face), 3), 127.0))
+    drawn, head, known = grey.shown(camera)[1], face.matte == HEAD, face.matte != UNKNOWN
+    if not head.any():
+        return None
+    return float((drawn & head).sum() / ((drawn | head) & known).sum())
+
+
+class MeanHeads:
+    """The mean head of a bundle, posed in photos by what its encoder sees."""
+
+    def __init__(self, bundle: Path) -> None:
+        self._encoder, self._prior = Encoder(bundle), read_prior(bundle / "prior.maqp")
+        mesh = mesh_of(self._prior)
+        self._points, self._faces = mesh.points / MM_PER_DM, mesh.faces
+        self._template = template_points(self._prior, self._points)
+
+    def posed(self, rgb: np.ndarray, box: np.ndarray) -> PosedMesh:
+        """Raises ValueError where the encoder sees no head."""
+        seen, options = self._encoder.seen(rgb, box)
+        pinned = np.stack([np.zeros(len(seen.codes)), np.full(len(seen.codes), PINNED)], 1)
+        found = fit_anchors(self._prior, replace(seen, codes=pinned), options)
+        height, width = rgb.shape[:2]
+        centre = -found.rotation.T @ found.shift
+        camera = Camera.centred(width, height, found.focal_px, found.rotation, centre)
+        return PosedMesh(self._points, self._template, self._faces, camera)
+
+
+def fitted_mesh(builder: HeadBuilder, face: RealFace, seconds: float) -> PosedMesh:
+    """Raises MaquetteError."""
+    builder.clear()
+    builder.add_photo(face.rgb, face.box)
+    with builder.fit(seconds) as head:
+        mesh, file = head.mesh(), stored(head)
+    unit = file.metres_per_unit
+    points, template = (a.astype(np.float64) / unit for a in (mesh.positions_m, mesh.template_points_m))
+    return PosedMesh(points, template, mesh.triangles.astype(np.int64), cameras_of(file)[0])
+
+
+def measure_real(
+    bundle: Path, photos: Path, faces: Path, seconds: Sequence[float], count: int | None = None, threads: int = 0
+) -> list[dict]:
+    """One row a face and time of fitting, at most `count` faces; none where there are no photographs."""
+    found, rows = list(real_faces(photos, faces))[:count], []
+    if not found:
+        return rows
+    mean = MeanHeads(bundle)
+    with HeadBuilder(bundle, threads=threads) as builder:
+        for face in tqdm(found, desc="real photographs", unit="face", disable=None):
+            about = {"face": face.name, "split": face.split, "eyes_px": face.eyes_px}
+            try:
+                before = {
+                    f"mean_{key}": value for key, value in figures_of(face, mean.posed(face.rgb, face.box)).items()
+                }
+                for asked in seconds:
+                    rows.append(
+                        about | before | {"asked_s": asked} | figures_of(face, fitted_mesh(builder, face, asked))
+                    )
+            except (MaquetteError, ValueError) as error:
+                rows += [about | {"asked_s": asked, "missing": str(error)} for asked in seconds]
+    return rows

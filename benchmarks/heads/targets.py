@@ -1,0 +1,100 @@
+"""What is aimed at, beside what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from statistics import fmean, median
+
+from benchmarks.heads.tables import focal_within, found, having, ratio, table
+
+LONG_ENOUGH_S = 1.0  # from then on more time must not make it worse
+ONE, THREE, OTHER = "one photo", "three photos", "other maker's heads, one photo"
+
+
+def over(values: Mapping[float, float]) -> float:
+    """How far the error, by seconds, rises above its lowest once there was time enough, as a fraction."""
+    long = [value for asked, value in values.items() if asked >= LONG_ENOUGH_S]
+    return max(long) / min(long) - 1 if long else 0.0
+
+
+class _Lines:
+    def __init__(self) -> None:
+        self.lines: list[list[str]] = []
+
+    def add(self, what: str, value: float, gate: float, stretch: float, sign: str = "≤", digits: int = 2) -> None:
+        def is_met(limit: float) -> bool:
+            return value >= limit if sign == "≥" else value <= limit
+
+        state = "stretch" if is_met(stretch) else "met" if is_met(gate) else "missed"
+        self.lines.append([what, f"{value:.{digits}f}", f"{sign} {gate:g}", f"{sign} {stretch:g}", state])
+
+
+def targets(measured: Mapping) -> str:
+    """Figures of the first bundle; what was not measured is left out."""
+    rows = [row for row in measured["rows"] if row["bundle"] == measured["bundles"][0]]
+    at_s, lines = measured["at_s"], _Lines()
+    of_time = [row for row in found(rows) if row["asked_s"] == at_s]
+
+    def add(name: str, what: str, figure: Callable, gate: float, stretch: float, sign: str = "≤", needs=()) -> None:
+        own = having([row for row in of_time if row["set"] == name], *needs)
+        if own:
+            lines.add(f"{name}: {what}", figure(own), gate, stretch, sign)
+
+    def mean(key: str) -> Callable[[Sequence[Mapping]], float]:
+        return lambda own: fmean(row[key] for row in own)
+
+    add(ONE, "face, mm", mean("face_mm"), 1.8, 1.3)
+    add(ONE, "face by mean head", lambda own: ratio(own, "face_mm"), 0.7, 0.5)
+    add(ONE, "head by mean head", lambda own: ratio(own, "head_mm"), 0.65, 0.5)
+    linear = ("linear_head_mm",)
+    add(ONE, "head by linear head", lambda own: ratio(own, "head_mm", "linear"), 0.9, 0.75, needs=linear)
+    add(THREE, "face, mm", mean("face_mm"), 1.5, 1.0)
+    add(THREE, "head by mean head", lambda own: ratio(own, "head_mm"), 0.5, 0.4)
+    add(OTHER, "face by mean head", lambda own: ratio(own, "face_mm"), 0.9, 0.75)
+    for what in ("face", "head"):
+        by_time: dict[float, list[float]] = {}
+        for row in found(rows):
+            if row["set"] == ONE:
+                by_time.setdefault(row["asked_s"], []).append(row[f"{what}_mm"])
+        means = {asked: fmean(values) for asked, values in by_time.items()}
+        if sum(asked >= LONG_ENOUGH_S for asked in means) > 1:
+            add(ONE, f"{what}, error after 1 s or more above its lowest, %", lambda _, m=means: 100 * over(m), 5, 2)
+    views = ("view_psnr_db", "mean_view_psnr_db")
+    gain = "new views, dB over the mean head with the photo projected"
+    add(ONE, gain, lambda own: fmean(r["view_psnr_db"] - r["mean_view_psnr_db"] for r in own), 1.5, 3, "≥", views)
+    _of_real_faces(measured, lines)
+    add(ONE, "rotation of the camera, median, deg", lambda own: median(r["rotation_deg"] for r in own), 4, 2)
+    add(ONE, "focal length within 20 %, of photos", focal_within, 0.7, 0.85, "≥")
+    _of_program(measured, lines)
+    _of_engine(measured, lines)
+    add(ONE, "mesh at 1.6 mm, s", lambda own: median(row["mesh_ms"] for row in own) / 1000, 1, 0.4)
+    return table(("what", "figure", "gate", "stretch", "state"), lines.lines)
+
+
+def _of_real_faces(measured: Mapping, lines: _Lines) -> None:
+    own = [row for row in found(measured.get("real", ())) if row["asked_s"] == measured["at_s"]]
+    if own:
+        lines.add("real photographs: points by mean head posed alike", ratio(own, "points"), 0.9, 0.75)
+    if masked := having(own, "matte_iou"):
+        iou = fmean(row["matte_iou"] for row in masked)
+        lines.add("real photographs: silhouette, IoU", iou, 0.9, 0.94, "≥")
+
+
+def _of_program(measured: Mapping, lines: _Lines) -> None:
+    for row in measured.get("program", ()):
+        if row["what"] == "default":
+            lines.add("photo to GLB, default settings, whole program, s", row["seconds"], 10, 4)
+            lines.add("peak memory of this, MB", row["peak_mb"], 250, 150, digits=0)
+            lines.add(".maqh, KB", row["maqh_kb"], 128, 64, digits=0)
+        else:
+            lines.add("photo to the first mesh, whole program, s", row["seconds"], 0.7, 0.3)
+    if "bundle_mb" in measured:
+        lines.add("bundle, MB", measured["bundle_mb"], 4, 2.8)
+
+
+def _of_engine(measured: Mapping, lines: _Lines) -> None:
+    own = [row for row in measured.get("engine", ()) if row["what"] == "forward, back to all weights"]
+    if own:
+        best = min(own, key=lambda row: row["us"])
+        lines.add("engine: a point of a step by PyTorch, one thread", best["us"] / best["torch_us"], 0.33, 0.15)
+        lines.add("engine: fraction of the float peak", best["fraction"], 0.4, 0.6, "≥")

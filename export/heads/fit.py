@@ -1,255 +1,129 @@
-"""Fits a head to the encoder's cells and a photo's pixels in torch: the reference of sdk/src/head/fit.
+"""Fits a head to one photo in numpy and torch: the reference of what `maquette head` does on the device.
 
-Stage 0 is `export.heads.anchor_fit`. Stage 1 goes on from there: Adam over shape codes, colour codes and the camera.
-Each step draws rays through pixels; a ray has 12 sections around the surface that a search along it finds, and NeuS
-opacity in its log form. Terms, each the negative log of a probability: colours (robust), matte (cross entropy), normals
-of the surface against the encoder's, the terms of stage 0 and its prior of the codes. Colours move colour codes alone:
-one photo does not hold depth, and a shape that follows colours goes wrong while the picture gets better.
+    python -m export.heads.fit photo.jpg --out head.maqh
+    python -m export.heads.fit photo.jpg --out head.maqh --bundle .data/bundles/heads-fp32 --box 120,40,380,390
+
+The crop, the encoder, the stages, the rays and their order are the same (`export.heads.fitting`), and so is the file;
+`maquette head info head.maqh` reads it. Some ten times slower. Without --box the head is looked for in the middle of
+the photo, then in all of it; people are not looked for.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import argparse
+import hashlib
+import math
+from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor
-from torch.nn import functional as F
+from tqdm import tqdm
 
-from export.heads.anchor_fit import AnchorFit, AnchorModel, Observations
-from export.heads.field import geometry, surface
-from export.heads.prior import FieldShape, Prior
+from export.bundle import read_manifest
+from export.heads.fitting.anchor_fit import AnchorFit, fit_anchors
+from export.heads.fitting.photo import Encoder, HeadPhoto, NoHead, look_at, read_photo
+from export.heads.fitting.ray_fit import FitOptions, HeadState, RayFit
+from export.heads.head_file import CAMERA, HeadFileError, StoredHead, write_head
+from export.heads.prior import Prior, PriorError, combined
+from export.heads.prior_file import prior_from_bytes
 
-BOUND_DM = 2.0  # rays are followed within this distance of the origin
-
-
-@dataclass(frozen=True)
-class Photo:
-    """A crop that the encoder has seen: rgb [S, S, 3] 0..255, cells [G, G, 8]; the principal point in it."""
-
-    rgb: np.ndarray
-    cells: np.ndarray
-    centre_px: tuple[float, float]
+BUNDLE = Path("sdk/models/heads-int8")
+METRES_PER_UNIT = 0.1
 
 
-@dataclass(frozen=True)
-class FitOptions:
-    steps: int = 50
-    rays: int = 384
-    sections: int = 12
-    reach_dm: float = 0.12  # sections lie within this distance of the surface found
-    sharpness: float = 100.0  # 1/dm
-    rate: float = 0.03  # of whitened codes
-    # How much all pixels together count, in observations that are independent of each other.
-    colour_weight: float = 60.0
-    matte_weight: float = 200.0
-    normal_weight: float = 0.0  # the encoder errs alike over whole cheeks
-    anchor_weight: float = 0.1
-    colour_sigma: float = 0.12
-    colour_moves_shape: bool = False
+def size_sigma(prior: Prior) -> float:
+    """How much the size of heads differs, as a fraction of it: what the codes do to the anchors' mean distance from
+    their middle."""
+    from_middle = (prior.anchor_mean - prior.anchor_mean.mean(0)).astype(np.float64)
+    by_code = np.einsum("mc,mck->k", from_middle, prior.anchor_linear.astype(np.float64))
+    return float(np.linalg.norm(by_code) / (from_middle**2).sum())
 
 
-@dataclass(frozen=True)
-class FittedHead:
-    """shape_codes [K], colour_codes [C], camera as in AnchorFit, losses of each step."""
-
-    shape_codes: np.ndarray
-    colour_codes: np.ndarray
-    rotation: np.ndarray
-    shift: np.ndarray
-    focal_px: float
-    losses: list[dict[str, float]]
-
-
-class TorchPrior:
-    """A prior's bases as tensors."""
-
-    def __init__(self, prior: Prior) -> None:
-        self.shape: FieldShape = prior.shape
-
-        def joined(layer) -> Tensor:
-            return torch.from_numpy(np.concatenate([layer.weights, layer.bias[..., None]], -1).astype(np.float32))
-
-        self.constant = [joined(layer) for layer in prior.constant]
-        self.bases = {}
-        for indices, bases in zip(prior.shape.personal, (prior.shape_bases, prior.colour_bases), strict=True):
-            self.bases |= {index: joined(basis) for index, basis in zip(indices, bases, strict=True)}
-
-    def combine(self, z: Tensor, c: Tensor) -> list[Tensor]:
-        """The weights of one head."""
-        out = list(self.constant)
-        for index, basis in self.bases.items():
-            code = z if index < self.shape.first_surface_layer else c
-            out[index] = out[index] + torch.tensordot(code, basis, 1)
-        return out
-
-
-def rotation_of(w: Tensor) -> Tensor:
-    zero = torch.zeros(())
-    return torch.matrix_exp(
-        torch.stack(
-            [torch.stack([zero, -w[2], w[1]]), torch.stack([w[2], zero, -w[0]]), torch.stack([-w[1], w[0], zero])]
-        )
+def stored_head(prior: Prior, prior_sha256: str, photo: HeadPhoto, state: HeadState) -> StoredHead:
+    """The head as it is kept."""
+    shape, colour = state.shape.numpy(), state.colour.numpy()
+    camera = state.pose.camera()
+    row = (*photo.size, camera.focal_px, *photo.centre, camera.rotation, camera.shift)
+    return StoredHead(
+        prior.shape,
+        combined(prior, shape, colour),
+        shape,
+        colour,
+        np.array([row], CAMERA),
+        METRES_PER_UNIT,
+        size_sigma(prior) * METRES_PER_UNIT,
+        "prior",
+        prior.sharpness,
+        prior.cut_point.astype(np.float64),
+        prior.cut_normal.astype(np.float64),
+        prior.bounds_min,
+        prior.bounds_max,
+        prior.template_points,
+        prior.anchor_mean + prior.anchor_linear @ shape,
+        prior.anchor_sigma,
+        prior.places,
+        prior_sha256,
     )
 
 
-def log_clear(distances: Tensor, sharpness: float) -> Tensor:
-    """log(1 - alpha) of each section [R, N] from the distances at their ends [R, N + 1] (NeuS in its log form)."""
-    soft = F.softplus(-sharpness * distances)
-    return torch.minimum(torch.zeros(()), soft[:, :-1] - soft[:, 1:])
+def numbers(text: str) -> tuple[float, ...]:
+    values = tuple(float(part) for part in text.split(","))
+    if len(values) != 4 or not all(map(math.isfinite, values)) or values[2] <= values[0] or values[3] <= values[1]:
+        raise argparse.ArgumentTypeError(f"{text} is no box; give left,top,right,bottom in pixels")
+    return values
 
 
-class Fit:
-    """A fit under way; `step` may be called as often as one likes."""
+def parsed(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("photo", type=Path, help="JPEG or PNG, of one person")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the head, .maqh")
+    parser.add_argument("--bundle", type=Path, default=BUNDLE, metavar="DIR", help=f"of heads; default: {BUNDLE}")
+    parser.add_argument(
+        "--box", type=numbers, metavar="L,T,R,B", help="where the head with its hair is, px; default: it is looked for"
+    )
+    parser.add_argument("--roll", type=float, default=0, help="how far it is turned clockwise in the photo, degrees")
+    parser.add_argument("--focal-px", type=float, default=0, help="focal length; default: estimated")
+    parser.add_argument("--steps", type=int, default=FitOptions.max_steps, help="0: stage 0 alone; default %(default)s")
+    parser.add_argument("--seconds", type=float, default=math.inf, help="for stage 1; default: until it is done")
+    parser.add_argument("--threads", type=int, default=1, help="default: %(default)s")
+    options = parser.parse_args(arguments)
+    if options.steps < 0 or not options.seconds >= 0 or options.threads < 1 or not 0 <= options.focal_px < math.inf:
+        parser.error("--steps, --seconds and --focal-px must be 0 or more, --threads 1 or more")
+    return options
 
-    def __init__(self, prior: Prior, photo: Photo, begun: AnchorFit, seen: Observations, options: FitOptions) -> None:
-        self.prior, self.options, self.photo = TorchPrior(prior), options, photo
-        self.sharpness = options.sharpness
-        self.cut_point = torch.from_numpy(prior.cut_point)
-        self.cut_normal = torch.from_numpy(prior.cut_normal)
-        self.z = torch.tensor(begun.codes, dtype=torch.float32, requires_grad=True)
-        self.c = torch.zeros(prior.colour_codes, requires_grad=True)
-        self.turn = torch.zeros(3, requires_grad=True)
-        self.shift = torch.tensor(begun.shift, dtype=torch.float32, requires_grad=True)
-        self.log_focal = torch.tensor(float(np.log(begun.focal_px)), requires_grad=True)
-        self._start = torch.tensor(begun.rotation, dtype=torch.float32)
-        rate = options.rate
-        self.optimizer = torch.optim.Adam(
-            [
-                {"params": [self.z], "lr": rate},
-                {"params": [self.c], "lr": 3 * rate},
-                {"params": [self.turn], "lr": 0.1 * rate},
-                {"params": [self.shift], "lr": 0.2 * rate},
-                {"params": [self.log_focal], "lr": 0.1 * rate},
-            ],
-            betas=(0.9, 0.99),
-        )
-        self._rates = [group["lr"] for group in self.optimizer.param_groups]
-        mean, linear, sigma = AnchorModel(prior).at(seen.template)
-        keep = begun.weight > 0.05
-        self._anchor = tuple(
-            torch.tensor(a[keep], dtype=torch.float32) for a in (mean, linear, np.hypot(seen.sigma, sigma), seen.pixels)
-        )
-        codes = torch.tensor(seen.codes, dtype=torch.float32)
-        self._expected, self._inverse = codes[:, 0], (-2 * codes[:, 1]).exp()
-        self._pixels(photo)
-        self.losses: list[dict[str, float]] = []
 
-    def _pixels(self, photo: Photo) -> None:
-        """One pixel a cell: colours by area, matte, template points and normals."""
-        side = photo.cells.shape[0]
-        step = photo.rgb.shape[0] // side
-        rgb = photo.rgb.reshape(side, step, side, step, 3).mean((1, 3)) / 255
-        y, x = np.meshgrid(*(np.arange(side) * step + (step - 1) / 2,) * 2, indexing="ij")
-        matte = 1 / (1 + np.exp(-photo.cells[..., 4]))
+def fit(options: argparse.Namespace) -> None:
+    torch.set_num_threads(options.threads)
+    encoder = Encoder(options.bundle)
+    prior_file = options.bundle / read_manifest(options.bundle)["prior"]["file"]
+    data = prior_file.read_bytes()
+    prior = prior_from_bytes(data, str(prior_file))
+    photo = look_at(encoder, read_photo(options.photo), options.box, math.radians(options.roll), options.focal_px)
+    start: AnchorFit = fit_anchors(prior, photo)
+    print(f"{start.inliers} of {start.cells} cells agree with a camera of {start.pose.camera().focal_px:.0f} px")
+    if options.steps == 0 or options.seconds == 0:
+        state = HeadState(torch.from_numpy(start.codes.astype(np.float32)), torch.zeros(prior.colour_codes), start.pose)
+    else:
+        with tqdm(total=options.steps, unit="step") as bar:
 
-        def tensor(a: np.ndarray) -> Tensor:
-            return torch.tensor(a.reshape(side * side, -1), dtype=torch.float32)
+            def show(steps: int, loss: float) -> None:
+                bar.update(steps - bar.n)
+                bar.set_postfix(loss=f"{loss:.1f}")
 
-        self.pixels, self.rgb, self.matte = tensor(np.stack([x, y], -1)), tensor(rgb), tensor(matte)[:, 0]
-        self.seen_template, self.seen_sigma = tensor(photo.cells[..., :3]), tensor(np.exp(photo.cells[..., 3]))[:, 0]
-        self.seen_normal = F.normalize(tensor(photo.cells[..., 5:8]), dim=1)
-        # Rays are drawn where there is something to learn: in and around the head.
-        near = F.max_pool2d(self.matte.reshape(1, 1, side, side), 7, 1, 3).reshape(-1)
-        self.probability = 0.1 + near
+            found = RayFit(prior, photo, start, FitOptions(options.steps, options.seconds)).run(show)
+        print(f"loss {found.first_loss:.2f} -> {found.loss:.2f} in {found.steps} steps, ended by: {found.end}")
+        state = found.state
+    write_head(stored_head(prior, hashlib.sha256(data).hexdigest(), photo, state), options.out)
+    print(f"{options.out}: {options.out.stat().st_size / 1000:.0f} KB")
 
-    def rotation(self) -> Tensor:
-        return rotation_of(self.turn) @ self._start
 
-    def _rays(self, pixels: Tensor) -> tuple[Tensor, Tensor]:
-        """Origin [3] and unit directions [R, 3] in the head's frame."""
-        rotation = self.rotation()
-        centre = torch.tensor(self.photo.centre_px, dtype=torch.float32)
-        along = torch.cat([(pixels - centre) / self.log_focal.exp(), torch.ones(len(pixels), 1)], 1)
-        return -self.shift @ rotation, F.normalize(along @ rotation, dim=1)
+def main(arguments: list[str] | None = None) -> None:
+    options = parsed(arguments)
+    try:
+        fit(options)
+    except (OSError, NoHead, PriorError, HeadFileError, ValueError) as error:
+        raise SystemExit(f"No head was written: {error}") from error
 
-    def _distance(self, weights: list[Tensor], points: Tensor) -> Tensor:
-        cut = (points - self.cut_point) @ self.cut_normal
-        return torch.maximum(geometry(self.prior.shape, weights, points)[..., 0], cut)
 
-    @torch.no_grad()
-    def _found(self, weights: list[Tensor], origin: Tensor, rays: Tensor, samples: int = 40) -> tuple[Tensor, Tensor]:
-        """How far along each ray the surface is first met, or else came nearest; and whether the ray meets the ball."""
-        middle = -(rays @ origin)
-        square = BOUND_DM**2 - (origin.square().sum() - middle**2)
-        half = square.clamp(min=0).sqrt()
-        far = middle[:, None] + half[:, None] * torch.linspace(-1, 1, samples)
-        f = self._distance(weights, origin + far[..., None] * rays[:, None])
-        crossed = (f[:, :-1] > 0) & (f[:, 1:] <= 0)
-        at = torch.where(crossed.any(1), crossed.float().argmax(1), f[:, :-1].argmin(1))
-        rows = torch.arange(len(rays))
-        a, b = f[rows, at], f[rows, at + 1]
-        share = torch.where(crossed.any(1), a / (a - b).clamp(min=1e-6), 0.5)
-        return far[rows, at] + share * (far[rows, at + 1] - far[rows, at]), square > 0
-
-    def step(self, fraction: float = 0.0) -> dict[str, float]:
-        """One step of Adam; `fraction`: how much of the fit is done."""
-        for group, rate in zip(self.optimizer.param_groups, self._rates, strict=True):
-            group["lr"] = rate * (1 - 0.9 * fraction)
-        terms = self._terms()
-        self.optimizer.zero_grad()
-        z = (self._inverse * (self.z - self._expected).square()).sum()
-        loss = sum(terms.values()) + 0.5 * (z + self.c.square().sum())
-        loss.backward()
-        self.optimizer.step()
-        row = {name: float(value) for name, value in terms.items()}
-        self.losses.append(row)
-        return row
-
-    def _terms(self) -> dict[str, Tensor]:
-        o = self.options
-        chosen = torch.multinomial(self.probability, o.rays)
-        # Rays are drawn more often near the head: each counts as often as a pixel drawn evenly would.
-        even = (1 / self.probability[chosen]) / (1 / self.probability[chosen]).sum()
-        weights = self.prior.combine(self.z, self.c)
-        origin, rays = self._rays(self.pixels[chosen])
-        far, meets = self._found([w.detach() for w in weights], origin.detach(), rays.detach())
-        ends = far[:, None] + o.reach_dm * torch.linspace(-1, 1, o.sections + 1)
-        f = self._distance(weights, origin + ends[..., None] * rays[:, None])
-        clear = log_clear(f, self.sharpness) * meets[:, None]
-        total = clear.sum(1)
-        before = torch.cumsum(clear, 1) - clear
-        share = before.exp() * -torch.expm1(clear)
-        matte = self.matte[chosen]
-        opacity_loss = -(matte * torch.log(-torch.expm1(total) + 1e-6) + (1 - matte) * total.clamp(min=-16))
-        on = (matte > 0.5) & (total.detach() < -0.7)
-        terms = {"matte": o.matte_weight * (even * opacity_loss).sum()}
-        # The surface point, with a gradient along the ray: first order in the distance there.
-        middle = (ends[:, :-1] + ends[:, 1:]) / 2
-        depth = (share * middle).sum(1) / share.sum(1).clamp(min=1e-6)
-        point = (origin + depth[:, None] * rays)[on]
-        out = geometry(self.prior.shape, weights, point if o.colour_moves_shape else point.detach())
-        if not o.colour_moves_shape:
-            out = out.detach()
-        logits, _ = surface(self.prior.shape, weights, point if o.colour_moves_shape else point.detach(), out)
-        away = (logits.sigmoid() - self.rgb[chosen][on]) / o.colour_sigma
-        square = away.square().sum(1)
-        scale = even[on] / even[on].sum().clamp(min=1e-6)
-        terms["colour"] = o.colour_weight * (scale * square / (1 + square / 9)).sum() / 2
-        if o.normal_weight:
-            at = point.detach().requires_grad_(True)
-            value = geometry(self.prior.shape, weights, at)[:, 0]
-            (slope,) = torch.autograd.grad(value.sum(), at, create_graph=True)
-            shown = F.normalize(slope, dim=1) @ self.rotation().T
-            cosine = (shown * self.seen_normal[chosen][on]).sum(1)
-            terms["normal"] = o.normal_weight * (scale * (1 - cosine)).sum() / 0.06
-        mean, linear, sigma, pixels = self._anchor
-        points = (mean + linear @ self.z) @ self.rotation().T + self.shift
-        focal, away_z = self.log_focal.exp(), points[:, 2:].clamp(min=0.1)
-        centre = torch.tensor(self.photo.centre_px, dtype=torch.float32)
-        px = (1 + (sigma * focal / away_z[:, 0]).square()).sqrt()
-        square = ((focal * points[:, :2] / away_z + centre - pixels) / px[:, None]).square().sum(1)
-        terms["anchors"] = o.anchor_weight * (16 * square / (16 + square)).sum() / 2
-        return terms
-
-    def run(self) -> FittedHead:
-        for step in range(self.options.steps):
-            self.step(step / self.options.steps)
-        return self.result()
-
-    @torch.no_grad()
-    def result(self) -> FittedHead:
-        return FittedHead(
-            self.z.numpy().copy(), self.c.numpy().copy(), self.rotation().numpy().copy(), self.shift.numpy().copy(),
-            float(self.log_focal.exp()), self.losses,
-        )  # fmt: skip
+if __name__ == "__main__":
+    main()

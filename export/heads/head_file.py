@@ -1,4 +1,4 @@
-"""Head files (.maqh) in numpy: read. The layout is that of sdk/src/head/files/file_format.h, version 1
+"""Head files (.maqh) in numpy: written and read. The layout is that of sdk/src/head/files/file_format.h, version 1
 (docs/formats.md)."""
 
 from __future__ import annotations
@@ -9,7 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from export.heads.prior import MAX_ANCHORS, MAX_CODES, MAX_PLACES, FieldShape, Layer, PriorError
-from export.heads.stored_numbers import FLOATS, SHAPE, START, NumberReader, checked_head, shape_of
+from export.heads.stored_numbers import (
+    FLOATS,
+    SHAPE,
+    START,
+    NumberReader,
+    checked_head,
+    shape_of,
+    signed,
+    stored,
+    stored_layer,
+    stored_place,
+    write_whole,
+)
 
 MAGIC, VERSION, MAX_CAMERAS = b"MAQHED\r\n", 1, 256
 SCALE_SOURCES = ("prior", "given", "depth")
@@ -74,6 +86,33 @@ class StoredHead:
     anchor_sigma: np.ndarray  # [M]
     places: dict[str, np.ndarray]  # name -> [3] on the template head
     prior_sha256: str  # of the prior's file, which the codes belong to; zeros: not known
+
+
+def head_bytes(head: StoredHead) -> bytes:
+    """The bytes of a file. Raises HeadFileError for numbers that it cannot hold."""
+    stored_head = np.zeros((), HEAD)
+    for name in ("metres_per_unit", "metres_sigma", "sharpness", "cut_point", "cut_normal", "bounds_min", "bounds_max"):
+        stored_head[name] = getattr(head, name)
+    stored_head["shape"] = tuple(getattr(head.shape, name) for name in SHAPE.names)
+    stored_head["shape_codes"], stored_head["colour_codes"] = len(head.shape_codes), len(head.colour_codes)
+    stored_head["cameras"], stored_head["anchors"] = len(head.cameras), len(head.anchor_sigma)
+    stored_head["places"] = len(head.places)
+    stored_head["scale_source"] = SCALE_SOURCES.index(head.scale_source)
+    stored_head["prior_sha256"] = np.frombuffer(bytes.fromhex(head.prior_sha256), np.uint8)
+    try:
+        parts = [part for layer in head.layers for part in stored_layer(layer, "float16")]
+        parts += [stored(codes, "float32") for codes in (head.shape_codes, head.colour_codes)]
+        parts.append(np.ascontiguousarray(head.cameras, CAMERA).tobytes())
+        parts += [stored(a, "float16") for a in (head.template_points, head.anchor_points, head.anchor_sigma)]
+        parts += [part for name, point in head.places.items() for part in stored_place(name, point)]
+    except PriorError as error:
+        raise HeadFileError(f"The head cannot be stored: {error}") from None
+    return signed(stored_head, MAGIC, VERSION, b"".join(parts))
+
+
+def write_head(head: StoredHead, path: Path) -> None:
+    """The file appears atomically. Raises what head_bytes() raises, OSError for what cannot be written."""
+    write_whole(head_bytes(head), path)
 
 
 def head_from_bytes(data: bytes, name: str = "The head in memory") -> StoredHead:

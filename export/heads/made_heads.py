@@ -48,8 +48,8 @@ def shard_parser(description: str, out: Path) -> argparse.ArgumentParser:
 def write_shards(
     arguments: argparse.Namespace, kind: str, make: Callable[[Head, np.random.Generator], HeadPoints | HeadPictures]
 ) -> None:
-    """One file for each head that has none yet; whole or not at all. kind: what the random numbers depend on beside the
-    head's own."""
+    """One file for each head that has none yet; each appears atomically. kind: what the random numbers depend on
+    beside the head's own."""
     maker = make_maker()
     for number in tqdm(range(arguments.first, arguments.first + arguments.count), unit="head"):
         path = head_path(arguments.out, arguments.split, number)

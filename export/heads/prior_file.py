@@ -6,7 +6,6 @@ Bases are stored as float32, float16, or int8 with a scale for each row (their b
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from export.heads.stored_numbers import (
     stored,
     stored_layer,
     stored_place,
+    write_whole,
 )
 
 MAGIC, VERSION = b"MAQPRI\r\n", 1
@@ -79,14 +79,8 @@ def prior_bytes(prior: Prior, bases: str = "int8", constant: str = "float16") ->
 
 
 def write_prior(prior: Prior, path: Path, bases: str = "int8", constant: str = "float16") -> None:
-    """Beside its place first: a crash leaves the old file. Raises what prior_bytes() raises."""
-    data = prior_bytes(prior, bases, constant)
-    beside = path.with_name(f"{path.name}.tmp")
-    with beside.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
+    """The file appears atomically. Raises what prior_bytes() raises, OSError for what cannot be written."""
+    write_whole(prior_bytes(prior, bases, constant), path)
 
 
 def prior_from_bytes(data: bytes, name: str = "The prior in memory") -> Prior:

@@ -3,6 +3,9 @@ the field in float32, float16 and int8."""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import numpy as np
 
 from export.heads.prior import FieldShape, Layer, PriorError, check_shape
@@ -42,6 +45,16 @@ def signed(head: np.ndarray, magic: bytes, version: int, body: bytes) -> bytes:
     head["file_bytes"] = head.dtype.itemsize + len(body)
     head["check"] = xxh3(head.tobytes()[CHECKED:] + body)
     return head.tobytes() + body
+
+
+def write_whole(data: bytes, path: Path) -> None:
+    """Beside its place first: a crash leaves the old file."""
+    beside = path.with_name(f"{path.name}.tmp")
+    with beside.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(path)
 
 
 def checked_head(data: bytes, form: np.dtype, magic: bytes, version: int, name: str, kind: str) -> np.ndarray:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from export.heads.head_file import HEAD, HeadFileError, head_from_bytes, read_head
+from export.heads.head_file import HEAD, HeadFileError, head_bytes, head_from_bytes, read_head, write_head
 from export.heads.stored_numbers import CHECKED
 from export.xxh3 import xxh3
 
@@ -40,6 +40,19 @@ def test_it_holds_what_the_sdk_wrote():
     np.testing.assert_array_equal(head.anchor_sigma, [0.015625] * 5)
     assert list(head.places) == ["nose_tip", "chin"]
     assert bytes.fromhex(head.prior_sha256)[:3] == bytes([0, 7, 14])
+
+
+def test_what_is_read_is_written_again_byte_by_byte(tmp_path):
+    write_head(read_head(EXAMPLE), tmp_path / "again.maqh")
+    assert (tmp_path / "again.maqh").read_bytes() == EXAMPLE.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["again.maqh"]
+
+
+def test_weights_that_the_file_cannot_hold_are_refused():
+    head = read_head(EXAMPLE)
+    head.layers[0].weights[0, 0] = 1e5
+    with pytest.raises(HeadFileError, match="cannot be stored"):
+        head_bytes(head)
 
 
 def test_every_byte_that_is_missing_or_changed_is_noticed():

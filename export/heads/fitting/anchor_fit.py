@@ -1,0 +1,277 @@
+"""A head's codes and camera from the encoder's template points: the reference of sdk/src/head/fit/anchor_fit.
+
+The point of a head with codes z that a cell shows is x(τ; z) = τ + Σ w_k (a_k(z) - t_k), τ the template point seen
+there, a_k the four anchors nearest to it and t_k their own template points. Levenberg-Marquardt over the camera and z,
+robust against outliers (Geman-McClure), with what the encoder says of z and a log-normal focal length as priors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from export.heads.fitting.camera import UNKNOWNS, Camera, ScaledPose, is_small_step, scaled_pose
+from export.heads.fitting.photo import HeadPhoto, NoHead, usable
+from export.heads.prior import Prior
+
+NEIGHBOURS = 4
+SOFTENING_DM = 1e-3  # within which of an anchor the others no longer count
+MAX_CELLS = 600
+MAX_ANCHOR_DM = 0.5  # cells that see a point farther than this from all anchors are left out
+CELL_WEIGHT = 0.1  # of a cell's cost: neighbours say the same
+PIXEL_SIGMA = 0.3  # of where in its cell the encoder saw a point, in cells
+LIMIT = 9.0  # in squared sigmas
+INLIER = 13.8  # squared sigmas of two coordinates: 99.9 %
+MIN_INLIERS = 0.3  # of the cells
+MIN_POINTS = 4
+LOG_SIGMA_RANGE = (-4.6, 1.1)  # of template points
+# How much of the codes' variance widens the limit, from the mean head to the fitted one, and steps that is worth.
+PHASES = ((1.0, 3), (0.2, 3), (0.04, 3), (0.0, 100))
+MAX_STEPS = 16
+CODE_SIGMA_FACTOR, LOG_CODE_SIGMA_RANGE, MAX_CODE_MEAN = 1.2, (-3.0, 1.0), 10.0
+
+
+@dataclass(frozen=True)
+class CodePrior:
+    """What is known of shape codes before, by the encoder: means and inverse variances, [K]."""
+
+    mean: np.ndarray
+    inverse: np.ndarray
+
+    def cost(self, z: np.ndarray) -> float:
+        return float(((z - self.mean) ** 2 * self.inverse).sum())
+
+
+def code_prior(photo: HeadPhoto, codes: int) -> CodePrior:
+    """The encoder's word on top of the normal distribution of all heads. Raises ValueError for other numbers of codes
+    than the prior has."""
+    mean, inverse = np.zeros(codes), np.ones(codes)
+    if photo.codes is None:
+        return CodePrior(mean, inverse)
+    if photo.codes.shape != (codes, 2):
+        raise ValueError(f"The encoder says {len(photo.codes)} shape codes of a head, whose prior has {codes}.")
+    told = photo.codes.astype(np.float64)
+    sigma = CODE_SIGMA_FACTOR * np.exp(np.clip(told[:, 1], *LOG_CODE_SIGMA_RANGE))
+    is_told = sigma < 1
+    inverse[is_told] = sigma[is_told] ** -2
+    mean[is_told] = np.clip(told[is_told, 0], -MAX_CODE_MEAN, MAX_CODE_MEAN)
+    return CodePrior(mean, inverse)
+
+
+class AnchorPoints:
+    """Where template points lie on a head, as linear functions of its codes."""
+
+    def __init__(self, prior: Prior) -> None:
+        self.template = prior.template_points.astype(np.float64)
+        self.offset = prior.anchor_mean.astype(np.float64) - self.template
+        self.linear = prior.anchor_linear.astype(np.float64)
+        self.sigma = prior.anchor_sigma.astype(np.float64)
+        self._tree = cKDTree(self.template)
+
+    def at(self, template: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Template points [N, 3] -> mean [N, 3], linear [N, 3, K] and sigma [N] of the points of heads there."""
+        away, near = self._tree.query(template, NEIGHBOURS)
+        w = 1 / (away**2 + SOFTENING_DM**2)
+        w /= w.sum(1, keepdims=True)
+        mean = template + np.einsum("nk,nkc->nc", w, self.offset[near])
+        return mean, np.einsum("nk,nkcd->ncd", w, self.linear[near]), (w * self.sigma[near]).sum(1)
+
+    def distance(self, template: np.ndarray) -> np.ndarray:
+        return self._tree.query(template)[0]
+
+
+class AnchorTerms:
+    """What the cells of one photo cost. Pixels are from the principal point."""
+
+    def __init__(self, photo: HeadPhoto, points: AnchorPoints) -> None:
+        side = photo.cells.shape[0]
+        cells = photo.cells.reshape(side * side, -1).astype(np.float64)
+        rows, columns = np.divmod(np.arange(side * side), side)
+        pixels = photo.in_photo(columns + 0.5, rows + 0.5) - 0.5 - photo.centre
+        keep = np.nonzero(usable(cells) & (cells[:, 4] > 0))[0]
+        keep = keep[points.distance(cells[keep, :3]) <= MAX_ANCHOR_DM]
+        count = min(len(keep), MAX_CELLS)
+        keep = keep[np.arange(count) * len(keep) // max(count, 1)]
+        mean, linear, sigma = points.at(cells[keep, :3])
+        own = np.exp(np.clip(cells[keep, 3], *LOG_SIGMA_RANGE))
+        self.pixel_sigma = max(PIXEL_SIGMA * photo.cell_px, 1e-3)
+        self.mean, self.linear, self.pixels = (torch.from_numpy(a) for a in (mean, linear, pixels[keep]))
+        self.sigma_dm = torch.from_numpy(np.hypot(own, sigma))
+        self.code_variance = self.linear.square().sum((1, 2)) / 3
+        self.inverse_variance = self.limit = torch.ones(count, dtype=torch.float64)
+
+    def __len__(self) -> int:
+        return len(self.mean)
+
+    def points(self, z: Tensor) -> Tensor:
+        return self.mean + self.linear @ z
+
+    def set_noise(self, pose: ScaledPose, z: Tensor, code_fraction: float) -> None:
+        """Takes the noise in pixels as this camera sees it, and holds it until the next call."""
+        scale = pose.log_scale.exp() / pose.project(self.points(z))[1].clamp(min=0.1)
+        variance = self.pixel_sigma**2 + (scale * self.sigma_dm).square()
+        self.inverse_variance = 1 / variance
+        self.limit = LIMIT * (1 + code_fraction * scale.square() * self.code_variance / variance)
+
+    def residuals(self, pose: ScaledPose, z: Tensor) -> Tensor:
+        """[N, 2], in sigmas; NaN where a cell is not seen."""
+        at, ratio = pose.project(self.points(z))
+        off = (self.pixels - at) * self.inverse_variance.sqrt()[:, None]
+        return torch.where(ratio[:, None] > 1e-3, off, torch.nan)
+
+    def cost(self, pose: ScaledPose, z: Tensor) -> Tensor:
+        """Twice a negative log likelihood."""
+        error = self.residuals(pose, z).square().sum(1)
+        return CELL_WEIGHT * torch.where(error.isnan(), self.limit, error / (1 + error / self.limit)).sum()
+
+    def is_inlier(self, pose: ScaledPose, z: Tensor) -> Tensor:
+        return self.residuals(pose, z).square().sum(1) <= INLIER
+
+
+@dataclass(frozen=True, eq=False)
+class AnchorFit:
+    """codes [K]; the camera; inliers: how many cells agree, of `cells`; cost: twice the negative log posterior."""
+
+    codes: np.ndarray
+    pose: ScaledPose
+    inliers: int
+    cells: int
+    cost: float
+
+
+class _Equations:
+    """Levenberg-Marquardt over the camera and, where there is a prior of them, the codes."""
+
+    def __init__(self, terms: AnchorTerms, photo: HeadPhoto, codes: CodePrior | None) -> None:
+        self.terms, self.codes = terms, codes
+        self.log_focal, self.focal_sigma = float(np.log(photo.focal_px)), photo.log_focal_sigma
+        self.steps = 0
+
+    def cost(self, pose: ScaledPose, z: np.ndarray) -> float:
+        total = float(self.terms.cost(pose, torch.from_numpy(z)))
+        if self.codes:
+            total += self.codes.cost(z)
+        if self.focal_sigma > 0:
+            total += ((float(pose.log_focal) - self.log_focal) / self.focal_sigma) ** 2
+        return total
+
+    def _set_up(self, pose: ScaledPose, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        count = UNKNOWNS + (len(z) if self.codes else 0)
+        at = torch.from_numpy(z)
+
+        def off(step: Tensor) -> Tensor:
+            codes = at + step[UNKNOWNS:] if self.codes else at
+            return self.terms.residuals(pose.displaced(step[:UNKNOWNS]), codes)
+
+        zero = torch.zeros(count, dtype=torch.float64)
+        jacobian, residuals = torch.func.jacfwd(off)(zero), off(zero)
+        error = residuals.square().sum(1)
+        seen = ~error.isnan()
+        root = (1 / (1 + error / self.terms.limit) * CELL_WEIGHT**0.5)[seen, None]
+        j = -(jacobian[seen] * root[..., None]).reshape(-1, count).numpy()
+        a, b = j.T @ j, j.T @ (residuals[seen] * root).reshape(-1).numpy()
+        if self.codes:
+            a[UNKNOWNS:, UNKNOWNS:] += np.diag(self.codes.inverse)
+            b[UNKNOWNS:] -= self.codes.inverse * (z - self.codes.mean)
+        focal = UNKNOWNS - 1
+        if self.focal_sigma > 0:
+            a[focal, focal] += self.focal_sigma**-2
+            b[focal] += (self.log_focal - float(pose.log_focal)) / self.focal_sigma**2
+        else:
+            a[focal] = a[:, focal] = 0
+            a[focal, focal], b[focal] = 1, 0
+        return a, b
+
+    def minimise(
+        self, pose: ScaledPose, z: np.ndarray, max_steps: int, tolerance: float = 1e-4
+    ) -> tuple[ScaledPose, np.ndarray]:
+        """Ends where a step gains less than this part of the cost."""
+        cost, damping, current = self.cost(pose, z), 1e-3, None
+        for _ in range(max_steps):
+            if damping >= 1e9:
+                break
+            current = current or self._set_up(pose, z)
+            self.steps += 1
+            a, b = current
+            try:
+                change = cho_solve(cho_factor(a + damping * np.diag(np.diag(a)), lower=True), b)
+            except LinAlgError:
+                change = np.full(len(b), np.nan)
+            then = np.inf
+            if is_small_step(change[:UNKNOWNS]):
+                tried = pose.moved(change[:UNKNOWNS]), z + change[UNKNOWNS:] if self.codes else z
+                then = self.cost(*tried)
+            if not then < cost:
+                damping *= 10
+                continue
+            is_end = cost - then < tolerance * (1 + then)
+            (pose, z), cost, damping, current = tried, then, max(damping * 0.1, 1e-9), None
+            if is_end:
+                break
+        return pose, z
+
+
+def _start(terms: AnchorTerms, photo: HeadPhoto) -> ScaledPose:
+    """The camera of the mean head: RANSAC, then least squares over the cells that agree. Raises NoHead."""
+    points, pixels = terms.mean.numpy(), terms.pixels.numpy()
+    intrinsics = np.diag([photo.focal_px, photo.focal_px, 1.0])
+    zero = torch.zeros(terms.linear.shape[2], dtype=torch.float64)
+    spread = np.median(np.linalg.norm(points - points.mean(0), axis=1)) * np.sqrt(2 / 3)
+    away = np.median(np.linalg.norm(pixels - np.median(pixels, 0), axis=1))
+    scale = away / max(spread, 1e-9)  # roughly, pixels a dm
+    sigma = np.hypot(terms.pixel_sigma, scale * np.sqrt(terms.sigma_dm.numpy() ** 2 + terms.code_variance.numpy()))
+    cv2.setRNGSeed(1)
+    found, turn, shift, _ = cv2.solvePnPRansac(
+        points, pixels, intrinsics, None, iterationsCount=400, reprojectionError=float(3.7 * np.median(sigma)),
+        flags=cv2.SOLVEPNP_EPNP,
+    )  # fmt: skip
+    if not found or not shift[2, 0] > 0:
+        raise NoHead("No camera explains the points that are seen of the head. Use a photo where the face is seen.")
+    pose = scaled_pose(Camera(cv2.Rodrigues(turn)[0], shift[:, 0], photo.focal_px))
+    # Its noise has the codes', which are 0 here, in it.
+    terms.inverse_variance = torch.from_numpy(sigma**-2.0)
+    equations = _Equations(terms, photo, None)
+    terms.limit = torch.full((len(terms),), LIMIT, dtype=torch.float64)
+    pose, _ = equations.minimise(pose, zero.numpy(), 50, 1e-12)
+    for _ in range(5):
+        inliers = terms.is_inlier(pose, zero)
+        # Least squares over the inliers: an infinite limit for them, none of the others' weight.
+        terms.inverse_variance = torch.from_numpy(sigma**-2.0) * inliers
+        terms.limit = torch.full((len(terms),), torch.inf, dtype=torch.float64)
+        pose, _ = equations.minimise(pose, zero.numpy(), 50, 1e-12)
+        terms.inverse_variance = torch.from_numpy(sigma**-2.0)
+        if torch.equal(terms.is_inlier(pose, zero), inliers):
+            break
+    # One that sees more of the far side of the head than of the near one is that of a mirrored picture, which looks the
+    # same without perspective.
+    camera, seen = pose.camera(), points[inliers.numpy()]
+    eye = -camera.rotation.T @ camera.shift
+    if np.sign((seen * (eye - seen)).sum(1)).sum() <= 0:
+        raise NoHead("Only a mirrored picture explains the points that are seen of the head. Flip it.")
+    return pose
+
+
+def fit_anchors(prior: Prior, photo: HeadPhoto) -> AnchorFit:
+    """Raises NoHead for a photo whose cells no head explains."""
+    terms = AnchorTerms(photo, AnchorPoints(prior))
+    if len(terms) < MIN_POINTS:
+        raise NoHead(f"Only {len(terms)} points of a head are seen. Use a photo where the face is seen, and its box.")
+    pose = _start(terms, photo)
+    known = code_prior(photo, prior.shape_codes)
+    equations, z = _Equations(terms, photo, known), known.mean.copy()
+    for code_fraction, steps in PHASES:
+        terms.set_noise(pose, torch.from_numpy(z), code_fraction)
+        pose, z = equations.minimise(pose, z, min(steps, MAX_STEPS - equations.steps))
+    inliers = int(terms.is_inlier(pose, torch.from_numpy(z)).sum())
+    if inliers < MIN_INLIERS * len(terms):
+        raise NoHead(
+            f"Of {len(terms)} points that are seen of the head, {inliers} agree with one. Use a photo where the face "
+            "is seen, 64 pixels or more across, and give its box."
+        )
+    return AnchorFit(z, pose, inliers, len(terms), equations.cost(pose, z))

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from random import Random
 
-from tests.hostile.samples import CAPTURE, DENSEPOSE, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
+from tests.hostile.samples import CAPTURE, DENSEPOSE, HEAD, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
 from tests.hostile.trial import EITHER, REFUSED, Trial
 
 SCHEMES = ("stub:people", "stub:pattern", "stub:", "stub:x", "image:a.jpg", "video:a.mp4", "rec:a.maqrec", "file:a.jpg",
@@ -22,8 +22,8 @@ VALUES = ("", "0", "-1", "1", "nan", "inf", "1e400", "1e-320", "4294967296", "99
 OPTION_VALUES = ("", " ", "-1", "0", "1", "nan", "inf", "-inf", "1e400", "0x10", "010", "1e1", "99999999999999999999",
                  "-99999999999999999999", "1,5", "１", "1 2", "1x", "..", "/", "\x1b[31mred", "%n%s", "A" * 1000,
                  b"\xff\xfe", "\n", "--help", "-")  # fmt: skip
-ENVIRONMENT = ("MAQ_BUNDLE", "MAQ_SCENE_BUNDLE", "MAQ_ONNXRUNTIME_LIB", "LC_ALL", "LANG", "HOME", "TMPDIR", "TERM",
-               "COLUMNS", "OPENCV_LOG_LEVEL", "TZ")  # fmt: skip
+ENVIRONMENT = ("MAQ_BUNDLE", "MAQ_SCENE_BUNDLE", "MAQ_HEADS_BUNDLE", "MAQ_ONNXRUNTIME_LIB", "LC_ALL", "LANG", "HOME",
+               "TMPDIR", "TERM", "COLUMNS", "OPENCV_LOG_LEVEL", "TZ")  # fmt: skip
 PLACES = ("", "/", ".", "/dev/zero", "/dev/null", "/nonexistent", "a.jpg", "/etc/passwd", "x" * 1000, "\x1b[2J",
           b"\xff\xfe", "-1", "C.UTF-8", "de_DE.UTF-8")  # fmt: skip
 
@@ -34,6 +34,7 @@ def _with_files(samples: Samples):
         (folder / "a.maqrec").write_bytes(samples.recordings["raw.maqrec"])
         (folder / "a.mp4").write_bytes(samples.clips["clip.mp4"])
         (folder / "a.maqs").write_bytes(samples.scenes["8.maqs"])
+        (folder / "a.maqh").write_bytes(samples.heads["a.maqh"])
 
     return prepare
 
@@ -65,6 +66,7 @@ COMMANDS = {
     ("scene", "build"): (str(CAPTURE), *SCENE, "--out", "b.maqs", "--threads", "1"),
     ("scene", "render"): ("a.maqs", *SCENE, "--path", "orbit", "--seconds", "0.1", "--size", "48x32", "--out", "b.mp4"),
     ("scene", "info"): ("a.maqs",),
+    ("head",): (*HEAD[1:], "--out", "b.glb"),
 }  # fmt: skip
 
 
@@ -100,6 +102,9 @@ WRONG_USES = (
     ("scene", "build", str(CAPTURE), "--out", "b.maqs", "--bundle", str(PEOPLE_BUNDLE)),
     ("densepose", "a.jpg", "--out", "out", "--bundle", str(SCENE_BUNDLE)), ("play", "b.maqrec"), ("play", "a.maqs"),
     ("bench", "nothing.jpg", "--bundle", str(PEOPLE_BUNDLE)), ("bench", "--bundle", "/nonexistent"),
+    ("head",), ("head", "a.jpg"), ("head", "a.jpg", "--out", "b.stl"), ("head", "a.maqs", *HEAD[2:], "--out", "b.glb"),
+    ("head", "a.jpg", "--out", "b.glb", "--bundle", str(PEOPLE_BUNDLE)), ("head", "info", "a.jpg"), ("head", "info"),
+    (*HEAD[:-1], "90,10,95,40", "--out", "b.glb"),
 )  # fmt: skip
 
 
@@ -115,4 +120,6 @@ def environment(samples: Samples, rng: Random, index: int) -> Trial:
         words = ("densepose", "a.jpg", "--out", "out")
     elif name == "MAQ_SCENE_BUNDLE":
         words = ("scene", "build", str(CAPTURE), "--out", "b.maqs")
+    elif name == "MAQ_HEADS_BUNDLE":
+        words = (*HEAD[:2], *HEAD[4:], "--out", "b.glb")
     return Trial("environment", f"{name}={value!r:.40}", words, _with_files(samples), EITHER, environment={name: value})

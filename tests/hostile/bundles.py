@@ -7,12 +7,13 @@ from pathlib import Path
 from random import Random
 
 from tests.hostile.damage import damaged, damaged_json, flip
-from tests.hostile.samples import CAPTURE, DENSEPOSE, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
+from tests.hostile.samples import CAPTURE, DENSEPOSE, HEAD, HEADS_BUNDLE, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
 from tests.hostile.trial import EITHER, REFUSED, Trial
 
 PEOPLE_RUN = ("densepose", "stub:people?size=64x48&frames=2", *DENSEPOSE[3:], "--bundle", "bundle")
 SCENE_RUN = ("scene", "build", str(CAPTURE), "--bundle", "bundle", "--out", "a.maqs", "--threads", "1")
-KINDS = ((PEOPLE_BUNDLE, PEOPLE_RUN), (SCENE_BUNDLE, SCENE_RUN))
+HEAD_RUN = (*(word if word != str(HEADS_BUNDLE) else "bundle" for word in HEAD), "--out", "a.glb")
+KINDS = ((PEOPLE_BUNDLE, PEOPLE_RUN), (SCENE_BUNDLE, SCENE_RUN), (HEADS_BUNDLE, HEAD_RUN))
 
 
 def _copied(source: Path, changes: dict[str, bytes], is_signed: bool):
@@ -39,7 +40,7 @@ def _files(source: Path) -> list[str]:
 
 def damaged_files(samples: Samples, rng: Random, index: int) -> Trial:
     """With valid checksums: the runtime itself meets the damage."""
-    source, words = KINDS[index % 2]
+    source, words = KINDS[index % len(KINDS)]
     name = rng.choice(_files(source))
     how, data = damaged((source / name).read_bytes(), rng)
     return Trial("bundle files", f"{name}: {how}", words, _copied(source, {name: data}, True), EITHER)
@@ -47,7 +48,7 @@ def damaged_files(samples: Samples, rng: Random, index: int) -> Trial:
 
 def exchanged_files(samples: Samples, rng: Random, index: int) -> Trial:
     """A file in another's place, or none, with valid checksums."""
-    source, words = KINDS[index % 2]
+    source, words = KINDS[index % len(KINDS)]
     name = rng.choice(_files(source))
     other = rng.choice([*(file for file in _files(source) if file != name), "nothing", "zeros"])
     data = {"nothing": b"", "zeros": bytes(100_000)}.get(other) if other in ("nothing", "zeros") else None
@@ -56,7 +57,7 @@ def exchanged_files(samples: Samples, rng: Random, index: int) -> Trial:
 
 
 def unsigned_files(samples: Samples, rng: Random, index: int) -> Trial:
-    source, words = KINDS[index % 2]
+    source, words = KINDS[index % len(KINDS)]
     name = rng.choice(_files(source))
     how, data = flip((source / name).read_bytes(), rng)
     while data == (source / name).read_bytes():  # the same bit twice
@@ -65,7 +66,7 @@ def unsigned_files(samples: Samples, rng: Random, index: int) -> Trial:
 
 
 def manifests(samples: Samples, rng: Random, index: int) -> Trial:
-    source, words = KINDS[index % 2]
+    source, words = KINDS[index % len(KINDS)]
     how, text = damaged_json(json.loads((source / "manifest.json").read_text()), rng)
     data = text.encode("utf-8", "surrogatepass")
     return Trial("manifests", how, words, _copied(source, {"manifest.json": data}, False), EITHER)

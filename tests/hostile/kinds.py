@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from random import Random
 
-from tests.hostile import arguments, bundles, captures, limits, paths, pictures, recordings, scene_files
+from tests.hostile import arguments, bundles, captures, head_files, limits, paths, pictures, recordings, scene_files
 from tests.hostile.samples import Samples
 from tests.hostile.trial import Trial
 
@@ -20,10 +20,10 @@ class Kind:
 
 
 KINDS = {
-    "bundle-files": Kind(bundles.damaged_files, 200),
-    "bundle-exchanged": Kind(bundles.exchanged_files, 40),
-    "bundle-unsigned": Kind(bundles.unsigned_files, 40),
-    "manifests": Kind(bundles.manifests, 300),
+    "bundle-files": Kind(bundles.damaged_files, 300),
+    "bundle-exchanged": Kind(bundles.exchanged_files, 60),
+    "bundle-unsigned": Kind(bundles.unsigned_files, 60),
+    "manifests": Kind(bundles.manifests, 450),
     "capture-transforms": Kind(captures.transforms, 150),
     "capture-clouds": Kind(captures.clouds, 120),
     "capture-photos": Kind(captures.photos, 40),
@@ -31,6 +31,8 @@ KINDS = {
     "scene-unchecked": Kind(scene_files.unchecked, 120),
     "scene-checked": Kind(scene_files.checked, 180),
     "scene-sections": Kind(scene_files.sections, 60),
+    "head-unchecked": Kind(head_files.unchecked, 120),
+    "head-checked": Kind(head_files.checked, 180),
     "recording-unchecked": Kind(recordings.unchecked, 90),
     "recording-heads": Kind(recordings.heads, 90),
     "recording-frames": Kind(recordings.frames, 120),
@@ -40,18 +42,18 @@ KINDS = {
     "image-sizes": Kind(pictures.sizes, 120),
     "clips": Kind(pictures.clips, 90),
     "uris": Kind(arguments.uris, 200),
-    "options": Kind(arguments.options, 260),
-    "wrong-uses": Kind(arguments.wrong_uses, 34),
+    "options": Kind(arguments.options, 320),
+    "wrong-uses": Kind(arguments.wrong_uses, 42),
     "environment": Kind(arguments.environment, 60),
-    "special-inputs": Kind(paths.inputs, 208, ("user",)),
-    "special-outputs": Kind(paths.outputs, 119, ("user",)),
+    "special-inputs": Kind(paths.inputs, 256, ("user",)),
+    "special-outputs": Kind(paths.outputs, 136, ("user",)),
     "names": Kind(paths.names, 68),
     "written-names": Kind(paths.written_names, 60),
-    "memory": Kind(limits.memory, 252, ("user", "limits")),
-    "threads": Kind(limits.threads, 84, ("user", "limits")),
-    "open-files": Kind(limits.files, 112),
-    "file-sizes": Kind(limits.file_sizes, 84),
-    "lost-output": Kind(limits.lost_output, 112),
+    "memory": Kind(limits.memory, 288, ("user", "limits")),
+    "threads": Kind(limits.threads, 96, ("user", "limits")),
+    "open-files": Kind(limits.files, 128),
+    "file-sizes": Kind(limits.file_sizes, 96),
+    "lost-output": Kind(limits.lost_output, 128),
     "signals": Kind(limits.signals, 120),
 }
 

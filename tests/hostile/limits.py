@@ -4,7 +4,7 @@ import signal
 from pathlib import Path
 from random import Random
 
-from tests.hostile.samples import CAPTURE, DENSEPOSE, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
+from tests.hostile.samples import CAPTURE, DENSEPOSE, HEAD, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
 from tests.hostile.trial import EITHER, REFUSED, Trial
 
 SCENE = ("--bundle", str(SCENE_BUNDLE))
@@ -21,6 +21,7 @@ COMMANDS = (
     ("scene", "info", "a.maqs", "--json", "b.json"), ("info",), ("sources",),
     ("bench", "stub:people?size=64x48", "--bundle", str(PEOPLE_BUNDLE), "--runs", "3", "--seconds", "0", "--warm-up",
      "0", "--json", "b.json"),
+    (*HEAD, "--out", "b.glb", "--save", "b.maqh"), ("head", "info", "a.maqh"),
 )  # fmt: skip
 # Commands that a signal has to end.
 ENDLESS = (
@@ -34,6 +35,7 @@ ENDLESS = (
      "b"),
     ("scene", "build", str(CAPTURE), *SCENE, "--out", "b.maqs"),
     ("bench", "stub:people?size=64x48", "--bundle", str(PEOPLE_BUNDLE), "--seconds", "600"),
+    (*HEAD, "--seconds", "600", "--out", "b.glb", "--save", "b.maqh"),
 )  # fmt: skip
 MEMORY_MIB = (16, 24, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384, 512)
 OUTPUT_LOST = (">/dev/full", ">&-", "2>&-", ">&- 2>&-", "2>/dev/full", "<&-", "<&- >&- 2>&-", "<&- >/dev/full")
@@ -45,6 +47,7 @@ def _prepared(samples: Samples):
         (folder / "a.mp4").write_bytes(samples.clips["clip.mp4"])
         (folder / "a.maqrec").write_bytes(samples.recordings["raw.maqrec"])
         (folder / "a.maqs").write_bytes(samples.scenes["8.maqs"])
+        (folder / "a.maqh").write_bytes(samples.heads["a.maqh"])
 
     return prepare
 

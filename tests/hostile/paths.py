@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
-from tests.hostile.samples import CAPTURE, DENSEPOSE, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
+from tests.hostile.samples import CAPTURE, DENSEPOSE, HEAD, PEOPLE_BUNDLE, SCENE_BUNDLE, Samples
 from tests.hostile.trial import EITHER, REFUSED, WORKS, Trial
 
 
@@ -55,6 +55,8 @@ INPUTS = (
     ("scene", "info", "{}"), ("scene", "render", "{}", *SCENE, *SHOW, "--out", "b.mp4"),
     ("scene", "render", "a.maqs", *SCENE, "--views", "all", "--capture", "{}", "--out", "b"),
     ("bench", "{}", "--bundle", str(PEOPLE_BUNDLE), "--runs", "1", "--seconds", "0", "--warm-up", "0"),
+    ("head", "{}", *HEAD[2:], "--out", "b.glb"), ("head", "info", "{}"),
+    ("head", "a.jpg", "--bundle", "{}", *HEAD[4:], "--out", "b.glb"),
 )  # fmt: skip
 # Commands that write {}.
 OUTPUTS = (
@@ -62,7 +64,7 @@ OUTPUTS = (
     ("scene", "build", str(CAPTURE), *SCENE, "--out", "b.maqs", "--ply", "{}"),
     ("scene", "render", "a.maqs", *SCENE, *SHOW, "--out", "{}"),
     ("scene", "info", "a.maqs", "--json", "{}"), (*DENSEPOSE[:-1], "{}", "a.jpg", "--overlay"),
-    ("play", "a.maqrec", "--no-picture", "--json", "{}"),
+    ("play", "a.maqrec", "--no-picture", "--json", "{}"), (*HEAD, "--save", "{}"),
 )  # fmt: skip
 NAMES: tuple[bytes, ...] = (
     b"a b", b"a\nb", b"a\tb", b"\x1b[31mred", b"\xff\xfe", b"caf\xe9", "ä€😀".encode(), "\u202egpj".encode(), b"%41",

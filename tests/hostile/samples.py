@@ -12,22 +12,27 @@ ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests/native/data"
 PEOPLE_BUNDLE = DATA / "tiny_bundle"
 SCENE_BUNDLE = DATA / "tiny_scene/bundle"
+HEADS_BUNDLE = DATA / "round_heads/bundle"
 CAPTURE = DATA / "tiny_scene/capture"
 CLIP = ROOT / "tests/media/clip.mp4"
+# A head of a photo, a.jpg: the encoder of this bundle sees one wherever a photo is not black.
+HEAD = ("head", "a.jpg", "--bundle", str(HEADS_BUNDLE), "--threads", "1", "--seconds", "0", "--cell", "20",
+        "--box", "10,10,50,40")  # fmt: skip
 # What every run of dense pose has: small networks, one thread, one or two frames.
 DENSEPOSE = ("densepose", "--bundle", str(PEOPLE_BUNDLE), "--threads", "1", "--max-frames", "2", "--out", "out")
 
 
 @dataclass(frozen=True)
 class Samples:
-    """program: what made them. images, clips, recordings, scenes: bytes of good files by name. colmap: texts of a model
-    by file name."""
+    """program: what made them. images, clips, recordings, scenes, heads: bytes of good files by name. colmap: texts of
+    a model by file name."""
 
     program: Path
     images: dict[str, bytes]
     clips: dict[str, bytes]
     recordings: dict[str, bytes]
     scenes: dict[str, bytes]
+    heads: dict[str, bytes]
     colmap: dict[str, str]
 
 
@@ -41,9 +46,11 @@ def make_samples(program: Path, folder: Path) -> Samples:
 
     stub = "stub:pattern?size=32x24&frames=4"
     build = ("scene", "build", str(CAPTURE), "--bundle", str(SCENE_BUNDLE), "--threads", "1")
+    images = make_images()
+    (folder / "a.jpg").write_bytes(images["baseline.jpg"])
     return Samples(
         program=program,
-        images=make_images(),
+        images=images,
         clips={"clip.mp4": CLIP.read_bytes(), "clip.avi": _avi(folder / "clip.avi")},
         recordings={
             "raw.maqrec": made("raw.maqrec", "record", stub, "raw.maqrec"),
@@ -53,6 +60,7 @@ def make_samples(program: Path, folder: Path) -> Samples:
             f"{bits}.maqs": made(f"{bits}.maqs", *build, "--coefficients", str(bits), "--out", f"{bits}.maqs")
             for bits in (8, 16, 32)
         },
+        heads={"a.maqh": made("a.maqh", *HEAD, "--save", "a.maqh")},
         colmap=colmap_model(),
     )
 

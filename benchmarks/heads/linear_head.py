@@ -14,9 +14,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.heads.distances import MM_PER_DM, Triangles
-from benchmarks.heads.encoding import Encoder
 from benchmarks.heads.photos import Photo
-from export.heads.anchor_fit import fit_anchors
+from export.heads.fitting.anchor_fit import CodePrior, fit_anchors, observations_of
+from export.heads.fitting.photo import Encoder, NoHead, look_at
 from export.heads.prior import Prior
 from export.heads.prior_file import read_prior
 from export.heads.surface import HeadMaker
@@ -91,10 +91,10 @@ class LinearHeads:
 
     def mesh(self, photo: Photo, focal_px: float = 0) -> Triangles | None:
         """Of the head of a photo, mm; None where the encoder sees none. focal_px: 0 where it is not known."""
-        seen, options = self._encoder.seen(photo.rgb, photo.box, focal_px)
-        codes = carried_over(self._prior, self.template, self.mean, self.linear, seen.codes)
         try:
-            found = fit_anchors(self._model, replace(seen, codes=codes), options)
-        except ValueError:
+            seen = observations_of(look_at(self._encoder, photo.rgb[..., ::-1], tuple(photo.box), focal_px=focal_px))
+            codes = carried_over(self._prior, self.template, self.mean, self.linear, seen.codes)
+            found = fit_anchors(self._model, seen, CodePrior(codes[:, 0], np.exp(-2 * codes[:, 1])))
+        except NoHead:
             return None
         return Triangles((self.mean + self.linear @ found.codes) * MM_PER_DM, self.faces)

@@ -8,7 +8,7 @@ baseline is the mean head, posed by the same encoder's template points, with the
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import igl
@@ -17,12 +17,12 @@ from maquette.frames import Frame
 from tqdm import tqdm
 
 from benchmarks.heads.drawing import DrawnMesh, framed
-from benchmarks.heads.encoding import Encoder
 from benchmarks.heads.fitted import cameras_of, stored
 from benchmarks.heads.mean_head import MM_PER_DM, mesh_of, template_points
 from export.camera import Camera
 from export.evaluation.heads_api import HeadBuilder, MaquetteError
-from export.heads.anchor_fit import fit_anchors
+from export.heads.fitting.anchor_fit import CodePrior, fit_anchors, observations_of
+from export.heads.fitting.photo import Encoder, look_at
 from export.heads.head_shards import CROP_SIDES, SIDE
 from export.heads.photos.faces import HEAD, UNKNOWN, PhotoFaces
 from export.heads.prior_file import read_prior
@@ -30,7 +30,7 @@ from export.heads.shapes import vertex_normals
 from export.teachers.faces import LEFT_EYE, RIGHT_EYE
 
 SPLITS = ("val", "test")  # the encoder's training saw neither; val told when to end it
-PINNED = -12.0  # log sigma of codes that stay where they are
+PINNED = 1e10  # inverse variance of codes that stay where they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +124,9 @@ class MeanHeads:
 
     def posed(self, rgb: np.ndarray, box: np.ndarray) -> PosedMesh:
         """Raises ValueError where the encoder sees no head."""
-        seen, options = self._encoder.seen(rgb, box)
-        pinned = np.stack([np.zeros(len(seen.codes)), np.full(len(seen.codes), PINNED)], 1)
-        found = fit_anchors(self._prior, replace(seen, codes=pinned), options)
+        seen = observations_of(look_at(self._encoder, rgb[..., ::-1], tuple(box)))
+        codes = self._prior.shape_codes
+        found = fit_anchors(self._prior, seen, CodePrior(np.zeros(codes), np.full(codes, PINNED))).pose.camera()
         height, width = rgb.shape[:2]
         centre = -found.rotation.T @ found.shift
         camera = Camera.centred(width, height, found.focal_px, found.rotation, centre)

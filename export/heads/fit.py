@@ -20,7 +20,7 @@ import torch
 from tqdm import tqdm
 
 from export.bundle import read_manifest
-from export.heads.fitting.anchor_fit import AnchorFit, fit_anchors
+from export.heads.fitting.anchor_fit import AnchorFit, fit_anchors, observations_of
 from export.heads.fitting.photo import Encoder, HeadPhoto, NoHead, look_at, read_photo
 from export.heads.fitting.ray_fit import FitOptions, HeadState, RayFit
 from export.heads.head_file import CAMERA, HeadFileError, StoredHead, write_head
@@ -99,7 +99,7 @@ def fit(options: argparse.Namespace) -> None:
     data = prior_file.read_bytes()
     prior = prior_from_bytes(data, str(prior_file))
     photo = look_at(encoder, read_photo(options.photo), options.box, math.radians(options.roll), options.focal_px)
-    start: AnchorFit = fit_anchors(prior, photo)
+    start: AnchorFit = fit_anchors(prior, observations_of(photo))
     print(f"{start.inliers} of {start.cells} cells agree with a camera of {start.pose.camera().focal_px:.0f} px")
     if options.steps == 0 or options.seconds == 0:
         state = HeadState(torch.from_numpy(start.codes.astype(np.float32)), torch.zeros(prior.colour_codes), start.pose)

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from export.heads.fitting.camera import UNKNOWNS, Camera, ScaledPose, is_small_step, scaled_pose
-from export.heads.fitting.photo import HeadPhoto, NoHead, usable
+from export.heads.fitting.photo import HeadPhoto, NoHead, shows_head
 from export.heads.prior import Prior
 
 NEIGHBOURS = 4
@@ -37,6 +37,35 @@ MAX_STEPS = 16
 CODE_SIGMA_FACTOR, LOG_CODE_SIGMA_RANGE, MAX_CODE_MEAN = 1.2, (-3.0, 1.0), 10.0
 
 
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Of one photo: template points [N, 3] dm, their sigma [N] dm, pixels [N, 2] where they are seen, with the first
+    pixel's centre at (0, 0), and the sigma of these; what the encoder says of shape codes, [K, 2] as in HeadPhoto, or
+    None. centre: the principal point. log_focal_sigma: 0 where the focal length is known, else focal_px is the
+    median."""
+
+    template: np.ndarray
+    sigma: np.ndarray
+    pixels: np.ndarray
+    pixel_sigma: float
+    codes: np.ndarray | None
+    focal_px: float
+    log_focal_sigma: float
+    centre: np.ndarray
+
+
+def observations_of(photo: HeadPhoto) -> Observations:
+    """Of the cells that show the head."""
+    rows, columns = np.nonzero(shows_head(photo.cells))
+    cells = photo.cells[rows, columns].astype(np.float64)
+    pixels = photo.in_photo(columns + 0.5, rows + 0.5) - 0.5
+    sigma = np.exp(np.clip(cells[:, 3], *LOG_SIGMA_RANGE))
+    pixel_sigma = max(PIXEL_SIGMA * photo.cell_px, 1e-3)
+    return Observations(
+        cells[:, :3], sigma, pixels, pixel_sigma, photo.codes, photo.focal_px, photo.log_focal_sigma, photo.centre
+    )
+
+
 @dataclass(frozen=True)
 class CodePrior:
     """What is known of shape codes before, by the encoder: means and inverse variances, [K]."""
@@ -48,15 +77,15 @@ class CodePrior:
         return float(((z - self.mean) ** 2 * self.inverse).sum())
 
 
-def code_prior(photo: HeadPhoto, codes: int) -> CodePrior:
+def code_prior(seen: Observations, codes: int) -> CodePrior:
     """The encoder's word on top of the normal distribution of all heads. Raises ValueError for other numbers of codes
     than the prior has."""
     mean, inverse = np.zeros(codes), np.ones(codes)
-    if photo.codes is None:
+    if seen.codes is None:
         return CodePrior(mean, inverse)
-    if photo.codes.shape != (codes, 2):
-        raise ValueError(f"The encoder says {len(photo.codes)} shape codes of a head, whose prior has {codes}.")
-    told = photo.codes.astype(np.float64)
+    if seen.codes.shape != (codes, 2):
+        raise ValueError(f"The encoder says {len(seen.codes)} shape codes of a head, whose prior has {codes}.")
+    told = seen.codes.astype(np.float64)
     sigma = CODE_SIGMA_FACTOR * np.exp(np.clip(told[:, 1], *LOG_CODE_SIGMA_RANGE))
     is_told = sigma < 1
     inverse[is_told] = sigma[is_told] ** -2
@@ -89,20 +118,15 @@ class AnchorPoints:
 class AnchorTerms:
     """What the cells of one photo cost. Pixels are from the principal point."""
 
-    def __init__(self, photo: HeadPhoto, points: AnchorPoints) -> None:
-        side = photo.cells.shape[0]
-        cells = photo.cells.reshape(side * side, -1).astype(np.float64)
-        rows, columns = np.divmod(np.arange(side * side), side)
-        pixels = photo.in_photo(columns + 0.5, rows + 0.5) - 0.5 - photo.centre
-        keep = np.nonzero(usable(cells) & (cells[:, 4] > 0))[0]
-        keep = keep[points.distance(cells[keep, :3]) <= MAX_ANCHOR_DM]
+    def __init__(self, seen: Observations, points: AnchorPoints) -> None:
+        keep = np.nonzero(points.distance(seen.template) <= MAX_ANCHOR_DM)[0]
         count = min(len(keep), MAX_CELLS)
         keep = keep[np.arange(count) * len(keep) // max(count, 1)]
-        mean, linear, sigma = points.at(cells[keep, :3])
-        own = np.exp(np.clip(cells[keep, 3], *LOG_SIGMA_RANGE))
-        self.pixel_sigma = max(PIXEL_SIGMA * photo.cell_px, 1e-3)
-        self.mean, self.linear, self.pixels = (torch.from_numpy(a) for a in (mean, linear, pixels[keep]))
-        self.sigma_dm = torch.from_numpy(np.hypot(own, sigma))
+        mean, linear, sigma = points.at(seen.template[keep])
+        pixels = seen.pixels[keep] - seen.centre
+        self.pixel_sigma = seen.pixel_sigma
+        self.mean, self.linear, self.pixels = (torch.from_numpy(a) for a in (mean, linear, pixels))
+        self.sigma_dm = torch.from_numpy(np.hypot(seen.sigma[keep], sigma))
         self.code_variance = self.linear.square().sum((1, 2)) / 3
         self.inverse_variance = self.limit = torch.ones(count, dtype=torch.float64)
 
@@ -148,9 +172,9 @@ class AnchorFit:
 class _Equations:
     """Levenberg-Marquardt over the camera and, where there is a prior of them, the codes."""
 
-    def __init__(self, terms: AnchorTerms, photo: HeadPhoto, codes: CodePrior | None) -> None:
+    def __init__(self, terms: AnchorTerms, seen: Observations, codes: CodePrior | None) -> None:
         self.terms, self.codes = terms, codes
-        self.log_focal, self.focal_sigma = float(np.log(photo.focal_px)), photo.log_focal_sigma
+        self.log_focal, self.focal_sigma = float(np.log(seen.focal_px)), seen.log_focal_sigma
         self.steps = 0
 
     def cost(self, pose: ScaledPose, z: np.ndarray) -> float:
@@ -217,10 +241,10 @@ class _Equations:
         return pose, z
 
 
-def _start(terms: AnchorTerms, photo: HeadPhoto) -> ScaledPose:
+def _start(terms: AnchorTerms, seen: Observations) -> ScaledPose:
     """The camera of the mean head: RANSAC, then least squares over the cells that agree. Raises NoHead."""
     points, pixels = terms.mean.numpy(), terms.pixels.numpy()
-    intrinsics = np.diag([photo.focal_px, photo.focal_px, 1.0])
+    intrinsics = np.diag([seen.focal_px, seen.focal_px, 1.0])
     zero = torch.zeros(terms.linear.shape[2], dtype=torch.float64)
     spread = np.median(np.linalg.norm(points - points.mean(0), axis=1)) * np.sqrt(2 / 3)
     away = np.median(np.linalg.norm(pixels - np.median(pixels, 0), axis=1))
@@ -233,10 +257,10 @@ def _start(terms: AnchorTerms, photo: HeadPhoto) -> ScaledPose:
     )  # fmt: skip
     if not found or not shift[2, 0] > 0:
         raise NoHead("No camera explains the points that are seen of the head. Use a photo where the face is seen.")
-    pose = scaled_pose(Camera(cv2.Rodrigues(turn)[0], shift[:, 0], photo.focal_px))
+    pose = scaled_pose(Camera(cv2.Rodrigues(turn)[0], shift[:, 0], seen.focal_px))
     # Its noise has the codes', which are 0 here, in it.
     terms.inverse_variance = torch.from_numpy(sigma**-2.0)
-    equations = _Equations(terms, photo, None)
+    equations = _Equations(terms, seen, None)
     terms.limit = torch.full((len(terms),), LIMIT, dtype=torch.float64)
     pose, _ = equations.minimise(pose, zero.numpy(), 50, 1e-12)
     for _ in range(5):
@@ -250,21 +274,21 @@ def _start(terms: AnchorTerms, photo: HeadPhoto) -> ScaledPose:
             break
     # One that sees more of the far side of the head than of the near one is that of a mirrored picture, which looks the
     # same without perspective.
-    camera, seen = pose.camera(), points[inliers.numpy()]
+    camera, shown = pose.camera(), points[inliers.numpy()]
     eye = -camera.rotation.T @ camera.shift
-    if np.sign((seen * (eye - seen)).sum(1)).sum() <= 0:
+    if np.sign((shown * (eye - shown)).sum(1)).sum() <= 0:
         raise NoHead("Only a mirrored picture explains the points that are seen of the head. Flip it.")
     return pose
 
 
-def fit_anchors(prior: Prior, photo: HeadPhoto) -> AnchorFit:
-    """Raises NoHead for a photo whose cells no head explains."""
-    terms = AnchorTerms(photo, AnchorPoints(prior))
+def fit_anchors(prior: Prior, seen: Observations, known: CodePrior | None = None) -> AnchorFit:
+    """known: of the codes, by default what the encoder says. Raises NoHead for what no head explains."""
+    terms = AnchorTerms(seen, AnchorPoints(prior))
     if len(terms) < MIN_POINTS:
         raise NoHead(f"Only {len(terms)} points of a head are seen. Use a photo where the face is seen, and its box.")
-    pose = _start(terms, photo)
-    known = code_prior(photo, prior.shape_codes)
-    equations, z = _Equations(terms, photo, known), known.mean.copy()
+    pose = _start(terms, seen)
+    known = known or code_prior(seen, prior.shape_codes)
+    equations, z = _Equations(terms, seen, known), known.mean.copy()
     for code_fraction, steps in PHASES:
         terms.set_noise(pose, torch.from_numpy(z), code_fraction)
         pose, z = equations.minimise(pose, z, min(steps, MAX_STEPS - equations.steps))

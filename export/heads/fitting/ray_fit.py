@@ -17,7 +17,14 @@ import torch
 from torch import Tensor
 
 from export.heads.field import bases_of
-from export.heads.fitting.anchor_fit import CELL_WEIGHT, AnchorFit, AnchorPoints, AnchorTerms, code_prior
+from export.heads.fitting.anchor_fit import (
+    CELL_WEIGHT,
+    AnchorFit,
+    AnchorPoints,
+    AnchorTerms,
+    code_prior,
+    observations_of,
+)
 from export.heads.fitting.camera import UNKNOWNS, ScaledPose, is_small_step
 from export.heads.fitting.photo import HeadPhoto
 from export.heads.fitting.ray_terms import RayTerms
@@ -83,9 +90,10 @@ class RayFit:
         shape = torch.from_numpy(start.codes.astype(np.float32))
         self.now = HeadState(shape, torch.zeros(prior.colour_codes), start.pose)
         self.best, self.best_loss = self.now, math.inf
-        self.anchor_terms = AnchorTerms(photo, AnchorPoints(prior))
+        seen = observations_of(photo)
+        self.anchor_terms = AnchorTerms(seen, AnchorPoints(prior))
         self.anchor_terms.set_noise(start.pose, shape.double(), 0)
-        known = code_prior(photo, prior.shape_codes)
+        known = code_prior(seen, prior.shape_codes)
         self.code_mean, self.code_inverse = torch.from_numpy(known.mean), torch.from_numpy(known.inverse)
         # A step of all unknowns: Adam's variables, which begin at 0 each time.
         self.change = [

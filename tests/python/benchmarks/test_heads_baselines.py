@@ -20,7 +20,7 @@ from benchmarks.heads.distances import MM_PER_DM, Similarity, Triangles, measure
 from benchmarks.heads.drawing import DrawnMesh
 from benchmarks.heads.mean_head import template_points
 from benchmarks.heads.photos import Photo, PhotoBackgrounds, photo_of
-from export.heads.anchor_fit import AnchorFitOptions, Observations
+from export.heads.fitting.anchor_fit import Observations
 from export.heads.head_shards import SIDE
 from export.heads.photos.face_points import read_face_points
 from export.heads.photos.faces import PhotoFaces
@@ -230,11 +230,12 @@ def test_the_linear_head_follows_what_is_seen(monkeypatch):
     heads, base, directions = linear_heads()
     camera = look_at(0.2, 0.1, 0.0, 12.0, np.zeros(3), 900.0, 400)
     true = base + 0.01 * np.tensordot([4.0, -3.0, 1.0], directions, 1)
-    pixels = camera.projected(true)[0]
-    seen = Observations(base, np.full(300, 0.01), pixels, np.stack([np.zeros(3), np.zeros(3)], 1))
-    options = AnchorFitOptions(focal_px=900.0, log_focal_sigma=1e-4, centre_px=(camera.cx_px, camera.cy_px))
-    encoder = SimpleNamespace(seen=lambda *_: (seen, options))
-    monkeypatch.setattr(linear_head, "Encoder", lambda _: encoder)
+    near = (true * (camera.centre - true)).sum(1) > 0
+    pixels, principal = camera.projected(true[near])[0], np.array([camera.cx_px, camera.cy_px])
+    seen = Observations(base[near], np.full(near.sum(), 0.01), pixels, 1.0, np.zeros((3, 2)), 900.0, 0.0, principal)
+    for name in ("Encoder", "look_at"):
+        monkeypatch.setattr(linear_head, name, lambda *_, **__: None)
+    monkeypatch.setattr(linear_head, "observations_of", lambda _: seen)
     single = np.float32
     prior = replace(
         small_prior(), template_points=base.astype(single), anchor_mean=base.astype(single),
@@ -246,8 +247,8 @@ def test_the_linear_head_follows_what_is_seen(monkeypatch):
     found = linear_head.LinearHeads(Path(), maker, heads, 3).mesh(Photo(np.zeros((4, 4, 3)), np.zeros(4), camera))
     before, after = (np.linalg.norm(p - true * MM_PER_DM, axis=1).mean() for p in (heads.mean(0) * 100, found.points))
     assert after < 0.3 * before
-    too_few = replace(seen, template=seen.template[:5], sigma=seen.sigma[:5], pixels=pixels[:5])
-    encoder.seen = lambda *_: (too_few, options)
+    too_few = replace(seen, template=seen.template[:3], sigma=seen.sigma[:3], pixels=pixels[:3])
+    monkeypatch.setattr(linear_head, "observations_of", lambda _: too_few)
     heads_of = linear_head.LinearHeads(Path(), maker, heads, 3)
     assert heads_of.mesh(Photo(np.zeros((4, 4, 3)), np.zeros(4), camera)) is None
 

@@ -14,7 +14,7 @@ import trimesh  # noqa: E402
 from export.heads.face import is_face  # noqa: E402
 from export.heads.field import bases_of, geometry, surface  # noqa: E402
 from export.heads.fit import main  # noqa: E402
-from export.heads.fitting.anchor_fit import fit_anchors  # noqa: E402
+from export.heads.fitting.anchor_fit import fit_anchors, observations_of  # noqa: E402
 from export.heads.fitting.photo import Encoder, NoHead, crop, look_at, square  # noqa: E402
 from export.heads.fitting.ray_terms import log_clear  # noqa: E402
 from export.heads.fitting.rays import Shuffle  # noqa: E402
@@ -40,7 +40,7 @@ def encoder():
 def test_the_codes_that_the_cells_show_are_found(encoder):
     prior = read_prior(ROUND / "prior.maqp")
     photo = look_at(encoder, GREY, (40, 30, 160, 170), focal_px=900.0)
-    fit = fit_anchors(prior, photo)
+    fit = fit_anchors(prior, observations_of(photo))
     assert fit.inliers > 0.9 * fit.cells
     # Size and distance look alike: what is compared is the shape.
     ratio = (1 + 0.07 * fit.codes) / (1 + 0.07 * CODES)
@@ -65,7 +65,7 @@ def test_photos_that_show_no_head_are_refused(encoder):
     mirrored = np.zeros_like(GREY)
     mirrored[..., 0] = 250  # the encoder of ROUND sees a head there that no camera explains
     with pytest.raises(NoHead, match="mirrored"):
-        fit_anchors(read_prior(ROUND / "prior.maqp"), look_at(encoder, mirrored, (40, 30, 160, 170)))
+        fit_anchors(read_prior(ROUND / "prior.maqp"), observations_of(look_at(encoder, mirrored, (40, 30, 160, 170))))
 
 
 def test_crops_are_bilinear_and_grey_beyond_the_photo():
@@ -168,7 +168,7 @@ def codes_of_stage_0(bundle: Path) -> np.ndarray:
     """The codes of stage 0."""
     box = tuple(float(n) for n in BOX.split(","))
     photo = look_at(Encoder(bundle), cv2.imread(str(PHOTO)), box)
-    return fit_anchors(read_prior(bundle / "prior.maqp"), photo).codes
+    return fit_anchors(read_prior(bundle / "prior.maqp"), observations_of(photo)).codes
 
 
 def assert_alike(found: dict[str, float]) -> None:

@@ -15,6 +15,9 @@ from maquette.native import MaquetteError, NativeObject, native
 __all__ = ["FittedHead", "HeadBuilder", "HeadMesh", "MaquetteError", "NoHeads", "has_heads"]
 
 
+ALL_TRIANGLES = 0xFFFFFFFF  # MAQ_HEAD_ALL_TRIANGLES
+
+
 class NoHeads(RuntimeError):
     """The library was built without heads."""
 
@@ -55,11 +58,11 @@ class FittedHead(NativeObject):
         """The fields of maq_head_info."""
         return SimpleNamespace(**native().stats("maq_head_info", "maq_head_get_info", self.handle))
 
-    def mesh(self, cell_m: float = 0) -> HeadMesh:
-        """cell_m: 0 for the library's default. Raises MaquetteError."""
+    def mesh(self, **options: Any) -> HeadMesh:
+        """options: fields of maq_head_mesh_options by their names; by default all triangles. Raises MaquetteError."""
         n = native()
         mesh = n.sized("maq_head_mesh")
-        n.call("maq_head_get_mesh", self.handle, cell_m, mesh)
+        n.call("maq_head_get_mesh", self.handle, self._mesh_options(options), mesh)
 
         def copied(pointer: Any, count: int, kind: type) -> np.ndarray:
             size = count * 3 * np.dtype(kind).itemsize
@@ -88,9 +91,13 @@ class FittedHead(NativeObject):
         """Writes a `.maqh` file. Raises MaquetteError."""
         native().call("maq_head_save", self.handle, str(path).encode())
 
-    def export(self, path: Path, cell_m: float = 0) -> None:
-        """Writes .glb, .obj or .ply. Raises MaquetteError."""
-        native().call("maq_head_export", self.handle, str(path).encode(), cell_m)
+    def export(self, path: Path, **options: Any) -> None:
+        """Writes .glb, .obj or .ply. options: as of mesh(). Raises MaquetteError."""
+        native().call("maq_head_export", self.handle, str(path).encode(), self._mesh_options(options))
+
+    @staticmethod
+    def _mesh_options(options: dict[str, Any]) -> Any:
+        return native().config("maq_head_mesh_options", {"triangle_count": ALL_TRIANGLES, **options})
 
 
 class HeadBuilder(NativeObject):

@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
   failed = failed || maq_head_builder_create(context, &config, &builder) != MAQ_OK ||
            maq_head_builder_add_photo(builder, frame, &photo) != MAQ_OK ||
            maq_head_builder_fit(builder, 3.0, NULL, NULL, &head) != MAQ_OK ||
-           maq_head_export(head, argv[2], 0) != MAQ_OK;
+           maq_head_export(head, argv[2], NULL) != MAQ_OK;
   if (failed) fprintf(stderr, "%s\n", maq_last_error(NULL));
   nose.struct_size = sizeof nose;
   if (!failed && maq_head_get_landmark(head, "nose_tip", &nose) == MAQ_OK) {

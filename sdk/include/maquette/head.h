@@ -3,7 +3,7 @@
  *   maq_head_builder_create(context, NULL, &builder);
  *   maq_head_builder_add_photo(builder, frame, NULL);
  *   maq_head_builder_fit(builder, 3.0, NULL, NULL, &head);
- *   maq_head_export(head, "head.glb", 0);
+ *   maq_head_export(head, "head.glb", NULL);
  *   maq_head_save(head, "head.maqh");
  *
  * A face is biometric data: ask the person, and keep heads as you would keep passwords. Nothing leaves the device. A
@@ -89,7 +89,18 @@ typedef struct maq_head_info {
   float scale_sigma; /* standard deviation of its size, as a fraction of it: 0.04 is 4 %; 0: not known */
 } maq_head_info;
 
-/* A mesh: closed, without holes or crossing sheets, cut off below the chin. */
+/* How fine a mesh is. */
+typedef struct maq_head_mesh_options {
+  uint32_t struct_size;
+  uint32_t triangle_count; /* about as many, 100 or more: of the full mesh as many edges are collapsed as that takes,
+                              those first that move the surface least. 0 (default): 60,000, or with a cell_m all;
+                              MAQ_HEAD_ALL_TRIANGLES: all. */
+  double cell_m; /* distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0 (default): 0.0016 */
+} maq_head_mesh_options;
+
+#define MAQ_HEAD_ALL_TRIANGLES 0xFFFFFFFFu
+
+/* A mesh: closed, without holes, cut off below the chin. */
 typedef struct maq_head_mesh {
   uint32_t struct_size;
   uint32_t vertex_count;
@@ -100,6 +111,8 @@ typedef struct maq_head_mesh {
   const float* template_points_m; /* [vertex_count][3]: where the point lies on the template head, which is the same
                                      place (the tip of the nose, say) on every head */
   const uint32_t* triangles;      /* [triangle_count][3], counter-clockwise seen from outside */
+  float
+      simplification_error_m; /* the largest distance of a vertex of the full mesh from this one; 0 where it is full */
 } maq_head_mesh;
 
 /* A place of the head that has a name. */
@@ -197,18 +210,22 @@ MAQ_API const char* maq_head_get_landmark_name(const maq_head* head, uint32_t in
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the model has no such place). Does not block. */
 MAQ_API maq_status maq_head_get_landmark(const maq_head* head, const char* name, maq_head_landmark* landmark);
 
-/* Gets the head's surface as a mesh. `cell_m`: the distance of neighbouring vertices, about, 0.0005 to 0.02; 0: 0.0016.
- * The caller sets mesh->struct_size. The arrays are the head's and stay until another cell is asked for.
+/* Fills `options` with the defaults and sets struct_size. `struct_size` is sizeof(maq_head_mesh_options) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_head_mesh_options_init(maq_head_mesh_options* options, uint32_t struct_size);
+
+/* Gets the head's surface as a mesh. `options` may be NULL for the defaults. The caller sets mesh->struct_size. The
+ * arrays are the head's and stay until a mesh with other options is asked for.
  * One at a time, with maq_head_export. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (it has no surface),
- * MAQ_ERROR_OUT_OF_MEMORY. Blocks while it is made, a second or less with the default cell. */
-MAQ_API maq_status maq_head_get_mesh(maq_head* head, double cell_m, maq_head_mesh* mesh);
+ * MAQ_ERROR_OUT_OF_MEMORY. Blocks while it is made, a second or less with the defaults. */
+MAQ_API maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* options, maq_head_mesh* mesh);
 
 /* Writes that mesh to a file, by the ending of `path`: .glb (glTF 2.0), .obj with a .mtl beside it, or .ply (binary,
  * with template points). In files x is to the person's left, y up, z to the front, as glTF has it (docs/formats.md).
- * They appear atomically and replace existing ones. `cell_m` as above.
+ * They appear atomically and replace existing ones. `options` as above.
  * One at a time, with maq_head_get_mesh. Errors: as maq_head_get_mesh, and MAQ_ERROR_UNWRITABLE. Blocks while the mesh
  * is made and written. */
-MAQ_API maq_status maq_head_export(maq_head* head, const char* path, double cell_m);
+MAQ_API maq_status maq_head_export(maq_head* head, const char* path, const maq_head_mesh_options* options);
 
 #ifdef __cplusplus
 }

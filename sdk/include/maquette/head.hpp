@@ -25,6 +25,12 @@ inline maq_head_photo default_head_photo() {
   return photo;
 }
 
+inline maq_head_mesh_options default_head_mesh_options() {
+  maq_head_mesh_options options;
+  check(maq_head_mesh_options_init(&options, sizeof options));
+  return options;
+}
+
 class Head {
  public:
   // Takes over a head of the C API.
@@ -58,16 +64,18 @@ class Head {
     return landmark;
   }
 
-  // Its arrays are this object's, until another cell is asked for.
-  maq_head_mesh mesh(double cell_m = 0) {
+  // Its arrays are this object's, until a mesh with other options is asked for.
+  maq_head_mesh mesh(const maq_head_mesh_options& options = default_head_mesh_options()) {
     maq_head_mesh mesh{};
     mesh.struct_size = sizeof mesh;
-    check(maq_head_get_mesh(get(), cell_m, &mesh));
+    check(maq_head_get_mesh(get(), &options, &mesh));
     return mesh;
   }
 
   void save(const std::string& path) const { check(maq_head_save(get(), path.c_str())); }
-  void export_mesh(const std::string& path, double cell_m = 0) { check(maq_head_export(get(), path.c_str(), cell_m)); }
+  void export_mesh(const std::string& path, const maq_head_mesh_options& options = default_head_mesh_options()) {
+    check(maq_head_export(get(), path.c_str(), &options));
+  }
 
  private:
   Owner<maq_head, maq_head_destroy> owner_;

@@ -18,18 +18,44 @@ std::vector<float> in_metres(std::vector<float> decimetres) {
   return decimetres;
 }
 
+constexpr size_t kFirstMeshOptionsSize = sizeof(maq_head_mesh_options), kFirstMeshSize = sizeof(maq_head_mesh);
+constexpr uint32_t kDefaultTriangles = 60000, kMinTriangles = 100;
+
+maq_head_mesh_options default_mesh_options() {
+  maq_head_mesh_options options{};
+  options.struct_size = sizeof options;
+  return options;
+}
+
+head::SurfaceOptions surface_options(const maq_head_mesh_options& options) {
+  head::SurfaceOptions surface;
+  if (options.cell_m != 0) {
+    require_range("options.cell_m", options.cell_m, head::kMinSurfaceCell_m, head::kMaxSurfaceCell_m);
+    surface.cell_m = options.cell_m;
+  }
+  if (options.triangle_count == 0) {
+    surface.triangles = options.cell_m != 0 ? head::kAllTriangles : kDefaultTriangles;
+  } else if (options.triangle_count != MAQ_HEAD_ALL_TRIANGLES) {
+    require_range("options.triangle_count", options.triangle_count, kMinTriangles, MAQ_HEAD_ALL_TRIANGLES);
+    surface.triangles = options.triangle_count;
+  }
+  return surface;
+}
+
 // Makes the mesh, unless it is there.
-const head::HeadMesh& mesh_of(maq_head& head, double cell_m) {
-  if (cell_m != 0) require_range("cell_m", cell_m, head::kMinSurfaceCell_m, head::kMaxSurfaceCell_m);
-  const double wanted_m = cell_m != 0 ? cell_m : head::kDefaultSurfaceCell_m;
-  if (head.mesh_cell_m == wanted_m) return head.mesh;
+const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given) {
+  const head::SurfaceOptions wanted =
+      surface_options(read_config(given, "options", default_mesh_options(), kFirstMeshOptionsSize));
+  if (head.mesh_options.cell_m == wanted.cell_m && head.mesh_options.triangles == wanted.triangles) return head.mesh;
   WorkerThreads threads(head.threads);
-  head::HeadMesh mesh = head::head_surface(head.head, wanted_m, threads);
+  head::SurfaceStats stats;
+  head::HeadMesh mesh = head::head_surface(head.head, wanted, threads, &stats);
   std::vector<float> positions_m = in_metres(mesh.positions), template_points_m = in_metres(mesh.template_points);
   head.mesh = std::move(mesh);
   head.positions_m = std::move(positions_m);
   head.template_points_m = std::move(template_points_m);
-  head.mesh_cell_m = wanted_m;
+  head.mesh_stats = stats;
+  head.mesh_options = wanted;
   return head.mesh;
 }
 
@@ -96,11 +122,15 @@ maq_status maq_head_get_landmark(const maq_head* head, const char* name, maq_hea
   });
 }
 
-maq_status maq_head_get_mesh(maq_head* head, double cell_m, maq_head_mesh* mesh) {
+maq_status maq_head_mesh_options_init(maq_head_mesh_options* options, uint32_t struct_size) {
+  return init_config(__func__, options, struct_size, default_mesh_options(), kFirstMeshOptionsSize, "options");
+}
+
+maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* options, maq_head_mesh* mesh) {
   return guarded_alone(head, "head", __func__, [&] {
     require_argument(mesh, "mesh");
-    require_struct_size("mesh", mesh->struct_size, sizeof(maq_head_mesh), sizeof(maq_head_mesh));
-    const head::HeadMesh& made = mesh_of(*head, cell_m);
+    require_struct_size("mesh", mesh->struct_size, kFirstMeshSize, sizeof(maq_head_mesh));
+    const head::HeadMesh& made = mesh_of(*head, options);
     maq_head_mesh filled{};
     filled.vertex_count = uint32_t(made.vertex_count());
     filled.triangle_count = uint32_t(made.triangle_count());
@@ -109,16 +139,17 @@ maq_status maq_head_get_mesh(maq_head* head, double cell_m, maq_head_mesh* mesh)
     filled.colours_rgb = made.colours.data();
     filled.template_points_m = head->template_points_m.data();
     filled.triangles = made.triangles.data();
-    write_struct(mesh, "mesh", filled, sizeof(maq_head_mesh));
+    filled.simplification_error_m = float(head->mesh_stats.error_m);
+    write_struct(mesh, "mesh", filled, kFirstMeshSize);
     return MAQ_OK;
   });
 }
 
-maq_status maq_head_export(maq_head* head, const char* path, double cell_m) {
+maq_status maq_head_export(maq_head* head, const char* path, const maq_head_mesh_options* options) {
   return guarded_alone(head, "head", __func__, [&] {
     require_argument(path, "path");
     head::require_mesh_file_name(path);
-    head::write_mesh_file(mesh_of(*head, cell_m), path);
+    head::write_mesh_file(mesh_of(*head, options), path);
     return MAQ_OK;
   });
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "api/handle.h"
+#include "head/build/head_surface.h"
 #include "head/mesh/head_mesh.h"
 #include "head/stored_head.h"
 #include "maquette/head.h"
@@ -15,5 +16,6 @@ struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
   const int threads;
   maq::head::HeadMesh mesh;
   std::vector<float> positions_m, template_points_m;  // of the mesh
-  double mesh_cell_m = 0;                             // 0: none was made
+  maq::head::SurfaceOptions mesh_options{0, 0};       // of a cell of 0: none was made
+  maq::head::SurfaceStats mesh_stats;
 };

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <maquette/maquette.hpp>
@@ -36,6 +37,7 @@ struct HeadOptions {
   double roll_deg = 0;
   float focal_px = 0;
   double cell_mm = 0;
+  std::string triangles;  // empty: the library's default
   std::string densepose;
   NetworkOptions network;
   bool json = false;
@@ -190,7 +192,10 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
       document["photos"].push_back(describe_photo(photos[i], builder.photo(i)));
     if (!task.out.empty()) document["out"] = task.out;
     if (!task.save.empty()) document["save"] = task.save;
-    if (mesh != nullptr) document["vertices"] = mesh->vertex_count, document["triangles"] = mesh->triangle_count;
+    if (mesh != nullptr) {
+      document["vertices"] = mesh->vertex_count, document["triangles"] = mesh->triangle_count;
+      document["simplification_error_mm"] = std::round(1e6 * double(mesh->simplification_error_m)) / 1e3;
+    }
     document["scale_sigma"] = info.scale_sigma;
     if (pupils_m > 0) document["pupil_distance_m"] = pupils_m;
     document["steps"] = stats.step_count;
@@ -211,9 +216,23 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
   print_output("\n  find people %.0f | look %.0f | pose %.0f | fit %.0f (%d steps) | mesh and files %.0f ms\n",
                stages.find_ms, stages.look_ms, stages.pose_ms, stages.fit_ms, stats.step_count, stages.mesh_ms);
   if (mesh != nullptr) {
-    print_output("%s: %u vertices, %u triangles\n", task.out.c_str(), mesh->vertex_count, mesh->triangle_count);
+    print_output("%s: %u vertices, %u triangles", task.out.c_str(), mesh->vertex_count, mesh->triangle_count);
+    if (mesh->simplification_error_m > 0) {
+      print_output(", within %.2f mm of the full mesh", 1e3 * double(mesh->simplification_error_m));
+    }
+    print_output("\n");
   }
   if (!task.save.empty()) print_output("%s: the head itself; see `maquette head info`\n", task.save.c_str());
+}
+
+maq_head_mesh_options mesh_options(const HeadOptions& options) {
+  maq_head_mesh_options mesh = maquette::default_head_mesh_options();
+  mesh.cell_m = options.cell_mm * 1e-3;
+  if (options.triangles == "all")
+    mesh.triangle_count = MAQ_HEAD_ALL_TRIANGLES;
+  else if (!options.triangles.empty())
+    mesh.triangle_count = uint32_t(std::stoul(options.triangles));
+  return mesh;
 }
 
 void fit_one(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
@@ -238,11 +257,10 @@ void fit_one(const HeadOptions& options, const std::vector<Photo>& photos, const
   const maq_head_stats stats = builder.stats();
   stages.pose_ms = double(stats.pose_ms), stages.fit_ms = double(stats.fit_ms);
   timer.lap_ms();
-  const double cell_m = options.cell_mm * 1e-3;
   std::optional<maq_head_mesh> mesh;
   if (!task.out.empty()) {
-    head.export_mesh(task.out, cell_m);
-    mesh = head.mesh(cell_m);
+    head.export_mesh(task.out, mesh_options(options));
+    mesh = head.mesh(mesh_options(options));
   }
   if (!task.save.empty()) head.save(task.save);
   stages.mesh_ms = timer.lap_ms();
@@ -312,6 +330,12 @@ std::string check_person(const std::string& text) {
   return text == "all" || CLI::Range(1, 255)(text).empty() ? std::string() : text + " is neither 1 to 255 nor \"all\"";
 }
 
+std::string check_triangles(const std::string& text) {
+  return text == "all" || CLI::Range(100u, MAQ_HEAD_ALL_TRIANGLES - 1)(text).empty()
+             ? std::string()
+             : text + " is neither 100 or more nor \"all\"";
+}
+
 }  // namespace
 
 void add_head_command(CLI::App& app, int* exit_code) {
@@ -342,7 +366,13 @@ void add_head_command(CLI::App& app, int* exit_code) {
       ->add_option("--focal-px", options->focal_px,
                    "Focal length of the camera in pixels of the photo; default: estimated, or by the photo's fov=")
       ->check(CLI::Range(1e-3f, 1e9f));
-  command->add_option("--cell", options->cell_mm, "Distance of the mesh's vertices, mm (default 1.6)")
+  command
+      ->add_option(
+          "--triangles", options->triangles,
+          "About how many triangles the mesh has (default 60000, or all with --cell), or all; games and phones "
+          "want 2000 to 50000")
+      ->check(CLI::Validator(check_triangles, "100 or more, or all"));
+  command->add_option("--cell", options->cell_mm, "Distance of the full mesh's vertices, mm (default 1.6)")
       ->check(CLI::Range(0.5, 20.0));
   command->add_option("--densepose", options->densepose,
                       "Folder of the bundle that finds people; default: MAQ_BUNDLE, then the installed one");

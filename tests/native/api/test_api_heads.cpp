@@ -40,6 +40,14 @@ maq_head_photo with_box(float left, float top, float right, float bottom) {
   return photo;
 }
 
+maq_head_mesh_options of_cell(double cell_m) {
+  maq_head_mesh_options options = maquette::default_head_mesh_options();
+  options.cell_m = cell_m;
+  return options;
+}
+
+const maq_head_mesh_options coarse = of_cell(0.008);
+
 class ApiHeads : public testing::Test {
  protected:
   static void expect_text(const char* text) {
@@ -87,7 +95,7 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndPlaces) {
   EXPECT_GT(left.point_m[0], 0.02) << "left is the person's";
 
   const float crown_m = float(crown.point_m[2]);
-  const maq_head_mesh mesh = head.mesh(0.004);
+  const maq_head_mesh mesh = head.mesh(of_cell(0.004));
   ASSERT_GT(mesh.vertex_count, 1000u);
   EXPECT_EQ(mesh.triangle_count, 2 * (mesh.vertex_count - 2)) << "closed, of one piece without holes";
   for (uint32_t i = 0; i < mesh.vertex_count; ++i) {
@@ -98,9 +106,9 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndPlaces) {
     ASSERT_NEAR(t[2] * crown_m, p[2] * 0.121f, 1e-3f) << "on the template head the crown is at 121 mm";
   }
   for (uint32_t i = 0; i < 3 * mesh.triangle_count; ++i) ASSERT_LT(mesh.triangles[i], mesh.vertex_count);
-  const maq_head_mesh again = head.mesh(0.004);
+  const maq_head_mesh again = head.mesh(of_cell(0.004));
   EXPECT_EQ(again.positions_m, mesh.positions_m) << "kept until another cell is asked for";
-  EXPECT_GT(head.mesh(0.002).vertex_count, 3 * mesh.vertex_count);
+  EXPECT_GT(head.mesh(of_cell(0.002)).vertex_count, 3 * mesh.vertex_count);
 
   const maq_head_stats stats = builder.stats();
   EXPECT_EQ(stats.photo_count, 1u);
@@ -125,7 +133,7 @@ TEST_F(ApiHeads, TheFitToThePixelsTakesTheColourOfThePhoto) {
   EXPECT_GT(builder.stats().fit_ms, 0);
   maquette::Head first = fitted();
   const auto reddest = [](maquette::Head& of) {
-    const maq_head_mesh mesh = of.mesh(0.008);
+    const maq_head_mesh mesh = of.mesh(of_cell(0.008));
     double sum = 0;
     for (uint32_t i = 0; i < mesh.vertex_count; ++i) sum += mesh.colours_rgb[3 * i];
     return sum / mesh.vertex_count;
@@ -349,20 +357,49 @@ TEST_F(ApiHeads, HeadsOutliveTheirBuilderAndAreSavedAndOpened) {
   for (size_t axis = 0; axis < 3; ++axis) {
     EXPECT_NEAR(opened.landmark("chin").point_m[axis], head.landmark("chin").point_m[axis], 1e-4) << "as float16";
   }
-  EXPECT_NEAR(opened.mesh(0.008).vertex_count, head.mesh(0.008).vertex_count, 30);
+  EXPECT_NEAR(opened.mesh(of_cell(0.008)).vertex_count, head.mesh(of_cell(0.008)).vertex_count, 30);
+}
+
+TEST_F(ApiHeads, MeshesHaveAsManyTrianglesAsAreAskedFor) {
+  maquette::Head head = fitted();
+  const auto count = [&](double cell_m, uint32_t triangles) {
+    maq_head_mesh_options options = of_cell(cell_m);
+    options.triangle_count = triangles;
+    const maq_head_mesh mesh = head.mesh(options);
+    EXPECT_EQ(mesh.triangle_count, 2 * (mesh.vertex_count - 2)) << "closed, of one piece without holes";
+    return mesh.triangle_count;
+  };
+  const uint32_t full = count(0, MAQ_HEAD_ALL_TRIANGLES);
+  EXPECT_EQ(head.mesh().triangle_count, 60000u) << "the default";
+  EXPECT_GT(head.mesh().simplification_error_m, 0);
+  EXPECT_LT(head.mesh().simplification_error_m, 2e-4f);
+  EXPECT_GT(full, 60000u);
+  EXPECT_EQ(count(0, 2000), 2000u);
+  EXPECT_EQ(count(0.0016, 0), full) << "with a cell the default is all";
+  EXPECT_EQ(head.mesh(of_cell(0.0016)).simplification_error_m, 0);
+  EXPECT_EQ(count(0, full + 1), full);
+  maq_head_mesh mesh{};
+  mesh.struct_size = sizeof mesh;
+  maq_head_mesh_options options = maquette::default_head_mesh_options();
+  options.triangle_count = 99;
+  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("options.triangle_count is 99");
+  options.struct_size = 1;
+  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("options.struct_size");
 }
 
 TEST_F(ApiHeads, MeshesAreWrittenByTheirEnding) {
   const TempFolder folder;
   maquette::Head head = fitted();
-  for (const char* name : {"a.glb", "a.obj", "a.ply"}) head.export_mesh(folder.file(name), 0.008);
+  for (const char* name : {"a.glb", "a.obj", "a.ply"}) head.export_mesh(folder.file(name), of_cell(0.008));
   EXPECT_EQ(read_text(folder.file("a.glb")).substr(0, 4), "glTF");
   EXPECT_EQ(read_text(folder.file("a.ply")).substr(0, 4), "ply\n");
   EXPECT_TRUE(std::filesystem::exists(folder.file("a.mtl")));
   for (const char* name : {"a.stl", "a", "a.GLB", ""}) {
-    EXPECT_EQ(maq_head_export(head.get(), folder.file(name).c_str(), 0), MAQ_ERROR_INVALID_ARGUMENT) << name;
+    EXPECT_EQ(maq_head_export(head.get(), folder.file(name).c_str(), nullptr), MAQ_ERROR_INVALID_ARGUMENT) << name;
   }
-  EXPECT_EQ(maq_head_export(head.get(), "/nowhere/a.glb", 0.008), MAQ_ERROR_UNWRITABLE);
+  EXPECT_EQ(maq_head_export(head.get(), "/nowhere/a.glb", &coarse), MAQ_ERROR_UNWRITABLE);
   EXPECT_EQ(maq_head_save(head.get(), "/nowhere/a.maqh"), MAQ_ERROR_UNWRITABLE);
 }
 
@@ -372,8 +409,8 @@ TEST_F(ApiHeads, AFullDiskLeavesWhatWasThere) {
   for (const char* name : {"a.glb", "a.ply", "a.maqh"}) write_text(folder.file(name), name);
   {
     const FileSizeLimit limit(100);
-    EXPECT_EQ(maq_head_export(head.get(), folder.file("a.glb").c_str(), 0.008), MAQ_ERROR_UNWRITABLE);
-    EXPECT_EQ(maq_head_export(head.get(), folder.file("a.ply").c_str(), 0.008), MAQ_ERROR_UNWRITABLE);
+    EXPECT_EQ(maq_head_export(head.get(), folder.file("a.glb").c_str(), &coarse), MAQ_ERROR_UNWRITABLE);
+    EXPECT_EQ(maq_head_export(head.get(), folder.file("a.ply").c_str(), &coarse), MAQ_ERROR_UNWRITABLE);
     EXPECT_EQ(maq_head_save(head.get(), folder.file("a.maqh").c_str()), MAQ_ERROR_UNWRITABLE);
   }
   for (const char* name : {"a.glb", "a.ply", "a.maqh"}) EXPECT_EQ(read_text(folder.file(name)), name);
@@ -383,15 +420,16 @@ TEST_F(ApiHeads, AFullDiskLeavesWhatWasThere) {
 TEST_F(ApiHeads, WhatIsAskedOfAHeadIsChecked) {
   maquette::Head head = fitted();
   maq_head_mesh mesh{};
-  EXPECT_EQ(maq_head_get_mesh(head.get(), 0, &mesh), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
+  EXPECT_EQ(maq_head_get_mesh(head.get(), nullptr, &mesh), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
   mesh.struct_size = sizeof mesh;
   for (const double cell_m : {-1.0, 1e-5, 1.0, double(kNotANumber)}) {
-    EXPECT_EQ(maq_head_get_mesh(head.get(), cell_m, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
+    const maq_head_mesh_options options = of_cell(cell_m);
+    EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
     expect_text("cell_m is ");
   }
   EXPECT_EQ(mesh.vertex_count, 0u);
-  EXPECT_EQ(maq_head_get_mesh(head.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_get_mesh(nullptr, 0, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_get_mesh(head.get(), nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_get_mesh(nullptr, nullptr, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
   maq_head_landmark landmark{};
   landmark.struct_size = sizeof landmark;
   EXPECT_EQ(maq_head_get_landmark(head.get(), "elbow", &landmark), MAQ_ERROR_NOT_FOUND);
@@ -404,7 +442,7 @@ TEST_F(ApiHeads, WhatIsAskedOfAHeadIsChecked) {
   EXPECT_EQ(maq_head_get_info(head.get(), &info), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
   EXPECT_EQ(maq_head_get_info(nullptr, &info), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_save(head.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_export(head.get(), nullptr, 0), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_export(head.get(), nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   maq_head_photo_info photo{};
   photo.struct_size = sizeof photo;
   EXPECT_EQ(maq_head_builder_get_photo(builder.get(), 1, &photo), MAQ_ERROR_INVALID_ARGUMENT);
@@ -487,7 +525,7 @@ TEST_F(ApiHeads, ABundleInMemoryAndAnyNumberOfThreadsGiveTheSame) {
   in_memory.add_photo(frame, known);
   EXPECT_EQ(in_memory.stats().threads, 3);
   maquette::Head one = in_memory.fit(0), other = fitted();
-  const maq_head_mesh a = one.mesh(0.008), b = other.mesh(0.008);
+  const maq_head_mesh a = one.mesh(of_cell(0.008)), b = other.mesh(of_cell(0.008));
   ASSERT_EQ(a.vertex_count, b.vertex_count);
   EXPECT_EQ(std::memcmp(a.positions_m, b.positions_m, 12 * size_t(a.vertex_count)), 0);
 }
@@ -500,7 +538,7 @@ TEST_F(ApiHeads, HeadsOfOneBuilderEachMayBeMadeByManyThreads) {
       maquette::HeadBuilder own(context, kHeadsBundle);
       own.add_photo(frame, known);
       maquette::Head head = own.fit(0);
-      made += head.mesh(0.008).vertex_count > 100;
+      made += head.mesh(of_cell(0.008)).vertex_count > 100;
     });
   }
   const maquette::Head shared = fitted();

@@ -43,7 +43,7 @@ StoredHead octahedron(float radius) {
 
 HeadMesh mesh_of(const StoredHead& head, double cell_m = 0.004, int threads = 1) {
   WorkerThreads workers(threads);
-  return head_surface(head, cell_m, workers);
+  return head_surface(head, {cell_m}, workers);
 }
 
 TEST(HeadSurface, IsClosedAndLiesOnTheFieldAndTheCut) {

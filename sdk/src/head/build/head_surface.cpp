@@ -10,6 +10,7 @@
 #include "head/field/field_engine.h"
 #include "head/mesh/marching_cubes.h"
 #include "head/mesh/mesh_cleanup.h"
+#include "head/mesh/mesh_simplify.h"
 
 namespace maq::head {
 namespace {
@@ -153,7 +154,9 @@ HeadPlace find_head_place(const StoredHead& head, const std::string& name) {
   return place;
 }
 
-HeadMesh head_surface(const StoredHead& head, double cell_m, WorkerThreads& threads) {
+HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,
+                      SurfaceStats* stats) {
+  const double cell_m = surface.cell_m;
   if (!(cell_m >= kMinSurfaceCell_m && cell_m <= kMaxSurfaceCell_m)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The cells of a head's mesh are ", cell_m, " m large, but must be ",
                 kMinSurfaceCell_m, " to ", kMaxSurfaceCell_m, ".");
@@ -173,6 +176,14 @@ HeadMesh head_surface(const StoredHead& head, double cell_m, WorkerThreads& thre
                 "The head has no surface within its domain, so it has no mesh. Fit it again, to a sharper photo.");
   }
   keep_largest_piece(mesh);
+  SurfaceStats made;
+  made.full_triangles = mesh.triangle_count();
+  if (made.full_triangles > surface.triangles) {
+    const std::vector<float> full = mesh.positions;
+    simplify_mesh(mesh, surface.triangles);
+    made.error_m = head.scale.metres_per_unit * largest_distance(full, mesh, threads);
+  }
+  if (stats != nullptr) *stats = made;
   set_normals(
       mesh,
       [&](const float* x, const float* y, const float* z, float* gx, float* gy, float* gz, size_t count) {

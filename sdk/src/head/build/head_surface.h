@@ -1,6 +1,8 @@
 // The surface of a fitted head as a mesh, with normals, colours and template points; and where its named places lie.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "core/worker_threads.h"
@@ -10,13 +12,25 @@
 namespace maq::head {
 
 inline constexpr double kDefaultSurfaceCell_m = 0.0016, kMinSurfaceCell_m = 0.0005, kMaxSurfaceCell_m = 0.02;
+inline constexpr size_t kAllTriangles = SIZE_MAX;
+
+struct SurfaceOptions {
+  double cell_m = kDefaultSurfaceCell_m;  // the edge of a cube, in metres
+  size_t triangles = kAllTriangles;       // about as many are left (simplify_mesh)
+};
+
+struct SurfaceStats {
+  size_t full_triangles = 0;  // before simplification
+  double error_m = 0;         // the largest distance of a vertex of the full mesh from the simplified one
+};
 
 // Marching cubes of max(the field's distance, that to the cut plane), so that the head is closed below the chin; of
-// this the largest piece. Normals are the gradient of what is larger of the two. Lengths are true decimetres: those of
-// the head's frame times its scale. `cell_m`: the edge of a cube in metres. The same for any number of threads.
-// Throws MAQ_ERROR_INVALID_ARGUMENT for a cell beyond the limits, or of which more than kMaxCellsPerAxis would be
-// needed; MAQ_ERROR_UNSUPPORTED where the field has no surface in its domain; what marching_cubes() throws.
-HeadMesh head_surface(const StoredHead& head, double cell_m, WorkerThreads& threads);
+// this the largest piece, simplified. Normals are the gradient of what is larger of the two. Lengths are true
+// decimetres: those of the head's frame times its scale. The same for any number of threads. Throws
+// MAQ_ERROR_INVALID_ARGUMENT for a cell beyond the limits, or of which more than kMaxCellsPerAxis would be needed;
+// MAQ_ERROR_UNSUPPORTED where the field has no surface in its domain; what marching_cubes() throws.
+HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,
+                      SurfaceStats* stats = nullptr);
 
 struct HeadPlace {
   Vec3 point;        // in the head's frame and unit

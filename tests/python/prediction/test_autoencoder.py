@@ -54,9 +54,11 @@ def test_entries_move_to_what_they_stand_for_and_dead_ones_are_revived():
     centres = torch.randn(8, 2) * 5
     for step in range(400):
         seed_step(0, step)
-        book(centres[torch.randint(8, (256,))].T.reshape(1, 2, 16, 16) + 0.01 * torch.randn(1, 2, 16, 16))
+        # At first only one of the vectors comes: all entries begin there, and most of them die.
+        chosen = torch.randint(8 if step else 1, (256,))
+        book(centres[chosen].T.reshape(1, 2, 16, 16) + 0.01 * torch.randn(1, 2, 16, 16))
     distance = torch.cdist(centres, book.entries[0]).min(1).values
-    assert distance.max() < 0.1
+    assert distance.max() < 0.3
     codes = book.eval().nearest(centres.T.reshape(1, 2, 1, 8))
     assert used_fraction(codes, 8) == 1
 

@@ -1,0 +1,45 @@
+"""Attention over all places of a frame, with a learnt bias for each step along rows and along columns."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from export.prediction.config import CODE_SIDE, TransformerShape
+
+PLACES = CODE_SIDE * CODE_SIDE
+
+
+class AttentionLayer(nn.Module):
+    """Pre-norm attention and pre-norm two-layer network. masked: a place sees itself and those before, row by row."""
+
+    def __init__(self, shape: TransformerShape, masked: bool) -> None:
+        super().__init__()
+        inner = shape.heads * shape.head_width
+        self.heads, self.masked = shape.heads, masked
+        self.norm = nn.LayerNorm(shape.width)
+        self.query_key_value = nn.Linear(shape.width, 3 * inner, bias=False)
+        self.project = nn.Linear(inner, shape.width)
+        self.rows = nn.Parameter(torch.zeros(shape.heads, 2 * CODE_SIDE - 1))
+        self.columns = nn.Parameter(torch.zeros(shape.heads, 2 * CODE_SIDE - 1))
+        self.network = nn.Sequential(
+            nn.LayerNorm(shape.width), nn.Linear(shape.width, shape.hidden), nn.ReLU(),
+            nn.Linear(shape.hidden, shape.width),
+        )  # fmt: skip
+
+    def bias(self) -> Tensor:
+        """[heads, 256, 256]: added to the score of a query (row) and a key (column); -infinity where it is not seen."""
+        row, column = torch.arange(PLACES) // CODE_SIDE, torch.arange(PLACES) % CODE_SIDE
+        steps = [axis[:, None] - axis[None] + CODE_SIDE - 1 for axis in (row, column)]
+        bias = self.rows[:, steps[0]] + self.columns[:, steps[1]]
+        if self.masked:
+            bias = bias.masked_fill(torch.ones(PLACES, PLACES, dtype=torch.bool).triu(1), float("-inf"))
+        return bias
+
+    def forward(self, x: Tensor) -> Tensor:
+        """[B, 256, width] -> the same."""
+        query, key, value = self.query_key_value(self.norm(x)).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4)
+        seen = F.scaled_dot_product_attention(query, key, value, attn_mask=self.bias()[None].to(query.dtype))
+        x = x + self.project(seen.transpose(1, 2).flatten(2))
+        return x + self.network(x)

@@ -10,6 +10,7 @@ from torch.nn import functional as F
 DECAY = 0.99
 _EPSILON = 1e-5
 _DEAD = 0.03  # of the mean count: an entry used less than that is given a new place
+_REBORN = 0.06  # of the mean count: what an entry that was put elsewhere begins with, 70 steps from death
 _REBIRTH_STEPS = 20
 
 
@@ -61,7 +62,7 @@ class Codebook(nn.Module):
         vectors = self._vectors(x)
         for k in range(len(self.entries)):
             self.entries[k] = vectors[k, torch.randint(vectors.shape[1], (self.entries.shape[1],))]
-        self.counts.fill_(vectors.shape[1] / self.entries.shape[1])
+        self.counts.fill_(_REBORN * vectors.shape[1] / self.entries.shape[1])
         self.sums.copy_(self.entries * self.counts[..., None])
 
     @torch.no_grad()
@@ -83,9 +84,9 @@ class Codebook(nn.Module):
         mean = vectors.shape[1] / self.entries.shape[1]
         for k in range(len(self.entries)):
             dead = (self.counts[k] < _DEAD * mean).nonzero()[:, 0]
-            self.counts[k, dead] = mean / 4
+            self.counts[k, dead] = _REBORN * mean
             chosen = vectors[k, torch.randint(vectors.shape[1], (len(dead),))]
-            self.sums[k, dead] = chosen * mean / 4
+            self.sums[k, dead] = chosen * _REBORN * mean
 
 
 def used_fraction(codes: Tensor, entries: int) -> float:

@@ -115,11 +115,11 @@ def test_codes_that_move_are_learnt_far_below_the_table():
     shape = TransformerShape(width=32, layers=1, heads=2, head_width=16, hidden=64, embedding=32, slices=2, entries=8)
     training = Training(shape, clips)
     bits = []
-    for step in range(250):
+    for step in range(60):
         seed_step(0, step)
-        bits.append(training.advance(clips, 8, 3e-3)["bits"].item())
+        bits.append(training.advance(clips, 4, 5e-3)["bits"].item())
     assert np.mean(bits[:3]) > 2.7
-    assert np.mean(bits[-5:]) < 0.6 * np.mean(bits[:3])
+    assert np.mean(bits[-5:]) < 0.5 * np.mean(bits[:3])
 
 
 def test_frames_before_the_first_are_unseen():
@@ -137,9 +137,9 @@ def test_drawn_codes_are_the_likeliest_given_themselves():
     codes = drawn_codes(net, before, fps, 0.0, torch.Generator())
     with torch.no_grad():
         assert torch.equal(net(before, codes, fps).argmax(-1).view(1, 2, 16, 16), codes)
-    draws = [drawn_codes(net, before, fps, 1.0, torch.Generator().manual_seed(seed)) for seed in (3, 3, 4)]
+    draws = [drawn_codes(net, before, fps, 1.0, torch.Generator().manual_seed(seed)) for seed in (3, 3)]
     assert torch.equal(draws[0], draws[1])
-    assert not torch.equal(draws[0], draws[2])
+    assert not torch.equal(draws[0], codes)
 
 
 def test_a_stopped_training_goes_on_to_the_same_weights(tmp_path, monkeypatch):

@@ -36,7 +36,8 @@ HEAD = np.dtype(
         ("places", "<u4"),
         ("sharpness", "<f4"),
         ("scale_source", "u1"),
-        ("zero", "u1", 3),
+        ("has_texture", "u1"),
+        ("zero", "u1", 2),
         ("metres_per_unit", "<f8"),
         ("metres_sigma", "<f8"),
         ("cut_point", "<f8", 3),
@@ -86,6 +87,8 @@ class StoredHead:
     anchor_sigma: np.ndarray  # [M]
     places: dict[str, np.ndarray]  # name -> [3] on the template head
     prior_sha256: str  # of the prior's file, which the codes belong to; zeros: not known
+    texture_px: int = 0  # a side; 0: there is no texture
+    texture: bytes = b""  # a JPEG file
 
 
 def head_bytes(head: StoredHead) -> bytes:
@@ -98,6 +101,7 @@ def head_bytes(head: StoredHead) -> bytes:
     stored_head["cameras"], stored_head["anchors"] = len(head.cameras), len(head.anchor_sigma)
     stored_head["places"] = len(head.places)
     stored_head["scale_source"] = SCALE_SOURCES.index(head.scale_source)
+    stored_head["has_texture"] = head.texture_px > 0
     stored_head["prior_sha256"] = np.frombuffer(bytes.fromhex(head.prior_sha256), np.uint8)
     try:
         parts = [part for layer in head.layers for part in stored_layer(layer, "float16")]
@@ -105,6 +109,8 @@ def head_bytes(head: StoredHead) -> bytes:
         parts.append(np.ascontiguousarray(head.cameras, CAMERA).tobytes())
         parts += [stored(a, "float16") for a in (head.template_points, head.anchor_points, head.anchor_sigma)]
         parts += [part for name, point in head.places.items() for part in stored_place(name, point)]
+        if head.texture_px > 0:
+            parts += [np.array([head.texture_px, len(head.texture)], "<u4").tobytes(), head.texture]
     except PriorError as error:
         raise HeadFileError(f"The head cannot be stored: {error}") from None
     return signed(stored_head, MAGIC, VERSION, b"".join(parts))
@@ -136,7 +142,7 @@ def _read(data: bytes, name: str) -> StoredHead:
         n > limit for n, limit in zip(counts, (MAX_CODES, MAX_CODES, MAX_CAMERAS, MAX_ANCHORS, MAX_PLACES), strict=True)
     ):
         raise HeadFileError(f"{name} claims more codes, cameras, anchors or places than a head may have.")
-    if head["zero"].any() or head["scale_source"] >= len(SCALE_SOURCES):
+    if head["zero"].any() or head["has_texture"] > 1 or head["scale_source"] >= len(SCALE_SOURCES):
         raise HeadFileError(f"{name} stores its numbers in a way that version {VERSION} does not have.")
     single, half = FLOATS[0], FLOATS[1]
     read = NumberReader(data, HEAD.itemsize, name)
@@ -146,6 +152,10 @@ def _read(data: bytes, name: str) -> StoredHead:
     points, on_head = (read.numbers((counts[3], 3), half) for _ in range(2))
     sigma = read.numbers((counts[3],), half)
     places = dict(read.place() for _ in range(counts[4]))
+    texture_px, texture = 0, b""
+    if head["has_texture"]:
+        texture_px, size = (int(number) for number in read.records(2, np.dtype("<u4")))
+        texture = read.records(size, np.dtype("u1")).tobytes()
     read.end()
     return StoredHead(
         shape,
@@ -162,4 +172,6 @@ def _read(data: bytes, name: str) -> StoredHead:
         sigma,
         places,
         head["prior_sha256"].tobytes().hex(),
+        texture_px,
+        texture,
     )

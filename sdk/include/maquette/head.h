@@ -7,8 +7,8 @@
  *   maq_head_save(head, "head.maqh");
  *
  * A face is biometric data: ask the person, and keep heads as you would keep passwords. Nothing leaves the device. A
- * builder keeps the part of each photo around the head until maq_head_builder_clear or its end; a head holds no photo,
- * nor does its file.
+ * builder keeps the part of each photo around the head until maq_head_builder_clear or its end; a head and its file
+ * hold no photo, unless the builder's config asks for a texture, which has the face's pixels.
  */
 #ifndef MAQUETTE_HEAD_H_
 #define MAQUETTE_HEAD_H_
@@ -36,6 +36,11 @@ typedef struct maq_head_config {
                                    energy and costs some speed */
   maq_provider provider;  /* for the network; default MAQ_PROVIDER_CPU. One that cannot be had, or that takes less than
                              half of the network, is replaced by the CPU: the log says why. */
+  uint32_t texture_px; /* of heads, pixels a side, 256 to 2048: the photos' pixels where they see the surface well, the
+                          network's colours elsewhere. 0 (default): heads have none, and hold no part of a photo. With
+                          1024 a fit takes 140 MB of memory more, and a second or two. */
+  int32_t texture_mirrored; /* 1: where no photo sees one side of the head, it looks as the other; 0 (default): as the
+                               network has it */
 } maq_head_config;
 
 /* What the app knows of a photo. */
@@ -86,7 +91,8 @@ typedef struct maq_head_info {
   uint32_t photo_count;    /* that it was fitted to */
   uint32_t landmark_count; /* places with a name */
   maq_head_scale scale;
-  float scale_sigma; /* standard deviation of its size, as a fraction of it: 0.04 is 4 %; 0: not known */
+  float scale_sigma;   /* standard deviation of its size, as a fraction of it: 0.04 is 4 %; 0: not known */
+  uint32_t texture_px; /* pixels a side; 0: it has no texture */
 } maq_head_info;
 
 /* How fine a mesh is. */
@@ -100,7 +106,8 @@ typedef struct maq_head_mesh_options {
 
 #define MAQ_HEAD_ALL_TRIANGLES 0xFFFFFFFFu
 
-/* A mesh: closed, without holes, cut off below the chin. */
+/* A mesh: closed, without holes, cut off below the chin. Where there is a texture, vertices around the cut are there
+ * twice, once for the cap. */
 typedef struct maq_head_mesh {
   uint32_t struct_size;
   uint32_t vertex_count;
@@ -113,6 +120,10 @@ typedef struct maq_head_mesh {
   const uint32_t* triangles;      /* [triangle_count][3], counter-clockwise seen from outside */
   float
       simplification_error_m; /* the largest distance of a vertex of the full mesh from this one; 0 where it is full */
+  /* Of a head with a texture, else NULL and 0. */
+  const float* texture_coordinates; /* [vertex_count][2]: u to the right, v down, 0 to 1 */
+  const uint8_t* texture_jpeg;      /* a JPEG file, square: a disc, its middle the crown, the face in its lower half */
+  uint32_t texture_bytes;           /* of it */
 } maq_head_mesh;
 
 /* A place of the head that has a name. */
@@ -188,8 +199,8 @@ MAQ_API maq_status maq_head_builder_get_photo(const maq_head_builder* builder, u
  * damaged), MAQ_ERROR_UNSUPPORTED (another version). Blocks while the file is read. */
 MAQ_API maq_status maq_head_open(maq_context* context, const char* path, maq_head** head);
 
-/* Writes the head to a file, some 60 KB (docs/formats.md), which appears atomically and replaces an existing one.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks while it is written. */
+/* Writes the head to a file, some 60 KB and its texture (docs/formats.md), which appears atomically and replaces an
+ * existing one. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks while it is written. */
 MAQ_API maq_status maq_head_save(const maq_head* head, const char* path);
 
 /* Frees the head (NULL is fine); pointers of its meshes are invalid afterwards.
@@ -221,10 +232,10 @@ MAQ_API maq_status maq_head_mesh_options_init(maq_head_mesh_options* options, ui
 MAQ_API maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* options, maq_head_mesh* mesh);
 
 /* Writes that mesh to a file, by the ending of `path`: .glb (glTF 2.0), .obj with a .mtl beside it, or .ply (binary,
- * with template points). In files x is to the person's left, y up, z to the front, as glTF has it (docs/formats.md).
- * They appear atomically and replace existing ones. `options` as above.
- * One at a time, with maq_head_get_mesh. Errors: as maq_head_get_mesh, and MAQ_ERROR_UNWRITABLE. Blocks while the mesh
- * is made and written. */
+ * with template points), the first two with the texture where the head has one. In files x is to the person's left, y
+ * up, z to the front, as glTF has it (docs/formats.md). They appear atomically and replace existing ones. `options` as
+ * above. One at a time, with maq_head_get_mesh. Errors: as maq_head_get_mesh, and MAQ_ERROR_UNWRITABLE. Blocks while
+ * the mesh is made and written. */
 MAQ_API maq_status maq_head_export(maq_head* head, const char* path, const maq_head_mesh_options* options);
 
 #ifdef __cplusplus

@@ -4,6 +4,7 @@
 #include "api/head_handle.h"
 #include "core/worker_threads.h"
 #include "head/build/head_surface.h"
+#include "head/build/head_texture.h"
 #include "head/files/head_file.h"
 #include "head/mesh/mesh_files.h"
 
@@ -50,6 +51,7 @@ const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given
   WorkerThreads threads(head.threads);
   head::SurfaceStats stats;
   head::HeadMesh mesh = head::head_surface(head.head, wanted, threads, &stats);
+  if (head.head.texture.side_px > 0) head::set_texture_coordinates(head.head, mesh);
   std::vector<float> positions_m = in_metres(mesh.positions), template_points_m = in_metres(mesh.template_points);
   head.mesh = std::move(mesh);
   head.positions_m = std::move(positions_m);
@@ -91,6 +93,7 @@ maq_status maq_head_get_info(const maq_head* head, maq_head_info* info) {
     filled.landmark_count = uint32_t(from.places.size());
     filled.scale = maq_head_scale(from.scale.source);
     filled.scale_sigma = float(from.scale.sigma / from.scale.metres_per_unit);
+    filled.texture_px = uint32_t(from.texture.side_px);
     write_struct(info, "info", filled, sizeof(maq_head_info));
     return MAQ_OK;
   });
@@ -139,6 +142,12 @@ maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* option
     filled.colours_rgb = made.colours.data();
     filled.template_points_m = head->template_points_m.data();
     filled.triangles = made.triangles.data();
+    const std::vector<uint8_t>& texture = head->head.texture.jpeg;
+    if (!texture.empty()) {
+      filled.texture_coordinates = made.texture_coordinates.data();
+      filled.texture_jpeg = texture.data();
+      filled.texture_bytes = uint32_t(texture.size());
+    }
     filled.simplification_error_m = float(head->mesh_stats.error_m);
     write_struct(mesh, "mesh", filled, kFirstMeshSize);
     return MAQ_OK;
@@ -149,7 +158,7 @@ maq_status maq_head_export(maq_head* head, const char* path, const maq_head_mesh
   return guarded_alone(head, "head", __func__, [&] {
     require_argument(path, "path");
     head::require_mesh_file_name(path);
-    head::write_mesh_file(mesh_of(*head, options), path);
+    head::write_mesh_file(mesh_of(*head, options), path, head->head.texture.jpeg);
     return MAQ_OK;
   });
 }

@@ -60,11 +60,17 @@ maq_status maq_head_builder_create(maq_context* context, const maq_head_config* 
     require_argument(builder, "builder");
     const maq_head_config config = read_config(given, "config", default_config(), kFirstConfigSize);
     SessionSettings settings = session_settings(config);
+    if (config.texture_px != 0) {
+      require_range("config.texture_px", config.texture_px, uint32_t(head::kMinTexture_px),
+                    uint32_t(head::kMaxTexture_px));
+    }
+    require_range("config.texture_mirrored", config.texture_mirrored, 0, 1);
+    const head::TextureOptions texture{int(config.texture_px), config.texture_mirrored == 1};
     Bundle bundle = read_bundle_argument(config, "config", kHeadsBundle);
     const Manifest manifest = bundle.manifest;
     const auto runtime = context->state->onnxruntime();
     settings.provider = available_provider(*runtime, config.provider);
-    auto made = std::make_unique<head::HeadBuilder>(runtime, std::move(bundle), settings);
+    auto made = std::make_unique<head::HeadBuilder>(runtime, std::move(bundle), settings, texture);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
                                 ") loaded, ", made->threads(), " thread(s)");
     *builder = new maq_head_builder(context->state, std::move(made));

@@ -83,6 +83,11 @@ std::string stored_head_fault(const StoredHead& head) {
   for (std::string fault : {cut_fault(head.cut), bounds_fault(head.bounds), anchors_fault(head.anchors)}) {
     if (!fault.empty()) return fault;
   }
+  const StoredTexture& texture = head.texture;
+  if (texture.side_px < 0 || texture.side_px > kMaxTextureSide_px || texture.jpeg.size() > kMaxTextureBytes ||
+      (texture.side_px == 0) != texture.jpeg.empty()) {
+    return concatenate("its texture has ", texture.side_px, " pixels a side and ", texture.jpeg.size(), " bytes");
+  }
   return places_fault(head.places);
 }
 

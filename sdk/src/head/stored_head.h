@@ -38,6 +38,15 @@ struct StoredAnchors {
   size_t count() const { return sigma.size(); }
 };
 
+// The only part of a head that has pixels of photos; made when it is asked for. head/texture says how it is laid out.
+struct StoredTexture {
+  int side_px = 0;            // 0: there is none
+  std::vector<uint8_t> jpeg;  // a whole file, of side_px x side_px pixels
+};
+
+inline constexpr int kMaxTextureSide_px = 2048;
+inline constexpr size_t kMaxTextureBytes = 6 << 20;
+
 struct StoredHead {
   explicit StoredHead(FieldWeights of_head) : weights(std::move(of_head)) {}
 
@@ -50,6 +59,7 @@ struct StoredHead {
   HeadBounds bounds;
   StoredAnchors anchors;  // may be empty
   std::vector<NamedPoint> places;
+  StoredTexture texture;
   std::array<uint8_t, 32> prior_sha256{};  // of the prior's file, which the codes belong to; zeros: not known
 };
 

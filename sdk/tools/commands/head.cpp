@@ -37,6 +37,8 @@ struct HeadOptions {
   double roll_deg = 0;
   float focal_px = 0;
   double cell_mm = 0;
+  uint32_t texture_px = 0;
+  bool is_mirrored = false;
   std::string triangles;  // empty: the library's default
   std::string densepose;
   NetworkOptions network;
@@ -294,6 +296,8 @@ int run_head(const HeadOptions& options) {
   config.threads = options.network.threads;
   config.allow_spinning = options.network.no_spin ? 0 : 1;
   config.provider = provider_of(options.network);
+  config.texture_px = options.texture_px;
+  config.texture_mirrored = options.is_mirrored ? 1 : 0;
   maquette::HeadBuilder builder(context, config);
   Stages stages;
   LapTimer timer;
@@ -374,6 +378,15 @@ void add_head_command(CLI::App& app, int* exit_code) {
       ->check(CLI::Validator(check_triangles, "100 or more, or all"));
   command->add_option("--cell", options->cell_mm, "Distance of the full mesh's vertices, mm (default 1.6)")
       ->check(CLI::Range(0.5, 20.0));
+  CLI::Option* const texture =
+      command
+          ->add_option("--texture", options->texture_px,
+                       "Give the head a texture of so many pixels a side, 256 to 2048, with the photos' pixels: 1024")
+          ->check(CLI::Range(256u, 2048u));
+  command
+      ->add_flag("--mirror", options->is_mirrored,
+                 "Where the photos see one side of the head alone, let the other look like it")
+      ->needs(texture);
   command->add_option("--densepose", options->densepose,
                       "Folder of the bundle that finds people; default: MAQ_BUNDLE, then the installed one");
   command->add_flag("--json", options->json, "Print what was found as one JSON line per head");
@@ -385,12 +398,14 @@ void add_head_command(CLI::App& app, int* exit_code) {
       "of\n"
       "the head above all, is made up as heads are that look alike. More photos of the same person, from the sides,\n"
       "help; each may be from another camera. Faces should be 64 pixels or more across.\n\n"
-      "A face is biometric data: ask the person. Nothing leaves this machine, and a saved head holds no photo.\n\n"
+      "A face is biometric data: ask the person. Nothing leaves this machine, and a saved head holds no photo,\n"
+      "unless --texture asks for one, which has the face's pixels.\n\n"
       "Examples:\n"
       "  maquette head photo.jpg --out head.glb\n"
       "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
       "  maquette head group.jpg --out heads/head.ply --person all\n"
       "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
+      "  maquette head photo.jpg --out head.glb --texture 1024\n"
       "  maquette head info head.maqh");
   command->require_subcommand(0, 1);
   add_head_info_command(*command, exit_code);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <maquette/maquette.hpp>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -387,6 +388,55 @@ TEST_F(ApiHeads, MeshesHaveAsManyTrianglesAsAreAskedFor) {
   options.struct_size = 1;
   EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
   expect_text("options.struct_size");
+}
+
+TEST_F(ApiHeads, AHeadHasATextureWhereItIsAskedFor) {
+  const TempFolder folder;
+  maquette::Head plain = fitted();
+  EXPECT_EQ(plain.info().texture_px, 0u);
+  EXPECT_EQ(plain.mesh(coarse).texture_jpeg, nullptr);
+  EXPECT_EQ(plain.mesh(coarse).texture_coordinates, nullptr);
+  maq_head_config config = maquette::default_head_config();
+  config.bundle_path = kHeadsBundle;
+  config.texture_px = 256;
+  maquette::HeadBuilder textured(context, config);
+  textured.add_photo(frame, known);
+  maquette::Head head = textured.fit(0);
+  EXPECT_EQ(head.info().texture_px, 256u);
+  const maq_head_mesh mesh = head.mesh(coarse);
+  ASSERT_NE(mesh.texture_jpeg, nullptr);
+  ASSERT_NE(mesh.texture_coordinates, nullptr);
+  const std::string jpeg(reinterpret_cast<const char*>(mesh.texture_jpeg), mesh.texture_bytes);
+  EXPECT_EQ(jpeg.substr(0, 2), "\xFF\xD8");
+  EXPECT_GT(mesh.vertex_count, plain.mesh(coarse).vertex_count) << "the cap's rim";
+  for (uint32_t i = 0; i < 2 * mesh.vertex_count; ++i) {
+    ASSERT_GE(mesh.texture_coordinates[i], 0);
+    ASSERT_LE(mesh.texture_coordinates[i], 1);
+  }
+  // The photo is of one colour, (140, 130, 120); the nose of the plain head is redder.
+  write_text(folder.file("texture.jpg"), jpeg);
+  maquette::Source source(context, "image:" + folder.file("texture.jpg"));
+  const std::optional<maquette::Frame> picture = source.next();
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->desc().width_px, 256);
+  EXPECT_EQ(picture->desc().height_px, 256);
+  const maq_frame_desc desc = picture->desc();
+  const uint8_t* const row = desc.planes[0] + 190 * desc.stride_bytes[0];
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(row[3 * 128 + c], 120 + 10 * int(c), 6) << "B, G, R of the face";
+  head.export_mesh(folder.file("a.glb"), coarse);
+  EXPECT_NE(read_text(folder.file("a.glb")).find(jpeg), std::string::npos);
+  head.export_mesh(folder.file("a.obj"), coarse);
+  EXPECT_EQ(read_text(folder.file("a.jpg")), jpeg);
+  head.save(folder.file("a.maqh"));
+  maquette::Head opened = maquette::Head::open(context, folder.file("a.maqh"));
+  const maq_head_mesh again = opened.mesh(coarse);
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(again.texture_jpeg), again.texture_bytes), jpeg);
+  for (const uint32_t side : {1u, 255u, 2049u}) {
+    config.texture_px = side;
+    maq_head_builder* made = nullptr;
+    EXPECT_EQ(maq_head_builder_create(context.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
+    expect_text("config.texture_px is ");
+  }
 }
 
 TEST_F(ApiHeads, MeshesAreWrittenByTheirEnding) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 
 #include "head/files/head_file.h"
@@ -110,6 +111,32 @@ TEST(HeadFiles, HoldAllOfAHead) {
   EXPECT_EQ(again.places[1].template_point, head.places[1].template_point);
   EXPECT_EQ(again.prior_sha256, head.prior_sha256);
   EXPECT_EQ(bytes_of(again), read_text(folder.file("a.maqh")));
+}
+
+TEST(HeadFiles, HoldATextureOnlyWhereThereIsOne) {
+  StoredHead head = example();
+  const size_t without = bytes_of(head).size();
+  head.texture = {512, {0xFF, 0xD8, 0xFF, 7, 8, 9, 10}};
+  std::string bytes = bytes_of(head);
+  EXPECT_EQ(bytes.size(), without + 8 + 7);
+  const StoredHead read = read_head(bytes.data(), bytes.size(), "a.maqh");
+  EXPECT_EQ(read.texture.side_px, 512);
+  EXPECT_EQ(read.texture.jpeg, head.texture.jpeg);
+  EXPECT_EQ(read.places.size(), 2u);
+  const auto refuse = [&](const char* text, uint32_t side_px, uint32_t count) {
+    std::string changed = bytes;
+    std::memcpy(changed.data() + without, &side_px, 4);
+    std::memcpy(changed.data() + without + 4, &count, 4);
+    head_file_damage::repair(changed);
+    expect_error(MAQ_ERROR_UNREADABLE, text, [&] { read_head(changed.data(), changed.size(), "a.maqh"); });
+  };
+  refuse("a texture of 0 pixels", 0, 7);
+  refuse("a texture of 4096 pixels", 4096, 7);
+  refuse("0 bytes", 512, 0);
+  refuse("ends before", 512, ~0u);
+  refuse("belong to nothing", 512, 6);
+  head.texture.side_px = 0;
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "its texture has 0 pixels", [&] { bytes_of(head); });
 }
 
 TEST(HeadFiles, AreTheOnesThatPythonReads) {
@@ -229,7 +256,9 @@ TEST(HeadFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {
   refuse("ends before", kBad, [](auto& head) { head.cameras = 256; });
   refuse("ends before", kBad, [](auto& head) { head.anchors = 16384; });
   refuse("belong to nothing", kBad, [](auto& head) { head.places = 1; });
-  refuse("in a way", kBad, [](auto& head) { head.zero[2] = 1; });
+  refuse("in a way", kBad, [](auto& head) { head.zero[1] = 1; });
+  refuse("in a way", kBad, [](auto& head) { head.has_texture = 2; });
+  refuse("ends before", kBad, [](auto& head) { head.has_texture = 1; });
   refuse("source 9", kBad, [](auto& head) { head.scale_source = 9; });
   refuse("scale is inf", kBad, [](auto& head) { head.metres_per_unit = INFINITY; });
   refuse("cut plane", kBad, [](auto& head) { head.cut_point[1] = NAN; });

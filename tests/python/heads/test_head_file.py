@@ -1,5 +1,6 @@
 """Head files as Python reads them: the bytes that the native test writes again (tests/native/head)."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,15 @@ def test_what_is_read_is_written_again_byte_by_byte(tmp_path):
     write_head(read_head(EXAMPLE), tmp_path / "again.maqh")
     assert (tmp_path / "again.maqh").read_bytes() == EXAMPLE.read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["again.maqh"]
+
+
+def test_a_texture_is_read_and_written():
+    head = replace(read_head(EXAMPLE), texture_px=512, texture=b"\xff\xd8\xff of a photo")
+    data = head_bytes(head)
+    assert len(data) == len(EXAMPLE.read_bytes()) + 8 + len(head.texture)
+    again = head_from_bytes(data)
+    assert (again.texture_px, again.texture) == (512, head.texture)
+    assert read_head(EXAMPLE).texture == b""
 
 
 def test_weights_that_the_file_cannot_hold_are_refused():

@@ -21,7 +21,7 @@ FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
 CURVES = {"edges", "edges/curves"}
-HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh"}
+HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture"}
 SYSTEMS = (
     SCENE
     | CURVES
@@ -52,6 +52,7 @@ MAY_INCLUDE = {
     "head/files": {"core", "core/math", "head", "head/camera", "head/field"},
     "head/fit": BASE - {"nn"} | {"head", "head/camera", "head/field"},
     "head/mesh": BASE - {"nn"} | {"head/camera"},
+    "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
     "scene/networks": CAPTURE,

@@ -120,8 +120,8 @@ StoredAnchors anchors_of(const HeadPrior& prior, const std::vector<float>& shape
 }  // namespace
 
 HeadBuilder::HeadBuilder(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, Bundle bundle,
-                         const SessionSettings& settings)
-    : bundle_(std::move(bundle)), encoder_(runtime, bundle_, settings), cancel_(runtime) {}
+                         const SessionSettings& settings, const TextureOptions& texture)
+    : bundle_(std::move(bundle)), encoder_(runtime, bundle_, settings), cancel_(runtime), texture_(texture) {}
 
 void HeadBuilder::add_photo(const ImageView& photo, const PhotoHints& hints) {
   check_hints(photo, hints);
@@ -139,6 +139,7 @@ void HeadBuilder::add_photo(const ImageView& photo, const PhotoHints& hints) {
     cancel_.reset();
     photos_.resize(before);
     found_.resize(before);
+    if (crops_.size() > before) crops_.resize(before);
     throw;
   }
   stats_.encode_ms += watch.elapsed_ms();
@@ -147,6 +148,7 @@ void HeadBuilder::add_photo(const ImageView& photo, const PhotoHints& hints) {
 void HeadBuilder::clear() {
   photos_.clear();
   found_.clear();
+  crops_.clear();
   encoding_ = {};
   stats_ = {};
 }
@@ -175,9 +177,11 @@ void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
   const bool was_given = is_given(hints.box_px);
   std::array<float, 4> box = was_given ? hints.box_px : find_head(photo, hints.roll_rad);
   Seen seen;
+  HeadSquare square;
   for (int looks = was_given ? 1 : kLooksAround; looks > 0; --looks) {
-    seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), hints.roll_rad,
-                                     encoder_.spec()));
+    square =
+        square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), hints.roll_rad, encoder_.spec());
+    seen = look(photo, square);
     if (seen.head_cells < kMinHeadCells) {
       throw Error(MAQ_ERROR_NOT_FOUND, "No head is seen in the box (", box[0], ", ", box[1], ") to (", box[2], ", ",
                   box[3], ") of the photo. Give the box of the head with its hair, and its roll where it leans.");
@@ -198,6 +202,7 @@ void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
   made.rgb = encoding_.rgb;
   made.codes = encoding_.codes;
   const double cells = double(made.seen.cells.size());
+  if (texture_.side_px > 0) crops_.push_back(texture_crop(photo, square, texture_.side_px));
   photos_.push_back(std::move(made));
   found_.push_back({box, double(seen.head_cells) / cells, false, 0, 0});
 }
@@ -259,6 +264,13 @@ StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
   head.places = prior.places;
   head.prior_sha256 = bundle_.prior_sha256;
   head.codes = std::move(fit.codes);
+  if (texture_.side_px > 0) {
+    std::vector<TextureSource> sources;
+    for (size_t i = 0; i < photos_.size(); ++i) {
+      if (fit.photos[i].is_used()) sources.push_back({&crops_[i], &photos_[i].seen, fit.photos[i].camera});
+    }
+    head.texture = make_texture(head, sources, texture_, threads);
+  }
   report(1);
   return head;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/worker_threads.h"
+#include "head/build/head_texture.h"
 #include "head/bundle/head_bundle.h"
 #include "head/bundle/head_encoder.h"
 #include "head/fit/head_fit.h"
@@ -41,8 +42,9 @@ struct HeadBuildStats {
 
 class HeadBuilder {
  public:
-  // Throws what HeadBundle and HeadEncoder throw.
-  HeadBuilder(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, Bundle bundle, const SessionSettings& settings);
+  // `texture`: heads get one, unless its side is 0. Throws what HeadBundle and HeadEncoder throw.
+  HeadBuilder(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, Bundle bundle, const SessionSettings& settings,
+              const TextureOptions& texture = {0, false});
   HeadBuilder(const HeadBuilder&) = delete;
   HeadBuilder& operator=(const HeadBuilder&) = delete;
 
@@ -82,6 +84,8 @@ class HeadBuilder {
   HeadEncoding encoding_;
   std::vector<HeadPhoto> photos_;
   std::vector<PhotoFound> found_;
+  TextureOptions texture_;
+  std::vector<TextureCrop> crops_;  // of each photo, where heads get a texture
   HeadBuildStats stats_;
 };
 

@@ -56,12 +56,13 @@ static_assert(sizeof(PriorFileHead) == 144 && offsetof(PriorFileHead, sharpness)
 // cameras: StoredCamera.
 // anchors: float16 template points [anchors][3], points [anchors][3], sigma [anchors].
 // places: as of a prior.
+// texture, where has_texture is 1: u32 pixels a side, u32 bytes, a JPEG file.
 struct HeadFileHead {
   FileStart start;
   StoredShape shape;
   uint32_t shape_codes, colour_codes, cameras, anchors, places;
   float sharpness;
-  uint8_t scale_source, zero[3];
+  uint8_t scale_source, has_texture, zero[2];
   double metres_per_unit, metres_sigma, cut_point[3], cut_normal[3];
   float bounds_min[3], bounds_max[3];
   uint8_t prior_sha256[32];

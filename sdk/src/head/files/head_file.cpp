@@ -50,7 +50,7 @@ void check_counts(const HeadFileHead& head, const FieldShape& shape, const Store
     file.fail(" claims ", head.shape_codes, " and ", head.colour_codes, " codes, ", head.cameras, " cameras, ",
               head.anchors, " anchors and ", head.places, " places: more than a head may have.");
   }
-  if (head.zero[0] + head.zero[1] + head.zero[2] > 0) {
+  if (head.zero[0] + head.zero[1] > 0 || head.has_texture > 1) {
     file.fail(" stores its numbers in a way that version ", kHeadFileVersion, " does not have.");
   }
   uint64_t weights = 0;
@@ -80,6 +80,7 @@ std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
   file_head.places = uint32_t(head.places.size());
   file_head.sharpness = head.sharpness;
   file_head.scale_source = uint8_t(head.scale.source);
+  file_head.has_texture = head.texture.side_px > 0 ? 1 : 0;
   file_head.metres_per_unit = head.scale.metres_per_unit;
   file_head.metres_sigma = head.scale.sigma;
   put(head.cut.point, file_head.cut_point);
@@ -100,6 +101,11 @@ std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
     writer.number(uint8_t(place.name.size()));
     writer.text(place.name);
     writer.floats(kFloat, place.template_point.data(), 3);
+  }
+  if (file_head.has_texture != 0) {
+    writer.number(uint32_t(head.texture.side_px));
+    writer.number(uint32_t(head.texture.jpeg.size()));
+    writer.bytes(head.texture.jpeg);
   }
   writer.finish(sizeof file_head, kHeadFileMagic, kHeadFileVersion);
   return writer.bytes();
@@ -130,6 +136,13 @@ StoredHead read_head(const void* bytes, size_t count, const std::string& name) {
   head.anchors.points = file.floats(kHalf, 3 * size_t(file_head.anchors));
   head.anchors.sigma = file.floats(kHalf, file_head.anchors);
   head.places = file.places(file_head.places);
+  if (file_head.has_texture != 0) {
+    const auto side_px = file.number<uint32_t>(), bytes_of_texture = file.number<uint32_t>();
+    if (side_px < 1 || side_px > uint32_t(kMaxTextureSide_px) || bytes_of_texture < 1) {
+      file.fail(" has a texture of ", side_px, " pixels a side and ", bytes_of_texture, " bytes, which none has.");
+    }
+    head.texture = {int(side_px), file.bytes(bytes_of_texture)};
+  }
   file.end();
   head.scale = {file_head.metres_per_unit, file_head.metres_sigma, ScaleSource(file_head.scale_source)};
   head.sharpness = file_head.sharpness;

@@ -109,6 +109,11 @@ void StoredBytes::layers(StoredFormat format, const std::vector<FieldLayer>& of_
   for (const FieldLayer& layer : of_codes) floats(is_int8 ? StoredFormat::kFloat16 : format, layer.bias, outputs);
 }
 
+std::vector<uint8_t> StoredBytes::bytes(size_t count) {
+  const uint8_t* const from = take(count);
+  return {from, from + count};
+}
+
 std::vector<NamedPoint> StoredBytes::places(size_t count) {
   std::vector<NamedPoint> places;
   for (size_t i = 0; i < count; ++i) {

@@ -47,6 +47,7 @@ class StoredBytes {
   // The weights and biases of one layer of some heads, in order.
   void layers(StoredFormat format, const std::vector<FieldLayer>& of_codes);
   std::vector<NamedPoint> places(size_t count);
+  std::vector<uint8_t> bytes(size_t count);
 
   // Throws unless everything was read.
   void end() const;
@@ -82,6 +83,7 @@ class BytesWriter {
     const auto* bytes = reinterpret_cast<const uint8_t*>(&number);
     bytes_.insert(bytes_.end(), bytes, bytes + sizeof number);
   }
+  void bytes(const std::vector<uint8_t>& bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
   void text(const std::string& text) { bytes_.insert(bytes_.end(), text.begin(), text.end()); }
   void floats(StoredFormat format, const float* values, size_t count);
   void layer(StoredFormat format, const ConstFieldLayer& layer);

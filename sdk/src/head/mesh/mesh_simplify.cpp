@@ -17,9 +17,9 @@ constexpr uint32_t kNoCorner = std::numeric_limits<uint32_t>::max();
 // A triangle may turn by a collapse as long as the cosine is larger: folds cannot come of it.
 constexpr double kMinTurnCosine = 0.3;
 // Where the surface is flat all collapses cost nothing; a small share of the edge's length, squared, makes them even.
-constexpr double kLengthShare = 3e-6;
+constexpr double kLengthFraction = 3e-6;
 // Holds a vertex near the edge's middle in the directions that planes leave free.
-constexpr double kMiddleShare = 1e-3;
+constexpr double kMiddleFraction = 1e-3;
 
 // The sum of weights times squared distances from planes: p'Ap + 2b'p + c, A symmetric.
 struct Quadric {
@@ -45,8 +45,8 @@ struct Quadric {
   double at(Vec3 p) const { return std::max(0.0, dot(p, times(p)) + 2 * dot(b, p) + c); }
 
   // Where it is least, held near `middle`.
-  Vec3 least_near(Vec3 middle) const {
-    const double hold = kMiddleShare * trace();
+  Vec3 min_near(Vec3 middle) const {
+    const double hold = kMiddleFraction * trace();
     if (!(hold > 0)) return middle;
     const Vec3 r0{xx + hold, xy, xz}, r1{xy, yy + hold, yz}, r2{xz, yz, zz + hold};
     const Vec3 right = -(times(middle) + b);
@@ -153,7 +153,7 @@ class Simplifier {
   Vec3 place_of(uint32_t a, uint32_t b) const {
     Quadric both = quadrics_[a];
     both.add(quadrics_[b]);
-    return both.least_near(0.5 * (points_[a] + points_[b]));
+    return both.min_near(0.5 * (points_[a] + points_[b]));
   }
 
   Collapse collapse_of(uint32_t a, uint32_t b) const {
@@ -161,7 +161,7 @@ class Simplifier {
     both.add(quadrics_[b]);
     const Vec3 along = points_[b] - points_[a];
     const double cost =
-        both.at(both.least_near(0.5 * (points_[a] + points_[b]))) + kLengthShare * both.trace() * dot(along, along);
+        both.at(both.min_near(0.5 * (points_[a] + points_[b]))) + kLengthFraction * both.trace() * dot(along, along);
     return {cost, std::max(a, b), std::min(a, b), age_of(a, b)};
   }
 

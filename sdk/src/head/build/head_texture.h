@@ -1,0 +1,39 @@
+// The texture of a fitted head: the part of a photo that it takes, and its picture from these.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/worker_threads.h"
+#include "head/bundle/head_encoder.h"
+#include "head/fit/observations.h"
+#include "head/mesh/head_mesh.h"
+#include "head/stored_head.h"
+#include "head/texture/texture_bake.h"
+
+namespace maq::head {
+
+// A photo around the head, as fine as the photo is, at most as the texture.
+struct TextureCrop {
+  int side_px = 0;
+  std::vector<uint8_t> rgb;  // [side][side][3]; grey beyond the photo
+  AffineMap photo_to_crop;
+};
+
+TextureCrop texture_crop(const ImageView& photo, const HeadSquare& square, int texture_px);
+
+// One that was fitted to. The camera is of the whole photo; `crop` and `seen` are of one square.
+struct TextureSource {
+  const TextureCrop* crop = nullptr;
+  const HeadObservations* seen = nullptr;
+  HeadCamera camera;
+};
+
+// As a JPEG file. Throws what head_surface() and JpegEncoder throw.
+StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSource>& photos,
+                           const TextureOptions& options, WorkerThreads& threads);
+
+// Gives a mesh of the head (head_surface) its places in the texture.
+void set_texture_coordinates(const StoredHead& head, HeadMesh& mesh);
+
+}  // namespace maq::head

@@ -1,0 +1,294 @@
+#include "head/texture/texture_bake.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "core/error.h"
+#include "head/mesh/mesh_raster.h"
+#include "head/texture/smooth_fill.h"
+#include "head/texture/texture_layout.h"
+
+namespace maq::head {
+namespace {
+
+constexpr int kRowsOfTask = 16;
+// From the first cosine between normal and view on a photo counts, from the second wholly.
+constexpr double kFirstCosine = 0.2, kWholeCosine = 0.65;
+// From the first share of head on in the matte a photo counts, from the second wholly.
+constexpr double kFirstMatte = 0.6, kWholeMatte = 0.95;
+// A surface is hidden when another is before it by more: decimetres.
+constexpr double kHiddenBehind_dm = 0.06;
+constexpr int kMargin_px = 2;  // of a photo's square
+// What photos differ by fades with the distance from what they see: to 1 / e over this share of the texture's side.
+constexpr double kFadeFraction = 0.1;
+
+double smooth_step(double value, double first, double whole) {
+  const double t = std::clamp((value - first) / (whole - first), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+// What each texel shows; row by row.
+struct Texels {
+  std::vector<float> positions, normals, colours;  // [side][side][3]
+  std::vector<uint8_t> is_surface, is_cap;         // [side][side]
+};
+
+struct Differences {
+  std::vector<float> values;   // [side][side][3]: photo less mesh, 0 to 255
+  std::vector<float> weights;  // [side][side]
+};
+
+void draw_texel_rows(const HeadMesh& mesh, int side, int first_row, int end_row, Texels& texels,
+                     std::vector<float>& outermost) {
+  const auto corner = [&](uint32_t vertex, size_t axis) {
+    return double(mesh.texture_coordinates[2 * size_t(vertex) + axis]) * side - 0.5;
+  };
+  for (size_t i = 0; i < mesh.triangle_count(); ++i) {
+    const uint32_t* const t = &mesh.triangles[3 * i];
+    const double x[3] = {corner(t[0], 0), corner(t[1], 0), corner(t[2], 0)};
+    const double y[3] = {corner(t[0], 1), corner(t[1], 1), corner(t[2], 1)};
+    const int top = std::max(first_row, int(std::ceil(std::min({y[0], y[1], y[2]}))));
+    const int bottom = std::min(end_row - 1, int(std::floor(std::max({y[0], y[1], y[2]}))));
+    if (top > bottom) continue;
+    const int left = std::max(0, int(std::ceil(std::min({x[0], x[1], x[2]}))));
+    const int right = std::min(side - 1, int(std::floor(std::max({x[0], x[1], x[2]}))));
+    const double area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
+    if (area == 0) continue;
+    for (int row = top; row <= bottom; ++row) {
+      for (int column = left; column <= right; ++column) {
+        double shares[3];
+        shares[0] = ((x[1] - column) * (y[2] - row) - (x[2] - column) * (y[1] - row)) / area;
+        shares[1] = ((x[2] - column) * (y[0] - row) - (x[0] - column) * (y[2] - row)) / area;
+        shares[2] = 1 - shares[0] - shares[1];
+        if (shares[0] < 0 || shares[1] < 0 || shares[2] < 0) continue;
+        const auto between = [&](const auto& values, size_t axis) {
+          double sum = 0;
+          for (size_t k = 0; k < 3; ++k) sum += shares[k] * double(values[3 * size_t(t[k]) + axis]);
+          return float(sum);
+        };
+        const size_t texel = size_t(row) * size_t(side) + size_t(column);
+        float squared = 0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+          const float value = between(mesh.positions, axis);
+          squared += value * value;
+        }
+        if (texels.is_surface[texel] != 0 && squared <= outermost[texel]) continue;
+        outermost[texel] = squared;
+        texels.is_surface[texel] = 1;
+        for (size_t axis = 0; axis < 3; ++axis) {
+          texels.positions[3 * texel + axis] = between(mesh.positions, axis);
+          texels.normals[3 * texel + axis] = between(mesh.normals, axis);
+          texels.colours[3 * texel + axis] = between(mesh.colours, axis);
+        }
+      }
+    }
+  }
+}
+
+Texels draw_texels(const HeadMesh& mesh, int side, WorkerThreads& threads) {
+  const size_t count = size_t(side) * size_t(side);
+  Texels texels;
+  for (auto* values : {&texels.positions, &texels.normals, &texels.colours}) values->resize(3 * count);
+  texels.is_surface.resize(count), texels.is_cap.resize(count);
+  std::vector<float> outermost(count);
+  threads.run(size_t(side + kRowsOfTask - 1) / kRowsOfTask, [&](size_t task, int) {
+    const int first = int(task) * kRowsOfTask;
+    draw_texel_rows(mesh, side, first, std::min(side, first + kRowsOfTask), texels, outermost);
+  });
+  for (int row = 0; row < side; ++row) {
+    for (int column = 0; column < side; ++column) {
+      const float u = (float(column) + 0.5f) / float(side), v = (float(row) + 0.5f) / float(side);
+      texels.is_cap[size_t(row) * size_t(side) + size_t(column)] = is_in_cap_disc(u, v) ? 1 : 0;
+    }
+  }
+  return texels;
+}
+
+// Bilinear, of values [height][width][channels] at a place within them; pixel centres are whole numbers.
+template <class T, size_t kChannels>
+std::array<double, kChannels> between_pixels(const std::vector<T>& values, int width, int height, double x, double y) {
+  x = std::clamp(x, 0.0, width - 1.0), y = std::clamp(y, 0.0, height - 1.0);
+  const int left = std::min(int(x), std::max(0, width - 2)), top = std::min(int(y), std::max(0, height - 2));
+  const double along = x - left, down = y - top;
+  std::array<double, kChannels> made{};
+  for (int j = 0; j < 2; ++j) {
+    for (int i = 0; i < 2; ++i) {
+      const int column = std::min(left + i, width - 1), row = std::min(top + j, height - 1);
+      const double share = (i == 0 ? 1 - along : along) * (j == 0 ? 1 - down : down);
+      const size_t at = (size_t(row) * size_t(width) + size_t(column)) * kChannels;
+      for (size_t c = 0; c < kChannels; ++c) made[c] += share * double(values[at + c]);
+    }
+  }
+  return made;
+}
+
+// How much of 5 x 5 pixels around a place show a surface at this depth, or one behind it: 0 at what hides it and just
+// beside that, as a fitted edge is not quite where the photo's is.
+double seen_fraction(const RasterImage& depths, double x, double y, double depth, int spacing_px) {
+  int seen = 0;
+  for (int j = -2; j <= 2; ++j) {
+    for (int i = -2; i <= 2; ++i) {
+      const int column = std::clamp(int(std::lround(x)) + i * spacing_px, 0, depths.width_px - 1);
+      const int row = std::clamp(int(std::lround(y)) + j * spacing_px, 0, depths.height_px - 1);
+      const float nearest = depths.depth[size_t(row) * size_t(depths.width_px) + size_t(column)];
+      seen += nearest == 0 || depth <= double(nearest) + kHiddenBehind_dm;
+    }
+  }
+  return smooth_step(seen / 25.0, 0.6, 1);
+}
+
+// What one photo says. Its weight is a confidence, 0 to 1.
+Differences look_at(const TexturePhoto& photo, const HeadMesh& mesh, const Texels& texels, int side,
+                    WorkerThreads& threads) {
+  const HeadCamera& camera = photo.camera;
+  RasterImage depths;
+  MeshRaster raster;
+  raster.draw(mesh, camera, {}, threads, depths);
+  const Vec3 eye = inverse(camera.head_to_camera).translation;
+  const int spacing_px = std::max(1, camera.width_px / 192);
+  Differences made;
+  made.values.resize(texels.positions.size()), made.weights.resize(texels.is_surface.size());
+  threads.run(size_t(side), [&](size_t row, int) {
+    for (size_t texel = row * size_t(side); texel < (row + 1) * size_t(side); ++texel) {
+      if (texels.is_surface[texel] == 0 || texels.is_cap[texel] != 0) continue;
+      const float *p = &texels.positions[3 * texel], *n = &texels.normals[3 * texel];
+      const Vec3 point{double(p[0]), double(p[1]), double(p[2])};
+      const Vec3 normal = normalized({double(n[0]), double(n[1]), double(n[2])});
+      const double facing = smooth_step(dot(normal, normalized(eye - point)), kFirstCosine, kWholeCosine);
+      const Vec3 seen = camera.head_to_camera * point;
+      if (facing <= 0 || !(seen.z > 0)) continue;
+      const double x = camera.focal_px * seen.x / seen.z + camera.cx_px;
+      const double y = camera.focal_px * seen.y / seen.z + camera.cy_px;
+      if (!(x >= kMargin_px && y >= kMargin_px && x <= camera.width_px - 1 - kMargin_px &&
+            y <= camera.height_px - 1 - kMargin_px)) {
+        continue;
+      }
+      const double cell_x = (x + 0.5) / camera.width_px * photo.matte_side - 0.5;
+      const double cell_y = (y + 0.5) / camera.height_px * photo.matte_side - 0.5;
+      const double matte = between_pixels<float, 1>(photo.matte, photo.matte_side, photo.matte_side, cell_x, cell_y)[0];
+      const double weight =
+          facing * smooth_step(matte, kFirstMatte, kWholeMatte) * seen_fraction(depths, x, y, seen.z, spacing_px);
+      if (weight <= 0) continue;
+      const auto rgb = between_pixels<uint8_t, 3>(photo.rgb, camera.width_px, camera.height_px, x, y);
+      for (size_t c = 0; c < 3; ++c) made.values[3 * texel + c] = float(rgb[c]) - texels.colours[3 * texel + c];
+      made.weights[texel] = float(weight);
+    }
+  });
+  return made;
+}
+
+// All photos together: what each differs by without its mean, and the mean over all.
+Differences blend(const std::vector<TexturePhoto>& photos, const HeadMesh& mesh, const Texels& texels, int side,
+                  WorkerThreads& threads) {
+  Differences all;
+  all.values.resize(texels.positions.size()), all.weights.resize(texels.is_surface.size());
+  std::vector<float> shares(all.weights.size());
+  double mean_of_all[3] = {}, weight_of_all = 0;
+  for (const TexturePhoto& photo : photos) {
+    const Differences one = look_at(photo, mesh, texels, side, threads);
+    double sums[3] = {}, weight = 0;
+    for (size_t i = 0; i < one.weights.size(); ++i) {
+      weight += double(one.weights[i]);
+      for (size_t c = 0; c < 3; ++c) sums[c] += double(one.weights[i]) * double(one.values[3 * i + c]);
+    }
+    if (weight <= 0) continue;
+    // Texels of a photo that shows the head larger count more.
+    const double distance = length(photo.camera.head_to_camera.translation);
+    const double pixels_per_dm = photo.camera.focal_px / std::max(distance, 1e-6);
+    for (size_t c = 0; c < 3; ++c) mean_of_all[c] += sums[c];
+    weight_of_all += weight;
+    for (size_t i = 0; i < one.weights.size(); ++i) {
+      if (one.weights[i] <= 0) continue;
+      const float share = float(double(one.weights[i]) * double(one.weights[i]) * pixels_per_dm * pixels_per_dm);
+      for (size_t c = 0; c < 3; ++c) {
+        all.values[3 * i + c] += share * (one.values[3 * i + c] - float(sums[c] / weight));
+      }
+      shares[i] += share;
+      all.weights[i] = std::max(all.weights[i], one.weights[i]);
+    }
+  }
+  for (size_t i = 0; i < shares.size(); ++i) {
+    if (shares[i] <= 0) continue;
+    for (size_t c = 0; c < 3; ++c) {
+      all.values[3 * i + c] = all.values[3 * i + c] / shares[i] + float(mean_of_all[c] / weight_of_all);
+    }
+  }
+  return all;
+}
+
+// Where one side is not known, what the other is.
+Differences mirrored(const Differences& known, const Texels& texels, int side) {
+  Differences made = known;
+  for (size_t row = 0; row < size_t(side); ++row) {
+    for (size_t column = 0; column < size_t(side); ++column) {
+      const size_t at = row * size_t(side) + column, from = row * size_t(side) + size_t(side) - 1 - column;
+      const float own = known.weights[at], other = (1 - own) * known.weights[from];
+      if (other <= 0 || texels.is_surface[at] == 0 || texels.is_cap[at] != 0) continue;
+      for (size_t c = 0; c < 3; ++c) {
+        made.values[3 * at + c] = (own * known.values[3 * at + c] + other * known.values[3 * from + c]) / (own + other);
+      }
+      made.weights[at] = own + other;
+    }
+  }
+  return made;
+}
+
+}  // namespace
+
+HeadCamera crop_camera(const HeadCamera& camera, const AffineMap& to_crop, int side_px) {
+  const double scale = std::hypot(to_crop.xx, to_crop.yx);
+  const double cosine = to_crop.xx / scale, sine = to_crop.yx / scale;
+  const RigidMotion turn{{cosine, -sine, 0, sine, cosine, 0, 0, 0, 1}, {}};
+  HeadCamera made;
+  made.head_to_camera = turn * camera.head_to_camera;
+  made.focal_px = scale * camera.focal_px;
+  const Point middle = to_crop({camera.cx_px + 0.5, camera.cy_px + 0.5});
+  made.cx_px = middle.x - 0.5, made.cy_px = middle.y - 0.5;
+  made.width_px = made.height_px = side_px;
+  return made;
+}
+
+TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, const TextureOptions& options,
+                          WorkerThreads& threads) {
+  const int side = options.side_px;
+  if (side < kMinTexture_px || side > kMaxTexture_px) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The texture has ", side, " pixels a side, but must have ", kMinTexture_px,
+                " to ", kMaxTexture_px, ".");
+  }
+  const Texels texels = draw_texels(mesh, side, threads);
+  Differences seen = blend(photos, mesh, texels, side, threads);
+  if (options.is_mirrored) seen = mirrored(seen, texels, side);
+  std::vector<float> around = seen.values;
+  fill_smoothly(side, seen.weights, around);
+  const std::vector<float> distances = distance_to_known(side, seen.weights);
+  const size_t count = texels.is_surface.size();
+  std::vector<float> colours(3 * count), is_known(count);
+  double from_photos = 0, all = 0;
+  for (size_t i = 0; i < count; ++i) {
+    if (texels.is_surface[i] == 0) continue;
+    is_known[i] = 1;
+    const float known = seen.weights[i];
+    const float fade =
+        texels.is_cap[i] != 0 ? 0 : float(std::exp(-double(distances[i]) / (kFadeFraction * double(side))));
+    for (size_t c = 0; c < 3; ++c) {
+      colours[3 * i + c] =
+          texels.colours[3 * i + c] + known * seen.values[3 * i + c] + (1 - known) * fade * around[3 * i + c];
+    }
+    if (texels.is_cap[i] == 0) from_photos += double(known), all += 1;
+  }
+  fill_smoothly(side, is_known, colours);  // filters look beyond the border
+  TextureImage image;
+  image.side_px = side;
+  image.photo_share = all > 0 ? from_photos / all : 0;
+  image.bgr.resize(3 * count);
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t c = 0; c < 3; ++c) {
+      image.bgr[3 * i + 2 - c] = uint8_t(std::clamp(std::lround(colours[3 * i + c]), 0L, 255L));
+    }
+  }
+  return image;
+}
+
+}  // namespace maq::head

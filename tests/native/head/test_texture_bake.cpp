@@ -1,0 +1,218 @@
+// The picture of a texture: what photos see well is theirs, all else the network's, and no step lies between.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "head/mesh/marching_cubes.h"
+#include "head/mesh/mesh_cleanup.h"
+#include "head/texture/smooth_fill.h"
+#include "head/texture/texture_bake.h"
+#include "head/texture/texture_layout.h"
+#include "support/expect_error.h"
+
+namespace texture_bake_tests {
+namespace {
+
+using namespace maq::head;  // NOLINT
+using maq::Vec3;
+using Rgb = std::array<int, 3>;
+
+constexpr int kSide = 256;
+constexpr uint8_t kOwn = 100;  // the mesh's colour
+
+// Cut off below.
+template <class Field>
+HeadMesh mesh_of(Field&& field) {
+  MarchingCubesOptions options;
+  options.box_min = {-2.2f, -2.2f, -2.2f}, options.box_max = {2.2f, 2.2f, 2.2f}, options.cell = 0.06f;
+  maq::WorkerThreads threads(1);
+  HeadMesh mesh = marching_cubes(
+      [&](const float* x, const float* y, const float* z, float* f, size_t n) {
+        for (size_t i = 0; i < n; ++i) f[i] = std::max(field(x[i], y[i], z[i]), -0.9f - z[i]);
+      },
+      options, threads);
+  set_normals(mesh);
+  mesh.template_points = mesh.positions;
+  mesh.colours.assign(mesh.positions.size(), kOwn);
+  set_texture_coordinates(mesh, find_cap(mesh, {0, 0, -1}, 0.9f, 0.003f));
+  return mesh;
+}
+
+HeadMesh ball() {
+  return mesh_of([](float x, float y, float z) { return std::hypot(x, y, z) - 1; });
+}
+
+// From 6 dm away in the direction of `from`, which is level, of length 1.
+TexturePhoto photo_from(Vec3 from, Rgb rgb, float matte = 1) {
+  TexturePhoto photo;
+  const Vec3 forward = -from, down{0, 0, -1}, right = cross(down, forward);
+  photo.camera.head_to_camera.rotation = {right.x, right.y,   right.z,   down.x,   down.y,
+                                          down.z,  forward.x, forward.y, forward.z};
+  photo.camera.head_to_camera.translation = {0, 0, 6};
+  photo.camera.focal_px = 400, photo.camera.cx_px = photo.camera.cy_px = 99.5;
+  photo.camera.width_px = photo.camera.height_px = 200;
+  for (int i = 0; i < 200 * 200; ++i) {
+    for (const int value : rgb) photo.rgb.push_back(uint8_t(value));
+  }
+  photo.matte_side = 10;
+  photo.matte.assign(100, matte);
+  return photo;
+}
+
+TextureImage bake(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, bool is_mirrored = false,
+                  int thread_count = 1) {
+  maq::WorkerThreads threads(thread_count);
+  return bake_texture(mesh, photos, {kSide, is_mirrored}, threads);
+}
+
+Rgb at(const TextureImage& image, Vec3 point) {
+  const auto place = texture_place(point);
+  const size_t pixel = size_t(place[1] * kSide) * kSide + size_t(place[0] * kSide);
+  return {image.bgr[3 * pixel + 2], image.bgr[3 * pixel + 1], image.bgr[3 * pixel]};
+}
+
+// Between neighbours in the disc of the surface.
+int largest_step(const TextureImage& image) {
+  int largest = 0;
+  for (int y = 0; y < kSide - 1; ++y) {
+    for (int x = 0; x < kSide - 1; ++x) {
+      if (std::hypot(x - kSide / 2, y - kSide / 2) > 0.4 * kSide) continue;
+      for (int c = 0; c < 3; ++c) {
+        const auto value = [&](int column, int row) { return int(image.bgr[size_t((row * kSide + column) * 3 + c)]); };
+        largest = std::max({largest, std::abs(value(x, y) - value(x + 1, y)), std::abs(value(x, y) - value(x, y + 1))});
+      }
+    }
+  }
+  return largest;
+}
+
+void expect_near(Rgb found, Rgb expected, int tolerance) {
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], tolerance);
+}
+
+constexpr Vec3 kFront{0, -1, 0}, kBack{0, 1, 0}, kLeft{1, 0, 0}, kRight{-1, 0, 0};
+
+TEST(TextureBake, WhatAPhotoSeesIsItsAndTheRestIsTheMeshsWithoutAStep) {
+  const TextureImage image = bake(ball(), {photo_from(kFront, {200, 120, 40})});
+  ASSERT_EQ(image.side_px, kSide);
+  expect_near(at(image, kFront), {200, 120, 40}, 1);
+  expect_near(at(image, kBack), {kOwn, kOwn, kOwn}, 12);
+  EXPECT_LE(largest_step(image), 10) << "of 100";
+  EXPECT_GT(image.photo_share, 0.1);
+  EXPECT_LT(image.photo_share, 0.5) << "a photo does not see more than half of a ball";
+}
+
+TEST(TextureBake, WithoutPhotosAndOutsideTheMatteItIsTheMeshs) {
+  for (const auto& photos : {std::vector<TexturePhoto>{}, {photo_from(kFront, {250, 0, 0}, 0.5f)}}) {
+    const TextureImage image = bake(ball(), photos);
+    EXPECT_EQ(image.photo_share, 0);
+    for (const uint8_t value : image.bgr) ASSERT_EQ(value, kOwn);
+  }
+}
+
+TEST(TextureBake, WhatLiesBehindAnotherPartTakesNothingOfIt) {
+  // A small ball before the large one; the photo shows it in red.
+  HeadMesh mesh = mesh_of([](float x, float y, float z) {
+    return std::min(std::hypot(x, y, z) - 1, std::hypot(x - 0.3f, y + 1.6f, z) - 0.25f);
+  });
+  TexturePhoto photo = photo_from(kFront, {kOwn, kOwn, kOwn});
+  for (int y = 0; y < 200; ++y) {
+    for (int x = 0; x < 200; ++x) {
+      // Its middle is 4.4 dm away: (0.3, 0) / 4.4 * 400 to the right.
+      if (std::hypot(x - 99.5 - 27.3, y - 99.5) < 22.9) photo.rgb[size_t(y * 200 + x) * 3] = 255;
+    }
+  }
+  // All of the small ball at one place of the texture, where it is no area.
+  for (size_t i = 0; i < mesh.vertex_count(); ++i) {
+    if (std::hypot(mesh.positions[3 * i], mesh.positions[3 * i + 1], mesh.positions[3 * i + 2]) < 1.1f) continue;
+    mesh.texture_coordinates[2 * i] = mesh.texture_coordinates[2 * i + 1] = 0.001f;
+  }
+  const TextureImage image = bake(mesh, {photo});
+  EXPECT_GT(image.photo_share, 0.1);
+  for (size_t i = 0; i < image.bgr.size(); ++i) ASSERT_NEAR(image.bgr[i], kOwn, 15) << "at " << i;
+}
+
+TEST(TextureBake, AMirroredSideLooksAsTheOther) {
+  const HeadMesh mesh = ball();
+  const std::vector<TexturePhoto> photos = {photo_from(kLeft, {200, 120, 40})};
+  expect_near(at(bake(mesh, photos), kLeft), {200, 120, 40}, 1);
+  expect_near(at(bake(mesh, photos), kRight), {kOwn, kOwn, kOwn}, 20);
+  const TextureImage mirrored = bake(mesh, photos, true);
+  expect_near(at(mirrored, kLeft), {200, 120, 40}, 1);
+  expect_near(at(mirrored, kRight), {200, 120, 40}, 1);
+  EXPECT_LE(largest_step(mirrored), 10);
+}
+
+TEST(TextureBake, PhotosOfOtherExposureMeetWithoutAStep) {
+  const TextureImage image = bake(ball(), {photo_from(kLeft, {180, 180, 180}), photo_from(kFront, {120, 120, 120})});
+  EXPECT_LE(largest_step(image), 4);
+  const int left = at(image, kLeft)[0], front = at(image, kFront)[0];
+  EXPECT_NEAR(left, front, 10) << "both have the mean level";
+  EXPECT_NEAR(left, 150, 15);
+}
+
+TEST(TextureBake, IsTheSameForAnyNumberOfThreadsAndChecksItsSide) {
+  const HeadMesh mesh = ball();
+  const std::vector<TexturePhoto> photos = {photo_from(kFront, {200, 120, 40}), photo_from(kLeft, {10, 20, 30})};
+  EXPECT_EQ(bake(mesh, photos, false, 1).bgr, bake(mesh, photos, false, 3).bgr);
+  maq::WorkerThreads threads(1);
+  for (const int side : {0, 255, 2049, -1}) {
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "pixels a side", [&] { bake_texture(mesh, {}, {side, false}, threads); });
+  }
+}
+
+TEST(TextureBake, ACropsCameraSeesWhereTheCropShowsIt) {
+  HeadCamera camera = photo_from(maq::normalized({0.3, -1, 0}), {0, 0, 0}).camera;
+  camera.cx_px = 310, camera.cy_px = 250;
+  maq::AffineMap to_crop;
+  const double scale = 0.7, turn = 0.4;
+  to_crop.xx = scale * std::cos(turn), to_crop.xy = -scale * std::sin(turn);
+  to_crop.yx = -to_crop.xy, to_crop.yy = to_crop.xx;
+  to_crop.shift_x = -20, to_crop.shift_y = 35;
+  const HeadCamera crop = crop_camera(camera, to_crop, 128);
+  EXPECT_EQ(crop.width_px, 128);
+  const auto pixel = [](const HeadCamera& by, Vec3 p) {
+    const Vec3 seen = by.head_to_camera * p;
+    return maq::Point{by.focal_px * seen.x / seen.z + by.cx_px, by.focal_px * seen.y / seen.z + by.cy_px};
+  };
+  for (const Vec3 p : {Vec3{0, 0, 0}, Vec3{0.5, -0.8, 0.3}, Vec3{-0.9, 0.2, -1}}) {
+    const maq::Point in_photo = pixel(camera, p), in_crop = pixel(crop, p);
+    const maq::Point expected = to_crop({in_photo.x + 0.5, in_photo.y + 0.5});
+    EXPECT_NEAR(in_crop.x + 0.5, expected.x, 1e-9);
+    EXPECT_NEAR(in_crop.y + 0.5, expected.y, 1e-9);
+  }
+}
+
+TEST(TextureBake, FillingKeepsWhatIsKnownAndGoesOnFromIt) {
+  constexpr int side = 37;
+  std::vector<float> weights(side * side), values(3 * side * side, 777);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      if (x >= 8 && x < 28) continue;  // a strip in the middle is not known
+      weights[size_t(y * side + x)] = 1;
+      for (int c = 0; c < 3; ++c) values[size_t(3 * (y * side + x) + c)] = x < 8 ? 10.0f : 50.0f;
+    }
+  }
+  fill_smoothly(side, weights, values);
+  for (int x = 0; x < side; ++x) {
+    const float value = values[size_t(3 * (18 * side + x))];
+    if (x < 8) {
+      EXPECT_EQ(value, 10);
+    }
+    if (x >= 28) {
+      EXPECT_EQ(value, 50);
+    }
+    EXPECT_GE(value, 9.99f);
+    EXPECT_LE(value, 50.01f);
+  }
+  EXPECT_LT(values[size_t(3 * (18 * side + 9))], 20);
+  EXPECT_GT(values[size_t(3 * (18 * side + 26))], 40);
+  const auto distances = distance_to_known(side, weights);
+  EXPECT_EQ(distances[size_t(18 * side + 3)], 0);
+  EXPECT_EQ(distances[size_t(18 * side + 12)], 5);
+  EXPECT_EQ(distance_to_known(2, {0, 0, 0, 0})[0], 1e9f);
+}
+
+}  // namespace
+}  // namespace texture_bake_tests

@@ -31,7 +31,7 @@ _MISSING = {948}  # thing without a mesh in the package
 _ASSETS = [
     {"name": "pybullet 3.2.7", "licence": "zlib", "used": "random_urdfs"},
     {"name": "pybullet 3.2.7: franka_panda", "licence": "Apache-2.0", "used": "arm"},
-    {"name": "pybullet 3.2.7: kuka_iiwa", "licence": "BSD-3-Clause", "used": "arm"},
+    {"name": "pybullet 3.2.7: kuka_iiwa", "licence": "BSD-2-Clause", "used": "arm"},
 ]
 
 

@@ -13,10 +13,10 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 
-from benchmarks.heads import engine, program, quality, real_faces, report, savings, sheet
+from benchmarks.heads import engine, prior_limit, program, quality, real_faces, report, savings, sheet
 from benchmarks.heads.photos import Photo, PhotoBackgrounds, TrueHead
 
-PARTS = ("quality", "real", "savings", "program", "engine", "sheet")
+PARTS = ("quality", "prior", "real", "savings", "program", "engine", "sheet")
 
 
 def front_photos(options: argparse.Namespace, count: int) -> list[tuple[TrueHead, Photo]]:
@@ -37,11 +37,16 @@ def measured_parts(options: argparse.Namespace) -> dict[str, Callable[[], dict]]
         (_, photo), *_ = front_photos(options, 3)
         return {"program": program.measure_program(bundle, photo), "bundle_mb": program.bundle_mb(bundle)}
 
+    def of_prior() -> dict:
+        heads = quality.read_made_heads(options.data, options.heads, quality.make_maker())
+        return {"prior": prior_limit.measure_prior(bundle, options.data / "points/test", heads)}
+
     def of_savings() -> dict:
         heads = front_photos(options, options.setting_heads)
         return {"savings": savings.measure_savings(bundle, heads, options.at, options.threads)}
 
     return {
+        "prior": of_prior,
         "real": lambda: {
             "real": real_faces.measure_real(
                 bundle, options.photos, faces, sorted(options.seconds), options.heads, options.threads

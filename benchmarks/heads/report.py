@@ -98,6 +98,13 @@ def _program_parts(rows: Sequence[Mapping]) -> list[str]:
 def _more_parts(measured: Mapping, sheet: str) -> list[str]:
     """Real photographs, settings, the program, the engine, the sheet: those that were measured."""
     at_s, parts = measured["at_s"], []
+    if own := measured.get("prior"):
+        mm = [f"{fmean(row[key] for row in own):.2f}" for key in ("face_mm", "head_mm", "mean_face_mm", "mean_head_mm")]
+        parts += [
+            _title("what the prior can say at best"),
+            f"Codes fitted to the true distances of {len(own)} heads instead of to photos, without alignment: face "
+            f"{mm[0]} mm, head {mm[1]} mm; the mean head {mm[2]} and {mm[3]} mm.",
+        ]
     if measured.get("real"):
         parts += _real_parts(measured["real"], at_s)
     if measured.get("savings"):

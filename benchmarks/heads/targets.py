@@ -59,6 +59,8 @@ def targets(measured: Mapping) -> str:
         means = {asked: fmean(values) for asked, values in by_time.items()}
         if sum(asked >= LONG_ENOUGH_S for asked in means) > 1:
             add(ONE, f"{what}, error after 1 s or more above its lowest, %", lambda _, m=means: 100 * over(m), 5, 2)
+    if own := measured.get("prior"):
+        lines.add("codes fitted to the true distances: head, mm", fmean(row["head_mm"] for row in own), 1.0, 0.6)
     views = ("view_psnr_db", "mean_view_psnr_db")
     gain = "new views, dB over the mean head with the photo projected"
     add(ONE, gain, lambda own: fmean(r["view_psnr_db"] - r["mean_view_psnr_db"] for r in own), 1.5, 3, "≥", views)

@@ -15,13 +15,24 @@ from scipy.spatial.transform import Rotation
 from small_prior import small_prior
 
 from benchmarks.heads import __main__ as whole_report
-from benchmarks.heads import engine, face_mesh, linear_head, new_views, program, quality, real_faces, report, savings
-from benchmarks.heads.distances import MM_PER_DM, Similarity, Triangles, measure
+from benchmarks.heads import (
+    engine,
+    face_mesh,
+    linear_head,
+    new_views,
+    prior_limit,
+    program,
+    quality,
+    real_faces,
+    report,
+    savings,
+)
+from benchmarks.heads.distances import MM_PER_DM, Similarity, Triangles, TruePoints, measure
 from benchmarks.heads.drawing import DrawnMesh
 from benchmarks.heads.mean_head import template_points
 from benchmarks.heads.photos import Photo, PhotoBackgrounds, photo_of
 from export.heads.fitting.anchor_fit import Observations
-from export.heads.head_shards import SIDE
+from export.heads.head_shards import SIDE, HeadPoints
 from export.heads.photos.face_points import read_face_points
 from export.heads.photos.faces import PhotoFaces
 from export.heads.views import look_at
@@ -382,6 +393,30 @@ def test_template_points_of_the_mean_head_are_those_of_its_field():
     at = torch.from_numpy(points.astype(np.float32))
     wanted = surface(prior.shape, weights, at, geometry(prior.shape, weights, at))[1]
     np.testing.assert_allclose(template_points(prior, points), wanted.detach().numpy(), rtol=1e-5, atol=1e-6)
+
+
+def test_the_prior_s_limit_is_measured_with_codes_fitted_to_the_truth(tmp_path, monkeypatch):
+    import torch
+
+    from export.heads.field import bases_of, geometry
+
+    prior = small_prior()
+    bases = bases_of(prior)
+    points = (0.5 * ball_points(400)).astype(np.float32)
+    wanted = torch.full((prior.shape_codes,), 1.5), torch.zeros(prior.colour_codes)
+    with torch.no_grad():
+        distance = geometry(bases.shape, bases.combine(*wanted), torch.from_numpy(points))[:, 0].numpy()
+    on = points[np.abs(distance) < np.sort(np.abs(distance))[60]]  # the nearest to that head's surface
+    stored = HeadPoints(
+        on, on, on, np.full(on.shape, 128, np.uint8), points, distance, points, distance, points, points
+    )
+    np.savez(tmp_path / "head-00000.npz", **vars(stored))
+    monkeypatch.setattr(prior_limit, "read_prior", lambda _: prior)
+    true = TruePoints(on.astype(np.float64) * MM_PER_DM, np.arange(len(on)) < 30)
+    head = SimpleNamespace(name="head-00000", true=true)
+    (row,) = prior_limit.measure_prior(Path(), tmp_path, [head], 60)
+    assert row["head_mm"] < row["mean_head_mm"]
+    assert "codes fitted to the true distances: head, mm" in report.page(empty_report() | {"prior": [row]})
 
 
 # --- settings, the program, the engine, the page ---

@@ -83,9 +83,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if name in options.parts:
             try:
                 measured |= quality.shortened(part())
+                options.figures.write_text(json.dumps(measured, indent=1) + "\n")
             except OSError as error:  # a program that is not built, data that are not there
                 print(f"The part {name} is left out: {error}", file=sys.stderr)
-    options.figures.write_text(json.dumps(measured, indent=1) + "\n")
     options.out.parent.mkdir(parents=True, exist_ok=True)
     picture = options.out.with_name(f"{options.out.stem}-sheet.jpg")
     if "sheet" in options.parts:

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from statistics import fmean
+from statistics import fmean, median
 
 from benchmarks.heads.engine import engine_table
 from benchmarks.heads.savings import settings_table
-from benchmarks.heads.tables import by_baseline, by_group, by_real_face, by_seconds, found, size_of, table, yaw_of
+from benchmarks.heads.tables import (
+    by_baseline,
+    by_group,
+    by_real_face,
+    by_seconds,
+    ended_too_early,
+    found,
+    size_of,
+    table,
+    yaw_of,
+)
 from benchmarks.heads.targets import targets
 
 _HOW = """Distances go from points of the true surface, above the cut and seen from outside, to the mesh that the
@@ -59,6 +69,18 @@ def beside(rows: Sequence[Mapping], bundles: Sequence[str], at_s: float) -> str:
 
 def _title(text: str) -> str:
     return f"## {text[0].upper()}{text[1:]}"
+
+
+def warning(rows: Sequence[Mapping], at_s: float) -> str:
+    """Of fits that time ended too early; empty where there is none."""
+    if not ended_too_early(rows, at_s):
+        return ""
+    steps = median(row["steps"] for row in found(rows) if row["asked_s"] == at_s)
+    return (
+        f"**Fits of {at_s:g} s came no further than {steps:.0f} steps: the machine was busy, or is too slow for this "
+        "time. Measure again, on a quiet machine or with more `--seconds`, before you believe figures of the fit and "
+        "times; those at 0 s, of baselines and of sizes hold.**"
+    )
 
 
 def _set_parts(name: str, own: Sequence[Mapping], at_s: float) -> list[str]:
@@ -143,6 +165,7 @@ def page(measured: Mapping, sheet: str = "") -> str:
         "benchmarks.heads` ([benchmarks/heads](../../benchmarks/heads/README.md)).",
         f"{_HOW} {'and the focal length' if measured.get('known_focal') else 'and knows nothing of the camera'}.",
         _TIME,
+        *filter(None, [warning(rows, at_s)]),
         f"## Targets, after {at_s:g} s",
         targets(measured),
     ]

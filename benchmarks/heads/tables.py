@@ -7,6 +7,7 @@ from itertools import pairwise
 from statistics import fmean, median
 
 FOCAL_WITHIN = 0.2
+MIN_STEPS = 20  # fits that time ends before that say little
 YAWS_DEG, SIZES_PX = (0, 15, 30, 45), (0, 120, 150, 180, 1000)
 _HEADER = (
     "seconds", "found", "face, mm", "by mean head", "head, mm", "by mean head", "not aligned, mm", "by mean head",
@@ -36,6 +37,12 @@ def ratio(rows: Sequence[Mapping], what: str, baseline: str = "mean") -> float:
 def focal_within(rows: Sequence[Mapping]) -> float:
     """The fraction of heads whose focal length is right to 20 %."""
     return fmean(abs(row["focal_ratio"] - 1) <= FOCAL_WITHIN for row in rows if row["focal_ratio"])
+
+
+def ended_too_early(rows: Sequence[Mapping], at_s: float) -> bool:
+    """Whether time ended half of the fits before they got anywhere."""
+    steps = [row["steps"] for row in found(rows) if row["asked_s"] == at_s > 0]
+    return bool(steps) and median(steps) < MIN_STEPS
 
 
 def by_seconds(rows: Sequence[Mapping]) -> str:

@@ -244,7 +244,7 @@ def row_of(head, asked, face, whole, bundle="b", name="one photo", **more):
     return {"bundle": bundle, "set": name, "head": head, "asked_s": asked, "face_mm": face, "head_mm": whole,
             "unaligned_mm": 9, "scale": 0.9, "normals_deg": 20, "mean_face_mm": 2, "mean_head_mm": 4,
             "mean_unaligned_mm": 10, "mean_normals_deg": 30, "yaw_deg": -20, "head_px": 100, "focal_ratio": 1.1,
-            "rotation_deg": 3.0, "fit_s": 1, "steps": 5, "encode_ms": 1, "mesh_ms": 1,
+            "rotation_deg": 3.0, "fit_s": 1, "steps": 50, "encode_ms": 1, "mesh_ms": 1,
             "used_photos": 1} | more  # fmt: skip
 
 

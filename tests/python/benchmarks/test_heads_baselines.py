@@ -471,7 +471,7 @@ def full_row(head, face, **more):
     return {"bundle": "b", "set": "one photo", "head": head, "asked_s": 2, "face_mm": face, "head_mm": 2.0,
             "unaligned_mm": 9, "scale": 0.9, "normals_deg": 20, "mean_face_mm": 2, "mean_head_mm": 4, "yaw_deg": -20,
             "mean_unaligned_mm": 10, "mean_normals_deg": 30, "head_px": 130, "focal_ratio": 1.1, "rotation_deg": 3.0,
-            "fit_s": 1, "steps": 5, "encode_ms": 1, "mesh_ms": 300, "used_photos": 1, "linear_head_mm": 2.5,
+            "fit_s": 1, "steps": 50, "encode_ms": 1, "mesh_ms": 300, "used_photos": 1, "linear_head_mm": 2.5,
             "linear_face_mm": 1.5, "view_psnr_db": 20.0, "mean_view_psnr_db": 18.0, "seen_mm": 1.0, "unseen_mm": 3.0,
             "face_mesh_inner_face_mm": 2.6, "inner_face_mm": 1.1, "hair": "long"} | more  # fmt: skip
 
@@ -489,6 +489,16 @@ def test_the_page_has_baselines_groups_and_targets():
     assert "| 1 heads |" in page
     assert "| fitted, 2 s | 1.00 | 1.10 | 2.00 | 1.00 | 3.00 |" in page
     assert "| MediaPipe's 468 points |  | 2.60 |" in page
+
+
+def test_the_page_warns_of_fits_that_time_ended_too_early():
+    def page(steps):
+        return report.page(empty_report() | {"rows": [full_row(head, 1.0, steps=steps) for head in "ab"]})
+
+    assert "Fits of 2 s came no further than 5 steps: the machine was busy" in page(5)
+    assert "| one photo: face, mm | 1.00 | ≤ 1.8 | ≤ 1.3 | not measured |" in page(5)
+    assert "| one photo: face, mm | 1.00 | ≤ 1.8 | ≤ 1.3 | stretch |" in page(120)
+    assert "busy" not in page(120)
 
 
 def test_parts_can_be_measured_again(tmp_path, monkeypatch):

@@ -31,6 +31,7 @@ def front_photos(options: argparse.Namespace, count: int) -> list[tuple[TrueHead
 
 def measured_parts(options: argparse.Namespace) -> dict[str, Callable[[], dict]]:
     """What each part adds to the figures, beside those of `quality.py`."""
+    # --photos names those of the test split; photos of the other splits lie beside them.
     bundle, faces = options.bundles[0], options.data / "photos"
 
     def of_program() -> dict:
@@ -49,7 +50,7 @@ def measured_parts(options: argparse.Namespace) -> dict[str, Callable[[], dict]]
         "prior": of_prior,
         "real": lambda: {
             "real": real_faces.measure_real(
-                bundle, options.photos, faces, sorted(options.seconds), options.heads, options.threads
+                bundle, options.photos.parent, faces, sorted(options.seconds), options.heads, options.threads
             )
         },
         "savings": lambda: {

@@ -465,6 +465,8 @@ def test_pytorch_computes_what_the_engine_is_measured_with():
     assert "| avx2 | forward, back to all weights | 0.500 | 2.000 | 0.25 | 50 % |" in page
     assert "| engine: a point of a step by PyTorch, one thread | 0.25 | ≤ 0.33 | ≤ 0.15 | met |" in page
     assert "| engine: fraction of the float peak | 0.50 | ≥ 0.4 | ≥ 0.6 | met |" in page
+    impossible = report.page(empty_report() | {"engine": [rows[0] | {"fraction": 3.0}]})
+    assert "| engine: fraction of the float peak | 3.00 | ≥ 0.4 | ≥ 0.6 | not measured |" in impossible
 
 
 def full_row(head, face, **more):

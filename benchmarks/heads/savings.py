@@ -66,7 +66,7 @@ def _one(builder: HeadBuilder, head: TrueHead, photo: Photo, setting: Setting) -
     builder.add_photo(photo.rgb, photo.box if setting.box else None, focal_px)
     with builder.fit(setting.seconds) as result:
         before = time.perf_counter()
-        mesh = result.mesh(setting.cell_m)
+        mesh = result.mesh(cell_m=setting.cell_m)
         mesh_s = time.perf_counter() - before
     whole_s = time.perf_counter() - start
     found = measure(triangles_of(mesh), head.true)

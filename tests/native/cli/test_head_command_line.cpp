@@ -1,8 +1,10 @@
 // `maquette head` as a person meets it: files, what is printed, sentences.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "support/program_run.h"
 
@@ -83,6 +85,27 @@ TEST_F(HeadCommandLine, PeopleAreFoundByDensePose) {
   EXPECT_TRUE(exists("b/a_1.obj"));
   EXPECT_TRUE(exists("b/a_1.mtl"));
   expect_error("'" MAQ_TEST_MEDIA "/photo.jpg' --out c.glb --person 99", 1, "heads, so there is no person 99");
+}
+
+TEST_F(HeadCommandLine, OfACrowdEachHeadThatIsSeenIsMade) {
+  const Outcome all =
+      run("'stub:people?count=20&size=1280x720&seed=3' --person all --save b/a.maqh --seconds 0 --json");
+  ASSERT_EQ(all.exit_code, 0) << all.err;
+  std::istringstream lines(all.out);
+  std::string line;
+  double last_area = INFINITY;
+  int heads = 0;
+  while (std::getline(lines, line)) {
+    const auto head = nlohmann::json::parse(line);
+    EXPECT_EQ(head["person"], ++heads);
+    EXPECT_TRUE(exists("b/a_" + std::to_string(heads) + ".maqh"));
+    const auto box = head["photos"][0]["box_px"].get<std::vector<double>>();
+    const double area = (box[2] - box[0]) * (box[3] - box[1]);
+    EXPECT_LE(area, last_area) << "the largest first";
+    last_area = area;
+  }
+  EXPECT_GE(heads, 5);
+  EXPECT_FALSE(exists("b/a_" + std::to_string(heads + 1) + ".maqh"));
 }
 
 TEST_F(HeadCommandLine, ErrorsSayWhatToDo) {

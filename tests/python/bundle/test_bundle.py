@@ -10,10 +10,12 @@ from export import bundle
 from export.bundle import BundleInfo, read_manifest
 from export.densepose import bundle as densepose
 from export.densepose.graphs import open_bundle
+from export.heads import bundle as heads
 from export.scenes import bundle as scenes
 
 DENSEPOSE = Path("sdk/models/densepose-b-int8")
 TINY = Path("tests/native/data/tiny_bundle")
+HEADS = ("sdk/models/heads-int8", "tests/native/data/round_heads/bundle", "tests/native/data/tiny_head/bundle")
 SCENES = ("sdk/models/scenes-int8", "tests/native/data/tiny_scene/bundle")
 
 
@@ -38,6 +40,13 @@ def test_the_manifests_of_scene_networks_are_what_their_writer_writes(folder, tm
     written = scenes.write_manifest(copy, info)
     assert (copy / "manifest.json").read_bytes() == (Path(folder) / "manifest.json").read_bytes()
     assert scenes.identity(written) == scenes.identity(read_manifest(Path(folder)))
+
+
+@pytest.mark.parametrize("folder", HEADS)
+def test_the_manifests_of_heads_are_what_their_writer_writes(folder, tmp_path):
+    copy, info = copied(folder, tmp_path)
+    heads.write_manifest(copy, info)
+    assert (copy / "manifest.json").read_bytes() == (Path(folder) / "manifest.json").read_bytes()
 
 
 def test_files_are_signed_with_their_size_and_digest(tmp_path):

@@ -62,7 +62,8 @@ def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
     assert "maquette.DensePose" in metadata  # the README
     for name in ("py.typed", "share/maquette/licenses/LICENSE", "share/maquette/licenses/libjpeg-turbo.txt",
                  "share/maquette/licenses/onnxruntime/LICENSE.txt",
-                 "share/maquette/models/edges-int8/manifest.json"):  # fmt: skip
+                 "share/maquette/models/edges-int8/manifest.json",
+                 "share/maquette/models/heads-int8/manifest.json"):  # fmt: skip
         assert f"maquette/{name}" in names
     assert not [name for name in names if "demo" in name or name.startswith("build")]
     assert wheel.stat().st_size < 16e6

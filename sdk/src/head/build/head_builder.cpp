@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "core/clock.h"
@@ -13,6 +14,10 @@ namespace {
 // Less is no head, or one that tells nothing: of 48 x 48 cells a head fills some 600.
 constexpr size_t kMinHeadCells = 40;
 constexpr double kMinMatte = 0.5;
+// What is no head, the encoder takes for one, but not for any place on it: the medians of its sigmas are 0.04 to 0.08
+// for faces, up to 0.19 for backs of heads, 0.12 to 0.5 for animals and rooms. With a box somebody knows that there is
+// a head.
+constexpr double kMaxFoundSigma_dm = 0.15, kMaxSigma_dm = 0.25;
 // Of the found cells, so many may be strays on each side of the head's box.
 constexpr double kStrayFraction = 0.01;
 constexpr int kLooksAround = 2;  // once a head was found somewhere in a photo
@@ -156,40 +161,51 @@ void HeadBuilder::clear() {
 HeadBuilder::Seen HeadBuilder::look(const ImageView& photo, const HeadSquare& square) {
   encoder_.run(photo, square, cancel_, encoding_);
   Seen seen;
+  seen.square = square;
   seen.cells = read_observations(encoding_.cells.data(), encoder_.spec().cells, encoding_.crop_to_photo, photo.width_px,
                                  photo.height_px);
   seen.head_cells = size_t(std::count_if(seen.cells.cells.begin(), seen.cells.cells.end(), shows_head));
+  std::vector<double> sigmas;
+  for (const HeadCell& cell : seen.cells.cells) {
+    if (shows_head(cell)) sigmas.push_back(cell.sigma_dm);
+  }
+  const auto middle = sigmas.begin() + std::ptrdiff_t(sigmas.size() / 2);
+  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  seen.sigma_dm = sigmas.empty() ? 0 : *middle;
   return seen;
 }
 
-std::array<float, 4> HeadBuilder::find_head(const ImageView& photo, double roll_rad) {
+std::pair<std::array<float, 4>, HeadBuilder::Seen> HeadBuilder::find_head(const ImageView& photo, double roll_rad) {
   const double middle_x = photo.width_px / 2.0, middle_y = photo.height_px / 2.0;
   // A square in the middle, then one with all of the photo.
   for (const int side : {std::min(photo.width_px, photo.height_px), std::max(photo.width_px, photo.height_px)}) {
-    const Seen seen = look(photo, {middle_x, middle_y, std::max(2.0, double(side)), roll_rad});
-    if (seen.head_cells >= kMinHeadCells) return box_of(seen.cells);
+    Seen seen = look(photo, {middle_x, middle_y, std::max(2.0, double(side)), roll_rad});
+    std::array<float, 4> box{};
+    for (int looks = 0; looks < kLooksAround && seen.head_cells >= kMinHeadCells; ++looks) {
+      const std::array<float, 4> around = box_of(seen.cells);
+      if (looks > 0 && is_same(around, box)) break;
+      box = around;
+      seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), roll_rad,
+                                       encoder_.spec()));
+    }
+    if (seen.head_cells >= kMinHeadCells && seen.sigma_dm <= kMaxFoundSigma_dm) return {box, std::move(seen)};
   }
   throw Error(MAQ_ERROR_NOT_FOUND, "No head is seen in the photo of ", photo.width_px, " x ", photo.height_px,
               " pixels. Give the box of the head, or a photo where it is larger.");
 }
 
 void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
-  const bool was_given = is_given(hints.box_px);
-  std::array<float, 4> box = was_given ? hints.box_px : find_head(photo, hints.roll_rad);
+  std::array<float, 4> box = hints.box_px;
   Seen seen;
-  HeadSquare square;
-  for (int looks = was_given ? 1 : kLooksAround; looks > 0; --looks) {
-    square =
-        square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), hints.roll_rad, encoder_.spec());
-    seen = look(photo, square);
-    if (seen.head_cells < kMinHeadCells) {
+  if (is_given(box)) {
+    seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), hints.roll_rad,
+                                     encoder_.spec()));
+    if (seen.head_cells < kMinHeadCells || seen.sigma_dm > kMaxSigma_dm) {
       throw Error(MAQ_ERROR_NOT_FOUND, "No head is seen in the box (", box[0], ", ", box[1], ") to (", box[2], ", ",
                   box[3], ") of the photo. Give the box of the head with its hair, and its roll where it leans.");
     }
-    if (looks == 1) break;
-    const std::array<float, 4> around = box_of(seen.cells);
-    if (is_same(around, box)) break;
-    box = around;
+  } else {
+    std::tie(box, seen) = find_head(photo, hints.roll_rad);
   }
   const double long_side = std::max(photo.width_px, photo.height_px);
   HeadPhoto made;
@@ -202,7 +218,7 @@ void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
   made.rgb = encoding_.rgb;
   made.codes = encoding_.codes;
   const double cells = double(made.seen.cells.size());
-  if (texture_.side_px > 0) crops_.push_back(texture_crop(photo, square, texture_.side_px));
+  if (texture_.side_px > 0) crops_.push_back(texture_crop(photo, seen.square, texture_.side_px));
   photos_.push_back(std::move(made));
   found_.push_back({box, double(seen.head_cells) / cells, false, 0, 0});
 }

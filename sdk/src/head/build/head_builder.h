@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/worker_threads.h"
@@ -69,13 +70,15 @@ class HeadBuilder {
 
  private:
   struct Seen {
+    HeadSquare square;
     HeadObservations cells;
     size_t head_cells = 0;  // of which the matte says that they show the head
+    double sigma_dm = 0;    // of these, the median of the encoder's
   };
   void look_at(const ImageView& photo, const PhotoHints& hints);
   Seen look(const ImageView& photo, const HeadSquare& square);
-  // Where the head is in a photo whose app does not know. Throws MAQ_ERROR_NOT_FOUND.
-  std::array<float, 4> find_head(const ImageView& photo, double roll_rad);
+  // Where the head is in a photo whose app does not know, and what is seen there. Throws MAQ_ERROR_NOT_FOUND.
+  std::pair<std::array<float, 4>, Seen> find_head(const ImageView& photo, double roll_rad);
   StoredHead fit_photos(double seconds, const Progress& progress);
 
   HeadBundle bundle_;

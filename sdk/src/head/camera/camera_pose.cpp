@@ -315,14 +315,12 @@ bool is_usable(const Correspondence& point) {
 
 const char* pose_status_text(PoseStatus status) {
   switch (status) {
-    case PoseStatus::kFound: return "The camera is found.";
-    case PoseStatus::kAmbiguous:
-      return "Two cameras explain the points almost alike. Points out of their plane would tell.";
-    case PoseStatus::kTooFewPoints: return "There are less than 4 usable points. Give more.";
-    case PoseStatus::kCollinear:
-      return "The points do not hold the rotation. Give some off their line, or farther apart.";
-    case PoseStatus::kNoConsensus: return "No camera explains enough of the points. Check them and their sigmas.";
-    case PoseStatus::kMirrored: return "Only a mirrored picture explains the points. Flip it.";
+    case PoseStatus::kFound: return "It is seen from a known side.";
+    case PoseStatus::kAmbiguous: return "It may be turned in two ways, which look almost alike.";
+    case PoseStatus::kTooFewPoints: return "Too little of it is seen.";
+    case PoseStatus::kCollinear: return "What is seen of it does not tell how it is turned.";
+    case PoseStatus::kNoConsensus: return "What is seen does not fit a head from any side.";
+    case PoseStatus::kMirrored: return "What is seen fits a head only in a mirrored photo.";
   }
   return "";
 }

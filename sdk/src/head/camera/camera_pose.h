@@ -32,7 +32,7 @@ enum class PoseStatus {
   kMirrored,      // only a mirrored picture does, or, the same to the pixels, a head behind the camera
 };
 
-// A sentence for the log.
+// A sentence for who took the photo: what of the head ("it") is seen.
 const char* pose_status_text(PoseStatus status);
 
 struct CameraPose {

@@ -127,7 +127,7 @@ TEST_F(ShippedHeads, AMirroredPhotoShowsTheHeadFromTheOtherSide) {
   EXPECT_NEAR(made.pitch_deg(), as_it_is.pitch_deg(), 8);
 }
 
-TEST_F(ShippedHeads, TurnedPhotosShowTheSameHeadWhereTheirRollIsTold) {
+TEST_F(ShippedHeads, RotatedPhotosShowTheSameHeadWhereTheirRollIsTold) {
   const Made as_it_is = make(photo_);
   const cv::Point2f middle(227, 101);  // of the head
   for (const double roll_deg : {-120.0, -35.0, 20.0, 90.0, 180.0}) {

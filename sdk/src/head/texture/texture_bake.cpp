@@ -136,7 +136,7 @@ double seen_fraction(const RasterImage& depths, double x, double y, double depth
       seen += nearest == 0 || depth <= double(nearest) + kHiddenBehind_dm;
     }
   }
-  return smooth_step(seen / 25.0, 0.6, 1);
+  return smooth_step(seen / 25.0, 0.8, 1);
 }
 
 // What one photo says. Its weight is a confidence, 0 to 1.

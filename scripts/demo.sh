@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs the built SDK on the bundled photo, clip, depth picture and room, and on a real place: scripts/demo.sh [OUTPUT_FOLDER]
+# Runs the built SDK on the bundled photo (people, a head of one), clip, depth picture and room, and on a real place:
+# scripts/demo.sh [OUTPUT_FOLDER]
 #
 # The real place is fetched once (box, or what is in .data/places/real), which needs Python 3.11 and some minutes; without a
 # network the demo says so and goes on. REAL=no leaves it out.
@@ -19,6 +20,10 @@ for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
     printf '\n== maquette densepose %s --out %s --overlay\n' "$source" "$out"
     "$maquette" densepose "$source" --out "$out" --overlay
 done
+
+# A head of the person in the photo, and a clip of it turning.
+printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --preview %s/head_turning.mp4\n' "$out" "$out"
+"$maquette" head tests/media/photo.jpg --out "$out/head.glb" --preview "$out/head_turning.mp4"
 
 # The edges of a carton that a depth camera sees, and its size beside the true one.
 depth='image:tests/media/box_depth.png?depth_unit=0.001&fx=600'
@@ -85,4 +90,4 @@ fi
 printf '\nPictures to look at, in %s:\n' "$out"
 find "$out" -name '*_overlay.*' -o -name '*.mp4' | sort | sed 's/^/  /'
 printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/formats.md); <place>.maqs, scenes;\n'
-printf 'box_depth_distance.png and box_depth_kind.png, the field of edges; box_depth_curves.step, .dxf and .json, its curves.\n'
+printf 'box_depth_distance.png and box_depth_kind.png, the field of edges; box_depth_curves.step, .dxf and .json, its curves; head.glb.\n'

@@ -1,4 +1,4 @@
-"""Opens every view of the desktop demo, on rendered people, a clip, a room and solids: the pictures of its guide.
+"""Opens every view of the desktop demo, on rendered people, a clip, a room, solids, a photo: pictures of its guide.
 
 scripts/install-packages.sh test && make build && scripts/make-venv.sh
 .venv/bin/python scripts/desktop-demo-pictures.py
@@ -25,6 +25,8 @@ ROOM = ("tests/media/room", 20)
 # With the pointer near a corner of a carton.
 SOLIDS = ("stub:solids?scene=room&seed=2&size=640x480", 20)
 POINTER = ("--pointer", "581,402")
+PHOTO = ("tests/media/photo.jpg", 12)
+HEADS = [("--shading", "colour"), ("--shading", "normals"), ("--compare", "slider")]
 
 
 def shown(source: str, frames: int, folder: Path, *options: str) -> np.ndarray:
@@ -56,7 +58,7 @@ def main() -> None:
     def keep(name: str, picture: np.ndarray) -> None:
         cv2.imwrite(str(options.out / name), picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
-    with tempfile.TemporaryDirectory() as temporary, tqdm(total=17, unit="picture") as progress:
+    with tempfile.TemporaryDirectory() as temporary, tqdm(total=20, unit="picture") as progress:
 
         def run(source: tuple[str, int], *arguments: str) -> np.ndarray:
             picture = shown(*source, Path(temporary), *arguments)
@@ -72,6 +74,7 @@ def main() -> None:
             "desktop-scene.jpg",
             sheet([run(ROOM, "--compare", c)[44:756, :950] for c in ("none", "slider", "error")], 3, 520),
         )
+        keep("desktop-head.jpg", sheet([run(PHOTO, "--head", *h)[44:756, :950] for h in HEADS], 3, 520))
         keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 
 

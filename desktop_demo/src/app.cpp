@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
+#include <utility>
 
 namespace fs = std::filesystem;
 
@@ -25,6 +27,8 @@ App::App(const Options& options)
       people_(context_, options, window_, painter_),
       edges_(context_, options, window_, painter_),
       scene_(context_, options, window_, painter_),
+      head_(context_, options, window_, painter_),
+      seeks_head_(options.head),
       saver_(context_, options.out) {
   if (!options.texture.empty()) load_outfit(options.texture);
   if (options.edges) live_ = &edges_;
@@ -52,7 +56,12 @@ int App::run() {
 void App::draw_frame(double seconds) {
   take_drops();
   if (outfits_.take()) painter_.set_outfit(outfits_.front());
-  const bool has_new_image = view_->update();
+  bool has_new_image = view_->update();
+  if (seeks_head_ && has_new_image) {
+    seeks_head_ = false;
+    show_head(false);
+    has_new_image = false;
+  }
   take_keys();
   const Rect all = window_.rect();
   const int panel_px = shows_panel_ ? std::min(int(330 * window_.scale()), all.width / 2) : 0;
@@ -132,7 +141,10 @@ void App::perform(Action action) {
     case Action::kNone: break;
     case Action::kOpenCamera: live_->open_camera(); break;
     case Action::kOtherView: view_ == &edges_ ? show(people_) : show(edges_); break;
-    case Action::kLeaveScene: show(*live_); break;
+    case Action::kBack: show(*live_); break;
+    case Action::kHead: show_head(false); break;
+    case Action::kAddToHead: show_head(true); break;
+    case Action::kExport: head_.export_head(saver_); break;
     case Action::kHelp: shows_help_ = !shows_help_; break;
     case Action::kSnapshot: saver_.save_snapshot(window_.read_pixels(view_->image_rect()), view_->companions()); break;
     case Action::kClip: saver_.has_clip() ? saver_.end_clip() : saver_.begin_clip(view_->images_per_second()); break;
@@ -147,6 +159,14 @@ void App::show(LiveView& view) {
     each->set_visible(each == &view);
   }
   if (!view.has_source()) view.open_first();
+}
+
+void App::show_head(bool adds_photo) {
+  std::optional<maquette::LiveHeadPhoto> photo = people_.head_photo();
+  if (!photo) return;
+  people_.set_visible(false);
+  view_ = &head_;
+  head_.fit(std::move(*photo), adds_photo && head_.has_head());
 }
 
 void App::open(const std::string& path_or_uri) {

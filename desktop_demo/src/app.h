@@ -6,13 +6,14 @@
 #include <string>
 
 #include "edges_view.h"
+#include "head_view.h"
 #include "options.h"
-#include "painter.h"
 #include "panel.h"
 #include "people_view.h"
 #include "scene_view.h"
+#include "screen/painter.h"
+#include "screen/window.h"
 #include "ui_times.h"
-#include "window.h"
 
 class App {
  public:
@@ -28,6 +29,7 @@ class App {
   void perform(Action action);
   void show(LiveView& view);  // in place of the one that is shown
   void open(const std::string& path_or_uri);
+  void show_head(bool adds_photo);
   void load_outfit(const std::string& path);
   int report(const maquette::RgbaImage& screenshot);
 
@@ -40,8 +42,10 @@ class App {
   PeopleView people_;
   EdgesView edges_;
   SceneView scene_;
+  HeadView head_;
   LiveView* live_ = &people_;  // or &edges_: shown, or behind the scene
-  MainView* view_ = &people_;  // live_ or &scene_
+  MainView* view_ = &people_;  // live_, &scene_ or &head_
+  bool seeks_head_ = false;    // of the first picture
   bool shows_panel_ = true, shows_help_ = false;
   maquette::TripleBuffer<maquette::RgbaImage> outfits_;
   maquette::Saver saver_;  // last: its jobs use the others

@@ -5,7 +5,7 @@
 #include <imgui.h>
 #include <string>
 
-#include "window.h"
+#include "screen/window.h"
 
 class EdgesDrawing {
  public:

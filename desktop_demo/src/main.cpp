@@ -1,4 +1,4 @@
-// maquette-demo: a person's own body surface, live from a webcam; scenes; edges of a depth camera.
+// maquette-demo: a person's own body surface, live from a webcam; scenes; edges of a depth camera; heads.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -24,6 +24,7 @@ int main(int argc, char** argv) try {
   Options options;
   options.bundle = shared_file("MAQ_BUNDLE", "models/densepose-b-int8");
   options.scene_bundle = shared_file("MAQ_SCENE_BUNDLE", "models/scenes-int8");
+  options.heads_bundle = shared_file("MAQ_HEADS_BUNDLE", "models/heads-int8");
   options.edges_bundle = shared_file("MAQ_EDGES_BUNDLE", "models/edges-int8");
   options.texture = shared_file("MAQ_DEMO_OUTFIT", "demo/outfit.png");
   if (!fs::exists(options.texture)) options.texture.clear();
@@ -31,15 +32,16 @@ int main(int argc, char** argv) try {
   // A thread that stays awake takes a core from the window.
   options.model.allow_spinning = options.edges_model.edges.allow_spinning = 0;
   bool part_only = false, skip_planes = false;
-  std::string path, view = "parts", compare = "none", layer = "depth", size = "1280x800";
+  std::string path, view = "parts", compare = "none", layer = "depth", shading = "colour", size = "1280x800";
 
   CLI::App cli(
       "Shows the body surface of the people before the camera, live, on the processor alone; flies through scenes;\n"
-      "shows sharp edges in depth.\n\n"
+      "shows sharp edges in depth; makes 3D heads.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
       "  maquette-demo room.maqs --capture room --compare slider\n"
+      "  maquette-demo photo.jpg --head      a 3D head of the person in a photo, or in the first picture of a camera\n"
       "  maquette-demo --edges               edges and sizes of solids; or of a depth camera, a recording, a picture:\n"
       "  maquette-demo --edges 'image:depth.png?depth_unit=0.001&fov=60'\n"
       "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
@@ -56,6 +58,12 @@ int main(int argc, char** argv) try {
   cli.add_flag("--curves,!--no-curves", options.edges_model.finds_curves, "Of edges, with corners and boxes");
   cli.add_flag("--boxes,!--no-boxes", options.edges_model.finds_boxes, "Measured, of edges");
   cli.add_flag("--skip-planes", skip_planes, "Edges: the network runs where depth is not plane; faster");
+  cli.add_flag("--head", options.head, "A 3D head of the person in the first picture; later by the key G")
+      ->excludes("--edges");
+  cli.add_option("--shading", shading, "Of heads")->capture_default_str()->check(CLI::IsMember(kShadingNames));
+  cli.add_option("--fit-seconds", options.fit_seconds, "Of heads: the time for the fit to the pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 3600.0));
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");
@@ -63,12 +71,13 @@ int main(int argc, char** argv) try {
       ->check(CLI::ExistingFile);
   cli.add_option("--capture", options.capture, "Folder of the photos that the scene file was made of")
       ->check(CLI::ExistingDirectory);
-  cli.add_option("--compare", compare, "Photo against rendering")
+  cli.add_option("--compare", compare, "Photo against rendering; of heads: slider")
       ->capture_default_str()
       ->check(CLI::IsMember(kCompareNames));
   cli.add_option("--bundle", options.bundle, "Folder of the dense pose networks");
   cli.add_option("--scene-bundle", options.scene_bundle, "Folder of the scene networks");
   cli.add_option("--edges-bundle", options.edges_bundle, "Folder of the edge network");
+  cli.add_option("--heads-bundle", options.heads_bundle, "Folder of the heads' network");
   cli.add_option("--threads", options.model.threads, "Of the networks; 0: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
   cli.add_option("--key-frames", options.model.key_frame_interval, "People are looked for in one of so many frames")
@@ -95,6 +104,8 @@ int main(int argc, char** argv) try {
   options.view = View(std::find(kViewNames.begin(), kViewNames.end(), view) - kViewNames.begin());
   const auto& layers = maquette::kEdgeLayerNames;
   options.layer = maquette::EdgeLayer(std::find(layers.begin(), layers.end(), layer) - layers.begin());
+  options.shading = maq_head_shading(std::find(kShadingNames.begin(), kShadingNames.end(), shading) -
+                                     kShadingNames.begin() + int(MAQ_HEAD_SHADING_COLOUR));
   options.compare = Compare(std::find(kCompareNames.begin(), kCompareNames.end(), compare) - kCompareNames.begin());
   const bool is_size = std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
   if (!is_size || std::min(options.width_px, options.height_px) < 64 ||

@@ -1,4 +1,5 @@
-// What fills the window beside the panel: people (PeopleView), edges (EdgesView) or a scene (SceneView).
+// What fills the window beside the panel: people (PeopleView), edges (EdgesView), a scene (SceneView) or a head
+// (HeadView).
 #pragma once
 
 #include <app/saver.h>
@@ -6,12 +7,24 @@
 #include <string>
 
 #include "options.h"
-#include "painter.h"
+#include "screen/painter.h"
+#include "screen/window.h"
 #include "stage_chart.h"
-#include "window.h"
 
 // What the user wants that is not the view's own business, by a key or a button.
-enum class Action { kNone, kOpenCamera, kOtherView, kLeaveScene, kSnapshot, kClip, kRecord, kHelp };
+enum class Action {
+  kNone,
+  kOpenCamera,
+  kOtherView,
+  kHead,       // of the person in the picture
+  kAddToHead,  // the picture, for the head so far
+  kBack,       // to the live view
+  kExport,     // the head
+  kSnapshot,
+  kClip,
+  kRecord,
+  kHelp
+};
 
 // What pointer and arrow keys did since the last frame.
 struct Steering {

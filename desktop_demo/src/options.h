@@ -17,9 +17,16 @@ constexpr std::array<const char*, 6> kViewNames = {"camera", "parts", "contours"
 enum class Compare { kNone, kSlider, kError };
 constexpr std::array<const char*, 3> kCompareNames = {"none", "slider", "error"};
 
+// In the order of maq_head_shading.
+constexpr std::array<const char*, 5> kShadingNames = {"colour", "shape", "normals", "template", "depth"};
+
 struct Options {
   std::string source = kFirstCamera;  // or a file, a folder with a capture
   bool edges = false;                 // of the source, rather than people
+  bool head = false;                  // of the person in its first picture
+  maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
+  double fit_seconds = 3;  // of a head
+  std::string heads_bundle;
   View view = View::kParts;
   bool mesh = true;
   std::string texture, capture, scene_bundle;

@@ -4,7 +4,7 @@
 #include <app/process_load.h>
 
 #include "main_view.h"
-#include "window.h"
+#include "screen/window.h"
 
 class Panel {
  public:

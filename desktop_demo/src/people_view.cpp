@@ -54,7 +54,20 @@ bool PeopleView::update() {
   return true;
 }
 
+std::optional<maquette::LiveHeadPhoto> PeopleView::head_photo() const {
+  if (frame().number == 0) return std::nullopt;
+  maquette::LiveHeadPhoto photo{frame().camera, {}};
+  const auto area = [](const std::array<float, 4>& box) { return (box[2] - box[0]) * (box[3] - box[1]); };
+  for (uint32_t i = 0; i < frame().people.size(); ++i) {
+    const auto box = frame().result->head_box_px(i);
+    if (box && (!photo.box_px || area(*box) > area(*photo.box_px))) photo.box_px = box;
+  }
+  return photo;
+}
+
 Action PeopleView::press(int key) {
+  if (key == GLFW_KEY_G) return Action::kHead;
+  if (key == GLFW_KEY_A) return Action::kAddToHead;
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) view_ = View(key - GLFW_KEY_1);
   if (key == GLFW_KEY_M) shows_mesh_ = !shows_mesh_;
   return LiveView::press(key);
@@ -132,6 +145,9 @@ Action PeopleView::draw_panel() {
                      stats.network_width_px, stats.network_height_px);
   draw_model_options();
   if (ImGui::Button("Edges of a depth camera (F5)")) action = Action::kOtherView;
+  if (ImGui::Button("Head of this person (G)")) action = Action::kHead;
+  ImGui::SameLine();
+  if (ImGui::Button("add (A)")) action = Action::kAddToHead;
   return action;
 }
 

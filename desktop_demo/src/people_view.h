@@ -2,8 +2,10 @@
 #pragma once
 
 #include <app/live_densepose.h>
+#include <app/live_head.h>
 #include <app/mapped_frame.h>
 #include <app/triple_buffer.h>
+#include <optional>
 #include <vector>
 
 #include "live_view.h"
@@ -13,6 +15,9 @@ class PeopleView final : public LiveView {
   PeopleView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter);
 
   bool is_trying_on() const { return view_ == View::kTryOn; }
+
+  // What is shown, with the largest head; nothing before the first picture.
+  std::optional<maquette::LiveHeadPhoto> head_photo() const;
 
   bool update() override;
   Action press(int key) override;

@@ -48,7 +48,7 @@ Action SceneView::press(int key) {
   if (key == GLFW_KEY_N) fly_to_nearest_photo();
   if (key == GLFW_KEY_COMMA) fly_to_photo(photo_ - 1);
   if (key == GLFW_KEY_PERIOD) fly_to_photo(photo_ + 1);
-  return key == GLFW_KEY_X ? Action::kLeaveScene : Action::kNone;
+  return key == GLFW_KEY_X ? Action::kBack : Action::kNone;
 }
 
 void SceneView::set_compare(Compare compare) {
@@ -187,7 +187,7 @@ Action SceneView::draw_panel() {
   stages_.draw(kStages, std::size(kStages), window_.scale());
   if (!scene->photos.empty()) draw_photo_buttons();
   ImGui::TextWrapped("Fly: W A S D, Q E down and up, mouse or arrows to look, wheel to zoom.");
-  return ImGui::Button("Back to people (X)") ? Action::kLeaveScene : Action::kNone;
+  return ImGui::Button("Back to people (X)") ? Action::kBack : Action::kNone;
 }
 
 void SceneView::draw_facts() const {

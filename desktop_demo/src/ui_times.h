@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "window.h"
+#include "screen/window.h"
 
 class UiTimes {
  public:

@@ -1,29 +1,16 @@
 #include "app/live_scene.h"
 
-#if defined(__linux__)
-#include <sys/resource.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-#endif
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <new>
 
+#include "app/thread_priority.h"
+
 namespace maquette {
 namespace {
 
 constexpr double kMaxWidthPx = 1280, kMaxHeightPx = 960;
-constexpr int kNice = 5;
-
-// So that drawing goes first; threads that this one starts inherit it.
-void lower_priority_of_this_thread() {
-#if defined(__linux__)
-  const id_t thread = id_t(syscall(SYS_gettid));
-  setpriority(PRIO_PROCESS, thread, std::min(19, getpriority(PRIO_PROCESS, thread) + kNice));
-#endif
-}
 
 maq_pinhole_camera within_limits(maq_pinhole_camera camera) {
   const double scale = std::min(kMaxWidthPx / camera.intrinsics.width_px, kMaxHeightPx / camera.intrinsics.height_px);

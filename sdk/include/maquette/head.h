@@ -13,7 +13,7 @@
 #ifndef MAQUETTE_HEAD_H_
 #define MAQUETTE_HEAD_H_
 
-#include "maquette/frame.h"
+#include "maquette/capture.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -237,6 +237,121 @@ MAQ_API maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options
  * above. One at a time, with maq_head_get_mesh. Errors: as maq_head_get_mesh, and MAQ_ERROR_UNWRITABLE. Blocks while
  * the mesh is made and written. */
 MAQ_API maq_status maq_head_export(maq_head* head, const char* path, const maq_head_mesh_options* options);
+
+/* ---- Previews ---- */
+
+/* Receives the head as far as it is fitted, on the thread of maq_head_builder_fit, which waits: the callback's time is
+ * a part of the fit's. `head` is the callback's, to be given to maq_head_destroy. It must not call the builder, nor
+ * throw. */
+typedef void (*maq_head_preview_callback)(void* user_data, maq_head* head);
+
+/* Has `preview` called during every later maq_head_builder_fit: with the head that the network saw, then every
+ * `interval_s` seconds (0 to 3600); not where the fit is given no time. NULL: no longer. `user_data` is passed to it.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_head_builder_set_preview(maq_head_builder* builder, double interval_s,
+                                                maq_head_preview_callback preview, void* user_data);
+
+/* ---- Pictures ----
+ *
+ *   maq_head_renderer_create(context, NULL, head, &renderer);
+ *   maq_head_renderer_get_camera(renderer, 0.5, 0, 640, 480, &camera);  or one of the app, or maq_head_get_camera
+ *   maq_head_renderer_run(renderer, &camera, &image);
+ *   maq_head_image_save(image, "head.png", 1);
+ */
+
+typedef struct maq_head_renderer maq_head_renderer;
+typedef struct maq_head_image maq_head_image;
+
+/* What the colours of a picture show. */
+typedef enum maq_head_shading {
+  MAQ_HEAD_SHADING_COLOUR = 1,   /* the head's colours, in soft light */
+  MAQ_HEAD_SHADING_SHAPE = 2,    /* grey, in soft light */
+  MAQ_HEAD_SHADING_NORMALS = 3,  /* red to the right, green up, blue to the camera, as in normal maps */
+  MAQ_HEAD_SHADING_TEMPLATE = 4, /* template points: red to the person's left, green to the back, blue up */
+  MAQ_HEAD_SHADING_DEPTH = 5     /* near is white, far is black */
+} maq_head_shading;
+
+typedef struct maq_head_renderer_config {
+  uint32_t struct_size;
+  int32_t threads;                   /* 1 to 64; 0 (default): the machine's large cores, at most 4 */
+  const maq_head_mesh_options* mesh; /* that is drawn; default NULL: the defaults. Read once. */
+  double near_m;                     /* what is nearer to the camera, along its axis, is not drawn; default 0.01 */
+  maq_head_shading shading;          /* default MAQ_HEAD_SHADING_COLOUR */
+  float light;            /* how much darker is what is turned away from the light, 0 (not at all) to 1 (black); default
+                             0.35 */
+  int32_t smooth_edges;   /* 1 (default): edges are drawn with four samples a pixel; 0: with one, which is faster */
+  int32_t use_background; /* 1: pictures are composed over `background` by their alpha; 0 (default): they are not, and
+                             colours are 0 where there is no head */
+  uint8_t background[3];  /* red, green, blue; with use_background */
+  uint32_t image_pool_size; /* images the app may hold at once, 1 to 64; default 4 */
+} maq_head_renderer_config;
+
+/* The planes of an image, each of the camera's size. */
+typedef enum maq_head_plane {
+  MAQ_HEAD_PLANE_BGR = 1,     /* three bytes a pixel: blue, green, red; what maq_head_shading says */
+  MAQ_HEAD_PLANE_ALPHA = 2,   /* one byte a pixel: coverage by the head, 0 to 255 */
+  MAQ_HEAD_PLANE_DEPTH = 3,   /* a float a pixel: metres along the optical axis; 0 where there is no head */
+  MAQ_HEAD_PLANE_NORMALS = 4, /* three floats a pixel: outwards, in the camera (x to the right, y down, z forward), of
+                                 length 1; 0 where there is no head */
+  MAQ_HEAD_PLANE_TEMPLATE_POINTS = 5 /* three floats a pixel: metres, on the template head; 0 where there is no head */
+} maq_head_plane;
+
+/* Gets the camera of a photo that the head was fitted to, by its index below photo_count of maq_head_info: what
+ * maq_head_renderer_run draws with it lies on the head in the photo. The caller sets camera->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
+MAQ_API maq_status maq_head_get_camera(const maq_head* head, uint32_t index, maq_pinhole_camera* camera);
+
+/* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_head_renderer_config) of the
+ * caller. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_head_renderer_config_init(maq_head_renderer_config* config, uint32_t struct_size);
+
+/* Creates a renderer of a head, which it needs no longer afterwards. `config` may be NULL for the defaults. `*renderer`
+ * is the caller's, to be given to maq_head_renderer_destroy.
+ * One at a time with maq_head_get_mesh of the head, whose mesh is made or used. Errors: MAQ_ERROR_INVALID_ARGUMENT,
+ * MAQ_ERROR_UNSUPPORTED (it has no surface), MAQ_ERROR_OUT_OF_MEMORY. Blocks while the mesh is made, a second or less
+ * with the defaults. */
+MAQ_API maq_status maq_head_renderer_create(maq_context* context, const maq_head_renderer_config* config,
+                                            maq_head* head, maq_head_renderer** renderer);
+
+/* Frees the renderer (NULL is fine). Images still held stay valid until they are released.
+ * Once for each renderer, from any thread, while it does not render. Does not block. */
+MAQ_API void maq_head_renderer_destroy(maq_head_renderer* renderer);
+
+/* Fills `camera` with one that sees the whole head from far enough, whichever way it is turned, in a picture of
+ * width_px x height_px. `yaw_rad`: how far it stands to the person's left of the front, `pitch_rad`: how far above. The
+ * caller sets camera->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (an angle that is not finite), MAQ_ERROR_IMAGE_SIZE. Does not block.
+ */
+MAQ_API maq_status maq_head_renderer_get_camera(const maq_head_renderer* renderer, double yaw_rad, double pitch_rad,
+                                                int32_t width_px, int32_t height_px, maq_pinhole_camera* camera);
+
+/* Has later pictures show something else.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_head_renderer_set_shading(maq_head_renderer* renderer, maq_head_shading shading);
+
+/* Renders the head as the camera sees it, in a picture of the camera's size. The world is that of the head: metres, x
+ * to the person's left, y to the back, z up. The camera should be outside of the head: it has no inside. `*image` comes
+ * from a pool of image_pool_size: give it back with maq_head_image_release.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, or one with distortion), MAQ_ERROR_IMAGE_SIZE,
+ * MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_OUT_OF_MEMORY. Blocks while it renders, milliseconds. */
+MAQ_API maq_status maq_head_renderer_run(maq_head_renderer* renderer, const maq_pinhole_camera* camera,
+                                         maq_head_image** image);
+
+/* Gives the image back (NULL is fine). Pointers into it are invalid afterwards.
+ * Once for each image, from any thread. Does not block. */
+MAQ_API void maq_head_image_release(maq_head_image* image);
+
+/* Gets a plane: rows of `*stride_bytes` bytes, inside the image.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_head_image_get_plane(const maq_head_image* image, maq_head_plane plane, const void** pixels,
+                                            size_t* stride_bytes);
+
+/* Writes the colours to a file, in the format of the path's extension: PNG (.png), lossless, with alpha where
+ * `with_alpha` is 1, or JPEG (.jpg, .jpeg) at quality 95, without alpha. The file is written atomically and replaces
+ * an existing one; its folder must exist.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension, alpha in a JPEG file), MAQ_ERROR_UNWRITABLE,
+ * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is written. */
+MAQ_API maq_status maq_head_image_save(const maq_head_image* image, const char* path, int32_t with_alpha);
 
 #ifdef __cplusplus
 }

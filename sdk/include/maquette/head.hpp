@@ -4,6 +4,7 @@
 
 #include <exception>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -62,6 +63,14 @@ class Head {
     landmark.struct_size = sizeof landmark;
     check(maq_head_get_landmark(get(), name.c_str(), &landmark));
     return landmark;
+  }
+
+  // Of the photo at `index`, below info().photo_count.
+  maq_pinhole_camera camera(uint32_t index) const {
+    maq_pinhole_camera camera{};
+    camera.struct_size = sizeof camera;
+    check(maq_head_get_camera(get(), index, &camera));
+    return camera;
   }
 
   // Its arrays are this object's, until a mesh with other options is asked for.
@@ -125,6 +134,18 @@ class HeadBuilder {
     return Head(fitted);
   }
 
+  // `preview` gets the head so far during fits, which wait: first what the network saw, then every `interval_s`
+  // seconds. It may not throw. An empty one: no longer.
+  void set_preview(double interval_s, std::function<void(Head)> preview) {
+    auto kept = preview ? std::make_unique<std::function<void(Head)>>(std::move(preview)) : nullptr;
+    const auto pass_on = [](void* user_data, maq_head* head) {
+      (*static_cast<std::function<void(Head)>*>(user_data))(Head(head));
+    };
+    check(maq_head_builder_set_preview(get(), interval_s,
+                                       kept ? static_cast<maq_head_preview_callback>(pass_on) : nullptr, kept.get()));
+    preview_ = std::move(kept);
+  }
+
   // From any thread: what runs, or else the next, throws Error with MAQ_CANCELLED.
   void cancel() { check(maq_head_builder_cancel(get())); }
 
@@ -149,7 +170,65 @@ class HeadBuilder {
     owner_.reset(made);
   }
 
+  std::unique_ptr<std::function<void(Head)>> preview_;  // where the builder finds it, also when this is moved
   Owner<maq_head_builder, maq_head_builder_destroy> owner_;
+};
+
+inline maq_head_renderer_config default_head_renderer_config() {
+  maq_head_renderer_config config;
+  check(maq_head_renderer_config_init(&config, sizeof config));
+  return config;
+}
+
+class HeadImage {
+ public:
+  // Takes over an image of the C API.
+  explicit HeadImage(maq_head_image* image) : owner_(image) {}
+
+  maq_head_image* get() const { return owner_.get(); }
+
+  // Rows of *stride_bytes.
+  const void* plane(maq_head_plane plane, size_t* stride_bytes) const {
+    const void* pixels = nullptr;
+    check(maq_head_image_get_plane(get(), plane, &pixels, stride_bytes));
+    return pixels;
+  }
+
+  void save(const std::string& path, bool with_alpha = false) const {
+    check(maq_head_image_save(get(), path.c_str(), with_alpha ? 1 : 0));
+  }
+
+ private:
+  Owner<maq_head_image, maq_head_image_release> owner_;
+};
+
+class HeadRenderer {
+ public:
+  HeadRenderer(const Context& context, const maq_head_renderer_config& config, Head& head) {
+    maq_head_renderer* made = nullptr;
+    check(maq_head_renderer_create(context.get(), &config, head.get(), &made));
+    owner_.reset(made);
+  }
+
+  maq_head_renderer* get() const { return owner_.get(); }
+
+  maq_pinhole_camera camera(double yaw_rad, double pitch_rad, int width_px, int height_px) const {
+    maq_pinhole_camera camera{};
+    camera.struct_size = sizeof camera;
+    check(maq_head_renderer_get_camera(get(), yaw_rad, pitch_rad, width_px, height_px, &camera));
+    return camera;
+  }
+
+  void set_shading(maq_head_shading shading) { check(maq_head_renderer_set_shading(get(), shading)); }
+
+  HeadImage run(const maq_pinhole_camera& camera) {
+    maq_head_image* image = nullptr;
+    check(maq_head_renderer_run(get(), &camera, &image));
+    return HeadImage(image);
+  }
+
+ private:
+  Owner<maq_head_renderer, maq_head_renderer_destroy> owner_;
 };
 
 }  // namespace maquette

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "api/boundary.h"
+#include "api/camera_argument.h"
 #include "api/edges_handle.h"
 #include "core/clock.h"
 #include "core/worker_threads.h"
@@ -93,11 +94,7 @@ maq_status maq_edges_fusion_add_view(maq_edges_fusion* fusion, const maq_edges_r
     require_argument(result, "result");
     require_argument(camera, "camera");
     require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
-    const maq_intrinsics& lens = camera->intrinsics;
-    PinholeCamera pose;
-    pose.intrinsics() = {lens.width_px, lens.height_px, lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px};
-    std::copy_n(camera->rotation, 9, pose.rotation.begin());
-    std::copy_n(camera->centre, 3, pose.centre.begin());
+    const PinholeCamera pose = pinhole_of(*camera);
     const EdgeField& field = result->result.field;
     const EdgeCurves& curves = fusion->extractor.extract(field);
     fusion->fields.add_view(field, pose);

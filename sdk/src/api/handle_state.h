@@ -30,7 +30,9 @@ enum class HandleKind : uint32_t {
   kEdgesCurves,
   kEdgesFusion,
   kHead,
-  kHeadBuilder
+  kHeadBuilder,
+  kHeadRenderer,
+  kHeadImage
 };
 
 class HandleState {

@@ -1,6 +1,5 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "arguments/picture_size.h"
 #include "commands/scene_commands.h"
 #include "commands/scene_flight.h"
 #include "interrupt.h"
@@ -45,21 +45,8 @@ struct RenderOptions {
   std::vector<std::string> without;
 };
 
-struct Size {
-  int width_px = 0, height_px = 0;
-};
-
-std::optional<Size> size_of(const std::string& text) {
-  if (text.empty()) return {};
-  Size size;
-  const char* const end = text.data() + text.size();
-  const auto width = std::from_chars(text.data(), end, size.width_px);
-  const bool goes_on = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
-  const auto height = goes_on ? std::from_chars(width.ptr + 1, end, size.height_px) : width;
-  if (!goes_on || height.ec != std::errc() || height.ptr != end || size.width_px < 1 || size.height_px < 1) {
-    throw std::runtime_error("--size " + text + " is not a size; write it as 640x480.");
-  }
-  return size;
+std::optional<PictureSize> size_of(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional(parse_picture_size(text));
 }
 
 maquette::SceneRenderer make_renderer(const maquette::Context& context, const maquette::Scene& scene,
@@ -140,7 +127,7 @@ std::string picture_name(const maq_capture_view& view) { return fs::path(view.na
 
 int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& capture, const RenderOptions& options) {
   const std::vector<uint32_t> views = chosen_views(capture, options.views);
-  const std::optional<Size> size = size_of(options.size);
+  const std::optional<PictureSize> size = size_of(options.size);
   std::set<std::string> names;
   for (const uint32_t index : views) {
     const std::string name = picture_name(capture.view(index));
@@ -179,8 +166,8 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
 
 std::vector<maq_pinhole_camera> flight(const maquette::Scene& scene, const maquette::Capture* capture,
                                        const RenderOptions& options) {
-  constexpr Size kUsual = {640, 480};
-  const Size size = size_of(options.size).value_or(kUsual);
+  constexpr PictureSize kUsual = {640, 480};
+  const PictureSize size = size_of(options.size).value_or(kUsual);
   const int frames = std::max(1, int(std::lround(options.seconds * options.fps)));
   if (options.path == "orbit") return flight_around(scene.info(), size.width_px, size.height_px, frames);
   if (capture == nullptr) {

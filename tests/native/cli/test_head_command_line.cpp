@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 #include <sstream>
 
 #include "support/program_run.h"
@@ -51,6 +52,70 @@ TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
   EXPECT_EQ(document["scale"], "prior");
   EXPECT_EQ(document["landmarks"].size(), 5u);
   EXPECT_GT(document["landmarks"]["crown"]["point_m"][2], 0.08);
+}
+
+TEST_F(HeadCommandLine, AHeadIsRenderedAsPicturesAndClips) {
+  const Outcome made = run("grey.png --box 110,60,200,180 --save head.maqh --preview p/turn.mp4 --seconds 0 --cell 8");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_NE(made.out.find("p/turn.mp4: 150 frames, "), std::string::npos) << made.out;
+  cv::VideoCapture preview(folder_.file("p/turn.mp4"));
+  EXPECT_EQ(preview.get(cv::CAP_PROP_FRAME_WIDTH), 640);
+
+  const Outcome front = run("render head.maqh --out v/front.png --size 160x120 --cell 6");
+  ASSERT_EQ(front.exit_code, 0) << front.err;
+  EXPECT_EQ(front.out, "v/front.png\n");
+  const cv::Mat with_alpha = cv::imread(folder_.file("v/front.png"), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(with_alpha.channels(), 4);
+  ASSERT_EQ(with_alpha.size(), cv::Size(160, 120));
+  EXPECT_EQ(with_alpha.at<cv::Vec4b>(2, 2)[3], 0);
+  EXPECT_EQ(with_alpha.at<cv::Vec4b>(60, 80)[3], 255);
+
+  std::vector<cv::Mat> pictures;
+  for (const char* options : {"", "--shading shape", "--shading normals", "--shading template", "--shading depth",
+                              "--yaw 90", "--pitch 60"}) {
+    const Outcome ran = run(std::string("render head.maqh --out a.png --no-alpha --background 1,2,3 --size 80x60 ") +
+                            "--cell 6 " + options);
+    ASSERT_EQ(ran.exit_code, 0) << options << ran.err;
+    pictures.push_back(cv::imread(folder_.file("a.png"), cv::IMREAD_UNCHANGED));
+    EXPECT_EQ(pictures.back().at<cv::Vec3b>(0, 0), cv::Vec3b(3, 2, 1)) << options;
+    for (size_t i = 0; i + 1 < pictures.size(); ++i) {
+      EXPECT_GT(cv::norm(pictures[i], pictures.back(), cv::NORM_INF), 15) << options << " is as number " << i;
+    }
+  }
+  EXPECT_NEAR(pictures[2].at<cv::Vec3b>(30, 40)[0], 250, 8) << "the face looks to the camera: blue";
+
+  const Outcome photo = run("render head.maqh --out over.png --photo 1 --cell 6");
+  ASSERT_EQ(photo.exit_code, 0) << photo.err;
+  EXPECT_EQ(cv::imread(folder_.file("over.png")).size(), cv::Size(320, 240));
+
+  const Outcome clip = run("render head.maqh --out c.avi --seconds 0.4 --fps 10 --size 64x48 --cell 6");
+  ASSERT_EQ(clip.exit_code, 0) << clip.err;
+  EXPECT_NE(clip.out.find("c.avi: 4 frames, "), std::string::npos) << clip.out;
+  cv::VideoCapture turn(folder_.file("c.avi"));
+  cv::Mat first, second;
+  ASSERT_TRUE(turn.read(first) && turn.read(second));
+  EXPECT_GT(cv::norm(first, second, cv::NORM_INF), 40) << "it turns";
+}
+
+TEST_F(HeadCommandLine, WrongViewsOfAHeadAreASentence) {
+  ASSERT_EQ(run("grey.png --box 110,60,200,180 --save head.maqh --seconds 0").exit_code, 0);
+  expect_error("render head.maqh", 2, "--out is required");
+  expect_error("render --out a.png", 2, "head is required");
+  expect_error("render head.maqh --out a.glb", 2, "must end with .png, .jpg, .mp4 or .avi");
+  expect_error("render head.maqh --out a.png --size big", 1, "--size big is not a size; write it as 640x480");
+  expect_error("render head.maqh --out a.png --size 20000x20000", 1, "20000 x 20000 pixels, over the limit");
+  expect_error("render head.maqh --out a.png --shading x-ray", 2, "--shading");
+  expect_error("render head.maqh --out a.png --pitch 91", 2, "--pitch");
+  expect_error("render head.maqh --out a.png --yaw nan", 1, "must be finite");
+  expect_error("render head.maqh --out a.png --seconds 3", 1, "are for clips");
+  expect_error("render head.maqh --out a.png --photo 2", 1, "so there is no photo 2");
+  expect_error("render head.maqh --out a.mp4 --photo 1", 1, "--photo is one view");
+  expect_error("render head.maqh --out a.png --photo 1 --yaw 3", 1, "--photo is one view");
+  expect_error("render head.maqh --out a.png --background 1,2,300", 2, "--background");
+  expect_error("render none.maqh --out a.png", 1, "none.maqh");
+  expect_error("render grey.png --out a.png", 1, "grey.png");
+  expect_error("grey.png --preview turn.gif", 2, "must end with .png, .jpg, .mp4 or .avi");
+  EXPECT_FALSE(exists("a.png"));
 }
 
 TEST_F(HeadCommandLine, JsonSaysWhatWasFound) {
@@ -110,7 +175,7 @@ TEST_F(HeadCommandLine, OfACrowdEachHeadThatIsSeenIsMade) {
 
 TEST_F(HeadCommandLine, ErrorsSayWhatToDo) {
   expect_error("", 2, "photo is required");
-  expect_error("grey.png", 2, "--out or --save is required");
+  expect_error("grey.png", 2, "--out, --save or --preview is required");
   expect_error("grey.png --out head.stl", 2, "must end with .glb, .obj or .ply");
   expect_error("grey.png --out a.glb --box 1,2,3", 2, "--box");
   expect_error("grey.png --out a.glb --seconds -1", 2, "--seconds");
@@ -131,8 +196,14 @@ TEST_F(HeadCommandLine, ErrorsSayWhatToDo) {
 TEST_F(HeadCommandLine, HelpTeachesWithExamples) {
   const Outcome result = run("--help");
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* text : {"maquette head photo.jpg --out head.glb", "--person all", "biometric", "info"}) {
+  for (const char* text : {"maquette head photo.jpg --out head.glb", "--person all", "--preview turn.mp4", "biometric",
+                           "info", "maquette head render head.maqh"}) {
     EXPECT_NE(result.out.find(text), std::string::npos) << text;
+  }
+  const Outcome render = run("render --help");
+  EXPECT_EQ(render.exit_code, 0);
+  for (const char* text : {"--shading normals --seconds 4", "--photo 1", "near is white"}) {
+    EXPECT_NE(render.out.find(text), std::string::npos) << text;
   }
 }
 

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "head/mesh/marching_cubes.h"
-#include "head/mesh/mesh_cleanup.h"
 #include "head/mesh/mesh_raster.h"
+#include "support/ball_mesh.h"
 #include "support/expect_error.h"
 
 namespace {
@@ -16,20 +15,6 @@ using maq::head::HeadCamera;
 using maq::head::HeadMesh;
 using maq::head::MeshRaster;
 using maq::head::RasterImage;
-
-HeadMesh raster_ball(float cell) {
-  WorkerThreads threads(2);
-  maq::head::MarchingCubesOptions options;
-  options.box_min = {-1.2f, -1.2f, -1.2f}, options.box_max = {1.2f, 1.2f, 1.2f}, options.cell = cell;
-  HeadMesh mesh = marching_cubes(
-      [](const float* x, const float* y, const float* z, float* f, size_t n) {
-        for (size_t i = 0; i < n; ++i) f[i] = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]) - 1;
-      },
-      options, threads);
-  set_normals(mesh);
-  for (const float position : mesh.positions) mesh.colours.push_back(uint8_t(std::lround(127.5f + 100 * position)));
-  return mesh;
-}
 
 // From the front, 6 away: x of the head to the right, z up.
 HeadCamera front(int width_px, int height_px) {
@@ -52,7 +37,7 @@ TEST(MeshRaster, ShowsABallWhereRaysMeetIt) {
   WorkerThreads threads(2);
   MeshRaster raster;
   RasterImage image;
-  const HeadMesh mesh = raster_ball(0.02f);
+  const HeadMesh mesh = ball_mesh(0.02f);
   const HeadCamera camera = front(160, 120);
   maq::head::RasterOptions options;
   options.ambient = 1;
@@ -84,7 +69,7 @@ TEST(MeshRaster, ShowsABallWhereRaysMeetIt) {
 }
 
 TEST(MeshRaster, TwoThreadsDrawThePictureOfOne) {
-  const HeadMesh mesh = raster_ball(0.05f);
+  const HeadMesh mesh = ball_mesh(0.05f);
   WorkerThreads one(1), two(2);
   MeshRaster raster;
   RasterImage a, b;
@@ -99,7 +84,7 @@ TEST(MeshRaster, ClosedMeshesHaveNoHoles) {
   WorkerThreads threads(1);
   MeshRaster raster;
   RasterImage image;
-  const HeadMesh mesh = raster_ball(0.1f);
+  const HeadMesh mesh = ball_mesh(0.1f);
   HeadCamera camera = front(320, 320);
   camera.cx_px = camera.cy_px = 160;  // grid lines of the mesh fall on pixels
   raster.draw(mesh, camera, {}, threads, image);

@@ -27,7 +27,7 @@ SYSTEMS = (
     | CURVES
     | HEAD
     | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/build", "head/bundle", "head/files",
-       "sources", "sources/recording"}
+       "head/render", "sources", "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {
     "core": set(),
@@ -52,6 +52,7 @@ MAY_INCLUDE = {
     "head/files": {"core", "core/math", "head", "head/camera", "head/field"},
     "head/fit": BASE - {"nn"} | {"head", "head/camera", "head/field"},
     "head/mesh": BASE - {"nn"} | {"head/camera"},
+    "head/render": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
@@ -71,6 +72,7 @@ MAY_INCLUDE = {
     "sources/synthetic": BACKEND | {"sources/recording"},
     "pipeline": SYSTEMS | {"core/trace"},
     "api": SYSTEMS | {"pipeline"},
+    "api/head": SYSTEMS | {"api"},
     "api/scene": SCENE | {"api"},
 }  # fmt: skip
 
@@ -81,6 +83,7 @@ TOOLS_MAY_INCLUDE = {
     "arguments": {"."},
     "output": {"."},
     "commands": {".", "arguments", "output"},
+    "commands/head": {".", "arguments", "commands", "output"},
 }
 
 # What the tools compile in of sdk/src and sdk/app: there is one way to write a file that appears whole, and one to draw

@@ -76,12 +76,9 @@ maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhol
   return guarded_alone(renderer, "renderer", __func__, [&] {
     require_argument(camera, "camera");
     require_argument(image, "image");
-    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
-    if (is_distorted(camera->intrinsics)) {
-      throw ArgumentError("camera.intrinsics.distortion is not 0; pictures are rendered without distortion.");
-    }
+    const PinholeCamera from = undistorted_pinhole_of(*camera);
     BoundedPool<maq_scene_image>::Pooled handle = renderer->images.acquire();
-    renderer->renderer.render(pinhole_of(*camera), handle->image);
+    renderer->renderer.render(from, handle->image);
     *image = lend<maq_scene_image>(std::move(handle));
     return MAQ_OK;
   });

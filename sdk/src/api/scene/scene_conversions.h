@@ -9,10 +9,10 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
+#include "api/camera_argument.h"
 #include "api/scene/scene_handles.h"
 #include "core/worker_threads.h"
 #include "image/geometry/lens.h"
-#include "image/geometry/pinhole_camera.h"
 #include "nn/provider.h"
 #include "scene/networks/scene_networks.h"
 
@@ -34,33 +34,6 @@ inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, 
   const auto runtime = context->state->onnxruntime();
   settings.provider = available_provider(*runtime, provider);
   return std::make_shared<SceneNetworks>(runtime, std::move(bundle), settings);
-}
-
-// Without the distortion.
-inline Intrinsics intrinsics_of(const maq_intrinsics& given) {
-  return {given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
-}
-
-// The camera without its distortion.
-inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
-  PinholeCamera camera;
-  camera.intrinsics() = intrinsics_of(given.intrinsics);
-  std::copy_n(given.rotation, 9, camera.rotation.begin());
-  std::copy_n(given.centre, 3, camera.centre.begin());
-  return camera;
-}
-
-inline maq_pinhole_camera camera_of(const PinholeCamera& camera) {
-  maq_pinhole_camera filled{};
-  filled.struct_size = sizeof filled;
-  filled.intrinsics = {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, {}};
-  std::copy_n(camera.rotation.begin(), 9, filled.rotation);
-  std::copy_n(camera.centre.begin(), 3, filled.centre);
-  return filled;
-}
-
-inline bool is_distorted(const maq_intrinsics& given) {
-  return std::any_of(std::begin(given.distortion), std::end(given.distortion), [](double k) { return k != 0; });
 }
 
 inline void check_distortion(const maq_intrinsics& given) {

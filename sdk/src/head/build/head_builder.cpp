@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -243,6 +244,32 @@ StoredHead HeadBuilder::fit(double seconds, const Progress& progress) {
   }
 }
 
+void HeadBuilder::set_preview(double interval_s, Preview preview) {
+  if (!(interval_s >= 0 && interval_s <= 3600)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The time between previews is ", interval_s, " s, but must be 0 to 3600.");
+  }
+  preview_interval_s_ = interval_s;
+  preview_ = std::move(preview);
+}
+
+StoredHead HeadBuilder::stored_head(const FieldCodes& codes, FieldWeights weights,
+                                    const std::vector<PhotoFit>& photos) const {
+  const HeadPrior& prior = bundle_.prior;
+  StoredHead head(std::move(weights));
+  for (const PhotoFit& photo : photos) {
+    if (photo.is_used()) head.cameras.push_back(photo.camera);
+  }
+  head.scale.sigma = size_sigma(prior) * head.scale.metres_per_unit;
+  head.sharpness = prior.sharpness;
+  head.cut = prior.cut;
+  head.bounds = prior.bounds;
+  head.anchors = anchors_of(prior, codes.shape);
+  head.places = prior.places;
+  head.prior_sha256 = bundle_.prior_sha256;
+  head.codes = codes;
+  return head;
+}
+
 StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
   const auto report = [&](double done) {
     if (progress && !progress(done)) cancel_.cancel();
@@ -253,7 +280,14 @@ StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
   HeadFitOptions options;
   options.seconds = seconds;
   WorkerThreads threads(encoder_.threads());
+  std::optional<double> next_preview_s;  // none before the first
   HeadFit fit = fit_head(prior, photos_, options, threads, [&](const HeadFitProgress& now) {
+    if (preview_ && now.seconds >= next_preview_s.value_or(0)) {
+      FieldWeights weights(prior.bases.shape());
+      prior.bases.combine(now.codes, weights);
+      preview_(stored_head(now.codes, std::move(weights), now.photos));
+      next_preview_s = now.seconds + preview_interval_s_;
+    }
     report(std::min(1.0, std::max(now.seconds / seconds, double(now.steps) / options.max_steps)));
     return true;
   });
@@ -263,23 +297,14 @@ StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
   stats_.used_photos = fit.start.used();
   if (!fit.start.is_found()) refuse_photos(fit.start.photos);
 
-  StoredHead head(std::move(fit.weights));
   for (size_t i = 0; i < photos_.size(); ++i) {
     const PhotoFit& photo = fit.photos[i];
     if (!photo.is_used()) continue;
     found_[i].is_used = true;
     found_[i].focal_px = photo.camera.focal_px;
     found_[i].rms_px = photo.rms_px;
-    head.cameras.push_back(photo.camera);
   }
-  head.scale.sigma = size_sigma(prior) * head.scale.metres_per_unit;
-  head.sharpness = prior.sharpness;
-  head.cut = prior.cut;
-  head.bounds = prior.bounds;
-  head.anchors = anchors_of(prior, fit.codes.shape);
-  head.places = prior.places;
-  head.prior_sha256 = bundle_.prior_sha256;
-  head.codes = std::move(fit.codes);
+  StoredHead head = stored_head(fit.codes, std::move(fit.weights), fit.photos);
   if (texture_.side_px > 0) {
     std::vector<TextureSource> sources;
     for (size_t i = 0; i < photos_.size(); ++i) {

@@ -62,6 +62,11 @@ class HeadBuilder {
   // Throws MAQ_ERROR_INVALID_ARGUMENT without photos, MAQ_ERROR_NOT_FOUND where no photo shows a head, MAQ_CANCELLED.
   StoredHead fit(double seconds, const Progress& progress);
 
+  // Gets the head so far: that of the encoder, then every `interval_s` of a fit, which waits. An empty one: no longer.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT for an interval that is not 0 to 3600 s.
+  using Preview = std::function<void(StoredHead head)>;
+  void set_preview(double interval_s, Preview preview);
+
   // From any thread: ends the call that runs, or else the next.
   void cancel() noexcept { cancel_.cancel(); }
 
@@ -80,6 +85,7 @@ class HeadBuilder {
   // Where the head is in a photo whose app does not know, and what is seen there. Throws MAQ_ERROR_NOT_FOUND.
   std::pair<std::array<float, 4>, Seen> find_head(const ImageView& photo, double roll_rad);
   StoredHead fit_photos(double seconds, const Progress& progress);
+  StoredHead stored_head(const FieldCodes& codes, FieldWeights weights, const std::vector<PhotoFit>& photos) const;
 
   HeadBundle bundle_;
   HeadEncoder encoder_;
@@ -90,6 +96,8 @@ class HeadBuilder {
   TextureOptions texture_;
   std::vector<TextureCrop> crops_;  // of each photo, where heads get a texture
   HeadBuildStats stats_;
+  double preview_interval_s_ = 0;
+  Preview preview_;
 };
 
 }  // namespace maq::head

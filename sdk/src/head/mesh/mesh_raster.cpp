@@ -10,23 +10,39 @@ namespace maq::head {
 namespace {
 
 constexpr int kBandRows = 16, kMaxSide = 16384;
-constexpr size_t kTask = 8192;  // vertices or triangles
+constexpr size_t kTask = 8192, kChunk = 256;  // vertices or triangles; a task has whole chunks
 constexpr uint32_t kNoTriangle = UINT32_MAX;
-
-using Vector = std::array<double, 3>;
+constexpr size_t kMaxSamples = 4;          // of a pixel
+constexpr float kSameSurface = 1 / 1.02f;  // of inverse depths in a pixel: farther ones are of what is behind
 
 // What is linear in the pixel: a column + b row + c.
 struct Plane {
   double a = 0, b = 0, c = 0;
 };
 
+// The camera as edges of triangles need it. Samples are the pixels of a picture that is larger by their number a side.
+struct Sampling {
+  Sampling(const HeadCamera& camera, int samples_a_side)
+      : per_pixel(samples_a_side),
+        width(camera.width_px * samples_a_side),
+        step(1 / (camera.focal_px * samples_a_side)),
+        cx(of_pixel(camera.cx_px)),
+        cy(of_pixel(camera.cy_px)) {}
+
+  double of_pixel(double px) const { return (px + 0.5) * per_pixel - 0.5; }
+
+  int per_pixel, width;
+  double step;  // between directions of neighbouring samples
+  double cx, cy;
+};
+
 // The plane that is 0 along the edge from p to q in the picture (Olano and Greer, Triangle scan conversion using 2D
 // homogeneous coordinates, 1997: no clipping). The other way round it is the negative, to the bit: so of triangles that
 // share an edge, each pixel on it belongs to one at least.
 template <class Vertex>
-Plane edge_plane(const Vertex& p, const Vertex& q, const HeadCamera& camera) {
-  const double x = p.y * q.z - p.z * q.y, y = p.z * q.x - p.x * q.z, z = p.x * q.y - p.y * q.x;
-  return {x / camera.focal_px, y / camera.focal_px, z - (x * camera.cx_px + y * camera.cy_px) / camera.focal_px};
+Plane edge_plane(const Vertex& p, const Vertex& q, const Sampling& sampling) {
+  const double x = (p.y * q.z - p.z * q.y) * sampling.step, y = (p.z * q.x - p.x * q.z) * sampling.step;
+  return {x, y, (p.x * q.y - p.y * q.x) - (x * sampling.cx + y * sampling.cy)};
 }
 
 struct Setup {
@@ -35,16 +51,20 @@ struct Setup {
   bool is_seen = false;
 };
 
+// Six times the volume of the triangle and the camera's centre; 0 for triangles without an area, and those seen from
+// their side. Positive for those seen from behind.
 template <class Vertex>
-Setup set_up(const std::array<const Vertex*, 3>& corners, const HeadCamera& camera) {
+double volume_of(const Vertex& p, const Vertex& q, const Vertex& r) {
+  return p.x * (q.y * r.z - q.z * r.y) + p.y * (q.z * r.x - q.x * r.z) + p.z * (q.x * r.y - q.y * r.x);
+}
+
+template <class Vertex>
+Setup set_up(const std::array<const Vertex*, 3>& corners, const Sampling& sampling) {
   Setup made;
   for (size_t k = 0; k < 3; ++k) {
-    made.edges[k] = edge_plane(*corners[(k + 1) % 3], *corners[(k + 2) % 3], camera);
+    made.edges[k] = edge_plane(*corners[(k + 1) % 3], *corners[(k + 2) % 3], sampling);
   }
-  // Six times the volume of the triangle and the camera's centre; 0 for triangles without an area, and those seen from
-  // their side.
-  const Vertex &p = *corners[0], &q = *corners[1], &r = *corners[2];
-  const double volume = p.x * (q.y * r.z - q.z * r.y) + p.y * (q.z * r.x - q.x * r.z) + p.z * (q.x * r.y - q.y * r.x);
+  const double volume = volume_of(*corners[0], *corners[1], *corners[2]);
   if (volume == 0 || !std::isfinite(volume)) return made;
   const double sign = volume > 0 ? 1 : -1;
   for (Plane& edge : made.edges) {
@@ -57,183 +77,308 @@ Setup set_up(const std::array<const Vertex*, 3>& corners, const HeadCamera& came
   return made;
 }
 
-void check(const HeadCamera& camera) {
+void check(const HeadCamera& camera, const RasterOptions& options) {
   if (camera.width_px < 1 || camera.height_px < 1 || camera.width_px > kMaxSide || camera.height_px > kMaxSide) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of a mesh is asked for with ", camera.width_px, "x", camera.height_px,
                 " pixels. Give each side 1 to ", kMaxSide, ".");
   }
   bool is_finite = std::isfinite(camera.focal_px) && camera.focal_px > 0 && std::isfinite(camera.cx_px) &&
-                   std::isfinite(camera.cy_px);
+                   std::isfinite(camera.cy_px) && std::isfinite(options.pixel_aspect) && options.pixel_aspect > 0;
   is_finite = is_finite && maq::is_finite(camera.head_to_camera.translation);
   for (const double value : camera.head_to_camera.rotation) is_finite = is_finite && std::isfinite(value);
   if (!is_finite) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The camera of a mesh's picture has a focal length of ", camera.focal_px,
                 " pixels, or a number that is not finite. Give a positive one and finite numbers.");
   }
+  if (!std::isfinite(options.near) || !(options.near > 0)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The near plane of a mesh's picture is at ", options.near,
+                ". Give a positive distance.");
+  }
 }
 
-// The first and last pixel between two positions, within 0 and `size`.
+// The first and last pixel between two positions, within 0 and `size`. By hand, since ceil and floor are calls on
+// processors that have no instruction for them.
 std::array<int, 2> pixels_between(double low, double high, int size) {
-  return {int(std::clamp(std::ceil(low), 0.0, double(size))), int(std::clamp(std::floor(high), -1.0, size - 1.0))};
+  const double first = std::clamp(low, 0.0, double(size)), last = std::clamp(high, -1.0, size - 1.0);
+  const int first_px = int(first), last_px = int(last + 1) - 1;
+  return {double(first_px) < first ? first_px + 1 : first_px, last_px};
+}
+
+uint8_t byte_of(float value) { return uint8_t(std::clamp(value + 0.5f, 0.0f, 255.0f)); }
+
+// A point of the surface.
+struct SurfacePoint {
+  std::array<float, 3> normal, colour, template_point;  // colour: R, G, B, 0 to 255
+  float depth;
+};
+
+std::array<float, 3> shade(const SurfacePoint& point, const RasterOptions& options) {
+  std::array<float, 3> rgb{};
+  switch (options.shading) {
+    case MeshShading::kColour:
+    case MeshShading::kShape: {
+      float lit = 0;
+      for (size_t axis = 0; axis < 3; ++axis) lit += point.normal[axis] * options.light[axis];
+      const float light = options.ambient + (1 - options.ambient) * std::max(0.0f, lit);
+      for (size_t channel = 0; channel < 3; ++channel) rgb[channel] = point.colour[channel] * light;
+      break;
+    }
+    case MeshShading::kNormals:
+      rgb = {127.5f * (1 + point.normal[0]), 127.5f * (1 - point.normal[1]), 127.5f * (1 - point.normal[2])};
+      break;
+    case MeshShading::kTemplate:
+      for (size_t axis = 0; axis < 3; ++axis) {
+        rgb[axis] = 127.5f * (1 + point.template_point[axis] / options.template_reach);
+      }
+      break;
+    case MeshShading::kDepth:
+      rgb.fill(127.5f * (1 - (point.depth - options.middle_depth) / options.depth_reach));
+      break;
+  }
+  return rgb;
 }
 
 }  // namespace
 
-void MeshRaster::project(const HeadMesh& mesh, const HeadCamera& camera, double near, WorkerThreads& threads) {
-  vertices_.resize(mesh.vertex_count());
-  rows_.resize(mesh.triangle_count());
+struct MeshRaster::Band {
+  Sampling sampling;
+  float* inverse_depth;  // of each sample
+  uint32_t* triangles;
+};
+
+void MeshRaster::project(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options,
+                         WorkerThreads& threads) {
+  vertices_.resize(mesh.vertex_count()), attributes_.resize(mesh.vertex_count());
+  const bool has_normals = !mesh.normals.empty(), has_template = !mesh.template_points.empty();
+  const bool has_colours = !mesh.colours.empty() && options.shading != MeshShading::kShape;
+  std::array<float, 9> rotation{};
+  for (size_t i = 0; i < 9; ++i) rotation[i] = float(camera.head_to_camera.rotation[i]);
   threads.run((vertices_.size() + kTask - 1) / kTask, [&](size_t task, int) {
     for (size_t i = task * kTask; i < std::min((task + 1) * kTask, vertices_.size()); ++i) {
       const float* const p = &mesh.positions[3 * i];
       const Vec3 seen = camera.head_to_camera * Vec3{double(p[0]), double(p[1]), double(p[2])};
       Vertex& vertex = vertices_[i];
-      vertex.x = seen.x, vertex.y = seen.y, vertex.z = seen.z;
-      if (vertex.z < near) continue;
-      vertex.column_px = camera.focal_px * vertex.x / vertex.z + camera.cx_px;
-      vertex.row_px = camera.focal_px * vertex.y / vertex.z + camera.cy_px;
-    }
-  });
-  threads.run((rows_.size() + kTask - 1) / kTask, [&](size_t task, int) {
-    for (size_t i = task * kTask; i < std::min((task + 1) * kTask, rows_.size()); ++i) {
-      double low = 1e300, high = -1e300;
-      int behind = 0;
-      for (size_t k = 0; k < 3; ++k) {
-        const Vertex& vertex = vertices_[mesh.triangles[3 * i + k]];
-        if (!(vertex.z >= near)) {
-          ++behind;
-        } else {
-          low = std::min(low, vertex.row_px), high = std::max(high, vertex.row_px);
-        }
+      vertex.x = seen.x, vertex.y = seen.y * options.pixel_aspect, vertex.z = seen.z;
+      Attributes& attributes = attributes_[i];
+      attributes = {};
+      for (size_t axis = 0; axis < 3; ++axis) {
+        attributes.colour[axis] = float(has_colours ? mesh.colours[3 * i + axis] : options.grey[axis]);
+        if (has_template) attributes.template_point[axis] = mesh.template_points[3 * i + axis];
+        if (!has_normals) continue;
+        const float *const row = &rotation[3 * axis], *const n = &mesh.normals[3 * i];
+        attributes.normal[axis] = row[0] * n[0] + row[1] * n[1] + row[2] * n[2];
       }
-      rows_[i] = {0, -1};
-      if (behind == 3) continue;
-      if (behind > 0) low = -1, high = camera.height_px;  // may be anywhere
-      const auto rows = pixels_between(low, high, camera.height_px);
-      rows_[i] = {rows[0], rows[1]};
+      if (vertex.z < double(options.near)) continue;
+      const double scale = camera.focal_px / vertex.z;
+      vertex.column_px = scale * vertex.x + camera.cx_px;
+      vertex.row_px = scale * vertex.y + camera.cy_px;
     }
   });
 }
 
-void MeshRaster::draw_band(const HeadMesh& mesh, const HeadCamera& camera, double near, int top, int bottom) {
-  const size_t width = size_t(camera.width_px);
-  std::fill(inverse_depth_.begin() + std::ptrdiff_t(size_t(top) * width),
-            inverse_depth_.begin() + std::ptrdiff_t(size_t(bottom) * width), 0.0f);
-  std::fill(triangles_.begin() + std::ptrdiff_t(size_t(top) * width),
-            triangles_.begin() + std::ptrdiff_t(size_t(bottom) * width), kNoTriangle);
-  const double max_inverse_depth = 1 / near;
-  for (size_t i = 0; i < rows_.size(); ++i) {
-    const int first_row = std::max(rows_[i].first, top), last_row = std::min(rows_[i].last, bottom - 1);
-    if (first_row > last_row) continue;
+void MeshRaster::find_rows(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options,
+                           WorkerThreads& threads) {
+  const double near = double(options.near);
+  rows_.resize(mesh.triangle_count());
+  chunk_rows_.resize((rows_.size() + kChunk - 1) / kChunk);
+  const auto rows_of = [&](size_t triangle) -> Rows {
     std::array<const Vertex*, 3> corners{};
     double low = 1e300, high = -1e300;
+    int behind = 0;
     for (size_t k = 0; k < 3; ++k) {
-      corners[k] = &vertices_[mesh.triangles[3 * i + k]];
-      const bool is_behind = !(corners[k]->z >= near);
-      low = std::min(low, is_behind ? -1.0 : corners[k]->column_px);
-      high = std::max(high, is_behind ? double(camera.width_px) : corners[k]->column_px);
-    }
-    const auto columns = pixels_between(low, high, camera.width_px);
-    if (columns[0] > columns[1]) continue;
-    const Setup setup = set_up(corners, camera);
-    if (!setup.is_seen) continue;
-    const Plane &e0 = setup.edges[0], &e1 = setup.edges[1], &e2 = setup.edges[2], &depth = setup.inverse_depth;
-    for (int row = first_row; row <= last_row; ++row) {
-      const double c0 = e0.b * row + e0.c, c1 = e1.b * row + e1.c, c2 = e2.b * row + e2.c, cd = depth.b * row + depth.c;
-      float* const depths = inverse_depth_.data() + size_t(row) * width;
-      for (int column = columns[0]; column <= columns[1]; ++column) {
-        if (e0.a * column + c0 < 0 || e1.a * column + c1 < 0 || e2.a * column + c2 < 0) continue;
-        const double inverse = depth.a * column + cd;
-        if (!(inverse > 0) || inverse > max_inverse_depth || float(inverse) <= depths[column]) continue;
-        depths[column] = float(inverse);
-        triangles_[size_t(row) * width + size_t(column)] = uint32_t(i);
+      corners[k] = &vertices_[mesh.triangles[3 * triangle + k]];
+      if (!(corners[k]->z >= near)) {
+        ++behind;
+      } else {
+        low = std::min(low, corners[k]->row_px), high = std::max(high, corners[k]->row_px);
       }
+    }
+    if (behind == 3) return {0, -1};
+    if (options.draws_front_alone && !(volume_of(*corners[0], *corners[1], *corners[2]) < 0)) return {0, -1};
+    if (behind > 0) low = -1, high = camera.height_px;  // may be anywhere
+    // Samples are up to a quarter of a pixel away from its middle.
+    const auto rows = pixels_between(low - 0.25, high + 0.25, camera.height_px);
+    return {int16_t(rows[0]), int16_t(rows[1])};
+  };
+  threads.run((rows_.size() + kTask - 1) / kTask, [&](size_t task, int) {
+    for (size_t chunk = task * (kTask / kChunk); chunk < (task + 1) * (kTask / kChunk); ++chunk) {
+      const size_t end = std::min((chunk + 1) * kChunk, rows_.size());
+      if (chunk * kChunk >= end) break;
+      Rows all = {INT16_MAX, -1};
+      for (size_t i = chunk * kChunk; i < end; ++i) {
+        rows_[i] = rows_of(i);
+        if (rows_[i].first > rows_[i].last) continue;
+        all = {std::min(all.first, rows_[i].first), std::max(all.last, rows_[i].last)};
+      }
+      chunk_rows_[chunk] = all;
+    }
+  });
+}
+
+void MeshRaster::draw_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top,
+                           int bottom, Band& band) const {
+  const Sampling& sampling = band.sampling;
+  const double near = double(options.near), max_inverse_depth = 1 / near;
+  const int first_sample = top * sampling.per_pixel, sample_rows = (bottom - top) * sampling.per_pixel;
+  const size_t samples = size_t(sampling.width) * size_t(sample_rows);
+  std::fill_n(band.inverse_depth, samples, 0.0f);
+  std::fill_n(band.triangles, samples, kNoTriangle);
+  const auto draw = [&](size_t triangle) {
+    std::array<const Vertex*, 3> corners{};
+    double left = 1e300, right = -1e300, high = 1e300, low = -1e300;
+    for (size_t k = 0; k < 3; ++k) {
+      const Vertex& corner = *(corners[k] = &vertices_[mesh.triangles[3 * triangle + k]]);
+      if (!(corner.z >= near)) {  // it may reach anywhere
+        left = high = -1, right = camera.width_px, low = camera.height_px;
+        continue;
+      }
+      left = std::min(left, corner.column_px), right = std::max(right, corner.column_px);
+      high = std::min(high, corner.row_px), low = std::max(low, corner.row_px);
+    }
+    const auto columns = pixels_between(sampling.of_pixel(left), sampling.of_pixel(right), sampling.width);
+    const auto rows =
+        pixels_between(sampling.of_pixel(high) - first_sample, sampling.of_pixel(low) - first_sample, sample_rows);
+    if (columns[0] > columns[1] || rows[0] > rows[1]) return;
+    const Setup setup = set_up(corners, sampling);
+    if (!setup.is_seen) return;
+    const Plane &e0 = setup.edges[0], &e1 = setup.edges[1], &e2 = setup.edges[2], &depth = setup.inverse_depth;
+    for (int row = rows[0]; row <= rows[1]; ++row) {
+      const double y = first_sample + row;
+      const double c0 = e0.b * y + e0.c, c1 = e1.b * y + e1.c, c2 = e2.b * y + e2.c, cd = depth.b * y + depth.c;
+      const size_t begin = size_t(row) * size_t(sampling.width);
+      double x = columns[0];
+      for (int column = columns[0]; column <= columns[1]; ++column, x += 1) {
+        if (e0.a * x + c0 < 0 || e1.a * x + c1 < 0 || e2.a * x + c2 < 0) continue;
+        const double inverse = depth.a * x + cd;
+        const size_t sample = begin + size_t(column);
+        if (!(inverse > 0) || inverse > max_inverse_depth || float(inverse) <= band.inverse_depth[sample]) continue;
+        band.inverse_depth[sample] = float(inverse);
+        band.triangles[sample] = uint32_t(triangle);
+      }
+    }
+  };
+  for (size_t chunk = 0; chunk < chunk_rows_.size(); ++chunk) {
+    if (chunk_rows_[chunk].first >= bottom || chunk_rows_[chunk].last < top) continue;
+    for (size_t i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, rows_.size()); ++i) {
+      if (rows_[i].first < bottom && rows_[i].last >= top) draw(i);
     }
   }
 }
 
 void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top,
-                            int bottom, RasterImage& image) const {
-  const size_t width = size_t(camera.width_px);
-  uint32_t last = kNoTriangle;
-  Setup setup;
-  std::array<const Vertex*, 3> corners{};
-  for (size_t pixel = size_t(top) * width; pixel < size_t(bottom) * width; ++pixel) {
-    const uint32_t triangle = triangles_[pixel];
-    if (triangle == kNoTriangle) {
-      image.alpha[pixel] = 0, image.depth[pixel] = 0;
-      for (size_t axis = 0; axis < 3; ++axis) image.bgr[3 * pixel + axis] = 0, image.normals[3 * pixel + axis] = 0;
-      continue;
-    }
+                            int bottom, const Band& band, RasterImage& image) const {
+  const Sampling& sampling = band.sampling;
+  const size_t width = size_t(camera.width_px), side = size_t(sampling.per_pixel), samples_count = side * side;
+  const bool has_normals = !mesh.normals.empty(), has_template = !mesh.template_points.empty();
+  // Of a triangle, where a pixel's middle is or, outside of it, near that.
+  const auto point_of = [&](uint32_t triangle, size_t row_px, size_t column_px, float depth) {
     const uint32_t* const indices = &mesh.triangles[3 * size_t(triangle)];
-    if (triangle != last) {
-      for (size_t k = 0; k < 3; ++k) corners[k] = &vertices_[indices[k]];
-      setup = set_up(corners, camera);
-      last = triangle;
+    const Vertex &p = vertices_[indices[0]], &q = vertices_[indices[1]], &r = vertices_[indices[2]];
+    // What a corner weighs is the volume of the pixel's ray and the other two.
+    const double x = (double(column_px) - camera.cx_px) / camera.focal_px;
+    const double y = (double(row_px) - camera.cy_px) / camera.focal_px;
+    const auto volume = [&](const Vertex& a, const Vertex& b) {
+      return x * (a.y * b.z - a.z * b.y) + y * (a.z * b.x - a.x * b.z) + (a.x * b.y - a.y * b.x);
+    };
+    // Outside, but near, they go on as they are inside.
+    std::array<double, 3> volumes = {volume(q, r), volume(r, p), volume(p, q)};
+    const double sum = volumes[0] + volumes[1] + volumes[2];
+    const bool is_near =
+        std::isfinite(1 / sum) && std::min({volumes[0] / sum, volumes[1] / sum, volumes[2] / sum}) > -1;
+    std::array<float, 3> weights{};
+    for (size_t k = 0; k < 3; ++k) weights[k] = is_near ? float(volumes[k] / sum) : 1.0f / 3;
+    const Attributes &of_p = attributes_[indices[0]], &of_q = attributes_[indices[1]], &of_r = attributes_[indices[2]];
+    SurfacePoint point{};
+    point.depth = depth;
+    const auto mean = [&](std::array<float, 3> Attributes::*which, std::array<float, 3>& to) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        to[axis] =
+            weights[0] * (of_p.*which)[axis] + weights[1] * (of_q.*which)[axis] + weights[2] * (of_r.*which)[axis];
+      }
+    };
+    mean(&Attributes::normal, point.normal);
+    mean(&Attributes::colour, point.colour);
+    mean(&Attributes::template_point, point.template_point);
+    if (!has_normals) {
+      const Vec3 a{q.x - p.x, (q.y - p.y) / options.pixel_aspect, q.z - p.z};
+      const Vec3 across = normalized(cross(a, {r.x - p.x, (r.y - p.y) / options.pixel_aspect, r.z - p.z}));
+      point.normal = {float(across.x), float(across.y), float(across.z)};
     }
-    const size_t row_px = pixel / width, column_px = pixel % width;
-    const double row = double(row_px), column = double(column_px);
-    std::array<double, 3> weights{};
-    double sum = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      weights[k] = std::max(0.0, setup.edges[k].a * column + setup.edges[k].b * row + setup.edges[k].c);
-      sum += weights[k];
-    }
-    for (double& weight : weights) weight = sum > 0 ? weight / sum : 1.0 / 3;
-    Vector normal{};
-    if (mesh.normals.empty()) {
-      const Vertex &p = *corners[0], &q = *corners[1], &r = *corners[2];
-      const Vector a = {q.x - p.x, q.y - p.y, q.z - p.z}, b = {r.x - p.x, r.y - p.y, r.z - p.z};
-      normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    } else {
-      const Mat3& rotation = camera.head_to_camera.rotation;
-      Vector head{};
-      for (size_t k = 0; k < 3; ++k) {
-        for (size_t axis = 0; axis < 3; ++axis) {
-          head[axis] += weights[k] * double(mesh.normals[3 * size_t(indices[k]) + axis]);
+    const float length = std::sqrt(point.normal[0] * point.normal[0] + point.normal[1] * point.normal[1] +
+                                   point.normal[2] * point.normal[2]);
+    const float to_length = length > 0 ? 1 / length : 0;
+    for (float& value : point.normal) value *= to_length;
+    if (!(length > 0)) point.normal = {0, 0, -1};
+    return point;
+  };
+  const size_t first = size_t(top) * width, count_of_band = size_t(bottom - top) * width;
+  std::fill_n(&image.alpha[first], count_of_band, uint8_t(0));
+  std::fill_n(&image.depth[first], count_of_band, 0.0f);
+  std::fill_n(&image.bgr[3 * first], 3 * count_of_band, uint8_t(0));
+  std::fill_n(&image.normals[3 * first], 3 * count_of_band, 0.0f);
+  if (has_template) std::fill_n(&image.template_points[3 * first], 3 * count_of_band, 0.0f);
+  for (size_t row = size_t(top); row < size_t(bottom); ++row) {
+    for (size_t column = 0; column < width; ++column) {
+      const size_t pixel = row * width + column;
+      const size_t corner = (row - size_t(top)) * side * size_t(sampling.width) + column * side;
+      std::array<size_t, kMaxSamples> covered{};
+      size_t count = 0, nearest = 0;
+      for (size_t k = 0; k < samples_count; ++k) {
+        const size_t sample = corner + (k / side) * size_t(sampling.width) + k % side;
+        if (band.triangles[sample] == kNoTriangle) continue;
+        if (count == 0 || band.inverse_depth[sample] > band.inverse_depth[nearest]) nearest = sample;
+        covered[count++] = sample;
+      }
+      if (count == 0) continue;
+      image.alpha[pixel] = uint8_t(255 * count / samples_count);
+      float inverse = 0;
+      size_t of_nearest = 0;  // samples of the same surface
+      for (size_t k = 0; k < count; ++k) {
+        if (band.inverse_depth[covered[k]] < kSameSurface * band.inverse_depth[nearest]) continue;
+        inverse += band.inverse_depth[covered[k]];
+        ++of_nearest;
+      }
+      image.depth[pixel] = float(of_nearest) / inverse;
+      const SurfacePoint point = point_of(band.triangles[nearest], row, column, image.depth[pixel]);
+      std::array<float, 3> rgb = shade(point, options);
+      if (of_nearest < count) {
+        rgb.fill(0);
+        for (size_t k = 0; k < count; ++k) {
+          const size_t sample = covered[k];
+          const std::array<float, 3> one =
+              shade(point_of(band.triangles[sample], row, column, 1 / band.inverse_depth[sample]), options);
+          for (size_t channel = 0; channel < 3; ++channel) rgb[channel] += one[channel] / float(count);
         }
       }
-      for (size_t r = 0; r < 3; ++r) {
-        for (size_t axis = 0; axis < 3; ++axis) normal[r] += rotation[3 * r + axis] * head[axis];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        image.normals[3 * pixel + axis] = point.normal[axis];
+        image.bgr[3 * pixel + 2 - axis] = byte_of(rgb[axis]);
+        if (has_template) image.template_points[3 * pixel + axis] = point.template_point[axis];
       }
     }
-    const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-    double lit = 0;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      normal[axis] = length > 0 ? normal[axis] / length : axis == 2 ? -1 : 0;
-      lit += normal[axis] * double(options.light[axis]);
-      image.normals[3 * pixel + axis] = float(normal[axis]);
-    }
-    const double light = double(options.ambient) + (1 - double(options.ambient)) * std::max(0.0, lit);
-    for (size_t channel = 0; channel < 3; ++channel) {
-      double colour = double(options.grey[channel]);
-      if (!mesh.colours.empty()) {
-        colour = 0;
-        for (size_t k = 0; k < 3; ++k) colour += weights[k] * double(mesh.colours[3 * size_t(indices[k]) + channel]);
-      }
-      image.bgr[3 * pixel + 2 - channel] = uint8_t(std::clamp(colour * light + 0.5, 0.0, 255.0));
-    }
-    image.alpha[pixel] = 255;
-    image.depth[pixel] = 1 / inverse_depth_[pixel];
   }
 }
 
 void MeshRaster::draw(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options,
                       WorkerThreads& threads, RasterImage& image) {
-  check(camera);
-  const double near = double(options.near);
-  if (!std::isfinite(near) || !(near > 0)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The near plane of a mesh's picture is at ", near,
-                ". Give a positive distance.");
-  }
+  check(camera, options);
   const size_t pixels = size_t(camera.width_px) * size_t(camera.height_px);
   image.width_px = camera.width_px, image.height_px = camera.height_px;
   image.bgr.resize(3 * pixels), image.alpha.resize(pixels), image.depth.resize(pixels);
-  image.normals.resize(3 * pixels), inverse_depth_.resize(pixels), triangles_.resize(pixels);
-  project(mesh, camera, near, threads);
-  threads.run(size_t(camera.height_px + kBandRows - 1) / kBandRows, [&](size_t band, int) {
-    const int top = int(band) * kBandRows, bottom = std::min(camera.height_px, top + kBandRows);
-    draw_band(mesh, camera, near, top, bottom);
-    shade_band(mesh, camera, options, top, bottom, image);
+  image.normals.resize(3 * pixels);
+  image.template_points.resize(mesh.template_points.empty() ? 0 : 3 * pixels);
+  const Sampling sampling(camera, options.is_smooth ? 2 : 1);
+  const size_t samples = size_t(sampling.width) * kBandRows * size_t(sampling.per_pixel);
+  inverse_depths_.resize(size_t(threads.count())), triangles_.resize(size_t(threads.count()));
+  for (auto& depths : inverse_depths_) depths.resize(samples);
+  for (auto& triangles : triangles_) triangles.resize(samples);
+  project(mesh, camera, options, threads);
+  find_rows(mesh, camera, options, threads);
+  threads.run(size_t(camera.height_px + kBandRows - 1) / kBandRows, [&](size_t number, int worker) {
+    const int top = int(number) * kBandRows, bottom = std::min(camera.height_px, top + kBandRows);
+    Band band{sampling, inverse_depths_[size_t(worker)].data(), triangles_[size_t(worker)].data()};
+    draw_band(mesh, camera, options, top, bottom, band);
+    shade_band(mesh, camera, options, top, bottom, band, image);
   });
 }
 

@@ -1,4 +1,4 @@
-// Pictures of a mesh: what a camera would see of it, under a simple light.
+// Pictures of a mesh: what a camera would see of it, under a simple light or in colours that tell its shape.
 #pragma once
 
 #include <array>
@@ -11,50 +11,76 @@
 
 namespace maq::head {
 
+// What colour a point of the surface gets.
+enum class MeshShading {
+  kColour,    // its own, under the light; that of meshes without colours is grey
+  kShape,     // grey, under the light
+  kNormals,   // R, G, B: to the right, up and to the camera, -1 to 1
+  kTemplate,  // R, G, B: x, y, z of its template point, -template_reach to template_reach
+  kDepth      // from white at middle_depth - depth_reach to black at middle_depth + depth_reach
+};
+
 struct RasterOptions {
   float near = 0.05f;  // what is nearer is not drawn; in the mesh's unit
   // Where the light comes from, in the camera; of length 1. Over the viewer's left shoulder.
   std::array<float, 3> light = {-0.36f, -0.48f, -0.8f};
   float ambient = 0.35f;                          // of the colour, without light
-  std::array<uint8_t, 3> grey = {200, 200, 200};  // R, G, B of meshes without colours
+  std::array<uint8_t, 3> grey = {200, 200, 200};  // R, G, B of meshes without colours, and of kShape
+  MeshShading shading = MeshShading::kColour;
+  float template_reach = 1.4f;                 // of kTemplate
+  float middle_depth = 0, depth_reach = 1.4f;  // of kDepth
+  double pixel_aspect = 1;  // the vertical focal length over the horizontal one, which is the camera's
+  bool is_smooth = false;   // edges: of 2 x 2 samples a pixel
+  // Triangles that are seen from behind are left out. For closed meshes and cameras outside of them: half of the time.
+  bool draws_front_alone = false;
 };
 
 // Row by row, without padding. Kept between uses.
 struct RasterImage {
   int width_px = 0, height_px = 0;
-  std::vector<uint8_t> bgr;    // 0 where there is no mesh
-  std::vector<uint8_t> alpha;  // 255 on the mesh, else 0
-  std::vector<float> depth;    // along the optical axis; 0 where there is no mesh
-  std::vector<float> normals;  // x, y, z in the camera, of length 1; 0 where there is no mesh
+  std::vector<uint8_t> bgr;            // of the mesh, not weighed by alpha; 0 where there is no mesh
+  std::vector<uint8_t> alpha;          // 255 on the mesh, else 0; between them at smooth edges
+  std::vector<float> depth;            // along the optical axis; 0 where there is no mesh
+  std::vector<float> normals;          // x, y, z in the camera, of length 1; 0 where there is no mesh
+  std::vector<float> template_points;  // x, y, z on the template head; 0 where there is no mesh; empty without them
 };
 
 class MeshRaster {
  public:
-  // Draws both sides of each triangle: its colours and normals between those of its vertices, correct in perspective,
-  // or its own normal where the mesh has none. The nearest is seen; of equally near ones the first. Triangles without
-  // an area are skipped. The same for any number of threads.
+  // Draws both sides of each triangle: its colours, normals and template points between those of its vertices, correct
+  // in perspective, or its own normal where the mesh has none. The nearest is seen; of equally near ones the first.
+  // Triangles without an area are skipped. With smooth edges a pixel's depth, normal and template point are those of
+  // what is nearest in it. The same for any number of threads.
   // Throws MAQ_ERROR_INVALID_ARGUMENT for a camera that is not finite, MAQ_ERROR_IMAGE_SIZE for pictures of no pixels
   // or more than 16384 a side.
   void draw(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, WorkerThreads& threads,
             RasterImage& image);
 
  private:
-  void project(const HeadMesh& mesh, const HeadCamera& camera, double near, WorkerThreads& threads);
-  void draw_band(const HeadMesh& mesh, const HeadCamera& camera, double near, int top, int bottom);
-  void shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top, int bottom,
-                  RasterImage& image) const;
-
   struct Vertex {
-    double x, y, z;            // in the camera
+    double x, y, z;            // in the camera; y times the pixel's aspect
     double column_px, row_px;  // not set behind the near plane
   };
-  struct Rows {
-    int first, last;  // empty: the triangle is not seen
+  struct Attributes {
+    std::array<float, 3> normal, colour, template_point;  // normal: in the camera
   };
+  struct Rows {
+    int16_t first, last;  // empty: the triangle is not seen
+  };
+  struct Band;  // the samples of some rows
+
+  void project(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, WorkerThreads& threads);
+  void find_rows(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, WorkerThreads& threads);
+  void draw_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top, int bottom,
+                 Band& band) const;
+  void shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top, int bottom,
+                  const Band& band, RasterImage& image) const;
+
   std::vector<Vertex> vertices_;
-  std::vector<Rows> rows_;            // of each triangle
-  std::vector<float> inverse_depth_;  // of each pixel
-  std::vector<uint32_t> triangles_;   // likewise: that which is seen
+  std::vector<Attributes> attributes_;              // of each vertex
+  std::vector<Rows> rows_, chunk_rows_;             // of each triangle, of each chunk of them
+  std::vector<std::vector<float>> inverse_depths_;  // of the samples of a band, for each thread
+  std::vector<std::vector<uint32_t>> triangles_;    // likewise: that which is seen
 };
 
 }  // namespace maq::head

@@ -5,7 +5,7 @@
 #include <maquette/densepose_mesh.hpp>
 
 #include "options.h"
-#include "window.h"
+#include "screen/window.h"
 
 class Painter {
  public:

@@ -15,7 +15,7 @@
 #include "arguments/model_options.h"
 #include "arguments/source_argument.h"
 #include "commands/commands.h"
-#include "commands/head_commands.h"
+#include "commands/head/head_commands.h"
 #include "interrupt.h"
 #include "output/output_file.h"
 #include "output/progress_bar.h"
@@ -30,7 +30,7 @@ using BoxPx = std::array<float, 4>;
 
 struct HeadOptions {
   std::vector<std::string> photos;
-  std::string out, save;
+  std::string out, save, preview;
   double seconds = 3;
   std::string person = "1";
   std::vector<float> box;
@@ -72,7 +72,7 @@ struct Photo {
 // One head to be fitted, and its files.
 struct Task {
   size_t person;  // from 0
-  std::string out, save;
+  std::string out, save, preview;
 };
 
 struct Stages {
@@ -136,12 +136,13 @@ std::vector<Task> tasks_of(const HeadOptions& options, const std::vector<Photo>&
       throw std::runtime_error(first.argument.uri + " shows " + std::to_string(first.heads.size()) +
                                " heads, so there is no person " + options.person + "; name another, or --box.");
     }
-    return {{person, options.out, options.save}};
+    return {{person, options.out, options.save, options.preview}};
   }
   if (first.heads.empty()) throw std::runtime_error(first.argument.uri + " shows no heads of people.");
   std::vector<Task> tasks;
   for (size_t i = 0; i < first.heads.size(); ++i) {
-    tasks.push_back({i, with_number(options.out, i + 1), with_number(options.save, i + 1)});
+    tasks.push_back(
+        {i, with_number(options.out, i + 1), with_number(options.save, i + 1), with_number(options.preview, i + 1)});
   }
   return tasks;
 }
@@ -184,7 +185,7 @@ void print_photo(const Photo& photo, const maq_head_photo_info& found) {
 
 void print_result(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
                   const maquette::HeadBuilder& builder, maquette::Head& head, const maq_head_mesh* mesh,
-                  const Stages& stages) {
+                  const Stages& stages, const std::string& of_preview) {
   const maq_head_info info = head.info();
   const maq_head_stats stats = builder.stats();
   const double pupils_m = pupil_distance_m(head);
@@ -194,6 +195,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
       document["photos"].push_back(describe_photo(photos[i], builder.photo(i)));
     if (!task.out.empty()) document["out"] = task.out;
     if (!task.save.empty()) document["save"] = task.save;
+    if (!task.preview.empty()) document["preview"] = task.preview;
     if (mesh != nullptr) {
       document["vertices"] = mesh->vertex_count, document["triangles"] = mesh->triangle_count;
       document["simplification_error_mm"] = std::round(1e6 * double(mesh->simplification_error_m)) / 1e3;
@@ -225,6 +227,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
     print_output("\n");
   }
   if (!task.save.empty()) print_output("%s: the head itself; see `maquette head info`\n", task.save.c_str());
+  print_output("%s", of_preview.c_str());
 }
 
 maq_head_mesh_options mesh_options(const HeadOptions& options) {
@@ -237,8 +240,8 @@ maq_head_mesh_options mesh_options(const HeadOptions& options) {
   return mesh;
 }
 
-void fit_one(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
-             maquette::HeadBuilder& builder, Stages stages) {
+void fit_one(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
+             const Task& task, maquette::HeadBuilder& builder, Stages stages) {
   builder.clear();
   LapTimer timer;
   add_photos(options, photos, task, builder);
@@ -266,12 +269,19 @@ void fit_one(const HeadOptions& options, const std::vector<Photo>& photos, const
   }
   if (!task.save.empty()) head.save(task.save);
   stages.mesh_ms = timer.lap_ms();
-  print_result(options, photos, task, builder, head, mesh ? &*mesh : nullptr, stages);
+  std::string of_preview;
+  if (!task.preview.empty()) {
+    HeadView view;
+    view.mesh = mesh_options(options);
+    view.threads = options.network.threads;
+    of_preview = write_head_view(context, head, task.preview, view);
+  }
+  print_result(options, photos, task, builder, head, mesh ? &*mesh : nullptr, stages, of_preview);
 }
 
 void require_files(const HeadOptions& options, const std::vector<Task>& tasks) {
   for (const Task& task : tasks) {
-    for (const std::string* path : {&task.out, &task.save}) {
+    for (const std::string* path : {&task.out, &task.save, &task.preview}) {
       if (path->empty()) continue;
       make_folder_of(*path);
       require_writable(*path);
@@ -308,11 +318,11 @@ int run_head(const HeadOptions& options) {
   int failed = 0;
   for (const Task& task : tasks) {
     if (tasks.size() == 1) {
-      fit_one(options, photos, task, builder, stages);
+      fit_one(options, context, photos, task, builder, stages);
       continue;
     }
     try {
-      if (!interrupted()) fit_one(options, photos, task, builder, stages);
+      if (!interrupted()) fit_one(options, context, photos, task, builder, stages);
     } catch (const OutputLost&) {
       throw;
     } catch (const std::exception& error) {
@@ -350,6 +360,9 @@ void add_head_command(CLI::App& app, int* exit_code) {
   command->add_option("-o,--out", options->out, "Mesh to write: .glb (for most programs), .obj or .ply")
       ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
   command->add_option("--save", options->save, "Also keep the head itself, some 60 KB: head.maqh");
+  command
+      ->add_option("--preview", options->preview, "Also a clip of the head turning, turn.mp4; or a picture, front.png")
+      ->check(CLI::Validator(check_head_view_name, ".mp4, .avi, .png or .jpg"));
   command
       ->add_option("--seconds", options->seconds,
                    "Time for the fit to the pixels (default 3); 0: only what the network sees at a glance")
@@ -406,13 +419,18 @@ void add_head_command(CLI::App& app, int* exit_code) {
       "  maquette head group.jpg --out heads/head.ply --person all\n"
       "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
       "  maquette head photo.jpg --out head.glb --texture 1024\n"
+      "  maquette head photo.jpg --out head.glb --preview turn.mp4\n"
+      "  maquette head render head.maqh --out view.png --yaw 30\n"
       "  maquette head info head.maqh");
   command->require_subcommand(0, 1);
   add_head_info_command(*command, exit_code);
+  add_head_render_command(*command, exit_code);
   command->callback([=] {
     if (!command->get_subcommands().empty()) return;
     if (photos->empty()) throw CLI::RequiredError(photos->get_name());
-    if (options->out.empty() && options->save.empty()) throw CLI::RequiredError("--out or --save");
+    if (options->out.empty() && options->save.empty() && options->preview.empty()) {
+      throw CLI::RequiredError("--out, --save or --preview");
+    }
     if (options->photos.size() > 1 && (options->person != "1" || !options->box.empty())) {
       throw CLI::ValidationError("--person and --box", "are for a single photo");
     }

@@ -19,3 +19,6 @@ struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
   maq::head::SurfaceOptions mesh_options{0, 0};       // of a cell of 0: none was made
   maq::head::SurfaceStats mesh_stats;
 };
+
+// Makes the mesh, unless it is there; for calls that run one at a time on a head. `options` as in maq_head_get_mesh.
+const maq::head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* options);

@@ -4,7 +4,7 @@
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
 #include "api/frame_handle.h"
-#include "api/head_handle.h"
+#include "api/head/head_handle.h"
 #include "core/worker_threads.h"
 #include "head/build/head_builder.h"
 #include "nn/provider.h"
@@ -116,6 +116,20 @@ maq_status maq_head_builder_cancel(maq_head_builder* builder) {
   return guarded(builder, __func__, [&] {
     require_argument(builder, "builder");
     builder->builder->cancel();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_builder_set_preview(maq_head_builder* builder, double interval_s, maq_head_preview_callback preview,
+                                        void* user_data) {
+  return guarded_alone(builder, "builder", __func__, [&] {
+    head::HeadBuilder::Preview pass_on;
+    if (preview != nullptr) {
+      pass_on = [=](head::StoredHead head) {
+        preview(user_data, new maq_head(std::move(head), builder->builder->threads()));
+      };
+    }
+    builder->builder->set_preview(interval_s, std::move(pass_on));
     return MAQ_OK;
   });
 }

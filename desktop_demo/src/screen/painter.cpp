@@ -1,11 +1,11 @@
-#include "painter.h"
+#include "screen/painter.h"
 
 #include <epoxy/gl.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "shaders.h"
+#include "screen/shaders.h"
 
 namespace {
 

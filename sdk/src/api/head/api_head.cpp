@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "api/boundary.h"
-#include "api/head_handle.h"
+#include "api/head/head_handle.h"
 #include "core/worker_threads.h"
 #include "head/build/head_surface.h"
 #include "head/build/head_texture.h"
@@ -43,7 +43,8 @@ head::SurfaceOptions surface_options(const maq_head_mesh_options& options) {
   return surface;
 }
 
-// Makes the mesh, unless it is there.
+}  // namespace
+
 const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given) {
   const head::SurfaceOptions wanted =
       surface_options(read_config(given, "options", default_mesh_options(), kFirstMeshOptionsSize));
@@ -60,8 +61,6 @@ const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given
   head.mesh_options = wanted;
   return head.mesh;
 }
-
-}  // namespace
 
 maq_status maq_head_open(maq_context* context, const char* path, maq_head** head) {
   return guarded(context, __func__, [&] {

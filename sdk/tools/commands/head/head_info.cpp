@@ -5,7 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "commands/head_commands.h"
+#include "commands/head/head_commands.h"
 #include "output/output_file.h"
 #include "print.h"
 #include "program.h"

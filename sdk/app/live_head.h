@@ -1,0 +1,127 @@
+// A head fitted to pictures on a thread of its own and rendered on another, for programs with a window: what is there
+// of it can be turned while it still forms. No call waits but the destructor's.
+//
+//   maquette::LiveHead head(context, "models/heads-int8");
+//   head.fit({picture, box_px}, 3.0, false);
+//   for (;;) { head.render(view); if (head.images().take()) draw(head.images().front().rendering); }
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/rgba_image.h"
+#include "app/triple_buffer.h"
+
+namespace maquette {
+
+struct LiveHeadPhoto {
+  RgbaImage picture;
+  std::optional<std::array<float, 4>> box_px;  // of the head, as in maq_head_photo; nothing: it is looked for
+};
+
+struct LiveHeadView {
+  int width_px = 640, height_px = 480;  // at most; over the photo the picture has the photo's shape
+  double yaw_rad = 0, pitch_rad = 0;    // of the camera: to the person's left, up
+  double zoom = 1;                      // above 1 the head is larger
+  maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
+  bool is_over_photo =
+      false;  // as the photo's camera sees it, drawn on the photo; where that is not known from its yaw
+};
+
+struct LiveHeadImage {
+  RgbaImage rendering, photo;  // photo: the latest, of the rendering's size; empty unless that is over the photo
+  double rendering_ms = 0;
+  uint64_t number = 0;  // counts images from 1
+};
+
+struct LiveHeadState {
+  enum Phase { kNone, kFitting, kReady, kFailed } phase = kNone;
+  double progress = 0;                             // 0 to 1, while it is fitted
+  std::string text;                                // what is being done, or why it failed, in sentences; or nothing
+  bool has_head = false;                           // there is something to be rendered
+  std::shared_ptr<const RgbaImage> photo;          // the latest that was given
+  uint32_t photo_count = 0, used_photo_count = 0;  // from here on: of the head that is ready
+  uint32_t triangle_count = 0;
+  double pupil_distance_m = 0;  // 0: not known
+  double seconds = 0;           // from the photo to the mesh
+};
+
+class LiveHead {  // all calls by the thread that takes the images
+ public:
+  // `threads`: 0 for the library's default. `on_change`, which may be null, is called on this object's threads after
+  // each image and each change of state; it may not throw. The context must outlive this.
+  LiveHead(const Context& context, const std::string& bundle_path, int threads = 0,
+           std::function<void()> on_change = nullptr);
+  ~LiveHead();  // waits for the step that runs
+
+  // Fits a head to a photo, for `seconds`; `adds_photo`: together with those of the head so far. What is being fitted
+  // is given up.
+  void fit(LiveHeadPhoto photo, double seconds, bool adds_photo);
+  // Ends the fit; what there is of the head stays.
+  void cancel() { is_cancelled_ = true; }
+  // Renders an image once there is something of a head, and again when there is more of it; the latest call wins.
+  void render(const LiveHeadView& view);
+
+  std::shared_ptr<const LiveHeadState> state() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return state_;
+  }
+  // The head that is ready, or null; for one thread at a time.
+  std::shared_ptr<Head> head() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return head_;
+  }
+  TripleBuffer<LiveHeadImage>& images() { return images_; }
+  const TripleBuffer<LiveHeadImage>& images() const { return images_; }
+
+ private:
+  struct Request {
+    LiveHeadPhoto photo;
+    double seconds = 0;
+    bool adds_photo = false;
+  };
+  // What is rendered; of the thread that renders alone, once it is set.
+  struct Shown {
+    HeadRenderer renderer;
+    std::optional<maq_pinhole_camera> photo_camera;
+    std::shared_ptr<const RgbaImage> photo;
+  };
+
+  void run_fits();
+  void fit_photo(const Request& request);
+  void run_renderings();
+  void render_shown(Shown& shown, const LiveHeadView& view, LiveHeadImage& image);
+  void show(Head& head, const maq_head_mesh_options& mesh, bool has_photo_camera);
+  void update(const std::function<void(LiveHeadState&)>& change) noexcept;
+
+  const Context& context_;
+  const std::string bundle_path_;
+  const int threads_;
+  const std::function<void()> on_change_;
+  mutable std::mutex mutex_;  // of what the threads share
+  std::condition_variable wake_fits_, wake_renderings_;
+  std::optional<Request> request_;
+  std::atomic<bool> is_cancelled_{false};  // the fit that runs
+  bool ends_ = false;
+  std::shared_ptr<const LiveHeadState> state_ = std::make_shared<LiveHeadState>();
+  std::shared_ptr<Head> head_;
+  std::shared_ptr<Shown> shown_;
+  std::optional<LiveHeadView> view_;
+  bool needs_image_ = false;
+  TripleBuffer<LiveHeadImage> images_;
+  uint64_t image_count_ = 0;                // of the thread that renders
+  std::optional<HeadBuilder> builder_;      // of the thread that fits
+  std::shared_ptr<const RgbaImage> photo_;  // likewise: the latest
+  std::thread fits_, renderings_;
+};
+
+}  // namespace maquette

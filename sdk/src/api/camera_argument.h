@@ -1,0 +1,49 @@
+// Cameras of the C API to those of the SDK, and back.
+#pragma once
+
+#include <algorithm>
+#include <iterator>
+
+#include "api/boundary.h"
+#include "image/geometry/pinhole_camera.h"
+#include "maquette/capture.h"
+
+namespace maq {
+
+// Without the distortion.
+inline Intrinsics intrinsics_of(const maq_intrinsics& given) {
+  return {given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
+}
+
+inline bool is_distorted(const maq_intrinsics& given) {
+  return std::any_of(std::begin(given.distortion), std::end(given.distortion), [](double k) { return k != 0; });
+}
+
+// The camera without its distortion.
+inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
+  PinholeCamera camera;
+  camera.intrinsics() = intrinsics_of(given.intrinsics);
+  std::copy_n(given.rotation, 9, camera.rotation.begin());
+  std::copy_n(given.centre, 3, camera.centre.begin());
+  return camera;
+}
+
+// Of a picture to be rendered.
+inline PinholeCamera undistorted_pinhole_of(const maq_pinhole_camera& given) {
+  require_struct_size("camera", given.struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
+  if (is_distorted(given.intrinsics)) {
+    throw ArgumentError("camera.intrinsics.distortion is not 0; pictures are rendered without distortion.");
+  }
+  return pinhole_of(given);
+}
+
+inline maq_pinhole_camera camera_of(const PinholeCamera& camera) {
+  maq_pinhole_camera filled{};
+  filled.struct_size = sizeof filled;
+  filled.intrinsics = {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, {}};
+  std::copy_n(camera.rotation.begin(), 9, filled.rotation);
+  std::copy_n(camera.centre.begin(), 3, filled.centre);
+  return filled;
+}
+
+}  // namespace maq

@@ -99,14 +99,14 @@ TEST(TextureBake, WhatAPhotoSeesIsItsAndTheRestIsTheMeshsWithoutAStep) {
   expect_near(at(image, kFront), {200, 120, 40}, 1);
   expect_near(at(image, kBack), {kOwn, kOwn, kOwn}, 12);
   EXPECT_LE(largest_step(image), 10) << "of 100";
-  EXPECT_GT(image.photo_share, 0.1);
-  EXPECT_LT(image.photo_share, 0.5) << "a photo does not see more than half of a ball";
+  EXPECT_GT(image.photo_fraction, 0.1);
+  EXPECT_LT(image.photo_fraction, 0.5) << "a photo does not see more than half of a ball";
 }
 
 TEST(TextureBake, WithoutPhotosAndOutsideTheMatteItIsTheMeshs) {
   for (const auto& photos : {std::vector<TexturePhoto>{}, {photo_from(kFront, {250, 0, 0}, 0.5f)}}) {
     const TextureImage image = bake(ball(), photos);
-    EXPECT_EQ(image.photo_share, 0);
+    EXPECT_EQ(image.photo_fraction, 0);
     for (const uint8_t value : image.bgr) ASSERT_EQ(value, kOwn);
   }
 }
@@ -129,7 +129,7 @@ TEST(TextureBake, WhatLiesBehindAnotherPartTakesNothingOfIt) {
     mesh.texture_coordinates[2 * i] = mesh.texture_coordinates[2 * i + 1] = 0.001f;
   }
   const TextureImage image = bake(mesh, {photo});
-  EXPECT_GT(image.photo_share, 0.1);
+  EXPECT_GT(image.photo_fraction, 0.1);
   for (size_t i = 0; i < image.bgr.size(); ++i) ASSERT_NEAR(image.bgr[i], kOwn, 30) << "at " << i;
 }
 

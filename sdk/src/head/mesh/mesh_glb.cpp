@@ -39,9 +39,10 @@ class GlbWriter {
   size_t add_accessor(const std::vector<T>& values, size_t each, Component type, BufferTarget target,
                       const std::string& more = "") {
     static constexpr const char* kTypes[] = {"", "SCALAR", "VEC2", "VEC3", "VEC4"};
-    add(accessors_, concatenate("{\"bufferView\":", add_view(values.data(), values.size() * sizeof(T), target),
-                                ",\"componentType\":", int(type), ",\"count\":", values.size() / each, ",\"type\":\"",
-                                kTypes[each], '"', type == Component::kUnsignedByte ? ",\"normalized\":true" : "", more, '}'));
+    add(accessors_,
+        concatenate("{\"bufferView\":", add_view(values.data(), values.size() * sizeof(T), target),
+                    ",\"componentType\":", int(type), ",\"count\":", values.size() / each, ",\"type\":\"", kTypes[each],
+                    '"', type == Component::kUnsignedByte ? ",\"normalized\":true" : "", more, '}'));
     return accessor_count_++;
   }
 
@@ -117,17 +118,19 @@ std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t
     high[axis] = i < 3 ? positions[i] : std::max(high[axis], positions[i]);
   }
   const std::string limits = ",\"min\":" + text_of(low) + ",\"max\":" + text_of(high);
-  std::string attributes = concatenate("\"POSITION\":", glb.add_accessor(positions, 3, Component::kFloat, kVertices, limits));
+  std::string attributes =
+      concatenate("\"POSITION\":", glb.add_accessor(positions, 3, Component::kFloat, kVertices, limits));
   if (!mesh.normals.empty()) {
     attributes += concatenate(",\"NORMAL\":", glb.add_accessor(normals_in_file(mesh), 3, Component::kFloat, kVertices));
   }
   std::string of_material, of_file;
   if (!texture.empty()) {
-    attributes += concatenate(",\"TEXCOORD_0\":", glb.add_accessor(mesh.texture_coordinates, 2, Component::kFloat, kVertices));
+    attributes +=
+        concatenate(",\"TEXCOORD_0\":", glb.add_accessor(mesh.texture_coordinates, 2, Component::kFloat, kVertices));
     of_material = ",\"baseColorTexture\":{\"index\":0}";
   } else if (!mesh.colours.empty()) {
-    attributes +=
-        concatenate(",\"COLOR_0\":", glb.add_accessor(linear_colours(mesh.colours), 4, Component::kUnsignedByte, kVertices));
+    attributes += concatenate(",\"COLOR_0\":",
+                              glb.add_accessor(linear_colours(mesh.colours), 4, Component::kUnsignedByte, kVertices));
   }
   const size_t indices = glb.add_accessor(mesh.triangles, 1, Component::kUnsignedInt, kIndices);
   if (!texture.empty()) {

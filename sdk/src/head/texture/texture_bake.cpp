@@ -281,7 +281,7 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
   fill_smoothly(side, is_known, colours);  // filters look beyond the border
   TextureImage image;
   image.side_px = side;
-  image.photo_share = all > 0 ? from_photos / all : 0;
+  image.photo_fraction = all > 0 ? from_photos / all : 0;
   image.bgr.resize(3 * count);
   for (size_t i = 0; i < count; ++i) {
     for (size_t c = 0; c < 3; ++c) {

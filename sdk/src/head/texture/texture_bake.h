@@ -32,8 +32,8 @@ struct TextureOptions {
 
 struct TextureImage {
   int side_px = 0;
-  std::vector<uint8_t> bgr;  // [side][side][3]
-  double photo_share = 0;    // of the head's texels without the cap, how much is from photos
+  std::vector<uint8_t> bgr;   // [side][side][3]
+  double photo_fraction = 0;  // of the head's texels without the cap, how much is from photos
 };
 
 // `mesh` has normals, colours and texture coordinates (texture_layout.h). A texel shows the outermost surface that lies

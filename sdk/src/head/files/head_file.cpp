@@ -13,7 +13,7 @@ namespace {
 
 constexpr char kHeadKind[] = "a head (.maqh)";
 constexpr char kHeadRemedy[] = "Fit the head again, or use the Maquette that it was made with.";
-constexpr StoredFormat kHalf = StoredFormat::kFloat16, kFloat = StoredFormat::kFloat32;
+constexpr StoredFormat kStoredHalf = StoredFormat::kFloat16, kStoredFloat = StoredFormat::kFloat32;
 constexpr float kMaxHalf = 65504;
 
 Vec3 vector_of(const double (&values)[3]) { return {values[0], values[1], values[2]}; }
@@ -54,7 +54,7 @@ void check_counts(const HeadFileHead& head, const FieldShape& shape, const Store
     file.fail(" stores its numbers in a way that version ", kHeadFileVersion, " does not have.");
   }
   uint64_t weights = 0;
-  for (int layer = 0; layer < shape.layers(); ++layer) weights += stored_layer_bytes(shape, layer, kHalf, 1);
+  for (int layer = 0; layer < shape.layers(); ++layer) weights += stored_layer_bytes(shape, layer, kStoredHalf, 1);
   if (weights > file.left()) {
     file.fail(" has ", file.left(), " bytes behind its head, but the weights that it claims take ", weights, ".");
   }
@@ -91,16 +91,18 @@ std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
 
   BytesWriter writer;
   writer.number(file_head);
-  for (int layer = 0; layer < head.weights.shape().layers(); ++layer) writer.layer(kHalf, head.weights.layer(layer));
-  for (const auto* codes : {&head.codes.shape, &head.codes.colour}) writer.floats(kFloat, codes->data(), codes->size());
+  for (int layer = 0; layer < head.weights.shape().layers(); ++layer)
+    writer.layer(kStoredHalf, head.weights.layer(layer));
+  for (const auto* codes : {&head.codes.shape, &head.codes.colour})
+    writer.floats(kStoredFloat, codes->data(), codes->size());
   for (const HeadCamera& camera : head.cameras) writer.number(stored(camera));
   for (const auto* values : {&head.anchors.template_points, &head.anchors.points, &head.anchors.sigma}) {
-    writer.floats(kHalf, values->data(), values->size());
+    writer.floats(kStoredHalf, values->data(), values->size());
   }
   for (const NamedPoint& place : head.places) {
     writer.number(uint8_t(place.name.size()));
     writer.text(place.name);
-    writer.floats(kFloat, place.template_point.data(), 3);
+    writer.floats(kStoredFloat, place.template_point.data(), 3);
   }
   if (file_head.has_texture != 0) {
     writer.number(uint32_t(head.texture.side_px));
@@ -128,13 +130,13 @@ StoredHead read_head(const void* bytes, size_t count, const std::string& name) {
   check_counts(file_head, shape, file);
 
   StoredHead head{FieldWeights(shape)};
-  for (int layer = 0; layer < shape.layers(); ++layer) file.layers(kHalf, {head.weights.layer(layer)});
-  head.codes.shape = file.floats(kFloat, file_head.shape_codes);
-  head.codes.colour = file.floats(kFloat, file_head.colour_codes);
+  for (int layer = 0; layer < shape.layers(); ++layer) file.layers(kStoredHalf, {head.weights.layer(layer)});
+  head.codes.shape = file.floats(kStoredFloat, file_head.shape_codes);
+  head.codes.colour = file.floats(kStoredFloat, file_head.colour_codes);
   for (uint32_t i = 0; i < file_head.cameras; ++i) head.cameras.push_back(camera_of(file.number<StoredCamera>()));
-  head.anchors.template_points = file.floats(kHalf, 3 * size_t(file_head.anchors));
-  head.anchors.points = file.floats(kHalf, 3 * size_t(file_head.anchors));
-  head.anchors.sigma = file.floats(kHalf, file_head.anchors);
+  head.anchors.template_points = file.floats(kStoredHalf, 3 * size_t(file_head.anchors));
+  head.anchors.points = file.floats(kStoredHalf, 3 * size_t(file_head.anchors));
+  head.anchors.sigma = file.floats(kStoredHalf, file_head.anchors);
   head.places = file.places(file_head.places);
   if (file_head.has_texture != 0) {
     const auto side_px = file.number<uint32_t>(), bytes_of_texture = file.number<uint32_t>();

@@ -7,22 +7,10 @@
 #include "core/error.h"
 
 namespace maq::head {
-namespace {
-
-constexpr int kBandRows = 16, kMaxSide = 16384;
-constexpr size_t kTask = 8192, kChunk = 256;  // vertices or triangles; a task has whole chunks
-constexpr uint32_t kNoTriangle = UINT32_MAX;
-constexpr size_t kMaxSamples = 4;          // of a pixel
-constexpr float kSameSurface = 1 / 1.02f;  // of inverse depths in a pixel: farther ones are of what is behind
-
-// What is linear in the pixel: a column + b row + c.
-struct Plane {
-  double a = 0, b = 0, c = 0;
-};
 
 // The camera as edges of triangles need it. Samples are the pixels of a picture that is larger by their number a side.
-struct Sampling {
-  Sampling(const HeadCamera& camera, int samples_a_side)
+struct RasterSampling {
+  RasterSampling(const HeadCamera& camera, int samples_a_side)
       : per_pixel(samples_a_side),
         width(camera.width_px * samples_a_side),
         step(1 / (camera.focal_px * samples_a_side)),
@@ -36,11 +24,24 @@ struct Sampling {
   double cx, cy;
 };
 
+namespace {
+
+constexpr int kBandRows = 16, kMaxSide = 16384;
+constexpr size_t kTask = 8192, kChunk = 256;  // vertices or triangles; a task has whole chunks
+constexpr uint32_t kNoTriangle = UINT32_MAX;
+constexpr size_t kMaxSamples = 4;          // of a pixel
+constexpr float kSameSurface = 1 / 1.02f;  // of inverse depths in a pixel: farther ones are of what is behind
+
+// What is linear in the pixel: a column + b row + c.
+struct Plane {
+  double a = 0, b = 0, c = 0;
+};
+
 // The plane that is 0 along the edge from p to q in the picture (Olano and Greer, Triangle scan conversion using 2D
 // homogeneous coordinates, 1997: no clipping). The other way round it is the negative, to the bit: so of triangles that
 // share an edge, each pixel on it belongs to one at least.
 template <class Vertex>
-Plane edge_plane(const Vertex& p, const Vertex& q, const Sampling& sampling) {
+Plane edge_plane(const Vertex& p, const Vertex& q, const RasterSampling& sampling) {
   const double x = (p.y * q.z - p.z * q.y) * sampling.step, y = (p.z * q.x - p.x * q.z) * sampling.step;
   return {x, y, (p.x * q.y - p.y * q.x) - (x * sampling.cx + y * sampling.cy)};
 }
@@ -59,7 +60,7 @@ double volume_of(const Vertex& p, const Vertex& q, const Vertex& r) {
 }
 
 template <class Vertex>
-Setup set_up(const std::array<const Vertex*, 3>& corners, const Sampling& sampling) {
+Setup set_up(const std::array<const Vertex*, 3>& corners, const RasterSampling& sampling) {
   Setup made;
   for (size_t k = 0; k < 3; ++k) {
     made.edges[k] = edge_plane(*corners[(k + 1) % 3], *corners[(k + 2) % 3], sampling);
@@ -141,7 +142,7 @@ std::array<float, 3> shade(const SurfacePoint& point, const RasterOptions& optio
 }  // namespace
 
 struct MeshRaster::Band {
-  Sampling sampling;
+  RasterSampling sampling;
   float* inverse_depth;  // of each sample
   uint32_t* triangles;
 };
@@ -217,7 +218,7 @@ void MeshRaster::find_rows(const HeadMesh& mesh, const HeadCamera& camera, const
 
 void MeshRaster::draw_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top,
                            int bottom, Band& band) const {
-  const Sampling& sampling = band.sampling;
+  const RasterSampling& sampling = band.sampling;
   const double near = double(options.near), max_inverse_depth = 1 / near;
   const int first_sample = top * sampling.per_pixel, sample_rows = (bottom - top) * sampling.per_pixel;
   const size_t samples = size_t(sampling.width) * size_t(sample_rows);
@@ -267,7 +268,7 @@ void MeshRaster::draw_band(const HeadMesh& mesh, const HeadCamera& camera, const
 
 void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top,
                             int bottom, const Band& band, RasterImage& image) const {
-  const Sampling& sampling = band.sampling;
+  const RasterSampling& sampling = band.sampling;
   const size_t width = size_t(camera.width_px), side = size_t(sampling.per_pixel), samples_count = side * side;
   const bool has_normals = !mesh.normals.empty(), has_template = !mesh.template_points.empty();
   // Of a triangle, where a pixel's middle is or, outside of it, near that.
@@ -367,7 +368,7 @@ void MeshRaster::draw(const HeadMesh& mesh, const HeadCamera& camera, const Rast
   image.bgr.resize(3 * pixels), image.alpha.resize(pixels), image.depth.resize(pixels);
   image.normals.resize(3 * pixels);
   image.template_points.resize(mesh.template_points.empty() ? 0 : 3 * pixels);
-  const Sampling sampling(camera, options.is_smooth ? 2 : 1);
+  const RasterSampling sampling(camera, options.is_smooth ? 2 : 1);
   const size_t samples = size_t(sampling.width) * kBandRows * size_t(sampling.per_pixel);
   inverse_depths_.resize(size_t(threads.count())), triangles_.resize(size_t(threads.count()));
   for (auto& depths : inverse_depths_) depths.resize(samples);

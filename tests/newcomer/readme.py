@@ -24,6 +24,7 @@ PROMISES = {
     "densepose photo.jpg": "results/photo_IUV.png",
     "densepose clip.mp4": "results/clip*_IUV.png",
     "scene build": "room.maqs",
+    "head photo.jpg": "head.glb",
     "scene render": "room.mp4",
     "./people": PRINTS + r"person 0\.\d+ at x \d+ y \d+",
     "make wheel": "build/wheel/maquette-*.whl",

@@ -56,6 +56,7 @@ fi
 if [ "$group" != demo ] && [ "$group" != desktop ]; then
     needs_command git git
     needs_command ccache ccache       # what was compiled in another checkout is not compiled again
+    needs_command assimp assimp-utils  # a reader of heads that is not ours
     needs_package libgtest-dev
     needs_package libgmock-dev
     needs_package libcamera-dev       # without it the SDK is built without libcamera: cameras

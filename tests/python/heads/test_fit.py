@@ -189,8 +189,6 @@ def test_sdk_and_torch_fit_the_same_round_head(tmp_path):
 
 @pytest.mark.slow
 def test_sdk_and_torch_fit_the_same_head_with_the_shipped_bundle(tmp_path):
-    if not (SHIPPED / "manifest.json").exists():
-        pytest.skip(f"{SHIPPED} is not there")
     assert_alike(compared(SHIPPED, tmp_path))
 
 

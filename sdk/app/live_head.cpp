@@ -204,12 +204,16 @@ void LiveHead::show(Head& head, const maq_head_mesh_options& mesh, bool has_phot
   if (has_photo_camera && cameras > 0) made.photo_camera = head.camera(cameras - 1);
   auto shown = std::make_shared<Shown>(std::move(made));
   {
+    // One step, so that no image comes while the state says that there is no head.
     const std::lock_guard<std::mutex> lock(mutex_);
+    auto state = std::make_shared<LiveHeadState>(*state_);
+    state->has_head = true;
+    state_ = std::move(state);
     shown_ = std::move(shown);
     needs_image_ = view_.has_value();
     wake_renderings_.notify_one();
   }
-  update([](LiveHeadState& state) { state.has_head = true; });
+  if (on_change_) on_change_();
 }
 
 void LiveHead::run_renderings() {

@@ -35,8 +35,8 @@ if(WAY STREQUAL "find_package")
   endif()
   run(build/head "image:${CMAKE_CURRENT_LIST_DIR}/../media/photo.jpg" head.glb
     "${CMAKE_CURRENT_LIST_DIR}/../native/data/round_heads/bundle")
-  file(READ "${WORK_DIR}/head.glb" head LIMIT 4)
-  if(NOT output MATCHES "the nose ends [0-9]+ mm before" OR NOT head STREQUAL "glTF")
+  file(READ "${WORK_DIR}/head.glb" head LIMIT 4 HEX)
+  if(NOT output MATCHES "the nose ends [0-9]+ mm before" OR NOT head STREQUAL "676c5446")  # "glTF"
     message(FATAL_ERROR "head printed ${output} and wrote ${head}")
   endif()
 else()

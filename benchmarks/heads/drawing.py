@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from maquette import HeadMesh
 
+from benchmarks.heads.fitted import DM_PER_M
 from benchmarks.heads.other_heads import PEOPLE, load_head
 from export.camera import Camera
-from export.evaluation.heads_api import HeadMesh
 from export.heads.made_heads import make_head
 from export.heads.surface import HeadMaker, Place
 from export.heads.view_shards import sample_camera
@@ -28,19 +29,19 @@ FRAME_DM = 3.4  # side of what a new view shows
 
 @dataclass(frozen=True, eq=False)
 class DrawnMesh:
-    """A mesh of the library, seen by cameras in dm of the head's frame."""
+    """A mesh of the library, seen by cameras in dm."""
 
     scene: Scene
 
     @staticmethod
-    def of(mesh: HeadMesh, metres_per_unit: float) -> DrawnMesh:
+    def of(mesh: HeadMesh) -> DrawnMesh:
         vertex_colours = mesh.colours.astype(np.float64)
         faces = mesh.triangles.astype(np.int64)
 
         def mixed(place: Place) -> np.ndarray:
             return (vertex_colours[faces[place.face]] * place.weight[..., None]).sum(1)
 
-        positions = mesh.positions_m.astype(np.float64) / metres_per_unit
+        positions = mesh.positions_m.astype(np.float64) * DM_PER_M
         return DrawnMesh.coloured(positions, faces, mesh.normals.astype(np.float64), mixed)
 
     @staticmethod

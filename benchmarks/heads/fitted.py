@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
+from maquette import Head, HeadMesh
 
 from benchmarks.heads.distances import Triangles
 from export.camera import Camera
-from export.evaluation.heads_api import FittedHead, HeadMesh
-from export.heads.head_file import StoredHead, read_head
 
-MM_PER_M = 1000
+MM_PER_M, DM_PER_M = 1000, 10
 
 
 def triangles_of(mesh: HeadMesh) -> Triangles:
@@ -20,22 +16,15 @@ def triangles_of(mesh: HeadMesh) -> Triangles:
     return Triangles(mesh.positions_m.astype(np.float64) * MM_PER_M, mesh.triangles.astype(np.int64))
 
 
-def stored(head: FittedHead) -> StoredHead:
-    """What the library writes of it: the C API does not give cameras."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "head.maqh"
-        head.save(path)
-        return read_head(path)
-
-
-def cameras_of(head: StoredHead) -> list[Camera]:
-    """Of the photos that it was fitted to, in the order they were added; in units of the head's frame (dm)."""
+def cameras_of(head: Head) -> list[Camera]:
+    """Of the photos that it was fitted to, in the order they were added; in dm."""
+    found = [head.camera(k) for k in range(head.info.photo_count)]
     return [
         Camera(
-            int(c["width_px"]), int(c["height_px"]), *(float(c[k]) for k in ("focal_px", "focal_px", "cx_px", "cy_px")),
-            c["rotation"].copy(), -c["rotation"].T @ c["translation"],
+            c.intrinsics.width_px, c.intrinsics.height_px, c.intrinsics.fx_px, c.intrinsics.fy_px, c.intrinsics.cx_px,
+            c.intrinsics.cy_px, c.rotation, DM_PER_M * c.centre,
         )
-        for c in head.cameras
+        for c in found
     ]  # fmt: skip
 
 

@@ -20,13 +20,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from maquette import HeadBuilder, MaquetteError
 from tqdm import tqdm
 
 from benchmarks.heads import report
-from benchmarks.heads.distances import MM_PER_DM, Triangles, aligned, inner_face_mm, measure
+from benchmarks.heads.distances import Triangles, aligned, inner_face_mm, measure
 from benchmarks.heads.drawing import DrawnMesh
 from benchmarks.heads.face_mesh import FaceMeshes
-from benchmarks.heads.fitted import MM_PER_M, angle_deg, cameras_of, stored, triangles_of
+from benchmarks.heads.fitted import angle_deg, cameras_of, triangles_of
 from benchmarks.heads.linear_head import LinearHeads, read_visible
 from benchmarks.heads.mean_head import read_mean_head
 from benchmarks.heads.new_views import View, psnr_db, true_views, with_photo
@@ -41,7 +42,6 @@ from benchmarks.heads.photos import (
     yaw_pitch_deg,
 )  # fmt: skip
 from benchmarks.heads.targets import ONE, OTHER, THREE
-from export.evaluation.heads_api import HeadBuilder, MaquetteError
 from export.evaluation.machine import describe_machine
 from export.heads.made_heads import make_maker
 from export.heads.surface import HeadMaker
@@ -131,7 +131,7 @@ def measure_head(
     try:
         builder.clear()
         for photo in photos:
-            builder.add_photo(photo.rgb, photo.box, photo.camera.fx_px if known_focal else 0)
+            builder.add_photo(photo.rgb, photo.box, focal_px=photo.camera.fx_px if known_focal else None)
         return [about | {"asked_s": asked} | fitted(builder, case, asked) for asked in seconds]
     except MaquetteError as error:
         return [about | {"asked_s": asked, "missing": str(error)} for asked in seconds]
@@ -142,24 +142,22 @@ def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
     true = case.head.true
     with builder.fit(asked_s) as result:
         start = time.perf_counter()
-        mesh = result.mesh()
+        mesh = result.mesh("all")
         mesh_ms = 1000 * (time.perf_counter() - start)
-        file = stored(result)
+        cameras = cameras_of(result)
     stats = builder.stats
-    used = [photo for k, photo in enumerate(case.photos) if builder.photo(k).is_used]
-    pairs = list(zip(cameras_of(file), used, strict=True))
+    used = [photo for photo, found in zip(case.photos, builder.photos, strict=True) if found.is_used]
+    pairs = list(zip(cameras, used, strict=True))
     triangles = triangles_of(mesh)
     found = asdict(measure(triangles, true, case.seen))
     if case.views:
-        # In decimetres of the true head, whatever the unit of the head's file.
-        drawn = DrawnMesh.of(mesh, MM_PER_DM / MM_PER_M)
-        found["view_psnr_db"] = psnr_db(drawn, aligned(triangles, true.points), case.views)
+        found["view_psnr_db"] = psnr_db(DrawnMesh.of(mesh), aligned(triangles, true.points), case.views)
     return found | {
-        "fit_s": stats.total_ms / 1000,
-        "steps": stats.step_count,
-        "encode_ms": stats.encode_ms,
+        "fit_s": stats["total_ms"] / 1000,
+        "steps": stats["step_count"],
+        "encode_ms": stats["encode_ms"],
         "mesh_ms": mesh_ms,
-        "used_photos": stats.used_photo_count,
+        "used_photos": stats["used_photo_count"],
         "focal_ratio": float(np.median([camera.fx_px / photo.camera.fx_px for camera, photo in pairs])),
         # Frames of heads of another maker lie otherwise in their heads.
         "rotation_deg": float(np.median([angle_deg(camera.rotation, photo.camera.rotation) for camera, photo in pairs]))

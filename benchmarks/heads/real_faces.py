@@ -13,14 +13,13 @@ from pathlib import Path
 
 import igl
 import numpy as np
-from maquette.frames import Frame
+from maquette import Frame, HeadBuilder, MaquetteError
 from tqdm import tqdm
 
 from benchmarks.heads.drawing import DrawnMesh, framed
-from benchmarks.heads.fitted import cameras_of, stored
+from benchmarks.heads.fitted import DM_PER_M, cameras_of
 from benchmarks.heads.mean_head import MM_PER_DM, mesh_of, template_points
 from export.camera import Camera
-from export.evaluation.heads_api import HeadBuilder, MaquetteError
 from export.heads.fitting.anchor_fit import CodePrior, fit_anchors, observations_of
 from export.heads.fitting.photo import Encoder, look_at
 from export.heads.head_shards import CROP_SIDES, SIDE
@@ -138,10 +137,9 @@ def fitted_mesh(builder: HeadBuilder, face: RealFace, seconds: float) -> PosedMe
     builder.clear()
     builder.add_photo(face.rgb, face.box)
     with builder.fit(seconds) as head:
-        mesh, file = head.mesh(), stored(head)
-    unit = file.metres_per_unit
-    points, template = (a.astype(np.float64) / unit for a in (mesh.positions_m, mesh.template_points_m))
-    return PosedMesh(points, template, mesh.triangles.astype(np.int64), cameras_of(file)[0])
+        mesh, camera = head.mesh("all"), cameras_of(head)[0]
+    points, template = (a.astype(np.float64) * DM_PER_M for a in (mesh.positions_m, mesh.template_points_m))
+    return PosedMesh(points, template, mesh.triangles.astype(np.int64), camera)
 
 
 def measure_real(

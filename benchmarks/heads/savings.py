@@ -13,13 +13,13 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
+from maquette import HeadBuilder, MaquetteError
 from tqdm import tqdm
 
 from benchmarks.heads.distances import measure
 from benchmarks.heads.fitted import triangles_of
 from benchmarks.heads.photos import Photo, TrueHead
 from benchmarks.heads.tables import table
-from export.evaluation.heads_api import HeadBuilder, MaquetteError
 
 
 @dataclass(frozen=True)
@@ -61,17 +61,17 @@ def measure_savings(bundle: Path, heads: Sequence[tuple[TrueHead, Photo]], at_s:
 
 def _one(builder: HeadBuilder, head: TrueHead, photo: Photo, setting: Setting) -> dict:
     builder.clear()
-    focal_px = photo.camera.fx_px if setting.focal else 0
+    focal_px = photo.camera.fx_px if setting.focal else None
     start = time.perf_counter()
-    builder.add_photo(photo.rgb, photo.box if setting.box else None, focal_px)
+    builder.add_photo(photo.rgb, photo.box if setting.box else None, focal_px=focal_px)
     with builder.fit(setting.seconds) as result:
         before = time.perf_counter()
-        mesh = result.mesh(cell_m=setting.cell_m)
+        mesh = result.mesh("all", cell_m=setting.cell_m)
         mesh_s = time.perf_counter() - before
     whole_s = time.perf_counter() - start
     found = measure(triangles_of(mesh), head.true)
     return {
-        "whole_s": whole_s, "mesh_s": mesh_s, "steps": builder.stats.step_count, "triangles": len(mesh.triangles),
+        "whole_s": whole_s, "mesh_s": mesh_s, "steps": builder.stats["step_count"], "triangles": len(mesh.triangles),
         "face_mm": found.face_mm, "head_mm": found.head_mm,
     }  # fmt: skip
 

@@ -18,16 +18,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from maquette.frames import Frame
+from maquette import Frame, HeadBuilder, MaquetteError
 from tqdm import tqdm
 
 from benchmarks.heads import drawing
 from benchmarks.heads.drawing import DrawnMesh, beside, framed
-from benchmarks.heads.fitted import cameras_of, stored
+from benchmarks.heads.fitted import cameras_of
 from benchmarks.heads.photos import PhotoBackgrounds, TrueHead, generator, photo_of, read_made_heads, read_other_heads
 from benchmarks.heads.quality import BACKGROUNDS, BUNDLE, DATA, FIGURES, ONE, OTHER
 from export.camera import Camera
-from export.evaluation.heads_api import HeadBuilder, MaquetteError
 from export.evaluation.paint import labelled_tile, mosaic
 from export.heads.head_shards import CROP_SIDES
 from export.heads.made_heads import make_maker
@@ -70,14 +69,13 @@ def row_of(builder: HeadBuilder, case: Case, seconds: float) -> list[np.ndarray]
     try:
         builder.clear()
         builder.add_photo(case.rgb, case.box)
-        box = builder.photo(0).box_px
+        box = builder.photos[0].box_px
         with builder.fit(seconds) as head:
-            mesh, file = head.mesh(), stored(head)
+            mesh, camera = head.mesh("all"), cameras_of(head)[0]
     except MaquetteError as error:
         tiles = [case.rgb, *[empty] * (len(COLUMNS) - 1)]
         return _labelled(tiles, [case.label, str(error)[:40]])
-    camera = cameras_of(file)[0]
-    drawn = DrawnMesh.of(mesh, file.metres_per_unit)
+    drawn = DrawnMesh.of(mesh)
     near, to_picture = framed(camera, box, CROP_SIDES, TILE_PX)
     photo = cv2.warpAffine(
         case.rgb, to_picture, (TILE_PX, TILE_PX), flags=cv2.INTER_AREA | cv2.WARP_INVERSE_MAP, borderValue=(90,) * 3

@@ -1,4 +1,4 @@
-"""Maquette: a camera into 3D on two CPU cores. Dense pose, scenes and edges, over numpy arrays.
+"""Maquette: a camera into 3D on two CPU cores. Dense pose, scenes, edges and heads over numpy arrays.
 
     import maquette
     result = maquette.DensePose().run(rgb)          # uint8 [H, W, 3]
@@ -10,14 +10,24 @@ from maquette.densepose import DensePose, DensePoseResult, Person, part_colours,
 from maquette.edges import Box, Curve, Curves, Edges, EdgesResult
 from maquette.frames import Camera, Frame, Intrinsics, PixelFormat, Source, list_cameras
 from maquette.fusion import EdgesFusion
+from maquette.heads import (
+    Head,
+    HeadBuilder,
+    HeadImage,
+    HeadInfo,
+    HeadLandmark,
+    HeadMesh,
+    HeadPhoto,
+    HeadRenderer,
+)
 from maquette.native import MaquetteError, library_path, native
 from maquette.scenes import Capture, PinholeCamera, Scene, SceneImage, SceneRenderer, View
 
 __all__ = [
     "Box", "Camera", "Capture", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
-    "EdgesResult", "Frame", "Intrinsics", "MaquetteError", "Person", "PinholeCamera", "PixelFormat", "Scene",
-    "SceneImage", "SceneRenderer", "Source", "View", "library_path", "list_cameras", "part_colours", "part_name",
-    "sdk_version",
+    "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadImage", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
+    "HeadRenderer", "Intrinsics", "MaquetteError", "Person", "PinholeCamera", "PixelFormat", "Scene", "SceneImage",
+    "SceneRenderer", "Source", "View", "library_path", "list_cameras", "part_colours", "part_name", "sdk_version",
 ]  # fmt: skip
 
 

@@ -17,10 +17,12 @@ PART_COUNT = 24
 
 @dataclass(frozen=True)
 class Person:
-    """box_px: left, top, right, bottom in pixels of the image, the latter two exclusive. score: 0 to 1."""
+    """box_px: left, top, right, bottom in pixels of the image, the latter two exclusive. score: 0 to 1. head_box_px:
+    around the pixels that show the head, for `HeadBuilder.add_photo`; None where none does."""
 
     box_px: tuple[float, float, float, float]
     score: float
+    head_box_px: tuple[float, float, float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class DensePose(NativeObject):
                           release="maq_densepose_result_release")  # fmt: skip
         count = n.lib.maq_densepose_result_get_person_count(result)
         found = n.indexed("maq_densepose_result_get_person", result, "maq_person", count)
-        people = [Person(tuple(p.box_px), p.score) for p in found]
+        people = [Person(tuple(p.box_px), p.score, _head_box_px(result, index)) for index, p in enumerate(found)]
         planes = [
             n.plane("maq_densepose_result_get_plane", result, plane, frame.shape, np.uint8)
             for plane in (
@@ -94,6 +96,17 @@ class DensePose(NativeObject):
         shape = (PART_COUNT, struct.nodes, struct.nodes, 3)
         data = n.ffi.buffer(struct.points_m, 4 * int(np.prod(shape)))
         return np.frombuffer(data, np.float32).reshape(shape).copy()
+
+
+def _head_box_px(result: Any, index: int) -> tuple[float, ...] | None:
+    n = native()
+    box_px = n.ffi.new("float[4]")
+    status = n.ask("maq_densepose_result_get_head_box", result, index, box_px)
+    if status == n.lib.MAQ_ERROR_NOT_FOUND:
+        return None
+    if status:
+        n.fail("maq_densepose_result_get_head_box", status)
+    return tuple(box_px)
 
 
 def part_name(part: int) -> str:

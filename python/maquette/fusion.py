@@ -9,7 +9,7 @@ import numpy as np
 
 from maquette.edges import Curves, Edges, EdgesResult
 from maquette.frames import Frame
-from maquette.native import NativeObject, native
+from maquette.native import NativeObject, ProgressCallback, native
 from maquette.scenes import PinholeCamera
 
 # maq_edges_fusion_point
@@ -20,9 +20,9 @@ POINT = np.dtype([("point_m", "<f8", 3), ("normal", "<f4", 3), ("distance_m", "<
 class EdgesFusion(NativeObject):
     """Add views, finish, then ask for points and curves, in the world of the cameras.
 
-    edges: the network. progress: called by `finish` with the fraction done; returns False to cancel. settings: fields
-    of maq_edges_fusion_config by their names: cell_m, min_views, max_points, ... Raises MaquetteError, as all methods
-    do.
+    edges: the network. progress: called by `finish` with the fraction done; returns False to cancel, and what it raises
+    comes out of `finish`. settings: fields of maq_edges_fusion_config by their names: cell_m, min_views, max_points,
+    ... Raises MaquetteError, as all methods do.
     """
 
     def __init__(
@@ -30,9 +30,8 @@ class EdgesFusion(NativeObject):
     ) -> None:  # fmt: skip
         n = native()
         self._edges = edges
-        told = None if progress is None else lambda _, done: 0 if progress(done) is False else 1
-        self._callback = n.ffi.NULL if told is None else n.ffi.callback("int32_t(void *, double)", told, error=0)
-        config = n.config("maq_edges_fusion_config", {**settings, "progress_callback": self._callback})
+        self._progress = ProgressCallback(progress, "int32_t(void *, double)")
+        config = n.config("maq_edges_fusion_config", {**settings, "progress_callback": self._progress.pointer})
         super().__init__(n.create("maq_edges_fusion", n.context, config))
 
     def add_view(self, depth: Frame | np.ndarray, camera: PinholeCamera) -> EdgesResult:
@@ -47,7 +46,7 @@ class EdgesFusion(NativeObject):
 
     def finish(self) -> None:
         """Makes points and curves of the views so far; more can be added afterwards."""
-        native().call("maq_edges_fusion_finish", self.handle)
+        self._progress.run(lambda: native().call("maq_edges_fusion_finish", self.handle))
 
     def curves(self) -> Curves:
         """Those of the latest `finish`; without boxes, and with nothing to snap to. Hold no more than 4 at once."""

@@ -8,9 +8,11 @@ import os
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
+
+T = TypeVar("T")
 
 _FOLDER = Path(__file__).resolve().parent
 _IN_WHEEL = _FOLDER / "lib" / "libmaquette.so"
@@ -163,14 +165,37 @@ def native() -> Native:
     return Native(library_path())
 
 
-def progress_callback(progress: Callable[[float, str], bool | None] | None, callback: str) -> Any:
-    """A callback of the C API around a Python function of the fraction done and the stage, which may return False to
-    cancel. An exception in it cancels, too, and is printed by cffi."""
-    ffi = native().ffi
-    if progress is None:
-        return ffi.NULL
+class ProgressCallback:
+    """A callback of the C API, of the type `signature`, around a Python function of the fraction done, and of the stage
+    where the C API tells one. The function may be None, and may return False to cancel. What it raises cancels, too,
+    and comes out of `run`; so does Ctrl-C, for which Python needs to be asked now and then. `pointer`: for the C API.
+    """
 
-    def told(_: Any, done: float, stage: Any) -> int:
-        return 0 if progress(done, ffi.string(stage).decode()) is False else 1
+    def __init__(self, progress: Callable[..., bool | None] | None, signature: str) -> None:
+        ffi = native().ffi
+        self._raised: BaseException | None = None
 
-    return ffi.callback(callback, told, error=0)
+        def told(_: Any, done: float, *stage: Any) -> int:
+            if self._raised is not None:
+                return 0
+            go_on = progress is None or progress(done, *(ffi.string(text).decode() for text in stage))
+            return 0 if go_on is False else 1
+
+        self.pointer = ffi.callback(signature, told, error=0, onerror=self.keep)
+
+    def keep(self, _: Any, error: BaseException, __: Any) -> None:
+        """The `onerror` of this callback, and of others of the same call."""
+        self._raised = error
+
+    def run(self, call: Callable[[], T]) -> T:
+        """What `call` returns, in which the library calls back. Raises MaquetteError, and what the function raises."""
+        self._raised, result = None, None
+        try:
+            result = call()
+        except MaquetteError:
+            if self._raised is None:
+                raise
+        raised, self._raised = self._raised, None
+        if raised is not None:
+            raise raised
+        return result

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from maquette.frames import Intrinsics
-from maquette.native import NativeObject, native, progress_callback
+from maquette.native import NativeObject, ProgressCallback, native
 
 _PROGRESS = "int32_t(void *, double, const char *)"
 
@@ -41,6 +41,11 @@ class PinholeCamera:
         struct.centre = [float(v) for v in np.asarray(self.centre).reshape(3)]
         return struct
 
+    @staticmethod
+    def of_struct(struct: Any) -> PinholeCamera:
+        rotation = np.array(list(struct.rotation)).reshape(3, 3)
+        return PinholeCamera(Intrinsics.of_struct(struct.intrinsics), rotation, np.array(list(struct.centre)))
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -63,7 +68,9 @@ class Capture(NativeObject):
         n.call("maq_capture_get_info", self.handle, info)
         self.up = np.array(list(info.up))
         views = n.indexed("maq_capture_get_view", self.handle, "maq_capture_view", info.view_count)
-        self.views = [View(n.ffi.string(v.name).decode(), _camera_of(v.camera), bool(v.is_held_out)) for v in views]
+        self.views = [
+            View(n.ffi.string(v.name).decode(), PinholeCamera.of_struct(v.camera), bool(v.is_held_out)) for v in views
+        ]
         drops = n.indexed("maq_capture_get_drop", self.handle, "maq_capture_drop", info.drop_count)
         self.drops = [f"{d.count} {n.ffi.string(d.reason).decode()}" for d in drops]
 
@@ -76,22 +83,14 @@ class Scene(NativeObject):
         capture: Capture | str | Path, progress: Callable[[float, str], bool | None] | None = None, **settings: Any
     ) -> Scene:
         """progress: called with the fraction done and what is being done; returns False to cancel. settings: fields of
-        maq_scene_build_config by their names: long_side_px, max_views, max_points, ... Raises MaquetteError."""
+        maq_scene_build_config by their names: long_side_px, max_views, max_points, ... Raises MaquetteError, and what
+        `progress` raises."""
         n = native()
         capture = capture if isinstance(capture, Capture) else Capture(capture)
-        callback = progress_callback(progress, _PROGRESS)
-        config = n.config("maq_scene_build_config", {**settings, "progress_callback": callback})
-        return Scene(
-            n.create(
-                "maq_scene",
-                n.context,
-                config,
-                capture.handle,
-                n.ffi.NULL,
-                function="maq_scene_build",
-                release="maq_scene_close",
-            )
-        )
+        callback = ProgressCallback(progress, _PROGRESS)
+        config = n.config("maq_scene_build_config", {**settings, "progress_callback": callback.pointer})
+        build = ("maq_scene", n.context, config, capture.handle, n.ffi.NULL)
+        return Scene(callback.run(lambda: n.create(*build, function="maq_scene_build", release="maq_scene_close")))
 
     @staticmethod
     def open(path: str | Path) -> Scene:
@@ -162,8 +161,3 @@ class SceneRenderer(NativeObject):
         stats = n.stats("maq_scene_image_stats", "maq_scene_image_get_stats", image)
         n.ffi.release(image)
         return SceneImage(np.ascontiguousarray(bgr[..., ::-1]), alpha, depth, stats)
-
-
-def _camera_of(struct: Any) -> PinholeCamera:
-    rotation = np.array(list(struct.rotation)).reshape(3, 3)
-    return PinholeCamera(Intrinsics.of_struct(struct.intrinsics), rotation, np.array(list(struct.centre)))

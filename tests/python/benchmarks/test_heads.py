@@ -7,10 +7,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
+import maquette
 import numpy as np
 import pytest
 from ellipsoid_heads import RADII_MM, ellipsoid, pictures_of_ellipsoid, true_ellipsoid, true_head
-from maquette import MaquetteError
+from maquette import Head, HeadInfo, HeadMesh, Intrinsics, MaquetteError, PinholeCamera
 from scipy.spatial.transform import Rotation
 from small_prior import small_prior
 
@@ -19,14 +20,12 @@ from benchmarks.heads import distances, drawing, fitted, mean_head, photos, qual
 from benchmarks.heads.distances import Triangles, TruePoints, measure
 from benchmarks.heads.photos import PhotoBackgrounds, photo_of
 from export.camera import Camera
-from export.evaluation.heads_api import FittedHead, HeadBuilder, HeadMesh, has_heads
 from export.heads.field import geometry
-from export.heads.head_file import CAMERA, read_head
 from export.heads.head_shards import HeadPoints
 from export.heads.views import look_at
 from export.people import assets
 
-TINY, TINY_HEAD = Path("tests/native/data/tiny_head/bundle"), Path("tests/native/data/tiny_head/example.maqh")
+TINY_HEAD = Path("tests/native/data/tiny_head/example.maqh")
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 
@@ -155,17 +154,27 @@ def mesh_of_library(mesh, colour=(200, 100, 50)):
     return HeadMesh(mesh.points / 1000, normals, colours, mesh.points / 1000, mesh.faces)
 
 
-@pytest.fixture
-def known_cameras(monkeypatch):
-    """Heads that are fitted come with a camera as far in front of them as the pictures' and 20 degrees to the left."""
-    camera = look_at(np.radians(20), 0.1, 0.0, 6.0, np.zeros(3), 300.0, 100)
-    stored = np.zeros(1, CAMERA)
-    stored["width_px"] = stored["height_px"] = 100
-    stored["focal_px"], stored["cx_px"], stored["cy_px"] = 300, 49.5, 49.5
-    stored["rotation"], stored["translation"] = camera.rotation, camera.world_to_camera[:, 3]
-    file = SimpleNamespace(cameras=stored, metres_per_unit=0.1)
-    for module in (quality, sheet):
-        monkeypatch.setattr(module, "stored", lambda head: file)
+class FakeHead:
+    """Fitted, with a camera as far in front of it as the pictures' and 20 degrees to the left."""
+
+    info = HeadInfo(photo_count=1, scale="prior", scale_sigma=0.04, texture_px=0)
+
+    def __init__(self, width):
+        self.width = width
+
+    def mesh(self, triangle_count):
+        assert triangle_count == "all"
+        return mesh_of_library(ellipsoid(radii=RADII_MM * [self.width, 1, 1]))
+
+    def camera(self, index):
+        seen = look_at(np.radians(20), 0.1, 0.0, 6.0, np.zeros(3), 300.0, 100)
+        return PinholeCamera(Intrinsics(100, 100, 300, 300, 49.5, 49.5), seen.rotation, seen.centre / 10)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
 
 
 class FakeBuilder:
@@ -177,24 +186,22 @@ class FakeBuilder:
     def clear(self):
         self.focals_px, self.boxes = [], []
 
-    def add_photo(self, rgb, box, focal_px=0):
+    def add_photo(self, rgb, box, focal_px=None):
         if self.refuses:
             raise MaquetteError("No head is seen.", "MAQ_ERROR_NOT_FOUND")
         self.focals_px.append(focal_px)
         self.boxes.append(box)
 
     def fit(self, seconds):
-        mesh = ellipsoid(radii=RADII_MM * [self.widths[seconds], 1, 1])
-        result = FakeBuilder(self.widths)
-        result.mesh = lambda: mesh_of_library(mesh)
-        return result
+        return FakeHead(self.widths[seconds])
 
-    def photo(self, index):
-        return SimpleNamespace(is_used=1, box_px=self.boxes[index])
+    @property
+    def photos(self):
+        return [SimpleNamespace(is_used=True, box_px=box) for box in self.boxes]
 
     @property
     def stats(self):
-        return SimpleNamespace(total_ms=10, step_count=3, encode_ms=2, used_photo_count=1)
+        return {"total_ms": 10, "step_count": 3, "encode_ms": 2, "used_photo_count": 1}
 
     def __enter__(self):
         return self
@@ -207,7 +214,6 @@ def one_photo(heads, seconds, known_focal=False):
     return quality.HeadSet(quality.ONE, [(head, [0]) for head in heads], seconds, known_focal)
 
 
-@pytest.mark.usefixtures("known_cameras")
 def test_heads_are_measured_by_seconds_beside_the_mean_head(backgrounds):
     head, mean = true_head([0]), ellipsoid(radii=RADII_MM * [1.2, 1, 1])
     rows = quality.measure_set(FakeBuilder({0: 1.1, 2: 1.0}), one_photo([head], [0, 2]), backgrounds, mean)
@@ -222,12 +228,11 @@ def test_heads_are_measured_by_seconds_beside_the_mean_head(backgrounds):
     json.dumps(rows)
 
 
-@pytest.mark.usefixtures("known_cameras")
 @pytest.mark.parametrize("known", [False, True])
 def test_the_library_gets_the_focal_length_only_if_it_is_to_know_it(backgrounds, known):
     builder = FakeBuilder({0: 1.0})
     quality.measure_set(builder, one_photo([true_head([0])], [0], known), backgrounds, ellipsoid())
-    assert builder.focals_px == pytest.approx([360.0 if known else 0.0])
+    assert builder.focals_px == ([pytest.approx(360.0)] if known else [None])
 
 
 def test_a_head_that_is_not_found_is_said_to_be_missing(backgrounds):
@@ -325,16 +330,21 @@ def test_a_time_that_is_not_measured_gives_way_to_the_nearest():
     assert distances.ICP_STEPS > 5
 
 
-def test_cameras_are_read_from_the_head_file():
-    first, second = fitted.cameras_of(read_head(TINY_HEAD))
+@pytest.mark.skipif(
+    not maquette.library_path().exists(), reason=f"{maquette.library_path()} is not built: run `make build`"
+)
+def test_cameras_of_fitted_heads_are_in_decimetres():
+    with Head.open(TINY_HEAD) as head:
+        first, second = fitted.cameras_of(head)
     assert (first.width_px, first.height_px, first.fx_px, second.fy_px) == (640, 480, 812.25, 813.25)
-    np.testing.assert_allclose(second.world_to_camera[:, 3], [0.1, -0.2, 10.5], atol=1e-12)
+    # A unit of that head's file is 98.7 mm.
+    np.testing.assert_allclose(second.world_to_camera[:, 3], 0.987 * np.array([0.1, -0.2, 10.5]), atol=1e-12)
     turn = Rotation.from_rotvec([0, 0.5, 0]).as_matrix()
     assert fitted.angle_deg(first.rotation, first.rotation @ turn) == pytest.approx(np.degrees(0.5))
 
 
 def test_a_mesh_is_drawn_in_its_own_colours_and_normals():
-    drawn = drawing.DrawnMesh.of(mesh_of_library(ellipsoid()), 0.1)
+    drawn = drawing.DrawnMesh.of(mesh_of_library(ellipsoid()))
     camera = drawing.beside(look_at(0, 0, 0, 9.0, np.zeros(3), 100.0, 64), 45, 65)
     yaw, _ = photos.yaw_pitch_deg(camera.rotation)
     assert yaw == pytest.approx(45)
@@ -368,7 +378,6 @@ def test_the_sheet_has_the_best_the_median_and_the_worst_head():
     assert sheet.chosen(rows, "three photos", 1) == []
 
 
-@pytest.mark.usefixtures("known_cameras")
 def test_a_row_of_the_sheet_has_photo_mesh_and_truth():
     rgb, box, asked = np.full((100, 100, 3), 30, np.uint8), np.array([20.0, 10, 80, 90]), []
 
@@ -394,7 +403,6 @@ def test_real_photos_come_with_boxes_around_their_largest_face(tmp_path):
     np.testing.assert_allclose(case.box, [45, 35, 75, 65])
 
 
-@pytest.mark.usefixtures("known_cameras")
 def test_the_whole_report_is_written_with_its_sheet(tmp_path, data, backgrounds, monkeypatch):
     monkeypatch.setattr(quality, "HeadBuilder", lambda *_, **__: FakeBuilder({0: 1.1, 1: 1.0}))
     monkeypatch.setattr(quality, "read_mean_head", lambda _: ellipsoid(radii=RADII_MM * [1.2, 1, 1]))
@@ -425,22 +433,3 @@ def test_a_made_head_is_made_again_in_the_light_of_its_picture():
     views, lamps = drawing.made_head(maker, "head-00004", 1)
     seen = views.seen(photos.camera_of(stored, 1), lamps)
     np.testing.assert_array_equal(seen.rgb.round(), stored.rgb[1])
-
-
-@pytest.mark.skipif(not has_heads(), reason="the library was built without heads")
-class TestLibrary:
-    def test_the_library_gives_mesh_landmarks_and_figures(self, tmp_path):
-        with HeadBuilder(TINY, threads=1) as builder:
-            assert builder.stats.photo_count == 0
-            with pytest.raises(MaquetteError, match="no photos"):
-                builder.fit(0)
-            with pytest.raises(MaquetteError, match=r"^The box .* empty"):
-                builder.add_photo(np.zeros((32, 32, 3), np.uint8), [5, 5, 5, 9])
-
-    def test_a_stored_head_has_a_mesh_and_places(self, tmp_path):
-        with FittedHead.open(TINY_HEAD) as head:
-            assert head.info.photo_count == 2
-            assert len(head.landmarks()) == head.info.landmark_count > 0
-            assert fitted.stored(head).metres_per_unit == 0.0987
-            with pytest.raises(MaquetteError):
-                head.export(tmp_path / "head.xyz")

@@ -123,6 +123,10 @@ def test_views_are_fused(box):
     assert not fusion.curves().boxes
     assert told == sorted(told)
     assert told[-1] <= 1
+    failing = maquette.EdgesFusion(maquette.Edges(threads=1), progress=lambda done: 1 / 0, threads=1)
+    failing.add_view(depth, camera)
+    with pytest.raises(ZeroDivisionError):
+        failing.finish()
     with pytest.raises(maquette.MaquetteError, match="min_views"):
         maquette.EdgesFusion(maquette.Edges(threads=1), min_views=0)
 
@@ -175,6 +179,8 @@ def test_a_scene_is_built_saved_and_rendered(tmp_path):
     assert image.depth[image.alpha == 255].min() > 0
     with pytest.raises(maquette.MaquetteError, match="MAQ_CANCELLED"):
         maquette.Scene.build(folder, progress=lambda done, stage: False)
+    with pytest.raises(ZeroDivisionError):
+        maquette.Scene.build(folder, progress=lambda done, stage: 1 / 0)
 
 
 def test_a_camera_that_looks_at_a_point_sees_it_in_the_middle():

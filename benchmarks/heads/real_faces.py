@@ -22,7 +22,7 @@ from benchmarks.heads.mean_head import MM_PER_DM, mesh_of, template_points
 from export.camera import Camera
 from export.heads.fitting.anchor_fit import CodePrior, fit_anchors, observations_of
 from export.heads.fitting.photo import Encoder, look_at
-from export.heads.head_shards import CROP_SIDES, SIDE
+from export.heads.head_shards import CROP_SIDES
 from export.heads.photos.faces import HEAD, UNKNOWN, PhotoFaces
 from export.heads.prior_file import read_prior
 from export.heads.shapes import vertex_normals
@@ -83,7 +83,7 @@ def real_faces(photos: Path, faces: Path, splits: Sequence[str] = SPLITS) -> Ite
                 rgb = frame.pixels()
             for k, (x, y, side) in enumerate(found.square.astype(np.float64)):
                 half = side / CROP_SIDES / 2
-                pixel = [x, y] + ((found.pixel[k].astype(np.float64) + 0.5) / SIDE - 0.5) * side
+                pixel = [x, y] + ((found.pixel[k].astype(np.float64) + 0.5) / found.rgb.shape[1] - 0.5) * side
                 yield RealFace(
                     f"{path.stem}/{k}", split, rgb, np.array([x, y, x, y]) + 0.5 + half * np.array([-1, -1, 1, 1]),
                     found.square[k], pixel, found.template.astype(np.float64), found.weight[k], found.matte[k],
@@ -103,7 +103,7 @@ def figures_of(face: RealFace, mesh: PosedMesh) -> dict:
 def matte_iou(face: RealFace, mesh: PosedMesh) -> float | None:
     x, y, side = face.square
     square = np.array([x, y, x, y]) + 0.5 + side / 2 * np.array([-1, -1, 1, 1])
-    camera, _ = framed(mesh.camera, square, 1.0, SIDE)
+    camera, _ = framed(mesh.camera, square, 1.0, len(face.matte))
     normals = vertex_normals(mesh.points, mesh.faces)
     grey = DrawnMesh.coloured(mesh.points, mesh.faces, normals, lambda place: np.full((len(place.face), 3), 127.0))
     drawn, head, known = grey.shown(camera)[1], face.matte == HEAD, face.matte != UNKNOWN

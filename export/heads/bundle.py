@@ -16,6 +16,7 @@ from pathlib import Path
 
 from export.bundle import LICENCE, BundleInfo, Signature, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
+from export.heads.face import FACE_RADIUS_DM, FACE_SIDES, NOSE_TIP
 from export.heads.prior import Prior
 from export.heads.prior_file import bases_errors, prior_bytes, read_prior, write_prior
 
@@ -23,6 +24,8 @@ GRAPHS = ("encoder",)
 PRIOR = "prior.maqp"
 CELL_CHANNELS = 8
 CROP_SIDES = 1.6  # side of the crop by the longer side of the head's box, hair included
+# What the encoder looks at a second time.
+FACE = {"center_dm": NOSE_TIP.tolist(), "radius_dm": FACE_RADIUS_DM, "crop_sides": FACE_SIDES}
 # What heads are made from; the packages are named in export/people/assets.py and export/photos.
 TRAINING_DATA = (
     {"name": "Maquette made heads (export.heads)", "licence": LICENCE, "used_for": "training, calibration"},
@@ -67,14 +70,15 @@ def crop_and_cell(graph: Signature, path: Path, codes: int) -> tuple[int, int]:
     )
 
 
-def write_manifest(folder: Path, info: BundleInfo, crop_sides: float = CROP_SIDES) -> dict:
+def write_manifest(folder: Path, info: BundleInfo, crop_sides: float = CROP_SIDES, face: dict | None = FACE) -> dict:
     """Describes `encoder.onnx` and `prior.maqp` that lie in `folder`, of any precision, and writes `manifest.json`,
-    which it returns. Raises ValueError for a graph of other shapes, PriorError for a file that is no prior."""
+    which it returns. face: None where the encoder must not look at it a second time. Raises ValueError for a graph of
+    other shapes, PriorError for a file that is no prior."""
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
     codes = read_prior(folder / PRIOR).shape_codes
     crop, cell = crop_and_cell(graphs["encoder"], folder / "encoder.onnx", codes)
     task_keys = {
-        "encoder": {"crop_px": crop, "cell_px": cell, "crop_sides": crop_sides},
+        "encoder": {"crop_px": crop, "cell_px": cell, "crop_sides": crop_sides} | ({"face": face} if face else {}),
         "prior": {"file": PRIOR},
     }
     return write_bundle_manifest(folder, "heads", info, graphs, files=(PRIOR,), task_keys=task_keys)
@@ -88,6 +92,7 @@ def write_bundle(
     bases: str = "int8",
     constant: str = "float16",
     crop_sides: float = CROP_SIDES,
+    face: dict | None = FACE,
 ) -> dict:
     """The whole bundle. bases, constant: as prior_bytes() has them. Returns the manifest. Raises what write_manifest()
     and prior_bytes() raise."""
@@ -97,7 +102,7 @@ def write_bundle(
     if not (target.exists() and target.samefile(encoder)):
         shutil.copyfile(encoder, target)
     write_prior(prior, folder / PRIOR, bases, constant)
-    return write_manifest(folder, info, crop_sides)
+    return write_manifest(folder, info, crop_sides, face)
 
 
 def main() -> None:

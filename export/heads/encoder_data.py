@@ -11,8 +11,13 @@ import torch
 from torch.utils.data import IterableDataset
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX
-from export.heads.head_shards import LABEL_STEP, POINT_SCALE, SIDE, HeadPictures, head_paths, read_pictures
+from export.heads.face import FACE_SIDES, is_face
+from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures, head_paths, read_pictures
 from export.people.imaging import camera_faults
+
+MAX_BILINEAR_ZOOM = 1.25
+FACE_SHARE = 0.5  # of the training crops
+MIN_FACE_FRACTION, STRAY_FRACTION = 0.01, 0.01
 
 
 @dataclass(frozen=True)
@@ -49,58 +54,117 @@ class Backgrounds:
         return out[:, ::-1] if rng.random() < 0.5 else out
 
 
-def placing(rng: np.random.Generator, augment: bool) -> tuple[np.ndarray, np.ndarray, bool]:
-    """A crop's place in a picture of `SIDE` pixels: linear [2, 2] and the whole map [2, 3] from pixels of the crop to
-    pixels of the picture, and whether it is mirrored."""
+@dataclass(frozen=True)
+class Placing:
+    """A crop's place in a picture: linear [2, 2] and the whole map [2, 3] from pixels of the crop to pixels of the
+    picture, and whether it is mirrored."""
+
+    linear: np.ndarray
+    to_picture: np.ndarray
+    mirrored: bool
+
+    @property
+    def zoom(self) -> float:
+        """Pixels of the picture by one of the crop."""
+        return float(np.linalg.norm(self.linear[:, 0]))
+
+    def cut(self, picture: np.ndarray, border: int = cv2.BORDER_CONSTANT, value: tuple = ()) -> np.ndarray:
+        """float32 [192, 192, C] of a picture [H, W, C]: bilinear, of pixels averaged before where it shrinks. border,
+        value: what is beyond the picture, as of cv2.warpAffine."""
+        to_picture = self.to_picture
+        if self.zoom > MAX_BILINEAR_ZOOM:
+            height, width = picture.shape[:2]
+            size = round(width / self.zoom), round(height / self.zoom)
+            picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+            scale = np.array([size[0] / width, size[1] / height])
+            to_picture = to_picture.copy()
+            to_picture[:, 2] += 0.5
+            to_picture *= scale[:, None]
+            to_picture[:, 2] -= 0.5
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        size = (CROP_PX, CROP_PX)
+        cut = cv2.warpAffine(picture, to_picture, size, flags=flags, borderMode=border, borderValue=value)
+        return cut.astype(np.float32)
+
+
+def placing(rng: np.random.Generator, augment: bool, side: int, face: np.ndarray | None = None) -> Placing:
+    """A crop of a square picture with sides of `side` pixels: of the whole head, or of the face, whose box (left, top,
+    right, bottom) is given."""
     u = rng.uniform
-    side = SIDE * (u(0.72, 1.12) if augment else 0.92)
+    if face is None:
+        size, middle = side * (u(0.72, 1.12) if augment else 0.92), np.full(2, (side - 1) / 2)
+    else:
+        size = FACE_SIDES * (face[2:] - face[:2]).max() * (u(0.85, 1.3) if augment else 1.0)
+        middle = face.reshape(2, 2).mean(0)
     turn = np.radians(rng.normal(0, 12)) if augment else 0.0
-    shift = rng.normal(0, 0.05 * SIDE, 2) if augment else np.zeros(2)
+    shift = rng.normal(0, 0.05 * size, 2) if augment else np.zeros(2)
     mirror = augment and u() < 0.5
-    zoom = side / CROP_PX
+    zoom = size / CROP_PX
     cos, sin = zoom * np.cos(turn), zoom * np.sin(turn)
     linear = np.array([[cos, -sin], [sin, cos]])
     if mirror:
         linear = linear @ np.diag([-1.0, 1.0])
-    middle = (SIDE - 1) / 2 + shift
-    return linear, np.concatenate([linear, (middle - linear @ np.full(2, (CROP_PX - 1) / 2))[:, None]], 1), mirror
+    offset = middle + shift - linear @ np.full(2, (CROP_PX - 1) / 2)
+    return Placing(linear, np.concatenate([linear, offset[:, None]], 1), mirror)
+
+
+def face_box(template: np.ndarray, known: np.ndarray) -> np.ndarray | None:
+    """Around the pixels of a map [H, W, 3] of template points (dm) that show the face, without strays: left, top,
+    right, bottom (px); None where they are fewer than `MIN_FACE_FRACTION` of all. known: bool [H, W]."""
+    y, x = np.nonzero(known & is_face(template))
+    if len(x) < MIN_FACE_FRACTION * known.size:
+        return None
+    at = np.sort(np.stack([x, y], 1), 0)
+    strays = int(STRAY_FRACTION * len(at))
+    return np.concatenate([at[strays], at[-1 - strays] + 1]).astype(float)
+
+
+def face_box_of(pictures: HeadPictures, k: int) -> np.ndarray | None:
+    """`face_box` of picture k, in its pixels."""
+    step = 2
+    template = pictures.template[k][::step, ::step] / np.float32(POINT_SCALE)
+    masks = pictures.masks[k][:: LABEL_STEP * step, :: LABEL_STEP * step]
+    box = face_box(template, masks == 255)
+    return None if box is None else box * (LABEL_STEP * step) - 0.5
 
 
 def crop_of(
-    pictures: HeadPictures, k: int, backgrounds: Backgrounds, rng: np.random.Generator, augment: bool = True
+    pictures: HeadPictures,
+    k: int,
+    backgrounds: Backgrounds,
+    rng: np.random.Generator,
+    augment: bool = True,
+    of_face: bool = False,
 ) -> Crop:
-    """A training crop of picture k: other place, size and turn, mirrored half of the time, occluded now and then."""
-    linear, to_picture, mirror = placing(rng, augment)
-    zoom = float(np.linalg.norm(linear[:, 0]))
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    """A training crop of picture k, of the whole head or, where it is seen, the face: other place, size and turn,
+    mirrored half of the time, occluded now and then."""
+    place = placing(rng, augment, pictures.rgb.shape[1], face_box_of(pictures, k) if of_face else None)
     masks = pictures.masks[k]
-    planes = np.dstack([pictures.rgb[k], (masks > 200) * np.uint8(255)])
-    rgb = cv2.warpAffine(planes, to_picture, (CROP_PX, CROP_PX), flags=flags).astype(np.float32)
-    present = (masks > 0).astype(np.uint8) * 255
-    alpha = cv2.warpAffine(present, to_picture, (CROP_PX, CROP_PX), flags=flags).astype(np.float32)[..., None] / 255
-    matte = rgb[..., 3] / 255
-    image = rgb[..., :3] + (1 - alpha) * backgrounds.crop(rng, CROP_PX)
+    planes = np.dstack([pictures.rgb[k], (masks > 200) * np.uint8(255), (masks > 0) * np.uint8(255)])
+    planes = place.cut(planes)
+    matte, alpha = planes[..., 3] / 255, planes[..., 4:] / 255
+    image = planes[..., :3] + (1 - alpha) * backgrounds.crop(rng, CROP_PX)
     if augment and rng.random() < 0.3:
         image, part = occluded(image, backgrounds, rng)
         matte = matte * (1 - part)
     # Labels are picked at the middle of each cell, never mixed.
     j = CELL_PX * np.arange(CELLS) + (CELL_PX - 1) / 2
     x, y = np.meshgrid(j, j)
-    source = np.stack([x, y], -1) @ linear.T + to_picture[:, 2]
+    source = np.stack([x, y], -1) @ place.linear.T + place.to_picture[:, 2]
     at = np.round(source / LABEL_STEP).astype(int)
-    limit = SIDE // LABEL_STEP - 1
+    limit = pictures.template.shape[1] - 1
     inside = ((at >= 0) & (at <= limit)).all(-1)
     at = np.clip(at, 0, limit)
     template = pictures.template[k][at[..., 1], at[..., 0]].astype(np.float32) / POINT_SCALE
     normal = pictures.normal[k][at[..., 1], at[..., 0]].astype(np.float32) / 127
     known = (pictures.normal[k][at[..., 1], at[..., 0]] != 0).any(-1) & inside
     cells = matte.reshape(CELLS, CELL_PX, CELLS, CELL_PX).mean((1, 3)) * known
-    normal[..., :2] = normal[..., :2] @ (linear / zoom)  # the crop's axes are turned against the picture's
-    if mirror:
+    normal[..., :2] = normal[..., :2] @ (place.linear / place.zoom)  # the crop's axes are turned against the picture's
+    if place.mirrored:
         template[..., 0] *= -1
     if augment:
         image = as_cameras_see(image, rng)
-    return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal, mirror)
+    return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal, place.mirrored)
 
 
 def occluded(image: np.ndarray, backgrounds: Backgrounds, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -155,7 +219,8 @@ class CropStream(IterableDataset):
         crops, codes = [], []
         for number in rng.integers(len(self.heads), size=count):
             pictures = self.heads[number]
-            crops.append(crop_of(pictures, int(rng.integers(len(pictures.rgb))), self.backgrounds, rng))
+            k, of_face = int(rng.integers(len(pictures.rgb))), rng.random() < FACE_SHARE
+            crops.append(crop_of(pictures, k, self.backgrounds, rng, of_face=of_face))
             codes.append(np.where(crops[-1].mirrored, np.nan, self.codes[number]).astype(np.float32))
         return *batched(crops), torch.from_numpy(np.stack(codes))
 

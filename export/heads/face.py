@@ -6,6 +6,7 @@ import numpy as np
 
 NOSE_TIP = np.array([0.0, -1.24, -0.35])  # of the template, dm
 FACE_RADIUS_DM = 0.95
+FACE_SIDES = 1.3  # side of the encoder's closer look by the longer side of the face's box
 
 
 def is_face(template: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 SPLITS = ("train", "val", "test")
-SIDE = 256  # of a picture, px
+SIDE = 512  # of a picture, px
 LABEL_STEP = 2  # template points and normals are stored for every second pixel of every second row
 POINT_SCALE = 8000.0  # int16 a dm
 CROP_SIDES = 1.6  # side of a picture by the longer side of the head's box; a training cuts smaller ones out of it
@@ -37,8 +37,8 @@ class HeadPoints:
 
 @dataclass(frozen=True)
 class HeadPictures:
-    """K pictures of a head. rgb uint8 [K, 256, 256, 3]; masks uint8 [K, 256, 256]: 255 head, 128 bust, 0 nothing;
-    template int16 [K, 128, 128, 3], dm times 8,000; normal int8 [K, 128, 128, 3], camera's axes, times 127;
+    """K pictures of a head. rgb uint8 [K, 512, 512, 3]; masks uint8 [K, 512, 512]: 255 head, 128 bust, 0 nothing;
+    template int16 [K, 256, 256, 3], dm times 8,000; normal int8 [K, 256, 256, 3], camera's axes, times 127;
     rotation [K, 3, 3] and shift [K, 3] from the head's frame (dm) to the camera's; intrinsics [K, 3]: focal, cx,
     cy, px."""
 

@@ -35,7 +35,7 @@ from export.heads.encoder import (
     save_encoder,
     start_from_detector,
 )
-from export.heads.encoder_data import Backgrounds, Crop, CropStream, batched, crop_of, read_heads
+from export.heads.encoder_data import Backgrounds, Crop, CropStream, batched, crop_of, face_box_of, read_heads
 from export.heads.photos.crops import MixedStream, PhotoCrop, batched_photos, crop_photo
 from export.heads.photos.faces import read_photos
 from export.training import (
@@ -56,10 +56,12 @@ VIEWS = 6  # of a held-out head
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What is validated on: crops of made heads with their shape codes [N, K] (NaN: mirrored), faces of photos."""
+    """What is validated on: crops of made heads with their shape codes [N, K] (NaN: mirrored), crops of their faces,
+    faces of photos."""
 
     crops: list[Crop]
     codes: torch.Tensor
+    face_crops: list[Crop]
     faces: list[PhotoCrop]
 
 
@@ -68,6 +70,17 @@ def held_out_crops(folder: Path, backgrounds: Backgrounds) -> list[Crop]:
     rng = np.random.default_rng(1)
     heads = read_heads(folder, "val")
     return [crop_of(p, k, backgrounds, rng, augment=k % 2 == 1) for p in heads for k in range(VIEWS)]
+
+
+def held_out_face_crops(folder: Path, backgrounds: Backgrounds) -> list[Crop]:
+    """The same crops of the faces of validation heads each time, as of good photos."""
+    rng = np.random.default_rng(1)
+    return [
+        crop_of(p, k, backgrounds, rng, augment=False, of_face=True)
+        for p in read_heads(folder, "val")
+        for k in range(VIEWS)
+        if face_box_of(p, k) is not None
+    ]
 
 
 def codes_of_crops(crops: list[Crop], codes: torch.Tensor) -> torch.Tensor:
@@ -79,7 +92,11 @@ def codes_of_crops(crops: list[Crop], codes: torch.Tensor) -> torch.Tensor:
 def held_out_faces(folder: Path) -> list[PhotoCrop]:
     """The faces of the validation photos, upright in the middle of their crops."""
     rng = np.random.default_rng(1)
-    return [crop_photo(f, k, None, rng, augment=False) for f in read_photos(folder, "val") for k in range(len(f.rgb))]
+    return [
+        crop_photo(f, k, None, rng, augment=False, of_face=True)
+        for f in read_photos(folder, "val")
+        for k in range(len(f.rgb))
+    ]
 
 
 @torch.no_grad()
@@ -93,6 +110,9 @@ def validate(encoder: HeadEncoder, held_out: HeldOut) -> dict[str, float]:
     cells, codes = run(encoder, image)
     known = held_out.codes.isfinite().all(1)
     found = figures(cells, *labels) | code_figures(codes[known], held_out.codes[known])
+    image, *labels = batched(held_out.face_crops)
+    of_faces = figures(run(encoder, image)[0], *labels)
+    found |= {"face_mm": of_faces["point_mm"], "face_median_mm": of_faces["median_mm"]}
     if held_out.faces:
         image, *labels = batched_photos(held_out.faces)
         found |= photo_figures(run(encoder, image)[0], *labels)
@@ -181,9 +201,10 @@ def train(arguments: argparse.Namespace) -> None:
     arguments.out.mkdir(parents=True, exist_ok=True)
     heads = read_heads(arguments.data, "train", arguments.heads)
     prior = torch.load(arguments.prior, weights_only=True)
-    crops = held_out_crops(arguments.data, Backgrounds(arguments.backgrounds / "val"))
+    backgrounds = Backgrounds(arguments.backgrounds / "val")
+    crops, face_crops = (of(arguments.data, backgrounds) for of in (held_out_crops, held_out_face_crops))
     faces = held_out_faces(arguments.photos) if arguments.photos else []
-    held_out = HeldOut(crops, codes_of_crops(crops, prior["held_out_z"]), faces)
+    held_out = HeldOut(crops, codes_of_crops(crops, prior["held_out_z"]), face_crops, faces)
     encoder = HeadEncoder(prior["z"].shape[1])
     start_from_detector(encoder, arguments.init)
     if arguments.start:
@@ -233,7 +254,7 @@ def train(arguments: argparse.Namespace) -> None:
     def validated() -> None:
         found = validate(mean.net, held_out)
         log.append({"step": step, "spent": spent_s} | found)
-        names = ["point_mm", "median_mm", "normal_deg"] + ["photo_mm"] * bool(held_out.faces)
+        names = ["point_mm", "median_mm", "face_median_mm", "normal_deg"] + ["photo_mm"] * bool(held_out.faces)
         write_log(log, arguments.out, names, "spent", "held-out heads, mm")
         write_sample(mean.net, held_out.crops, arguments.out / "sample.png")
         bar.write(" ".join(f"{k}={v:.4g}" for k, v in log[-1].items()))

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from export.heads.fitting.camera import UNKNOWNS, Camera, ScaledPose, is_small_step, scaled_pose
-from export.heads.fitting.photo import HeadPhoto, NoHead, shows_head
+from export.heads.fitting.photo import HeadPhoto, Look, NoHead, shows_head
 from export.heads.prior import Prior
 
 NEIGHBOURS = 4
@@ -26,6 +26,7 @@ MAX_CELLS = 600
 MAX_ANCHOR_DM = 0.5  # cells that see a point farther than this from all anchors are left out
 CELL_WEIGHT = 0.1  # of a cell's cost: neighbours say the same
 PIXEL_SIGMA = 0.3  # of where in its cell the encoder saw a point, in cells
+FACE_BORDER = 1.0  # cells at the border of the look at the face, of which the first look is heard, too
 LIMIT = 9.0  # in squared sigmas
 INLIER = 13.8  # squared sigmas of two coordinates: 99.9 %
 MIN_INLIERS = 0.3  # of the cells
@@ -40,14 +41,14 @@ CODE_SIGMA_FACTOR, LOG_CODE_SIGMA_RANGE, MAX_CODE_MEAN = 1.2, (-3.0, 1.0), 10.0
 @dataclass(frozen=True, eq=False)
 class Observations:
     """Of one photo: template points [N, 3] dm, their sigma [N] dm, pixels [N, 2] where they are seen, with the first
-    pixel's centre at (0, 0), and the sigma of these; what the encoder says of shape codes, [K, 2] as in HeadPhoto, or
-    None. centre: the principal point. log_focal_sigma: 0 where the focal length is known, else focal_px is the
+    pixel's centre at (0, 0), and the sigma of these [N]; what the encoder says of shape codes, [K, 2] as in HeadPhoto,
+    or None. centre: the principal point. log_focal_sigma: 0 where the focal length is known, else focal_px is the
     median."""
 
     template: np.ndarray
     sigma: np.ndarray
     pixels: np.ndarray
-    pixel_sigma: float
+    pixel_sigma: np.ndarray
     codes: np.ndarray | None
     focal_px: float
     log_focal_sigma: float
@@ -55,15 +56,30 @@ class Observations:
 
 
 def observations_of(photo: HeadPhoto) -> Observations:
-    """Of the cells that show the head."""
-    rows, columns = np.nonzero(shows_head(photo.cells))
-    cells = photo.cells[rows, columns].astype(np.float64)
-    pixels = photo.in_photo(columns + 0.5, rows + 0.5) - 0.5
-    sigma = np.exp(np.clip(cells[:, 3], *LOG_SIGMA_RANGE))
-    pixel_sigma = max(PIXEL_SIGMA * photo.cell_px, 1e-3)
+    """Of the cells that show the head: those of the closer look at the face, and of the first one around it."""
+    first = shows_head(photo.cells)
+    looks: list[tuple[Look, np.ndarray]] = [(photo, first)]
+    if photo.face:
+        rows, columns = np.nonzero(first)
+        at = photo.face.in_cells(*photo.in_photo(columns + 0.5, rows + 0.5).T)
+        last = photo.face.cells.shape[0] - FACE_BORDER
+        around = first.copy()
+        around[rows, columns] = ~((at >= FACE_BORDER) & (at <= last)).all(1)
+        looks = [(photo, around), (photo.face, shows_head(photo.face.cells))]
+    parts = [_cells_of(look, chosen) for look, chosen in looks]
+    template, sigma, pixels, pixel_sigma = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Observations(
-        cells[:, :3], sigma, pixels, pixel_sigma, photo.codes, photo.focal_px, photo.log_focal_sigma, photo.centre
+        template, sigma, pixels, pixel_sigma, photo.codes, photo.focal_px, photo.log_focal_sigma, photo.centre
     )
+
+
+def _cells_of(look: Look, chosen: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Template points, sigmas, pixels and their sigmas of the chosen cells [G, G]."""
+    rows, columns = np.nonzero(chosen)
+    cells = look.cells[rows, columns].astype(np.float64)
+    pixels = look.in_photo(columns + 0.5, rows + 0.5) - 0.5
+    sigma = np.exp(np.clip(cells[:, 3], *LOG_SIGMA_RANGE))
+    return cells[:, :3], sigma, pixels, np.full(len(rows), max(PIXEL_SIGMA * look.cell_px, 1e-3))
 
 
 @dataclass(frozen=True)
@@ -124,7 +140,7 @@ class AnchorTerms:
         keep = keep[np.arange(count) * len(keep) // max(count, 1)]
         mean, linear, sigma = points.at(seen.template[keep])
         pixels = seen.pixels[keep] - seen.centre
-        self.pixel_sigma = seen.pixel_sigma
+        self.pixel_sigma = torch.from_numpy(seen.pixel_sigma[keep])
         self.mean, self.linear, self.pixels = (torch.from_numpy(a) for a in (mean, linear, pixels))
         self.sigma_dm = torch.from_numpy(np.hypot(seen.sigma[keep], sigma))
         self.code_variance = self.linear.square().sum((1, 2)) / 3
@@ -139,7 +155,7 @@ class AnchorTerms:
     def set_noise(self, pose: ScaledPose, z: Tensor, code_fraction: float) -> None:
         """Takes the noise in pixels as this camera sees it, and holds it until the next call."""
         scale = pose.log_scale.exp() / pose.project(self.points(z))[1].clamp(min=0.1)
-        variance = self.pixel_sigma**2 + (scale * self.sigma_dm).square()
+        variance = self.pixel_sigma.square() + (scale * self.sigma_dm).square()
         self.inverse_variance = 1 / variance
         self.limit = LIMIT * (1 + code_fraction * scale.square() * self.code_variance / variance)
 
@@ -249,7 +265,9 @@ def _start(terms: AnchorTerms, seen: Observations) -> ScaledPose:
     spread = np.median(np.linalg.norm(points - points.mean(0), axis=1)) * np.sqrt(2 / 3)
     away = np.median(np.linalg.norm(pixels - np.median(pixels, 0), axis=1))
     scale = away / max(spread, 1e-9)  # roughly, pixels a dm
-    sigma = np.hypot(terms.pixel_sigma, scale * np.sqrt(terms.sigma_dm.numpy() ** 2 + terms.code_variance.numpy()))
+    sigma = np.hypot(
+        terms.pixel_sigma.numpy(), scale * np.sqrt(terms.sigma_dm.numpy() ** 2 + terms.code_variance.numpy())
+    )
     cv2.setRNGSeed(1)
     found, turn, shift, _ = cv2.solvePnPRansac(
         points, pixels, intrinsics, None, iterationsCount=400, reprojectionError=float(3.7 * np.median(sigma)),

@@ -6,7 +6,7 @@ Squares and maps are in continuous coordinates: pixel (x, y) covers [x, x + 1) x
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -31,24 +31,13 @@ class NoHead(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class HeadPhoto:
-    """rgb: float32 [S, S, 3], 0..255, the crop; cells: float32 [G, G, 8], what the encoder says; codes: [K, 2], mean
-    and log sigma of each shape code, None where the encoder does not say them; to_photo: [2, 3], from the crop's pixels
-    to the photo's. size: width and height; centre: the principal point, where the first pixel's centre is (0, 0).
-    log_focal_sigma: 0 where the focal length is known, else focal_px is the median."""
+class Look:
+    """rgb: float32 [S, S, 3], 0..255, a crop of a photo; cells: float32 [G, G, 8], what the encoder says of it;
+    to_photo: [2, 3], from the crop's pixels to the photo's."""
 
     rgb: np.ndarray
     cells: np.ndarray
-    codes: np.ndarray | None
     to_photo: np.ndarray
-    size: tuple[int, int]
-    focal_px: float
-    log_focal_sigma: float
-    box_px: Box
-
-    @property
-    def centre(self) -> np.ndarray:
-        return (np.array(self.size) - 1) / 2
 
     @property
     def cell_px(self) -> float:
@@ -60,6 +49,38 @@ class HeadPhoto:
         scale = self.rgb.shape[0] / self.cells.shape[0]
         return np.stack([x * scale, y * scale], -1) @ self.to_photo[:, :2].T + self.to_photo[:, 2]
 
+    def in_cells(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """From pixels of the photo to cells of the crop, both continuous, [..., 2]."""
+        at = (np.stack([x, y], -1) - self.to_photo[:, 2]) @ np.linalg.inv(self.to_photo[:, :2]).T
+        return at * (self.cells.shape[0] / self.rgb.shape[0])
+
+
+@dataclass(frozen=True, eq=False)
+class HeadPhoto(Look):
+    """codes: [K, 2], mean and log sigma of each shape code, None where the encoder does not say them. size: width and
+    height; centre: the principal point, where the first pixel's centre is (0, 0). log_focal_sigma: 0 where the focal
+    length is known, else focal_px is the median. face: a second, closer look; None where no face is seen."""
+
+    codes: np.ndarray | None
+    size: tuple[int, int]
+    focal_px: float
+    log_focal_sigma: float
+    box_px: Box
+    face: Look | None = None
+
+    @property
+    def centre(self) -> np.ndarray:
+        return (np.array(self.size) - 1) / 2
+
+
+@dataclass(frozen=True)
+class FaceSpec:
+    """Which points of the template are the face's, [3] and dm, and the side of the second look by its box."""
+
+    center: np.ndarray
+    radius_dm: float
+    crop_sides: float
+
 
 class Encoder:
     """The encoder of a bundle for heads."""
@@ -70,6 +91,8 @@ class Encoder:
         if manifest.get("task") != "heads":
             raise ValueError(f"{folder} is a bundle for {manifest.get('task')}; name one for heads.")
         self.crop_px, self.crop_sides = (manifest["encoder"][key] for key in ("crop_px", "crop_sides"))
+        face = manifest["encoder"].get("face")
+        self.face = FaceSpec(np.array(face["center_dm"]), face["radius_dm"], face["crop_sides"]) if face else None
         self.graph = session(folder / manifest["graphs"]["encoder"]["file"])
 
     def run(self, bgr: np.ndarray, to_photo: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
@@ -115,6 +138,10 @@ def usable(cells: np.ndarray) -> np.ndarray:
     return np.isfinite(cells).all(-1) & (np.abs(cells[..., :3]) <= 16).all(-1)
 
 
+def shows_face(cells: np.ndarray, face: FaceSpec) -> np.ndarray:
+    return np.linalg.norm(cells[..., :3] - face.center, axis=-1) < face.radius_dm
+
+
 def shows_head(cells: np.ndarray) -> np.ndarray:
     return usable(cells) & (cells[..., 4] > 0)
 
@@ -138,13 +165,20 @@ def look_at(
         rgb, cells, codes = encoder.run(bgr, to_photo)
         known = focal_px > 0
         photo = HeadPhoto(
-            rgb, cells.copy(), codes, to_photo, (width, height), focal_px if known else float(max(width, height)),
+            rgb, cells.copy(), to_photo, codes, (width, height), focal_px if known else float(max(width, height)),
             0.0 if known else LOG_FOCAL_SIGMA, box or (0, 0, 0, 0),
         )  # fmt: skip
         grid = np.arange(cells.shape[0]) + 0.5
         at = photo.in_photo(*np.meshgrid(grid, grid))
         photo.cells[~((at >= 0) & (at < (width, height))).all(-1)] = np.nan
         return photo
+
+    def with_face(photo: HeadPhoto) -> HeadPhoto:
+        of_face = encoder.face and _box_around(photo, shows_head(photo.cells) & shows_face(photo.cells, encoder.face))
+        if not of_face:
+            return photo
+        closer = look(square(of_face, roll_rad, encoder.face.crop_sides, encoder.crop_px))
+        return replace(photo, face=Look(closer.rgb, closer.cells, closer.to_photo))
 
     looks = 1 if box else 2
     if box is None:
@@ -163,12 +197,16 @@ def look_at(
         if left == 1 or _is_same(around, box):
             break
         box = around
-    return photo
+    return with_face(photo)
 
 
 def _box_of(photo: HeadPhoto) -> Box | None:
     """Around the cells that show a head, without strays; None where there are too few."""
-    rows, columns = np.nonzero(shows_head(photo.cells))
+    return _box_around(photo, shows_head(photo.cells))
+
+
+def _box_around(photo: HeadPhoto, chosen: np.ndarray) -> Box | None:
+    rows, columns = np.nonzero(chosen)
     if len(rows) < MIN_HEAD_CELLS:
         return None
     at = np.sort(photo.in_photo(columns + 0.5, rows + 0.5), axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX
-from export.heads.encoder_data import Backgrounds, CropStream, as_cameras_see, occluded, placing
+from export.heads.encoder_data import FACE_SHARE, Backgrounds, CropStream, as_cameras_see, occluded, placing
 from export.heads.photos.faces import HEAD, NOTHING, UNKNOWN, PhotoFaces
 
 _GREY = 127
@@ -29,18 +29,24 @@ class PhotoCrop:
 
 
 def crop_photo(
-    faces: PhotoFaces, k: int, backgrounds: Backgrounds | None, rng: np.random.Generator, augment: bool = True
+    faces: PhotoFaces,
+    k: int,
+    backgrounds: Backgrounds | None,
+    rng: np.random.Generator,
+    augment: bool = True,
+    of_face: bool = False,
 ) -> PhotoCrop:
-    """A crop of face k, placed and spoilt as those of made heads are. Without `augment` no backgrounds are needed."""
-    linear, to_picture, mirror = placing(rng, augment)
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    """A crop of face k, with its head or, `of_face`, alone, placed and spoilt as those of made heads are. Without
+    `augment` no backgrounds are needed."""
+    seen = faces.pixel[k][faces.weight[k] > 0]
+    box = np.concatenate([seen.min(0), seen.max(0)]) if of_face and len(seen) else None
+    place = placing(rng, augment, faces.rgb.shape[1], box)
+    to_picture = place.to_picture
     around = cv2.BORDER_REPLICATE if augment and rng.random() < 0.5 else cv2.BORDER_CONSTANT
-    image = cv2.warpAffine(
-        faces.rgb[k], to_picture, (CROP_PX, CROP_PX), flags=flags, borderMode=around, borderValue=(_GREY,) * 3
-    ).astype(np.float32)
+    image = place.cut(faces.rgb[k], around, (_GREY,) * 3)
     nearest = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
     matte = cv2.warpAffine(faces.matte[k], to_picture, (CROP_PX, CROP_PX), flags=nearest, borderValue=UNKNOWN)
-    pixel = (faces.pixel[k] - to_picture[:, 2]) @ np.linalg.inv(linear).T
+    pixel = (faces.pixel[k] - to_picture[:, 2]) @ np.linalg.inv(place.linear).T
     template, weight = faces.template.copy(), faces.weight[k] * ((pixel >= 0) & (pixel <= CROP_PX - 1)).all(1)
     share = (matte == HEAD).astype(np.float32)
     if augment and rng.random() < 0.3:
@@ -48,7 +54,7 @@ def crop_photo(
         at = np.clip(np.round(pixel).astype(int), 0, CROP_PX - 1)
         weight = weight * (part[at[:, 1], at[:, 0]] < 0.5)
         share = share * (1 - part)
-    if mirror:
+    if place.mirrored:
         template[:, 0] *= -1
     if augment:
         image = as_cameras_see(image, rng)
@@ -83,5 +89,10 @@ class MixedStream(CropStream):
     def random_batch(self, rng: np.random.Generator, count: int):
         wanted = int(np.floor(self.share * count + rng.random()))
         wanted = min(max(wanted, 1), count - 1)
-        crops = [crop_photo(*self.faces[rng.integers(len(self.faces))], self.backgrounds, rng) for _ in range(wanted)]
+        crops = [
+            crop_photo(
+                *self.faces[rng.integers(len(self.faces))], self.backgrounds, rng, of_face=rng.random() < FACE_SHARE
+            )
+            for _ in range(wanted)
+        ]
         return super().random_batch(rng, count - wanted), batched_photos(crops)

@@ -190,7 +190,7 @@ def write_bundle(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     write_encoder(folder / "encoder.onnx")
     write_prior(prior(), folder / "prior.maqp", bases="float16", constant="float16")
-    write_manifest(folder, BundleInfo("round-heads", "fp32"))
+    write_manifest(folder, BundleInfo("round-heads", "fp32"), face=None)
 
 
 if __name__ == "__main__":

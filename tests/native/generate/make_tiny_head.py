@@ -124,7 +124,7 @@ def main() -> None:
     bundle.mkdir(exist_ok=True)
     write_encoder(bundle / "encoder.onnx")
     write_encoder(FOLDER / "codes.onnx", len(SHAPE_CODES))
-    write_bundle(bundle, bundle / "encoder.onnx", small_prior(), BundleInfo("tiny-heads", "fp32"))
+    write_bundle(bundle, bundle / "encoder.onnx", small_prior(), BundleInfo("tiny-heads", "fp32"), face=None)
     photo = np.random.default_rng(9).integers(0, 256, (CROP_PX, CROP_PX, 3), np.uint8)  # B, G, R
     (cells,) = session(bundle / "encoder.onnx").run(None, {"image": photo[None, :, :, ::-1].astype(np.float32)})
     (FOLDER / "photo.bgr").write_bytes(photo.tobytes())

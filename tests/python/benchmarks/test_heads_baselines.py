@@ -32,7 +32,7 @@ from benchmarks.heads.drawing import DrawnMesh
 from benchmarks.heads.mean_head import template_points
 from benchmarks.heads.photos import Photo, PhotoBackgrounds, photo_of
 from export.heads.fitting.anchor_fit import Observations
-from export.heads.head_shards import SIDE, HeadPoints
+from export.heads.head_shards import HeadPoints
 from export.heads.photos.face_points import read_face_points
 from export.heads.photos.faces import PhotoFaces
 from export.heads.views import look_at
@@ -243,7 +243,10 @@ def test_the_linear_head_follows_what_is_seen(monkeypatch):
     true = base + 0.01 * np.tensordot([4.0, -3.0, 1.0], directions, 1)
     near = (true * (camera.centre - true)).sum(1) > 0
     pixels, principal = camera.projected(true[near])[0], np.array([camera.cx_px, camera.cy_px])
-    seen = Observations(base[near], np.full(near.sum(), 0.01), pixels, 1.0, np.zeros((3, 2)), 900.0, 0.0, principal)
+    count = near.sum()
+    seen = Observations(
+        base[near], np.full(count, 0.01), pixels, np.ones(count), np.zeros((3, 2)), 900.0, 0.0, principal
+    )
     for name in ("Encoder", "look_at"):
         monkeypatch.setattr(linear_head, name, lambda *_, **__: None)
     monkeypatch.setattr(linear_head, "observations_of", lambda _: seen)
@@ -258,7 +261,7 @@ def test_the_linear_head_follows_what_is_seen(monkeypatch):
     found = linear_head.LinearHeads(Path(), maker, heads, 3).mesh(Photo(np.zeros((4, 4, 3)), np.zeros(4), camera))
     before, after = (np.linalg.norm(p - true * MM_PER_DM, axis=1).mean() for p in (heads.mean(0) * 100, found.points))
     assert after < 0.3 * before
-    too_few = replace(seen, template=seen.template[:3], sigma=seen.sigma[:3], pixels=pixels[:3])
+    too_few = replace(seen, template=seen.template[:3], sigma=seen.sigma[:3], pixels=pixels[:3], pixel_sigma=np.ones(3))
     monkeypatch.setattr(linear_head, "observations_of", lambda _: too_few)
     heads_of = linear_head.LinearHeads(Path(), maker, heads, 3)
     assert heads_of.mesh(Photo(np.zeros((4, 4, 3)), np.zeros(4), camera)) is None
@@ -289,6 +292,8 @@ def test_baselines_stand_beside_the_head_in_every_row(backgrounds):
 
 
 # --- real photographs ---
+
+SIDE = 256  # of a stored face
 
 
 def real_face(mesh, template, **more):

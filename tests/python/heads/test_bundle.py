@@ -33,7 +33,7 @@ def write_graph(path: Path, image: list, cells: list, names: tuple[str, str] = (
 def test_the_tiny_manifest_is_what_its_writer_writes(tmp_path):
     manifest = read_manifest(TINY)
     info = BundleInfo(manifest["name"], manifest["precision"])
-    write_bundle(tmp_path, TINY / "encoder.onnx", small_prior(), info)
+    write_bundle(tmp_path, TINY / "encoder.onnx", small_prior(), info, face=None)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["encoder.onnx", "manifest.json", "prior.maqp"]
     for path in tmp_path.iterdir():
         assert path.read_bytes() == (TINY / path.name).read_bytes(), path.name
@@ -44,7 +44,8 @@ def test_a_manifest_says_what_the_encoder_sees_and_what_all_is_made_from(tmp_pat
     info = BundleInfo("heads", "fp32", training_data=TRAINING_DATA)
     manifest = write_bundle(tmp_path / "bundle", encoder, small_prior(), info, bases="float32", constant="float32")
     assert (manifest["task"], manifest["licence"]) == ("heads", "Apache-2.0")
-    assert manifest["encoder"] == {"crop_px": 192, "cell_px": 4, "crop_sides": 1.6}
+    face = {"center_dm": [0.0, -1.24, -0.35], "radius_dm": 0.95, "crop_sides": 1.3}
+    assert manifest["encoder"] == {"crop_px": 192, "cell_px": 4, "crop_sides": 1.6, "face": face}
     assert manifest["prior"] == {"file": "prior.maqp"}
     digest = hashlib.sha256((tmp_path / "bundle" / "prior.maqp").read_bytes()).hexdigest()
     assert manifest["files"]["prior.maqp"]["sha256"] == digest

@@ -20,7 +20,7 @@ class Grey:
 def faces() -> PhotoFaces:
     """A black picture with one white dot where its second point is seen; the left half head, a column unknown."""
     rgb = np.zeros((1, 256, 256, 3), np.uint8)
-    rgb[0, 99:102, 119:122] = 255
+    rgb[0, 97:104, 117:124] = 255
     matte = np.full((1, 256, 256), NOTHING, np.uint8)
     matte[..., :128] = HEAD
     matte[..., 128:140] = UNKNOWN

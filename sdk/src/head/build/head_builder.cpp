@@ -59,11 +59,12 @@ void check_hints(const ImageView& photo, const PhotoHints& hints) {
 
 bool shows_head(const HeadCell& cell) { return cell.is_usable && cell.matte > kMinMatte; }
 
-// Around the cells that show the head, without strays.
-std::array<float, 4> box_of(const HeadObservations& seen) {
+// Around the cells that are chosen, one at least, without strays.
+template <typename IsChosen>
+std::array<float, 4> box_of(const HeadObservations& seen, IsChosen is_chosen) {
   std::vector<double> x, y;
   for (const HeadCell& cell : seen.cells) {
-    if (!shows_head(cell)) continue;
+    if (!is_chosen(cell)) continue;
     x.push_back(cell.x_px);
     y.push_back(cell.y_px);
   }
@@ -183,7 +184,7 @@ std::pair<std::array<float, 4>, HeadBuilder::Seen> HeadBuilder::find_head(const 
     Seen seen = look(photo, {middle_x, middle_y, std::max(2.0, double(side)), roll_rad});
     std::array<float, 4> box{};
     for (int looks = 0; looks < kLooksAround && seen.head_cells >= kMinHeadCells; ++looks) {
-      const std::array<float, 4> around = box_of(seen.cells);
+      const std::array<float, 4> around = box_of(seen.cells, shows_head);
       if (looks > 0 && is_same(around, box)) break;
       box = around;
       seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), roll_rad,
@@ -193,6 +194,18 @@ std::pair<std::array<float, 4>, HeadBuilder::Seen> HeadBuilder::find_head(const 
   }
   throw Error(MAQ_ERROR_NOT_FOUND, "No head is seen in the photo of ", photo.width_px, " x ", photo.height_px,
               " pixels. Give the box of the head, or a photo where it is larger.");
+}
+
+std::optional<HeadObservations> HeadBuilder::look_at_face(const ImageView& photo, const HeadObservations& seen,
+                                                          double roll_rad) {
+  const std::optional<FaceSpec>& face = encoder_.spec().face;
+  if (!face) return std::nullopt;
+  const auto shows_face = [&](const HeadCell& cell) { return shows_head(cell) && face->contains(cell.template_point); };
+  if (size_t(std::count_if(seen.cells.begin(), seen.cells.end(), shows_face)) < kMinHeadCells) return std::nullopt;
+  const std::array<float, 4> box = box_of(seen, shows_face);
+  const double x0 = double(box[0]), y0 = double(box[1]), x1 = double(box[2]), y1 = double(box[3]);
+  const double side_px = std::max(2.0, face->crop_sides * std::max(x1 - x0, y1 - y0));
+  return look(photo, {(x0 + x1) / 2, (y0 + y1) / 2, side_px, roll_rad}).cells;
 }
 
 void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
@@ -219,6 +232,7 @@ void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
   made.rgb = encoding_.rgb;
   made.codes = encoding_.codes;
   const double cells = double(made.seen.cells.size());
+  made.face = look_at_face(photo, made.seen, hints.roll_rad);
   if (texture_.side_px > 0) crops_.push_back(texture_crop(photo, seen.square, texture_.side_px));
   photos_.push_back(std::move(made));
   found_.push_back({box, double(seen.head_cells) / cells, false, 0, 0});

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -82,6 +83,8 @@ class HeadBuilder {
   };
   void look_at(const ImageView& photo, const PhotoHints& hints);
   Seen look(const ImageView& photo, const HeadSquare& square);
+  // A closer look at the face, if one is seen and the bundle has it.
+  std::optional<HeadObservations> look_at_face(const ImageView& photo, const HeadObservations& seen, double roll_rad);
   // Where the head is in a photo whose app does not know, and what is seen there. Throws MAQ_ERROR_NOT_FOUND.
   std::pair<std::array<float, 4>, Seen> find_head(const ImageView& photo, double roll_rad);
   StoredHead fit_photos(double seconds, const Progress& progress);

@@ -29,6 +29,16 @@ void require_tensor(const Manifest& manifest, const std::vector<TensorSpec>& sid
               " [1, ", side_px, ", ", side_px, ", ", channels, "]. Export the bundle again.");
 }
 
+FaceSpec checked_face(const ManifestNode& node) {
+  constexpr float kMaxReach_dm = 4;
+  const auto center = node.at("center_dm").numbers<3>(-kMaxReach_dm, kMaxReach_dm);
+  FaceSpec face;
+  face.center_dm = {double(center[0]), double(center[1]), double(center[2])};
+  face.radius_dm = double(node.at("radius_dm").number(0.01f, kMaxReach_dm));
+  face.crop_sides = double(node.at("crop_sides").number(1, 8));
+  return face;
+}
+
 EncoderSpec checked_encoder(const Manifest& manifest) {
   const ManifestNode node = manifest.root.at("encoder");
   const int crop_px = node.at("crop_px").integer(1, kMaxCrop_px);
@@ -37,6 +47,7 @@ EncoderSpec checked_encoder(const Manifest& manifest) {
   if (crop_px % encoder.cells.cell_px != 0) node.at("crop_px").fail("is ", crop_px, ", not a multiple of cell_px");
   encoder.cells.side = crop_px / encoder.cells.cell_px;
   encoder.crop_sides = double(node.at("crop_sides").number(1, 8));
+  if (const auto face = node.find("face")) encoder.face = checked_face(*face);
   const GraphSpec& graph = manifest.graphs.at(kGraph);
   encoder.says_codes = graph.outputs.size() == 2;
   require_tensor(manifest, graph.inputs, 1, "input", "image", crop_px, 3);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "head/fit/observations.h"
@@ -11,11 +12,21 @@
 
 namespace maq::head {
 
+// The face on the template head, which the encoder looks at a second time, closer.
+struct FaceSpec {
+  Vec3 center_dm;
+  double radius_dm = 0;
+  double crop_sides = 0;  // side of that crop by the longer side of the face's box
+
+  bool contains(Vec3 template_point) const { return length(template_point - center_dm) < radius_dm; }
+};
+
 // What the encoder sees, and what it says of that.
 struct EncoderSpec {
   CellGrid cells;
-  double crop_sides = 1.6;  // side of the crop by the longer side of the head's box, hair included
-  bool says_codes = false;  // of the whole crop, besides its cells
+  double crop_sides = 1.6;       // side of the crop by the longer side of the head's box, hair included
+  bool says_codes = false;       // of the whole crop, besides its cells
+  std::optional<FaceSpec> face;  // none: there is no second look
 
   int crop_px() const { return cells.side * cells.cell_px; }
 };

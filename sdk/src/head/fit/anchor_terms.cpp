@@ -37,36 +37,52 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+// Whether a closer look shows what the cell does, not at its border.
+bool is_covered(const HeadCell& cell, const HeadObservations& closer, double border_cells) {
+  const Point at = closer.photo_to_crop({cell.x_px + 0.5, cell.y_px + 0.5});
+  const double scale =
+      std::sqrt(closer.crop_to_photo.xx * closer.crop_to_photo.yy - closer.crop_to_photo.xy * closer.crop_to_photo.yx);
+  const double cell_px = closer.cell_px / scale;  // of the crop
+  const double first = border_cells * cell_px, last = (closer.side - border_cells) * cell_px;
+  return at.x >= first && at.x <= last && at.y >= first && at.y <= last;
+}
+
 }  // namespace
 
 AnchorTerms::AnchorTerms(const HeadPhoto& photo, const AnchorPoints& points, const AnchorTermOptions& options)
     : codes_(points.codes()),
-      pixel_sigma_px_(std::max(options.pixel_sigma * photo.seen.cell_px, 1e-3)),
       cell_weight_(options.cell_weight),
       limit_(options.limit),
       cx_px_(photo.cx_px),
       cy_px_(photo.cy_px) {
-  std::vector<AnchorPoints::Place> places;
-  std::vector<const HeadCell*> usable;
-  for (const HeadCell& cell : photo.seen.cells) {
-    if (!cell.is_usable || !(cell.matte > options.min_matte)) continue;
-    const AnchorPoints::Place place = points.place(cell.template_point);
-    if (!(place.distance_dm <= options.max_anchor_dm)) continue;
-    places.push_back(place);
-    usable.push_back(&cell);
-  }
+  struct Usable {
+    const HeadCell& cell;
+    AnchorPoints::Place place;
+    double pixel_sigma_px;
+  };
+  std::vector<Usable> usable;
+  const auto take = [&](const HeadObservations& look, const HeadObservations* closer) {
+    const double pixel_sigma_px = std::max(options.pixel_sigma * look.cell_px, 1e-3);
+    for (const HeadCell& cell : look.cells) {
+      if (!cell.is_usable || !(cell.matte > options.min_matte)) continue;
+      if (closer != nullptr && is_covered(cell, *closer, options.face_border)) continue;
+      const AnchorPoints::Place place = points.place(cell.template_point);
+      if (place.distance_dm <= options.max_anchor_dm) usable.push_back({cell, place, pixel_sigma_px});
+    }
+  };
+  take(photo.seen, photo.face ? &*photo.face : nullptr);
+  if (photo.face) take(*photo.face, nullptr);
   const size_t count = std::min(usable.size(), options.max_cells);
   cells_.reserve(count);
   linear_.resize(count * 3 * codes_);
   for (size_t i = 0; i < count; ++i) {
-    const size_t from = i * usable.size() / count;
-    const HeadCell& cell = *usable[from];
+    const auto& [cell, place, pixel_sigma_px] = usable[i * usable.size() / count];
     double* rows = linear_.data() + i * 3 * codes_;
-    points.linear(places[from], rows);
+    points.linear(place, rows);
     double squares = 0;
     for (size_t k = 0; k < 3 * codes_; ++k) squares += rows[k] * rows[k];
-    const double sigma_dm = std::hypot(cell.sigma_dm, places[from].sigma_dm);
-    cells_.push_back({places[from].mean, cell.x_px - cx_px_, cell.y_px - cy_px_, sigma_dm, squares / 3, 0, limit_});
+    const double sigma_dm = std::hypot(cell.sigma_dm, place.sigma_dm), x = cell.x_px - cx_px_, y = cell.y_px - cy_px_;
+    cells_.push_back({place.mean, x, y, sigma_dm, squares / 3, pixel_sigma_px, 0, limit_});
   }
 }
 
@@ -88,7 +104,7 @@ std::vector<Correspondence> AnchorTerms::correspondences() const {
   std::vector<Correspondence> result;
   for (const Cell& cell : cells_) {
     const double sigma_dm = std::sqrt(cell.sigma_dm * cell.sigma_dm + cell.code_variance);
-    const double sigma_px = std::hypot(pixel_sigma_px_, scale * sigma_dm);
+    const double sigma_px = std::hypot(cell.pixel_sigma_px, scale * sigma_dm);
     result.push_back({cell.mean, cell.x_px + cx_px_, cell.y_px + cy_px_, sigma_px, cell_weight_});
   }
   return result;
@@ -119,7 +135,7 @@ void AnchorTerms::set_noise(const ScaledPose& pose, const double* codes, double 
     Cell& cell = cells_[i];
     const double ratio = std::max(projection.project(point(i, codes)).depth_ratio, 0.1);
     const double scale = projection.scale() / ratio, at_px = scale * cell.sigma_dm;
-    const double variance = pixel_sigma_px_ * pixel_sigma_px_ + at_px * at_px;
+    const double variance = cell.pixel_sigma_px * cell.pixel_sigma_px + at_px * at_px;
     cell.inverse_variance = 1 / variance;
     cell.limit = limit_ * (1 + code_fraction * scale * scale * cell.code_variance / variance);
   }

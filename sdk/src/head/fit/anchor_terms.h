@@ -14,12 +14,14 @@ namespace maq::head {
 // The noise of a cell: that of its template point (the encoder's sigma) and of the anchors near it, in decimetres, and
 // of the pixel. Each cell's squared error e, in sigmas, costs e / (1 + e / limit) (Geman-McClure).
 struct AnchorTermOptions {
-  size_t max_cells = 600;  // of a photo, spread evenly over those that are usable
+  size_t max_cells = 1000;  // of a photo, spread evenly over those that are usable
   double min_matte = 0.5;
   double cell_weight = 0.1;    // of a cell's cost: neighbours say the same
   double pixel_sigma = 0.3;    // of where in its cell the encoder saw the point, in cells
   double limit = 9;            // in squared sigmas
   double max_anchor_dm = 0.5;  // cells that see a point farther than this from all anchors are left out
+  // Where there is a closer look at the face, the first look is heard only around it and in this border, in cells.
+  double face_border = 1;
 };
 
 // The costs of one photo. The pose's origin is that of the head's frame.
@@ -59,7 +61,7 @@ class AnchorTerms {
   struct Cell {
     Vec3 mean;
     double x_px, y_px;  // from the principal point
-    double sigma_dm, code_variance;
+    double sigma_dm, code_variance, pixel_sigma_px;
     double inverse_variance, limit;  // set_noise()
   };
   struct Residual {
@@ -71,7 +73,7 @@ class AnchorTerms {
   Residual residual(size_t cell, const ScaledProjection& projection, const double* codes) const;
 
   size_t codes_;
-  double pixel_sigma_px_, cell_weight_, limit_, cx_px_, cy_px_;
+  double cell_weight_, limit_, cx_px_, cy_px_;
   std::vector<Cell> cells_;
   std::vector<double> linear_;  // [cells][3][codes]
   std::vector<double> rows_;    // [2 cells][unknowns], of accumulate()

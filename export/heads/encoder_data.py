@@ -140,9 +140,9 @@ def crop_of(
     mirrored half of the time, occluded now and then."""
     place = placing(rng, augment, pictures.rgb.shape[1], face_box_of(pictures, k) if of_face else None)
     masks = pictures.masks[k]
-    planes = np.dstack([pictures.rgb[k], (masks > 200) * np.uint8(255), (masks > 0) * np.uint8(255)])
-    planes = place.cut(planes)
-    matte, alpha = planes[..., 3] / 255, planes[..., 4:] / 255
+    planes = place.cut(np.dstack([pictures.rgb[k], (masks > 200) * np.uint8(255)]))
+    alpha = place.cut((masks > 0) * np.uint8(255))[..., None] / 255
+    matte = planes[..., 3] / 255
     image = planes[..., :3] + (1 - alpha) * backgrounds.crop(rng, CROP_PX)
     if augment and rng.random() < 0.3:
         image, part = occluded(image, backgrounds, rng)

@@ -18,6 +18,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
+from torch.nn import functional as F
 from torch.utils.data import DataLoader
 
 from export.heads.encoder import (
@@ -156,8 +157,12 @@ def batch_losses(encoder: HeadEncoder, batch: tuple, precision: str) -> dict[str
 
 
 def go_on_from(encoder: HeadEncoder, path: Path) -> None:
-    """Takes the weights of another training. The last layer of codes begins anew where their number is another."""
+    """Takes the weights of another training. The last layer of codes begins anew where their number is another, and so
+    do the parts that an older encoder does not have."""
     state = torch.load(path, weights_only=True)["state"]
+    first = state["head.0.conv.weight"]
+    missing = encoder.head[0].conv.in_channels - first.shape[1]
+    state["head.0.conv.weight"] = F.pad(first, (0, 0, 0, 0, 0, missing))
     if state["code.bias"].shape != encoder.code.bias.shape:
         state = {name: value for name, value in state.items() if not name.startswith("code.")}
     encoder.load_state_dict(state, strict=False)

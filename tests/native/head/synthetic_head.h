@@ -271,12 +271,12 @@ inline void rays_of(const HeadCamera& camera, const std::vector<maq::Point>& pix
   }
 }
 
-// What an encoder would say of the head with these codes, with noise, and the crop's pixels.
-inline HeadPhoto photo_of(const FieldCodes& codes, const HeadCamera& camera, const Noise& noise = {},
-                          double roll = 0.1) {
+// What an encoder would say of the head with these codes, with noise, and the crop's pixels. The crop shows `crop_dm`.
+inline HeadPhoto photo_of(const FieldCodes& codes, const HeadCamera& camera, const Noise& noise = {}, double roll = 0.1,
+                          double crop_dm = 4) {
   const FieldWeights weights = prior().bases.combine(codes);
   const Vec3 middle = camera.head_to_camera * Vec3{};
-  const double scale = camera.focal_px / middle.z * 4 / 192;  // the crop shows 4 dm
+  const double scale = camera.focal_px / middle.z * crop_dm / 192;
   maq::AffineMap map;
   map.xx = scale * std::cos(roll), map.xy = -scale * std::sin(roll);
   map.yx = -map.xy, map.yy = map.xx;

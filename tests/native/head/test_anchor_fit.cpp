@@ -1,6 +1,7 @@
 // Cameras and codes from template points, against those that made them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -217,6 +218,37 @@ TEST(AnchorFit, CellsAreSpreadAndThoseFarFromAllAnchorsLeftOut) {
     }
   }
   EXPECT_EQ(AnchorTerms(photo, points, options).cells(), all - 1);
+}
+
+TEST(AnchorFit, ACloserLookTakesThePlaceOfTheFirstWhereItSeesTheHead) {
+  const AnchorPoints points(prior());
+  AnchorTermOptions options = independent_cells().terms;
+  options.max_cells = 100000;
+  double alone_error = 0, error = 0;
+  for (unsigned seed = 1; seed < 5; ++seed) {
+    const HeadCamera camera = camera_at(6, 900, 0.3 * seed - 0.6, 0.1);
+    HeadPhoto photo = photo_for_anchors(camera, seed, 0.1);
+    const AnchorFit alone = fit_anchors(prior(), {photo}, independent_cells());
+    Noise noise;
+    noise.seed = seed + 10, noise.point_dm = 0.01, noise.has_colours = false;
+    const HeadObservations closer = photo_of(kTruth, camera, noise, 0.1, 1).seen;
+    size_t around = 0, inside = 0;
+    for (const HeadCell& cell : photo.seen.cells) {
+      if (!cell.is_usable || cell.matte < 0.5) continue;
+      const maq::Point at = closer.photo_to_crop({cell.x_px + 0.5, cell.y_px + 0.5});
+      (std::max(std::abs(at.x - 96), std::abs(at.y - 96)) > 92 ? around : inside) += 1;
+    }
+    EXPECT_GT(around, 100u);
+    EXPECT_GT(inside, 50u);
+    photo.face = closer;
+    EXPECT_EQ(AnchorTerms(photo, points, options).cells(), around + 48 * 48) << "of the closer look all see the head";
+    const AnchorFit fit = fit_anchors(prior(), {photo}, independent_cells());
+    alone_error += code_error(alone.shape_codes), error += code_error(fit.shape_codes);
+    // Where nothing can be used of the closer look, nothing is lost around it.
+    for (HeadCell& cell : photo.face->cells) cell = {};
+    EXPECT_EQ(AnchorTerms(photo, points, options).cells(), around);
+  }
+  EXPECT_LT(error, 0.8 * alone_error);
 }
 
 TEST(AnchorFit, AnchorsAreMetAndBetweenThemTheyAreMixed) {

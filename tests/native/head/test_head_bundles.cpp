@@ -75,6 +75,18 @@ TEST_F(HeadBundles, OfAnotherTaskOrWithoutWhatIsReadAreRefused) {
   for (const json& value : {json(0), json(0.5), json(9), json("1.6")}) {
     expect_refused(with("crop_sides", value), MAQ_ERROR_BAD_BUNDLE, "encoder.crop_sides");
   }
+  const json face = {{"center_dm", {0, -1.24, -0.35}}, {"radius_dm", 0.95}, {"crop_sides", 1.3}};
+  for (const auto& [key, value] : {std::pair<const char*, json>{"center_dm", {0, -1.24}},
+                                   {"center_dm", {0, -5, 0}},
+                                   {"radius_dm", 0},
+                                   {"radius_dm", "1"},
+                                   {"crop_sides", 0.9},
+                                   {"crop_sides", nullptr}}) {
+    json made = face;
+    made[key] = value;
+    expect_refused(with("face", made), MAQ_ERROR_BAD_BUNDLE, (std::string("encoder.face.") + key).c_str());
+  }
+  expect_refused(with("face", 1), MAQ_ERROR_BAD_BUNDLE, "encoder.face");
   changed = manifest_;
   changed["prior"]["file"] = "../prior.maqp";
   expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "prior.file");

@@ -37,7 +37,7 @@ from export.heads.field import bases_of, geometry
 from export.heads.head_shards import read_points
 from export.heads.prior import Prior, PriorError
 from export.heads.prior_file import FORMATS, HEAD, prior_bytes, prior_from_bytes, write_prior
-from export.heads.train_encoder import held_out_crops
+from export.heads.train_encoder import held_out_crops, held_out_face_crops
 from export.heads.train_prior import HeadTensors, fitted_codes
 from quantization.analysis.errors import sqnr_db
 from quantization.blocks import Workpiece, blocks
@@ -52,12 +52,14 @@ FIGURES = {"median_mm": 3, "point_mm": 3, "within_2_sigma": 4, "matte_iou": 4, "
 
 
 def training_crops(folder: Path, backgrounds: Path, count: int) -> list[Crop]:
-    """Crops as the encoder was trained on, of as many heads as there are crops."""
+    """Crops as the encoder was trained on, every second of a face, of as many heads as there are crops."""
     heads, photos = read_heads(folder, "train", count), Backgrounds(backgrounds / "train")
     rng = np.random.default_rng(0)
     return [
-        crop_of(pictures, int(rng.integers(len(pictures.rgb))), photos, rng)
-        for pictures in (heads[k % len(heads)] for k in range(count))
+        crop_of(
+            heads[k % len(heads)], int(rng.integers(len(heads[k % len(heads)].rgb))), photos, rng, of_face=k % 2 == 1
+        )
+        for k in range(count)
     ]
 
 
@@ -183,7 +185,9 @@ def run(options: argparse.Namespace) -> None:
     prior = float_prior(options.fp32 / PRIOR)
     views = options.data / "views"
     calibration = samples(training_crops(views, options.backgrounds, settings.crops))
-    crops = spread(held_out_crops(views, Backgrounds(options.backgrounds / "val")), settings.held_out_crops)
+    backgrounds = Backgrounds(options.backgrounds / "val")
+    both = [*held_out_crops(views, backgrounds), *held_out_face_crops(views, backgrounds)]
+    crops = spread(both, settings.held_out_crops)
     if options.blocks:
         print_blocks(source, settings.graphs["encoder"], calibration, crops)
         return

@@ -20,12 +20,13 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from export.bundle import BundleInfo, bytes_of
 from export.densepose.graphs import session
 from export.densepose.simplified import simplified
 from export.heads.bundle import PRIOR, TRAINING_DATA, write_manifest
-from export.heads.encoder import CROP_PX, HeadEncoder, load_encoder
+from export.heads.encoder import CELLS, CROP_PX, OUTPUTS, POINT, HeadEncoder, load_encoder
 from export.heads.field import FieldBases, bases_of, geometry, surface
 from export.heads.prior import Prior, PriorError
 from export.heads.prior_file import read_prior
@@ -37,6 +38,25 @@ FIELD_TOLERANCE = 1e-5  # the same; where that is below 1 (dm), in dm
 FIELD_OUTPUTS = ("distance", "feature", "colour_logits", "template_point")
 
 
+class AffinePoints(nn.Module):
+    """What the whole crop says of each cell, [1, 128] -> [1, 48, 48, 8]: an affine function of its place for template
+    points, 0 for the rest."""
+
+    def __init__(self, affine: nn.Linear, place: Tensor) -> None:
+        """affine: of [3, 3] outputs; place: [1, 2, 48, 48]."""
+        super().__init__()
+        self.linear = nn.Linear(affine.in_features, 3 * OUTPUTS)
+        weight, bias = affine.weight.unflatten(0, (3, 3)), affine.bias.unflatten(0, (3, 3))
+        padding = OUTPUTS - POINT.stop
+        self.linear.weight.data = F.pad(weight.transpose(0, 1), (0, 0, 0, padding)).flatten(0, 1)
+        self.linear.bias.data = F.pad(bias.T, (0, padding)).flatten()
+        rows = place[0].flatten(1).T
+        self.register_buffer("rows", torch.cat([rows, torch.ones(len(rows), 1)], 1))
+
+    def forward(self, context: Tensor) -> Tensor:
+        return (self.rows @ self.linear(context).view(3, OUTPUTS)).view(1, CELLS, CELLS, OUTPUTS)
+
+
 class EncoderGraph(nn.Module):
     """The encoder with fewer operations: the pixels' scale lies in the first convolution (their mean does not, since
     beyond the border is the mean), and the last one is a matrix product, which needs no other layout than the output's.
@@ -45,15 +65,20 @@ class EncoderGraph(nn.Module):
     def __init__(self, encoder: HeadEncoder) -> None:
         super().__init__()
         net = simplified(encoder)
-        self.backbone, self.neck, self.head = net.backbone, net.neck, net.head[:-1]
-        self.predict = joined(net.head[-1])
+        self.backbone, self.neck = net.backbone, net.neck
+        self.first, self.second, self.predict = net.head[0], net.head[1], joined(net.head[2])
+        self.context, self.context_hidden, self.bias = net.context, net.context_hidden, net.bias
+        self.points = AffinePoints(net.affine, net.place)
         self.whole, self.code, self.codes = net.whole, net.code, net.codes
         self.register_buffer("mean", net.mean)
+        self.register_buffer("place", net.place)
         self.backbone.stem.conv.weight.data *= net.scale[:, None, None]
 
     def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
         taps = self.backbone((image - self.mean).permute(0, 3, 1, 2))
-        cells = self.predict(channels_last(self.head(self.neck.finest(taps))))
+        context = F.relu(self.context_hidden(self.context(taps[-1]).flatten(1)))
+        seen = self.first(torch.cat([self.neck.finest(taps), self.place], 1)) + self.bias(context)[..., None, None]
+        cells = self.predict(channels_last(self.second(seen))) + self.points(context)
         codes = self.code(self.whole(taps[-1]).mean((2, 3)))
         return cells, codes.view(1, self.codes, 2)
 

@@ -26,7 +26,7 @@ from export.bundle import BundleInfo, bytes_of
 from export.densepose.graphs import session
 from export.densepose.simplified import simplified
 from export.heads.bundle import PRIOR, TRAINING_DATA, write_manifest
-from export.heads.encoder import CELLS, CROP_PX, OUTPUTS, POINT, HeadEncoder, load_encoder
+from export.heads.encoder import CELLS, CROP_PX, OUTPUTS, POINT, WIDTH, HeadEncoder, load_encoder
 from export.heads.field import FieldBases, bases_of, geometry, surface
 from export.heads.prior import Prior, PriorError
 from export.heads.prior_file import read_prior
@@ -39,8 +39,8 @@ FIELD_OUTPUTS = ("distance", "feature", "colour_logits", "template_point")
 
 
 class AffinePoints(nn.Module):
-    """What the whole crop says of each cell, [1, 128] -> [1, 48, 48, 8]: an affine function of its place for template
-    points, 0 for the rest."""
+    """Adds to cells [1, 48, 48, 8] what the whole crop [1, 128] says of each: an affine function of its place for
+    template points, 0 for the rest."""
 
     def __init__(self, affine: nn.Linear, place: Tensor) -> None:
         """affine: of [3, 3] outputs; place: [1, 2, 48, 48]."""
@@ -53,8 +53,8 @@ class AffinePoints(nn.Module):
         rows = place[0].flatten(1).T
         self.register_buffer("rows", torch.cat([rows, torch.ones(len(rows), 1)], 1))
 
-    def forward(self, context: Tensor) -> Tensor:
-        return (self.rows @ self.linear(context).view(3, OUTPUTS)).view(1, CELLS, CELLS, OUTPUTS)
+    def forward(self, cells: Tensor, context: Tensor) -> Tensor:
+        return cells + (self.rows @ self.linear(context).view(3, OUTPUTS)).view(1, CELLS, CELLS, OUTPUTS)
 
 
 class EncoderGraph(nn.Module):
@@ -66,7 +66,12 @@ class EncoderGraph(nn.Module):
         super().__init__()
         net = simplified(encoder)
         self.backbone, self.neck = net.backbone, net.neck
-        self.first, self.second, self.predict = net.head[0], net.head[1], joined(net.head[2])
+        # What is seen and where it is have convolutions of their own: in int8 they would share an unsigned scale.
+        first = net.head[0].conv
+        self.first, self.first_place = (nn.Conv2d(n, WIDTH, 3, padding=1, bias=n == WIDTH) for n in (WIDTH, 2))
+        self.first.weight.data, self.first.bias.data = first.weight.data[:, :WIDTH], first.bias.data
+        self.first_place.weight.data = first.weight.data[:, WIDTH:]
+        self.second, self.predict = net.head[1], joined(net.head[2])
         self.context, self.context_hidden, self.bias = net.context, net.context_hidden, net.bias
         self.points = AffinePoints(net.affine, net.place)
         self.whole, self.code, self.codes = net.whole, net.code, net.codes
@@ -77,8 +82,9 @@ class EncoderGraph(nn.Module):
     def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
         taps = self.backbone((image - self.mean).permute(0, 3, 1, 2))
         context = F.relu(self.context_hidden(self.context(taps[-1]).flatten(1)))
-        seen = self.first(torch.cat([self.neck.finest(taps), self.place], 1)) + self.bias(context)[..., None, None]
-        cells = self.predict(channels_last(self.second(seen))) + self.points(context)
+        seen = F.relu6(self.first(self.neck.finest(taps)) + self.first_place(self.place))
+        seen = seen + self.bias(context)[..., None, None]
+        cells = self.points(self.predict(channels_last(self.second(seen))), context)
         codes = self.code(self.whole(taps[-1]).mean((2, 3)))
         return cells, codes.view(1, self.codes, 2)
 

@@ -1,7 +1,7 @@
 """Stage 1 of a fit: Adam over codes and camera with what the pixels say along rays (sdk/src/head/fit/head_fit).
 
 What is minimised is a negative log posterior: the priors of the codes and of the focal length, ANCHOR_WEIGHT times the
-terms of `anchor_fit`, and those of `ray_terms`, of which CELL_WEIGHT a cell of the encoder count. Rays, their order,
+terms of `anchor_fit`, and those of `ray_terms`, of which RAY_WEIGHT a cell of the encoder count. Rays, their order,
 rates, checks and ends are those of the SDK, so that both go the same way step by step.
 """
 
@@ -18,7 +18,6 @@ from torch import Tensor
 
 from export.heads.field import bases_of
 from export.heads.fitting.anchor_fit import (
-    CELL_WEIGHT,
     AnchorFit,
     AnchorPoints,
     AnchorTerms,
@@ -32,6 +31,7 @@ from export.heads.fitting.rays import RayLevel, Rays, Shuffle, rays_of
 from export.heads.prior import Prior
 
 GRID_DRIFT, GRID_STEPS = 0.2, 20  # how far codes move, and for how many steps, before the grid is made anew
+RAY_WEIGHT = 0.03  # of a cell of the encoder: light and shadow are in no term
 MAX_REFUSALS = 10
 MIN_RATE = 0.2  # of the rates, at which a fit without a gain ends
 WARM_UP = 5  # steps over which the rates rise
@@ -166,7 +166,7 @@ class RayFit:
     @staticmethod
     def _ray_weight(level: RayLevel, count: int) -> float:
         """What a ray's loss is worth where `count` of them stand for all pixels."""
-        return CELL_WEIGHT * level.cells_per_ray * (len(level.fitted) + len(level.held_out)) / count if count else 0.0
+        return RAY_WEIGHT * level.cells_per_ray * (len(level.fitted) + len(level.held_out)) / count if count else 0.0
 
     def _loss(self, rays: Rays, level: RayLevel, is_exact: bool) -> Tensor:
         """Of the state, with a gradient by `change`."""

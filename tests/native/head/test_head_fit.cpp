@@ -27,7 +27,7 @@ HeadFitOptions independent_cells(int max_steps) {
   HeadFitOptions options;
   options.rays.normal_weight = 1;  // those of these photos are right
   options.seconds = 1e6, options.max_steps = max_steps;
-  options.anchors.terms.cell_weight = 1, options.anchors.terms.pixel_sigma = 0.02;
+  options.anchors.terms.cell_weight = options.ray_weight = 1, options.anchors.terms.pixel_sigma = 0.02;
   options.rays.point_sigma_dm = 0.02;
   return options;
 }

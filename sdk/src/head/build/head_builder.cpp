@@ -21,7 +21,11 @@ constexpr double kMinMatte = 0.5;
 constexpr double kMaxFoundSigma_dm = 0.15, kMaxSigma_dm = 0.25;
 // Of the found cells, so many may be strays on each side of the head's box.
 constexpr double kStrayFraction = 0.01;
-constexpr int kLooksAround = 2;  // once a head was found somewhere in a photo
+// What is smaller is no head that could be fitted.
+constexpr float kMinFoundSide_px = 8;
+constexpr double kMinSearchedSide_px = 32;
+constexpr int kMaxSearchedSquares = 7;  // a row, and a column
+constexpr int kLooksAround = 2;         // once a head was found somewhere in a photo
 // A box that moved by less of its size is the same.
 constexpr float kSameBox = 0.15f;
 
@@ -86,6 +90,33 @@ bool is_same(const std::array<float, 4>& a, const std::array<float, 4>& b) {
     if (std::abs(a[side] - b[side]) > limit) return false;
   }
   return true;
+}
+
+// Where a head is looked for: in the middle, in the whole photo, then in squares of half the photo's short side that
+// overlap by half, the middle ones first.
+std::vector<HeadSquare> squares_to_search(int width_px, int height_px, double roll_rad) {
+  const double width = width_px, height = height_px, short_side = std::min(width, height);
+  std::vector<HeadSquare> squares;
+  const auto add = [&](double x, double y, double side) { squares.push_back({x, y, std::max(2.0, side), roll_rad}); };
+  add(width / 2, height / 2, short_side);
+  if (width_px != height_px) add(width / 2, height / 2, std::max(width, height));
+  const double side = short_side / 2;
+  if (side < kMinSearchedSide_px) return squares;
+  const int columns = std::min(kMaxSearchedSquares, int(2 * width / side) - 1);
+  const int rows = std::min(kMaxSearchedSquares, int(2 * height / side) - 1);
+  const size_t first = squares.size();
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      add(side / 2 + (width - side) * column / std::max(1, columns - 1),
+          side / 2 + (height - side) * row / std::max(1, rows - 1), side);
+    }
+  }
+  const auto from_middle = [&](const HeadSquare& square) {
+    return std::hypot(square.x_px - width / 2, square.y_px - height / 2);
+  };
+  std::stable_sort(squares.begin() + std::ptrdiff_t(first), squares.end(),
+                   [&](const HeadSquare& a, const HeadSquare& b) { return from_middle(a) < from_middle(b); });
+  return squares;
 }
 
 // How much the size of heads differs, as a fraction of it: what the codes, whitened, do to the anchors' mean distance
@@ -178,14 +209,13 @@ HeadBuilder::Seen HeadBuilder::look(const ImageView& photo, const HeadSquare& sq
 }
 
 std::pair<std::array<float, 4>, HeadBuilder::Seen> HeadBuilder::find_head(const ImageView& photo, double roll_rad) {
-  const double middle_x = photo.width_px / 2.0, middle_y = photo.height_px / 2.0;
-  // A square in the middle, then one with all of the photo.
-  for (const int side : {std::min(photo.width_px, photo.height_px), std::max(photo.width_px, photo.height_px)}) {
-    Seen seen = look(photo, {middle_x, middle_y, std::max(2.0, double(side)), roll_rad});
+  for (const HeadSquare& square : squares_to_search(photo.width_px, photo.height_px, roll_rad)) {
+    Seen seen = look(photo, square);
     std::array<float, 4> box{};
     for (int looks = 0; looks < kLooksAround && seen.head_cells >= kMinHeadCells; ++looks) {
       const std::array<float, 4> around = box_of(seen.cells, shows_head);
-      if (looks > 0 && is_same(around, box)) break;
+      if (std::max(around[2] - around[0], around[3] - around[1]) < kMinFoundSide_px) seen.head_cells = 0;
+      if (seen.head_cells == 0 || (looks > 0 && is_same(around, box))) break;
       box = around;
       seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), roll_rad,
                                        encoder_.spec()));

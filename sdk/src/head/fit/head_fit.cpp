@@ -185,7 +185,7 @@ class Fitter {
   // What a ray's loss is worth where `count` of them stand for all pixels.
   double ray_weight(const FitRays& level, size_t count) const {
     const double cells = level.cells_per_ray * double(level.fitted.size() + level.held_out.size());
-    return count > 0 ? options_.anchors.terms.cell_weight * cells / double(count) : 0;
+    return count > 0 ? options_.ray_weight * cells / double(count) : 0;
   }
 
   void set_field(const State& state, bool is_exact) {

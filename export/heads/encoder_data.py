@@ -16,7 +16,7 @@ from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures, head
 from export.people.imaging import camera_faults
 
 MAX_BILINEAR_ZOOM = 1.25
-FACE_SHARE = 0.5  # of the training crops
+FACE_FRACTION = 0.5  # of the training crops
 MIN_FACE_FRACTION, STRAY_FRACTION = 0.01, 0.01
 
 
@@ -219,7 +219,7 @@ class CropStream(IterableDataset):
         crops, codes = [], []
         for number in rng.integers(len(self.heads), size=count):
             pictures = self.heads[number]
-            k, of_face = int(rng.integers(len(pictures.rgb))), rng.random() < FACE_SHARE
+            k, of_face = int(rng.integers(len(pictures.rgb))), rng.random() < FACE_FRACTION
             crops.append(crop_of(pictures, k, self.backgrounds, rng, of_face=of_face))
             codes.append(np.where(crops[-1].mirrored, np.nan, self.codes[number]).astype(np.float32))
         return *batched(crops), torch.from_numpy(np.stack(codes))

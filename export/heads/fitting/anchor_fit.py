@@ -22,7 +22,7 @@ from export.heads.prior import Prior
 
 NEIGHBOURS = 4
 SOFTENING_DM = 1e-3  # within which of an anchor the others no longer count
-MAX_CELLS = 600
+MAX_CELLS = 1000
 MAX_ANCHOR_DM = 0.5  # cells that see a point farther than this from all anchors are left out
 CELL_WEIGHT = 0.3  # of a cell's cost: neighbours say the same
 PIXEL_SIGMA = 0.3  # of where in its cell the encoder saw a point, in cells

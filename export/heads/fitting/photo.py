@@ -75,7 +75,7 @@ class HeadPhoto(Look):
 
 @dataclass(frozen=True)
 class FaceSpec:
-    """Which points of the template are the face's, [3] and dm, and the side of the second look by its box."""
+    """Which points of the template are the face's, [3] and dm, and the side of the closer look by its box."""
 
     center: np.ndarray
     radius_dm: float

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX
-from export.heads.encoder_data import FACE_SHARE, Backgrounds, CropStream, as_cameras_see, occluded, placing
+from export.heads.encoder_data import FACE_FRACTION, Backgrounds, CropStream, as_cameras_see, occluded, placing
 from export.heads.photos.faces import HEAD, NOTHING, UNKNOWN, PhotoFaces
 
 _GREY = 127
@@ -91,7 +91,7 @@ class MixedStream(CropStream):
         wanted = min(max(wanted, 1), count - 1)
         crops = [
             crop_photo(
-                *self.faces[rng.integers(len(self.faces))], self.backgrounds, rng, of_face=rng.random() < FACE_SHARE
+                *self.faces[rng.integers(len(self.faces))], self.backgrounds, rng, of_face=rng.random() < FACE_FRACTION
             )
             for _ in range(wanted)
         ]

@@ -191,7 +191,7 @@ def test_points_of_a_crop_show_the_pixels_of_the_photo():
     assert fates == [""]
     y, x = np.nonzero(faces.rgb[0, ..., 0] > 128)
     assert np.abs(faces.pixel[0, NOSE_TIP] - [x.mean(), y.mean()]).max() < 1.2
-    assert faces.rgb.shape == (1, 256, 256, 3)
+    assert faces.rgb.shape == (1, 512, 512, 3)
     assert faces.weight[0, NOSE_TIP] > 0.5
 
 

@@ -34,7 +34,7 @@ crops = 3
 held_out_crops = 4
 fitted_heads = 2
 [encoder]
-float_nodes = ["/predict/*"]
+float_nodes = ["/predict/*", "/points/*", "/first_place/*"]
 """
 
 
@@ -154,7 +154,8 @@ def test_a_table_shows_what_each_block_gains(fp32, data, tmp_path, monkeypatch, 
     assert not (tmp_path / "out").exists()
     lines = [line.split("│") for line in capsys.readouterr().out.splitlines() if "│" in line]
     rows = {line[1].strip(): line[2:-1] for line in lines}
-    assert list(rows) == ["everything", "as the settings say", "- /predict/*", "+ /backbone/blocks.3/*"]
+    less = ["- /predict/*", "- /points/*", "- /first_place/*"]
+    assert list(rows) == ["everything", "as the settings say", *less, "+ /backbone/blocks.3/*"]
     size, point_db = ({name: float(row[k]) for name, row in rows.items()} for k in (0, 1))
     assert size["everything"] > size["+ /backbone/blocks.3/*"] > size["as the settings say"]
     assert point_db["everything"] > point_db["as the settings say"] > point_db["- /predict/*"]

@@ -157,9 +157,8 @@ def read_photo(path: Path) -> np.ndarray:
 def look_at(
     encoder: Encoder, bgr: np.ndarray, box: Box | None = None, roll_rad: float = 0.0, focal_px: float = 0.0
 ) -> HeadPhoto:
-    """box: of the head with its hair; None: it is looked for in the middle, then in the whole photo (the SDK
-    goes on with parts of it). focal_px: 0 where
-    it is not known. Raises NoHead."""
+    """box: of the head with its hair; None: it is looked for in the middle, then in the whole photo (the SDK goes on
+    with parts of it). focal_px: 0 where it is not known. Raises NoHead."""
     height, width = bgr.shape[:2]
 
     def look(to_photo: np.ndarray) -> HeadPhoto:

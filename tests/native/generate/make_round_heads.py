@@ -4,7 +4,8 @@ and a mesh.
 The prior: |S x| in a norm of 13 directions, nearly an ellipsoid, whose three shape codes stretch its axes by 7 %; two
 colour codes. The encoder does not look for anything: whatever the crop shows, it sees the head of CODES, from the
 front and turned by TURN_RAD, in its middle. Of a crop that is black, it sees none; of one that is more blue than red, a
-mirrored one, which no camera explains. Of one that is greener than both others together, it says shape codes, too.
+mirrored one, which no camera explains. Of one that is greener than both others together, it says shape codes, too. The
+template head is round as well, open below, with an eye and a tooth, both octahedra; it opens its mouth and winks.
 
     python -m tests.native.generate.make_round_heads
 """
@@ -19,9 +20,10 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from export.bundle import OPSET, BundleInfo
-from export.heads.bundle import CROP_SIDES, write_manifest
+from export.heads.bundle import CROP_SIDES, TEMPLATE, write_manifest
 from export.heads.prior import FieldShape, Layer, Prior
 from export.heads.prior_file import write_prior
+from export.heads.template_file import Kind, Template, write_template
 
 FOLDER = Path(__file__).parents[1] / "data" / "round_heads"
 CODES = np.array([1.5, 0.5, -1.5])  # narrow and tall
@@ -186,8 +188,53 @@ def write_encoder(path: Path) -> None:
     onnx.save(model, path)
 
 
+def template() -> Template:
+    """Rings around the z axis from the crown down to the cut, and two octahedra inside."""
+    rings, around = 14, 24
+    polar = np.linspace(0.1, 2.35, rings)[:, None]
+    azimuth = np.linspace(0, 2 * np.pi, around, endpoint=False) + np.pi / 2  # the seam is at the back
+    directions = np.stack(np.broadcast_arrays(np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth),
+                                              np.cos(polar)), -1).reshape(-1, 3)  # fmt: skip
+    directions = np.concatenate([directions, [[0, 0, 1]]])
+    points, kinds = [on_template(directions)], [np.full(len(directions), Kind.SURFACE)]
+    vertex_points, uv = [], []
+    for ring in range(rings):
+        for step in range(around + 1):  # the seam's vertices are there twice
+            vertex_points.append(ring * around + step % around)
+            uv.append((step / around, (ring + 1) / (rings + 1)))
+    crown = len(vertex_points)
+    vertex_points.append(rings * around)
+    uv.append((0.5, 0))
+    triangles = []
+    for step in range(around):
+        triangles.append((crown, step, step + 1))
+        for ring in range(rings - 1):
+            a, b = ring * (around + 1) + step, (ring + 1) * (around + 1) + step
+            triangles += [(a, b, b + 1), (a, b + 1, a + 1)]
+    octahedron = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
+    eye = on_template(np.array([0.35, -0.9, 0.25])) * 0.9
+    for middle, radius, kind in ((eye, 0.1, Kind.EYE), (np.array([0, -0.6, -0.4]), 0.05, Kind.TEETH)):
+        first, start = sum(map(len, points)), len(vertex_points)
+        points.append(middle + radius * octahedron)
+        kinds.append(np.full(6, kind))
+        vertex_points += range(first, first + 6)
+        uv += [(0.1 * k, 1) for k in range(6)]
+        triangles += [tuple(start + corner for corner in face) for face in faces]
+    points = np.concatenate(points)
+    jaw = np.flatnonzero((points[:, 1] < -0.2) & (points[:, 2] < -0.35))
+    lid = np.flatnonzero(np.linalg.norm(points - eye, axis=1) < 0.3)
+    actions = {
+        "jawOpen": (jaw, np.tile([0, 0.02, -0.15], (len(jaw), 1))),
+        "eyeBlinkLeft": (lid, np.tile([0, 0, -0.05], (len(lid), 1))),
+    }
+    return Template(points, np.concatenate(kinds).astype(np.uint8), np.array(vertex_points), np.array(uv),
+                    np.array(triangles), actions)  # fmt: skip
+
+
 def write_bundle(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
+    write_template(template(), folder / TEMPLATE)
     write_encoder(folder / "encoder.onnx")
     write_prior(prior(), folder / "prior.maqp", bases="float16", constant="float16")
     write_manifest(folder, BundleInfo("round-heads", "fp32"), face=None)

@@ -8,6 +8,8 @@ anchors (template points, mean, linear, sigma), template points of the places.
 32 x 32 pixels of noise, B, G, R bytes; `cells.f32`: what the encoder says of it [8][8][8].
 `codes.onnx`: an encoder that says codes, too.
 
+`template.maqt`: a template head of five points.
+
 `field/usual.maqp`: a field of the usual size. `field/<name>.f32`, of it and of two of those priors: POINTS points [3]
 (dm), then what torch finds there in float64 for the head of the same codes: distance (dm), logits of red, green and
 blue [3], template point [3] (dm).
@@ -31,7 +33,9 @@ from export.heads.bundle import write_bundle
 from export.heads.field import bases_of, geometry, surface
 from export.heads.prior import FieldShape, Layer, Prior, combined
 from export.heads.prior_file import FORMATS, read_prior, write_prior
+from export.heads.template_file import write_template
 from tests.python.support.small_prior import small_prior
+from tests.python.support.small_template import small_template
 
 FOLDER = Path(__file__).parents[1] / "data" / "tiny_head"
 CROP_PX, CELL_PX = 32, 4
@@ -120,6 +124,7 @@ def write_fields(folder: Path, priors: Path) -> None:
 
 def main() -> None:
     write_priors(FOLDER / "priors")
+    write_template(small_template(), FOLDER / "template.maqt")
     bundle = FOLDER / "bundle"
     bundle.mkdir(exist_ok=True)
     write_encoder(bundle / "encoder.onnx")

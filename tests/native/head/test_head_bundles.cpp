@@ -49,6 +49,33 @@ TEST_F(HeadBundles, HaveTheEncodersSizesAndThePrior) {
   EXPECT_EQ(manifest_["files"]["prior.maqp"]["sha256"], digest);
 }
 
+TEST_F(HeadBundles, MayHaveATemplateHead) {
+  EXPECT_EQ(maq::head::HeadBundle(maq::read_bundle(folder_.path().string())).template_head, nullptr);
+  const std::string bytes = read_text(tiny_head::kFolder + "/template.maqt");
+  write_text(folder_.file("template.maqt"), bytes);
+  json changed = manifest_;
+  const auto describe = [&](const std::string& content) {
+    changed["files"]["template.maqt"] = {{"sha256", maq::sha256_hex(content.data(), content.size())},
+                                         {"bytes", content.size()}};
+  };
+  describe(bytes);
+  changed["template"] = {{"file", "template.maqt"}};
+  write_text(folder_.file("manifest.json"), changed.dump());
+  const maq::head::HeadBundle bundle(maq::read_bundle(folder_.path().string()));
+  ASSERT_NE(bundle.template_head, nullptr);
+  EXPECT_EQ(bundle.template_head->actions.size(), 2u);
+  EXPECT_EQ(bundle.bundle.files.count("template.maqt"), 0u);
+  changed["template"]["file"] = "another.maqt";
+  expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "template.file");
+  changed["template"] = json::object();
+  expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "template");
+  changed["template"] = {{"file", "template.maqt"}};
+  const std::string cut = bytes.substr(0, bytes.size() - 1);
+  write_text(folder_.file("template.maqt"), cut);
+  describe(cut);
+  expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "truncated or damaged");
+}
+
 TEST_F(HeadBundles, OfAnotherTaskOrWithoutWhatIsReadAreRefused) {
   json changed = manifest_;
   changed["task"] = "edges";

@@ -48,6 +48,18 @@ HeadMesh with_coordinates(HeadMesh mesh) {
   return mesh;
 }
 
+// Opens what is below and winks: of the second, nothing moves.
+HeadMesh with_morph_targets(HeadMesh mesh) {
+  maq::head::MorphTarget open{"jawOpen", {}, {}};
+  for (size_t i = 0; i < mesh.vertex_count(); ++i) {
+    if (mesh.positions[3 * i + 2] > -0.4f) continue;
+    open.vertices.push_back(uint32_t(i));
+    open.moves.insert(open.moves.end(), {0, 0.02f, -0.2f});
+  }
+  mesh.morph_targets = {open, {"eyeBlinkLeft", {}, {}}};
+  return mesh;
+}
+
 std::vector<uint8_t> small_png() {
   const std::string text = read_text(std::string(MAQ_TEST_DATA) + "/head_mesh/texture.png");
   return {text.begin(), text.end()};
@@ -100,8 +112,9 @@ TEST(MeshFiles, AreTheOnesThatOtherProgramsRead) {
   for (const char* name : {"textured.glb", "textured.obj"}) {
     write_mesh_file(with_coordinates(example()), folder.file(name), small_png());
   }
-  for (const char* name : {"example.glb", "example.obj", "example.mtl", "example.ply", "textured.glb", "textured.obj",
-                           "textured.mtl", "textured.png"}) {
+  write_mesh_file(with_morph_targets(with_coordinates(example())), folder.file("morphing.glb"));
+  for (const char* name : {"morphing.glb", "example.glb", "example.obj", "example.mtl", "example.ply", "textured.glb",
+                           "textured.obj", "textured.mtl", "textured.png"}) {
     EXPECT_TRUE(read_text(folder.file(name)) == read_text(kept + name)) << name << " is not what lies in " << kept;
   }
 }
@@ -157,6 +170,31 @@ TEST(MeshFiles, ATextureLiesInAGlbInPlaceOfVertexColours) {
   EXPECT_EQ(std::memcmp(bytes.data() + begin + view["byteOffset"].get<size_t>(), texture.data(), texture.size()), 0);
 }
 
+TEST(MeshFiles, AGlbHasMorphTargetsWithNames) {
+  const HeadMesh mesh = with_morph_targets(with_coordinates(example()));
+  const auto bytes = maq::head::mesh_as_glb(mesh, {});
+  size_t begin = 0;
+  const json file = parse_glb(bytes, begin);
+  const json& of_mesh = file["meshes"][0];
+  EXPECT_EQ(of_mesh["extras"]["targetNames"], json::array({"jawOpen", "eyeBlinkLeft"}));
+  const json& primitive = of_mesh["primitives"][0];
+  EXPECT_TRUE(primitive["attributes"].contains("TEXCOORD_0")) << "without a texture, too";
+  EXPECT_TRUE(primitive["attributes"].contains("COLOR_0"));
+  ASSERT_EQ(primitive["targets"].size(), 2u);
+  const json& moved = file["accessors"][primitive["targets"][0]["POSITION"].get<size_t>()];
+  EXPECT_EQ(moved["count"], mesh.vertex_count());
+  EXPECT_EQ(moved["sparse"]["count"], mesh.morph_targets[0].vertices.size());
+  EXPECT_FLOAT_EQ(moved["min"][1].get<float>(), -0.02f);
+  EXPECT_FLOAT_EQ(moved["min"][2].get<float>(), -0.002f);
+  EXPECT_EQ(moved["max"], json::array({0.0, 0.0, 0.0})) << "of the vertices that stay";
+  const size_t view = moved["sparse"]["indices"]["bufferView"].get<size_t>();
+  EXPECT_EQ(word(bytes, begin + file["bufferViews"][view]["byteOffset"].get<size_t>()),
+            mesh.morph_targets[0].vertices[0]);
+  const json& still = file["accessors"][primitive["targets"][1]["POSITION"].get<size_t>()];
+  EXPECT_FALSE(still.contains("sparse"));
+  EXPECT_FALSE(still.contains("bufferView")) << "all of it is 0";
+}
+
 TEST(MeshFiles, WhatIsWrongWithAMeshIsSaidAndNoFileIsLeft) {
   const TempFolder folder;
   const auto refuse = [&](const char* text, const HeadMesh& mesh, const std::vector<uint8_t>& texture = {}) {
@@ -177,6 +215,12 @@ TEST(MeshFiles, WhatIsWrongWithAMeshIsSaidAndNoFileIsLeft) {
   mesh = example();
   mesh.triangles[4] = uint32_t(mesh.vertex_count());
   refuse("A triangle of the mesh has vertex", mesh);
+  mesh = with_morph_targets(example());
+  mesh.morph_targets[0].moves.pop_back();
+  refuse("The morph target jawOpen", mesh);
+  mesh = with_morph_targets(example());
+  mesh.morph_targets[0].vertices.back() = uint32_t(mesh.vertex_count());
+  refuse("The morph target jawOpen", mesh);
   refuse("neither a JPEG nor a PNG", with_coordinates(example()), {1, 2, 3});
   refuse("no texture coordinates", example(), small_png());
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, ".glb, .obj or .ply",

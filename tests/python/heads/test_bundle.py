@@ -8,12 +8,14 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 from small_prior import small_prior
+from small_template import small_template
 
 from export.bundle import BundleInfo, read_manifest
 from export.heads import bundle
-from export.heads.bundle import TRAINING_DATA, write_bundle, write_manifest
+from export.heads.bundle import TEMPLATE_DATA, TRAINING_DATA, add_template, write_bundle, write_manifest
 from export.heads.prior import PriorError
 from export.heads.prior_file import read_prior
+from export.heads.template_file import write_template
 
 TINY = Path("tests/native/data/tiny_head/bundle")
 
@@ -53,6 +55,23 @@ def test_a_manifest_says_what_the_encoder_sees_and_what_all_is_made_from(tmp_pat
     np.testing.assert_array_equal(
         read_prior(tmp_path / "bundle" / "prior.maqp").shape_bases[0].weights, small_prior().shape_bases[0].weights
     )
+
+
+def test_a_template_is_added_to_a_bundle_and_named_with_its_licence(tmp_path):
+    encoder = write_graph(tmp_path / "made.onnx", [1, 192, 192, 3], [1, 48, 48, 8])
+    info = BundleInfo("heads", "fp32", training_data=TRAINING_DATA, measured={"found": 1})
+    before = write_bundle(tmp_path / "bundle", encoder, small_prior(), info)
+    assert "template" not in before
+    write_template(small_template(), tmp_path / "a.maqt")
+    after = add_template(tmp_path / "bundle", tmp_path / "a.maqt")
+    assert after == read_manifest(tmp_path / "bundle")
+    assert after["template"] == {"file": "template.maqt"}
+    assert set(after["files"]) == {"encoder.onnx", "prior.maqp", "template.maqt"}
+    assert after["training_data"] == [*before["training_data"], TEMPLATE_DATA]
+    assert after["measured"] == {"found": 1}
+    with pytest.raises(PriorError, match="is not a template head"):
+        add_template(tmp_path / "bundle", tmp_path / "bundle" / "prior.maqp")
+    assert read_manifest(tmp_path / "bundle") == after
 
 
 @pytest.mark.parametrize(

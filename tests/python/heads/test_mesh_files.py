@@ -11,7 +11,7 @@ import trimesh
 from PIL import Image
 
 DATA = Path("tests/native/data/head_mesh")
-NAMES = ("example.glb", "example.obj", "example.ply", "textured.glb", "textured.obj")
+NAMES = ("example.glb", "example.obj", "example.ply", "textured.glb", "textured.obj", "morphing.glb")
 
 
 def load(name: str) -> trimesh.Trimesh:
@@ -76,3 +76,30 @@ def test_the_texture_in_the_glb_is_the_file_that_was_given():
     texture = data[begin : begin + view["byteLength"]]
     assert texture == (DATA / "texture.png").read_bytes()
     assert Image.open(io.BytesIO(texture)).size == (16, 16)
+
+
+def read_glb(name: str) -> tuple[dict, bytes]:
+    """The JSON and the bytes of a file."""
+    data = (DATA / name).read_bytes()
+    length = struct.unpack("<I", data[12:16])[0]
+    return json.loads(data[20 : 20 + length]), data[28 + length :]
+
+
+def test_morph_targets_are_sparse_and_say_where_vertices_go(expected):
+    file, data = read_glb("morphing.glb")
+    mesh = file["meshes"][0]
+    assert mesh["extras"]["targetNames"] == ["jawOpen", "eyeBlinkLeft"]
+    opened, still = (file["accessors"][target["POSITION"]] for target in mesh["primitives"][0]["targets"])
+    assert "sparse" not in still
+    assert "bufferView" not in still
+    sparse = opened["sparse"]
+
+    def numbers(part: str, form: str) -> np.ndarray:
+        view = file["bufferViews"][sparse[part]["bufferView"]]
+        return np.frombuffer(data, form, view["byteLength"] // 4, view["byteOffset"])
+
+    below = np.flatnonzero(np.asarray(expected.vertices)[:, 1] <= -0.04)  # y is up in files
+    assert numbers("indices", "<u4").tolist() == below.tolist()
+    moves = numbers("values", "<f4").reshape(-1, 3)
+    assert len(moves) == sparse["count"] == len(below)
+    assert np.abs(moves - [0, -0.02, -0.002]).max() < 1e-8

@@ -21,7 +21,7 @@ FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/build", "scene/render"}
 CURVES = {"edges", "edges/curves"}
-HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture"}
+HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture", "head/wrap"}
 SYSTEMS = (
     SCENE
     | CURVES
@@ -54,6 +54,7 @@ MAY_INCLUDE = {
     "head/mesh": BASE - {"nn"} | {"head/camera"},
     "head/render": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
+    "head/wrap": {"core", "core/math", "head"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
     "scene/networks": CAPTURE,

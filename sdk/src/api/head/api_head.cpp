@@ -1,10 +1,13 @@
 #include <algorithm>
 
 #include "api/boundary.h"
+#include "api/bundle_argument.h"
 #include "api/head/head_handle.h"
 #include "core/worker_threads.h"
 #include "head/build/head_surface.h"
 #include "head/build/head_texture.h"
+#include "head/build/wrapped_surface.h"
+#include "head/bundle/head_bundle.h"
 #include "head/files/head_file.h"
 #include "head/mesh/mesh_files.h"
 
@@ -19,7 +22,9 @@ std::vector<float> in_metres(std::vector<float> decimetres) {
   return decimetres;
 }
 
+// Of the structs' first release.
 constexpr size_t kFirstMeshOptionsSize = sizeof(maq_head_mesh_options), kFirstMeshSize = sizeof(maq_head_mesh);
+constexpr char kHeadsBundle[] = "heads-int8";  // of options without one
 constexpr uint32_t kDefaultTriangles = 60000, kMinTriangles = 100;
 
 maq_head_mesh_options default_mesh_options() {
@@ -30,6 +35,11 @@ maq_head_mesh_options default_mesh_options() {
 
 head::SurfaceOptions surface_options(const maq_head_mesh_options& options) {
   head::SurfaceOptions surface;
+  if (number_in(options.topology) == MAQ_HEAD_TOPOLOGY_TEMPLATE &&
+      (options.cell_m != 0 || options.triangle_count != 0)) {
+    throw ArgumentError(
+        "options.cell_m and options.triangle_count must be 0 with the template's topology, whose triangles are given.");
+  }
   if (options.cell_m != 0) {
     require_range("options.cell_m", options.cell_m, head::kMinSurfaceCell_m, head::kMaxSurfaceCell_m);
     surface.cell_m = options.cell_m;
@@ -43,21 +53,54 @@ head::SurfaceOptions surface_options(const maq_head_mesh_options& options) {
   return surface;
 }
 
+// Of the mesh that the head has.
+const std::vector<uint8_t>& texture_of(const maq_head& head) {
+  static const std::vector<uint8_t> kNone;
+  return head.mesh_topology == MAQ_HEAD_TOPOLOGY_TEMPLATE ? kNone : head.head.texture.jpeg;
+}
+
+// The head's own, or that of the bundle that the options name.
+const head::HeadTemplate& template_of(maq_head& head, const maq_head_mesh_options& options) {
+  if (head.template_head == nullptr) {
+    head.template_head = head::template_of_bundle(read_bundle_argument(options, "options", kHeadsBundle));
+  }
+  if (head.template_head == nullptr) {
+    throw Error(MAQ_ERROR_UNSUPPORTED,
+                "The bundle has no template head, so meshes cannot have its topology. Use a bundle of this version of "
+                "Maquette, or the field's topology.");
+  }
+  return *head.template_head;
+}
+
 }  // namespace
 
 const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given) {
-  const head::SurfaceOptions wanted =
-      surface_options(read_config(given, "options", default_mesh_options(), kFirstMeshOptionsSize));
-  if (head.mesh_options.cell_m == wanted.cell_m && head.mesh_options.triangles == wanted.triangles) return head.mesh;
+  const maq_head_mesh_options options = read_config(given, "options", default_mesh_options(), kFirstMeshOptionsSize);
+  const int32_t topology = number_in(options.topology);
+  require_range("options.topology", topology, int32_t(MAQ_HEAD_TOPOLOGY_FIELD), int32_t(MAQ_HEAD_TOPOLOGY_TEMPLATE));
+  const head::SurfaceOptions wanted = surface_options(options);
+  if (head.mesh_topology == options.topology && head.mesh_options.cell_m == wanted.cell_m &&
+      head.mesh_options.triangles == wanted.triangles) {
+    return head.mesh;
+  }
   WorkerThreads threads(head.threads);
   head::SurfaceStats stats;
-  head::HeadMesh mesh = head::head_surface(head.head, wanted, threads, &stats);
-  if (head.head.texture.side_px > 0) head::set_texture_coordinates(head.head, mesh);
+  head::HeadMesh mesh;
+  if (topology == MAQ_HEAD_TOPOLOGY_TEMPLATE) {
+    mesh = head::wrapped_surface(head.head, template_of(head, options), threads);
+  } else {
+    mesh = head::head_surface(head.head, wanted, threads, &stats);
+    if (head.head.texture.side_px > 0) head::set_texture_coordinates(head.head, mesh);
+  }
   std::vector<float> positions_m = in_metres(mesh.positions), template_points_m = in_metres(mesh.template_points);
+  std::vector<std::vector<float>> morph_moves_m;
+  for (const head::MorphTarget& target : mesh.morph_targets) morph_moves_m.push_back(in_metres(target.moves));
   head.mesh = std::move(mesh);
   head.positions_m = std::move(positions_m);
   head.template_points_m = std::move(template_points_m);
+  head.morph_moves_m = std::move(morph_moves_m);
   head.mesh_stats = stats;
+  head.mesh_topology = options.topology;
   head.mesh_options = wanted;
   return head.mesh;
 }
@@ -141,14 +184,30 @@ maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* option
     filled.colours_rgb = made.colours.data();
     filled.template_points_m = head->template_points_m.data();
     filled.triangles = made.triangles.data();
-    const std::vector<uint8_t>& texture = head->head.texture.jpeg;
+    if (!made.texture_coordinates.empty()) filled.texture_coordinates = made.texture_coordinates.data();
+    const std::vector<uint8_t>& texture = texture_of(*head);
     if (!texture.empty()) {
-      filled.texture_coordinates = made.texture_coordinates.data();
       filled.texture_jpeg = texture.data();
       filled.texture_bytes = uint32_t(texture.size());
     }
+    filled.morph_target_count = uint32_t(made.morph_targets.size());
     filled.simplification_error_m = float(head->mesh_stats.error_m);
     write_struct(mesh, "mesh", filled, kFirstMeshSize);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_get_morph_target(const maq_head* head, uint32_t index, maq_head_morph_target* target) {
+  return guarded(head, __func__, [&] {
+    require_argument(head, "head");
+    require_index("index", index, head->mesh.morph_targets.size());
+    const head::MorphTarget& from = head->mesh.morph_targets[index];
+    maq_head_morph_target filled{};
+    filled.vertex_count = uint32_t(from.vertices.size());
+    filled.name = from.name.c_str();
+    filled.vertices = from.vertices.data();
+    filled.moves_m = head->morph_moves_m[index].data();
+    write_struct(target, "target", filled, sizeof(maq_head_morph_target));
     return MAQ_OK;
   });
 }
@@ -157,7 +216,8 @@ maq_status maq_head_export(maq_head* head, const char* path, const maq_head_mesh
   return guarded_alone(head, "head", __func__, [&] {
     require_argument(path, "path");
     head::require_mesh_file_name(path);
-    head::write_mesh_file(mesh_of(*head, options), path, head->head.texture.jpeg);
+    const head::HeadMesh& mesh = mesh_of(*head, options);
+    head::write_mesh_file(mesh, path, texture_of(*head));
     return MAQ_OK;
   });
 }

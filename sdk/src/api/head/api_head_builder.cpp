@@ -107,7 +107,7 @@ maq_status maq_head_builder_fit(maq_head_builder* builder, double seconds, maq_h
     head::HeadBuilder::Progress report;
     if (progress != nullptr) report = [&](double done) { return progress(user_data, done) != 0; };
     head::StoredHead fitted = builder->builder->fit(seconds, report);
-    *head = new maq_head(std::move(fitted), builder->builder->threads());
+    *head = new maq_head(std::move(fitted), builder->builder->threads(), builder->builder->template_head());
     return MAQ_OK;
   });
 }
@@ -126,7 +126,8 @@ maq_status maq_head_builder_set_preview(maq_head_builder* builder, double interv
     head::HeadBuilder::Preview pass_on;
     if (preview != nullptr) {
       pass_on = [=](head::StoredHead head) {
-        preview(user_data, new maq_head(std::move(head), builder->builder->threads()));
+        preview(user_data,
+                new maq_head(std::move(head), builder->builder->threads(), builder->builder->template_head()));
       };
     }
     builder->builder->set_preview(interval_s, std::move(pass_on));

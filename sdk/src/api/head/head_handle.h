@@ -1,22 +1,29 @@
 #pragma once
 
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "api/handle.h"
 #include "head/build/head_surface.h"
+#include "head/head_template.h"
 #include "head/mesh/head_mesh.h"
 #include "head/stored_head.h"
 #include "maquette/head.h"
 
 // A head stays what it is while the app has it; its mesh is made when it is asked for.
 struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
-  maq_head(maq::head::StoredHead of, int thread_count) : head(std::move(of)), threads(thread_count) {}
+  maq_head(maq::head::StoredHead of, int thread_count,
+           std::shared_ptr<const maq::head::HeadTemplate> of_bundle = nullptr)
+      : head(std::move(of)), threads(thread_count), template_head(std::move(of_bundle)) {}
   const maq::head::StoredHead head;
   const int threads;
+  std::shared_ptr<const maq::head::HeadTemplate> template_head;  // null: it was not asked for yet
   maq::head::HeadMesh mesh;
   std::vector<float> positions_m, template_points_m;  // of the mesh
-  maq::head::SurfaceOptions mesh_options{0, 0};       // of a cell of 0: none was made
+  std::vector<std::vector<float>> morph_moves_m;      // of its morph targets
+  maq_head_topology mesh_topology = MAQ_HEAD_TOPOLOGY_FIELD;
+  maq::head::SurfaceOptions mesh_options{0, 0};  // of a cell of 0: none was made
   maq::head::SurfaceStats mesh_stats;
 };
 

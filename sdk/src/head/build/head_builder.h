@@ -71,6 +71,8 @@ class HeadBuilder {
   // From any thread: ends the call that runs, or else the next.
   void cancel() noexcept { cancel_.cancel(); }
 
+  // Of the bundle; null where it has none.
+  const std::shared_ptr<const HeadTemplate>& template_head() const { return bundle_.template_head; }
   int threads() const { return encoder_.threads(); }
   maq_provider provider() const { return encoder_.provider(); }
 

@@ -88,12 +88,6 @@ std::string names_of(const std::vector<NamedPoint>& places) {
   return names.empty() ? "none" : names;
 }
 
-// Of what is no number 0.
-uint8_t byte_of_logit(float logit) {
-  const double share = 1 / (1 + std::exp(-double(logit)));
-  return share >= 0 ? uint8_t(std::lround(255 * share)) : uint8_t(0);
-}
-
 void set_surface_values(const CutField& field, HeadMesh& mesh, WorkerThreads& threads) {
   const size_t vertices = mesh.vertex_count();
   mesh.colours.resize(3 * vertices);
@@ -120,25 +114,22 @@ void set_surface_values(const CutField& field, HeadMesh& mesh, WorkerThreads& th
 
 }  // namespace
 
-HeadPlace find_head_place(const StoredHead& head, const std::string& name) {
-  const auto found =
-      std::find_if(head.places.begin(), head.places.end(), [&](const NamedPoint& place) { return place.name == name; });
-  if (found == head.places.end()) {
-    throw Error(MAQ_ERROR_NOT_FOUND, "The head has no place named \"", name, "\"; it has ", names_of(head.places), ".");
-  }
-  const Vec3 wanted{double(found->template_point[0]), double(found->template_point[1]),
-                    double(found->template_point[2])};
-  const StoredAnchors& anchors = head.anchors;
+uint8_t byte_of_logit(float logit) {
+  const double share = 1 / (1 + std::exp(-double(logit)));
+  return share >= 0 ? uint8_t(std::lround(255 * share)) : uint8_t(0);
+}
+
+HeadPlace place_by_anchors(const StoredAnchors& anchors, Vec3 template_point) {
   const size_t count = std::min<size_t>(kAnchorsOfPlace, anchors.count());
   const auto point_of = [](const std::vector<float>& points, size_t i) {
     return Vec3{double(points[3 * i]), double(points[3 * i + 1]), double(points[3 * i + 2])};
   };
   std::vector<std::pair<double, size_t>> nearest(anchors.count());
   for (size_t i = 0; i < nearest.size(); ++i) {
-    nearest[i] = {length(point_of(anchors.template_points, i) - wanted), i};
+    nearest[i] = {length(point_of(anchors.template_points, i) - template_point), i};
   }
   std::partial_sort(nearest.begin(), nearest.begin() + std::ptrdiff_t(count), nearest.end());
-  HeadPlace place{wanted};
+  HeadPlace place{template_point};
   double sum = 0;
   Vec3 offset;
   for (size_t k = 0; k < count; ++k) {
@@ -149,9 +140,19 @@ HeadPlace find_head_place(const StoredHead& head, const std::string& name) {
     place.sigma += weight * double(anchors.sigma[i]);
   }
   if (count == 0) return place;
-  place.point = wanted + (1 / sum) * offset;
+  place.point = template_point + (1 / sum) * offset;
   place.sigma /= sum;
   return place;
+}
+
+HeadPlace find_head_place(const StoredHead& head, const std::string& name) {
+  const auto found =
+      std::find_if(head.places.begin(), head.places.end(), [&](const NamedPoint& place) { return place.name == name; });
+  if (found == head.places.end()) {
+    throw Error(MAQ_ERROR_NOT_FOUND, "The head has no place named \"", name, "\"; it has ", names_of(head.places), ".");
+  }
+  return place_by_anchors(head.anchors, {double(found->template_point[0]), double(found->template_point[1]),
+                                         double(found->template_point[2])});
 }
 
 HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,

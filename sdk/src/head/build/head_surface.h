@@ -32,12 +32,18 @@ struct SurfaceStats {
 HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,
                       SurfaceStats* stats = nullptr);
 
+// Of a colour of the field; 0 where it is no number.
+uint8_t byte_of_logit(float logit);
+
 struct HeadPlace {
   Vec3 point;        // in the head's frame and unit
   double sigma = 0;  // standard deviation of each coordinate, as the anchors around it have
 };
 
-// By the anchors around the place. Throws MAQ_ERROR_NOT_FOUND for a name that the head does not have.
+// By the anchors around a point of the template head (dm); the point itself where there are none.
+HeadPlace place_by_anchors(const StoredAnchors& anchors, Vec3 template_point);
+
+// Throws MAQ_ERROR_NOT_FOUND for a name that the head does not have.
 HeadPlace find_head_place(const StoredHead& head, const std::string& name);
 
 }  // namespace maq::head

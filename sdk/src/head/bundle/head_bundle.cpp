@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "head/files/prior_file.h"
+#include "head/files/template_file.h"
 
 namespace maq::head {
 namespace {
@@ -58,6 +59,10 @@ EncoderSpec checked_encoder(const Manifest& manifest) {
 
 std::string prior_name(const Manifest& manifest) { return manifest.listed_file(manifest.root.at("prior").at("file")); }
 
+std::string template_name(const Manifest& manifest) {
+  return manifest.listed_file(manifest.root.at("template").at("file"));
+}
+
 HeadPrior prior_of(const Bundle& bundle) {
   const std::string name = prior_name(bundle.manifest);
   const std::vector<uint8_t>& bytes = bundle.files.at(name);
@@ -73,12 +78,22 @@ std::array<uint8_t, 32> digest_of(const std::string& hexadecimal) {
 
 }  // namespace
 
+std::shared_ptr<const HeadTemplate> template_of_bundle(const Bundle& bundle) {
+  bundle.manifest.require_task("heads");
+  if (!bundle.manifest.root.find("template")) return nullptr;
+  const std::string name = template_name(bundle.manifest);
+  const std::vector<uint8_t>& bytes = bundle.files.at(name);
+  return std::make_shared<const HeadTemplate>(read_template(bytes.data(), bytes.size(), bundle.path_of(name)));
+}
+
 HeadBundle::HeadBundle(Bundle opened)
     : bundle(checked_task(std::move(opened))),
       encoder(checked_encoder(bundle.manifest)),
       prior(prior_of(bundle)),
-      prior_sha256(digest_of(bundle.manifest.files.at(prior_name(bundle.manifest)).sha256)) {
+      prior_sha256(digest_of(bundle.manifest.files.at(prior_name(bundle.manifest)).sha256)),
+      template_head(template_of_bundle(bundle)) {
   bundle.files.erase(prior_name(bundle.manifest));
+  if (template_head != nullptr) bundle.files.erase(template_name(bundle.manifest));
   if (encoder.says_codes &&
       !is_tensor(encoder_graph().outputs[1], "codes", {int64_t(1), int64_t(prior.shape_codes()), int64_t(2)})) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", bundle.manifest.name, ": the second output of graph ", kGraph,

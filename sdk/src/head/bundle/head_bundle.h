@@ -1,13 +1,15 @@
-// What a bundle for heads has (docs/formats.md): the encoder and the prior.
+// What a bundle for heads has (docs/formats.md): the encoder, the prior and, where it has one, the template head.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "head/fit/observations.h"
 #include "head/head_prior.h"
+#include "head/head_template.h"
 #include "nn/bundle.h"
 
 namespace maq::head {
@@ -31,6 +33,9 @@ struct EncoderSpec {
   int crop_px() const { return cells.side * cells.cell_px; }
 };
 
+// Null where the bundle has none. Throws as HeadBundle does, and what read_template() throws.
+std::shared_ptr<const HeadTemplate> template_of_bundle(const Bundle& bundle);
+
 struct HeadBundle {
   // Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, MAQ_ERROR_BAD_BUNDLE where the manifest lacks what is
   // read, or the graph's input or output is not that of the format; what read_prior() throws.
@@ -39,7 +44,8 @@ struct HeadBundle {
   Bundle bundle;  // without the prior's bytes
   EncoderSpec encoder;
   HeadPrior prior;
-  std::array<uint8_t, 32> prior_sha256;  // of its file: what stored heads name
+  std::array<uint8_t, 32> prior_sha256;               // of its file: what stored heads name
+  std::shared_ptr<const HeadTemplate> template_head;  // may be null
 
   const GraphSpec& encoder_graph() const;
 };

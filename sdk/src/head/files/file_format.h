@@ -1,5 +1,5 @@
-// The bytes of a prior (.maqp) and of a stored head (.maqh). Numbers are little-endian, as on every machine that the
-// SDK runs on. Behind the head of either file follow, without gaps, what its comment lists.
+// The bytes of a prior (.maqp), of a stored head (.maqh) and of the template head (.maqt). Numbers are little-endian,
+// as on every machine that the SDK runs on. Behind the head of each file follow, without gaps, what its comment lists.
 #pragma once
 
 #include <cstddef>
@@ -7,9 +7,10 @@
 
 namespace maq::head {
 
-inline constexpr uint32_t kPriorFileVersion = 1, kHeadFileVersion = 1;
+inline constexpr uint32_t kPriorFileVersion = 1, kHeadFileVersion = 1, kTemplateFileVersion = 1;
 inline constexpr char kPriorFileMagic[8] = {'M', 'A', 'Q', 'P', 'R', 'I', '\r', '\n'};
 inline constexpr char kHeadFileMagic[8] = {'M', 'A', 'Q', 'H', 'E', 'D', '\r', '\n'};
+inline constexpr char kTemplateFileMagic[8] = {'M', 'A', 'Q', 'T', 'E', 'M', '\r', '\n'};
 
 // How floats are stored.
 enum class StoredFormat : uint8_t {
@@ -74,5 +75,17 @@ struct StoredCamera {
   double focal_px, cx_px, cy_px, rotation[9], translation[3];
 };
 static_assert(sizeof(StoredCamera) == 128);
+
+// points: int16 [points][3], in steps of point_step_dm. kinds: TemplateKind [points].
+// vertices: u16 point of each; u16 [vertices][2]: u and v times 65535.
+// triangles: u16 vertices [triangles][3].
+// actions: of each u8 length of its name, the name, u16 number of points that move, u16 these, int16 [.][3] in steps of
+// move_step_dm.
+struct TemplateFileHead {
+  FileStart start;
+  uint32_t points, vertices, triangles, actions;
+  float point_step_dm, move_step_dm;
+};
+static_assert(sizeof(TemplateFileHead) == 56);
 
 }  // namespace maq::head

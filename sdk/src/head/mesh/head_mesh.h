@@ -3,11 +3,19 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace maq::head {
 
-// What is empty is not known. All arrays but the triangles are by vertex.
+// How vertices move at the weight 1; all others stay.
+struct MorphTarget {
+  std::string name;                // letters, digits and _
+  std::vector<uint32_t> vertices;  // that move, increasing
+  std::vector<float> moves;        // [vertices][3], decimetres
+};
+
+// What is empty is not known. Arrays of floats and bytes are by vertex.
 struct HeadMesh {
   std::vector<float> positions;            // x, y, z, decimetres
   std::vector<float> normals;              // x, y, z, of length 1, outwards
@@ -15,6 +23,7 @@ struct HeadMesh {
   std::vector<float> template_points;      // x, y, z on the template head, decimetres
   std::vector<float> texture_coordinates;  // u to the right, v down, 0 to 1
   std::vector<uint32_t> triangles;         // three vertices each, counter-clockwise seen from outside
+  std::vector<MorphTarget> morph_targets;  // of the template head alone
 
   size_t vertex_count() const { return positions.size() / 3; }
   size_t triangle_count() const { return triangles.size() / 3; }

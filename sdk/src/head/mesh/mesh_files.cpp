@@ -51,6 +51,14 @@ void check_mesh(const HeadMesh& mesh, const std::vector<uint8_t>& texture) {
   check_numbers(mesh.normals, 3, "a normal");
   check_numbers(mesh.template_points, 3, "a template point");
   check_numbers(mesh.texture_coordinates, 2, "texture coordinates");
+  for (const MorphTarget& target : mesh.morph_targets) {
+    if (target.moves.size() != 3 * target.vertices.size() ||
+        std::any_of(target.vertices.begin(), target.vertices.end(), [&](uint32_t v) { return v >= count; })) {
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The morph target ", target.name,
+                  " of the mesh moves vertices that there are not. Give moves of those that there are.");
+    }
+    check_numbers(target.moves, 3, "a morph target");
+  }
   if (texture.empty()) return;
   if (!is_jpeg(texture) && !is_png(texture)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The mesh's texture of ", texture.size(),

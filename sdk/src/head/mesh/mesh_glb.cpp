@@ -46,6 +46,20 @@ class GlbWriter {
     return accessor_count_++;
   }
 
+  // Of vectors that are 0 but for those of some vertices (glTF 2.0, 3.6.2.3).
+  size_t add_sparse(size_t count, const std::vector<uint32_t>& vertices, const std::vector<float>& vectors,
+                    const std::string& more) {
+    std::string text = concatenate("{\"componentType\":5126,\"count\":", count, ",\"type\":\"VEC3\"", more);
+    if (!vertices.empty()) {
+      const size_t indices = add_view(vertices.data(), vertices.size() * sizeof(uint32_t), kNoTarget);
+      const size_t values = add_view(vectors.data(), vectors.size() * sizeof(float), kNoTarget);
+      text += concatenate(",\"sparse\":{\"count\":", vertices.size(), ",\"indices\":{\"bufferView\":", indices,
+                          ",\"componentType\":5125},\"values\":{\"bufferView\":", values, "}}");
+    }
+    add(accessors_, text + '}');
+    return accessor_count_++;
+  }
+
   size_t add_view(const void* data, size_t bytes, BufferTarget target) {
     std::string view = concatenate("{\"buffer\":0,\"byteOffset\":", bytes_.size(), ",\"byteLength\":", bytes);
     if (target != kNoTarget) view += concatenate(",\"target\":", int(target));
@@ -106,31 +120,52 @@ std::vector<uint8_t> linear_colours(const std::vector<uint8_t>& colours) {
   return made;
 }
 
+// ",\"min\":…,\"max\":…" of vectors; `with_zero`: some that are 0 are not among them.
+std::string limits_of(const std::vector<float>& vectors, bool with_zero) {
+  std::array<float, 3> low{}, high{};
+  for (size_t i = 0; i < vectors.size(); ++i) {
+    const size_t axis = i % 3;
+    const bool is_first = i < 3 && !with_zero;
+    low[axis] = is_first ? vectors[i] : std::min(low[axis], vectors[i]);
+    high[axis] = is_first ? vectors[i] : std::max(high[axis], vectors[i]);
+  }
+  return ",\"min\":" + text_of(low) + ",\"max\":" + text_of(high);
+}
+
 }  // namespace
 
 std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t>& texture) {
   GlbWriter glb;
   const std::vector<float> positions = positions_in_file(mesh);
-  std::array<float, 3> low{}, high{};
-  for (size_t i = 0; i < positions.size(); ++i) {
-    const size_t axis = i % 3;
-    low[axis] = i < 3 ? positions[i] : std::min(low[axis], positions[i]);
-    high[axis] = i < 3 ? positions[i] : std::max(high[axis], positions[i]);
-  }
-  const std::string limits = ",\"min\":" + text_of(low) + ",\"max\":" + text_of(high);
+  const std::string limits = limits_of(positions, false);
   std::string attributes =
       concatenate("\"POSITION\":", glb.add_accessor(positions, 3, Component::kFloat, kVertices, limits));
   if (!mesh.normals.empty()) {
     attributes += concatenate(",\"NORMAL\":", glb.add_accessor(normals_in_file(mesh), 3, Component::kFloat, kVertices));
   }
   std::string of_material, of_file;
-  if (!texture.empty()) {
+  if (!mesh.texture_coordinates.empty()) {
     attributes +=
         concatenate(",\"TEXCOORD_0\":", glb.add_accessor(mesh.texture_coordinates, 2, Component::kFloat, kVertices));
+  }
+  if (!texture.empty()) {
     of_material = ",\"baseColorTexture\":{\"index\":0}";
   } else if (!mesh.colours.empty()) {
     attributes += concatenate(",\"COLOR_0\":",
                               glb.add_accessor(linear_colours(mesh.colours), 4, Component::kUnsignedByte, kVertices));
+  }
+  std::string targets, names;
+  for (const MorphTarget& target : mesh.morph_targets) {
+    const std::vector<float> moves = to_file_axes(target.moves, [](const float*) { return 0.1; });
+    const bool is_sparse = target.vertices.size() < mesh.vertex_count();
+    const size_t accessor = glb.add_sparse(mesh.vertex_count(), target.vertices, moves, limits_of(moves, is_sparse));
+    targets += concatenate(targets.empty() ? "" : ",", "{\"POSITION\":", accessor, '}');
+    names += concatenate(names.empty() ? "" : ",", '"', target.name, '"');
+  }
+  std::string of_primitive, of_mesh;
+  if (!targets.empty()) {
+    of_primitive = ",\"targets\":[" + targets + ']';
+    of_mesh = ",\"extras\":{\"targetNames\":[" + names + "]}";
   }
   const size_t indices = glb.add_accessor(mesh.triangles, 1, Component::kUnsignedInt, kIndices);
   if (!texture.empty()) {
@@ -140,13 +175,13 @@ std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t
                     "\"}],\"samplers\":[{\"magFilter\":9729,\"minFilter\":9987}]"  // linear, with mip maps
                     ",\"textures\":[{\"sampler\":0,\"source\":0}]");
   }
-  return glb.finish(concatenate(
-      of_file,
-      ",\"materials\":[{\"name\":\"head\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,1],"
-      "\"metallicFactor\":0,\"roughnessFactor\":0.75",
-      of_material, "}}],\"meshes\":[{\"name\":\"head\",\"primitives\":[{\"attributes\":{", attributes,
-      "},\"indices\":", indices,
-      ",\"material\":0}]}],\"nodes\":[{\"name\":\"head\",\"mesh\":0}],\"scenes\":[{\"nodes\":[0]}],\"scene\":0"));
+  return glb.finish(
+      concatenate(of_file,
+                  ",\"materials\":[{\"name\":\"head\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,1],"
+                  "\"metallicFactor\":0,\"roughnessFactor\":0.75",
+                  of_material, "}}],\"meshes\":[{\"name\":\"head\",\"primitives\":[{\"attributes\":{", attributes,
+                  "},\"indices\":", indices, ",\"material\":0", of_primitive, "}]", of_mesh,
+                  "}],\"nodes\":[{\"name\":\"head\",\"mesh\":0}],\"scenes\":[{\"nodes\":[0]}],\"scene\":0"));
 }
 
 }  // namespace maq::head

@@ -40,6 +40,7 @@ struct HeadOptions {
   uint32_t texture_px = 0;
   bool is_mirrored = false;
   std::string triangles;  // empty: the library's default
+  std::string topology = "field";
   std::string densepose;
   NetworkOptions network;
   bool json = false;
@@ -198,6 +199,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
     if (!task.preview.empty()) document["preview"] = task.preview;
     if (mesh != nullptr) {
       document["vertices"] = mesh->vertex_count, document["triangles"] = mesh->triangle_count;
+      if (mesh->morph_target_count > 0) document["facial_actions"] = mesh->morph_target_count;
       document["simplification_error_mm"] = std::round(1e6 * double(mesh->simplification_error_m)) / 1e3;
     }
     document["scale_sigma"] = info.scale_sigma;
@@ -224,6 +226,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
     if (mesh->simplification_error_m > 0) {
       print_output(", within %.2f mm of the full mesh", 1e3 * double(mesh->simplification_error_m));
     }
+    if (mesh->morph_target_count > 0) print_output(", %u facial actions", mesh->morph_target_count);
     print_output("\n");
   }
   if (!task.save.empty()) print_output("%s: the head itself; see `maquette head info`\n", task.save.c_str());
@@ -233,6 +236,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
 maq_head_mesh_options mesh_options(const HeadOptions& options) {
   maq_head_mesh_options mesh = maquette::default_head_mesh_options();
   mesh.cell_m = options.cell_mm * 1e-3;
+  mesh.topology = topology_of(options.topology);
   if (options.triangles == "all")
     mesh.triangle_count = MAQ_HEAD_ALL_TRIANGLES;
   else if (!options.triangles.empty())
@@ -383,14 +387,17 @@ void add_head_command(CLI::App& app, int* exit_code) {
       ->add_option("--focal-px", options->focal_px,
                    "Focal length of the camera in pixels of the photo; default: estimated, or by the photo's fov=")
       ->check(CLI::Range(1e-3f, 1e9f));
-  command
-      ->add_option(
-          "--triangles", options->triangles,
-          "About how many triangles the mesh has (default 60000, or all with --cell), or all; games and phones "
-          "want 2000 to 50000")
-      ->check(CLI::Validator(check_triangles, "100 or more, or all"));
-  command->add_option("--cell", options->cell_mm, "Distance of the full mesh's vertices, mm (default 1.6)")
-      ->check(CLI::Range(0.5, 20.0));
+  CLI::Option* const triangles =
+      command
+          ->add_option(
+              "--triangles", options->triangles,
+              "About how many triangles the mesh has (default 60000, or all with --cell), or all; games and phones "
+              "want 2000 to 50000")
+          ->check(CLI::Validator(check_triangles, "100 or more, or all"));
+  CLI::Option* const cell =
+      command->add_option("--cell", options->cell_mm, "Distance of the full mesh's vertices, mm (default 1.6)")
+          ->check(CLI::Range(0.5, 20.0));
+  add_topology_option(*command, options->topology)->excludes(triangles)->excludes(cell);
   CLI::Option* const texture =
       command
           ->add_option("--texture", options->texture_px,
@@ -419,6 +426,7 @@ void add_head_command(CLI::App& app, int* exit_code) {
       "  maquette head group.jpg --out heads/head.ply --person all\n"
       "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
       "  maquette head photo.jpg --out head.glb --texture 1024\n"
+      "  maquette head photo.jpg --out avatar.glb --topology template\n"
       "  maquette head photo.jpg --out head.glb --preview turn.mp4\n"
       "  maquette head render head.maqh --out view.png --yaw 30\n"
       "  maquette head info head.maqh");

@@ -7,13 +7,18 @@
 
 namespace CLI {
 class App;
-}
+class Option;
+}  // namespace CLI
 
 void add_head_info_command(CLI::App& head, int* exit_code);
 void add_head_render_command(CLI::App& head, int* exit_code);
 
 // "as heads are on average, give or take 4 %".
 std::string text_of_scale(const maq_head_info& info);
+
+// --topology field|template.
+CLI::Option* add_topology_option(CLI::App& command, std::string& topology);
+maq_head_topology topology_of(const std::string& name);
 
 // What a picture or a clip of a head shows.
 struct HeadView {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "arguments/bundle_argument.h"
 #include "commands/head/head_commands.h"
 #include "output/output_file.h"
 #include "print.h"
@@ -13,7 +14,7 @@
 namespace {
 
 struct HeadInfoOptions {
-  std::string path;
+  std::string path, bundle;
   bool json = false;
 };
 
@@ -21,10 +22,31 @@ const char* name_of_scale(maq_head_scale scale) {
   return scale == MAQ_HEAD_SCALE_GIVEN ? "given" : scale == MAQ_HEAD_SCALE_DEPTH ? "depth" : "prior";
 }
 
+// What the template's mesh of a head has; nothing where the default bundle has no template.
+struct TemplateFacts {
+  uint32_t vertices = 0, triangles = 0, actions = 0;
+};
+
+TemplateFacts template_facts(maquette::Head& head, const std::string& named) {
+  const std::string bundle = named.empty() ? default_heads_bundle() : named;
+  maq_head_mesh_options options = maquette::default_head_mesh_options();
+  options.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
+  if (!bundle.empty()) options.bundle_path = bundle.c_str();
+  try {
+    const maq_head_mesh mesh = head.mesh(options);
+    return {mesh.vertex_count, mesh.triangle_count, mesh.morph_target_count};
+  } catch (const maquette::Error& error) {
+    const bool is_missing = error.status() == MAQ_ERROR_UNSUPPORTED || error.status() == MAQ_ERROR_NOT_FOUND;
+    if (!is_missing || !named.empty()) throw;
+    return {};
+  }
+}
+
 int show_head(const HeadInfoOptions& options) {
   const maquette::Context context = open_context();
-  const maquette::Head head = maquette::Head::open(context, options.path);
+  maquette::Head head = maquette::Head::open(context, options.path);
   const maq_head_info info = head.info();
+  const TemplateFacts of_template = template_facts(head, options.bundle);
   if (options.json) {
     nlohmann::ordered_json places = nlohmann::ordered_json::object();
     for (const std::string& name : head.landmark_names()) {
@@ -35,6 +57,10 @@ int show_head(const HeadInfoOptions& options) {
                                     {"photos", info.photo_count},
                                     {"scale", name_of_scale(info.scale)},
                                     {"scale_sigma", info.scale_sigma},
+                                    {"template",
+                                     {{"vertices", of_template.vertices},
+                                      {"triangles", of_template.triangles},
+                                      {"facial_actions", of_template.actions}}},
                                     {"landmarks", places}},
                                    2)
                              .c_str());
@@ -44,6 +70,12 @@ int show_head(const HeadInfoOptions& options) {
                text_of_scale(info).c_str());
   if (const double distance_m = pupil_distance_m(head); distance_m > 0) {
     print_output("  pupils     %.1f mm apart\n", 1e3 * distance_m);
+  }
+  if (of_template.vertices > 0) {
+    print_output("  template   %u vertices, %u triangles, %u facial actions\n", of_template.vertices,
+                 of_template.triangles, of_template.actions);
+  } else {
+    print_output("  template   none: the installed bundle has none, see --bundle\n");
   }
   if (info.landmark_count > 0) print_output("  landmarks  mm to the person's left, to the back, up; give or take\n");
   for (const std::string& name : head.landmark_names()) {
@@ -79,10 +111,25 @@ double pupil_distance_m(const maquette::Head& head) {
                     left.point_m[2] - right.point_m[2]);
 }
 
+CLI::Option* add_topology_option(CLI::App& command, std::string& topology) {
+  return command
+      .add_option("--topology", topology,
+                  "Of the mesh: field (default), the surface as it is, or template: the same vertices, texture "
+                  "coordinates and facial actions (morph targets) for every head")
+      ->check(CLI::IsMember({"field", "template"}));
+}
+
+maq_head_topology topology_of(const std::string& name) {
+  return name == "template" ? MAQ_HEAD_TOPOLOGY_TEMPLATE : MAQ_HEAD_TOPOLOGY_FIELD;
+}
+
 void add_head_info_command(CLI::App& head, int* exit_code) {
   auto options = std::make_shared<HeadInfoOptions>();
-  CLI::App* command = head.add_subcommand("info", "Check a saved head and print its size and landmarks");
+  CLI::App* command =
+      head.add_subcommand("info", "Check a saved head and print its size, landmarks and facial actions");
   command->add_option("head", options->path, "File that `maquette head --save` wrote")->required();
+  command->add_option("--bundle", options->bundle,
+                      "Folder of the bundle with the template head; default: MAQ_HEADS_BUNDLE, then the installed one");
   command->add_flag("--json", options->json, "Print it as JSON, in metres");
   command->callback([=] { *exit_code = show_head(*options); });
 }

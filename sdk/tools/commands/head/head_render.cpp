@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "arguments/bundle_argument.h"
 #include "arguments/picture_size.h"
 #include "commands/head/head_commands.h"
 #include "interrupt.h"
@@ -23,7 +24,7 @@ constexpr std::array<const char*, 5> kShadingNames = {"colour", "shape", "normal
 constexpr double kDegree_rad = 3.14159265358979323846 / 180;
 
 struct HeadRenderOptions {
-  std::string head, out, size, shading = "colour";
+  std::string head, out, size, bundle, shading = "colour", topology = "field";
   double cell_mm = 0;
   bool no_alpha = false, is_timed_clip = false, has_angle = false;
   HeadView view;
@@ -87,6 +88,9 @@ int render_head(const HeadRenderOptions& given) {
   const auto name = std::find(kShadingNames.begin(), kShadingNames.end(), given.shading);
   view.shading = maq_head_shading(name - kShadingNames.begin() + int(MAQ_HEAD_SHADING_COLOUR));
   view.mesh.cell_m = given.cell_mm * 1e-3;
+  view.mesh.topology = topology_of(given.topology);
+  const std::string bundle = given.bundle.empty() ? default_heads_bundle() : given.bundle;
+  if (!bundle.empty()) view.mesh.bundle_path = bundle.c_str();
   view.with_alpha = !given.no_alpha;
   if (!given.size.empty()) {
     const PictureSize size = parse_picture_size(given.size);
@@ -160,8 +164,12 @@ void add_head_render_command(CLI::App& head, int* exit_code) {
       ->expected(3)
       ->check(CLI::Range(0, 255));
   command->add_flag("--no-alpha", options->no_alpha, "PNG on the background; without this it is transparent there");
-  command->add_option("--cell", options->cell_mm, "Distance of the mesh's vertices, mm; default: 60,000 triangles")
-      ->check(CLI::Range(0.5, 20.0));
+  CLI::Option* const cell =
+      command->add_option("--cell", options->cell_mm, "Distance of the mesh's vertices, mm; default: 60,000 triangles")
+          ->check(CLI::Range(0.5, 20.0));
+  add_topology_option(*command, options->topology)->excludes(cell);
+  command->add_option("--bundle", options->bundle,
+                      "Folder of the bundle with the template head; default: MAQ_HEADS_BUNDLE, then the installed one");
   command->add_option("--threads", view.threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(1, 64));
   command->footer(

@@ -19,6 +19,7 @@ from maquette.heads import (
     HeadMesh,
     HeadPhoto,
     HeadRenderer,
+    MorphTarget,
 )
 from maquette.native import MaquetteError, library_path, native
 from maquette.scenes import Capture, PinholeCamera, Scene, SceneImage, SceneRenderer, View
@@ -26,8 +27,9 @@ from maquette.scenes import Capture, PinholeCamera, Scene, SceneImage, SceneRend
 __all__ = [
     "Box", "Camera", "Capture", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
     "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadImage", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
-    "HeadRenderer", "Intrinsics", "MaquetteError", "Person", "PinholeCamera", "PixelFormat", "Scene", "SceneImage",
-    "SceneRenderer", "Source", "View", "library_path", "list_cameras", "part_colours", "part_name", "sdk_version",
+    "HeadRenderer", "Intrinsics", "MaquetteError", "MorphTarget", "Person", "PinholeCamera", "PixelFormat", "Scene",
+    "SceneImage", "SceneRenderer", "Source", "View", "library_path", "list_cameras", "part_colours", "part_name",
+    "sdk_version",
 ]  # fmt: skip
 
 

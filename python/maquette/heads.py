@@ -19,6 +19,7 @@ from maquette.scenes import PinholeCamera
 
 SCALES = ("prior", "given", "depth")
 SHADINGS = ("colour", "shape", "normals", "template", "depth")
+TOPOLOGIES = ("field", "template")
 _ALL_TRIANGLES = 0xFFFFFFFF  # MAQ_HEAD_ALL_TRIANGLES
 
 
@@ -59,15 +60,29 @@ class HeadLandmark:
 
 
 @dataclass(frozen=True, eq=False)
+class MorphTarget:
+    """How vertices move in a facial action at its strongest: to position + weight * move, with weights of 0 to 1.
+
+    name: one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's. vertices: uint32 [N], increasing;
+    all others stay. moves_m: float32 [N, 3].
+    """
+
+    name: str
+    vertices: np.ndarray
+    moves_m: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class HeadMesh:
-    """A closed mesh of V vertices and F triangles, cut off below the chin.
+    """A mesh of V vertices and F triangles, cut off below the chin, and closed but for the template's topology.
 
     positions_m: float32 [V, 3]. normals: float32 [V, 3], outwards, of length 1. colours: uint8 [V, 3], sRGB.
     template_points_m: float32 [V, 3], where each vertex lies on the template head, which is the same place (the tip of
     the nose, say) on every head. triangles: uint32 [F, 3], counter-clockwise seen from outside. simplification_error_m:
     the largest distance of a vertex of the full mesh from this one. texture_coordinates: float32 [V, 2], u to the
     right and v down, 0 to 1. texture_jpeg: a JPEG file, square; `Frame.decode` reads it. Both are None where the head
-    has no texture; where it has one, vertices around the cut are there twice.
+    has no texture; where it has one, vertices around the cut are there twice. With the template's topology there are
+    coordinates without a texture, and morph_targets; vertices at seams of the texture are there twice.
     """
 
     positions_m: np.ndarray
@@ -78,6 +93,7 @@ class HeadMesh:
     simplification_error_m: float = 0.0
     texture_coordinates: np.ndarray | None = None
     texture_jpeg: bytes | None = None
+    morph_targets: tuple[MorphTarget, ...] = ()
 
 
 class Head(NativeObject):
@@ -94,11 +110,13 @@ class Head(NativeObject):
         """Writes a head file (.maqh), some 60 KB and the texture, atomically. Raises MaquetteError."""
         native().call("maq_head_save", self.handle, str(path).encode())
 
-    def export(self, path: str | Path, triangle_count: int | str = 0, cell_m: float = 0) -> None:
+    def export(self, path: str | Path, triangle_count: int | str = 0, cell_m: float = 0, topology: str = "field",
+               bundle: str | Path | None = None) -> None:  # fmt: skip
         """Writes its mesh for other programs: .glb, .obj with a .mtl beside it, or .ply; the first two have the
-        texture. In files x is to the person's left, y up, z to the front. Options: as of `mesh`. Raises
-        MaquetteError."""
-        native().call("maq_head_export", self.handle, str(path).encode(), _mesh_options(triangle_count, cell_m))
+        texture, the first has morph targets. In files x is to the person's left, y up, z to the front. Options: as of
+        `mesh`. Raises MaquetteError."""
+        options = _mesh_options(triangle_count, cell_m, topology, bundle)
+        native().call("maq_head_export", self.handle, str(path).encode(), options)
 
     @property
     def info(self) -> HeadInfo:
@@ -106,22 +124,35 @@ class Head(NativeObject):
         native().call("maq_head_get_info", self.handle, info)
         return HeadInfo(info.photo_count, SCALES[info.scale], info.scale_sigma, info.texture_px)
 
-    def mesh(self, triangle_count: int | str = 0, cell_m: float = 0) -> HeadMesh:
+    def mesh(self, triangle_count: int | str = 0, cell_m: float = 0, topology: str = "field",
+             bundle: str | Path | None = None) -> HeadMesh:  # fmt: skip
         """The surface, made in a second or less; the same again costs nothing.
 
         triangle_count: about as many, 100 or more, or "all"; 0: 60,000, or all where there is a cell_m. cell_m:
-        distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0: 0.0016. Raises MaquetteError.
+        distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0: 0.0016. topology: "field", the
+        surface as it is, or "template": vertices, triangles and texture coordinates are the same for every head, with
+        facial actions; triangle_count and cell_m are 0 then. bundle: folder of the bundle whose template it is, for a
+        head from a file; default: the installed one. Raises MaquetteError.
         """
         n = native()
         mesh = n.sized("maq_head_mesh")
-        n.call("maq_head_get_mesh", self.handle, _mesh_options(triangle_count, cell_m), mesh)
+        n.call("maq_head_get_mesh", self.handle, _mesh_options(triangle_count, cell_m, topology, bundle), mesh)
 
-        def copied(pointer: Any, shape: tuple[int, int], kind: type) -> np.ndarray:
-            size = shape[0] * shape[1] * np.dtype(kind).itemsize
+        def copied(pointer: Any, shape: tuple[int, ...], kind: type) -> np.ndarray:
+            size = int(np.prod(shape)) * np.dtype(kind).itemsize
             return np.frombuffer(n.ffi.buffer(pointer, size), kind).reshape(shape).copy()
 
+        def morph_target(index: int) -> MorphTarget:
+            target = n.sized("maq_head_morph_target")
+            n.call("maq_head_get_morph_target", self.handle, index, target)
+            return MorphTarget(
+                n.ffi.string(target.name).decode(),
+                copied(target.vertices, (target.vertex_count,), np.uint32),
+                copied(target.moves_m, (target.vertex_count, 3), np.float32),
+            )
+
         vertices = mesh.vertex_count
-        has_texture = mesh.texture_bytes > 0
+        has_texture, has_coordinates = mesh.texture_bytes > 0, mesh.texture_coordinates != n.ffi.NULL
         return HeadMesh(
             copied(mesh.positions_m, (vertices, 3), np.float32),
             copied(mesh.normals, (vertices, 3), np.float32),
@@ -129,8 +160,9 @@ class Head(NativeObject):
             copied(mesh.template_points_m, (vertices, 3), np.float32),
             copied(mesh.triangles, (mesh.triangle_count, 3), np.uint32),
             mesh.simplification_error_m,
-            copied(mesh.texture_coordinates, (vertices, 2), np.float32) if has_texture else None,
+            copied(mesh.texture_coordinates, (vertices, 2), np.float32) if has_coordinates else None,
             bytes(n.ffi.buffer(mesh.texture_jpeg, mesh.texture_bytes)) if has_texture else None,
+            tuple(morph_target(index) for index in range(mesh.morph_target_count)),
         )
 
     def landmark(self, name: str) -> HeadLandmark:
@@ -281,8 +313,8 @@ class HeadRenderer(NativeObject):
 
     shading: what colours show: "colour", "shape" (grey), "normals", "template" (template points) or "depth".
     background: red, green, blue, 0 to 255, over which pictures are composed; None: they are not. triangle_count,
-    cell_m: of the mesh, as `Head.mesh` has them. settings: fields of maq_head_renderer_config by their names: threads,
-    light, smooth_edges, near_m, ... Raises MaquetteError.
+    cell_m, topology, bundle: of the mesh, as `Head.mesh` has them. settings: fields of maq_head_renderer_config by
+    their names: threads, light, smooth_edges, near_m, ... Raises MaquetteError.
     """
 
     def __init__(
@@ -292,12 +324,14 @@ class HeadRenderer(NativeObject):
         background: Sequence[int] | None = None,
         triangle_count: int | str = 0,
         cell_m: float = 0,
+        topology: str = "field",
+        bundle: str | Path | None = None,
         **settings: Any,
     ) -> None:
         n = native()
         if background is not None:
             settings |= {"use_background": 1, "background": _numbers("background", background, "red, green, blue")}
-        mesh = _mesh_options(triangle_count, cell_m)
+        mesh = _mesh_options(triangle_count, cell_m, topology, bundle)
         config = n.config("maq_head_renderer_config", {"shading": _shading(shading), "mesh": mesh, **settings})
         super().__init__(n.create("maq_head_renderer", n.context, config, head.handle))
 
@@ -338,12 +372,17 @@ class HeadRenderer(NativeObject):
         return made
 
 
-def _mesh_options(triangle_count: int | str, cell_m: float) -> Any:
+def _mesh_options(triangle_count: int | str, cell_m: float, topology: str, bundle: str | Path | None) -> Any:
     if isinstance(triangle_count, str):
         if triangle_count != "all":
             raise ValueError(f'triangle_count is "{triangle_count}"; it is a number or "all"')
         triangle_count = _ALL_TRIANGLES
-    return native().config("maq_head_mesh_options", {"triangle_count": triangle_count, "cell_m": cell_m})
+    if topology not in TOPOLOGIES:
+        raise ValueError(f'topology is "{topology}"; it is one of {", ".join(TOPOLOGIES)}')
+    settings = {"triangle_count": triangle_count, "cell_m": cell_m, "topology": TOPOLOGIES.index(topology)}
+    if bundle is not None:
+        settings["bundle_path"] = bundle
+    return native().config("maq_head_mesh_options", settings)
 
 
 def _shading(name: str) -> int:

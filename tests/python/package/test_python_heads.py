@@ -66,6 +66,32 @@ def test_meshes_are_as_fine_as_asked_for(head):
     assert whole.positions_m.max() < 0.3  # copies: later meshes do not write over them
 
 
+def test_the_template_s_mesh_is_the_same_for_every_head_and_has_facial_actions(head, tmp_path):
+    mesh = head.mesh(topology="template")
+    jaw, wink = mesh.morph_targets
+
+    assert len(mesh.positions_m) == 14 * 25 + 1 + 12  # as tests/native/generate/make_round_heads.py has it
+    assert mesh.texture_coordinates.shape == (len(mesh.positions_m), 2)
+    assert mesh.texture_jpeg is None
+    assert (jaw.name, wink.name) == ("jawOpen", "eyeBlinkLeft")
+    assert jaw.moves_m.shape == (len(jaw.vertices), 3)
+    assert jaw.moves_m[:, 2] == pytest.approx(-0.015, abs=0.003)
+    assert np.all(mesh.template_points_m[jaw.vertices, 2] < 0)
+    assert np.all(np.diff(jaw.vertices.astype(int)) > 0)
+    assert head.mesh(cell_m=COARSE_M).morph_targets == ()
+
+    head.save(tmp_path / "a.maqh")
+    opened = maquette.Head.open(tmp_path / "a.maqh")
+    opened.export(tmp_path / "a.glb", topology="template", bundle=ROUND)
+    assert b'"targetNames":["jawOpen","eyeBlinkLeft"]' in (tmp_path / "a.glb").read_bytes()
+    np.testing.assert_array_equal(opened.mesh(topology="template").triangles, mesh.triangles)
+    for wrong in ({"topology": "sphere"}, {"triangle_count": "most"}):
+        with pytest.raises(ValueError, match="it is"):
+            head.mesh(**wrong)
+    with pytest.raises(maquette.MaquetteError, match="must be 0 with the template"):
+        head.mesh(cell_m=COARSE_M, topology="template")
+
+
 def test_places_have_names(head):
     places = head.landmarks()
 

@@ -1,8 +1,7 @@
 """A linear head as a baseline: principal components of the vertices of the heads that the prior was trained on, fitted
 to what the same encoder sees in a photo, with the same camera model and losses as the library's first stage.
 
-The components are whitened, so they are normal a priori. What the encoder says of the prior's codes is carried over to
-them through the anchors, which are linear in the codes.
+The components are whitened, so they are normal a priori.
 """
 
 from __future__ import annotations
@@ -11,13 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from benchmarks.heads.distances import MM_PER_DM, Triangles
 from benchmarks.heads.photos import Photo
-from export.heads.fitting.anchor_fit import CodePrior, fit_anchors, observations_of
+from export.heads.fitting.anchor_fit import fit_anchors, observations_of
 from export.heads.fitting.photo import Encoder, NoHead, look_at
-from export.heads.prior import Prior
 from export.heads.prior_file import read_prior
 from export.heads.surface import HeadMaker
 
@@ -53,23 +50,6 @@ def principal_components(vertices: np.ndarray, count: int) -> tuple[np.ndarray, 
     return mean.reshape(-1, 3), linear.reshape(-1, 3, len(best)), sigma
 
 
-def carried_over(prior: Prior, template: np.ndarray, mean: np.ndarray, linear: np.ndarray, codes: np.ndarray):
-    """Means and log sigmas [K, 2] of components from those of the prior's codes [C, 2]; template [V, 3]: where the
-    linear head's vertices lie on the template head."""
-    away, at = cKDTree(template).query(prior.template_points)
-    same = away < 1e-3
-    if same.sum() < 100:
-        raise ValueError("The anchors of the prior are no vertices of these heads: they were made by another version.")
-    shape = linear[at[same]].reshape(-1, linear.shape[2])
-    anchors = prior.anchor_linear[same].reshape(-1, prior.shape_codes).astype(np.float64)
-    offset = (prior.anchor_mean[same] - mean[at[same]]).reshape(-1)
-    noise = np.repeat(prior.anchor_sigma[same].astype(np.float64), 3)
-    solve = np.linalg.solve(shape.T @ shape + 1e-6 * np.eye(shape.shape[1]), shape.T)
-    expected = solve @ (anchors @ codes[:, 0] + offset)
-    variance = ((solve @ anchors) ** 2) @ np.exp(2 * codes[:, 1].astype(np.float64)) + (solve**2) @ noise**2
-    return np.stack([expected, 0.5 * np.log(variance)], 1)
-
-
 class LinearHeads:
     """The linear head of `visible` [H, V, 3], fitted to photos through a bundle's encoder."""
 
@@ -82,10 +62,11 @@ class LinearHeads:
         self.faces = number[faces].astype(np.int64)
         self.template = shapes.template[own]
         self.mean, self.linear, sigma = principal_components(visible[:, own], min(count, len(visible) - 1))
-        self._encoder, self._prior = Encoder(bundle), read_prior(bundle / "prior.maqp")
+        self._encoder = Encoder(bundle)
         single = np.float32
         self._model = replace(
-            self._prior, template_points=self.template.astype(single), anchor_mean=self.mean.astype(single),
+            read_prior(bundle / "prior.maqp"),
+            template_points=self.template.astype(single), anchor_mean=self.mean.astype(single),
             anchor_linear=self.linear.astype(single), anchor_sigma=np.maximum(sigma, MIN_SIGMA_DM).astype(single),
         )  # fmt: skip
 
@@ -93,8 +74,7 @@ class LinearHeads:
         """Of the head of a photo, mm; None where the encoder sees none. focal_px: 0 where it is not known."""
         try:
             seen = observations_of(look_at(self._encoder, photo.rgb[..., ::-1], tuple(photo.box), focal_px=focal_px))
-            codes = carried_over(self._prior, self.template, self.mean, self.linear, seen.codes)
-            found = fit_anchors(self._model, seen, CodePrior(codes[:, 0], np.exp(-2 * codes[:, 1])))
+            found = fit_anchors(self._model, seen)
         except NoHead:
             return None
         return Triangles((self.mean + self.linear @ found.codes) * MM_PER_DM, self.faces)

@@ -20,7 +20,7 @@ from benchmarks.heads.drawing import DrawnMesh, framed
 from benchmarks.heads.fitted import DM_PER_M, cameras_of
 from benchmarks.heads.mean_head import MM_PER_DM, mesh_of, template_points
 from export.camera import Camera
-from export.heads.fitting.anchor_fit import CodePrior, fit_anchors, observations_of
+from export.heads.fitting.anchor_fit import fit_anchors, observations_of
 from export.heads.fitting.photo import Encoder, look_at
 from export.heads.head_shards import CROP_SIDES
 from export.heads.photos.faces import HEAD, UNKNOWN, PhotoFaces
@@ -29,7 +29,6 @@ from export.heads.shapes import vertex_normals
 from export.teachers.faces import LEFT_EYE, RIGHT_EYE
 
 SPLITS = ("val", "test")  # the encoder's training saw neither; val told when to end it
-PINNED = 1e10  # inverse variance of codes that stay where they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +123,7 @@ class MeanHeads:
     def posed(self, rgb: np.ndarray, box: np.ndarray) -> PosedMesh:
         """Raises ValueError where the encoder sees no head."""
         seen = observations_of(look_at(self._encoder, rgb[..., ::-1], tuple(box)))
-        codes = self._prior.shape_codes
-        found = fit_anchors(self._prior, seen, CodePrior(np.zeros(codes), np.full(codes, PINNED))).pose.camera()
+        found = fit_anchors(self._prior, seen, moves_codes=False).pose.camera()
         height, width = rgb.shape[:2]
         centre = -found.rotation.T @ found.shift
         camera = Camera.centred(width, height, found.focal_px, found.rotation, centre)

@@ -62,19 +62,18 @@ TEMPLATE_DATA = {
 }
 
 
-def crop_and_cell(graph: Signature, path: Path, codes: int) -> tuple[int, int]:
-    """Sides in pixels of the crop and of a cell. Raises ValueError for a graph that is no encoder of a prior of so many
-    shape codes."""
+def crop_and_cell(graph: Signature, path: Path) -> tuple[int, int]:
+    """Sides in pixels of the crop and of a cell. Raises ValueError for a graph that is no encoder of heads."""
     shapes = {name: list(shape) for side in ("inputs", "outputs") for name, shape in graph[side].items()}
     sizes = [size for shape in shapes.values() for size in shape]
-    if list(shapes)[:2] == ["image", "cells"] and all(isinstance(n, int) and n > 0 for n in sizes):
+    if list(shapes) == ["image", "cells"] and all(isinstance(n, int) and n > 0 for n in sizes):
         crop, side = shapes["image"][1], shapes["cells"][1]
         wanted = {"image": [1, crop, crop, 3], "cells": [1, side, side, CELL_CHANNELS]}
-        if shapes in (wanted, wanted | {"codes": [1, codes, 2]}) and crop % side == 0:
+        if shapes == wanted and crop % side == 0:
             return crop, crop // side
     raise ValueError(
-        f"{path} has {shapes}; the format asks for image [1, crop, crop, 3], cells [1, crop / cell, crop / cell, "
-        f"{CELL_CHANNELS}] and, if there are codes, [1, {codes}, 2], in numbers."
+        f"{path} has {shapes}; the format asks for image [1, crop, crop, 3] and cells [1, crop / cell, crop / cell, "
+        f"{CELL_CHANNELS}], in numbers."
     )
 
 
@@ -83,8 +82,8 @@ def write_manifest(folder: Path, info: BundleInfo, crop_sides: float = CROP_SIDE
     precision, and writes `manifest.json`, which it returns. face: None where the encoder must not look at it a second
     time. Raises ValueError for a graph of other shapes, PriorError for a file that is no prior or no template."""
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
-    codes = read_prior(folder / PRIOR).shape_codes
-    crop, cell = crop_and_cell(graphs["encoder"], folder / "encoder.onnx", codes)
+    read_prior(folder / PRIOR)
+    crop, cell = crop_and_cell(graphs["encoder"], folder / "encoder.onnx")
     task_keys = {
         "encoder": {"crop_px": crop, "cell_px": cell, "crop_sides": crop_sides} | ({"face": face} if face else {}),
         "prior": {"file": PRIOR},

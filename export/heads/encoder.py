@@ -21,22 +21,21 @@ CROP_PX, CELL_PX = 192, 4
 CELLS = CROP_PX // CELL_PX
 OUTPUTS = 8  # template point (dm), log of its sigma (dm), logit of the matte, normal in the camera's axes
 POINT, LOG_SIGMA, MATTE, NORMAL = slice(0, 3), 3, 4, slice(5, 8)
-WIDTH, CODE_WIDTH = 64, 256
+WIDTH = 64
 CONTEXT_WIDTH, CONTEXT = 32, 128
 STRIDE = 32  # of the coarsest map
 
 
 class HeadEncoder(nn.Module):
-    """[N, 192, 192, 3] RGB 0..255 -> cells [N, 48, 48, 8] and shape codes [N, 64, 2].
+    """[N, 192, 192, 3] RGB 0..255 -> cells [N, 48, 48, 8].
 
-    Cell (i, j) stands for the crop's pixel (4 j + 1.5, 4 i + 1.5). A code is given by its mean and log sigma. Template
-    points are the sum of an affine function of the cell's place, which the whole crop tells, and of what is seen there:
-    convolutions alone, which do not know where they are, were off by 6 mm at the tip of the nose.
+    Cell (i, j) stands for the crop's pixel (4 j + 1.5, 4 i + 1.5). Template points are the sum of an affine function of
+    the cell's place, which the whole crop tells, and of what is seen there: convolutions alone, which do not know where
+    they are, were off by 6 mm at the tip of the nose.
     """
 
-    def __init__(self, codes: int = 64) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.codes = codes
         self.backbone = MobileNetV2()
         self.neck = BiFPN(NetworkConfig.BACKBONES["mobilenet_v2"], WIDTH)
         self.head = nn.Sequential(ConvBn(WIDTH + 2, WIDTH, 3), ConvBn(WIDTH, WIDTH, 3), nn.Conv2d(WIDTH, OUTPUTS, 1))
@@ -47,22 +46,13 @@ class HeadEncoder(nn.Module):
         for layer in (self.affine, self.bias):
             nn.init.zeros_(layer.weight)
             nn.init.zeros_(layer.bias)
-        self.whole = ConvBn(coarsest, CODE_WIDTH, 1)
-        self.code = nn.Linear(CODE_WIDTH, 2 * codes)
-        nn.init.normal_(self.code.weight, 0, 0.01)
-        nn.init.zeros_(self.code.bias)
         self.register_buffer("mean", torch.from_numpy(MEAN), persistent=False)
         self.register_buffer("scale", torch.from_numpy(1 / STD), persistent=False)
         j = (torch.arange(CELLS) + 0.5) * (2 / CELLS) - 1
         place = torch.stack([j[None].expand(CELLS, CELLS), j[:, None].expand(CELLS, CELLS)])
         self.register_buffer("place", place[None].contiguous(), persistent=False)  # x and y of cells, -1..1
 
-    @property
-    def code_parts(self) -> tuple[nn.Module, ...]:
-        """What says codes and nothing else."""
-        return self.whole, self.code
-
-    def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, image: Tensor) -> Tensor:
         taps = self.backbone(((image - self.mean) * self.scale).permute(0, 3, 1, 2))
         context = F.relu(self.context_hidden(self.context(taps[-1]).flatten(1)))
         place = self.place.expand(len(image), -1, -1, -1)
@@ -72,9 +62,7 @@ class HeadEncoder(nn.Module):
         affine = self.affine(context).unflatten(1, (3, 3))  # of x, y and 1
         points = (affine[..., :2] @ self.place.flatten(2) + affine[..., 2:]).transpose(1, 2)
         points = points.unflatten(1, (CELLS, CELLS))
-        cells = torch.cat([cells[..., POINT] + points, cells[..., POINT.stop :]], -1)
-        codes = self.code(F.dropout(self.whole(taps[-1]).mean((2, 3)), 0.2, self.training))
-        return cells, codes.unflatten(1, (self.codes, 2))
+        return torch.cat([cells[..., POINT] + points, cells[..., POINT.stop :]], -1)
 
 
 def start_from_detector(encoder: HeadEncoder, path: Path) -> None:
@@ -106,16 +94,7 @@ def losses(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> di
     }
 
 
-def code_losses(codes: Tensor, true: Tensor) -> dict[str, Tensor]:
-    """Negative log likelihood of true codes [N, K], NaN where unknown, by their means and log sigmas [N, K, 2]."""
-    known = true.isfinite()
-    log_sigma = codes[..., 1].clamp(-3, 1)
-    away = (codes[..., 0] - true.nan_to_num()) * (-log_sigma).exp()
-    likelihood = 0.5 * away.square() + log_sigma
-    return {"code": (likelihood * known).sum() / known.sum().clamp(min=1)}
-
-
-SCALES = {"point": 0.3, "coarse": 1.0, "matte": 1.0, "normal": 0.3, "code": 0.2}
+SCALES = {"point": 0.3, "coarse": 1.0, "matte": 1.0, "normal": 0.3}
 
 
 @torch.no_grad()
@@ -133,18 +112,6 @@ def figures(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> d
         "within_2_sigma": float((away < 2 * sigma).float().mean()),
         "matte_iou": float(both / either.clamp(min=1)),
         "normal_deg": float(torch.rad2deg(cosine.clamp(-1, 1).acos()).mean()),
-    }
-
-
-@torch.no_grad()
-def code_figures(codes: Tensor, true: Tensor) -> dict[str, float]:
-    """Root mean square error of codes (1: nothing is known of them), of the best quarter, and in their own sigmas."""
-    away = codes[..., 0] - true
-    error = away.square().mean(0).sqrt()
-    return {
-        "code_error": float(away.square().mean().sqrt()),
-        "best_code_error": float(error.sort().values[: len(error) // 4].mean()),
-        "code_sigmas": float((away / codes[..., 1].clamp(-3, 1).exp()).square().mean().sqrt()),
     }
 
 
@@ -196,13 +163,12 @@ def save_encoder(encoder: HeadEncoder, path: Path) -> None:
 def load_encoder(path: Path) -> HeadEncoder:
     """In evaluation mode. Raises FileNotFoundError, and what torch raises for other files."""
     state = torch.load(path, map_location="cpu", weights_only=True)["state"]
-    encoder = HeadEncoder(len(state["code.bias"]) // 2)
+    encoder = HeadEncoder()
     encoder.load_state_dict(state)
     return encoder.eval()
 
 
-def run_encoder(encoder: HeadEncoder, crop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Crop RGB [192, 192, 3] -> cells float32 [48, 48, 8], codes float32 [64, 2]."""
+def run_encoder(encoder: HeadEncoder, crop: np.ndarray) -> np.ndarray:
+    """Crop RGB [192, 192, 3] -> cells float32 [48, 48, 8]."""
     with torch.no_grad():
-        cells, codes = encoder(torch.from_numpy(np.ascontiguousarray(crop, np.float32))[None])
-    return cells[0].numpy(), codes[0].numpy()
+        return encoder(torch.from_numpy(np.ascontiguousarray(crop, np.float32))[None])[0].numpy()

@@ -22,14 +22,13 @@ MIN_FACE_FRACTION, STRAY_FRACTION = 0.01, 0.01
 
 @dataclass(frozen=True)
 class Crop:
-    """image uint8 RGB [192, 192, 3]; template float32 [48, 48, 3] dm; matte float32 [48, 48]; normal [48, 48, 3];
-    mirrored: whether left and right are exchanged."""
+    """image uint8 RGB [192, 192, 3]; template float32 [48, 48, 3] dm; matte float32 [48, 48]; normal
+    [48, 48, 3]."""
 
     image: np.ndarray
     template: np.ndarray
     matte: np.ndarray
     normal: np.ndarray
-    mirrored: bool
 
 
 class Backgrounds:
@@ -164,7 +163,7 @@ def crop_of(
         template[..., 0] *= -1
     if augment:
         image = as_cameras_see(image, rng)
-    return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal, place.mirrored)
+    return Crop(np.clip(image, 0, 255).astype(np.uint8), template, cells, normal)
 
 
 def occluded(image: np.ndarray, backgrounds: Backgrounds, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -200,13 +199,10 @@ def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadP
 
 
 class CropStream(IterableDataset):
-    """Endless random batches of made heads: image float32 [B, 192, 192, 3], template, matte, normal, and shape codes
-    [B, K], NaN where the crop is mirrored. codes: of the heads, [H, K]."""
+    """Endless random batches of made heads: image float32 [B, 192, 192, 3], template, matte, normal."""
 
-    def __init__(
-        self, heads: list[HeadPictures], codes: np.ndarray, backgrounds: Backgrounds, batch: int, seed: int
-    ) -> None:
-        self.heads, self.codes, self.backgrounds, self.batch, self.seed = heads, codes, backgrounds, batch, seed
+    def __init__(self, heads: list[HeadPictures], backgrounds: Backgrounds, batch: int, seed: int) -> None:
+        self.heads, self.backgrounds, self.batch, self.seed = heads, backgrounds, batch, seed
 
     def __iter__(self):
         info = torch.utils.data.get_worker_info()
@@ -216,13 +212,12 @@ class CropStream(IterableDataset):
             yield self.random_batch(rng, self.batch)
 
     def random_batch(self, rng: np.random.Generator, count: int) -> tuple[torch.Tensor, ...]:
-        crops, codes = [], []
+        crops = []
         for number in rng.integers(len(self.heads), size=count):
             pictures = self.heads[number]
             k, of_face = int(rng.integers(len(pictures.rgb))), rng.random() < FACE_FRACTION
             crops.append(crop_of(pictures, k, self.backgrounds, rng, of_face=of_face))
-            codes.append(np.where(crops[-1].mirrored, np.nan, self.codes[number]).astype(np.float32))
-        return *batched(crops), torch.from_numpy(np.stack(codes))
+        return batched(crops)
 
 
 def batched(crops: list[Crop]) -> tuple[torch.Tensor, ...]:

@@ -18,7 +18,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-from torch.nn import functional as F
 from torch.utils.data import DataLoader
 
 from export.heads.encoder import (
@@ -26,9 +25,8 @@ from export.heads.encoder import (
     POINT,
     SCALES,
     HeadEncoder,
-    code_figures,
-    code_losses,
     figures,
+    load_encoder,
     losses,
     photo_figures,
     photo_losses,
@@ -57,11 +55,9 @@ VIEWS = 6  # of a held-out head
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What is validated on: crops of made heads with their shape codes [N, K] (NaN: mirrored), crops of their faces,
-    faces of photos."""
+    """What is validated on: crops of made heads, crops of their faces, faces of photos."""
 
     crops: list[Crop]
-    codes: torch.Tensor
     face_crops: list[Crop]
     faces: list[PhotoCrop]
 
@@ -84,12 +80,6 @@ def held_out_face_crops(folder: Path, backgrounds: Backgrounds) -> list[Crop]:
     ]
 
 
-def codes_of_crops(crops: list[Crop], codes: torch.Tensor) -> torch.Tensor:
-    """Of `held_out_crops`, by the codes of their heads [H, K]: [N, K], NaN where mirrored."""
-    mirrored = torch.tensor([crop.mirrored for crop in crops])
-    return codes.repeat_interleave(VIEWS, 0).masked_fill(mirrored[:, None], torch.nan)
-
-
 def held_out_faces(folder: Path) -> list[PhotoCrop]:
     """The faces of the validation photos, upright in the middle of their crops."""
     rng = np.random.default_rng(1)
@@ -101,22 +91,19 @@ def held_out_faces(folder: Path) -> list[PhotoCrop]:
 
 
 @torch.no_grad()
-def run(encoder: HeadEncoder, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    parts = [encoder(image[k : k + 16]) for k in range(0, len(image), 16)]
-    return tuple(torch.cat(column) for column in zip(*parts, strict=True))
+def run(encoder: HeadEncoder, image: torch.Tensor) -> torch.Tensor:
+    return torch.cat([encoder(image[k : k + 16]) for k in range(0, len(image), 16)])
 
 
 def validate(encoder: HeadEncoder, held_out: HeldOut) -> dict[str, float]:
     image, *labels = batched(held_out.crops)
-    cells, codes = run(encoder, image)
-    known = held_out.codes.isfinite().all(1)
-    found = figures(cells, *labels) | code_figures(codes[known], held_out.codes[known])
+    found = figures(run(encoder, image), *labels)
     image, *labels = batched(held_out.face_crops)
-    of_faces = figures(run(encoder, image)[0], *labels)
+    of_faces = figures(run(encoder, image), *labels)
     found |= {"face_mm": of_faces["point_mm"], "face_median_mm": of_faces["median_mm"]}
     if held_out.faces:
         image, *labels = batched_photos(held_out.faces)
-        found |= photo_figures(run(encoder, image)[0], *labels)
+        found |= photo_figures(run(encoder, image), *labels)
     return found
 
 
@@ -125,7 +112,7 @@ def write_sample(encoder: HeadEncoder, crops: list[Crop], path: Path) -> None:
     """Crops, true template points, found ones, found matte."""
     rows = []
     for crop in crops[:: max(1, len(crops) // 8)][:8]:
-        cells, _ = run_encoder(encoder, crop.image)
+        cells = run_encoder(encoder, crop.image)
 
         def shown(points: np.ndarray, mask: np.ndarray) -> np.ndarray:
             colour = np.clip((points / 3 + 0.5) * 255, 0, 255) * mask[..., None]
@@ -144,9 +131,9 @@ def batch_losses(encoder: HeadEncoder, batch: tuple, precision: str) -> dict[str
     made, photos = batch if isinstance(batch[0], (tuple, list)) else (batch, None)
     image = made[0] if photos is None else torch.cat([made[0], photos[0]])
     with torch.autocast("cpu", torch.bfloat16, enabled=precision == "bfloat16"):
-        cells, codes = (out.float() for out in encoder(image))
+        cells = encoder(image).float()
     count = len(made[0])
-    terms = losses(cells[:count], *made[1:-1]) | code_losses(codes[:count], made[-1])
+    terms = losses(cells[:count], *made[1:])
     if photos is None:
         return terms
     share = count / len(image)
@@ -156,32 +143,14 @@ def batch_losses(encoder: HeadEncoder, batch: tuple, precision: str) -> dict[str
     }
 
 
-def go_on_from(encoder: HeadEncoder, path: Path) -> None:
-    """Takes the weights of another training. The last layer of codes begins anew where their number is another, and so
-    do the parts that an older encoder does not have."""
-    state = torch.load(path, weights_only=True)["state"]
-    first = state["head.0.conv.weight"]
-    missing = encoder.head[0].conv.in_channels - first.shape[1]
-    state["head.0.conv.weight"] = F.pad(first, (0, 0, 0, 0, 0, missing))
-    if state["code.bias"].shape != encoder.code.bias.shape:
-        state = {name: value for name, value in state.items() if not name.startswith("code.")}
-    encoder.load_state_dict(state, strict=False)
-
-
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/heads/views"))
-    parser.add_argument(
-        "--prior", type=Path, default=Path(".data/runs/heads-prior/weights.pt"), help="codes of the heads"
-    )
     parser.add_argument("--photos", type=Path, help="faces of photos, such as .data/heads/photos; default: none")
     parser.add_argument(
         "--photo-share", dest="photo_fraction", type=float, default=0.2, help="of a batch, with --photos"
     )
     parser.add_argument("--start", type=Path, help="weights.pt of an encoder to go on from, instead of --init")
-    parser.add_argument(
-        "--codes-only", action="store_true", help="train what says shape codes alone, for another --prior"
-    )
     parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds"))
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder"))
     parser.add_argument("--init", type=Path, default=Path("export/weights/densepose-b.pt"), help="of a person detector")
@@ -205,19 +174,14 @@ def train(arguments: argparse.Namespace) -> None:
     torch.manual_seed(arguments.seed)
     arguments.out.mkdir(parents=True, exist_ok=True)
     heads = read_heads(arguments.data, "train", arguments.heads)
-    prior = torch.load(arguments.prior, weights_only=True)
     backgrounds = Backgrounds(arguments.backgrounds / "val")
     crops, face_crops = (of(arguments.data, backgrounds) for of in (held_out_crops, held_out_face_crops))
     faces = held_out_faces(arguments.photos) if arguments.photos else []
-    held_out = HeldOut(crops, codes_of_crops(crops, prior["held_out_z"]), face_crops, faces)
-    encoder = HeadEncoder(prior["z"].shape[1])
+    held_out = HeldOut(crops, face_crops, faces)
+    encoder = HeadEncoder()
     start_from_detector(encoder, arguments.init)
     if arguments.start:
-        go_on_from(encoder, arguments.start)
-    if arguments.codes_only:
-        encoder.requires_grad_(False)
-        for part in encoder.code_parts:
-            part.requires_grad_(True)
+        encoder.load_state_dict(load_encoder(arguments.start).state_dict())
     encoder.to(memory_format=torch.channels_last)
     mean = Ema(encoder, 0.998)
     trained = [p for p in encoder.parameters() if p.requires_grad]
@@ -231,16 +195,7 @@ def train(arguments: argparse.Namespace) -> None:
         optimizer.load_state_dict(state["optimizer"])
         step, spent_s, log = state["step"], state["spent_s"], state["log"]
     encoder.train()
-    if arguments.codes_only:
-        for part in (encoder.backbone, encoder.neck, encoder.head):
-            part.eval()
-    made = (
-        heads,
-        prior["z"][: len(heads)].numpy(),
-        Backgrounds(arguments.backgrounds / "train"),
-        arguments.batch,
-        arguments.seed + step,
-    )
+    made = (heads, Backgrounds(arguments.backgrounds / "train"), arguments.batch, arguments.seed + step)
     photos = read_photos(arguments.photos, "train") if arguments.photos else []
     stream = MixedStream(*made, photos=photos, share=arguments.photo_fraction) if photos else CropStream(*made)
     batches = iter(DataLoader(stream, batch_size=None, num_workers=1, prefetch_factor=4))
@@ -268,8 +223,6 @@ def train(arguments: argparse.Namespace) -> None:
         for group in optimizer.param_groups:
             group["lr"] = rate_at(step, schedule.fraction(step, spent_s), arguments.rate)
         terms = batch_losses(encoder, next(batches), arguments.precision)
-        if arguments.codes_only:
-            terms = {"code": terms["code"]}
         optimizer.zero_grad(set_to_none=True)
         sum(SCALES[name.removeprefix("photo_")] * value for name, value in terms.items()).backward()
         torch.nn.utils.clip_grad_norm_(trained, 5.0)

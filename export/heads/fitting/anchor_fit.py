@@ -2,7 +2,7 @@
 
 The point of a head with codes z that a cell shows is x(τ; z) = τ + Σ w_k (a_k(z) - t_k), τ the template point seen
 there, a_k the four anchors nearest to it and t_k their own template points. Levenberg-Marquardt over the camera and z,
-robust against outliers (Geman-McClure), with what the encoder says of z and a log-normal focal length as priors.
+robust against outliers (Geman-McClure), with N(0, 1) of each code and a log-normal focal length as priors.
 """
 
 from __future__ import annotations
@@ -35,21 +35,18 @@ LOG_SIGMA_RANGE = (-4.6, 1.1)  # of template points
 # How much of the codes' variance widens the limit, from the mean head to the fitted one, and steps that is worth.
 PHASES = ((1.0, 3), (0.2, 3), (0.04, 3), (0.0, 100))
 MAX_STEPS = 16
-CODE_SIGMA_FACTOR, LOG_CODE_SIGMA_RANGE, MAX_CODE_MEAN = 1.2, (-3.0, 1.0), 10.0
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
     """Of one photo: template points [N, 3] dm, their sigma [N] dm, pixels [N, 2] where they are seen, with the first
-    pixel's centre at (0, 0), and the sigma of these [N]; what the encoder says of shape codes, [K, 2] as in HeadPhoto,
-    or None. centre: the principal point. log_focal_sigma: 0 where the focal length is known, else focal_px is the
-    median."""
+    pixel's centre at (0, 0), and the sigma of these [N]. centre: the principal point. log_focal_sigma: 0 where the
+    focal length is known, else focal_px is the median."""
 
     template: np.ndarray
     sigma: np.ndarray
     pixels: np.ndarray
     pixel_sigma: np.ndarray
-    codes: np.ndarray | None
     focal_px: float
     log_focal_sigma: float
     centre: np.ndarray
@@ -68,9 +65,7 @@ def observations_of(photo: HeadPhoto) -> Observations:
         looks = [(photo, around), (photo.face, shows_head(photo.face.cells))]
     parts = [_cells_of(look, chosen) for look, chosen in looks]
     template, sigma, pixels, pixel_sigma = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Observations(
-        template, sigma, pixels, pixel_sigma, photo.codes, photo.focal_px, photo.log_focal_sigma, photo.centre
-    )
+    return Observations(template, sigma, pixels, pixel_sigma, photo.focal_px, photo.log_focal_sigma, photo.centre)
 
 
 def _cells_of(look: Look, chosen: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -80,33 +75,6 @@ def _cells_of(look: Look, chosen: np.ndarray) -> tuple[np.ndarray, ...]:
     pixels = look.in_photo(columns + 0.5, rows + 0.5) - 0.5
     sigma = np.exp(np.clip(cells[:, 3], *LOG_SIGMA_RANGE))
     return cells[:, :3], sigma, pixels, np.full(len(rows), max(PIXEL_SIGMA * look.cell_px, 1e-3))
-
-
-@dataclass(frozen=True)
-class CodePrior:
-    """What is known of shape codes before, by the encoder: means and inverse variances, [K]."""
-
-    mean: np.ndarray
-    inverse: np.ndarray
-
-    def cost(self, z: np.ndarray) -> float:
-        return float(((z - self.mean) ** 2 * self.inverse).sum())
-
-
-def code_prior(seen: Observations, codes: int) -> CodePrior:
-    """The encoder's word on top of the normal distribution of all heads. Raises ValueError for other numbers of codes
-    than the prior has."""
-    mean, inverse = np.zeros(codes), np.ones(codes)
-    if seen.codes is None:
-        return CodePrior(mean, inverse)
-    if seen.codes.shape != (codes, 2):
-        raise ValueError(f"The encoder says {len(seen.codes)} shape codes of a head, whose prior has {codes}.")
-    told = seen.codes.astype(np.float64)
-    sigma = CODE_SIGMA_FACTOR * np.exp(np.clip(told[:, 1], *LOG_CODE_SIGMA_RANGE))
-    is_told = sigma < 1
-    inverse[is_told] = sigma[is_told] ** -2
-    mean[is_told] = np.clip(told[is_told, 0], -MAX_CODE_MEAN, MAX_CODE_MEAN)
-    return CodePrior(mean, inverse)
 
 
 class AnchorPoints:
@@ -186,27 +154,27 @@ class AnchorFit:
 
 
 class _Equations:
-    """Levenberg-Marquardt over the camera and, where there is a prior of them, the codes."""
+    """Levenberg-Marquardt over the camera and, where they move, the codes."""
 
-    def __init__(self, terms: AnchorTerms, seen: Observations, codes: CodePrior | None) -> None:
-        self.terms, self.codes = terms, codes
+    def __init__(self, terms: AnchorTerms, seen: Observations, moves_codes: bool) -> None:
+        self.terms, self.moves_codes = terms, moves_codes
         self.log_focal, self.focal_sigma = float(np.log(seen.focal_px)), seen.log_focal_sigma
         self.steps = 0
 
     def cost(self, pose: ScaledPose, z: np.ndarray) -> float:
         total = float(self.terms.cost(pose, torch.from_numpy(z)))
-        if self.codes:
-            total += self.codes.cost(z)
+        if self.moves_codes:
+            total += float(z @ z)
         if self.focal_sigma > 0:
             total += ((float(pose.log_focal) - self.log_focal) / self.focal_sigma) ** 2
         return total
 
     def _set_up(self, pose: ScaledPose, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        count = UNKNOWNS + (len(z) if self.codes else 0)
+        count = UNKNOWNS + (len(z) if self.moves_codes else 0)
         at = torch.from_numpy(z)
 
         def off(step: Tensor) -> Tensor:
-            codes = at + step[UNKNOWNS:] if self.codes else at
+            codes = at + step[UNKNOWNS:] if self.moves_codes else at
             return self.terms.residuals(pose.displaced(step[:UNKNOWNS]), codes)
 
         zero = torch.zeros(count, dtype=torch.float64)
@@ -216,9 +184,9 @@ class _Equations:
         root = (1 / (1 + error / self.terms.limit) * CELL_WEIGHT**0.5)[seen, None]
         j = -(jacobian[seen] * root[..., None]).reshape(-1, count).numpy()
         a, b = j.T @ j, j.T @ (residuals[seen] * root).reshape(-1).numpy()
-        if self.codes:
-            a[UNKNOWNS:, UNKNOWNS:] += np.diag(self.codes.inverse)
-            b[UNKNOWNS:] -= self.codes.inverse * (z - self.codes.mean)
+        if self.moves_codes:
+            a[UNKNOWNS:, UNKNOWNS:] += np.eye(len(z))
+            b[UNKNOWNS:] -= z
         focal = UNKNOWNS - 1
         if self.focal_sigma > 0:
             a[focal, focal] += self.focal_sigma**-2
@@ -245,7 +213,7 @@ class _Equations:
                 change = np.full(len(b), np.nan)
             then = np.inf
             if is_small_step(change[:UNKNOWNS]):
-                tried = pose.moved(change[:UNKNOWNS]), z + change[UNKNOWNS:] if self.codes else z
+                tried = pose.moved(change[:UNKNOWNS]), z + change[UNKNOWNS:] if self.moves_codes else z
                 then = self.cost(*tried)
             if not then < cost:
                 damping *= 10
@@ -278,7 +246,7 @@ def _start(terms: AnchorTerms, seen: Observations) -> ScaledPose:
     pose = scaled_pose(Camera(cv2.Rodrigues(turn)[0], shift[:, 0], seen.focal_px))
     # Its noise has the codes', which are 0 here, in it.
     terms.inverse_variance = torch.from_numpy(sigma**-2.0)
-    equations = _Equations(terms, seen, None)
+    equations = _Equations(terms, seen, moves_codes=False)
     terms.limit = torch.full((len(terms),), LIMIT, dtype=torch.float64)
     pose, _ = equations.minimise(pose, zero.numpy(), 50, 1e-12)
     for _ in range(5):
@@ -299,14 +267,13 @@ def _start(terms: AnchorTerms, seen: Observations) -> ScaledPose:
     return pose
 
 
-def fit_anchors(prior: Prior, seen: Observations, known: CodePrior | None = None) -> AnchorFit:
-    """known: of the codes, by default what the encoder says. Raises NoHead for what no head explains."""
+def fit_anchors(prior: Prior, seen: Observations, moves_codes: bool = True) -> AnchorFit:
+    """moves_codes: False poses the mean head. Raises NoHead for what no head explains."""
     terms = AnchorTerms(seen, AnchorPoints(prior))
     if len(terms) < MIN_POINTS:
         raise NoHead(f"Only {len(terms)} points of a head are seen. Use a photo where the face is seen, and its box.")
     pose = _start(terms, seen)
-    known = known or code_prior(seen, prior.shape_codes)
-    equations, z = _Equations(terms, seen, known), known.mean.copy()
+    equations, z = _Equations(terms, seen, moves_codes), np.zeros(terms.linear.shape[2])
     for code_fraction, steps in PHASES:
         terms.set_noise(pose, torch.from_numpy(z), code_fraction)
         pose, z = equations.minimise(pose, z, min(steps, MAX_STEPS - equations.steps))

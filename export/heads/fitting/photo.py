@@ -57,11 +57,10 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class HeadPhoto(Look):
-    """codes: [K, 2], mean and log sigma of each shape code, None where the encoder does not say them. size: width and
-    height; centre: the principal point, where the first pixel's centre is (0, 0). log_focal_sigma: 0 where the focal
-    length is known, else focal_px is the median. face: a second, closer look; None where no face is seen."""
+    """size: width and height; centre: the principal point, where the first pixel's centre is (0, 0). log_focal_sigma: 0
+    where the focal length is known, else focal_px is the median. face: a second, closer look; None where no face is
+    seen."""
 
-    codes: np.ndarray | None
     size: tuple[int, int]
     focal_px: float
     log_focal_sigma: float
@@ -95,11 +94,10 @@ class Encoder:
         self.face = FaceSpec(np.array(face["center_dm"]), face["radius_dm"], face["crop_sides"]) if face else None
         self.graph = session(folder / manifest["graphs"]["encoder"]["file"])
 
-    def run(self, bgr: np.ndarray, to_photo: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        """The crop, its cells and codes, as in HeadPhoto."""
+    def run(self, bgr: np.ndarray, to_photo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The crop and its cells, as in Look."""
         rgb = crop(bgr, to_photo, self.crop_px)
-        cells, *codes = self.graph.run(None, {"image": rgb[None]})
-        return rgb, cells[0], codes[0][0] if codes and np.isfinite(codes[0]).all() else None
+        return rgb, self.graph.run(["cells"], {"image": rgb[None]})[0][0]
 
 
 def square(box: Box, roll_rad: float, sides: float, crop_px: int) -> np.ndarray:
@@ -162,10 +160,10 @@ def look_at(
     height, width = bgr.shape[:2]
 
     def look(to_photo: np.ndarray) -> HeadPhoto:
-        rgb, cells, codes = encoder.run(bgr, to_photo)
+        rgb, cells = encoder.run(bgr, to_photo)
         known = focal_px > 0
         photo = HeadPhoto(
-            rgb, cells.copy(), to_photo, codes, (width, height), focal_px if known else float(max(width, height)),
+            rgb, cells.copy(), to_photo, (width, height), focal_px if known else float(max(width, height)),
             0.0 if known else LOG_FOCAL_SIGMA, box or (0, 0, 0, 0),
         )  # fmt: skip
         grid = np.arange(cells.shape[0]) + 0.5

@@ -21,7 +21,6 @@ from export.heads.fitting.anchor_fit import (
     AnchorFit,
     AnchorPoints,
     AnchorTerms,
-    code_prior,
     observations_of,
 )
 from export.heads.fitting.camera import UNKNOWNS, ScaledPose, is_small_step
@@ -93,8 +92,6 @@ class RayFit:
         seen = observations_of(photo)
         self.anchor_terms = AnchorTerms(seen, AnchorPoints(prior))
         self.anchor_terms.set_noise(start.pose, shape.double(), 0)
-        known = code_prior(seen, prior.shape_codes)
-        self.code_mean, self.code_inverse = torch.from_numpy(known.mean), torch.from_numpy(known.inverse)
         # A step of all unknowns: Adam's variables, which begin at 0 each time.
         self.change = [
             torch.zeros(count, dtype=torch.float64, requires_grad=True)
@@ -180,7 +177,7 @@ class RayFit:
         if is_old or (is_exact and drift > 0):
             self.grid, self.grid_shape, self.grid_age = self.ray_terms.grid(weights), self.now.shape, 1
         seen = self.ray_terms.losses(weights, pose, self.grid, rays).total()
-        priors = 0.5 * ((self.code_inverse * (shape - self.code_mean).square()).sum() + colour.square().sum())
+        priors = 0.5 * (shape.square().sum() + colour.square().sum())
         if self.photo.log_focal_sigma > 0:
             off = (pose.log_focal - math.log(self.photo.focal_px)) / self.photo.log_focal_sigma
             priors = priors + 0.5 * off.square()

@@ -66,7 +66,7 @@ def main() -> None:
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     encoder, crops = load_encoder(arguments.encoder), faces_of(arguments.photos, arguments.split)
-    answers = np.stack([run_encoder(encoder, crop.image)[0] for crop in crops])
+    answers = np.stack([run_encoder(encoder, crop.image) for crop in crops])
     labels = batched_photos(crops)[1:]
     every = photo_figures(torch.from_numpy(answers), *labels)
     print(f"{len(crops)} faces: " + " ".join(f"{name}={value:.3g}" for name, value in every.items()))

@@ -143,15 +143,6 @@ TEST_F(ApiHeads, TheFitToThePixelsTakesTheColourOfThePhoto) {
   EXPECT_LT(std::abs(reddest(head) - 140), std::abs(reddest(first) - 140));
 }
 
-TEST_F(ApiHeads, WhatTheEncoderSaysOfTheShapeCountsInTheFit) {
-  const double seen_m = -fitted().landmark("nose_tip").point_m[1];
-  const PlainPhoto green(320, 240, {90, 200, 90});
-  builder.clear();
-  builder.add_photo(maquette::Frame(context, green.desc), known);
-  const double said_m = -builder.fit(0).landmark("nose_tip").point_m[1];
-  EXPECT_LT(said_m, 0.9 * seen_m) << "it says that the head is flat";
-}
-
 TEST_F(ApiHeads, AKnownFocalLengthIsKept) {
   maq_head_photo photo = known;
   photo.focal_px = 777;

@@ -4,8 +4,8 @@ and a mesh.
 The prior: |S x| in a norm of 13 directions, nearly an ellipsoid, whose three shape codes stretch its axes by 7 %; two
 colour codes. The encoder does not look for anything: whatever the crop shows, it sees the head of CODES, from the
 front and turned by TURN_RAD, in its middle. Of a crop that is black, it sees none; of one that is more blue than red, a
-mirrored one, which no camera explains. Of one that is greener than both others together, it says shape codes, too. The
-template head is round as well, open below, with an eye and a tooth, both octahedra; it opens its mouth and winks.
+mirrored one, which no camera explains. The template head is round as well, open below, with an eye and a tooth, both
+octahedra; it opens its mouth and winks.
 
     python -m tests.native.generate.make_round_heads
 """
@@ -27,7 +27,6 @@ from export.heads.template_file import Kind, Template, write_template
 
 FOLDER = Path(__file__).parents[1] / "data" / "round_heads"
 CODES = np.array([1.5, 0.5, -1.5])  # narrow and tall
-SAID_CODES = np.array([1.5, 3, -1.5])  # of greener crops: flat, too, which a front view hardly tells
 TURN_RAD, DISTANCE_DM = 0.25, 10.0
 RADII_DM = np.array([0.75, 0.95, 1.15])
 STRETCH = 0.07
@@ -156,12 +155,6 @@ def write_encoder(path: Path) -> None:
         helper.make_node("Mul", ["darkness", "matte"], ["unseen"]),
         helper.make_node("Add", ["plain", "change"], ["seen"]),
         helper.make_node("Add", ["seen", "unseen"], ["cells"]),
-        # How green: 0 to 1.
-        helper.make_node("Mul", ["colour", "to_green"], ["green"]),
-        helper.make_node("ReduceSum", ["green", "inner_axes"], ["greenness"], keepdims=1),
-        helper.make_node("Clip", ["greenness", "zero", "one"], ["fraction"]),
-        helper.make_node("Reshape", ["fraction", "three_axes"], ["knows"]),
-        helper.make_node("Mul", ["knows", "known"], ["codes"]),
     ]
     constants = [
         constant("red_to_blue", [-0.1, 0, 0.1]),
@@ -171,16 +164,11 @@ def write_encoder(path: Path) -> None:
         constant("black", 200),
         constant("zero", 0),
         constant("one", 1),
-        constant("to_green", [-0.1, 0.2, -0.1]),
-        constant("known", np.stack([SAID_CODES, np.full(3, np.log(0.05))], 1)[None]),
         numpy_helper.from_array(np.array([3], np.int64), "last_axis"),
-        numpy_helper.from_array(np.array([1, 2, 3], np.int64), "inner_axes"),
-        numpy_helper.from_array(np.array([1, 1, 1], np.int64), "three_axes"),
     ]
     inputs = [helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, CROP_PX, CROP_PX, 3])]
     outputs = [
         helper.make_tensor_value_info("cells", TensorProto.FLOAT, [1, CELLS, CELLS, 8]),
-        helper.make_tensor_value_info("codes", TensorProto.FLOAT, [1, 3, 2]),
     ]
     graph = helper.make_graph(nodes, "encoder", inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)

@@ -6,7 +6,6 @@ anchors (template points, mean, linear, sigma), template points of the places.
 
 `bundle`: an encoder of one convolution, crops of 32 px and cells of 4 px, and the prior with int8 bases. `photo.bgr`:
 32 x 32 pixels of noise, B, G, R bytes; `cells.f32`: what the encoder says of it [8][8][8].
-`codes.onnx`: an encoder that says codes, too.
 
 `template.maqt`: a template head of five points.
 
@@ -57,9 +56,8 @@ def write_priors(folder: Path) -> None:
         np.concatenate([array.ravel() for array in arrays]).astype("<f4").tofile(path.with_suffix(".f32"))
 
 
-def write_encoder(path: Path, codes: int = 0) -> None:
-    """A convolution of each cell's pixels: 3 colours -> 8 channels. codes: so many are said, too: each number the mean
-    of one channel."""
+def write_encoder(path: Path) -> None:
+    """A convolution of each cell's pixels: 3 colours -> 8 channels."""
     rng = np.random.default_rng(3)
     side = CROP_PX // CELL_PX
     scales = np.array([1, 1, 1, 2, 4, 1, 1, 1])  # mattes of both signs
@@ -73,15 +71,6 @@ def write_encoder(path: Path, codes: int = 0) -> None:
     ]
     constants = {"weights": weights.astype(np.float32), "bias": bias.astype(np.float32)}
     outputs = [helper.make_tensor_value_info("cells", TensorProto.FLOAT, [1, side, side, 8])]
-    if codes:
-        nodes += [
-            helper.make_node("ReduceMean", ["found"], ["means"], axes=[2, 3], keepdims=0),
-            helper.make_node("Slice", ["means", "first", "last", "axis"], ["numbers"]),
-            helper.make_node("Reshape", ["numbers", "shape"], ["codes"]),
-        ]
-        sizes = {"first": [0], "last": [2 * codes], "axis": [1], "shape": [1, codes, 2]}
-        constants |= {name: np.array(values, np.int64) for name, values in sizes.items()}
-        outputs.append(helper.make_tensor_value_info("codes", TensorProto.FLOAT, [1, codes, 2]))
     image = helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, CROP_PX, CROP_PX, 3])
     initializers = [numpy_helper.from_array(values, name) for name, values in constants.items()]
     graph = helper.make_graph(nodes, "encoder", [image], outputs, initializers)
@@ -128,7 +117,6 @@ def main() -> None:
     bundle = FOLDER / "bundle"
     bundle.mkdir(exist_ok=True)
     write_encoder(bundle / "encoder.onnx")
-    write_encoder(FOLDER / "codes.onnx", len(SHAPE_CODES))
     write_bundle(bundle, bundle / "encoder.onnx", small_prior(), BundleInfo("tiny-heads", "fp32"), face=None)
     photo = np.random.default_rng(9).integers(0, 256, (CROP_PX, CROP_PX, 3), np.uint8)  # B, G, R
     (cells,) = session(bundle / "encoder.onnx").run(None, {"image": photo[None, :, :, ::-1].astype(np.float32)})

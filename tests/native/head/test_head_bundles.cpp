@@ -132,14 +132,8 @@ TEST_F(HeadBundles, WithAnotherGraphAreRefused) {
     }
     json changed = manifest_;
     json& tensors = changed["graphs"]["encoder"][side];
-    for (int i = 0; i < 2; ++i) tensors.push_back(tensors[0]);
+    tensors.push_back(tensors[0]);
     expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, text);
-  }
-  for (const json& codes : {json{{"name", "codes"}, {"type", "float32"}, {"shape", {1, 4, 2}}},
-                            json{{"name", "other"}, {"type", "float32"}, {"shape", {1, 3, 2}}}}) {
-    json changed = manifest_;
-    changed["graphs"]["encoder"]["outputs"].push_back(codes);
-    expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "codes [1, 3, 2]");
   }
   json changed = manifest_;
   changed["encoder"]["cell_px"] = 8;

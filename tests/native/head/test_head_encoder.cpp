@@ -180,28 +180,6 @@ TEST(HeadEncoder, ASquareIsMadeOfTheLongerSideOfABox) {
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "finite", [&] { square_around(0, 0, INFINITY, 70, 0, spec); });
 }
 
-TEST(HeadEncoder, SaysWhatTheWholeCropTellsOfTheCodes) {
-  maq::Bundle opened = maq::read_bundle(tiny_head::kBundle);
-  opened.manifest.graphs.at("encoder").outputs.push_back({"codes", "float32", {int64_t(1), int64_t(3), int64_t(2)}});
-  const std::string graph = read_text(tiny_head::kFolder + "/codes.onnx");
-  opened.files.at("encoder.onnx").assign(graph.begin(), graph.end());
-  const HeadBundle bundle(std::move(opened));
-  EXPECT_TRUE(bundle.encoder.says_codes);
-  HeadEncoder encoder(tiny_head::runtime(), bundle, Encoder::settings(1));
-  const maq::RunCancel cancel(tiny_head::runtime());
-  const std::string bytes = read_text(tiny_head::kFolder + "/photo.bgr");
-  const std::vector<uint8_t> bgr(bytes.begin(), bytes.end());
-  HeadEncoding found;
-  encoder.run(view(bgr, 32, 32), {16, 16, 32, 0}, cancel, found);
-  ASSERT_EQ(found.codes.size(), 6u);
-  for (size_t k = 0; k < 6; ++k) {  // they are the means of the first channels of all cells
-    double mean = 0;
-    for (size_t cell = 0; cell < 64; ++cell) mean += double(found.cells[8 * cell + k]) / 64;
-    EXPECT_NEAR(found.codes[k], mean, 1e-4);
-  }
-  EXPECT_TRUE(Encoder().run(view(bgr, 32, 32), {16, 16, 32, 0}).codes.empty());
-}
-
 TEST(HeadEncoder, CanBeCancelledAndUsedAgain) {
   const std::vector<uint8_t> bgr = ramp(64, 48);
   Encoder encoder;

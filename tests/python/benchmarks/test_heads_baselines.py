@@ -218,25 +218,6 @@ def test_principal_components_are_whitened_and_leave_what_is_left():
     assert linear_head.principal_components(heads, 1)[2].mean() > 0.005
 
 
-def test_what_the_encoder_says_of_codes_is_carried_over_to_the_components():
-    heads, base, directions = linear_heads()
-    mean, linear, _ = linear_head.principal_components(heads, 3)
-    prior = small_prior()
-    single = np.float32
-    of_codes = 0.01 * directions.transpose(1, 2, 0)  # a code moves the head by one direction
-    prior = replace(
-        prior, template_points=base.astype(single), anchor_mean=base.astype(single),
-        anchor_linear=of_codes.astype(single), anchor_sigma=np.full(300, 1e-3, single),
-    )  # fmt: skip
-    codes = np.stack([[1.5, -2.0, 0.5], np.log([0.1, 0.1, 0.1])], 1)
-    found = linear_head.carried_over(prior, base, mean, linear, codes)
-    np.testing.assert_allclose(mean + linear @ found[:, 0], base + of_codes @ codes[:, 0], atol=2e-4)
-    vague = linear_head.carried_over(prior, base, mean, linear, codes + [0, 1])
-    assert (vague[:, 1] > found[:, 1] + 0.5).all()
-    with pytest.raises(ValueError, match="another version"):
-        linear_head.carried_over(prior, base + 0.5, mean, linear, codes)
-
-
 def test_the_linear_head_follows_what_is_seen(monkeypatch):
     heads, base, directions = linear_heads()
     camera = look_at(0.2, 0.1, 0.0, 12.0, np.zeros(3), 900.0, 400)
@@ -244,9 +225,7 @@ def test_the_linear_head_follows_what_is_seen(monkeypatch):
     near = (true * (camera.centre - true)).sum(1) > 0
     pixels, principal = camera.projected(true[near])[0], np.array([camera.cx_px, camera.cy_px])
     count = near.sum()
-    seen = Observations(
-        base[near], np.full(count, 0.01), pixels, np.ones(count), np.zeros((3, 2)), 900.0, 0.0, principal
-    )
+    seen = Observations(base[near], np.full(count, 0.01), pixels, np.ones(count), 900.0, 0.0, principal)
     for name in ("Encoder", "look_at"):
         monkeypatch.setattr(linear_head, name, lambda *_, **__: None)
     monkeypatch.setattr(linear_head, "observations_of", lambda _: seen)

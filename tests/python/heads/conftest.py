@@ -5,14 +5,14 @@ import pytest
 
 @pytest.fixture(scope="session")
 def lively_encoder():
-    """By a seed and a number of codes, an untrained encoder whose normalisation and fusion do something."""
+    """By a seed, an untrained encoder whose normalisation and fusion do something."""
     import torch
 
     from export.heads.encoder import HeadEncoder
 
-    def made(seed: int, codes: int = 64) -> HeadEncoder:
+    def made(seed: int) -> HeadEncoder:
         torch.manual_seed(seed)
-        encoder = HeadEncoder(codes)
+        encoder = HeadEncoder()
         for module in encoder.modules():
             if isinstance(module, torch.nn.BatchNorm2d):
                 module.running_mean.uniform_(-0.2, 0.2)

@@ -101,7 +101,7 @@ def test_the_bundle_says_what_int8_costs(fp32, data, tmp_path, monkeypatch, caps
     assert (manifest["task"], manifest["precision"], manifest["name"]) == ("heads", "int8", "heads-int8")
     assert manifest["training_data"] == [{"name": "balls"}]
     measured = manifest["measured"]
-    assert set(measured["sqnr_db"]["encoder"]) == {"cells", "codes", "template_point", "log_sigma", "matte", "normal"}
+    assert set(measured["sqnr_db"]["encoder"]) == {"cells", "template_point", "log_sigma", "matte", "normal"}
     assert min(measured["sqnr_db"]["encoder"].values()) > 10
     assert measured["int8_cost"]["crops"] == 4
     costs = [measured["int8_cost"][name] for name in ("fp32", "int8")]

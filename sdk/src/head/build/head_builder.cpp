@@ -260,7 +260,6 @@ void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
   made.cx_px = (photo.width_px - 1) / 2.0, made.cy_px = (photo.height_px - 1) / 2.0;
   made.rgb_side = encoder_.spec().crop_px();
   made.rgb = encoding_.rgb;
-  made.codes = encoding_.codes;
   const double cells = double(made.seen.cells.size());
   made.face = look_at_face(photo, made.seen, hints.roll_rad);
   if (texture_.side_px > 0) crops_.push_back(texture_crop(photo, seen.square, texture_.side_px));

@@ -50,10 +50,8 @@ EncoderSpec checked_encoder(const Manifest& manifest) {
   encoder.crop_sides = double(node.at("crop_sides").number(1, 8));
   if (const auto face = node.find("face")) encoder.face = checked_face(*face);
   const GraphSpec& graph = manifest.graphs.at(kGraph);
-  encoder.says_codes = graph.outputs.size() == 2;
   require_tensor(manifest, graph.inputs, 1, "input", "image", crop_px, 3);
-  require_tensor(manifest, graph.outputs, encoder.says_codes ? 2 : 1, "output", "cells", encoder.cells.side,
-                 int64_t(kCellChannels));
+  require_tensor(manifest, graph.outputs, 1, "output", "cells", encoder.cells.side, int64_t(kCellChannels));
   return encoder;
 }
 
@@ -94,11 +92,6 @@ HeadBundle::HeadBundle(Bundle opened)
       template_head(template_of_bundle(bundle)) {
   bundle.files.erase(prior_name(bundle.manifest));
   if (template_head != nullptr) bundle.files.erase(template_name(bundle.manifest));
-  if (encoder.says_codes &&
-      !is_tensor(encoder_graph().outputs[1], "codes", {int64_t(1), int64_t(prior.shape_codes()), int64_t(2)})) {
-    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", bundle.manifest.name, ": the second output of graph ", kGraph,
-                " must be codes [1, ", prior.shape_codes(), ", 2], as the prior has them. Export the bundle again.");
-  }
 }
 
 const GraphSpec& HeadBundle::encoder_graph() const { return bundle.manifest.graphs.at(kGraph); }

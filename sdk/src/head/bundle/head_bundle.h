@@ -27,7 +27,6 @@ struct FaceSpec {
 struct EncoderSpec {
   CellGrid cells;
   double crop_sides = 1.6;       // side of the crop by the longer side of the head's box, hair included
-  bool says_codes = false;       // of the whole crop, besides its cells
   std::optional<FaceSpec> face;  // none: there is no closer look
 
   int crop_px() const { return cells.side * cells.cell_px; }

@@ -14,11 +14,8 @@ constexpr float kGrey = 127;
 constexpr double kMinSide_px = 2, kMaxSide_px = 1e5, kMaxPlace_px = 1e6;
 
 Shape input_shape(const EncoderSpec& spec) { return {1, spec.crop_px(), spec.crop_px(), 3}; }
-std::vector<Shape> output_shapes(const HeadBundle& bundle) {
-  const int side = bundle.encoder.cells.side;
-  std::vector<Shape> shapes = {{1, side, side, int64_t(kCellChannels)}};
-  if (bundle.encoder.says_codes) shapes.push_back({1, bundle.prior.shape_codes(), 2});
-  return shapes;
+std::vector<Shape> output_shapes(const EncoderSpec& spec) {
+  return {{1, spec.cells.side, spec.cells.side, int64_t(kCellChannels)}};
 }
 
 void check_numbers(const HeadSquare& square) {
@@ -68,7 +65,7 @@ void check_square(const HeadSquare& square, int width_px, int height_px) {
 
 HeadEncoder::HeadEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const HeadBundle& bundle,
                          SessionSettings settings)
-    : spec_(bundle.encoder), shapes_(output_shapes(bundle)) {
+    : spec_(bundle.encoder), shapes_(output_shapes(spec_)) {
   const GraphSpec& graph = bundle.encoder_graph();
   const std::vector<uint8_t>& bytes = bundle.bundle.files.at(graph.file);
   const std::string name = bundle.bundle.path_of(graph.file);
@@ -99,19 +96,13 @@ void HeadEncoder::run(const ImageView& photo, const HeadSquare& square, const Ru
   }
 
   inputs_.assign(1, {encoding.rgb.data(), input_shape(spec_)});
-  const std::vector<TensorView>& outputs = session_->run(inputs_, shapes_, &cancel);
-  const float* const found = outputs[0].data;
+  const float* const found = session_->run(inputs_, shapes_, &cancel)[0].data;
   const size_t cells = size_t(spec_.cells.side) * size_t(spec_.cells.side);
   encoding.cells.assign(found, found + cells * kCellChannels);
   encoding.broken_cells = 0;
   for (size_t i = 0; i < cells; ++i) {
     const float* const cell = encoding.cells.data() + i * kCellChannels;
     if (!are_finite(cell, kCellChannels)) ++encoding.broken_cells;
-  }
-  encoding.codes.clear();
-  if (spec_.says_codes) {
-    const size_t numbers = 2 * size_t(shapes_[1][1]);
-    if (are_finite(outputs[1].data, numbers)) encoding.codes.assign(outputs[1].data, outputs[1].data + numbers);
   }
   if (encoding.broken_cells == cells) {
     throw Error(MAQ_ERROR_INFERENCE, "The encoder of heads gave no finite number. Install the bundle again.");

@@ -32,9 +32,6 @@ void check_square(const HeadSquare& square, int width_px, int height_px);
 struct HeadEncoding {
   std::vector<float> rgb;    // [crop_px][crop_px][3]: R, G, B in 0..255, what the encoder saw; 127 beyond the photo
   std::vector<float> cells;  // [side][side][kCellChannels], as read_observations() reads them
-  // [shape codes][2]: what the whole crop tells of each, mean and log of its standard deviation; empty where the
-  // encoder does not say it, or not in finite numbers.
-  std::vector<float> codes;
   AffineMap crop_to_photo;
   size_t broken_cells = 0;  // with numbers that are not finite
 };

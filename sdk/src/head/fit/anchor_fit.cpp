@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/math/small_solve.h"
-#include "head/fit/code_prior.h"
 
 namespace maq::head {
 namespace {
@@ -27,12 +27,8 @@ struct Participant {
 
 class JointFit {
  public:
-  JointFit(std::vector<Participant>& parts, CodePrior prior)
-      : parts_(parts),
-        prior_(std::move(prior)),
-        codes_(prior_.means.size()),
-        size_(parts.size() * kPoseUnknowns + codes_),
-        z_(prior_.means) {}
+  JointFit(std::vector<Participant>& parts, size_t codes)
+      : parts_(parts), codes_(codes), size_(parts.size() * kPoseUnknowns + codes), z_(codes) {}
 
   void run(int max_steps) {
     for (const Phase& phase : kPhases) {
@@ -66,7 +62,7 @@ class JointFit {
   }
 
   double cost_of(const std::vector<ScaledPose>& poses, const std::vector<double>& z) const {
-    double sum = prior_.cost(z.data());
+    double sum = std::inner_product(z.begin(), z.end(), z.begin(), 0.0);
     for (size_t i = 0; i < parts_.size(); ++i) {
       sum += parts_[i].terms.cost(poses[i], z.data());
       if (!(parts_[i].log_focal_sigma > 0)) continue;
@@ -103,8 +99,8 @@ class JointFit {
       }
     }
     for (size_t k = 0; k < codes_; ++k) {
-      a_[(first_code + k) * size_ + first_code + k] += prior_.inverse_variances[k];
-      b_[first_code + k] -= prior_.inverse_variances[k] * (z_[k] - prior_.means[k]);
+      a_[(first_code + k) * size_ + first_code + k] += 1;
+      b_[first_code + k] -= z_[k];
     }
   }
 
@@ -148,7 +144,6 @@ class JointFit {
   }
 
   std::vector<Participant>& parts_;
-  CodePrior prior_;
   size_t codes_, size_;
   std::vector<double> z_;
   int steps_ = 0;
@@ -209,9 +204,7 @@ AnchorFit fit_anchors(const HeadPrior& prior, const std::vector<HeadPhoto>& phot
         {i, std::move(terms), scaled_pose_of(pose.camera, {}), std::log(photo.focal_px), photo.log_focal_sigma});
   }
   while (!parts.empty()) {
-    std::vector<const HeadPhoto*> seen;
-    for (const Participant& part : parts) seen.push_back(&photos[part.photo]);
-    JointFit joint(parts, code_prior(seen, points.codes()));
+    JointFit joint(parts, points.codes());
     joint.run(options.max_steps);
     // The photo that agrees least, if it agrees too little, shows another head: without it the others say more.
     size_t worst = 0;

@@ -10,7 +10,7 @@
 
 namespace maq::head {
 
-// With the terms of AnchorTermOptions, code_prior() for the codes and the photo's prior for its focal length.
+// With the terms of AnchorTermOptions, N(0, 1) for each code and the photo's prior for its focal length.
 struct AnchorFitOptions {
   AnchorTermOptions terms;
   // Of a photo's cells, so many must agree with the head that all photos say, or the photo shows no head, or another's.

@@ -7,7 +7,6 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "head/fit/adam.h"
-#include "head/fit/code_prior.h"
 
 namespace maq::head {
 namespace {
@@ -79,9 +78,6 @@ class Fitter {
                         photos[i].log_focal_sigma});
       parts_.back().terms.set_noise(now_.poses.back(), z.data(), 0);
     }
-    std::vector<const HeadPhoto*> seen;
-    for (const Part& part : parts_) seen.push_back(&photos[part.photo]);
-    code_prior_ = code_prior(seen, shape_codes_);
     const size_t unknowns = shape_codes_ + colour_codes_ + kPoseUnknowns * parts_.size();
     full_gradient_.resize(unknowns);
     change_.resize(unknowns);
@@ -204,9 +200,9 @@ class Fitter {
   // Stage 0's terms and priors; adds their gradient where it is asked for.
   void add_priors(const State& state, HeadLosses& losses, double* gradient) {
     const std::vector<double> z = as_doubles(state.codes.shape);
-    losses.prior += 0.5 * code_prior_.cost(z.data());
-    for (size_t k = 0; gradient != nullptr && k < shape_codes_; ++k) {
-      gradient[k] += code_prior_.inverse_variances[k] * (z[k] - code_prior_.means[k]);
+    for (size_t k = 0; k < shape_codes_; ++k) {
+      losses.prior += 0.5 * z[k] * z[k];
+      if (gradient != nullptr) gradient[k] += z[k];
     }
     for (size_t k = 0; k < colour_codes_; ++k) {
       const auto code = double(state.codes.colour[k]);
@@ -364,7 +360,6 @@ class Fitter {
   RayGradient gradient_;
   size_t shape_codes_, colour_codes_;
   Shuffle shuffle_;
-  CodePrior code_prior_;
   std::vector<Part> parts_;
   State now_, best_;
   HeadLosses best_losses_;

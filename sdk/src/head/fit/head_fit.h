@@ -13,10 +13,10 @@
 
 namespace maq::head {
 
-// What is minimised is a negative log posterior: code_prior() for shape codes, 1/2 |c|^2 for colour codes, the focal
-// length's prior, `anchor_weight` times the terms of stage 0, and those of rays (RayTermOptions), of which `ray_weight`
-// a cell of the encoder count: its neighbours say the same, and light and shadow are in no term. With 0.3, as much as
-// then a cell of stage 0, faces of held-out heads became 10 % worse in 5 s; with 0.03 they stay within 2 %.
+// What is minimised is a negative log posterior: 1/2 |z|^2 for all codes, the focal length's prior, `anchor_weight`
+// times the terms of stage 0, and those of rays (RayTermOptions), of which `ray_weight` a cell of the encoder count:
+// its neighbours say the same, and light and shadow are in no term. With 0.3, as much as then a cell of stage 0, faces
+// of held-out heads became 10 % worse in 5 s; with 0.03 they stay within 2 %.
 struct HeadFitOptions {
   AnchorFitOptions anchors;
   RayTermOptions rays;

@@ -49,8 +49,6 @@ struct HeadPhoto {
   // then colours are not fitted.
   int rgb_side = 0;
   std::vector<float> rgb;
-  // What the encoder says of the shape codes, the mean and the log sigma of each; may be empty.
-  std::vector<float> codes;
 };
 
 // `cells`: [side][side][kCellChannels]. crop_to_photo takes the crop's square (0, 0)..(side cell_px) to its place; it

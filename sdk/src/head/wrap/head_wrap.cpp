@@ -179,7 +179,7 @@ class Wrapping {
   bool is_skin(size_t i) const { return head_.kinds[i] == TemplateKind::kSurface; }
 
   // Points that did not find their place, and those of flipped triangles, are let go of: they follow their neighbours,
-  // as the skin inside does. Where that is not enough, so do these.
+  // together with the skin inside, which would hold lips and lids where it is. Where that is not enough, so do these.
   void let_go() {
     look();
     std::vector<uint8_t> is_loose(count_);
@@ -200,7 +200,7 @@ class Wrapping {
         }
       }
       for (size_t i = 0; i < count_; ++i) is_loose[i] = uint8_t(is_loose[i] | is_near[i]);
-      std::vector<size_t> loose;
+      std::vector<size_t> loose = points_inside();
       for (const size_t i : surface_) {
         if (is_loose[i] != 0) loose.push_back(i);
       }

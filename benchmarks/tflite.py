@@ -118,9 +118,10 @@ class Converter:
             return None
         if node.op_type == "Constant":
             return numpy_helper.to_array(node.attribute[0].t)
-        x, scale, zero = (self.constant(x) for x in node.input)
+        x, scale, *zeros = (self.constant(x) for x in node.input)
         if x is None:
             return None
+        zero = zeros[0] if zeros else np.zeros(scale.shape, x.dtype if node.op_type == "DequantizeLinear" else np.uint8)
         if node.op_type == "DequantizeLinear":
             along = [1] * x.ndim
             if scale.ndim:

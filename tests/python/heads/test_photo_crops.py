@@ -109,7 +109,7 @@ def test_losses_and_figures_count_known_points_and_cells_alone():
 
 class Made(MixedStream):
     def __init__(self, share: float) -> None:
-        super().__init__([], np.zeros((0, 5)), Grey(), 16, 0, photos=[faces()], share=share)
+        super().__init__([], Grey(), 16, 0, photos=[faces()], share=share)
 
 
 def test_a_mixed_batch_holds_the_share_in_the_mean_and_both_kinds(monkeypatch):
@@ -129,14 +129,14 @@ def test_the_training_counts_each_crop_of_a_mixed_batch_the_same(monkeypatch):
     from export.heads import train_encoder
 
     def encoder(image):
-        return torch.zeros(len(image), CELLS, CELLS, OUTPUTS), torch.zeros(len(image), 5, 2)
+        return torch.zeros(len(image), CELLS, CELLS, OUTPUTS)
 
     monkeypatch.setattr(train_encoder, "losses", lambda cells, *rest: {"coarse": torch.tensor(float(len(cells)))})
     monkeypatch.setattr(train_encoder, "photo_losses", lambda cells, *rest: {"coarse": torch.tensor(1.0)})
-    made, real = (torch.zeros(12, 192, 192, 3), torch.zeros(12, 5)), (torch.zeros(4, 192, 192, 3),)
+    made, real = (torch.zeros(12, 192, 192, 3),), (torch.zeros(4, 192, 192, 3),)
     terms = train_encoder.batch_losses(encoder, (made, real), "float32")
-    assert {name: float(value) for name, value in terms.items()} == {"coarse": 9.0, "code": 0.0, "photo_coarse": 0.25}
-    assert set(train_encoder.batch_losses(encoder, made, "float32")) == {"coarse", "code"}
+    assert {name: float(value) for name, value in terms.items()} == {"coarse": 9.0, "photo_coarse": 0.25}
+    assert set(train_encoder.batch_losses(encoder, made, "float32")) == {"coarse"}
 
 
 def test_the_training_makes_no_threads_that_its_worker_would_wait_for(tmp_path, monkeypatch):

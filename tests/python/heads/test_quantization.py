@@ -81,7 +81,7 @@ def data(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fp32(lively_encoder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("fp32")
-    export_encoder(lively_encoder(0, 3), folder / "encoder.onnx")
+    export_encoder(lively_encoder(0), folder / "encoder.onnx")
     write_prior(small_prior(), folder / "prior.maqp", bases="float32")
     write_manifest(folder, BundleInfo("heads-fp32", "fp32", training_data=({"name": "balls"},)))
     return folder
@@ -179,7 +179,7 @@ def test_the_noise_of_template_points_is_told_apart_from_that_of_logits():
 def test_figures_are_in_millimetres_and_degrees():
     template = np.random.default_rng(0).normal(size=(48, 48, 3)).astype(np.float32)
     normal = np.broadcast_to(np.float32([0, 0, -1]), (48, 48, 3))
-    crop = Crop(np.zeros((192, 192, 3), np.uint8), template, np.ones((48, 48), np.float32), normal, False)
+    crop = Crop(np.zeros((192, 192, 3), np.uint8), template, np.ones((48, 48), np.float32), normal)
     cells = torch.zeros(1, 48, 48, 8)
     cells[..., :3] = torch.from_numpy(template) + torch.tensor([0.03, 0.0, 0.04])
     cells[..., 4] = 1.0

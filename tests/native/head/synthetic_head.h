@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "head/camera/head_camera.h"
@@ -150,24 +153,37 @@ inline std::vector<float> first_hits(const FieldWeights& weights, const std::vec
   const size_t count = from.size();
   std::vector<float> columns[3], f(count), low(count, -1.0f), high(count, -1.0f), at(count);
   for (auto& column : columns) column.resize(count);
+  std::vector<size_t> rays(count);  // that are looked at
+  std::iota(rays.begin(), rays.end(), size_t{0});
   const auto evaluate = [&] {
-    for (size_t i = 0; i < count; ++i) {
+    for (size_t k = 0; k < rays.size(); ++k) {
+      const size_t i = rays[k];
       const Vec3 p = from[i] + double(at[i]) * (to[i] - from[i]);
-      columns[0][i] = float(p.x), columns[1][i] = float(p.y), columns[2][i] = float(p.z);
+      columns[0][k] = float(p.x), columns[1][k] = float(p.y), columns[2][k] = float(p.z);
     }
-    engine.distances({columns[0].data(), columns[1].data(), columns[2].data(), count}, workspace, f.data());
+    engine.distances({columns[0].data(), columns[1].data(), columns[2].data(), rays.size()}, workspace, f.data());
   };
-  for (int k = 0; k <= kSamples; ++k) {
+  for (int k = 0; k <= kSamples && !rays.empty(); ++k) {
     std::fill(at.begin(), at.end(), float(k) / kSamples);
     evaluate();
-    for (size_t i = 0; i < count; ++i) {
-      if (high[i] < 0 && f[i] <= 0) high[i] = at[i], low[i] = std::max(0.0f, at[i] - 1.0f / kSamples);
+    std::vector<size_t> outside;
+    for (size_t n = 0; n < rays.size(); ++n) {
+      const size_t i = rays[n];
+      if (f[n] <= 0)
+        high[i] = at[i], low[i] = std::max(0.0f, at[i] - 1.0f / kSamples);
+      else
+        outside.push_back(i);
     }
+    rays = std::move(outside);
   }
-  for (int k = 0; k < 16; ++k) {
-    for (size_t i = 0; i < count; ++i) at[i] = (low[i] + high[i]) / 2;
+  rays.clear();
+  for (size_t i = 0; i < count; ++i) {
+    if (high[i] >= 0) rays.push_back(i);
+  }
+  for (int k = 0; k < 16 && !rays.empty(); ++k) {
+    for (const size_t i : rays) at[i] = (low[i] + high[i]) / 2;
     evaluate();
-    for (size_t i = 0; i < count; ++i) (f[i] <= 0 ? high : low)[i] = at[i];
+    for (size_t n = 0; n < rays.size(); ++n) (f[n] <= 0 ? high : low)[rays[n]] = at[rays[n]];
   }
   for (size_t i = 0; i < count; ++i) at[i] = high[i] < 0 ? -1.0f : (low[i] + high[i]) / 2;
   return at;
@@ -296,13 +312,26 @@ inline HeadPhoto photo_of(const FieldCodes& codes, const HeadCamera& camera, con
     FieldEngine engine(weights.shape());
     engine.set_weights(weights);
     FieldWorkspace workspace;
+    std::array<std::vector<float>, 3> at;
     for (size_t i = 0; i < hits.size(); ++i) {
+      if (hits[i] < 0) continue;
       const Vec3 p = from[i] + double(hits[i]) * (to[i] - from[i]);
-      const float x[3] = {float(p.x), float(p.y), float(p.z)};
+      at[0].push_back(float(p.x)), at[1].push_back(float(p.y)), at[2].push_back(float(p.z));
+    }
+    const size_t count = at[0].size();
+    std::vector<float> found(10 * count);
+    const auto three = [&](size_t k) {
+      return std::array<float*, 3>{&found[k * count], &found[(k + 1) * count], &found[(k + 2) * count]};
+    };
+    if (count > 0) {
+      engine.forward({at[0].data(), at[1].data(), at[2].data(), count}, workspace,
+                     {found.data(), three(1), three(4), three(7)});
+    }
+    for (size_t i = 0, hit = 0; i < hits.size(); ++i) {
       float out[10] = {};
       if (hits[i] >= 0) {
-        engine.forward({x, x + 1, x + 2, 1}, workspace,
-                       {out, {out + 1, out + 2, out + 3}, {out + 4, out + 5, out + 6}, {out + 7, out + 8, out + 9}});
+        for (size_t k = 0; k < 10; ++k) out[k] = found[k * count + hit];
+        ++hit;
       }
       use(i, hits[i] >= 0, out);
     }

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import torch
 from maquette import Head, HeadBuilder, MaquetteError
-from maquette.native import native
 from scipy.spatial import cKDTree
 
 from benchmarks.heads.distances import MM_PER_DM
@@ -28,7 +27,6 @@ from export.heads.head_file import StoredHead, read_head
 from export.heads.shapes import HeadShapes
 from export.heads.template_file import Kind, Template, read_template
 
-TEMPLATE_TOPOLOGY = 1  # MAQ_HEAD_TOPOLOGY_TEMPLATE
 STORED_WITHIN_DM = 2e-4  # points of the file
 
 
@@ -66,14 +64,6 @@ def in_field(head: StoredHead, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return distance.detach().numpy(), template.detach().numpy()
 
 
-def wrapped_vertices_m(head: Head) -> np.ndarray:
-    """Of the mesh with the template's topology, [V, 3]."""
-    n = native()
-    mesh = n.sized("maq_head_mesh")
-    n.call("maq_head_get_mesh", head.handle, n.config("maq_head_mesh_options", {"topology": TEMPLATE_TOPOLOGY}), mesh)
-    return np.frombuffer(n.ffi.buffer(mesh.positions_m, 12 * mesh.vertex_count), np.float32).reshape(-1, 3).copy()
-
-
 def stored(head: Head) -> StoredHead:
     """What the library writes of it: the C API does not give the field."""
     with tempfile.TemporaryDirectory() as folder:
@@ -85,7 +75,7 @@ def figures_of(fitted: Head, true: np.ndarray, template: Template, same: np.ndar
     """true [V, 3]: vertices of the true head, dm; same [P]: which of them each point of the template is, or -1."""
     file = stored(fitted)
     points = np.zeros_like(template.points)
-    points[template.vertex_points] = wrapped_vertices_m(fitted) / file.metres_per_unit
+    points[template.vertex_points] = fitted.mesh(topology="template").positions_m / file.metres_per_unit
     skin = template.kinds == Kind.SURFACE
     distance, found = in_field(file, points[skin])
     residual = np.linalg.norm(found - template.points[skin], axis=1)

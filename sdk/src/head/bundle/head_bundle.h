@@ -40,7 +40,7 @@ struct HeadBundle {
   // read, or the graph's input or output is not that of the format; what read_prior() throws.
   explicit HeadBundle(Bundle opened);
 
-  Bundle bundle;  // without the prior's bytes
+  Bundle bundle;  // without the bytes of prior and template
   EncoderSpec encoder;
   HeadPrior prior;
   std::array<uint8_t, 32> prior_sha256;               // of its file: what stored heads name

@@ -10,13 +10,12 @@
 namespace maq::head {
 
 // Writes .glb (glTF 2.0), .obj or .ply (binary, little endian), by the extension of `path` in small letters; it appears
-// atomically. What the mesh knows is written, template points in
-// .ply alone, morph targets in .glb alone. `texture` is a JPEG or PNG file, empty for
-// none; .ply has none. An .obj gets a material beside it, named like it but .mtl, and its texture likewise (.jpg,
-// .png); these appear first. Vertex colours of .glb are linear, as glTF wants them, and left out where there is a
-// texture, which they would be multiplied with. Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, an empty mesh,
-// positions or normals that are no numbers, arrays of wrong lengths, a texture of another format or without
-// coordinates; and what AtomicFile throws.
+// atomically. What the mesh knows is written, template points in .ply alone, morph targets in .glb alone. `texture` is
+// a JPEG or PNG file, empty for none; .ply has none. An .obj gets a material beside it, named like it but .mtl, and its
+// texture likewise (.jpg, .png); these appear first. Vertex colours of .glb are linear, as glTF wants them, and left
+// out where there is a texture, which they would be multiplied with. Throws MAQ_ERROR_INVALID_ARGUMENT for another
+// extension, an empty mesh, positions or normals that are no numbers, arrays of wrong lengths, a texture of another
+// format or without coordinates; and what AtomicFile throws.
 void write_mesh_file(const HeadMesh& mesh, const std::string& path, const std::vector<uint8_t>& texture = {});
 
 // Throws MAQ_ERROR_INVALID_ARGUMENT for another extension: before long work for such a file.

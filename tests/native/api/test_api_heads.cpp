@@ -13,63 +13,17 @@
 #include <vector>
 
 #include "support/file_size_limit.h"
+#include "support/round_heads.h"
 #include "support/temp_folder.h"
 
+namespace api_heads_tests {
 namespace {
 
-constexpr char kHeadsBundle[] = MAQ_TEST_DATA "/round_heads/bundle";
+using namespace round_heads;  // NOLINT
+
 constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
-// In one colour: the encoder of the bundle sees a head in what is not black, and another one in blue.
-struct PlainPhoto {
-  explicit PlainPhoto(int width = 320, int height = 240, std::array<uint8_t, 3> bgr = {120, 130, 140})
-      : pixels(size_t(width) * size_t(height) * 3) {
-    for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = bgr[i % 3];
-    maq_frame_desc_init(&desc, sizeof desc);
-    desc.format = MAQ_PIXEL_BGR8;
-    desc.width_px = width;
-    desc.height_px = height;
-    desc.planes[0] = pixels.data();
-  }
-  std::vector<uint8_t> pixels;
-  maq_frame_desc desc;
-};
-
-maq_head_photo with_box(float left, float top, float right, float bottom) {
-  maq_head_photo photo = maquette::default_head_photo();
-  photo.box_px[0] = left, photo.box_px[1] = top, photo.box_px[2] = right, photo.box_px[3] = bottom;
-  return photo;
-}
-
-maq_head_mesh_options of_cell(double cell_m) {
-  maq_head_mesh_options options = maquette::default_head_mesh_options();
-  options.cell_m = cell_m;
-  return options;
-}
-
-const maq_head_mesh_options coarse = of_cell(0.008);
-
-class ApiHeads : public testing::Test {
- protected:
-  static void expect_text(const char* text) {
-    EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
-  }
-  void expect_refused(maq_status status, const char* text, const maq_frame* given, const maq_head_photo& photo) {
-    EXPECT_EQ(maq_head_builder_add_photo(builder.get(), given, &photo), status);
-    expect_text(text);
-  }
-  maquette::Head fitted(double seconds = 0) {
-    builder.clear();
-    builder.add_photo(frame, known);
-    return builder.fit(seconds);
-  }
-
-  const maquette::Context context;
-  const PlainPhoto image, black{320, 240, {0, 0, 0}}, blue{320, 240, {200, 60, 20}};
-  const maquette::Frame frame{context, image.desc}, black_frame{context, black.desc}, blue_frame{context, blue.desc};
-  const maq_head_photo known = with_box(110, 60, 200, 180);
-  maquette::HeadBuilder builder{context, kHeadsBundle};
-};
+class ApiHeads : public RoundHeads {};
 
 TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndPlaces) {
   builder.add_photo(frame, known);
@@ -381,88 +335,6 @@ TEST_F(ApiHeads, MeshesHaveAsManyTrianglesAsAreAskedFor) {
   expect_text("options.struct_size");
 }
 
-maq_head_mesh_options of_template() {
-  maq_head_mesh_options options = maquette::default_head_mesh_options();
-  options.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
-  return options;
-}
-
-TEST_F(ApiHeads, TheTemplatesMeshHasItsVerticesOnTheHeadAndMorphTargets) {
-  maquette::Head head = fitted();
-  const float crown_m = float(head.landmark("crown").point_m[2]);
-  const maq_head_mesh mesh = head.mesh(of_template());
-  ASSERT_EQ(mesh.vertex_count, 14u * 25 + 1 + 12) << "as tests/native/generate/make_round_heads.py has it";
-  EXPECT_EQ(mesh.triangle_count, 24u * (1 + 2 * 13) + 16);
-  ASSERT_NE(mesh.texture_coordinates, nullptr);
-  EXPECT_EQ(mesh.texture_jpeg, nullptr);
-  for (uint32_t i = 0; i < 14 * 25 + 1; ++i) {
-    const float *p = mesh.positions_m + 3 * i, *t = mesh.template_points_m + 3 * i, *n = mesh.normals + 3 * i;
-    ASSERT_NEAR(t[2] * crown_m, p[2] * 0.121f, 1e-3f) << "on the template head the crown is at 121 mm";
-    ASSERT_GT(n[0] * p[0] + n[1] * p[1] + n[2] * p[2], 0) << "outwards";
-    ASSERT_GE(mesh.texture_coordinates[2 * i], 0);
-    ASSERT_LE(mesh.texture_coordinates[2 * i], 1);
-  }
-  ASSERT_EQ(mesh.morph_target_count, 2u);
-  EXPECT_STREQ(head.morph_target(1).name, "eyeBlinkLeft");
-  const maq_head_morph_target jaw = head.morph_target(0);
-  EXPECT_STREQ(jaw.name, "jawOpen");
-  ASSERT_GT(jaw.vertex_count, 20u);
-  for (uint32_t k = 0; k < jaw.vertex_count; ++k) {
-    ASSERT_LT(jaw.vertices[k], mesh.vertex_count);
-    ASSERT_TRUE(k == 0 || jaw.vertices[k] > jaw.vertices[k - 1]);
-    ASSERT_NEAR(jaw.moves_m[3 * k + 2], -0.015f, 0.003f) << "15 mm, by the size of the face";
-  }
-  maq_head_morph_target target{};
-  EXPECT_EQ(maq_head_get_morph_target(head.get(), 0, &target), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
-  target.struct_size = sizeof target;
-  EXPECT_EQ(maq_head_get_morph_target(head.get(), 2, &target), MAQ_ERROR_INVALID_ARGUMENT);
-  head.mesh(coarse);
-  EXPECT_EQ(maq_head_get_morph_target(head.get(), 0, &target), MAQ_ERROR_INVALID_ARGUMENT) << "another mesh";
-}
-
-TEST_F(ApiHeads, AnOpenedHeadTakesTheTemplateOfTheBundleThatIsNamed) {
-  const TempFolder folder;
-  maquette::Head head = fitted();
-  head.save(folder.file("a.maqh"));
-  maquette::Head opened = maquette::Head::open(context, folder.file("a.maqh"));
-  maq_head_mesh_options options = of_template();
-  maq_head_mesh mesh{};
-  mesh.struct_size = sizeof mesh;
-  options.bundle_path = "/nowhere";
-  EXPECT_EQ(maq_head_get_mesh(opened.get(), &options, &mesh), MAQ_ERROR_NOT_FOUND);
-  options.bundle_path = MAQ_TEST_DATA "/tiny_head/bundle";
-  EXPECT_EQ(maq_head_get_mesh(opened.get(), &options, &mesh), MAQ_ERROR_UNSUPPORTED);
-  expect_text("has no template head");
-  options.bundle_path = kHeadsBundle;
-  const maq_head_mesh made = opened.mesh(options), as_fitted = head.mesh(of_template());
-  ASSERT_EQ(made.vertex_count, as_fitted.vertex_count);
-  for (uint32_t i = 0; i < 3 * made.vertex_count; ++i) {
-    ASSERT_NEAR(made.positions_m[i], as_fitted.positions_m[i], 5e-4) << "weights are stored as float16";
-  }
-  options.bundle_path = nullptr;
-  EXPECT_EQ(opened.mesh(options).positions_m, made.positions_m) << "it has its template now";
-  opened.export_mesh(folder.file("a.glb"), options);
-  EXPECT_NE(read_text(folder.file("a.glb")).find("targetNames"), std::string::npos);
-}
-
-TEST_F(ApiHeads, TopologiesThatThereAreNotAndTrianglesOfTheTemplateAreASentence) {
-  maquette::Head head = fitted();
-  maq_head_mesh mesh{};
-  mesh.struct_size = sizeof mesh;
-  maq_head_mesh_options options = of_template();
-  options.cell_m = 0.002;
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("must be 0 with the template's topology");
-  options = of_template();
-  options.triangle_count = 5000;
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
-  const int32_t wrong = 2;
-  options = of_template();
-  std::memcpy(&options.topology, &wrong, sizeof wrong);
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("options.topology is 2");
-}
-
 TEST_F(ApiHeads, AHeadHasATextureWhereItIsAskedFor) {
   const TempFolder folder;
   maquette::Head plain = fitted();
@@ -711,3 +583,4 @@ TEST_F(ApiHeads, DensePoseGivesBoxesOfHeads) {
 }
 
 }  // namespace
+}  // namespace api_heads_tests

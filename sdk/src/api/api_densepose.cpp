@@ -15,11 +15,11 @@ using namespace maq;
 namespace {
 
 // Of the struct without what came after the crops of people.
-constexpr size_t kFirstConfigSize = offsetof(maq_densepose_config, provider);
+constexpr size_t kFirstDensePoseConfigSize = offsetof(maq_densepose_config, provider);
 // Without the threads.
-constexpr size_t kFirstStatsSize = offsetof(maq_densepose_stats, threads);
+constexpr size_t kFirstDensePoseStatsSize = offsetof(maq_densepose_stats, threads);
 
-maq_densepose_config default_config() {
+maq_densepose_config default_densepose_config() {
   maq_densepose_config config{};
   config.struct_size = sizeof config;
   config.score_threshold = -1;
@@ -46,7 +46,7 @@ const BodyPart* body_part(int32_t part) {
 namespace maq {
 
 maq_densepose_config read_densepose_config(const maq_densepose_config* given, const char* name) {
-  return read_config(given, name, default_config(), kFirstConfigSize);
+  return read_config(given, name, default_densepose_config(), kFirstDensePoseConfigSize);
 }
 
 DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name) {
@@ -98,7 +98,7 @@ void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]) {
 }
 
 maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+  return init_config(__func__, config, struct_size, default_densepose_config(), kFirstDensePoseConfigSize);
 }
 
 maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* given, maq_densepose** densepose) {
@@ -225,7 +225,7 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.provider = from.provider;
     filled.threads = from.threads;
     filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
-    write_struct(stats, "stats", filled, kFirstStatsSize);
+    write_struct(stats, "stats", filled, kFirstDensePoseStatsSize);
     return MAQ_OK;
   });
 }

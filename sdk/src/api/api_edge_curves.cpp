@@ -10,7 +10,7 @@ using namespace maq;
 namespace {
 
 // Of the structs' first release.
-constexpr size_t kFirstConfigSize = sizeof(maq_edges_curves_config);
+constexpr size_t kFirstCurvesConfigSize = sizeof(maq_edges_curves_config);
 constexpr double kMaxRadiusPx = 1e6;
 
 // Points are handed out as triples of doubles.
@@ -21,7 +21,7 @@ static_assert(int(Bend::kConvex) == MAQ_EDGE_BEND_CONVEX && int(Bend::kConcave) 
 static_assert(int(SnapTarget::kCorner) == MAQ_EDGES_SNAP_CORNER && int(SnapTarget::kEdge) == MAQ_EDGES_SNAP_CURVE &&
               int(SnapTarget::kPlane) == MAQ_EDGES_SNAP_PLANE);
 
-maq_edges_curves_config default_config() {
+maq_edges_curves_config default_curves_config() {
   const CurveOptions options;
   maq_edges_curves_config config{};
   config.struct_size = sizeof config;
@@ -69,7 +69,7 @@ Vec3 read_vector(const double* from, const char* name) {
 }  // namespace
 
 CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char* name) {
-  const maq_edges_curves_config config = read_config(given, name, default_config(), kFirstConfigSize);
+  const maq_edges_curves_config config = read_config(given, name, default_curves_config(), kFirstCurvesConfigSize);
   require_range(concatenate(name, ".find_boxes"), config.find_boxes, 0, 1);
   CurveRequest request;
   request.finds_boxes = config.find_boxes == 1;
@@ -80,7 +80,7 @@ CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char
 }
 
 maq_status maq_edges_curves_config_init(maq_edges_curves_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+  return init_config(__func__, config, struct_size, default_curves_config(), kFirstCurvesConfigSize);
 }
 
 maq_status maq_edges_result_find_curves(const maq_edges_result* result, const maq_edges_curves_config* config,

@@ -14,9 +14,10 @@ using namespace maq;
 namespace {
 
 // Of the structs' first release; that of the stats without the threads.
-constexpr size_t kFirstConfigSize = sizeof(maq_edges_config), kFirstStatsSize = offsetof(maq_edges_stats, threads);
+constexpr size_t kFirstEdgesConfigSize = sizeof(maq_edges_config),
+                 kFirstEdgesStatsSize = offsetof(maq_edges_stats, threads);
 
-maq_edges_config default_config() {
+maq_edges_config default_edges_config() {
   maq_edges_config config{};
   config.struct_size = sizeof config;
   config.result_pool_size = 4;
@@ -27,7 +28,7 @@ maq_edges_config default_config() {
 }  // namespace
 
 maq_edges_config maq::read_edges_config(const maq_edges_config* given, const char* name) {
-  return read_config(given, name, default_config(), kFirstConfigSize);
+  return read_config(given, name, default_edges_config(), kFirstEdgesConfigSize);
 }
 
 EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* name) {
@@ -46,7 +47,7 @@ EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* na
 }
 
 maq_status maq_edges_config_init(maq_edges_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+  return init_config(__func__, config, struct_size, default_edges_config(), kFirstEdgesConfigSize);
 }
 
 maq_status maq_edges_create(maq_context* context, const maq_edges_config* given, maq_edges** edges) {
@@ -160,7 +161,7 @@ maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_
     filled.provider = from.provider;
     filled.threads = from.threads;
     filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
-    write_struct(stats, "stats", filled, kFirstStatsSize);
+    write_struct(stats, "stats", filled, kFirstEdgesStatsSize);
     return MAQ_OK;
   });
 }

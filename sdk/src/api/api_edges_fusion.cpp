@@ -16,11 +16,11 @@ using namespace maq;
 namespace {
 
 // Of the structs' first release.
-constexpr size_t kFirstConfigSize = sizeof(maq_edges_fusion_config);
+constexpr size_t kFirstFusionConfigSize = sizeof(maq_edges_fusion_config);
 constexpr size_t kCurvesPool = 4;
 constexpr float kFractionOfPoints = 0.9f;  // of the time of finish; curves take the rest
 
-maq_edges_fusion_config default_config() {
+maq_edges_fusion_config default_fusion_config() {
   const FusionOptions options;
   maq_edges_fusion_config config{};
   config.struct_size = sizeof config;
@@ -71,7 +71,7 @@ struct maq_edges_fusion : HandleOf<HandleKind::kEdgesFusion> {
 };
 
 maq_status maq_edges_fusion_config_init(maq_edges_fusion_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+  return init_config(__func__, config, struct_size, default_fusion_config(), kFirstFusionConfigSize);
 }
 
 maq_status maq_edges_fusion_create(maq_context* context, const maq_edges_fusion_config* given,
@@ -79,7 +79,8 @@ maq_status maq_edges_fusion_create(maq_context* context, const maq_edges_fusion_
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(fusion, "fusion");
-    const maq_edges_fusion_config config = read_config(given, "config", default_config(), kFirstConfigSize);
+    const maq_edges_fusion_config config =
+        read_config(given, "config", default_fusion_config(), kFirstFusionConfigSize);
     fusion_options(config);  // checks it before threads start
     *fusion = new maq_edges_fusion(config);
     return MAQ_OK;

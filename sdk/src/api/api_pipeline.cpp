@@ -15,15 +15,15 @@ namespace {
 constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
 constexpr double kMaxFrameBudgetMs = 60000;
 // Of the structs without the frame budget.
-constexpr size_t kFirstConfigSize = offsetof(maq_pipeline_config, nice) + sizeof(int32_t);
-constexpr size_t kFirstStatsSize = offsetof(maq_pipeline_stats, key_frame_interval);
+constexpr size_t kFirstPipelineConfigSize = offsetof(maq_pipeline_config, nice) + sizeof(int32_t);
+constexpr size_t kFirstPipelineStatsSize = offsetof(maq_pipeline_stats, key_frame_interval);
 // Of the struct without edges.
 constexpr size_t kFirstResultSize = offsetof(maq_pipeline_result, edges);
 
 // Of the thread that asked, as with maq_last_error.
 thread_local std::string given_problem, given_uri;
 
-maq_pipeline_config default_config() {
+maq_pipeline_config default_pipeline_config() {
   maq_pipeline_config config{};
   config.struct_size = sizeof config;
   config.result_pool_size = kDefaultPoolSize;
@@ -160,7 +160,7 @@ struct maq_pipeline : HandleOf<HandleKind::kPipeline> {
 };
 
 maq_status maq_pipeline_config_init(maq_pipeline_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+  return init_config(__func__, config, struct_size, default_pipeline_config(), kFirstPipelineConfigSize);
 }
 
 maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* given, maq_pipeline** pipeline) {
@@ -168,7 +168,8 @@ maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* 
     require_argument(context, "context");
     require_argument(given, "config");
     require_argument(pipeline, "pipeline");
-    const maq_pipeline_config config = read_config(given, "config", default_config(), kFirstConfigSize);
+    const maq_pipeline_config config =
+        read_config(given, "config", default_pipeline_config(), kFirstPipelineConfigSize);
     require_range("config.result_pool_size", config.result_pool_size, 1u, kMaxPoolSize);
     *pipeline = new maq_pipeline(config, context->state);
     return MAQ_OK;
@@ -284,7 +285,7 @@ maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipeline_sta
                  maq_pipeline_stats{0, from.results, from.dropped_results, from.dropped_frames, from.results_per_second,
                                     from.latest.wait_ms, from.latest.run_ms, from.latest.age_ms,
                                     from.effort.key_frame_interval, from.effort.long_side_px},
-                 kFirstStatsSize);
+                 kFirstPipelineStatsSize);
     return MAQ_OK;
   });
 }

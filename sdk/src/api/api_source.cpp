@@ -10,11 +10,11 @@ namespace {
 
 constexpr uint32_t kLargestPoolSize = 64;
 // Of the structs without what is for cameras.
-constexpr size_t kFirstConfigSize = offsetof(maq_source_config, queue_length);
-constexpr size_t kFirstInfoSize = offsetof(maq_source_info, dropped_frame_count);
+constexpr size_t kFirstSourceConfigSize = offsetof(maq_source_config, queue_length);
+constexpr size_t kFirstSourceInfoSize = offsetof(maq_source_info, dropped_frame_count);
 constexpr size_t kFirstSchemeSize = offsetof(maq_source_scheme, is_camera);
 
-maq_source_config default_config() {
+maq_source_config default_source_config() {
   maq_source_config config{};
   config.struct_size = sizeof config;
   const SourceSettings defaults;
@@ -34,7 +34,7 @@ void require_control(maq_control control) {
 namespace maq {
 
 maq_source_config read_source_config(const maq_source_config* given, const char* name) {
-  return read_config(given, name, default_config(), kFirstConfigSize);
+  return read_config(given, name, default_source_config(), kFirstSourceConfigSize);
 }
 
 SourceSettings source_settings(const maq_source_config& config, const char* name, const Log& log) {
@@ -63,7 +63,7 @@ SourceSettings source_settings(const maq_source_config& config, const char* name
 }  // namespace maq
 
 maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+  return init_config(__func__, config, struct_size, default_source_config(), kFirstSourceConfigSize);
 }
 
 maq_status maq_source_create(maq_context* context, const char* uri, const maq_source_config* given,
@@ -103,7 +103,7 @@ maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) 
     filled.clock = from.clock;
     filled.frame_pool_size = uint32_t(source->frames.capacity());
     filled.dropped_frame_count = source->source->drops();
-    write_struct(info, "info", filled, kFirstInfoSize);
+    write_struct(info, "info", filled, kFirstSourceInfoSize);
     return MAQ_OK;
   });
 }

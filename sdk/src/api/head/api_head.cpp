@@ -24,7 +24,6 @@ std::vector<float> in_metres(std::vector<float> decimetres) {
 
 // Of the structs' first release.
 constexpr size_t kFirstMeshOptionsSize = sizeof(maq_head_mesh_options), kFirstMeshSize = sizeof(maq_head_mesh);
-constexpr char kHeadsBundle[] = "heads-int8";  // of options without one
 constexpr uint32_t kDefaultTriangles = 60000, kMinTriangles = 100;
 
 maq_head_mesh_options default_mesh_options() {

@@ -14,10 +14,9 @@ using namespace maq;
 namespace {
 
 // Of the structs' first release.
-constexpr size_t kFirstConfigSize = sizeof(maq_head_config), kFirstPhotoSize = sizeof(maq_head_photo);
-constexpr char kHeadsBundle[] = "heads-int8";  // of a config without one
+constexpr size_t kFirstHeadConfigSize = sizeof(maq_head_config), kFirstPhotoSize = sizeof(maq_head_photo);
 
-maq_head_config default_config() {
+maq_head_config default_head_builder_config() {
   maq_head_config config{};
   config.struct_size = sizeof config;
   config.allow_spinning = 1;
@@ -47,7 +46,7 @@ struct maq_head_builder : HandleOf<HandleKind::kHeadBuilder> {
 };
 
 maq_status maq_head_config_init(maq_head_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), kFirstConfigSize);
+  return init_config(__func__, config, struct_size, default_head_builder_config(), kFirstHeadConfigSize);
 }
 
 maq_status maq_head_photo_init(maq_head_photo* photo, uint32_t struct_size) {
@@ -58,7 +57,7 @@ maq_status maq_head_builder_create(maq_context* context, const maq_head_config* 
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(builder, "builder");
-    const maq_head_config config = read_config(given, "config", default_config(), kFirstConfigSize);
+    const maq_head_config config = read_config(given, "config", default_head_builder_config(), kFirstHeadConfigSize);
     SessionSettings settings = session_settings(config);
     if (config.texture_px != 0) {
       require_range("config.texture_px", config.texture_px, uint32_t(head::kMinTexture_px),

@@ -15,7 +15,7 @@ using namespace maq;
 
 namespace {
 
-maq_head_renderer_config default_config() {
+maq_head_renderer_config default_head_renderer_config() {
   maq_head_renderer_config config{};
   config.struct_size = sizeof config;
   config.near_m = 0.01;
@@ -84,7 +84,7 @@ maq_status maq_head_get_camera(const maq_head* head, uint32_t index, maq_pinhole
 }
 
 maq_status maq_head_renderer_config_init(maq_head_renderer_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_head_renderer_config));
+  return init_config(__func__, config, struct_size, default_head_renderer_config(), sizeof(maq_head_renderer_config));
 }
 
 maq_status maq_head_renderer_create(maq_context* context, const maq_head_renderer_config* given, maq_head* head,
@@ -93,7 +93,7 @@ maq_status maq_head_renderer_create(maq_context* context, const maq_head_rendere
     require_argument(context, "context");
     require_argument(renderer, "renderer");
     const maq_head_renderer_config config =
-        read_config(given, "config", default_config(), sizeof(maq_head_renderer_config));
+        read_config(given, "config", default_head_renderer_config(), sizeof(maq_head_renderer_config));
     const head::HeadRenderOptions options = options_of(config);
     *renderer = new maq_head_renderer(mesh_of(*head, config.mesh), options, config.image_pool_size);
     return MAQ_OK;

@@ -11,6 +11,8 @@
 #include "head/stored_head.h"
 #include "maquette/head.h"
 
+constexpr char kHeadsBundle[] = "heads-int8";  // of a config, or of options, that name none
+
 // A head stays what it is while the app has it; its mesh is made when it is asked for.
 struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
   maq_head(maq::head::StoredHead of, int thread_count,

@@ -21,7 +21,7 @@ struct BuildSettings {
   BuildProgress progress;
 };
 
-maq_scene_build_config default_config() {
+maq_scene_build_config default_scene_build_config() {
   maq_scene_build_config config{};
   config.struct_size = sizeof config;
   config.long_side_px = 640;
@@ -104,7 +104,7 @@ struct maq_scene_builder : HandleOf<HandleKind::kSceneBuilder> {
 };
 
 maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_config(), sizeof(maq_scene_build_config));
+  return init_config(__func__, config, struct_size, default_scene_build_config(), sizeof(maq_scene_build_config));
 }
 
 maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* given, const maq_capture* capture,
@@ -114,7 +114,7 @@ maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* g
     require_argument(capture, "capture");
     require_argument(scene, "scene");
     const maq_scene_build_config config =
-        read_config(given, "config", default_config(), sizeof(maq_scene_build_config));
+        read_config(given, "config", default_scene_build_config(), sizeof(maq_scene_build_config));
     const BuildSettings settings = checked_settings(config);
     if (stats != nullptr) require_struct_size("stats", stats->struct_size, sizeof *stats, sizeof *stats);
     const auto networks = open_scene_networks(context, settings.read_bundle(), settings.options.fitting.threads, true);
@@ -140,7 +140,7 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
                   kMaxPoints, "; make it thinner.");
     }
     const maq_scene_build_config config =
-        read_config(given, "config", default_config(), sizeof(maq_scene_build_config));
+        read_config(given, "config", default_scene_build_config(), sizeof(maq_scene_build_config));
     BuildSettings settings = checked_settings(config);
     auto networks = open_scene_networks(context, settings.read_bundle(), settings.options.fitting.threads, true);
     PointCloud points;

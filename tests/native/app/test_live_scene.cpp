@@ -477,7 +477,7 @@ TEST(LiveScene, OpeningManyTimesLeavesNothingBehind) {
   {
     const maquette::Context context;
     maquette::LiveScene scene(context, kBundle, 2);
-    for (int i = 0; i < 30; ++i) {
+    for (int i = 0; i < 12; ++i) {
       scene.open(small_room(), i % 2 == 0 ? kRoom : "");
       if (i % 3 == 0) continue;
       ASSERT_TRUE(wait_until_open(scene));
@@ -486,7 +486,7 @@ TEST(LiveScene, OpeningManyTimesLeavesNothingBehind) {
     }
     EXPECT_EQ(threads_of_this_process().size(), threads);
   }
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 8; ++i) {
     const maquette::Context context;
     maquette::LiveScene scene(context, kBundle, 2);
     scene.open(i % 2 == 0 ? small_room() : thinned_room());

@@ -13,8 +13,8 @@
 #include "maquette/maquette.h"
 #include "status_error.h"
 
-// A native method of an object of the package dev.maquette.
-#define MAQ_NATIVE_OF(object, type, name) extern "C" JNIEXPORT type JNICALL Java_dev_maquette_##object##_##name
+// A native method of an object of the package dev.maquette.jni.
+#define MAQ_NATIVE_OF(object, type, name) extern "C" JNIEXPORT type JNICALL Java_dev_maquette_jni_##object##_##name
 #define MAQ_NATIVE(type, name) MAQ_NATIVE_OF(Native, type, name)
 
 namespace maq_jni {

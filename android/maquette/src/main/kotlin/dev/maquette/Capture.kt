@@ -1,5 +1,7 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeScene
+
 /**
  * Posed photos of a place and a point cloud, in a folder. Made by [Maquette.openCapture]. Photos are read when they are
  * needed. All functions may be called from any thread.

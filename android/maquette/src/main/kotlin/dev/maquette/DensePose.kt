@@ -2,6 +2,8 @@ package dev.maquette
 
 import android.graphics.Bitmap
 import android.hardware.HardwareBuffer
+import dev.maquette.jni.Native
+import dev.maquette.jni.NativePicture
 import java.nio.ByteBuffer
 
 /** Finds people and maps each of their pixels to the body surface. Made by [Maquette.densePose]. */

@@ -1,5 +1,7 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeEdges
+
 /** A point in metres, in the camera's coordinates: x right, y down, z along the optical axis. */
 data class Point3(val x: Double, val y: Double, val z: Double)
 

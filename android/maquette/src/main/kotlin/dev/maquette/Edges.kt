@@ -1,5 +1,6 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeEdges
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
 import java.nio.FloatBuffer

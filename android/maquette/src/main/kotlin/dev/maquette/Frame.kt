@@ -2,6 +2,8 @@ package dev.maquette
 
 import android.graphics.Bitmap
 import android.hardware.HardwareBuffer
+import dev.maquette.jni.Native
+import dev.maquette.jni.NativePicture
 import java.nio.ByteBuffer
 
 /** Rows from top to bottom, 8 bits a channel but for depth. */

@@ -8,6 +8,7 @@ import android.util.AttributeSet
 import android.util.Log
 import android.view.SurfaceHolder
 import android.view.SurfaceView
+import dev.maquette.jni.NativePreview
 import java.util.concurrent.CountDownLatch
 import kotlin.concurrent.thread
 

@@ -5,6 +5,10 @@ import android.graphics.Bitmap
 import android.graphics.ImageFormat
 import android.hardware.HardwareBuffer
 import android.media.Image
+import dev.maquette.jni.Native
+import dev.maquette.jni.NativeEdges
+import dev.maquette.jni.NativePicture
+import dev.maquette.jni.NativeScene
 import java.io.IOException
 import java.nio.ByteBuffer
 

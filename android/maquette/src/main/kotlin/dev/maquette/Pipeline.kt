@@ -1,5 +1,7 @@
 package dev.maquette
 
+import dev.maquette.jni.NativePipeline
+
 /**
  * Runs a source and dense pose on a thread of the library, for apps that must not block. The newest frame is processed;
  * frames that come while the networks are busy are dropped. Made by [Maquette.pipeline]; stopped until [setSource].

@@ -1,5 +1,7 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeSource
+
 /**
  * Writes frames to a recording (.maqrec) with their times, depth and intrinsics; the source `rec:` plays it. Made by
  * [Maquette.recorder]. After a crash, every frame that was added can be read.

@@ -1,5 +1,7 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeScene
+
 /**
  * A place that can be seen from new viewpoints with a [SceneRenderer]. Made by [Maquette.buildScene],
  * [SceneBuilder.finish] and [Maquette.openScene]. All functions may be called from any thread.

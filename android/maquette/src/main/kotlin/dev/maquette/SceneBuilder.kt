@@ -1,5 +1,6 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeScene
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
 

@@ -1,6 +1,7 @@
 package dev.maquette
 
 import android.graphics.Bitmap
+import dev.maquette.jni.NativeScene
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
 

@@ -1,5 +1,7 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeSource
+
 /** A timeout without limit. */
 const val WAIT_FOREVER: Long = -1
 

@@ -1,5 +1,6 @@
-package dev.maquette
+package dev.maquette.jni
 
+import dev.maquette.Progress
 import java.nio.ByteBuffer
 
 /** The C API's captures and scenes, as [Native]. */

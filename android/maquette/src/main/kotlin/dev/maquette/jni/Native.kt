@@ -1,11 +1,10 @@
-package dev.maquette
+package dev.maquette.jni
 
 import java.nio.ByteBuffer
 
 /**
- * The C API (src/main/cpp): contexts, frames and dense pose; [NativeSource], [NativePipeline], [NativeScene],
- * [NativeEdges], [NativePicture] and [NativePreview] have the rest. Handles are numbers here; [Handle] keeps them. Texts
- * are UTF-8. A bundle is a folder, or names and buffers.
+ * The C API (src/main/cpp): contexts, frames and dense pose; the other objects of this package have the rest. Handles are
+ * numbers here; [dev.maquette.Handle] keeps them. Texts are UTF-8. A bundle is a folder, or names and buffers.
  * The values of a configuration are in the order of its properties.
  */
 internal object Native {

@@ -1,4 +1,4 @@
-package dev.maquette
+package dev.maquette.jni
 
 import android.graphics.Bitmap
 import android.hardware.HardwareBuffer

@@ -1,4 +1,7 @@
-package dev.maquette
+package dev.maquette.jni
+
+import dev.maquette.Changes
+import dev.maquette.Source
 
 /** The C API's sources and recorders, as [Native]. */
 internal object NativeSource {

@@ -1,5 +1,7 @@
-package dev.maquette
+package dev.maquette.jni
 
+import dev.maquette.Changes
+import dev.maquette.Pipeline
 import java.nio.ByteBuffer
 
 /** The C API's pipelines, as [Native]. */

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "core/error.h"
-#include "core/file.h"
+#include "core/files/file.h"
 #include "nn/sha256.h"
 
 namespace maq {

@@ -10,9 +10,9 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/files/unique_fd.h"
 #include "core/rounding.h"
 #include "core/thread.h"
-#include "core/unique_fd.h"
 #include "image/depth.h"
 #include "image/files/jpeg.h"
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "core/error.h"
-#include "core/file.h"
+#include "core/files/file.h"
 #include "sources/android/camera2_camera.h"
 #include "sources/calibration_options.h"
 #include "sources/control_options.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/atomic_file.h"
+#include "core/files/atomic_file.h"
 #include "print.h"
 
 namespace fs = std::filesystem;

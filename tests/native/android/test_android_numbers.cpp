@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/file_reader.h"
+#include "core/files/file_reader.h"
 
 namespace {
 

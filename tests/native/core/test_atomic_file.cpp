@@ -1,5 +1,5 @@
 // Files that appear whole, and what else a path may lead to: links, devices, pipes, descriptors.
-#include "core/atomic_file.h"
+#include "core/files/atomic_file.h"
 
 #include <dlfcn.h>
 #include <fcntl.h>

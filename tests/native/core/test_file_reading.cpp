@@ -5,8 +5,8 @@
 
 #include <thread>
 
-#include "core/file.h"
-#include "core/file_reader.h"
+#include "core/files/file.h"
+#include "core/files/file_reader.h"
 #include "support/expect_error.h"
 #include "support/pipe_writer.h"
 #include "support/temp_folder.h"

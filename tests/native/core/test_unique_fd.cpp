@@ -1,5 +1,5 @@
 // Descriptors and events that close themselves.
-#include "core/unique_fd.h"
+#include "core/files/unique_fd.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

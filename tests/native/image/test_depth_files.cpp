@@ -6,7 +6,7 @@
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/file.h"
+#include "core/files/file.h"
 #include "image/files/depth_file.h"
 #include "image/files/image_file.h"
 #include "support/expect_error.h"

@@ -2,7 +2,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/file.h"
+#include "core/files/file.h"
 #include "image/files/image_file.h"
 #include "image/files/image_header.h"
 #include "support/expect_error.h"

@@ -14,7 +14,7 @@ MAX_FILES, SMALL_UNIT_LINES = 25, 60
 
 # Each folder of sdk/src, and the folders that its files may include beside their own. A folder in a folder is a room of
 # its own: "scene" means the files of sdk/src/scene, not those of its rooms.
-BASE = {"core", "core/math", "image", "image/geometry", "image/files", "nn"}
+BASE = {"core", "core/files", "core/math", "image", "image/geometry", "image/files", "nn"}
 BACKEND = BASE - {"nn"} | {"sources"}
 CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
@@ -31,13 +31,14 @@ SYSTEMS = (
 )  # fmt: skip
 MAY_INCLUDE = {
     "core": set(),
+    "core/files": {"core"},
     "core/math": set(),
     "core/trace": set(),
     "image": {"core", "image/geometry"},
-    "image/files": {"core", "image"},
-    "image/files/android": {"core", "image", "image/files"},
+    "image/files": {"core", "core/files", "image"},
+    "image/files/android": {"core", "core/files", "image", "image/files"},
     "image/geometry": {"core", "image"},
-    "nn": {"core"},
+    "nn": {"core", "core/files"},
     "densepose": BASE | {"core/trace"},
     "edges": BASE,
     "edges/curves": BASE - {"nn"} | {"edges"},
@@ -49,7 +50,7 @@ MAY_INCLUDE = {
     "head/build": BASE | {"head/bundle"} | HEAD,
     "head/camera": {"core", "core/math"},
     "head/field": {"core", "core/math"},
-    "head/files": {"core", "core/math", "head", "head/camera", "head/field"},
+    "head/files": {"core", "core/files", "core/math", "head", "head/camera", "head/field"},
     "head/fit": BASE - {"nn"} | {"head", "head/camera", "head/field"},
     "head/mesh": BASE - {"nn"} | {"head/camera"},
     "head/render": BASE - {"nn"} | {"head/camera", "head/mesh"},
@@ -90,7 +91,7 @@ TOOLS_MAY_INCLUDE = {
 # What the tools compile in of sdk/src and sdk/app: there is one way to write a file that appears whole, and one to draw
 # edges.
 COMPILED_IN = {
-    ("sdk/tools/output/output_file.cpp", "core/atomic_file.h"),
+    ("sdk/tools/output/output_file.cpp", "core/files/atomic_file.h"),
     ("sdk/tools/output/edge_overlay.cpp", "app/edge_picture.h"),
 }
 

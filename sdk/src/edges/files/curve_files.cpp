@@ -2,8 +2,8 @@
 
 #include <ostream>
 
-#include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/files/atomic_file.h"
 #include "edges/files/curve_json.h"
 #include "edges/files/curve_step.h"
 #include "edges/files/curve_text.h"

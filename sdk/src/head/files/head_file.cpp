@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/atomic_file.h"
-#include "core/file.h"
+#include "core/files/atomic_file.h"
+#include "core/files/file.h"
 #include "head/files/file_format.h"
 #include "head/files/stored_numbers.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "core/file.h"
+#include "core/files/file.h"
 #include "head/files/file_format.h"
 #include "head/files/stored_numbers.h"
 

@@ -5,8 +5,8 @@
 #include <locale>
 #include <sstream>
 
-#include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/files/atomic_file.h"
 #include "head/mesh/file_axes.h"
 
 namespace maq::head {

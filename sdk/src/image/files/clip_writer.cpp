@@ -2,10 +2,10 @@
 
 #include <cmath>
 
-#include "core/blocked_write_signals.h"
 #include "core/error.h"
-#include "core/file.h"
-#include "core/file_reader.h"
+#include "core/files/blocked_write_signals.h"
+#include "core/files/file.h"
+#include "core/files/file_reader.h"
 #include "image/convert.h"
 
 namespace maq {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/atomic_file.h"
+#include "core/files/atomic_file.h"
 #include "core/frame.h"
 #include "image/files/file_codecs.h"
 

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/file.h"
+#include "core/files/atomic_file.h"
+#include "core/files/file.h"
 #include "image/depth.h"
 #include "image/files/file_codecs.h"
 #include "image/files/image_file.h"

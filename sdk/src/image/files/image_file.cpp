@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/file.h"
-#include "core/file_reader.h"
+#include "core/files/atomic_file.h"
+#include "core/files/file.h"
+#include "core/files/file_reader.h"
 #include "image/convert.h"
 #include "image/files/file_codecs.h"
 #include "image/files/jpeg.h"

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "core/error.h"
-#include "core/file.h"
+#include "core/files/file.h"
 #include "image/files/depth_file.h"
 #include "image/files/image_file.h"
 #include "image/geometry/undistort.h"

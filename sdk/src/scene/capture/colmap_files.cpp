@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "core/file.h"
-#include "core/file_reader.h"
+#include "core/files/file.h"
+#include "core/files/file_reader.h"
 
 namespace maq {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/file_reader.h"
+#include "core/files/file_reader.h"
 
 namespace maq {
 

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "core/error.h"
-#include "core/file.h"
-#include "core/file_reader.h"
+#include "core/files/file.h"
+#include "core/files/file_reader.h"
 #include "image/files/image_file.h"
 
 namespace maq {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/atomic_file.h"
+#include "core/files/atomic_file.h"
 #include "scene/format/block_codec.h"
 
 namespace maq {

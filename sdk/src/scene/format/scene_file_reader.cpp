@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/file.h"
+#include "core/files/file.h"
 #include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/files/atomic_file.h"
 #include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/file.h"
+#include "core/files/file.h"
 #include "core/memory.h"
 #include "core/thread.h"
 #include "image/convert.h"

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/unique_fd.h"
+#include "core/files/unique_fd.h"
 
 namespace maq {
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "core/files/unique_fd.h"
 #include "core/frame.h"
 #include "core/log.h"
-#include "core/unique_fd.h"
 #include "image/files/jpeg.h"
 #include "maquette/source.h"
 #include "sources/source.h"

@@ -10,7 +10,7 @@
 
 #include "core/checked_arithmetic.h"
 #include "core/error.h"
-#include "core/file.h"
+#include "core/files/file.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
 

@@ -8,9 +8,9 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "core/blocked_write_signals.h"
 #include "core/build_info.h"
 #include "core/error.h"
+#include "core/files/blocked_write_signals.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
 

@@ -1,4 +1,4 @@
-#include "core/atomic_file.h"
+#include "core/files/atomic_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -14,8 +14,8 @@
 #include <string_view>
 #include <thread>
 
-#include "core/blocked_write_signals.h"
 #include "core/error.h"
+#include "core/files/blocked_write_signals.h"
 
 namespace maq {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/unique_fd.h"
+#include "core/files/unique_fd.h"
 
 namespace maq {
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 from maquette import HeadMesh
 
@@ -35,14 +36,23 @@ class DrawnMesh:
 
     @staticmethod
     def of(mesh: HeadMesh) -> DrawnMesh:
-        vertex_colours = mesh.colours.astype(np.float64)
+        """With its texture where it has one, else with the colours of its vertices."""
         faces = mesh.triangles.astype(np.int64)
+        textured = mesh.texture_jpeg is not None
+        of_vertices = (mesh.texture_coordinates if textured else mesh.colours).astype(np.float64)
+        texture = cv2.imdecode(np.frombuffer(mesh.texture_jpeg, np.uint8), cv2.IMREAD_COLOR_RGB) if textured else None
 
         def mixed(place: Place) -> np.ndarray:
-            return (vertex_colours[faces[place.face]] * place.weight[..., None]).sum(1)
+            return (of_vertices[faces[place.face]] * place.weight[..., None]).sum(1)
+
+        def sampled(place: Place) -> np.ndarray:
+            pixel = (mixed(place) * texture.shape[0] - 0.5).astype(np.float32)
+            found = cv2.remap(texture, pixel[:, None, 0].copy(), pixel[:, None, 1].copy(), cv2.INTER_LINEAR,
+                              borderMode=cv2.BORDER_REPLICATE)  # fmt: skip
+            return found[:, 0].astype(np.float64)
 
         positions = mesh.positions_m.astype(np.float64) * DM_PER_M
-        return DrawnMesh.coloured(positions, faces, mesh.normals.astype(np.float64), mixed)
+        return DrawnMesh.coloured(positions, faces, mesh.normals.astype(np.float64), sampled if textured else mixed)
 
     @staticmethod
     def coloured(

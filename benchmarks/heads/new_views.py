@@ -1,5 +1,6 @@
-"""New views of a head fitted to one photo beside pictures of the true head from there, in the photo's light: PSNR
-inside of both silhouettes. The baseline is the mean head with the photo projected onto it by the true camera.
+"""New views of a head fitted to one photo beside pictures of the true head from there, in the photo's light: PSNR and a
+distance by features inside of both silhouettes. The baseline is the mean head with the photo projected onto it by the
+true camera.
 
 Fitted and mean head lie where they fit the true head best (rigid and scale). Where the photo does not see the mean
 head, or hardly, it has the colour of the nearest place that the photo does see.
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+import torch
 from scipy.spatial import cKDTree
 
 from benchmarks.heads import drawing
@@ -22,6 +24,7 @@ from benchmarks.heads.visible import seen_from
 from export.camera import Camera
 from export.heads.shapes import vertex_normals
 from export.heads.surface import HeadMaker, Place
+from export.scenes.perceptual import Perceptual
 
 TURNS_DEG = (-60.0, -45.0, -30.0, 30.0, 45.0, 60.0)  # about the head's axis, from the photo's camera
 SIDE_PX = 160
@@ -57,15 +60,26 @@ def moved(camera: Camera, to_mesh: Similarity) -> Camera:
     )
 
 
-def psnr_db(drawn: DrawnMesh, to_mesh: Similarity, views: Sequence[View]) -> float:
-    """Mean over the views; of each over the pixels that either head covers."""
-    found = []
+def view_errors(
+    drawn: DrawnMesh, to_mesh: Similarity, views: Sequence[View], perceptual: Perceptual | None = None
+) -> dict[str, float]:
+    """Means over the views, of each over the pixels that either head covers: psnr_db, and distance (lower is better),
+    if there is a network for it."""
+    psnr, distance = [], []
     for view in views:
         rgb, present = drawn.shown(moved(view.camera, to_mesh))
         either = present | view.mask
         error = (rgb[either].astype(np.float64) - view.rgb[either]) ** 2
-        found.append(10 * np.log10(255**2 / max(error.mean(), 1e-9)))
-    return float(np.mean(found))
+        psnr.append(10 * np.log10(255**2 / max(error.mean(), 1e-9)))
+        if perceptual:
+            with torch.inference_mode():
+                distance.append(float(perceptual(_tensor(rgb), _tensor(view.rgb), _tensor(255 * either[..., None]))))
+    return {"psnr_db": float(np.mean(psnr))} | ({"distance": float(np.mean(distance))} if perceptual else {})
+
+
+def _tensor(picture: np.ndarray) -> torch.Tensor:
+    """[H, W, C] in 0..255 as float32 [1, C, H, W] in 0..1."""
+    return torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)[None].float() / 255
 
 
 def with_photo(mesh: Triangles, to_mesh: Similarity, photo: Photo) -> DrawnMesh:

@@ -15,7 +15,7 @@ import json
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,13 @@ from maquette import HeadBuilder, MaquetteError
 from tqdm import tqdm
 
 from benchmarks.heads import report
-from benchmarks.heads.distances import Triangles, aligned, inner_face_mm, measure
+from benchmarks.heads.distances import Similarity, Triangles, aligned, inner_face_mm, measure
 from benchmarks.heads.drawing import DrawnMesh
 from benchmarks.heads.face_mesh import FaceMeshes
 from benchmarks.heads.fitted import angle_deg, cameras_of, triangles_of
 from benchmarks.heads.linear_head import LinearHeads, read_visible
 from benchmarks.heads.mean_head import read_mean_head
-from benchmarks.heads.new_views import View, psnr_db, true_views, with_photo
+from benchmarks.heads.new_views import View, true_views, view_errors, with_photo
 from benchmarks.heads.photos import (
     Photo,
     PhotoBackgrounds,
@@ -46,10 +46,13 @@ from export.evaluation.machine import describe_machine
 from export.heads.made_heads import make_maker
 from export.heads.surface import HeadMaker
 from export.photos.packages import PackageError
+from export.scenes.perceptual import Perceptual, load_perceptual
 
 KNOWN, EIGHT = "one photo, focal length known", "eight photos"
 BUNDLE, DATA, BACKGROUNDS = Path("sdk/models/heads-int8"), Path(".data/heads"), Path(".data/backgrounds/test")
 FIGURES = Path("build/benchmarks/heads.json")
+PERCEPTUAL = Path(".data/teachers/backbone.pt")
+TEXTURE_PX = 512  # a pixel of the texture is some 1.5 mm of skin, as in the photos
 SECONDS = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
@@ -65,11 +68,13 @@ class HeadSet:
 
 @dataclass(frozen=True, eq=False)
 class Baselines:
-    """What heads are measured beside, besides the mean head; None is left out. maker: draws new views."""
+    """What heads are measured beside, besides the mean head; None is left out. maker draws new views, perceptual
+    compares them."""
 
     linear: LinearHeads | None = None
     face: FaceMeshes | None = None
     maker: HeadMaker | None = None
+    perceptual: Perceptual | None = None
 
 
 NOTHING_ELSE = Baselines()
@@ -81,20 +86,27 @@ def photos_of(head: TrueHead, numbers: Iterable[int], backgrounds: PhotoBackgrou
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Photos of a head, and what is true of them. seen: which of the true points the photos show; views: new ones."""
+    """Photos of a head, and what is true of them. seen: which of the true points the photos show; views: new ones, that
+    `perceptual` compares, too."""
 
     head: TrueHead
     photos: Sequence[Photo]
     seen: np.ndarray | None = None
     views: Sequence[View] = ()
+    perceptual: Perceptual | None = None
 
     @staticmethod
-    def of(head: TrueHead, numbers: Sequence[int], backgrounds: PhotoBackgrounds, maker: HeadMaker | None) -> Case:
+    def of(head: TrueHead, numbers: Sequence[int], backgrounds: PhotoBackgrounds, others: Baselines) -> Case:
         photos = photos_of(head, numbers, backgrounds)
         seen = head.seen_by([photo.camera for photo in photos])
-        drawable = maker is not None and head.true.mesh is not None and len(photos) == 1
-        views = true_views(maker, head.name, numbers[0], photos[0].camera) if drawable else ()
-        return Case(head, photos, seen, views)
+        drawable = others.maker is not None and head.true.mesh is not None and len(photos) == 1
+        views = true_views(others.maker, head.name, numbers[0], photos[0].camera) if drawable else ()
+        return Case(head, photos, seen, views, others.perceptual)
+
+    def view_errors(self, drawn: DrawnMesh, to_mesh: Similarity) -> dict[str, float]:
+        """`view_...` of a mesh."""
+        found = view_errors(drawn, to_mesh, self.views, self.perceptual)
+        return {f"view_{key}": value for key, value in found.items()}
 
 
 def measure_baselines(case: Case, mean: Triangles, others: Baselines, known_focal: bool = False) -> dict:
@@ -103,7 +115,8 @@ def measure_baselines(case: Case, mean: Triangles, others: Baselines, known_foca
     found = {f"mean_{key}": value for key, value in asdict(measure(mesh=mean, true=true, seen=case.seen)).items()}
     if case.views:
         to_mean = aligned(mean, true.points)
-        found["mean_view_psnr_db"] = psnr_db(with_photo(mean, to_mean, photo), to_mean, case.views)
+        errors = case.view_errors(with_photo(mean, to_mean, photo), to_mean)
+        found |= {f"mean_{key}": value for key, value in errors.items()}
     if len(case.photos) > 1:
         return found
     if others.linear:
@@ -114,6 +127,13 @@ def measure_baselines(case: Case, mean: Triangles, others: Baselines, known_foca
         mesh = others.face.mesh(photo.rgb, photo.box)
         found["face_mesh_inner_face_mm"] = inner_face_mm(mesh, true) if mesh else None
     return found
+
+
+def add_photos(builder: HeadBuilder, photos: Sequence[Photo], known_focal: bool) -> None:
+    """In place of those that the builder has."""
+    builder.clear()
+    for photo in photos:
+        builder.add_photo(photo.rgb, photo.box, focal_px=photo.camera.fx_px if known_focal else None)
 
 
 def measure_head(
@@ -129,12 +149,32 @@ def measure_head(
         **baselines,
     }
     try:
-        builder.clear()
-        for photo in photos:
-            builder.add_photo(photo.rgb, photo.box, focal_px=photo.camera.fx_px if known_focal else None)
+        add_photos(builder, photos, known_focal)
         return [about | {"asked_s": asked} | fitted(builder, case, asked) for asked in seconds]
     except MaquetteError as error:
         return [about | {"asked_s": asked, "missing": str(error)} for asked in seconds]
+
+
+@dataclass(frozen=True, eq=False)
+class Painter:
+    """What new views are drawn of: a builder that makes textures, and its time of fitting."""
+
+    builder: HeadBuilder
+    at_s: float
+
+
+def measure_views(painter: Painter, case: Case, known_focal: bool = False) -> dict:
+    """`view_...` of the fitted head with its texture, `coloured_view_...` without; nothing where no head is found."""
+    try:
+        add_photos(painter.builder, case.photos, known_focal)
+        with painter.builder.fit(painter.at_s) as result:
+            mesh = result.mesh("all")
+    except MaquetteError:
+        return {}
+    to_mesh = aligned(triangles_of(mesh), case.head.true.points)
+    without = replace(mesh, texture_jpeg=None, texture_coordinates=None)
+    coloured = case.view_errors(DrawnMesh.of(without), to_mesh)
+    return case.view_errors(DrawnMesh.of(mesh), to_mesh) | {f"coloured_{key}": value for key, value in coloured.items()}
 
 
 def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
@@ -150,8 +190,6 @@ def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
     pairs = list(zip(cameras, used, strict=True))
     triangles = triangles_of(mesh)
     found = asdict(measure(triangles, true, case.seen))
-    if case.views:
-        found["view_psnr_db"] = psnr_db(DrawnMesh.of(mesh), aligned(triangles, true.points), case.views)
     return found | {
         "fit_s": stats["total_ms"] / 1000,
         "steps": stats["step_count"],
@@ -167,13 +205,20 @@ def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
 
 
 def measure_set(
-    builder: HeadBuilder, own: HeadSet, backgrounds: PhotoBackgrounds, mean: Triangles, others: Baselines = NOTHING_ELSE
-) -> list[dict]:
+    builder: HeadBuilder, own: HeadSet, backgrounds: PhotoBackgrounds, mean: Triangles,
+    others: Baselines = NOTHING_ELSE, painter: Painter | None = None,
+) -> list[dict]:  # fmt: skip
+    """Rows of a set; those at the painter's time have new views, where they can be drawn."""
     rows = []
     for head, numbers in tqdm(own.heads, desc=own.name, unit="head", disable=None):
-        case = Case.of(head, numbers, backgrounds, others.maker)
+        case = Case.of(head, numbers, backgrounds, others)
         beside = measure_baselines(case, mean, others, own.known_focal)
-        rows += [{"set": own.name} | row for row in measure_head(builder, case, beside, own.seconds, own.known_focal)]
+        of_head = measure_head(builder, case, beside, own.seconds, own.known_focal)
+        views = measure_views(painter, case, own.known_focal) if painter and case.views else {}
+        for row in of_head:
+            if painter and row["asked_s"] == painter.at_s and "missing" not in row:
+                row |= views
+            rows.append({"set": own.name} | row)
     return rows
 
 
@@ -208,7 +253,10 @@ def baselines_of(options: argparse.Namespace, bundle: Path, maker: HeadMaker) ->
         face = FaceMeshes()
     except (ImportError, PackageError) as error:
         print(f"No mesh of MediaPipe's face network: {error} (scripts/make-venv.sh teachers)", file=sys.stderr)
-    return Baselines(linear, face, maker)
+    perceptual = load_perceptual(PERCEPTUAL) if PERCEPTUAL.exists() else None
+    if not perceptual:
+        print(f"No distance by features: {PERCEPTUAL} is missing (python -m export.teachers)", file=sys.stderr)
+    return Baselines(linear, face, maker, perceptual)
 
 
 def parser_of(description: str) -> argparse.ArgumentParser:
@@ -241,9 +289,14 @@ def run(options: argparse.Namespace) -> dict:
     sets, backgrounds, rows = sets_of(options, maker), PhotoBackgrounds(options.backgrounds), []
     for number, bundle in enumerate(options.bundles):
         mean, others = read_mean_head(bundle), baselines_of(options, bundle, maker) if not number else NOTHING_ELSE
-        with HeadBuilder(bundle, threads=options.threads) as builder:
+        with (
+            HeadBuilder(bundle, threads=options.threads) as builder,
+            HeadBuilder(bundle, threads=options.threads, texture_px=TEXTURE_PX) as of_textures,
+        ):
+            painter = Painter(of_textures, options.at) if not number else None
             for own in sets:
-                rows += [{"bundle": bundle.name} | row for row in measure_set(builder, own, backgrounds, mean, others)]
+                found = measure_set(builder, own, backgrounds, mean, others, painter)
+                rows += [{"bundle": bundle.name} | row for row in found]
     measured = {
         "machine": describe_machine(),
         "bundles": [bundle.name for bundle in options.bundles],

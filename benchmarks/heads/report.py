@@ -37,9 +37,11 @@ model and prior. *MediaPipe's 468 points*: its face network's points with their 
 face alone, and is aligned by it, as all others are for that column. *Seen side*: true points that the photos show,
 after the alignment of the whole head; *unseen side*: the others. *Result to truth*: from points of the mesh to the true
 surface. *New views*: PSNR inside of both silhouettes of six views 30° to 60° around from the photo, in its light,
-before grey; the mean head has the photo projected onto it by the true camera, and where the photo does not see it the
-colour of the nearest place that it does. NeuS from a sphere is not among them: the library has no such fit, as its
-prior is part of the network. A perceptual measure of new views is missing."""
+before grey; of the fitted head with a texture of 512 x 512, and *without texture* with the network's colours. The mean
+head has the photo projected onto it by the true camera, and where the photo does not see it the colour of the nearest
+place that it does. *By features*: how far features of the person detector's trunk differ, relative to their size,
+averaged over four layers (lower is better); in the manner of LPIPS, without anybody's judgement in it. NeuS from a
+sphere is not among them: the library has no such fit, as its prior is part of the network."""
 
 _REAL = """Faces of photographs that training never saw (those of the validation split told when to end it). Points:
 mean distance in the photo from where MediaPipe's face network sees its points to where the same places of the fitted

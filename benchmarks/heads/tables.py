@@ -116,7 +116,8 @@ def size_of(row: Mapping) -> str | None:
 PARTS = (
     ("face_mm", "face, mm"), ("inner_face_mm", "inner face, mm"), ("head_mm", "head, mm"), ("seen_mm", "seen side, mm"),
     ("unseen_mm", "unseen side, mm"), ("back_mm", "result to truth, mm"), ("normals_deg", "normals, deg"),
-    ("view_psnr_db", "new views, dB"),
+    ("view_psnr_db", "new views, dB"), ("view_distance", "by features"),
+    ("coloured_view_psnr_db", "without texture, dB"),
 )  # fmt: skip
 
 

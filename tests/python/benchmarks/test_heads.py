@@ -358,6 +358,22 @@ def test_a_mesh_is_drawn_in_its_own_colours_and_normals():
     assert row[np.flatnonzero((row != drawing.GREY).any(1))[0], 0] < 60  # on the left it points to the left
 
 
+def test_a_mesh_with_a_texture_is_drawn_with_it():
+    # Red on the left half of the texture, blue on the right; so is the head, seen from the front.
+    texture = np.zeros((32, 32, 3), np.uint8)
+    texture[:, :16], texture[:, 16:] = (220, 0, 0), (0, 0, 220)
+    mesh = mesh_of_library(ellipsoid())
+    across = np.where(mesh.positions_m[:, 0] < 0, 0.25, 0.75)
+    painted = replace(
+        mesh, texture_coordinates=np.column_stack([across, np.full(len(across), 0.5)]).astype(np.float32),
+        texture_jpeg=cv2.imencode(".png", texture[..., ::-1])[1].tobytes(),
+    )  # fmt: skip
+    camera = look_at(0, 0, 0, 9.0, np.zeros(3), 100.0, 64)
+    picture = drawing.DrawnMesh.of(painted).colours(camera)
+    np.testing.assert_allclose(picture[32, 26], [220, 0, 0], atol=2)
+    np.testing.assert_allclose(picture[32, 38], [0, 0, 220], atol=2)
+
+
 def test_a_square_around_a_box_shows_what_the_photo_shows():
     camera = Camera(300, 200, 400.0, 400.0, 149.5, 99.5, np.eye(3), np.zeros(3))
     near, to_picture = drawing.framed(camera, np.array([100, 40, 140, 120]), 1.5, 60)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+import torch
 from ellipsoid_heads import RADII_MM, ball_points, ellipsoid, pictures_of_ellipsoid, true_ellipsoid, true_head
 from maquette import MaquetteError
 from scipy.spatial.transform import Rotation
@@ -31,11 +32,13 @@ from benchmarks.heads.distances import MM_PER_DM, Similarity, Triangles, TruePoi
 from benchmarks.heads.drawing import DrawnMesh
 from benchmarks.heads.mean_head import template_points
 from benchmarks.heads.photos import Photo, PhotoBackgrounds, photo_of
+from export.densepose.network import MobileNetV2
 from export.heads.fitting.anchor_fit import Observations
 from export.heads.head_shards import HeadPoints
 from export.heads.photos.face_points import read_face_points
 from export.heads.photos.faces import PhotoFaces
 from export.heads.views import look_at
+from export.scenes.perceptual import Perceptual
 from export.teachers.faces import LEFT_EYE, RIGHT_EYE, Face
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -129,6 +132,10 @@ def view_from(yaw_deg, drawn):
     return new_views.View(camera, *drawn.shown(camera))
 
 
+def psnr_db(drawn, to_mesh, views):
+    return new_views.view_errors(drawn, to_mesh, views)["psnr_db"]
+
+
 def test_a_new_view_of_the_right_head_is_the_true_picture_wherever_the_result_lies():
     drawn = white(ellipsoid())
     views = [view_from(yaw, drawn) for yaw in (-30, 45)]
@@ -140,18 +147,30 @@ def test_a_new_view_of_the_right_head_is_the_true_picture_wherever_the_result_li
         lambda place: np.full((len(place.face), 3), 240.0),
     )  # fmt: skip
     nowhere = Similarity(1.0, np.eye(3), np.zeros(3))
-    assert new_views.psnr_db(drawn, nowhere, views) > 60
-    assert new_views.psnr_db(moved, to_mesh, views) > 25  # up to a pixel of the border
-    assert new_views.psnr_db(moved, nowhere, views) < 20
+    assert psnr_db(drawn, nowhere, views) > 60
+    assert psnr_db(moved, to_mesh, views) > 25  # up to a pixel of the border
+    assert psnr_db(moved, nowhere, views) < 20
 
 
 def test_both_silhouettes_count():
     views = [view_from(0, white(ellipsoid()))]
     nowhere = Similarity(1.0, np.eye(3), np.zeros(3))
     small, large = (white(ellipsoid(radii=RADII_MM * k)) for k in (0.9, 1.1))
-    exact = new_views.psnr_db(white(ellipsoid()), nowhere, views)
-    assert exact - new_views.psnr_db(small, nowhere, views) > 20
-    assert exact - new_views.psnr_db(large, nowhere, views) > 20
+    exact = psnr_db(white(ellipsoid()), nowhere, views)
+    assert exact - psnr_db(small, nowhere, views) > 20
+    assert exact - psnr_db(large, nowhere, views) > 20
+
+
+def test_features_tell_the_right_head_from_others():
+    torch.manual_seed(0)
+    perceptual = Perceptual(MobileNetV2())
+    views = [view_from(0, white(ellipsoid()))]
+    nowhere = Similarity(1.0, np.eye(3), np.zeros(3))
+    right, small, tiny = (
+        new_views.view_errors(white(ellipsoid(radii=RADII_MM * k)), nowhere, views, perceptual)["distance"]
+        for k in (1, 0.9, 0.7)
+    )
+    assert right < 1e-6 < small < tiny
 
 
 def test_a_photo_is_projected_where_it_sees_the_mesh_and_continued_where_it_does_not():
@@ -255,7 +274,7 @@ def test_baselines_stand_beside_the_head_in_every_row(backgrounds):
     head, mean = true_head([0]), ellipsoid(radii=RADII_MM * [1.2, 1, 1])
     inner = head.true.points[:, 1] < -80
     head = replace(head, true=replace(whole_ellipsoid(), is_inner_face=inner))
-    case = quality.Case.of(head, [0], backgrounds, None)
+    case = quality.Case.of(head, [0], backgrounds, quality.NOTHING_ELSE)
     others = quality.Baselines(
         SimpleNamespace(mesh=lambda *_: ellipsoid(radii=RADII_MM * [1.1, 1, 1])),
         SimpleNamespace(mesh=lambda *_: ellipsoid(radii=RADII_MM * [1.3, 1, 1])),

@@ -298,7 +298,7 @@ typedef struct maq_head_image maq_head_image;
 
 /* What the colours of a picture show. */
 typedef enum maq_head_shading {
-  MAQ_HEAD_SHADING_COLOUR = 1,   /* the head's colours, in soft light */
+  MAQ_HEAD_SHADING_COLOUR = 1,   /* the head's texture, where its mesh has one, else its colours; in soft light */
   MAQ_HEAD_SHADING_SHAPE = 2,    /* grey, in soft light */
   MAQ_HEAD_SHADING_NORMALS = 3,  /* red to the right, green up, blue to the camera, as in normal maps */
   MAQ_HEAD_SHADING_TEMPLATE = 4, /* template points: red to the person's left, green to the back, blue up */

@@ -88,6 +88,44 @@ TEST_F(ApiHeadRendering, GivesPlanesOfTheHeadFromTheFront) {
   EXPECT_LT(points[3 * middle + 1], -0.05f) << "the front of the template head";
 }
 
+TEST_F(ApiHeadRendering, ATextureIsShownInPlaceOfTheNetworksColours) {
+  // Stripes in the photo: the texture has them, the network's colours do not.
+  std::vector<uint8_t> striped(320 * 240 * 3);
+  for (size_t i = 0; i < striped.size(); ++i) striped[i] = i / 3 % 16 < 8 ? 40 : 220;
+  maq_frame_desc desc;
+  maq_frame_desc_init(&desc, sizeof desc);
+  desc.format = MAQ_PIXEL_BGR8, desc.width_px = 320, desc.height_px = 240;
+  desc.planes[0] = striped.data();
+  maq_head_config config = maquette::default_head_config();
+  config.bundle_path = kRoundHeads;
+  config.texture_px = 512;
+  maquette::HeadBuilder textured(context, config);
+  textured.add_photo(maquette::Frame(context, desc), known());
+  maquette::Head painted = textured.fit(0);
+  maq_head_renderer_config bare = coarse();
+  bare.light = 0;
+  maquette::HeadRenderer renderer(context, bare, painted);
+  const maq_pinhole_camera camera = painted.camera(0);
+  const auto contrast = [&](const maquette::HeadImage& image) {
+    const auto* bgr = plane<uint8_t>(image, MAQ_HEAD_PLANE_BGR, 3, 320);
+    double low = 255, high = 0;
+    for (int column = 135; column < 175; ++column) {  // the middle of the face
+      const double value = bgr[3 * (120 * 320 + column)];
+      low = std::min(low, value), high = std::max(high, value);
+    }
+    return high - low;
+  };
+  EXPECT_GT(contrast(renderer.run(camera)), 120);
+  renderer.set_shading(MAQ_HEAD_SHADING_SHAPE);
+  EXPECT_LT(contrast(renderer.run(camera)), 40);
+  // The template's mesh has texture coordinates of its own layout.
+  maq_head_mesh_options options = maquette::default_head_mesh_options();
+  options.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
+  bare.mesh = &options;
+  maquette::HeadRenderer of_template(context, bare, painted);
+  EXPECT_LT(contrast(of_template.run(camera)), 60);
+}
+
 TEST_F(ApiHeadRendering, TheCameraOfAPhotoLaysTheHeadOnThePhoto) {
   const maq_pinhole_camera camera = head.camera(0);
   EXPECT_EQ(camera.intrinsics.width_px, 320);

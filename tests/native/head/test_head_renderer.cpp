@@ -52,7 +52,7 @@ HeadRenderOptions with_shading(MeshShading shading) {
 }
 
 TEST(HeadRenderer, ShowsWhereRaysMeetTheBallInMetres) {
-  HeadRenderer renderer(ball_mesh(0.02f), with_shading(MeshShading::kColour));
+  HeadRenderer renderer(ball_mesh(0.02f), std::nullopt, with_shading(MeshShading::kColour));
   const PinholeCamera camera = from_the_front();
   HeadPicture picture;
   renderer.render(camera, picture);
@@ -95,7 +95,7 @@ TEST(HeadRenderer, EdgesAreSmoothOrNot) {
   for (const bool is_smooth : {true, false}) {
     HeadRenderOptions options = with_shading(MeshShading::kColour);
     options.is_smooth = is_smooth;
-    HeadRenderer renderer(ball_mesh(0.05f), options);
+    HeadRenderer renderer(ball_mesh(0.05f), std::nullopt, options);
     HeadPicture picture;
     renderer.render(camera, picture);
     int between = 0;
@@ -109,7 +109,7 @@ TEST(HeadRenderer, EdgesAreSmoothOrNot) {
 }
 
 TEST(HeadRenderer, EachShadingTellsItsQuantity) {
-  HeadRenderer renderer(ball_mesh(0.02f), with_shading(MeshShading::kColour));
+  HeadRenderer renderer(ball_mesh(0.02f), std::nullopt, with_shading(MeshShading::kColour));
   const PinholeCamera camera = from_the_front();
   const size_t pixel = size_t(40 * camera.width_px + 70);
   const Hit hit = hit_of(camera, 70, 40);
@@ -134,9 +134,9 @@ TEST(HeadRenderer, EachShadingTellsItsQuantity) {
 
 TEST(HeadRenderer, TheBackgroundLiesUnderTheHead) {
   HeadRenderOptions options = with_shading(MeshShading::kShape);
-  HeadRenderer plain(ball_mesh(0.05f), options);
+  HeadRenderer plain(ball_mesh(0.05f), std::nullopt, options);
   options.background_rgb = {10, 20, 250};
-  HeadRenderer over(ball_mesh(0.05f), options);
+  HeadRenderer over(ball_mesh(0.05f), std::nullopt, options);
   HeadPicture without, with;
   plain.render(from_the_front(), without);
   over.render(from_the_front(), with);
@@ -151,7 +151,7 @@ TEST(HeadRenderer, TheBackgroundLiesUnderTheHead) {
 }
 
 TEST(HeadRenderer, TheOrbitSeesTheWholeHeadFromWhereItSays) {
-  HeadRenderer renderer(ball_mesh(0.05f), with_shading(MeshShading::kColour));
+  HeadRenderer renderer(ball_mesh(0.05f), std::nullopt, with_shading(MeshShading::kColour));
   const double kQuarter = std::acos(0.0);
   for (const auto& [yaw, pitch, axis, sign] :
        {std::tuple{0.0, 0.0, 1, -1}, std::tuple{kQuarter, 0.0, 0, 1}, std::tuple{-kQuarter, 0.0, 0, -1},
@@ -179,7 +179,7 @@ TEST(HeadRenderer, TheOrbitSeesTheWholeHeadFromWhereItSays) {
 }
 
 TEST(HeadRenderer, HostileCamerasGetAPictureOrASentence) {
-  HeadRenderer renderer(ball_mesh(0.1f), with_shading(MeshShading::kColour));
+  HeadRenderer renderer(ball_mesh(0.1f), std::nullopt, with_shading(MeshShading::kColour));
   HeadPicture picture;
   const auto refused = [&](maq_status status, const char* text, auto&& change) {
     PinholeCamera camera = from_the_front(20, 16);
@@ -222,7 +222,7 @@ TEST(HeadRenderer, HostileCamerasGetAPictureOrASentence) {
   EXPECT_GE(covered([](PinholeCamera& c) { c.centre[1] = 0; }), 0) << "inside of the head";
   EXPECT_GE(covered([](PinholeCamera& c) { c.centre[1] = -0.1; }), 0) << "on its surface";
   EXPECT_EQ(covered([](PinholeCamera& c) { c.width_px = c.height_px = 1; }) & ~1, 0);
-  expect_error(MAQ_ERROR_UNSUPPORTED, "no surface", [] { HeadRenderer({}, {}); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "no surface", [] { HeadRenderer({}, std::nullopt, {}); });
 }
 
 TEST(HeadRenderer, TwoInTwoThreadsDrawWhatOneThreadDraws) {
@@ -232,12 +232,12 @@ TEST(HeadRenderer, TwoInTwoThreadsDrawWhatOneThreadDraws) {
     renderer.render(renderer.orbit_camera(0.7 * step, 0.1 * step, 120 + step, 90), picture);
   };
   std::vector<HeadPicture> expected(6);
-  HeadRenderer one(ball_mesh(0.05f), options);
+  HeadRenderer one(ball_mesh(0.05f), std::nullopt, options);
   for (int step = 0; step < 6; ++step) turned(one, step, expected[size_t(step)]);
   const auto run = [&] {
     HeadRenderOptions two = options;
     two.threads = 2;
-    HeadRenderer renderer(ball_mesh(0.05f), two);
+    HeadRenderer renderer(ball_mesh(0.05f), std::nullopt, two);
     HeadPicture picture;
     for (int step = 0; step < 6; ++step) {
       turned(renderer, step, picture);

@@ -52,12 +52,6 @@ head::SurfaceOptions surface_options(const maq_head_mesh_options& options) {
   return surface;
 }
 
-// Of the mesh that the head has.
-const std::vector<uint8_t>& texture_of(const maq_head& head) {
-  static const std::vector<uint8_t> kNone;
-  return head.mesh_topology == MAQ_HEAD_TOPOLOGY_TEMPLATE ? kNone : head.head.texture.jpeg;
-}
-
 // The head's own, or that of the bundle that the options name.
 const head::HeadTemplate& template_of(maq_head& head, const maq_head_mesh_options& options) {
   if (head.template_head == nullptr) {
@@ -72,6 +66,11 @@ const head::HeadTemplate& template_of(maq_head& head, const maq_head_mesh_option
 }
 
 }  // namespace
+
+const std::vector<uint8_t>& texture_of(const maq_head& head) {
+  static const std::vector<uint8_t> kNone;
+  return head.mesh_topology == MAQ_HEAD_TOPOLOGY_TEMPLATE ? kNone : head.head.texture.jpeg;
+}
 
 const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given) {
   const maq_head_mesh_options options = read_config(given, "options", default_mesh_options(), kFirstMeshOptionsSize);

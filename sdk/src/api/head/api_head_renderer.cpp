@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "api/boundary.h"
@@ -62,8 +63,9 @@ struct maq_head_image : HandleOf<HandleKind::kHeadImage> {
 };
 
 struct maq_head_renderer : HandleOf<HandleKind::kHeadRenderer> {
-  maq_head_renderer(const head::HeadMesh& mesh, const head::HeadRenderOptions& options, size_t pool_size)
-      : renderer(mesh, options), images(pool_size, "images") {}
+  maq_head_renderer(const head::HeadMesh& mesh, std::optional<head::MeshTexture> texture,
+                    const head::HeadRenderOptions& options, size_t pool_size)
+      : renderer(mesh, std::move(texture), options), images(pool_size, "images") {}
   head::HeadRenderer renderer;
   BoundedPool<maq_head_image> images;
 };
@@ -95,7 +97,14 @@ maq_status maq_head_renderer_create(maq_context* context, const maq_head_rendere
     const maq_head_renderer_config config =
         read_config(given, "config", default_head_renderer_config(), sizeof(maq_head_renderer_config));
     const head::HeadRenderOptions options = options_of(config);
-    *renderer = new maq_head_renderer(mesh_of(*head, config.mesh), options, config.image_pool_size);
+    const head::HeadMesh& mesh = mesh_of(*head, config.mesh);
+    std::optional<head::MeshTexture> texture;
+    if (const std::vector<uint8_t>& jpeg = texture_of(*head); !jpeg.empty()) {
+      Frame decoded;
+      decode_image(jpeg, "The head's texture", decoded);
+      texture.emplace(decoded.image);
+    }
+    *renderer = new maq_head_renderer(mesh, std::move(texture), options, config.image_pool_size);
     return MAQ_OK;
   });
 }

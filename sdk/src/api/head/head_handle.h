@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -31,3 +32,7 @@ struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
 
 // Makes the mesh, unless it is there; for calls that run one at a time on a head. `options` as in maq_head_get_mesh.
 const maq::head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* options);
+
+// The JPEG file of the mesh that the head has; empty where there is none, as for the template's topology, whose texture
+// coordinates are of another layout.
+const std::vector<uint8_t>& texture_of(const maq_head& head);

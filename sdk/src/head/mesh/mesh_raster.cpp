@@ -105,6 +105,10 @@ std::array<int, 2> pixels_between(double low, double high, int size) {
   return {double(first_px) < first ? first_px + 1 : first_px, last_px};
 }
 
+bool is_textured(const HeadMesh& mesh, const RasterOptions& options) {
+  return options.shading == MeshShading::kColour && options.texture != nullptr && !mesh.texture_coordinates.empty();
+}
+
 uint8_t byte_of(float value) { return uint8_t(std::clamp(value + 0.5f, 0.0f, 255.0f)); }
 
 // A point of the surface.
@@ -152,6 +156,7 @@ void MeshRaster::project(const HeadMesh& mesh, const HeadCamera& camera, const R
   vertices_.resize(mesh.vertex_count()), attributes_.resize(mesh.vertex_count());
   const bool has_normals = !mesh.normals.empty(), has_template = !mesh.template_points.empty();
   const bool has_colours = !mesh.colours.empty() && options.shading != MeshShading::kShape;
+  const bool has_places = is_textured(mesh, options);
   std::array<float, 9> rotation{};
   for (size_t i = 0; i < 9; ++i) rotation[i] = float(camera.head_to_camera.rotation[i]);
   threads.run((vertices_.size() + kTask - 1) / kTask, [&](size_t task, int) {
@@ -169,6 +174,7 @@ void MeshRaster::project(const HeadMesh& mesh, const HeadCamera& camera, const R
         const float *const row = &rotation[3 * axis], *const n = &mesh.normals[3 * i];
         attributes.normal[axis] = row[0] * n[0] + row[1] * n[1] + row[2] * n[2];
       }
+      if (has_places) attributes.texture_place = {mesh.texture_coordinates[2 * i], mesh.texture_coordinates[2 * i + 1]};
       if (vertex.z < double(options.near)) continue;
       const double scale = camera.focal_px / vertex.z;
       vertex.column_px = scale * vertex.x + camera.cx_px;
@@ -271,6 +277,21 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, cons
   const RasterSampling& sampling = band.sampling;
   const size_t width = size_t(camera.width_px), side = size_t(sampling.per_pixel), samples_count = side * side;
   const bool has_normals = !mesh.normals.empty(), has_template = !mesh.template_points.empty();
+  const MeshTexture* const texture = is_textured(mesh, options) ? options.texture : nullptr;
+  // Twice the area of a triangle in the picture and in the texture. Corners behind the near plane are nowhere in the
+  // picture: no level is right for all of such a triangle.
+  const auto level_of = [&](const std::array<const Vertex*, 3>& corners,
+                            const std::array<const Attributes*, 3>& attributes) {
+    const Vertex &p = *corners[0], &q = *corners[1], &r = *corners[2];
+    if (std::min({p.z, q.z, r.z}) < double(options.near)) return 0;
+    const double pixels =
+        (q.column_px - p.column_px) * (r.row_px - p.row_px) - (q.row_px - p.row_px) * (r.column_px - p.column_px);
+    const std::array<float, 2>&a = attributes[0]->texture_place, &b = attributes[1]->texture_place,
+                            &c = attributes[2]->texture_place;
+    const double texels = double((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) *
+                          double(texture->width_px()) * double(texture->height_px());
+    return texture->level_of(std::abs(texels), std::abs(pixels));
+  };
   // Of a triangle, where a pixel's middle is or, outside of it, near that.
   const auto point_of = [&](uint32_t triangle, size_t row_px, size_t column_px, float depth) {
     const uint32_t* const indices = &mesh.triangles[3 * size_t(triangle)];
@@ -298,7 +319,16 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, cons
       }
     };
     mean(&Attributes::normal, point.normal);
-    mean(&Attributes::colour, point.colour);
+    if (texture != nullptr) {
+      std::array<float, 2> place{};
+      for (size_t axis = 0; axis < 2; ++axis) {
+        place[axis] = weights[0] * of_p.texture_place[axis] + weights[1] * of_q.texture_place[axis] +
+                      weights[2] * of_r.texture_place[axis];
+      }
+      point.colour = texture->colour(place[0], place[1], level_of({&p, &q, &r}, {&of_p, &of_q, &of_r}));
+    } else {
+      mean(&Attributes::colour, point.colour);
+    }
     mean(&Attributes::template_point, point.template_point);
     if (!has_normals) {
       const Vec3 a{q.x - p.x, (q.y - p.y) / options.pixel_aspect, q.z - p.z};

@@ -8,12 +8,13 @@
 #include "core/worker_threads.h"
 #include "head/camera/head_camera.h"
 #include "head/mesh/head_mesh.h"
+#include "head/mesh/mesh_texture.h"
 
 namespace maq::head {
 
 // What colour a point of the surface gets.
 enum class MeshShading {
-  kColour,    // its own, under the light; that of meshes without colours is grey
+  kColour,    // its own, under the light: the texture's where there is one, else the vertices', else grey
   kShape,     // grey, under the light
   kNormals,   // R, G, B: to the right, up and to the camera, -1 to 1
   kTemplate,  // R, G, B: x, y, z of its template point, -template_reach to template_reach
@@ -27,6 +28,7 @@ struct RasterOptions {
   float ambient = 0.35f;                          // of the colour, without light
   std::array<uint8_t, 3> grey = {200, 200, 200};  // R, G, B of meshes without colours, and of kShape
   MeshShading shading = MeshShading::kColour;
+  const MeshTexture* texture = nullptr;        // of meshes with texture coordinates; may be null
   float template_reach = 1.4f;                 // of kTemplate
   float middle_depth = 0, depth_reach = 1.4f;  // of kDepth
   double pixel_aspect = 1;  // the vertical focal length over the horizontal one, which is the camera's
@@ -63,6 +65,7 @@ class MeshRaster {
   };
   struct Attributes {
     std::array<float, 3> normal, colour, template_point;  // normal: in the camera
+    std::array<float, 2> texture_place;
   };
   struct Rows {
     int16_t first, last;  // empty: the triangle is not seen

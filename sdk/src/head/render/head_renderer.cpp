@@ -33,8 +33,8 @@ HeadCamera camera_of(const PinholeCamera& from) {
 
 }  // namespace
 
-HeadRenderer::HeadRenderer(HeadMesh mesh, const HeadRenderOptions& options)
-    : mesh_(std::move(mesh)), options_(options), threads_(options.threads) {
+HeadRenderer::HeadRenderer(HeadMesh mesh, std::optional<MeshTexture> texture, const HeadRenderOptions& options)
+    : mesh_(std::move(mesh)), texture_(std::move(texture)), options_(options), threads_(options.threads) {
   if (mesh_.triangles.empty()) throw Error(MAQ_ERROR_UNSUPPORTED, "The head has no surface that could be drawn.");
   for (float& value : mesh_.positions) value *= kMetresPerDecimetre;
   for (float& value : mesh_.template_points) value *= kMetresPerDecimetre;
@@ -58,6 +58,7 @@ void HeadRenderer::render(const PinholeCamera& camera, HeadPicture& picture) {
   raster.near = float(options_.near_m);
   raster.ambient = 1 - options_.light;
   raster.shading = options_.shading;
+  if (texture_) raster.texture = &*texture_;
   raster.template_reach *= kMetresPerDecimetre;
   raster.middle_depth = float((of.head_to_camera * middle_).z), raster.depth_reach = float(radius_);
   raster.pixel_aspect = camera.fy_px / camera.fx_px;

@@ -8,6 +8,7 @@
 #include "core/worker_threads.h"
 #include "head/mesh/head_mesh.h"
 #include "head/mesh/mesh_raster.h"
+#include "head/mesh/mesh_texture.h"
 #include "image/geometry/pinhole_camera.h"
 
 namespace maq::head {
@@ -25,8 +26,9 @@ using HeadPicture = RasterImage;  // lengths in metres
 
 class HeadRenderer {
  public:
-  // The mesh is in decimetres, as head_surface() makes it. Throws MAQ_ERROR_UNSUPPORTED for a mesh without triangles.
-  HeadRenderer(HeadMesh mesh, const HeadRenderOptions& options);
+  // The mesh is in decimetres, as head_surface() makes it; the texture, if any, is drawn in place of its colours.
+  // Throws MAQ_ERROR_UNSUPPORTED for a mesh without triangles.
+  HeadRenderer(HeadMesh mesh, std::optional<MeshTexture> texture, const HeadRenderOptions& options);
 
   void set_shading(MeshShading shading) { options_.shading = shading; }
 
@@ -42,6 +44,7 @@ class HeadRenderer {
   void lay_over_background(HeadPicture& picture);
 
   HeadMesh mesh_;  // metres
+  std::optional<MeshTexture> texture_;
   Vec3 middle_;
   double radius_ = 0;
   HeadRenderOptions options_;

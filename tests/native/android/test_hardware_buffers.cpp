@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hardware_buffer.h"
+#include "graphics/hardware_buffer.h"
 #include "status_error.h"
 #include "support/fake_ndk_graphics.h"
 

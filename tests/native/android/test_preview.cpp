@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "preview.h"
+#include "graphics/preview.h"
 #include "status_error.h"
 #include "support/fake_ndk_graphics.h"
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "ndk_graphics.h"
+#include "graphics/ndk_graphics.h"
 
 struct AHardwareBuffer {
   AHardwareBuffer_Desc desc;

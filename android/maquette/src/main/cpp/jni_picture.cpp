@@ -2,7 +2,7 @@
 #include <cstring>
 #include <memory>
 
-#include "hardware_buffer.h"
+#include "graphics/hardware_buffer.h"
 #include "jni_call.h"
 
 using maq_jni::call;

@@ -1,6 +1,6 @@
-// Results on a Surface (preview.h).
+// Results on a Surface (graphics/preview.h).
+#include "graphics/preview.h"
 #include "jni_call.h"
-#include "preview.h"
 
 using maq_jni::call;
 using maq_jni::handle;

@@ -1,6 +1,8 @@
 # The native methods' sources, beside this file: for the AAR and for tests/android.
 set(MAQ_JNI_SOURCES
-  hardware_buffer.cpp
+  graphics/hardware_buffer.cpp
+  graphics/ndk_graphics.cpp
+  graphics/preview.cpp
   jni_camera_image.cpp
   jni_capture.cpp
   jni_context.cpp
@@ -14,7 +16,5 @@ set(MAQ_JNI_SOURCES
   jni_scene_building.cpp
   jni_source.cpp
   jni_threads.cpp
-  ndk_graphics.cpp
-  preview.cpp
 )
 list(TRANSFORM MAQ_JNI_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/")

@@ -1,4 +1,4 @@
-#include "preview.h"
+#include "graphics/preview.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "hardware_buffer.h"
+#include "graphics/hardware_buffer.h"
 
 #include <cerrno>
 #include <memory>

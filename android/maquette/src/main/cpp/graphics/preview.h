@@ -3,8 +3,8 @@
 
 #include <mutex>
 
+#include "graphics/ndk_graphics.h"
 #include "maquette/maquette.h"
-#include "ndk_graphics.h"
 
 namespace maq_jni {
 

@@ -1,4 +1,4 @@
-#include "ndk_graphics.h"
+#include "graphics/ndk_graphics.h"
 
 #include <dlfcn.h>
 

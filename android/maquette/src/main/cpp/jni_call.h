@@ -128,6 +128,14 @@ inline std::vector<jdouble> numbers(JNIEnv* env, jdoubleArray array, size_t coun
   return values;
 }
 
+// A struct of the C API that a call fills.
+template <typename Struct>
+Struct sized() {
+  Struct value{};
+  value.struct_size = sizeof value;
+  return value;
+}
+
 struct Memory {
   uint8_t* data = nullptr;
   size_t size_bytes = 0;

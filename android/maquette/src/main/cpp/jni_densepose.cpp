@@ -88,6 +88,18 @@ MAQ_NATIVE(jfloatArray, peopleOfResult)(JNIEnv* env, jclass, jlong result) {
   });
 }
 
+// Left, top, right and bottom; null where none of the person's head is seen.
+MAQ_NATIVE(jfloatArray, headBoxOfResult)(JNIEnv* env, jclass, jlong result, jint person) {
+  return call(env, [&]() -> jfloatArray {
+    jfloat box[4];
+    const maq_status status =
+        maq_densepose_result_get_head_box(object<maq_densepose_result>(result), uint32_t(person), box);
+    if (status == MAQ_ERROR_NOT_FOUND) return nullptr;
+    check(status);
+    return maq_jni::floats_of(env, box, 4);
+  });
+}
+
 // A plane as a direct buffer over the result's own memory; rows follow each other without padding.
 MAQ_NATIVE(jobject, planeOfResult)(JNIEnv* env, jclass, jlong result, jint plane) {
   return call(env, [&]() -> jobject {

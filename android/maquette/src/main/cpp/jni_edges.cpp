@@ -5,15 +5,9 @@ using maq_jni::call;
 using maq_jni::check;
 using maq_jni::handle;
 using maq_jni::object;
+using maq_jni::sized;
 
 namespace {
-
-template <typename Struct>
-Struct sized() {
-  Struct value{};
-  value.struct_size = sizeof value;
-  return value;
-}
 
 void append(std::vector<jdouble>& values, const double* from, size_t count) {
   values.insert(values.end(), from, from + count);

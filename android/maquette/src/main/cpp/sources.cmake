@@ -9,6 +9,9 @@ set(MAQ_JNI_SOURCES
   jni_densepose.cpp
   jni_edges.cpp
   jni_frame.cpp
+  jni_head.cpp
+  jni_head_building.cpp
+  jni_head_rendering.cpp
   jni_picture.cpp
   jni_pipeline.cpp
   jni_preview.cpp

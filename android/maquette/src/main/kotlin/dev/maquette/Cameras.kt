@@ -50,3 +50,6 @@ data class PinholeCamera(val intrinsics: Intrinsics, val rotation: List<Double>,
         fun of(v: DoubleArray) = PinholeCamera(Intrinsics.of(v), v.slice(14 until 23), v.slice(23 until 26))
     }
 }
+
+/** A point in metres. */
+data class Point3(val x: Double, val y: Double, val z: Double)

@@ -182,6 +182,16 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
+     * Where the head of a person is, by the pixels that show it: for [HeadBuilder.addPhoto]. null where none of it is seen.
+     *
+     * @param person index in [people].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for another index.
+     */
+    fun headBox(person: Int): HeadBox? =
+        handle.use { Native.headBoxOfResult(it, person) }
+            ?.let { (left, top, right, bottom) -> HeadBox(left, top, right, bottom) }
+
+    /**
      * A plane as it lies in native memory, [heightPx] rows of [widthPx] bytes, read-only and without a copy. It must
      * not be read after the result has been closed: [copyPlane] gives what stays.
      */

@@ -2,12 +2,10 @@ package dev.maquette
 
 import dev.maquette.jni.NativeEdges
 
-/** A point in metres, in the camera's coordinates: x right, y down, z along the optical axis. */
-data class Point3(val x: Double, val y: Double, val z: Double)
-
 /**
  * The sharp feature curves of a depth frame, the corners in which they meet, and boxes. Found by
- * [EdgesResult.findCurves]; lists are copies and stay when this is closed.
+ * [EdgesResult.findCurves]; lists are copies and stay when this is closed. Points are in the camera's coordinates: x right,
+ * y down, z along the optical axis.
  */
 class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
     private val handle = Handle(this, pointer, NativeEdges::releaseCurves)

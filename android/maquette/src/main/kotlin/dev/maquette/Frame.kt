@@ -117,12 +117,5 @@ class Frame internal constructor(pointer: Long) : AutoCloseable {
     override fun close() = handle.close()
 }
 
-internal fun requireDrawable(bitmap: Bitmap) {
-    require(bitmap.isMutable) { "The bitmap is not mutable; make it with Bitmap.createBitmap or copy it." }
-    require(bitmap.config == Bitmap.Config.ARGB_8888) { "The bitmap is ${bitmap.config}; ARGB_8888 is needed." }
-}
-
-internal fun requireOpen(buffer: HardwareBuffer) = check(!buffer.isClosed) { "This HardwareBuffer is closed." }
-
 /** [heightPx] rows of [widthPx] depths along the optical axis, in metres; 0 where it is unknown. */
 class DepthImage(val widthPx: Int, val heightPx: Int, val metres: FloatArray)

@@ -7,6 +7,7 @@ import android.hardware.HardwareBuffer
 import android.media.Image
 import dev.maquette.jni.Native
 import dev.maquette.jni.NativeEdges
+import dev.maquette.jni.NativeHead
 import dev.maquette.jni.NativePicture
 import dev.maquette.jni.NativeScene
 import java.io.IOException
@@ -291,6 +292,35 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         bundle: ModelBundle,
         config: SceneRenderer.Config = SceneRenderer.Config(),
     ): SceneRenderer = handle.use { context -> SceneRenderer(context, scene, bundle, config) }
+
+    /**
+     * Loads the network of heads; takes some 100 ms, so not on the main thread.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
+     *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task).
+     */
+    fun headBuilder(bundle: ModelBundle, config: HeadBuilder.Config = HeadBuilder.Config()): HeadBuilder =
+        handle.use { context ->
+            HeadBuilder(
+                NativeHead.createBuilder(context, bundle.folder, bundle.names, bundle.buffers, config.values()),
+            )
+        }
+
+    /**
+     * Opens a head file (.maqh); no networks are needed. Blocks while it is read.
+     *
+     * @throws MaquetteException with [Status.NOT_FOUND], [Status.UNREADABLE] (damaged, or not a head) and
+     *   [Status.UNSUPPORTED] (another version).
+     */
+    fun openHead(path: String): Head = handle.use { context -> Head(NativeHead.open(context, path.toByteArray())) }
+
+    /**
+     * A renderer of a head; makes its mesh, which takes a second or less with the defaults, so not on the main thread.
+     *
+     * @throws MaquetteException as [Head.mesh].
+     */
+    fun headRenderer(head: Head, config: HeadRenderer.Config = HeadRenderer.Config()): HeadRenderer =
+        handle.use { context -> HeadRenderer(context, head, config) }
 
     override fun close() = handle.close()
 

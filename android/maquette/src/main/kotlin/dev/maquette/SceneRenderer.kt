@@ -132,19 +132,7 @@ class SceneImage internal constructor(pointer: Long, val widthPx: Int, val heigh
         }
 
     /** A copy as an opaque ARGB_8888 bitmap. */
-    fun toBitmap(): Bitmap =
-        handle.use {
-            val bgr = ByteArray(Plane.BGR.pixelBytes * widthPx * heightPx)
-            plane(Plane.BGR).get(bgr)
-            val pixels =
-                IntArray(widthPx * heightPx) { k ->
-                    val blue = bgr[3 * k].toInt() and 0xFF
-                    val green = bgr[3 * k + 1].toInt() and 0xFF
-                    val red = bgr[3 * k + 2].toInt() and 0xFF
-                    0xFF shl 24 or (red shl 16) or (green shl 8) or blue
-                }
-            Bitmap.createBitmap(pixels, widthPx, heightPx, Bitmap.Config.ARGB_8888)
-        }
+    fun toBitmap(): Bitmap = handle.use { bitmapOf(plane(Plane.BGR), null, widthPx, heightPx) }
 
     /** Of this picture. */
     val stats: Stats

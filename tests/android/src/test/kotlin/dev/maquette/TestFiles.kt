@@ -10,6 +10,8 @@ object TestFiles {
     val bundle = File(root, "sdk/models/densepose-b-int8")
     val scenesBundle = File(root, "sdk/models/scenes-int8")
     val edgesBundle = File(root, "sdk/models/edges-int8")
+    val headsBundle = File(root, "sdk/models/heads-int8")
+    val roundHeadsBundle = File(root, "tests/native/data/round_heads/bundle")
     val photo = File(root, "tests/media/photo.jpg")
     val clip = File(root, "tests/media/clip.mp4")
     val room = File(root, "tests/media/room")

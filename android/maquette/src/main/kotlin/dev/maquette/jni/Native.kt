@@ -79,6 +79,9 @@ internal object Native {
     @JvmStatic external fun saveResult(result: Long, folder: ByteArray, stem: ByteArray)
     @JvmStatic external fun sizeOfResult(result: Long): IntArray
     @JvmStatic external fun peopleOfResult(result: Long): FloatArray
+
+    /** Left, top, right, bottom; null: none of the person's head is seen. */
+    @JvmStatic external fun headBoxOfResult(result: Long, person: Int): FloatArray?
     @JvmStatic external fun planeOfResult(result: Long, plane: Int): ByteBuffer
     @JvmStatic external fun statsOfResult(result: Long): DoubleArray
 }

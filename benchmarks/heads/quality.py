@@ -52,7 +52,7 @@ KNOWN, EIGHT = "one photo, focal length known", "eight photos"
 BUNDLE, DATA, BACKGROUNDS = Path("sdk/models/heads-int8"), Path(".data/heads"), Path(".data/backgrounds/test")
 FIGURES = Path("build/benchmarks/heads.json")
 PERCEPTUAL = Path(".data/teachers/backbone.pt")
-TEXTURE_PX = 512  # a pixel of the texture is some 1.5 mm of skin, as in the photos
+TEXTURE_PX = 512  # a side
 SECONDS = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 

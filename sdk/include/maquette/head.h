@@ -113,8 +113,8 @@ typedef struct maq_head_mesh_options {
   maq_head_topology topology; /* default MAQ_HEAD_TOPOLOGY_FIELD. The template's has its own triangles: triangle_count
                                  and cell_m must be 0 then. */
   const char* bundle_path;    /* for the template's topology of a head from a file, which has no template in it: the
-                                 bundle's folder; NULL (default): bundle_files, or without them the bundle installed with
-                                 the library. A head that was fitted, or has got a template, keeps its own. */
+                                 bundle's folder; NULL (default): bundle_files, or without them the bundle installed
+                                 with the library. A head that was fitted, or has got a template, keeps its own. */
   const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL */
   uint32_t bundle_file_count;          /* default 0 */
 } maq_head_mesh_options;

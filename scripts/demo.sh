@@ -21,9 +21,9 @@ for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
     "$maquette" densepose "$source" --out "$out" --overlay
 done
 
-# A head of the person in the photo, and a clip of it turning.
-printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --preview %s/head_turning.mp4\n' "$out" "$out"
-"$maquette" head tests/media/photo.jpg --out "$out/head.glb" --preview "$out/head_turning.mp4"
+# A head of the person in the photo with the photo as its texture, and a clip of it turning.
+printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --texture 1024 --preview %s/head_turning.mp4\n' "$out" "$out"
+"$maquette" head tests/media/photo.jpg --out "$out/head.glb" --texture 1024 --preview "$out/head_turning.mp4"
 
 # The edges of a carton that a depth camera sees, and its size beside the true one.
 depth='image:tests/media/box_depth.png?depth_unit=0.001&fx=600'

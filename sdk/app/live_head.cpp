@@ -15,6 +15,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kPreviewInterval_s = 0.4, kPreviewCell_m = 0.004;
 constexpr int kMaxSide_px = 4096;
+constexpr uint32_t kTexture_px = 1024;  // saved heads and meshes hold the photo's pixels, then
 constexpr std::array<uint8_t, 3> kBackground = {18, 18, 20};
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -141,6 +142,7 @@ void LiveHead::fit_photo(const Request& request) {
     maq_head_config config = default_head_config();
     config.bundle_path = bundle_path_.c_str(), config.threads = threads_;
     config.allow_spinning = 0;  // a thread that stays awake takes a core from the window
+    config.texture_px = kTexture_px;
     builder_.emplace(context_, config);
   }
   photo_ = std::make_shared<const RgbaImage>(request.photo.picture);

@@ -202,17 +202,17 @@ def test_nothing_is_left_in_the_folder_that_it_is_started_in(tmp_path):
 
 
 @pytest.mark.skipif(not WITH_SANITIZERS.exists(), reason="build/asan has no maquette-demo")
-def test_150_frames_leak_nothing(tmp_path):
+def test_60_frames_leak_nothing(tmp_path):
     # Drivers and X libraries are unloaded before leaks are looked for, and what only their variables point to would
     # count as leaked, with no name left to tell it by. So they stay.
     (tmp_path / "stay.c").write_text("int dlclose(void* library) { return library == 0; }")
     assert run("cc", "-shared", "-fPIC", tmp_path / "stay.c", "-o", tmp_path / "stay.so").returncode == 0
     env = {"ASAN_OPTIONS": "detect_leaks=1:verify_asan_link_order=0", "LD_PRELOAD": str(tmp_path / "stay.so")}
-    options = ("--source", "stub:people?count=2&seed=7", "--frames", 150, "--view", "try-on", "--mesh")
+    options = ("--source", "stub:people?count=2&seed=7", "--frames", 60, "--view", "try-on", "--mesh")
     ran = headless(*options, program=WITH_SANITIZERS, env=env, timeout_s=900)
     assert "Sanitizer" not in ran.stderr, ran.stderr[-3000:]
     assert ran.returncode == 0, ran.stderr[-3000:]
-    assert json.loads(ran.stdout)["frames"] == 150
+    assert json.loads(ran.stdout)["frames"] == 60
 
 
 def test_its_own_code_stays_short():

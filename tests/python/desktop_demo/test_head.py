@@ -20,7 +20,9 @@ BACKGROUND = (20, 18, 18)  # BGR, behind the head
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("head")
-    options = {"colour": [], "normals": ["--shading", "normals"], "over": ["--compare", "slider"]}
+    over = ["--compare", "slider"]
+    normals = ["--shading", "normals"]
+    options = {"colour": [], "normals": normals, "over": over, "normals_over": over + normals}
     return {
         name: show(folder, PHOTO, "--head", "--fit-seconds", "0.5", "--frames", 5, *of) for name, of in options.items()
     }
@@ -62,15 +64,20 @@ def test_normals_are_another_picture_of_the_same_head(shown):
 
 
 def test_over_the_photo_one_half_is_the_photo_and_the_other_has_the_head_on_it(shown):
-    picture = shown["over"]
-    assert picture.report["head"]["is_over_photo"]
-    seen = picture.rectangle("picture_px").astype(int)
-    photo = cv2.resize(cv2.imread(str(PHOTO)), seen.shape[1::-1], interpolation=cv2.INTER_LINEAR).astype(int)
-    differs = np.abs(seen - photo).mean(-1) > 30
-    middle, edge = seen.shape[1] // 2, seen.shape[0] // 10
-    assert differs[edge:, : middle - 4].mean() < 0.01  # a message may lie over its top
-    # The head is in the middle of the photo's upper third.
-    assert differs[edge : seen.shape[0] // 3, middle + 4 : middle + seen.shape[1] // 16].mean() > 0.3
+    differences = {}
+    for name in ("over", "normals_over"):
+        picture = shown[name]
+        assert picture.report["head"]["is_over_photo"]
+        seen = picture.rectangle("picture_px").astype(int)
+        photo = cv2.resize(cv2.imread(str(PHOTO)), seen.shape[1::-1], interpolation=cv2.INTER_LINEAR).astype(int)
+        difference = np.abs(seen - photo).mean(-1)
+        middle, edge = seen.shape[1] // 2, seen.shape[0] // 10
+        assert (difference[edge:, : middle - 4] > 30).mean() < 0.01  # a message may lie over its top
+        # The head is in the middle of the photo's upper third.
+        differences[name] = difference[edge : seen.shape[0] // 3, middle + 4 : middle + seen.shape[1] // 16]
+    # Its texture is the photo, but for the light: near it, not the same.
+    assert (differences["normals_over"] > 30).mean() > 0.6
+    assert 3 < np.median(differences["over"]) < 30
 
 
 @pytest.mark.parametrize(

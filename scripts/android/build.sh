@@ -43,6 +43,7 @@ jar() {
         -Dtransitive=false "-Dartifact=$1" >&2
     echo "$file"
 }
+rm -rf build/android-tests/classes  # else classes that were renamed or moved since stay, and go into the AAR
 mvn --batch-mode --quiet -f tests/android/pom.xml compile
 version="$(sed -n 's/^project(maquette VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)"
 property() { sed -n "s/.*<$1>\(.*\)<\/$1>.*/\1/p" tests/android/pom.xml; }

@@ -112,6 +112,28 @@ MAQ_API void maq_frame_release(maq_frame* frame);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc);
 
+/* Where a frame's picture comes from. Values never change meaning; new ones are added at the end. */
+typedef enum maq_frame_kind {
+  MAQ_FRAME_CAPTURED = 1, /* a camera took it, or it was read, wrapped or drawn */
+  MAQ_FRAME_PREDICTED = 2 /* made up by a predictor from frames before it (prediction.h): nobody saw it */
+} maq_frame_kind;
+
+typedef struct maq_frame_origin {
+  uint32_t struct_size;
+  maq_frame_kind kind;
+  /* Of a predicted frame, otherwise 0: */
+  int64_t horizon_ns; /* from the captured frame that it was made from to its own timestamp */
+  int64_t age_ns;     /* since that frame was captured: by the clock until now with MAQ_CLOCK_MONOTONIC, otherwise
+                         horizon_ns */
+  int64_t captured_timestamp_ns; /* of that frame */
+  uint64_t captured_sequence;
+} maq_frame_origin;
+
+/* Says whether the frame was captured or made up, and then from how old a frame. Copies by maq_frame_resize keep it.
+ * The caller sets origin->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_frame_get_origin(const maq_frame* frame, maq_frame_origin* origin);
+
 /* Describes the frame's depth image: of a frame whose pixels are depth those, otherwise what came with the picture,
  * MAQ_PIXEL_DEPTH16, aligned with it (it may be smaller and then covers the same view). Valid until the frame is
  * released. The intrinsics of the source hold for both. The caller sets desc->struct_size.

@@ -45,6 +45,15 @@ class Frame {
     return desc;
   }
 
+  maq_frame_origin origin() const {
+    maq_frame_origin origin{};
+    origin.struct_size = sizeof origin;
+    check(maq_frame_get_origin(get(), &origin));
+    return origin;
+  }
+  // Made up by a predictor or a concealer: no camera took it.
+  bool is_predicted() const { return origin().kind == MAQ_FRAME_PREDICTED; }
+
   // Nothing when the frame came without depth.
   std::optional<maq_frame_desc> depth() const {
     maq_frame_desc desc{};

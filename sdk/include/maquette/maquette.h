@@ -68,6 +68,7 @@
 #include "maquette/frame.h"
 #include "maquette/head.h"
 #include "maquette/pipeline.h"
+#include "maquette/prediction.h"
 #include "maquette/recorder.h"
 #include "maquette/scene.h"
 #include "maquette/source.h"

@@ -20,6 +20,7 @@
 #include "maquette/head.hpp"
 #include "maquette/maquette.h"
 #include "maquette/pipeline.hpp"
+#include "maquette/prediction.hpp"
 #include "maquette/scene.hpp"
 #include "maquette/source.hpp"
 

@@ -1,5 +1,6 @@
 #include "api/boundary.h"
 #include "api/frame_handle.h"
+#include "core/clock.h"
 #include "image/convert.h"
 #include "image/files/depth_file.h"
 #include "image/files/image_file.h"
@@ -124,6 +125,27 @@ maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
   });
 }
 
+maq_status maq_frame_get_origin(const maq_frame* frame, maq_frame_origin* origin) {
+  return guarded(frame, __func__, [&] {
+    require_argument(frame, "frame");
+    const FrameOrigin& from = frame->frame.origin;
+    maq_frame_origin filled{};
+    filled.kind = MAQ_FRAME_CAPTURED;
+    if (from.is_predicted) {
+      filled.kind = MAQ_FRAME_PREDICTED;
+      filled.horizon_ns = filled.age_ns = from.horizon_ns;
+      if (frame->frame.clock == MAQ_CLOCK_MONOTONIC) {
+        const int64_t now_ns = monotonic_ns();
+        if (__builtin_sub_overflow(now_ns, from.captured_timestamp_ns, &filled.age_ns)) filled.age_ns = INT64_MAX;
+      }
+      filled.captured_timestamp_ns = from.captured_timestamp_ns;
+      filled.captured_sequence = from.captured_sequence;
+    }
+    write_struct(origin, "origin", filled, sizeof(maq_frame_origin));
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
@@ -165,6 +187,7 @@ maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, int32_t he
     handle->frame.timestamp_ns = frame->frame.timestamp_ns;
     handle->frame.clock = frame->frame.clock;
     handle->frame.sequence = frame->frame.sequence;
+    handle->frame.origin = frame->frame.origin;
     *resized = handle.release();
     return MAQ_OK;
   });

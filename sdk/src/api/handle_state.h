@@ -32,7 +32,8 @@ enum class HandleKind : uint32_t {
   kHead,
   kHeadBuilder,
   kHeadRenderer,
-  kHeadImage
+  kHeadImage,
+  kPredictor
 };
 
 class HandleState {

@@ -63,12 +63,21 @@ class PixelLease {
   int slot_ = 0;
 };
 
+// What a frame was made from that no camera took (maq_frame_origin).
+struct FrameOrigin {
+  bool is_predicted = false;
+  int64_t captured_timestamp_ns = 0;
+  uint64_t captured_sequence = 0;
+  int64_t horizon_ns = 0;
+};
+
 struct Frame {
   ImageView image;
   ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the image; no width when there is none
   int64_t timestamp_ns = 0;
   maq_clock clock = MAQ_CLOCK_MEDIA;
   uint64_t sequence = 0;
+  FrameOrigin origin;
   // Memory of the pixels when the library owns them; kept between uses of a pooled frame.
   std::vector<uint8_t> storage;
   std::vector<uint8_t> depth_storage;
@@ -83,6 +92,7 @@ struct Frame {
     lease.reset();
     jpeg = nullptr;
     depth.width_px = 0;
+    origin = {};
   }
 
   // Makes `storage` hold one image of that size without row padding and points `image` at it.

@@ -185,6 +185,42 @@ TEST(SteadyState, DepthFramesTakeNothingFromTheHeap) {
   }
 }
 
+TEST(SteadyState, PredictedFramesTakeNothingFromTheHeap) {
+  const maquette::Context context;
+  for (const maq_prediction_method method : {MAQ_PREDICTION_AUTO, MAQ_PREDICTION_MOTION}) {
+    maq_predictor_config config = maquette::default_predictor_config();
+    config.method = method;
+    config.threads = 2;
+    maquette::Predictor predictor(context, config);
+    maquette::Source source(context, "stub:people?count=2&size=320x240&fps=30");
+    std::vector<maquette::Frame> frames;
+    for (int i = 0; i < 4; ++i) frames.push_back(std::move(*source.next()));
+    std::vector<uint8_t> pixels(320 * 240 * 3);
+    maq_frame_desc desc = frames[0].desc();
+    int64_t time_ns = 0;
+    const auto run = [&](int count) {
+      for (int i = 0; i < count; ++i) {
+        frames[size_t(i) % 4].copy_pixels(MAQ_PIXEL_BGR8, pixels.data(), 0, pixels.size());
+        desc.planes[0] = pixels.data();
+        desc.stride_bytes[0] = 0;
+        desc.timestamp_ns = time_ns += 33333333;
+        const maquette::Frame frame(context, desc);
+        counting = true;
+        ASSERT_EQ(maq_predictor_push(predictor.get(), frame.get()), MAQ_OK);
+        maq_frame* predicted = nullptr;
+        ASSERT_EQ(maq_predictor_predict(predictor.get(), 0.1, &predicted), MAQ_OK);
+        maq_frame_release(predicted);
+        counting = false;
+      }
+    };
+    run(40);  // until every memory of past frames was filled
+    counted();
+    run(30);
+    const Allocations found = counted();
+    EXPECT_EQ(found.ours, 0) << "method " << method << "\n" << found.where;
+  }
+}
+
 // Through the thread, the queue and the status callback of a camera; a recording stands in for the device.
 TEST(SteadyState, FramesOfLiveSourcesTakeNothingFromTheHeap) {
   const TempFolder folder;

@@ -27,7 +27,7 @@ SYSTEMS = (
     | CURVES
     | HEAD
     | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/build", "head/bundle", "head/files",
-       "head/render", "sources", "sources/recording"}
+       "head/render", "prediction", "sources", "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {
     "core": set(),
@@ -56,6 +56,7 @@ MAY_INCLUDE = {
     "head/render": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "head/wrap": {"core", "core/math", "head"},
+    "prediction": {"core", "image"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
     "scene/networks": CAPTURE,

@@ -1,0 +1,36 @@
+// The pixels of a picture fetched from another along a field of displacements: the loops over pixels.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "prediction/optical_flow.h"
+
+namespace maq {
+
+// A plane of values in a frame: `channels` bytes, `channel_bytes` apart, of each of width x height pixels that lie
+// `pixel_bytes` apart; a pixel of it is `subsampled` pixels of the frame wide or high.
+struct PlaneSamples {
+  const uint8_t* from;
+  size_t from_stride;
+  uint8_t* to;
+  size_t to_stride;
+  int width, height;
+  int channels, channel_bytes, pixel_bytes;
+  int subsampled_x, subsampled_y;
+};
+
+// Of a row of the picture: how far each pixel's origin is, and that as a pixel with the weights (of 256) of the one to
+// its right and the one below. Memory that is used again.
+struct FetchRow {
+  std::vector<float> upper_dx, upper_dy;  // between two rows of the field
+  std::vector<float> dx, dy;
+  std::vector<int> left, right, x_weight, above, below, y_weight;
+};
+
+// Row `y` of a plane, along a field whose pixels are `scale` pixels of the frame each way. A byte behind the last of
+// `from` is read where pixels have three.
+void fetch_row(const PlaneSamples& plane, const FlowField& field, int scale, int y, FetchRow& row);
+
+}  // namespace maq

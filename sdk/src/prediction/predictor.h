@@ -1,0 +1,70 @@
+// The coming frames of a stream, from those that were seen.
+#pragma once
+
+#include <cstdint>
+
+#include "core/frame.h"
+#include "core/worker_threads.h"
+#include "maquette/prediction.h"
+#include "prediction/extrapolation.h"
+#include "prediction/grey_pyramid.h"
+#include "prediction/method_choice.h"
+#include "prediction/optical_flow.h"
+
+namespace maq {
+
+struct PredictorSettings {
+  maq_prediction_method method = MAQ_PREDICTION_AUTO;
+  int threads = 1;
+};
+
+// As in maq_predictor_stats.
+struct PredictorStats {
+  float grey_ms = 0, flow_ms = 0, choice_ms = 0, push_ms = 0;
+  float project_ms = 0, fetch_ms = 0, predict_ms = 0;
+  maq_prediction_method method = MAQ_PREDICTION_LAST;  // of the latest prediction
+  uint64_t pushed = 0, predicted = 0, restarts = 0;
+};
+
+// Not for two threads at once.
+class Predictor {
+ public:
+  // How far apart frames may be for their motion to be known, and how far ahead frames are predicted.
+  static constexpr int64_t kMaxInterval_ns = 1000000000, kMaxAhead_ns = 10000000000;
+
+  explicit Predictor(const PredictorSettings& settings);
+  Predictor(const Predictor&) = delete;
+  Predictor& operator=(const Predictor&) = delete;
+
+  // The frame is copied. What came before is forgotten where it is of another size, format or clock, not later, more
+  // than kMaxInterval_ns later, or shows something else (a cut); a frame of the newest's time replaces that. Throws
+  // MAQ_ERROR_UNSUPPORTED for a depth image.
+  void push(const Frame& frame);
+
+  // What the stream will show `ahead_ns` after the newest frame, 0 to kMaxAhead_ns, in its format. Memory of `frame` is
+  // reused. Throws MAQ_ERROR_INVALID_ARGUMENT for another time, or before the first frame.
+  void predict(int64_t ahead_ns, Frame& frame);
+
+  void restart();
+
+  bool has_frame() const { return has_frame_; }
+  const PredictorStats& stats() const { return stats_; }
+
+ private:
+  const PredictorSettings settings_;
+  WorkerThreads threads_;
+  Frame newest_;  // the image in its own memory, and a byte
+  bool has_frame_ = false;
+  bool has_before_ = false;  // a frame that the newest one goes on from; its grey levels are those of before_
+  int64_t before_ns_ = 0;    // its time
+  int64_t interval_ns_ = 0;  // of flow_; 0: no motion is known
+  bool moves_ = false;
+  GreyPyramid now_, before_;
+  FlowField flow_;
+  OpticalFlow optical_flow_;
+  Extrapolation extrapolation_;
+  MethodChoice choice_;
+  PredictorStats stats_;
+};
+
+}  // namespace maq

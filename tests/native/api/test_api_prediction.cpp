@@ -1,0 +1,151 @@
+// Predictors through the C API: frames in and out, marks, statuses.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <maquette/maquette.hpp>
+#include <string>
+#include <vector>
+
+#include "support/temp_folder.h"
+
+namespace {
+
+std::string text() { return maq_last_error(nullptr); }
+
+class ApiPrediction : public testing::Test {
+ protected:
+  maquette::Frame frame(int number) const {
+    maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=30");
+    for (int i = 0; i < number; ++i) source.next();
+    return std::move(*source.next());
+  }
+
+  const maquette::Context context_;
+};
+
+TEST_F(ApiPrediction, AFramePredictedIsOneOfTheStreamAndSaysThatItIsMadeUp) {
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=30");
+  maquette::Predictor predictor(context_);
+  maq_frame_desc last{};
+  for (int i = 0; i < 6; ++i) {
+    const auto frame = source.next();
+    EXPECT_EQ(frame->origin().kind, MAQ_FRAME_CAPTURED);
+    EXPECT_EQ(frame->origin().horizon_ns, 0);
+    EXPECT_FALSE(frame->is_predicted());
+    last = frame->desc();
+    predictor.push(*frame);
+  }
+  const maquette::Frame predicted = predictor.predict(0.1);
+  const maq_frame_desc desc = predicted.desc();
+  EXPECT_EQ(desc.format, last.format);
+  EXPECT_EQ(desc.width_px, 320);
+  EXPECT_EQ(desc.timestamp_ns, last.timestamp_ns + 100000000);
+  const maq_frame_origin origin = predicted.origin();
+  EXPECT_EQ(origin.kind, MAQ_FRAME_PREDICTED);
+  EXPECT_EQ(origin.horizon_ns, 100000000);
+  EXPECT_EQ(origin.age_ns, 100000000) << "of a media clock";
+  EXPECT_EQ(origin.captured_timestamp_ns, last.timestamp_ns);
+  EXPECT_EQ(origin.captured_sequence, last.sequence);
+  EXPECT_TRUE(predicted.resized(64, 48).is_predicted()) << "a copy keeps it";
+  const maq_predictor_stats stats = predictor.stats();
+  EXPECT_EQ(stats.pushed_count, 6u);
+  EXPECT_EQ(stats.predicted_count, 1u);
+  EXPECT_EQ(stats.restart_count, 0u);
+  EXPECT_GT(stats.push_ms, 0);
+  EXPECT_GT(stats.predict_ms, 0);
+}
+
+TEST_F(ApiPrediction, TheAgeOfALiveFrameGrows) {
+  std::vector<uint8_t> pixels(64 * 64, 50);
+  maq_frame_desc desc{};
+  maq_frame_desc_init(&desc, sizeof desc);
+  desc.format = MAQ_PIXEL_GREY8;
+  desc.width_px = desc.height_px = 64;
+  desc.planes[0] = pixels.data();
+  desc.clock = MAQ_CLOCK_MONOTONIC;
+  desc.timestamp_ns = 1000;  // after the start of the machine
+  maquette::Predictor predictor(context_);
+  predictor.push(maquette::Frame(context_, desc));
+  const maquette::Frame predicted = predictor.predict(0.5);
+  const maq_frame_origin first = predicted.origin(), second = predicted.origin();
+  EXPECT_EQ(first.horizon_ns, 500000000);
+  EXPECT_GT(first.age_ns, 0);
+  EXPECT_GE(second.age_ns, first.age_ns);
+}
+
+TEST_F(ApiPrediction, AFrameOfThePoolThatIsUsedAgainIsNoLongerMarked) {
+  maquette::Source source(context_, "stub:pattern?size=64x64&fps=30");
+  maquette::Predictor predictor(context_);
+  predictor.push(*source.next());
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_TRUE(predictor.predict(0.1).is_predicted());
+    EXPECT_FALSE(source.next()->is_predicted());
+  }
+}
+
+TEST_F(ApiPrediction, ThePoolIsBoundedAndOutlivesThePredictor) {
+  maq_predictor_config config = maquette::default_predictor_config();
+  config.frame_pool_size = 2;
+  config.threads = 1;
+  auto predictor = std::make_unique<maquette::Predictor>(context_, config);
+  predictor->push(frame(0));
+  maquette::Frame one = predictor->predict(0), other = predictor->predict(1);
+  maq_frame* third = nullptr;
+  EXPECT_EQ(maq_predictor_predict(predictor->get(), 0, &third), MAQ_ERROR_POOL_EMPTY);
+  EXPECT_NE(text().find("predicted frames"), std::string::npos);
+  predictor.reset();
+  EXPECT_EQ(one.desc().width_px, 320);
+}
+
+TEST_F(ApiPrediction, WhatIsWrongIsTold) {
+  maquette::Predictor predictor(context_);
+  maq_frame* made = nullptr;
+  EXPECT_EQ(maq_predictor_predict(predictor.get(), 0.1, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(text().find("No frame was pushed"), std::string::npos);
+  predictor.push(frame(0));
+  for (const double wrong : {-0.001, 10.001, 1e300, double(std::numeric_limits<float>::infinity()), std::nan("")}) {
+    EXPECT_EQ(maq_predictor_predict(predictor.get(), wrong, &made), MAQ_ERROR_INVALID_ARGUMENT) << wrong;
+    EXPECT_NE(text().find("ahead_s is"), std::string::npos);
+  }
+  EXPECT_EQ(maq_predictor_predict(predictor.get(), 0.1, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_predictor_push(predictor.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_predictor_push(nullptr, frame(0).get()), MAQ_ERROR_INVALID_ARGUMENT);
+  const maquette::Source solids(context_, "stub:solids?scene=box&seed=1&fps=1&size=64x64");
+  EXPECT_EQ(maq_predictor_restart(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  predictor.restart();
+  EXPECT_EQ(maq_predictor_predict(predictor.get(), 0.1, &made), MAQ_ERROR_INVALID_ARGUMENT) << "nothing is left";
+  EXPECT_EQ(made, nullptr);
+  maq_predictor_destroy(nullptr);
+}
+
+TEST_F(ApiPrediction, ConfigsAndStructsOutOfRangeAreRefused) {
+  maq_predictor* made = nullptr;
+  const auto refused = [&](const char* name, auto&& change) {
+    maq_predictor_config config = maquette::default_predictor_config();
+    change(config);
+    EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT) << name;
+    EXPECT_NE(text().find(std::string("config.") + name), std::string::npos) << text();
+  };
+  refused("threads", [](maq_predictor_config& config) { config.threads = -1; });
+  refused("threads", [](maq_predictor_config& config) { config.threads = 65; });
+  refused("method", [](maq_predictor_config& config) {
+    const int32_t unknown = 3;
+    std::memcpy(&config.method, &unknown, sizeof unknown);
+  });
+  refused("frame_pool_size", [](maq_predictor_config& config) { config.frame_pool_size = 0; });
+  refused("frame_pool_size", [](maq_predictor_config& config) { config.frame_pool_size = 65; });
+  refused("struct_size", [](maq_predictor_config& config) { config.struct_size = 3; });
+  EXPECT_EQ(maq_predictor_create(nullptr, nullptr, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_predictor_create(context_.get(), nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  const maquette::Predictor predictor(context_);
+  maq_predictor_stats stats{};
+  EXPECT_EQ(maq_predictor_get_stats(predictor.get(), &stats), MAQ_ERROR_INVALID_ARGUMENT);
+  const maquette::Frame captured = frame(0);
+  maq_frame_origin origin{};
+  EXPECT_EQ(maq_frame_get_origin(captured.get(), &origin), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_frame_get_origin(nullptr, &origin), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_frame_get_origin(captured.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+}
+
+}  // namespace

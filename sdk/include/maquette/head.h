@@ -37,8 +37,8 @@ typedef struct maq_head_config {
   maq_provider provider;  /* for the network; default MAQ_PROVIDER_CPU. One that cannot be had, or that takes less than
                              half of the network, is replaced by the CPU: the log says why. */
   uint32_t texture_px; /* of heads, pixels a side, 256 to 2048: the photos' pixels where they see the surface well, the
-                          network's colours elsewhere. 0 (default): heads have none, and hold no part of a photo. With
-                          1024 a fit takes 140 MB of memory more, and a second or two. */
+                          network's colours, in the photos' light, elsewhere. 0 (default): heads have none, and hold no
+                          part of a photo. With 1024 a fit takes 140 MB of memory more, and a second or two. */
   int32_t texture_mirrored; /* 1: where no photo sees one side of the head, it looks as the other; 0 (default): as the
                                network has it */
 } maq_head_config;

@@ -39,8 +39,9 @@ struct TextureImage {
 // `mesh` has normals, colours and texture coordinates (texture_layout.h). A texel shows the outermost surface that lies
 // there. A photo counts for it as far as the surface faces it, no other part of the mesh is before it, and the matte
 // says that it is the head; finer photos more. What a photo differs from the mesh's colours by is blended; its mean
-// over the photo is made the same for all photos, and its surroundings' mean goes on into what no photo sees, less
-// with the distance: so there is no step. The same for any number of threads.
+// over the photo is made the same for all photos. What no photo sees has the mesh's colours in the photos' light
+// (photo_light.h), and what its surroundings still differ by, less with the distance: so there is no step. The same for
+// any number of threads.
 TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, const TextureOptions& options,
                           WorkerThreads& threads);
 

@@ -1,0 +1,30 @@
+// What a photo's exposure, white balance and light make of a surface's colours: fitted where the photo sees the
+// surface, applied where it does not.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/math/vec3.h"
+
+namespace maq::head {
+
+// Of one colour channel, 0 to 255: gain * own + offset + own * dot(directed, normal), a Lambertian surface in uniform
+// light and light from one side.
+struct ChannelLight {
+  double gain = 1, offset = 0;
+  Vec3 directed;
+
+  float operator()(float own, const float* normal) const;  // within 0 to 255
+};
+
+using PhotoLight = std::array<ChannelLight, 3>;
+
+// By weighted least squares, over points of a surface: `weights` [n], 0 where the photo does not see it; `own` colours,
+// `differences` of the photo's from them, and unit `normals` [n][3]. What the points do not determine stays near a
+// plain gain: own colours that hardly vary tell no gain from an offset, and few normals no direction. Nothing seen:
+// nothing is changed.
+PhotoLight fit_photo_light(const std::vector<float>& weights, const std::vector<float>& own,
+                           const std::vector<float>& differences, const std::vector<float>& normals);
+
+}  // namespace maq::head

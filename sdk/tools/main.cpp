@@ -19,6 +19,7 @@ int main(int argc, char** argv) try {
   add_sources_command(app, &exit_code);
   add_doctor_command(app, &exit_code);
   add_play_command(app, &exit_code);
+  add_predict_command(app, &exit_code);
   add_record_command(app, &exit_code);
   add_densepose_command(app, &exit_code);
   add_edges_command(app, &exit_code);

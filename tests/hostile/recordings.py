@@ -12,7 +12,7 @@ from tests.hostile.trial import EITHER, REFUSED, Trial
 HEAD = struct.Struct("<8sIIQ")
 FRAME = struct.Struct("<IIqQIiiiiIQQ")
 FIELDS = ("magic", "head_check", "timestamp_ns", "sequence", "encoding", "width_px", "height_px", "depth_width_px",
-          "depth_height_px", "zero", "picture_bytes", "payload_check")  # fmt: skip
+          "depth_height_px", "predicted_us", "picture_bytes", "payload_check")  # fmt: skip
 PLAYS = (
     (*DENSEPOSE, "rec:a.maqrec"),
     ("play", "a.maqrec", "--no-picture", "--seconds", "1", "--json", "a.json"),

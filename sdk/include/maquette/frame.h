@@ -168,7 +168,7 @@ MAQ_API maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, in
  * of 16 bits in whole millimetres, 0 where nothing is known or it is over 65.534 m, or a TIFF (.tif, .tiff) of metres
  * as floats; image: with depth_unit=0.001 or depth_unit=1 reads it again. The depth that came with a picture is not
  * written: wrap maq_frame_get_depth for that. The file is written atomically and replaces an existing one; its folder
- * must exist.
+ * must exist. That of a predicted frame says so at its beginning, and image: and maq_frame_decode read it.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNSUPPORTED (depth in builds for
  * Android), MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it is
  * written. */

@@ -17,6 +17,8 @@ typedef struct maq_recorder_config {
   /* 0 (default): pixels stay as they are, 18 MB a second at 640 x 480 YUYV and 30 frames a second. 1 to 100: they are
    * compressed as JPEG of that quality. What a camera sends as JPEG is kept as it came in both cases. */
   uint32_t jpeg_quality;
+  int32_t keep_predicted; /* 1: frames that a predictor made up are recorded too, marked as such; 0 (default): they are
+                             refused */
 } maq_recorder_config;
 
 typedef struct maq_recorder_info {
@@ -37,9 +39,9 @@ MAQ_API maq_status maq_recorder_create(maq_context* context, const char* path, c
                                        const maq_recorder_config* config, maq_recorder** recorder);
 
 /* Adds a frame, which is complete in the file when the call returns. Frames may have different sizes and formats.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the frame before), MAQ_ERROR_UNWRITABLE (the
- * disk is full: earlier frames stay readable, and frames can be added again once there is space). Blocks while it is
- * written. */
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the frame before), MAQ_ERROR_UNSUPPORTED (a
+ * predicted frame, without keep_predicted), MAQ_ERROR_UNWRITABLE (the disk is full: earlier frames stay readable, and
+ * frames can be added again once there is space). Blocks while it is written. */
 MAQ_API maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame);
 
 /* Writes the index, without which a player has to search for the frames, and closes the file.

@@ -201,7 +201,7 @@ maq_status maq_frame_save(const maq_frame* frame, const char* path) {
     if (is_depth(image.format)) {
       write_depth_file(image, path);
     } else {
-      write_image_file(image, path);
+      write_image_file(image, path, frame->frame.origin);
     }
     return MAQ_OK;
   });

@@ -1,3 +1,5 @@
+#include <cstddef>
+
 #include "api/boundary.h"
 #include "api/source_handle.h"
 #include "maquette/recorder.h"
@@ -6,12 +8,16 @@
 using namespace maq;
 
 struct maq_recorder : HandleOf<HandleKind::kRecorder> {
-  maq_recorder(const char* path, const RecordingInfo& info, int jpeg_quality) : writer(path, info, jpeg_quality) {}
+  maq_recorder(const char* path, const RecordingInfo& info, const maq_recorder_config& config)
+      : writer(path, info, int(config.jpeg_quality), config.keep_predicted == 1) {}
   RecordingWriter writer;
 };
 
+// Of the struct's first release.
+static constexpr size_t kFirstRecorderConfigSize = offsetof(maq_recorder_config, keep_predicted);
+
 maq_status maq_recorder_config_init(maq_recorder_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, maq_recorder_config{}, sizeof(maq_recorder_config));
+  return init_config(__func__, config, struct_size, maq_recorder_config{}, kFirstRecorderConfigSize);
 }
 
 maq_status maq_recorder_create(maq_context* context, const char* path, const maq_source* source,
@@ -20,15 +26,16 @@ maq_status maq_recorder_create(maq_context* context, const char* path, const maq
     require_argument(context, "context");
     require_argument(path, "path");
     require_argument(recorder, "recorder");
-    const maq_recorder_config config = read_config(given, "config", maq_recorder_config{}, sizeof(maq_recorder_config));
+    const maq_recorder_config config = read_config(given, "config", maq_recorder_config{}, kFirstRecorderConfigSize);
     require_range("config.jpeg_quality", config.jpeg_quality, 0u, 100u);
+    require_range("config.keep_predicted", config.keep_predicted, 0, 1);
     RecordingInfo info;
     if (source != nullptr) {
       info.source = source->uri;
       info.fps = source->source->info().fps;
       if (source->source->intrinsics() != nullptr) info.intrinsics = *source->source->intrinsics();
     }
-    *recorder = new maq_recorder(path, info, int(config.jpeg_quality));
+    *recorder = new maq_recorder(path, info, config);
     return MAQ_OK;
   });
 }

@@ -69,6 +69,11 @@ struct FrameOrigin {
   int64_t captured_timestamp_ns = 0;
   uint64_t captured_sequence = 0;
   int64_t horizon_ns = 0;
+
+  // The origin of a frame whose time and number were changed.
+  FrameOrigin moved_to(int64_t timestamp_ns, uint64_t sequence) const {
+    return is_predicted ? FrameOrigin{true, timestamp_ns - horizon_ns, sequence, horizon_ns} : FrameOrigin{};
+  }
 };
 
 struct Frame {

@@ -35,23 +35,22 @@ void Predictor::restart() {
   choice_.restart();
 }
 
-void Predictor::push(const Frame& frame) {
+void Predictor::keep(const Frame& frame) {
   if (is_depth(frame.image.format)) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours that could be predicted; give the picture.");
   }
   const Stopwatch whole;
-  Stopwatch stage;
-  bool is_again = false;
+  is_again_ = false;
   if (has_frame_) {
     const std::optional<int64_t> since = interval(newest_.timestamp_ns, frame.timestamp_ns);
-    is_again = since == 0;
+    is_again_ = since == 0;
     if (!since || !is_same_kind(frame.image, newest_.image) || frame.clock != newest_.clock) {
-      is_again = false;
+      is_again_ = false;
       restart();
       ++stats_.restarts;
     }
   }
-  if (has_frame_ && !is_again) {
+  if (has_frame_ && !is_again_) {
     std::swap(now_, before_);
     before_ns_ = newest_.timestamp_ns;
     has_before_ = true;
@@ -65,11 +64,19 @@ void Predictor::push(const Frame& frame) {
   newest_.timestamp_ns = frame.timestamp_ns;
   newest_.clock = frame.clock;
   newest_.sequence = frame.sequence;
+  has_frame_ = true;
+  interval_ns_ = 0;
+  moves_ = false;
+  stats_.push_ms = float(whole.elapsed_ms());
+}
+
+void Predictor::follow() {
+  if (!has_frame_) return;
+  const Stopwatch whole;
+  Stopwatch stage;
   now_.set(newest_.image, threads_);
   stats_.grey_ms = float(stage.lap_ms());
 
-  interval_ns_ = 0;
-  moves_ = false;
   stats_.flow_ms = stats_.choice_ms = 0;
   if (settings_.method != MAQ_PREDICTION_LAST) {
     if (has_before_) {
@@ -79,21 +86,20 @@ void Predictor::push(const Frame& frame) {
         has_before_ = false;
         ++stats_.restarts;
       } else {
-        interval_ns_ = frame.timestamp_ns - before_ns_;
+        interval_ns_ = newest_.timestamp_ns - before_ns_;
         const auto is_none = [](float displacement) { return displacement == 0; };
         moves_ = !std::all_of(flow_.dx_px.begin(), flow_.dx_px.end(), is_none) ||
                  !std::all_of(flow_.dy_px.begin(), flow_.dy_px.end(), is_none);
       }
     }
     stats_.flow_ms = float(stage.lap_ms());
-    if (settings_.method == MAQ_PREDICTION_AUTO && !is_again) {
-      choice_.add(now_, frame.timestamp_ns, flow_, interval_ns_, threads_);
+    if (settings_.method == MAQ_PREDICTION_AUTO && !is_again_) {
+      choice_.add(now_, newest_.timestamp_ns, flow_, interval_ns_, threads_);
       stats_.choice_ms = float(stage.lap_ms());
     }
   }
-  has_frame_ = true;
   ++stats_.pushed;
-  stats_.push_ms = float(whole.elapsed_ms());
+  stats_.push_ms += float(whole.elapsed_ms());
 }
 
 void Predictor::predict(int64_t ahead_ns, Frame& frame) {

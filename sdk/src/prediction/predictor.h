@@ -39,7 +39,13 @@ class Predictor {
   // The frame is copied. What came before is forgotten where it is of another size, format or clock, not later, more
   // than kMaxInterval_ns later, or shows something else (a cut); a frame of the newest's time replaces that. Throws
   // MAQ_ERROR_UNSUPPORTED for a depth image.
-  void push(const Frame& frame);
+  void push(const Frame& frame) {
+    keep(frame);
+    follow();
+  }
+  // The same in two steps: the frame is needed for the first alone, which is short; the second finds its motion.
+  void keep(const Frame& frame);
+  void follow();
 
   // What the stream will show `ahead_ns` after the newest frame, 0 to kMaxAhead_ns, in its format. Memory of `frame` is
   // reused. Throws MAQ_ERROR_INVALID_ARGUMENT for another time, or before the first frame.
@@ -55,6 +61,7 @@ class Predictor {
   WorkerThreads threads_;
   Frame newest_;  // the image in its own memory, and a byte
   bool has_frame_ = false;
+  bool is_again_ = false;    // the newest one replaced one of its time
   bool has_before_ = false;  // a frame that the newest one goes on from; its grey levels are those of before_
   int64_t before_ns_ = 0;    // its time
   int64_t interval_ns_ = 0;  // of flow_; 0: no motion is known

@@ -42,6 +42,7 @@ struct CameraBuffer {
   const uint8_t* jpeg = nullptr;      // of a JPEG image
   size_t jpeg_bytes = 0;
   ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the picture; no width when there is none
+  FrameOrigin origin;                            // of a recording that is replayed
   int slot = 0;
   int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the picture was taken; no later than the one before: it is dropped
   uint32_t sequence = 0;     // counts the device's frames, those that were lost included

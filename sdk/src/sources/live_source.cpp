@@ -477,6 +477,7 @@ NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
     frame.timestamp_ns = buffer.timestamp_ns;
     frame.clock = MAQ_CLOCK_MONOTONIC;
     frame.sequence = entry.sequence;
+    frame.origin = buffer.origin.moved_to(frame.timestamp_ns, frame.sequence);
     return NextFrame::kFrame;
   }
 }

@@ -14,6 +14,7 @@
 #include "output/frame_image.h"
 #include "output/output_file.h"
 #include "output/overlay.h"
+#include "output/prediction_mark.h"
 #include "print.h"
 #include "program.h"
 
@@ -110,7 +111,8 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
     const maquette::DensePoseResult result = densepose.run(given.frame);
     const maq_densepose_stats stats = result.stats();
     // Drawn before the first file is written, so that a frame has all its files or none.
-    const cv::Mat overlay = options.overlay ? draw_overlay(image_of(given.frame), result) : cv::Mat();
+    cv::Mat overlay = options.overlay ? draw_overlay(image_of(given.frame), result) : cv::Mat();
+    if (options.overlay) draw_prediction_mark(given.frame, overlay);
     make_folder_of(fs::path(options.out) / (given.stem + "_IUV.png"));
     result.save(options.out, given.stem);
     if (options.overlay && of_clip) clip.add(overlay);

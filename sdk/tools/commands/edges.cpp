@@ -14,6 +14,7 @@
 #include "output/edge_overlay.h"
 #include "output/frame_image.h"
 #include "output/output_file.h"
+#include "output/prediction_mark.h"
 #include "print.h"
 #include "program.h"
 
@@ -140,8 +141,8 @@ void run_source(const EdgesOptions& options, const SourceArgument& argument, con
     const maquette::EdgesResult result = edges.run(given.frame, intrinsics);
     // Drawn before the first file is written, so that a frame has all its files or none.
     const FoundCurves found = find_curves(options, result);
-    const cv::Mat overlay =
-        options.overlay ? draw_edge_overlay(result, found.curves, found.corners, found.boxes) : cv::Mat();
+    cv::Mat overlay = options.overlay ? draw_edge_overlay(result, found.curves, found.corners, found.boxes) : cv::Mat();
+    if (options.overlay) draw_prediction_mark(given.frame, overlay);
     make_folder_of(fs::path(options.out) / (given.stem + "_distance.png"));
     result.save(options.out, given.stem);
     for (const std::string& format : options.formats) {

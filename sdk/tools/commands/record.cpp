@@ -21,6 +21,7 @@ struct RecordOptions {
   int64_t frames = 0;
   double seconds = 0;
   uint32_t quality = 0;
+  bool keep_predicted = false;
 };
 
 // Frames that may wait while the disk is slow.
@@ -41,6 +42,7 @@ int record(const RecordOptions& options) {
   maq_recorder_config how{};
   maquette::check(maq_recorder_config_init(&how, sizeof how));
   how.jpeg_quality = options.quality;
+  how.keep_predicted = options.keep_predicted ? 1 : 0;
   maquette::Recorder recorder(context, options.out, &source, &how);
 
   int64_t expected = options.frames > 0 ? options.frames : std::max<int64_t>(0, info.frame_count);
@@ -86,6 +88,8 @@ void add_record_command(CLI::App& app, int* exit_code) {
       ->add_option("-q,--quality", options->quality,
                    "Compress frames as JPEG of this quality, 1 to 100; default: store them unchanged")
       ->check(CLI::Range(1, 100));
+  command->add_flag("--keep-predicted", options->keep_predicted,
+                    "Record predicted frames too, marked as such; default: they are an error");
   command->footer(
       "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording. After a crash or a power cut\n"
       "it can still be played.\n\n"

@@ -84,6 +84,85 @@ TEST_F(ApiPrediction, AFrameOfThePoolThatIsUsedAgainIsNoLongerMarked) {
   }
 }
 
+TEST_F(ApiPrediction, SavedPicturesKeepTheMark) {
+  const TempFolder folder;
+  maquette::Predictor predictor(context_);
+  predictor.push(frame(3));
+  const maquette::Frame predicted = predictor.predict(0.25);
+  for (const char* name : {"a.png", "a.jpg", "a.jpeg"}) {
+    const std::string path = folder.file(name);
+    predicted.save(path);
+    const std::string bytes = read_text(path);
+    const maquette::Frame decoded = maquette::Frame::decode(context_, bytes.data(), bytes.size());
+    for (const char* options : {"", "?size=160x120"}) {
+      const maquette::Frame read = std::move(*maquette::Source(context_, "image:" + path + options).next());
+      for (const maquette::Frame* found : {&decoded, &read}) {
+        EXPECT_EQ(found->origin().kind, MAQ_FRAME_PREDICTED) << name;
+        EXPECT_EQ(found->origin().horizon_ns, 250000000);
+        EXPECT_EQ(found->origin().captured_timestamp_ns, predicted.origin().captured_timestamp_ns);
+        EXPECT_EQ(found->origin().captured_sequence, 3u);
+      }
+    }
+    frame(3).save(path);
+    EXPECT_FALSE(maquette::Source(context_, "image:" + path).next()->is_predicted()) << name;
+  }
+  std::vector<uint8_t> one(320 * 240 * 3), other(one.size());
+  predicted.save(folder.file("b.png"));
+  predicted.copy_pixels(MAQ_PIXEL_BGR8, one.data(), 0, one.size());
+  maquette::Source(context_, "image:" + folder.file("b.png"))
+      .next()
+      ->copy_pixels(MAQ_PIXEL_BGR8, other.data(), 0, other.size());
+  EXPECT_EQ(one, other) << "the picture is the same";
+}
+
+TEST_F(ApiPrediction, RecordersRefusePredictedFramesUnlessTheyKeepThemMarked) {
+  const TempFolder folder;
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=30");
+  maquette::Predictor predictor(context_);
+  const auto first = source.next(), second = source.next();
+  predictor.push(*first);
+  predictor.push(*second);
+  const maquette::Frame predicted = predictor.predict(0.1);
+  {
+    maquette::Recorder recorder(context_, folder.file("refused.maqrec"), &source);
+    recorder.add(*first);
+    EXPECT_EQ(maq_recorder_add_frame(recorder.get(), predicted.get()), MAQ_ERROR_UNSUPPORTED);
+    EXPECT_NE(text().find("keep_predicted"), std::string::npos);
+    recorder.add(*second);
+    recorder.finish();
+    EXPECT_EQ(recorder.info().frame_count, 2u);
+  }
+  maq_recorder_config config{};
+  maquette::check(maq_recorder_config_init(&config, sizeof config));
+  EXPECT_EQ(config.keep_predicted, 0);
+  config.keep_predicted = 1;
+  for (const uint32_t quality : {0u, 90u}) {
+    const std::string path = folder.file("kept" + std::to_string(quality) + ".maqrec");
+    config.jpeg_quality = quality;
+    maquette::Recorder recorder(context_, path, &source, &config);
+    recorder.add(*first);
+    recorder.add(*second);
+    recorder.add(predicted);
+    recorder.finish();
+    for (const char* options : {"", "?size=160x120", "?live=1&speed=20"}) {
+      maq_source_config all = maquette::default_source_config();
+      all.queue_length = 8;
+      maquette::Source played(context_, "rec:" + path + options, &all);
+      for (int i = 0; i < 3; ++i) {
+        const auto frame = played.next();
+        ASSERT_TRUE(frame) << options;
+        EXPECT_EQ(frame->is_predicted(), i == 2) << options;
+        EXPECT_EQ(frame->origin().horizon_ns, i == 2 ? 100000000 : 0) << options;
+      }
+    }
+  }
+  config.keep_predicted = 2;
+  maq_recorder* made = nullptr;
+  EXPECT_EQ(maq_recorder_create(context_.get(), folder.file("x").c_str(), nullptr, &config, &made),
+            MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(text().find("config.keep_predicted is 2"), std::string::npos);
+}
+
 TEST_F(ApiPrediction, ThePoolIsBoundedAndOutlivesThePredictor) {
   maq_predictor_config config = maquette::default_predictor_config();
   config.frame_pool_size = 2;

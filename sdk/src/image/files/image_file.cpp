@@ -9,6 +9,7 @@
 #include "image/convert.h"
 #include "image/files/file_codecs.h"
 #include "image/files/jpeg.h"
+#include "image/files/origin_mark.h"
 
 namespace maq {
 namespace {
@@ -98,6 +99,7 @@ void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& f
     uint8_t* pixels = frame.allocate_bgr(image.view.width_px, image.view.height_px);
     copy_pixels(image.view, MAQ_PIXEL_BGR8, pixels, 0, frame.storage.size());
   }
+  frame.origin = read_origin_mark(bytes);
   if (orientation == Orientation::kUpright) apply_orientation(frame, read_exif_orientation(bytes));
 }
 
@@ -137,13 +139,14 @@ std::vector<uint8_t> encode_image(const ImageView& image, const std::string& ext
   return encode(image.format == MAQ_PIXEL_GREY8 ? image : as_bgr(image, memory), extension);
 }
 
-void write_image_file(const ImageView& image, const std::string& path) {
+void write_image_file(const ImageView& image, const std::string& path, const FrameOrigin& origin) {
   const std::string extension = lower_case_extension(path);
   if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .png nor in .jpg, by which its format is chosen.");
   }
   AtomicFile file(path);
-  const std::vector<uint8_t> bytes = encode_image(image, extension == ".png" ? extension : ".jpg");
+  std::vector<uint8_t> bytes = encode_image(image, extension == ".png" ? extension : ".jpg");
+  mark_origin(origin, extension, bytes);
   file.append(bytes.data(), bytes.size());
   file.commit();
 }

@@ -21,9 +21,9 @@ void check_image_start(const EncodedBytes& start, const std::string& origin);
 // A file or a pipe, still encoded, whose first bytes were checked. Throws what read_file() throws too.
 std::vector<uint8_t> read_encoded_image(const std::string& path);
 
-// Decodes an image, a whole JPEG, PNG, WebP, BMP or TIFF file, into `frame` as BGR. `origin` names it in errors.
-// Throws MAQ_ERROR_UNREADABLE for what is damaged, truncated or no image, MAQ_ERROR_UNSUPPORTED for other formats,
-// MAQ_ERROR_IMAGE_SIZE, and, but for JPEG, what file_codecs() throws.
+// Decodes an image, a whole JPEG, PNG, WebP, BMP or TIFF file, into `frame` as BGR, with its origin. `origin` names it
+// in errors. Throws MAQ_ERROR_UNREADABLE for what is damaged, truncated or no image, MAQ_ERROR_UNSUPPORTED for other
+// formats, MAQ_ERROR_IMAGE_SIZE, and, but for JPEG, what file_codecs() throws.
 void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& frame,
                   Orientation orientation = Orientation::kUpright);
 
@@ -38,9 +38,9 @@ SizePx read_image_file_size(const std::string& path);
 // Throws MAQ_ERROR_UNSUPPORTED for a depth image, and what file_codecs() throws.
 std::vector<uint8_t> encode_image(const ImageView& image, const std::string& extension);
 
-// PNG or JPEG by the extension of `path`, written atomically.
+// PNG or JPEG by the extension of `path`, written atomically. The file of a predicted frame says so (origin_mark.h).
 // Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, MAQ_ERROR_UNWRITABLE, and what encode_image() throws.
-void write_image_file(const ImageView& image, const std::string& path);
+void write_image_file(const ImageView& image, const std::string& path, const FrameOrigin& origin = {});
 
 // The same with an alpha plane: one byte a pixel of a BGR8 image, rows without padding.
 // Throws MAQ_ERROR_INVALID_ARGUMENT for an extension other than .png too.

@@ -28,6 +28,7 @@ class ImageSource : public Source {
     if (uri.width_px > 0) {
       Frame scaled;
       resize_to_bgr(image_.image, uri.width_px, uri.height_px, scaled);
+      scaled.origin = image_.origin;
       image_ = std::move(scaled);
       if (intrinsics_) intrinsics_ = resized(*intrinsics_, uri.width_px, uri.height_px);
     }

@@ -33,13 +33,15 @@ struct RecordingEntry {
 class RecordingWriter {
  public:
   // Makes the file, which must not be there yet. `jpeg_quality` 0 keeps pixels as they are, 1 to 100 compresses them;
-  // what came from a camera as JPEG is kept as it came in both cases. Throws MAQ_ERROR_UNWRITABLE.
-  RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality);
+  // what came from a camera as JPEG is kept as it came in both cases. Predicted frames are kept, with a mark, where
+  // `keeps_predicted` is set. Throws MAQ_ERROR_UNWRITABLE.
+  RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality, bool keeps_predicted = false);
   // Without finish() the file has no index; without finish() and a frame it is removed.
   ~RecordingWriter();
 
-  // Throws MAQ_ERROR_INVALID_ARGUMENT unless the frame is later than the one before, MAQ_ERROR_UNWRITABLE when the disk
-  // is full; the file then holds the frames before.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT unless the frame is later than the one before, MAQ_ERROR_UNSUPPORTED for a
+  // predicted frame that is not kept, MAQ_ERROR_UNWRITABLE when the disk is full; the file then holds the frames
+  // before.
   void add(const Frame& frame);
   // Writes the index; nothing can be added afterwards. Throws MAQ_ERROR_UNWRITABLE.
   void finish();
@@ -53,6 +55,7 @@ class RecordingWriter {
   std::string path_;
   UniqueFd file_;
   int jpeg_quality_;
+  bool keeps_predicted_;
   JpegEncoder jpeg_;
   std::vector<RecordingEntry> entries_;
   std::vector<uint8_t> payload_;

@@ -207,6 +207,13 @@ void RecordingReader::read(size_t index, Frame& frame) {
   }
   frame.timestamp_ns = head.timestamp_ns;
   frame.sequence = head.sequence;
+  frame.origin = {};
+  if (head.predicted_us > 0) {
+    const int64_t horizon_ns = (int64_t(head.predicted_us) - 1) * 1000;
+    int64_t captured_ns = 0;
+    if (__builtin_sub_overflow(head.timestamp_ns, horizon_ns, &captured_ns)) captured_ns = INT64_MIN;
+    frame.origin = {true, captured_ns, head.sequence, horizon_ns};
+  }
 }
 
 }  // namespace maq

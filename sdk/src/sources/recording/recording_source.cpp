@@ -63,11 +63,13 @@ class RecordingSource : public Source {
       reader_.read(index, recorded_);
       resize_to_bgr(recorded_.image, width_px_, height_px_, frame);
       frame.sequence = recorded_.sequence;
+      frame.origin = recorded_.origin;
     } else {
       reader_.read(index, frame);
     }
     frame.sequence = frame.sequence > first_sequence_ ? frame.sequence - first_sequence_ : 0;
     frame.timestamp_ns = time_ns(index) - time_ns(first_);
+    frame.origin = frame.origin.moved_to(frame.timestamp_ns, frame.sequence);
     frame.clock = MAQ_CLOCK_MEDIA;
     return NextFrame::kFrame;
   }

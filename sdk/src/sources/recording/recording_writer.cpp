@@ -3,6 +3,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
@@ -34,10 +35,11 @@ std::string head_json(const RecordingInfo& info) {
 
 }  // namespace
 
-RecordingWriter::RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality)
+RecordingWriter::RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality, bool keeps_predicted)
     : path_(std::move(path)),
       file_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)),
-      jpeg_quality_(jpeg_quality) {
+      jpeg_quality_(jpeg_quality),
+      keeps_predicted_(keeps_predicted) {
   if (!file_.is_open()) {
     const char* remedy = errno == EEXIST ? " Recordings are never written over: give another name, or remove it." : "";
     throw Error(MAQ_ERROR_UNWRITABLE, path_, " cannot be made: ", std::strerror(errno), ".", remedy);
@@ -102,6 +104,11 @@ void RecordingWriter::add(const Frame& frame) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The frame is of ", frame.timestamp_ns, " ns, but the first of ", path_,
                 " of ", entries_[0].timestamp_ns, " ns: a recording spans at most ", kMaxSpanNs, " ns.");
   }
+  if (frame.origin.is_predicted && !keeps_predicted_) {
+    throw Error(MAQ_ERROR_UNSUPPORTED,
+                "The frame was predicted: no camera took it. Leave it out, or make the recorder with "
+                "keep_predicted = 1, which marks it.");
+  }
   const ImageView& image = frame.image;
   FrameHead head{};
   head.magic = kFrameMagic;
@@ -109,6 +116,9 @@ void RecordingWriter::add(const Frame& frame) {
   head.sequence = frame.sequence;
   head.width_px = image.width_px;
   head.height_px = image.height_px;
+  if (frame.origin.is_predicted) {
+    head.predicted_us = uint32_t(1 + std::clamp<int64_t>(frame.origin.horizon_ns / 1000, 0, kMaxHorizonUs));
+  }
   if (frame.jpeg != nullptr) {
     head.encoding = kJpegEncoding;
     payload_.assign(frame.jpeg, frame.jpeg + frame.jpeg_bytes);

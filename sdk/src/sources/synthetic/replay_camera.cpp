@@ -137,6 +137,7 @@ class ReplayCamera : public Camera {
       std::swap(frame, ahead_);
       buffer.image = frame.image;
       buffer.depth = frame.depth;
+      buffer.origin = frame.origin;
       buffer.slot = slot;
       buffer.timestamp_ns = to_ns(now.due);
       buffer.sequence = now.sequence;

@@ -1,0 +1,21 @@
+// The mark of predicted frames in image files: a comment (JPEG) or a text chunk (PNG) at the beginning, which says what
+// maq_frame_get_origin says.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/frame.h"
+#include "image/files/image_header.h"
+
+namespace maq {
+
+// Puts the mark of a predicted frame into an encoded PNG or JPEG image; nothing for others. `extension`: ".png" or
+// ".jpg".
+void mark_origin(const FrameOrigin& origin, const std::string& extension, std::vector<uint8_t>& encoded);
+
+// What the mark of an encoded image says; of one without a mark that it was captured.
+FrameOrigin read_origin_mark(const EncodedBytes& encoded);
+
+}  // namespace maq

@@ -1,0 +1,310 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "arguments/source_argument.h"
+#include "commands/commands.h"
+#include "interrupt.h"
+#include "output/frame_image.h"
+#include "output/output_file.h"
+#include "output/prediction_mark.h"
+#include "output/progress_bar.h"
+#include "print.h"
+#include "program.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct PredictOptions {
+  std::string source;
+  int64_t from = -1;
+  int64_t frames = 16;
+  maq_prediction_method method = MAQ_PREDICTION_AUTO;
+  bool compare = false;
+  bool json = false;
+  int threads = 0;
+  std::string out;
+};
+
+constexpr int64_t kDefaultFrom = 30;
+constexpr double kShownBefore_s = 1;  // of the frames that were seen, at the beginning of a clip
+
+const char* name_of(maq_prediction_method method) {
+  switch (method) {
+    case MAQ_PREDICTION_LAST: return "last";
+    case MAQ_PREDICTION_MOTION: return "motion";
+    default: return "auto";
+  }
+}
+
+// Peak signal-to-noise ratio of pictures of 8 bits; 99 dB where they are the same.
+double psnr_db(const cv::Mat& one, const cv::Mat& other) {
+  const double squares = cv::norm(one, other, cv::NORM_L2SQR) / (3.0 * double(one.total()));
+  return squares > 0 ? std::min(99.0, 10 * std::log10(255.0 * 255.0 / squares)) : 99;
+}
+
+// One picture ahead, by each method, and what was seen then.
+struct Ahead {
+  double ahead_s = 0;
+  maq_prediction_method method = MAQ_PREDICTION_LAST;  // that was chosen
+  double predict_ms = 0;
+  std::optional<double> last_db, motion_db, chosen_db;
+};
+
+// Where the pictures go: a clip, or a folder of PNG files.
+class PredictedPictures {
+ public:
+  PredictedPictures(const maquette::Context& context, const std::string& out, const std::string& stem, double fps)
+      : context_(context), out_(out), stem_(stem) {
+    if (out.empty()) return;
+    const std::string extension = out_.extension().string();
+    if (extension == ".mp4" || extension == ".avi") {
+      make_folder_of(out_);
+      clip_.emplace(context, out, fps > 0 ? fps : 10);
+    } else if (!extension.empty() && !fs::is_directory(out_)) {
+      throw std::runtime_error(out + " ends in " + extension +
+                               "; give a clip (.mp4 or .avi), or a folder for PNG files.");
+    }
+  }
+
+  bool is_clip() const { return clip_.has_value(); }
+  void add_to_clip(const cv::Mat& picture) {
+    clip_->add(frame_of(context_, picture));
+    ++count_;
+  }
+  // The frame itself, with the mark in the file; or the pictures drawn side by side.
+  void save(int64_t number, const maquette::Frame& frame, const cv::Mat* compared) {
+    char name[64];
+    std::snprintf(name, sizeof name, "_ahead_%03lld.png", (long long)number);
+    const fs::path path = out_ / (stem_ + name);
+    make_folder_of(path);
+    if (compared != nullptr) {
+      frame_of(context_, *compared).save(path.string());
+    } else {
+      frame.save(path.string());
+    }
+    ++count_;
+  }
+  // "": nothing was asked for.
+  std::string finish() {
+    if (clip_) clip_->finish();
+    return count_ > 0 ? out_.string() : "";
+  }
+
+ private:
+  const maquette::Context& context_;
+  const fs::path out_;
+  const std::string stem_;
+  std::optional<maquette::Clip> clip_;
+  int64_t count_ = 0;
+};
+
+maquette::Predictor make_predictor(const maquette::Context& context, const PredictOptions& options,
+                                   maq_prediction_method method) {
+  maq_predictor_config config = maquette::default_predictor_config();
+  config.threads = options.threads;
+  config.method = method;
+  return maquette::Predictor(context, config);
+}
+
+// Beside one another, each with its name.
+cv::Mat side_by_side(const std::vector<std::pair<std::string, cv::Mat>>& pictures) {
+  std::vector<cv::Mat> named;
+  for (const auto& [name, picture] : pictures) {
+    named.push_back(picture.clone());
+    draw_caption(name, named.back());
+  }
+  cv::Mat row;
+  cv::hconcat(named, row);
+  return row;
+}
+
+std::string caption(const char* name, double ahead_s, std::optional<double> db) {
+  char text[96];
+  if (db) {
+    std::snprintf(text, sizeof text, "%s +%.0f ms: %.1f dB", name, 1e3 * ahead_s, *db);
+  } else {
+    std::snprintf(text, sizeof text, "%s +%.0f ms", name, 1e3 * ahead_s);
+  }
+  return text;
+}
+
+void print_results(const PredictOptions& options, const std::string& stem, uint64_t last_seen,
+                   const std::vector<Ahead>& found, const std::string& written) {
+  if (options.json) {
+    nlohmann::ordered_json document = {
+        {"source", stem}, {"last_seen_frame", last_seen}, {"method", name_of(options.method)}};
+    document["frames"] = nlohmann::ordered_json::array();
+    for (const Ahead& ahead : found) {
+      nlohmann::ordered_json frame = {
+          {"ahead_s", ahead.ahead_s}, {"method", name_of(ahead.method)}, {"predict_ms", rounded_ms(ahead.predict_ms)}};
+      if (ahead.last_db) {
+        frame["psnr_db"] = {{"last", *ahead.last_db}, {"motion", *ahead.motion_db}, {"chosen", *ahead.chosen_db}};
+      }
+      document["frames"].push_back(frame);
+    }
+    if (!written.empty()) document["out"] = written;
+    print_output("%s\n", json_text(document, 1).c_str());
+    return;
+  }
+  if (options.compare) print_output("  ahead        last      motion    %s\n", name_of(options.method));
+  for (const Ahead& ahead : found) {
+    if (!options.compare) break;
+    if (!ahead.last_db) {
+      print_output("%6.0f ms   no frame to compare with\n", 1e3 * ahead.ahead_s);
+      continue;
+    }
+    print_output("%6.0f ms  %7.2f dB  %7.2f dB  %7.2f dB  %s\n", 1e3 * ahead.ahead_s, *ahead.last_db, *ahead.motion_db,
+                 *ahead.chosen_db, name_of(ahead.method));
+  }
+  if (!written.empty()) print_output("%s  %zu predicted frames -> %s\n", stem.c_str(), found.size(), written.c_str());
+}
+
+int predict(const PredictOptions& options) {
+  if (options.out.empty() && !options.compare) {
+    throw std::runtime_error(
+        "Nothing is asked for: name a clip or folder with --out, or print figures with --compare.");
+  }
+  catch_interrupts();
+  const SourceArgument argument = parse_source_argument(options.source);
+  const maquette::Context context = open_context();
+  maquette::Source source(context, argument.uri);
+  const StoppedByInterrupt stopped(source);
+  const maq_source_info info = source.info();
+  int64_t from = options.from;
+  if (from < 0) {
+    from = kDefaultFrom;
+    if (info.frame_count > 0) from = std::clamp<int64_t>(info.frame_count - 1 - options.frames, 1, kDefaultFrom);
+  }
+  PredictedPictures pictures(context, options.out, argument.stem, info.fps);
+  maquette::Predictor predictor = make_predictor(context, options, options.method);
+  std::optional<maquette::Predictor> motion;
+  if (options.compare) motion = make_predictor(context, options, MAQ_PREDICTION_MOTION);
+
+  ProgressBar progress(argument.stem, from + 1 + options.frames);
+  std::deque<cv::Mat> before;  // the frames seen last, for the clip
+  const size_t shown_before = pictures.is_clip() ? size_t(std::max(1.0, kShownBefore_s * info.fps)) : 1;
+  maq_frame_desc first{}, last{};
+  int64_t seen = 0;
+  while (seen <= from && !interrupted()) {
+    const auto frame = source.next();
+    if (!frame) break;
+    last = frame->desc();
+    if (seen == 0) first = last;
+    predictor.push(*frame);
+    if (motion) motion->push(*frame);
+    before.push_back(image_of(*frame));
+    if (before.size() > shown_before) before.pop_front();
+    progress.advance(++seen, "seen");
+  }
+  if (interrupted()) return 1;
+  if (seen <= from) {
+    progress.finish();
+    throw std::runtime_error(argument.uri + " has " + std::to_string(seen) + " frames, but --from is " +
+                             std::to_string(from) + ": give a number below.");
+  }
+  double step_s = info.fps > 0 ? 1 / info.fps : 0;
+  if (step_s == 0 && seen > 1) step_s = double(last.timestamp_ns - first.timestamp_ns) / 1e9 / double(seen - 1);
+  if (!(step_s > 0)) step_s = 0.1;
+
+  if (pictures.is_clip()) {
+    for (const cv::Mat& picture : before) {
+      pictures.add_to_clip(options.compare ? side_by_side({{"seen", picture}, {"seen", picture}, {"seen", picture}})
+                                           : picture);
+    }
+  }
+  std::vector<Ahead> found;
+  bool has_truth = options.compare;
+  for (int64_t i = 1; i <= options.frames && !interrupted(); ++i) {
+    Ahead ahead;
+    ahead.ahead_s = step_s * double(i);
+    std::optional<maquette::Frame> truth;
+    if (has_truth) truth = source.next();
+    has_truth =
+        truth.has_value() && truth->desc().width_px == last.width_px && truth->desc().height_px == last.height_px;
+    if (has_truth) ahead.ahead_s = double(truth->desc().timestamp_ns - last.timestamp_ns) / 1e9;
+    const maquette::Frame frame = predictor.predict(ahead.ahead_s);
+    const maq_predictor_stats stats = predictor.stats();
+    ahead.method = stats.method;
+    ahead.predict_ms = double(stats.predict_ms);
+    cv::Mat picture = image_of(frame);
+    if (options.compare) {
+      const cv::Mat moved = image_of(motion->predict(ahead.ahead_s));
+      const cv::Mat seen_then = has_truth ? image_of(*truth) : cv::Mat(picture.size(), picture.type(), cv::Scalar());
+      if (has_truth) {
+        ahead.last_db = psnr_db(before.back(), seen_then);
+        ahead.motion_db = psnr_db(moved, seen_then);
+        ahead.chosen_db = psnr_db(picture, seen_then);
+      }
+      const cv::Mat row = side_by_side({{has_truth ? "truth" : "no truth", seen_then},
+                                        {caption("last", ahead.ahead_s, ahead.last_db), before.back()},
+                                        {caption("motion", ahead.ahead_s, ahead.motion_db), moved}});
+      if (pictures.is_clip()) {
+        pictures.add_to_clip(row);
+      } else if (!options.out.empty()) {
+        pictures.save(i, frame, &row);
+      }
+    } else if (pictures.is_clip()) {
+      draw_prediction_mark(frame, picture);
+      pictures.add_to_clip(picture);
+    } else {
+      pictures.save(i, frame, nullptr);
+    }
+    found.push_back(ahead);
+    progress.advance(seen + i, name_of(ahead.method));
+  }
+  progress.finish();
+  print_results(options, argument.stem, last.sequence, found, pictures.finish());
+  return interrupted() ? 1 : 0;
+}
+
+}  // namespace
+
+void add_predict_command(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<PredictOptions>();
+  CLI::App* command =
+      app.add_subcommand("predict", "Show what a clip or a camera will show next, beside what it did show");
+  command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
+  command
+      ->add_option("--from", options->from,
+                   "Number of the last frame that is seen, from 0; default: 30, or less of a short clip")
+      ->check(CLI::Range(int64_t(0), int64_t(1) << 40));
+  command->add_option("-n,--frames", options->frames, "Predict so many frames after it; default: 16")
+      ->check(CLI::Range(int64_t(1), int64_t(10000)));
+  command
+      ->add_option("-m,--method", options->method,
+                   "last: the last frame; motion: everything moves on as it did; auto (default): whichever was right "
+                   "so far")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, maq_prediction_method>{
+          {"auto", MAQ_PREDICTION_AUTO}, {"last", MAQ_PREDICTION_LAST}, {"motion", MAQ_PREDICTION_MOTION}}));
+  command->add_flag("-c,--compare", options->compare,
+                    "Print the error (PSNR) of last and motion by time ahead, and draw truth, last and motion side by "
+                    "side");
+  command->add_option("-t,--threads", options->threads, "Threads; default: the large cores, at most 4")
+      ->check(CLI::Range(0, 64));
+  command->add_option("-o,--out", options->out, "Clip (.mp4 or .avi), or folder for PNG files");
+  command->add_flag("--json", options->json, "Print one JSON document");
+  command->footer(
+      "A clip begins with the last second that was seen; predicted frames have a border and say how far ahead they\n"
+      "are, and PNG files are marked inside. PSNR in dB: higher is nearer to the truth, +1 dB is an error 11 % "
+      "smaller.\n\n"
+      "Examples:\n"
+      "  maquette predict clip.mp4 --from 40 --frames 16 --compare --out next.mp4\n"
+      "  maquette predict clip.mp4 --from 40 --compare            # the figures alone\n"
+      "  maquette predict 'stub:people?count=2' --method motion --out next/\n"
+      "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4");
+  command->callback([=] { *exit_code = predict(*options); });
+}

@@ -1,0 +1,111 @@
+// `maquette predict` as a person meets it: figures, clips, marked pictures, sentences.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+#include <string>
+
+#include "support/program_run.h"
+
+namespace {
+
+class PredictCommandLine : public ::testing::Test {
+ protected:
+  // A textured square that moves by 4 pixels a frame over a texture that stands still.
+  PredictCommandLine() {
+    cv::VideoWriter clip(folder_.file("square.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, {160, 120});
+    for (int i = 0; i < 20; ++i) {
+      cv::Mat picture(120, 160, CV_8UC3);
+      for (int y = 0; y < picture.rows; ++y) {
+        for (int x = 0; x < picture.cols; ++x) {
+          const double u = x - 10 - 4 * i, v = y - 30;
+          const bool is_thing = u >= 0 && u < 48 && v >= 0 && v < 48;
+          const double value = is_thing ? 170 + 60 * std::sin(0.5 * u) * std::sin(0.4 * v)
+                                        : 90 + 40 * std::sin(0.3 * x) * std::sin(0.2 * y);
+          picture.at<cv::Vec3b>(y, x) = cv::Vec3b::all(uint8_t(value));
+        }
+      }
+      clip.write(picture);
+    }
+  }
+
+  Outcome run(const std::string& arguments) const {
+    return run_program(folder_, "MAQ_BUNDLE=", "predict " + arguments);
+  }
+  void expect_failure(const std::string& arguments, const std::string& text) const {
+    const Outcome result = run(arguments);
+    EXPECT_EQ(result.exit_code, 1) << arguments;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(PredictCommandLine, ComparesTheMethodsAndDrawsThemBesideTheTruth) {
+  const Outcome result = run("square.avi --from 9 --frames 6 --compare --out o/next.avi");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("ahead"), std::string::npos);
+  EXPECT_NE(result.out.find("300 ms"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("6 predicted frames -> o/next.avi"), std::string::npos) << result.out;
+  cv::VideoCapture clip(folder_.file("o/next.avi"));
+  int frames = 0;
+  cv::Mat picture;
+  while (clip.read(picture)) ++frames;
+  EXPECT_EQ(frames, 10 + 6) << "those seen within a second before, and those predicted";
+}
+
+TEST_F(PredictCommandLine, MotionIsNearerToTheTruthThanTheLastFrame) {
+  const Outcome result = run("square.avi --from 12 --frames 5 --compare --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto document = nlohmann::json::parse(result.out);
+  EXPECT_EQ(document["last_seen_frame"], 12);
+  ASSERT_EQ(document["frames"].size(), 5u);
+  for (const auto& frame : document["frames"]) {
+    EXPECT_EQ(frame["method"], "motion");
+    EXPECT_GT(frame["psnr_db"]["motion"].get<double>(), frame["psnr_db"]["last"].get<double>() + 3);
+    EXPECT_EQ(frame["psnr_db"]["motion"], frame["psnr_db"]["chosen"]);
+  }
+  EXPECT_NEAR(document["frames"][4]["ahead_s"].get<double>(), 0.25, 1e-6);
+}
+
+TEST_F(PredictCommandLine, PicturesInAFolderAreMarkedInside) {
+  const Outcome result = run("square.avi --from 9 --frames 3 --method motion --out pictures");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* name : {"square_ahead_001.png", "square_ahead_002.png", "square_ahead_003.png"}) {
+    const std::string bytes = read_text(folder_.file(std::string("pictures/") + name));
+    EXPECT_NE(bytes.find(std::string("predicted\0maquette horizon_ns=", 29)), std::string::npos) << name;
+    EXPECT_EQ(cv::imread(folder_.file(std::string("pictures/") + name)).size(), cv::Size(160, 120));
+  }
+}
+
+TEST_F(PredictCommandLine, PredictedFramesOfAClipHaveABorder) {
+  const Outcome result = run("square.avi --from 4 --frames 2 --out next.avi");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  cv::VideoCapture clip(folder_.file("next.avi"));
+  cv::Mat picture;
+  for (int i = 0; i < 7; ++i) {
+    ASSERT_TRUE(clip.read(picture));
+    const cv::Vec3b edge = picture.at<cv::Vec3b>(60, 0);
+    const bool is_magenta = edge[0] > 150 && edge[1] < 110 && edge[2] > 150;
+    EXPECT_EQ(is_magenta, i >= 5) << i;
+  }
+}
+
+TEST_F(PredictCommandLine, AfterTheEndThereIsNothingToCompareWith) {
+  const Outcome result = run("square.avi --from 18 --frames 3 --compare");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("no frame to compare with"), std::string::npos) << result.out;
+}
+
+TEST_F(PredictCommandLine, WhatIsWrongIsOneSentence) {
+  expect_failure("square.avi", "--out");
+  expect_failure("square.avi --from 20 --compare", "has 20 frames, but --from is 20");
+  expect_failure("missing.avi --compare", "does not exist");
+  expect_failure("square.avi --compare --out next.gif", "ends in .gif");
+  EXPECT_NE(run("square.avi --compare --method latent").exit_code, 0);
+  EXPECT_NE(run("--help").out.find("maquette predict clip.mp4 --from 40"), std::string::npos);
+}
+
+}  // namespace

@@ -8,20 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from export.checked_file import START, checked_head, signed, write_whole
 from export.heads.prior import MAX_ANCHORS, MAX_CODES, MAX_PLACES, FieldShape, Layer, PriorError
-from export.heads.stored_numbers import (
-    FLOATS,
-    SHAPE,
-    START,
-    NumberReader,
-    checked_head,
-    shape_of,
-    signed,
-    stored,
-    stored_layer,
-    stored_place,
-    write_whole,
-)
+from export.heads.stored_numbers import FLOATS, SHAPE, NumberReader, shape_of, stored, stored_layer, stored_place
 
 MAGIC, VERSION, MAX_CAMERAS = b"MAQHED\r\n", 1, 256
 SCALE_SOURCES = ("prior", "given", "depth")
@@ -135,7 +124,7 @@ def read_head(path: Path) -> StoredHead:
 
 
 def _read(data: bytes, name: str) -> StoredHead:
-    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a head (.maqh)")
+    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a head (.maqh)", PriorError)
     shape = shape_of(head["shape"])
     counts = [int(head[key]) for key in ("shape_codes", "colour_codes", "cameras", "anchors", "places")]
     if any(

@@ -11,20 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
+from export.checked_file import START, checked_head, signed, write_whole
 from export.heads.prior import MAX_ANCHORS, MAX_CODES, MAX_PLACES, Prior, PriorError, check_prior
 from export.heads.stored_numbers import (
     FLOATS,
     FORMATS,
     SHAPE,
-    START,
     NumberReader,
-    checked_head,
     shape_of,
-    signed,
     stored,
     stored_layer,
     stored_place,
-    write_whole,
 )
 
 MAGIC, VERSION = b"MAQPRI\r\n", 1
@@ -85,7 +82,7 @@ def write_prior(prior: Prior, path: Path, bases: str = "int8", constant: str = "
 
 def prior_from_bytes(data: bytes, name: str = "The prior in memory") -> Prior:
     """name: begins the sentence of errors. Raises PriorError for what is damaged or no prior."""
-    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a prior of heads (.maqp)")
+    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a prior of heads (.maqp)", PriorError)
     shape = shape_of(head["shape"])
     formats = int(head["constant_format"]), int(head["bases_format"])
     counts = int(head["shape_codes"]), int(head["colour_codes"])

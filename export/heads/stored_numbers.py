@@ -1,29 +1,16 @@
-"""What files of priors and heads have in common (sdk/src/head/files/stored_numbers.h): how they begin, and layers of
-the field in float32, float16 and int8."""
+"""What files of priors and heads have in common (sdk/src/head/files/stored_numbers.h): layers of the field in float32,
+float16 and int8."""
 
 from __future__ import annotations
-
-import os
-from pathlib import Path
 
 import numpy as np
 
 from export.heads.prior import FieldShape, Layer, PriorError, check_shape
-from export.xxh3 import xxh3
 
 FORMATS = {"float32": 0, "float16": 1, "int8": 2}
 FLOATS = {0: np.dtype("<f4"), 1: np.dtype("<f2")}
 MAX_STORED_NUMBER = 1e6
 
-# The first fields of any head.
-START = [
-    ("magic", "S8"),
-    ("version", "<u4"),
-    ("head_bytes", "<u4"),
-    ("check", "<u8"),  # of all that follows in the file
-    ("file_bytes", "<u8"),
-]
-CHECKED = np.dtype(START).fields["file_bytes"][1]  # from there on the check covers the file
 SHAPE = np.dtype(
     [
         ("octaves", "<u4"),
@@ -37,36 +24,6 @@ SHAPE = np.dtype(
         ("smoothing", "<f4"),
     ]
 )
-
-
-def signed(head: np.ndarray, magic: bytes, version: int, body: bytes) -> bytes:
-    """A whole file: `head`, whose start is filled in, and what follows."""
-    head["magic"], head["version"], head["head_bytes"] = magic, version, head.dtype.itemsize
-    head["file_bytes"] = head.dtype.itemsize + len(body)
-    head["check"] = xxh3(head.tobytes()[CHECKED:] + body)
-    return head.tobytes() + body
-
-
-def write_whole(data: bytes, path: Path) -> None:
-    """Beside its place first: a crash leaves the old file."""
-    beside = path.with_name(f"{path.name}.tmp")
-    with beside.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
-
-
-def checked_head(data: bytes, form: np.dtype, magic: bytes, version: int, name: str, kind: str) -> np.ndarray:
-    """The head of a file of that kind ("a head (.maqh)"). Raises PriorError for another file, version or check."""
-    if len(data) < form.itemsize or not data.startswith(magic):
-        raise PriorError(f"{name} is not {kind}.")
-    head = np.frombuffer(data, form, 1)[0]
-    if head["version"] != version:
-        raise PriorError(f"{name} is {kind} of version {head['version']}; version {version} is read here.")
-    if head["head_bytes"] != form.itemsize or head["file_bytes"] != len(data) or head["check"] != xxh3(data[CHECKED:]):
-        raise PriorError(f"{name} is cut off or damaged; copy it again.")
-    return head
 
 
 def shape_of(stored: np.ndarray) -> FieldShape:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from export.checked_file import START, checked_head, signed, write_whole
 from export.heads.prior import PriorError
-from export.heads.stored_numbers import START, NumberReader, checked_head, signed, write_whole
+from export.heads.stored_numbers import NumberReader
 
 MAGIC, VERSION = b"MAQTEM\r\n", 1
 MAX_POINTS, MAX_ACTIONS, MAX_NAME = 65535, 256, 64
@@ -91,7 +92,7 @@ def write_template(template: Template, path: Path) -> None:
 
 def template_from_bytes(data: bytes, name: str = "The template in memory") -> Template:
     """name: begins the sentence of errors. Raises PriorError for what is damaged or no template."""
-    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a template head (.maqt)")
+    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a template head (.maqt)", PriorError)
     points, vertices, triangles = int(head["points"]), int(head["vertices"]), int(head["triangles"])
     read = NumberReader(data, HEAD.itemsize, name)
     u1, u2, i2 = np.dtype("u1"), np.dtype("<u2"), np.dtype("<i2")

@@ -4,8 +4,8 @@ from random import Random
 
 import numpy as np
 
+from export.checked_file import CHECKED
 from export.heads.head_file import HEAD
-from export.heads.stored_numbers import CHECKED
 from export.xxh3 import xxh3
 from tests.hostile.damage import FLOATS, INTEGERS, cut, flip
 from tests.hostile.samples import Samples

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from export.checked_file import CHECKED
 from export.heads.head_file import HEAD, HeadFileError, head_bytes, head_from_bytes, read_head, write_head
-from export.heads.stored_numbers import CHECKED
 from export.xxh3 import xxh3
 
 EXAMPLE = Path("tests/native/data/tiny_head/example.maqh")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from small_prior import SMALL, small_prior
 
+from export.checked_file import CHECKED
 from export.heads.prior import FieldShape, Layer, Prior, PriorError, check_prior, combined
 from export.heads.prior_file import HEAD, bases_errors, prior_bytes, prior_from_bytes, read_prior, write_prior
-from export.heads.stored_numbers import CHECKED
 from export.xxh3 import xxh3
 
 

@@ -20,6 +20,7 @@ ALLOWED = {
     "export.jobs": set(),
     "export.bundle": set(),
     "export.xxh3": set(),
+    "export.checked_file": {"export.xxh3"},
     "export.onnx_graphs": {"export.bundle"},
     "export.photos": set(),
     "export.people": {"export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid"},
@@ -34,7 +35,10 @@ ALLOWED = {
         "export.camera", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",
         "export.surface",
     },
-    "export.prediction": {"export.clips", "export.training"},
+    "export.prediction": {
+        "export.bundle", "export.checked_file", "export.clips", "export.densepose", "export.onnx_graphs",
+        "export.training",
+    },
     "export.scenes": {
         "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.point_cloud",
         "export.training", "export.xxh3",
@@ -43,8 +47,8 @@ ALLOWED = {
         "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.solids", "export.training",
     },
     "export.heads": {
-        "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.people", "export.teachers",
-        "export.training", "export.xxh3",
+        "export.bundle", "export.camera", "export.checked_file", "export.densepose", "export.onnx_graphs",
+        "export.people", "export.teachers", "export.training",
     },
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},

@@ -15,7 +15,7 @@ CELL_PX = 4  # pixels of a place, both ways
 TRAINING_DATA = (
     {"name": "Maquette clips: shapes, pushing (export.clips)", "licence": LICENCE, "used_for": "training, calibration"},
     {"name": "Franka Panda arm and objects of pybullet_data", "licence": "Apache-2.0, zlib", "used_for": "rendering"},
-    {"name": "KUKA iiwa arm of pybullet_data", "licence": "BSD-3-Clause", "used_for": "rendering"},
+    {"name": "KUKA iiwa arm of pybullet_data", "licence": "BSD-2-Clause", "used_for": "rendering"},
 )
 
 

@@ -60,6 +60,7 @@
 
 #include "maquette/capture.h"
 #include "maquette/clip.h"
+#include "maquette/concealer.h"
 #include "maquette/context.h"
 #include "maquette/densepose.h"
 #include "maquette/edge_curves.h"

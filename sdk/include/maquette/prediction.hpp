@@ -1,9 +1,13 @@
-// What a stream will show next, for C++17; a part of maquette.hpp.
+// What a stream will show next, and live sources with short gaps bridged, for C++17; a part of maquette.hpp.
 #ifndef MAQUETTE_PREDICTION_HPP_
 #define MAQUETTE_PREDICTION_HPP_
 
+#include <optional>
+
+#include "maquette/concealer.h"
 #include "maquette/frame.hpp"
 #include "maquette/prediction.h"
+#include "maquette/source.hpp"
 
 namespace maquette {
 
@@ -42,6 +46,43 @@ class Predictor {
 
  private:
   Owner<maq_predictor, maq_predictor_destroy> owner_;
+};
+
+inline maq_concealer_config default_concealer_config() {
+  maq_concealer_config config;
+  check(maq_concealer_config_init(&config, sizeof config));
+  return config;
+}
+
+// The frames of a live source with its short gaps bridged; Frame::is_predicted tells which were made up.
+class Concealer {
+ public:
+  Concealer(const Context& context, Source& source, const maq_concealer_config& config = default_concealer_config()) {
+    maq_concealer* made = nullptr;
+    check(maq_concealer_create(context.get(), source.get(), &config, &made));
+    owner_.reset(made);
+  }
+
+  maq_concealer* get() const { return owner_.get(); }
+
+  // As Source::next.
+  std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
+    maq_frame* frame = nullptr;
+    const maq_status status = maq_concealer_acquire_frame(get(), timeout_ns, &frame);
+    if (status == MAQ_END_OF_STREAM || status == MAQ_CANCELLED) return std::nullopt;
+    check(status);
+    return Frame(frame);
+  }
+
+  maq_concealer_stats stats() const {
+    maq_concealer_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_concealer_get_stats(get(), &stats));
+    return stats;
+  }
+
+ private:
+  Owner<maq_concealer, maq_concealer_destroy> owner_;
 };
 
 }  // namespace maquette

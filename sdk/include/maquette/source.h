@@ -141,8 +141,8 @@ MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info
  * frame_pool_size: give it back promptly with maq_frame_release.
  * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_CANCELLED (the source is stopped),
  * MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_POOL_EMPTY when all frames are held, MAQ_ERROR_UNREADABLE when a clip ends before
- * its header says, after all readable frames, or for a damaged frame of a recording, which is skipped. Blocks while
- * decoding. */
+ * its header says, after all readable frames, or for a damaged frame of a recording, which is skipped; MAQ_ERROR_BUSY
+ * while a concealer takes its frames. Blocks while decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
 
 /* Gets a file descriptor for poll, epoll or a looper of Android: it is readable while maq_source_acquire_frame would

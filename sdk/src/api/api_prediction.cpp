@@ -1,9 +1,12 @@
+#include <atomic>
 #include <cmath>
 
 #include "api/boundary.h"
 #include "api/frame_handle.h"
+#include "api/source_handle.h"
 #include "core/worker_threads.h"
-#include "maquette/prediction.h"
+#include "maquette/concealer.h"
+#include "pipeline/concealer.h"
 #include "prediction/predictor.h"
 
 using namespace maq;
@@ -15,7 +18,30 @@ struct maq_predictor : HandleOf<HandleKind::kPredictor> {
   BoundedPool<maq_frame> frames;
 };
 
+struct maq_concealer : HandleOf<HandleKind::kConcealer> {
+  maq_concealer(const maq_source& source, const ConcealerSettings& settings, size_t pool_size)
+      : is_concealed(source.is_concealed), frames(pool_size, "frames"), concealer(source.source, settings) {}
+  ~maq_concealer() { *is_concealed = false; }
+  std::shared_ptr<std::atomic<bool>> is_concealed;
+  BoundedPool<maq_frame> frames;
+  Concealer concealer;
+};
+
 namespace {
+
+maq_concealer_config default_concealer_config() {
+  maq_concealer_config config{};
+  config.struct_size = sizeof config;
+  config.max_gap_ms = 300;
+  config.frame_pool_size = 3;
+  return config;
+}
+
+PredictorSettings predictor_settings(int32_t threads, const maq_prediction_method& method) {
+  require_range("config.threads", threads, 0, kMaxThreads);
+  require_range("config.method", number_in(method), int32_t(MAQ_PREDICTION_AUTO), int32_t(MAQ_PREDICTION_MOTION));
+  return {method, threads != 0 ? threads : default_threads()};
+}
 
 maq_predictor_config default_predictor_config() {
   maq_predictor_config config{};
@@ -36,11 +62,8 @@ maq_status maq_predictor_create(maq_context* context, const maq_predictor_config
     require_argument(predictor, "predictor");
     const maq_predictor_config config =
         read_config(given, "config", default_predictor_config(), sizeof(maq_predictor_config));
-    require_range("config.threads", config.threads, 0, kMaxThreads);
-    require_range("config.method", number_in(config.method), int32_t(MAQ_PREDICTION_AUTO),
-                  int32_t(MAQ_PREDICTION_MOTION));
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
-    const PredictorSettings settings{config.method, config.threads != 0 ? config.threads : default_threads()};
+    const PredictorSettings settings = predictor_settings(config.threads, config.method);
     *predictor = new maq_predictor(settings, config.frame_pool_size);
     return MAQ_OK;
   });
@@ -82,6 +105,65 @@ maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor
         maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms, from.fetch_ms,
                             from.predict_ms, from.method, from.pushed, from.predicted, from.restarts},
         sizeof(maq_predictor_stats));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_concealer_config_init(maq_concealer_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, default_concealer_config(), sizeof(maq_concealer_config));
+}
+
+maq_status maq_concealer_create(maq_context* context, maq_source* source, const maq_concealer_config* given,
+                                maq_concealer** concealer) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(source, "source");
+    require_argument(concealer, "concealer");
+    const maq_concealer_config config =
+        read_config(given, "config", default_concealer_config(), sizeof(maq_concealer_config));
+    require_range("config.max_gap_ms", config.max_gap_ms, 1, 10000);
+    require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
+    const PredictorSettings predictor = predictor_settings(config.threads, config.method);
+    if (source->is_concealed->exchange(true)) {
+      throw Error(MAQ_ERROR_BUSY, "The source has a concealer already; destroy that first.");
+    }
+    try {
+      *concealer = new maq_concealer(*source, {predictor, config.max_gap_ms}, config.frame_pool_size);
+    } catch (...) {
+      *source->is_concealed = false;
+      throw;
+    }
+    return MAQ_OK;
+  });
+}
+
+void maq_concealer_destroy(maq_concealer* concealer) { destroy(concealer, "concealer", __func__); }
+
+maq_status maq_concealer_acquire_frame(maq_concealer* concealer, int64_t timeout_ns, maq_frame** frame) {
+  return guarded_alone(concealer, "concealer", __func__, [&] {
+    require_argument(frame, "frame");
+    BoundedPool<maq_frame>::Pooled handle = concealer->frames.acquire();
+    switch (concealer->concealer.next(timeout_ns, handle->frame)) {
+      case NextFrame::kFrame: break;
+      case NextFrame::kEnd: return MAQ_END_OF_STREAM;
+      case NextFrame::kTimeout:
+        return keep_error(concealer, MAQ_TIMEOUT, nullptr,
+                          concatenate("No frame came within ", timeout_ns / 1000000, " ms.").c_str());
+      case NextFrame::kStopped: return keep_error(concealer, MAQ_CANCELLED, nullptr, "The source was stopped.");
+    }
+    *frame = lend<maq_frame>(std::move(handle));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_concealer_get_stats(const maq_concealer* concealer, maq_concealer_stats* stats) {
+  return guarded(concealer, __func__, [&] {
+    require_argument(concealer, "concealer");
+    const ConcealerStats from = concealer->concealer.stats();
+    write_struct(stats, "stats",
+                 maq_concealer_stats{0, from.captured, from.predicted, from.late, from.dropped, from.latest_gap_ms,
+                                     from.latest_wait_ms, from.max_wait_ms},
+                 sizeof(maq_concealer_stats));
     return MAQ_OK;
   });
 }

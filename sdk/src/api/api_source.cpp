@@ -112,6 +112,9 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
   const SourceCall call(source);
   return guarded_alone(source, "source", __func__, [&] {
     require_argument(frame, "frame");
+    if (*source->is_concealed) {
+      throw Error(MAQ_ERROR_BUSY, "A concealer takes the frames of this source; acquire them from it, or destroy it.");
+    }
     BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
     switch (source->is_stopped ? NextFrame::kStopped : source->source->next(timeout_ns, handle->frame)) {
       case NextFrame::kFrame: break;

@@ -33,7 +33,8 @@ enum class HandleKind : uint32_t {
   kHeadBuilder,
   kHeadRenderer,
   kHeadImage,
-  kPredictor
+  kPredictor,
+  kConcealer
 };
 
 class HandleState {

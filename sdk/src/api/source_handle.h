@@ -35,7 +35,8 @@ struct maq_source : maq::HandleOf<maq::HandleKind::kSource> {
   }
 
   std::string uri;
-  std::unique_ptr<maq::Source> source;
+  std::shared_ptr<maq::Source> source;  // a concealer's too
+  std::shared_ptr<std::atomic<bool>> is_concealed = std::make_shared<std::atomic<bool>>(false);
   maq::BoundedPool<maq_frame> frames;
   std::atomic<bool> is_stopped{false};
   std::mutex mutex;  // of the rest

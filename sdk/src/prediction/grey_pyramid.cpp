@@ -4,7 +4,6 @@
 
 #include "core/error.h"
 #include "core/rounding.h"
-#include "core/simd_clones.h"
 
 namespace maq {
 namespace {
@@ -24,14 +23,12 @@ Brightness brightness_of(maq_pixel_format format) {
     case MAQ_PIXEL_RGBA8: return {4, {77, 150, 29}};
     case MAQ_PIXEL_GREY8:
     case MAQ_PIXEL_NV12: return {1, {256, 0, 0}};
-    case MAQ_PIXEL_YUYV: return {2, {256, 0, 0}};
-    default:
-      throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours that could be predicted; give the picture.");
+    default: return {2, {256, 0, 0}};  // YUYV
   }
 }
 
 // Adds a row of the frame, as 256 times its brightness, to the sums of columns.
-MAQ_SIMD_CLONES void add_grey(const uint8_t* __restrict row, int width, int* __restrict sums) {
+void add_grey(const uint8_t* __restrict row, int width, int* __restrict sums) {
   for (int x = 0; x < width; ++x) sums[x] += row[x] * 256;
 }
 
@@ -63,9 +60,8 @@ void mean_of_columns(const int* sums, int width, int scale, int rows, float* mea
 }
 
 // (1, 2, 1) / 4 both ways: noise and what lies between pixels would pass for motion.
-MAQ_SIMD_CLONES void smooth_row(const float* __restrict above, const float* __restrict here,
-                                const float* __restrict below, int width, float* __restrict columns,
-                                float* __restrict smooth) {
+void smooth_row(const float* __restrict above, const float* __restrict here, const float* __restrict below, int width,
+                float* __restrict columns, float* __restrict smooth) {
   for (int x = 0; x < width; ++x) columns[x + 1] = (above[x] + here[x] + (here[x] + below[x])) * 0.25f;
   columns[0] = columns[1];
   columns[width + 1] = columns[width];
@@ -74,8 +70,7 @@ MAQ_SIMD_CLONES void smooth_row(const float* __restrict above, const float* __re
   }
 }
 
-MAQ_SIMD_CLONES void halve_row(const float* __restrict above, const float* __restrict below, int width,
-                               float* __restrict half) {
+void halve_row(const float* __restrict above, const float* __restrict below, int width, float* __restrict half) {
   for (int x = 0; x < width; ++x)
     half[x] = (above[2 * x] + above[2 * x + 1] + (below[2 * x] + below[2 * x + 1])) * 0.25f;
 }
@@ -98,6 +93,12 @@ void repeat_first_and_last_row(GreyLevel& level) {
 
 }  // namespace
 
+void require_picture(const ImageView& image) {
+  if (is_depth(image.format)) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours that could be predicted; give the picture.");
+  }
+}
+
 void GreyLevel::resize(int width, int height) {
   width_px = width;
   height_px = height;
@@ -105,6 +106,7 @@ void GreyLevel::resize(int width, int height) {
 }
 
 void GreyPyramid::set(const ImageView& image, WorkerThreads& threads) {
+  require_picture(image);
   const Brightness as = brightness_of(image.format);
   scale_ = 1;
   while (2 * std::max(image.width_px, image.height_px) > 3 * kLongSide_px * scale_) scale_ *= 2;

@@ -10,6 +10,9 @@
 
 namespace maq {
 
+// Throws MAQ_ERROR_UNSUPPORTED for a depth image.
+void require_picture(const ImageView& image);
+
 // Beyond the edges the last pixels are repeated, kBorder_px far.
 struct GreyLevel {
   static constexpr int kBorder_px = 12;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/simd_clones.h"
-
 namespace maq {
 namespace {
 
@@ -20,7 +18,7 @@ double ratio(int64_t one_ns, int64_t other_ns) {
   return double(std::max(one_ns, other_ns)) / double(std::max<int64_t>(std::min(one_ns, other_ns), 1));
 }
 
-MAQ_SIMD_CLONES int64_t squares_of_row(const uint8_t* __restrict one, const uint8_t* __restrict other, int count) {
+int64_t squares_of_row(const uint8_t* __restrict one, const uint8_t* __restrict other, int count) {
   int sum = 0;  // at most 65,025 each, of at most 8,192
   for (int i = 0; i < count; ++i) sum += (one[i] - other[i]) * (one[i] - other[i]);
   return sum;

@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kRun_px = 32;  // that is copied at once where nothing moves
 
-MAQ_SIMD_CLONES void mix_rows(const float* __restrict upper, const float* __restrict lower, float weight, int width,
-                              float factor, float* __restrict mixed) {
+void mix_rows(const float* __restrict upper, const float* __restrict lower, float weight, int width, float factor,
+              float* __restrict mixed) {
   for (int x = 0; x < width; ++x) mixed[x] = (upper[x] + (lower[x] - upper[x]) * weight) * factor;
 }
 
@@ -44,7 +44,7 @@ MAQ_SIMD_CLONES void find_positions(const float* __restrict dx, const float* __r
   }
 }
 
-MAQ_SIMD_CLONES bool moves(const float* dx, const float* dy, int count) {
+bool moves(const float* dx, const float* dy, int count) {
   int any = 0;
   for (int i = 0; i < count; ++i) any |= int(dx[i] != 0) | int(dy[i] != 0);
   return any != 0;
@@ -64,8 +64,8 @@ inline FourWords mix(FourWords one, FourWords other, int weight) {
 }
 
 // Of three or four bytes, of which one more may be read.
-template <int channels>
-inline void fetch_colours(const PlaneSamples& plane, const FetchRow& row, int y, int begin, int end) {
+MAQ_SIMD_CLONES void fetch_colours(const PlaneSamples& plane, const FetchRow& row, int y, int begin, int end) {
+  const size_t channels = size_t(plane.channels);
   const int *const __restrict above = row.above.data(), *const __restrict below = row.below.data(),
                               *const __restrict left = row.left.data(), *const __restrict right = row.right.data(),
                               *const __restrict x_weight = row.x_weight.data(),
@@ -86,14 +86,6 @@ inline void fetch_colours(const PlaneSamples& plane, const FetchRow& row, int y,
       std::memcpy(to, &four, channels);
     }
   }
-}
-
-MAQ_SIMD_CLONES void fetch_three(const PlaneSamples& plane, const FetchRow& row, int y, int begin, int end) {
-  fetch_colours<3>(plane, row, y, begin, end);
-}
-
-MAQ_SIMD_CLONES void fetch_four(const PlaneSamples& plane, const FetchRow& row, int y, int begin, int end) {
-  fetch_colours<4>(plane, row, y, begin, end);
 }
 
 void fetch_values(const PlaneSamples& plane, const FetchRow& row, int y, int begin, int end) {
@@ -140,10 +132,8 @@ void fetch_row(const PlaneSamples& plane, const FlowField& field, int scale, int
       const size_t from = size_t(begin) * size_t(plane.pixel_bytes);
       std::memcpy(plane.to + size_t(y) * plane.to_stride + from, plane.from + size_t(y) * plane.from_stride + from,
                   size_t(end - begin) * size_t(plane.pixel_bytes));
-    } else if (plane.channels == 3) {
-      fetch_three(plane, row, y, begin, end);
-    } else if (plane.channels == 4) {
-      fetch_four(plane, row, y, begin, end);
+    } else if (plane.channels >= 3) {
+      fetch_colours(plane, row, y, begin, end);
     } else {
       fetch_values(plane, row, y, begin, end);
     }

@@ -36,9 +36,7 @@ void Predictor::restart() {
 }
 
 void Predictor::keep(const Frame& frame) {
-  if (is_depth(frame.image.format)) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours that could be predicted; give the picture.");
-  }
+  require_picture(frame.image);
   const Stopwatch whole;
   is_again_ = false;
   if (has_frame_) {

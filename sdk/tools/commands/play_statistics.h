@@ -4,6 +4,7 @@
 #include <maquette/maquette.hpp>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,11 @@ class PlayStatistics {
   static void note_state(void* self, maq_source_state state, const char* reason);
   // A frame that was just acquired.
   void add(const maq_frame_desc& desc);
+
+  // One that was predicted in place of a frame that was not there: counted apart.
+  void add_predicted() { ++predicted_; }
+  // What the concealer says at the end.
+  void set_concealer(const maq_concealer_stats& stats) { concealer_ = stats; }
 
   int64_t frames() const { return int64_t(timestamps_ns_.size()); }
   // Frames a second over the last second or so.
@@ -41,6 +47,8 @@ class PlayStatistics {
   int64_t begin_ns_;
   double processor_s_;
   double close_ms_ = 0;
+  int64_t predicted_ = 0;
+  std::optional<maq_concealer_stats> concealer_;
   std::vector<int64_t> timestamps_ns_;
   std::vector<float> ages_ms_;  // of frames with times of the monotonic clock
   std::vector<double> arrivals_s_;

@@ -99,6 +99,20 @@ TEST_F(PredictCommandLine, AfterTheEndThereIsNothingToCompareWith) {
   EXPECT_NE(result.out.find("no frame to compare with"), std::string::npos) << result.out;
 }
 
+TEST_F(PredictCommandLine, PlayConcealsAStallAndCountsWhatItMadeUp) {
+  const std::string stub = "'stub:people?size=160x120&fps=30&stall=300ms@30&live=1' --no-picture --frames 45";
+  const Outcome bridged = run_program(folder_, "MAQ_BUNDLE=", "play " + stub + " --conceal --json a.json");
+  ASSERT_EQ(bridged.exit_code, 0) << bridged.err;
+  EXPECT_NE(bridged.out.find("predicted frames"), std::string::npos) << bridged.out;
+  const auto report = nlohmann::json::parse(read_text(folder_.file("a.json")));
+  EXPECT_EQ(report["frames"], 45) << "captured ones";
+  EXPECT_GE(report["concealed"]["predicted_frames"].get<int>(), 4);
+  EXPECT_LE(report["concealed"]["predicted_frames"].get<int>(), 20);
+  const Outcome plain = run_program(folder_, "MAQ_BUNDLE=", "play " + stub + " --json b.json");
+  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  EXPECT_FALSE(nlohmann::json::parse(read_text(folder_.file("b.json"))).contains("concealed"));
+}
+
 TEST_F(PredictCommandLine, WhatIsWrongIsOneSentence) {
   expect_failure("square.avi", "--out");
   expect_failure("square.avi --from 20 --compare", "has 20 frames, but --from is 20");

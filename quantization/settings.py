@@ -10,10 +10,11 @@ from typing import ClassVar, TypeVar
 from export.densepose import bundle as densepose
 from export.edges import bundle as edges
 from export.heads import bundle as heads
+from export.prediction import bundle as prediction
 from export.scenes import bundle as scenes
 
-DENSEPOSE, EDGES, HEADS, SCENES = (
-    Path(__file__).with_name(f"{system}.toml") for system in ("densepose", "edges", "heads", "scenes")
+DENSEPOSE, EDGES, HEADS, PREDICTION, SCENES = (
+    Path(__file__).with_name(f"{system}.toml") for system in ("densepose", "edges", "heads", "prediction", "scenes")
 )
 METHODS = ("minmax", "percentile", "entropy")
 
@@ -93,7 +94,18 @@ class HeadSettings:
     fitted_heads: int
 
 
-Settings = TypeVar("Settings", DensePoseSettings, EdgeSettings, HeadSettings, SceneSettings)
+@dataclass(frozen=True)
+class PredictionSettings:
+    """graphs: settings by graph name. frames, held_out_frames: how many frames calibrate, and measure the error."""
+
+    GRAPHS: ClassVar[tuple[str, ...]] = prediction.GRAPHS
+
+    graphs: dict[str, GraphSettings]
+    frames: int
+    held_out_frames: int
+
+
+Settings = TypeVar("Settings", DensePoseSettings, EdgeSettings, HeadSettings, PredictionSettings, SceneSettings)
 
 
 def read_settings(path: Path, kind: type[Settings]) -> Settings:

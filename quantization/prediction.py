@@ -1,0 +1,107 @@
+"""Makes an int8 bundle of prediction from a fp32 one of export.prediction, calibrated on frames of rendered clips.
+
+    python -m quantization.prediction --fp32 .data/bundles/prediction-fp32 --out .data/bundles/prediction-int8
+
+What stays float is in `quantization/prediction.toml`. Prints sizes, each output's signal to noise ratio, and what int8
+costs on frames of validation clips: codes that stay the same, and PSNR of frames that were made codes and frames again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from export.bundle import BundleInfo, bytes_of, read_manifest
+from export.densepose.graphs import session
+from export.prediction.bundle import CODES, write_manifest
+from export.prediction.code_file import FrameCodes, read_code_file
+from export.prediction.data import read_clips
+from export.prediction.picture_error import psnr_db
+from quantization.quantize import as_measured, quantize_graphs
+from quantization.samples import Sample
+from quantization.settings import PREDICTION, PredictionSettings, read_settings
+
+
+def frames_of(data: Path, sets: Sequence[str], split: str, count: int) -> np.ndarray:
+    """uint8 [count, 64, 64, 3], evenly over all clips of a split. Raises SystemExit where there are none."""
+    frames = read_clips(data, list(sets), split).frames.flatten(0, 1)
+    return frames[np.linspace(0, len(frames) - 1, min(count, len(frames))).astype(int)].numpy()
+
+
+def codes_of(features: np.ndarray, codes: FrameCodes) -> np.ndarray:
+    """Numbers of the nearest entries, [places, slices]; the lowest of equals. features [1, side, side, slices *
+    width]."""
+    slices, _, width = codes.entries.shape
+    own = features.reshape(-1, slices, width).transpose(1, 0, 2)
+    distance = (codes.entries**2).sum(-1)[:, None] - 2 * own @ codes.entries.transpose(0, 2, 1)
+    return distance.argmin(-1).T
+
+
+def entries_of(numbers: np.ndarray, codes: FrameCodes) -> np.ndarray:
+    """What the decoder is given of codes [places, slices]: float32 [1, side, side, slices * width]."""
+    picked = np.stack([codes.entries[k][own] for k, own in enumerate(numbers.T)], 1)
+    return np.ascontiguousarray(picked.reshape(1, codes.side, codes.side, -1))
+
+
+def samples(folder: Path, frames: np.ndarray, codes: FrameCodes) -> dict[str, list[Sample]]:
+    """What each graph of a fp32 bundle is given of frames."""
+    encoder = session(folder / "encoder.onnx")
+    images: list[Sample] = [{"image": frame[None].astype(np.float32)} for frame in frames]
+    seen = [encoder.run(None, image)[0] for image in images]
+    return {"encoder": images, "decoder": [{"features": entries_of(codes_of(own, codes), codes)} for own in seen]}
+
+
+def cost(fp32: Path, int8: Path, frames: np.ndarray, codes: FrameCodes) -> dict[str, float]:
+    """equal_codes: the share that is the same in both; psnr_db of rebuilt frames, of each."""
+    numbers, rebuilt = {}, {}
+    for name, folder in (("fp32", fp32), ("int8", int8)):
+        encoder, decoder = session(folder / "encoder.onnx"), session(folder / "decoder.onnx")
+        seen, made = [], []
+        for frame in tqdm(frames, desc=name, unit="frame", leave=False):
+            seen.append(codes_of(encoder.run(None, {"image": frame[None].astype(np.float32)})[0], codes))
+            made.append(decoder.run(None, {"features": entries_of(seen[-1], codes)})[0])
+        numbers[name], rebuilt[name] = np.stack(seen), torch.from_numpy(np.concatenate(made))
+    truth = torch.from_numpy(frames)
+    figures = {f"psnr_db_{name}": round(float(psnr_db(own, truth).mean()), 2) for name, own in rebuilt.items()}
+    return {"equal_codes": round(float((numbers["fp32"] == numbers["int8"]).mean()), 4)} | figures
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--fp32", type=Path, default=Path(".data/bundles/prediction-fp32"))
+    parser.add_argument("--out", type=Path, default=Path(".data/bundles/prediction-int8"))
+    parser.add_argument("--name", help="default: the folder's name")
+    parser.add_argument("--data", type=Path, default=Path(".data/clips"))
+    parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
+    parser.add_argument("--settings", type=Path, default=PREDICTION)
+    options = parser.parse_args()
+    settings = read_settings(options.settings, PredictionSettings)
+    codes = read_code_file(options.fp32 / CODES)
+    calibrating = frames_of(options.data, options.sets, "train", settings.frames)
+    held_out = frames_of(options.data, options.sets, "val", settings.held_out_frames)
+    options.out.mkdir(parents=True, exist_ok=True)
+    given = samples(options.fp32, calibrating, codes), samples(options.fp32, held_out, codes)
+    quality = quantize_graphs(options.fp32, options.out, settings.graphs, *given)
+    measured = cost(options.fp32, options.out, held_out, codes)
+    print(", ".join(f"{name} {value}" for name, value in measured.items()))
+    shutil.copyfile(options.fp32 / CODES, options.out / CODES)
+    manifest = read_manifest(options.fp32)
+    info = BundleInfo(
+        name=options.name or options.out.name,
+        precision="int8",
+        version=manifest["version"],
+        training_data=tuple(manifest["training_data"]),
+        measured={"sqnr_db": as_measured(quality), "int8_cost": measured},
+    )
+    write_manifest(options.out, info)
+    print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
+
+
+if __name__ == "__main__":
+    main()

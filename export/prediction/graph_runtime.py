@@ -1,0 +1,132 @@
+"""What the runtime does around the graphs of the transformer, in numpy: the reference for the C++. Look-ups,
+neighbours, the relative bias, kept keys and values; a frame at once, or place after place with the codes that a caller
+chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from export.densepose.graphs import session
+from export.prediction.attention import PLACES
+from export.prediction.config import CODE_SIDE, TransformerShape
+from export.prediction.transformer import UNSEEN, LatentTransformer
+from export.prediction.transformer_graphs import NEIGHBOURS, slice_names
+
+
+@dataclass(frozen=True, eq=False)
+class TransformerTables:
+    """float32. context_rows [frames * slices * K, embedding], of codes of the frames before, oldest first; slice_rows
+    [slices * K, embedding], of the frame itself; earlier [slice][slice before] [K, width]; row_bias and column_bias
+    [layers, heads, 31], of the slice network, by query less key; prior [slices, K + 1, K], logits by the code before.
+    """
+
+    context_rows: np.ndarray
+    slice_rows: np.ndarray
+    earlier: list[list[np.ndarray]]
+    row_bias: np.ndarray
+    column_bias: np.ndarray
+    prior: np.ndarray
+
+    @staticmethod
+    def of(net: LatentTransformer) -> TransformerTables:
+        layers = net.slices.layers
+        return TransformerTables(
+            net.context.rows.weight.detach().numpy()[:-1],
+            net.slices.rows.weight.detach().numpy(),
+            [[table.weight.detach().numpy() for table in tables] for tables in net.heads.earlier],
+            np.stack([layer.rows.detach().numpy() for layer in layers]),
+            np.stack([layer.columns.detach().numpy() for layer in layers]),
+            net.table.numpy(),
+        )
+
+
+# Logits [K] of slice k at a place -> the code.
+Choice = Callable[[int, int, np.ndarray], int]
+
+
+class GraphRuntime:
+    """One frame at a time: `begin`, then `logits` of given codes, or `chosen` codes."""
+
+    def __init__(self, folder: Path, tables: TransformerTables, shape: TransformerShape) -> None:
+        self.tables, self.shape = tables, shape
+        self.context_graph, self.slice_graph = session(folder / "context.onnx"), session(folder / "slices.onnx")
+        self.head_graphs = [session(folder / f"head_{k}.onnx") for k in range(shape.slices)]
+        row, column = np.divmod(np.arange(PLACES), CODE_SIDE)
+        steps = [axis[:, None] - axis[None] + CODE_SIDE - 1 for axis in (row, column)]
+        self.bias = tables.row_bias[:, :, steps[0]] + tables.column_bias[:, :, steps[1]]  # [layers, heads, 256, 256]
+        self.bias[:, :, np.triu(np.ones((PLACES, PLACES), bool), 1)] = -np.inf
+
+    def begin(self, before: np.ndarray, fps: float) -> None:
+        """before int64 [frames, slices, 16, 16], oldest first, UNSEEN where there was none."""
+        entries = self.shape.entries
+        codes = before.reshape(-1, PLACES)  # [frames * slices, 256]
+        first = np.arange(len(codes))[:, None] * entries
+        rows = self.tables.context_rows[np.where(codes == UNSEEN, 0, codes + first)]
+        summed = np.where((codes == UNSEEN)[..., None], 0, rows).sum(0, dtype=np.float32)
+        step = np.array([[np.log2(10 / fps)]], np.float32)
+        (self.context,) = self.context_graph.run(None, {"summed": summed[None], "time_step": step})
+        last = np.where(before[-1] == UNSEEN, entries, before[-1]).reshape(-1, PLACES)
+        self.prior = np.stack([self.tables.prior[k][own] for k, own in enumerate(last)])  # [slices, 256, K]
+
+    def embedded(self, codes: np.ndarray) -> np.ndarray:
+        """Codes [slices, 16, 16] -> [16, 16, embedding]."""
+        first = np.arange(len(codes))[:, None, None] * self.shape.entries
+        return self.tables.slice_rows[codes + first].sum(0)
+
+    def logits(self, codes: np.ndarray) -> np.ndarray:
+        """Of each code of a frame given those before it: codes int64 [slices, 16, 16] -> [slices, 256, K]."""
+        padded = np.pad(self.embedded(codes), ((2, 0), (1, 1), (0, 0)))
+        near = np.concatenate(
+            [padded[2 + y :, 1 + x :][:CODE_SIDE, :CODE_SIDE] for y, x in NEIGHBOURS], -1
+        ).reshape(1, PLACES, -1)  # fmt: skip
+        heads, width = self.shape.heads, self.shape.head_width
+        unseen = np.zeros((heads, 1, width), np.float32)
+        hidden = np.full((heads, PLACES, 1), -np.inf, np.float32)
+        caches = [array for own in self.bias for array in (unseen, unseen, np.concatenate([hidden, own], -1))]
+        features = self._slices(self.context, near, caches)[0]
+        known, found = codes.reshape(len(codes), PLACES), []
+        for k in range(len(codes)):
+            found.append(self._head(k, features, known[:k]) + self.prior[k])
+        return np.stack(found)
+
+    def chosen(self, choose: Choice) -> np.ndarray:
+        """Codes int64 [slices, 16, 16], place after place; `choose` is given slice, place and logits."""
+        shape = self.shape
+        codes = np.zeros((shape.slices, PLACES), np.int64)
+        embedded = np.zeros((CODE_SIDE + 2, CODE_SIDE + 2, shape.embedding), np.float32)  # two above, one beside
+        sizes = (shape.layers, shape.heads, PLACES, shape.head_width)
+        keys, values = np.zeros(sizes, np.float32), np.zeros(sizes, np.float32)
+        first = np.arange(shape.slices) * shape.entries
+        for place in range(PLACES):
+            row, column = divmod(place, CODE_SIDE)
+            near = np.concatenate([embedded[2 + row + y, 1 + column + x] for y, x in NEIGHBOURS])
+            caches = []
+            for layer, bias in enumerate(self.bias):
+                # What is kept is seen before this place; this place sees itself.
+                own = np.full((shape.heads, 1, PLACES + 1), -np.inf, np.float32)
+                own[:, 0, :place], own[:, 0, PLACES] = bias[:, place, :place], bias[:, place, place]
+                caches += [keys[layer], values[layer], own]
+            features, *new = self._slices(self.context[:, place : place + 1], near[None, None], caches)
+            for layer in range(shape.layers):
+                keys[layer, :, place], values[layer, :, place] = new[2 * layer][:, 0], new[2 * layer + 1][:, 0]
+            for k in range(shape.slices):
+                logits = self._head(k, features, codes[:k, place : place + 1])[0] + self.prior[k, place]
+                codes[k, place] = choose(k, place, logits)
+            embedded[2 + row, 1 + column] = self.tables.slice_rows[codes[:, place] + first].sum(0)
+        return codes.reshape(-1, CODE_SIDE, CODE_SIDE)
+
+    def _slices(self, context: np.ndarray, near: np.ndarray, caches: list[np.ndarray]) -> list[np.ndarray]:
+        names = slice_names(self.shape.layers)[0]
+        given = dict(zip(names, (context, near, *caches), strict=True))
+        return self.slice_graph.run(None, {name: np.ascontiguousarray(array) for name, array in given.items()})
+
+    def _head(self, k: int, features: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """known: codes [k, places] of the slices before -> logits [places, K]."""
+        earlier = np.zeros_like(features[0])
+        for table, codes in zip(self.tables.earlier[k], known, strict=True):
+            earlier = earlier + table[codes]
+        return self.head_graphs[k].run(None, {"features": features, "earlier": earlier[None]})[0][0]

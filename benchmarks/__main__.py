@@ -8,7 +8,8 @@
 Parts: frames (people, pixels, threads; start, memory), start (libraries, their size, CPU time), window (what an app
 with a window waits for), sweep (error against run time), person_sizes (the same for small, tilted and crowded people),
 frame_budget (a device that throttles), agreement (int8 against fp32), peers (other runtimes and the roofline), cameras
-(how frames get to the app), scenes (new views of captured scenes), edges (fields of depth frames).
+(how frames get to the app), scenes (new views of captured scenes), edges (fields of depth frames), prediction
+(what clips show next).
 The report holds the parts that were measured, now or in the last run.
 Exit status: 0 when every gate is met, 1 when one is missed, 2 when something could not be measured.
 """
@@ -26,7 +27,7 @@ from pathlib import Path
 
 from maquette import MaquetteError
 
-from benchmarks import cameras, frame_budget, frame_time, gates, report, start, window
+from benchmarks import cameras, frame_budget, frame_time, gates, prediction, report, start, window
 from benchmarks.edges import measure as edges
 from benchmarks.scenes import measure as scenes
 from benchmarks.scenes.command import SceneCommandError
@@ -34,7 +35,7 @@ from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-4"
 PARTS = ("frames", "start", "window", "sweep", "person_sizes", "frame_budget", "agreement", "peers", "cameras",
-         "scenes", "edges")  # fmt: skip
+         "scenes", "edges", "prediction")  # fmt: skip
 PEER_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -144,6 +145,9 @@ def measure(options: argparse.Namespace) -> dict:
             edges.sources_of(options), options.out, options.threads, options.quick
         )
         replace(figures, missing, edges.FIGURES, found, why)
+    if "prediction" in options.only:
+        document["prediction"], found, why = prediction.measure(options.quick, threads=options.threads)
+        replace(figures, missing, prediction.FIGURES, found, why)
     return document
 
 

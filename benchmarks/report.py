@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section, frame_budget, person_sizes, start, window
+from benchmarks import camera_section, frame_budget, person_sizes, prediction, start, window
 from benchmarks.edges import pictures as edge_pictures
 from benchmarks.edges import section as edge_section
 from benchmarks.scenes import pictures as scene_pictures
@@ -226,6 +226,7 @@ SECTIONS = {
     "cameras": camera_section.section,
     "scenes": scene_section.section,
     "edges": edge_section.section,
+    "prediction": prediction.section,
 }
 
 
@@ -235,7 +236,7 @@ def warnings_of(document: dict) -> set[str]:
     runs = [frames[name] for name in ("people", "sizes", "one_thread") if name in frames]
     found = {text for run in runs for text in run["warnings"]}
     found |= {text for run in runs for case in run["cases"] for text in case["warnings"]}
-    others = ("start", "window", "cameras", "scenes", "edges")
+    others = ("start", "window", "cameras", "scenes", "edges", "prediction")
     return found.union(*(document[name]["warnings"] for name in others if name in document))
 
 

@@ -29,6 +29,8 @@ struct maq_concealer : HandleOf<HandleKind::kConcealer> {
 
 namespace {
 
+constexpr const char* kConcealedTwice = "The source has a concealer already; destroy that first.";
+
 maq_concealer_config default_concealer_config() {
   maq_concealer_config config{};
   config.struct_size = sizeof config;
@@ -125,7 +127,7 @@ maq_status maq_concealer_create(maq_context* context, maq_source* source, const 
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
     const PredictorSettings predictor = predictor_settings(config.threads, config.method);
     if (source->is_concealed->exchange(true)) {
-      throw Error(MAQ_ERROR_BUSY, "The source has a concealer already; destroy that first.");
+      throw Error(MAQ_ERROR_BUSY, kConcealedTwice);
     }
     try {
       *concealer = new maq_concealer(*source, {predictor, config.max_gap_ms}, config.frame_pool_size);

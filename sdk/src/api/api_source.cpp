@@ -8,6 +8,8 @@ using namespace maq;
 
 namespace {
 
+constexpr const char* kConcealed = "A concealer takes the frames of this source; acquire them from it, or destroy it.";
+
 constexpr uint32_t kLargestPoolSize = 64;
 // Of the structs without what is for cameras.
 constexpr size_t kFirstSourceConfigSize = offsetof(maq_source_config, queue_length);
@@ -113,7 +115,7 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
   return guarded_alone(source, "source", __func__, [&] {
     require_argument(frame, "frame");
     if (*source->is_concealed) {
-      throw Error(MAQ_ERROR_BUSY, "A concealer takes the frames of this source; acquire them from it, or destroy it.");
+      throw Error(MAQ_ERROR_BUSY, kConcealed);
     }
     BoundedPool<maq_frame>::Pooled handle = source->frames.acquire();
     switch (source->is_stopped ? NextFrame::kStopped : source->source->next(timeout_ns, handle->frame)) {

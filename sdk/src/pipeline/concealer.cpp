@@ -16,6 +16,10 @@
 namespace maq {
 namespace {
 
+constexpr const char* kNotLive =
+    "The source is not live: its frames come when they are asked for, so that there are no gaps to conceal. "
+    "Add live=1 to its URI, or take its frames as they are.";
+
 constexpr int64_t kSlice_ns = 20000000;  // how long a wait for a frame may hold up closing
 constexpr int64_t kMinPeriod_ns = 1000000, kMaxPeriod_ns = 1000000000;  // between frames
 constexpr int64_t kSlackPart = 8;  // of a period, by which frames may be late: cameras are not exact
@@ -175,10 +179,7 @@ struct Concealer::State {
 
 Concealer::Concealer(std::shared_ptr<Source> source, const ConcealerSettings& settings) {
   if (!source->info().is_live) {
-    throw Error(
-        MAQ_ERROR_UNSUPPORTED,
-        "The source is not live: its frames come when they are asked for, so that there are no gaps to conceal. "
-        "Add live=1 to its URI, or take its frames as they are.");
+    throw Error(MAQ_ERROR_UNSUPPORTED, kNotLive);
   }
   state_ = std::make_unique<State>(std::move(source), settings);
   state_->thread = start_thread("maq conceal", [state = state_.get()] { state->run(); });

@@ -7,16 +7,21 @@
 namespace maq {
 namespace {
 
-constexpr int kSampleStep = 7;           // for the median of a field
+constexpr int kSampleStep = 31;  // for the median of a field
+constexpr float kMaxMedian_px = 64;
 constexpr float kSameMotion_px = 0.25f;  // displacements that differ by less go on together
 constexpr int kFetchRowsOfTask = 16;
 
-float median_of(const std::vector<float>& values, std::vector<float>& sorted) {
-  sorted.clear();
-  for (size_t i = 0; i < values.size(); i += kSampleStep) sorted.push_back(values[i]);
-  const auto middle = sorted.begin() + ptrdiff_t(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
+// To a hundredth of a pixel.
+float median_of(const std::vector<float>& displacements_px) {
+  float low = -kMaxMedian_px, high = kMaxMedian_px;
+  while (high - low > 0.01f) {
+    const float middle = (low + high) / 2;
+    ptrdiff_t below = 0;
+    for (size_t i = 0; i < displacements_px.size(); i += kSampleStep) below += displacements_px[i] < middle ? 1 : -1;
+    (below > 0 ? high : low) = middle;
+  }
+  return (low + high) / 2;
 }
 
 // Of an image and packed memory of its format.
@@ -60,30 +65,31 @@ const FlowField& Extrapolation::project(const FlowField& flow, float intervals) 
   const int width = flow.width_px, height = flow.height_px;
   projected_.resize(width, height);
   priority_.assign(flow.dx_px.size(), 0.0f);
-  const float common_x = median_of(flow.dx_px, sorted_), common_y = median_of(flow.dy_px, sorted_);
+  const float common_x = median_of(flow.dx_px), common_y = median_of(flow.dy_px);
   for (size_t i = 0; i < flow.dx_px.size(); ++i) {
     projected_.dx_px[i] = flow.dx_px[i] * intervals;
     projected_.dy_px[i] = flow.dy_px[i] * intervals;
   }
+  const float alike = kSameMotion_px / std::max(intervals, kSameMotion_px);
+  const float *const from_x = flow.dx_px.data(), *const from_y = flow.dy_px.data();
+  float *const to_x = projected_.dx_px.data(), *const to_y = projected_.dy_px.data(),
+               *const priority = priority_.data();
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const size_t at = size_t(y) * size_t(width) + size_t(x);
-      const float unlike_x = flow.dx_px[at] - common_x, unlike_y = flow.dy_px[at] - common_y;
+      const float unlike_x = from_x[at] - common_x, unlike_y = from_y[at] - common_y;
       const float unlike = unlike_x * unlike_x + unlike_y * unlike_y;
-      if (unlike * intervals * intervals < kSameMotion_px * kSameMotion_px) continue;
+      if (unlike < alike * alike) continue;
+      const float dx = from_x[at] * intervals, dy = from_y[at] * intervals;
+      const float left = float(x) - dx, top = float(y) - dy;
+      if (!(left >= 0 && top >= 0 && left < float(width - 1) && top < float(height - 1))) continue;
       // To the four pixels around where it comes to lie, or expansion would tear holes.
-      const float dx = flow.dx_px[at] * intervals, dy = flow.dy_px[at] * intervals;
-      const float to_x = float(x) - dx, to_y = float(y) - dy;
-      if (!(to_x > -1 && to_y > -1 && to_x < float(width) && to_y < float(height))) continue;
-      const int left = int(to_x + 1) - 1, top = int(to_y + 1) - 1;
-      for (int i = std::max(top, 0); i <= std::min(top + 1, height - 1); ++i) {
-        for (int j = std::max(left, 0); j <= std::min(left + 1, width - 1); ++j) {
-          const size_t to = size_t(i) * size_t(width) + size_t(j);
-          if (unlike <= priority_[to]) continue;
-          priority_[to] = unlike;
-          projected_.dx_px[to] = dx;
-          projected_.dy_px[to] = dy;
-        }
+      const size_t first = size_t(top) * size_t(width) + size_t(left);
+      for (const size_t to : {first, first + 1, first + size_t(width), first + size_t(width) + 1}) {
+        if (unlike <= priority[to]) continue;
+        priority[to] = unlike;
+        to_x[to] = dx;
+        to_y[to] = dy;
       }
     }
   }

@@ -27,7 +27,7 @@ class Extrapolation {
 
  private:
   FlowField projected_;
-  std::vector<float> sorted_, priority_;
+  std::vector<float> priority_;
   std::vector<FetchRow> rows_;  // of a worker each
 };
 

@@ -8,6 +8,8 @@
 namespace maq {
 namespace {
 
+constexpr const char* kNoPicture = "A depth image has no colours that could be predicted; give the picture.";
+
 constexpr int kGreyRowsOfTask = 16;
 
 // Where a format has its brightness: the bytes from a pixel to the next, and the weights (of 256) of its first three.
@@ -95,7 +97,7 @@ void repeat_first_and_last_row(GreyLevel& level) {
 
 void require_picture(const ImageView& image) {
   if (is_depth(image.format)) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours that could be predicted; give the picture.");
+    throw Error(MAQ_ERROR_UNSUPPORTED, kNoPicture);
   }
 }
 

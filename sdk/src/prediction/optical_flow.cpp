@@ -116,6 +116,35 @@ void OpticalFlow::densify(const GreyLevel& from, const GreyLevel& to, WorkerThre
   });
 }
 
+// Means over 5 x 5 pixels: errors of neighbours cancel, and they would grow with the time ahead. What is 0 around stays
+// 0.
+void OpticalFlow::smooth(WorkerThreads& threads, FlowField& flow) {
+  constexpr int kRadius_px = 2;
+  const int width = flow.width_px, height = flow.height_px;
+  across_.resize(width, height);
+  threads.run(size_t(height), [&](size_t y, int worker) {
+    std::vector<float>& row = votes_[size_t(worker)];
+    row.resize(size_t(width + 2 * kRadius_px));
+    for (const auto& [from, to] : {std::pair{&flow.dx_px, &across_.dx_px}, {&flow.dy_px, &across_.dy_px}}) {
+      const float* const begin = from->data() + y * size_t(width);
+      std::fill(row.begin(), row.begin() + kRadius_px, begin[0]);
+      std::copy(begin, begin + width, row.begin() + kRadius_px);
+      std::fill(row.end() - kRadius_px, row.end(), begin[width - 1]);
+      const float* const rows[] = {row.data(), row.data() + 1, row.data() + 2, row.data() + 3, row.data() + 4};
+      mean_of_five(rows, width, to->data() + y * size_t(width));
+    }
+  });
+  threads.run(size_t(height), [&](size_t y, int) {
+    for (const auto& [from, to] : {std::pair{&across_.dx_px, &flow.dx_px}, {&across_.dy_px, &flow.dy_px}}) {
+      const float* rows[2 * kRadius_px + 1];
+      for (int i = -kRadius_px; i <= kRadius_px; ++i) {
+        rows[i + kRadius_px] = from->data() + size_t(std::clamp(int(y) + i, 0, height - 1)) * size_t(width);
+      }
+      mean_of_five(rows, width, to->data() + y * size_t(width));
+    }
+  });
+}
+
 FlowFit OpticalFlow::find(const GreyPyramid& from, const GreyPyramid& to, WorkerThreads& threads, FlowField& flow) {
   const GreyLevel& finest = from.levels()[0];
   if (std::min(finest.width_px, finest.height_px) < kPatch_px) {
@@ -134,6 +163,7 @@ FlowFit OpticalFlow::find(const GreyPyramid& from, const GreyPyramid& to, Worker
   }
   hold_still(threads);
   densify(finest, to.levels()[0], threads, flow);
+  smooth(threads, flow);
   FlowFit fit;
   const float each = 1.0f / float(patches_.size());
   for (const Patch& patch : patches_) {

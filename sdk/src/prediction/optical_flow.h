@@ -41,11 +41,13 @@ class OpticalFlow {
  private:
   void match(const GreyLevel& from, const GreyLevel& to, const FlowField* coarser, WorkerThreads& threads);
   void hold_still(WorkerThreads& threads);
+  void smooth(WorkerThreads& threads, FlowField& flow);
   void densify(const GreyLevel& from, const GreyLevel& to, WorkerThreads& threads, FlowField& flow);
 
   int columns_ = 0, rows_ = 0;  // of patches
   std::vector<Patch> patches_, next_;
   std::vector<FlowField> fields_;          // by level, of the coarser ones
+  FlowField across_;                       // smoothed along its rows alone
   std::vector<std::vector<float>> votes_;  // of a worker each: weights, and weighted displacements
 };
 

@@ -9,8 +9,8 @@ namespace maq {
 namespace {
 
 constexpr int kPixels = kPatch_px * kPatch_px;
-constexpr int kMaxIterations = 8;
-constexpr float kSettled_px = 0.01f;      // a step that ends the search
+constexpr int kMaxIterations = 5;
+constexpr float kSettled_px = 0.02f;      // a step that ends the search
 constexpr float kMaxDisplacement_px = 8;  // of one level, from where the search began: farther it is lost
 constexpr float kMinDeterminant = 1e-3f;  // of the gradients' covariance (grey levels a pixel, squared): no texture
 constexpr float kBetter = 0.95f;          // of what is left along a neighbour's displacement, to be taken over
@@ -175,6 +175,16 @@ void search_patch(const GreyLevel& from, const GreyLevel& to, int x, int y, cons
 void vote(const GreyLevel& from, const GreyLevel& to, int x, int y, int row, const Patch& patch, float* weights,
           float* dx, float* dy) {
   vote_clones(from, to, x, y, row, patch, weights, dx, dy);
+}
+
+void mean_of_five(const float* const* rows, int count, float* mean) {
+  int i = 0;
+  for (; i + kPatch_px <= count; i += kPatch_px) {
+    const Row outer = MAQ_LOAD_ROW(rows[0] + i) + MAQ_LOAD_ROW(rows[4] + i),
+              inner = MAQ_LOAD_ROW(rows[1] + i) + MAQ_LOAD_ROW(rows[3] + i);
+    MAQ_ROW_AT(mean + i) = (outer + inner + MAQ_LOAD_ROW(rows[2] + i)) * 0.2f;
+  }
+  for (; i < count; ++i) mean[i] = (rows[0][i] + rows[4][i] + (rows[1][i] + rows[3][i]) + rows[2][i]) * 0.2f;
 }
 
 }  // namespace maq

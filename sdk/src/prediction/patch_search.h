@@ -30,4 +30,7 @@ void search_patch(const GreyLevel& from, const GreyLevel& to, int x, int y, cons
 void vote(const GreyLevel& from, const GreyLevel& to, int x, int y, int row, const Patch& patch, float* weights,
           float* dx, float* dy);
 
+// Mean of five rows, pixel by pixel.
+void mean_of_five(const float* const* rows, int count, float* mean);
+
 }  // namespace maq

@@ -10,6 +10,8 @@
 namespace maq {
 namespace {
 
+constexpr const char* kNoFrame = "No frame was pushed yet, so there is nothing to predict from; push one first.";
+
 // Of a frame's contrast, what is left along the flow where the one before shows something else: 0.8 to 0.9 between
 // unrelated clips, under 0.1 within them. Noise does not go on either.
 constexpr float kCutFraction = 0.3f;
@@ -102,8 +104,7 @@ void Predictor::follow() {
 
 void Predictor::predict(int64_t ahead_ns, Frame& frame) {
   if (!has_frame_) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT,
-                "No frame was pushed yet, so there is nothing to predict from; push one first.");
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, kNoFrame);
   }
   if (ahead_ns < 0 || ahead_ns > kMaxAhead_ns) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The time ahead is ", double(ahead_ns) / 1e9, " s, but must be 0 to ",

@@ -9,7 +9,7 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from benchmarks import __main__ as benchmark
-from benchmarks import cameras, compare, gates, graphs, report, roofline, start, sweep, window
+from benchmarks import cameras, compare, gates, graphs, prediction, report, roofline, start, sweep, window
 from benchmarks.edges import measure as edges
 from benchmarks.scenes import measure as scenes
 
@@ -86,7 +86,7 @@ def test_the_shipped_targets_can_be_read():
     names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "peak_memory_mb", "first_result_ms",
              "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8", "time_by_pytorch_fp32",
              "roofline_fraction", *start.FIGURES, *window.FIGURES, *cameras.FIGURES, *scenes.FIGURES,
-             *edges.FIGURES}  # fmt: skip
+             *edges.FIGURES, *prediction.FIGURES}  # fmt: skip
     assert {v.figure for v in gates.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
 
 
@@ -201,13 +201,24 @@ def document():
     view = {"open_ms": 1.0, "first_view_ms": 2.0, "longest_call_ms": 0.5}
     waits = {"first": [live], "next": [live], "scene": [view], "capture": [view], "demo": {},
              "demo_missing": "there is no <Xvfb>", "warnings": []}  # fmt: skip
-    return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "edges": edges_document(), "window": waits,
+    return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "edges": edges_document(),
+            "prediction": prediction_document(), "window": waits,
             "start": {"processes": processes, "files": {"library": file}, "warnings": []},
             "frames": frames, "sweep": rows, "person_sizes": sizes, "threads": 2,
             "frame_budget": {"missing": "no control group can be made: <mkdir>"},
             "quick": True, "gates": [gate],
             "peers": {"runtimes": runtimes, "roofline": line},
             "agreement": {"labels": 0.98, "parts": 0.99, "mask_iou": 0.97, "same_count": 0.9, "images": 5}}  # fmt: skip
+
+
+def prediction_document():
+    ahead = [{"frames": n, "last_db": 20.0, "motion_db": 25.0, "dis_db": 24.0, "auto_db": 25.0, "motion_chosen": 1.0}
+             for n in prediction.HORIZONS]  # fmt: skip
+    row = {"film": "pushing 00000, 10 fps", "size_px": [320, 240], "threads": 2, "dis_ms": 9.0, "starts": 3,
+           "push_ms": 3.0, "auto_push_ms": 4.0, "predict_ms": 2.0, "cpu_ms": 5.0, "horizons": ahead}  # fmt: skip
+    waits = {"captured": 20, "predicted": 5, "wait_ms": {"median": 0.1, "p99": 0.5, "max": 0.6}}
+    return {"rows": [row], "sets": prediction.means_of([row]), "speed": [row | {"film": "street"}], "waits": waits,
+            "missing": ["real clips (<none>)"], "warnings": []}  # fmt: skip
 
 
 def edges_document():

@@ -18,6 +18,10 @@
 namespace maq {
 namespace {
 
+constexpr const char* kPredictedRefused =
+    "The frame was predicted: no camera took it. Leave it out, or make the recorder with "
+    "keep_predicted = 1, which marks it.";
+
 std::string head_json(const RecordingInfo& info) {
   nlohmann::json head;
   head["made_by"] = std::string("maquette ") + sdk_version();
@@ -105,9 +109,7 @@ void RecordingWriter::add(const Frame& frame) {
                 " of ", entries_[0].timestamp_ns, " ns: a recording spans at most ", kMaxSpanNs, " ns.");
   }
   if (frame.origin.is_predicted && !keeps_predicted_) {
-    throw Error(MAQ_ERROR_UNSUPPORTED,
-                "The frame was predicted: no camera took it. Leave it out, or make the recorder with "
-                "keep_predicted = 1, which marks it.");
+    throw Error(MAQ_ERROR_UNSUPPORTED, kPredictedRefused);
   }
   const ImageView& image = frame.image;
   FrameHead head{};

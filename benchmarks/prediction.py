@@ -1,0 +1,251 @@
+"""What is predicted of clips: PSNR by time ahead beside the last frame and OpenCV's DIS, run times, and how long a
+concealer's frames are waited for.
+
+    python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (5 minutes)
+    python -m benchmarks.prediction --quick                 fewer clips, to see that it runs
+    python -m benchmarks --only prediction                  the same as a part of the report
+
+Needs clips of `export.clips` (.data/clips/pushing/val), those of `export.photos` (.data/photos/clip), and the program
+measure_prediction (`cmake --build --preset release --target measure_prediction`). What is not there is left out, and
+said. Predictions begin at every third frame; all methods see the same frames.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from export.clips.clip import read_clip
+
+PROGRAM = Path("build/release/benchmarks/native/measure_prediction")
+HORIZONS = (1, 3, 5, 8)  # frames ahead
+SIZE_PX, LARGE_PX = (320, 240), (640, 480)
+FIRST_START, START_STEP = 4, 3  # as measure_prediction has them
+FRAMES = 90  # of a real clip
+WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
+FIGURES = ("prediction_pictures_a_second", "concealed_wait_p99_ms")
+METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto"}
+
+
+@dataclass(frozen=True)
+class Film:
+    """name, and bgr: uint8 [T, H, W, 3] at `fps` frames a second."""
+
+    name: str
+    bgr: np.ndarray
+    fps: float
+
+
+def measure(
+    quick: bool = False,
+    clips: Path = Path(".data/clips/pushing/val"),
+    photos: Path = Path(".data/photos/clip"),
+    threads: int = 2,
+) -> tuple[dict, dict[str, float], dict[str, str]]:
+    """The document, the figures of FIGURES, and why one is missing.
+
+    Raises FileNotFoundError where the program was not built, subprocess.SubprocessError where it fails.
+    """
+    if not PROGRAM.exists():
+        raise FileNotFoundError(f"{PROGRAM} is missing: cmake --build --preset release --target measure_prediction")
+    absent = []
+    films = real_films(photos, SIZE_PX, quick)
+    if not films:
+        absent.append(f"real clips ({photos} has none: python -m export.photos people)")
+    pushing = pushing_films(clips, 3 if quick else 24)
+    if not pushing:
+        absent.append(f"pushing ({clips} has none: python -m export.clips.dataset pushing --split val --clips 16)")
+    rows = [measure_film(film, threads) for film in tqdm([*films, *pushing], desc="prediction", disable=None)]
+    large = [film for film in real_films(photos, LARGE_PX, quick=True) if film.bgr.shape[1:3] == LARGE_PX[::-1]]
+    speed = [measure_film(film, count) for film in large[:1] for count in (1, threads)]
+    waits = json.loads(run(["waits", "6" if quick else "30", WAIT_SOURCE]))
+    document = {"rows": rows, "sets": means_of(rows), "speed": speed, "waits": waits, "missing": absent, "warnings": []}
+    figures = {"concealed_wait_p99_ms": waits["wait_ms"]["p99"]}
+    missing = {}
+    if speed:
+        figures["prediction_pictures_a_second"] = 1000 / (speed[-1]["push_ms"] + speed[-1]["predict_ms"])
+    else:
+        missing["prediction_pictures_a_second"] = "; ".join(absent)
+    return document, figures, missing
+
+
+def run(words: Sequence[str], given: bytes = b"") -> str:
+    return subprocess.run([str(PROGRAM), *words], input=given, capture_output=True, check=True).stdout.decode()
+
+
+def real_films(folder: Path, size_px: tuple[int, int], quick: bool) -> list[Film]:
+    films = []
+    for path in sorted(folder.glob("*.*")):
+        capture = cv2.VideoCapture(str(path))
+        own_fps = capture.get(cv2.CAP_PROP_FPS)
+        for wanted_fps in (10,) if quick else (10, 30):
+            step = max(1, round(own_fps / wanted_fps))
+            fps = own_fps / step
+            if abs(fps / wanted_fps - 1) > 0.3:
+                continue
+            frames = read_film(path, step, size_px)
+            if len(frames) > FIRST_START + max(HORIZONS):
+                films.append(Film(f"{path.stem}, {fps:.0f} fps", np.stack(frames), fps))
+    return films
+
+
+def read_film(path: Path, step: int, size_px: tuple[int, int]) -> list[np.ndarray]:
+    capture, frames, index = cv2.VideoCapture(str(path)), [], 0
+    while len(frames) < FRAMES:
+        there, frame = capture.read()
+        if not there:
+            break
+        if index % step == 0:
+            frames.append(cv2.resize(frame, size_px, interpolation=cv2.INTER_AREA))
+        index += 1
+    return frames
+
+
+def pushing_films(folder: Path, most: int) -> list[Film]:
+    films = []
+    for path in sorted(folder.glob("clip-*.npz"))[:most]:
+        clip = read_clip(path)
+        if clip.large is not None:
+            films.append(Film(f"pushing {path.stem[5:]}, {clip.fps:.0f} fps", clip.large.rgb[..., ::-1], clip.fps))
+    return films
+
+
+def measure_film(film: Film, threads: int) -> dict:
+    frames = np.ascontiguousarray(film.bgr)
+    height, width = frames.shape[1:3]
+    words = ["errors", str(width), str(height), str(film.fps), str(threads), *map(str, HORIZONS)]
+    found = json.loads(run(words, frames.tobytes()))
+    dis, dis_ms = dis_errors(frames)
+    for row in found["horizons"]:
+        row["dis_db"] = dis[row["frames"]]
+    return {"film": film.name, "size_px": [width, height], "threads": threads, "dis_ms": dis_ms, **found}
+
+
+def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
+    """Constant velocity by OpenCV's DIS (preset medium), fetched backward: PSNR by horizon, and milliseconds of motion
+    and one picture, on OpenCV's own threads."""
+    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    y, x = np.mgrid[: frames.shape[1], : frames.shape[2]].astype(np.float32)
+    errors: dict[int, list[float]] = {horizon: [] for horizon in HORIZONS}
+    times = []
+    for start in range(FIRST_START, len(frames) - max(HORIZONS), START_STEP):
+        begin = time.perf_counter()
+        now, before = (cv2.cvtColor(frames[i], cv2.COLOR_BGR2GRAY) for i in (start, start - 1))
+        flow = dis.calc(now, before, None)
+        for horizon in HORIZONS:
+            moved = cv2.remap(frames[start], x + horizon * flow[..., 0], y + horizon * flow[..., 1], cv2.INTER_LINEAR,
+                              borderMode=cv2.BORDER_REPLICATE)  # fmt: skip
+            if horizon == HORIZONS[0]:
+                times.append(1000 * (time.perf_counter() - begin))
+            errors[horizon].append(psnr_db(moved, frames[start + horizon]))
+    return {horizon: float(np.mean(values)) for horizon, values in errors.items()}, float(np.median(times))
+
+
+def psnr_db(one: np.ndarray, other: np.ndarray) -> float:
+    squares = np.mean((one.astype(np.float32) - other) ** 2)
+    return float(10 * np.log10(255**2 / max(squares, 0.01)))
+
+
+def means_of(rows: list[dict]) -> dict[str, dict]:
+    """Of pushing and of the real clips: PSNR by method and horizon, means over clips."""
+    sets = {"pushing": [row for row in rows if row["film"].startswith("pushing")],
+            "real": [row for row in rows if not row["film"].startswith("pushing")]}  # fmt: skip
+    return {
+        name: {"clips": len(of_set),
+               **{method: [float(np.mean([row["horizons"][i][f"{method}_db"] for row in of_set]))
+                           for i in range(len(HORIZONS))] for method in METHODS}}
+        for name, of_set in sets.items() if of_set
+    }  # fmt: skip
+
+
+def table_of(rows: list[dict], sets: dict[str, dict]) -> list[list[str]]:
+    """A head and rows: of each clip and set, PSNR in dB by method and frames ahead, and how often auto took motion."""
+    table = [["clip", *(f"{says} +{horizon}" for horizon in HORIZONS for says in METHODS.values()), "motion taken"]]
+    for row in rows:
+        cells = [f"{ahead[f'{method}_db']:.1f}" for ahead in row["horizons"] for method in METHODS]
+        taken = "/".join(f"{ahead['motion_chosen']:.0%}" for ahead in row["horizons"])
+        table.append([row["film"], *cells, taken])
+    for name, means in sets.items():
+        cells = [f"{means[method][i]:.1f}" for i in range(len(HORIZONS)) for method in METHODS]
+        table.append([f"mean of {means['clips']} ({name})", *cells, ""])
+    return table
+
+
+def section(measured: dict) -> tuple[str, list]:
+    """Title and parts, as benchmarks.report has them, of what measure returned."""
+    waits = measured["waits"]
+    parts: list = [
+        "What a predictor makes of a stream 1, 3, 5 and 8 frames after it saw its latest: PSNR in dB (320 x 240). "
+        "Motion: ours; OpenCV DIS: constant velocity by its preset medium; auto: what an app gets without an option.",
+        table_of([], measured["sets"]) if measured["sets"] else "No clip was there.",
+    ]
+    rows = [
+        [
+            "640 x 480, ms",
+            "threads",
+            "frame pushed",
+            "with auto",
+            "picture made",
+            "pictures a second",
+            "CPU time",
+            "DIS, its threads",
+        ]
+    ]
+    for row in measured["speed"]:
+        rate = 1000 / (row["push_ms"] + row["predict_ms"])
+        times = [f"{row[key]:.2f}" for key in ("push_ms", "auto_push_ms", "predict_ms")]
+        rows.append(
+            [row["film"], str(row["threads"]), *times, f"{rate:.0f}", f"{row['cpu_ms']:.1f}", f"{row['dis_ms']:.1f}"]
+        )
+    parts += [rows] if measured["speed"] else []
+    parts.append(
+        f"A camera of 640 x 480 at 30 frames a second that drops a quarter of them, concealed: {waits['captured']} "
+        f"frames captured, {waits['predicted']} predicted, there {waits['wait_ms']['median']:.2f} ms (median), "
+        f"{waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
+    )
+    parts += [f"Not measured: {'; '.join(measured['missing'])}."] if measured["missing"] else []
+    return "Prediction", parts
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.prediction",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--clips", type=Path, default=Path(".data/clips/pushing/val"), metavar="DIR")
+    parser.add_argument("--photos", type=Path, default=Path(".data/photos/clip"), metavar="DIR")
+    parser.add_argument("--out", type=Path, default=Path("build/benchmarks/prediction.json"), metavar="FILE")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--quick", action="store_true")
+    options = parser.parse_args(argv)
+    document, figures, missing = measure(options.quick, options.clips, options.photos, options.threads)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    options.out.write_text(json.dumps(document | {"figures": figures}, indent=1) + "\n")
+    console = Console(width=200)
+    head, *rows = table_of(document["rows"], document["sets"])
+    shown = Table(*head)
+    for row in rows:
+        shown.add_row(*row)
+    console.print(shown)
+    for part in section(document)[1][2:]:
+        console.print(part if isinstance(part, str) else "\n".join("   ".join(row) for row in part))
+    for name in FIGURES:
+        console.print(f"{name}: {figures[name]:.2f}" if name in figures else f"{name}: not measured, {missing[name]}")
+    console.print(f"Written: {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

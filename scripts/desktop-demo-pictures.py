@@ -25,19 +25,30 @@ ROOM = ("tests/media/room", 20)
 # With the pointer near a corner of a carton.
 SOLIDS = ("stub:solids?scene=room&seed=2&size=640x480", 20)
 POINTER = ("--pointer", "581,402")
+# The last frame is one that the camera would have taken while it stalls.
+STALLS = "stub:people?seed=3&fps=15&stall=300ms@3s"
 PHOTO = ("tests/media/photo.jpg", 12)
 HEADS = [("--shading", "colour"), ("--shading", "normals"), ("--compare", "slider")]
 
 
-def shown(source: str, frames: int, folder: Path, *options: str) -> np.ndarray:
-    """The window at the end of a run: uint8 [height, width, 3] BGR."""
+def shown(source: str, frames: int, folder: Path, *options: str) -> tuple[np.ndarray, dict]:
+    """The window at the end of a run, uint8 [height, width, 3] BGR, and what the demo reports."""
     picture = folder / "shown.png"
     command = ["xvfb-run", "-a", "-s", "-screen 0 1600x1200x24", DEMO, source, "--headless", "--frames", str(frames),
                "--size", "1280x800", "--screenshot", picture, *options]  # fmt: skip
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     report = json.loads(ran.stdout)
     print(" ".join([Path(source).name, *options]), report["ui"])
-    return cv2.imread(str(picture))
+    return cv2.imread(str(picture)), report
+
+
+def bridged(folder: Path) -> np.ndarray:
+    """While the camera stalls, which is some 46 frames after the start."""
+    for frames in range(45, 55):
+        picture, report = shown(STALLS, frames, folder, "--next", "--bridge-gaps", "--ahead", "100")
+        if report["prediction"]["now_is_predicted"]:
+            return picture
+    raise RuntimeError("No run ended with a bridged frame; the machine is too busy.")
 
 
 def sheet(pictures: list[np.ndarray], columns: int, width_px: int) -> np.ndarray:
@@ -58,10 +69,10 @@ def main() -> None:
     def keep(name: str, picture: np.ndarray) -> None:
         cv2.imwrite(str(options.out / name), picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
-    with tempfile.TemporaryDirectory() as temporary, tqdm(total=20, unit="picture") as progress:
+    with tempfile.TemporaryDirectory() as temporary, tqdm(total=21, unit="picture") as progress:
 
         def run(source: tuple[str, int], *arguments: str) -> np.ndarray:
-            picture = shown(*source, Path(temporary), *arguments)
+            picture, _ = shown(*source, Path(temporary), *arguments)
             progress.update()
             return picture
 
@@ -75,6 +86,8 @@ def main() -> None:
             sheet([run(ROOM, "--compare", c)[44:756, :950] for c in ("none", "slider", "error")], 3, 520),
         )
         keep("desktop-head.jpg", sheet([run(PHOTO, "--head", *h)[44:756, :950] for h in HEADS], 3, 520))
+        keep("desktop-demo-next.jpg", bridged(Path(temporary)))
+        progress.update()
         keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 
 

@@ -26,12 +26,14 @@ App::App(const Options& options)
       panel_(window_),
       people_(context_, options, window_, painter_),
       edges_(context_, options, window_, painter_),
+      next_(context_, options, window_, painter_),
       scene_(context_, options, window_, painter_),
       head_(context_, options, window_, painter_),
       seeks_head_(options.head),
       saver_(context_, options.out) {
   if (!options.texture.empty()) load_outfit(options.texture);
   if (options.edges) live_ = &edges_;
+  if (options.next) live_ = &next_;
   open(options.source);
 }
 
@@ -97,6 +99,7 @@ void App::take_keys() {
       case GLFW_KEY_F3: perform(Action::kClip); break;
       case GLFW_KEY_F4: perform(Action::kRecord); break;
       case GLFW_KEY_F5: perform(Action::kOtherView); break;
+      case GLFW_KEY_F7: perform(Action::kNext); break;
       case GLFW_KEY_F6: ImGui::SetWindowFocus(ImGui::GetIO().NavActive ? nullptr : "panel"); break;
       case GLFW_KEY_F11: window_.toggle_full_screen(); break;
       case GLFW_KEY_ESCAPE: shows_help_ = false; break;
@@ -141,6 +144,7 @@ void App::perform(Action action) {
     case Action::kNone: break;
     case Action::kOpenCamera: live_->open_camera(); break;
     case Action::kOtherView: view_ == &edges_ ? show(people_) : show(edges_); break;
+    case Action::kNext: view_ == &next_ ? show(people_) : show(next_); break;
     case Action::kBack: show(*live_); break;
     case Action::kHead: show_head(false); break;
     case Action::kAddToHead: show_head(true); break;
@@ -155,10 +159,15 @@ void App::perform(Action action) {
 void App::show(LiveView& view) {
   view_ = live_ = &view;
   scene_.open("");
-  for (LiveView* const each : {static_cast<LiveView*>(&people_), static_cast<LiveView*>(&edges_)}) {
-    each->set_visible(each == &view);
+  LiveView* const all[] = {&people_, &edges_, &next_};
+  for (LiveView* const each : all) each->set_visible(each == &view);
+  // People and what comes next are views of one source.
+  LiveView* const other = &view == &people_ ? all[2] : &view == &next_ ? all[0] : nullptr;
+  if (other != nullptr && other->has_source()) {
+    view.open(other->hand_over());
+  } else if (!view.has_source()) {
+    view.open_first();
   }
-  if (!view.has_source()) view.open_first();
 }
 
 void App::show_head(bool adds_photo) {
@@ -179,6 +188,7 @@ void App::open(const std::string& path_or_uri) {
   view_ = &scene_;
   people_.set_visible(false);
   edges_.set_visible(false);
+  next_.set_visible(false);
   scene_.open(path_or_uri);
 }
 

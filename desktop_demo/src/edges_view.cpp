@@ -11,9 +11,10 @@
 
 namespace {
 
-constexpr OwnSources kSources = {kRenderedSolids, "depthai:", kRenderedSolids,
-                                 "These solids are rendered; drop a recording of a depth camera here."};
-constexpr const char* kStages[] = {"depth", "planes", "slopes", "network", "decode", "curves", "boxes", "draw", "wait"};
+constexpr OwnSources kEdgesSources = {kRenderedSolids, "depthai:", kRenderedSolids,
+                                      "These solids are rendered; drop a recording of a depth camera here."};
+constexpr const char* kEdgesStages[] = {"depth",  "planes", "slopes", "network", "decode",
+                                        "curves", "boxes",  "draw",   "wait"};
 constexpr std::array<const char*, 5> kFormats = {"json", "obj", "ply", "dxf", "step"};
 constexpr const char* kSnapNames[] = {"nothing", "corner", "curve", "plane"};
 constexpr float kSnapRadius = 14;  // in units of the window at scale 1
@@ -21,7 +22,7 @@ constexpr float kSnapRadius = 14;  // in units of the window at scale 1
 }  // namespace
 
 EdgesView::EdgesView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
-    : LiveView(options, window, painter, kSources),
+    : LiveView(options, window, painter, kEdgesSources),
       model_(options.edges_model),
       layer_(options.layer),
       live_(
@@ -150,7 +151,7 @@ Action EdgesView::draw_panel() {
   ImGui::Text("%d x %d in %.1f ms, curves in %.1f ms", shown.picture.width_px, shown.picture.height_px,
               double(shown.stats.total_ms), double(shown.curves_stats.curves_ms + shown.curves_stats.boxes_ms));
   if (shown.age_ms >= 0) ImGui::Text("from camera to result: %.0f ms", shown.age_ms);
-  stages_.draw(kStages, std::size(kStages), window_.scale());
+  stages_.draw(kEdgesStages, std::size(kEdgesStages), window_.scale());
   ImGui::Text("%zu curves, %zu corners", shown.curves.size(), shown.corners.size());
   for (const maq_edges_box& box : shown.boxes) ImGui::TextWrapped("box of %s", text_of(box).c_str());
   draw_layers();

@@ -18,6 +18,13 @@ void LiveView::open(const std::string& uri) {
   live_->open(maquette::source_uri(uri), seeks_camera_ ? own_.stand_in : "");
 }
 
+std::string LiveView::hand_over() {
+  const std::string uri = seeks_camera_ ? own_.camera : live_->status().uri;
+  recording_.clear();
+  live_->close();
+  return uri;
+}
+
 void LiveView::set_visible(bool is_visible) {
   is_visible_ = is_visible;
   stages_.clear();

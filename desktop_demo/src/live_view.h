@@ -21,6 +21,8 @@ class LiveView : public MainView {
       : MainView(options, window, painter), own_(own) {}
 
   void open(const std::string& uri);
+  // Closes the source, and says what another view must open to play the same; "" without one.
+  std::string hand_over();
   void open_first() { open(own_.start); }
   void open_camera() { open(own_.camera); }
   bool has_source() const { return !live_->status().uri.empty(); }
@@ -35,7 +37,7 @@ class LiveView : public MainView {
 
  protected:
   // Of what the view plays by; must outlive the view's calls.
-  void set_live(maquette::LivePipeline* live) { live_ = live; }
+  void set_live(maquette::LivePlayer* live) { live_ = live; }
   // To be asked before a frame is taken, which then is the last.
   void note_end() { has_ended_ = live_->status().has_ended; }
   Action draw_source(double results_per_second) const;  // in the panel
@@ -45,7 +47,7 @@ class LiveView : public MainView {
   void apply_pause() { live_->set_paused(is_paused_ || !is_visible_); }
 
   const OwnSources own_;
-  maquette::LivePipeline* live_ = nullptr;
+  maquette::LivePlayer* live_ = nullptr;
   bool is_paused_ = false, is_visible_ = true, seeks_camera_ = false;
   bool has_ended_ = false;  // with the result of the latest update()
   std::string recording_;   // its path; "" without one

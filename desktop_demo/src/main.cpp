@@ -1,4 +1,5 @@
-// maquette-demo: a person's own body surface, live from a webcam; scenes; edges of a depth camera; heads.
+// maquette-demo: a person's own body surface, live from a webcam; scenes; edges of a depth camera; heads; what comes
+// next.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -32,11 +33,13 @@ int main(int argc, char** argv) try {
   // A thread that stays awake takes a core from the window.
   options.model.allow_spinning = options.edges_model.edges.allow_spinning = 0;
   bool part_only = false, skip_planes = false;
+  double ahead_ms = options.prediction.ahead_s * 1e3;
+  std::string method = kMethodNames[0];
   std::string path, view = "parts", compare = "none", layer = "depth", shading = "colour", size = "1280x800";
 
   CLI::App cli(
       "Shows the body surface of the people before the camera, live, on the processor alone; flies through scenes;\n"
-      "shows sharp edges in depth; makes 3D heads.\n\n"
+      "shows sharp edges in depth; makes 3D heads; shows what a camera will show next.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
@@ -44,6 +47,9 @@ int main(int argc, char** argv) try {
       "  maquette-demo photo.jpg --head      a 3D head of the person in a photo, or in the first picture of a camera\n"
       "  maquette-demo --edges               edges and sizes of solids; or of a depth camera, a recording, a picture:\n"
       "  maquette-demo --edges 'image:depth.png?depth_unit=0.001&fov=60'\n"
+      "  maquette-demo --next                now, and what comes 200 ms later (--ahead), predicted\n"
+      "  maquette-demo --next --bridge-gaps 'stub:people?stall=300ms@3s'\n"
+      "                                      predicted frames, marked in magenta, while the camera stalls\n"
       "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
       "In the window F1 shows the keys. Files can be dropped on it.",
       "maquette-demo");
@@ -64,6 +70,20 @@ int main(int argc, char** argv) try {
   cli.add_option("--fit-seconds", options.fit_seconds, "Of heads: the time for the fit to the pixels")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 3600.0));
+  auto* const next = cli.add_flag("--next", options.next, "What the source will show next, beside what it shows")
+                         ->excludes("--edges")
+                         ->excludes("--head");
+  cli.add_option("--ahead", ahead_ms, "How far ahead, in milliseconds")
+      ->capture_default_str()
+      ->needs(next)
+      ->check(CLI::Range(kMinAheadMs, kMaxAheadMs));
+  cli.add_option("--method", method, "By which it is predicted; auto: whichever was right about the latest frames")
+      ->capture_default_str()
+      ->needs(next)
+      ->check(CLI::IsMember(kMethodNames));
+  cli.add_flag("--bridge-gaps", options.prediction.bridges_gaps,
+               "Predicted frames, marked, where the camera's are late or missing, for 300 ms at most")
+      ->needs(next);
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");
@@ -106,6 +126,9 @@ int main(int argc, char** argv) try {
   options.layer = maquette::EdgeLayer(std::find(layers.begin(), layers.end(), layer) - layers.begin());
   options.shading = maq_head_shading(std::find(kShadingNames.begin(), kShadingNames.end(), shading) -
                                      kShadingNames.begin() + int(MAQ_HEAD_SHADING_COLOUR));
+  options.prediction.ahead_s = ahead_ms / 1e3;
+  options.prediction.method =
+      maq_prediction_method(std::find(kMethodNames.begin(), kMethodNames.end(), method) - kMethodNames.begin());
   options.compare = Compare(std::find(kCompareNames.begin(), kCompareNames.end(), compare) - kCompareNames.begin());
   const bool is_size = std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
   if (!is_size || std::min(options.width_px, options.height_px) < 64 ||
@@ -118,7 +141,7 @@ int main(int argc, char** argv) try {
   options.edges_model.edges.skip_planes = skip_planes ? 1 : 0;
   options.model.detail = part_only ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
   if (options.headless) {
-    options.live.real_time = false;
+    options.live.real_time = options.prediction.bridges_gaps;  // others have no gaps
     options.live.max_results = options.frames;
     options.live.reconnect_ms = 4000;
   }

@@ -1,5 +1,5 @@
-// What fills the window beside the panel: people (PeopleView), edges (EdgesView), a scene (SceneView) or a head
-// (HeadView).
+// What fills the window beside the panel: people (PeopleView), edges (EdgesView), what comes next (NextView), a
+// scene (SceneView) or a head (HeadView).
 #pragma once
 
 #include <app/saver.h>
@@ -16,6 +16,7 @@ enum class Action {
   kNone,
   kOpenCamera,
   kOtherView,
+  kNext,
   kHead,       // of the person in the picture
   kAddToHead,  // the picture, for the head so far
   kBack,       // to the live view

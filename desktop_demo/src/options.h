@@ -4,6 +4,7 @@
 #include <app/edge_picture.h>
 #include <app/live_densepose.h>
 #include <app/live_edges.h>
+#include <app/live_prediction.h>
 #include <array>
 #include <string>
 #include <vector>
@@ -20,10 +21,16 @@ constexpr std::array<const char*, 3> kCompareNames = {"none", "slider", "error"}
 // In the order of maq_head_shading.
 constexpr std::array<const char*, 5> kShadingNames = {"colour", "shape", "normals", "template", "depth"};
 
+// In the order of maq_prediction_method.
+constexpr std::array<const char*, 3> kMethodNames = {"auto", "last", "motion"};
+constexpr double kMinAheadMs = 33, kMaxAheadMs = 1000;
+
 struct Options {
   std::string source = kFirstCamera;  // or a file, a folder with a capture
   bool edges = false;                 // of the source, rather than people
   bool head = false;                  // of the person in its first picture
+  bool next = false;                  // what the source will show next
+  maquette::PredictionChoice prediction;
   maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
   double fit_seconds = 3;  // of a head
   std::string heads_bundle;

@@ -145,6 +145,7 @@ Action PeopleView::draw_panel() {
                      stats.network_width_px, stats.network_height_px);
   draw_model_options();
   if (ImGui::Button("Edges of a depth camera (F5)")) action = Action::kOtherView;
+  if (ImGui::Button("What comes next (F7)")) action = Action::kNext;
   if (ImGui::Button("Head of this person (G)")) action = Action::kHead;
   ImGui::SameLine();
   if (ImGui::Button("add (A)")) action = Action::kAddToHead;

@@ -11,7 +11,7 @@ namespace {
 constexpr int kMovingSidePx = 640, kStillSidePx = 1280;  // of images while flying, and after
 constexpr double kFlightSpeed = 0.12;                    // diagonals of the scene a second
 constexpr double kToPhotoS = 0.6;
-constexpr const char* kStages[] = {"project", "shade", "refine", "resample"};
+constexpr const char* kSceneStages[] = {"project", "shade", "refine", "resample"};
 
 }  // namespace
 
@@ -184,7 +184,7 @@ Action SceneView::draw_panel() {
   }
   // Until its first image is there the one that is shown may be of another scene.
   if (scene->phase == maquette::LiveSceneState::kReady && image_count_ > 0) draw_facts();
-  stages_.draw(kStages, std::size(kStages), window_.scale());
+  stages_.draw(kSceneStages, std::size(kSceneStages), window_.scale());
   if (!scene->photos.empty()) draw_photo_buttons();
   ImGui::TextWrapped("Fly: W A S D, Q E down and up, mouse or arrows to look, wheel to zoom.");
   return ImGui::Button("Back to people (X)") ? Action::kBack : Action::kNone;

@@ -55,6 +55,13 @@ void LivePipeline::open(const std::string& uri, const std::string& fallback) {
   pipeline_->set_source(uri);
 }
 
+void LivePipeline::close() {
+  pipeline_->stop();
+  std::lock_guard<std::mutex> lock(mutex_);
+  uri_.clear(), fallback_.clear(), fallback_reason_.clear();
+  states_.clear();
+}
+
 void LivePipeline::take_result(PipelineResult result) {
   if (max_results_ != 0 && result_count_ >= max_results_) return;
   on_result_(std::move(result), pipeline_->stats().results_per_second);

@@ -1,5 +1,6 @@
 // A pipeline (maquette/pipeline.h) for programs with a window: options that suit one, another source where one cannot
-// be opened, and what the user is told. Used as LiveDensePose or LiveEdges, which say what runs.
+// be opened, and what the user is told. Used as LiveDensePose or LiveEdges, which say what runs. LivePlayer is what it
+// has in common with LivePrediction.
 #pragma once
 
 #include <atomic>
@@ -35,27 +36,37 @@ struct LiveOptions {
   double frame_budget_ms = 0;       // as in maq_pipeline_config
 };
 
-class LivePipeline {
+// These return at once, unless they say otherwise; what goes wrong is in status().
+class LivePlayer {
+ public:
+  virtual ~LivePlayer() = default;
+
+  // Plays a source in place of the present one. `fallback`: what plays when it cannot be opened; the reason stays in
+  // `problem`.
+  virtual void open(const std::string& uri, const std::string& fallback) = 0;
+  virtual void close() = 0;  // so that others can open the source
+  virtual void set_paused(bool is_paused) = 0;
+  // Begins a recording of the source (.maqrec), or ends it with "".
+  virtual void set_recording(const std::string& path) = 0;
+  virtual LiveStatus status() const = 0;
+};
+
+class LivePipeline : public LivePlayer {
  public:
   // `model`: what runs, densepose or edges with curves; the other fields are set here. `on_result` is called on the
   // pipeline's thread with each result and how many there are a second; `on_change`, which may be null, on that thread
   // with each change of the status. Neither may throw or destroy this.
   LivePipeline(const Context& context, maq_pipeline_config model, std::function<void(PipelineResult, double)> on_result,
                std::function<void()> on_change, const LiveOptions& options);
-  ~LivePipeline();
+  ~LivePipeline() override;
   LivePipeline(const LivePipeline&) = delete;
   LivePipeline& operator=(const LivePipeline&) = delete;
 
-  // These return at once; what goes wrong is in status().
-
-  // Plays a source in place of the present one. `fallback`: what plays when it cannot be opened; the reason stays in
-  // `problem`.
-  void open(const std::string& uri, const std::string& fallback = "");
-  void set_paused(bool is_paused) { pipeline_->set_paused(is_paused); }
-  // Begins a recording of the source (.maqrec), or ends it with "".
-  void set_recording(const std::string& path) { pipeline_->set_recording(path); }
-
-  LiveStatus status() const;
+  void open(const std::string& uri, const std::string& fallback = "") override;
+  void close() override;  // the device is free when the model's run is done
+  void set_paused(bool is_paused) override { pipeline_->set_paused(is_paused); }
+  void set_recording(const std::string& path) override { pipeline_->set_recording(path); }
+  LiveStatus status() const override;
 
  protected:
   Pipeline& pipeline() { return *pipeline_; }

@@ -1,0 +1,159 @@
+#include "next_view.h"
+
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+#include <cmath>
+#include <iterator>
+
+namespace {
+
+constexpr OwnSources kPredictedSources = {kFirstCamera, kFirstCamera, "stub:people?count=2",
+                                          "These people are rendered; drop a clip or a recording here."};
+constexpr const char* kPredictionStages[] = {"brightness", "motion", "choice", "move on", "pixels", "wait"};
+constexpr double kAheadSPerRadian = 0.3;  // of what drags and arrows turn elsewhere
+constexpr ImU32 kMadeUpColour = IM_COL32(255, 0, 255, 255), kDarkColour = IM_COL32(20, 20, 24, 220);
+
+std::string predicted_text(double ahead_s) {
+  return "predicted +" + std::to_string(std::lround(ahead_s * 1e3)) + " ms";
+}
+
+}  // namespace
+
+NextView::NextView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
+    : LiveView(options, window, painter, kPredictedSources),
+      choice_(options.prediction),
+      live_(
+          context, options.prediction,
+          [this](const maquette::PredictionFrame& frame) {
+            frames_.back() = frame;
+            frames_.publish();
+            Window::wake();
+          },
+          Window::wake, options.live) {
+  set_live(&live_);
+}
+
+// Meanwhile others drew into the textures.
+void NextView::set_visible(bool is_visible) {
+  LiveView::set_visible(is_visible);
+  if (is_visible && frame().number > 0) painter_.set_scene(frame().next, frame().now);
+}
+
+bool NextView::update() {
+  note_end();
+  if (!frames_.take()) return false;
+  painter_.set_scene(frame().next, frame().now);
+  const maq_predictor_stats& s = frame().stats;
+  stages_.add({s.grey_ms, s.flow_ms, s.choice_ms, s.project_ms, s.fetch_ms, float(frame().waiting_ms)});
+  return true;
+}
+
+Action NextView::press(int key) {
+  if (key >= GLFW_KEY_1 && key <= GLFW_KEY_3) choice_.method = maq_prediction_method(key - GLFW_KEY_1);
+  if (key == GLFW_KEY_B) choice_.bridges_gaps = !choice_.bridges_gaps;
+  live_.set_choice(choice_);
+  return LiveView::press(key);
+}
+
+void NextView::steer(const Steering& steering, const Rect&) {
+  if (steering.right == 0) return;
+  choice_.ahead_s =
+      std::clamp(choice_.ahead_s + kAheadSPerRadian * double(steering.right), kMinAheadMs / 1e3, kMaxAheadMs / 1e3);
+  live_.set_choice(choice_);
+}
+
+// Beside each other or one below the other, whichever is larger.
+void NextView::place(const Rect& area) {
+  const int width = frame().now.width_px, height = frame().now.height_px;
+  const Rect beside = Rect{0, 0, area.width / 2, area.height}.fit(width, height);
+  const Rect below = Rect{0, 0, area.width, area.height / 2}.fit(width, height);
+  const bool is_beside = beside.width >= below.width;
+  const Rect& one = is_beside ? beside : below;
+  const int all_width = is_beside ? 2 * one.width : one.width, all_height = is_beside ? one.height : 2 * one.height;
+  image_rect_ = {area.x + (area.width - all_width) / 2, area.y + (area.height - all_height) / 2, all_width, all_height};
+  now_rect_ = {image_rect_.x, image_rect_.y, one.width, one.height};
+  next_rect_ = {image_rect_.x + all_width - one.width, image_rect_.y + all_height - one.height, one.width, one.height};
+}
+
+void NextView::draw(const Rect& area) {
+  if (frame().number == 0) return;
+  place(area);
+  painter_.draw_scene(now_rect_, 1);
+  painter_.draw_scene(next_rect_, 0);
+  const bool is_bridged = frame().origin.kind == MAQ_FRAME_PREDICTED;
+  mark(now_rect_, is_bridged, is_bridged ? predicted_text(double(frame().origin.horizon_ns) / 1e9) : "now");
+  mark(next_rect_, true, predicted_text(frame().made_ahead_s) + ", " + kMethodNames[size_t(frame().stats.method)]);
+}
+
+void NextView::mark(const Rect& rect, bool is_predicted, const std::string& text) const {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const float line = 4 * window_.scale(), pad = 4 * window_.scale();
+  const ImVec2 from = {float(rect.x), float(rect.y)}, to = {from.x + float(rect.width), from.y + float(rect.height)};
+  const float half = line / 2;
+  if (is_predicted)
+    list->AddRect({from.x + half, from.y + half}, {to.x - half, to.y - half}, kMadeUpColour, 0, 0, line);
+  const ImVec2 size = ImGui::CalcTextSize(text.c_str());
+  const ImVec2 at = {from.x + line, to.y - line - size.y - 2 * pad};
+  list->AddRectFilled(at, {at.x + size.x + 2 * pad, at.y + size.y + 2 * pad},
+                      is_predicted ? kMadeUpColour : kDarkColour);
+  list->AddText({at.x + pad, at.y + pad}, is_predicted ? IM_COL32_BLACK : IM_COL32_WHITE, text.c_str());
+}
+
+void NextView::add_to_report(nlohmann::ordered_json* report) const {
+  LiveView::add_to_report(report);
+  nlohmann::ordered_json& json = *report;
+  json["frames"] = frame().number;
+  json["view"] = "next";
+  json["frame_px"] = {frame().now.width_px, frame().now.height_px};
+  json["now_px"] = window_.in_pixels(now_rect_).numbers();
+  json["next_px"] = window_.in_pixels(next_rect_).numbers();
+  json["prediction"] = {{"ahead_ms", frame().ahead_s * 1e3},
+                        {"method", kMethodNames[size_t(frame().stats.method)]},
+                        {"push_ms", frame().stats.push_ms},
+                        {"predict_ms", frame().stats.predict_ms},
+                        {"now_is_predicted", frame().origin.kind == MAQ_FRAME_PREDICTED},
+                        {"bridges_gaps", frame().bridges_gaps},
+                        {"bridged_frames", frame().gaps.predicted_count},
+                        {"latest_gap_ms", frame().gaps.latest_gap_ms}};
+}
+
+Action NextView::draw_panel() {
+  Action action = draw_source(frame().results_per_second);
+  const maq_predictor_stats& stats = frame().stats;
+  ImGui::Text("%d x %d, pushed in %.1f ms", frame().now.width_px, frame().now.height_px, double(stats.push_ms));
+  ImGui::Text("predicted in %.1f ms by %s", double(stats.predict_ms), kMethodNames[size_t(stats.method)]);
+  stages_.draw(kPredictionStages, std::size(kPredictionStages), window_.scale());
+  bool changed = false;
+  float ahead_ms = float(choice_.ahead_s * 1e3);
+  if (ImGui::SliderFloat("ahead", &ahead_ms, float(kMinAheadMs), float(kMaxAheadMs), "%.0f ms",
+                         ImGuiSliderFlags_AlwaysClamp)) {
+    choice_.ahead_s = double(ahead_ms) / 1e3;
+    changed = true;
+  }
+  ImGui::TextUnformatted("Method (1 to 3)");
+  for (size_t i = 0; i < kMethodNames.size(); ++i) {
+    if (i != 0) ImGui::SameLine(float(i) * 100 * window_.scale());
+    const auto method = maq_prediction_method(i);
+    if (!ImGui::RadioButton(kMethodNames[i], choice_.method == method)) continue;
+    choice_.method = method;
+    changed = true;
+  }
+  draw_pause();
+  ImGui::Separator();
+  changed |= ImGui::Checkbox("Bridge gaps (B)", &choice_.bridges_gaps);
+  if (changed) live_.set_choice(choice_);
+  draw_gaps();
+  ImGui::TextWrapped("What has a border in magenta was made up: never steer anything by it.");
+  if (ImGui::Button("People (F7)")) action = Action::kNext;
+  return action;
+}
+
+void NextView::draw_gaps() {
+  if (!choice_.bridges_gaps) return;
+  if (frame().number > 0 && !frame().bridges_gaps) {
+    ImGui::TextWrapped("This source does not play in real time, so that it has no gaps.");
+    return;
+  }
+  ImGui::Text("%llu frames bridged, latest gap %.0f ms", static_cast<unsigned long long>(frame().gaps.predicted_count),
+              double(frame().gaps.latest_gap_ms));
+}

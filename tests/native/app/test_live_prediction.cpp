@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+
+#include <app/live_prediction.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <vector>
+
+#include "support/wait_until.h"
+
+namespace {
+
+// What came from the thread.
+class PredictionRun {
+ public:
+  explicit PredictionRun(const maquette::PredictionChoice& choice = {}, bool real_time = false)
+      : live(
+            context, choice, [this](const maquette::PredictionFrame& frame) { keep(frame); }, nullptr,
+            options(real_time)) {}
+
+  std::vector<maquette::PredictionFrame> seen() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return seen_;
+  }
+  bool until_ended() {
+    return wait_until([&] { return live.status().has_ended; });
+  }
+
+  maquette::Context context;
+
+ private:
+  static maquette::LiveOptions options(bool real_time) {
+    maquette::LiveOptions options;
+    options.real_time = real_time;
+    options.reconnect_ms = 300;
+    return options;
+  }
+  void keep(const maquette::PredictionFrame& frame) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    seen_.push_back(frame);
+  }
+
+  mutable std::mutex mutex_;
+  std::vector<maquette::PredictionFrame> seen_;
+
+ public:
+  maquette::LivePrediction live;  // last: it uses the others
+};
+
+double difference(const maquette::RgbaImage& one, const maquette::RgbaImage& other) {
+  double sum = 0;
+  for (size_t i = 0; i < one.rgba.size(); ++i) sum += std::abs(int(one.rgba[i]) - int(other.rgba[i]));
+  return sum / double(one.rgba.size());
+}
+
+TEST(LivePrediction, ShowsWhatComesBesideWhatIs) {
+  maquette::PredictionChoice choice;
+  choice.method = MAQ_PREDICTION_MOTION;
+  PredictionRun run(choice);
+  run.live.open("stub:people?size=160x120&frames=6");
+  ASSERT_TRUE(run.until_ended());
+  EXPECT_EQ(run.live.status().problem, "");
+  const auto seen = run.seen();
+  ASSERT_EQ(seen.size(), 6u);
+  EXPECT_EQ(difference(seen[0].now, seen[0].next), 0) << "of one frame, no motion is known";
+  EXPECT_GT(difference(seen[5].now, seen[5].next), 0.1);
+  EXPECT_EQ(seen[5].stats.method, MAQ_PREDICTION_MOTION);
+  EXPECT_EQ(seen[5].number, 6u);
+}
+
+TEST(LivePrediction, AnotherTimeAheadIsSeenAfterTheEndToo) {
+  maquette::PredictionChoice choice;
+  choice.method = MAQ_PREDICTION_MOTION;
+  choice.ahead_s = 0;
+  PredictionRun run(choice);
+  run.live.open("stub:people?size=160x120&frames=4");
+  ASSERT_TRUE(run.until_ended());
+  ASSERT_EQ(run.seen().size(), 4u);
+  choice.ahead_s = 0.3;
+  run.live.set_choice(choice);
+  ASSERT_TRUE(wait_until([&] { return run.seen().size() == 5; }));
+  EXPECT_EQ(difference(run.seen()[3].now, run.seen()[4].now), 0);
+  EXPECT_GT(difference(run.seen()[3].next, run.seen()[4].next), 0.1);
+  EXPECT_EQ(run.seen()[4].ahead_s, 0.3);
+}
+
+TEST(LivePrediction, GapsAreBridgedAndMarkedAndPredictionGoesOnFromTheCapturedFrame) {
+  maquette::PredictionChoice choice;
+  choice.bridges_gaps = true;
+  PredictionRun run(choice, true);
+  run.live.open("stub:people?size=160x120&fps=10&stall=1s@1s");
+  const auto made_up = [&] {
+    for (const auto& frame : run.seen()) {
+      if (frame.origin.kind == MAQ_FRAME_PREDICTED && frame.number > 1) return std::optional(frame);
+    }
+    return std::optional<maquette::PredictionFrame>();
+  };
+  ASSERT_TRUE(wait_until([&] { return made_up().has_value(); }));
+  EXPECT_TRUE(made_up()->bridges_gaps);
+  EXPECT_GT(made_up()->gaps.predicted_count, 0u);
+  EXPECT_GT(made_up()->made_ahead_s, made_up()->ahead_s + 0.05);
+}
+
+TEST(LivePrediction, WithoutTheSwitchNothingIsMadeUp) {
+  PredictionRun run({}, true);
+  run.live.open("stub:people?size=160x120&fps=20&stall=300ms@500ms&loop=0&frames=20");
+  ASSERT_TRUE(run.until_ended());
+  for (const auto& frame : run.seen()) EXPECT_EQ(frame.origin.kind, MAQ_FRAME_CAPTURED);
+}
+
+TEST(LivePrediction, WhatCannotBeShownIsSaidAndTheFallbackPlays) {
+  PredictionRun run;
+  run.live.open("image:/none.png");
+  ASSERT_TRUE(run.until_ended());
+  EXPECT_TRUE(run.live.status().has_failed);
+  EXPECT_NE(run.live.status().problem.find("/none.png"), std::string::npos);
+  run.live.open("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001&fov=60");
+  ASSERT_TRUE(wait_until([&] {
+    const maquette::LiveStatus status = run.live.status();
+    return status.has_failed && status.problem.find("/none.png") == std::string::npos;
+  }));
+  EXPECT_NE(run.live.status().problem.find("epth"), std::string::npos) << run.live.status().problem;
+  run.live.open("image:/none.png", "stub:people?size=160x120&frames=2");
+  ASSERT_TRUE(run.until_ended());
+  EXPECT_FALSE(run.live.status().has_failed);
+  EXPECT_NE(run.live.status().problem.find("/none.png"), std::string::npos);
+  EXPECT_EQ(run.live.status().uri, "stub:people?size=160x120&frames=2");
+  EXPECT_EQ(run.seen().size(), 2u);
+}
+
+TEST(LivePrediction, CloseLetsTheSourceGoAndRecordingsHaveCapturedFrames) {
+  const std::string path = testing::TempDir() + "/live_prediction.maqrec";
+  std::filesystem::remove(path);
+  maquette::PredictionChoice choice;
+  choice.bridges_gaps = true;
+  PredictionRun run(choice, true);
+  run.live.open("stub:people?size=160x120&fps=10&drop=0.2");
+  run.live.set_recording(path);
+  ASSERT_TRUE(wait_until([&] { return run.seen().size() >= 20 && run.seen().back().gaps.predicted_count > 0; }));
+  run.live.close();
+  EXPECT_EQ(run.live.status().uri, "");
+  const size_t count = run.seen().size();
+  maquette::Source recording(run.context, "rec:" + path);
+  size_t recorded = 0;
+  while (const auto frame = recording.next()) {
+    EXPECT_FALSE(frame->is_predicted());
+    ++recorded;
+  }
+  EXPECT_GT(recorded, 5u);
+  EXPECT_LT(recorded, count);
+}
+
+}  // namespace

@@ -1,0 +1,138 @@
+"""The desktop demo's view of what comes next: it differs from now while things move, and what is made up is marked."""
+
+import shutil
+
+import numpy as np
+import pytest
+from hands import demo
+from shown_by_demo import DEMO, ROOT, headless, show
+
+pytestmark = [
+    pytest.mark.skipif(not DEMO.exists(), reason="maquette-demo is not built (scripts/install-packages.sh desktop)"),
+    pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb (scripts/install-packages.sh test)"),
+]
+
+PEOPLE = "stub:people?count=2&seed=3&size=320x240"
+# Long enough that the last bridged frame, which stays on the screen, is seen.
+STALLS = "stub:people?count=2&seed=3&size=320x240&fps=10&stall=6s@3s"
+MAGENTA = (255, 0, 255)
+
+
+def is_magenta(picture) -> np.ndarray:
+    return np.abs(picture.astype(int) - MAGENTA).max(-1) < 8
+
+
+def has_border(picture) -> bool:
+    """At the middle of each side, some pixels inwards."""
+    mask = is_magenta(picture)
+    height, width = mask.shape
+    rows, columns = slice(height // 2 - 5, height // 2 + 5), slice(width // 2 - 5, width // 2 + 5)
+    return bool(mask[rows, 1:3].all() and mask[rows, -3:-1].all() and mask[1:3, columns].all())
+
+
+def inside(picture) -> np.ndarray:
+    """Without border and caption."""
+    return picture[10:-60, 10:-10].astype(int)
+
+
+def difference(shown) -> float:
+    return float(np.abs(inside(shown.rectangle("now_px")) - inside(shown.rectangle("next_px"))).mean())
+
+
+def test_what_comes_differs_from_now_while_things_move_and_is_marked(tmp_path):
+    moved = show(tmp_path, "--next", PEOPLE, "--method", "motion", "--ahead", 400, "--frames", 20)
+    assert (moved.report["view"], moved.report["problem"], moved.report["frames"]) == ("next", "", 20)
+    prediction = moved.report["prediction"]
+    assert (prediction["method"], prediction["ahead_ms"]) == ("motion", 400)
+    assert prediction["push_ms"] > 0
+    assert prediction["predict_ms"] > 0
+    assert has_border(moved.rectangle("next_px"))
+    assert not has_border(moved.rectangle("now_px"))
+    assert difference(moved) > 0.5
+    nearer = show(tmp_path, "--next", PEOPLE, "--method", "motion", "--ahead", 33, "--frames", 20)
+    assert np.array_equal(inside(nearer.rectangle("now_px")), inside(moved.rectangle("now_px")))
+    assert difference(nearer) < 0.6 * difference(moved)
+
+
+def test_the_last_frame_is_now(tmp_path):
+    shown = show(tmp_path, "--next", PEOPLE, "--method", "last", "--frames", 20)
+    assert shown.report["prediction"]["method"] == "last"
+    assert difference(shown) < 0.05
+    assert has_border(shown.rectangle("next_px"))
+
+
+def test_auto_says_what_it_chose(tmp_path):
+    shown = show(tmp_path, "--next", PEOPLE, "--ahead", 100, "--frames", 20)
+    chosen = shown.report["prediction"]["method"]
+    assert chosen in ("last", "motion")
+    assert (difference(shown) > 0.2) == (chosen == "motion")
+
+
+def test_of_a_photo_nothing_else_comes(tmp_path):
+    shown = show(tmp_path, "--next", ROOT / "tests/media/photo.jpg", "--frames", 5)
+    assert shown.report["states"][-1] == "ended"
+    assert shown.report["frames"] == 1
+    assert difference(shown) < 0.05
+
+
+def test_a_stall_is_bridged_by_frames_that_are_counted(tmp_path):
+    shown = show(tmp_path, "--next", "--bridge-gaps", STALLS.replace("6s@3s", "1s@2s"), "--frames", 30)
+    prediction = shown.report["prediction"]
+    assert prediction["bridges_gaps"]
+    assert prediction["bridged_frames"] >= 1
+    assert 0 < prediction["latest_gap_ms"] <= 310
+    assert not prediction["now_is_predicted"]
+    without = show(tmp_path, "--next", STALLS.replace("6s@3s", "1s@2s") + "&live=1", "--frames", 30)
+    assert without.report["prediction"]["bridged_frames"] == 0
+
+
+def test_a_bridged_frame_has_a_border_and_the_switch_is_a_key():
+    def now(hands):
+        """The upper of the two pictures; the demo's window is 1280 x 800 and the panel 330 wide."""
+        return hands.see()[0:400, 208:741]
+
+    def shows_people(hands):
+        return inside(now(hands)).std() > 10
+
+    with demo("--next", "--bridge-gaps", STALLS) as hands:
+        hands.until(lambda: shows_people(hands) and not has_border(now(hands)), "a captured frame")
+        hands.until(lambda: has_border(now(hands)), "a bridged frame with its border")
+        hands.until(lambda: not has_border(now(hands)), "the camera again")
+    with demo("--next", STALLS) as hands:
+        hands.until(lambda: shows_people(hands), "a picture")
+        hands.press("b")
+        hands.until(lambda: has_border(now(hands)), "a bridged frame with its border")
+
+
+def test_f7_goes_from_people_to_what_comes_and_back_with_the_same_source():
+    with demo(PEOPLE, "--view", "camera", "--no-mesh") as hands:
+
+        def marks():
+            return int(is_magenta(hands.see()[:, :900]).sum())
+
+        hands.until(lambda: hands.see()[100:700, :900].astype(int).std() > 10, "people")
+        assert marks() == 0
+        hands.press("F7")
+        hands.until(lambda: marks() > 1000, "the border of what comes")
+        hands.press("F7")
+        hands.until(lambda: marks() == 0 and hands.see()[100:700, :900].astype(int).std() > 10, "people again")
+        hands.press("F5")
+        hands.press("F7")
+        hands.until(lambda: marks() > 1000, "what comes, from edges")
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("missing.mp4",), "missing.mp4"),
+        ((f"image:{ROOT}/tests/media/box_depth.png?depth_unit=0.001&fov=60",), "depth"),
+        (("--ahead", 2000), "--ahead"),
+        (("--method", "latent"), "latent"),
+        (("--edges",), "--edges"),
+    ],
+    ids=lambda value: str(value)[-30:],
+)
+def test_what_cannot_be_shown_is_said_in_a_sentence(options, word):
+    ran = headless("--next", *options, "--frames", 5, timeout_s=60)
+    assert 0 < ran.returncode < 126, ran.stderr
+    assert word in ran.stderr.lower()

@@ -4,7 +4,8 @@ the difference between frames and what is left of it after motion.
     python -m export.prediction.evaluate_events --sets pushing --split val
     python -m export.prediction.evaluate_events --transformer .data/runs/prediction-transformer/weights.pt
 
-A frame's level is its score over the median of the 8 before it, so that one threshold serves quiet and busy streams.
+A frame's level is how many times its score is above or below the median of the 8 before it: one threshold serves quiet
+and busy streams, and a picture that stands still all at once stands out, too.
 With an event: its first frame, and the following two of a freeze. Without: all frames of the same clips as they were.
 """
 
@@ -90,9 +91,9 @@ def transformer_surprise(net: Autoencoder, transformer: LatentTransformer) -> Sc
 
 
 def levels(scores: np.ndarray, floor: float) -> np.ndarray:
-    """Of scores [n], from the BEFORE-th on: the logarithm of each over the median of those before it."""
+    """Of scores [n], from the BEFORE-th on: the logarithm of each over the median of those before, without its sign."""
     medians = np.array([np.median(scores[k - BEFORE : k]) for k in range(BEFORE, len(scores))])
-    return np.log((scores[BEFORE:] + floor) / (medians + floor))
+    return np.abs(np.log((scores[BEFORE:] + floor) / (medians + floor)))
 
 
 def area_under_roc(without: Sequence[float], with_event: Sequence[float]) -> float:

@@ -33,8 +33,8 @@ def test_the_area_is_the_chance_of_a_higher_level():
 
 
 def test_a_level_is_relative_to_the_frames_before():
-    found = levels(np.array([1.0] * 8 + [1.0, 8.0, 1.0]), 0.0)
-    assert found == pytest.approx([0, np.log(8), 0])
+    found = levels(np.array([1.0] * 8 + [1.0, 8.0, 0.5]), 0.0)
+    assert found == pytest.approx([0, np.log(8), np.log(2)])
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_cuts_and_blackouts_are_seen_by_differences(clips):
         assert set(areas) == set(KINDS)
         assert areas["cut"] > 0.9
         assert areas["blackout"] > 0.9
-        assert areas["freeze"] < 0.6, "nothing differs from the frame before"
+        assert areas["freeze"] > 0.9, "nothing differs from the frame before any more"
 
 
 def test_surprise_is_bits_a_code_of_every_frame_but_the_first(clips):

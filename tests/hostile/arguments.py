@@ -67,6 +67,7 @@ COMMANDS = {
     ("scene", "render"): ("a.maqs", *SCENE, "--path", "orbit", "--seconds", "0.1", "--size", "48x32", "--out", "b.mp4"),
     ("scene", "info"): ("a.maqs",),
     ("head",): (*HEAD[1:], "--out", "b.glb"),
+    ("predict",): ("a.maqrec", "--frames", "2", "--out", "b"),
 }  # fmt: skip
 
 
@@ -104,7 +105,9 @@ WRONG_USES = (
     ("bench", "nothing.jpg", "--bundle", str(PEOPLE_BUNDLE)), ("bench", "--bundle", "/nonexistent"),
     ("head",), ("head", "a.jpg"), ("head", "a.jpg", "--out", "b.stl"), ("head", "a.maqs", *HEAD[2:], "--out", "b.glb"),
     ("head", "a.jpg", "--out", "b.glb", "--bundle", str(PEOPLE_BUNDLE)), ("head", "info", "a.jpg"), ("head", "info"),
-    (*HEAD[:-1], "90,10,95,40", "--out", "b.glb"),
+    (*HEAD[:-1], "90,10,95,40", "--out", "b.glb"), ("predict",), ("predict", "a.maqrec", "--out", "b.xyz"),
+    ("predict", "b.maqrec", "--out", "b.mp4"), ("predict", "a.maqs", "--out", "b"),
+    ("predict", "a.maqrec", "--from", "99", "--out", "b"),
 )  # fmt: skip
 
 

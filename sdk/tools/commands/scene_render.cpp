@@ -77,14 +77,14 @@ float median(std::vector<float> values) {
   return *middle;
 }
 
-// Renders `repeat` times; `ms` gets the medians of the times.
+// Renders `repeat` times, fewer after an interrupt; `ms` gets the medians of the times.
 maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
                            nlohmann::ordered_json& ms) {
   std::vector<float> total, project, shade, refine, resample;
   // The first prepares networks for its size; it is left out of the times.
   if (repeat > 1) renderer.run(camera);
   std::unique_ptr<maquette::SceneImage> image;
-  for (int i = 0; i < repeat; ++i) {
+  for (int i = 0; i < repeat && (i == 0 || !interrupted()); ++i) {
     image.reset();
     image = std::make_unique<maquette::SceneImage>(renderer.run(camera));
     const maq_scene_image_stats stats = image->stats();

@@ -68,7 +68,8 @@ def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
                  "share/maquette/models/heads-int8/manifest.json"):  # fmt: skip
         assert f"maquette/{name}" in names
     assert not [name for name in names if "demo" in name or name.startswith("build")]
-    assert wheel.stat().st_size < 17e6
+    # 17 MB until edges had a network of twice the size (0.4 MB) and the library prediction (0.07 MB).
+    assert wheel.stat().st_size < 17.5e6
 
 
 def test_the_wheel_is_not_built_without_the_library(tmp_path):

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from export.bundle import BundleInfo, read_manifest
+from export.bundle import read_manifest
 from export.densepose.graphs import session
 from export.edges.bundle import write_manifest
 from export.edges.data import Frame, read_frames
@@ -23,7 +23,7 @@ from export.edges.graph_field import field_of_planes, slopes_of
 from export.edges.metrics import frame_figures
 from export.edges.validation import frame_through
 from export.solids.sensors import LEVELS
-from quantization.quantize import as_measured, quantize_graphs
+from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import EDGES, EdgeSettings, read_settings
 
@@ -77,13 +77,7 @@ def main() -> None:
     for level, row in measured.items():
         print(f"{level}: " + ", ".join(f"{name} {value}" for name, value in row.items()))
     manifest = read_manifest(options.fp32)
-    info = BundleInfo(
-        name=options.name or options.out.name,
-        precision="int8",
-        version=manifest["version"],
-        training_data=tuple(manifest["training_data"]),
-        measured={"sqnr_db": as_measured(quality), "int8_cost": measured},
-    )
+    info = int8_info(options.name or options.out.name, manifest, quality, int8_cost=measured)
     write_manifest(options.out, info, manifest["field"]["multiple_px"])
 
 

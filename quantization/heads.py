@@ -27,7 +27,7 @@ from rich.table import Table
 from torch import Tensor
 from tqdm import tqdm
 
-from export.bundle import BundleInfo, bytes_of, read_manifest
+from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.heads.bundle import PRIOR, write_manifest
 from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, figures
@@ -42,7 +42,7 @@ from export.heads.train_prior import HeadTensors, fitted_codes
 from quantization.analysis.errors import sqnr_db
 from quantization.blocks import Workpiece, blocks
 from quantization.graphs.prepare import prepare
-from quantization.quantize import as_measured, calibrate, quantize_graphs
+from quantization.quantize import calibrate, int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import HEADS, GraphSettings, HeadSettings, read_settings
 
@@ -203,17 +203,10 @@ def run(options: argparse.Namespace) -> None:
     stored = bases_cost(prior, settings.bases, heads)
     print_cost(stored, f"bases, {len(heads)} heads")
     write_prior(prior, options.out / PRIOR, settings.bases)
-    info = BundleInfo(
-        name=options.name or options.out.name,
-        precision="int8",
-        version=manifest["version"],
-        training_data=tuple(manifest["training_data"]),
-        measured={
-            "sqnr_db": as_measured(quality),
-            "int8_cost": encoder_cost | {"crops": len(crops)},
-            "bases_cost": stored | {"stored_as": settings.bases, "heads": len(heads)},
-        },
-    )
+    info = int8_info(
+        options.name or options.out.name, manifest, quality, int8_cost=encoder_cost | {"crops": len(crops)},
+        bases_cost=stored | {"stored_as": settings.bases, "heads": len(heads)},
+    )  # fmt: skip
     write_manifest(options.out, info)
     print(f"{options.out}: {bytes_of(options.fp32) / 1e6:.2f} -> {bytes_of(options.out) / 1e6:.2f} MB")
 

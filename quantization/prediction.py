@@ -17,13 +17,13 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from export.bundle import BundleInfo, bytes_of, read_manifest
+from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.prediction.bundle import CODES, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.data import read_clips
 from export.prediction.picture_error import psnr_db
-from quantization.quantize import as_measured, quantize_graphs
+from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
 
@@ -91,14 +91,7 @@ def main() -> None:
     measured = cost(options.fp32, options.out, held_out, codes)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
-    manifest = read_manifest(options.fp32)
-    info = BundleInfo(
-        name=options.name or options.out.name,
-        precision="int8",
-        version=manifest["version"],
-        training_data=tuple(manifest["training_data"]),
-        measured={"sqnr_db": as_measured(quality), "int8_cost": measured},
-    )
+    info = int8_info(options.name or options.out.name, read_manifest(options.fp32), quality, int8_cost=measured)
     write_manifest(options.out, info)
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
 

@@ -18,7 +18,9 @@ import argparse
 import fnmatch
 import shutil
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -185,6 +187,20 @@ def as_measured(quality: dict[str, dict[str, float]]) -> dict[str, dict[str, flo
     return {graph: {name: round(value, 1) for name, value in outputs.items()} for graph, outputs in quality.items()}
 
 
+def int8_info(
+    name: str, source: Mapping[str, Any], quality: dict[str, dict[str, float]], **measured: object
+) -> BundleInfo:
+    """What the int8 bundle of a fp32 one says of itself. source: manifest of that; quality: of `quantize_graphs`;
+    measured: further figures."""
+    return BundleInfo(
+        name=name,
+        precision="int8",
+        version=source["version"],
+        training_data=tuple(source["training_data"]),
+        measured={"sqnr_db": as_measured(quality), **measured},
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, parents=[options_of_calibration()]
@@ -209,13 +225,8 @@ def main() -> None:
     wanted = {name: settings.graphs[name] for name in source.manifest["graphs"] if name not in kept["graphs"]}
     samples = [collect(source, records, settings.people_per_image) for records in (calibration, held_out)]
     quality = quantize_graphs(source.folder, options.out, wanted, *samples)
-    info = BundleInfo(
-        name=options.name or options.out.name,
-        precision="int8",
-        version=source.manifest["version"],
-        training_data=tuple(source.manifest["training_data"]),
-        measured={"sqnr_db": kept["measured"].get("sqnr_db", {}) | as_measured(quality)},
-    )
+    quality = kept["measured"].get("sqnr_db", {}) | quality
+    info = int8_info(options.name or options.out.name, source.manifest, quality)
     bundle_format.write_manifest(options.out, info, source.network, source.decode, crops=crops)
     sizes = [bytes_of(folder) / 1e6 for folder in (options.bundle, options.out)]
     print(f"{options.out}: {sizes[0]:.2f} -> {sizes[1]:.2f} MB")

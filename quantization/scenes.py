@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from export.bundle import BundleInfo, read_manifest
+from export.bundle import read_manifest
 from export.scenes.bundle import BASIS, write_manifest
 from export.scenes.captures import read_captures
 from quantization.bundle_networks import BundleNetworks
-from quantization.quantize import as_measured, quantize_graphs
+from quantization.quantize import int8_info, quantize_graphs
 from quantization.scene_samples import collect, psnrs_db, shots
 from quantization.settings import SCENES, SceneSettings, read_settings
 
@@ -43,17 +43,8 @@ def main() -> None:
     before = float(np.mean(psnrs_db(fp32, held_out, "fp32")))
     after = float(np.mean(psnrs_db(BundleNetworks(options.out), held_out, "int8")))
     print(f"PSNR of {len(held_out)} held-out photos: fp32 {before:.2f} dB, int8 {after:.2f} dB")
-    manifest = read_manifest(options.fp32)
-    info = BundleInfo(
-        name=options.name or options.out.name,
-        precision="int8",
-        version=manifest["version"],
-        training_data=tuple(manifest["training_data"]),
-        measured={
-            "sqnr_db": as_measured(quality),
-            "psnr_db": {"fp32": round(before, 2), "int8": round(after, 2), "pictures": len(held_out)},
-        },
-    )
+    pictures = {"fp32": round(before, 2), "int8": round(after, 2), "pictures": len(held_out)}
+    info = int8_info(options.name or options.out.name, read_manifest(options.fp32), quality, psnr_db=pictures)
     write_manifest(options.out, info)
 
 

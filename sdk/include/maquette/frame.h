@@ -115,7 +115,7 @@ MAQ_API maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* de
 /* Where a frame's picture comes from. Values never change meaning; new ones are added at the end. */
 typedef enum maq_frame_kind {
   MAQ_FRAME_CAPTURED = 1, /* a camera took it, or it was read, wrapped or drawn */
-  MAQ_FRAME_PREDICTED = 2 /* made up by a predictor from frames before it (prediction.h): nobody saw it */
+  MAQ_FRAME_PREDICTED = 2 /* made up by a predictor from the frames before it (prediction.h) */
 } maq_frame_kind;
 
 typedef struct maq_frame_origin {

@@ -1,4 +1,4 @@
-// The mark of predicted frames in pictures that are drawn: nobody must take them for a camera's.
+// The mark of predicted frames in drawn pictures, so that they are not mistaken for captured ones.
 #pragma once
 
 #include <maquette/maquette.hpp>

@@ -8,10 +8,10 @@ import numpy as np
 import torch
 
 from export.prediction.config import TransformerShape
+from export.prediction.export_transformer import export_transformer
 from export.prediction.graph_runtime import GraphRuntime, TransformerTables
 from export.prediction.sampling import drawn_codes
 from export.prediction.transformer import UNSEEN, LatentTransformer
-from export.prediction.transformer_graphs import write_transformer_graphs
 
 SHAPE = TransformerShape(width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=8, slices=3, entries=16)
 FPS = 15.0
@@ -32,7 +32,7 @@ def net():
 @pytest.fixture(scope="module")
 def runtime(net, tmp_path_factory):
     folder = tmp_path_factory.mktemp("graphs")
-    write_transformer_graphs(net, folder)
+    assert export_transformer(net, folder) < 1e-4
     return GraphRuntime(folder, TransformerTables.of(net), SHAPE)
 
 

@@ -1,4 +1,4 @@
-"""Maquette: a camera into 3D on two CPU cores. Dense pose, scenes, edges and heads over numpy arrays.
+"""Maquette: a camera into 3D on two CPU cores. Dense pose, scenes, edges, heads and prediction over numpy arrays.
 
     import maquette
     result = maquette.DensePose().run(rgb)          # uint8 [H, W, 3]
@@ -8,7 +8,7 @@ Errors of the SDK are MaquetteError. README.md of the package shows each system.
 
 from maquette.densepose import DensePose, DensePoseResult, Person, part_colours, part_name
 from maquette.edges import Box, Curve, Curves, Edges, EdgesResult
-from maquette.frames import Camera, Frame, Intrinsics, PixelFormat, Source, list_cameras
+from maquette.frames import Camera, Frame, Intrinsics, Origin, PixelFormat, Source, list_cameras
 from maquette.fusion import EdgesFusion
 from maquette.heads import (
     Head,
@@ -22,14 +22,15 @@ from maquette.heads import (
     MorphTarget,
 )
 from maquette.native import MaquetteError, library_path, native
+from maquette.prediction import Concealer, Predictor
 from maquette.scenes import Capture, PinholeCamera, Scene, SceneImage, SceneRenderer, View
 
 __all__ = [
-    "Box", "Camera", "Capture", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
+    "Box", "Camera", "Capture", "Concealer", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
     "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadImage", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
-    "HeadRenderer", "Intrinsics", "MaquetteError", "MorphTarget", "Person", "PinholeCamera", "PixelFormat", "Scene",
-    "SceneImage", "SceneRenderer", "Source", "View", "library_path", "list_cameras", "part_colours", "part_name",
-    "sdk_version",
+    "HeadRenderer", "Intrinsics", "MaquetteError", "MorphTarget", "Origin", "Person", "PinholeCamera", "PixelFormat",
+    "Predictor", "Scene", "SceneImage", "SceneRenderer", "Source", "View", "library_path", "list_cameras",
+    "part_colours", "part_name", "sdk_version",
 ]  # fmt: skip
 
 

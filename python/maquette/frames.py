@@ -66,6 +66,16 @@ class Intrinsics:
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Of a frame that was made up: from how old a frame. horizon_s: from the captured frame that it was made from to
+    its own time. age_s: since that frame was captured, until now. captured_sequence: the number of that frame."""
+
+    horizon_s: float
+    age_s: float
+    captured_sequence: int
+
+
 class Frame(NativeObject):
     """One image with its format and time.
 
@@ -134,6 +144,16 @@ class Frame(NativeObject):
         """The number of the frame in its source, from 0; gaps are frames that were dropped."""
         return self._description().sequence
 
+    @property
+    def origin(self) -> Origin | None:
+        """None of a captured frame; what a predicted one was made from."""
+        n = native()
+        origin = n.sized("maq_frame_origin")
+        n.call("maq_frame_get_origin", self.handle, origin)
+        if origin.kind != n.lib.MAQ_FRAME_PREDICTED:
+            return None
+        return Origin(origin.horizon_ns / 1e9, origin.age_ns / 1e9, origin.captured_sequence)
+
     def pixels(self, format: PixelFormat = PixelFormat.RGB8) -> np.ndarray:
         """A copy in RGB8, BGR8, RGBA8 or GREY8: uint8 [H, W, C], grey [H, W]. Raises MaquetteError for depth images."""
         _, channels = _KINDS[PixelFormat(format)]
@@ -176,6 +196,22 @@ def as_frame(image: Frame | np.ndarray) -> Frame:
     return image if isinstance(image, Frame) else Frame(image)
 
 
+def acquired_frame(function: str, handle: Any, timeout_s: float | None) -> Frame | None:
+    """The frame that `function`, one of maq_…_acquire_frame, waits for; None after the last one. Raises MaquetteError,
+    TimeoutError."""
+    n = native()
+    out = n.ffi.new("maq_frame **")
+    limit = n.lib.MAQ_WAIT_FOREVER if timeout_s is None else round(timeout_s * 1e9)
+    status = n.ask(function, handle, limit, out)
+    if status == n.lib.MAQ_END_OF_STREAM:
+        return None
+    if status == n.lib.MAQ_TIMEOUT:
+        raise TimeoutError(f"no frame came within {timeout_s:g} s")
+    if status:
+        n.fail(function, status)
+    return Frame.of_handle(n.ffi.gc(out[0], n.lib.maq_frame_release))
+
+
 class Source(NativeObject):
     """A camera, file, recording or simulated scene, opened by a URI; iterate over it.
 
@@ -204,17 +240,7 @@ class Source(NativeObject):
     def read(self, timeout_s: float | None = None) -> Frame | None:
         """The next frame, or None after the last one. timeout_s: of live sources (None: no limit). Raises
         MaquetteError, TimeoutError."""
-        n = native()
-        out = n.ffi.new("maq_frame **")
-        limit = n.lib.MAQ_WAIT_FOREVER if timeout_s is None else round(timeout_s * 1e9)
-        status = n.ask("maq_source_acquire_frame", self.handle, limit, out)
-        if status == n.lib.MAQ_END_OF_STREAM:
-            return None
-        if status == n.lib.MAQ_TIMEOUT:
-            raise TimeoutError(f"no frame came within {timeout_s:g} s")
-        if status:
-            n.fail("maq_source_acquire_frame", status)
-        return Frame.of_handle(n.ffi.gc(out[0], n.lib.maq_frame_release))
+        return acquired_frame("maq_source_acquire_frame", self.handle, timeout_s)
 
     def __iter__(self) -> Iterator[Frame]:
         while (frame := self.read()) is not None:

@@ -42,7 +42,7 @@ typedef struct maq_predictor_stats {
   maq_prediction_method method; /* of the latest prediction: MAQ_PREDICTION_LAST or MAQ_PREDICTION_MOTION */
   uint64_t pushed_count;
   uint64_t predicted_count;
-  uint64_t restart_count; /* frames that did not go on from the one before, so that it was forgotten */
+  uint64_t reset_count; /* frames that did not go on from the one before, so that it was forgotten */
 } maq_predictor_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_predictor_config) of the caller.
@@ -76,7 +76,7 @@ MAQ_API maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_
 
 /* Forgets the frames so far, as before another stream.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
-MAQ_API maq_status maq_predictor_restart(maq_predictor* predictor);
+MAQ_API maq_status maq_predictor_reset(maq_predictor* predictor);
 
 /* Gets times and counts. The caller sets stats->struct_size.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */

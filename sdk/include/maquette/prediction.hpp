@@ -35,7 +35,7 @@ class Predictor {
     return Frame(made);
   }
 
-  void restart() { check(maq_predictor_restart(get())); }
+  void reset() { check(maq_predictor_reset(get())); }
 
   maq_predictor_stats stats() const {
     maq_predictor_stats stats{};

@@ -92,9 +92,9 @@ maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_f
   });
 }
 
-maq_status maq_predictor_restart(maq_predictor* predictor) {
+maq_status maq_predictor_reset(maq_predictor* predictor) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
-    predictor->predictor.restart();
+    predictor->predictor.reset();
     return MAQ_OK;
   });
 }
@@ -105,7 +105,7 @@ maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor
     write_struct(
         stats, "stats",
         maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms, from.fetch_ms,
-                            from.predict_ms, from.method, from.pushed, from.predicted, from.restarts},
+                            from.predict_ms, from.method, from.pushed, from.predicted, from.resets},
         sizeof(maq_predictor_stats));
     return MAQ_OK;
   });

@@ -42,7 +42,7 @@ MethodChoice::MethodChoice() {
   }
 }
 
-void MethodChoice::restart() {
+void MethodChoice::reset() {
   count_ = 0;
   for (Horizon& horizon : horizons_) horizon.count = 0;
 }

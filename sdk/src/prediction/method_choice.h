@@ -19,7 +19,7 @@ class MethodChoice {
   MethodChoice();
 
   // Forgets all frames and what was right about them.
-  void restart();
+  void reset();
 
   // A frame has arrived: first the methods are judged by it, then it is remembered. `flow` is its motion over
   // `interval_ns`, of the pyramid's finest level; 0: none is known, as of a stream's first frame. Takes nothing from

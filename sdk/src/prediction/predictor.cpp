@@ -31,10 +31,10 @@ bool is_same_kind(const ImageView& one, const ImageView& other) {
 
 Predictor::Predictor(const PredictorSettings& settings) : settings_(settings), threads_(settings.threads) {}
 
-void Predictor::restart() {
+void Predictor::reset() {
   has_frame_ = has_before_ = moves_ = false;
   interval_ns_ = 0;
-  choice_.restart();
+  choice_.reset();
 }
 
 void Predictor::keep(const Frame& frame) {
@@ -46,8 +46,8 @@ void Predictor::keep(const Frame& frame) {
     is_again_ = since == 0;
     if (!since || !is_same_kind(frame.image, newest_.image) || frame.clock != newest_.clock) {
       is_again_ = false;
-      restart();
-      ++stats_.restarts;
+      reset();
+      ++stats_.resets;
     }
   }
   if (has_frame_ && !is_again_) {
@@ -82,9 +82,9 @@ void Predictor::follow() {
     if (has_before_) {
       const FlowFit fit = optical_flow_.find(now_, before_, threads_, flow_);
       if (fit.moved > kCutFraction * fit.contrast) {
-        choice_.restart();
+        choice_.reset();
         has_before_ = false;
-        ++stats_.restarts;
+        ++stats_.resets;
       } else {
         interval_ns_ = newest_.timestamp_ns - before_ns_;
         const auto is_none = [](float displacement) { return displacement == 0; };

@@ -23,7 +23,7 @@ struct PredictorStats {
   float grey_ms = 0, flow_ms = 0, choice_ms = 0, push_ms = 0;
   float project_ms = 0, fetch_ms = 0, predict_ms = 0;
   maq_prediction_method method = MAQ_PREDICTION_LAST;  // of the latest prediction
-  uint64_t pushed = 0, predicted = 0, restarts = 0;
+  uint64_t pushed = 0, predicted = 0, resets = 0;
 };
 
 // Not for two threads at once.
@@ -51,7 +51,7 @@ class Predictor {
   // reused. Throws MAQ_ERROR_INVALID_ARGUMENT for another time, or before the first frame.
   void predict(int64_t ahead_ns, Frame& frame);
 
-  void restart();
+  void reset();
 
   bool has_frame() const { return has_frame_; }
   const PredictorStats& stats() const { return stats_; }

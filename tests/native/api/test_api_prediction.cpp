@@ -51,7 +51,7 @@ TEST_F(ApiPrediction, AFramePredictedIsOneOfTheStreamAndSaysThatItIsMadeUp) {
   const maq_predictor_stats stats = predictor.stats();
   EXPECT_EQ(stats.pushed_count, 6u);
   EXPECT_EQ(stats.predicted_count, 1u);
-  EXPECT_EQ(stats.restart_count, 0u);
+  EXPECT_EQ(stats.reset_count, 0u);
   EXPECT_GT(stats.push_ms, 0);
   EXPECT_GT(stats.predict_ms, 0);
 }
@@ -191,8 +191,8 @@ TEST_F(ApiPrediction, WhatIsWrongIsTold) {
   EXPECT_EQ(maq_predictor_push(predictor.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_predictor_push(nullptr, frame(0).get()), MAQ_ERROR_INVALID_ARGUMENT);
   const maquette::Source solids(context_, "stub:solids?scene=box&seed=1&fps=1&size=64x64");
-  EXPECT_EQ(maq_predictor_restart(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  predictor.restart();
+  EXPECT_EQ(maq_predictor_reset(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  predictor.reset();
   EXPECT_EQ(maq_predictor_predict(predictor.get(), 0.1, &made), MAQ_ERROR_INVALID_ARGUMENT) << "nothing is left";
   EXPECT_EQ(made, nullptr);
   maq_predictor_destroy(nullptr);

@@ -263,11 +263,11 @@ TEST(Predictor, OneFrameIsTheLastAndNoneIsAStatus) {
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "11 s", [&] { predictor.predict(11000000000, frame); });
   expect_error(MAQ_ERROR_UNSUPPORTED, "depth", [&] { predictor.push(plain(9, 9, 1, 5, MAQ_PIXEL_DEPTH16)); });
   expect_last(predictor, texture(3, 0, 0));
-  predictor.restart();
+  predictor.reset();
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "No frame was pushed", [&] { predictor.predict(0, frame); });
 }
 
-TEST(Predictor, TimesThatDoNotGoOnRestartTheContext) {
+TEST(Predictor, TimesThatDoNotGoOnResetTheContext) {
   constexpr int64_t kHour_ns = 3600000000000, kFirst = INT64_MIN, kLast = INT64_MAX;
   for (const auto& [before, after] : {std::pair{kHour_ns, kHour_ns - 1},
                                       {kHour_ns, int64_t(0)},
@@ -277,7 +277,7 @@ TEST(Predictor, TimesThatDoNotGoOnRestartTheContext) {
     maq::Predictor predictor({MAQ_PREDICTION_MOTION, 1});
     predictor.push(texture(0, 0, before));
     predictor.push(texture(2, 0, after));
-    EXPECT_EQ(predictor.stats().restarts, 1u);
+    EXPECT_EQ(predictor.stats().resets, 1u);
     expect_last(predictor, texture(2, 0, 0));
     if (after > kHour_ns) continue;
     predictor.push(texture(4, 0, after + kFrame_ns));
@@ -297,7 +297,7 @@ TEST(Predictor, AFrameOfTheSameTimeReplacesTheOneBefore) {
   EXPECT_LE(worst_error_px(predicted, 4, 0, 20), 0.25);
 }
 
-TEST(Predictor, AnotherSizeFormatOrClockRestartsTheContext) {
+TEST(Predictor, AnotherSizeFormatOrClockResetsTheContext) {
   for (int change = 0; change < 4; ++change) {
     maq::Predictor predictor({MAQ_PREDICTION_MOTION, 1});
     predictor.push(texture(0, 0, 0));
@@ -306,7 +306,7 @@ TEST(Predictor, AnotherSizeFormatOrClockRestartsTheContext) {
                                              change == 2 ? 120 : kHeight, 4, 0, 2 * kFrame_ns);
     if (change == 3) other.clock = MAQ_CLOCK_MONOTONIC;
     predictor.push(other);
-    EXPECT_EQ(predictor.stats().restarts, 1u) << change;
+    EXPECT_EQ(predictor.stats().resets, 1u) << change;
     expect_last(predictor, other);
   }
 }
@@ -330,7 +330,7 @@ TEST(Predictor, NothingOfTheSceneBeforeACutIsPredictedAfterIt) {
       for (int i = 0; i < 3; ++i) predictor.push(texture(2 * i, 0, i * kFrame_ns));
       predictor.push(after);
       expect_last(predictor, after);
-      EXPECT_EQ(predictor.stats().restarts, 1u);
+      EXPECT_EQ(predictor.stats().resets, 1u);
     }
   }
   // The motion after it is that of the new scene.

@@ -1,0 +1,92 @@
+"""Prediction: what a stream will show next, and live sources whose short gaps are bridged by it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from maquette.frames import Frame, Source, acquired_frame
+from maquette.native import NativeObject, native
+
+METHODS = ("auto", "last", "motion")  # of maq_prediction_method
+
+
+class Predictor(NativeObject):
+    """Gets the frames of a stream as they come, and makes pictures of what it will show a while later.
+
+    method: "motion" (everything moves on as it moved), "last" (the last frame), or "auto": whichever was right about
+    the frames that have come. settings: fields of maq_predictor_config by their names. It sees pictures, not the world:
+    never steer anything by what it made up.
+    """
+
+    def __init__(self, method: str = "auto", **settings: Any) -> None:
+        n = native()
+        config = n.config("maq_predictor_config", {"method": _method(method), **settings})
+        super().__init__(n.create("maq_predictor", n.context, config))
+
+    def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> None:
+        """The stream's next frame: one of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in seconds, from
+        any moment on. What came before is forgotten at a cut, another size or a second's pause. Raises
+        MaquetteError."""
+        if isinstance(image, Frame) == (time_s is not None):
+            raise ValueError("time_s is the time of an array, and needed; frames have their own")
+        frame = image if isinstance(image, Frame) else Frame(image, timestamp_ns=round((time_s or 0) * 1e9))
+        native().call("maq_predictor_push", self.handle, frame.handle)
+
+    def predict(self, ahead_s: float) -> Frame:
+        """The picture `ahead_s` seconds (0 to 10) after the latest frame, of that frame's size and format; its `origin`
+        says that it is made up. Hold at most four at once (frame_pool_size). Raises MaquetteError, also before the
+        first frame."""
+        n = native()
+        made = n.create(
+            "maq_frame", self.handle, ahead_s, function="maq_predictor_predict", release="maq_frame_release"
+        )
+        return Frame.of_handle(made)
+
+    def reset(self) -> None:
+        """Forgets the frames so far, as before another stream."""
+        native().call("maq_predictor_reset", self.handle)
+
+    @property
+    def stats(self) -> dict[str, float]:
+        """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method`: an
+        index into METHODS."""
+        return native().stats("maq_predictor_stats", "maq_predictor_get_stats", self.handle)
+
+
+class Concealer(NativeObject):
+    """A live source without short gaps: where a frame is not there when it is due, one that was predicted before;
+    iterate over it. `Frame.origin` of each says which; what acts on frames, such as a robot, must look at it.
+
+    Until it is closed it takes the source's frames, and `Source.read` fails. max_gap_s: how long a camera that sends
+    nothing is bridged; then reading goes on as of the source itself. settings: fields of maq_concealer_config by their
+    names. Raises MaquetteError for a source that is not live.
+    """
+
+    def __init__(self, source: Source, max_gap_s: float = 0.3, method: str = "auto", **settings: Any) -> None:
+        n = native()
+        own = {"max_gap_ms": round(max_gap_s * 1000), "method": _method(method)}
+        config = n.config("maq_concealer_config", own | settings)
+        super().__init__(n.create("maq_concealer", n.context, source.handle, config))
+
+    def read(self, timeout_s: float | None = None) -> Frame | None:
+        """The next frame, or None after the source's last one. Raises MaquetteError, TimeoutError."""
+        return acquired_frame("maq_concealer_acquire_frame", self.handle, timeout_s)
+
+    def __iter__(self) -> Iterator[Frame]:
+        while (frame := self.read()) is not None:
+            yield frame
+
+    @property
+    def stats(self) -> dict[str, float]:
+        """How many frames were captured in time, predicted, late and dropped, and how long was waited: the fields of
+        maq_concealer_stats."""
+        return native().stats("maq_concealer_stats", "maq_concealer_get_stats", self.handle)
+
+
+def _method(name: str) -> int:
+    if name not in METHODS:
+        raise ValueError(f"no method {name!r}; there are {', '.join(METHODS)}")
+    return METHODS.index(name)

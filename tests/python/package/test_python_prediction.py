@@ -1,0 +1,92 @@
+"""Prediction and concealing through the Python package."""
+
+import maquette
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.skipif(
+    not maquette.library_path().exists(), reason=f"{maquette.library_path()} is not built: run `make build`"
+)
+STEP_PX, PERIOD_S = 4, 0.1
+
+
+def textured(shift_px: int) -> np.ndarray:
+    """uint8 [120, 160, 3]: smooth noise that has moved to the right."""
+    y, x = np.mgrid[:120, :160]
+    x = x - shift_px
+    grey = 128 + 40 * np.sin(x / 7 + y / 11) + 40 * np.sin(x / 5 - y / 9 + 1) + 30 * np.cos(x / 13)
+    return np.repeat(grey.clip(0, 255).astype(np.uint8)[..., None], 3, 2)
+
+
+@pytest.fixture
+def moving():
+    """A predictor that has seen the noise move by STEP_PX in each PERIOD_S."""
+    with maquette.Predictor("motion", threads=1) as predictor:
+        for number in range(3):
+            predictor.push(textured(STEP_PX * number), time_s=number * PERIOD_S)
+        yield predictor
+
+
+def test_what_moves_moves_on(moving):
+    made = moving.predict(2 * PERIOD_S)
+
+    inside = np.s_[20:-20, 40:-40]
+    right, still = (np.abs(made.pixels().astype(int) - textured(shift))[inside].mean() for shift in (16, 8))
+    assert right < 2 < 10 < still
+    assert made.shape == (120, 160)
+    assert made.timestamp_ns == round(4 * PERIOD_S * 1e9)
+    assert made.origin.horizon_s == pytest.approx(2 * PERIOD_S)
+    assert made.origin.age_s >= made.origin.horizon_s
+    assert moving.stats["pushed_count"] == 3
+    assert moving.stats["predicted_count"] == 1
+
+
+def test_the_last_frame_is_one_method_and_captured_frames_have_no_origin():
+    frame = maquette.Frame(textured(0))
+    predictor = maquette.Predictor("last")
+    predictor.push(frame)
+
+    assert np.array_equal(predictor.predict(1).pixels(), frame.pixels())
+    assert frame.origin is None
+
+
+def test_a_predictor_that_has_forgotten_its_frames_asks_for_one(moving):
+    moving.reset()
+
+    with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_INVALID_ARGUMENT"):
+        moving.predict(0.1)
+
+
+def test_arrays_need_their_time_and_frames_have_it(moving):
+    with pytest.raises(ValueError, match="time_s"):
+        moving.push(textured(0))
+    with pytest.raises(ValueError, match="time_s"):
+        moving.push(maquette.Frame(textured(0)), time_s=1)
+
+
+def test_wrong_settings_are_named():
+    with pytest.raises(ValueError, match="auto, last, motion"):
+        maquette.Predictor("magic")
+    with pytest.raises(TypeError, match="frame_pool_size"):
+        maquette.Predictor(pool=3)
+
+
+def test_gaps_are_bridged_by_frames_that_say_so():
+    source = maquette.Source("stub:people?count=1&size=160x120&fps=20&drop=0.3&frames=60&live=1", loop=0)
+    with maquette.Concealer(source, threads=1) as concealer:
+        with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_BUSY"):
+            source.read(0)
+        frames = [(frame.timestamp_ns, frame.origin) for frame in concealer]
+        stats = concealer.stats
+
+    made_up = [origin for _, origin in frames if origin]
+    times = [time_ns for time_ns, _ in frames]
+    assert times == sorted(times)
+    assert len(made_up) == stats["predicted_count"] > 3
+    assert all(0 < origin.horizon_s <= 0.3 for origin in made_up)
+    assert len(frames) - len(made_up) == stats["captured_count"] - stats["dropped_count"]
+
+
+def test_only_live_sources_have_gaps():
+    with pytest.raises(maquette.MaquetteError, match="not live"):
+        maquette.Concealer(maquette.Source("stub:people?frames=3"))

@@ -23,7 +23,7 @@ constexpr double kTurn_rad = 2 * 3.14159265358979323846;
 maq::head::HeadMesh mesh_of(const char* path, size_t triangles, int threads) {
   if (path == nullptr || *path == 0) return ball_mesh(0.0256f);
   maq::WorkerThreads workers(threads);
-  return head_surface(maq::head::read_head_file(path), {maq::head::kDefaultSurfaceCell_m, triangles}, workers);
+  return head_surface(maq::head::read_head_file(path), {0, triangles}, workers);
 }
 
 }  // namespace

@@ -129,9 +129,10 @@ class Head(NativeObject):
         """The surface, made in a second or less; the same again costs nothing.
 
         triangle_count: about as many, 100 or more, or "all"; 0: 60,000, or all where there is a cell_m. cell_m:
-        distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0: 0.0016. topology: "field", the
-        surface as it is, or "template": vertices, triangles and texture coordinates are the same for every head, with
-        facial actions; triangle_count and cell_m are 0 then. bundle: folder of the bundle whose template it is, for a
+        distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0: 0.0016, or 0.0021 where no more
+        than 60,000 triangles are to be left. topology: "field", the surface as it is, or "template": vertices,
+        triangles and texture coordinates are the same for every head, with facial actions; triangle_count and cell_m
+        are 0 then. bundle: folder of the bundle whose template it is, for a
         head from a file; default: the installed one. Raises MaquetteError.
         """
         n = native()

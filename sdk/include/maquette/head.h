@@ -109,7 +109,8 @@ typedef struct maq_head_mesh_options {
   uint32_t triangle_count; /* about as many, 100 or more: of the full mesh as many edges are collapsed as that takes,
                               those first that move the surface least. 0 (default): 60,000, or with a cell_m all;
                               MAQ_HEAD_ALL_TRIANGLES: all. */
-  double cell_m; /* distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0 (default): 0.0016 */
+  double cell_m; /* distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0 (default): 0.0016, or
+                    0.0021 where no more than 60,000 triangles are to be left */
   maq_head_topology topology; /* default MAQ_HEAD_TOPOLOGY_FIELD. The template's has its own triangles: triangle_count
                                  and cell_m must be 0 then. */
   const char* bundle_path;    /* for the template's topology of a head from a file, which has no template in it: the

@@ -112,9 +112,22 @@ TEST(HeadSurface, IsTheSameForAnyNumberOfThreads) {
 
 TEST(HeadSurface, AnEmptyFieldAndCellsOutOfRangeAreASentence) {
   expect_error(MAQ_ERROR_UNSUPPORTED, "no surface", [] { mesh_of(octahedron(-1)); });
-  for (const double cell_m : {0.0, -1.0, 1e-4, 0.1, double(NAN), double(INFINITY)}) {
+  for (const double cell_m : {1e-9, -1.0, 1e-4, 0.1, double(NAN), double(INFINITY)}) {
     expect_error(MAQ_ERROR_INVALID_ARGUMENT, "m large, but must be", [&] { mesh_of(octahedron(1), cell_m); });
   }
+}
+
+TEST(HeadSurface, AFullMeshIsAsFineAsTheTrianglesThatAreLeftNeed) {
+  const StoredHead head = octahedron(1);
+  WorkerThreads workers(1);
+  const auto full_triangles = [&](double cell_m, size_t triangles) {
+    SurfaceStats stats;
+    head_surface(head, {cell_m, triangles}, workers, &stats);
+    return stats.full_triangles;
+  };
+  EXPECT_EQ(full_triangles(0, kAllTriangles), full_triangles(0.0016, kAllTriangles));
+  EXPECT_EQ(full_triangles(0, 60001), full_triangles(0.0016, kAllTriangles));
+  EXPECT_EQ(full_triangles(0, 60000), full_triangles(0.0021, kAllTriangles));
 }
 
 TEST(HeadSurface, PlacesLieWhereTheAnchorsAroundThemDo) {

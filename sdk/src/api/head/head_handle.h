@@ -26,7 +26,7 @@ struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
   std::vector<float> positions_m, template_points_m;  // of the mesh
   std::vector<std::vector<float>> morph_moves_m;      // of its morph targets
   maq_head_topology mesh_topology = MAQ_HEAD_TOPOLOGY_FIELD;
-  maq::head::SurfaceOptions mesh_options{0, 0};  // of a cell of 0: none was made
+  maq::head::SurfaceOptions mesh_options{0, 0};  // of 0 triangles: none was made
   maq::head::SurfaceStats mesh_stats;
 };
 

@@ -157,7 +157,7 @@ HeadPlace find_head_place(const StoredHead& head, const std::string& name) {
 
 HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,
                       SurfaceStats* stats) {
-  const double cell_m = surface.cell_m;
+  const double cell_m = surface.cell_m != 0 ? surface.cell_m : default_surface_cell_m(surface.triangles);
   if (!(cell_m >= kMinSurfaceCell_m && cell_m <= kMaxSurfaceCell_m)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The cells of a head's mesh are ", cell_m, " m large, but must be ",
                 kMinSurfaceCell_m, " to ", kMaxSurfaceCell_m, ".");

@@ -11,13 +11,16 @@
 
 namespace maq::head {
 
-inline constexpr double kDefaultSurfaceCell_m = 0.0016, kMinSurfaceCell_m = 0.0005, kMaxSurfaceCell_m = 0.02;
+inline constexpr double kMinSurfaceCell_m = 0.0005, kMaxSurfaceCell_m = 0.02;
 inline constexpr size_t kAllTriangles = SIZE_MAX;
 
 struct SurfaceOptions {
-  double cell_m = kDefaultSurfaceCell_m;  // the edge of a cube, in metres
-  size_t triangles = kAllTriangles;       // about as many are left (simplify_mesh)
+  double cell_m = 0;                 // the edge of a cube, in metres; 0: default_surface_cell_m(triangles)
+  size_t triangles = kAllTriangles;  // about as many are left (simplify_mesh)
 };
+
+// Of a full mesh of which so many triangles are to be left: one of 2.1 mm has some 115,000, one of 1.6 mm 200,000.
+constexpr double default_surface_cell_m(size_t triangles) { return triangles > 60000 ? 0.0016 : 0.0021; }
 
 struct SurfaceStats {
   size_t full_triangles = 0;  // before simplification

@@ -395,7 +395,9 @@ void add_head_command(CLI::App& app, int* exit_code) {
               "want 2000 to 50000")
           ->check(CLI::Validator(check_triangles, "100 or more, or all"));
   CLI::Option* const cell =
-      command->add_option("--cell", options->cell_mm, "Distance of the full mesh's vertices, mm (default 1.6)")
+      command
+          ->add_option("--cell", options->cell_mm,
+                       "Distance of the full mesh's vertices, mm (default 2.1, or 1.6 for more than 60000 triangles)")
           ->check(CLI::Range(0.5, 20.0));
   add_topology_option(*command, options->topology)->excludes(triangles)->excludes(cell);
   CLI::Option* const texture =

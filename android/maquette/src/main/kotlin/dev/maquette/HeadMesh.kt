@@ -21,7 +21,8 @@ enum class HeadTopology {
  * How fine the mesh of a head is, and of which vertices.
  *
  * @property triangleCount about as many, 100 or more; 0: 60,000, or with a [cellM] all; [ALL_TRIANGLES]: all.
- * @property cellM distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02 metres; 0: 0.0016.
+ * @property cellM distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02 metres; 0: 0.0016, or 0.0021
+ *     where no more than 60,000 triangles are to be left.
  * @property topology with [HeadTopology.TEMPLATE], [triangleCount] and [cellM] must be 0.
  * @property bundle networks of heads, whose template it is, for [HeadTopology.TEMPLATE] of a head that was opened: there is
  *   none in its file. A head that was fitted, or has got a template, keeps its own.

@@ -1,7 +1,11 @@
-"""What several files need: one thread for torch, signal handlers put back, and what is slow to make (the body, its
-atlas, a renderer of undressed bodies)."""
+"""What several files need: one thread for torch and numpy, of which a second would wait for a processor that another
+group of tests has; signal handlers put back; and what is slow to make (the body, its atlas, a renderer of undressed
+bodies)."""
 
+import os
 import signal
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when numpy and torch are loaded
 
 import numpy as np
 import pytest

@@ -27,7 +27,7 @@ from export.clips.events import KINDS, with_event
 from export.prediction.autoencoder import Autoencoder
 from export.prediction.codes import read_codes
 from export.prediction.data import Clips, read_clips
-from export.prediction.table import CodeTable, bits_by_table
+from export.prediction.table import CodeTable, bits_by_table, bits_of_stream
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.train_transformer import load_transformer
 from export.prediction.transformer import UNSEEN, LatentTransformer
@@ -69,6 +69,18 @@ def table_surprise(net: Autoencoder, table: CodeTable) -> Score:
     def score(frames: np.ndarray, fps: float) -> np.ndarray:
         del fps
         return bits_by_table(table, net.encode(torch.from_numpy(frames))[None])[0].numpy()
+
+    return score
+
+
+def stream_surprise(net: Autoencoder, table: CodeTable) -> Score:
+    """Bits a code by the table and by which codes stay in this stream, as the SDK has them."""
+    frequency_bits, after_bits = (-logs.numpy() / math.log(2) for logs in (table.frequency, table.after))
+
+    def score(frames: np.ndarray, fps: float) -> np.ndarray:
+        del fps
+        codes = net.encode(torch.from_numpy(frames)).numpy()
+        return bits_of_stream(frequency_bits, after_bits, codes).mean((1, 2, 3))
 
     return score
 
@@ -139,6 +151,7 @@ def main() -> None:
     table = CodeTable.counted(read_codes(options.codes, "train").codes, net.shape.entries)
     scores: dict[str, Score] = {
         "difference": difference, "flow residual": flow_residual, "surprise, table": table_surprise(net, table),
+        "surprise, table and what stays": stream_surprise(net, table),
     }  # fmt: skip
     if options.transformer:
         scores["surprise, transformer"] = transformer_surprise(net, load_transformer(options.transformer))

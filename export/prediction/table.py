@@ -5,12 +5,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
+import numpy as np
 import torch
 from torch import Tensor
 
 _PRIOR_COUNT = 4.0  # as if so many more had been seen of what is likely without counting: the same code, or any
 _SAME = 0.5  # of that, for the same code
+
+
+STAYS_AT_FIRST = 0.7  # how likely it is that a code stays as it is, before a stream has shown it
+_RETURNS = 0.02  # of that weight, to each of the two, so that either may come back
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,3 +58,24 @@ def bits_by_table(table: CodeTable, codes: Tensor) -> Tensor:
     """Of every frame but the first, a code: float32 [N, T - 1]."""
     of = [-table.after[k][codes[:, :-1, k], codes[:, 1:, k]] for k in range(codes.shape[2])]
     return torch.stack(of).mean((0, 3, 4)) / math.log(2)
+
+
+def bits_of_stream(frequency_bits: np.ndarray, after_bits: np.ndarray, codes: np.ndarray) -> np.ndarray:
+    """Of one stream as the SDK has them (sdk/src/prediction/codes/code_surprise.h): each code either stays or follows
+    the table, and each place learns which from the frames so far: the posterior of two experts (Herbster and Warmuth,
+    "Tracking the best expert", 1998). After a cut, a frame with at least as many bits as its codes have by themselves,
+    places have learnt nothing.
+
+    frequency_bits float32 [slices, K], after_bits [slices, K, K], codes [T, slices, 16, 16] -> float64 [T - 1, slices,
+    16, 16].
+    """
+    slices = np.arange(codes.shape[1])[:, None, None]
+    at_first = np.full(codes.shape[1:], STAYS_AT_FIRST)
+    stays, found = at_first, []
+    for before, now in pairwise(codes):
+        own = np.where(now == before, stays, 0)
+        likely = own + (1 - stays) * np.exp2(-after_bits[slices, before, now].astype(np.float64))
+        found.append(-np.log2(likely))
+        is_cut = found[-1].sum() >= frequency_bits[slices, now].sum()
+        stays = at_first if is_cut else _RETURNS + (1 - 2 * _RETURNS) * own / likely
+    return np.stack(found)

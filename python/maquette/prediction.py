@@ -1,8 +1,10 @@
-"""Prediction: what a stream will show next, and live sources whose short gaps are bridged by it."""
+"""Prediction: what a stream will show next, how surprising what it shows is, and live sources whose short gaps are
+bridged."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,10 +32,7 @@ class Predictor(NativeObject):
         """The stream's next frame: one of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in seconds, from
         any moment on. What came before is forgotten at a cut, another size or a second's pause. Raises
         MaquetteError."""
-        if isinstance(image, Frame) == (time_s is not None):
-            raise ValueError("time_s is the time of an array, and needed; frames have their own")
-        frame = image if isinstance(image, Frame) else Frame(image, timestamp_ns=round((time_s or 0) * 1e9))
-        native().call("maq_predictor_push", self.handle, frame.handle)
+        native().call("maq_predictor_push", self.handle, _timed_frame(image, time_s).handle)
 
     def predict(self, ahead_s: float) -> Frame:
         """The picture `ahead_s` seconds (0 to 10) after the latest frame, of that frame's size and format; its `origin`
@@ -54,6 +53,56 @@ class Predictor(NativeObject):
         """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method`: an
         index into METHODS."""
         return native().stats("maq_predictor_stats", "maq_predictor_get_stats", self.handle)
+
+
+@dataclass(frozen=True, eq=False)
+class SurpriseScore:
+    """Of one frame. bits: a code, mean of the frame: hundredths where nothing changes, 1 to 3 where much moves. ratio:
+    to the median of the 8 frames before, 1 where these are not known. map: float32 [16, 16], bits of a code by cell.
+    is_event: whether it is a cut, or the ratio is event_ratio or more, or 1 / event_ratio or less. is_cut: whether
+    nothing in it follows from the frame before, as at a cut or a black-out. is_start: whether the frame does not go on
+    from the one before: the first, another size or format, a pause; its bits say how rare its codes are."""
+
+    bits: float
+    ratio: float
+    is_event: bool
+    is_cut: bool
+    is_start: bool
+    map: np.ndarray
+
+
+class Surprise(NativeObject):
+    """How surprising each frame of a stream is after the one before, and where, in bits.
+
+    networks_of: another stream, whose networks this one uses as well. settings: fields of maq_surprise_config by their
+    names, as event_ratio=6. Raises MaquetteError.
+    """
+
+    def __init__(self, networks_of: Surprise | None = None, **settings: Any) -> None:
+        n = native()
+        shared = {} if networks_of is None else {"networks_of": networks_of.handle}
+        config = n.config("maq_surprise_config", shared | settings)
+        super().__init__(n.create("maq_surprise", n.context, config))
+
+    def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> SurpriseScore:
+        """The stream's next frame: one of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in seconds. Raises
+        MaquetteError."""
+        n = native()
+        score = n.sized("maq_surprise_score")
+        n.call("maq_surprise_push", self.handle, _timed_frame(image, time_s).handle, score)
+        cells = np.empty((score.rows, score.columns), np.float32)
+        n.call("maq_surprise_copy_map", self.handle, n.ffi.from_buffer("float[]", cells), cells.size)
+        flags = (bool(score.is_event), bool(score.is_cut), bool(score.is_start))
+        return SurpriseScore(score.bits, score.ratio, *flags, cells)
+
+    def reset(self) -> None:
+        """Forgets the frames so far, as before another stream."""
+        native().call("maq_surprise_reset", self.handle)
+
+    @property
+    def stats(self) -> dict[str, float]:
+        """Milliseconds of the latest frame, and counts: the fields of maq_surprise_stats."""
+        return native().stats("maq_surprise_stats", "maq_surprise_get_stats", self.handle)
 
 
 class Concealer(NativeObject):
@@ -90,3 +139,9 @@ def _method(name: str) -> int:
     if name not in METHODS:
         raise ValueError(f"no method {name!r}; there are {', '.join(METHODS)}")
     return METHODS.index(name)
+
+
+def _timed_frame(image: Frame | np.ndarray, time_s: float | None) -> Frame:
+    if isinstance(image, Frame) == (time_s is not None):
+        raise ValueError("time_s is the time of an array, and needed; frames have their own")
+    return image if isinstance(image, Frame) else Frame(image, timestamp_ns=round((time_s or 0) * 1e9))

@@ -13,6 +13,7 @@ DATA = ROOT / "tests/native/data"
 PEOPLE_BUNDLE = DATA / "tiny_bundle"
 SCENE_BUNDLE = DATA / "tiny_scene/bundle"
 HEADS_BUNDLE = DATA / "round_heads/bundle"
+PREDICTION_BUNDLE = DATA / "tiny_prediction/bundle"
 CAPTURE = DATA / "tiny_scene/capture"
 CLIP = ROOT / "tests/media/clip.mp4"
 # A head of a photo, a.jpg: the encoder of this bundle sees one wherever a photo is not black.

@@ -1,4 +1,4 @@
-/* Prediction: what a stream will show next. */
+/* Prediction: what a stream will show next, and how surprising what it shows is. */
 #ifndef MAQUETTE_PREDICTION_H_
 #define MAQUETTE_PREDICTION_H_
 
@@ -81,6 +81,94 @@ MAQ_API maq_status maq_predictor_reset(maq_predictor* predictor);
 /* Gets times and counts. The caller sets stats->struct_size.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor_stats* stats);
+
+/* How surprising each frame of a stream is after the one before, and where, in bits: to notice what stands out, such as
+ * a cut, a frozen or a covered camera, or something that appears, without a list of what may happen. A network makes a
+ * frame, squeezed to a small square, codes at columns * rows cells of a map; a table and what the stream has shown so
+ * far say how likely each code is. */
+
+typedef struct maq_surprise maq_surprise;
+
+typedef struct maq_surprise_config {
+  uint32_t struct_size;
+  int32_t threads;         /* 1 to 64; 0 (default): the machine's large cores, at most 4; MAQ_THREADS_MEASURED: as
+                              many of these as pay, measured */
+  const char* bundle_path; /* folder with manifest.json; NULL (default): bundle_files, or without them the bundle
+                              installed with the library (share/maquette/models/prediction-int8). Copied. */
+  const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
+  uint32_t bundle_file_count;          /* default 0 */
+  int32_t allow_spinning;              /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy
+                                          and costs some speed */
+  const maq_surprise* networks_of;     /* another stream, whose networks this one uses as well: it takes little memory
+                                          then, and frames of both are encoded one after the other. What is said above
+                                          is not read. The other may be destroyed first. NULL (default): own networks */
+  float event_ratio; /* a frame is an event from this ratio on, and from 1 / it down; above 1, at most 1e6; default 4 */
+} maq_surprise_config;
+
+/* Of one frame. */
+typedef struct maq_surprise_score {
+  uint32_t struct_size;
+  int32_t columns; /* of the map */
+  int32_t rows;
+  float bits;  /* a code, mean of the frame: some hundredths where nothing changes, 1 to 3 where much moves, over 8
+                  where nothing was foreseen */
+  float ratio; /* bits by the median of the 8 frames before: 1 is as usual, 6 six times as surprising, 1/6 a sixth, as
+                  of a stream that freezes. Both with 0.035 added, so that noise counts little. 1 while fewer than
+                  4 are known */
+  int32_t is_event; /* 1: a cut, or ratio is event_ratio or more, or 1 / event_ratio or less */
+  int32_t is_cut;   /* 1: nothing in it follows from the frame before, as at a cut or a black-out: its codes are no more
+                       likely after that than by themselves. The ratios of the frames that follow begin anew */
+  int32_t is_start; /* 1: the frame does not go on from the one before, and bits say how rare its codes are: the first;
+                       another size, format or clock; an earlier time; over a second later */
+} maq_surprise_score;
+
+/* Times of the latest frame, in wall-clock milliseconds, and counts since the stream was made. */
+typedef struct maq_surprise_stats {
+  uint32_t struct_size;
+  float resize_ms; /* the frame to the network's square */
+  float network_ms;
+  float nearest_ms; /* codes of what the network says */
+  float push_ms;    /* all of it, and the bits */
+  int32_t threads;  /* of the network */
+  uint64_t pushed_count;
+  uint64_t event_count;
+  uint64_t start_count;
+} maq_surprise_stats;
+
+/* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_surprise_config) of the caller.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_surprise_config_init(maq_surprise_config* config, uint32_t struct_size);
+
+/* Loads a model bundle of the task "prediction" and checks its files' sizes and SHA-256, for one stream. `config` may
+ * be NULL for the defaults. `*surprise` is the caller's, to be given to maq_surprise_destroy. Any thread. Errors:
+ * MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_UNSUPPORTED (a bundle of another
+ * task), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read, and while threads are measured. */
+MAQ_API maq_status maq_surprise_create(maq_context* context, const maq_surprise_config* config,
+                                       maq_surprise** surprise);
+
+/* Frees the stream (NULL is fine), and its networks with the last stream that uses them.
+ * Once for each handle, from any thread. May block briefly. */
+MAQ_API void maq_surprise_destroy(maq_surprise* surprise);
+
+/* Shows the stream's next frame, of any size and format but depth, which is not kept, and says how surprising it is.
+ * The caller sets score->struct_size. After an error the stream is as it was before the frame. One at a time. Errors:
+ * MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (a depth image), MAQ_ERROR_INFERENCE. Blocks while the network
+ * runs, and while frames of streams with the same networks are encoded. */
+MAQ_API maq_status maq_surprise_push(maq_surprise* surprise, const maq_frame* frame, maq_surprise_score* score);
+
+/* Writes the map of the latest frame to `bits`, columns * rows floats row by row from the top left: the bits of a code,
+ * mean of the cell, whose mean is score.bits. A cell is that part of the frame, whatever the frame's shape. `count` is
+ * how many have room there.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little room; before the first frame). Does not block. */
+MAQ_API maq_status maq_surprise_copy_map(const maq_surprise* surprise, float* bits, size_t count);
+
+/* Forgets the frames so far, as before another stream.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_surprise_reset(maq_surprise* surprise);
+
+/* Gets times and counts. The caller sets stats->struct_size.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_surprise_get_stats(const maq_surprise* surprise, maq_surprise_stats* stats);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,11 @@
-// What a stream will show next, and live sources with short gaps bridged, for C++17; a part of maquette.hpp.
+// What a stream will show next, how surprising what it shows is, and live sources with short gaps bridged, for C++17; a
+// part of maquette.hpp.
 #ifndef MAQUETTE_PREDICTION_HPP_
 #define MAQUETTE_PREDICTION_HPP_
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "maquette/concealer.h"
 #include "maquette/frame.hpp"
@@ -46,6 +49,50 @@ class Predictor {
 
  private:
   Owner<maq_predictor, maq_predictor_destroy> owner_;
+};
+
+inline maq_surprise_config default_surprise_config() {
+  maq_surprise_config config;
+  check(maq_surprise_config_init(&config, sizeof config));
+  return config;
+}
+
+// How surprising the frames of one stream are. Several share networks by networks_of of their configs.
+class Surprise {
+ public:
+  explicit Surprise(const Context& context, const maq_surprise_config& config = default_surprise_config()) {
+    maq_surprise* made = nullptr;
+    check(maq_surprise_create(context.get(), &config, &made));
+    owner_.reset(made);
+  }
+
+  maq_surprise* get() const { return owner_.get(); }
+
+  maq_surprise_score push(const Frame& frame) {
+    score_.struct_size = sizeof score_;
+    check(maq_surprise_push(get(), frame.get(), &score_));
+    return score_;
+  }
+
+  // Of the latest frame: score.rows rows of score.columns cells.
+  std::vector<float> map() const {
+    std::vector<float> bits(size_t(score_.columns) * size_t(score_.rows));
+    check(maq_surprise_copy_map(get(), bits.data(), bits.size()));
+    return bits;
+  }
+
+  void reset() { check(maq_surprise_reset(get())); }
+
+  maq_surprise_stats stats() const {
+    maq_surprise_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_surprise_get_stats(get(), &stats));
+    return stats;
+  }
+
+ private:
+  Owner<maq_surprise, maq_surprise_destroy> owner_;
+  maq_surprise_score score_{};
 };
 
 inline maq_concealer_config default_concealer_config() {

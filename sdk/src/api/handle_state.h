@@ -34,7 +34,8 @@ enum class HandleKind : uint32_t {
   kHeadRenderer,
   kHeadImage,
   kPredictor,
-  kConcealer
+  kConcealer,
+  kSurprise
 };
 
 class HandleState {

@@ -26,4 +26,6 @@ std::string default_edges_bundle() { return bundle_of("MAQ_EDGES_BUNDLE", "edges
 
 std::string default_heads_bundle() { return bundle_of("MAQ_HEADS_BUNDLE", "heads-int8"); }
 
+std::string default_prediction_bundle() { return bundle_of("MAQ_PREDICTION_BUNDLE", "prediction-int8"); }
+
 std::string default_scene_bundle() { return bundle_of("MAQ_SCENE_BUNDLE", "scenes-int8"); }

@@ -6,7 +6,8 @@
 // The environment variable MAQ_BUNDLE, else the bundle installed (or staged) with this program; "" without either.
 std::string default_bundle();
 // Likewise the network of edges: MAQ_EDGES_BUNDLE, that of heads: MAQ_HEADS_BUNDLE, and those
-// of scenes: MAQ_SCENE_BUNDLE.
+// of prediction: MAQ_PREDICTION_BUNDLE, and of scenes: MAQ_SCENE_BUNDLE.
 std::string default_edges_bundle();
 std::string default_heads_bundle();
+std::string default_prediction_bundle();
 std::string default_scene_bundle();

@@ -16,6 +16,7 @@
 
 #include "arguments/source_argument.h"
 #include "commands/commands.h"
+#include "commands/predict_surprise.h"
 #include "interrupt.h"
 #include "output/frame_image.h"
 #include "output/output_file.h"
@@ -275,28 +276,50 @@ int predict(const PredictOptions& options) {
 
 void add_predict_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<PredictOptions>();
-  CLI::App* command =
-      app.add_subcommand("predict", "Show what a clip or a camera will show next, beside what it did show");
+  CLI::App* command = app.add_subcommand(
+      "predict", "Show what a clip or a camera will show next, beside what it did show, or what of it is surprising");
+  auto surprise = std::make_shared<SurpriseOptions>();
+  auto is_surprise = std::make_shared<bool>(false);
   command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
+  CLI::Option* const flag = command->add_flag(
+      "-s,--surprise", *is_surprise,
+      "Predict no pictures, but say how surprising each frame is after those before: a meter in a terminal, and a line "
+      "for each event; with --json a line a frame");
   command
-      ->add_option("--from", options->from,
-                   "Number of the last frame that is seen, from 0; default: 30, or less of a short clip")
-      ->check(CLI::Range(int64_t(0), int64_t(1) << 40));
-  command->add_option("-n,--frames", options->frames, "Predict so many frames after it; default: 16")
-      ->check(CLI::Range(int64_t(1), int64_t(10000)));
+      ->add_option("--events", surprise->event_ratio,
+                   "An event is that many times as surprising as the 8 frames before, or as little; default: 4")
+      ->check(CLI::Range(1.001, 1e6))
+      ->needs(flag);
+  command->add_option("--max-frames", surprise->max_frames, "Stop after so many; default: at the end, or at Ctrl-C")
+      ->check(CLI::Range(int64_t(1), int64_t(1) << 40))
+      ->needs(flag);
   command
-      ->add_option("-m,--method", options->method,
-                   "last: the last frame; motion: everything moves on as it did; auto (default): whichever was right "
-                   "so far")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, maq_prediction_method>{
-          {"auto", MAQ_PREDICTION_AUTO}, {"last", MAQ_PREDICTION_LAST}, {"motion", MAQ_PREDICTION_MOTION}}));
-  command->add_flag("-c,--compare", options->compare,
-                    "Print the error (PSNR) of last and motion by time ahead, and draw truth, last and motion side by "
-                    "side");
+      ->add_option("--bundle", surprise->bundle,
+                   "Folder of the network; default: MAQ_PREDICTION_BUNDLE, then the one installed with this program")
+      ->needs(flag);
+  const auto for_pictures = [flag](CLI::Option* option) { option->excludes(flag); };
+  for_pictures(command
+                   ->add_option("--from", options->from,
+                                "Number of the last frame that is seen, from 0; default: 30, or less of a short clip")
+                   ->check(CLI::Range(int64_t(0), int64_t(1) << 40)));
+  for_pictures(command->add_option("-n,--frames", options->frames, "Predict so many frames after it; default: 16")
+                   ->check(CLI::Range(int64_t(1), int64_t(10000))));
+  for_pictures(
+      command
+          ->add_option(
+              "-m,--method", options->method,
+              "last: the last frame; motion: everything moves on as it did; auto (default): whichever was right "
+              "so far")
+          ->transform(CLI::CheckedTransformer(std::map<std::string, maq_prediction_method>{
+              {"auto", MAQ_PREDICTION_AUTO}, {"last", MAQ_PREDICTION_LAST}, {"motion", MAQ_PREDICTION_MOTION}})));
+  for_pictures(command->add_flag(
+      "-c,--compare", options->compare,
+      "Print the error (PSNR) of last and motion by time ahead, and draw truth, last and motion side by "
+      "side"));
   command->add_option("-t,--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
-  command->add_option("-o,--out", options->out, "Clip (.mp4 or .avi), or folder for PNG files");
-  command->add_flag("--json", options->json, "Print one JSON document");
+  for_pictures(command->add_option("-o,--out", options->out, "Clip (.mp4 or .avi), or folder for PNG files"));
+  command->add_flag("--json", options->json, "Print one JSON document, or with --surprise a line a frame");
   command->footer(
       "A clip begins with the last second that was seen; predicted frames have a border and say how far ahead they\n"
       "are, and PNG files are marked inside. PSNR in dB: higher is nearer to the truth, +1 dB is an error 11 % "
@@ -305,6 +328,16 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "  maquette predict clip.mp4 --from 40 --frames 16 --compare --out next.mp4\n"
       "  maquette predict clip.mp4 --from 40 --compare            # the figures alone\n"
       "  maquette predict 'stub:people?count=2' --method motion --out next/\n"
-      "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4");
-  command->callback([=] { *exit_code = predict(*options); });
+      "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4\n"
+      "  maquette predict camera: --surprise --events 6           # what stands out: cuts, a frozen or covered camera");
+  command->callback([=] {
+    if (!*is_surprise) {
+      *exit_code = predict(*options);
+      return;
+    }
+    surprise->source = options->source;
+    surprise->threads = options->threads;
+    surprise->json = options->json;
+    *exit_code = run_surprise(*surprise);
+  });
 }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
+#include <sstream>
 #include <string>
 
 #include "support/program_run.h"
@@ -120,6 +121,52 @@ TEST_F(PredictCommandLine, WhatIsWrongIsOneSentence) {
   expect_failure("square.avi --compare --out next.gif", "ends in .gif");
   EXPECT_NE(run("square.avi --compare --method latent").exit_code, 0);
   EXPECT_NE(run("--help").out.find("maquette predict clip.mp4 --from 40"), std::string::npos);
+}
+
+TEST_F(PredictCommandLine, SaysHowSurprisingFramesAre) {
+  const Outcome lines = run("square.avi --surprise --json");
+  ASSERT_EQ(lines.exit_code, 0) << lines.err;
+  std::istringstream text(lines.out);
+  int frames = 0;
+  for (std::string line; std::getline(text, line); ++frames) {
+    const auto frame = nlohmann::json::parse(line);
+    EXPECT_EQ(frame["source"], "square");
+    EXPECT_EQ(frame["frame"], frames);
+    EXPECT_EQ(frame["start"], frames == 0);
+    EXPECT_GE(frame["bits"].get<double>(), 0);
+    EXPECT_TRUE(frame["peak"]["x_px"].get<double>() > 0 && frame["peak"]["x_px"].get<double>() < 160);
+  }
+  EXPECT_EQ(frames, 20);
+  const Outcome summary = run("square.avi --surprise --max-frames 12");
+  ASSERT_EQ(summary.exit_code, 0) << summary.err;
+  EXPECT_NE(summary.out.find("12 frames"), std::string::npos) << summary.out;
+}
+
+TEST_F(PredictCommandLine, NamesTheEventsOfAClip) {
+  cv::VideoWriter clip(folder_.file("cut.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, {160, 120});
+  cv::VideoCapture square(folder_.file("square.avi"));
+  cv::Mat picture;
+  for (int i = 0; i < 30; ++i) {
+    if (i < 20) square.read(picture);
+    if (i >= 20) picture = cv::Mat(120, 160, CV_8UC3, cv::Scalar(20, 20, 200));
+    clip.write(picture);
+  }
+  clip.release();
+  const Outcome result = run("cut.avi --surprise --events 6");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("1.00 s  frame 20"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("  cut\n"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("1 events"), std::string::npos) << result.out;
+}
+
+TEST_F(PredictCommandLine, SurpriseAndPicturesDoNotMix) {
+  for (const char* wrong :
+       {"square.avi --surprise --compare", "square.avi --surprise --out o.mp4", "square.avi --events 6",
+        "square.avi --surprise --events 1", "square.avi --surprise --max-frames 0", "square.avi --surprise --from 3"}) {
+    EXPECT_EQ(run(wrong).exit_code, 2) << wrong;
+  }
+  expect_failure("missing.avi --surprise", "missing.avi");
+  expect_failure("square.avi --surprise --bundle nowhere", "nowhere");
 }
 
 }  // namespace

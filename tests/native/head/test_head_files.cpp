@@ -8,9 +8,9 @@
 
 #include "head/files/head_file.h"
 #include "head/files/stored_numbers.h"
+#include "support/checked_file_damage.h"
 #include "support/expect_error.h"
 #include "support/file_size_limit.h"
-#include "support/head_file_damage.h"
 #include "support/peak_memory.h"
 #include "support/temp_folder.h"
 #include "support/tiny_head.h"
@@ -127,7 +127,7 @@ TEST(HeadFiles, HoldATextureOnlyWhereThereIsOne) {
     std::string changed = bytes;
     std::memcpy(changed.data() + without, &side_px, 4);
     std::memcpy(changed.data() + without + 4, &count, 4);
-    head_file_damage::repair(changed);
+    checked_file_damage::repair(changed);
     expect_error(MAQ_ERROR_UNREADABLE, text, [&] { read_head(changed.data(), changed.size(), "a.maqh"); });
   };
   refuse("a texture of 0 pixels", 0, 7);
@@ -223,12 +223,12 @@ TEST(HeadFiles, AFullDiskLeavesTheOldFile) {
 }
 
 TEST(HeadFiles, CutOrChangedAtAnyBitAreRefused) {
-  head_file_damage::expect_all_damage_noticed(bytes_of(example()), MAQ_ERROR_UNREADABLE, open_and_use);
+  checked_file_damage::expect_all_damage_noticed(bytes_of(example()), MAQ_ERROR_UNREADABLE, open_and_use);
 }
 
 TEST(HeadFiles, WithRandomChangesAndRightChecksAreRefusedOrHarmless) {
-  head_file_damage::expect_random_changes_harmless(bytes_of(example()), sizeof(HeadFileHead), 10'000,
-                                                   MAQ_ERROR_UNREADABLE, open_and_use);
+  checked_file_damage::expect_random_changes_harmless(bytes_of(example()), sizeof(HeadFileHead), 10'000,
+                                                      MAQ_ERROR_UNREADABLE, open_and_use);
 }
 
 TEST(HeadFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {
@@ -239,7 +239,7 @@ TEST(HeadFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {
     std::memcpy(&head, bytes.data(), sizeof head);
     change(head);
     std::memcpy(bytes.data(), &head, sizeof head);
-    head_file_damage::repair(bytes);
+    checked_file_damage::repair(bytes);
     expect_error(status, text, [&] { read_head(bytes.data(), bytes.size(), "a.maqh"); });
   };
   constexpr maq_status kBad = MAQ_ERROR_UNREADABLE;
@@ -272,7 +272,7 @@ TEST(HeadFiles, ThatClaimMuchTakeNoMemory) {
   std::memcpy(&head, bytes.data(), sizeof head);
   head.shape = {8, 256, 8, 256, 256, 8, 8, 8, 2e-4f};
   std::memcpy(bytes.data(), &head, sizeof head);
-  head_file_damage::repair(bytes);
+  checked_file_damage::repair(bytes);
   const double grown = peak_memory_growth_mib(
       [&] { expect_error(MAQ_ERROR_UNREADABLE, "claims", [&] { open_and_use(bytes.data(), bytes.size()); }); });
   EXPECT_LT(grown, 2);

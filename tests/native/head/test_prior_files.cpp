@@ -5,8 +5,8 @@
 
 #include "head/files/prior_file.h"
 #include "head/files/stored_numbers.h"
+#include "support/checked_file_damage.h"
 #include "support/expect_error.h"
-#include "support/head_file_damage.h"
 #include "support/peak_memory.h"
 #include "support/tiny_head.h"
 
@@ -14,7 +14,7 @@ namespace prior_files {
 namespace {
 
 using namespace maq::head;  // NOLINT
-using head_file_damage::repair;
+using checked_file_damage::repair;
 
 const std::string kPath = tiny_head::kFolder + "/priors/int8.maqp";
 
@@ -78,14 +78,14 @@ TEST(PriorFiles, OfEachFormatAreWhatPythonReadsInThem) {
 }
 
 TEST(PriorFiles, CutOrChangedAtAnyBitAreRefused) {
-  head_file_damage::expect_all_damage_noticed(read_text(kPath), MAQ_ERROR_BAD_BUNDLE, open_and_use);
+  checked_file_damage::expect_all_damage_noticed(read_text(kPath), MAQ_ERROR_BAD_BUNDLE, open_and_use);
 }
 
 TEST(PriorFiles, WithRandomChangesAndRightChecksAreRefusedOrHarmless) {
   for (const char* format : {"float32", "float16", "int8"}) {
     const std::string whole = read_text(tiny_head::kFolder + "/priors/" + format + ".maqp");
-    head_file_damage::expect_random_changes_harmless(whole, sizeof(PriorFileHead), 4'000, MAQ_ERROR_BAD_BUNDLE,
-                                                     open_and_use);
+    checked_file_damage::expect_random_changes_harmless(whole, sizeof(PriorFileHead), 4'000, MAQ_ERROR_BAD_BUNDLE,
+                                                        open_and_use);
   }
 }
 

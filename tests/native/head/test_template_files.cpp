@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "head/files/template_file.h"
+#include "support/checked_file_damage.h"
 #include "support/expect_error.h"
-#include "support/head_file_damage.h"
 #include "support/peak_memory.h"
 #include "support/tiny_head.h"
 
@@ -13,7 +13,7 @@ namespace template_files {
 namespace {
 
 using namespace maq::head;  // NOLINT
-using head_file_damage::repair;
+using checked_file_damage::repair;
 
 const std::string kPath = tiny_head::kFolder + "/template.maqt";
 
@@ -44,12 +44,12 @@ TEST(TemplateFiles, AreWhatPythonWrote) {
 }
 
 TEST(TemplateFiles, CutOrChangedAtAnyBitAreRefused) {
-  head_file_damage::expect_all_damage_noticed(read_text(kPath), MAQ_ERROR_BAD_BUNDLE, open_and_use);
+  checked_file_damage::expect_all_damage_noticed(read_text(kPath), MAQ_ERROR_BAD_BUNDLE, open_and_use);
 }
 
 TEST(TemplateFiles, WithRandomChangesAndRightChecksAreRefusedOrHarmless) {
-  head_file_damage::expect_random_changes_harmless(read_text(kPath), sizeof(TemplateFileHead), 4'000,
-                                                   MAQ_ERROR_BAD_BUNDLE, open_and_use);
+  checked_file_damage::expect_random_changes_harmless(read_text(kPath), sizeof(TemplateFileHead), 4'000,
+                                                      MAQ_ERROR_BAD_BUNDLE, open_and_use);
 }
 
 TEST(TemplateFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {

@@ -11,11 +11,13 @@ from export.bundle import BundleInfo, read_manifest
 from export.densepose import bundle as densepose
 from export.densepose.graphs import open_bundle
 from export.heads import bundle as heads
+from export.prediction import bundle as prediction
 from export.scenes import bundle as scenes
 
 DENSEPOSE = Path("sdk/models/densepose-b-int8")
 TINY = Path("tests/native/data/tiny_bundle")
 HEADS = ("sdk/models/heads-int8", "tests/native/data/round_heads/bundle", "tests/native/data/tiny_head/bundle")
+PREDICTION = ("sdk/models/prediction-int8", "tests/native/data/tiny_prediction/bundle")
 SCENES = ("sdk/models/scenes-int8", "tests/native/data/tiny_scene/bundle")
 
 
@@ -46,6 +48,13 @@ def test_the_manifests_of_scene_networks_are_what_their_writer_writes(folder, tm
 def test_the_manifests_of_heads_are_what_their_writer_writes(folder, tmp_path):
     copy, info = copied(folder, tmp_path)
     heads.write_manifest(copy, info, face=read_manifest(Path(folder))["encoder"].get("face"))
+    assert (copy / "manifest.json").read_bytes() == (Path(folder) / "manifest.json").read_bytes()
+
+
+@pytest.mark.parametrize("folder", PREDICTION)
+def test_the_manifests_of_prediction_are_what_their_writer_writes(folder, tmp_path):
+    copy, info = copied(folder, tmp_path)
+    prediction.write_manifest(copy, info)
     assert (copy / "manifest.json").read_bytes() == (Path(folder) / "manifest.json").read_bytes()
 
 

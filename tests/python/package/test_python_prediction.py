@@ -90,3 +90,36 @@ def test_gaps_are_bridged_by_frames_that_say_so():
 def test_only_live_sources_have_gaps():
     with pytest.raises(maquette.MaquetteError, match="not live"):
         maquette.Concealer(maquette.Source("stub:people?frames=3"))
+
+
+def test_what_changes_is_surprising_where_it_changes():
+    surprise = maquette.Surprise(threads=1)
+    assert surprise.push(textured(0), time_s=0).is_start
+    for number in range(1, 12):
+        still = surprise.push(textured(0), time_s=number * PERIOD_S)
+    assert still.bits < 0.1
+    assert not still.is_event
+
+    changed = textured(0)
+    changed[60:90, 80:120] = 255 - changed[60:90, 80:120]
+    score = surprise.push(changed, time_s=12 * PERIOD_S)
+    assert score.map.shape == (16, 16)
+    assert score.map.mean() == pytest.approx(score.bits, rel=1e-4)
+    row, column = np.unravel_index(score.map.argmax(), score.map.shape)
+    assert 8 <= row <= 11
+    assert 8 <= column <= 11
+    assert score.ratio > 2
+    assert surprise.stats["pushed_count"] == 13
+
+
+def test_streams_share_networks():
+    first = maquette.Surprise(threads=1)
+    second = maquette.Surprise(networks_of=first)
+    bits = [second.push(textured(4 * k), time_s=k * PERIOD_S).bits for k in range(4)]
+    first.close()
+    second.reset()
+    assert [second.push(textured(4 * k), time_s=k * PERIOD_S).bits for k in range(4)] == bits
+    with pytest.raises(TypeError, match="event_ratio"):
+        maquette.Surprise(event_rate=2)
+    with pytest.raises(ValueError, match="time_s"):
+        second.push(textured(0))

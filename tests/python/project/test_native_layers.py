@@ -27,7 +27,7 @@ SYSTEMS = (
     | CURVES
     | HEAD
     | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/build", "head/bundle", "head/files",
-       "head/render", "prediction", "sources", "sources/recording"}
+       "head/render", "prediction", "prediction/codes", "sources", "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {
     "core": set(),
@@ -57,6 +57,7 @@ MAY_INCLUDE = {
     "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "head/wrap": {"core", "core/math", "head"},
     "prediction": {"core", "image"},
+    "prediction/codes": BASE,
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
     "scene/networks": CAPTURE,

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/files/checked_bytes.h"
+
 namespace maq::head {
 
 inline constexpr uint32_t kPriorFileVersion = 1, kHeadFileVersion = 1, kTemplateFileVersion = 1;
@@ -18,15 +20,6 @@ enum class StoredFormat : uint8_t {
   kFloat16,
   kInt8,  // of bases alone: float32 scale of each row, then the steps of all rows, then float16 biases
 };
-
-struct FileStart {
-  char magic[8];
-  uint32_t version;
-  uint32_t head_bytes;  // of the whole struct that begins with this
-  uint64_t check;       // 64-bit XXH3 of all that follows in the file
-  uint64_t file_bytes;
-};
-inline constexpr size_t kCheckedFrom = offsetof(FileStart, file_bytes);
 
 // FieldShape.
 struct StoredShape {

@@ -1,16 +1,11 @@
 #include "head/files/stored_numbers.h"
 
-#include <xxhash.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 namespace maq::head {
 namespace {
-
-// Larger ones come of no training, and products of some of them are not finite.
-constexpr float kMaxStoredNumber = 1e6f;
 
 size_t size_of(StoredFormat format) { return format == StoredFormat::kFloat16 ? sizeof(uint16_t) : sizeof(float); }
 
@@ -37,34 +32,8 @@ uint16_t float_to_half(float value) {
   return uint16_t(sign | (((exponent + 14) << 10) + units));
 }
 
-void StoredBytes::check_start(const char (&magic)[8], uint32_t version, size_t head_bytes, const char* kind,
-                              const char* remedy) const {
-  FileStart start;
-  if (left_ < head_bytes) fail(" is too short to be ", kind, ": ", left_, " bytes.");
-  std::memcpy(&start, bytes_, sizeof start);
-  if (std::memcmp(start.magic, magic, sizeof start.magic) != 0) fail(" is not ", kind, ".");
-  if (start.version != version) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, name_, " is ", kind, " of version ", start.version, "; this SDK reads version ",
-                version, ". ", remedy);
-  }
-  if (start.file_bytes != left_) {
-    fail(" has ", left_, " bytes, but should have ", start.file_bytes, ": it is truncated or damaged; copy it again.");
-  }
-  if (start.head_bytes != head_bytes || start.check != XXH3_64bits(bytes_ + kCheckedFrom, left_ - kCheckedFrom)) {
-    fail(" is damaged; copy it again.");
-  }
-}
-
-const uint8_t* StoredBytes::take(size_t count) {
-  if (count > left_) fail(" ends before what its head claims.");
-  const uint8_t* const taken = bytes_;
-  bytes_ += count;
-  left_ -= count;
-  return taken;
-}
-
 void StoredBytes::floats(StoredFormat format, float* to, size_t count) {
-  if (count > left_ / size_of(format)) fail(" ends before what its head claims.");
+  require_left(count, size_of(format));
   const uint8_t* const from = take(count * size_of(format));
   if (format == StoredFormat::kFloat16) {
     for (size_t i = 0; i < count; ++i) {
@@ -75,14 +44,11 @@ void StoredBytes::floats(StoredFormat format, float* to, size_t count) {
   } else if (count > 0) {
     std::memcpy(to, from, count * sizeof(float));
   }
-  // False for NaN.
-  if (!std::all_of(to, to + count, [](float value) { return std::abs(value) <= kMaxStoredNumber; })) {
-    fail(" has numbers that are not finite, or too large; make it again.");
-  }
+  check_floats(to, count);
 }
 
 std::vector<float> StoredBytes::floats(StoredFormat format, size_t count) {
-  if (count > left_ / size_of(format)) fail(" ends before what its head claims.");
+  require_left(count, size_of(format));
   std::vector<float> values(count);
   floats(format, values.data(), count);
   return values;
@@ -109,11 +75,6 @@ void StoredBytes::layers(StoredFormat format, const std::vector<FieldLayer>& of_
   for (const FieldLayer& layer : of_codes) floats(is_int8 ? StoredFormat::kFloat16 : format, layer.bias, outputs);
 }
 
-std::vector<uint8_t> StoredBytes::bytes(size_t count) {
-  const uint8_t* const from = take(count);
-  return {from, from + count};
-}
-
 std::vector<NamedPoint> StoredBytes::places(size_t count) {
   std::vector<NamedPoint> places;
   for (size_t i = 0; i < count; ++i) {
@@ -124,10 +85,6 @@ std::vector<NamedPoint> StoredBytes::places(size_t count) {
     places.push_back(std::move(place));
   }
   return places;
-}
-
-void StoredBytes::end() const {
-  if (left_ > 0) fail(" has ", left_, " bytes that belong to nothing.");
 }
 
 FieldShape checked_shape(const StoredShape& stored, const StoredBytes& bytes) {
@@ -181,17 +138,6 @@ void BytesWriter::floats(StoredFormat format, const float* values, size_t count)
 void BytesWriter::layer(StoredFormat format, const ConstFieldLayer& layer) {
   for (int output = 0; output < layer.outputs; ++output) floats(format, layer.row(output), size_t(layer.inputs));
   floats(format, layer.bias, size_t(layer.outputs));
-}
-
-void BytesWriter::finish(size_t head_bytes, const char (&magic)[8], uint32_t version) {
-  FileStart start{};
-  std::memcpy(start.magic, magic, sizeof start.magic);
-  start.version = version;
-  start.head_bytes = uint32_t(head_bytes);
-  start.file_bytes = bytes_.size();
-  std::memcpy(bytes_.data(), &start, sizeof start);
-  start.check = XXH3_64bits(bytes_.data() + kCheckedFrom, bytes_.size() - kCheckedFrom);
-  std::memcpy(bytes_.data(), &start, sizeof start);
 }
 
 }  // namespace maq::head

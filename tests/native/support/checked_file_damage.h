@@ -1,4 +1,4 @@
-// Damage to files of heads: what begins them, and checks that fit.
+// Damage to files that begin with a checksum: their start, and checks that fit.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,18 +12,18 @@
 #include <xxhash.h>
 
 #include "core/error.h"
-#include "head/files/file_format.h"
+#include "core/files/checked_bytes.h"
 
-namespace head_file_damage {
+namespace checked_file_damage {
 
 // Makes the check right, and the length where `with_length`.
 inline void repair(std::string& bytes, bool with_length = false) {
-  maq::head::FileStart start;
+  maq::FileStart start;
   if (bytes.size() < sizeof start) return;
   std::memcpy(&start, bytes.data(), sizeof start);
   if (with_length) start.file_bytes = bytes.size();
   std::memcpy(bytes.data(), &start, sizeof start);
-  start.check = XXH3_64bits(bytes.data() + maq::head::kCheckedFrom, bytes.size() - maq::head::kCheckedFrom);
+  start.check = XXH3_64bits(bytes.data() + maq::kCheckedFrom, bytes.size() - maq::kCheckedFrom);
   std::memcpy(bytes.data(), &start, sizeof start);
 }
 
@@ -83,4 +83,4 @@ inline void expect_random_changes_harmless(const std::string& whole, size_t head
   EXPECT_GT(opened, rounds / 20);
 }
 
-}  // namespace head_file_damage
+}  // namespace checked_file_damage

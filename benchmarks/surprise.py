@@ -1,0 +1,79 @@
+"""How well surprise finds events through the C API, beside a difference of frames and optical flow, and how long a
+frame takes.
+
+    python -m benchmarks.surprise                       val clips of pushing, sdk/models/prediction-int8 (some minutes)
+    python -m benchmarks.surprise --clips 4             fewer clips, to see that it runs
+    python -m benchmarks.surprise --bundle .data/bundles/prediction-fp32
+
+Needs clips of `export.clips` (.data/clips/pushing/val) and the built library (`make build`). Levels, kinds of events
+and their places are those of `export.prediction.evaluate_events`; of surprise the scores are `bits` of each frame.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import maquette
+import numpy as np
+
+from export.clips.events import KINDS
+from export.prediction.data import Clips, read_clips
+from export.prediction.evaluate_events import Score, difference, flow_residual, measured
+
+BUNDLE = Path("sdk/models/prediction-int8")
+
+
+def sdk_surprise(bundle: Path) -> Score:
+    """Bits of a code of each frame but the first, as maq_surprise_push gives them."""
+    stream = maquette.Surprise(bundle_path=bundle, threads=1)
+
+    def score(frames: np.ndarray, fps: float) -> np.ndarray:
+        stream.reset()
+        bits = [stream.push(np.ascontiguousarray(frame), time_s=t / fps).bits for t, frame in enumerate(frames)]
+        return np.array(bits[1:])
+
+    return score
+
+
+def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
+    """Of a simulated camera of 640 x 480: of median wall-clock times, processor time, and medians of stages."""
+    surprise = maquette.Surprise(bundle_path=bundle, threads=threads)
+    stats, used_ms = [], []
+    for frame in maquette.Source(f"stub:people?count=2&size=640x480&fps=30&frames={frames}"):
+        begin = time.process_time()
+        surprise.push(frame)
+        used_ms.append(1000 * (time.process_time() - begin))
+        stats.append(surprise.stats)
+    of = {name: float(np.median([one[name] for one in stats[5:]])) for name in stats[0] if name.endswith("_ms")}
+    return {"frames_a_second": 1000 / of["push_ms"], "cpu_ms": float(np.median(used_ms[5:])), **of}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.surprise", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--bundle", type=Path, default=BUNDLE)
+    parser.add_argument("--data", type=Path, default=Path(".data/clips"))
+    parser.add_argument("--sets", nargs="+", default=["pushing"], help="default %(default)s")
+    parser.add_argument("--split", choices=("val", "test"), default="val")
+    parser.add_argument("--clips", type=int, help="at most so many; default: all")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    for threads in (1, 2):
+        found = frames_a_second(options.bundle, threads)
+        parts = ", ".join(f"{name} {value:.2f}" for name, value in found.items() if name != "frames_a_second")
+        print(f"640 x 480, {threads} thread(s): {found['frames_a_second']:.0f} frames a second ({parts})", flush=True)
+    clips = read_clips(options.data, options.sets, options.split)
+    if options.clips:
+        clips = Clips(clips.frames[: options.clips], clips.fps[: options.clips], clips.names[: options.clips])
+    scores = {"difference": difference, "flow residual": flow_residual, "surprise": sdk_surprise(options.bundle)}
+    areas = measured(clips, scores, options.seed)
+    print(" | ".join(["", *KINDS, "mean"]))
+    for name, own in areas.items():
+        print(" | ".join([name, *(f"{own[kind]:.2f}" for kind in KINDS), f"{np.mean(list(own.values())):.3f}"]))
+
+
+if __name__ == "__main__":
+    main()

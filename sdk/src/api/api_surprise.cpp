@@ -1,0 +1,129 @@
+#include <algorithm>
+
+#include "api/boundary.h"
+#include "api/bundle_argument.h"
+#include "api/frame_handle.h"
+#include "core/clock.h"
+#include "core/worker_threads.h"
+#include "maquette/prediction.h"
+#include "prediction/codes/surprise.h"
+
+using namespace maq;
+
+struct maq_surprise : HandleOf<HandleKind::kSurprise> {
+  maq_surprise(std::shared_ptr<ContextState> of, std::shared_ptr<FrameEncoder> encoder, float ratio)
+      : state(std::move(of)), surprise(std::move(encoder)), event_ratio(ratio) {}
+  std::shared_ptr<ContextState> state;
+  Surprise surprise;
+  const float event_ratio;
+  float push_ms = 0;
+  uint64_t pushed = 0, events = 0, starts = 0;
+};
+
+namespace {
+
+constexpr char kPredictionBundle[] = "prediction-int8";
+
+maq_surprise_config default_surprise_config() {
+  maq_surprise_config config{};
+  config.struct_size = sizeof config;
+  config.allow_spinning = 1;
+  config.event_ratio = 4;
+  return config;
+}
+
+std::shared_ptr<FrameEncoder> make_encoder(const ContextState& state, std::shared_ptr<const OnnxRuntimeLibrary> runtime,
+                                           const maq_surprise_config& config) {
+  require_threads("config.threads", config.threads, kMaxThreads);
+  require_range("config.allow_spinning", config.allow_spinning, 0, 1);
+  SessionSettings settings;
+  settings.threads = config.threads != 0 ? config.threads : default_threads();
+  settings.spin = config.allow_spinning == 1;
+  CodeBundle bundle(read_bundle_argument(config, "config", kPredictionBundle));
+  const Manifest manifest = bundle.bundle.manifest;
+  auto made = std::make_shared<FrameEncoder>(std::move(runtime), std::move(bundle), settings);
+  state.log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
+                    ") loaded, ", made->threads(), " thread(s)");
+  return made;
+}
+
+}  // namespace
+
+maq_status maq_surprise_config_init(maq_surprise_config* config, uint32_t struct_size) {
+  return init_config(__func__, config, struct_size, default_surprise_config(), sizeof(maq_surprise_config));
+}
+
+maq_status maq_surprise_create(maq_context* context, const maq_surprise_config* given, maq_surprise** surprise) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(surprise, "surprise");
+    const maq_surprise_config config =
+        read_config(given, "config", default_surprise_config(), sizeof(maq_surprise_config));
+    if (!(config.event_ratio > 1 && config.event_ratio <= 1e6f)) {
+      throw ArgumentError("config.event_ratio is ", config.event_ratio, ", but must be above 1, and at most 1e6.");
+    }
+    std::shared_ptr<FrameEncoder> encoder;
+    if (config.networks_of != nullptr) {
+      require_argument(config.networks_of, "config.networks_of");
+      encoder = config.networks_of->surprise.encoder();
+    } else {
+      encoder = make_encoder(*context->state, context->state->onnxruntime(), config);
+    }
+    *surprise = new maq_surprise(context->state, std::move(encoder), config.event_ratio);
+    return MAQ_OK;
+  });
+}
+
+void maq_surprise_destroy(maq_surprise* surprise) { destroy(surprise, "surprise", __func__); }
+
+maq_status maq_surprise_push(maq_surprise* surprise, const maq_frame* frame, maq_surprise_score* score) {
+  return guarded_alone(surprise, "surprise", __func__, [&] {
+    require_argument(frame, "frame");
+    require_argument(score, "score");
+    require_struct_size("score", score->struct_size, sizeof *score, sizeof *score);
+    const Stopwatch whole;
+    const SurpriseScore found = surprise->surprise.push(frame->frame);
+    surprise->push_ms = float(whole.elapsed_ms());
+    const float limit = surprise->event_ratio;
+    const bool is_event = found.is_cut || found.ratio >= limit || found.ratio * limit <= 1;
+    surprise->pushed += 1;
+    surprise->events += is_event ? 1 : 0;
+    surprise->starts += found.is_start ? 1 : 0;
+    const auto side = int32_t(surprise->surprise.encoder()->codes().side);
+    write_struct(score, "score",
+                 maq_surprise_score{0, side, side, found.bits, found.ratio, is_event ? 1 : 0, found.is_cut ? 1 : 0,
+                                    found.is_start ? 1 : 0},
+                 sizeof(maq_surprise_score));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_surprise_copy_map(const maq_surprise* surprise, float* bits, size_t count) {
+  return guarded_alone(surprise, "surprise", __func__, [&] {
+    require_argument(bits, "bits");
+    const std::vector<float>& map = surprise->surprise.map();
+    if (map.empty()) throw ArgumentError("No frame was pushed, so there is no map; push one first.");
+    if (count < map.size()) throw ArgumentError("count is ", count, ", but the map has ", map.size(), " cells.");
+    std::copy(map.begin(), map.end(), bits);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_surprise_reset(maq_surprise* surprise) {
+  return guarded_alone(surprise, "surprise", __func__, [&] {
+    surprise->surprise.reset();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_surprise_get_stats(const maq_surprise* surprise, maq_surprise_stats* stats) {
+  return guarded_alone(surprise, "surprise", __func__, [&] {
+    const EncoderTimes& times = surprise->surprise.times();
+    write_struct(stats, "stats",
+                 maq_surprise_stats{0, times.resize_ms, times.network_ms, times.nearest_ms, surprise->push_ms,
+                                    surprise->surprise.encoder()->threads(), surprise->pushed, surprise->events,
+                                    surprise->starts},
+                 sizeof(maq_surprise_stats));
+    return MAQ_OK;
+  });
+}

@@ -1,0 +1,26 @@
+// What a bundle for prediction has (docs/formats.md): the graphs that make a frame codes and codes a frame, and what
+// codes stand for.
+#pragma once
+
+#include "nn/bundle.h"
+#include "nn/session.h"
+#include "prediction/codes/code_file.h"
+
+namespace maq {
+
+struct CodeBundle {
+  // Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, MAQ_ERROR_BAD_BUNDLE where the manifest lacks what is
+  // read, or graphs and codes do not belong together; what read_code_file() throws.
+  explicit CodeBundle(Bundle opened);
+
+  Bundle bundle;  // without the bytes of the file of codes
+  FrameCodes codes;
+  int frame_px = 0;  // side of the square that a frame is squeezed to
+
+  Shape frame_shape() const { return {1, frame_px, frame_px, 3}; }
+  Shape features_shape() const {
+    return {1, int64_t(codes.side), int64_t(codes.side), int64_t(codes.slices * codes.width)};
+  }
+};
+
+}  // namespace maq

@@ -1,0 +1,77 @@
+#include "prediction/codes/surprise.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "core/clock.h"
+
+namespace maq {
+namespace {
+
+constexpr float kFloor_bits = 0.035f;  // what the noise of a picture that stands still counts as
+
+}  // namespace
+
+Surprise::Surprise(std::shared_ptr<FrameEncoder> encoder)
+    : encoder_(std::move(encoder)), code_surprise_(encoder_->codes()), codes_(encoder_->codes().count()) {
+  map_.reserve(encoder_->codes().places());
+  before_.reserve(kBefore + 1);
+}
+
+void Surprise::reset() {
+  code_surprise_.reset();
+  before_.clear();
+  map_.clear();
+  has_frame_ = false;
+}
+
+bool Surprise::is_of_same_kind(const Frame& frame) const {
+  return frame.image.format == format_ && frame.image.width_px == width_px_ && frame.image.height_px == height_px_;
+}
+
+bool Surprise::is_soon_after(const Frame& frame) const {
+  if (frame.clock != clock_ || frame.timestamp_ns < timestamp_ns_) return false;
+  // Both may be far from zero.
+  return uint64_t(frame.timestamp_ns) - uint64_t(timestamp_ns_) <= uint64_t(kMaxInterval_ns);
+}
+
+float Surprise::ratio_of(float bits) const {
+  if (before_.size() < kMinBefore) return 1;
+  std::array<float, kBefore> sorted{};
+  std::partial_sort_copy(before_.begin(), before_.end(), sorted.begin(), sorted.end());
+  const size_t count = before_.size();
+  const float median = (sorted[(count - 1) / 2] + sorted[count / 2]) / 2;
+  return (bits + kFloor_bits) / (median + kFloor_bits);
+}
+
+SurpriseScore Surprise::push(const Frame& frame) {
+  times_ = encoder_->run(frame.image, codes_.data());
+  SurpriseScore score;
+  const bool is_of_other_kind = has_frame_ && !is_of_same_kind(frame);
+  score.is_start = !has_frame_ || is_of_other_kind || !is_soon_after(frame);
+  if (score.is_start) {
+    code_surprise_.reset();
+    // Another kind of picture is compared with what was shown; after a pause nothing is known of what is usual.
+    if (!is_of_other_kind) before_.clear();
+  }
+  map_.resize(encoder_->codes().places());
+  score.is_cut = code_surprise_.add(codes_.data(), map_.data());
+  for (const float bits : map_) score.bits += bits / float(map_.size());
+  score.ratio = ratio_of(score.bits);
+  if (score.is_start || score.is_cut) {
+    before_.clear();
+  } else {
+    before_.push_back(score.bits);
+    if (before_.size() > kBefore) before_.erase(before_.begin());
+  }
+  has_frame_ = true;
+  format_ = frame.image.format;
+  width_px_ = frame.image.width_px;
+  height_px_ = frame.image.height_px;
+  clock_ = frame.clock;
+  timestamp_ns_ = frame.timestamp_ns;
+  return score;
+}
+
+}  // namespace maq

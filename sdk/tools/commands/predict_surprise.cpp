@@ -1,0 +1,143 @@
+#include "commands/predict_surprise.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <maquette/maquette.hpp>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "arguments/bundle_argument.h"
+#include "arguments/source_argument.h"
+#include "interrupt.h"
+#include "output/output_file.h"
+#include "print.h"
+#include "program.h"
+
+namespace {
+
+// The cell of the map with the most bits.
+struct Peak {
+  double x_px = 0, y_px = 0;  // its middle in the frame
+  float bits = 0;
+};
+
+Peak peak_of(const std::vector<float>& map, const maq_surprise_score& score, const maq_frame_desc& desc) {
+  const auto most = std::max_element(map.begin(), map.end());
+  const auto cell = int32_t(most - map.begin());
+  return {(cell % score.columns + 0.5) * desc.width_px / score.columns,
+          (cell / score.columns + 0.5) * desc.height_px / score.rows, *most};
+}
+
+// A line on a terminal that is drawn again with each frame: surprise on a logarithmic scale.
+class SurpriseMeter {
+ public:
+  SurpriseMeter() : is_visible_(isatty(STDERR_FILENO) != 0) {}
+  ~SurpriseMeter() { clear(); }
+  SurpriseMeter(const SurpriseMeter&) = delete;
+  SurpriseMeter& operator=(const SurpriseMeter&) = delete;
+
+  void show(double time_s, const maq_surprise_score& score) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!is_visible_ || now - last_drawn_ < kRedraw) return;
+    last_drawn_ = now;
+    is_drawn_ = true;
+    const double share = std::log(double(score.bits) / kMinBits) / std::log(kMaxBits / kMinBits);
+    const int filled = int(std::lround(kWidth * std::clamp(share, 0.0, 1.0)));
+    std::string bar;
+    for (int i = 0; i < kWidth; ++i) bar += i < filled ? "█" : "░";
+    std::fprintf(stderr, "\r%9.2f s  %s  %5.2f bits a code  x %.2f\x1b[K", time_s, bar.c_str(), double(score.bits),
+                 double(score.ratio));
+    std::fflush(stderr);
+  }
+  // What is printed next takes its line.
+  void clear() {
+    if (is_drawn_) std::fputs("\r\x1b[K", stderr);
+    is_drawn_ = false;
+    last_drawn_ = {};
+  }
+
+ private:
+  static constexpr int kWidth = 30;
+  static constexpr double kMinBits = 0.03, kMaxBits = 10;
+  static constexpr std::chrono::milliseconds kRedraw{80};
+
+  const bool is_visible_;
+  bool is_drawn_ = false;
+  std::chrono::steady_clock::time_point last_drawn_{};
+};
+
+void print_json(const std::string& stem, const maq_frame_desc& desc, const maq_surprise_score& score, const Peak& peak,
+                double push_ms) {
+  const nlohmann::ordered_json line = {{"source", stem},
+                                       {"frame", desc.sequence},
+                                       {"timestamp_ns", desc.timestamp_ns},
+                                       {"bits", score.bits},
+                                       {"ratio", score.ratio},
+                                       {"event", score.is_event != 0},
+                                       {"cut", score.is_cut != 0},
+                                       {"start", score.is_start != 0},
+                                       {"peak", {{"x_px", peak.x_px}, {"y_px", peak.y_px}, {"bits", peak.bits}}},
+                                       {"ms", rounded_ms(push_ms)}};
+  print_output("%s\n", json_text(line).c_str());
+  flush_output();  // for who reads line by line
+}
+
+void print_event(double time_s, const maq_frame_desc& desc, const maq_surprise_score& score, const Peak& peak) {
+  print_output("%9.2f s  frame %llu  x %.2f  %.2f bits a code", time_s, (unsigned long long)desc.sequence,
+               double(score.ratio), double(score.bits));
+  if (score.is_cut != 0) print_output("  cut");
+  if (score.is_cut == 0 && score.ratio > 1) print_output("  most at (%.0f, %.0f)", peak.x_px, peak.y_px);
+  print_output("\n");
+  flush_output();
+}
+
+}  // namespace
+
+int run_surprise(const SurpriseOptions& options) {
+  catch_interrupts();
+  const SourceArgument argument = parse_source_argument(options.source);
+  const maquette::Context context = open_context();
+  maquette::Source source(context, argument.uri);
+  const StoppedByInterrupt stopped(source);
+  const std::string bundle = options.bundle.empty() ? default_prediction_bundle() : options.bundle;
+  maq_surprise_config config = maquette::default_surprise_config();
+  if (!bundle.empty()) config.bundle_path = bundle.c_str();
+  config.threads = options.threads;
+  config.event_ratio = float(options.event_ratio);
+  maquette::Surprise surprise(context, config);
+
+  SurpriseMeter meter;
+  int64_t frames = 0, first_ns = 0;
+  double bits = 0;
+  while (!interrupted() && (options.max_frames == 0 || frames < options.max_frames)) {
+    const auto frame = source.next();
+    if (!frame) break;
+    const maq_frame_desc desc = frame->desc();
+    if (frames == 0) first_ns = desc.timestamp_ns;
+    const maq_surprise_score score = surprise.push(*frame);
+    const Peak peak = peak_of(surprise.map(), score, desc);
+    const double time_s = double(desc.timestamp_ns - first_ns) / 1e9;
+    ++frames;
+    if (score.is_start == 0) bits += double(score.bits);
+    if (options.json) {
+      print_json(argument.stem, desc, score, peak, double(surprise.stats().push_ms));
+    } else if (score.is_event != 0) {
+      meter.clear();
+      print_event(time_s, desc, score, peak);
+    }
+    meter.show(time_s, score);
+  }
+  meter.clear();
+  if (!options.json) {
+    const maq_surprise_stats stats = surprise.stats();
+    const uint64_t compared = stats.pushed_count - stats.start_count;
+    print_output("%s  %llu frames, %.2f bits a code in the mean, %llu events\n", argument.stem.c_str(),
+                 (unsigned long long)stats.pushed_count, compared > 0 ? bits / double(compared) : 0,
+                 (unsigned long long)stats.event_count);
+  }
+  return interrupted() && options.max_frames != 0 ? 1 : 0;
+}

@@ -1,0 +1,69 @@
+// Nearest entries: against float64, ties, NaN.
+#include "prediction/codes/nearest_entry.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace {
+
+maq::FrameCodes random_codes(size_t slices, size_t entries, size_t width, size_t side, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal;
+  maq::FrameCodes codes;
+  codes.slices = slices, codes.entries = entries, codes.width = width, codes.side = side;
+  codes.vectors.resize(slices * entries * width);
+  for (float& value : codes.vectors) value = normal(random);
+  return codes;
+}
+
+TEST(NearestEntry, IsThatOfFloat64ForEverySize) {
+  std::mt19937 random(2);
+  std::normal_distribution<float> normal;
+  for (const auto& [slices, entries, width, side] :
+       {std::array<size_t, 4>{4, 512, 32, 16}, {1, 1, 1, 1}, {3, 17, 5, 2}, {2, 15, 7, 3}, {1, 1024, 2, 5}}) {
+    const maq::FrameCodes codes = random_codes(slices, entries, width, side, 3);
+    std::vector<float> features(codes.places() * slices * width);
+    for (float& value : features) value = normal(random);
+    std::vector<uint16_t> found(codes.count());
+    maq::NearestEntry(codes).run(features.data(), codes.places(), found.data());
+    for (size_t place = 0; place < codes.places(); ++place) {
+      for (size_t slice = 0; slice < slices; ++slice) {
+        const auto distance = [&](size_t entry) {
+          double sum = 0;
+          for (size_t i = 0; i < width; ++i) {
+            const double difference = double(features[(place * slices + slice) * width + i]) -
+                                      double(codes.vectors[(slice * entries + entry) * width + i]);
+            sum += difference * difference;
+          }
+          return sum;
+        };
+        double least = std::numeric_limits<double>::infinity();
+        for (size_t entry = 0; entry < entries; ++entry) least = std::min(least, distance(entry));
+        EXPECT_LE(distance(found[place * slices + slice]), least + 1e-5) << place << " " << slice;
+      }
+    }
+  }
+}
+
+TEST(NearestEntry, IsTheLowestOfEqualsAndOfNumbersThatAreNone) {
+  maq::FrameCodes codes = random_codes(1, 40, 4, 2, 5);
+  for (const size_t copy : {6u, 21u, 39u}) std::copy_n(codes.vectors.data() + 12, 4, codes.vectors.data() + 4 * copy);
+  std::vector<float> features(16);
+  std::copy_n(codes.vectors.data() + 12, 4, features.data());
+  features[4] = std::numeric_limits<float>::quiet_NaN();
+  features[8] = std::numeric_limits<float>::infinity();
+  std::vector<uint16_t> found(4, 99);
+  maq::NearestEntry(codes).run(features.data(), 4, found.data());
+  EXPECT_EQ(found[0], 3);
+  EXPECT_EQ(found[1], 0);
+  EXPECT_LT(found[2], 40);
+  std::fill(codes.vectors.begin(), codes.vectors.end(), 0.0f);
+  maq::NearestEntry(codes).run(features.data(), 1, found.data());
+  EXPECT_EQ(found[0], 0) << "all are equal";
+}
+
+}  // namespace

@@ -1,0 +1,231 @@
+// How surprising frames are: bits, what is usual, what ends a stream.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <thread>
+
+#include "support/expect_error.h"
+#include "support/moving_texture.h"
+#include "support/tiny_prediction.h"
+
+namespace {
+
+constexpr int64_t kStep_ns = 33333333;
+
+// The shipped network; one for all tests.
+std::shared_ptr<maq::FrameEncoder> shipped() {
+  static const auto opened = tiny_prediction::encoder(MAQ_TEST_MODELS "/prediction-int8");
+  return opened;
+}
+
+maq::Frame texture_frame(double x, int64_t time_ns, int width = 320, int height = 240) {
+  return moving_texture::frame(MAQ_PIXEL_BGR8, width, height, x, 0, time_ns);
+}
+
+maq::Frame filled_frame(uint8_t value, int64_t time_ns, int width = 320, int height = 240) {
+  maq::Frame frame;
+  std::memset(frame.allocate_bgr(width, height), value, size_t(width) * size_t(height) * 3);
+  frame.timestamp_ns = time_ns;
+  return frame;
+}
+
+maq::Frame noise_frame(unsigned seed, int64_t time_ns) {
+  maq::Frame frame = filled_frame(0, time_ns);
+  std::mt19937 random(seed);
+  for (uint8_t& value : frame.storage) value = uint8_t(random());
+  return frame;
+}
+
+// A stream that moves for a while: what is usual is known.
+int64_t show_motion(maq::Surprise& surprise, int frames = 20) {
+  for (int i = 0; i < frames; ++i) surprise.push(texture_frame(2 * i, i * kStep_ns));
+  return frames * kStep_ns;
+}
+
+TEST(Surprise, BitsAreThoseOfPython) {
+  maq::Surprise surprise(tiny_prediction::encoder());
+  const std::string stored = read_text(tiny_prediction::kFolder + "/bits.f32");
+  std::vector<float> expected(stored.size() / sizeof(float));
+  std::memcpy(expected.data(), stored.data(), stored.size());
+  EXPECT_TRUE(surprise.push(tiny_prediction::frame(0)).is_start);
+  for (int number = 1; number < tiny_prediction::kFrames; ++number) {
+    const maq::SurpriseScore score = surprise.push(tiny_prediction::frame(number));
+    EXPECT_FALSE(score.is_start);
+    const float* const of_python = expected.data() + size_t(number - 1) * surprise.map().size();
+    for (size_t i = 0; i < surprise.map().size(); ++i) EXPECT_NEAR(surprise.map()[i], of_python[i], 2e-4) << i;
+    const float mean =
+        std::accumulate(of_python, of_python + surprise.map().size(), 0.0f) / float(surprise.map().size());
+    EXPECT_NEAR(score.bits, mean, 1e-4);
+  }
+}
+
+TEST(Surprise, AStreamThatStandsStillHasLessThanATenthOfABitFromTheFifthFrameOn) {
+  const auto expect_still = [](const maq::Frame& still, int frames) {
+    maq::Surprise surprise(shipped());
+    for (int i = 0; i < frames; ++i) {
+      maq::Frame frame;
+      frame.image = still.image;
+      frame.timestamp_ns = i * kStep_ns;
+      const maq::SurpriseScore score = surprise.push(frame);
+      ASSERT_TRUE(std::isfinite(score.bits) && score.bits >= 0);
+      ASSERT_TRUE(i < 4 || score.bits <= 0.1f) << i << " " << score.bits;
+      ASSERT_TRUE(i < 8 || (score.ratio > 0.4f && score.ratio < 2.5f)) << i << " " << score.ratio;
+      ASSERT_FALSE(score.is_cut);
+    }
+  };
+  expect_still(texture_frame(0, 0), 1000);
+  for (const maq::Frame& still : {filled_frame(0, 0), filled_frame(255, 0), noise_frame(1, 0)}) expect_still(still, 20);
+}
+
+TEST(Surprise, CutBlackOutAndFreezeStandOut) {
+  maq::Surprise surprise(shipped());
+  for (const auto& of_other_scene : {filled_frame(0, 20 * kStep_ns), noise_frame(3, 20 * kStep_ns)}) {
+    surprise.reset();
+    show_motion(surprise);
+    maq::Frame frame;
+    frame.image = of_other_scene.image;
+    frame.timestamp_ns = of_other_scene.timestamp_ns;
+    const maq::SurpriseScore score = surprise.push(frame);
+    EXPECT_TRUE(score.is_cut);
+    EXPECT_FALSE(score.is_start);
+    EXPECT_GT(score.ratio, 2);
+  }
+  surprise.reset();
+  const int64_t time_ns = show_motion(surprise);
+  float least = 1;
+  for (int i = 0; i < 4; ++i) {
+    const maq::SurpriseScore score = surprise.push(texture_frame(2 * 19, time_ns + i * kStep_ns));
+    least = std::min(least, score.ratio);
+    EXPECT_FALSE(score.is_cut);
+  }
+  EXPECT_LT(least, 0.25) << "freeze";
+}
+
+TEST(Surprise, NothingOfTheSceneBeforeACutIsKnownAfterIt) {
+  maq::Surprise cut(shipped()), fresh(shipped());
+  const int64_t time_ns = show_motion(cut);
+  const auto shown = [&](int i) {
+    return moving_texture::frame(MAQ_PIXEL_BGR8, 320, 240, 900 - i, 700, time_ns + i * kStep_ns);
+  };
+  cut.push(filled_frame(255, time_ns));
+  fresh.push(filled_frame(255, time_ns));
+  for (int i = 1; i < 12; ++i) {
+    const maq::SurpriseScore one = cut.push(shown(i)), other = fresh.push(shown(i));
+    EXPECT_EQ(one.bits, other.bits) << i;
+    EXPECT_EQ(one.ratio, other.ratio) << i;
+  }
+}
+
+TEST(Surprise, AnotherSizeOrFormatStandsOutAndStartsAnew) {
+  for (int kind = 0; kind < 2; ++kind) {
+    maq::Surprise surprise(shipped()), fresh(shipped());
+    const int64_t time_ns = show_motion(surprise);
+    const auto changed = [&](int i) {
+      return kind == 0 ? texture_frame(40 + 2 * i, time_ns + i * kStep_ns, 640, 480)
+                       : moving_texture::frame(MAQ_PIXEL_NV12, 320, 240, 40 + 2 * i, 0, time_ns + i * kStep_ns);
+    };
+    const maq::SurpriseScore score = surprise.push(changed(0));
+    EXPECT_TRUE(score.is_start);
+    EXPECT_GT(score.ratio, 2);
+    EXPECT_EQ(score.bits, fresh.push(changed(0)).bits);
+    for (int i = 1; i < 12; ++i) {
+      const maq::SurpriseScore one = surprise.push(changed(i)), other = fresh.push(changed(i));
+      EXPECT_EQ(one.bits, other.bits) << i;
+      EXPECT_EQ(one.ratio, other.ratio) << i;
+      EXPECT_FALSE(one.is_start);
+    }
+  }
+}
+
+TEST(Surprise, TimeThatGoesBackOrPausesStartsAnewWithoutAnEvent) {
+  constexpr int64_t kHour_ns = 3600000000000, kMin_ns = std::numeric_limits<int64_t>::min(),
+                    kMax_ns = std::numeric_limits<int64_t>::max();
+  for (const int64_t jump : {-kStep_ns, kHour_ns, maq::Surprise::kMaxInterval_ns + 1, -kHour_ns}) {
+    maq::Surprise surprise(shipped());
+    const int64_t last_ns = show_motion(surprise) - kStep_ns;
+    const maq::SurpriseScore score = surprise.push(texture_frame(40, last_ns + jump));
+    EXPECT_TRUE(score.is_start) << jump;
+    EXPECT_EQ(score.ratio, 1) << jump;
+  }
+  for (const int64_t step : {int64_t(0), maq::Surprise::kMaxInterval_ns}) {
+    maq::Surprise surprise(shipped());
+    const int64_t last_ns = show_motion(surprise) - kStep_ns;
+    EXPECT_FALSE(surprise.push(texture_frame(40, last_ns + step)).is_start) << step;
+  }
+  maq::Surprise surprise(shipped());
+  surprise.push(texture_frame(0, kMin_ns));
+  EXPECT_TRUE(surprise.push(texture_frame(0, kMax_ns)).is_start);
+  EXPECT_TRUE(surprise.push(texture_frame(0, kMin_ns)).is_start);
+  EXPECT_FALSE(surprise.push(texture_frame(0, kMin_ns)).is_start);
+  maq::Frame of_other_clock = texture_frame(0, kMin_ns);
+  of_other_clock.clock = MAQ_CLOCK_MONOTONIC;
+  EXPECT_TRUE(surprise.push(of_other_clock).is_start);
+}
+
+TEST(Surprise, OfOneFrameAndOfFewNothingIsUsual) {
+  maq::Surprise surprise(shipped());
+  EXPECT_TRUE(surprise.map().empty());
+  const maq::SurpriseScore first = surprise.push(texture_frame(0, 0));
+  EXPECT_TRUE(first.is_start);
+  EXPECT_EQ(first.ratio, 1);
+  EXPECT_GT(first.bits, 5) << "by how rare codes are";
+  EXPECT_EQ(surprise.map().size(), 256u);
+  for (int i = 1; i <= int(maq::Surprise::kMinBefore); ++i) {
+    EXPECT_EQ(surprise.push(texture_frame(i * i, i * kStep_ns)).ratio, 1) << i;
+  }
+  EXPECT_LT(surprise.push(texture_frame(16, 5 * kStep_ns)).ratio, 1);
+}
+
+TEST(Surprise, TheMapSaysWhereAndItsMeanIsTheFramesBits) {
+  maq::Surprise surprise(shipped());
+  for (int i = 0; i < 12; ++i) surprise.push(texture_frame(0, i * kStep_ns));
+  maq::Frame changed = texture_frame(0, 12 * kStep_ns);
+  for (int y = 120; y < 180; ++y) std::memset(changed.storage.data() + size_t(y) * 960 + 480, 255, 240);
+  const maq::SurpriseScore score = surprise.push(changed);
+  const std::vector<float>& map = surprise.map();
+  const double mean = std::accumulate(map.begin(), map.end(), 0.0) / double(map.size());
+  EXPECT_NEAR(mean, double(score.bits), 1e-4);
+  const auto peak = size_t(std::max_element(map.begin(), map.end()) - map.begin());
+  EXPECT_TRUE(peak / 16 >= 7 && peak / 16 <= 12 && peak % 16 >= 7 && peak % 16 <= 12) << peak;
+  EXPECT_LT(map[0], 0.3) << "nothing changed there";
+  EXPECT_LT(map[255], 0.3);
+}
+
+TEST(Surprise, AFrameThatCannotBeEncodedLeavesTheStreamAsItWas) {
+  maq::Surprise surprise(shipped()), other(shipped());
+  const int64_t time_ns = show_motion(surprise);
+  show_motion(other);
+  const std::vector<float> map = surprise.map();
+  maq::Frame depth;
+  depth.allocate(MAQ_PIXEL_DEPTH16, 320, 240);
+  expect_error(MAQ_ERROR_UNSUPPORTED, "depth", [&] { surprise.push(depth); });
+  EXPECT_EQ(surprise.map(), map);
+  const maq::SurpriseScore one = surprise.push(texture_frame(40, time_ns)),
+                           two = other.push(texture_frame(40, time_ns));
+  EXPECT_EQ(one.bits, two.bits);
+  EXPECT_EQ(one.ratio, two.ratio);
+}
+
+TEST(Surprise, StreamsThatShareNetworksDoNotDependOnEachOther) {
+  std::vector<float> alone;
+  maq::Surprise surprise(shipped());
+  for (int i = 0; i < 30; ++i) alone.push_back(surprise.push(texture_frame(2 * i, i * kStep_ns)).bits);
+  std::vector<std::thread> threads;
+  for (int k = 0; k < 4; ++k) {
+    threads.emplace_back([&, k] {
+      maq::Surprise own(shipped());
+      for (int i = 0; i < 30; ++i) {
+        const bool is_same = k % 2 == 0;
+        const float bits =
+            own.push(is_same ? texture_frame(2 * i, i * kStep_ns) : noise_frame(unsigned(100 * k + i), i * kStep_ns))
+                .bits;
+        EXPECT_TRUE(!is_same || bits == alone[size_t(i)]) << k << " " << i;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+}  // namespace

@@ -18,7 +18,7 @@ from pathlib import Path
 import maquette
 import numpy as np
 
-from export.clips.events import KINDS
+from export.clips.events import KINDS, with_event
 from export.prediction.data import Clips, read_clips
 from export.prediction.evaluate_events import Score, difference, flow_residual, measured
 
@@ -35,6 +35,28 @@ def sdk_surprise(bundle: Path) -> Score:
         return np.array(bits[1:])
 
     return score
+
+
+def cuts_found(clips: Clips, bundle: Path, seed: int) -> dict[str, tuple[int, int]]:
+    """How many frames say that they are cuts, and of how many: by kind of event the first frame of each, and under ""
+    all frames of clips without events."""
+    stream = maquette.Surprise(bundle_path=bundle, threads=1)
+
+    def flags(frames: np.ndarray, fps: float) -> list[bool]:
+        stream.reset()
+        return [stream.push(np.ascontiguousarray(frame), time_s=t / fps).is_cut for t, frame in enumerate(frames)]
+
+    frames, fps = clips.frames.numpy(), clips.fps.numpy()
+    without = [flag for own, rate in zip(frames, fps, strict=True) for flag in flags(own, float(rate))]
+    found = {"": (sum(without), len(without))}
+    for number, kind in enumerate(KINDS):
+        at_event = []
+        for k, (own, rate) in enumerate(zip(frames, fps, strict=True)):
+            rng = np.random.default_rng([seed, number, k])
+            event = with_event(kind, own, frames[(k + 1) % len(frames)], float(rate), rng)
+            at_event.append(flags(event.rgb, float(rate))[event.at])
+        found[kind] = (sum(at_event), len(at_event))
+    return found
 
 
 def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
@@ -68,6 +90,8 @@ def main() -> None:
     clips = read_clips(options.data, options.sets, options.split)
     if options.clips:
         clips = Clips(clips.frames[: options.clips], clips.fps[: options.clips], clips.names[: options.clips])
+    cuts = cuts_found(clips, options.bundle, options.seed)
+    print("called a cut: " + ", ".join(f"{kind or 'without event'} {n}/{of}" for kind, (n, of) in cuts.items()))
     scores = {"difference": difference, "flow residual": flow_residual, "surprise": sdk_surprise(options.bundle)}
     areas = measured(clips, scores, options.seed)
     print(" | ".join(["", *KINDS, "mean"]))

@@ -99,6 +99,13 @@ class Surprise(NativeObject):
         """Forgets the frames so far, as before another stream."""
         native().call("maq_surprise_reset", self.handle)
 
+    def rebuilt(self) -> Frame:
+        """What the network saw of the latest frame: a picture of 64 x 64; what is not in it cannot be surprising. Hold
+        at most four at once. Raises MaquetteError."""
+        n = native()
+        made = n.create("maq_frame", self.handle, function="maq_surprise_acquire_rebuilt", release="maq_frame_release")
+        return Frame.of_handle(made)
+
     @property
     def stats(self) -> dict[str, float]:
         """Milliseconds of the latest frame, and counts: the fields of maq_surprise_stats."""

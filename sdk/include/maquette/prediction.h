@@ -162,6 +162,14 @@ MAQ_API maq_status maq_surprise_push(maq_surprise* surprise, const maq_frame* fr
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little room; before the first frame). Does not block. */
 MAQ_API maq_status maq_surprise_copy_map(const maq_surprise* surprise, float* bits, size_t count);
 
+/* Makes the picture that the codes of the latest frame stand for: what the network saw of it. What is not in it cannot
+ * be surprising. RGB, square (64 x 64 pixels in the bundles of this SDK) whatever the frame's shape, with the frame's
+ * time; maq_frame_get_origin says MAQ_FRAME_PREDICTED, as of every frame that no camera took, with a horizon of 0. The
+ * first call opens a second network. `*frame` comes from a pool of 4: give it back with maq_frame_release. One at a
+ * time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also before the first frame), MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_BAD_BUNDLE,
+ * MAQ_ERROR_INFERENCE. Blocks while the network runs. */
+MAQ_API maq_status maq_surprise_acquire_rebuilt(maq_surprise* surprise, maq_frame** frame);
+
 /* Forgets the frames so far, as before another stream.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_surprise_reset(maq_surprise* surprise);

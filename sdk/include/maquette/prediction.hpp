@@ -81,6 +81,13 @@ class Surprise {
     return bits;
   }
 
+  // What the network saw of the latest frame.
+  Frame rebuilt() {
+    maq_frame* made = nullptr;
+    check(maq_surprise_acquire_rebuilt(get(), &made));
+    return Frame(made);
+  }
+
   void reset() { check(maq_surprise_reset(get())); }
 
   maq_surprise_stats stats() const {

@@ -6,15 +6,22 @@
 #include "core/clock.h"
 #include "core/worker_threads.h"
 #include "maquette/prediction.h"
+#include "prediction/codes/frame_decoder.h"
 #include "prediction/codes/surprise.h"
 
 using namespace maq;
 
 struct maq_surprise : HandleOf<HandleKind::kSurprise> {
-  maq_surprise(std::shared_ptr<ContextState> of, std::shared_ptr<FrameEncoder> encoder, float ratio)
-      : state(std::move(of)), surprise(std::move(encoder)), event_ratio(ratio) {}
+  maq_surprise(std::shared_ptr<ContextState> of, std::shared_ptr<FrameEncoder> encoder,
+               std::shared_ptr<FrameDecoder> to_pictures, float ratio)
+      : state(std::move(of)), surprise(std::move(encoder)), decoder(std::move(to_pictures)), event_ratio(ratio) {}
   std::shared_ptr<ContextState> state;
   Surprise surprise;
+  std::shared_ptr<FrameDecoder> decoder;
+  BoundedPool<maq_frame> pictures{4, "rebuilt pictures"};
+  int64_t timestamp_ns = 0;  // of the latest frame
+  uint64_t sequence = 0;
+  maq_clock clock = MAQ_CLOCK_MEDIA;
   const float event_ratio;
   float push_ms = 0;
   uint64_t pushed = 0, events = 0, starts = 0;
@@ -32,18 +39,25 @@ maq_surprise_config default_surprise_config() {
   return config;
 }
 
-std::shared_ptr<FrameEncoder> make_encoder(const ContextState& state, std::shared_ptr<const OnnxRuntimeLibrary> runtime,
-                                           const maq_surprise_config& config) {
+struct Networks {
+  std::shared_ptr<FrameEncoder> encoder;
+  std::shared_ptr<FrameDecoder> decoder;
+};
+
+Networks open_networks(ContextState& state, const maq_surprise_config& config) {
   require_threads("config.threads", config.threads, kMaxThreads);
   require_range("config.allow_spinning", config.allow_spinning, 0, 1);
   SessionSettings settings;
   settings.threads = config.threads != 0 ? config.threads : default_threads();
   settings.spin = config.allow_spinning == 1;
-  CodeBundle bundle(read_bundle_argument(config, "config", kPredictionBundle));
-  const Manifest manifest = bundle.bundle.manifest;
-  auto made = std::make_shared<FrameEncoder>(std::move(runtime), std::move(bundle), settings);
+  const CodeBundle bundle(read_bundle_argument(config, "config", kPredictionBundle));
+  Networks made;
+  made.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, settings);
+  settings.threads = made.encoder->threads();
+  made.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, settings);
+  const Manifest& manifest = bundle.bundle.manifest;
   state.log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
-                    ") loaded, ", made->threads(), " thread(s)");
+                    ") loaded, ", settings.threads, " thread(s)");
   return made;
 }
 
@@ -62,14 +76,15 @@ maq_status maq_surprise_create(maq_context* context, const maq_surprise_config* 
     if (!(config.event_ratio > 1 && config.event_ratio <= 1e6f)) {
       throw ArgumentError("config.event_ratio is ", config.event_ratio, ", but must be above 1, and at most 1e6.");
     }
-    std::shared_ptr<FrameEncoder> encoder;
+    Networks networks;
     if (config.networks_of != nullptr) {
       require_argument(config.networks_of, "config.networks_of");
-      encoder = config.networks_of->surprise.encoder();
+      networks = {config.networks_of->surprise.encoder(), config.networks_of->decoder};
     } else {
-      encoder = make_encoder(*context->state, context->state->onnxruntime(), config);
+      networks = open_networks(*context->state, config);
     }
-    *surprise = new maq_surprise(context->state, std::move(encoder), config.event_ratio);
+    *surprise =
+        new maq_surprise(context->state, std::move(networks.encoder), std::move(networks.decoder), config.event_ratio);
     return MAQ_OK;
   });
 }
@@ -84,6 +99,9 @@ maq_status maq_surprise_push(maq_surprise* surprise, const maq_frame* frame, maq
     const Stopwatch whole;
     const SurpriseScore found = surprise->surprise.push(frame->frame);
     surprise->push_ms = float(whole.elapsed_ms());
+    surprise->timestamp_ns = frame->frame.timestamp_ns;
+    surprise->sequence = frame->frame.sequence;
+    surprise->clock = frame->frame.clock;
     const float limit = surprise->event_ratio;
     const bool is_event = found.is_cut || found.ratio >= limit || found.ratio * limit <= 1;
     surprise->pushed += 1;
@@ -105,6 +123,24 @@ maq_status maq_surprise_copy_map(const maq_surprise* surprise, float* bits, size
     if (map.empty()) throw ArgumentError("No frame was pushed, so there is no map; push one first.");
     if (count < map.size()) throw ArgumentError("count is ", count, ", but the map has ", map.size(), " cells.");
     std::copy(map.begin(), map.end(), bits);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_surprise_acquire_rebuilt(maq_surprise* surprise, maq_frame** frame) {
+  return guarded_alone(surprise, "surprise", __func__, [&] {
+    require_argument(frame, "frame");
+    if (surprise->surprise.map().empty()) throw ArgumentError("No frame was pushed, so there is nothing to rebuild.");
+    BoundedPool<maq_frame>::Pooled handle = surprise->pictures.acquire();
+    const int side_px = surprise->decoder->frame_px();
+    Frame& picture = handle->frame;
+    picture.clear();
+    surprise->decoder->run(surprise->surprise.codes().data(), picture.allocate(MAQ_PIXEL_RGB8, side_px, side_px));
+    picture.timestamp_ns = surprise->timestamp_ns;
+    picture.sequence = surprise->sequence;
+    picture.clock = surprise->clock;
+    picture.origin = {true, picture.timestamp_ns, picture.sequence, 0};
+    *frame = lend<maq_frame>(std::move(handle));
     return MAQ_OK;
   });
 }

@@ -318,7 +318,9 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "side"));
   command->add_option("-t,--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
-  for_pictures(command->add_option("-o,--out", options->out, "Clip (.mp4 or .avi), or folder for PNG files"));
+  command->add_option("-o,--out", options->out,
+                      "Clip (.mp4 or .avi), or folder for PNG files; with --surprise a clip that shows where, what the "
+                      "network saw, and the curve");
   command->add_flag("--json", options->json, "Print one JSON document, or with --surprise a line a frame");
   command->footer(
       "A clip begins with the last second that was seen; predicted frames have a border and say how far ahead they\n"
@@ -329,7 +331,8 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "  maquette predict clip.mp4 --from 40 --compare            # the figures alone\n"
       "  maquette predict 'stub:people?count=2' --method motion --out next/\n"
       "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4\n"
-      "  maquette predict camera: --surprise --events 6           # what stands out: cuts, a frozen or covered camera");
+      "  maquette predict camera: --surprise --events 6           # what stands out: cuts, a frozen or covered camera\n"
+      "  maquette predict clip.mp4 --surprise --out surprise.mp4");
   command->callback([=] {
     if (!*is_surprise) {
       *exit_code = predict(*options);
@@ -338,6 +341,7 @@ void add_predict_command(CLI::App& app, int* exit_code) {
     surprise->source = options->source;
     surprise->threads = options->threads;
     surprise->json = options->json;
+    surprise->out = options->out;
     *exit_code = run_surprise(*surprise);
   });
 }

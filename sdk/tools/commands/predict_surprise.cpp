@@ -6,14 +6,19 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <maquette/maquette.hpp>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "arguments/bundle_argument.h"
 #include "arguments/source_argument.h"
 #include "interrupt.h"
+#include "output/frame_image.h"
 #include "output/output_file.h"
+#include "output/surprise_picture.h"
 #include "print.h"
 #include "program.h"
 
@@ -95,6 +100,17 @@ void print_event(double time_s, const maq_frame_desc& desc, const maq_surprise_s
   flush_output();
 }
 
+// "": none.
+std::optional<maquette::Clip> open_clip(const maquette::Context& context, const std::string& path, double fps) {
+  if (path.empty()) return std::nullopt;
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (extension != ".mp4" && extension != ".avi") {
+    throw std::runtime_error(path + " is no clip of surprise; give a name that ends in .mp4 or .avi.");
+  }
+  make_folder_of(path);
+  return maquette::Clip(context, path, fps > 0 ? fps : 10);
+}
+
 }  // namespace
 
 int run_surprise(const SurpriseOptions& options) {
@@ -110,6 +126,8 @@ int run_surprise(const SurpriseOptions& options) {
   config.event_ratio = float(options.event_ratio);
   maquette::Surprise surprise(context, config);
 
+  std::optional<maquette::Clip> clip = open_clip(context, options.out, source.info().fps);
+  SurprisePicture picture;
   SurpriseMeter meter;
   int64_t frames = 0, first_ns = 0;
   double bits = 0;
@@ -122,6 +140,7 @@ int run_surprise(const SurpriseOptions& options) {
     const Peak peak = peak_of(surprise.map(), score, desc);
     const double time_s = double(desc.timestamp_ns - first_ns) / 1e9;
     ++frames;
+    if (clip) clip->add(frame_of(context, picture.draw(*frame, surprise.rebuilt(), score, surprise.map())));
     if (score.is_start == 0) bits += double(score.bits);
     if (options.json) {
       print_json(argument.stem, desc, score, peak, double(surprise.stats().push_ms));
@@ -132,12 +151,13 @@ int run_surprise(const SurpriseOptions& options) {
     meter.show(time_s, score);
   }
   meter.clear();
+  if (clip && frames > 0) clip->finish();
   if (!options.json) {
     const maq_surprise_stats stats = surprise.stats();
     const uint64_t compared = stats.pushed_count - stats.start_count;
-    print_output("%s  %llu frames, %.2f bits a code in the mean, %llu events\n", argument.stem.c_str(),
+    print_output("%s  %llu frames, %.2f bits a code in the mean, %llu events%s%s\n", argument.stem.c_str(),
                  (unsigned long long)stats.pushed_count, compared > 0 ? bits / double(compared) : 0,
-                 (unsigned long long)stats.event_count);
+                 (unsigned long long)stats.event_count, options.out.empty() ? "" : " -> ", options.out.c_str());
   }
   return interrupted() && options.max_frames != 0 ? 1 : 0;
 }

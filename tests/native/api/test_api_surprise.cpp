@@ -70,6 +70,34 @@ TEST_F(ApiSurprise, TheInstalledBundleFindsACutAsAnEvent) {
   EXPECT_EQ(surprise.stats().event_count, 1u);
 }
 
+TEST_F(ApiSurprise, WhatTheNetworkSawIsAPictureLikeTheFrameAndMarkedAsMadeUp) {
+  maquette::Surprise surprise(context_);
+  maq_frame* made = nullptr;
+  EXPECT_EQ(maq_surprise_acquire_rebuilt(surprise.get(), &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(last_text().find("No frame was pushed"), std::string::npos);
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=64x64&fps=30");
+  source.next();
+  const auto frame = source.next();
+  surprise.push(*frame);
+  const maquette::Frame rebuilt = surprise.rebuilt();
+  EXPECT_EQ(rebuilt.desc().width_px, 64);
+  EXPECT_EQ(rebuilt.desc().timestamp_ns, frame->desc().timestamp_ns);
+  EXPECT_EQ(rebuilt.origin().kind, MAQ_FRAME_PREDICTED);
+  EXPECT_EQ(rebuilt.origin().horizon_ns, 0);
+  EXPECT_EQ(rebuilt.origin().captured_sequence, 1u);
+  std::vector<uint8_t> one(64 * 64 * 3), other(one.size());
+  rebuilt.copy_pixels(MAQ_PIXEL_RGB8, one.data(), 0, one.size());
+  frame->copy_pixels(MAQ_PIXEL_RGB8, other.data(), 0, other.size());
+  double squares = 0;
+  for (size_t i = 0; i < one.size(); ++i) squares += std::pow(double(one[i]) - double(other[i]), 2);
+  EXPECT_LT(std::sqrt(squares / double(one.size())), 30) << "of 255, of a kind of picture that it was not trained on";
+  std::vector<maquette::Frame> held;
+  for (int i = 0; i < 3; ++i) held.push_back(surprise.rebuilt());
+  EXPECT_EQ(maq_surprise_acquire_rebuilt(surprise.get(), &made), MAQ_ERROR_POOL_EMPTY);
+  EXPECT_EQ(maq_surprise_acquire_rebuilt(surprise.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(made, nullptr);
+}
+
 TEST_F(ApiSurprise, StreamsShareNetworksThatOutliveTheFirst) {
   maq_surprise_config config = surprise_config();
   auto first = std::make_unique<maquette::Surprise>(context_, config);

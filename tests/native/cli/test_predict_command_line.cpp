@@ -159,12 +159,23 @@ TEST_F(PredictCommandLine, NamesTheEventsOfAClip) {
   EXPECT_NE(result.out.find("1 events"), std::string::npos) << result.out;
 }
 
+TEST_F(PredictCommandLine, DrawsSurpriseAsAClip) {
+  const Outcome result = run("square.avi --surprise --max-frames 8 --out o/surprise.avi");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find(" -> o/surprise.avi"), std::string::npos) << result.out;
+  cv::VideoCapture clip(folder_.file("o/surprise.avi"));
+  int frames = 0;
+  for (cv::Mat picture; clip.read(picture); ++frames) EXPECT_EQ(picture.size(), cv::Size(320, 120 + 64));
+  EXPECT_EQ(frames, 8);
+}
+
 TEST_F(PredictCommandLine, SurpriseAndPicturesDoNotMix) {
   for (const char* wrong :
-       {"square.avi --surprise --compare", "square.avi --surprise --out o.mp4", "square.avi --events 6",
-        "square.avi --surprise --events 1", "square.avi --surprise --max-frames 0", "square.avi --surprise --from 3"}) {
+       {"square.avi --surprise --compare", "square.avi --events 6", "square.avi --surprise --events 1",
+        "square.avi --surprise --max-frames 0", "square.avi --surprise --from 3"}) {
     EXPECT_EQ(run(wrong).exit_code, 2) << wrong;
   }
+  expect_failure("square.avi --surprise --out pictures", "ends in .mp4 or .avi");
   expect_failure("missing.avi --surprise", "missing.avi");
   expect_failure("square.avi --surprise --bundle nowhere", "nowhere");
 }

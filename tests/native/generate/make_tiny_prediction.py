@@ -2,7 +2,8 @@
 
 `bundle`: 16 x 16 places of two codes of 16. `frames.rgb`: uint8 [6][64][64][3], things that move over a texture, the
 last one of another scene. `codes.u8`: [6][256][2], codes by torch. `bits.f32`: little-endian [5][256], bits of a code
-of each frame but the first, mean of the place, by export/prediction/table.py. `large.rgb`: uint8 [120][160][3], and
+of each frame but the first, mean of the place, by export/prediction/table.py. `rebuilt.f32`: [64][64][3], the first
+frame's codes decoded by torch, 0..255. `large.rgb`: uint8 [120][160][3], and
 `large.u8`: what OpenCV's INTER_AREA squeezes it to, [64][64][3].
 
     python -m tests.native.generate.make_tiny_prediction
@@ -54,6 +55,7 @@ def main() -> None:
     export_bundle(net, table, FOLDER / "bundle", BundleInfo("tiny-prediction", "fp32"))
     stored = read_code_file(FOLDER / "bundle" / "codes.maqc")
     bits = bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy())
+    net.decode(codes[:1])[0].numpy().astype("<f4").tofile(FOLDER / "rebuilt.f32")
     frames.tofile(FOLDER / "frames.rgb")
     codes.permute(0, 2, 3, 1).numpy().astype(np.uint8).tofile(FOLDER / "codes.u8")
     bits.mean(1).astype("<f4").tofile(FOLDER / "bits.f32")

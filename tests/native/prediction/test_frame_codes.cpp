@@ -1,6 +1,7 @@
 // Frames as codes: what torch says, and extreme pictures.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "support/expect_error.h"
@@ -32,6 +33,26 @@ TEST(FrameCodes, AreThoseOfTorch) {
     equal += equal_count(codes, std::vector<uint16_t>(of_torch, of_torch + codes.size()));
   }
   EXPECT_GE(double(equal), 0.999 * double(expected.size())) << "of " << expected.size();
+}
+
+TEST(FrameCodes, ThePictureOfThemIsThatOfTorch) {
+  const maq::CodeBundle bundle(maq::read_bundle(tiny_prediction::kBundle));
+  const auto encoder = tiny_prediction::encoder();
+  maq::FrameDecoder decoder(tiny_prediction::runtime(), bundle, {});
+  const std::string stored = read_text(kFolder + "/rebuilt.f32"), codes = read_text(kFolder + "/codes.u8");
+  std::vector<uint16_t> of_torch(encoder->codes().count());
+  for (size_t i = 0; i < of_torch.size(); ++i) of_torch[i] = uint8_t(codes[i]);
+  std::vector<uint8_t> rgb(64 * 64 * 3);
+  for (int again = 0; again < 2; ++again) {
+    decoder.run(of_torch.data(), rgb.data());
+    double squares = 0;
+    for (size_t i = 0; i < rgb.size(); ++i) {
+      float expected;
+      std::memcpy(&expected, stored.data() + i * sizeof expected, sizeof expected);
+      squares += std::pow(double(rgb[i]) - std::round(double(expected)), 2);
+    }
+    EXPECT_LE(squares / double(rgb.size()), 255.0 * 255.0 / 1e5) << "PSNR is at least 50 dB";
+  }
 }
 
 TEST(FrameCodes, OfALargeFrameAreThoseOfThePictureThatOpenCVMakesOfIt) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/log.h"
+#include "prediction/codes/frame_decoder.h"
 #include "prediction/codes/surprise.h"
 #include "support/temp_folder.h"
 

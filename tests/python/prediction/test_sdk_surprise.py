@@ -50,6 +50,21 @@ def test_cells_of_test_clips_have_the_bits_of_torch(clips, tmp_path):
     assert equal >= 0.999 * cells, f"{cells - equal} of {cells} cells differ"
 
 
+def test_what_was_seen_is_the_picture_that_torch_makes_of_the_codes(clips, tmp_path):
+    net = load_autoencoder(WEIGHTS)
+    codes = net.encode(torch.from_numpy(clips[0]))
+    export_bundle(net, CodeTable.counted(codes[None], net.shape.entries), tmp_path, BundleInfo("whole", "fp32"))
+    surprise = maquette.Surprise(bundle_path=tmp_path, threads=1)
+    psnr_db = []
+    for t in (0, 14, 29):
+        surprise.push(np.ascontiguousarray(clips[0][t]), time_s=t / 10)
+        expected = net.decode(codes[t : t + 1])[0].numpy().clip(0, 255).round()
+        squares = np.mean((surprise.rebuilt().pixels().astype(np.float64) - expected) ** 2)
+        psnr_db.append(10 * np.log10(255**2 / max(squares, 1e-3)))
+    # One code of a thousand may differ by a near tie, which shows in its cell.
+    assert np.median(psnr_db) >= 50, psnr_db
+
+
 def test_the_shipped_bundle_finds_a_cut_between_clips_and_nothing_in_them(clips):
     surprise = maquette.Surprise(threads=1)
     frames = np.concatenate([clips[0][:20], clips[1][:20]])

@@ -18,10 +18,10 @@ Bundle checked_prediction(Bundle bundle) {
   return bundle;
 }
 
-FrameCodes codes_of(Bundle& bundle) {
+std::shared_ptr<const FrameCodes> codes_of(Bundle& bundle) {
   const std::string name = bundle.manifest.listed_file(bundle.manifest.root.at("codes").at("file"));
   const std::vector<uint8_t>& bytes = bundle.files.at(name);
-  FrameCodes codes = read_code_file(bytes.data(), bytes.size(), bundle.path_of(name));
+  auto codes = std::make_shared<const FrameCodes>(read_code_file(bytes.data(), bytes.size(), bundle.path_of(name)));
   bundle.files.erase(name);
   return codes;
 }

@@ -2,6 +2,8 @@
 // codes stand for.
 #pragma once
 
+#include <memory>
+
 #include "nn/bundle.h"
 #include "nn/session.h"
 #include "prediction/codes/code_file.h"
@@ -14,12 +16,12 @@ struct CodeBundle {
   explicit CodeBundle(Bundle opened);
 
   Bundle bundle;  // without the bytes of the file of codes
-  FrameCodes codes;
+  std::shared_ptr<const FrameCodes> codes;
   int frame_px = 0;  // side of the square that a frame is squeezed to
 
   Shape frame_shape() const { return {1, frame_px, frame_px, 3}; }
   Shape features_shape() const {
-    return {1, int64_t(codes.side), int64_t(codes.side), int64_t(codes.slices * codes.width)};
+    return {1, int64_t(codes->side), int64_t(codes->side), int64_t(codes->slices * codes->width)};
   }
 };
 

@@ -11,10 +11,10 @@
 
 namespace maq {
 
-FrameEncoder::FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, CodeBundle bundle,
+FrameEncoder::FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const CodeBundle& bundle,
                            SessionSettings settings)
-    : codes_(std::move(bundle.codes)),
-      nearest_(codes_),
+    : codes_(bundle.codes),
+      nearest_(*codes_),
       frame_px_(bundle.frame_px),
       input_shape_(bundle.frame_shape()),
       output_shapes_{bundle.features_shape()} {
@@ -49,11 +49,11 @@ EncoderTimes FrameEncoder::run(const ImageView& image, uint16_t* found) {
   inputs_.assign(1, {image_.data(), input_shape_});
   const float* const features = session_->run(inputs_, output_shapes_)[0].data;
   times.network_ms = float(stage.lap_ms());
-  if (!are_finite(features, codes_.count() * codes_.width)) {
+  if (!are_finite(features, codes_->count() * codes_->width)) {
     throw Error(MAQ_ERROR_INFERENCE,
                 "The encoder of frames gave numbers that are not finite. Install the bundle again.");
   }
-  nearest_.run(features, codes_.places(), found);
+  nearest_.run(features, codes_->places(), found);
   times.nearest_ms = float(stage.lap_ms());
   return times;
 }

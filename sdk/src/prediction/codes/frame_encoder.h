@@ -22,10 +22,10 @@ struct EncoderTimes {
 // For several streams, from any thread: their frames are encoded one after another.
 class FrameEncoder {
  public:
-  // `settings.threads` may be MAQ_THREADS_MEASURED. Throws what Session throws.
-  FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, CodeBundle bundle, SessionSettings settings);
+  // `settings.threads` may be MAQ_THREADS_MEASURED. The bundle is not needed afterwards. Throws what Session throws.
+  FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const CodeBundle& bundle, SessionSettings settings);
 
-  const FrameCodes& codes() const { return codes_; }
+  const FrameCodes& codes() const { return *codes_; }
   int threads() const { return threads_; }  // in use
 
   // Squeezes the frame to a square, by area, in bytes as the network was trained on them, and writes codes().count()
@@ -34,7 +34,7 @@ class FrameEncoder {
   EncoderTimes run(const ImageView& image, uint16_t* found);
 
  private:
-  FrameCodes codes_;
+  const std::shared_ptr<const FrameCodes> codes_;
   const NearestEntry nearest_;
   const int frame_px_;
   const Shape input_shape_;

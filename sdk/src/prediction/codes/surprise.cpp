@@ -14,7 +14,10 @@ constexpr float kFloor_bits = 0.035f;  // what the noise of a picture that stand
 }  // namespace
 
 Surprise::Surprise(std::shared_ptr<FrameEncoder> encoder)
-    : encoder_(std::move(encoder)), code_surprise_(encoder_->codes()), codes_(encoder_->codes().count()) {
+    : encoder_(std::move(encoder)),
+      code_surprise_(encoder_->codes()),
+      codes_(encoder_->codes().count()),
+      coming_(codes_.size()) {
   map_.reserve(encoder_->codes().places());
   before_.reserve(kBefore + 1);
 }
@@ -46,7 +49,8 @@ float Surprise::ratio_of(float bits) const {
 }
 
 SurpriseScore Surprise::push(const Frame& frame) {
-  times_ = encoder_->run(frame.image, codes_.data());
+  times_ = encoder_->run(frame.image, coming_.data());
+  codes_.swap(coming_);
   SurpriseScore score;
   const bool is_of_other_kind = has_frame_ && !is_of_same_kind(frame);
   score.is_start = !has_frame_ || is_of_other_kind || !is_soon_after(frame);

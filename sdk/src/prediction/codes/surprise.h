@@ -36,6 +36,8 @@ class Surprise {
 
   // Of the latest frame, a code's bits by place: [side][side], row by row. Empty before the first.
   const std::vector<float>& map() const { return map_; }
+  // Codes of the latest frame: [places][slices]. Of use after the first.
+  const std::vector<uint16_t>& codes() const { return codes_; }
   const EncoderTimes& times() const { return times_; }
   const std::shared_ptr<FrameEncoder>& encoder() const { return encoder_; }
 
@@ -46,7 +48,7 @@ class Surprise {
 
   std::shared_ptr<FrameEncoder> encoder_;
   CodeSurprise code_surprise_;
-  std::vector<uint16_t> codes_;
+  std::vector<uint16_t> codes_, coming_;
   std::vector<float> map_;
   std::vector<float> before_;  // bits of at most kBefore frames, the latest last
   // Of the frame before.

@@ -1,5 +1,5 @@
 """What is predicted of clips: PSNR by time ahead beside the last frame and OpenCV's DIS, run times, and how long a
-concealer's frames are waited for.
+concealer's frames are waited for; how long surprise takes.
 
     python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (5 minutes)
     python -m benchmarks.prediction --quick                 fewer clips, to see that it runs
@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import maquette
 import numpy as np
 from rich.console import Console
 from rich.table import Table
@@ -30,11 +31,12 @@ from export.clips.clip import read_clip
 
 PROGRAM = Path("build/release/benchmarks/native/measure_prediction")
 HORIZONS = (1, 3, 5, 8)  # frames ahead
+BUNDLE = Path("sdk/models/prediction-int8")
 SIZE_PX, LARGE_PX = (320, 240), (640, 480)
 FIRST_START, START_STEP = 4, 3  # as measure_prediction has them
 FRAMES = 90  # of a real clip
 WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
-FIGURES = ("prediction_pictures_a_second", "concealed_wait_p99_ms")
+FIGURES = ("prediction_pictures_a_second", "concealed_wait_p99_ms", "surprise_frames_a_second")
 METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto"}
 
 
@@ -71,7 +73,12 @@ def measure(
     speed = [measure_film(film, count) for film in large[:1] for count in (1, threads)]
     waits = json.loads(run(["waits", "6" if quick else "30", WAIT_SOURCE]))
     document = {"rows": rows, "sets": means_of(rows), "speed": speed, "waits": waits, "missing": absent, "warnings": []}
-    figures = {"concealed_wait_p99_ms": waits["wait_ms"]["p99"]}
+    surprise = frames_a_second(BUNDLE, threads, 60 if quick else 200)
+    document["surprise"] = surprise
+    figures = {
+        "concealed_wait_p99_ms": waits["wait_ms"]["p99"],
+        "surprise_frames_a_second": surprise["frames_a_second"],
+    }
     missing = {}
     if speed:
         figures["prediction_pictures_a_second"] = 1000 / (speed[-1]["push_ms"] + speed[-1]["predict_ms"])
@@ -157,6 +164,19 @@ def psnr_db(one: np.ndarray, other: np.ndarray) -> float:
     return float(10 * np.log10(255**2 / max(squares, 0.01)))
 
 
+def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
+    """Surprise of a simulated camera of 640 x 480: by median wall-clock time, processor time, medians of stages."""
+    surprise = maquette.Surprise(bundle_path=bundle, threads=threads)
+    stats, used_ms = [], []
+    for frame in maquette.Source(f"stub:people?count=2&size=640x480&fps=30&frames={frames}"):
+        begin = time.process_time()
+        surprise.push(frame)
+        used_ms.append(1000 * (time.process_time() - begin))
+        stats.append(surprise.stats)
+    of = {name: float(np.median([one[name] for one in stats[5:]])) for name in stats[0] if name.endswith("_ms")}
+    return {"frames_a_second": 1000 / of["push_ms"], "cpu_ms": float(np.median(used_ms[5:])), **of}
+
+
 def means_of(rows: list[dict]) -> dict[str, dict]:
     """Of pushing and of the real clips: PSNR by method and horizon, means over clips."""
     sets = {"pushing": [row for row in rows if row["film"].startswith("pushing")],
@@ -213,6 +233,13 @@ def section(measured: dict) -> tuple[str, list]:
         f"A camera of 640 x 480 at 30 frames a second that drops a quarter of them, concealed: {waits['captured']} "
         f"frames captured, {waits['predicted']} predicted, there {waits['wait_ms']['median']:.2f} ms (median), "
         f"{waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
+    )
+    surprise = measured["surprise"]
+    parts.append(
+        f"Surprise with its map, frames of 640 x 480: {surprise['frames_a_second']:.0f} a second, "
+        f"{surprise['cpu_ms']:.1f} ms of processor time a frame (squeezing {surprise['resize_ms']:.1f}, network "
+        f"{surprise['network_ms']:.1f}, nearest entries {surprise['nearest_ms']:.1f} ms). How well it finds events: "
+        "`python -m benchmarks.surprise`."
     )
     parts += [f"Not measured: {'; '.join(measured['missing'])}."] if measured["missing"] else []
     return "Prediction", parts

@@ -12,17 +12,15 @@ and their places are those of `export.prediction.evaluate_events`; of surprise t
 from __future__ import annotations
 
 import argparse
-import time
 from pathlib import Path
 
 import maquette
 import numpy as np
 
+from benchmarks.prediction import BUNDLE, frames_a_second
 from export.clips.events import KINDS, with_event
 from export.prediction.data import Clips, read_clips
 from export.prediction.evaluate_events import Score, difference, flow_residual, measured
-
-BUNDLE = Path("sdk/models/prediction-int8")
 
 
 def sdk_surprise(bundle: Path) -> Score:
@@ -57,19 +55,6 @@ def cuts_found(clips: Clips, bundle: Path, seed: int) -> dict[str, tuple[int, in
             at_event.append(flags(event.rgb, float(rate))[event.at])
         found[kind] = (sum(at_event), len(at_event))
     return found
-
-
-def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
-    """Of a simulated camera of 640 x 480: of median wall-clock times, processor time, and medians of stages."""
-    surprise = maquette.Surprise(bundle_path=bundle, threads=threads)
-    stats, used_ms = [], []
-    for frame in maquette.Source(f"stub:people?count=2&size=640x480&fps=30&frames={frames}"):
-        begin = time.process_time()
-        surprise.push(frame)
-        used_ms.append(1000 * (time.process_time() - begin))
-        stats.append(surprise.stats)
-    of = {name: float(np.median([one[name] for one in stats[5:]])) for name in stats[0] if name.endswith("_ms")}
-    return {"frames_a_second": 1000 / of["push_ms"], "cpu_ms": float(np.median(used_ms[5:])), **of}
 
 
 def main() -> None:

@@ -217,8 +217,9 @@ def prediction_document():
     row = {"film": "pushing 00000, 10 fps", "size_px": [320, 240], "threads": 2, "dis_ms": 9.0, "starts": 3,
            "push_ms": 3.0, "auto_push_ms": 4.0, "predict_ms": 2.0, "cpu_ms": 5.0, "horizons": ahead}  # fmt: skip
     waits = {"captured": 20, "predicted": 5, "wait_ms": {"median": 0.1, "p99": 0.5, "max": 0.6}}
+    surprise = {"frames_a_second": 200.0, "cpu_ms": 4.0, "resize_ms": 0.3, "network_ms": 2.0, "nearest_ms": 0.9}
     return {"rows": [row], "sets": prediction.means_of([row]), "speed": [row | {"film": "street"}], "waits": waits,
-            "missing": ["real clips (<none>)"], "warnings": []}  # fmt: skip
+            "surprise": surprise, "missing": ["real clips (<none>)"], "warnings": []}  # fmt: skip
 
 
 def edges_document():

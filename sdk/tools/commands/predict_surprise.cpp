@@ -33,8 +33,8 @@ struct Peak {
 Peak peak_of(const std::vector<float>& map, const maq_surprise_score& score, const maq_frame_desc& desc) {
   const auto most = std::max_element(map.begin(), map.end());
   const auto cell = int32_t(most - map.begin());
-  return {(cell % score.columns + 0.5) * desc.width_px / score.columns,
-          (cell / score.columns + 0.5) * desc.height_px / score.rows, *most};
+  const int32_t column = cell % score.columns, row = cell / score.columns;
+  return {(column + 0.5) * desc.width_px / score.columns, (row + 0.5) * desc.height_px / score.rows, *most};
 }
 
 // A line on a terminal that is drawn again with each frame: surprise on a logarithmic scale.

@@ -23,9 +23,10 @@ maq::FrameCodes random_codes(size_t slices, size_t entries, size_t width, size_t
 TEST(NearestEntry, IsThatOfFloat64ForEverySize) {
   std::mt19937 random(2);
   std::normal_distribution<float> normal;
-  for (const auto& [slices, entries, width, side] :
+  for (const std::array<size_t, 4>& sizes :
        {std::array<size_t, 4>{4, 512, 32, 16}, {1, 1, 1, 1}, {3, 17, 5, 2}, {2, 15, 7, 3}, {1, 1024, 2, 5}}) {
-    const maq::FrameCodes codes = random_codes(slices, entries, width, side, 3);
+    const size_t slices = sizes[0], entries = sizes[1], width = sizes[2];
+    const maq::FrameCodes codes = random_codes(slices, entries, width, sizes[3], 3);
     std::vector<float> features(codes.places() * slices * width);
     for (float& value : features) value = normal(random);
     std::vector<uint16_t> found(codes.count());

@@ -102,9 +102,9 @@ lint: packages-lint packages-test  ## check layout and lint rules without changi
 	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format --dry-run --Werror
 	@! LC_ALL=C.UTF-8 git grep -nE '^.{121}' -- '*.h' '*.hpp' '*.c' '*.cpp' || { echo "Lines have at most 120 characters." >&2; exit 1; }
 	@.venv/bin/ruff format --check . && .venv/bin/ruff check .
-	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
+	@cmake --preset debug -DMAQ_BUILD_TESTS=ON >/dev/null
 	@git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/app/*.cpp' 'sdk/tools/*.cpp' 'desktop_demo/src/*.cpp' \
-	    | xargs -r .venv/bin/python scripts/clang_tidy.py --build build/release
+	    | xargs -r .venv/bin/python scripts/clang_tidy.py --build build/debug
 
 .PHONY: clean
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)

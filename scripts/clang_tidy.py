@@ -1,11 +1,11 @@
 """Runs clang-tidy on the C++ sources of a build, on every processor, and only where something changed.
 
-    python scripts/clang_tidy.py [--build build/release] FILE...        (in the project's root)
+    python scripts/clang_tidy.py [--build build/debug] FILE...        (in the project's root)
 
-A file is checked again when it, a header it includes, its compile command, .clang-tidy or clang-tidy itself changed:
-the stamps under ~/.cache/maquette/clang-tidy (XDG_CACHE_HOME is obeyed) hold the hashes of a clean run, for all
-checkouts of this machine. Files that the build does not compile are named and left out. Exit status 1 when clang-tidy
-has something to say.
+A file is checked together with those that the build compiles with it, and again when one of them, a header that they
+include, their compile command, .clang-tidy or clang-tidy itself changed: the stamps under ~/.cache/maquette/clang-tidy
+(XDG_CACHE_HOME is obeyed) hold the hashes of a clean run, for all checkouts of this machine. Files that the build does
+not compile are named and left out. Exit status 1 when clang-tidy has something to say.
 """
 
 from __future__ import annotations
@@ -37,14 +37,15 @@ def hash_of(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Compilation:
-    """How the build compiles one source: `words` is the command, run in `folder`."""
+    """How the build compiles `sources` together: `words` is the command, run in `folder`, of the file `unit`."""
 
-    source: Path
+    sources: tuple[Path, ...]
+    unit: Path
     folder: Path
     words: tuple[str, ...]
 
     def dependencies(self) -> list[Path]:
-        """The source and every header that it includes."""
+        """The sources and every header that they include."""
         words, skip = [], False
         for word in self.words:
             if skip or word in ("-c", "-o"):
@@ -52,29 +53,35 @@ class Compilation:
                 continue
             words.append(word)
         rule = subprocess.run([*words, "-M"], cwd=self.folder, capture_output=True, text=True, check=True).stdout
-        return [self.folder / name for name in rule.replace("\\\n", " ").split(":", 1)[1].split()]
+        names = rule.replace("\\\n", " ").split(":", 1)[1].split()
+        included = [self.folder / name for name in names if self.folder / name != self.unit]
+        return [*included, *self.sources]
 
 
-def compilations(build: Path) -> dict[Path, Compilation]:
-    """The commands of a build by source, without a compiler cache before them. Sources that CMake compiles several as
-    one (UNITY_BUILD) are checked one by one: the analyzer follows only what is in the file itself."""
-    found = {}
+def compilations(build: Path) -> list[Compilation]:
+    """The commands of a build, without a compiler cache before them. What CMake compiles as one (UNITY_BUILD) is
+    checked as one, in half the time of one by one; the analyzer follows functions of included sources where the file
+    that includes them is called UnifiedSource."""
+    found = []
     for entry in json.loads((build / "compile_commands.json").read_text()):
         words = shlex.split(entry["command"])
         cache = next((i for i, word in enumerate(words) if Path(word).name == "ccache"), -1)
         words = words[cache + 1 :]
-        file = Path(entry["file"])
-        sources = [file]
-        if file.parent.name == "Unity":
-            sources = [Path(name) for name in re.findall(r'^#include "(.+)"$', file.read_text(), re.MULTILINE)]
-        for source in sources:
-            command = tuple(str(source) if word == entry["file"] else word for word in words)
-            found[source.resolve()] = Compilation(source.resolve(), Path(entry["directory"]), command)
+        unit = Path(entry["file"])
+        sources = (unit.resolve(),)
+        if unit.parent.name == "Unity":
+            text = unit.read_text()
+            sources = tuple(Path(name).resolve() for name in re.findall(r'^#include "(.+)"$', text, re.MULTILINE))
+            unit = unit.with_name(f"UnifiedSource-{unit.stem}.cpp")
+            if not unit.is_file() or unit.read_text() != text:
+                unit.write_text(text)
+        command = tuple(str(unit) if word == entry["file"] else word for word in words)
+        found.append(Compilation(sources, unit, Path(entry["directory"]), command))
     return found
 
 
 class Checker:
-    """Checks sources and remembers the clean ones in `stamps`, by paths that do not tell where the checkout is."""
+    """Checks compilations and remembers the clean ones in `stamps`, by paths that do not tell where the checkout is."""
 
     def __init__(self, stamps: Path, root: Path):
         self.stamps, self.root = stamps, root
@@ -82,8 +89,8 @@ class Checker:
         self.version = subprocess.run(["clang-tidy", "--version"], capture_output=True, text=True, check=True).stdout
 
     def stamp(self, compilation: Compilation) -> Path:
-        settings = [hash_of(folder / ".clang-tidy") for folder in compilation.source.parents]
-        key = "\0".join([self.version, *settings, str(compilation.source), *compilation.words])
+        settings = [hash_of(folder / ".clang-tidy") for folder in compilation.sources[0].parents]
+        key = "\0".join([self.version, *settings, *map(str, compilation.sources), *compilation.words])
         key = key.replace(str(self.root), ".")
         return self.stamps / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
 
@@ -94,7 +101,7 @@ class Checker:
         return all(hash_of(self.root / path) == wanted for path, wanted in json.loads(stamp.read_text()).items())
 
     def check(self, compilation: Compilation) -> str:
-        """What clang-tidy says of a source; nothing when it is clean."""
+        """What clang-tidy says of the sources; nothing when they are clean."""
         if self.is_known_clean(compilation):
             return ""
         paths = [Path(os.path.normpath(path)) for path in compilation.dependencies()]
@@ -102,30 +109,36 @@ class Checker:
             str(path.relative_to(self.root) if path.is_relative_to(self.root) else path): hash_of(path)
             for path in paths
         }
-        command = ["clang-tidy", "--quiet", "--warnings-as-errors=*", str(compilation.source)]
+        command = ["clang-tidy", "--quiet", "--warnings-as-errors=*", str(compilation.unit)]
+        if compilation.unit.name.startswith("UnifiedSource"):
+            command.insert(1, "--checks=-bugprone-suspicious-include")  # which is of sources that are included
         ran = subprocess.run(
             [*command, "--", *compilation.words[1:]], cwd=compilation.folder, capture_output=True, text=True
         )
         if ran.returncode == 0:
             self.stamp(compilation).write_text(json.dumps(hashes))
             return ""
-        return ran.stdout or ran.stderr or f"clang-tidy ended with status {ran.returncode} on {compilation.source}\n"
+        return ran.stdout or ran.stderr or f"clang-tidy ended with status {ran.returncode} on {compilation.unit}\n"
 
 
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--build", type=Path, default=Path("build/release"))
+    parser.add_argument("--build", type=Path, default=Path("build/debug"))
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
     options = parser.parse_args(arguments)
     known = compilations(options.build)
-    wanted = [path.resolve() for path in options.files]
-    for path in wanted:
-        if path not in known:
-            print(f"not checked: {path}, which {options.build} does not compile")
+    wanted = {path.resolve() for path in options.files}
+    for path in sorted(wanted.difference(*(compilation.sources for compilation in known))):
+        print(f"not checked: {path}, which {options.build} does not compile")
+    chosen: list[Compilation] = []
+    for compilation in sorted(known, key=lambda compilation: len(compilation.sources), reverse=True):
+        if wanted.intersection(compilation.sources):  # else another has checked them
+            chosen.append(compilation)
+            wanted.difference_update(compilation.sources)
     checker = Checker(cache_folder() / "clang-tidy", Path.cwd())
     failed = 0
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for text in pool.map(checker.check, [known[path] for path in wanted if path in known]):
+        for text in pool.map(checker.check, chosen):
             failed += bool(text)
             print(text, end="", flush=True)
     return 1 if failed else 0

@@ -67,13 +67,41 @@ def test_a_clean_file_is_checked_once_and_again_when_a_header_or_the_settings_ch
     assert project("a.cpp", "b.cpp") == (0, "", ["a.cpp", "b.cpp"])
 
 
-def test_files_that_are_compiled_as_one_are_checked_one_by_one(project):
+def test_files_that_are_compiled_as_one_are_checked_as_one(project):
     unity = project.folder / "Unity/unity_0_cxx.cxx"
     unity.parent.mkdir()
     unity.write_text(f'#include "{project.folder}/a.cpp"\n\n#include "{project.folder}/b.cpp"\n')
-    commands = [{"directory": str(project.folder), "file": str(unity), "command": f"c++ -o u.o -c {unity}"}]
+    commands = json.loads((project.folder / "compile_commands.json").read_text())
+    commands.append({"directory": str(project.folder), "file": str(unity), "command": f"c++ -o u.o -c {unity}"})
     (project.folder / "compile_commands.json").write_text(json.dumps(commands))
-    assert project("a.cpp", "b.cpp") == (0, "", ["a.cpp", "b.cpp"])
+    unified = (
+        "UnifiedSource-unity_0_cxx.cpp"  # a name by which clang's analyzer knows that what is included is the source
+    )
+    assert project("a.cpp", "b.cpp") == (0, "", [unified])
+    assert project("a.cpp", "b.cpp") == (0, "", [])
+    for changed in ("a.h", "b.cpp"):
+        (project.folder / changed).write_text(f"int {changed[0]}(float);\n")
+        assert project("a.cpp", "b.cpp") == (0, "", [unified])
+
+
+@pytest.mark.skipif(shutil.which("clang-tidy") is None, reason="no clang-tidy (make packages-lint)")
+def test_the_analyzer_follows_functions_of_files_that_are_compiled_as_one(tmp_path):
+    unity = tmp_path / "Unity/unity_0_cxx.cxx"
+    unity.parent.mkdir()
+    unity.write_text(f'#include "{tmp_path}/a.cpp"\n')
+    (tmp_path / "a.cpp").write_text("int a(int n) {\n  int* p = nullptr;\n  return n > 3 ? *p : 0;\n}\n")
+    (tmp_path / ".clang-tidy").write_text(
+        "Checks: '-*,clang-analyzer-*,bugprone-suspicious-include'\nHeaderFilterRegex: a.cpp\n"
+    )
+    commands = [{"directory": str(tmp_path), "file": str(unity), "command": f"c++ -o u.o -c {unity}"}]
+    (tmp_path / "compile_commands.json").write_text(json.dumps(commands))
+    ran = subprocess.run(
+        [sys.executable, SCRIPT, "--build", tmp_path, tmp_path / "a.cpp"], capture_output=True, text=True,
+        env=os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}, cwd=tmp_path,
+    )  # fmt: skip
+    assert ran.returncode == 1
+    assert "a.cpp:3:18: error: Dereference of null pointer" in ran.stdout
+    assert "#include of file with '.cpp' extension" not in ran.stdout
 
 
 def test_a_clean_file_is_known_in_another_checkout(project, tmp_path_factory):

@@ -345,13 +345,13 @@ std::string check_mesh_name(const std::string& path) {
 }
 
 std::string check_person(const std::string& text) {
-  return text == "all" || CLI::Range(1, 255)(text).empty() ? std::string() : text + " is neither 1 to 255 nor \"all\"";
+  const CLI::Range person(1, 255);
+  return text == "all" || person(text).empty() ? std::string() : text + " is neither 1 to 255 nor \"all\"";
 }
 
 std::string check_triangles(const std::string& text) {
-  return text == "all" || CLI::Range(100u, MAQ_HEAD_ALL_TRIANGLES - 1)(text).empty()
-             ? std::string()
-             : text + " is neither 100 or more nor \"all\"";
+  const CLI::Range triangles(100u, MAQ_HEAD_ALL_TRIANGLES - 1);
+  return text == "all" || triangles(text).empty() ? std::string() : text + " is neither 100 or more nor \"all\"";
 }
 
 }  // namespace

@@ -6,3 +6,7 @@ endif()
 add_library(maq_xxhash INTERFACE)
 target_include_directories(maq_xxhash SYSTEM INTERFACE "${MAQ_XXHASH_INCLUDE_DIR}")
 target_compile_definitions(maq_xxhash INTERFACE XXH_INLINE_ALL)
+# Sanitizer builds optimise less (-Og) than its functions that must be inlined need.
+if(MAQ_SANITIZE)
+  target_compile_definitions(maq_xxhash INTERFACE XXH_NO_INLINE_HINTS=1)
+endif()

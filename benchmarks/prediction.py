@@ -190,11 +190,12 @@ def means_of(rows: list[dict]) -> dict[str, dict]:
 
 
 def table_of(rows: list[dict], sets: dict[str, dict]) -> list[list[str]]:
-    """A head and rows: of each clip and set, PSNR in dB by method and frames ahead, and how often auto took motion."""
-    table = [["clip", *(f"{says} +{horizon}" for horizon in HORIZONS for says in METHODS.values()), "motion taken"]]
+    """A head and rows: of each clip and set, PSNR in dB by method and frames ahead, and how much of auto's pictures is
+    motion's."""
+    table = [["clip", *(f"{says} +{horizon}" for horizon in HORIZONS for says in METHODS.values()), "motion in auto"]]
     for row in rows:
         cells = [f"{ahead[f'{method}_db']:.1f}" for ahead in row["horizons"] for method in METHODS]
-        taken = "/".join(f"{ahead['motion_chosen']:.0%}" for ahead in row["horizons"])
+        taken = "/".join(f"{ahead['motion_fraction']:.0%}" for ahead in row["horizons"])
         table.append([row["film"], *cells, taken])
     for name, means in sets.items():
         cells = [f"{means[method][i]:.1f}" for i in range(len(HORIZONS)) for method in METHODS]

@@ -50,7 +50,7 @@ maquette::Frame frame_of(const maquette::Context& context, const Pixels& pixels,
 
 struct Sums {
   double last_db = 0, motion_db = 0, auto_db = 0;
-  int motion_chosen = 0;
+  double motion_fraction = 0;  // of auto's pictures
 };
 
 int measure_errors(int width, int height, double fps, int threads, const std::vector<size_t>& horizons) {
@@ -94,7 +94,7 @@ int measure_errors(int width, int height, double fps, int threads, const std::ve
       predict_ms.push_back(double(motion.stats().predict_ms));
       sums[k].motion_db += psnr_db(predicted, truth);
       automatic.predict(ahead_s).copy_pixels(MAQ_PIXEL_BGR8, predicted.data(), 0, predicted.size());
-      sums[k].motion_chosen += automatic.stats().method == MAQ_PREDICTION_MOTION ? 1 : 0;
+      sums[k].motion_fraction += double(automatic.stats().motion_fraction);
       sums[k].auto_db += psnr_db(predicted, truth);
     }
   }
@@ -105,9 +105,9 @@ int measure_errors(int width, int height, double fps, int threads, const std::ve
       quantile(push_cpu_ms, .5) + quantile(predict_cpu_ms, .5));
   for (size_t k = 0; k < horizons.size(); ++k) {
     std::printf(
-        "%s{\"frames\": %zu, \"last_db\": %.4f, \"motion_db\": %.4f, \"auto_db\": %.4f, \"motion_chosen\": %.4f}",
+        "%s{\"frames\": %zu, \"last_db\": %.4f, \"motion_db\": %.4f, \"auto_db\": %.4f, \"motion_fraction\": %.4f}",
         k == 0 ? "" : ", ", horizons[k], sums[k].last_db / starts, sums[k].motion_db / starts, sums[k].auto_db / starts,
-        double(sums[k].motion_chosen) / starts);
+        sums[k].motion_fraction / starts);
   }
   std::printf("]}\n");
   return 0;

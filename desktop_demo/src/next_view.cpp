@@ -17,6 +17,11 @@ std::string predicted_text(double ahead_s) {
   return "predicted +" + std::to_string(std::lround(ahead_s * 1e3)) + " ms";
 }
 
+std::string method_text(const maq_predictor_stats& stats) {
+  if (stats.method != MAQ_PREDICTION_AUTO) return kMethodNames[size_t(stats.method)];
+  return std::to_string(std::lround(100 * double(stats.motion_fraction))) + " % motion";
+}
+
 }  // namespace
 
 NextView::NextView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
@@ -82,7 +87,7 @@ void NextView::draw(const Rect& area) {
   painter_.draw_scene(next_rect_, 0);
   const bool is_bridged = frame().origin.kind == MAQ_FRAME_PREDICTED;
   mark(now_rect_, is_bridged, is_bridged ? predicted_text(double(frame().origin.horizon_ns) / 1e9) : "now");
-  mark(next_rect_, true, predicted_text(frame().made_ahead_s) + ", " + kMethodNames[size_t(frame().stats.method)]);
+  mark(next_rect_, true, predicted_text(frame().made_ahead_s) + ", " + method_text(frame().stats));
 }
 
 void NextView::mark(const Rect& rect, bool is_predicted, const std::string& text) const {
@@ -109,6 +114,7 @@ void NextView::add_to_report(nlohmann::ordered_json* report) const {
   json["next_px"] = window_.in_pixels(next_rect_).numbers();
   json["prediction"] = {{"ahead_ms", frame().ahead_s * 1e3},
                         {"method", kMethodNames[size_t(frame().stats.method)]},
+                        {"motion_fraction", frame().stats.motion_fraction},
                         {"push_ms", frame().stats.push_ms},
                         {"predict_ms", frame().stats.predict_ms},
                         {"now_is_predicted", frame().origin.kind == MAQ_FRAME_PREDICTED},
@@ -121,7 +127,7 @@ Action NextView::draw_panel() {
   Action action = draw_source(frame().results_per_second);
   const maq_predictor_stats& stats = frame().stats;
   ImGui::Text("%d x %d, pushed in %.1f ms", frame().now.width_px, frame().now.height_px, double(stats.push_ms));
-  ImGui::Text("predicted in %.1f ms by %s", double(stats.predict_ms), kMethodNames[size_t(stats.method)]);
+  ImGui::Text("predicted in %.1f ms by %s", double(stats.predict_ms), method_text(stats).c_str());
   stages_.draw(kPredictionStages, std::size(kPredictionStages), window_.scale());
   bool changed = false;
   float ahead_ms = float(choice_.ahead_s * 1e3);

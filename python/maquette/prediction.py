@@ -18,9 +18,9 @@ METHODS = ("auto", "last", "motion")  # of maq_prediction_method
 class Predictor(NativeObject):
     """Gets the frames of a stream as they come, and makes pictures of what it will show a while later.
 
-    method: "motion" (everything moves on as it moved), "last" (the last frame), or "auto": whichever was right about
-    the frames that have come. settings: fields of maq_predictor_config by their names. It sees pictures, not the world:
-    never steer anything by what it made up.
+    method: "motion" (everything moves on as it moved), "last" (the last frame), or "auto": both mixed, place by place,
+    by how right each was about the frames that have come. settings: fields of maq_predictor_config by their names. It
+    sees pictures, not the world: never steer anything by what it made up.
     """
 
     def __init__(self, method: str = "auto", **settings: Any) -> None:
@@ -51,7 +51,7 @@ class Predictor(NativeObject):
     @property
     def stats(self) -> dict[str, float]:
         """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method`: an
-        index into METHODS."""
+        index into METHODS; `motion_fraction`: how much of the picture is motion's."""
         return native().stats("maq_predictor_stats", "maq_predictor_get_stats", self.handle)
 
 

@@ -16,8 +16,8 @@ typedef struct maq_predictor maq_predictor;
 
 /* Values never change meaning; new ones are added at the end. */
 typedef enum maq_prediction_method {
-  MAQ_PREDICTION_AUTO = 0,  /* whichever of the others was right about the frames that have come, at that time ahead;
-                               the last frame where they tie, and while nothing moves */
+  MAQ_PREDICTION_AUTO = 0,  /* the others mixed, place by place, by how right each was there about the frames that have
+                               come, at that time ahead; the last frame until that is known, and while nothing moves */
   MAQ_PREDICTION_LAST = 1,  /* the last frame, repeated */
   MAQ_PREDICTION_MOTION = 2 /* everything moves on as it moved between the last two frames */
 } maq_prediction_method;
@@ -39,7 +39,9 @@ typedef struct maq_predictor_stats {
   float project_ms;             /* of the latest prediction: where each pixel comes from */
   float fetch_ms;               /* its pixels */
   float predict_ms;             /* all of it */
-  maq_prediction_method method; /* of the latest prediction: MAQ_PREDICTION_LAST or MAQ_PREDICTION_MOTION */
+  maq_prediction_method method; /* of the latest prediction: MAQ_PREDICTION_LAST or MAQ_PREDICTION_MOTION where one made
+                                   all of it, else MAQ_PREDICTION_AUTO */
+  float motion_fraction;        /* how much of it is motion's, 0 to 1 */
   uint64_t pushed_count;
   uint64_t predicted_count;
   uint64_t reset_count; /* frames that did not go on from the one before, so that it was forgotten */

@@ -102,11 +102,11 @@ maq_status maq_predictor_reset(maq_predictor* predictor) {
 maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor_stats* stats) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
     const PredictorStats& from = predictor->predictor.stats();
-    write_struct(
-        stats, "stats",
-        maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms, from.fetch_ms,
-                            from.predict_ms, from.method, from.pushed, from.predicted, from.resets},
-        sizeof(maq_predictor_stats));
+    write_struct(stats, "stats",
+                 maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms,
+                                     from.fetch_ms, from.predict_ms, from.method, from.motion_fraction, from.pushed,
+                                     from.predicted, from.resets},
+                 sizeof(maq_predictor_stats));
     return MAQ_OK;
   });
 }

@@ -96,8 +96,8 @@ const FlowField& Extrapolation::project(const FlowField& flow, float intervals) 
   return projected_;
 }
 
-void Extrapolation::fetch(const ImageView& image, const FlowField& field, int scale, WorkerThreads& threads,
-                          uint8_t* pixels) {
+void Extrapolation::fetch(const ImageView& image, const FlowField& field, int scale, const CellWeights* weights,
+                          WorkerThreads& threads, uint8_t* pixels) {
   rows_.resize(size_t(threads.count()));
   PlaneSamples planes[2];
   const int count = samples_of(image, pixels, planes);
@@ -106,6 +106,7 @@ void Extrapolation::fetch(const ImageView& image, const FlowField& field, int sc
     threads.run(size_t(divide_up(samples.height, kFetchRowsOfTask)), [&](size_t task, int worker) {
       for (int y = int(task) * kFetchRowsOfTask; y < std::min(int(task + 1) * kFetchRowsOfTask, samples.height); ++y) {
         fetch_row(samples, field, scale, y, rows_[size_t(worker)]);
+        if (weights != nullptr) mix_row(samples, *weights, scale, y, rows_[size_t(worker)]);
       }
     });
   }

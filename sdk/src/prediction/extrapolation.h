@@ -22,8 +22,10 @@ class Extrapolation {
 
   // Fetches each pixel of a coming picture from `image` along `field`, whose pixels are `scale` pixels of it each way;
   // bilinear, beyond the edges the last pixels. `pixels`: memory of packed_bytes() of the image's format and size. No
-  // depth image. Where the field is 0 pixels are copied. A byte behind the image's last must be readable.
-  void fetch(const ImageView& image, const FlowField& field, int scale, WorkerThreads& threads, uint8_t* pixels);
+  // depth image. Where the field is 0 pixels are copied. A byte behind the image's last must be readable. With
+  // `weights` the picture is a mix of what is fetched and the image as it is.
+  void fetch(const ImageView& image, const FlowField& field, int scale, const CellWeights* weights,
+             WorkerThreads& threads, uint8_t* pixels);
 
  private:
   FlowField projected_;

@@ -102,6 +102,36 @@ void fetch_values(const PlaneSamples& plane, const FetchRow& row, int y, int beg
   }
 }
 
+// Of a run of pixels without gaps.
+template <int kChannels>
+void mix_packed(const uint8_t* __restrict from, uint8_t* __restrict to, const float* __restrict weights, int count) {
+  for (int x = 0; x < count; ++x) {
+    const int weight = int(weights[x] + 0.5f);
+    for (int c = 0; c < kChannels; ++c) {
+      const int at = x * kChannels + c;
+      to[at] = uint8_t((from[at] * (256 - weight) + to[at] * weight + 128) >> 8);
+    }
+  }
+}
+
+void mix_run(const PlaneSamples& plane, const uint8_t* from, uint8_t* to, const float* weights, int count) {
+  if (plane.channels * plane.channel_bytes == plane.pixel_bytes) {
+    switch (plane.channels) {
+      case 1: return mix_packed<1>(from, to, weights, count);
+      case 2: return mix_packed<2>(from, to, weights, count);
+      case 3: return mix_packed<3>(from, to, weights, count);
+      default: return mix_packed<4>(from, to, weights, count);
+    }
+  }
+  for (int x = 0; x < count; ++x) {
+    const int weight = int(weights[x] + 0.5f);
+    for (int channel = 0; channel < plane.channels; ++channel) {
+      const int at = x * plane.pixel_bytes + channel * plane.channel_bytes;
+      to[at] = uint8_t((from[at] * (256 - weight) + to[at] * weight + 128) >> 8);
+    }
+  }
+}
+
 }  // namespace
 
 void fetch_row(const PlaneSamples& plane, const FlowField& field, int scale, int y, FetchRow& row) {
@@ -138,6 +168,23 @@ void fetch_row(const PlaneSamples& plane, const FlowField& field, int scale, int
       fetch_values(plane, row, y, begin, end);
     }
   }
+}
+
+void mix_row(const PlaneSamples& plane, const CellWeights& weights, int scale, int y, FetchRow& row) {
+  const size_t columns = size_t(weights.columns);
+  row.cell_weights.resize(columns);
+  row.weights.resize(size_t(plane.width));
+  const float cell_px = float(scale * weights.cell_px);
+  const float step_x = float(plane.subsampled_x) / cell_px, step_y = float(plane.subsampled_y) / cell_px;
+  const float at = std::clamp((float(y) + 0.5f) * step_y - 0.5f, 0.0f, float(weights.rows - 1));
+  const size_t upper = size_t(at), lower = std::min(upper + 1, size_t(weights.rows - 1));
+  mix_rows(weights.weights.data() + upper * columns, weights.weights.data() + lower * columns, at - float(upper),
+           weights.columns, 256, row.cell_weights.data());
+  const auto is_all = [](float weight) { return weight >= 256; };
+  if (std::all_of(row.cell_weights.begin(), row.cell_weights.end(), is_all)) return;
+  stretch_row(row.cell_weights.data(), weights.columns, step_x, plane.width, row.weights.data());
+  mix_run(plane, plane.from + size_t(y) * plane.from_stride, plane.to + size_t(y) * plane.to_stride, row.weights.data(),
+          plane.width);
 }
 
 }  // namespace maq

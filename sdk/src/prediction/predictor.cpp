@@ -113,17 +113,24 @@ void Predictor::predict(int64_t ahead_ns, Frame& frame) {
   const Stopwatch whole;
   Stopwatch stage;
   maq_prediction_method method = settings_.method;
-  if (method == MAQ_PREDICTION_AUTO) method = choice_.choose(ahead_ns);
   if (!moves_ || ahead_ns == 0) method = MAQ_PREDICTION_LAST;
+  const CellWeights* weights = nullptr;
+  float motion_fraction = method == MAQ_PREDICTION_LAST ? 0.0f : 1.0f;
+  if (method == MAQ_PREDICTION_AUTO) {
+    weights = &choice_.at(ahead_ns);
+    motion_fraction = weights->mean;
+    if (motion_fraction == 0) method = MAQ_PREDICTION_LAST;
+    if (motion_fraction == 1) method = MAQ_PREDICTION_MOTION, weights = nullptr;
+  }
   const ImageView& image = newest_.image;
   frame.clear();
   uint8_t* const pixels = frame.allocate(image.format, image.width_px, image.height_px);
   stats_.project_ms = 0;
-  if (method == MAQ_PREDICTION_MOTION) {
+  if (method != MAQ_PREDICTION_LAST) {
     const float intervals = float(double(ahead_ns) / double(interval_ns_));
     const FlowField& field = extrapolation_.project(flow_, intervals);
     stats_.project_ms = float(stage.lap_ms());
-    extrapolation_.fetch(image, field, now_.scale(), threads_, pixels);
+    extrapolation_.fetch(image, field, now_.scale(), weights, threads_, pixels);
   } else {
     copy_packed(image, pixels);
   }
@@ -133,6 +140,7 @@ void Predictor::predict(int64_t ahead_ns, Frame& frame) {
   frame.sequence = newest_.sequence;
   frame.origin = {true, newest_.timestamp_ns, newest_.sequence, ahead_ns};
   stats_.method = method;
+  stats_.motion_fraction = motion_fraction;
   ++stats_.predicted;
   stats_.predict_ms = float(whole.elapsed_ms());
 }

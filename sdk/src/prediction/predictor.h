@@ -8,7 +8,7 @@
 #include "maquette/prediction.h"
 #include "prediction/extrapolation.h"
 #include "prediction/grey_pyramid.h"
-#include "prediction/method_choice.h"
+#include "prediction/method_weights.h"
 #include "prediction/optical_flow.h"
 
 namespace maq {
@@ -23,6 +23,7 @@ struct PredictorStats {
   float grey_ms = 0, flow_ms = 0, choice_ms = 0, push_ms = 0;
   float project_ms = 0, fetch_ms = 0, predict_ms = 0;
   maq_prediction_method method = MAQ_PREDICTION_LAST;  // of the latest prediction
+  float motion_fraction = 0;                           // of it
   uint64_t pushed = 0, predicted = 0, resets = 0;
 };
 
@@ -70,7 +71,7 @@ class Predictor {
   FlowField flow_;
   OpticalFlow optical_flow_;
   Extrapolation extrapolation_;
-  MethodChoice choice_;
+  MethodWeights choice_;
   PredictorStats stats_;
 };
 

@@ -60,8 +60,8 @@ double psnr_db(const cv::Mat& one, const cv::Mat& other) {
 // One picture ahead, by each method, and what was seen then.
 struct Ahead {
   double ahead_s = 0;
-  maq_prediction_method method = MAQ_PREDICTION_LAST;  // that was chosen
-  double predict_ms = 0;
+  maq_prediction_method method = MAQ_PREDICTION_LAST;  // that made it; auto: both
+  double motion_fraction = 0, predict_ms = 0;
   std::optional<double> last_db, motion_db, chosen_db;
 };
 
@@ -143,6 +143,13 @@ std::string caption(const char* name, double ahead_s, std::optional<double> db) 
   return text;
 }
 
+std::string fraction_of_motion(const Ahead& ahead) {
+  if (ahead.method != MAQ_PREDICTION_AUTO) return name_of(ahead.method);
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f %% motion", 100 * ahead.motion_fraction);
+  return text;
+}
+
 void print_results(const PredictOptions& options, const std::string& stem, uint64_t last_seen,
                    const std::vector<Ahead>& found, const std::string& written) {
   if (options.json) {
@@ -150,8 +157,10 @@ void print_results(const PredictOptions& options, const std::string& stem, uint6
         {"source", stem}, {"last_seen_frame", last_seen}, {"method", name_of(options.method)}};
     document["frames"] = nlohmann::ordered_json::array();
     for (const Ahead& ahead : found) {
-      nlohmann::ordered_json frame = {
-          {"ahead_s", ahead.ahead_s}, {"method", name_of(ahead.method)}, {"predict_ms", rounded_ms(ahead.predict_ms)}};
+      nlohmann::ordered_json frame = {{"ahead_s", ahead.ahead_s},
+                                      {"method", name_of(ahead.method)},
+                                      {"motion_fraction", std::round(1e3 * ahead.motion_fraction) / 1e3},
+                                      {"predict_ms", rounded_ms(ahead.predict_ms)}};
       if (ahead.last_db) {
         frame["psnr_db"] = {{"last", *ahead.last_db}, {"motion", *ahead.motion_db}, {"chosen", *ahead.chosen_db}};
       }
@@ -169,7 +178,7 @@ void print_results(const PredictOptions& options, const std::string& stem, uint6
       continue;
     }
     print_output("%6.0f ms  %7.2f dB  %7.2f dB  %7.2f dB  %s\n", 1e3 * ahead.ahead_s, *ahead.last_db, *ahead.motion_db,
-                 *ahead.chosen_db, name_of(ahead.method));
+                 *ahead.chosen_db, fraction_of_motion(ahead).c_str());
   }
   if (!written.empty()) print_output("%s  %zu predicted frames -> %s\n", stem.c_str(), found.size(), written.c_str());
 }
@@ -222,9 +231,10 @@ int predict(const PredictOptions& options) {
   if (!(step_s > 0)) step_s = 0.1;
 
   if (pictures.is_clip()) {
+    const size_t columns = !options.compare ? 1 : options.method == MAQ_PREDICTION_AUTO ? 4 : 3;
     for (const cv::Mat& picture : before) {
-      pictures.add_to_clip(options.compare ? side_by_side({{"seen", picture}, {"seen", picture}, {"seen", picture}})
-                                           : picture);
+      const std::vector<std::pair<std::string, cv::Mat>> row(columns, {"seen", picture});
+      pictures.add_to_clip(options.compare ? side_by_side(row) : picture);
     }
   }
   std::vector<Ahead> found;
@@ -240,6 +250,7 @@ int predict(const PredictOptions& options) {
     const maquette::Frame frame = predictor.predict(ahead.ahead_s);
     const maq_predictor_stats stats = predictor.stats();
     ahead.method = stats.method;
+    ahead.motion_fraction = double(stats.motion_fraction);
     ahead.predict_ms = double(stats.predict_ms);
     cv::Mat picture = image_of(frame);
     if (options.compare) {
@@ -250,9 +261,14 @@ int predict(const PredictOptions& options) {
         ahead.motion_db = psnr_db(moved, seen_then);
         ahead.chosen_db = psnr_db(picture, seen_then);
       }
-      const cv::Mat row = side_by_side({{has_truth ? "truth" : "no truth", seen_then},
-                                        {caption("last", ahead.ahead_s, ahead.last_db), before.back()},
-                                        {caption("motion", ahead.ahead_s, ahead.motion_db), moved}});
+      std::vector<std::pair<std::string, cv::Mat>> columns = {
+          {has_truth ? "truth" : "no truth", seen_then},
+          {caption("last", ahead.ahead_s, ahead.last_db), before.back()},
+          {caption("motion", ahead.ahead_s, ahead.motion_db), moved}};
+      if (options.method == MAQ_PREDICTION_AUTO) {
+        columns.emplace_back(caption("auto", ahead.ahead_s, ahead.chosen_db), picture);
+      }
+      const cv::Mat row = side_by_side(columns);
       if (pictures.is_clip()) {
         pictures.add_to_clip(row);
       } else if (!options.out.empty()) {
@@ -306,15 +322,14 @@ void add_predict_command(CLI::App& app, int* exit_code) {
                    ->check(CLI::Range(int64_t(1), int64_t(10000))));
   for_pictures(
       command
-          ->add_option(
-              "-m,--method", options->method,
-              "last: the last frame; motion: everything moves on as it did; auto (default): whichever was right "
-              "so far")
+          ->add_option("-m,--method", options->method,
+                       "last: the last frame; motion: everything moves on as it did; auto (default): both mixed, place "
+                       "by place, by how right they were so far")
           ->transform(CLI::CheckedTransformer(std::map<std::string, maq_prediction_method>{
               {"auto", MAQ_PREDICTION_AUTO}, {"last", MAQ_PREDICTION_LAST}, {"motion", MAQ_PREDICTION_MOTION}})));
   for_pictures(command->add_flag(
       "-c,--compare", options->compare,
-      "Print the error (PSNR) of last and motion by time ahead, and draw truth, last and motion side by "
+      "Print the error (PSNR) of last and motion by time ahead, and draw truth and all of them side by "
       "side"));
   command->add_option("-t,--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(0, 64));

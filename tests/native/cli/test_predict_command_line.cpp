@@ -64,9 +64,9 @@ TEST_F(PredictCommandLine, MotionIsNearerToTheTruthThanTheLastFrame) {
   EXPECT_EQ(document["last_seen_frame"], 12);
   ASSERT_EQ(document["frames"].size(), 5u);
   for (const auto& frame : document["frames"]) {
-    EXPECT_EQ(frame["method"], "motion");
+    EXPECT_GT(frame["motion_fraction"].get<double>(), 0.3) << "where the square moves, not where nothing does";
     EXPECT_GT(frame["psnr_db"]["motion"].get<double>(), frame["psnr_db"]["last"].get<double>() + 3);
-    EXPECT_EQ(frame["psnr_db"]["motion"], frame["psnr_db"]["chosen"]);
+    EXPECT_GT(frame["psnr_db"]["chosen"].get<double>(), frame["psnr_db"]["motion"].get<double>() - 0.5);
   }
   EXPECT_NEAR(document["frames"][4]["ahead_s"].get<double>(), 0.25, 1e-6);
 }

@@ -61,11 +61,11 @@ def test_the_last_frame_is_now(tmp_path):
     assert has_border(shown.rectangle("next_px"))
 
 
-def test_auto_says_what_it_chose(tmp_path):
+def test_auto_says_how_much_of_the_picture_is_motions(tmp_path):
     shown = show(tmp_path, "--next", PEOPLE, "--ahead", 100, "--frames", 20)
-    chosen = shown.report["prediction"]["method"]
-    assert chosen in ("last", "motion")
-    assert (difference(shown) > 0.2) == (chosen == "motion")
+    fraction = shown.report["prediction"]["motion_fraction"]
+    assert shown.report["prediction"]["method"] == ("last" if fraction == 0 else "motion" if fraction == 1 else "auto")
+    assert (difference(shown) > 0.2) == (fraction > 0)
 
 
 def test_of_a_photo_nothing_else_comes(tmp_path):

@@ -1,5 +1,5 @@
-// Which method was right about the frames that have arrived: what each would have said of them is compared with them,
-// at several horizons.
+// Which method was right about the frames that have arrived, and where: what each would have said of them is compared
+// with them, place by place and at several horizons.
 #pragma once
 
 #include <array>
@@ -7,16 +7,15 @@
 #include <vector>
 
 #include "core/worker_threads.h"
-#include "maquette/prediction.h"
 #include "prediction/extrapolation.h"
 #include "prediction/grey_pyramid.h"
 #include "prediction/optical_flow.h"
 
 namespace maq {
 
-class MethodChoice {
+class MethodWeights {
  public:
-  MethodChoice();
+  MethodWeights();
 
   // Forgets all frames and what was right about them.
   void reset();
@@ -27,8 +26,9 @@ class MethodChoice {
   void add(const GreyPyramid& pyramid, int64_t timestamp_ns, const FlowField& flow, int64_t interval_ns,
            WorkerThreads& threads);
 
-  // MAQ_PREDICTION_MOTION where its errors were smaller at the horizon nearest to that, else MAQ_PREDICTION_LAST.
-  maq_prediction_method choose(int64_t ahead_ns) const;
+  // How much of each place is motion's, the rest being the last frame's, by their errors there at the horizon nearest
+  // to that. Of none where nothing is known yet. Stays until the next call.
+  const CellWeights& at(int64_t ahead_ns);
 
  private:
   static constexpr size_t kHorizons = 5, kFrames = 16;
@@ -41,11 +41,11 @@ class MethodChoice {
     bool moves = false;
   };
 
-  // Logarithms of the mean squares of the differences of brightness (which PSNR is of), in a mean in which later ones
+  // Of each cell: logarithms of the mean squares of the differences of brightness, in a mean in which later frames
   // count more: a moment in which everything was wrong must not outweigh many.
   struct Horizon {
     int64_t ahead_ns = 0;
-    double last_error = 0, motion_error = 0;
+    std::vector<float> last_errors, motion_errors, latest;
     int count = 0;
     Extrapolation extrapolation;
     std::vector<uint8_t> predicted;
@@ -53,11 +53,14 @@ class MethodChoice {
   };
 
   void judge(Horizon& horizon, const Past& now) const;
+  void take(Horizon& horizon, const Past& now, const uint8_t* predicted, std::vector<float>& errors) const;
 
   std::array<Horizon, kHorizons> horizons_;
   std::array<Past, kFrames> past_;
   size_t count_ = 0;  // of all frames remembered so far; the newest lies before it in past_, round and round
   Past now_;
+  int columns_ = 0, rows_ = 0, cell_px_ = 0;  // of cells; cell_px_ in pixels of the flow
+  CellWeights weights_;
 };
 
 }  // namespace maq

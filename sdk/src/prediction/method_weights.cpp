@@ -1,0 +1,176 @@
+#include "prediction/method_weights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "core/rounding.h"
+
+namespace maq {
+namespace {
+
+constexpr int64_t kFirstHorizon_ns = 1000000000 / 30;  // each later one is twice as far
+constexpr int64_t kMinStep_ns = 1000000000 / 32;       // between frames that are remembered
+constexpr double kMaxRatio = 1.5;                      // of a frame's age to the horizon that it stands for
+constexpr float kMinWeight = 0.1f;                     // of the newest frame in the running errors
+constexpr int kCell_px = 8;                            // each way, at half the size of the flow
+constexpr float kRoundingError = 0.3f;                 // mean square of what rounding to whole grey levels leaves
+constexpr float kMeanFraction = 0.3f;  // of the mean over all places: errors of few frames in one place say little
+constexpr float kAll = 0.97f;          // a weight beyond which a method has a place to itself
+
+double ratio(int64_t one_ns, int64_t other_ns) {
+  return double(std::max(one_ns, other_ns)) / double(std::max<int64_t>(std::min(one_ns, other_ns), 1));
+}
+
+int squares_of_run(const uint8_t* __restrict one, const uint8_t* __restrict other, int count) {
+  int sum = 0;  // at most 65,025 each
+  for (int i = 0; i < count; ++i) sum += (one[i] - other[i]) * (one[i] - other[i]);
+  return sum;
+}
+
+float mean_of(const std::vector<float>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0f) / float(values.size());
+}
+
+float mean_of_exponentials(const std::vector<float>& values) {
+  float sum = 0;
+  for (const float value : values) sum += std::exp(value);
+  return sum / float(values.size());
+}
+
+}  // namespace
+
+MethodWeights::MethodWeights() {
+  int64_t ahead_ns = kFirstHorizon_ns;
+  for (Horizon& horizon : horizons_) {
+    horizon.ahead_ns = ahead_ns;
+    ahead_ns *= 2;
+  }
+}
+
+void MethodWeights::reset() {
+  count_ = 0;
+  for (Horizon& horizon : horizons_) horizon.count = 0;
+}
+
+// Into `errors`, a running mean of those so far. Each cell is judged together with those around it.
+void MethodWeights::take(Horizon& horizon, const Past& now, const uint8_t* predicted,
+                         std::vector<float>& errors) const {
+  std::vector<float>& latest = horizon.latest;
+  latest.assign(size_t(columns_) * size_t(rows_), 0.0f);
+  errors.resize(latest.size());
+  const size_t width = size_t(now.width_px);
+  for (int row = 0; row < rows_; ++row) {
+    const int end = std::min((row + 1) * kCell_px, now.height_px);
+    for (int column = 0; column < columns_; ++column) {
+      const int left = column * kCell_px, count = std::min(kCell_px, now.width_px - left);
+      int squares = 0;
+      for (int y = row * kCell_px; y < end; ++y) {
+        const size_t at = size_t(y) * width + size_t(left);
+        squares += squares_of_run(predicted + at, now.grey.data() + at, count);
+      }
+      latest[size_t(row * columns_ + column)] = float(squares) / float(count * (end - row * kCell_px));
+    }
+  }
+  const float weight = std::max(1.0f / float(horizon.count + 1), kMinWeight);
+  for (int row = 0; row < rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      float sum = 0;
+      for (int y = row - 1; y <= row + 1; ++y) {
+        for (int x = column - 1; x <= column + 1; ++x) {
+          sum += latest[size_t(std::clamp(y, 0, rows_ - 1) * columns_ + std::clamp(x, 0, columns_ - 1))];
+        }
+      }
+      float& error = errors[size_t(row * columns_ + column)];
+      if (horizon.count == 0) error = 0;
+      error += weight * (std::log(sum / 9 + kRoundingError) - error);
+    }
+  }
+}
+
+void MethodWeights::judge(Horizon& horizon, const Past& now) const {
+  const Past* nearest = nullptr;
+  for (size_t i = 0; i < std::min(count_, kFrames); ++i) {
+    const Past& past = past_[(count_ - 1 - i) % kFrames];
+    const auto away = [&](const Past& of) { return ratio(now.timestamp_ns - of.timestamp_ns, horizon.ahead_ns); };
+    if (past.interval_ns > 0 && (nearest == nullptr || away(past) < away(*nearest))) nearest = &past;
+  }
+  if (nearest == nullptr || ratio(now.timestamp_ns - nearest->timestamp_ns, horizon.ahead_ns) > kMaxRatio) return;
+  take(horizon, now, nearest->grey.data(), horizon.last_errors);
+  const uint8_t* moved = nearest->grey.data();
+  if (nearest->moves) {
+    const float intervals = float(double(now.timestamp_ns - nearest->timestamp_ns) / double(nearest->interval_ns));
+    const ImageView image{
+        MAQ_PIXEL_GREY8, now.width_px, now.height_px, {{nearest->grey.data(), size_t(now.width_px)}, {}}};
+    horizon.predicted.resize(nearest->grey.size());
+    horizon.extrapolation.fetch(image, horizon.extrapolation.project(nearest->flow, intervals), 1, nullptr,
+                                horizon.alone, horizon.predicted.data());
+    moved = horizon.predicted.data();
+  }
+  take(horizon, now, moved, horizon.motion_errors);
+  horizon.count = std::min(horizon.count + 1, 1000);
+}
+
+void MethodWeights::add(const GreyPyramid& pyramid, int64_t timestamp_ns, const FlowField& flow, int64_t interval_ns,
+                        WorkerThreads& threads) {
+  // At half the size of the flow: it tells the methods apart, in a quarter of the time.
+  const GreyLevel& level = pyramid.levels()[pyramid.levels().size() > 1 ? 1 : 0];
+  const int step = pyramid.levels().size() > 1 ? 2 : 1;
+  columns_ = divide_up(level.width_px, kCell_px);
+  rows_ = divide_up(level.height_px, kCell_px);
+  cell_px_ = step * kCell_px;
+  now_.timestamp_ns = timestamp_ns;
+  now_.interval_ns = interval_ns;
+  now_.width_px = level.width_px;
+  now_.height_px = level.height_px;
+  now_.grey.resize(size_t(level.width_px) * size_t(level.height_px) + 1);
+  now_.flow.resize(level.width_px, level.height_px);
+  now_.moves = false;
+  for (int y = 0; y < level.height_px; ++y) {
+    const size_t row = size_t(y) * size_t(level.width_px);
+    const float* const grey = level.at(0, y);
+    for (int x = 0; x < level.width_px; ++x) now_.grey[row + size_t(x)] = uint8_t(grey[x] + 0.5f);
+    if (interval_ns <= 0) continue;
+    const size_t from = size_t(y * step) * size_t(flow.width_px);
+    for (int x = 0; x < level.width_px; ++x) {
+      const size_t at = from + size_t(x * step);
+      now_.flow.dx_px[row + size_t(x)] = flow.dx_px[at] / float(step);
+      now_.flow.dy_px[row + size_t(x)] = flow.dy_px[at] / float(step);
+      now_.moves = now_.moves || flow.dx_px[at] != 0 || flow.dy_px[at] != 0;
+    }
+  }
+  threads.run(kHorizons, [&](size_t i, int) { judge(horizons_[i], now_); });
+  // At more than 32 frames a second not each is remembered, so that they reach back far enough.
+  if (count_ > 0 && timestamp_ns - past_[(count_ - 1) % kFrames].timestamp_ns < kMinStep_ns) return;
+  std::swap(past_[count_ % kFrames], now_);
+  ++count_;
+}
+
+const CellWeights& MethodWeights::at(int64_t ahead_ns) {
+  const Horizon* nearest = nullptr;
+  for (const Horizon& horizon : horizons_) {
+    const bool is_nearer = nearest == nullptr || ratio(horizon.ahead_ns, ahead_ns) < ratio(nearest->ahead_ns, ahead_ns);
+    if (horizon.count > 0 && is_nearer) nearest = &horizon;
+  }
+  weights_.columns = columns_;
+  weights_.rows = rows_;
+  weights_.cell_px = cell_px_;
+  weights_.weights.assign(size_t(columns_) * size_t(rows_), 0.0f);
+  weights_.mean = 0;
+  if (nearest == nullptr) return weights_;
+  const float last_everywhere = kMeanFraction * mean_of_exponentials(nearest->last_errors),
+              motion_everywhere = kMeanFraction * mean_of_exponentials(nearest->motion_errors);
+  for (size_t i = 0; i < weights_.weights.size(); ++i) {
+    // Squares would be right for errors that have nothing to do with each other; the cube decides more.
+    const float last = std::exp(nearest->last_errors[i]) + last_everywhere,
+                motion = std::exp(nearest->motion_errors[i]) + motion_everywhere;
+    const float last3 = last * last * last, motion3 = motion * motion * motion;
+    const float weight = last3 / (last3 + motion3);
+    weights_.weights[i] = weight > kAll ? 1.0f : weight < 1 - kAll ? 0.0f : weight;
+  }
+  weights_.mean = mean_of(weights_.weights);
+  return weights_;
+}
+
+}  // namespace maq

@@ -34,7 +34,7 @@ Predictor::Predictor(const PredictorSettings& settings) : settings_(settings), t
 void Predictor::reset() {
   has_frame_ = has_before_ = moves_ = false;
   interval_ns_ = 0;
-  choice_.reset();
+  method_weights_.reset();
 }
 
 void Predictor::keep(const Frame& frame) {
@@ -82,7 +82,7 @@ void Predictor::follow() {
     if (has_before_) {
       const FlowFit fit = optical_flow_.find(now_, before_, threads_, flow_);
       if (fit.moved > kCutFraction * fit.contrast) {
-        choice_.reset();
+        method_weights_.reset();
         has_before_ = false;
         ++stats_.resets;
       } else {
@@ -94,7 +94,7 @@ void Predictor::follow() {
     }
     stats_.flow_ms = float(stage.lap_ms());
     if (settings_.method == MAQ_PREDICTION_AUTO && !is_again_) {
-      choice_.add(now_, newest_.timestamp_ns, flow_, interval_ns_, threads_);
+      method_weights_.add(now_, newest_.timestamp_ns, flow_, interval_ns_, threads_);
       stats_.choice_ms = float(stage.lap_ms());
     }
   }
@@ -117,7 +117,7 @@ void Predictor::predict(int64_t ahead_ns, Frame& frame) {
   const CellWeights* weights = nullptr;
   float motion_fraction = method == MAQ_PREDICTION_LAST ? 0.0f : 1.0f;
   if (method == MAQ_PREDICTION_AUTO) {
-    weights = &choice_.at(ahead_ns);
+    weights = &method_weights_.at(ahead_ns);
     motion_fraction = weights->mean;
     if (motion_fraction == 0) method = MAQ_PREDICTION_LAST;
     if (motion_fraction == 1) method = MAQ_PREDICTION_MOTION, weights = nullptr;

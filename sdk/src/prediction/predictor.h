@@ -71,7 +71,7 @@ class Predictor {
   FlowField flow_;
   OpticalFlow optical_flow_;
   Extrapolation extrapolation_;
-  MethodWeights choice_;
+  MethodWeights method_weights_;
   PredictorStats stats_;
 };
 

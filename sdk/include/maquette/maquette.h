@@ -18,7 +18,8 @@
  *     _open, _open_memory, _build, _finish    _close     captures and scenes
  *     _open, _fit                             _destroy   heads
  *     _acquire_…, _run, _find_…, _load_…,     _release   frames, results and images, most from a pool of fixed size
- *     _wrap, _decode, _resize, _convert_yuv
+ *     _wrap, _decode, _resize, _convert_yuv,
+ *     _predict
  *
  *   (_finish of a builder returns a scene; _finish of a clip or a recorder completes its file and returns nothing.)
  *   What `_get_…` returns belongs to the object that it was called with.

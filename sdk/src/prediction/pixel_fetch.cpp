@@ -102,6 +102,10 @@ void fetch_values(const PlaneSamples& plane, const FetchRow& row, int y, int beg
   }
 }
 
+inline uint8_t mix(uint8_t one, uint8_t other, int weight) {
+  return uint8_t((one * (256 - weight) + other * weight + 128) >> 8);
+}
+
 // Of a run of pixels without gaps.
 template <int kChannels>
 void mix_packed(const uint8_t* __restrict from, uint8_t* __restrict to, const float* __restrict weights, int count) {
@@ -109,7 +113,7 @@ void mix_packed(const uint8_t* __restrict from, uint8_t* __restrict to, const fl
     const int weight = int(weights[x] + 0.5f);
     for (int c = 0; c < kChannels; ++c) {
       const int at = x * kChannels + c;
-      to[at] = uint8_t((from[at] * (256 - weight) + to[at] * weight + 128) >> 8);
+      to[at] = mix(from[at], to[at], weight);
     }
   }
 }
@@ -127,7 +131,7 @@ void mix_run(const PlaneSamples& plane, const uint8_t* from, uint8_t* to, const 
     const int weight = int(weights[x] + 0.5f);
     for (int channel = 0; channel < plane.channels; ++channel) {
       const int at = x * plane.pixel_bytes + channel * plane.channel_bytes;
-      to[at] = uint8_t((from[at] * (256 - weight) + to[at] * weight + 128) >> 8);
+      to[at] = mix(from[at], to[at], weight);
     }
   }
 }

@@ -25,6 +25,12 @@ done
 printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --texture 1024 --preview %s/head_turning.mp4\n' "$out" "$out"
 "$maquette" head tests/media/photo.jpg --out "$out/head.glb" --texture 1024 --preview "$out/head_turning.mp4"
 
+# What the clip shows next, beside what it did show, and how surprising each of its frames is.
+printf '\n== maquette predict tests/media/clip.mp4 --from 15 --compare --out %s/next.mp4\n' "$out"
+"$maquette" predict tests/media/clip.mp4 --from 15 --compare --out "$out/next.mp4"
+printf '\n== maquette predict tests/media/clip.mp4 --surprise --out %s/surprise.mp4\n' "$out"
+"$maquette" predict tests/media/clip.mp4 --surprise --out "$out/surprise.mp4"
+
 # The edges of a carton that a depth camera sees, and its size beside the true one.
 depth='image:tests/media/box_depth.png?depth_unit=0.001&fx=600'
 printf "\n== maquette edges '%s' --out %s --overlay --boxes --format json,step,dxf\n" "$depth" "$out"

@@ -51,6 +51,18 @@ def bridged(folder: Path) -> np.ndarray:
     raise RuntimeError("No run ended with a bridged frame; the machine is too busy.")
 
 
+def with_a_jump(folder: Path) -> str:
+    """The clip with 20 of its frames left out after the 40th."""
+    path = folder / "jump.mp4"
+    source = cv2.VideoCapture(str(ROOT / CLIP[0]))
+    frames = [source.read()[1] for _ in range(72)]
+    clip = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 30, frames[0].shape[1::-1])
+    for frame in frames[:40] + frames[60:]:
+        clip.write(frame)
+    clip.release()
+    return str(path)
+
+
 def sheet(pictures: list[np.ndarray], columns: int, width_px: int) -> np.ndarray:
     """Pictures of one size beside and below each other."""
     height_px = round(pictures[0].shape[0] * width_px / pictures[0].shape[1])
@@ -69,7 +81,7 @@ def main() -> None:
     def keep(name: str, picture: np.ndarray) -> None:
         cv2.imwrite(str(options.out / name), picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
-    with tempfile.TemporaryDirectory() as temporary, tqdm(total=21, unit="picture") as progress:
+    with tempfile.TemporaryDirectory() as temporary, tqdm(total=22, unit="picture") as progress:
 
         def run(source: tuple[str, int], *arguments: str) -> np.ndarray:
             picture, _ = shown(*source, Path(temporary), *arguments)
@@ -88,6 +100,7 @@ def main() -> None:
         keep("desktop-head.jpg", sheet([run(PHOTO, "--head", *h)[44:756, :950] for h in HEADS], 3, 520))
         keep("desktop-demo-next.jpg", bridged(Path(temporary)))
         progress.update()
+        keep("desktop-demo-surprise.jpg", run((with_a_jump(Path(temporary)), 41), "--next", "--surprise"))
         keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 
 

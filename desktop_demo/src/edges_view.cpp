@@ -7,7 +7,7 @@
 #include <iterator>
 #include <utility>
 
-#include "edges_drawing.h"
+#include "drawing/edges_drawing.h"
 
 namespace {
 

@@ -27,6 +27,7 @@ int main(int argc, char** argv) try {
   options.scene_bundle = shared_file("MAQ_SCENE_BUNDLE", "models/scenes-int8");
   options.heads_bundle = shared_file("MAQ_HEADS_BUNDLE", "models/heads-int8");
   options.edges_bundle = shared_file("MAQ_EDGES_BUNDLE", "models/edges-int8");
+  options.prediction.surprise_bundle = shared_file("MAQ_PREDICTION_BUNDLE", "models/prediction-int8");
   options.texture = shared_file("MAQ_DEMO_OUTFIT", "demo/outfit.png");
   if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
@@ -39,7 +40,8 @@ int main(int argc, char** argv) try {
 
   CLI::App cli(
       "Shows the body surface of the people before the camera, live, on the processor alone; flies through scenes;\n"
-      "shows sharp edges in depth; makes 3D heads; shows what a camera will show next.\n\n"
+      "shows sharp edges in depth; makes 3D heads; shows what a camera will show next, and what of it is "
+      "surprising.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
@@ -50,6 +52,7 @@ int main(int argc, char** argv) try {
       "  maquette-demo --next                now, and what comes 200 ms later (--ahead), predicted\n"
       "  maquette-demo --next --bridge-gaps 'stub:people?stall=300ms@3s'\n"
       "                                      predicted frames, marked in magenta, while the camera stalls\n"
+      "  maquette-demo --next --surprise     and how surprising each frame is, where, and what stood out\n"
       "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
       "In the window F1 shows the keys. Files can be dropped on it.",
       "maquette-demo");
@@ -84,6 +87,10 @@ int main(int argc, char** argv) try {
   cli.add_flag("--bridge-gaps", options.prediction.bridges_gaps,
                "Predicted frames, marked, where the camera's are late or missing, for 300 ms at most")
       ->needs(next);
+  cli.add_flag("--surprise", options.prediction.finds_surprise,
+               "How surprising each frame is: where, a curve, and the events that stood out")
+      ->needs(next);
+  cli.add_option("--prediction-bundle", options.prediction.surprise_bundle, "Folder of the network for surprise");
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");

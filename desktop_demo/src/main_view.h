@@ -9,7 +9,7 @@
 #include "options.h"
 #include "screen/painter.h"
 #include "screen/window.h"
-#include "stage_chart.h"
+#include "drawing/stage_chart.h"
 
 // What the user wants that is not the view's own business, by a key or a button.
 enum class Action {

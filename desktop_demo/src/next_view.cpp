@@ -5,11 +5,14 @@
 #include <cmath>
 #include <iterator>
 
+#include "drawing/surprise_drawing.h"
+
 namespace {
 
 constexpr OwnSources kPredictedSources = {kFirstCamera, kFirstCamera, "stub:people?count=2",
                                           "These people are rendered; drop a clip or a recording here."};
 constexpr const char* kPredictionStages[] = {"brightness", "motion", "choice", "move on", "pixels", "wait"};
+constexpr float kCurveHeight = 90;
 constexpr double kAheadSPerRadian = 0.3;  // of what drags and arrows turn elsewhere
 constexpr ImU32 kMadeUpColour = IM_COL32(255, 0, 255, 255), kDarkColour = IM_COL32(20, 20, 24, 220);
 
@@ -56,6 +59,7 @@ bool NextView::update() {
 Action NextView::press(int key) {
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_3) choice_.method = maq_prediction_method(key - GLFW_KEY_1);
   if (key == GLFW_KEY_B) choice_.bridges_gaps = !choice_.bridges_gaps;
+  if (key == GLFW_KEY_S) choice_.finds_surprise = !choice_.finds_surprise;
   live_.set_choice(choice_);
   return LiveView::press(key);
 }
@@ -67,8 +71,10 @@ void NextView::steer(const Steering& steering, const Rect&) {
   live_.set_choice(choice_);
 }
 
-// Beside each other or one below the other, whichever is larger.
-void NextView::place(const Rect& area) {
+// Beside each other or one below the other, whichever is larger; the curve of surprise below both.
+void NextView::place(Rect area) {
+  const int curve_height = choice_.finds_surprise ? std::min(int(kCurveHeight * window_.scale()), area.height / 4) : 0;
+  area.height -= curve_height;
   const int width = frame().now.width_px, height = frame().now.height_px;
   const Rect beside = Rect{0, 0, area.width / 2, area.height}.fit(width, height);
   const Rect below = Rect{0, 0, area.width, area.height / 2}.fit(width, height);
@@ -78,6 +84,8 @@ void NextView::place(const Rect& area) {
   image_rect_ = {area.x + (area.width - all_width) / 2, area.y + (area.height - all_height) / 2, all_width, all_height};
   now_rect_ = {image_rect_.x, image_rect_.y, one.width, one.height};
   next_rect_ = {image_rect_.x + all_width - one.width, image_rect_.y + all_height - one.height, one.width, one.height};
+  curve_rect_ = {image_rect_.x, image_rect_.y + all_height, all_width, curve_height};
+  image_rect_.height += curve_height;
 }
 
 void NextView::draw(const Rect& area) {
@@ -86,6 +94,10 @@ void NextView::draw(const Rect& area) {
   painter_.draw_scene(now_rect_, 1);
   painter_.draw_scene(next_rect_, 0);
   const bool is_bridged = frame().origin.kind == MAQ_FRAME_PREDICTED;
+  if (choice_.finds_surprise && !frame().surprise.empty()) {
+    draw_surprising_cells(frame(), now_rect_);
+    draw_surprise_curve(frame().surprise, curve_rect_, window_.scale());
+  }
   mark(now_rect_, is_bridged, is_bridged ? predicted_text(double(frame().origin.horizon_ns) / 1e9) : "now");
   mark(next_rect_, true, predicted_text(frame().made_ahead_s) + ", " + method_text(frame().stats));
 }
@@ -112,6 +124,7 @@ void NextView::add_to_report(nlohmann::ordered_json* report) const {
   json["frame_px"] = {frame().now.width_px, frame().now.height_px};
   json["now_px"] = window_.in_pixels(now_rect_).numbers();
   json["next_px"] = window_.in_pixels(next_rect_).numbers();
+  json["curve_px"] = window_.in_pixels(curve_rect_).numbers();
   json["prediction"] = {{"ahead_ms", frame().ahead_s * 1e3},
                         {"method", kMethodNames[size_t(frame().stats.method)]},
                         {"motion_fraction", frame().stats.motion_fraction},
@@ -121,6 +134,7 @@ void NextView::add_to_report(nlohmann::ordered_json* report) const {
                         {"bridges_gaps", frame().bridges_gaps},
                         {"bridged_frames", frame().gaps.predicted_count},
                         {"latest_gap_ms", frame().gaps.latest_gap_ms}};
+  json["surprise"] = surprise_report(frame());
 }
 
 Action NextView::draw_panel() {
@@ -147,8 +161,11 @@ Action NextView::draw_panel() {
   draw_pause();
   ImGui::Separator();
   changed |= ImGui::Checkbox("Bridge gaps (B)", &choice_.bridges_gaps);
-  if (changed) live_.set_choice(choice_);
   draw_gaps();
+  changed |= ImGui::Checkbox("Surprise (S)", &choice_.finds_surprise);
+  if (changed) live_.set_choice(choice_);
+  if (choice_.finds_surprise) draw_surprise_text(frame(), window_.scale());
+  ImGui::Separator();
   ImGui::TextWrapped("What has a border in magenta was made up: never steer anything by it.");
   if (ImGui::Button("People (F7)")) action = Action::kNext;
   return action;

@@ -1,5 +1,5 @@
-// A source and, beside it, what it will show a moment later; its short gaps are bridged when the user wants it. What is
-// made up has a border in magenta and says so.
+// A source and, beside it, what it will show a moment later; its short gaps are bridged, and how surprising it is is
+// drawn over and below it, when the user wants it. What is made up has a border in magenta and says so.
 #pragma once
 
 #include <app/live_prediction.h>
@@ -24,12 +24,12 @@ class NextView final : public LiveView {
 
  private:
   const maquette::PredictionFrame& frame() const { return frames_.front(); }
-  void place(const Rect& area);
+  void place(Rect area);
   void mark(const Rect& rect, bool is_predicted, const std::string& text) const;
   void draw_gaps();
 
   maquette::PredictionChoice choice_;
-  Rect now_rect_, next_rect_;
+  Rect now_rect_, next_rect_, curve_rect_;
   maquette::TripleBuffer<maquette::PredictionFrame> frames_;
   maquette::LivePrediction live_;  // last: its thread uses the others
 };

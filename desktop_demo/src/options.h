@@ -30,7 +30,7 @@ struct Options {
   bool edges = false;                 // of the source, rather than people
   bool head = false;                  // of the person in its first picture
   bool next = false;                  // what the source will show next
-  maquette::PredictionChoice prediction;
+  maquette::PredictionChoice prediction;  // and surprise
   maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
   double fit_seconds = 3;  // of a head
   std::string heads_bundle;

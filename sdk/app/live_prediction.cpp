@@ -16,7 +16,7 @@ constexpr double kMaxAheadS = 10;          // of a predictor
 constexpr auto kRetryFor = std::chrono::seconds(2), kSecond = std::chrono::seconds(1);
 constexpr auto kRetryEvery = std::chrono::milliseconds(100), kCloseWithin = std::chrono::milliseconds(200);
 constexpr uint32_t kFramesHeld = 3;
-constexpr size_t kMaxStatesKept = 1000;
+constexpr size_t kMaxStatesKept = 1000, kMaxMomentsKept = 300;
 
 }  // namespace
 
@@ -119,7 +119,9 @@ void LivePrediction::run() {
 
 void LivePrediction::close_source() {
   recorder_.reset(), recording_.clear();
-  concealer_.reset(), predictor_.reset(), source_.reset();
+  concealer_.reset(), predictor_.reset(), surprise_.reset(), source_.reset();
+  is_surprise_switched_ = false;
+  frame_.surprise.clear(), frame_.surprise_bits.clear();
   has_pushed_ = false;
   times_.clear();
 }
@@ -188,6 +190,23 @@ void LivePrediction::apply(const Wanted& wanted) {
   const bool bridges = choice.bridges_gaps && source_->info().is_live == 1;
   if (bridges && !concealer_) concealer_.emplace(context_, *source_);
   if (!bridges) concealer_.reset();
+  if (is_surprise_switched_ != choice.finds_surprise) switch_surprise(choice);
+}
+
+// Without its network the picture goes on.
+void LivePrediction::switch_surprise(const PredictionChoice& choice) {
+  is_surprise_switched_ = choice.finds_surprise;
+  surprise_.reset();
+  frame_.surprise.clear(), frame_.surprise_bits.clear();
+  if (!choice.finds_surprise) return;
+  maq_surprise_config config = default_surprise_config();
+  if (!choice.surprise_bundle.empty()) config.bundle_path = choice.surprise_bundle.c_str();
+  config.allow_spinning = 0;
+  try {
+    surprise_.emplace(context_, config);
+  } catch (const Error& error) {
+    enter(MAQ_PIPELINE_RUNNING, error.what());
+  }
 }
 
 // Where the disk is full, the picture goes on.
@@ -198,6 +217,15 @@ void LivePrediction::record(const std::function<void()>& step) {
     recorder_.reset();
     enter(MAQ_PIPELINE_RUNNING, error.what());
   }
+}
+
+void LivePrediction::find_surprise(const Frame& frame) {
+  const int64_t timestamp_ns = frame.desc().timestamp_ns;
+  if (frame_.surprise.empty()) first_ns_ = timestamp_ns;
+  frame_.surprise.push_back({surprise_->push(frame), double(timestamp_ns - first_ns_) / 1e9});
+  if (frame_.surprise.size() > kMaxMomentsKept) frame_.surprise.pop_front();
+  frame_.surprise_bits = surprise_->map();
+  frame_.surprise_ms = double(surprise_->stats().push_ms);
 }
 
 void LivePrediction::play_frame(const Wanted& wanted) {
@@ -224,6 +252,7 @@ void LivePrediction::show(Frame frame, const Wanted& wanted) {
       if (recorder_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) recorder_->add(frame);
     });
     predictor_->push(frame);
+    if (surprise_) find_surprise(frame);
     pushed_ns_ = shown_ns_;
     has_pushed_ = true;
   }

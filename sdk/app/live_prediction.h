@@ -1,5 +1,6 @@
-// A source and what it will show next (maquette/prediction.h) on a thread of its own, for programs with a window; short
-// gaps of a camera are bridged on request (maquette/concealer.h), which a pipeline does not do.
+// A source, what it will show next and how surprising what it shows is (maquette/prediction.h), on a thread of its own,
+// for programs with a window; short gaps of a camera are bridged on request (maquette/concealer.h), which a pipeline
+// does not do.
 //
 //   maquette::LivePrediction live(context, {}, [&](const maquette::PredictionFrame& frame) { … });
 //   live.open("stub:people?stall=300ms@3s");
@@ -15,6 +16,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "app/live_pipeline.h"
 #include "app/rgba_image.h"
@@ -25,6 +27,13 @@ struct PredictionChoice {
   double ahead_s = 0.2;
   maq_prediction_method method = MAQ_PREDICTION_AUTO;
   bool bridges_gaps = false;  // of a source that plays in real time; others have none
+  bool finds_surprise = false;
+  std::string surprise_bundle;  // folder of its network; "": the one installed with the library
+};
+
+struct SurpriseMoment {
+  maq_surprise_score score{};
+  double time_s = 0;  // timestamp of its frame, after that of the first
 };
 
 struct PredictionFrame {
@@ -35,6 +44,9 @@ struct PredictionFrame {
   maq_predictor_stats stats{};  // of next
   maq_concealer_stats gaps{};   // since the bridging was switched on
   bool bridges_gaps = false;
+  std::deque<SurpriseMoment> surprise;  // of the latest captured frames, at most 300; empty where it is not wanted
+  std::vector<float> surprise_bits;     // of the last of them, score.rows rows of score.columns cells
+  double surprise_ms = 0;               // that it took
   double waiting_ms = 0, results_per_second = 0;
   uint64_t number = 0;  // 0: none yet
 };
@@ -70,6 +82,8 @@ class LivePrediction final : public LivePlayer {
   void close_source();
   void apply(const Wanted& wanted);
   void record(const std::function<void()>& step);
+  void switch_surprise(const PredictionChoice& choice);
+  void find_surprise(const Frame& frame);
   void play_frame(const Wanted& wanted);
   void show(Frame frame, const Wanted& wanted);
   void predict(double ahead_s);
@@ -97,6 +111,9 @@ class LivePrediction final : public LivePlayer {
   std::optional<Predictor> predictor_;
   maq_prediction_method method_ = MAQ_PREDICTION_AUTO;
   std::string recording_;
+  std::optional<Surprise> surprise_;
+  bool is_surprise_switched_ = false;  // on; without surprise_ it could not be made
+  int64_t first_ns_ = 0;               // timestamp of the first frame whose surprise was found
   PredictionFrame frame_;
   int64_t pushed_ns_ = 0, shown_ns_ = 0;  // timestamps of the latest captured frame, and of `now`
   bool has_pushed_ = false;

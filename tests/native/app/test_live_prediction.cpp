@@ -68,6 +68,42 @@ TEST(LivePrediction, ShowsWhatComesBesideWhatIs) {
   EXPECT_EQ(seen[5].number, 6u);
 }
 
+TEST(LivePrediction, SurpriseIsFoundOfEachFrameWhileItIsWanted) {
+  maquette::PredictionChoice choice;
+  choice.finds_surprise = true;
+  PredictionRun run(choice);
+  run.live.open("stub:people?size=160x120&frames=12");
+  ASSERT_TRUE(run.until_ended());
+  EXPECT_EQ(run.live.status().problem, "");
+  const maquette::PredictionFrame last = run.seen().back();
+  ASSERT_EQ(last.surprise.size(), 12u);
+  EXPECT_EQ(last.surprise[0].score.is_start, 1);
+  EXPECT_EQ(last.surprise[11].score.is_start, 0);
+  EXPECT_GT(last.surprise[11].time_s, last.surprise[10].time_s);
+  const maq_surprise_score& score = last.surprise[11].score;
+  EXPECT_EQ(last.surprise_bits.size(), size_t(score.rows) * size_t(score.columns));
+  EXPECT_GT(last.surprise_ms, 0);
+  choice.finds_surprise = false;
+  run.live.set_choice(choice);
+  run.live.open("stub:people?size=160x120&frames=3");
+  ASSERT_TRUE(wait_until([&] { return run.seen().size() == 15; }));
+  EXPECT_TRUE(run.seen().back().surprise.empty());
+  EXPECT_TRUE(run.seen().back().surprise_bits.empty());
+}
+
+TEST(LivePrediction, WithoutTheNetworkOfSurpriseThePictureGoesOn) {
+  maquette::PredictionChoice choice;
+  choice.finds_surprise = true;
+  choice.surprise_bundle = "/nowhere";
+  PredictionRun run(choice);
+  run.live.open("stub:people?size=160x120&frames=3");
+  ASSERT_TRUE(run.until_ended());
+  EXPECT_FALSE(run.live.status().has_failed);
+  EXPECT_NE(run.live.status().problem.find("/nowhere"), std::string::npos) << run.live.status().problem;
+  EXPECT_EQ(run.seen().size(), 3u);
+  EXPECT_TRUE(run.seen().back().surprise.empty());
+}
+
 TEST(LivePrediction, AnotherTimeAheadIsSeenAfterTheEndToo) {
   maquette::PredictionChoice choice;
   choice.method = MAQ_PREDICTION_MOTION;

@@ -1,7 +1,9 @@
-"""The desktop demo's view of what comes next: it differs from now while things move, and what is made up is marked."""
+"""The desktop demo's view of what comes next: it differs from now while things move, what is made up is marked, and what
+is surprising is red, in the picture and in its curve."""
 
 import shutil
 
+import cv2
 import numpy as np
 import pytest
 from hands import demo
@@ -102,6 +104,56 @@ def test_a_bridged_frame_has_a_border_and_the_switch_is_a_key():
         hands.until(lambda: shows_people(hands), "a picture")
         hands.press("b")
         hands.until(lambda: has_border(now(hands)), "a bridged frame with its border")
+
+
+def redness(picture) -> np.ndarray:
+    return picture[..., 2].astype(int) - picture[..., :2].max(-1)
+
+
+def clip_with_a_cut(path, frames=20):
+    """People who walk, and from `frames` on as many frames of a checkerboard."""
+    clip = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 20, (320, 240))
+    source = cv2.VideoCapture(str(ROOT / "tests/media/clip.mp4"))
+    for _ in range(frames):
+        clip.write(cv2.resize(source.read()[1], (320, 240)))
+    board = np.kron(np.indices((15, 20)).sum(0) % 2, np.ones((16, 16)))[..., None] * np.uint8([200, 220, 240])
+    for _ in range(frames):
+        clip.write(board.astype(np.uint8))
+    clip.release()
+    return path
+
+
+def test_a_cut_is_an_event_in_the_curve_and_red_in_the_picture(tmp_path):
+    clip = clip_with_a_cut(tmp_path / "cut.mp4")
+    at_the_cut = show(tmp_path, "--next", "--surprise", clip, "--frames", 21)
+    assert at_the_cut.report["surprise"]["events_s"] == [pytest.approx(1.0, abs=0.03)]
+    assert at_the_cut.report["surprise"]["bits"] > 6
+    assert np.median(redness(inside(at_the_cut.rectangle("now_px")))) > 60
+    event = redness(at_the_cut.rectangle("curve_px")).max(0) > 100
+    assert 1 <= event.sum() <= 4
+    assert event[-5:].any()
+    before = show(tmp_path, "--next", "--surprise", clip, "--frames", 20)
+    assert before.report["surprise"]["events_s"] == []
+    assert before.report["surprise"]["bits"] < 4
+    assert redness(before.rectangle("curve_px")).max() < 20
+    off = show(tmp_path, "--next", clip, "--frames", 21)
+    assert off.report["surprise"]["frames"] == 0
+    assert np.median(redness(inside(off.rectangle("now_px")))) < 20
+
+
+def test_surprise_is_switched_by_a_key_and_the_picture_goes_on_without_its_network():
+    def curve(hands):
+        """The lowest rows of the window where the pictures are."""
+        return hands.see()[770:795, 208:741].astype(int)
+
+    with demo("--next", PEOPLE) as hands:
+        hands.until(lambda: hands.see()[100:400, 208:741].astype(int).std() > 10, "people")
+        without = curve(hands).std()
+        hands.press("s")
+        hands.until(lambda: curve(hands).std() < 30 and abs(curve(hands).std() - without) > 2, "the curve")
+    ran = headless("--next", "--surprise", "--prediction-bundle", ROOT / "tests", PEOPLE, "--frames", 5, timeout_s=60)
+    assert ran.returncode == 0, ran.stderr
+    assert "manifest.json" in ran.stdout
 
 
 def test_f7_goes_from_people_to_what_comes_and_back_with_the_same_source():

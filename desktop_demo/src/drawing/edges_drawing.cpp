@@ -1,4 +1,4 @@
-#include "edges_drawing.h"
+#include "drawing/edges_drawing.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stage_chart.h"
+#include "drawing/stage_chart.h"
 
 #include <imgui.h>
 #include <algorithm>

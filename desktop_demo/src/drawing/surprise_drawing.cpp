@@ -1,0 +1,105 @@
+#include "drawing/surprise_drawing.h"
+
+#include <imgui.h>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace {
+
+using maquette::PredictionFrame;
+using maquette::SurpriseMoment;
+
+constexpr float kRedFromBits = 1, kRedBits = 8, kMaxRed = 0.7f;  // of a cell: where red begins, and where it is full
+constexpr double kMinBits = 0.03, kMaxBits = 12;                 // of the curve
+constexpr size_t kMaxEventsListed = 5;
+constexpr ImU32 kEventColour = IM_COL32(230, 60, 60, 255);
+
+ImU32 red_of(float bits) {
+  const float red = kMaxRed * std::clamp((bits - kRedFromBits) / (kRedBits - kRedFromBits), 0.0f, 1.0f);
+  return IM_COL32(255, 0, 0, int(255 * red));
+}
+
+// 0 to 1 from the bottom to the top of the curve.
+float height_of(double bits) {
+  const double height = std::log(std::max(bits, kMinBits) / kMinBits) / std::log(kMaxBits / kMinBits);
+  return float(std::clamp(height, 0.0, 1.0));
+}
+
+}  // namespace
+
+// Colours change smoothly between the middles of the cells, and not beyond the outer ones'.
+void draw_surprising_cells(const PredictionFrame& frame, const Rect& picture) {
+  const maq_surprise_score& score = frame.surprise.back().score;
+  if (score.is_start != 0) return;  // its bits are of another kind
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const auto colour = [&](int row, int column) {
+    return red_of(frame.surprise_bits[size_t(std::clamp(row, 0, score.rows - 1)) * size_t(score.columns) +
+                                      size_t(std::clamp(column, 0, score.columns - 1))]);
+  };
+  // A line of the grid: the borders of the picture, and between them the middles.
+  const auto at = [](int i, int count, int from, int length) {
+    const float cell = std::clamp(float(i) - 0.5f, 0.0f, float(count));
+    return float(from) + cell * float(length) / float(count);
+  };
+  for (int row = 0; row <= score.rows; ++row) {
+    const float top = at(row, score.rows, picture.y, picture.height);
+    const float bottom = at(row + 1, score.rows, picture.y, picture.height);
+    for (int column = 0; column <= score.columns; ++column) {
+      const float left = at(column, score.columns, picture.x, picture.width);
+      const float right = at(column + 1, score.columns, picture.x, picture.width);
+      list->AddRectFilledMultiColor({left, top}, {right, bottom}, colour(row - 1, column - 1), colour(row - 1, column),
+                                    colour(row, column), colour(row, column - 1));
+    }
+  }
+}
+
+void draw_surprise_curve(const std::deque<SurpriseMoment>& moments, const Rect& rect, float scale) {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const ImVec2 from = {float(rect.x), float(rect.y)}, to = {from.x + float(rect.width), from.y + float(rect.height)};
+  list->AddRectFilled(from, to, IM_COL32(20, 20, 24, 255));
+  const auto y_of = [&](double bits) { return to.y - 1 - height_of(bits) * (to.y - from.y - 2); };
+  for (const auto& [bits, text] : {std::pair{0.1, "0.1 bits"}, {1.0, "1 bit"}, {10.0, "10 bits"}}) {
+    list->AddLine({from.x, y_of(bits)}, {to.x, y_of(bits)}, IM_COL32(60, 60, 66, 255));
+    list->AddText({from.x + 4 * scale, y_of(bits)}, IM_COL32(150, 150, 156, 255), text);
+  }
+  const float step = std::max(1.0f, float(rect.width) / 300);
+  float x = to.x - 1 - step * float(moments.size() - 1);
+  for (size_t i = 0; i < moments.size(); ++i, x += step) {
+    const maq_surprise_score& now = moments[i].score;
+    if (x < from.x) continue;
+    if (now.is_event != 0) list->AddLine({x, from.y}, {x, to.y}, kEventColour, scale);
+    if (i == 0 || now.is_start != 0 || moments[i - 1].score.is_start != 0 || x - step < from.x) continue;
+    list->AddLine({x - step, y_of(double(moments[i - 1].score.bits))}, {x, y_of(double(now.bits))},
+                  IM_COL32(230, 230, 230, 255), 1.5f * scale);
+  }
+}
+
+void draw_surprise_text(const PredictionFrame& frame, float scale) {
+  if (frame.surprise.empty()) return;
+  const maq_surprise_score& score = frame.surprise.back().score;
+  ImGui::Text("%.2f bits a code, %.1f times the usual, in %.1f ms", double(score.bits), double(score.ratio),
+              frame.surprise_ms);
+  size_t count = 0;
+  for (auto moment = frame.surprise.rbegin(); moment != frame.surprise.rend() && count < kMaxEventsListed; ++moment) {
+    if (moment->score.is_event == 0) continue;
+    ++count;
+    ImGui::TextColored(ImColor(kEventColour), "%.1f s", moment->time_s);
+    ImGui::SameLine(60 * scale);
+    ImGui::Text("%.2f bits, %.1f times%s", double(moment->score.bits), double(moment->score.ratio),
+                moment->score.is_cut != 0 ? ", a cut" : "");
+  }
+  if (count == 0) ImGui::TextUnformatted("No event in the latest frames.");
+}
+
+nlohmann::ordered_json surprise_report(const PredictionFrame& frame) {
+  nlohmann::ordered_json report;
+  report["frames"] = frame.surprise.size();
+  report["events_s"] = nlohmann::json::array();
+  for (const SurpriseMoment& moment : frame.surprise) {
+    if (moment.score.is_event != 0) report["events_s"].push_back(moment.time_s);
+  }
+  if (!frame.surprise.empty()) report["bits"] = frame.surprise.back().score.bits;
+  return report;
+}

@@ -1,5 +1,5 @@
 """Lists of photographs: `backgrounds.toml` (no people) -> `.data/backgrounds/{train,val,test}/NAME.jpg`,
-`photographs.toml` (people, and more without) -> `.data/photos/{train,val,test,empty}/NAME.jpg`.
+`photographs.toml` (people, and more without) -> `.data/photos/SPLIT/NAME.jpg`.
 
 Each photo is shrunk until its short side is 576 px (area interpolation; never enlarged) and stored as
 JPEG, so every machine gets the same folder from the same packages. A background's split is a property of its name,
@@ -53,7 +53,7 @@ def load_backgrounds() -> list[Photograph]:
 
 
 def load_photographs() -> list[Photograph]:
-    """photographs.toml: people by split, and `empty`."""
+    """photographs.toml: people by split, and splits without people."""
     with open(FOLDER / "photographs.toml", "rb") as file:
         table = tomllib.load(file)
     return [

@@ -19,6 +19,8 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from export.photos.qt_resources import read_resource
+
 FOLDER = Path(__file__).parent
 ARCHIVES = Path(".deps/photos")
 
@@ -128,7 +130,10 @@ def _source_command(wanted: str, folder: Path) -> list[str]:
 
 
 class PackageReader:
-    """Reads members of one archive by their path inside it; use it in a `with` statement."""
+    """Reads members of one archive by their path inside it; use it in a `with` statement.
+
+    "a.rcc!b/c.webp" is the file b/c.webp inside the Qt resource file a.rcc of the archive.
+    """
 
     def __init__(self, path: Path):
         self.path = path
@@ -149,6 +154,13 @@ class PackageReader:
         (self._zip or self._tar).close()
 
     def read(self, member: str) -> bytes:
+        """Raises PackageError if there is no such member."""
+        outer, _, inner = member.partition("!")
+        if inner:
+            try:
+                return read_resource(self.read(outer), inner)
+            except KeyError:
+                raise PackageError(f"{self.path.name} has no file {member}.") from None
         try:
             if self._zip:
                 return self._zip.read(member)

@@ -41,13 +41,30 @@ def test_no_photograph_is_both_trained_on_and_tested_on():
     assert len({p.name for p in photos}) == len({(p.package, p.member) for p in photos}) == len(photos)
     looked_at = {(m.package, m.member) for m in people.load_people()}
     assert not looked_at & {(p.package, p.member) for p in photos}
-    assert {p.split for p in photos} == {"train", "val", "test", "empty", "animals", "views"}
+    assert {p.split for p in photos} == {
+        "train",
+        "val",
+        "test",
+        "empty",
+        "animals",
+        "train-animals",
+        "views",
+    }
 
 
 def test_no_animal_of_the_test_stands_in_the_background_of_training():
     tested = {(p.package, p.member) for p in backgrounds.load_photographs() if p.split == "animals"}
-    assert len(tested) >= 9
+    assert len(tested) >= 20
     assert not tested & {(p.package, p.member) for p in backgrounds.load_backgrounds()}
+
+
+def test_animals_to_train_with_are_many_and_no_package_has_animals_of_the_test_too():
+    photos = backgrounds.load_photographs()
+    trained = [p for p in photos if p.split == "train-animals"]
+    assert len(trained) >= 59
+    assert not {p.package for p in trained} & {p.package for p in photos if p.split == "animals"}
+    kept_from_training = {p.member for p in backgrounds.load_backgrounds() if p.split != "train"}
+    assert not [p.name for p in trained if p.member in kept_from_training]
 
 
 def test_photographs_without_a_licence_for_more_are_tested_on_alone():

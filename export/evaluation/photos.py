@@ -250,7 +250,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     folder = Path(".data/photos")
     parser.add_argument(
         "--photos", type=Path, nargs="+", default=[folder / "photo", folder / "test"], metavar="DIR",
-        help="of people (default: the two of the test; .data/photos/val to choose between recipes)",
+        help="of people (default: the two of the test; .data/photos/val to choose between recipes; fresh: never)",
     )  # fmt: skip
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
     parser.add_argument(

@@ -13,7 +13,7 @@ EPILOG = """\
 examples:
   python -m export.photos fetch          everything below .data: people to look at, places to render in
   python -m export.photos backgrounds    photos without people -> .data/backgrounds/{train,val,test}
-  python -m export.photos people         photos and clips of people -> .data/photos/{photo,clip,train,val,test}, and
+  python -m export.photos people         photos and clips of people -> .data/photos/{photo,clip,train,val,test,fresh},
                                          without people -> .data/photos/{empty,animals,train-animals}
   python -m export.photos panoramas      places known all around, with their light -> .data/panoramas/{train,val,test}
   python -m export.photos list           what there is, with package and licence; fetches nothing

@@ -32,7 +32,7 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument(
         "--photos", type=Path, nargs="+", metavar="DIR",
-        default=[Path(".data/photos") / name for name in ("photo", "train", "val", "test")],
+        default=[Path(".data/photos") / name for name in ("photo", "train", "val", "test", "fresh")],
         help="default: all of `export.photos people`",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")

@@ -45,6 +45,7 @@ def test_no_photograph_is_both_trained_on_and_tested_on():
         "train",
         "val",
         "test",
+        "fresh",
         "empty",
         "animals",
         "train-animals",
@@ -70,9 +71,17 @@ def test_animals_to_train_with_are_many_and_no_package_has_animals_of_the_test_t
 def test_photographs_without_a_licence_for_more_are_tested_on_alone():
     listed = packages.load_packages()
     for photo in backgrounds.load_photographs():
-        assert photo.split in ("test", "empty", "animals") or "tests only" not in listed[photo.package].licence, (
-            photo.name
-        )
+        if "tests only" in listed[photo.package].licence:
+            assert photo.split in ("test", "fresh", "empty", "animals"), photo.name
+
+
+def test_nothing_is_trained_on_or_chosen_by_that_shares_a_package_with_the_fresh_test():
+    photos = backgrounds.load_photographs()
+    fresh = [p for p in photos if p.split == "fresh"]
+    assert len(fresh) >= 40
+    learnt_from = [p for p in photos if p.split in ("train", "val", "train-animals")]
+    learnt_from += [p for p in backgrounds.load_backgrounds() if p.split != "test"]
+    assert not {p.package for p in fresh} & {p.package for p in learnt_from}
 
 
 def test_nothing_of_the_performance_that_checks_views_is_trained_on():

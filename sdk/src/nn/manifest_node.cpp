@@ -8,7 +8,7 @@ namespace maq {
 using nlohmann::json;
 
 ManifestNode ManifestNode::parse(const std::string& text, const std::string& origin) {
-  constexpr char kRemedy[] = ". Fetch or export the bundle again.";
+  constexpr char kAdvice[] = ". Fetch or export the bundle again.";
   json root;
   try {
     root = json::parse(text);
@@ -24,9 +24,9 @@ ManifestNode ManifestNode::parse(const std::string& text, const std::string& ori
       while (!what.empty() && uint8_t(what.back()) >= 0x80) what.pop_back();  // a part of a character
       what += "...";
     }
-    throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object: ", what, kRemedy);
+    throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object: ", what, kAdvice);
   }
-  if (!root.is_object()) throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object", kRemedy);
+  if (!root.is_object()) throw Error(MAQ_ERROR_BAD_BUNDLE, origin, " is not a JSON object", kAdvice);
   const auto document = std::make_shared<const Document>(Document{std::move(root), origin});
   return {document, document->root, ""};
 }

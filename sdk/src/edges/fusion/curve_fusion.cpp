@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kPlaceStep_r = 1;  // between the places of a curve
 constexpr int kMaxSteps = 20000;    // along one curve, and as many when it is made longer
-constexpr double kTwoPi = 6.283185307179586;
+constexpr double kTurn_rad = 6.283185307179586;
 constexpr double kBeside = 1.3;  // of match_r: so near a fused curve nothing else is another one
 // A crease in a quarter of what was seen of a curve is one: for the rest one side was hidden.
 constexpr double kCreaseFraction = 0.25;
@@ -63,7 +63,7 @@ class CurveFusion::Merger {
         pieces_(from.pieces_),
         places_(from.places_),
         min_views_(from.centres_.size() > 2 ? options_.min_views : 1),
-        cosine_(std::cos(options_.match_deg * kTwoPi / 360)) {
+        cosine_(std::cos(options_.match_deg * kTurn_rad / 360)) {
     double largest = 0;
     for (Place& place : places_) {
       const auto& c = from.centres_[size_t(place.view)];
@@ -265,7 +265,7 @@ class CurveFusion::Merger {
             return Spot{now.centre + std::cos(a) * now.x_axis + std::sin(a) * now.y_axis,
                         (1 / radius) * (std::cos(a) * now.y_axis - std::sin(a) * now.x_axis)};
           },
-          now.sweep_rad * radius, draft.r_m, kTwoPi * radius, true);
+          now.sweep_rad * radius, draft.r_m, kTurn_rad * radius, true);
       fill_points();
       const auto better = arc_fitter_.fit(points_.data(), points_.size());
       if (!better || !(better->rms <= 1.5 * options_.tolerance_r)) return restore(first, end);
@@ -275,8 +275,8 @@ class CurveFusion::Merger {
     EdgeCurve& curve = draft.curve;
     curve.type = CurveType::kArc;
     curve.centre = arc->centre, curve.x_axis = arc->x_axis, curve.y_axis = arc->y_axis;
-    curve.is_closed = (kTwoPi - arc->sweep_rad) * radius < options_.gap_r * draft.r_m;
-    curve.sweep_rad = curve.is_closed ? kTwoPi : arc->sweep_rad;
+    curve.is_closed = (kTurn_rad - arc->sweep_rad) * radius < options_.gap_r * draft.r_m;
+    curve.sweep_rad = curve.is_closed ? kTurn_rad : arc->sweep_rad;
     curve.rms_r = arc->rms;
     if (!(curve.sweep_rad * radius >= options_.min_length_r * draft.r_m)) return restore(first, end);
     const auto spot = [&](double s) {

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kHead = 0.5, kInner = 0.9;  // of a matte; beyond this, no background shows through
 constexpr double kMaxSpread_dm = 0.25;       // of the template points of neighbours on one surface
-constexpr int kSquare = 3;                   // cells a side of what is held out
+constexpr int kHeldOutCells = 3;             // cells a side of what is held out
 
 uint64_t mixed(uint64_t z) {  // SplitMix64
   z += 0x9e3779b97f4a7c15u;
@@ -130,7 +130,7 @@ void add_fit_rays(const HeadPhoto& photo, uint32_t index, const FitRayOptions& o
         const double size = double(photo.rgb_side) / side;
         ray.has_colour = mean_colour(photo, column * size, row * size, size, ray.rgb);
       }
-      const uint64_t square = uint64_t(cell_y / kSquare) << 40 | uint64_t(cell_x / kSquare) << 20 | index;
+      const uint64_t square = uint64_t(cell_y / kHeldOutCells) << 40 | uint64_t(cell_x / kHeldOutCells) << 20 | index;
       const bool is_held_out =
           double(mixed(square + mixed(options.seed)) >> 11) < options.held_out_fraction * 9007199254740992.0;
       (is_held_out ? rays.held_out : rays.fitted).push_back(ray);

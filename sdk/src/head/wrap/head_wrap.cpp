@@ -25,7 +25,7 @@ constexpr double kReach_dm = 16;  // no point is farther
 bool is_on_surface(TemplateKind kind) { return kind == TemplateKind::kSurface || kind == TemplateKind::kEyeFront; }
 bool is_part(TemplateKind kind) { return kind >= TemplateKind::kEye; }
 
-Vec3 point_at(const std::vector<float>& values, size_t i) {
+Vec3 triple_at(const std::vector<float>& values, size_t i) {
   return {double(values[3 * i]), double(values[3 * i + 1]), double(values[3 * i + 2])};
 }
 
@@ -39,8 +39,8 @@ class Wrapping {
   Wrapping(const HeadTemplate& head, const std::vector<float>& starts, const WrapField& field)
       : head_(head), field_(field), count_(head.point_count()), at_(count_), trust_(count_), normals_(count_) {
     for (size_t i = 0; i < count_; ++i) {
-      template_.push_back(point_at(head.points, i));
-      const Vec3 start = point_at(starts, i);
+      template_.push_back(triple_at(head.points, i));
+      const Vec3 start = triple_at(starts, i);
       at_[i] = is_finite(start) && length(start) < kReach_dm ? start : template_[i];
       if (is_on_surface(head.kinds[i])) surface_.push_back(i);
     }

@@ -26,7 +26,7 @@ struct OwnedArrays {
   Bytes positions, constant_terms, linear_terms;
 };
 
-bool is_sound(float value) { return std::abs(value) <= kMaxMagnitude; }  // false for NaN
+bool is_in_range(float value) { return std::abs(value) <= kMaxMagnitude; }  // false for NaN
 
 void check(const FittedPoints& points) {
   const size_t count = points.count();
@@ -49,14 +49,14 @@ void check(const FittedPoints& points) {
     }
   }
   for (size_t i = 0; i < count; ++i) {
-    if (!is_sound(points.x[i]) || !is_sound(points.y[i]) || !is_sound(points.z[i])) {
+    if (!is_in_range(points.x[i]) || !is_in_range(points.y[i]) || !is_in_range(points.z[i])) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Point ", i, " is at (", points.x[i], ", ", points.y[i], ", ",
                   points.z[i], "): not finite, or too far away.");
     }
     const float* constant = &points.constant_terms[i * kFeatures];
     const float* linear = &points.linear_terms[i * kLinearTerms];
-    if (!std::all_of(constant, constant + kFeatures, is_sound) ||
-        !std::all_of(linear, linear + kLinearTerms, is_sound) || std::isnan(points.view_dependence[i])) {
+    if (!std::all_of(constant, constant + kFeatures, is_in_range) ||
+        !std::all_of(linear, linear + kLinearTerms, is_in_range) || std::isnan(points.view_dependence[i])) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The descriptor of point ", i,
                   " is not finite or too large; the networks may be damaged.");
     }

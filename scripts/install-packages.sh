@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs the Debian packages that a group of make targets needs, and only those that are missing.
+# Installs the Debian packages that groups of make targets need, and only those that are missing.
 #
 #   scripts/install-packages.sh demo        to build the SDK and run it
 #   scripts/install-packages.sh desktop     + the desktop demo
@@ -9,18 +9,29 @@
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
+#   scripts/install-packages.sh test lint   what both need, at once
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,13s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,14s/^# \{0,1\}//p' "$0"; }
 
-group="${1:-}"
-case "$group" in
-    demo | desktop | test | isa | camera-vm | lint | android | newcomer) ;;
-    -h | --help) usage; exit 0 ;;
-    *) usage >&2; exit 2 ;;
-esac
+for group in "${@:-}"; do
+    case "$group" in
+        demo | desktop | test | isa | camera-vm | lint | android | newcomer) ;;
+        -h | --help) usage; exit 0 ;;
+        *) usage >&2; exit 2 ;;
+    esac
+done
+# wants GROUP...: whether one of them is asked for.
+wants() {
+    local asked group
+    for asked in "${groups[@]}"; do
+        for group; do [ "$asked" != "$group" ] || return 0; done
+    done
+    return 1
+}
+groups=("$@")
 
 if ! command -v dpkg-query >/dev/null; then
     echo "This is not a Debian system, so nothing is installed: see the package list in $0." >&2
@@ -48,12 +59,12 @@ needs_package libpng-dev
 needs_package libxxhash-dev
 needs_package ca-certificates
 
-if [ "$group" != demo ]; then
+if wants desktop test isa camera-vm lint android newcomer; then
     needs_package libglfw3-dev
     needs_package libepoxy-dev
     needs_package libimgui-dev
 fi
-if [ "$group" != demo ] && [ "$group" != desktop ]; then
+if wants test isa camera-vm lint android newcomer; then
     needs_command git git
     needs_command ccache ccache       # what was compiled in another checkout is not compiled again
     needs_command assimp assimp-utils  # a reader of heads that is not ours
@@ -68,12 +79,12 @@ if [ "$group" != demo ] && [ "$group" != desktop ]; then
     needs_command Xvfb xvfb           # a display for the desktop demo
     needs_command xauth xauth         # ... which xvfb-run needs to start it
 fi
-if [ "$group" = isa ]; then
+if wants isa; then
     needs_command qemu-aarch64 qemu-user
     needs_command aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
     needs_command mvn maven           # brings ONNX Runtime for aarch64
 fi
-if [ "$group" = camera-vm ]; then
+if wants camera-vm; then
     needs_command qemu-system-x86_64 qemu-system-x86
     needs_package busybox-static      # static: the virtual machine has no libraries but those packed
     needs_command cpio cpio
@@ -82,11 +93,11 @@ if [ "$group" = camera-vm ]; then
     needs_command cam libcamera-tools
     needs_command udevadm udev
 fi
-if [ "$group" = lint ]; then
+if wants lint; then
     needs_command clang-format clang-format
     needs_command clang-tidy clang-tidy
 fi
-if [ "$group" = test ] || [ "$group" = android ]; then
+if wants test android; then
     needs_command javac openjdk-17-jdk-headless
     needs_command mvn maven           # brings Kotlin, and Android's classes to test against
     needs_command clang++-14 clang-14
@@ -96,7 +107,7 @@ if [ "$group" = test ] || [ "$group" = android ]; then
     needs_command python3 python3
     needs_package python3-pip         # brings headers of a C library like Android's
 fi
-[ "$group" != newcomer ] || needs_command debootstrap debootstrap
+! wants newcomer || needs_command debootstrap debootstrap
 
 [ ${#missing[@]} -eq 0 ] && exit 0
 

@@ -15,6 +15,8 @@ case "${1:-}" in -h | --help) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 extras="${1:-}"
 python="${PYTHON:-python3}"
 stamp=".venv/.ready-${extras:-light}"
+exec 9<"$0"  # one at a time, in one environment
+flock 9
 if [ -f "$stamp" ] && [ ! pyproject.toml -nt "$stamp" ]; then exit 0; fi
 
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {

@@ -126,6 +126,7 @@ class Concealer(NativeObject):
         own = {"max_gap_ms": round(max_gap_s * 1000), "method": _method(method)}
         config = n.config("maq_concealer_config", own | settings)
         super().__init__(n.create("maq_concealer", n.context, source.handle, config))
+        self._source = source  # forgotten by its owner, it would be stopped
 
     def read(self, timeout_s: float | None = None) -> Frame | None:
         """The next frame, or None after the source's last one. Raises MaquetteError, TimeoutError."""

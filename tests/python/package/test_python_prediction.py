@@ -1,5 +1,7 @@
 """Prediction and concealing through the Python package."""
 
+import gc
+
 import maquette
 import numpy as np
 import pytest
@@ -85,6 +87,13 @@ def test_gaps_are_bridged_by_frames_that_say_so():
     assert len(made_up) == stats["predicted_count"] > 3
     assert all(0 < origin.horizon_s <= 0.3 for origin in made_up)
     assert len(frames) - len(made_up) == stats["captured_count"] - stats["dropped_count"]
+
+
+def test_a_source_that_is_forgotten_stays_open_as_long_as_its_concealer():
+    concealer = maquette.Concealer(maquette.Source("stub:pattern?size=64x48&fps=100&live=1"), threads=1)
+    gc.collect()
+
+    assert all(concealer.read(timeout_s=60) is not None for _ in range(3))
 
 
 def test_only_live_sources_have_gaps():

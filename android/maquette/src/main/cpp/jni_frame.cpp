@@ -126,6 +126,22 @@ MAQ_NATIVE(jlongArray, describeFrame)(JNIEnv* env, jclass, jlong frame) {
   });
 }
 
+// Of a predicted frame its horizon and age, and the timestamp and sequence of the captured one; null of a captured
+// frame.
+MAQ_NATIVE(jlongArray, originOfFrame)(JNIEnv* env, jclass, jlong frame) {
+  return call(env, [&]() -> jlongArray {
+    auto origin = maq_jni::sized<maq_frame_origin>();
+    check(maq_frame_get_origin(object<maq_frame>(frame), &origin));
+    if (origin.kind == MAQ_FRAME_CAPTURED) return nullptr;
+    const jlong values[] = {origin.horizon_ns, origin.age_ns, origin.captured_timestamp_ns,
+                            jlong(origin.captured_sequence)};
+    jlongArray array = env->NewLongArray(4);
+    maq_jni::check_pending(env);
+    env->SetLongArrayRegion(array, 0, 4, values);
+    return array;
+  });
+}
+
 MAQ_NATIVE(void, copyFramePixels)(JNIEnv* env, jclass, jlong frame, jint format, jobject buffer) {
   call(env, [&] {
     const Memory memory = maq_jni::memory_of(env, buffer);

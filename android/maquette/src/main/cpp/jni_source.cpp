@@ -162,11 +162,12 @@ MAQ_NATIVE_OF(NativeSource, jdoubleArray, cameraNumbers)(JNIEnv* env, jclass, jl
 
 // `source` may be 0.
 MAQ_NATIVE_OF(NativeSource, jlong, createRecorder)
-(JNIEnv* env, jclass, jlong context, jbyteArray path, jlong source, jint jpeg_quality) {
+(JNIEnv* env, jclass, jlong context, jbyteArray path, jlong source, jint jpeg_quality, jboolean keep_predicted) {
   return call(env, [&] {
     maq_recorder_config config;
     check(maq_recorder_config_init(&config, sizeof config));
     config.jpeg_quality = uint32_t(jpeg_quality);
+    config.keep_predicted = keep_predicted == JNI_TRUE ? 1 : 0;
     maq_recorder* recorder = nullptr;
     check(maq_recorder_create(object<maq_context>(context), maq_jni::text(env, path).c_str(),
                               source == 0 ? nullptr : source_of(source), &config, &recorder));

@@ -14,6 +14,7 @@ set(MAQ_JNI_SOURCES
   jni_head_rendering.cpp
   jni_picture.cpp
   jni_pipeline.cpp
+  jni_prediction.cpp
   jni_preview.cpp
   jni_scene.cpp
   jni_scene_building.cpp

@@ -29,6 +29,9 @@ private const val CANCELLATION_MS = 50L
  */
 fun Source.frames(): Flow<Frame> = acquired(::acquireFrame)
 
+/** As [frames] of a source, for a source whose gaps are bridged; [Frame.origin] tells which frames are made up. */
+fun Concealer.frames(): Flow<Frame> = acquired(::acquireFrame)
+
 /**
  * The results, until the source ends or the pipeline is stopped: begin to collect after [Pipeline.setSource]. Each is
  * the collector's, to be closed by it, and what is said of [frames] holds here too. Results that come while the collector

@@ -60,6 +60,29 @@ class Frame internal constructor(pointer: Long) : AutoCloseable {
     /** Its number in its source, from 0. */
     val sequence: Long get() = description[5]
 
+    /**
+     * Where the picture of a predicted frame comes from.
+     *
+     * @property horizonNs from the captured frame that it was made from to its own timestamp.
+     * @property ageNs since that frame was captured: until now with [Clock.MONOTONIC], else as [horizonNs].
+     * @property capturedTimestampNs of that frame.
+     * @property capturedSequence of that frame.
+     */
+    data class Origin(
+        val horizonNs: Long,
+        val ageNs: Long,
+        val capturedTimestampNs: Long,
+        val capturedSequence: Long,
+    )
+
+    /**
+     * Null where a camera took the frame, or it was read, wrapped or drawn. Else it is made up, by a [Predictor] or a
+     * [Concealer]: what acts on frames, such as a robot, must not act on it. A copy by [resize] keeps it; a bitmap or
+     * pixels do not say so.
+     */
+    val origin: Origin?
+        get() = handle.use(Native::originOfFrame)?.let { o -> Origin(o[0], o[1], o[2], o[3]) }
+
     /** Copies the pixels into a direct buffer as RGB8, BGR8, RGBA8 or GREY8, rows without padding. */
     fun copyPixels(
         format: PixelFormat,
@@ -119,3 +142,26 @@ class Frame internal constructor(pointer: Long) : AutoCloseable {
 
 /** [heightPx] rows of [widthPx] depths along the optical axis, in metres; 0 where it is unknown. */
 class DepthImage(val widthPx: Int, val heightPx: Int, val metres: FloatArray)
+
+internal fun requireDrawable(bitmap: Bitmap) {
+    require(bitmap.isMutable) { "The bitmap is not mutable; make it with Bitmap.createBitmap or copy it." }
+    require(bitmap.config == Bitmap.Config.ARGB_8888) { "The bitmap is ${bitmap.config}; ARGB_8888 is needed." }
+}
+
+internal fun requireOpen(buffer: HardwareBuffer) = check(!buffer.isClosed) { "This HardwareBuffer is closed." }
+
+/** An ARGB_8888 bitmap of three bytes a pixel, blue, green, red, and one of alpha; null: it is opaque. */
+internal fun bitmapOf(bgr: ByteBuffer, alpha: ByteBuffer?, widthPx: Int, heightPx: Int): Bitmap {
+    val colours = ByteArray(3 * widthPx * heightPx)
+    bgr.get(colours)
+    val alphas = alpha?.let { ByteArray(widthPx * heightPx).also(it::get) }
+    val pixels =
+        IntArray(widthPx * heightPx) { k ->
+            val blue = colours[3 * k].toInt() and 0xFF
+            val green = colours[3 * k + 1].toInt() and 0xFF
+            val red = colours[3 * k + 2].toInt() and 0xFF
+            val opacity = if (alphas == null) 0xFF else alphas[k].toInt() and 0xFF
+            opacity shl 24 or (red shl 16) or (green shl 8) or blue
+        }
+    return Bitmap.createBitmap(pixels, widthPx, heightPx, Bitmap.Config.ARGB_8888)
+}

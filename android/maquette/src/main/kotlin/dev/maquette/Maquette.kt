@@ -9,6 +9,7 @@ import dev.maquette.jni.Native
 import dev.maquette.jni.NativeEdges
 import dev.maquette.jni.NativeHead
 import dev.maquette.jni.NativePicture
+import dev.maquette.jni.NativePrediction
 import dev.maquette.jni.NativeScene
 import java.io.IOException
 import java.nio.ByteBuffer
@@ -204,10 +205,55 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      * @param source where the frames will come from: its rate and intrinsics are recorded too.
      * @param jpegQuality 1 to 100: pixels are compressed as JPEG of that quality, for which Android 11 is needed; 0:
      *   they stay as they are, 14 MB a second at 640 x 480 (NV12) and 30 frames a second.
+     * @param keepPredicted true: frames that a [Predictor] or a [Concealer] made up are recorded too, marked as such;
+     *   false: they are refused.
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] and [Status.UNWRITABLE].
      */
-    fun recorder(path: String, source: Source? = null, jpegQuality: Int = 0): Recorder =
-        handle.use { context -> Recorder(context, path, source, jpegQuality) }
+    fun recorder(
+        path: String,
+        source: Source? = null,
+        jpegQuality: Int = 0,
+        keepPredicted: Boolean = false,
+    ): Recorder = handle.use { context -> Recorder(context, path, source, jpegQuality, keepPredicted) }
+
+    /**
+     * A predictor for one stream; no networks are needed. Does not block.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
+     */
+    fun predictor(config: Predictor.Config = Predictor.Config()): Predictor =
+        handle.use { context -> Predictor(NativePrediction.createPredictor(context, config.values())) }
+
+    /**
+     * How surprising the frames of one stream are. Loads the networks of prediction; takes some 10 ms, so not on the
+     * main thread.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
+     *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task).
+     */
+    fun surprise(bundle: ModelBundle, config: Surprise.Config = Surprise.Config()): Surprise =
+        handle.use { context -> Surprise(context, bundle, config, null) }
+
+    /**
+     * As above, for a further stream, with the networks of another one, which may be closed: it takes some kilobytes
+     * then, and frames of both are encoded one after the other. Does not block.
+     *
+     * @param eventRatio as of [Surprise.Config].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
+     */
+    fun surprise(networksOf: Surprise, eventRatio: Float = 4f): Surprise =
+        handle.use { context -> Surprise(context, null, Surprise.Config(eventRatio = eventRatio), networksOf) }
+
+    /**
+     * A concealer of a live source, whose frames it takes until it is closed: [Source.acquireFrame] then fails with
+     * [Status.BUSY]. Does not block.
+     *
+     * @param source stays the app's; closing or stopping it ends the frames of the concealer too.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.UNSUPPORTED] (the
+     *   source is not live), [Status.BUSY] (it has a concealer already), [Status.OUT_OF_MEMORY] (no more threads).
+     */
+    fun concealer(source: Source, config: Concealer.Config = Concealer.Config()): Concealer =
+        handle.use { context -> Concealer(context, source, config) }
 
     /** The cameras that are connected now. Blocks while devices answer: not on the main thread. */
     fun cameras(): List<Camera> = handle.use(Camera::all)

@@ -21,17 +21,16 @@ class Recorder internal constructor(
     path: String,
     source: Source?,
     jpegQuality: Int,
+    keepPredicted: Boolean,
 ) : AutoCloseable {
-    private val handle =
-        Handle(
-            this,
-            if (source == null) {
-                NativeSource.createRecorder(context, path.toByteArray(), 0, jpegQuality)
-            } else {
-                source.handle.use { NativeSource.createRecorder(context, path.toByteArray(), it, jpegQuality) }
-            },
-            NativeSource::destroyRecorder,
-        )
+    private val handle: Handle
+
+    init {
+        fun create(source: Long) =
+            NativeSource.createRecorder(context, path.toByteArray(), source, jpegQuality, keepPredicted)
+        val made = if (source == null) create(0) else source.handle.use(::create)
+        handle = Handle(this, made, NativeSource::destroyRecorder)
+    }
 
     /** What has been written so far. */
     data class Info(val frameCount: Long, val sizeBytes: Long)
@@ -46,8 +45,9 @@ class Recorder internal constructor(
     /**
      * Adds a frame, which is complete in the file when the call returns. Frames may have different sizes and formats.
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (not later than the frame before) and
-     *   [Status.UNWRITABLE] (no space: earlier frames stay readable, and frames can be added again once there is some).
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (not later than the frame before), [Status.UNSUPPORTED]
+     *   (predicted, and such are not kept) and [Status.UNWRITABLE] (no space: earlier frames stay readable, and frames
+     *   can be added again once there is some).
      */
     fun add(frame: Frame) = handle.use { recorder -> frame.handle.use { NativeSource.record(recorder, it) } }
 

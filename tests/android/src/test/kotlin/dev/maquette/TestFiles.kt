@@ -11,6 +11,7 @@ object TestFiles {
     val scenesBundle = File(root, "sdk/models/scenes-int8")
     val edgesBundle = File(root, "sdk/models/edges-int8")
     val headsBundle = File(root, "sdk/models/heads-int8")
+    val predictionBundle = File(root, "sdk/models/prediction-int8")
     val roundHeadsBundle = File(root, "tests/native/data/round_heads/bundle")
     val photo = File(root, "tests/media/photo.jpg")
     val clip = File(root, "tests/media/clip.mp4")

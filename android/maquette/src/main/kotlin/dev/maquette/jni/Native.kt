@@ -53,6 +53,9 @@ internal object Native {
     @JvmStatic external fun decodeFrame(context: Long, data: ByteBuffer, sizeBytes: Int): Long
     @JvmStatic external fun releaseFrame(frame: Long)
     @JvmStatic external fun describeFrame(frame: Long): LongArray
+
+    /** Horizon, age, and timestamp and sequence of the captured frame; null: no predicted frame. */
+    @JvmStatic external fun originOfFrame(frame: Long): LongArray?
     @JvmStatic external fun copyFramePixels(frame: Long, format: Int, pixels: ByteBuffer)
 
     /** Depth in metres; writes its width and height. Null: the frame has none. */

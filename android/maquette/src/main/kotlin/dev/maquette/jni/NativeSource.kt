@@ -23,7 +23,15 @@ internal object NativeSource {
     @JvmStatic external fun control(source: Long, control: Int): DoubleArray?
     @JvmStatic external fun setControl(source: Long, control: Int, value: Double)
 
-    @JvmStatic external fun createRecorder(context: Long, path: ByteArray, source: Long, jpegQuality: Int): Long
+    @JvmStatic
+    external fun createRecorder(
+        context: Long,
+        path: ByteArray,
+        source: Long,
+        jpegQuality: Int,
+        keepPredicted: Boolean,
+    ): Long
+
     @JvmStatic external fun destroyRecorder(recorder: Long)
     @JvmStatic external fun record(recorder: Long, frame: Long)
     @JvmStatic external fun finishRecorder(recorder: Long)

@@ -93,11 +93,14 @@ class SurpriseTest : AndroidTest() {
         second.reset()
         assertEquals("the other may be closed", alone, second.bitsOfMotion(0..3))
         assertClosed { maquette.surprise(networksOf = first) }
-        maquette.surprise(networksOf = second, eventRatio = 1.001f).use { third ->
-            second.close()
-            val events = third.bitsOfMotion(0..11).let { third.stats.eventCount }
-            assertTrue("$events", events > 2)
+        val events = listOf(1.0001f, 1e6f).map { ratio ->
+            maquette.surprise(networksOf = second, eventRatio = ratio).use { third ->
+                for (number in 0..11) third.pushTexture(number)
+                third.stats.eventCount
+            }
         }
+        assertTrue("$events", events[0] > events[1])
+        second.close()
         val inMemory = ModelBundle.ofBuffers(TestFiles.bundleInMemory(TestFiles.predictionBundle))
         maquette.surprise(inMemory, config).use { assertEquals(alone, it.bitsOfMotion(0..3)) }
     }

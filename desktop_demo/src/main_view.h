@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "drawing/stage_chart.h"
 #include "options.h"
 #include "screen/painter.h"
 #include "screen/window.h"
-#include "drawing/stage_chart.h"
 
 // What the user wants that is not the view's own business, by a key or a button.
 enum class Action {

@@ -26,10 +26,10 @@ constexpr std::array<const char*, 3> kMethodNames = {"auto", "last", "motion"};
 constexpr double kMinAheadMs = 33, kMaxAheadMs = 1000;
 
 struct Options {
-  std::string source = kFirstCamera;  // or a file, a folder with a capture
-  bool edges = false;                 // of the source, rather than people
-  bool head = false;                  // of the person in its first picture
-  bool next = false;                  // what the source will show next
+  std::string source = kFirstCamera;      // or a file, a folder with a capture
+  bool edges = false;                     // of the source, rather than people
+  bool head = false;                      // of the person in its first picture
+  bool next = false;                      // what the source will show next
   maquette::PredictionChoice prediction;  // and surprise
   maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
   double fit_seconds = 3;  // of a head

@@ -1,5 +1,5 @@
-"""The desktop demo's view of what comes next: it differs from now while things move, what is made up is marked, and what
-is surprising is red, in the picture and in its curve."""
+"""The desktop demo's view of what comes next: it differs from now while things move, what is made up is marked, and
+what is surprising is red, in the picture and in its curve."""
 
 import shutil
 

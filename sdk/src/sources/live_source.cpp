@@ -379,15 +379,12 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
 LiveSource::~LiveSource() {
   State& state = *state_;
   state.stop();
+  wait_for_report();
   std::vector<State::Entry> left;
   bool ended = false;
   {
     std::unique_lock<std::mutex> lock(state.mutex);
     ended = state.changed.wait_for(lock, kStopTimeout, [&] { return state.ended; });
-    // The app may free what its callback uses as soon as this returns.
-    if (std::this_thread::get_id() != state.thread.get_id()) {
-      state.changed.wait(lock, [&] { return !state.reporting; });
-    }
     left.swap(state.ring);
     state.first = state.count = 0;
   }
@@ -428,6 +425,13 @@ void LiveSource::seek(int64_t time_ns) {
 }
 
 void LiveSource::stop() { state_->stop(); }
+
+void LiveSource::wait_for_report() {
+  State& state = *state_;
+  if (std::this_thread::get_id() == state.thread.get_id()) return;
+  std::unique_lock<std::mutex> lock(state.mutex);
+  state.changed.wait(lock, [&] { return !state.reporting; });
+}
 
 int LiveSource::event_fd() {
   std::lock_guard<std::mutex> lock(state_->mutex);

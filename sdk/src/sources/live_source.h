@@ -34,6 +34,7 @@ class LiveSource : public Source {
   NextFrame next(int64_t timeout_ns, Frame& frame) override;
   // The thread closes the camera as soon as that answers.
   void stop() override;
+  void wait_for_report() override;
   int event_fd() override;
 
  private:

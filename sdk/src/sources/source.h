@@ -39,6 +39,8 @@ class Source {
   virtual NextFrame next(int64_t timeout_ns, Frame& frame) = 0;
   // From any thread, for good: where next() waits, it returns kStopped, now and later. Others end what they decode.
   virtual void stop() {}
+  // After stop(): returns when no state callback runs any more; in a state callback, at once.
+  virtual void wait_for_report() {}
   // From any thread: a descriptor of the source that is readable while next() would not wait. Throws
   // MAQ_ERROR_UNSUPPORTED where it never does.
   virtual int event_fd();

@@ -3,7 +3,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <future>
 #include <maquette/maquette.hpp>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -207,6 +209,29 @@ TEST_F(Concealer, AConcealedSourceIsBusy) {
   EXPECT_TRUE(source.next(kPatience_ns));
   maquette::Concealer again(context_, source, config());
   EXPECT_TRUE(again.next(kPatience_ns));
+}
+
+TEST_F(Concealer, ItsSourceIsDestroyedAfterTheStateCallbackThatRuns) {
+  struct Listener {
+    std::promise<void> begun, concealed;
+    std::atomic<bool> is_done{false};
+  } listener;
+  maq_source_config config = maquette::default_source_config();
+  config.state_user_data = &listener;
+  config.state_callback = [](void* user_data, maq_source_state state, const char*) {
+    if (state != MAQ_SOURCE_STARTED) return;
+    Listener& self = *static_cast<Listener*>(user_data);
+    self.begun.set_value();
+    self.concealed.get_future().wait();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    self.is_done = true;
+  };
+  std::optional<maquette::Source> source(std::in_place, context_, "stub:people?size=64x48&live=1", &config);
+  listener.begun.get_future().wait();
+  const maquette::Concealer concealer(context_, *source, this->config());
+  listener.concealed.set_value();
+  source.reset();
+  EXPECT_TRUE(listener.is_done) << "what it uses may be freed now";
 }
 
 TEST_F(Concealer, WhatIsWrongIsTold) {

@@ -240,7 +240,10 @@ def main(argv: list[str] | None = None) -> int:
         "--consistent", type=Path, nargs="+", default=[], metavar="WEIGHTS",
         help="weights.pt of trainings: what they agree on about people seen large completes the labels",
     )  # fmt: skip
-    parser.add_argument("--empty", type=Path, default=Path(".data/backgrounds/train"), metavar="DIR", help="no people")
+    parser.add_argument(
+        "--empty", type=Path, nargs="+", default=[Path(".data/backgrounds/train")], metavar="DIR",
+        help="photographs without people",
+    )  # fmt: skip
     parser.add_argument(
         "--composed", type=int, default=2400, metavar="N",
         help="images with people cut out of photos in front of other places (default %(default)s)",
@@ -274,7 +277,7 @@ def main(argv: list[str] | None = None) -> int:
         pictures.append(shrunk(image, label))
     known = np.concatenate([instance[~ignore] for _, instance, ignore in (visible_boxes(p[1]) for p in pictures)])
     empty = []
-    for path in sorted(arguments.empty.glob("*.jpg")):
+    for path in sorted(p for folder in arguments.empty for p in folder.glob("*.jpg")):
         image = read(path)
         empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
     people, count = write_training_set(pictures, empty, arguments.repeat, arguments.composed, arguments.out)

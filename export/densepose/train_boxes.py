@@ -60,8 +60,8 @@ MINE_EVERY = 200  # steps after which background boxes are scored again
 @dataclass(frozen=True)
 class Boxes:
     """Boxes to learn from. roi: float16 [R, C, 7, 7]; person: float32 [R], probability that it shows a person: 0 or 1
-    where labels say it; target: float32 [R, 4], deltas to the true box (0 for background); weight: float32 [R], how often
-    a box is drawn."""
+    where labels say it; target: float32 [R, 4], deltas to the true box (0 for background); weight: float32 [R], how
+    often a box is drawn."""
 
     roi: Tensor
     person: Tensor

@@ -99,6 +99,12 @@ struct LiveSource::State {
     changed.notify_all();
   }
 
+  void wait_for_report() {
+    if (std::this_thread::get_id() == thread.get_id()) return;
+    std::unique_lock<std::mutex> lock(mutex);
+    changed.wait(lock, [&] { return !reporting; });
+  }
+
   void push(Entry entry) {
     Entry old;  // returned to the camera after the lock is released
     {
@@ -379,7 +385,7 @@ LiveSource::LiveSource(CameraOpener open, std::string name, const SourceSettings
 LiveSource::~LiveSource() {
   State& state = *state_;
   state.stop();
-  wait_for_report();
+  state.wait_for_report();
   std::vector<State::Entry> left;
   bool ended = false;
   {
@@ -426,12 +432,7 @@ void LiveSource::seek(int64_t time_ns) {
 
 void LiveSource::stop() { state_->stop(); }
 
-void LiveSource::wait_for_report() {
-  State& state = *state_;
-  if (std::this_thread::get_id() == state.thread.get_id()) return;
-  std::unique_lock<std::mutex> lock(state.mutex);
-  state.changed.wait(lock, [&] { return !state.reporting; });
-}
+void LiveSource::wait_for_report() { state_->wait_for_report(); }
 
 int LiveSource::event_fd() {
   std::lock_guard<std::mutex> lock(state_->mutex);

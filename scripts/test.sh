@@ -17,6 +17,11 @@ native() {
         --output-junit "$PWD/$results/ctest-$build.xml"
 }
 
+# python_tests NAME MARKERS: the Python tests with these markers.
+python_tests() {
+    .venv/bin/python -m pytest -rs -m "$2" --junitxml "$results/$1.xml"
+}
+
 # build NAME...: compiles asan, tsan.
 build() {
     local name targets
@@ -41,11 +46,13 @@ group() {
     {
         printf '\n== %s\n' "$1"
         case "$1" in
-            python) .venv/bin/python -m pytest -rs --junitxml "$results/pytest.xml" ;;
+            python) python_tests pytest "not asan_build" ;;
             camera-vm) tests/camera_vm/run.sh ;;
             aarch64) scripts/test-isa.sh 1 core ;;
             android) scripts/android/build.sh 1 && scripts/android/test.sh ;;
-            asan) built asan && native asan ;;
+            asan)
+                built asan && { native asan || status=$?; } && python_tests pytest-asan asan_build && [ "$status" -eq 0 ]
+                ;;
             tsan) built tsan && native tsan -L threads ;;
             *) native "$1" ;;
         esac

@@ -201,6 +201,7 @@ def test_nothing_is_left_in_the_folder_that_it_is_started_in(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.asan_build
 @pytest.mark.skipif(not WITH_SANITIZERS.exists(), reason="build/asan has no maquette-demo")
 def test_60_frames_leak_nothing(tmp_path):
     # Drivers and X libraries are unloaded before leaks are looked for, and what only their variables point to would

@@ -11,9 +11,6 @@ the two convolutions and two linear layers of the head: minutes of one core.
 
 Boxes of a view are the RPN's proposals, where the first pass of the box head moves them (the second pass sees those),
 and true boxes shaken. Boxes of background are drawn more often the likelier the head takes them for a person.
-
-With `--keep` only pictures without people teach something new: of all others the head learns to say what it says at the
-start (distillation), so that it forgets nothing about people while it learns what else is not one.
 """
 
 from __future__ import annotations
@@ -59,9 +56,8 @@ MINE_EVERY = 200  # steps after which background boxes are scored again
 
 @dataclass(frozen=True)
 class Boxes:
-    """Boxes to learn from. roi: float16 [R, C, 7, 7]; person: float32 [R], probability that it shows a person: 0 or 1
-    where labels say it; target: float32 [R, 4], deltas to the true box (0 for background); weight: float32 [R], how
-    often a box is drawn."""
+    """Boxes to learn from. roi: float16 [R, C, 7, 7]; person: bool [R]; target: float32 [R, 4], deltas to the true box
+    (0 for background); weight: float32 [R], how often a box is drawn."""
 
     roi: Tensor
     person: Tensor
@@ -164,8 +160,8 @@ def view_of(picture: Picture, size: int, rng: np.random.Generator) -> tuple[np.n
 
 
 @torch.no_grad()
-def boxes_of(net: MobileParsingRCNN, image: Tensor, truth: People, keeps: bool = False) -> Boxes:
-    """image: normalised [1, 3, h, w]. keeps: to be learnt is what the box head says now, and not the truth."""
+def boxes_of(net: MobileParsingRCNN, image: Tensor, truth: People) -> Boxes:
+    """image: normalised [1, 3, h, w]."""
     config, size = net.config, tuple(image.shape[-2:])
     features, objectness, deltas = net.detector(image)
     flat = [bx.flat_outputs(o, d) for o, d in zip(objectness, deltas, strict=True)]
@@ -176,10 +172,6 @@ def boxes_of(net: MobileParsingRCNN, image: Tensor, truth: People, keeps: bool =
         proposed = torch.cat([proposed, bx.clip(bx.decode(moved, proposed, config.delta_weights), *size)])
     candidates = torch.cat([proposed, shaken(truth.box, size)])
     candidates = candidates[((candidates[:, 2:] - candidates[:, :2]) > 4).all(1)]
-    if keeps:
-        roi = tg.pooled(features, [candidates], config, config.box_pool)
-        logits, said = net.box_head(roi)
-        return Boxes(roi.half(), logits.softmax(1)[:, 0], said, torch.ones(len(candidates)))
     person, match, known = matched(candidates, truth)
     candidates, person, match = candidates[known], person[known], match[known]
     roi = tg.pooled(features, [candidates], config, config.box_pool)
@@ -195,7 +187,7 @@ def boxes_of(net: MobileParsingRCNN, image: Tensor, truth: People, keeps: bool =
         # Everybody equally often, however many proposals lie on them.
         count = torch.bincount(match[person], minlength=len(truth.box))[match[person]]
         weight[person] = torch.where(crowded[match[person]], OVERLAP_WEIGHT, 1.0) / count
-    return Boxes(roi.half(), person.float(), target, weight)
+    return Boxes(roi.half(), person, target, weight)
 
 
 def shaken(boxes: Tensor, size: tuple[int, int]) -> Tensor:
@@ -223,20 +215,15 @@ def matched(candidates: Tensor, truth: People) -> tuple[Tensor, Tensor, Tensor]:
     return person, match, known
 
 
-def views(
-    net: MobileParsingRCNN, kinds: list[tuple[list[Picture], float]], count: int, seed: int, keeps: bool = False
-) -> Boxes:
-    """The boxes of `count` augmented pictures. kinds: pictures and how often they are drawn (fractions of 1). keeps: of
-    those that may show people, the box head shall go on saying what it says now."""
+def views(net: MobileParsingRCNN, kinds: list[tuple[list[Picture], float]], count: int, seed: int) -> Boxes:
+    """The boxes of `count` augmented pictures. kinds: pictures and how often they are drawn (fractions of 1)."""
     rng, parts = np.random.default_rng(seed), []
     torch.manual_seed(seed)
     fractions = np.array([fraction if pictures else 0.0 for pictures, fraction in kinds])
     for _ in trange(count, desc="features", unit="picture", disable=None):
         pictures = kinds[rng.choice(len(kinds), p=fractions / fractions.sum())][0]
-        picture = pictures[rng.integers(len(pictures))]
-        image, people = view_of(picture, int(rng.choice(SIZES)), rng)
-        has_people = len(picture.box) > 0 or not picture.complete
-        parts.append(boxes_of(net, torch.from_numpy(data.normalised(image))[None], people, keeps and has_people))
+        image, people = view_of(pictures[rng.integers(len(pictures))], int(rng.choice(SIZES)), rng)
+        parts.append(boxes_of(net, torch.from_numpy(data.normalised(image))[None], people))
     return Boxes.joined(parts)
 
 
@@ -251,8 +238,7 @@ def fit(net: MobileParsingRCNN, boxes: Boxes, steps: int, rate: float, seed: int
     head, averaged = net.box_head, copy.deepcopy(net.box_head).requires_grad_(False)
     optimiser = torch.optim.AdamW(head.parameters(), lr=rate, weight_decay=0.01)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    is_person = boxes.person > 0.5
-    people, background = is_person.nonzero()[:, 0], (~is_person).nonzero()[:, 0]
+    people, background = boxes.person.nonzero()[:, 0], (~boxes.person).nonzero()[:, 0]
     bar, means = trange(steps, unit="step", disable=None), {}
     for step in bar:
         if step % MINE_EVERY == 0:
@@ -263,9 +249,9 @@ def fit(net: MobileParsingRCNN, boxes: Boxes, steps: int, rate: float, seed: int
             background[torch.randint(len(background), (BACKGROUND // 2,))],
         ])  # fmt: skip
         logits, deltas = head(boxes.roi[drawn].float())
-        likely_person, person = boxes.person[drawn], is_person[drawn]
+        person = boxes.person[drawn]
         terms = {
-            "class": F.cross_entropy(logits, torch.stack([likely_person, 1 - likely_person], 1)),
+            "class": F.cross_entropy(logits, (~person).long()),
             "box": F.l1_loss(deltas[person], boxes.target[drawn][person]),
         }
         optimiser.zero_grad()
@@ -294,10 +280,6 @@ def main() -> int:
              "--labels), `background` (photographs without people)",
     )  # fmt: skip
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"))
-    parser.add_argument(
-        "--keep", action="store_true",
-        help="learn from pictures without people alone, and forget nothing about people",
-    )  # fmt: skip
     parser.add_argument("--views", type=int, default=500)
     parser.add_argument("--steps", type=int, default=500)
     parser.add_argument("--lr", type=float, default=5e-4)
@@ -325,11 +307,10 @@ def main() -> int:
         except (OSError, ValueError) as error:
             print(error, file=sys.stderr)
             return 1
-        boxes = views(net, kinds, options.views, options.seed, options.keep)
+        boxes = views(net, kinds, options.views, options.seed)
         if options.features:
             torch.save(vars(boxes), options.features)
-    shown = int((boxes.person > 0.5).sum())
-    print(f"{shown} boxes of people, {len(boxes.person) - shown} of background")
+    print(f"{int(boxes.person.sum())} boxes of people, {int((~boxes.person).sum())} of background")
     head = fit(net, boxes, options.steps, options.lr, options.seed)
     trained = {f"box_head.{name}": value.half() for name, value in head.state_dict().items()}
     options.out.mkdir(parents=True, exist_ok=True)

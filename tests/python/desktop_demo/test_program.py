@@ -103,13 +103,14 @@ def test_a_camera_that_is_lost_and_comes_back_goes_on(lost_camera):
 
 
 def test_a_camera_that_stays_away_ends_with_a_sentence():
-    ran = headless("--source", "stub:people?unplug@1s", "--frames", 100, timeout_s=60)
+    # By 5 s the networks are loaded, also where the machine is busy.
+    ran = headless("--source", "stub:people?unplug@5s", "--frames", 1000, timeout_s=60)
     assert_refused(ran)
     report = json.loads(ran.stdout)
     states = report["states"]
     assert states.index("running") < states.index("reconnecting") < states.index("failed")
     assert "running" not in states[states.index("reconnecting") :]
-    assert 0 < report["frames"] < 100
+    assert 0 < report["frames"] < 1000
     assert len(report["problem"]) > 20
 
 

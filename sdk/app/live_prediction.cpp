@@ -252,7 +252,7 @@ void LivePrediction::show(Frame frame, const Wanted& wanted) {
       if (recorder_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) recorder_->add(frame);
     });
     predictor_->push(frame);
-    if (surprise_) find_surprise(frame);
+    if (surprise_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) find_surprise(frame);
     pushed_ns_ = shown_ns_;
     has_pushed_ = true;
   }

@@ -160,17 +160,28 @@ def view_of(picture: Picture, size: int, rng: np.random.Generator) -> tuple[np.n
 
 
 @torch.no_grad()
+def proposed_boxes(
+    net: MobileParsingRCNN, features: list[Tensor], objectness: list[Tensor], deltas: list[Tensor],
+    size: tuple[int, int],
+) -> Tensor:  # fmt: skip
+    """The RPN's proposals in a picture of `size` (height, width), and where the first pass of the box head moves them:
+    [R, 4], pixels."""
+    config = net.config
+    flat = [bx.flat_outputs(o, d) for o, d in zip(objectness, deltas, strict=True)]
+    anchors = bx.anchors(config, [tuple(o.shape[-2:]) for o in objectness])
+    proposed = tg.proposals([f[0][0] for f in flat], [f[1][0] for f in flat], anchors, size, 1000, PROPOSALS)
+    if not len(proposed):
+        return proposed
+    moved = net.box_head(tg.pooled(features, [proposed], config, config.box_pool))[1]
+    return torch.cat([proposed, bx.clip(bx.decode(moved, proposed, config.delta_weights), *size)])
+
+
+@torch.no_grad()
 def boxes_of(net: MobileParsingRCNN, image: Tensor, truth: People) -> Boxes:
     """image: normalised [1, 3, h, w]."""
     config, size = net.config, tuple(image.shape[-2:])
     features, objectness, deltas = net.detector(image)
-    flat = [bx.flat_outputs(o, d) for o, d in zip(objectness, deltas, strict=True)]
-    anchors = bx.anchors(config, [tuple(o.shape[-2:]) for o in objectness])
-    proposed = tg.proposals([f[0][0] for f in flat], [f[1][0] for f in flat], anchors, size, 1000, PROPOSALS)
-    if len(proposed):
-        moved = net.box_head(tg.pooled(features, [proposed], config, config.box_pool))[1]
-        proposed = torch.cat([proposed, bx.clip(bx.decode(moved, proposed, config.delta_weights), *size)])
-    candidates = torch.cat([proposed, shaken(truth.box, size)])
+    candidates = torch.cat([proposed_boxes(net, features, objectness, deltas, size), shaken(truth.box, size)])
     candidates = candidates[((candidates[:, 2:] - candidates[:, :2]) > 4).all(1)]
     person, match, known = matched(candidates, truth)
     candidates, person, match = candidates[known], person[known], match[known]
@@ -215,16 +226,24 @@ def matched(candidates: Tensor, truth: People) -> tuple[Tensor, Tensor, Tensor]:
     return person, match, known
 
 
-def views(net: MobileParsingRCNN, kinds: list[tuple[list[Picture], float]], count: int, seed: int) -> Boxes:
-    """The boxes of `count` augmented pictures. kinds: pictures and how often they are drawn (fractions of 1)."""
-    rng, parts = np.random.default_rng(seed), []
-    torch.manual_seed(seed)
+def drawn_views(
+    kinds: list[tuple[list[Picture], float]], count: int, seed: int
+) -> Iterator[tuple[Picture, Tensor, People]]:
+    """`count` pictures, each with a view of it, normalised [1, 3, h, w], and the people there. kinds: pictures and how
+    often they are drawn (fractions of 1)."""
+    rng = np.random.default_rng(seed)
     fractions = np.array([fraction if pictures else 0.0 for pictures, fraction in kinds])
     for _ in trange(count, desc="features", unit="picture", disable=None):
         pictures = kinds[rng.choice(len(kinds), p=fractions / fractions.sum())][0]
-        image, people = view_of(pictures[rng.integers(len(pictures))], int(rng.choice(SIZES)), rng)
-        parts.append(boxes_of(net, torch.from_numpy(data.normalised(image))[None], people))
-    return Boxes.joined(parts)
+        picture = pictures[rng.integers(len(pictures))]
+        image, people = view_of(picture, int(rng.choice(SIZES)), rng)
+        yield picture, torch.from_numpy(data.normalised(image))[None], people
+
+
+def views(net: MobileParsingRCNN, kinds: list[tuple[list[Picture], float]], count: int, seed: int) -> Boxes:
+    """The boxes of `count` augmented pictures."""
+    torch.manual_seed(seed)
+    return Boxes.joined([boxes_of(net, image, people) for _, image, people in drawn_views(kinds, count, seed)])
 
 
 @torch.no_grad()
@@ -271,8 +290,8 @@ def fit(net: MobileParsingRCNN, boxes: Boxes, steps: int, rate: float, seed: int
     return averaged
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
+    """--init, and what `read_kinds` needs."""
     parser.add_argument("--init", type=Path, default=Path("export/weights/densepose-b.pt"))
     parser.add_argument(
         "--kind", action="append", nargs=3, required=True, metavar=("FRACTION", "WHAT", "DIR"),
@@ -280,6 +299,25 @@ def main() -> int:
              "--labels), `background` (photographs without people)",
     )  # fmt: skip
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"))
+
+
+def read_kinds(options: argparse.Namespace) -> list[tuple[list[Picture], float]]:
+    """The pictures of --kind and how often they are drawn. Raises OSError or ValueError, a sentence, for what cannot be
+    read."""
+    readers = {
+        "shards": from_shards,
+        "background": without_people,
+        "photos": lambda folder: from_photos(folder, options.labels),
+    }
+    unknown = {what for _, what, _ in options.kind} - readers.keys()
+    if unknown:
+        raise ValueError(f"--kind is one of {', '.join(readers)}, not {', '.join(sorted(unknown))}")
+    return [(readers[what](Path(folder)), float(fraction)) for fraction, what, folder in options.kind]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_picture_arguments(parser)
     parser.add_argument("--views", type=int, default=500)
     parser.add_argument("--steps", type=int, default=500)
     parser.add_argument("--lr", type=float, default=5e-4)
@@ -294,16 +332,8 @@ def main() -> int:
     if options.features and options.features.exists():
         boxes = Boxes(**torch.load(options.features))
     else:
-        readers = {
-            "shards": from_shards,
-            "background": without_people,
-            "photos": lambda f: from_photos(f, options.labels),
-        }
-        unknown = {what for _, what, _ in options.kind} - readers.keys()
-        if unknown:
-            parser.error(f"--kind is one of {', '.join(readers)}, not {', '.join(sorted(unknown))}")
         try:
-            kinds = [(readers[what](Path(folder)), float(fraction)) for fraction, what, folder in options.kind]
+            kinds = read_kinds(options)
         except (OSError, ValueError) as error:
             print(error, file=sys.stderr)
             return 1

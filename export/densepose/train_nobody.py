@@ -26,12 +26,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 from tqdm import trange
 
-from export.densepose import boxes as bx
-from export.densepose import data
 from export.densepose import targets as tg
 from export.densepose.config import NetworkConfig
 from export.densepose.network import MobileParsingRCNN
-from export.densepose.train_boxes import PROPOSALS, SIZES, Picture, from_photos, from_shards, view_of, without_people
+from export.densepose.train_boxes import Picture, add_picture_arguments, drawn_views, proposed_boxes, read_kinds
 
 KEPT, NOBODY = 3, 3  # views in a step
 MAPS_WEIGHTS, BOXES_WEIGHT = (15.0, 2.0, 2.0, 2.0, 2.0), 0.2  # P2, of which the surface is read, to P6
@@ -56,29 +54,18 @@ def view(net: MobileParsingRCNN, image: Tensor, keeps: bool) -> View:
     config, size = net.config, tuple(image.shape[-2:])
     taps = net.backbone(image)
     features = net.neck(taps)
-    objectness, deltas = net.rpn(features)
-    flat = [bx.flat_outputs(o, d) for o, d in zip(objectness, deltas, strict=True)]
-    anchors = bx.anchors(config, [tuple(o.shape[-2:]) for o in objectness])
-    boxes = tg.proposals([f[0][0] for f in flat], [f[1][0] for f in flat], anchors, size, 1000, PROPOSALS)
-    if len(boxes):
-        moved = net.box_head(tg.pooled(features, [boxes], config, config.box_pool))[1]
-        boxes = torch.cat([boxes, bx.clip(bx.decode(moved, boxes, config.delta_weights), *size)])
-        boxes = boxes[((boxes[:, 2:] - boxes[:, :2]) > 4).all(1)]
+    boxes = proposed_boxes(net, features, *net.rpn(features), size)
+    boxes = boxes[((boxes[:, 2:] - boxes[:, :2]) > 4).all(1)]
     likely = net.box_head(tg.pooled(features, [boxes], config, config.box_pool))[0].softmax(1)[:, 0]
     return View([tap.half() for tap in taps], boxes, likely, keeps)
 
 
 def views(net: MobileParsingRCNN, kinds: list[tuple[list[Picture], float]], count: int, seed: int) -> list[View]:
     """Of `count` augmented pictures. kinds: pictures and how often they are drawn (fractions of 1)."""
-    rng, made = np.random.default_rng(seed), []
-    fractions = np.array([fraction if pictures else 0.0 for pictures, fraction in kinds])
-    for _ in trange(count, desc="features", unit="picture", disable=None):
-        pictures = kinds[rng.choice(len(kinds), p=fractions / fractions.sum())][0]
-        picture = pictures[rng.integers(len(pictures))]
-        image, _ = view_of(picture, int(rng.choice(SIZES)), rng)
-        keeps = len(picture.box) > 0 or not picture.complete
-        made.append(view(net, torch.from_numpy(data.normalised(image))[None], keeps))
-    return made
+    return [
+        view(net, image, keeps=len(picture.box) > 0 or not picture.complete)
+        for picture, image, _ in drawn_views(kinds, count, seed)
+    ]
 
 
 def step_loss(net: MobileParsingRCNN, before: MobileParsingRCNN, of: View) -> dict[str, Tensor]:
@@ -148,13 +135,7 @@ def fit(net: MobileParsingRCNN, seen: list[View], steps: int, rate: float, seed:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--init", type=Path, default=Path("export/weights/densepose-b.pt"))
-    parser.add_argument(
-        "--kind", action="append", nargs=3, required=True, metavar=("FRACTION", "WHAT", "DIR"),
-        help="how often, what and where: `shards` (rendered or composed people), `photos` (of people; boxes in "
-             "--labels), `background` (photographs without people)",
-    )  # fmt: skip
-    parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"))
+    add_picture_arguments(parser)
     parser.add_argument("--views", type=int, default=1200)
     parser.add_argument("--steps", type=int, default=400)
     parser.add_argument("--lr", type=float, default=5e-4)
@@ -165,16 +146,8 @@ def main() -> int:
     net = MobileParsingRCNN(NetworkConfig.of(saved))
     net.load_state_dict(saved["ema"])
     net.float().eval()
-    readers = {
-        "shards": from_shards,
-        "background": without_people,
-        "photos": lambda folder: from_photos(folder, options.labels),
-    }
-    unknown = {what for _, what, _ in options.kind} - readers.keys()
-    if unknown:
-        parser.error(f"--kind is one of {', '.join(readers)}, not {', '.join(sorted(unknown))}")
     try:
-        kinds = [(readers[what](Path(folder)), float(fraction)) for fraction, what, folder in options.kind]
+        kinds = read_kinds(options)
     except (OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1

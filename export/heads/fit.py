@@ -31,16 +31,26 @@ BUNDLE = Path("sdk/models/heads-int8")
 METRES_PER_UNIT = 0.1
 
 
-def size_sigma(prior: Prior) -> float:
-    """How much the size of heads differs, as a fraction of it: what the codes do to the anchors' mean distance from
-    their middle."""
+def size_by_codes(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
+    """The anchors from their middle [M, 3], and how the mean of their distance from it depends on each code [K], as a
+    fraction of it."""
     from_middle = (prior.anchor_mean - prior.anchor_mean.mean(0)).astype(np.float64)
     by_code = np.einsum("mc,mck->k", from_middle, prior.anchor_linear.astype(np.float64))
-    return float(np.linalg.norm(by_code) / (from_middle**2).sum())
+    return from_middle, by_code / (from_middle**2).sum()
 
 
-def stored_head(prior: Prior, prior_sha256: str, photo: HeadPhoto, state: HeadState) -> StoredHead:
-    """The head as it is kept."""
+def anchor_sigma(prior: Prior, covariance: np.ndarray) -> np.ndarray:
+    """[M], of each coordinate: what the codes do not say of a point, and what is left of the codes [K, K] but for the
+    size, which no photo tells."""
+    from_middle, size = size_by_codes(prior)
+    moves = prior.anchor_linear.astype(np.float64) - from_middle[..., None] * size
+    return np.sqrt(prior.anchor_sigma**2 + np.einsum("mck,kl,mcl->m", moves, covariance, moves, optimize=True) / 3)
+
+
+def stored_head(
+    prior: Prior, prior_sha256: str, photo: HeadPhoto, state: HeadState, covariance: np.ndarray
+) -> StoredHead:
+    """The head as it is kept. covariance: of the shape codes, [K, K]."""
     shape, colour = state.shape.numpy(), state.colour.numpy()
     camera = state.pose.camera()
     row = (*photo.size, camera.focal_px, *photo.centre, camera.rotation, camera.shift)
@@ -51,7 +61,7 @@ def stored_head(prior: Prior, prior_sha256: str, photo: HeadPhoto, state: HeadSt
         colour,
         np.array([row], CAMERA),
         METRES_PER_UNIT,
-        size_sigma(prior) * METRES_PER_UNIT,
+        float(np.linalg.norm(size_by_codes(prior)[1])) * METRES_PER_UNIT,
         "prior",
         prior.sharpness,
         prior.cut_point.astype(np.float64),
@@ -60,7 +70,7 @@ def stored_head(prior: Prior, prior_sha256: str, photo: HeadPhoto, state: HeadSt
         prior.bounds_max,
         prior.template_points,
         prior.anchor_mean + prior.anchor_linear @ shape,
-        prior.anchor_sigma,
+        anchor_sigma(prior, covariance).astype(np.float32),
         prior.places,
         prior_sha256,
     )
@@ -113,7 +123,8 @@ def fit(options: argparse.Namespace) -> None:
             found = RayFit(prior, photo, start, FitOptions(options.steps, options.seconds)).run(show)
         print(f"loss {found.first_loss:.2f} -> {found.loss:.2f} in {found.steps} steps, ended by: {found.end}")
         state = found.state
-    write_head(stored_head(prior, hashlib.sha256(data).hexdigest(), photo, state), options.out)
+    head = stored_head(prior, hashlib.sha256(data).hexdigest(), photo, state, start.covariance)
+    write_head(head, options.out)
     print(f"{options.out}: {options.out.stat().st_size / 1000:.0f} KB")
 
 

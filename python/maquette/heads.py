@@ -53,7 +53,8 @@ class HeadInfo:
 @dataclass(frozen=True, eq=False)
 class HeadLandmark:
     """A place that has a name. point_m: float64 [3]. sigma_m: standard deviation of each coordinate that the shape
-    model leaves; that of the size comes on top."""
+    model and the photos leave: more where they do not show it, or along their lines of sight; that of the size comes
+    on top."""
 
     point_m: np.ndarray
     sigma_m: float
@@ -101,10 +102,32 @@ class Head(NativeObject):
     pixels."""
 
     @staticmethod
-    def open(path: str | Path) -> Head:
-        """Reads a file that `save` wrote; no network is needed. Raises MaquetteError."""
+    def open(file: str | Path | bytes) -> Head:
+        """Reads a file that `save` wrote, by its path or its bytes; no network is needed. Raises MaquetteError."""
         n = native()
-        return Head(n.create("maq_head", n.context, str(path).encode(), function="maq_head_open"))
+        if isinstance(file, bytes):
+            data = n.ffi.from_buffer(file)
+            return Head(n.create("maq_head", n.context, data, len(file), function="maq_head_open_memory"))
+        return Head(n.create("maq_head", n.context, str(file).encode(), function="maq_head_open"))
+
+    def scaled_by_distance(self, start: str, end: str, distance_m: float) -> Head:
+        """The same head, of the size at which the two places (see `landmark`) are `distance_m` apart (0.001 to 10),
+        such as pupil_left and pupil_right by what an optician measured. Raises MaquetteError."""
+        names = start.encode(), end.encode()
+        arguments = ("maq_head", self.handle, *names, float(distance_m))
+        return Head(native().create(*arguments, function="maq_head_scale_by_distance"))
+
+    def scaled_by_depth(self, depth: Frame | np.ndarray, camera: int = 0) -> Head:
+        """The same head, of the size at which it lies where a depth camera saw it.
+
+        depth: of the same view as the photo with this camera, in any size: a Frame that is depth or has depth, float32
+        [H, W] in metres or uint16 [H, W] in millimetres. The photo should have been given its focal_px: an estimated
+        one that is 10 % too long makes the head as much too small. Raises MaquetteError, with the status
+        MAQ_ERROR_NOT_FOUND where half of the head has no depth that agrees with it.
+        """
+        frame = as_frame(depth)
+        arguments = ("maq_head", self.handle, camera, frame.handle)
+        return Head(native().create(*arguments, function="maq_head_scale_by_depth"))
 
     def save(self, path: str | Path) -> None:
         """Writes a head file (.maqh), some 60 KB and the texture, atomically. Raises MaquetteError."""
@@ -200,8 +223,9 @@ class HeadBuilder(NativeObject):
 
     bundle: a folder with manifest.json (default: the one that comes with the package). settings: fields of
     maq_head_config by their names: threads, provider, texture_px (256 to 2048; 0, the default, makes no texture),
-    texture_mirrored (what no photo sees of one side looks like the other), ... The part of each photo around the head
-    stays in memory until `clear` or `close`. Raises MaquetteError.
+    texture_mirrored (what no photo sees of one side looks like the other), texture_unlit (the photos' light from one
+    side is taken out of the texture), ... The part of each photo around the head stays in memory until `clear` or
+    `close`. Raises MaquetteError.
     """
 
     def __init__(self, bundle: str | Path | None = None, **settings: Any) -> None:

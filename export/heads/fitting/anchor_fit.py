@@ -144,13 +144,15 @@ class AnchorTerms:
 
 @dataclass(frozen=True, eq=False)
 class AnchorFit:
-    """codes [K]; the camera; inliers: how many cells agree, of `cells`; cost: twice the negative log posterior."""
+    """codes [K]; the camera; inliers: how many cells agree, of `cells`; cost: twice the negative log posterior;
+    covariance [K, K] of the codes; None where they were not moved."""
 
     codes: np.ndarray
     pose: ScaledPose
     inliers: int
     cells: int
     cost: float
+    covariance: np.ndarray | None = None
 
 
 class _Equations:
@@ -195,6 +197,10 @@ class _Equations:
             a[focal] = a[:, focal] = 0
             a[focal, focal], b[focal] = 1, 0
         return a, b
+
+    def code_covariance(self, pose: ScaledPose, z: np.ndarray) -> np.ndarray:
+        """Of the codes, [K, K]."""
+        return np.linalg.inv(self._set_up(pose, z)[0])[UNKNOWNS:, UNKNOWNS:]
 
     def minimise(
         self, pose: ScaledPose, z: np.ndarray, max_steps: int, tolerance: float = 1e-4
@@ -283,4 +289,5 @@ def fit_anchors(prior: Prior, seen: Observations, moves_codes: bool = True) -> A
             f"Of {len(terms)} points that are seen of the head, {inliers} agree with one. Use a photo where the face "
             "is seen, 64 pixels or more across, and give its box."
         )
-    return AnchorFit(z, pose, inliers, len(terms), equations.cost(pose, z))
+    covariance = equations.code_covariance(pose, z) if moves_codes else None
+    return AnchorFit(z, pose, inliers, len(terms), equations.cost(pose, z), covariance)

@@ -41,6 +41,8 @@ typedef struct maq_head_config {
                           part of a photo. With 1024 a fit takes 140 MB of memory more, and a second or two. */
   int32_t texture_mirrored; /* 1: where no photo sees one side of the head, it looks as the other; 0 (default): as the
                                network has it */
+  int32_t texture_unlit;    /* 1: the photos' light from one side is taken out of the texture, as far as it can be told
+                               from the colours, so that an app can light the head anew; 0 (default): it stays */
 } maq_head_config;
 
 /* What the app knows of a photo. */
@@ -82,8 +84,8 @@ typedef struct maq_head_stats {
 /* Where the size of a head is from. */
 typedef enum maq_head_scale {
   MAQ_HEAD_SCALE_PRIOR = 0, /* heads are that large on average: photos alone do not tell */
-  MAQ_HEAD_SCALE_GIVEN = 1, /* a distance that was known */
-  MAQ_HEAD_SCALE_DEPTH = 2  /* a depth camera */
+  MAQ_HEAD_SCALE_GIVEN = 1, /* a distance that was known (maq_head_scale_by_distance) */
+  MAQ_HEAD_SCALE_DEPTH = 2  /* a depth camera (maq_head_scale_by_depth) */
 } maq_head_scale;
 
 typedef struct maq_head_info {
@@ -157,7 +159,8 @@ typedef struct maq_head_morph_target {
 /* A place of the head that has a name. */
 typedef struct maq_head_landmark {
   uint32_t struct_size;
-  float sigma_m; /* standard deviation of each coordinate that the shape model leaves; that of the size comes on top */
+  float sigma_m; /* standard deviation of each coordinate that the shape model and the photos leave: more where they do
+                    not show it, or along their lines of sight; that of the size comes on top */
   double point_m[3];
 } maq_head_landmark;
 
@@ -227,6 +230,10 @@ MAQ_API maq_status maq_head_builder_get_photo(const maq_head_builder* builder, u
  * damaged), MAQ_ERROR_UNSUPPORTED (another version). Blocks while the file is read. */
 MAQ_API maq_status maq_head_open(maq_context* context, const char* path, maq_head** head);
 
+/* Reads such a file that is in memory, which is copied. Errors and the rest as for maq_head_open, but for
+ * MAQ_ERROR_NOT_FOUND. */
+MAQ_API maq_status maq_head_open_memory(maq_context* context, const void* data, size_t size_bytes, maq_head** head);
+
 /* Writes the head to a file, some 60 KB and its texture (docs/formats.md), which appears atomically and replaces an
  * existing one. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks while it is written. */
 MAQ_API maq_status maq_head_save(const maq_head* head, const char* path);
@@ -248,6 +255,28 @@ MAQ_API const char* maq_head_get_landmark_name(const maq_head* head, uint32_t in
 /* Gets a place by its name. The caller sets landmark->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the model has no such place). Does not block. */
 MAQ_API maq_status maq_head_get_landmark(const maq_head* head, const char* name, maq_head_landmark* landmark);
+
+/* ---- Size ---- */
+
+/* Makes the same head of the size at which the places `from` and `to` are `distance_m` (0.001 to 10) apart, such as the
+ * distance of pupil_left and pupil_right that an optician measured. maq_head_info of `*scaled` says
+ * MAQ_HEAD_SCALE_GIVEN, and with scale_sigma how sure the shape model is of these places; `head` stays as it is.
+ * `*scaled` is the caller's, to be given to maq_head_destroy.
+ * One at a time, with maq_head_get_mesh. Errors: MAQ_ERROR_INVALID_ARGUMENT (also where both are the same place),
+ * MAQ_ERROR_NOT_FOUND (the model has no such place). Does not block. */
+MAQ_API maq_status maq_head_scale_by_distance(maq_head* head, const char* from, const char* to, double distance_m,
+                                              maq_head** scaled);
+
+/* Makes the same head of the size at which it lies where a depth camera saw it. `frame` has depth of the same view as
+ * the photo with the camera at `index` (maq_head_get_camera), in any size: its own pixels, or what came with the
+ * picture. The photo should have been given its focal_px: an estimated one that is 10 % too long makes the head as much
+ * too small. maq_head_info says MAQ_HEAD_SCALE_DEPTH, and how far the depth of its pixels spreads. The rest as above.
+ * One at a time, with maq_head_get_mesh. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range, no depth, another
+ * shape than the photo's), MAQ_ERROR_NOT_FOUND (half of the head has no depth that agrees with it),
+ * MAQ_ERROR_OUT_OF_MEMORY. Blocks for some 100 ms. */
+MAQ_API maq_status maq_head_scale_by_depth(maq_head* head, uint32_t index, const maq_frame* frame, maq_head** scaled);
+
+/* ---- Meshes ---- */
 
 /* Fills `options` with the defaults and sets struct_size. `struct_size` is sizeof(maq_head_mesh_options) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */

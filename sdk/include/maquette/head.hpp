@@ -43,7 +43,28 @@ class Head {
     return Head(opened);
   }
 
+  // A head file in memory, which is copied.
+  static Head open(const Context& context, const void* data, size_t size_bytes) {
+    maq_head* opened = nullptr;
+    check(maq_head_open_memory(context.get(), data, size_bytes, &opened));
+    return Head(opened);
+  }
+
   maq_head* get() const { return owner_.get(); }
+
+  // The same head of the size at which the two places are so far apart.
+  Head scaled_by_distance(const std::string& from, const std::string& to, double distance_m) {
+    maq_head* scaled = nullptr;
+    check(maq_head_scale_by_distance(get(), from.c_str(), to.c_str(), distance_m, &scaled));
+    return Head(scaled);
+  }
+
+  // The same head of the size at which it lies where the depth of the frame sees it, from the photo at `index`.
+  Head scaled_by_depth(const Frame& frame, uint32_t index = 0) {
+    maq_head* scaled = nullptr;
+    check(maq_head_scale_by_depth(get(), index, frame.get(), &scaled));
+    return Head(scaled);
+  }
 
   maq_head_info info() const {
     maq_head_info info{};

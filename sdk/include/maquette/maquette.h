@@ -16,7 +16,7 @@
  *
  *     _create                                 _destroy   contexts, sources, lists, models, builders, renderers, writers
  *     _open, _open_memory, _build, _finish    _close     captures and scenes
- *     _open, _fit                             _destroy   heads
+ *     _open, _open_memory, _fit, _scale_…     _destroy   heads
  *     _acquire_…, _run, _find_…, _load_…,     _release   frames, results and images, most from a pool of fixed size
  *     _wrap, _decode, _resize, _convert_yuv,
  *     _predict

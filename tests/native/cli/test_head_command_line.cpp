@@ -54,6 +54,29 @@ TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
   EXPECT_GT(document["landmarks"]["crown"]["point_m"][2], 0.08);
 }
 
+TEST_F(HeadCommandLine, ADistanceOrADepthImageGivesTheSize) {
+  const std::string photo = "grey.png --box 110,60,200,180 --seconds 0 --json --save a.maqh ";
+  const auto given = nlohmann::json::parse(run(photo + "--pupils 70").out);
+  EXPECT_NEAR(given["pupil_distance_m"], 0.07, 1e-6);
+  EXPECT_EQ(given["scale"], "given");
+  EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["scale"], "given");
+
+  double pupils_m[2];
+  for (const int far : {1, 2}) {  // where a screen stands
+    cv::imwrite(folder_.file("depth.png"), cv::Mat(240, 320, CV_16U, cv::Scalar(400 * far)));
+    const auto measured = nlohmann::json::parse(run(photo + "--depth 'image:depth.png?depth_unit=0.001'").out);
+    EXPECT_EQ(measured["scale"], "depth");
+    pupils_m[far - 1] = measured["pupil_distance_m"];
+  }
+  EXPECT_NEAR(pupils_m[1] / pupils_m[0], 2, 1e-6) << "twice as far, twice as large";
+  EXPECT_EQ(nlohmann::json::parse(run(photo).out)["scale"], "prior");
+
+  expect_error(photo + "--depth photo", 1, "file:grey.png came without depth");
+  expect_error(photo + "--depth grey.png", 1, "not depth");
+  expect_error(photo + "--pupils 63 --depth photo", 2, "--pupils");
+  expect_error(photo + "--pupils 5", 2, "10");
+}
+
 TEST_F(HeadCommandLine, AHeadIsRenderedAsPicturesAndClips) {
   const Outcome made = run("grey.png --box 110,60,200,180 --save head.maqh --preview p/turn.mp4 --seconds 0 --cell 8");
   ASSERT_EQ(made.exit_code, 0) << made.err;

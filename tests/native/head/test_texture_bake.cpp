@@ -62,9 +62,9 @@ TexturePhoto photo_from(Vec3 from, Rgb rgb, float matte = 1) {
 }
 
 TextureImage bake(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, bool is_mirrored = false,
-                  int thread_count = 1) {
+                  int thread_count = 1, bool is_unlit = false) {
   maq::WorkerThreads threads(thread_count);
-  return bake_texture(mesh, photos, {kSide, is_mirrored}, threads);
+  return bake_texture(mesh, photos, {kSide, is_mirrored, is_unlit}, threads);
 }
 
 Rgb at(const TextureImage& image, Vec3 point) {
@@ -149,6 +149,34 @@ TEST(TextureBake, WhatLiesBehindAnotherPartTakesNothingOfIt) {
   const TextureImage image = bake(mesh, {photo});
   EXPECT_GT(image.photo_fraction, 0.1);
   for (size_t i = 0; i < image.bgr.size(); ++i) ASSERT_NEAR(image.bgr[i], kOwn, 30) << "at " << i;
+}
+
+TEST(TextureBake, TheLightFromOneSideIsTakenOutWhereThatIsAskedFor) {
+  HeadMesh mesh = ball();
+  mesh.colours.assign(mesh.positions.size(), 180);
+  // A ball of grey 150 with a dark band, in light that is twice as strong from the person's left as from the right.
+  TexturePhoto photo = photo_from(kFront, {0, 0, 0});
+  const auto own = [](double z) { return std::abs(z - 0.3) < 0.08 ? 60.0 : 150.0; };
+  for (int row = 0; row < 200; ++row) {
+    for (int column = 0; column < 200; ++column) {
+      // Orthographic, nearly: the ball is 66 pixels wide to each side.
+      const double x = (column - 99.5) / 66.7, z = (99.5 - row) / 66.7;
+      for (size_t c = 0; c < 3; ++c) {
+        photo.rgb[size_t(row * 200 + column) * 3 + c] = uint8_t(own(z) * std::clamp(1 + x / 3, 0.5, 1.5));
+      }
+    }
+  }
+  const TextureImage lit = bake(mesh, {photo}), even = bake(mesh, {photo}, false, 1, true);
+  const auto slanted = [](double x, double z) { return Vec3{x, -std::sqrt(1 - x * x - z * z), z}; };
+  const auto difference = [&](const TextureImage& image) {
+    return at(image, slanted(0.5, 0))[1] - at(image, slanted(-0.5, 0))[1];
+  };
+  EXPECT_GT(difference(lit), 40) << "the photo's";
+  EXPECT_LT(std::abs(difference(even)), 0.35 * difference(lit));
+  EXPECT_NEAR(at(even, kFront)[1], at(lit, kFront)[1], 8) << "as bright as before";
+  EXPECT_LT(at(even, slanted(0, 0.3))[1], 85) << "the band is the surface's own";
+  EXPECT_LT(std::abs(at(even, kLeft)[1] - at(even, kRight)[1]), 0.5 * std::abs(at(lit, kLeft)[1] - at(lit, kRight)[1]))
+      << "also where the photo does not see it";
 }
 
 TEST(TextureBake, AMirroredSideLooksAsTheOther) {

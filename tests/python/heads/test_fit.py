@@ -148,6 +148,7 @@ def compared(bundle: Path, folder: Path) -> dict[str, float]:
     assert by_torch.places.keys() == by_sdk.places.keys()
     assert by_torch.metres_sigma == pytest.approx(by_sdk.metres_sigma, rel=1e-5)
     np.testing.assert_allclose(by_torch.anchor_points, by_sdk.anchor_points, atol=0.002)
+    np.testing.assert_allclose(by_torch.anchor_sigma, by_sdk.anchor_sigma, rtol=0.005)
     prior = read_prior(bundle / "prior.maqp")
     mesh = trimesh.load(mesh_path, process=False)
     points = in_head_frame(columns(mesh, "x", "y", "z"), by_sdk)

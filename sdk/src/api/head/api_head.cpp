@@ -2,8 +2,10 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
+#include "api/frame_handle.h"
 #include "api/head/head_handle.h"
 #include "core/worker_threads.h"
+#include "head/build/head_scale.h"
 #include "head/build/head_surface.h"
 #include "head/build/head_texture.h"
 #include "head/build/wrapped_surface.h"
@@ -65,6 +67,16 @@ const head::HeadTemplate& template_of(maq_head& head, const maq_head_mesh_option
   return *head.template_head;
 }
 
+// The same head of another size.
+maq_head* scaled_copy(const maq_head& head, const head::HeadScale& scale) {
+  head::StoredHead made = head.head;
+  made.scale = scale;
+  if (const std::string fault = head::stored_head_fault(made); !fault.empty()) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The head cannot have that size: ", fault, ".");
+  }
+  return new maq_head(std::move(made), head.threads, head.template_head);
+}
+
 }  // namespace
 
 const std::vector<uint8_t>& texture_of(const maq_head& head) {
@@ -109,6 +121,40 @@ maq_status maq_head_open(maq_context* context, const char* path, maq_head** head
     require_argument(path, "path");
     require_argument(head, "head");
     *head = new maq_head(head::read_head_file(path), default_threads());
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_open_memory(maq_context* context, const void* data, size_t size_bytes, maq_head** head) {
+  return guarded(context, __func__, [&] {
+    require_argument(context, "context");
+    require_argument(data, "data");
+    require_argument(head, "head");
+    *head = new maq_head(head::read_head(data, size_bytes, "The head in memory"), default_threads());
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_scale_by_distance(maq_head* head, const char* from, const char* to, double distance_m,
+                                      maq_head** scaled) {
+  return guarded_alone(head, "head", __func__, [&] {
+    require_argument(from, "from");
+    require_argument(to, "to");
+    require_argument(scaled, "scaled");
+    *scaled = scaled_copy(*head, head::scale_by_distance(head->head, from, to, distance_m));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_head_scale_by_depth(maq_head* head, uint32_t index, const maq_frame* frame, maq_head** scaled) {
+  return guarded_alone(head, "head", __func__, [&] {
+    require_argument(frame, "frame");
+    require_argument(scaled, "scaled");
+    require_index("index", index, head->head.cameras.size());
+    const ImageView* const depth = depth_of(frame->frame);
+    WorkerThreads threads(head->threads);
+    *scaled = scaled_copy(
+        *head, head::scale_by_depth(head->head, index, depth == nullptr ? frame->frame.image : *depth, threads));
     return MAQ_OK;
   });
 }

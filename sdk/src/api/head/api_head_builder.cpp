@@ -64,7 +64,8 @@ maq_status maq_head_builder_create(maq_context* context, const maq_head_config* 
                     uint32_t(head::kMaxTexture_px));
     }
     require_range("config.texture_mirrored", config.texture_mirrored, 0, 1);
-    const head::TextureOptions texture{int(config.texture_px), config.texture_mirrored == 1};
+    require_range("config.texture_unlit", config.texture_unlit, 0, 1);
+    const head::TextureOptions texture{int(config.texture_px), config.texture_mirrored == 1, config.texture_unlit == 1};
     Bundle bundle = read_bundle_argument(config, "config", kHeadsBundle);
     const Manifest manifest = bundle.manifest;
     const auto runtime = context->state->onnxruntime();

@@ -8,6 +8,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "head/build/known_anchors.h"
 
 namespace maq::head {
 namespace {
@@ -117,35 +118,6 @@ std::vector<HeadSquare> squares_to_search(int width_px, int height_px, double ro
   std::stable_sort(squares.begin() + std::ptrdiff_t(first), squares.end(),
                    [&](const HeadSquare& a, const HeadSquare& b) { return from_middle(a) < from_middle(b); });
   return squares;
-}
-
-// How much the size of heads differs, as a fraction of it: what the codes, whitened, do to the anchors' mean distance
-// from their middle.
-double size_sigma(const HeadPrior& prior) {
-  const HeadAnchors& anchors = prior.anchors;
-  const size_t count = anchors.count(), codes = size_t(prior.shape_codes());
-  std::array<double, 3> middle{};
-  for (size_t i = 0; i < 3 * count; ++i) middle[i % 3] += double(anchors.mean[i]) / double(count);
-  double squares = 0;
-  std::vector<double> by_code(codes);
-  for (size_t i = 0; i < 3 * count; ++i) {
-    const double from_middle = double(anchors.mean[i]) - middle[i % 3];
-    squares += from_middle * from_middle;
-    for (size_t k = 0; k < codes; ++k) by_code[k] += from_middle * double(anchors.linear[i * codes + k]);
-  }
-  double sum = 0;
-  for (const double value : by_code) sum += value * value;
-  return squares > 0 ? std::sqrt(sum) / squares : 0;
-}
-
-StoredAnchors anchors_of(const HeadPrior& prior, const std::vector<float>& shape) {
-  StoredAnchors stored{prior.anchors.template_points, prior.anchors.mean, prior.anchors.sigma};
-  for (size_t i = 0; i < stored.points.size(); ++i) {
-    double point = double(stored.points[i]);
-    for (size_t k = 0; k < shape.size(); ++k) point += double(prior.anchors.linear[i * shape.size() + k] * shape[k]);
-    stored.points[i] = float(point);
-  }
-  return stored;
 }
 
 [[noreturn]] void refuse_photos(const std::vector<PhotoFit>& photos) {
@@ -295,7 +267,7 @@ void HeadBuilder::set_preview(double interval_s, Preview preview) {
   preview_ = std::move(preview);
 }
 
-StoredHead HeadBuilder::stored_head(const FieldCodes& codes, FieldWeights weights,
+StoredHead HeadBuilder::stored_head(const FieldCodes& codes, FieldWeights weights, const AnchorFit& start,
                                     const std::vector<PhotoFit>& photos) const {
   const HeadPrior& prior = bundle_.prior;
   StoredHead head(std::move(weights));
@@ -306,7 +278,7 @@ StoredHead HeadBuilder::stored_head(const FieldCodes& codes, FieldWeights weight
   head.sharpness = prior.sharpness;
   head.cut = prior.cut;
   head.bounds = prior.bounds;
-  head.anchors = anchors_of(prior, codes.shape);
+  head.anchors = known_anchors(prior, codes.shape, start.code_covariance);
   head.places = prior.places;
   head.prior_sha256 = bundle_.prior_sha256;
   head.codes = codes;
@@ -328,7 +300,7 @@ StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
     if (preview_ && now.seconds >= next_preview_s.value_or(0)) {
       FieldWeights weights(prior.bases.shape());
       prior.bases.combine(now.codes, weights);
-      preview_(stored_head(now.codes, std::move(weights), now.photos));
+      preview_(stored_head(now.codes, std::move(weights), now.start, now.photos));
       next_preview_s = now.seconds + preview_interval_s_;
     }
     report(std::min(1.0, std::max(now.seconds / seconds, double(now.steps) / options.max_steps)));
@@ -347,7 +319,7 @@ StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
     found_[i].focal_px = photo.camera.focal_px;
     found_[i].rms_px = photo.rms_px;
   }
-  StoredHead head = stored_head(fit.codes, std::move(fit.weights), fit.photos);
+  StoredHead head = stored_head(fit.codes, std::move(fit.weights), fit.start, fit.photos);
   if (texture_.side_px > 0) {
     std::vector<TextureSource> sources;
     for (size_t i = 0; i < photos_.size(); ++i) {

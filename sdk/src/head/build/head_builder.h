@@ -90,7 +90,8 @@ class HeadBuilder {
   // Where the head is in a photo whose app does not know, and what is seen there. Throws MAQ_ERROR_NOT_FOUND.
   std::pair<std::array<float, 4>, Seen> find_head(const ImageView& photo, double roll_rad);
   StoredHead fit_photos(double seconds, const Progress& progress);
-  StoredHead stored_head(const FieldCodes& codes, FieldWeights weights, const std::vector<PhotoFit>& photos) const;
+  StoredHead stored_head(const FieldCodes& codes, FieldWeights weights, const AnchorFit& start,
+                         const std::vector<PhotoFit>& photos) const;
 
   HeadBundle bundle_;
   HeadEncoder encoder_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "core/error.h"
 #include "core/math/small_solve.h"
@@ -37,17 +38,13 @@ class JointFit {
     }
   }
 
-  // Of each code, from the inverse of the equations' matrix.
-  std::vector<float> code_sigmas() {
+  // Of the codes, from the inverse of the equations' matrix; nothing where that cannot be had.
+  std::vector<float> code_covariance() {
     set_up();
     std::vector<double> inverse(size_ * codes_);
     for (size_t k = 0; k < codes_; ++k) inverse[(size_ - codes_ + k) * codes_ + k] = 1;
-    std::vector<float> sigmas(codes_, 1.0f);
-    if (codes_ == 0 || !solve_positive(a_.data(), int(size_), int(size_), inverse.data(), int(codes_))) return sigmas;
-    for (size_t k = 0; k < codes_; ++k) {
-      sigmas[k] = float(std::sqrt(std::max(0.0, inverse[(size_ - codes_ + k) * codes_ + k])));
-    }
-    return sigmas;
+    if (codes_ == 0 || !solve_positive(a_.data(), int(size_), int(size_), inverse.data(), int(codes_))) return {};
+    return {inverse.end() - std::ptrdiff_t(codes_ * codes_), inverse.end()};
   }
 
   const std::vector<double>& codes() const { return z_; }
@@ -175,6 +172,18 @@ void check(const std::vector<HeadPhoto>& photos, const AnchorFitOptions& options
   }
 }
 
+// Empty: that of the prior, the identity.
+void set_covariance(AnchorFit& fit, std::vector<float> covariance) {
+  const size_t codes = fit.shape_codes.size();
+  if (covariance.empty()) {
+    covariance.assign(codes * codes, 0.0f);
+    for (size_t k = 0; k < codes; ++k) covariance[k * codes + k] = 1;
+  }
+  fit.code_sigmas.resize(codes);
+  for (size_t k = 0; k < codes; ++k) fit.code_sigmas[k] = std::sqrt(std::max(0.0f, covariance[k * codes + k]));
+  fit.code_covariance = std::move(covariance);
+}
+
 }  // namespace
 
 size_t AnchorFit::used() const {
@@ -186,7 +195,7 @@ AnchorFit fit_anchors(const HeadPrior& prior, const std::vector<HeadPhoto>& phot
   const AnchorPoints points(prior);
   AnchorFit result;
   result.shape_codes.assign(points.codes(), 0.0f);
-  result.code_sigmas.assign(points.codes(), 1.0f);
+  set_covariance(result, {});
   std::vector<Participant> parts;
   for (size_t i = 0; i < photos.size(); ++i) {
     const HeadPhoto& photo = photos[i];
@@ -223,7 +232,7 @@ AnchorFit fit_anchors(const HeadPrior& prior, const std::vector<HeadPhoto>& phot
     }
     if (least >= options.min_inlier_fraction) {
       std::copy(joint.codes().begin(), joint.codes().end(), result.shape_codes.begin());
-      result.code_sigmas = joint.code_sigmas();
+      set_covariance(result, joint.code_covariance());
       result.steps = joint.steps();
       result.cost = joint.cost();
       break;

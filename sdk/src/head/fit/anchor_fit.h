@@ -33,8 +33,9 @@ struct PhotoFit {
 struct AnchorFit {
   // Of the mean head where no photo has part.
   std::vector<float> shape_codes;
-  std::vector<float> code_sigmas;  // their standard deviations after all; 1: the photos say nothing of it
-  std::vector<PhotoFit> photos;    // as they were given
+  std::vector<float> code_sigmas;      // their standard deviations after all; 1: the photos say nothing of it
+  std::vector<float> code_covariance;  // [codes][codes]; the identity where the photos say nothing
+  std::vector<PhotoFit> photos;        // as they were given
   int steps = 0;
   double cost = 0;  // twice the negative log of the posterior
 

@@ -108,7 +108,8 @@ class Fitter {
     double step_seconds = 0;
     while (stats.steps < options_.max_steps) {
       const double seconds = seconds_now();
-      if (callback && !callback({stats.steps, seconds, best_losses_.total(), best_.codes, result_.photos})) {
+      if (callback &&
+          !callback({stats.steps, seconds, best_losses_.total(), best_.codes, result_.start, result_.photos})) {
         return HeadFitEnd::kCancelled;
       }
       if (seconds + step_seconds > options_.seconds) return HeadFitEnd::kSeconds;

@@ -75,6 +75,7 @@ struct HeadFitProgress {
   double seconds = 0;
   double loss = 0;  // of the best head so far
   const FieldCodes& codes;
+  const AnchorFit& start;
   const std::vector<PhotoFit>& photos;
 };
 

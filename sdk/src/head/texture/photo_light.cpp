@@ -16,6 +16,7 @@ constexpr double kGainVariance = 200, kDirectedVariance = 700;
 // Fixes the scale of an offset, no more: the weight of 100 grey levels of it.
 constexpr double kOffsetVariance = 1e-3, kOffsetUnit = 100;
 constexpr double kMaxPlainGain = 2;
+constexpr double kMinFraction = 0.25;
 
 using Terms = std::array<double, kUnknowns>;
 
@@ -26,9 +27,18 @@ Terms terms_of(float own, const float* normal) {
 
 }  // namespace
 
+double ChannelLight::strength(const float* normal) const {
+  return gain + directed.x * double(normal[0]) + directed.y * double(normal[1]) + directed.z * double(normal[2]);
+}
+
 float ChannelLight::operator()(float own, const float* normal) const {
-  const double side = directed.x * double(normal[0]) + directed.y * double(normal[1]) + directed.z * double(normal[2]);
-  return float(std::clamp((gain + side) * double(own) + offset, 0.0, 255.0));
+  return float(std::clamp(strength(normal) * double(own) + offset, 0.0, 255.0));
+}
+
+float ChannelLight::evened(float seen, const float* normal, double even) const {
+  if (!(even > 0)) return seen;
+  const double factor = even / std::max(strength(normal), kMinFraction * even);
+  return float(std::clamp((double(seen) - offset) * factor + offset, 0.0, 255.0));
 }
 
 PhotoLight fit_photo_light(const std::vector<float>& weights, const std::vector<float>& own,

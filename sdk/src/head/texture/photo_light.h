@@ -16,6 +16,11 @@ struct ChannelLight {
   Vec3 directed;
 
   float operator()(float own, const float* normal) const;  // within 0 to 255
+  double strength(const float* normal) const;              // what own colours are multiplied by
+
+  // What the light would make of a colour that it made `seen` of, were it everywhere of this strength; within 0 to 255.
+  // Where hardly any light falls its share of the colour is not known: there it counts as a quarter of `even`.
+  float evened(float seen, const float* normal, double even) const;
 };
 
 using PhotoLight = std::array<ChannelLight, 3>;

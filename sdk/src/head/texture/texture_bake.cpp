@@ -238,7 +238,7 @@ Differences mirrored(const Differences& known, const Texels& texels, int side) {
 }
 
 // The mesh's colours become what they would be in the photos' light, and differences are then from these.
-void match_light(Texels& texels, Differences& seen) {
+PhotoLight match_light(Texels& texels, Differences& seen) {
   const PhotoLight light = fit_photo_light(seen.weights, texels.colours, seen.values, texels.normals);
   for (size_t i = 0; i < seen.weights.size(); ++i) {
     if (texels.is_surface[i] == 0 || texels.is_cap[i] != 0) continue;
@@ -249,6 +249,20 @@ void match_light(Texels& texels, Differences& seen) {
       own = in_light;
     }
   }
+  return light;
+}
+
+// Of each channel, the light's mean strength on what the photos see.
+std::array<double, 3> mean_strength(const PhotoLight& light, const Texels& texels, const std::vector<float>& weights) {
+  std::array<double, 3> sums{};
+  double total = 0;
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] <= 0) continue;
+    total += double(weights[i]);
+    for (size_t c = 0; c < 3; ++c) sums[c] += double(weights[i]) * light[c].strength(&texels.normals[3 * i]);
+  }
+  for (double& sum : sums) sum = total > 0 ? sum / total : 0;
+  return sums;
 }
 
 }  // namespace
@@ -275,7 +289,8 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
   }
   Texels texels = draw_texels(mesh, side, threads);
   Differences seen = blend(photos, mesh, texels, side, threads);
-  match_light(texels, seen);
+  const PhotoLight light = match_light(texels, seen);
+  const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
   if (options.is_mirrored) seen = mirrored(seen, texels, side);
   std::vector<float> around = seen.values;
   fill_smoothly(side, seen.weights, around);
@@ -290,8 +305,11 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
     const float fade =
         texels.is_cap[i] != 0 ? 0 : float(std::exp(-double(distances[i]) / (kFadeFraction * double(side))));
     for (size_t c = 0; c < 3; ++c) {
-      colours[3 * i + c] =
-          texels.colours[3 * i + c] + known * seen.values[3 * i + c] + (1 - known) * fade * around[3 * i + c];
+      float& colour = colours[3 * i + c];
+      colour = texels.colours[3 * i + c] + known * seen.values[3 * i + c] + (1 - known) * fade * around[3 * i + c];
+      if (options.is_unlit && texels.is_cap[i] == 0) {
+        colour = light[c].evened(colour, &texels.normals[3 * i], even[c]);
+      }
     }
     if (texels.is_cap[i] == 0) from_photos += double(known), all += 1;
   }

@@ -28,6 +28,7 @@ HeadCamera crop_camera(const HeadCamera& camera, const AffineMap& to_crop, int s
 struct TextureOptions {
   int side_px = 1024;
   bool is_mirrored = false;  // where no photo sees one side of the head, what it sees of the other
+  bool is_unlit = false;     // the light from one side is taken out: it is even, as strong as on what the photos see
 };
 
 struct TextureImage {

@@ -36,9 +36,11 @@ struct HeadOptions {
   std::vector<float> box;
   double roll_deg = 0;
   float focal_px = 0;
+  double pupils_mm = 0;
+  std::string depth;  // a source, or "photo": what came with it
   double cell_mm = 0;
   uint32_t texture_px = 0;
-  bool is_mirrored = false;
+  bool is_mirrored = false, is_unlit = false;
   std::string triangles;  // empty: the library's default
   std::string topology = "field";
   std::string densepose;
@@ -202,6 +204,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
       if (mesh->morph_target_count > 0) document["facial_actions"] = mesh->morph_target_count;
       document["simplification_error_mm"] = std::round(1e6 * double(mesh->simplification_error_m)) / 1e3;
     }
+    document["scale"] = name_of_scale(info.scale);
     document["scale_sigma"] = info.scale_sigma;
     if (pupils_m > 0) document["pupil_distance_m"] = pupils_m;
     document["steps"] = stats.step_count;
@@ -244,6 +247,20 @@ maq_head_mesh_options mesh_options(const HeadOptions& options) {
   return mesh;
 }
 
+// Of the size that the options tell.
+maquette::Head sized(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
+                     const maquette::HeadBuilder& builder, maquette::Head head) {
+  if (options.pupils_mm > 0) return head.scaled_by_distance("pupil_left", "pupil_right", 1e-3 * options.pupils_mm);
+  if (options.depth.empty()) return head;
+  if (builder.photo(0).is_used == 0) throw std::runtime_error("The first photo, whose depth is given, was left out.");
+  if (options.depth != "photo") return head.scaled_by_depth(read_photo(options, context, options.depth).frame);
+  if (!photos[0].frame.depth()) {
+    throw std::runtime_error(photos[0].argument.uri +
+                             " came without depth; name its depth image: --depth 'image:depth.png?depth_unit=0.001'.");
+  }
+  return head.scaled_by_depth(photos[0].frame);
+}
+
 void fit_one(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
              const Task& task, maquette::HeadBuilder& builder, Stages stages) {
   builder.clear();
@@ -263,6 +280,7 @@ void fit_one(const HeadOptions& options, const maquette::Context& context, const
     throw std::runtime_error("Interrupted; no file was written.");
   }
   progress.finish();
+  head = sized(options, context, photos, builder, std::move(head));
   const maq_head_stats stats = builder.stats();
   stages.pose_ms = double(stats.pose_ms), stages.fit_ms = double(stats.fit_ms);
   timer.lap_ms();
@@ -312,6 +330,7 @@ int run_head(const HeadOptions& options) {
   config.provider = provider_of(options.network);
   config.texture_px = options.texture_px;
   config.texture_mirrored = options.is_mirrored ? 1 : 0;
+  config.texture_unlit = options.is_unlit ? 1 : 0;
   maquette::HeadBuilder builder(context, config);
   Stages stages;
   LapTimer timer;
@@ -387,6 +406,16 @@ void add_head_command(CLI::App& app, int* exit_code) {
       ->add_option("--focal-px", options->focal_px,
                    "Focal length of the camera in pixels of the photo; default: estimated, or by the photo's fov=")
       ->check(CLI::Range(1e-3f, 1e9f));
+  CLI::Option* const pupils =
+      command
+          ->add_option("--pupils", options->pupils_mm,
+                       "Distance of the person's pupils, mm, as opticians measure it; the head gets its size by it")
+          ->check(CLI::Range(10.0, 200.0));
+  command
+      ->add_option("--depth", options->depth,
+                   "Depth image of the first photo's view, 'image:depth.png?depth_unit=0.001', or photo: what came "
+                   "with it; the head gets its size by it")
+      ->excludes(pupils);
   CLI::Option* const triangles =
       command
           ->add_option(
@@ -409,6 +438,10 @@ void add_head_command(CLI::App& app, int* exit_code) {
       ->add_flag("--mirror", options->is_mirrored,
                  "Where the photos see one side of the head alone, let the other look like it")
       ->needs(texture);
+  command
+      ->add_flag("--unlit", options->is_unlit,
+                 "Take the photos' light from one side out of the texture, for programs that light it anew")
+      ->needs(texture);
   command->add_option("--densepose", options->densepose,
                       "Folder of the bundle that finds people; default: MAQ_BUNDLE, then the installed one");
   command->add_flag("--json", options->json, "Print what was found as one JSON line per head");
@@ -416,10 +449,10 @@ void add_head_command(CLI::App& app, int* exit_code) {
   command->footer(
       "The mesh is closed, coloured and in metres, with y up and the face to the front, and ends below the chin. A "
       "photo\n"
-      "does not tell how large a head is: it is taken to be of average size. What the photo does not show, the back "
-      "of\n"
-      "the head above all, is made up as heads are that look alike. More photos of the same person, from the sides,\n"
-      "help; each may be from another camera. Faces should be 64 pixels or more across.\n\n"
+      "does not tell how large a head is: it is taken to be of average size, unless --pupils or --depth tells.\n"
+      "What the photo does not show, the back of the head above all, is made up as heads are that look alike. More\n"
+      "photos of the same person, from the sides, help; each may be from another camera. Faces should be 64 pixels\n"
+      "or more across.\n\n"
       "A face is biometric data: ask the person. Nothing leaves this machine, and a saved head holds no photo,\n"
       "unless --texture asks for one, which has the face's pixels.\n\n"
       "Examples:\n"
@@ -427,6 +460,7 @@ void add_head_command(CLI::App& app, int* exit_code) {
       "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
       "  maquette head group.jpg --out heads/head.ply --person all\n"
       "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
+      "  maquette head photo.jpg --out head.glb --pupils 63\n"
       "  maquette head photo.jpg --out head.glb --texture 1024\n"
       "  maquette head photo.jpg --out avatar.glb --topology template\n"
       "  maquette head photo.jpg --out head.glb --preview turn.mp4\n"

@@ -13,6 +13,9 @@ class Option;
 void add_head_info_command(CLI::App& head, int* exit_code);
 void add_head_render_command(CLI::App& head, int* exit_code);
 
+// "prior", "given" or "depth".
+const char* name_of_scale(maq_head_scale scale);
+
 // "as heads are on average, give or take 4 %".
 std::string text_of_scale(const maq_head_info& info);
 

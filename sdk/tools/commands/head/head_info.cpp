@@ -18,10 +18,6 @@ struct HeadInfoOptions {
   bool json = false;
 };
 
-const char* name_of_scale(maq_head_scale scale) {
-  return scale == MAQ_HEAD_SCALE_GIVEN ? "given" : scale == MAQ_HEAD_SCALE_DEPTH ? "depth" : "prior";
-}
-
 // What the template's mesh of a head has; nothing where the default bundle has no template.
 struct TemplateFacts {
   uint32_t vertices = 0, triangles = 0, actions = 0;
@@ -87,6 +83,10 @@ int show_head(const HeadInfoOptions& options) {
 }
 
 }  // namespace
+
+const char* name_of_scale(maq_head_scale scale) {
+  return scale == MAQ_HEAD_SCALE_GIVEN ? "given" : scale == MAQ_HEAD_SCALE_DEPTH ? "depth" : "prior";
+}
 
 std::string text_of_scale(const maq_head_info& info) {
   std::string text = info.scale == MAQ_HEAD_SCALE_GIVEN   ? "from a distance that was given"

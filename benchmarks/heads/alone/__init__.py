@@ -1,0 +1,1 @@
+"""Measurements of heads that are commands of their own."""

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <exception>
+#include <optional>
 #include <vector>
 
 #include "head/build/head_surface.h"
@@ -35,7 +36,7 @@ int main(int argc, char** argv) try {
   for (const bool is_smooth : {true, false}) {
     maq::head::HeadRenderOptions options;
     options.threads = threads, options.is_smooth = is_smooth;
-    maq::head::HeadRenderer renderer(mesh, options);
+    maq::head::HeadRenderer renderer(mesh, std::nullopt, options);
     maq::head::HeadPicture picture;
     std::vector<double> ms;
     std::clock_t before = 0;

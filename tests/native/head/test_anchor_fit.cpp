@@ -160,6 +160,44 @@ TEST(AnchorFit, TheSameTwiceHasTheSameBits) {
   EXPECT_EQ(x.head_to_camera.translation.z, y.head_to_camera.translation.z);
 }
 
+TEST(AnchorFit, CodesThatMoveNothingOrTheSameStayWithinThePrior) {
+  const HeadPhoto photo = photo_for_anchors(camera_at(6, 900, 0.3), 5);
+  // Of rank 3: code 3 moves no anchor, or does what code 0 does.
+  HeadPrior idle = prior(), doubled = prior();
+  for (size_t row = 0; row < idle.anchors.linear.size(); row += 4) {
+    idle.anchors.linear[row + 3] = 0;
+    doubled.anchors.linear[row + 3] = doubled.anchors.linear[row];
+  }
+  const AnchorFit without = fit_anchors(idle, {photo}, independent_cells());
+  ASSERT_TRUE(without.is_found());
+  EXPECT_EQ(without.shape_codes[3], 0);
+  EXPECT_FLOAT_EQ(without.code_sigmas[3], 1);
+  const AnchorFit shared = fit_anchors(doubled, {photo}, independent_cells());
+  ASSERT_TRUE(shared.is_found());
+  EXPECT_NEAR(shared.shape_codes[3], shared.shape_codes[0], 1e-3f) << "the prior shares it between them";
+  for (const float code : shared.shape_codes) EXPECT_LT(std::abs(code), 3);
+  // And a code of which a step is 30 heads wide: it can be told exactly, and does not run away.
+  HeadPrior steep = prior();
+  for (float& value : steep.anchors.linear) value *= 1000;
+  const AnchorFit held = fit_anchors(steep, {photo}, independent_cells());
+  for (const float code : held.shape_codes) EXPECT_LT(std::abs(code), 0.1f);
+}
+
+TEST(AnchorFit, CellsThatAreAsSureAsAnyAreTrustedAndThoseThatKnowNothingShowNoHead) {
+  const HeadCamera camera = camera_at(6, 900, 0.3);
+  HeadPhoto claimed = photo_for_anchors(camera, 5);
+  for (HeadCell& cell : claimed.seen.cells) cell.sigma_dm = 0.01;  // read_observations() lets none be less
+  const AnchorFit sure = fit_anchors(prior(), {claimed}, independent_cells());
+  ASSERT_TRUE(sure.is_found());
+  EXPECT_LT(rotation_error(sure.photos[0].camera, camera), 0.05);
+  for (const float code : sure.shape_codes) EXPECT_LT(std::abs(code), 3);
+  for (HeadCell& cell : claimed.seen.cells) cell.sigma_dm = 3;  // nor more
+  const AnchorFit unsure = fit_anchors(prior(), {claimed}, independent_cells());
+  EXPECT_FALSE(unsure.is_found());
+  EXPECT_EQ(unsure.shape_codes, std::vector<float>(4, 0.0f));
+  EXPECT_EQ(unsure.code_sigmas, std::vector<float>(4, 1.0f));
+}
+
 TEST(AnchorFit, WhatCannotBeIsRefused) {
   const HeadPhoto photo = photo_for_anchors(camera_at(6, 900, 0), 1);
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "0 photos", [] { fit_anchors(prior(), {}); });

@@ -9,12 +9,14 @@ from export.bundle import BundleInfo, Signature
 from export.bundle import write_manifest as write_bundle_manifest
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import MEAN, STD
+from export.densepose.network import PersonEvidence
 from export.surface_grid import FILE as SURFACE_GRID
 
 GRAPHS = ("trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head")
 CROP_GRAPHS = ("crop_trunk", "crop_dense_head")  # of bundles with networks of their own for person crops
 CHARTS, CROP_CHARTS = "charts.f32", "crop_charts.f32"
 LEVELS = (2, 3, 4, 5, 6)
+EVIDENCE = "person"  # output of the trunk where the network has it
 # What the pictures are rendered from; the packages are named in export/people/assets.py and export/photos.
 TRAINING_DATA = (
     {"name": "Maquette rendered people", "licence": "Apache-2.0", "used_for": "training, calibration"},
@@ -32,6 +34,11 @@ TRAINING_DATA = (
         "name": "photographs of people in export/photos/photographs.toml (train)",
         "licence": "MIT, BSD-3-Clause, Apache-2.0",
         "used_for": "training, calibration",
+    },
+    {
+        "name": "photographs of animals in export/photos/photographs.toml (train-animals)",
+        "licence": "MIT, BSD-2-Clause, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-2.0, CC-BY-3.0, public domain",
+        "used_for": "training",
     },
     {
         "name": "labels of these by SSD MobileNetV2, BlazePose heavy, MediaPipe selfie segmentation and hand landmarks",
@@ -69,8 +76,9 @@ def signatures(network: NetworkConfig, crops: bool = False) -> dict[str, Signatu
         "outputs": {"labels": ["people", pool, pool, 4 * classes], "surface": ["people", pool, pool, width]},
     }
     crop_trunk = {"inputs": image, "outputs": maps("p", LEVELS[:1], width)}
+    evidence = {EVIDENCE: [1, *sizes[4], 1]} if network.evidence else {}
     return {
-        "trunk": {"inputs": image, "outputs": maps("p", LEVELS, width)},
+        "trunk": {"inputs": image, "outputs": maps("p", LEVELS, width) | evidence},
         "rpn_fine": rpn(LEVELS[:1]),
         "rpn_coarse": rpn(LEVELS[1:]),
         "box_head": {"inputs": rois(network.box_pool), "outputs": {"boxes": ["people", 6]}},
@@ -115,7 +123,8 @@ def write_manifest(
             "nms_iou": decode.box_nms_iou,
             "max_people": decode.max_people,
         }
-        | ({} if decode.second_pass_threshold is None else {"second_pass_threshold": decode.second_pass_threshold}),
+        | ({} if decode.second_pass_threshold is None else {"second_pass_threshold": decode.second_pass_threshold})
+        | ({"evidence_stride": PersonEvidence.STRIDE} if network.evidence else {}),
         "dense_head": {
             "pool_size": network.dense_pool,
             "stride": network.tap_strides[0],

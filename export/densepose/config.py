@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 @dataclass(frozen=True)
 class NetworkConfig:
     """Sizes of the network. `width`: channels of neck, RPN, box head and dense head (64 = variant B); `axis`: whether
-    the box head also tells the direction of the body axis."""
+    the box head also tells the direction of the body axis; `evidence`: channels of `PersonEvidence`, 0 without it."""
 
     BACKBONES: ClassVar[dict[str, tuple[int, ...]]] = {  # and their channels at strides 4, 8, 16, 32
         "mobilenet_v2": (24, 32, 96, 160),
@@ -19,6 +19,7 @@ class NetworkConfig:
     width: int = 64
     backbone: str = "mobilenet_v2"
     axis: bool = False
+    evidence: int = 0
     tap_strides: tuple[int, ...] = (4, 8, 16, 32)
     rpn_strides: tuple[int, ...] = (4, 8, 16, 32, 64)
     anchor_sizes: tuple[int, ...] = (32, 64, 128, 256, 512)
@@ -40,7 +41,10 @@ class NetworkConfig:
     def of(saved: dict[str, Any]) -> NetworkConfig:
         """The network that a checkpoint or weights file of `export.densepose.train` holds."""
         return NetworkConfig(
-            width=saved["width"], backbone=saved.get("backbone", "mobilenet_v3_large"), axis=saved.get("axis", False)
+            width=saved["width"],
+            backbone=saved.get("backbone", "mobilenet_v3_large"),
+            axis=saved.get("axis", False),
+            evidence=saved.get("evidence", 0),
         )
 
 

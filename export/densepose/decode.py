@@ -23,14 +23,15 @@ from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import MEAN, STD
 from export.densepose.network import MobileParsingRCNN
 
-Detector = Callable[[Tensor], tuple[list[Tensor], list[Tensor], list[Tensor]]]
+Detector = Callable[[Tensor], tuple[list[Tensor], list[Tensor], list[Tensor], Tensor | None]]
 BoxHead = Callable[[Tensor], tuple[Tensor, Tensor]]
 DenseHead = Callable[[Tensor], tuple[Tensor, Tensor, Tensor, Tensor]]
 
 
 @dataclass(frozen=True)
 class Graphs:
-    """The three callables; shapes as in docs/formats.md (the detector returns P2..P6, objectness, deltas)."""
+    """The three callables; shapes as in docs/formats.md (the detector returns P2..P6, objectness, deltas, and the
+    evidence of people, if any)."""
 
     detector: Detector
     box_head: BoxHead
@@ -38,7 +39,11 @@ class Graphs:
 
     @staticmethod
     def of_network(net: MobileParsingRCNN) -> Graphs:
-        return Graphs(net.detector, net.box_head, net.dense_head)
+        def detector(image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor], Tensor | None]:
+            features, evidence = net.trunk(image)
+            return features, *net.rpn(features), evidence
+
+        return Graphs(detector, net.box_head, net.dense_head)
 
 
 @dataclass(frozen=True)
@@ -89,14 +94,14 @@ def detect(graphs: Graphs, image: np.ndarray, network: NetworkConfig, config: De
     height, width = image.shape[:2]
     tensor, scale_x, scale_y = network_input(image, config.long_side)
     inner = (round(height / scale_y), round(width / scale_x))
-    features, objectness, deltas = graphs.detector(tensor)
+    features, objectness, deltas, evidence = graphs.detector(tensor)
     flat = [bx.flat_outputs(o, d) for o, d in zip(objectness, deltas, strict=True)]
     anchors = bx.anchors(network, [tuple(o.shape[-2:]) for o in objectness])
     proposed = tg.proposals(
         [f[0][0] for f in flat], [f[1][0] for f in flat], anchors, inner,
         config.pre_nms_top_k, config.post_nms_top_k, config.rpn_nms_iou,
     )  # fmt: skip
-    boxes, scores = _people(graphs, features, proposed, network, config, inner)
+    boxes, scores = _people(graphs, features, evidence, proposed, network, config, inner)
     return Detection(tensor, features, proposed, boxes, scores, (scale_x, scale_y))
 
 
@@ -123,23 +128,24 @@ def infer(
     return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance)
 
 
-def _people(graphs: Graphs, features: list[Tensor], proposed: Tensor, network: NetworkConfig,
+def _people(graphs: Graphs, features: list[Tensor], evidence: Tensor | None, proposed: Tensor, network: NetworkConfig,
             config: DecodeConfig, inner: tuple[int, int]) -> tuple[Tensor, Tensor]:  # fmt: skip
     """Box head, threshold and NMS, twice if the config asks for it: boxes [K, 4] in input pixels and scores [K], best
     first."""
     threshold = config.score_threshold
     if config.second_pass_threshold is not None:
         first_threshold = min(config.second_pass_threshold, threshold)
-        proposed, _ = _box_pass(graphs, features, proposed, network, config, inner, first_threshold)
-    return _box_pass(graphs, features, proposed, network, config, inner, threshold)
+        proposed, _ = _box_pass(graphs, features, evidence, proposed, network, config, inner, first_threshold)
+    return _box_pass(graphs, features, evidence, proposed, network, config, inner, threshold)
 
 
-def _box_pass(graphs: Graphs, features: list[Tensor], boxes: Tensor, network: NetworkConfig, config: DecodeConfig,
-              inner: tuple[int, int], threshold: float) -> tuple[Tensor, Tensor]:  # fmt: skip
+def _box_pass(graphs: Graphs, features: list[Tensor], evidence: Tensor | None, boxes: Tensor, network: NetworkConfig,
+              config: DecodeConfig, inner: tuple[int, int], threshold: float) -> tuple[Tensor, Tensor]:  # fmt: skip
     if not len(boxes):
         return boxes, boxes.new_zeros(0)
     logits, deltas = graphs.box_head(tg.pooled(features, [boxes], network, network.box_pool))
-    scores = logits.softmax(1)[:, 0]
+    likely = logits[:, 0] - logits[:, 1]
+    scores = (likely if evidence is None else likely + tg.mean_evidence(evidence, boxes)).sigmoid()
     boxes = bx.clip(bx.decode(deltas, boxes, network.delta_weights), *inner)
     valid = (scores > threshold) & ((boxes[:, 2:] - boxes[:, :2]) > 0).all(1)
     boxes, scores = boxes[valid], scores[valid]

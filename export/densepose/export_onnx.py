@@ -39,14 +39,15 @@ TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the tensor's largest val
 
 
 class Trunk(nn.Module):
-    """Backbone and neck: image -> P2..P6."""
+    """Backbone and neck: image -> P2..P6, and the evidence of people where the network has it."""
 
     def __init__(self, net: MobileParsingRCNN) -> None:
         super().__init__()
-        self.backbone, self.neck = net.backbone, net.neck
+        self.net = net
 
     def forward(self, image: Tensor) -> tuple[Tensor, ...]:
-        return tuple(channels_last(x) for x in self.neck(self.backbone(image)))
+        features, evidence = self.net.trunk(image)
+        return tuple(channels_last(x) for x in (*features, *([] if evidence is None else [evidence])))
 
 
 class CropTrunk(nn.Module):

@@ -47,6 +47,7 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
     rpn, head, dense = manifest["rpn"], manifest["box_head"], manifest["dense_head"]
     network = NetworkConfig(
         width=manifest["graphs"]["box_head"]["inputs"][0]["shape"][3],
+        evidence=int("evidence_stride" in head),  # how many channels it has within the graph, no manifest says
         anchor_sizes=tuple(rpn["anchor_sizes_px"]),
         aspect_ratios=tuple(rpn["aspect_ratios"]),
         rpn_strides=tuple(rpn["strides"]),
@@ -59,12 +60,14 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
         feed = {x["name"]: np.ascontiguousarray(t.numpy()) for x, t in zip(entry["inputs"], given, strict=True)}
         return [torch.from_numpy(x) for x in sessions[name].run([x["name"] for x in entry["outputs"]], feed)]
 
-    def detector(image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
-        features = run("trunk", image)
+    def detector(image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor], Tensor | None]:
+        outputs = run("trunk", image)
+        features = outputs[: len(network.rpn_strides)]
+        evidence = outputs[len(features)].permute(0, 3, 1, 2) if "evidence_stride" in head else None
         found = [x.permute(0, 3, 1, 2) for x in run("rpn_fine", features[0]) + run("rpn_coarse", *features[1:])]
         anchors = len(network.aspect_ratios)
         maps = [x.permute(0, 3, 1, 2).contiguous() for x in features]
-        return maps, [x[:, :anchors] for x in found], [x[:, anchors:] for x in found]
+        return maps, [x[:, :anchors] for x in found], [x[:, anchors:] for x in found], evidence
 
     def box_head(rois: Tensor) -> tuple[Tensor, Tensor]:
         (found,) = run("box_head", rois.permute(0, 2, 3, 1))

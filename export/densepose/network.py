@@ -250,6 +250,30 @@ class BiFPN(nn.Module):
         return [o2, o3, o4, o5, F.max_pool2d(o5, 1, 2)]
 
 
+class PersonEvidence(nn.Module):
+    """How much each cell of the backbone's maps of strides 16 and 32 speaks for a person: [N, 1, h / 16, w / 16].
+
+    Its mean over a box is added to the box head's logit of a person. These maps, which began as a detector of 80 kinds
+    of things, tell people from animals; the neck forgets it.
+    up: as in `BiFPN`.
+    """
+
+    STRIDE = 16
+    up: Callable[[Tensor, Tensor], Tensor] = staticmethod(_up)
+
+    def __init__(self, tap_channels: tuple[int, ...], channels: int) -> None:
+        super().__init__()
+        self.fine = nn.Conv2d(tap_channels[2], channels, 1)
+        self.coarse = nn.Conv2d(tap_channels[3], channels, 1, bias=False)
+        self.out = nn.Conv2d(channels, 1, 1)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+
+    def forward(self, fine: Tensor, coarse: Tensor) -> Tensor:
+        seen = self.fine(fine)
+        return self.out(F.relu(seen + self.up(self.coarse(coarse), seen)))
+
+
 class RpnHead(nn.Module):
     """Shared over levels: objectness logits [N, A, h, w] and box deltas [N, 4A, h, w], anchor-major."""
 
@@ -371,11 +395,17 @@ class MobileParsingRCNN(nn.Module):
         self.rpn = RpnHead(config.width, len(config.aspect_ratios))
         self.box_head = BoxHead(config.width, config.box_pool, config.axis)
         self.dense_head = DenseHead(config)
+        self.evidence = PersonEvidence(config.tap_channels, config.evidence) if config.evidence else None
 
     def detector(self, image: Tensor) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
         """Normalised image [N, 3, H, W], H and W multiples of 32 -> P2..P6, objectness, deltas (5 levels)."""
         features = self.neck(self.backbone(image))
         return (features, *self.rpn(features))
+
+    def trunk(self, image: Tensor) -> tuple[list[Tensor], Tensor | None]:
+        """P2..P6, and the evidence of people where the network has it."""
+        taps = self.backbone(image)
+        return self.neck(taps), None if self.evidence is None else self.evidence(*taps[2:])
 
     def finest(self, image: Tensor) -> Tensor:
         """P2 [N, C, H / 4, W / 4] alone: what the dense head needs."""

@@ -62,4 +62,6 @@ def simplified(net: Network) -> Network:
             elif isinstance(child, Aspp):
                 setattr(module, name, SplitAspp(child))
     net.neck.up = doubled
+    if getattr(net, "evidence", None) is not None:
+        net.evidence.up = doubled
     return net.eval().requires_grad_(False)

@@ -10,6 +10,7 @@ from torchvision.ops import batched_nms, box_iou
 
 from export.densepose import boxes as bx
 from export.densepose.config import NetworkConfig
+from export.densepose.network import PersonEvidence
 from export.shards import BOX_ALONE, UNSURE
 
 
@@ -155,6 +156,11 @@ def pooled(
                 order.append(before + own)
         before += len(box)
     return torch.cat(pieces)[torch.cat(order).argsort()] if order else pieces[0]
+
+
+def mean_evidence(evidence: Tensor, boxes: Tensor) -> Tensor:
+    """Of one picture's `PersonEvidence` [1, 1, h, w], the mean over each box, [R]."""
+    return align_rois(evidence[0], boxes / PersonEvidence.STRIDE, 1).flatten()
 
 
 def align_rois(features: Tensor, boxes: Tensor, pool: int) -> Tensor:

@@ -16,6 +16,7 @@ namespace {
 constexpr size_t kFeatureLevels = 4;  // P2 to P5, which the heads read
 constexpr size_t kRpnLevels = 5;      // P2 to P6
 constexpr int kFirstLevel = 2;
+constexpr char kEvidence[] = "person";  // output of the trunk
 // People gain by a crop whose box has a shorter long side, in pixels of the network's input, or who lean by more.
 constexpr float kSmallPersonPx = 150;
 constexpr double kMinLeanDegrees = 15;
@@ -102,8 +103,8 @@ DensePoseSettings resolved(DensePoseSettings settings, const DensePoseSpec& spec
 
 Box scaled(const Box& box, float x, float y) { return {box.x0 * x, box.y0 * y, box.x1 * x, box.y1 * y}; }
 
-// Probability of the first of two classes; stable for every finite logit.
-float first_of_two(const float* logits) { return 1.0f / (1.0f + std::exp(logits[1] - logits[0])); }
+// Stable for every finite logit.
+float logistic(float logit) { return 1.0f / (1.0f + std::exp(-logit)); }
 
 }  // namespace
 
@@ -119,7 +120,9 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
   cancel_ = std::make_unique<RunCancel>(runtime);
   const Manifest& manifest = bundle.manifest;
   const int first = kFirstLevel, last = kFirstLevel + int(kRpnLevels) - 1;
-  const GraphSpec trunk = graph_with(manifest, "trunk", {"image"}, at_levels("p", first, last));
+  std::vector<std::string> maps = at_levels("p", first, last);
+  if (spec_.box_head.evidence_stride > 0) maps.push_back(kEvidence);
+  const GraphSpec trunk = graph_with(manifest, "trunk", {"image"}, maps);
   channels_ = feature_channels(trunk, manifest.name);
   SessionSettings on_provider{settings_.threads, settings_.spin};
   on_provider.provider = available_provider(*runtime, settings_.provider);
@@ -138,7 +141,9 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
     return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file), with);
   };
   const std::vector<int64_t> features = {1, kAnySize, kAnySize, channels_};
-  trunk_ = make_checked("trunk", trunk, {1, 3, kAnySize, kAnySize}, {features}, on_cpu);
+  std::vector<std::vector<int64_t>> trunk_outputs(kRpnLevels, features);
+  trunk_outputs.push_back({1, kAnySize, kAnySize, 1});  // the evidence
+  trunk_ = make_checked("trunk", trunk, {1, 3, kAnySize, kAnySize}, trunk_outputs, on_cpu);
   const std::vector<int64_t> anchors = {1, kAnySize, kAnySize, 5 * int64_t(spec_.rpn.aspect_ratios.size())};
   rpn_fine_ = make_checked(
       "rpn_fine", graph_with(manifest, "rpn_fine", at_levels("p", first, first), at_levels("rpn", first, first)),
@@ -281,6 +286,10 @@ void DensePose::set_level_shapes(int width_px, int height_px, size_t levels) {
     const int stride = spec_.rpn.strides[l];
     shapes_.push_back({1, divide_up(height_px, stride), divide_up(width_px, stride), channels_});
   }
+  const int stride = spec_.box_head.evidence_stride;
+  if (levels == kRpnLevels && stride > 0) {
+    shapes_.push_back({1, divide_up(height_px, stride), divide_up(width_px, stride), 1});
+  }
 }
 
 int DensePose::measured_threads(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const Bundle& bundle,
@@ -304,6 +313,11 @@ maq_provider DensePose::run_trunk(const Mapper& mapper, const std::vector<float>
   for (size_t l = 0; l < std::min(mapper.levels, kFeatureLevels); ++l) {
     const TensorView& map = pyramid_[l];
     features_.push_back({map.data, channels_, int(map.shape[1]), int(map.shape[2]), spec_.box_head.strides[l]});
+  }
+  evidence_ = {};
+  if (pyramid_.size() > kRpnLevels) {
+    const TensorView& map = pyramid_[kRpnLevels];
+    evidence_ = {map.data, 1, int(map.shape[1]), int(map.shape[2]), spec_.box_head.evidence_stride};
   }
   return trunk.provider();
 }
@@ -340,6 +354,12 @@ const FeatureMap& DensePose::level_for(const Box& box) const {
   return features_[size_t(slot)];
 }
 
+float DensePose::evidence_in(const Box& box) {
+  float mean = 0;
+  if (evidence_.data != nullptr) roi_align_.run(evidence_, box, 1, &mean);
+  return mean;
+}
+
 void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_score, std::vector<ScoredBox>& found,
                              int* dropped) {
   found.clear();
@@ -358,7 +378,8 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_scor
   const TensorView& outputs = box_head_->run(inputs_, shapes_, cancel_.get()).front();
 
   for (size_t i = 0; i < boxes.size(); ++i) {
-    const float score = first_of_two(outputs.data + 6 * i);
+    const float* logits = outputs.data + 6 * i;
+    const float score = logistic(logits[0] - logits[1] + evidence_in(boxes[i].box));
     Box box = apply_deltas(boxes[i].box, outputs.data + 6 * i + 2, spec.delta_weights);
     if (std::isnan(score) || !clip_box(box, float(input_.width_px), float(input_.height_px))) {
       ++*dropped;

@@ -126,7 +126,7 @@ class DensePose {
   };
 
   void find_people(const ImageView& image, DensePoseResult& result);
-  // Of the trunk's outputs for such an input, into `shapes_`.
+  // Of the trunk's outputs for such an input, into `shapes_`; of one that gives all levels the evidence, too.
   void set_level_shapes(int width_px, int height_px, size_t levels);
   // How many threads the trunk, which takes the longest, is fastest on.
   int measured_threads(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const Bundle& bundle,
@@ -159,6 +159,8 @@ class DensePose {
   // Gives the person, who was painted last, the crop of the next frame, and between key frames the box of this one.
   void follow_in_crop(MappedPerson& person, const DensePoseResult& result);
   const FeatureMap& level_for(const Box& box) const;
+  // What speaks for a person in `box`, to be added to the box head's logit; 0 where the bundle has no such map.
+  float evidence_in(const Box& box);
 
   DensePoseSpec spec_;
   bool measures_threads_;
@@ -181,6 +183,7 @@ class DensePose {
   NetworkInput input_;
   std::vector<TensorView> pyramid_;   // P2 to P6, or P2, in memory of a trunk
   std::vector<FeatureMap> features_;  // the same, without P6
+  FeatureMap evidence_;               // of people, one channel; without data where the bundle has none
   std::vector<float> rois_;
   std::vector<MappedPerson> mapped_;
   // Scratch of a frame, kept so that the next one takes nothing from the heap.

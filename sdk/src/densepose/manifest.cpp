@@ -47,6 +47,7 @@ BoxHeadSpec read_box_head(const ManifestNode& node) {
   head.score_threshold = node.at("score_threshold").number(0, 1);
   head.nms_iou = node.at("nms_iou").number(0, 1);
   if (const auto threshold = node.find("second_pass_threshold")) head.second_pass_threshold = threshold->number(0, 1);
+  if (const auto stride = node.find("evidence_stride")) head.evidence_stride = stride->integer(1, 1024);
   head.max_people = node.at("max_people").integer(1, 255);
   return head;
 }

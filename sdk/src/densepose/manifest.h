@@ -30,6 +30,8 @@ struct BoxHeadSpec {
   float nms_iou = 0;
   // Boxes with a higher score go through the box head again, from where its first pass put them; none: one pass.
   std::optional<float> second_pass_threshold;
+  // Of the trunk's output `person`, whose mean over a box is added to the logit of a person; 0: it has none.
+  int evidence_stride = 0;
   int max_people = 0;
 };
 

@@ -171,6 +171,26 @@ TEST_F(DensePose, ASecondPassStartsWhereTheFirstEnded) {
   EXPECT_NEAR(box_of(1.0f, {}).x0, twice.x0, 1e-3) << "a box above the score threshold always gets a second pass";
 }
 
+TEST_F(DensePose, WhatSpeaksAgainstAPersonCountsWhereTheManifestAsksForIt) {
+  const BundleCopy bundle;
+  const auto people_on = [&](const cv::Scalar& background, bool asked) {
+    cv::Mat image = black(320, 256);
+    image = background;
+    image(cv::Rect(80, 100, 4, 4)) = kRed;
+    nlohmann::json manifest = bundle.manifest();
+    manifest["box_head"].erase("evidence_stride");
+    if (asked) manifest["box_head"]["evidence_stride"] = 16;
+    bundle.write_manifest(manifest);
+    maq::DensePoseResult result;
+    make({}, bundle.path()).run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    return result.people.size();
+  };
+  const cv::Scalar reddish = kRed * 0.1;
+  EXPECT_EQ(people_on(cv::Scalar::all(0), true), 1u);
+  EXPECT_EQ(people_on(reddish, true), 0u);
+  EXPECT_EQ(people_on(reddish, false), 1u);
+}
+
 TEST_F(DensePose, ABoxHiddenBehindAnotherIsDropped) {
   cv::Mat image = black(320, 256);
   image(cv::Rect(160, 96, 16, 16)) = kBlue;  // a person of 128 px

@@ -24,6 +24,7 @@ TEST(DensePoseManifest, ReadsEveryField) {
   EXPECT_EQ(spec.rpn.post_nms_top_k, 100);
   EXPECT_FLOAT_EQ(spec.box_head.delta_weights[2], 5);
   EXPECT_FALSE(spec.box_head.second_pass_threshold.has_value());
+  EXPECT_EQ(spec.box_head.evidence_stride, 0);
   EXPECT_EQ(spec.charts_file, "charts.f32");
   EXPECT_EQ(spec.dense_head.output_size, 64);
   EXPECT_EQ(spec.surface_file, "");
@@ -80,6 +81,7 @@ TEST(DensePoseManifest, RefusesValuesOutOfRange) {
                                                 {"/box_head/max_people", 256},
                                                 {"/box_head/score_threshold", -1},
                                                 {"/box_head/second_pass_threshold", 2},
+                                                {"/box_head/evidence_stride", 0},
                                                 {"/dense_head/index_classes", 1000},
                                                 {"/dense_head/mask_threshold", 1},
                                                 {"/dense_head/min_visible_fraction", 1.5},
@@ -112,6 +114,12 @@ TEST(DensePoseManifest, ATensorThatAGraphDoesNotListIsNamed) {
   manifest["graphs"]["trunk"]["inputs"][0]["name"] = "picture";
   no_input.write_manifest(manifest);
   expect_error(MAQ_ERROR_BAD_BUNDLE, "graph trunk lists no input image", [&] { load(no_input); });
+  const BundleCopy no_evidence;
+  manifest = no_evidence.manifest();
+  manifest["box_head"]["evidence_stride"] = 16;
+  manifest["graphs"]["trunk"]["outputs"].back()["name"] = "nobody";
+  no_evidence.write_manifest(manifest);
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "graph trunk lists no output person", [&] { load(no_evidence); });
 }
 
 }  // namespace

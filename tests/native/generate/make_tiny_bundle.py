@@ -5,6 +5,8 @@ red at a cell of P2 is a person of 32 px, green at a cell of P3 one of 64 px, bl
 each in the square anchor of that cell, shifted right by a tenth of its width (box delta 1 at weight 10).
 The dense head answers the same for everybody: the upper quarter of the box is background; of the rest the left half is
 part 3 and the right half part 7; U rises from -0.11 at the left to 1.11 at the right, V from 0 at the top to 1.
+The trunk's output `person`, which the manifest does not ask for (box_head.evidence_stride), is -180 times red, in cells
+of 16 px: with it, reddish surroundings speak against a person.
 
     python -m tests.native.generate.make_tiny_bundle      from the root; needs onnx and numpy
 """
@@ -56,7 +58,10 @@ def trunk():
     nodes += [
         helper.make_node("Transpose", [f"mean{level}"], [f"p{level}"], perm=[0, 2, 3, 1]) for level in range(2, 7)
     ]
-    return graph("trunk", nodes, [("image", [1, 3, "height", "width"])], maps("p", range(2, 7), CHANNELS), [])
+    nodes.append(helper.make_node("MatMul", ["p4", "evidence.weight"], ["person"]))
+    constants = [tensor("evidence.weight", np.array([[-180], [0], [0]], np.float32))]
+    outputs = [*maps("p", range(2, 7), CHANNELS), ("person", [1, "h4", "w4", 1])]
+    return graph("trunk", nodes, [("image", [1, 3, "height", "width"])], outputs, constants)
 
 
 def rpn(name, levels):

@@ -19,7 +19,7 @@ TEST(Manifest, ReadsEveryField) {
   EXPECT_EQ(manifest.task, "densepose");
   EXPECT_EQ(manifest.precision, "fp32");
   EXPECT_EQ(manifest.files.size(), 6u);
-  EXPECT_EQ(manifest.graphs.at("trunk").outputs.size(), 5u);
+  EXPECT_EQ(manifest.graphs.at("trunk").outputs.size(), 6u);
   EXPECT_EQ(manifest.graphs.at("rpn_coarse").inputs.size(), 4u);
   EXPECT_EQ(std::get<int64_t>(manifest.graphs.at("trunk").outputs[0].shape[3]), 3);
   EXPECT_EQ(std::get<std::string>(manifest.graphs.at("trunk").inputs[0].shape[2]), "height");

@@ -18,14 +18,15 @@ DECODE = DecodeConfig(long_side=160)
 HALF = DecodeConfig(mask_threshold=0.5)
 
 
-def fake_graphs(objectness=0.0, delta=0.0, person=10.0, part=3, u=0.5, v=0.25) -> Graphs:
-    """Networks that answer the same everywhere: these logits, deltas, part and coordinates."""
+def fake_graphs(objectness=0.0, delta=0.0, person=10.0, part=3, u=0.5, v=0.25, evidence=None) -> Graphs:
+    """Networks that answer the same everywhere: these logits, deltas, part and coordinates, this evidence of people."""
 
     def detector(image):
         sizes = [(-(-image.shape[2] // s), -(-image.shape[3] // s)) for s in CONFIG.rpn_strides]
         features = [torch.zeros(1, 64, *size) for size in sizes]
         scores = [torch.full((1, 3, *size), float(objectness)) for size in sizes]
-        return features, scores, [torch.full((1, 12, *size), float(delta)) for size in sizes]
+        deltas = [torch.full((1, 12, *size), float(delta)) for size in sizes]
+        return features, scores, deltas, None if evidence is None else torch.full((1, 1, *sizes[2]), evidence)
 
     def box_head(rois):
         logits = torch.tensor([float(person), 0.0]).expand(len(rois), 2)
@@ -63,6 +64,15 @@ def test_people_are_painted_with_their_part_and_coordinates():
     assert_sound(result, IMAGE)
     assert len(result.boxes)
     assert np.unique(result.iuv[result.instance > 0], axis=0).tolist() == [[3, 128, 64]]
+
+
+def test_evidence_is_added_to_the_logit_of_a_person():
+    plain = infer(fake_graphs(person=2.0), IMAGE, CONFIG, DECODE)
+    less = infer(fake_graphs(person=2.0, evidence=-1.0), IMAGE, CONFIG, DECODE)
+    # The larger part of a box in the picture's corner lies on the map, where the evidence is the same everywhere.
+    assert less.scores.min() == pytest.approx(torch.tensor(1.0).sigmoid().item(), abs=1e-4)
+    assert plain.scores.min() == pytest.approx(torch.tensor(2.0).sigmoid().item(), abs=1e-6)
+    assert len(infer(fake_graphs(person=2.0, evidence=-3.0), IMAGE, CONFIG, DECODE).boxes) == 0
 
 
 def test_the_second_pass_decides():

@@ -1,14 +1,11 @@
-"""Training of the box head alone."""
+"""Views of pictures to learn from, and what their boxes show."""
 
 import cv2
 import numpy as np
 import pytest
 import torch
 
-from export.densepose import train_boxes
-from export.densepose.config import NetworkConfig
-from export.densepose.network import MobileParsingRCNN
-from export.densepose.train_boxes import Boxes, People, Picture, matched, view_of
+from export.densepose.box_views import People, Picture, matched, view_of, without_people
 
 BLACK = np.zeros((200, 300, 3), np.uint8)
 
@@ -19,7 +16,7 @@ def picture(box, image=BLACK) -> Picture:
 
 
 def people(box, ignore) -> People:
-    return People(torch.tensor(box, dtype=torch.float32), torch.tensor(ignore), complete=True)
+    return People(torch.tensor(box, dtype=torch.float32), torch.tensor(ignore))
 
 
 def test_boxes_of_a_view_lie_where_the_view_shows_the_people():
@@ -48,22 +45,7 @@ def test_boxes_on_somebody_unsure_are_left_out_and_those_beside_are_nobody():
     assert match[0] == 0
 
 
-def test_only_the_box_head_learns_and_it_learns_who_is_nobody():
-    torch.manual_seed(0)
-    net = MobileParsingRCNN(NetworkConfig(width=16)).eval()
-    before = {name: value.clone() for name, value in net.state_dict().items()}
-    person = torch.arange(400) % 2 == 0
-    roi = torch.randn(400, 16, 7, 7) + person[:, None, None, None]
-    boxes = Boxes(roi.half(), person, torch.full((400, 4), 0.5) * person[:, None], torch.ones(400))
-    head = train_boxes.fit(net, boxes, steps=60, rate=3e-3, seed=0)
-    logits, deltas = head(roi)
-    assert ((logits[:, 0] > logits[:, 1]) == person).float().mean() > 0.95
-    assert (deltas[person].mean() - 0.5).abs() < 0.2
-    changed = {name.split(".")[0] for name, value in net.state_dict().items() if not torch.equal(value, before[name])}
-    assert changed == {"box_head"}
-
-
 def test_a_file_that_is_no_picture_is_named(tmp_path):
     (tmp_path / "torn.jpg").write_bytes(b"not a photo")
     with pytest.raises(ValueError, match=r"torn\.jpg is not an image"):
-        train_boxes.without_people(tmp_path)
+        without_people(tmp_path)

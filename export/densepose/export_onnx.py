@@ -43,11 +43,12 @@ class Trunk(nn.Module):
 
     def __init__(self, net: MobileParsingRCNN) -> None:
         super().__init__()
-        self.net = net
+        self.backbone, self.neck, self.evidence = net.backbone, net.neck, net.evidence
 
     def forward(self, image: Tensor) -> tuple[Tensor, ...]:
-        features, evidence = self.net.trunk(image)
-        return tuple(channels_last(x) for x in (*features, *([] if evidence is None else [evidence])))
+        taps = self.backbone(image)
+        evidence = [] if self.evidence is None else [self.evidence(*taps[2:])]
+        return tuple(channels_last(x) for x in (*self.neck(taps), *evidence))
 
 
 class CropTrunk(nn.Module):

@@ -5,7 +5,8 @@
 tilted pictures, a third of the people from behind, crowds in which boxes overlap.
 `USUAL` shows people at the size of `WIDE` as photographs usually do: most upright and facing the camera, one in eight
 small, half of those scattered or before a webcam in poses of photographs.
-`ANIMALS` shows animals and nobody, for a detector of people to learn the difference (`export.densepose.train_evidence`).
+`ANIMALS` shows animals and nobody, for a detector of people to learn the difference
+(`export.densepose.train_evidence`).
 """
 
 from __future__ import annotations

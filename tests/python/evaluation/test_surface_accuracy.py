@@ -314,7 +314,8 @@ def test_one_command_measures_rendered_images_and_labelled_photographs(folder, t
         visible=np.zeros((people, 33)), world=np.zeros((people, 33, 3)), mask=mask, doubt=mask,
     ).save(tmp_path / "labels/one.npz")  # fmt: skip
     arguments = ["--data", str(folder), "--photos", str(tmp_path / "photos"), "--labels", str(tmp_path / "labels")]
-    arguments += ["--empty", str(tmp_path / "empty"), "--out", str(tmp_path / "out"), "--backends", "fake"]
+    arguments += ["--empty", str(tmp_path / "empty"), "--animals", str(tmp_path / "animals")]
+    arguments += ["--out", str(tmp_path / "out"), "--backends", "fake"]
     assert command.main(arguments) == 0
     document = json.loads((tmp_path / "out/evaluation.json").read_text())
     figures = report.column_of(document, fingerprint(backend.path))

@@ -77,6 +77,33 @@ MAQ_NATIVE_OF(NativeHead, jlong, open)(JNIEnv* env, jclass, jlong context, jbyte
   });
 }
 
+MAQ_NATIVE_OF(NativeHead, jlong, openMemory)(JNIEnv* env, jclass, jlong context, jobject buffer) {
+  return call(env, [&] {
+    const maq_jni::Memory memory = maq_jni::memory_of(env, buffer);
+    maq_head* head = nullptr;
+    check(maq_head_open_memory(object<maq_context>(context), memory.data, memory.size_bytes, &head));
+    return handle(head);
+  });
+}
+
+MAQ_NATIVE_OF(NativeHead, jlong, scaleByDistance)
+(JNIEnv* env, jclass, jlong head, jbyteArray from, jbyteArray to, jdouble distance_m) {
+  return call(env, [&] {
+    maq_head* scaled = nullptr;
+    check(maq_head_scale_by_distance(object<maq_head>(head), maq_jni::text(env, from).c_str(),
+                                     maq_jni::text(env, to).c_str(), distance_m, &scaled));
+    return handle(scaled);
+  });
+}
+
+MAQ_NATIVE_OF(NativeHead, jlong, scaleByDepth)(JNIEnv* env, jclass, jlong head, jint camera, jlong frame) {
+  return call(env, [&] {
+    maq_head* scaled = nullptr;
+    check(maq_head_scale_by_depth(object<maq_head>(head), uint32_t(camera), object<maq_frame>(frame), &scaled));
+    return handle(scaled);
+  });
+}
+
 MAQ_NATIVE_OF(NativeHead, void, destroy)(JNIEnv*, jclass, jlong head) { maq_head_destroy(object<maq_head>(head)); }
 
 MAQ_NATIVE_OF(NativeHead, void, save)(JNIEnv* env, jclass, jlong head, jbyteArray path) {

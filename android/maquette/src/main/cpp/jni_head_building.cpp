@@ -60,7 +60,7 @@ MAQ_NATIVE_OF(NativeHead, jlong, createBuilder)
 (JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const std::vector<jdouble> from = numbers(env, values, 5);
+    const std::vector<jdouble> from = numbers(env, values, 6);
     maq_head_config config;
     check(maq_head_config_init(&config, sizeof config));
     bundle.put_into(config);
@@ -69,6 +69,7 @@ MAQ_NATIVE_OF(NativeHead, jlong, createBuilder)
     config.texture_mirrored = int32_t(from[2]);
     config.allow_spinning = int32_t(from[3]);
     config.provider = maq_provider(int32_t(from[4]));
+    config.texture_unlit = int32_t(from[5]);
     maq_head_builder* builder = nullptr;
     check(maq_head_builder_create(object<maq_context>(context), &config, &builder));
     return handle(builder);

@@ -34,7 +34,8 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
     /**
      * A place that has a name.
      *
-     * @property sigmaM standard deviation of each coordinate that the shape model leaves; that of the size comes on top.
+     * @property sigmaM standard deviation of each coordinate that the shape model and the photos leave: more where they do
+     *   not show it, or along their lines of sight; that of the size comes on top.
      */
     data class Landmark(val point: Point3, val sigmaM: Double)
 
@@ -64,6 +65,29 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
             }.toMap()
         cameras = List(info.photos) { index -> PinholeCamera.of(handle.use { NativeHead.camera(it, index) }) }
     }
+
+    /**
+     * The same head, of the size at which two of its [landmarks] are [distanceM] apart (0.001 to 10), such as pupil_left
+     * and pupil_right by what an optician measured.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also where both are the same place) and
+     *   [Status.NOT_FOUND] (it has no such place).
+     */
+    fun scaledByDistance(from: String, to: String, distanceM: Double): Head =
+        useMesh { head -> Head(NativeHead.scaleByDistance(head, from.toByteArray(), to.toByteArray(), distanceM)) }
+
+    /**
+     * The same head, of the size at which it lies where a depth camera saw it. Takes some 100 ms, so not on the main thread.
+     *
+     * @param depth of the same view as the photo with this camera, in any size: depth itself, or a picture that came with
+     *   depth. The photo should have been given its focal length: an estimated one that is 10 % too long makes the head as
+     *   much too small.
+     * @param camera its index in [cameras].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (the index, no depth, another shape than the photo's) and
+     *   [Status.NOT_FOUND] (half of the head has no depth that agrees with it).
+     */
+    fun scaledByDepth(depth: Frame, camera: Int = 0): Head =
+        useMesh { head -> depth.handle.use { frame -> Head(NativeHead.scaleByDepth(head, camera, frame)) } }
 
     /**
      * Makes its surface as a mesh, which stays when the head is closed. Takes a second or less with the defaults, so not on

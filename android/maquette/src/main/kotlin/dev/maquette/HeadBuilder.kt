@@ -54,6 +54,8 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
      * @property isTextureMirrored what no photo sees of one side looks like the other.
      * @property allowSpinning as of [DensePose.Config].
      * @property provider as of [DensePose.Config].
+     * @property isTextureUnlit the photos' light from one side is taken out of the texture, as far as it can be told from
+     *   the colours, so that an app can light the head anew.
      */
     data class Config(
         val threads: Int = 0,
@@ -61,6 +63,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         val isTextureMirrored: Boolean = false,
         val allowSpinning: Boolean = false,
         val provider: DensePose.Provider = DensePose.Provider.CPU,
+        val isTextureUnlit: Boolean = false,
     ) {
         internal fun values() =
             doubleArrayOf(
@@ -69,6 +72,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
                 if (isTextureMirrored) 1.0 else 0.0,
                 if (allowSpinning) 1.0 else 0.0,
                 provider.ordinal.toDouble(),
+                if (isTextureUnlit) 1.0 else 0.0,
             )
     }
 

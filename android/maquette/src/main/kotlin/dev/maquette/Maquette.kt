@@ -360,6 +360,16 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      */
     fun openHead(path: String): Head = handle.use { context -> Head(NativeHead.open(context, path.toByteArray())) }
 
+    /** Opens a head file in a direct buffer, from its start to its capacity; it is copied. Fails as for a path. */
+    fun openHead(file: ByteBuffer): Head = handle.use { context -> Head(NativeHead.openMemory(context, file)) }
+
+    /**
+     * Opens a head file of the app's assets. Fails as for a path.
+     *
+     * @throws IOException if it is not there.
+     */
+    fun openHead(assets: AssetManager, path: String): Head = openHead(ModelBundle.mappedOrRead(assets, path))
+
     /**
      * A renderer of a head; makes its mesh, which takes a second or less with the defaults, so not on the main thread.
      *

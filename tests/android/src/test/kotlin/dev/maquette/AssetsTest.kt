@@ -87,6 +87,22 @@ class AssetsTest : AndroidTest() {
     }
 
     @Test
+    fun aHeadComesFromTheAssets() = TestFiles.inNewFolder { folder ->
+        val file = File(folder, "head.maqh")
+        maquette.headBuilder(ModelBundle.ofFolder(TestFiles.roundHeadsBundle.path)).use { builder ->
+            val grey = Plane(ByteBuffer.allocateDirect(320 * 240).apply { repeat(capacity()) { put(it, 130.toByte()) } })
+            val box = HeadBox(110f, 60f, 200f, 180f)
+            maquette.frame(PixelFormat.GREY8, 320, 240, grey).use { builder.addPhoto(it, box) }
+            builder.fit(0.0).use { it.save(file.path) }
+        }
+        for (isCompressed in listOf(false, true)) {
+            val assets = assetsOf(mapOf("heads/a.maqh" to file.readBytes()), isCompressed, folder)
+            maquette.openHead(assets, "heads/a.maqh").use { assertEquals(1, it.info.photos) }
+            assertThrows(IOException::class.java) { maquette.openHead(assets, "heads/b.maqh") }
+        }
+    }
+
+    @Test
     fun wrongInputIsAnExceptionThatSaysWhatToDo() = TestFiles.inNewFolder { folder ->
         fun missing(assets: AssetManager, name: String) =
             assertThrows(IOException::class.java) { ModelBundle.ofAssets(assets, name) }.message!!

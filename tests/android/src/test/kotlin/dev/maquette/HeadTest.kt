@@ -2,6 +2,7 @@ package dev.maquette
 
 import java.io.File
 import java.nio.ByteBuffer
+import java.nio.ByteOrder
 import java.nio.FloatBuffer
 import kotlin.concurrent.thread
 import kotlin.math.abs
@@ -196,6 +197,53 @@ class HeadTest : AndroidTest() {
         val small = HeadBuilder.Config(texturePx = 255)
         assertTrue("255" in failure(Status.INVALID_ARGUMENT) { maquette.headBuilder(bundle, small) })
         failure(Status.INVALID_ARGUMENT) { maquette.headBuilder(bundle, HeadBuilder.Config(texturePx = -1)) }
+    }
+
+    @Test
+    fun aDistanceOrDepthThatIsKnownGivesTheSize() {
+        fun pupilsM(of: Head): Double {
+            val (p, q) = listOf("pupil_left", "pupil_right").map { of.landmarks[it]!!.point }
+            return length(Point3(p.x - q.x, p.y - q.y, p.z - q.z))
+        }
+        head().use { head ->
+            val given = head.scaledByDistance("pupil_left", "pupil_right", 0.07)
+            assertEquals(0.07, pupilsM(given), 1e-9)
+            assertEquals(Head.Scale.GIVEN, given.info.scale)
+            assertEquals(Head.Scale.PRIOR, head.info.scale)
+            failure(Status.INVALID_ARGUMENT) { head.scaledByDistance("chin", "chin", 0.07) }
+            failure(Status.NOT_FOUND) { head.scaledByDistance("chin", "elbow", 0.07) }
+
+            val seen = maquette.headRenderer(given, HeadRenderer.Config(mesh = coarse)).use { renderer ->
+                renderer.run(given.cameras.single()).use { image ->
+                    val depth = image.plane(HeadImage.Plane.DEPTH).asFloatBuffer()
+                    val shorts = ByteBuffer.allocateDirect(2 * 320 * 240).order(ByteOrder.nativeOrder())
+                    repeat(320 * 240) { shorts.putShort((1000 * depth[it]).toInt().toShort()) }
+                    shorts
+                }
+            }
+            maquette.frame(PixelFormat.DEPTH16, 320, 240, Plane(seen)).use { depth ->
+                val measured = head.scaledByDepth(depth)
+                assertEquals(0.07, pupilsM(measured), 3e-4)
+                assertEquals(Head.Scale.DEPTH, measured.info.scale)
+                failure(Status.INVALID_ARGUMENT) { head.scaledByDepth(depth, camera = 1) }
+            }
+            photo().use { assertTrue("not depth" in failure(Status.INVALID_ARGUMENT) { head.scaledByDepth(it) }) }
+        }
+    }
+
+    @Test
+    fun headsAreOpenedFromMemory() = TestFiles.inNewFolder<Unit> { folder ->
+        val head = head()
+        head.save(File(folder, "a.maqh").path)
+        val bytes = File(folder, "a.maqh").readBytes()
+        maquette.openHead(TestFiles.direct(bytes)).use { opened ->
+            assertEquals(head.landmarks.keys, opened.landmarks.keys)
+            opened.save(File(folder, "b.maqh").path)
+        }
+        assertEquals(bytes.toList(), File(folder, "b.maqh").readBytes().toList())
+        val cut = TestFiles.direct(bytes.copyOf(bytes.size - 1))
+        assertTrue("The head in memory" in failure(Status.UNREADABLE) { maquette.openHead(cut) })
+        failure(Status.INVALID_ARGUMENT) { maquette.openHead(ByteBuffer.wrap(bytes)) }
     }
 
     @Test

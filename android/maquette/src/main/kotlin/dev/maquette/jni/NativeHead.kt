@@ -38,6 +38,9 @@ internal object NativeHead {
     @JvmStatic external fun builderStats(builder: Long): DoubleArray
 
     @JvmStatic external fun open(context: Long, path: ByteArray): Long
+    @JvmStatic external fun openMemory(context: Long, file: ByteBuffer): Long
+    @JvmStatic external fun scaleByDistance(head: Long, from: ByteArray, to: ByteArray, distanceM: Double): Long
+    @JvmStatic external fun scaleByDepth(head: Long, camera: Int, frame: Long): Long
     @JvmStatic external fun destroy(head: Long)
     @JvmStatic external fun save(head: Long, path: ByteArray)
     @JvmStatic external fun info(head: Long): DoubleArray

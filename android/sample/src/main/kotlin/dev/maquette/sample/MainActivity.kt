@@ -12,6 +12,7 @@ class MainActivity : Screen(columns = 1) {
         removePicture()
         open("Live: people of the camera", LiveActivity::class.java)
         open("Photo: people of a picture", PhotoActivity::class.java)
+        open("Head: a person's head in 3D", HeadActivity::class.java)
         // By its name: it is in builds with ARCore alone.
         val capture = Intent().setClassName(this, "dev.maquette.sample.ArCaptureActivity")
         if (packageManager.resolveActivity(capture, 0) != null) {

@@ -1,19 +1,15 @@
 package dev.maquette.sample
 
-import android.content.Intent
 import android.graphics.Bitmap
 import android.graphics.BitmapFactory
 import android.graphics.Canvas
-import android.graphics.ImageDecoder
 import android.net.Uri
-import android.os.Build
-import android.provider.MediaStore
 import android.widget.Button
 import dev.maquette.BodySurface
 import dev.maquette.DensePoseResult
 
 /** A screen of people, painted by body part or dressed. */
-abstract class PeopleScreen : Screen() {
+abstract class PeopleScreen : PictureScreen() {
     /** What people wear; null: they are painted by body part. */
     @Volatile
     private var worn: Bitmap? = null
@@ -62,47 +58,16 @@ abstract class PeopleScreen : Screen() {
         return "dressed by a picture"
     }
 
-    /** Asks for an image, which [onPicked] gets. */
-    protected fun pickImage(request: Int) {
-        val pick = Intent(Intent.ACTION_GET_CONTENT).addCategory(Intent.CATEGORY_OPENABLE).setType("image/*")
-        startActivityForResult(pick, request)
-    }
-
-    protected open fun onPicked(
+    override fun onPicked(
         request: Int,
         image: Uri,
     ) {
         if (request == OUTFIT) inBackground({ decode(image) }, ::wear)
     }
 
-    @Deprecated("the platform's way without androidx")
-    override fun onActivityResult(
-        request: Int,
-        result: Int,
-        data: Intent?,
-    ) {
-        data?.data?.let { onPicked(request, it) }
-    }
-
-    /** Upright, at most [MAX_SIDE_PX] pixels long. */
-    protected open fun decode(image: Uri): Bitmap {
-        val bitmap =
-            if (Build.VERSION.SDK_INT >= 28) {
-                ImageDecoder.decodeBitmap(ImageDecoder.createSource(contentResolver, image)) { decoder, info, _ ->
-                    decoder.allocator = ImageDecoder.ALLOCATOR_SOFTWARE
-                    decoder.setTargetSampleSize(maxOf(1, maxOf(info.size.width, info.size.height) / MAX_SIDE_PX))
-                }
-            } else {
-                @Suppress("DEPRECATION")
-                MediaStore.Images.Media.getBitmap(contentResolver, image)
-            }
-        return bitmap.copy(Bitmap.Config.ARGB_8888, true)
-    }
-
     private companion object {
         const val TRY_ON = "Try on"
         const val BODY_PARTS = "Body parts"
         const val OUTFIT = 2
-        const val MAX_SIDE_PX = 2048
     }
 }

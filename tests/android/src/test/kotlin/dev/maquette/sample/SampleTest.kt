@@ -56,6 +56,19 @@ class PhotoOfFile : PhotoActivity() {
     override fun decode(image: Uri) = readBitmap(File(image.path!!))
 }
 
+class HeadOfFile : HeadActivity() {
+    override fun networks(name: String) = fromFolder(name)
+
+    override fun decode(image: Uri) = readBitmap(File(image.path!!))
+
+    override fun write(
+        to: Uri,
+        file: File,
+    ) {
+        file.copyTo(File(to.path!!))
+    }
+}
+
 class SceneOfFile : SceneActivity() {
     override fun networks(name: String) = fromFolder(name)
 
@@ -145,7 +158,7 @@ class SampleTest : AndroidTest() {
                     it.performClick()
                     shadowOf(main).nextStartedActivity.component!!.className.substringAfterLast('.')
                 }
-            assertEquals(listOf("LiveActivity", "PhotoActivity", "SceneActivity", "BenchmarkActivity"), opened)
+            assertEquals(listOf("LiveActivity", "PhotoActivity", "HeadActivity", "SceneActivity", "BenchmarkActivity"), opened)
         }
 
     @Test
@@ -192,6 +205,59 @@ class SampleTest : AndroidTest() {
             assertTrue(shownAfter("painted by body part", null).sameAs(shown))
             button(photo, "Wear a picture").performClick()
             assertFalse("another outfit", shownAfter("dressed by a picture", TestFiles.photo).sameAs(dressed))
+        }
+
+    @Test
+    fun photosBecomeAHeadThatTurnsAndIsSaved() =
+        TestFiles.inNewFolder { folder ->
+            screen(HeadOfFile::class.java) { head ->
+                button(head, "To the left").performClick() // no head yet: nothing to turn
+                button(head, "Save").performClick()
+                answer(head, File(folder, "none.glb"))
+                until(head, "what is missing") { sentence(head).startsWith("There is no head yet") }
+                assertFalse(File(folder, "none.glb").exists())
+
+                button(head, "Choose").performClick()
+                answer(head, TestFiles.photo)
+                until(head, "the head while it forms") { picture(head).contentDescription.contains("not finished") }
+                until(head, "a head") { sentence(head).startsWith("A head from 1 photo.") }
+                fun shownAfter(
+                    text: String,
+                    degrees: Int,
+                ): Bitmap {
+                    val before = (picture(head).drawable as BitmapDrawable).bitmap
+                    button(head, text).performClick()
+                    until(head, text) { !(picture(head).drawable as BitmapDrawable).bitmap.sameAs(before) }
+                    assertEquals("The head, turned by $degrees degrees", picture(head).contentDescription)
+                    return (picture(head).drawable as BitmapDrawable).bitmap
+                }
+                until(head, "its picture") { picture(head).contentDescription.contains("turned by -17 degrees") }
+                val left = (picture(head).drawable as BitmapDrawable).bitmap
+                shownAfter("To the right", 0)
+                assertFalse("from the front", shownAfter("To the right", 17).sameAs(left))
+                shownAfter("Show the shape", 17)
+                shownAfter("Show colours", 17)
+
+                button(head, "Save").performClick()
+                val asked = shadowOf(head).peekNextStartedActivityForResult().intent
+                assertEquals(Intent.ACTION_CREATE_DOCUMENT, asked.action)
+                answer(head, File(folder, "head.glb"))
+                until(head, "the file") { sentence(head).startsWith("Saved.") }
+                assertEquals("glTF", File(folder, "head.glb").readBytes().decodeToString(0, 4))
+                assertEquals("only for a while", emptyList<String>(), head.cacheDir.list()!!.filter { "glb" in it })
+
+                button(head, "Add a photo").performClick()
+                answer(head, TestFiles.photo)
+                until(head, "a head of both") { sentence(head).startsWith("A head from 2 photos.") }
+
+                val grey = Bitmap.createBitmap(300, 300, Bitmap.Config.ARGB_8888)
+                val file = File(folder, "grey.png")
+                file.outputStream().use { grey.compress(Bitmap.CompressFormat.PNG, 100, it) }
+                button(head, "Add a photo").performClick()
+                answer(head, file)
+                until(head, "that there is none") { sentence(head).startsWith("No head is seen") }
+                shownAfter("To the left", 0)
+            }
         }
 
     @Test

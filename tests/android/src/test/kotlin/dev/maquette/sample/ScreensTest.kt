@@ -24,6 +24,7 @@ class ScreensTest : AndroidTest() {
             MainActivity::class.java,
             LiveActivity::class.java,
             PhotoActivity::class.java,
+            HeadActivity::class.java,
             CaptureWithoutCamera::class.java,
             SceneActivity::class.java,
             BenchmarkActivity::class.java,

@@ -237,7 +237,8 @@ cv::Mat ShippedNetworks::photo_;
 // that follow make more of it. Measured on an AVX-512 machine: 0.034 for the trunk, whose first blocks are float and
 // whose fifty layers pass it on; 0 for the RPN and the heads.
 constexpr double kMaxOptimisingErrorTrunk = 0.05, kMaxOptimisingError = 0.01;
-// Of the evidence of people, logits, root mean square over its cells: 0.2 to 0.4 on six photos. A box counts their mean.
+// Of the evidence of people, logits, root mean square over its cells: 0.2 to 0.4 on six photos. A box counts their
+// mean.
 constexpr double kMaxEvidenceError = 0.5;
 
 TEST_F(ShippedNetworks, TheOptimisedTrunkAnswersAsTheUnoptimisedOne) {

@@ -142,9 +142,10 @@ def measure(options: argparse.Namespace) -> dict:
         replace(figures, missing, scenes.FIGURES, found, why)
     if "edges" in options.only:
         document["edges"], found, why = edges.measure(
-            edges.sources_of(options), options.out, options.threads, options.quick
-        )
-        replace(figures, missing, edges.FIGURES, found, why)
+            edges.sources_of(options), options.out, options.threads, options.quick, options.edge_parts,
+            document.get("edges"),
+        )  # fmt: skip
+        replace(figures, missing, [name for part in options.edge_parts for name in edges.FIGURES[part]], found, why)
     if "prediction" in options.only:
         document["prediction"], found, why = prediction.measure(options.quick, threads=options.threads)
         replace(figures, missing, prediction.FIGURES, found, why)

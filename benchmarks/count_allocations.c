@@ -4,9 +4,10 @@
  *   LD_PRELOAD=./count_allocations.so COUNT_FROM=200 COUNT_TO=1200 COUNT_FILE=count.json \
  *       maquette play 'stub:pattern?live=1&fps=400' --frames 1200 --no-picture
  *
- * writes {"frames": 1000, "allocations": 0} when frame 1200 is taken: allocations of all threads since frame 200 was.
- * The first ones are shown on standard error by their stacks, to be read by `addr2line -Cfe` of a library that has its
- * symbols. Needs glibc.
+ * writes {"frames": 1000, "allocations": 0, "of_onnxruntime": 0} when frame 1200 is taken: allocations of all threads
+ * since frame 200 was, and those of them that ONNX Runtime made, by the nearest caller in it or in the SDK. The first
+ * ones are shown on standard error by their stacks, to be read by `addr2line -Cfe` of a library that has its symbols;
+ * with COUNT_OWN=1 the first ones that are not of ONNX Runtime. Needs glibc.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -30,16 +31,35 @@ extern void* __libc_realloc(void* old, size_t bytes);
 extern void* __libc_memalign(size_t alignment, size_t bytes);
 
 static atomic_bool counting;
-static atomic_long allocations;
+static atomic_bool shows_own_only;
+static atomic_long allocations, of_onnxruntime, shown;
 static _Thread_local bool is_showing; /* a stack, which may allocate */
+
+/* Whether the nearest caller that is in ONNX Runtime or in the SDK is in ONNX Runtime. */
+static bool is_onnxruntime(void* const* stack, int depth) {
+  for (int i = 0; i < depth; ++i) {
+    Dl_info info;
+    if (dladdr(stack[i], &info) == 0 || info.dli_fname == NULL) continue;
+    if (strstr(info.dli_fname, "libonnxruntime") != NULL) return true;
+    if (strstr(info.dli_fname, "libmaquette") != NULL) return false;
+  }
+  return false;
+}
 
 static void count(void) {
   void* stack[STACK_DEPTH];
+  int depth;
+  bool is_theirs;
   if (!atomic_load(&counting) || is_showing) return;
-  if (atomic_fetch_add(&allocations, 1) >= STACKS_SHOWN) return;
   is_showing = true;
-  dprintf(STDERR_FILENO, "allocation in steady state:\n");
-  backtrace_symbols_fd(stack, backtrace(stack, STACK_DEPTH), STDERR_FILENO);
+  atomic_fetch_add(&allocations, 1);
+  depth = backtrace(stack, STACK_DEPTH);
+  is_theirs = is_onnxruntime(stack, depth);
+  if (is_theirs) atomic_fetch_add(&of_onnxruntime, 1);
+  if (!(is_theirs && atomic_load(&shows_own_only)) && atomic_fetch_add(&shown, 1) < STACKS_SHOWN) {
+    dprintf(STDERR_FILENO, "allocation in steady state:\n");
+    backtrace_symbols_fd(stack, depth, STDERR_FILENO);
+  }
   is_showing = false;
 }
 
@@ -78,10 +98,10 @@ static long number(const char* name) {
 }
 
 static void write_count(long frames) {
-  char text[96];
+  char text[128];
   const char* path = getenv("COUNT_FILE");
-  const int length =
-      snprintf(text, sizeof text, "{\"frames\": %ld, \"allocations\": %ld}\n", frames, atomic_load(&allocations));
+  const int length = snprintf(text, sizeof text, "{\"frames\": %ld, \"allocations\": %ld, \"of_onnxruntime\": %ld}\n",
+                              frames, atomic_load(&allocations), atomic_load(&of_onnxruntime));
   const int file = path == NULL ? STDOUT_FILENO : open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0 || write(file, text, (size_t)length) != length) {
     dprintf(STDERR_FILENO, "count_allocations: %s cannot be written: %s\n", path, strerror(errno));
@@ -99,6 +119,7 @@ maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_
     *(void**)&real = dlsym(RTLD_NEXT, "maq_source_acquire_frame");
     from = number("COUNT_FROM");
     to = number("COUNT_TO");
+    atomic_store(&shows_own_only, number("COUNT_OWN") > 0);
     backtrace(stack, STACK_DEPTH); /* loads what it needs */
   }
   status = real(source, timeout_ns, frame);

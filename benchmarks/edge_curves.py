@@ -21,6 +21,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -128,9 +129,23 @@ def pack(records: Sequence[Record], path: Path, noise_r: float = 0.0, blur_px: f
             kind = np.where(planes["kind"] == BOUNDARY, BOUNDARY_KIND, CREASE_KIND)
             kind = np.where(planes["kind"] == NONE, 0, kind)
             spread = np.hypot(noise_r, 0.5 * blur_px) * np.sqrt(2 / np.pi)
-            file.write(struct.pack("<2i6d", record.width, record.height, *record.intrinsics, LIMIT_R, spread))
-            for plane, to in ((distance, "<f4"), (planes["depth"], "<f4"), (kind, "u1")):
-                file.write(np.ascontiguousarray(plane, to).tobytes())
+            pack_field(file, record.intrinsics, distance, planes["depth"], kind, spread)
+
+
+def pack_field(
+    file: BinaryIO,
+    intrinsics: Sequence[float],
+    distance: np.ndarray,
+    depth: np.ndarray,
+    kind: np.ndarray,
+    spread_r: float = 0.0,
+) -> None:
+    """Appends a view. intrinsics: fx, fy, cx, cy in pixels. Planes [H, W]: distance in r, depth in metres, kind as in
+    the C++ field (0 none, 1 crease, 2 boundary)."""
+    height, width = distance.shape
+    file.write(struct.pack("<2i6d", width, height, *intrinsics, LIMIT_R, spread_r))
+    for plane, to in ((distance, "<f4"), (depth, "<f4"), (kind, "u1")):
+        file.write(np.ascontiguousarray(plane, to).tobytes())
 
 
 def _blurred(distance: np.ndarray, patch: np.ndarray, blur_px: float) -> np.ndarray:

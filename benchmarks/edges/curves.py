@@ -144,12 +144,14 @@ def _frames_with_box(row: Mapping) -> str:
     return f"a box was found in {row['steady_frames']} of {row['turned_frames']} frames"
 
 
-def figures_from(
-    solids: Sequence[Mapping], scenes: Sequence[Mapping], boxes: Sequence[Mapping]
-) -> tuple[dict[str, float], dict[str, str]]:
+def scene_figures_from(scenes: Sequence[Mapping]) -> dict[str, float]:
+    """Those that are gates."""
+    return {f"edges_fps_{row['scene']}": 1000 / row["ms"] for row in scenes if row["noise"] == "tof"}
+
+
+def figures_from(solids: Sequence[Mapping], boxes: Sequence[Mapping]) -> tuple[dict[str, float], dict[str, str]]:
     """Those that are gates, and why others are missing."""
     figures = {f"edges_curves_{row['level']}": row["f_score"] for row in solids if row["way"] == SHIPPED}
-    figures |= {f"edges_fps_{row['scene']}": 1000 / row["ms"] for row in scenes if row["noise"] == "tof"}
     missing, by_noise = {}, {row["noise"]: row for row in boxes if row["way"] == SHIPPED}
     for noise in ("tof", "stereo"):
         row, name = by_noise[noise], f"edges_box_mm_{noise}"

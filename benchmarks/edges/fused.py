@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import statistics
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from export.solids import sensors
 if TYPE_CHECKING:
     from export.solids.multiview import MultiView
 
-FIGURES = ("edges_fusion_s", "edges_fusion_memory_mb", "edges_fusion_rmse")
+FIGURES, TIME_FIGURE = ("edges_fusion_memory_mb", "edges_fusion_rmse"), "edges_fusion_s"
 SOLIDS, QUICK_SOLIDS = 6, 2
 VIEWS, TIMED_VIEWS = 12, 24
 TIMED_LEVEL = "tof"
@@ -84,30 +84,44 @@ def fused_views(
         return depths, results, fusion.points(), fusion.info, {"s": fusion.seconds, "cpu_s": fusion.cpu_seconds}
 
 
-def measure(bundle: Path, threads: int, quick: bool, folder: Path) -> dict:
-    """errors: by level, means over views of all solids. times: by solid. memory: of the first solid that there is, in
-    LARGE_PX. Raises ImportError without OpenCascade and Embree, CalledProcessError where the child process fails."""
+def solids(views: int, quick: bool, missing: list[str], said: str) -> Iterator[tuple[int, MultiView]]:
+    """Seeds of `val` with their solids in so many views; those that cannot be made are appended to `missing`. Raises
+    ImportError without OpenCascade and Embree."""
     from export.solids.multiview import multiview
     from export.solids.recipe import RecipeError
 
+    for seed in tqdm(range(QUICK_SOLIDS if quick else SOLIDS), desc=said, unit="solid", disable=None):
+        try:
+            yield seed, multiview("val", seed, views)
+        except RecipeError as error:
+            missing.append(f"val {seed}: {error}")
+
+
+def measure(bundle: Path, threads: int, quick: bool, folder: Path) -> dict:
+    """errors: by level, means over views of all solids. memory: of the first solid that there is, in LARGE_PX. Raises
+    ImportError as `solids`, CalledProcessError where the child process fails."""
+    from export.solids.multiview import multiview
+
     rows: dict[str, list[dict]] = {level: [] for level in LEVELS}
-    times, memory, missing = [], None, []
+    memory, missing = None, []
     with Edges(bundle, threads) as edges:
-        for seed in tqdm(range(QUICK_SOLIDS if quick else SOLIDS), desc="edges: fusion", unit="solid", disable=None):
-            try:
-                solid, timed = (multiview("val", seed, count) for count in (VIEWS, TIMED_VIEWS))
-                large = None if memory else multiview("val", seed, TIMED_VIEWS, LARGE_PX)
-            except RecipeError as error:
-                missing.append(f"val {seed}: {error}")
-                continue
+        for seed, solid in solids(VIEWS, quick, missing, "edges: fusion"):
             for level in LEVELS:
                 depths, results, points, info, _ = fused_views(solid, level, seed, edges, threads)
                 rows[level] += errors_of(solid, depths, results, points, info.cell_m)
-            *_, info, seconds = fused_views(timed, TIMED_LEVEL, seed, edges, threads)
-            times.append({"solid": f"{timed.family} {seed}", "points": int(info.point_count), **seconds})
-            if large:
-                memory = memory_of(large, bundle, threads, folder)
-    return {"errors": summed(rows), "times": times, "memory": memory, "missing": missing}
+            if not memory:
+                memory = memory_of(multiview("val", seed, TIMED_VIEWS, LARGE_PX), bundle, threads, folder)
+    return {"errors": summed(rows), "memory": memory, "missing": missing}
+
+
+def measure_times(bundle: Path, threads: int, quick: bool) -> dict:
+    """times: of each solid in TIMED_VIEWS, the views' own networks left out. Raises ImportError as `solids`."""
+    times, missing = [], []
+    with Edges(bundle, threads) as edges:
+        for seed, solid in solids(TIMED_VIEWS, quick, missing, "edges: time of fusion"):
+            *_, info, seconds = fused_views(solid, TIMED_LEVEL, seed, edges, threads)
+            times.append({"solid": f"{solid.family} {seed}", "points": int(info.point_count), **seconds})
+    return {"times": times, "missing": missing}
 
 
 def memory_of(solid: MultiView, bundle: Path, threads: int, folder: Path) -> dict:
@@ -127,10 +141,10 @@ def summed(rows: Mapping[str, Sequence[Mapping[str, float]]]) -> list[dict]:
     return found
 
 
-def found_in(bundle: Path, threads: int, quick: bool, folder: Path) -> tuple[dict | None, str]:
-    """What `measure` says, or None and why it cannot be measured."""
+def found_by(measuring: Callable[[], dict]) -> tuple[dict | None, str]:
+    """What `measure` or `measure_times` says, or None and why it cannot be measured."""
     try:
-        return measure(bundle, threads, quick, folder), ""
+        return measuring(), ""
     except ImportError as error:
         return None, f"{error.name} is not installed: {INSTALL}"
     except subprocess.CalledProcessError as error:
@@ -138,15 +152,16 @@ def found_in(bundle: Path, threads: int, quick: bool, folder: Path) -> tuple[dic
 
 
 def figures_from(found: Mapping | None) -> dict[str, float]:
-    """Those of FIGURES that are known: the seconds of the median solid, megabytes of MANY points in proportion to those
-    that there were, and the ratio of the level that gains the least."""
+    """Those of FIGURES and TIME_FIGURE that `found` says: the seconds of the median solid, megabytes of MANY points in
+    proportion to those that there were, and the ratio of the level that gains the least."""
     if found is None:
         return {}
     figures = {}
-    if found["times"]:
-        figures["edges_fusion_s"] = statistics.median(row["s"] for row in found["times"])
-    if found["memory"] and found["memory"]["points"]:
-        figures["edges_fusion_memory_mb"] = found["memory"]["memory_mb"] * MANY / found["memory"]["points"]
-    if found["errors"]:
+    if found.get("times"):
+        figures[TIME_FIGURE] = statistics.median(row["s"] for row in found["times"])
+    memory = found.get("memory")
+    if memory and memory["points"]:
+        figures["edges_fusion_memory_mb"] = memory["memory_mb"] * MANY / memory["points"]
+    if found.get("errors"):
         figures["edges_fusion_rmse"] = max(row["ratio"] for row in found["errors"])
     return figures

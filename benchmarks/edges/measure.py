@@ -1,7 +1,9 @@
 """Edges: how far fields and curves of depth frames are from the true ones, against run time, beside other ways.
 
-    python -m benchmarks --only edges            `make build` first
-    python -m benchmarks --only edges --quick    a few views, to see that it runs
+    python -m benchmarks --only edges                        `make build` first
+    python -m benchmarks --only edges --quick                a few views, to see that it runs
+    python -m benchmarks --only edges --edge-parts errors    an hour, which a busy machine does not distort
+    python -m benchmarks --only edges --edge-parts times     minutes, for a quiet one
 
 Figures come from whole views of solids whose families neither training nor the choice of thresholds saw. A gate that
 could not be measured is said to be so, with the reason.
@@ -12,12 +14,12 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.edges import carton, curves, fused, pictures, planes, quality, round_scans, speed
+from benchmarks.edges import carton, curves, fused, pictures, planes, quality, round_scans, speed, true_fields
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -37,17 +39,21 @@ CURVE_VIEWS = 100  # of the test views, evenly
 QUICK_VIEWS, QUICK_FRAMES = 8, 4
 CAD_PARTS = "kicad"  # the set of real parts, whose errors are compared with those of own solids
 
+PARTS = ("errors", "times")
 FIELD_FIGURES = (
     *(f"edges_rmse_{level}" for level in quality.LEVELS), "edges_rmse_by_rival", "edges_rmse_by_solids",
     "edges_recall_r_clean", *(f"edges_recall_4r_{level}" for level in quality.LEVELS), "edges_int8_rmse_percent",
-    "edges_int8_same_side", "edges_fps_320", "edges_fps_640", "edges_bundle_mb", "edges_memory_mb", "edges_allocations",
+    "edges_int8_same_side", "edges_bundle_mb", "edges_memory_mb", "edges_allocations",
+    "edges_own_allocations",
 )  # fmt: skip
 CURVE_FIGURES = (
-    *(f"edges_fps_{scene}" for scene in speed.SCENES), *(f"edges_curves_{level}" for level in quality.LEVELS),
-    "edges_box_mm_tof", "edges_box_mm_stereo", "edges_box_deviation_mm",
+    true_fields.FIGURE, *(f"edges_curves_{level}" for level in quality.LEVELS), "edges_box_mm_tof",
+    "edges_box_mm_stereo", "edges_box_deviation_mm",
 )  # fmt: skip
-NOT_YET = {"edges_curves_true": "the C API takes no fields"}
-FIGURES = (*FIELD_FIGURES, *CURVE_FIGURES, *fused.FIGURES, *carton.FIGURES, round_scans.FIGURE, *NOT_YET)
+FIGURES = {
+    "errors": (*FIELD_FIGURES, *CURVE_FIGURES, *fused.FIGURES, *carton.FIGURES, round_scans.FIGURE),
+    "times": ("edges_fps_320", "edges_fps_640", *(f"edges_fps_{scene}" for scene in speed.SCENES), fused.TIME_FIGURE),
+}
 
 
 @dataclass(frozen=True)
@@ -65,6 +71,15 @@ class Sources:
     views: int | None
 
 
+@dataclass
+class Found:
+    """Of one of PARTS: its entries of the document, the figures that are gates, and why others are missing."""
+
+    document: dict
+    figures: dict[str, float]
+    missing: dict[str, str]
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where views and networks are."""
     named = {"nargs": "+", "default": [], "type": _named}
@@ -77,6 +92,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--other-edge-weights", **named, metavar="NAME=FILE", help="in float, to compare with: m=m.pt")
     parser.add_argument("--other-edge-bundles", **named, metavar="NAME=BUNDLE", help="to compare with: m-int8=DIR")
     default = f"{CAD_PARTS}={SOLIDS / CAD_PARTS} if there"
+    parser.add_argument("--edge-parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART",
+                        help="errors (and memory), times; what is left out is of the last run in --out")  # fmt: skip
     parser.add_argument("--edge-sets", **named, metavar="NAME=DIR", help=f"further whole views; default: {default}")
 
 
@@ -121,10 +138,35 @@ def networks_of(given: Sources, folder: Path) -> Networks:
     return Networks({**bundles, **given.bundles}, histograms, missing)
 
 
-def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """What was measured, the figures that are gates, and why others are missing. The sheet of pictures is written into
-    `folder`: pictures are in no JSON."""
-    others, networks = OthersFraction(), networks_of(given, folder)
+def measure(
+    given: Sources, folder: Path, threads: int, quick: bool, parts: Sequence[str] = PARTS, last: Mapping | None = None
+) -> tuple[dict, dict[str, float], dict[str, str]]:
+    """What was measured, the figures that are gates, and why others are missing. last: the document of a run before,
+    from which parts come that are not measured. The sheet of pictures is written into `folder`: pictures are in no
+    JSON."""
+    document, networks = dict(last or {}), networks_of(given, folder)
+    document.setdefault("warnings_of", {})
+    figures, missing = {}, {}
+    for part, measuring in (("errors", measure_errors), ("times", measure_times)):
+        if part not in parts:
+            continue
+        others = OthersFraction()
+        found = measuring(given, networks, folder, threads, quick)
+        fraction, warnings = others.now(), []
+        if part == "errors" and found.document["views"]["test"] < MIN_VIEWS:
+            warnings.append(f"{found.document['views']['test']} test views, {MIN_VIEWS} are wanted")
+        if fraction > MAX_OTHERS:
+            warnings.append(f"other processes used {fraction:.0%} of the CPU (edges, {part})")
+        document |= found.document
+        document["warnings_of"] = document["warnings_of"] | {part: warnings}
+        figures |= {name: round(value, 4) for name, value in found.figures.items()}
+        missing |= {name: why for name, why in found.missing.items() if name not in found.figures}
+    document["warnings"] = [text for warnings in document["warnings_of"].values() for text in warnings]
+    return document, figures, missing
+
+
+def measure_errors(given: Sources, networks: Networks, folder: Path, threads: int, quick: bool) -> Found:
+    """Errors, and memory: what a busy machine does not distort."""
     views = min(QUICK_VIEWS, given.views or QUICK_VIEWS) if quick else given.views
     val, test = (read_views(given.solids / split, WIDTH_PX, views) for split in ("val", "test"))
     levels = [level for level in LEVELS if level not in quality.LEVELS]
@@ -133,50 +175,54 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
         errors = quality.measure(val, test, ways, levels[:1] if quick else levels)
         sets = {name: quality.of_set(read_views(path, WIDTH_PX, views), ways[SHIPPED], cuts_of(errors.cuts))
                 for name, path in given.sets.items()}  # fmt: skip
-    count = 2 if quick else min(SPEED_VIEWS, given.views or SPEED_VIEWS)
-    large_val, large = (read_views(given.solids / split, speed.FULL_PX[0], count) for split in ("val", "test"))
-    rows = speed.measure(large, networks.bundles, rivals_of(large_val), threads)
-    savings = speed.measure_savings(given.bundle, threads, QUICK_FRAMES if quick else SAVING_FRAMES)
     amounts = (2, 2, 5) if quick else (curves.BOX_SEEDS, curves.BOX_FRAMES, curves.STEADY_FRAMES)
     tuned = curves.tuned_planes(val)
+    some = test[:: max(1, len(test) // CURVE_VIEWS)]
     with Edges(given.bundle, threads) as shipped:
-        of_solids = curves.measure_solids(test[:: max(1, len(test) // CURVE_VIEWS)], shipped, tuned)
+        of_solids = curves.measure_solids(some, shipped, tuned)
         boxes = curves.measure_boxes(shipped, tuned, *amounts)
-    of_scenes = curves.measure_scenes(given.bundle, threads, QUICK_FRAMES if quick else curves.SCENE_FRAMES)
-    of_fusion, why_no_fusion = fused.found_in(given.bundle, threads, quick, folder)
+    of_true, why_no_true = true_fields.found_in(some, folder)
+    of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure(given.bundle, threads, quick, folder))
     of_carton, why_no_carton = carton.found_in(given.bundle)
     of_round, why_no_round = round_scans.found_in(given.bundle, threads)
-    fraction = others.now()
-    sheet = pictures.write_sheet(errors.shown, folder)
     document = {
         "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
-        "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "speed": rows,
-        "savings": savings, "curves": of_solids, "curves_of_scenes": of_scenes, "boxes": boxes, "fusion": of_fusion,
+        "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets,
+        "curves": of_solids, "curves_of_true_fields": of_true, "boxes": boxes, "fusion": of_fusion,
         "carton": of_carton, "round": of_round,
         "missing": {**networks.missing, **errors.missing, **programs_missing()},
-        "sheet": sheet.name, "warnings": [],
+        "sheet": pictures.write_sheet(errors.shown, folder).name,
     }  # fmt: skip
-    if len(test) < MIN_VIEWS:
-        document["warnings"].append(f"{len(test)} test views, {MIN_VIEWS} are wanted")
-    if fraction > MAX_OTHERS:
-        document["warnings"].append(f"other processes used {fraction:.0%} of the CPU (edges)")
-    figures = quality.figures_from(errors.rows, errors.agreement) | speed.figures_from(rows)
+    figures = quality.figures_from(errors.rows, errors.agreement)
     figures["edges_bundle_mb"] = sum(path.stat().st_size for path in given.bundle.iterdir()) / 1e6
     figures |= speed.stream_cost(given.bundle, threads, folder)
-    found, why = curves.figures_from(of_solids, of_scenes, boxes)
-    figures |= found
+    of_curves, missing = curves.figures_from(of_solids, boxes)
+    figures |= of_curves | true_fields.figures_from(of_true)
     figures |= fused.figures_from(of_fusion) | carton.figures_from(of_carton) | round_scans.figures_from(of_round)
-    missing = NOT_YET | why | dict.fromkeys(carton.FIGURES, why_no_carton or "too little of the carton was found")
-    missing |= dict.fromkeys(fused.FIGURES, why_no_fusion or "no solid could be made") | {
-        round_scans.FIGURE: why_no_round
-    }
+    missing |= dict.fromkeys(carton.FIGURES, why_no_carton or "too little of the carton was found")
+    missing |= dict.fromkeys(fused.FIGURES, why_no_fusion or "no solid could be made")
+    missing |= {round_scans.FIGURE: why_no_round, true_fields.FIGURE: why_no_true}
     if CAD_PARTS in sets:
         figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
     else:
         missing["edges_rmse_by_solids"] = f"no set of real parts: --edge-sets {CAD_PARTS}=DIR"
     missing |= dict.fromkeys(("edges_int8_rmse_percent", "edges_int8_same_side"), networks.missing.get(FLOAT, ""))
-    figures = {name: round(value, 4) for name, value in figures.items()}
-    return document, figures, {name: why for name, why in missing.items() if name not in figures}
+    return Found(document, figures, missing)
+
+
+def measure_times(given: Sources, networks: Networks, folder: Path, threads: int, quick: bool) -> Found:
+    """Error against run time, savings, frames a second, seconds of a fusion. Needs a quiet machine."""
+    count = 2 if quick else min(SPEED_VIEWS, given.views or SPEED_VIEWS)
+    val, test = (read_views(given.solids / split, speed.FULL_PX[0], count) for split in ("val", "test"))
+    scene_frames = QUICK_FRAMES if quick else curves.SCENE_FRAMES
+    # What gates are about comes first, while the machine is quiet.
+    of_scenes = curves.measure_scenes(given.bundle, threads, scene_frames)
+    savings = speed.measure_savings(given.bundle, threads, QUICK_FRAMES if quick else SAVING_FRAMES)
+    of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure_times(given.bundle, threads, quick))
+    rows = speed.measure(test, networks.bundles, rivals_of(val), threads)
+    document = {"speed": rows, "savings": savings, "curves_of_scenes": of_scenes, "fusion_times": of_fusion}
+    figures = speed.figures_from(rows) | curves.scene_figures_from(of_scenes) | fused.figures_from(of_fusion)
+    return Found(document, figures, {fused.TIME_FIGURE: why_no_fusion or "no solid could be made"})
 
 
 def cuts_of(cuts: dict[str, dict[float, int]]) -> dict[str, dict[float, int]]:

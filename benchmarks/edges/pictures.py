@@ -23,8 +23,10 @@ SHEET = "edges-sheet.png"
 
 def write(measured: dict, folder: Path) -> list[Path]:
     """The pictures of what was measured, into `folder`; the sheet has been written."""
-    drawn: dict[str, Callable[[dict], plt.Figure]] = {"edges-error-against-run-time.png": error_against_time}
-    if measured["groups"]:
+    drawn: dict[str, Callable[[dict], plt.Figure]] = {}
+    if "speed" in measured:
+        drawn["edges-error-against-run-time.png"] = error_against_time
+    if measured.get("groups"):
         drawn["edges-groups.png"] = groups
     written = []
     for name, draw in drawn.items():
@@ -32,7 +34,7 @@ def write(measured: dict, folder: Path) -> list[Path]:
         figure.savefig(folder / name, dpi=110, bbox_inches="tight")
         plt.close(figure)
         written.append(folder / name)
-    return written + ([folder / measured["sheet"]] if measured["sheet"] else [])
+    return written + ([folder / measured["sheet"]] if measured.get("sheet") else [])
 
 
 def front_of(rows: list[dict]) -> list[dict]:

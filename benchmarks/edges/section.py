@@ -20,15 +20,32 @@ ANCHORS = [
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """Title and parts, as benchmarks.report has them, of what edges.measure returned."""
+    """Title and parts, as benchmarks.report has them, of what edges.measure returned: of its errors and its times those
+    that were measured."""
+    parts: list = [f"Warnings of the measurement: {'; '.join(measured['warnings'])}."] if measured["warnings"] else []
+    if "errors" in measured:
+        parts += error_parts(measured)
+    if "speed" in measured:
+        parts += [
+            *speed_parts(measured["speed"]),
+            saving_rows(measured["savings"]),
+            "Work that is left out, 320 x 240: the time with the option by that without, the part of the frame that "
+            "the network ran on, and how far the field is from the one without it (root mean square, and pixels on the "
+            "other side of r).",
+            scene_rows(measured["curves_of_scenes"]),
+        ]
+    parts += fusion_parts(measured.get("fusion"), measured.get("fusion_times"))
+    parts += carton_parts(measured.get("carton"))
+    parts += round_parts(measured.get("round"))
+    return "Edges", parts
+
+
+def error_parts(measured: dict) -> list:
     views = measured["views"]
     parts: list = [
         "How far each pixel of a depth frame is from the nearest sharp feature curve, in r = depth / focal length: on "
         f"{views['test']} views (320 x 240) of {views['solids']} rendered solids whose families neither training nor "
-        f"the choice of thresholds saw. Thresholds of all ways are chosen on {views['val']} validation views."
-    ]
-    parts += [f"Warnings of the measurement: {'; '.join(measured['warnings'])}."] if measured["warnings"] else []
-    parts += [
+        f"the choice of thresholds saw. Thresholds of all ways are chosen on {views['val']} validation views.",
         error_rows(measured["errors"]),
         "Means over views of each view's figure. Near edges: pixels within 4 r of one. A pixel is called sharp where "
         "its distance is below a threshold, so chosen that at most 0.5 % (for r) or 2 % (for 4 r) of the validation "
@@ -45,19 +62,8 @@ def section(measured: dict) -> tuple[str, list]:
         parts.append(agreement_rows(measured))
     parts += [noise_rows(measured["errors"])]
     parts += set_parts(measured["sets"])
-    parts += [
-        *group_parts(measured["groups"]),
-        *speed_parts(measured["speed"]),
-        saving_rows(measured["savings"]),
-        "Work that is left out, 320 x 240: the time with the option by that without, the part of the frame that the "
-        "network ran on, and how far the field is from the one without it (root mean square, and pixels on the other "
-        "side of r).",
-    ]
-    parts += curve_parts(measured)
-    parts += fusion_parts(measured["fusion"])
-    parts += carton_parts(measured["carton"])
-    parts += round_parts(measured["round"])
-    return "Edges", parts
+    parts += group_parts(measured["groups"])
+    return parts + curve_parts(measured)
 
 
 def cells(row: dict) -> list[str]:
@@ -150,17 +156,27 @@ def curve_cells(row: dict) -> list[str]:
     return ["" if row[key] is None else format(row[key], form) for key, (_, form) in CURVE_COLUMNS.items()]
 
 
+def curve_heads() -> list[str]:
+    return [head for head, _ in CURVE_COLUMNS.values()]
+
+
+def scene_rows(rows: list[dict]) -> list[list[str]]:
+    table = [
+        ["simulated camera, planes skipped", *curve_heads(), "field, ms", "curves, ms", "boxes, ms", "frames a second"]
+    ]
+    for row in rows:
+        times = [f"{row[key]:.2f}" for key in ("field_ms", "curves_ms", "boxes_ms")]
+        table.append([f"{SCENES[row['scene']]}, {row['noise']}", *curve_cells(row), *times, f"{1000 / row['ms']:.0f}"])
+    return table
+
+
 def curve_parts(measured: dict) -> list:
-    heads_of = [head for head, _ in CURVE_COLUMNS.values()]
-    solids = [["curves, 320 x 240", "views", *heads_of, "curves, ms"]]
+    solids = [["curves, 320 x 240", "views", *curve_heads(), "curves, ms"]]
+    of_true = measured["curves_of_true_fields"]
+    if of_true is not None:
+        solids.append(["true field", str(of_true["views"]), *curve_cells(of_true), ""])
     for row in measured["curves"]:
         solids.append([f"{SAYS[row['level']]}: {row['way']}", str(row["views"]), *curve_cells(row), f"{row['ms']:.2f}"])
-    scenes = [
-        ["simulated camera, planes skipped", *heads_of, "field, ms", "curves, ms", "boxes, ms", "frames a second"]
-    ]
-    for row in measured["curves_of_scenes"]:
-        times = [f"{row[key]:.2f}" for key in ("field_ms", "curves_ms", "boxes_ms")]
-        scenes.append([f"{SCENES[row['scene']]}, {row['noise']}", *curve_cells(row), *times, f"{1000 / row['ms']:.0f}"])
     boxes = [["carton of 15 to 60 cm at 1.2 to 1.6 m", "frames", "with a box, %", "error of a side, mm (median)", "p90",
               "standard deviation while the camera turns, mm", "frames with a box"]]  # fmt: skip
     for row in measured["boxes"]:
@@ -173,7 +189,6 @@ def curve_parts(measured: dict) -> list:
         "one, means over views. Roundings that are neither sharp nor smooth count neither for nor against. Distances "
         "end at 100 r. Planes are those of OpenCV, with the threshold that suits validation views: they give creases, "
         "no boundaries.",
-        scenes,
         boxes,
         "The largest box of a frame with the sides of the true carton, both by size; frames without a box have no "
         "error and are in the percentage alone.",

@@ -28,25 +28,34 @@ def carton_parts(found: dict | None) -> list:
     ]
 
 
-def fusion_parts(found: dict | None) -> list:
+def fusion_parts(found: dict | None, timed: dict | None) -> list:
+    """Of fused.measure and fused.measure_times, as far as they have run."""
+    return fusion_error_parts(found) + fusion_time_parts(timed)
+
+
+def fusion_time_parts(timed: dict | None) -> list:
+    if timed is None or not timed["times"]:
+        return []
+    seconds, cpu_seconds, points = ([row[key] for row in timed["times"]] for key in ("s", "cpu_s", "points"))
+    return [
+        f"Fusing {fused.TIMED_VIEWS} views of {len(seconds)} solids, time of flight, took "
+        f"{statistics.median(seconds):.1f} s in the median ({min(seconds):.1f} to {max(seconds):.1f}; of the CPU "
+        f"{statistics.median(cpu_seconds):.1f}, {min(cpu_seconds):.1f} to {max(cpu_seconds):.1f}), {min(points):,} to "
+        f"{max(points):,} points: curves of each view, points, and curves in the world, without the network."
+    ]
+
+
+def fusion_error_parts(found: dict | None) -> list:
     if found is None:
         return []
     errors = [["fused views, 320 x 240", "one view, RMSE, r", f"{fused.VIEWS} fused, r", "by it"]]
     for row in found["errors"]:
         errors.append([SAYS[row["level"]], f"{row['one_r']:.2f}", f"{row['fused_r']:.2f}", f"{row['ratio']:.2f}"])
-    seconds, cpu_seconds, points = ([row[key] for row in found["times"]] for key in ("s", "cpu_s", "points"))
     says = [
-        f"Pixels of {len(found['times'])} solids of `val`, each seen from {fused.VIEWS} places, against the nearest "
+        f"Pixels of solids of `val`, each seen from {fused.VIEWS} places, against the nearest "
         "sharp curve that any of the views sees; a fused point stands for the pixels that it was made of, and all "
         "distances are cut where its own ends, 16 footprints of the view that was nearest to it."
     ]
-    if seconds:
-        says.append(
-            f"Fusing {fused.TIMED_VIEWS} views, time of flight, took {statistics.median(seconds):.1f} s in the median "
-            f"({min(seconds):.1f} to {max(seconds):.1f}; of the CPU {statistics.median(cpu_seconds):.1f}, "
-            f"{min(cpu_seconds):.1f} to {max(cpu_seconds):.1f}), {min(points):,} to {max(points):,} points: curves of "
-            "each view, points, and curves in the world, without the network."
-        )
     if found["memory"]:
         says.append(
             f"{found['memory']['points']:,} points of {fused.TIMED_VIEWS} views of 640 x 480 added "

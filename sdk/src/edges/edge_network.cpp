@@ -69,8 +69,11 @@ int threads_of(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const B
                          settings);
 }
 
-SessionSettings with_threads(SessionSettings settings, int threads) {
+// Planned memory is a second block beside what the first run took; without it a stream takes an eighth less, in the
+// same time.
+SessionSettings of_stream(SessionSettings settings, int threads) {
   settings.threads = threads;
+  settings.plans_memory = false;
   return settings;
 }
 
@@ -84,7 +87,7 @@ EdgeNetwork::EdgeNetwork(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bund
       threads_(threads_of(runtime, bundle_, multiple_px_, settings)),
       sessions_(std::move(runtime), bundle_.files.at(bundle_.manifest.graphs.at(kGraph).file),
                 bundle_.manifest.graphs.at(kGraph), bundle_.path_of(bundle_.manifest.graphs.at(kGraph).file),
-                with_threads(settings, threads_), kSessionsKept) {}
+                of_stream(settings, threads_), kSessionsKept) {}
 
 const float* EdgeNetwork::run(const float* slopes, int width_px, int height_px, const RunCancel& cancel) {
   inputs_.assign(1, {slopes, input_shape(width_px, height_px)});

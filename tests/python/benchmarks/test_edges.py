@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import __main__ as benchmark
 from benchmarks import gates
-from benchmarks.edges import curve_scores, curves, planes, quality, rivals, section, speed
+from benchmarks.edges import curve_scores, curves, planes, quality, rivals, section, speed, true_fields
 from benchmarks.edges import measure as edges
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
 from benchmarks.edges.views import View, bending_radius_r, bins, incidence_deg, polyline, read_views
@@ -218,7 +218,59 @@ def test_another_set_is_cut_where_own_solids_say(errors, solids):
 
 def test_each_gate_of_edges_has_a_figure_and_the_other_way_round():
     names = {g["figure"] for g in tomllib.loads(gates.TARGETS.read_text())["gate"] if g["figure"].startswith("edges_")}
-    assert names == set(edges.FIGURES)
+    errors, times = (set(edges.FIGURES[part]) for part in edges.PARTS)
+    assert names == errors | times
+    assert not errors & times
+
+
+def test_a_part_of_its_own_leaves_the_other_of_the_last_run(monkeypatch, tmp_path):
+    def found(name, value):
+        return lambda *_: edges.Found(
+            {name: value, "views": {"test": 1}}, {f"edges_{name}": value}, {"edges_why": "no"}
+        )
+
+    given = edges.Sources(tmp_path, edges.BUNDLE, tmp_path / "none.pt", {}, {}, {}, None)
+    monkeypatch.setattr(edges, "measure_errors", found("errors", 1.0))
+    monkeypatch.setattr(edges, "measure_times", found("speed", 2.0))
+    document, figures, missing = edges.measure(given, tmp_path, 1, True, ["errors"])
+    assert (document["errors"], figures, missing) == (1, {"edges_errors": 1}, {"edges_why": "no"})
+    assert "speed" not in document
+    assert any("200 are wanted" in text for text in document["warnings"])
+    monkeypatch.setattr(edges, "measure_times", found("speed", 3.0))
+    both, figures, _ = edges.measure(given, tmp_path, 1, True, ["times"], document)
+    assert (both["errors"], both["speed"], figures) == (1, 3, {"edges_speed": 3})
+    assert set(both["warnings"]) >= set(document["warnings_of"]["errors"])
+
+
+def test_the_report_tells_of_the_part_that_was_measured():
+    empty = {"warnings": [], "speed": [], "savings": [], "curves_of_scenes": [], "fusion_times": None}
+    _, of_times = section.section(empty | {"speed": [speed_row("a", 2.0), speed_row("b", 1.0)]})
+    table = next(part for part in of_times if isinstance(part, list) and part[0][0].startswith("frames of 640"))
+    assert [row[0] for row in table[1:]] == ["b", "a"]
+    assert section.section({"warnings": ["busy"]})[1] == ["Warnings of the measurement: busy."]
+
+
+def speed_row(name, ms):
+    by_level = dict.fromkeys(quality.LEVELS, 1.0)
+    return {"setting": name, "ms": ms, "ms_p90": ms, "by_level": by_level, "rmse_r": 1.0}
+
+
+@pytest.mark.skipif(not true_fields.PROGRAM.exists(), reason=f"{true_fields.PROGRAM} is not built")
+def test_the_true_field_gives_the_true_curve(solids, tmp_path):
+    views = read_views(solids / "test", 2 * WIDTH, None)
+    found, _ = true_fields.found_in(views, tmp_path)
+    assert found["views"] == 2
+    assert true_fields.figures_from(found)["edges_curves_true"] > 0.95
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_its_program_or_curves_the_true_field_says_why(solids, tmp_path, monkeypatch):
+    views = read_views(solids / "test", WIDTH, 1)
+    monkeypatch.setattr(true_fields, "PROGRAM", tmp_path / "nowhere")
+    found, why = true_fields.found_in(views, tmp_path)
+    assert found is None
+    assert "nowhere is not there" in why
+    assert true_fields.figures_from(None) == {}
 
 
 def test_options_name_further_networks_and_sets():
@@ -279,8 +331,9 @@ def test_gates_of_curves_say_why_they_are_missing():
     boxes = [box, box | {"noise": "stereo", "median_mm": None}, box | {"way": curves.PLANES, "median_mm": 9.0}]
     solid = [{"level": level, "way": SHIPPED, "f_score": 0.8} for level in ("clean", "tof")]
     scenes = [{"scene": "box", "noise": noise, "ms": ms} for noise, ms in (("tof", 10.0), ("none", 5.0))]
-    figures, missing = curves.figures_from(solid, scenes, boxes)
-    assert figures == {"edges_curves_clean": 0.8, "edges_curves_tof": 0.8, "edges_box_mm_tof": 3, "edges_fps_box": 100}
+    figures, missing = curves.figures_from(solid, boxes)
+    assert figures == {"edges_curves_clean": 0.8, "edges_curves_tof": 0.8, "edges_box_mm_tof": 3}
+    assert curves.scene_figures_from(scenes) == {"edges_fps_box": 100}
     assert missing["edges_box_mm_stereo"] == "no box was found in 4 frames"
     assert missing["edges_box_deviation_mm"] == "a box was found in 1 of 9 frames"
     assert missing["edges_curves_stereo"] == "the test views have no curves stored"

@@ -105,35 +105,37 @@ def measured():
         {"solid": f"crate {k}", "points": 300_000 + k, "s": s, "cpu_s": 2 * s} for k, s in enumerate((3.0, 1.0, 2.0))
     ]
     memory = {"points": 800_000, "cell_m": 0.001, "memory_mb": 200.0}
-    return {"errors": fused.summed(rows), "times": times, "memory": memory, "missing": ["val 4: lost"]}
+    found = {"errors": fused.summed(rows), "memory": memory, "missing": ["val 4: lost"]}
+    return found, {"times": times, "missing": []}
 
 
 def test_gates_are_the_worst_level_the_median_solid_and_a_million_points():
-    found = measured()
+    found, timed = measured()
     assert [row["ratio"] for row in found["errors"]] == pytest.approx([0.5, 0.9])
     figures = fused.figures_from(found)
     assert figures.keys() == set(fused.FIGURES)
-    assert list(figures.values()) == pytest.approx([2.0, 250.0, 0.9])
-    assert fused.figures_from({"errors": [], "times": [], "memory": None}) == {}
+    assert list(figures.values()) == pytest.approx([250.0, 0.9])
+    assert fused.figures_from(timed) == {fused.TIME_FIGURE: 2}
+    assert fused.figures_from({"errors": [], "memory": None}) == fused.figures_from({"times": []}) == {}
     assert fused.figures_from(None) == {}
 
 
 def test_the_report_tells_what_was_measured_and_nothing_without_it():
-    table, text = section_of_views.fusion_parts(measured())
+    table, text, of_times = section_of_views.fusion_parts(*measured())
     assert table[1] == ["exact depth", "3.00", "1.50", "0.50"]
-    assert "2.0 s in the median (1.0 to 3.0; of the CPU 4.0, 2.0 to 6.0)" in text
+    assert "2.0 s in the median (1.0 to 3.0; of the CPU 4.0, 2.0 to 6.0)" in of_times
     assert "800,000 points" in text
     assert "val 4: lost" in text
-    assert section_of_views.fusion_parts(None) == []
+    assert section_of_views.fusion_parts(None, None) == []
+    assert section_of_views.fusion_parts(None, measured()[1]) == [of_times]
 
 
-def test_what_is_missing_is_said(monkeypatch, tmp_path):
+def test_what_is_missing_is_said():
     def raises(error):
-        def measure(*_):
+        def measuring():
             raise error
 
-        monkeypatch.setattr(fused, "measure", measure)
-        return fused.found_in(BUNDLE, 1, True, tmp_path)
+        return fused.found_by(measuring)
 
     assert raises(ImportError("no", name="OCP")) == (None, f"OCP is not installed: {fused.INSTALL}")
     failed = subprocess.CalledProcessError(1, "python", stderr="Traceback\nMaquetteError: No bundle.\n")

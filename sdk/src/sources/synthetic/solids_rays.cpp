@@ -12,7 +12,8 @@ constexpr double kTiny = 1e-30;  // for 0, so that quotients are numbers
 
 }  // namespace
 
-SolidsRays::SolidsRays(const SolidsScene& scene, const SolidsView& view) {
+void SolidsRays::look(const SolidsScene& scene, const SolidsView& view) {
+  solids_.clear();
   solids_.reserve(scene.solids.size());
   for (const Solid& solid : scene.solids) {
     const auto turned = [&](const Vector3& v) {

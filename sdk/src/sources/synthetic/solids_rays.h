@@ -9,7 +9,11 @@ namespace maq {
 
 class SolidsRays {
  public:
-  SolidsRays(const SolidsScene& scene, const SolidsView& view);
+  SolidsRays() = default;  // of an empty scene
+  SolidsRays(const SolidsScene& scene, const SolidsView& view) { look(scene, view); }
+
+  // From another place; memory is kept.
+  void look(const SolidsScene& scene, const SolidsView& view);
 
   // Depth along the optical axis of what the ray in direction (x, y, 1) of the camera meets first; infinite for
   // nothing.

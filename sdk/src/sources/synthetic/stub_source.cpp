@@ -50,12 +50,14 @@ class StubSolids {
 
   void draw(uint64_t index, double time_s, Frame& frame) {
     auto* metres = reinterpret_cast<float*>(frame.allocate(MAQ_PIXEL_DEPTH32F, picture_.width_px, picture_.height_px));
-    SolidsRays(scene_, solids_view(scene_, time_s)).draw(picture_, metres);
+    rays_.look(scene_, solids_view(scene_, time_s));
+    rays_.draw(picture_, metres);
     noise_.apply(picture_, index, metres);
   }
 
  private:
   SolidsScene scene_;
+  SolidsRays rays_;
   DepthNoise noise_;
   SolidsPicture picture_;
   maq_intrinsics intrinsics_{};

@@ -2,8 +2,8 @@
 
     python -m benchmarks --only edges                        `make build` first
     python -m benchmarks --only edges --quick                a few views, to see that it runs
-    python -m benchmarks --only edges --edge-parts errors    an hour, which a busy machine does not distort
-    python -m benchmarks --only edges --edge-parts times     minutes, for a quiet one
+    python -m benchmarks --only edges --edge-parts fields curves    an hour, which a busy machine does not distort
+    python -m benchmarks --only edges --edge-parts times            minutes, for a quiet one
 
 Figures come from whole views of solids whose families neither training nor the choice of thresholds saw. A gate that
 could not be measured is said to be so, with the reason.
@@ -39,7 +39,7 @@ CURVE_VIEWS = 100  # of the test views, evenly
 QUICK_VIEWS, QUICK_FRAMES = 8, 4
 CAD_PARTS = "kicad"  # the set of real parts, whose errors are compared with those of own solids
 
-PARTS = ("errors", "times")
+PARTS = ("fields", "curves", "times")
 FIELD_FIGURES = (
     *(f"edges_rmse_{level}" for level in quality.LEVELS), "edges_rmse_by_rival", "edges_rmse_by_solids",
     "edges_recall_r_clean", *(f"edges_recall_4r_{level}" for level in quality.LEVELS), "edges_int8_rmse_percent",
@@ -51,7 +51,8 @@ CURVE_FIGURES = (
     "edges_box_mm_stereo", "edges_box_deviation_mm",
 )  # fmt: skip
 FIGURES = {
-    "errors": (*FIELD_FIGURES, *CURVE_FIGURES, *fused.FIGURES, *carton.FIGURES, round_scans.FIGURE),
+    "fields": (*FIELD_FIGURES, round_scans.FIGURE),
+    "curves": (*CURVE_FIGURES, *fused.FIGURES, *carton.FIGURES),
     "times": ("edges_fps_320", "edges_fps_640", *(f"edges_fps_{scene}" for scene in speed.SCENES), fused.TIME_FIGURE),
 }
 
@@ -93,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--other-edge-bundles", **named, metavar="NAME=BUNDLE", help="to compare with: m-int8=DIR")
     default = f"{CAD_PARTS}={SOLIDS / CAD_PARTS} if there"
     parser.add_argument("--edge-parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART",
-                        help="errors (and memory), times; what is left out is of the last run in --out")  # fmt: skip
+                        help="fields, curves (both errors), times; others are of the last run in --out")  # fmt: skip
     parser.add_argument("--edge-sets", **named, metavar="NAME=DIR", help=f"further whole views; default: {default}")
 
 
@@ -147,13 +148,14 @@ def measure(
     document, networks = dict(last or {}), networks_of(given, folder)
     document.setdefault("warnings_of", {})
     figures, missing = {}, {}
-    for part, measuring in (("errors", measure_errors), ("times", measure_times)):
+    measurements = {"fields": measure_fields, "curves": measure_curves, "times": measure_times}
+    for part, measuring in measurements.items():
         if part not in parts:
             continue
         others = OthersFraction()
         found = measuring(given, networks, folder, threads, quick)
         fraction, warnings = others.now(), []
-        if part == "errors" and found.document["views"]["test"] < MIN_VIEWS:
+        if part == "fields" and found.document["views"]["test"] < MIN_VIEWS:
             warnings.append(f"{found.document['views']['test']} test views, {MIN_VIEWS} are wanted")
         if fraction > MAX_OTHERS:
             warnings.append(f"other processes used {fraction:.0%} of the CPU (edges, {part})")
@@ -165,16 +167,48 @@ def measure(
     return document, figures, missing
 
 
-def measure_errors(given: Sources, networks: Networks, folder: Path, threads: int, quick: bool) -> Found:
-    """Errors, and memory: what a busy machine does not distort."""
-    views = min(QUICK_VIEWS, given.views or QUICK_VIEWS) if quick else given.views
+def views_of(given: Sources, quick: bool) -> tuple[list[View], list[View]]:
+    """Of validation and of test, WIDTH_PX wide."""
+    views = most_views(given, quick)
     val, test = (read_views(given.solids / split, WIDTH_PX, views) for split in ("val", "test"))
+    return val, test
+
+
+def most_views(given: Sources, quick: bool) -> int | None:
+    return min(QUICK_VIEWS, given.views or QUICK_VIEWS) if quick else given.views
+
+
+def measure_fields(given: Sources, networks: Networks, folder: Path, threads: int, quick: bool) -> Found:
+    """Errors of fields, and memory: what a busy machine does not distort."""
+    val, test = views_of(given, quick)
     levels = [level for level in LEVELS if level not in quality.LEVELS]
     with ExitStack() as stack:
         ways = opened(networks, threads, stack)
         errors = quality.measure(val, test, ways, levels[:1] if quick else levels)
-        sets = {name: quality.of_set(read_views(path, WIDTH_PX, views), ways[SHIPPED], cuts_of(errors.cuts))
-                for name, path in given.sets.items()}  # fmt: skip
+        sets = {name: quality.of_set(read_views(path, WIDTH_PX, most_views(given, quick)), ways[SHIPPED],
+                                     cuts_of(errors.cuts)) for name, path in given.sets.items()}  # fmt: skip
+    of_round, why_no_round = round_scans.found_in(given.bundle, threads)
+    document = {
+        "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
+        "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "round": of_round,
+        "missing": {**networks.missing, **errors.missing, **programs_missing()},
+        "sheet": pictures.write_sheet(errors.shown, folder).name,
+    }  # fmt: skip
+    figures = quality.figures_from(errors.rows, errors.agreement)
+    figures["edges_bundle_mb"] = sum(path.stat().st_size for path in given.bundle.iterdir()) / 1e6
+    figures |= speed.stream_cost(given.bundle, threads, folder) | round_scans.figures_from(of_round)
+    missing = {round_scans.FIGURE: why_no_round}
+    missing |= dict.fromkeys(("edges_int8_rmse_percent", "edges_int8_same_side"), networks.missing.get(FLOAT, ""))
+    if CAD_PARTS in sets:
+        figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
+    else:
+        missing["edges_rmse_by_solids"] = f"no set of real parts: --edge-sets {CAD_PARTS}=DIR"
+    return Found(document, figures, missing)
+
+
+def measure_curves(given: Sources, _: Networks, folder: Path, threads: int, quick: bool) -> Found:
+    """Errors of curves and boxes, of one view and of fused ones: what a busy machine does not distort."""
+    val, test = views_of(given, quick)
     amounts = (2, 2, 5) if quick else (curves.BOX_SEEDS, curves.BOX_FRAMES, curves.STEADY_FRAMES)
     tuned = curves.tuned_planes(val)
     some = test[:: max(1, len(test) // CURVE_VIEWS)]
@@ -182,31 +216,16 @@ def measure_errors(given: Sources, networks: Networks, folder: Path, threads: in
         of_solids = curves.measure_solids(some, shipped, tuned)
         boxes = curves.measure_boxes(shipped, tuned, *amounts)
     of_true, why_no_true = true_fields.found_in(some, folder)
-    of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure(given.bundle, threads, quick, folder))
     of_carton, why_no_carton = carton.found_in(given.bundle)
-    of_round, why_no_round = round_scans.found_in(given.bundle, threads)
-    document = {
-        "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
-        "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets,
-        "curves": of_solids, "curves_of_true_fields": of_true, "boxes": boxes, "fusion": of_fusion,
-        "carton": of_carton, "round": of_round,
-        "missing": {**networks.missing, **errors.missing, **programs_missing()},
-        "sheet": pictures.write_sheet(errors.shown, folder).name,
-    }  # fmt: skip
-    figures = quality.figures_from(errors.rows, errors.agreement)
-    figures["edges_bundle_mb"] = sum(path.stat().st_size for path in given.bundle.iterdir()) / 1e6
-    figures |= speed.stream_cost(given.bundle, threads, folder)
-    of_curves, missing = curves.figures_from(of_solids, boxes)
-    figures |= of_curves | true_fields.figures_from(of_true)
-    figures |= fused.figures_from(of_fusion) | carton.figures_from(of_carton) | round_scans.figures_from(of_round)
+    of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure(given.bundle, threads, quick, folder))
+    document = {"curves": of_solids, "curves_of_true_fields": of_true, "boxes": boxes, "fusion": of_fusion,
+                "carton": of_carton}  # fmt: skip
+    figures, missing = curves.figures_from(of_solids, boxes)
+    figures |= true_fields.figures_from(of_true)
+    figures |= fused.figures_from(of_fusion) | carton.figures_from(of_carton)
     missing |= dict.fromkeys(carton.FIGURES, why_no_carton or "too little of the carton was found")
     missing |= dict.fromkeys(fused.FIGURES, why_no_fusion or "no solid could be made")
-    missing |= {round_scans.FIGURE: why_no_round, true_fields.FIGURE: why_no_true}
-    if CAD_PARTS in sets:
-        figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
-    else:
-        missing["edges_rmse_by_solids"] = f"no set of real parts: --edge-sets {CAD_PARTS}=DIR"
-    missing |= dict.fromkeys(("edges_int8_rmse_percent", "edges_int8_same_side"), networks.missing.get(FLOAT, ""))
+    missing[true_fields.FIGURE] = why_no_true
     return Found(document, figures, missing)
 
 

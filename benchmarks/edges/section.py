@@ -25,6 +25,8 @@ def section(measured: dict) -> tuple[str, list]:
     parts: list = [f"Warnings of the measurement: {'; '.join(measured['warnings'])}."] if measured["warnings"] else []
     if "errors" in measured:
         parts += error_parts(measured)
+    if "curves" in measured:
+        parts += curve_parts(measured)
     if "speed" in measured:
         parts += [
             *speed_parts(measured["speed"]),
@@ -62,8 +64,7 @@ def error_parts(measured: dict) -> list:
         parts.append(agreement_rows(measured))
     parts += [noise_rows(measured["errors"])]
     parts += set_parts(measured["sets"])
-    parts += group_parts(measured["groups"])
-    return parts + curve_parts(measured)
+    return parts + group_parts(measured["groups"])
 
 
 def cells(row: dict) -> list[str]:
@@ -172,9 +173,8 @@ def scene_rows(rows: list[dict]) -> list[list[str]]:
 
 def curve_parts(measured: dict) -> list:
     solids = [["curves, 320 x 240", "views", *curve_heads(), "curves, ms"]]
-    of_true = measured["curves_of_true_fields"]
-    if of_true is not None:
-        solids.append(["true field", str(of_true["views"]), *curve_cells(of_true), ""])
+    for row in measured["curves_of_true_fields"]:
+        solids.append([f"true field, {SAYS[row['level']]}", str(row["views"]), *curve_cells(row), ""])
     for row in measured["curves"]:
         solids.append([f"{SAYS[row['level']]}: {row['way']}", str(row["views"]), *curve_cells(row), f"{row['ms']:.2f}"])
     boxes = [["carton of 15 to 60 cm at 1.2 to 1.6 m", "frames", "with a box, %", "error of a side, mm (median)", "p90",

@@ -1,4 +1,5 @@
-"""Curves from the true fields of views: what extraction can reach at most, and its own gate.
+"""Curves from the true fields of views: what extraction reaches by itself, which has a gate of its own, and what it
+reaches with the depth of sensors, whose error along the ray no field takes away.
 
 The program is that of benchmarks.edge_curves, which also says why what is missing is missing.
 """
@@ -7,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from tqdm import tqdm
@@ -14,31 +16,40 @@ from tqdm import tqdm
 from benchmarks.edge_curves import PROGRAM, extracted, pack_field
 from benchmarks.edges.curve_scores import view_score
 from benchmarks.edges.curves import mean_of, with_curves
+from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.views import View
+from export.edges.config import EPS_R
 from export.evaluation.edges_api import TYPES, Curves
 
 FIGURE = "edges_curves_true"
 
 
-def measure(views: Sequence[View], folder: Path) -> dict | None:
-    """Means over views with a curve that is surely sharp, as curves.measure_solids; None without any. Raises
-    FileNotFoundError without the program, CalledProcessError where it fails."""
+def measure(views: Sequence[View], folder: Path) -> list[dict]:
+    """Rows by sensor: means over views with a curve that is surely sharp, as curves.measure_solids; none without any.
+    Raises FileNotFoundError without the program, CalledProcessError where it fails."""
     if not PROGRAM.exists():
         raise FileNotFoundError(f"{PROGRAM} is not there: cmake --build --preset release --target {PROGRAM.name}")
-    wanted, path, scores = with_curves(views), folder / "edges-true-fields", []
-    if not wanted:
-        return None
-    try:
-        with path.open("wb") as file:
-            for view in wanted:
-                camera, frame = view.camera, view.frame
-                intrinsics = camera.focal_px, camera.focal_px, camera.cx_px, camera.cy_px
-                pack_field(file, intrinsics, frame.distance, frame.depth, frame.kind)
-        for view, found in zip(tqdm(wanted, desc="edges: true fields", disable=None), extracted(path), strict=True):
-            scores.append(view_score(_curves(found["curves"]), view))
-    finally:
-        path.unlink(missing_ok=True)
-    return {"views": len(scores), **mean_of(scores)}
+    wanted, path = with_curves(views), folder / "edges-true-fields"
+    rows = []
+    for level in tqdm(LEVELS if wanted else (), desc="edges: true fields", unit="level", disable=None):
+        try:
+            with path.open("wb") as file:
+                for view in wanted:
+                    _pack(view, view.seen(level), file)
+            scores = [view_score(_curves(found["curves"]), view)
+                      for view, found in zip(wanted, extracted(path), strict=True)]  # fmt: skip
+        finally:
+            path.unlink(missing_ok=True)
+        rows.append({"level": level, "views": len(scores), **mean_of(scores)})
+    return rows
+
+
+def _pack(view: View, depth: np.ndarray, file: BinaryIO) -> None:
+    """The true field as far as depth [H, W] in metres is known."""
+    camera, frame, known = view.camera, view.frame, depth > 0
+    intrinsics = camera.focal_px, camera.focal_px, camera.cx_px, camera.cy_px
+    distance, kind = np.where(known, frame.distance, EPS_R), np.where(known, frame.kind, 0)
+    pack_field(file, intrinsics, distance, depth, kind)
 
 
 def _curves(found: Sequence[Mapping]) -> Curves:
@@ -46,13 +57,14 @@ def _curves(found: Sequence[Mapping]) -> Curves:
     return Curves(types, kinds, [np.array(c["points"]) for c in found], [], 0.0, 0.0)
 
 
-def found_in(views: Sequence[View], folder: Path) -> tuple[dict | None, str]:
-    """What `measure` says, or None and why it cannot be measured."""
+def found_in(views: Sequence[View], folder: Path) -> tuple[list[dict], str]:
+    """What `measure` says, or nothing and why it cannot be measured."""
     try:
         return measure(views, folder), "the test views have no curves stored"
     except FileNotFoundError as error:
-        return None, str(error)
+        return [], str(error)
 
 
-def figures_from(found: Mapping | None) -> dict[str, float]:
-    return {} if found is None else {FIGURE: found["f_score"]}
+def figures_from(rows: Sequence[Mapping]) -> dict[str, float]:
+    by_level = {row["level"]: row["f_score"] for row in rows}
+    return {FIGURE: by_level["clean"]} if "clean" in by_level else {}

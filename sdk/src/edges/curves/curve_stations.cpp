@@ -17,7 +17,9 @@ constexpr double kClearly_px = 2;           // by which the field has the edge n
 constexpr double kBestAcross_px = 0.08;     // no place in the picture is believed to be known better
 constexpr double kSamePlace_px = 1;         // edges of a near and a far surface so near in the picture are one chain
 constexpr double kApart_r = 2;              // nearer surfaces' edges are one
-constexpr int kStray = 2;                   // stations that may have seen something else
+constexpr double kNoisy_r = 1, kWider = 4;  // depth that is so far from its surface needs a band so much wider
+constexpr double kSameNoise = 1.5, kSameSurface = 1.2;  // what is that much worse is another surface, or smears
+constexpr int kStray = 2;                               // stations that may have seen something else
 constexpr double kFarthestPlanes_px = 0.6;  // surfaces that meet farther from the field's edge bend, or are others
 
 Vec3 on_ray(const Intrinsics& camera, double x, double y, double inverse_depth) {
@@ -134,12 +136,11 @@ void CurveStations::place(const RidgePoint* points, const RidgeChain& chain) {
 
 // The pixels beside a station in rows away from it, each as far as no other edge lies in its way: there the field,
 // which grows with the distance from this edge, would have fallen again.
-void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, int side, double half_window_px,
-                                double from_px, double to_px) {
-  const double nx = side == 0 ? s.ty : -s.ty, ny = side == 0 ? -s.tx : s.tx;
-  const int half = int(std::max(half_window_px, 3.0));
-  for (int u = -half; u <= half; ++u) {
-    for (int across = 1; across <= to_px; ++across) {
+void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, const Band& band, double from_px) {
+  const double nx = band.side == 0 ? s.ty : -s.ty, ny = band.side == 0 ? -s.tx : s.tx;
+  const int half = int(std::max(band.half_window_px, 3.0));
+  for (int u = -half; u <= half; u += band.step_px) {
+    for (int across = 1; across <= band.to_px; across += band.step_px) {
       const int x = int(std::lround(s.x + u * s.tx + across * nx)), y = int(std::lround(s.y + u * s.ty + across * ny));
       if (x < 0 || y < 0 || x >= field.width || y >= field.height) break;
       const size_t at = size_t(y) * size_t(field.width) + size_t(x);
@@ -147,7 +148,7 @@ void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, i
       if (across >= kFallen_px && !(field.distance_r[at] >= 0.5 * across)) break;
       const float depth = field.depth_m[at];
       if (off < from_px || !(depth > 0 && std::isfinite(depth))) continue;
-      band_.push_back({double(x), double(y), 1.0 / double(depth), 1});
+      band_.push_back({double(x), double(y), 1.0 / double(depth), 1, off});
     }
   }
 }
@@ -155,12 +156,43 @@ void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, i
 SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
                                      int side, double half_window_px, bool may_bend) {
   // Away from what smears; where the surface is too narrow for that, nearer.
-  for (const double smear : {double(options.smear_px), 0.5 * options.smear_px, 0.15 * options.smear_px}) {
+  const Band band{side, half_window_px, double(options.smear_px) + double(options.support_px), 1};
+  for (const double smear : {1.0, 0.5, 0.15}) {
     band_.clear();
-    gather_band(field, s, side, half_window_px, smear + 0.5, options.smear_px + options.support_px);
+    gather_band(field, s, band, smear * options.smear_px + 0.5);
     if (band_.size() >= 12) break;
   }
-  return fitter_.fit(band_, s.x, s.y, focal_px(field.intrinsics), may_bend);
+  const SurfacePatch patch = fitter_.fit(band_, s.x, s.y, focal_px(field.intrinsics), may_bend);
+  if (patch.terms == 0 || !(patch.rms_r > kNoisy_r)) return patch;
+  narrow_.swap(band_);
+  const SurfacePatch wide = fit_noisy_side(field, options, s, side, half_window_px, may_bend);
+  if (wide.terms != 0 && wide.rms_r <= kSameNoise * patch.rms_r) return wide;
+  band_.swap(narrow_);
+  return patch;
+}
+
+// Noisy depth needs a wide band, of whose pixels a quarter will do: all of it where depth at the edge is no worse than
+// elsewhere, else what is away from the edge.
+SurfacePatch CurveStations::fit_noisy_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
+                                           int side, double half_window_px, bool may_bend) {
+  const double focal = focal_px(field.intrinsics), away_px = double(options.smear_px) + 0.5;
+  band_.clear();
+  gather_band(field, s, {side, half_window_px, double(options.smear_px) + kWider * double(options.support_px), 2}, 0.5);
+  const SurfacePatch whole = fitter_.fit(band_, s.x, s.y, focal, may_bend);
+  double squares = 0, squares_away = 0, count_away = 0;
+  for (const BandPixel& pixel : band_) {
+    const double off_r = focal * (whole.inverse_depth(pixel.x, pixel.y) / pixel.inverse_depth - 1);
+    const bool is_away = pixel.across >= away_px;
+    (is_away ? squares_away : squares) += off_r * off_r;
+    count_away += is_away;
+  }
+  const double near_r = std::sqrt(squares / std::max(1.0, double(band_.size()) - count_away));
+  if (count_away < 12 || (whole.terms != 0 && near_r <= kSameSurface * std::sqrt(squares_away / count_away))) {
+    return whole;
+  }
+  band_.erase(std::remove_if(band_.begin(), band_.end(), [&](const BandPixel& p) { return p.across < away_px; }),
+              band_.end());
+  return fitter_.fit(band_, s.x, s.y, focal, may_bend);
 }
 
 void CurveStations::fit_sides(const EdgeField& field, const CurveOptions& options) {

@@ -51,10 +51,17 @@ class CurveStations {
 
  private:
   void place(const RidgePoint* points, const RidgeChain& chain);
-  void gather_band(const EdgeField& field, const CurveStation& s, int side, double half_window_px, double from_px,
-                   double to_px);
+  // Pixels beside a station, every so many along and across.
+  struct Band {
+    int side;
+    double half_window_px, to_px;
+    int step_px;
+  };
+  void gather_band(const EdgeField& field, const CurveStation& s, const Band& band, double from_px);
   SurfacePatch fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s, int side,
                         double half_window_px, bool may_bend);
+  SurfacePatch fit_noisy_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s, int side,
+                              double half_window_px, bool may_bend);
   void fit_sides(const EdgeField& field, const CurveOptions& options);
   void fit_whole_sides(const EdgeField& field);
   void choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed);
@@ -68,7 +75,7 @@ class CurveStations {
 
   double half_window_px_ = 0;
   PatchFitter fitter_;
-  std::vector<BandPixel> band_;
+  std::vector<BandPixel> band_, narrow_;
   std::vector<PlaneSums> sums_;  // of each station's sides
   std::vector<double> shifts_, residuals_;
   std::vector<StationRun> parts_;

@@ -27,6 +27,7 @@ inline constexpr double kPatchScale_px = 8;
 struct BandPixel {
   double x, y, inverse_depth;
   double weight;
+  double across;  // px from the edge
 };
 
 // Sums of a plane's normal equations, so that those of several bands can be added.

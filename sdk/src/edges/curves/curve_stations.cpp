@@ -17,7 +17,7 @@ constexpr double kClearly_px = 2;           // by which the field has the edge n
 constexpr double kBestAcross_px = 0.08;     // no place in the picture is believed to be known better
 constexpr double kSamePlace_px = 1;         // edges of a near and a far surface so near in the picture are one chain
 constexpr double kApart_r = 2;              // nearer surfaces' edges are one
-constexpr double kNoisy_r = 1, kWider = 4;  // depth that is so far from its surface needs a band so much wider
+constexpr double kNoisy_r = 1.5, kWider = 3;  // depth that is so far from its surface needs a band so much wider
 constexpr double kSameNoise = 1.5, kSameSurface = 1.2;  // what is that much worse is another surface, or smears
 constexpr int kStray = 2;                               // stations that may have seen something else
 constexpr double kFarthestPlanes_px = 0.6;  // surfaces that meet farther from the field's edge bend, or are others

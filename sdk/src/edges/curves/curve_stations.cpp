@@ -9,14 +9,14 @@ namespace maq {
 namespace {
 
 constexpr double kStraightSpacing_px = 6, kCurvedSpacing_px = 3, kCurvedHalfWindow_px = 4;
-constexpr double kMinShift_px = 1;          // pixels nearer to the edge are rounded by what the field was made of
-constexpr double kFallen_px = 3;            // nearer to the edge the field says nothing about another one
-constexpr double kFarthestShift_px = 5;     // the field's value is best near the edge
-constexpr double kBelief_px = 2.5;          // values that want to move it farther are of another edge
-constexpr double kClearly_px = 2;           // by which the field has the edge nearer on the side that it belongs to
-constexpr double kBestAcross_px = 0.08;     // no place in the picture is believed to be known better
-constexpr double kSamePlace_px = 1;         // edges of a near and a far surface so near in the picture are one chain
-constexpr double kApart_r = 2;              // nearer surfaces' edges are one
+constexpr double kMinShift_px = 1;            // pixels nearer to the edge are rounded by what the field was made of
+constexpr double kFallen_px = 3;              // nearer to the edge the field says nothing about another one
+constexpr double kFarthestShift_px = 5;       // the field's value is best near the edge
+constexpr double kBelief_px = 2.5;            // values that want to move it farther are of another edge
+constexpr double kClearly_px = 2;             // by which the field has the edge nearer on the side that it belongs to
+constexpr double kBestAcross_px = 0.08;       // no place in the picture is believed to be known better
+constexpr double kSamePlace_px = 1;           // edges of a near and a far surface so near in the picture are one chain
+constexpr double kApart_r = 2;                // nearer surfaces' edges are one
 constexpr double kNoisy_r = 1.5, kWider = 3;  // depth that is so far from its surface needs a band so much wider
 constexpr double kSameNoise = 1.5, kSameSurface = 1.2;  // what is that much worse is another surface, or smears
 constexpr int kStray = 2;                               // stations that may have seen something else

@@ -169,12 +169,12 @@ def measure(
 
 def views_of(given: Sources, quick: bool) -> tuple[list[View], list[View]]:
     """Of validation and of test, WIDTH_PX wide."""
-    views = most_views(given, quick)
+    views = view_limit(given, quick)
     val, test = (read_views(given.solids / split, WIDTH_PX, views) for split in ("val", "test"))
     return val, test
 
 
-def most_views(given: Sources, quick: bool) -> int | None:
+def view_limit(given: Sources, quick: bool) -> int | None:
     return min(QUICK_VIEWS, given.views or QUICK_VIEWS) if quick else given.views
 
 
@@ -185,7 +185,7 @@ def measure_fields(given: Sources, networks: Networks, folder: Path, threads: in
     with ExitStack() as stack:
         ways = opened(networks, threads, stack)
         errors = quality.measure(val, test, ways, levels[:1] if quick else levels)
-        sets = {name: quality.of_set(read_views(path, WIDTH_PX, most_views(given, quick)), ways[SHIPPED],
+        sets = {name: quality.of_set(read_views(path, WIDTH_PX, view_limit(given, quick)), ways[SHIPPED],
                                      cuts_of(errors.cuts)) for name, path in given.sets.items()}  # fmt: skip
     of_round, why_no_round = round_scans.found_in(given.bundle, threads)
     document = {

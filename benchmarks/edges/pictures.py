@@ -18,7 +18,7 @@ from benchmarks.sweep import pareto
 from export.edges.validation import field_picture, slope_picture
 
 COLOURS = {"shipped": "black", "savings": "tab:green", "networks": "tab:blue", "without a network": "0.55"}
-SHEET = "edges-sheet.png"
+SHEET = "edges-sheet.jpg"
 
 
 def write(measured: dict, folder: Path) -> list[Path]:

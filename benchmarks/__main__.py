@@ -145,7 +145,7 @@ def measure(options: argparse.Namespace) -> dict:
             edges.sources_of(options), options.out, options.threads, options.quick, options.edge_parts,
             document.get("edges"),
         )  # fmt: skip
-        replace(figures, missing, [name for part in options.edge_parts for name in edges.FIGURES[part]], found, why)
+        replace(figures, missing, [name for part in options.edge_parts for name in edges.FIGURES_OF[part]], found, why)
     if "prediction" in options.only:
         document["prediction"], found, why = prediction.measure(options.quick, threads=options.threads)
         replace(figures, missing, prediction.FIGURES, found, why)

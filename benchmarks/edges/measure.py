@@ -50,11 +50,12 @@ CURVE_FIGURES = (
     true_fields.FIGURE, *(f"edges_curves_{level}" for level in quality.LEVELS), "edges_box_mm_tof",
     "edges_box_mm_stereo", "edges_box_deviation_mm",
 )  # fmt: skip
-FIGURES = {
+FIGURES_OF = {
     "fields": (*FIELD_FIGURES, round_scans.FIGURE),
     "curves": (*CURVE_FIGURES, *fused.FIGURES, *carton.FIGURES),
     "times": ("edges_fps_320", "edges_fps_640", *(f"edges_fps_{scene}" for scene in speed.SCENES), fused.TIME_FIGURE),
 }
+FIGURES = tuple(figure for figures in FIGURES_OF.values() for figure in figures)
 
 
 @dataclass(frozen=True)

@@ -238,13 +238,19 @@ def edges_document():
     box = {"noise": "stereo", "way": ways[0], "frames": 10, "with_box": 0.0, "median_mm": None, "p90_mm": None,
            "steady_frames": 0, "turned_frames": 10, "deviation_mm": None}  # fmt: skip
     fusion = {"errors": [{"level": "tof", "views": 12, "one_r": 2.0, "fused_r": 1.5, "known": 1.0, "ratio": 0.75}],
-              "times": [{"solid": "crate 0", "points": 300_000, "s": 1.0, "cpu_s": 2.0}], "memory": None,
-              "missing": []}  # fmt: skip
+              "memory": None, "missing": []}  # fmt: skip
+    timed = {"times": [{"solid": "crate 0", "points": 300_000, "s": 1.0, "cpu_s": 2.0}], "missing": []}
     scans = {"pixels": 10, "under_1r": 0.0, "under_4r": 0.1}
-    found = {"fusion": fusion, "carton": None, "round": scans | {"scans": [{"name": "toy", **scans}]}}
+    found = {
+        "fusion": fusion,
+        "fusion_times": timed,
+        "carton": None,
+        "round": scans | {"scans": [{"name": "toy", **scans}]},
+    }
     return {**found, "views": {"val": 2, "test": 3, "solids": 3}, "errors": errors, "groups": groups, "speed": speed,
             "agreement": [{"level": "clean", "same_side": 0.99}], "savings": [saving], "sheet": "", "warnings": ["few"],
             "curves": [curve | {"level": "clean", "way": ways[0], "views": 3, "ms": 2.0}], "boxes": [box],
+            "curves_of_true_fields": [curve | {"level": "tof", "views": 3}],
             "curves_of_scenes": [curve | {"scene": "box", "noise": "tof"} | times],
             "sets": {"kicad": [figures | {"level": "clean"}]}, "missing": {"PCL": "no <header>"}}  # fmt: skip
 

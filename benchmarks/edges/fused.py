@@ -9,6 +9,7 @@ from __future__ import annotations
 import statistics
 import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,10 +21,11 @@ from benchmarks.edges.fusion_api import Fusion
 from benchmarks.edges.fusion_memory import in_child
 from benchmarks.edges.quality import LEVELS
 from export.edges.config import EPS_R
+from export.edges.curve_metrics import score
 from export.edges.data import seen_by
 from export.edges.fusion import FieldView
 from export.edges.judged_pixels import JudgedPixels, judged_pixels
-from export.evaluation.edges_api import Edges, EdgesResult
+from export.evaluation.edges_api import Edges, EdgesResult, Pinhole
 from export.solids import sensors
 
 if TYPE_CHECKING:
@@ -34,6 +36,8 @@ SOLIDS, QUICK_SOLIDS = 6, 2
 VIEWS, TIMED_VIEWS = 12, 24
 TIMED_LEVEL = "tof"
 LARGE_PX, MANY = (640, 480), 1_000_000  # views for the measurement of memory, and points
+ALONE_EVERY = 3  # of the views, whose curves are judged without fusion
+FAR = 1e7  # r: from where a solid, of some thousand, has one footprint
 NEAR_CELLS = 2.0  # from a pixel's place to the point that it became part of, at most
 INSTALL = "scripts/make-venv.sh dev,solids"
 
@@ -69,19 +73,50 @@ def errors_of(
     return rows
 
 
-def fused_views(
-    solid: MultiView, level: str, seed: int, edges: Edges, threads: int
-) -> tuple[list[np.ndarray], list[EdgesResult], np.ndarray, Any, dict[str, float]]:
-    """What the sensor of a level reports, what is found in that, the points, what the fusion says, and its seconds: `s`
-    wall-clock, `cpu_s` of all threads."""
+@dataclass
+class FusedViews:
+    """depths: what the sensor of a level reports of each view; results: what is found in that. points, curves, in the
+    world, and info: of the fusion. seconds: of it, `s` wall-clock, `cpu_s` of all threads."""
+
+    depths: list[np.ndarray]
+    results: list[EdgesResult]
+    points: np.ndarray
+    curves: list[np.ndarray]
+    info: Any
+    seconds: dict[str, float]
+
+
+def fused_views(solid: MultiView, level: str, seed: int, edges: Edges, threads: int) -> FusedViews:
     depths, results = [], []
     rng = np.random.default_rng([24, seed, len(level)])  # as in export.edges.compare_fusion
     with Fusion(edges, threads=max(threads, 0)) as fusion:
         for view in solid.views:
             depths.append(seen_by(sensors.LEVELS[level], view.depth, view.camera.fx_px, rng))
             results.append(fusion.add_view(depths[-1], view.camera))
-        fusion.finish()
-        return depths, results, fusion.points(), fusion.info, {"s": fusion.seconds, "cpu_s": fusion.cpu_seconds}
+        curves = fusion.finish().points
+        seconds = {"s": fusion.seconds, "cpu_s": fusion.cpu_seconds}
+        return FusedViews(depths, results, fusion.points(), curves, fusion.info, seconds)
+
+
+def curve_rows(solid: MultiView, fused: FusedViews, edges: Edges) -> list[dict[str, float]]:
+    """Precision, recall and F-score by length within WITHIN_R of the median pixel, against all curves that any view
+    sees: the first of the fused views, the others of single ones, every ALONE_EVERY-th."""
+    r_m = float(np.median([np.median(v.depth[v.depth > 0]) / v.camera.fx_px for v in solid.views if v.depth.any()]))
+    rows = [world_score(fused.curves, solid.curves, r_m)]
+    for view, depth in list(zip(solid.views, fused.depths, strict=True))[::ALONE_EVERY]:
+        camera = view.camera
+        found = edges.run(depth, Pinhole(camera.fx_px, camera.cx_px, camera.cy_px), curves=True).curves
+        in_world = [points @ camera.rotation + camera.centre for points in found.points]
+        rows.append(world_score(in_world, solid.curves, r_m))
+    return rows
+
+
+def world_score(found: Sequence[np.ndarray], true: Sequence[np.ndarray], r_m: float) -> dict[str, float]:
+    """export.edges.curve_metrics.score of polylines [n, 3] in the world, where r is the same everywhere."""
+    # Put so far away from a camera with as long a focal length that depth, and so r, hardly varies.
+    away = np.array([0, 0, FAR])
+    figures = score([line / r_m + away for line in found], [line / r_m + away for line in true], FAR)
+    return {key: figures[key] for key in ("precision", "recall", "f_score")}
 
 
 def solids(views: int, quick: bool, missing: list[str], said: str) -> Iterator[tuple[int, MultiView]]:
@@ -98,20 +133,31 @@ def solids(views: int, quick: bool, missing: list[str], said: str) -> Iterator[t
 
 
 def measure(bundle: Path, threads: int, quick: bool, folder: Path) -> dict:
-    """errors: by level, means over views of all solids. memory: of the first solid that there is, in LARGE_PX. Raises
+    """errors: by level, means over views of all solids. curves: by level, means over solids, of all views fused and of
+    single ones. memory: of the first solid that there is, in LARGE_PX. Raises
     ImportError as `solids`, CalledProcessError where the child process fails."""
     from export.solids.multiview import multiview
 
     rows: dict[str, list[dict]] = {level: [] for level in LEVELS}
+    of_curves: dict[str, dict[str, list[dict]]] = {level: {"fused": [], "alone": []} for level in LEVELS}
     memory, missing = None, []
     with Edges(bundle, threads) as edges:
         for seed, solid in solids(VIEWS, quick, missing, "edges: fusion"):
             for level in LEVELS:
-                depths, results, points, info, _ = fused_views(solid, level, seed, edges, threads)
-                rows[level] += errors_of(solid, depths, results, points, info.cell_m)
+                found = fused_views(solid, level, seed, edges, threads)
+                rows[level] += errors_of(solid, found.depths, found.results, found.points, found.info.cell_m)
+                fused_row, *alone = curve_rows(solid, found, edges)
+                of_curves[level]["fused"].append(fused_row)
+                of_curves[level]["alone"] += alone
             if not memory:
                 memory = memory_of(multiview("val", seed, TIMED_VIEWS, LARGE_PX), bundle, threads, folder)
-    return {"errors": summed(rows), "memory": memory, "missing": missing}
+    curves = [{"level": level, **{way: means_of(scores) for way, scores in ways.items()}}
+              for level, ways in of_curves.items() if ways["fused"]]  # fmt: skip
+    return {"errors": summed(rows), "curves": curves, "memory": memory, "missing": missing}
+
+
+def means_of(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
 
 
 def measure_times(bundle: Path, threads: int, quick: bool) -> dict:
@@ -119,8 +165,9 @@ def measure_times(bundle: Path, threads: int, quick: bool) -> dict:
     times, missing = [], []
     with Edges(bundle, threads) as edges:
         for seed, solid in solids(TIMED_VIEWS, quick, missing, "edges: time of fusion"):
-            *_, info, seconds = fused_views(solid, TIMED_LEVEL, seed, edges, threads)
-            times.append({"solid": f"{solid.family} {seed}", "points": int(info.point_count), **seconds})
+            found = fused_views(solid, TIMED_LEVEL, seed, edges, threads)
+            points = int(found.info.point_count)
+            times.append({"solid": f"{solid.family} {seed}", "points": points, **found.seconds})
     return {"times": times, "missing": missing}
 
 
@@ -136,7 +183,7 @@ def summed(rows: Mapping[str, Sequence[Mapping[str, float]]]) -> list[dict]:
     found = []
     for level, of_level in rows.items():
         if of_level:
-            means = {key: float(np.mean([row[key] for row in of_level])) for key in of_level[0]}
+            means = means_of(of_level)
             found.append({"level": level, "views": len(of_level), **means, "ratio": means["fused_r"] / means["one_r"]})
     return found
 

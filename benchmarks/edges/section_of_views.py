@@ -63,7 +63,11 @@ def fusion_error_parts(found: dict | None) -> list:
         )
     if found["missing"]:
         says.append(f"Left out: {'; '.join(found['missing'])}.")
-    return [errors, " ".join(says)]
+    curves = [["curves of these solids: precision, recall, F", "one view", f"{fused.VIEWS} fused"]]
+    for row in found["curves"]:
+        scores = [[f"{row[way][key]:.2f}" for key in ("precision", "recall", "f_score")] for way in ("alone", "fused")]
+        curves.append([SAYS[row["level"]], *(", ".join(score) for score in scores)])
+    return [errors, curves, " ".join(says)]
 
 
 def round_parts(found: dict | None) -> list:

@@ -27,7 +27,8 @@ typedef struct maq_edges_curves_config {
   float min_votes;     /* how many an edge needs, above 0 to 100: 1 is what all pixels on one side of it have together;
                           default 0.35 */
   float smear_px;      /* so near an edge depth may be of neither surface, 0 to 32; default 3 */
-  float support_px;    /* surfaces beside an edge are fitted to a band so wide, beyond smear_px, 2 to 64; default 8 */
+  float support_px;    /* surfaces beside an edge are fitted to a band so wide, beyond smear_px, and three times as wide
+                          where depth is noisy, 2 to 64; default 8 */
   float break_deg;     /* a curve that turns by more at one place is two, above 0 to 180; default 15 */
   float min_length_px; /* shorter curves are left out, 4 to 1e6; default 10 */
   float tolerance_r;   /* the simplest type is taken that is so near the edge, above 0 to 16; default 0.5 */

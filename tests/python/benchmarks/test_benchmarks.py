@@ -238,7 +238,8 @@ def edges_document():
     box = {"noise": "stereo", "way": ways[0], "frames": 10, "with_box": 0.0, "median_mm": None, "p90_mm": None,
            "steady_frames": 0, "turned_frames": 10, "deviation_mm": None}  # fmt: skip
     fusion = {"errors": [{"level": "tof", "views": 12, "one_r": 2.0, "fused_r": 1.5, "known": 1.0, "ratio": 0.75}],
-              "memory": None, "missing": []}  # fmt: skip
+              "curves": [{"level": "tof", **dict.fromkeys(("alone", "fused"), curve)}], "memory": None,
+              "missing": []}  # fmt: skip
     timed = {"times": [{"solid": "crate 0", "points": 300_000, "s": 1.0, "cpu_s": 2.0}], "missing": []}
     scans = {"pixels": 10, "under_1r": 0.0, "under_4r": 0.1}
     found = {

@@ -105,7 +105,9 @@ def measured():
         {"solid": f"crate {k}", "points": 300_000 + k, "s": s, "cpu_s": 2 * s} for k, s in enumerate((3.0, 1.0, 2.0))
     ]
     memory = {"points": 800_000, "cell_m": 0.001, "memory_mb": 200.0}
-    found = {"errors": fused.summed(rows), "memory": memory, "missing": ["val 4: lost"]}
+    half = {"precision": 0.5, "recall": 0.25, "f_score": 1 / 3}
+    curves = [{"level": "tof", "alone": half, "fused": dict.fromkeys(half, 1.0)}]
+    found = {"errors": fused.summed(rows), "curves": curves, "memory": memory, "missing": ["val 4: lost"]}
     return found, {"times": times, "missing": []}
 
 
@@ -121,10 +123,11 @@ def test_gates_are_the_worst_level_the_median_solid_and_a_million_points():
 
 
 def test_the_report_tells_what_was_measured_and_nothing_without_it():
-    table, text, of_times = section_of_views.fusion_parts(*measured())
+    table, of_curves, text, of_times = section_of_views.fusion_parts(*measured())
     assert table[1] == ["exact depth", "3.00", "1.50", "0.50"]
     assert "2.0 s in the median (1.0 to 3.0; of the CPU 4.0, 2.0 to 6.0)" in of_times
     assert "800,000 points" in text
+    assert of_curves[1] == ["time of flight", "0.50, 0.25, 0.33", "1.00, 1.00, 1.00"]
     assert "val 4: lost" in text
     assert section_of_views.fusion_parts(None, None) == []
     assert section_of_views.fusion_parts(None, measured()[1]) == [of_times]
@@ -140,6 +143,15 @@ def test_what_is_missing_is_said():
     assert raises(ImportError("no", name="OCP")) == (None, f"OCP is not installed: {fused.INSTALL}")
     failed = subprocess.CalledProcessError(1, "python", stderr="Traceback\nMaquetteError: No bundle.\n")
     assert raises(failed) == (None, "MaquetteError: No bundle.")
+
+
+def test_curves_in_the_world_are_judged_by_one_footprint():
+    true = [np.array([[0, 0, 0], [1, 0, 0]], float), np.array([[0, 1, 0], [0, 1, 3]], float)]
+    beside = [true[0] + [0, 0.015, 0]]
+    assert fused.world_score(beside, true, 0.01)["precision"] == 1
+    assert fused.world_score(beside, true, 0.01)["recall"] == pytest.approx(0.25, abs=0.01)
+    assert fused.world_score(beside, true, 0.005)["precision"] == 0
+    assert fused.world_score(true, true, 0.01)["f_score"] == 1
 
 
 def corner_from(camera):

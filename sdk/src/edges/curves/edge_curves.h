@@ -17,9 +17,9 @@ struct CurveOptions {
   float select_px = 4;       // pixels nearer than that to an edge say where it is
   float min_votes = 0.35f;   // how many an edge needs: 1 is what all pixels on one side of it have together
   float smear_px = 3;        // so near an edge depth may be of neither surface: no plane is fitted to it
-  float support_px = 8;     // planes and patches are fitted to a band so wide, beyond smear_px
+  float support_px = 8;      // planes and patches are fitted to a band so wide, beyond smear_px; wider in noise
   float break_deg = 15;      // a curve that turns by more at one place is two
-  float min_length_px = 10;   // shorter curves are left out, but for the 3 px that a corner may hide
+  float min_length_px = 10;  // shorter curves are left out, but for the 3 px that a corner may hide
   float tolerance_r = 0.5f;  // the simplest type is taken that is so near its points (root of the mean square)
   float gap_r = 2.5f;        // surfaces that are farther apart along the ray do not meet in a crease
   float join_px = 12;        // ends so near the place where their curves meet share a corner

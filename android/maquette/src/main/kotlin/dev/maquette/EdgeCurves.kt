@@ -16,7 +16,7 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
      * @property selectPx pixels nearer than that to an edge say where it is.
      * @property minVotes how many an edge needs: 1 is what all pixels on one side of it have together.
      * @property smearPx so near an edge depth may be of neither surface.
-     * @property supportPx surfaces beside an edge are fitted to a band so wide.
+     * @property supportPx surfaces beside an edge are fitted to a band so wide, and three times as wide where depth is noisy.
      * @property breakDegrees a curve that turns by more at one place is two.
      * @property minLengthPx shorter curves are left out.
      * @property toleranceR the simplest type is taken that is so near the edge.

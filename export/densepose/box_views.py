@@ -33,7 +33,7 @@ IGNORED = 0.5  # fraction of a background box that may lie on a person whom no l
 
 @dataclass(frozen=True)
 class Picture:
-    """image: an encoded picture; box: float32 [n, 4] of its people, pixels; ignore: bool [n], somebody or not.
+    """image: an encoded picture; box: float32 [n, 4] of its people, pixels; ignore: bool [n], unsure ones.
     complete: whether there are no other people; the teachers overlook some."""
 
     image: bytes
@@ -44,7 +44,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class People:
-    """Those of a view: box float32 [n, 4], pixels; ignore bool [n], somebody or not."""
+    """Those of a view: box float32 [n, 4], pixels; ignore bool [n], unsure ones."""
 
     box: Tensor
     ignore: Tensor

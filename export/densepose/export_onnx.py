@@ -46,6 +46,7 @@ class Trunk(nn.Module):
         self.backbone, self.neck, self.evidence = net.backbone, net.neck, net.evidence
 
     def forward(self, image: Tensor) -> tuple[Tensor, ...]:
+        # As MobileParsingRCNN.trunk; but parameters keep the names that the quantization settings know.
         taps = self.backbone(image)
         evidence = [] if self.evidence is None else [self.evidence(*taps[2:])]
         return tuple(channels_last(x) for x in (*self.neck(taps), *evidence))

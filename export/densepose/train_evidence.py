@@ -8,8 +8,8 @@ It reads the backbone's maps, which stay as they are, as do boxes and surface: t
 of a box. So it comes last, after every training that changes the backbone. The maps and boxes of each of `--views`
 augmented pictures are kept in half precision; a step then costs three 1x1 convolutions.
 
-In pictures without people, every box is nobody. In all others scores are to stay as they are at the start
-(distillation), but of boxes on people whom labels are sure of, which are to be at least SURE.
+In pictures without people, every box is background. In all others scores are to stay as they are at the start
+(distillation); only boxes on people whom labels are sure of are to have at least SURE.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from export.densepose.network import MobileParsingRCNN, PersonEvidence
 
 CHANNELS = 24
 VIEWS = 6  # of each kind, with people and without, in a step
-LIKELY = 0.03  # boxes less likely to show a person at the start are left out: they show nobody anyway
-SURE = 0.7
-KEPT_WEIGHT = 1.5  # of the term that keeps scores, against that of boxes that show nobody
+LIKELY = 0.03  # min score of a box to learn from; lower ones are background already
+SURE = 0.7  # min score of a box on a labelled person
+KEPT_WEIGHT = 1.5  # of the term that keeps scores, against that of background
 DECAY = 1e-2  # of weights
 
 
@@ -128,13 +128,13 @@ def fit(seen: list[View], steps: int, rate: float, seed: int) -> PersonEvidence:
     averaged = copy.deepcopy(scaled).requires_grad_(False)
     optimiser = torch.optim.AdamW(scaled.parameters(), lr=rate, weight_decay=DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    kept, nobody = [v for v in seen if v.keeps], [v for v in seen if not v.keeps]
-    # The likelier a view shows somebody to the box head, the oftener it is drawn.
-    mistaken = np.array([float(v.logit.max().sigmoid()) for v in nobody])
+    kept, empty = [v for v in seen if v.keeps], [v for v in seen if not v.keeps]
+    # The likelier the box head takes a view for one of a person, the oftener it is drawn.
+    mistaken = np.array([float(v.logit.max().sigmoid()) for v in empty])
     bar, means = trange(steps, unit="step", disable=None), {}
     for step in bar:
         drawn = [kept[k] for k in rng.integers(len(kept), size=VIEWS)]
-        drawn += [nobody[k] for k in rng.choice(len(nobody), size=VIEWS, p=mistaken / mistaken.sum())]
+        drawn += [empty[k] for k in rng.choice(len(empty), size=VIEWS, p=mistaken / mistaken.sum())]
         losses = [view_loss(scaled, of) for of in drawn]
         optimiser.zero_grad()
         sum(losses).backward()
@@ -144,7 +144,7 @@ def fit(seen: list[View], steps: int, rate: float, seed: int) -> PersonEvidence:
         with torch.no_grad():
             for mean, value in zip(averaged.parameters(), scaled.parameters(), strict=True):
                 mean.lerp_(value, 1 - keep)
-        for name, part in (("kept", losses[:VIEWS]), ("nobody", losses[VIEWS:])):
+        for name, part in (("kept", losses[:VIEWS]), ("background", losses[VIEWS:])):
             now = sum(part).item() / VIEWS
             means[name] = 0.99 * means.get(name, now) + 0.01 * now
         bar.set_postfix({k: f"{v:.3f}" for k, v in means.items()}, refresh=False)

@@ -31,8 +31,9 @@ class Codebook(nn.Module):
         return x.float().unflatten(1, (slices, width)).permute(1, 0, 3, 4, 2).flatten(1, 3)
 
     def _nearest(self, vectors: Tensor) -> Tensor:
-        # |v|^2 is the same for all entries.
-        distance = self.entries.square().sum(-1)[:, None] - 2 * vectors @ self.entries.mT
+        # |v|^2 is the same for all entries. In float32 whatever the network computes in: near ones differ by little.
+        with torch.autocast(vectors.device.type, enabled=False):
+            distance = self.entries.square().sum(-1)[:, None] - 2 * vectors @ self.entries.mT
         return distance.argmin(-1)
 
     @torch.no_grad()

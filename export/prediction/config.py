@@ -23,7 +23,8 @@ class AutoencoderShape:
 @dataclass(frozen=True)
 class TransformerShape:
     """layers: of the context network and of the slice network, each; embedding: channels of embedded codes; frames:
-    how many before the predicted one are seen; slices, entries: of the autoencoder."""
+    how many before the predicted one are seen; motion: whether the codes of the picture that motion alone predicts are
+    seen as well; slices, entries: of the autoencoder."""
 
     width: int = 192
     layers: int = 6
@@ -34,6 +35,12 @@ class TransformerShape:
     frames: int = 3
     slices: int = 4
     entries: int = 512
+    motion: bool = False
+
+    @property
+    def seen(self) -> int:
+        """Frames of codes that the context network is given: those before, oldest first, and last the one by motion."""
+        return self.frames + self.motion
 
 
 AUTOENCODERS = {
@@ -41,6 +48,6 @@ AUTOENCODERS = {
     "paper": AutoencoderShape(widths=(128, 256), residual=128, depth_to_space=False),
 }
 TRANSFORMERS = {
-    "light": TransformerShape(),
+    "light": TransformerShape(motion=True),
     "paper": TransformerShape(width=512, layers=8, heads=8, head_width=128, hidden=512, embedding=128),
 }

@@ -30,7 +30,7 @@ def export_transformer(net: LatentTransformer, folder: Path) -> float:
     shape = net.eval().float().shape
     write_transformer_graphs(net, folder)
     rng = np.random.default_rng(0)
-    codes = rng.integers(shape.entries, size=(shape.frames + 1, shape.slices, CODE_SIDE, CODE_SIDE))
+    codes = rng.integers(shape.entries, size=(shape.seen + 1, shape.slices, CODE_SIDE, CODE_SIDE))
     before, own = torch.from_numpy(codes[None, :-1]), torch.from_numpy(codes[None, -1])
     expected = net(before, own, torch.tensor([_FPS]))[0].numpy()
     runtime = GraphRuntime(folder, TransformerTables.of(net), shape)

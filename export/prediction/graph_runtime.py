@@ -19,7 +19,8 @@ from export.prediction.transformer_graphs import NEIGHBOURS, slice_names
 
 @dataclass(frozen=True, eq=False)
 class TransformerTables:
-    """float32. context_rows [frames * slices * K, embedding], of codes of the frames before, oldest first; slice_rows
+    """float32. context_rows [seen * slices * K, embedding], of codes of the frames before, oldest first, and of the one
+    by motion; slice_rows
     [slices * K, embedding], of the frame itself; earlier [slice][slice before] [K, width]; row_bias and column_bias
     [layers, heads, 31], of the slice network, by query less key; prior [slices, K + 1, K], logits by the code before.
     """
@@ -61,15 +62,16 @@ class GraphRuntime:
         self.bias[:, :, np.triu(np.ones((PLACES, PLACES), bool), 1)] = -np.inf
 
     def begin(self, before: np.ndarray, fps: float) -> None:
-        """before int64 [frames, slices, 16, 16], oldest first, UNSEEN where there was none."""
+        """before int64 [seen, slices, 16, 16], oldest first, the one by motion last, UNSEEN where there was none."""
         entries = self.shape.entries
-        codes = before.reshape(-1, PLACES)  # [frames * slices, 256]
+        codes = before.reshape(-1, PLACES)  # [seen * slices, 256]
         first = np.arange(len(codes))[:, None] * entries
         rows = self.tables.context_rows[np.where(codes == UNSEEN, 0, codes + first)]
         summed = np.where((codes == UNSEEN)[..., None], 0, rows).sum(0, dtype=np.float32)
         step = np.array([[np.log2(10 / fps)]], np.float32)
         (self.context,) = self.context_graph.run(None, {"summed": summed[None], "time_step": step})
-        last = np.where(before[-1] == UNSEEN, entries, before[-1]).reshape(-1, PLACES)
+        last = before[self.shape.frames - 1].reshape(-1, PLACES)
+        last = np.where(last == UNSEEN, entries, last)
         self.prior = np.stack([self.tables.prior[k][own] for k, own in enumerate(last)])  # [slices, 256, K]
 
     def embedded(self, codes: np.ndarray) -> np.ndarray:

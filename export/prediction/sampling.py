@@ -6,16 +6,16 @@ import torch
 from torch import Tensor
 
 from export.prediction.config import CODE_SIDE
-from export.prediction.transformer import LatentTransformer
+from export.prediction.transformer import LatentTransformer, times_of
 
 
 @torch.no_grad()
 def drawn_codes(
     net: LatentTransformer, before: Tensor, fps: Tensor, temperature: float, generator: torch.Generator
 ) -> Tensor:
-    """before int64 [B, frames, slices, 16, 16]; fps [B] -> codes int64 [B, slices, 16, 16]. temperature 0: the
+    """before int64 [B, seen, slices, 16, 16]; fps [B] -> codes int64 [B, slices, 16, 16]. temperature 0: the
     likeliest of each."""
-    context, prior = net.context(before, fps), net.prior_logits(before)
+    context, prior = net.context(before, times_of(fps)), net.prior_logits(before)
     codes = torch.zeros_like(before[:, 0])
     for place in range(CODE_SIDE * CODE_SIDE):
         features = net.heads.norm(net.slices(context, codes)[:, place])

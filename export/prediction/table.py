@@ -29,16 +29,16 @@ class CodeTable:
 
     @staticmethod
     def counted(codes: Tensor, entries: int) -> CodeTable:
-        """From codes int64 [N, T, slices, 16, 16] of training clips."""
+        """From codes [N, T, slices, 16, 16] of training clips; on their device."""
         slices = codes.shape[2]
         frequency, after = [], []
         for k in range(slices):
-            own = codes[:, :, k]
+            own = codes[:, :, k].long()
             counts = torch.bincount(own.flatten(), minlength=entries).float() + 0.5
             frequency.append((counts / counts.sum()).log())
             pairs = torch.bincount((own[:, :-1] * entries + own[:, 1:]).flatten(), minlength=entries**2)
             pairs = pairs.view(entries, entries).float()
-            likely = _SAME * torch.eye(entries) + (1 - _SAME) * frequency[-1].exp()
+            likely = _SAME * torch.eye(entries, device=codes.device) + (1 - _SAME) * frequency[-1].exp()
             smoothed = pairs + _PRIOR_COUNT * likely
             after.append((smoothed / smoothed.sum(1, keepdim=True)).log())
         return CodeTable(torch.stack(frequency), torch.stack(after))
@@ -50,13 +50,13 @@ class CodeTable:
 
 def bits_by_frequency(table: CodeTable, codes: Tensor) -> Tensor:
     """Of every frame but the first, a code: float32 [N, T - 1]."""
-    of = [-table.frequency[k][codes[:, 1:, k]] for k in range(codes.shape[2])]
+    of = [-table.frequency[k][codes[:, 1:, k].long()] for k in range(codes.shape[2])]
     return torch.stack(of).mean((0, 3, 4)) / math.log(2)
 
 
 def bits_by_table(table: CodeTable, codes: Tensor) -> Tensor:
     """Of every frame but the first, a code: float32 [N, T - 1]."""
-    of = [-table.after[k][codes[:, :-1, k], codes[:, 1:, k]] for k in range(codes.shape[2])]
+    of = [-table.after[k][codes[:, :-1, k].long(), codes[:, 1:, k].long()] for k in range(codes.shape[2])]
     return torch.stack(of).mean((0, 3, 4)) / math.log(2)
 
 

@@ -2,7 +2,8 @@
 that were given already, and a chain of heads gives the slices of a place one after another.
 
 Departures from the paper: taps in time that never see anything are left out; the time from frame to frame takes the
-place of the frame's number, which ends at 16; probabilities start from a table (`table.py`).
+place of the frame's number, which ends at 16; probabilities start from a table (`table.py`); the picture that motion
+alone predicts is seen as one more frame.
 """
 
 from __future__ import annotations
@@ -20,31 +21,37 @@ UNSEEN = -1  # code of a frame before the stream's first
 
 
 class ContextNetwork(nn.Module):
-    """Codes of the frames before -> features of each place of the frame to come."""
+    """Codes of the frames before, and of the one that motion predicts -> features of each place of the frame to come.
 
-    def __init__(self, shape: TransformerShape) -> None:
+    times: how many numbers about time it is told.
+    """
+
+    def __init__(self, shape: TransformerShape, times: int = 1) -> None:
         super().__init__()
         self.shape = shape
         # A convolution in time of one-hots is a sum of rows; the row after the last stands for unseen codes and is 0.
-        self.rows = nn.Embedding(
-            shape.frames * shape.slices * shape.entries + 1, shape.embedding,
-            padding_idx=shape.frames * shape.slices * shape.entries,
-        )  # fmt: skip
-        nn.init.normal_(self.rows.weight, std=(shape.frames * shape.slices) ** -0.5)
+        rows = shape.seen * shape.slices * shape.entries
+        self.rows = nn.Embedding(rows + 1, shape.embedding, padding_idx=rows)
+        nn.init.normal_(self.rows.weight, std=(shape.seen * shape.slices) ** -0.5)
         self.rows.weight.data[-1] = 0
-        self.time_step = nn.Linear(1, shape.embedding)
+        self.time_step = nn.Linear(times, shape.embedding)
         self.widen = nn.Linear(shape.embedding, shape.width)
         self.layers = nn.Sequential(*(AttentionLayer(shape, masked=False) for _ in range(shape.layers)))
 
-    def forward(self, before: Tensor, fps: Tensor) -> Tensor:
-        """before int64 [B, frames, slices, 16, 16], oldest first, UNSEEN where there was none; fps [B] ->
-        [B, 256, width]."""
+    def forward(self, before: Tensor, times: Tensor) -> Tensor:
+        """before int64 [B, seen, slices, 16, 16], oldest first, UNSEEN where there was none; times [B, times], as
+        log2 of ten times the seconds -> [B, 256, width]."""
         shape = self.shape
-        codes = before.flatten(3).flatten(1, 2).transpose(1, 2)  # [B, 256, frames * slices]
-        first = torch.arange(codes.shape[-1]) * shape.entries
+        codes = before.flatten(3).flatten(1, 2).transpose(1, 2)  # [B, 256, seen * slices]
+        first = torch.arange(codes.shape[-1], device=codes.device) * shape.entries
         at = torch.where(codes == UNSEEN, self.rows.padding_idx, codes + first)
-        summed = self.rows(at).sum(2) + self.time_step(torch.log2(10 / fps)[:, None, None])
+        summed = self.rows(at).sum(2) + self.time_step(times)[:, None]
         return self.layers(self.widen(summed))
+
+
+def times_of(fps: Tensor) -> Tensor:
+    """[B] -> [B, 1]: what the context network is told of the time from frame to frame."""
+    return torch.log2(10 / fps)[:, None]
 
 
 def sinusoids(width: int) -> Tensor:
@@ -74,7 +81,7 @@ class SliceNetwork(nn.Module):
 
     def forward(self, context: Tensor, codes: Tensor) -> Tensor:
         """context [B, 256, width]; codes int64 [B, slices, 16, 16] -> [B, 256, width]."""
-        first = torch.arange(self.slices) * self.entries
+        first = torch.arange(self.slices, device=codes.device) * self.entries
         summed = self.rows(codes + first[:, None, None]).sum(1).permute(0, 3, 1, 2)
         above = self.above(F.pad(summed, (1, 1, 2, 0))[:, :, :-1])
         near = above + self.left(F.pad(summed, (1, 0))[..., :-1])
@@ -122,21 +129,30 @@ class LatentTransformer(nn.Module):
         self.context, self.slices, self.heads = ContextNetwork(shape), SliceNetwork(shape), ChannelHeads(shape)
         self.register_buffer("table", torch.zeros(shape.slices, shape.entries + 1, shape.entries))
 
-    def prior_logits(self, before: Tensor, table: Tensor | None = None) -> Tensor:
-        """before [B, frames, slices, 16, 16] -> [B, slices, 256, K] of the table (default: the network's own)."""
-        last = before[:, -1].flatten(2)
+    def prior_logits(self, before: Tensor, tables: Tensor | None = None, which: Tensor | None = None) -> Tensor:
+        """before [B, seen, slices, 16, 16] -> [B, slices, 256, K] of the table: the network's own, or number which [B]
+        of `tables` [n, slices, K + 1, K]."""
+        last = before[:, self.shape.frames - 1].flatten(2)
         last = torch.where(last == UNSEEN, self.shape.entries, last)
-        table = self.table if table is None else table
-        return torch.stack([table[k][last[:, k]] for k in range(self.shape.slices)], 1)
+        if tables is None:
+            return torch.stack([self.table[k][last[:, k]] for k in range(self.shape.slices)], 1)
+        return torch.stack([tables[which[:, None], k, last[:, k]] for k in range(self.shape.slices)], 1)
 
-    def forward(self, before: Tensor, codes: Tensor, fps: Tensor, table: Tensor | None = None) -> Tensor:
+    def forward(
+        self,
+        before: Tensor,
+        codes: Tensor,
+        fps: Tensor,
+        tables: Tensor | None = None,
+        which: Tensor | None = None,
+    ) -> Tensor:
         """Logits float32 [B, slices, 256, K] of each code of a frame given those before it in the frame.
 
-        before int64 [B, frames, slices, 16, 16], oldest first; codes int64 [B, slices, 16, 16]: of the frame itself;
-        fps [B]; table: instead of the network's own.
+        before int64 [B, seen, slices, 16, 16], oldest first; codes int64 [B, slices, 16, 16]: of the frame itself;
+        fps [B]; tables, which: instead of the network's own table, as in `prior_logits`.
         """
-        features = self.slices(self.context(before, fps), codes)
-        return self.heads(features, codes.flatten(2)).float() + self.prior_logits(before, table)
+        features = self.slices(self.context(before, times_of(fps)), codes)
+        return self.heads(features, codes.flatten(2)).float() + self.prior_logits(before, tables, which)
 
 
 def unreachable_parameters(shape: TransformerShape) -> int:

@@ -19,6 +19,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from export.pack_file import PackWriter, jpeg, shrunk
 from export.people import assets
 from export.people.animals import load_animals
 from export.people.motion import load_clips
@@ -29,8 +30,6 @@ from export.teachers.shards import write_training_set
 DATA = Path(".data")
 SPLITS = ("train", "val")
 SKIN_PX = 1024  # what the renderer uses
-LONG_SIDE = 512  # of photographs: a pack is to stay below 60 MiB
-QUALITY = 88
 _BODY = ("3dobjs/base.obj", "rigs/standard/rig.default.json", "rigs/standard/weights.default.json")
 
 
@@ -45,35 +44,6 @@ class Sizes:
 
     def of(self, split: str, count: int) -> int:
         return count if split == "train" else max(count // 4, 1)
-
-
-class PackWriter:
-    """Adds files to a tar archive, and counts their bytes before compression by first folder."""
-
-    def __init__(self, tar: tarfile.TarFile) -> None:
-        self._tar = tar
-        self.bytes: dict[str, int] = {}
-
-    def add(self, name: str, content: bytes) -> None:
-        entry = tarfile.TarInfo(name)
-        entry.size = len(content)
-        self._tar.addfile(entry, io.BytesIO(content))
-        key = name.split("/")[0]
-        self.bytes[key] = self.bytes.get(key, 0) + len(content)
-
-    def add_arrays(self, name: str, **arrays: np.ndarray) -> None:
-        buffer = io.BytesIO()
-        np.savez(buffer, **arrays)
-        self.add(name, buffer.getvalue())
-
-
-def jpeg(image: np.ndarray) -> bytes:
-    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
-
-
-def shrunk(image: np.ndarray, long_side: int = LONG_SIDE) -> np.ndarray:
-    scale = long_side / max(image.shape[:2])
-    return image if scale >= 1 else cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
 
 
 def make(path: Path, photos: Path, sizes: Sizes) -> dict[str, int]:

@@ -4,15 +4,17 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed: scripts/make-venv.sh train,dev")
 
+import cv2
 import numpy as np
 import torch
 
 from export.clips.clip import write_clip
 from export.clips.shapes import shapes_clip
-from export.prediction import train_autoencoder
+from export.prediction import run, train_autoencoder
 from export.prediction.autoencoder import Autoencoder
 from export.prediction.codebook import Codebook, used_fraction
 from export.prediction.config import AUTOENCODERS, AutoencoderShape
+from export.prediction.data import read_stills, varied
 from export.prediction.picture_error import horizon_figures, psnr_db
 from export.training import seed_step
 
@@ -92,10 +94,37 @@ def test_a_few_frames_are_learnt(tmp_path):
     losses = []
     for step in range(120):
         seed_step(0, step)
-        losses.append(training.advance(frames, 3e-3)["picture"].item())
+        losses.append(training.advance(frames, frames, 3e-3)["picture"].item())
     assert np.mean(losses[-10:]) < 0.3 * np.mean(losses[:3])
     figures = horizon_figures(training.net.eval(), frames.unflatten(0, (1, 8))[:, [0, 1, 2, 3, 4, 5, 6, 7, 0, 1]])
     assert {f"{name} {k}" for name in ("last", "plain", "difference") for k in (1, 3, 8)} == figures.keys()
+
+
+def test_a_varied_frame_differs_from_its_target_by_noise_alone():
+    torch.manual_seed(0)
+    frames = torch.full((64, 64, 64, 3), 128, dtype=torch.uint8)
+    frames[:, :, :32] = 100
+    seen, true = varied(frames)
+    noise = seen - true
+    assert noise.mean().abs() < 0.1
+    assert 0.5 < noise.std() < 5
+    levels = true.flatten(1, 2)
+    assert (levels.amax(1) - levels.amin(1) > 10).all()
+    assert levels.mean((1, 2)).std() > 5
+    brighter_right = true[:, :, 40:].mean((1, 2, 3)) > true[:, :, :20].mean((1, 2, 3))
+    assert 0.2 < brighter_right.float().mean() < 0.8
+
+
+def test_stills_are_crops_of_the_photographs(tmp_path):
+    photo = np.zeros((90, 160, 3), np.uint8)
+    photo[..., 0] = 200  # blue, as OpenCV has it
+    cv2.imwrite(str(tmp_path / "blue.jpg"), photo)
+    stills = read_stills(tmp_path, 5)
+    assert stills.shape == (5, 64, 64, 3)
+    assert (stills[..., 2].float() - 200).abs().max() < 6
+    assert stills[..., 0].max() < 6
+    with pytest.raises(SystemExit, match="No photographs"):
+        read_stills(tmp_path / "none", 5)
 
 
 def test_a_stopped_training_goes_on_to_the_same_weights(tmp_path, monkeypatch):
@@ -106,9 +135,7 @@ def test_a_stopped_training_goes_on_to_the_same_weights(tmp_path, monkeypatch):
     options = arguments(monkeypatch, data, halves, "--steps", "6")
     stops = iter([False] * 3 + [True] * 9)
     with monkeypatch.context() as patched:
-        patched.setattr(
-            train_autoencoder, "StopSignal", lambda: type("Stop", (), {"__bool__": lambda self: next(stops)})()
-        )
+        patched.setattr(run, "StopSignal", lambda: type("Stop", (), {"__bool__": lambda self: next(stops)})())
         train_autoencoder.train(options)
     assert torch.load(halves / "checkpoint.pt", weights_only=True)["step"] == 3
     train_autoencoder.train(options)

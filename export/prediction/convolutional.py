@@ -1,0 +1,74 @@
+"""A convolutional network that predicts a frame from the three before, in the manner of SimVP (arXiv 2206.05099): an
+encoder of single frames, blocks of wide convolutions over all of them, a decoder. It has no codes and no probabilities:
+what the transformer is compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from export.prediction.autoencoder import scaled
+
+
+@dataclass(frozen=True)
+class ConvolutionalShape:
+    """widths: channels at 64 x 64, 32 x 32 and 16 x 16 pixels; blocks: at the last; frames: seen; kernel: of blocks."""
+
+    widths: tuple[int, int, int] = (32, 96, 192)
+    blocks: int = 6
+    frames: int = 3
+    kernel: int = 7
+
+
+class TimedBlock(nn.Module):
+    """A depthwise convolution and two pointwise ones, scaled by channel by the times that it is told."""
+
+    def __init__(self, width: int, kernel: int) -> None:
+        super().__init__()
+        self.spatial = nn.Conv2d(width, width, kernel, padding=kernel // 2, groups=width)
+        self.scale = nn.Linear(2, width)
+        self.mixed = nn.Sequential(nn.Conv2d(width, 2 * width, 1), nn.ReLU(), nn.Conv2d(2 * width, width, 1))
+        nn.init.zeros_(self.mixed[-1].weight)
+
+    def forward(self, x: Tensor, times: Tensor) -> Tensor:
+        return x + self.mixed(self.spatial(x) * (1 + self.scale(times)[..., None, None]))
+
+
+class ConvolutionalNet(nn.Module):
+    def __init__(self, shape: ConvolutionalShape) -> None:
+        super().__init__()
+        self.shape = shape
+        first, second, third = shape.widths
+        self.fine = nn.Sequential(nn.Conv2d(3 * shape.frames, first, 3, padding=1), nn.ReLU())
+        self.middle = nn.Sequential(
+            nn.Conv2d(first, second, 4, 2, 1), nn.ReLU(), nn.Conv2d(second, second, 3, padding=1)
+        )
+        self.quarter = nn.Conv2d(second, third, 4, 2, 1)
+        self.blocks = nn.ModuleList(TimedBlock(third, shape.kernel) for _ in range(shape.blocks))
+        self.to_half = nn.Sequential(nn.Conv2d(third, 4 * second, 1), nn.PixelShuffle(2))
+        self.to_fine = nn.Sequential(
+            nn.ReLU(), nn.Conv2d(second, second, 3, padding=1), nn.ReLU(), nn.Conv2d(second, 4 * first, 1),
+            nn.PixelShuffle(2),
+        )  # fmt: skip
+        self.out = nn.Sequential(
+            nn.ReLU(), nn.Conv2d(first, first, 3, padding=1), nn.ReLU(), nn.Conv2d(first, 3, 3, padding=1)
+        )
+        nn.init.zeros_(self.out[-1].weight)  # a new network repeats the last frame
+        nn.init.zeros_(self.out[-1].bias)
+
+    def forward(self, before: Tensor, times: Tensor) -> Tensor:
+        """before [B, frames, 3, 64, 64] in -1..1, oldest first; times [B, 2] of `times_ahead` -> [B, 3, 64, 64]: what
+        the last frame changes by is learnt."""
+        fine = self.fine(before.flatten(1, 2))
+        half = self.middle(fine)
+        x = self.quarter(F.relu(half))
+        for block in self.blocks:
+            x = block(x, times)
+        return before[:, -1] + self.out(fine + self.to_fine(half + self.to_half(x)))
+
+    def predicted(self, frames: Tensor, times: Tensor) -> Tensor:
+        """frames [B, frames, 64, 64, 3], 0..255 -> float32 [B, 64, 64, 3], 0..255."""
+        before = scaled(frames.flatten(0, 1)).unflatten(0, frames.shape[:2])
+        return ((self(before, times).float() + 1) * 127.5).permute(0, 2, 3, 1)

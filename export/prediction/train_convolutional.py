@@ -1,0 +1,111 @@
+"""Trains the convolutional network that predicts frames without codes; goes on where it was stopped.
+
+    python -m export.prediction.train_convolutional --sets pushing shapes --minutes 120
+
+Writes checkpoint.pt, weights.pt, log.json and curves.png to --out. Figures are PSNR of held-out clips, dB, by frames
+ahead: `network H`, beside the last frame, `last H`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from export.prediction import run
+from export.prediction.convolutional import ConvolutionalNet, ConvolutionalShape
+from export.prediction.data import Clips, read_clips
+from export.prediction.motion_pictures import HORIZONS
+from export.prediction.parallel import times_ahead
+from export.prediction.picture_error import psnr_db
+
+_BATCH = 64  # held-out frames at once
+
+
+class Training(run.Training):
+    def __init__(self, shape: ConvolutionalShape, bf16: bool = False, device: str = "cpu") -> None:
+        net = ConvolutionalNet(shape).train().to(device)
+        super().__init__(net, torch.optim.AdamW(net.parameters(), betas=(0.9, 0.99), weight_decay=0.01), bf16)
+
+    def advance(self, clips: Clips, count: int, rate: float) -> dict[str, Tensor]:
+        """One step on `count` frames at random, half of them mirrored, at that learning rate."""
+        device, total = self.device, clips.frames.shape[1]
+        ahead = torch.randint(1, HORIZONS[-1] + 1, (count,), device=device)
+        clip = torch.randint(len(clips), (count,), device=device)
+        now = (torch.rand(count, device=device) * (total - ahead)).long()
+        before, truth = frames_of(clips, clip, now, self.net.shape.frames), clips.frames[clip, now + ahead]
+        mirrored = torch.rand(count, 1, 1, 1, device=device) < 0.5
+        before = torch.where(mirrored[:, None], before.flip(3), before)
+        truth = torch.where(mirrored, truth.flip(2), truth)
+        with self.autocast():
+            made = self.net.predicted(before, times_ahead(clips.fps[clip], ahead.float()))
+        loss = ((made - truth.float()) / 127.5).square().mean()
+        self.descend(loss, rate, largest_gradient=1.0)
+        return {"picture": loss.detach()}
+
+
+def frames_of(clips: Clips, clip: Tensor, now: Tensor, count: int) -> Tensor:
+    """The frames seen when frame `now` [B] of clips number `clip` [B] has come, the first repeated where there are
+    fewer: uint8 [B, count, 64, 64, 3]."""
+    at = now[:, None] + torch.arange(1 - count, 1, device=now.device)
+    return clips.frames[clip[:, None], at.clamp(min=0)]
+
+
+@torch.no_grad()
+def figures_of(net: ConvolutionalNet, clips: Clips, frames: int) -> dict[str, float]:
+    """Of held-out clips, `frames` of them for each time ahead, spread evenly over clips and times."""
+    figures: dict[str, float] = {}
+    device, seen = clips.frames.device, net.shape.frames
+    for ahead in HORIZONS:
+        times = clips.frames.shape[1] - ahead - seen
+        chosen = torch.linspace(0, len(clips) * times - 1, min(frames, len(clips) * times), device=device).long()
+        network, last = [], []
+        for some in chosen.split(_BATCH):
+            clip, now = some // times, seen + some % times
+            before, truth = frames_of(clips, clip, now, seen), clips.frames[clip, now + ahead]
+            told = times_ahead(clips.fps[clip], torch.full((len(some),), float(ahead), device=device))
+            network.append(psnr_db(net.predicted(before, told), truth))
+            last.append(psnr_db(before[:, -1], truth))
+        figures[f"network {ahead}"] = float(torch.cat(network).mean())
+        figures[f"last {ahead}"] = float(torch.cat(last).mean())
+    return figures
+
+
+def load_convolutional(path: Path) -> ConvolutionalNet:
+    """Weights as `train_convolutional` writes them."""
+    stored = torch.load(path, weights_only=True)
+    net = ConvolutionalNet(ConvolutionalShape(**(stored["shape"] | {"widths": tuple(stored["shape"]["widths"])})))
+    net.load_state_dict(stored["net"])
+    return net.eval()
+
+
+def parsed() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=Path(".data/clips"))
+    parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
+    parser.add_argument("--out", type=Path, default=Path(".data/runs/prediction-convolutional"))
+    parser.add_argument("--validate-frames", type=int, default=256, help="a time ahead (default %(default)s)")
+    run.add_arguments(parser, minutes=120, batch=16, rate=1e-3)
+    return parser.parse_args()
+
+
+def train(arguments: argparse.Namespace) -> None:
+    """Runs or resumes a training."""
+    run.begin(arguments)
+    device = torch.device(arguments.device)
+    clips, held_out = (read_clips(arguments.data, arguments.sets, split).on(device) for split in ("train", "val"))
+    training = Training(ConvolutionalShape(), arguments.bf16, arguments.device)
+    run.run(
+        training, arguments, lambda rate: training.advance(clips, arguments.batch, rate),
+        lambda: figures_of(training.net, held_out, arguments.validate_frames), "held out: PSNR, dB",
+    )  # fmt: skip
+
+
+def main() -> None:
+    train(parsed())
+
+
+if __name__ == "__main__":
+    main()

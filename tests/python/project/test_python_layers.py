@@ -20,6 +20,7 @@ ALLOWED = {
     "export.jobs": set(),
     "export.bundle": set(),
     "export.xxh3": set(),
+    "export.pack_file": set(),
     "export.checked_file": {"export.xxh3"},
     "export.onnx_graphs": {"export.bundle"},
     "export.photos": set(),
@@ -32,12 +33,12 @@ ALLOWED = {
         "export.training",
     },
     "export.teachers": {
-        "export.camera", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",
-        "export.surface",
+        "export.camera", "export.densepose", "export.jobs", "export.pack_file", "export.people", "export.photos",
+        "export.shards", "export.surface",
     },
     "export.prediction": {
-        "export.bundle", "export.checked_file", "export.clips", "export.densepose", "export.onnx_graphs",
-        "export.training",
+        "export.bundle", "export.checked_file", "export.clips", "export.densepose", "export.jobs",
+        "export.onnx_graphs", "export.pack_file", "export.training",
     },
     "export.scenes": {
         "export.bundle", "export.camera", "export.densepose", "export.onnx_graphs", "export.point_cloud",

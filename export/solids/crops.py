@@ -13,7 +13,6 @@ from export.solids.views import Seen, View
 
 CROP_PX = 128
 VIEWS, CROPS_OF_VIEW = 3, 2
-CROPS_OF_SEED = VIEWS * CROPS_OF_VIEW
 WHOLE_VIEWS = {"train": 2, "val": 3, "test": 2}
 WHOLE_PX = (FRAME_PX, (640, 480))  # each whole view in both sizes
 MAGNIFIED = max(width / FRAME_PX[0] for width, _ in WHOLE_PX)
@@ -33,16 +32,16 @@ def _planes(view: View, labels: Labels) -> dict[str, np.ndarray]:
     }
 
 
-def crops_of(split: str, seed: int, again: int = 0) -> list[Record]:
-    """CROPS_OF_SEED crops, fewer where cameras see too little. again: as for `recipe.make`."""
-    made = make(split, seed, VIEWS, again)
+def crops_of(split: str, seed: int, again: int = 0, views: int = VIEWS, of_view: int = CROPS_OF_VIEW) -> list[Record]:
+    """`of_view` crops of each of `views` views, fewer where cameras see too little. again: as for `recipe.make`."""
+    made = make(split, seed, views, again)
     rng = generator(split, seed, 1)
     found = []
     for number, camera in enumerate(made.cameras):
         seen = Seen(made.solid, camera)
         labeller = Labeller(seen)
         places = labeller.pixels_of_curves(camera)
-        for k in range(CROPS_OF_VIEW):
+        for k in range(of_view):
             view = _chosen(rng, seen, camera, places)
             if view is None:
                 continue

@@ -17,7 +17,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from export.jobs import Work, Workers
-from export.solids.crops import CROPS_OF_SEED, crops_of, whole_views_of
+from export.solids.crops import CROPS_OF_VIEW, VIEWS, crops_of, whole_views_of
 from export.solids.recipe import SPLITS, without_crashes
 from export.solids.records import Record, write_shard
 
@@ -26,8 +26,8 @@ SEEDS_OF_SHARD = 100
 MAX_S = 600.0  # of a solid, which takes a second; `recipe.CPU_S` comes first
 
 
-def _crops(job: tuple[str, int]) -> list[Record]:
-    return without_crashes(partial(crops_of, *job))
+def _crops(job: tuple[str, int], views: int, of_view: int) -> list[Record]:
+    return without_crashes(partial(crops_of, *job, views=views, of_view=of_view))
 
 
 def _whole_views(job: tuple[str, int]) -> list[Record]:
@@ -41,19 +41,22 @@ def main() -> None:
     parser.add_argument(
         "--count", type=int, default=64000, help="crops, or solids of whole views (default %(default)s)"
     )
+    parser.add_argument("--views", type=int, default=VIEWS, help="of a solid to take crops from (default %(default)s)")
+    parser.add_argument("--crops-of-view", type=int, default=CROPS_OF_VIEW, help="default: %(default)s")
     parser.add_argument("--out", type=Path, required=True)
     Workers.add_arguments(parser)
     options = parser.parse_args()
-    if options.count < 1:
-        parser.error("--count must be at least 1")
+    if min(options.count, options.views, options.crops_of_view) < 1:
+        parser.error("--count, --views and --crops-of-view must be at least 1")
     options.out.mkdir(parents=True, exist_ok=True)
-    seeds = options.count if options.whole else -(-options.count // CROPS_OF_SEED)
+    seeds = options.count if options.whole else -(-options.count // (options.views * options.crops_of_view))
     shards = {
         options.out / f"solids-{k:05d}.npz": range(k * SEEDS_OF_SHARD, min((k + 1) * SEEDS_OF_SHARD, seeds))
         for k in range(-(-seeds // SEEDS_OF_SHARD))
     }
     missing = {path: own for path, own in shards.items() if not path.exists()}
-    work = _whole_views if options.whole else _crops
+    crops = partial(_crops, views=options.views, of_view=options.crops_of_view)
+    work = _whole_views if options.whole else crops
     _render(options.split, work, missing, Workers.of(options, MAX_S), seeds)
 
 

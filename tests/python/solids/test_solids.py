@@ -20,7 +20,7 @@ from export.camera import Camera
 from export.solids import dataset, recipe
 from export.solids import shapes as s
 from export.solids.brep import solid_of
-from export.solids.crops import CROP_PX, CROPS_OF_SEED, crops_of, whole_views_of
+from export.solids.crops import CROP_PX, CROPS_OF_VIEW, VIEWS, crops_of, whole_views_of
 from export.solids.draw import Scale
 from export.solids.guarded import LostError, called
 from export.solids.recipe import DEVIATION_R, FAMILIES, SPLITS, RecipeError, looking, make, without_crashes
@@ -43,7 +43,7 @@ def test_a_seed_means_the_same_bytes(records):
 
 
 def test_crops_hold_what_training_needs(records):
-    assert 0 < len(records) <= CROPS_OF_SEED
+    assert 0 < len(records) <= VIEWS * CROPS_OF_VIEW
     for record in records:
         planes = record.decoded()
         assert {plane.shape for plane in planes.values()} == {(CROP_PX, CROP_PX)}
@@ -192,7 +192,7 @@ def test_a_dataset_does_not_depend_on_processes_and_goes_on_where_it_was(tmp_pat
     monkeypatch.setattr(dataset, "SEEDS_OF_SHARD", 2)
     folders = tmp_path / "one", tmp_path / "two"
     for folder, processes in zip(folders, ("0", "2"), strict=True):
-        arguments = ["dataset", "train", "--count", str(3 * CROPS_OF_SEED), "--out", str(folder)]
+        arguments = ["dataset", "train", "--count", str(3 * VIEWS * CROPS_OF_VIEW), "--out", str(folder)]
         monkeypatch.setattr(sys, "argv", [*arguments, "--processes", processes])
         dataset.main()
     paths = [sorted(folder.glob("*.npz")) for folder in folders]

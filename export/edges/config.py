@@ -18,10 +18,11 @@ KINDS = 2  # crease, boundary: logits
 @dataclass(frozen=True)
 class NetworkConfig:
     """widths: channels at 1/2, 1/4, 1/8, ... of the frame. bins: 0 for one distance and its spread per pixel, else a
-    histogram of so many bins over 0..EPS_R (the paper's loss)."""
+    histogram of so many bins over 0..EPS_R (the paper's loss). blocks: residual blocks at 1/4, 1/8, ..., or none."""
 
     widths: tuple[int, ...] = (24, 32, 48, 64)
     bins: int = 0
+    blocks: tuple[int, ...] = ()
 
     @property
     def multiple(self) -> int:
@@ -39,4 +40,5 @@ SIZES = {
     "s": NetworkConfig((24, 32, 48, 64)),
     "m": NetworkConfig((32, 48, 64, 96)),
     "l": NetworkConfig((48, 64, 96, 128)),
+    "xl": NetworkConfig((48, 64, 96, 128), blocks=(1, 1, 1)),
 }

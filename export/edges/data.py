@@ -12,6 +12,7 @@ from torch import Tensor
 
 from export.edges.config import EPS_R
 from export.edges.losses import FieldTarget
+from export.solids.compact import CompactCrop, read_compact
 from export.solids.records import Record, RecordError, read_records
 from export.solids.sensors import Sensor, drawn
 
@@ -35,7 +36,7 @@ class Frame:
     number: int = 0
 
 
-def frame_of(record: Record, number: int = 0) -> Frame:
+def frame_of(record: Record | CompactCrop, number: int = 0) -> Frame:
     planes = record.decoded()
     counts = ~planes["ignore"] & (planes["depth"] > 0)
     distance = planes["distance"].astype(np.float32)
@@ -59,11 +60,12 @@ def seen_by(sensor: Sensor, depth: np.ndarray, focal_px: float, rng: np.random.G
 class Batches:
     """Crops in a new order each pass, cut, mirrored, transposed and scaled, each through a sensor of its own.
 
-    Batch k depends on the seed and k alone.
+    Batch k depends on the seed and k alone. folder: of shards, or a file of `export.solids.compact`.
     """
 
     def __init__(self, folder: Path, crop_px: int, batch: int, seed: int, limit: int | None = None) -> None:
-        self.records = list(islice(read_records(folder), limit))
+        records = read_records(folder) if folder.is_dir() else read_compact(folder)
+        self.records = list(islice(records, limit))
         sides = {side for record in self.records for side in (record.height, record.width)}
         if len(self.records) < batch:
             raise RecordError(f"{folder} has {len(self.records)} crops, fewer than a batch of {batch}.")
@@ -74,7 +76,7 @@ class Batches:
         self.crop_px, self.batch, self.seed = crop_px, batch, seed
         self._pass, self._order = -1, np.empty(0, int)
 
-    def _index(self, number: int) -> int:
+    def index(self, number: int) -> int:
         """Of the crop that is drawn as the `number`-th."""
         turn, at = divmod(number, len(self.records))
         if turn != self._pass:
@@ -85,7 +87,7 @@ class Batches:
     def example(self, number: int) -> Frame:
         """The `number`-th crop, as a sensor of its own sees it."""
         rng = np.random.default_rng([self.seed, 2, number])
-        crop = frame_of(self.records[self._index(number)])
+        crop = frame_of(self.records[self.index(number)])
         y, x = rng.integers(crop.depth.shape[0] - self.crop_px + 1, size=2)
         flip_y, flip_x, transpose = rng.random(3) < 0.5
         depth, distance, kind, counts = (

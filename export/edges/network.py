@@ -23,13 +23,27 @@ def _doubled(x: Tensor, like: Tensor) -> Tensor:
     return F.interpolate(x, size=like.shape[2:], mode="nearest")
 
 
+class Residual(nn.Module):
+    """relu(x + f(x)) of planes that are not negative. It begins as the identity, so that a trained network without the
+    block computes the same with it."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.first = _convolution(channels, channels)
+        self.second = nn.Sequential(nn.Conv2d(channels, channels, 3, 1, 1, bias=False), nn.BatchNorm2d(channels))
+        nn.init.zeros_(self.second[1].weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return F.relu(x + self.second(self.first(x)))
+
+
 class EdgeNetwork(nn.Module):
     """Folded slopes [N, 12, H / 2, W / 2] -> planes [N, P, H, W]; H and W multiples of `config.multiple`.
 
-    Plain 3 x 3 convolutions, ReLU, skips by addition, the finest layers at half resolution: what int8 kernels do best
-    (docs/scenes.md). Planes without a histogram: distance / EPS_R (0 to 1 where it is right, not cut off), logarithm of
-    its spread, logits of crease and boundary. With one: logits of the bins, then those two. double: replaced where a
-    graph is made.
+    Plain 3 x 3 convolutions, ReLU, skips by addition, residual blocks where `config.blocks` has some, the finest layers
+    at half resolution: what int8 kernels do best (docs/scenes.md). Planes without a histogram: distance / EPS_R (0 to 1
+    where it is right, not cut off), logarithm of its spread, logits of crease and boundary. With one: logits of the
+    bins, then those two. double: replaced where a graph is made.
     """
 
     double: Callable[[Tensor, Tensor], Tensor] = staticmethod(_doubled)
@@ -39,14 +53,18 @@ class EdgeNetwork(nn.Module):
         widths = config.widths
         self.stem = nn.Sequential(_convolution(INPUT_PLANES * FOLD**2, widths[0]), _convolution(widths[0], widths[0]))
         self.down = nn.ModuleList(nn.Sequential(_convolution(a, b, 2), _convolution(b, b)) for a, b in pairwise(widths))
+        self.deep = nn.ModuleList(
+            nn.Sequential(*(Residual(width) for _ in range(count)))
+            for width, count in zip(widths[1:], config.blocks or (0,) * (len(widths) - 1), strict=True)
+        )
         self.up = nn.ModuleList(nn.ModuleList([_convolution(b, a), _convolution(a, a)]) for a, b in pairwise(widths))
         self.head = nn.Conv2d(widths[0], config.planes * FOLD**2, 3, 1, 1)
 
     def features(self, x: Tensor) -> Tensor:
         """Planes as they leave the graph: [N, P 4, H / 2, W / 2], 2 x 2 pixels as channels."""
         skips = [self.stem(x)]
-        for block in self.down:
-            skips.append(block(skips[-1]))
+        for block, deep in zip(self.down, self.deep, strict=True):
+            skips.append(deep(block(skips[-1])))
         x = skips.pop()
         for (narrow, join), skip in zip(reversed(self.up), reversed(skips), strict=True):
             x = join(self.double(narrow(x), skip) + skip)

@@ -3,26 +3,30 @@
     python -m export.solids.dataset train --count 64000 --out .data/solids/train
     python -m export.edges.train --data .data/solids --out .data/runs/edges-s --minutes 120
 
-It resumes from `--out` by itself, saves every few minutes and on Ctrl-C: checkpoint.pt, weights.pt (for
-export.edges.export_onnx), log.json, curves.png, and sample.png: what the camera sees, true field, ours.
+With a GPU, crops lie in its memory and sensors run on it in batches (`device_batches.py`): with other random numbers,
+so that a run is not the same with and without. It resumes from `--out` by itself, saves every few minutes and on
+Ctrl-C: checkpoint.pt, weights.pt (for export.edges.export_onnx), log.json, curves.png, and sample.png: what the camera
+sees, true field, ours.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import torch
-from torch import nn
+from torch import Tensor, nn
 from tqdm import tqdm
 
 from export.edges.config import SIZES, NetworkConfig
 from export.edges.data import Batches, RecordError, read_frames
 from export.edges.depth_input import folded, slopes
-from export.edges.losses import LOSSES, LossWeights, field_terms
+from export.edges.device_batches import DeviceBatches
+from export.edges.losses import LOSSES, FieldTarget, LossWeights, field_terms
 from export.edges.network import EdgeNetwork
 from export.edges.validation import sheet, validate
 from export.edges.weights import save_network, start_from
@@ -52,6 +56,7 @@ class TrainingConfig:
     """One training; the options of the command have the same names and say what they mean."""
 
     data: Path = Path(".data/solids")
+    pack: Path | None = None
     out: Path = Path(".data/runs/edges")
     init: Path | None = None
     size: str = "s"
@@ -68,7 +73,9 @@ class TrainingConfig:
     seed: int = 0
     threads: int | None = None
     precision: str = "float32"
+    batched_sensors: bool | None = None
     validate_minutes: float = 15
+    save_minutes: float = SAVE_EVERY_S / 60
 
     @property
     def network(self) -> NetworkConfig:
@@ -86,7 +93,8 @@ class Run:
             start_from(config.init, self.network)
         self.network = self.network.to(device, memory_format=torch.channels_last)
         self.mean = Ema(self.network, EMA_DECAY)
-        self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=config.lr, weight_decay=1e-4)
+        fused = device.type == "cuda"  # one kernel instead of hundreds
+        self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=config.lr, weight_decay=1e-4, fused=fused)
         self.step, self.spent_s, self.log = 0, 0.0, []
         if not self.checkpoint.exists():
             return
@@ -110,7 +118,9 @@ class Run:
         write_log(self.log, self.config.out, FIGURES, against="step", label="validation, r")
 
     def check(self, frames: list) -> None:
-        """Adds figures on held-out frames to the log and writes sample.png."""
+        """Adds figures on held-out frames, where there are some, to the log and writes sample.png."""
+        if not frames:
+            return
         figures = validate(self.mean.net, self.config.network.bins, frames, VALIDATED)
         flat = {f"{name}/{level}": value for level, row in figures.items() for name, value in row.items()}
         self.log.append({"step": self.step, "spent": self.spent_s, **flat})
@@ -119,16 +129,30 @@ class Run:
         tqdm.write(json.dumps({name: round(value, 4) for name, value in self.log[-1].items()}))
 
 
+def _batches(config: TrainingConfig, device: torch.device) -> Batches:
+    on_gpu = device.type == "cuda"
+    kind = DeviceBatches if config.batched_sensors or (on_gpu and config.batched_sensors is None) else Batches
+    source = config.pack or config.data / "train"
+    batches = kind(source, config.crop, config.batch, config.seed, config.crops)
+    return batches.moved(device) if isinstance(batches, DeviceBatches) else batches
+
+
+def _drawn(batches: Batches, seed: int, step: int, device: torch.device) -> tuple[Tensor, Tensor, FieldTarget]:
+    seed_step(seed, step)
+    return batches.draw(step, device)
+
+
 def train(config: TrainingConfig) -> None:
     """Trains as the head of this file says. Raises SystemExit where crops cannot be read."""
     if config.threads:
         torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    torch.backends.cudnn.benchmark = True  # all batches have one size
     try:
         run = Run(config, device)
-        batches = Batches(config.data / "train", config.crop, config.batch, config.seed, config.crops)
-        frames = read_frames(config.data / "val", limit=VALIDATION_FRAMES)
+        batches = _batches(config, device)
+        frames = read_frames(config.data / "val", limit=VALIDATION_FRAMES) if config.validate_minutes else []
     except (RecordError, FileNotFoundError, ValueError) as error:
         raise SystemExit(str(error)) from None
     schedule, stopped = Schedule(config.minutes, config.steps), StopSignal()
@@ -137,23 +161,24 @@ def train(config: TrainingConfig) -> None:
         return
     weights, bins, half = LossWeights(near=config.near), config.network.bins, config.precision == "bfloat16"
     smoothed, watch = SmoothedTerms(), Stopwatch(run.spent_s)
-    save_due, check_due = Interval(SAVE_EVERY_S), Interval(config.validate_minutes * 60)
+    save_due, check_due = Interval(config.save_minutes * 60), Interval(config.validate_minutes * 60 or math.inf)
     bar = schedule.bar(run.step, run.spent_s)
     run.network.train()
-    finished = False
+    finished, batch = False, _drawn(batches, config.seed, run.step, device)
     while not finished:
-        seed_step(config.seed, run.step)
         fraction = schedule.fraction(run.step, run.spent_s)
         for group in run.optimiser.param_groups:
             group["lr"] = steady_rate_at(run.step, fraction, config.lr, config.decay)
 
-        depth, focal_px, target = batches.draw(run.step, device)
+        depth, focal_px, target = batch
         planes = folded(slopes(depth, focal_px), 2).contiguous(memory_format=torch.channels_last)
         with torch.autocast(device.type, torch.bfloat16, enabled=half):
             output = run.network(planes)
         terms = field_terms(output.float(), target, bins, config.loss, weights)
         run.optimiser.zero_grad(set_to_none=True)
         sum(terms.values()).backward()
+        # Before anything waits for the GPU: it makes the next batch while this process prepares what follows.
+        batch = _drawn(batches, config.seed, run.step + 1, device)
         if torch.isfinite(nn.utils.clip_grad_norm_(run.network.parameters(), MAX_GRADIENT_NORM)):
             run.optimiser.step()
         run.mean.update(run.network, run.step)
@@ -166,7 +191,7 @@ def train(config: TrainingConfig) -> None:
         schedule.advance(bar, run.step, run.spent_s)
         if run.step % 20 == 0 or finished:
             run.log.append({"step": run.step, "loss": smoothed.loss, "terms": smoothed.values})
-            bar.set_postfix(step=run.step, loss=f"{smoothed.loss:.4f}")
+            bar.set_postfix(step=run.step, loss=f"{smoothed.loss:.4f}", refresh=False)
         if check_due.due() and not finished:
             run.check(frames)
             check_due.restart()
@@ -184,6 +209,7 @@ def parsed() -> TrainingConfig:
     default = TrainingConfig
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=default.data, help="holds train and val of export.solids.dataset")
+    parser.add_argument("--pack", type=Path, help="train on this file of export.solids.compact instead")
     parser.add_argument("--out", type=Path, default=default.out)
     parser.add_argument("--init", type=Path, help="weights.pt of a network as wide or narrower, to start from")
     parser.add_argument("--size", choices=SIZES, default=default.size)
@@ -200,7 +226,13 @@ def parsed() -> TrainingConfig:
     parser.add_argument("--seed", type=int, default=default.seed)
     parser.add_argument("--threads", type=int, help="default: one a core")
     parser.add_argument("--precision", choices=("float32", "bfloat16"), default=default.precision)
-    parser.add_argument("--validate-minutes", type=float, default=default.validate_minutes)
+    parser.add_argument(
+        "--batched-sensors", action=argparse.BooleanOptionalAction, help="sensors in torch; default: with a GPU"
+    )
+    parser.add_argument(
+        "--validate-minutes", type=float, default=default.validate_minutes, help="0: never, and no val is needed"
+    )
+    parser.add_argument("--save-minutes", type=float, default=default.save_minutes)
     return TrainingConfig(**vars(parser.parse_args()))
 
 

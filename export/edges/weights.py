@@ -12,14 +12,15 @@ from export.training import save_atomically
 
 
 def save_network(network: EdgeNetwork, config: NetworkConfig, path: Path) -> None:
-    """Widths, bins and weights."""
-    save_atomically({"widths": list(config.widths), "bins": config.bins, "state": network.state_dict()}, path)
+    """Widths, bins, blocks and weights."""
+    shape = {"widths": list(config.widths), "bins": config.bins, "blocks": list(config.blocks)}
+    save_atomically({**shape, "state": network.state_dict()}, path)
 
 
 def load_network(path: Path) -> tuple[EdgeNetwork, NetworkConfig]:
     """In evaluation mode. Raises FileNotFoundError, and what torch raises for other files."""
     saved = torch.load(path, map_location="cpu", weights_only=True)
-    config = NetworkConfig(tuple(saved["widths"]), saved["bins"])
+    config = NetworkConfig(tuple(saved["widths"]), saved["bins"], tuple(saved.get("blocks", ())))
     network = EdgeNetwork(config)
     network.load_state_dict(saved["state"])
     return network.eval(), config
@@ -27,7 +28,8 @@ def load_network(path: Path) -> tuple[EdgeNetwork, NetworkConfig]:
 
 @torch.no_grad()
 def start_from(path: Path, network: EdgeNetwork) -> None:
-    """Gives a network the weights of a trained one that is as wide or narrower: it then computes the same field.
+    """Gives a network the weights of a trained one that is as wide or narrower, with the same residual blocks or none:
+    it then computes the same field.
 
     New channels begin at random and are read with weights of 0 by the channels that are there already (as Net2Net,
     arXiv 1511.05641, widens, but without copies). Raises ValueError where the trained one is wider or has other planes.

@@ -13,9 +13,9 @@ from export.edges.config import EPS_R, SIZES, NetworkConfig
 from export.edges.export_onnx import BundleInfo, export
 from export.edges.graph_field import field_of_planes, slopes_of
 from export.edges.losses import FieldTarget, LossWeights, bin_centres, decoded, field_terms, histogram_target
-from export.edges.network import EdgeNetwork, PublishedNetwork
+from export.edges.network import EdgeNetwork, PublishedNetwork, Residual
 from export.edges.validation import field_of
-from export.edges.weights import save_network, start_from
+from export.edges.weights import load_network, save_network, start_from
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
 TINY = NetworkConfig((8, 8, 8))
@@ -127,6 +127,25 @@ def test_a_wider_network_starts_with_the_field_of_the_trained_one(tmp_path):
     planes = torch.rand(1, 12, 32, 32)
     torch.testing.assert_close(wide.eval()(planes), narrow.eval()(planes), atol=1e-5, rtol=1e-5)
     assert wide.stem[0][0].weight[16:].abs().min() > 0  # new channels can learn
+
+
+def test_a_deeper_network_starts_with_the_field_of_the_trained_one_and_comes_back_from_its_file(tmp_path):
+    trained = EdgeNetwork(TINY)
+    save_network(trained, TINY, tmp_path / "weights.pt")
+    deeper = replace(TINY, blocks=(1, 2))
+    network = EdgeNetwork(deeper)
+    start_from(tmp_path / "weights.pt", network)
+    planes = torch.rand(1, 12, 32, 32)
+    torch.testing.assert_close(network.eval()(planes), trained.eval()(planes))
+    for module in network.modules():
+        if isinstance(module, Residual):
+            torch.nn.init.uniform_(module.second[1].weight, 0.5, 1)
+    assert not torch.allclose(network(planes), trained(planes))
+    save_network(network, deeper, tmp_path / "deeper.pt")
+    again, config = load_network(tmp_path / "deeper.pt")
+    assert config == deeper
+    torch.testing.assert_close(again(planes), network(planes))
+    assert export(network, tmp_path, deeper.multiple) < 1e-4
 
 
 def test_a_start_from_another_network_is_refused(tmp_path):

@@ -6,13 +6,18 @@ import signal
 
 import numpy as np
 import pytest
+import torch
 from box_crops import write_crops
 
 from export.edges import train
 from export.edges.data import Batches, RecordError, read_frames
+from export.edges.device_batches import DeviceBatches
 from export.edges.metrics import cuts, frame_figures, summary
 from export.edges.validation import figures_of
 from export.edges.weights import load_network
+from export.solids.compact import write_compact
+from export.solids.records import read_records
+from export.solids.sensors import clean
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed", "signal_handlers")
 
@@ -61,6 +66,44 @@ def test_it_learns_and_leaves_weights_curves_and_a_sample(monkeypatch, crops, tm
     assert config.bins == 0
     assert {"log.json", "curves.png", "sample.png", "checkpoint.pt"} <= {path.name for path in tmp_path.iterdir()}
     assert json.loads((tmp_path / "log.json").read_text())[-1]["rmse_r/clean"] > 0
+
+
+def test_a_run_with_sensors_in_batches_learns_from_a_pack_and_resumes_exactly(monkeypatch, crops, tmp_path):
+    write_compact(tmp_path / "crops.xz", list(read_records(crops / "train")))
+    options = ("--pack", str(tmp_path / "crops.xz"), "--batched-sensors", "--validate-minutes", "0")
+    straight = run(monkeypatch, crops / "none", tmp_path / "straight", "--steps", "60", *options)
+    assert np.mean(straight[-5:]) < 0.9 * np.mean(straight[:5])
+    run(monkeypatch, crops / "none", tmp_path / "stopped", "--steps", "60", *options, stop_after=2)
+    rest = run(monkeypatch, crops / "none", tmp_path / "stopped", "--steps", "60", *options)
+    assert rest[:2] == pytest.approx(straight[2:4], rel=1e-5)
+    load_network(tmp_path / "straight" / "weights.pt")
+
+
+def test_batches_of_a_device_are_crops_mirrored_and_scaled_with_their_labels(monkeypatch, crops):
+    monkeypatch.setattr("export.edges.device_batches.drawn", lambda rng: clean)
+    batches = DeviceBatches(crops / "train", 64, 12, seed=1).moved(torch.device("cpu"))
+    planes = [record.decoded() for record in read_records(crops / "train")]
+    turns = [(k, turned) for k in range(4) for turned in (np.asarray, np.transpose)]
+    found = []
+    for step in range(2):
+        depth, focal_px, target = batches.draw(step, torch.device("cpu"))
+        assert (focal_px == 150).all()
+        assert target.counts.all()
+        for k, own in enumerate(depth.numpy()):
+            scale = own.max() / 1.4
+            assert 0.5 <= scale <= 2
+            alike = [
+                (number, turn, turned.__name__)
+                for number, of in enumerate(planes)
+                for turn, turned in turns
+                if np.allclose(turned(np.rot90(of["depth"], turn)) * scale, own, rtol=1e-5)
+                and np.array_equal(turned(np.rot90(of["distance"], turn)), target.distance[k].numpy())
+                and np.array_equal(turned(np.rot90(of["kind"] > 0, turn)) * 2, target.kind[k].numpy())
+            ]
+            assert len(alike) >= 1
+            found += alike[:1]
+    assert sorted(number for number, *_ in found) == sorted([*range(12)] * 2)  # each crop once a pass
+    assert len({(turn, name) for _, turn, name in found}) >= 6
 
 
 def test_a_run_of_another_size_is_not_overwritten(monkeypatch, crops, tmp_path):

@@ -4,7 +4,7 @@
 #
 #     scripts/train-prediction-from-pack.sh prediction.pack OUT
 #
-# The autoencoder first, beside it the convolutional network; then codes; then both transformers at once. Weights (half
+# The autoencoder first, beside it the convolutional network; then codes; then both transformers and the mender at once. Weights (half
 # precision, but for the autoencoder), logs and curves are copied to OUT.
 #
 # Environment: WORK (/dev/shm/maquette-prediction), SECONDS_LEFT for all (560), PERCENT of the batches and of the
@@ -32,24 +32,29 @@ keep() { # RUN NAME
 
 "$python" -m export.prediction.pack open "$pack"
 autoencoder=.data/runs/prediction-autoencoder/weights.pt
-"$python" -m export.prediction.train_convolutional --minutes "$(spare 0.85)" --bf16 --batch "$(part 256)" --rate 1e-3 \
+"$python" -m export.prediction.train_convolutional --minutes "$(spare 0.55)" --bf16 --batch "$(part 256)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3 >convolutional.log 2>&1 &
 convolutional=$!
 "$python" -m export.prediction.train_autoencoder --minutes "$(spare 0.24)" --batch "$(part 256)" --rate 1e-3 \
   --stills .data/backgrounds/train --validate-minutes 100
 keep prediction-autoencoder autoencoder
-"$python" -m export.prediction.codes --processes "${PROCESSES:-5}"
+"$python" -m export.prediction.codes --keep-pictures --processes "${PROCESSES:-5}"
 minutes=$(spare 0.95)
 "$python" -m export.prediction.train_parallel --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
   --autoencoder "$autoencoder" --validate-frames "$(part 64)" --validate-minutes 3 >parallel.log 2>&1 &
 parallel=$!
+"$python" -m export.prediction.train_convolutional --motion .data/prediction --out .data/runs/prediction-mender \
+  --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
+  >mender.log 2>&1 &
+mender=$!
 "$python" -m export.prediction.train_transformer --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3
 wait "$parallel" || echo "the parallel transformer failed" >&2
 wait "$convolutional" || echo "the convolutional network failed" >&2
-tail -n 3 convolutional.log parallel.log
-for name in transformer parallel convolutional; do keep "prediction-$name" "$name"; done
-cp convolutional.log parallel.log "$out/"
+wait "$mender" || echo "the mender failed" >&2
+tail -n 3 convolutional.log mender.log parallel.log
+for name in transformer parallel convolutional mender; do keep "prediction-$name" "$name"; done
+cp convolutional.log mender.log parallel.log "$out/"
 "$python" - "$out" <<'HALF'
 import sys
 from pathlib import Path

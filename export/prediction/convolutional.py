@@ -1,6 +1,6 @@
 """A convolutional network that predicts a frame from the three before, in the manner of SimVP (arXiv 2206.05099): an
-encoder of single frames, blocks of wide convolutions over all of them, a decoder. It has no codes and no probabilities:
-what the transformer is compared with."""
+encoder, blocks of wide convolutions at a quarter of the size, a decoder. It has no codes and no probabilities: what the
+transformer is compared with. Given the picture that motion predicts as well, it mends that."""
 
 from __future__ import annotations
 
@@ -14,12 +14,19 @@ from export.prediction.autoencoder import scaled
 
 @dataclass(frozen=True)
 class ConvolutionalShape:
-    """widths: channels at 64 x 64, 32 x 32 and 16 x 16 pixels; blocks: at the last; frames: seen; kernel: of blocks."""
+    """widths: channels at 64 x 64, 32 x 32 and 16 x 16 pixels; blocks: at the last; frames: seen; kernel: of blocks;
+    motion: whether the picture that motion predicts is seen as well."""
 
     widths: tuple[int, int, int] = (32, 96, 192)
     blocks: int = 6
     frames: int = 3
     kernel: int = 7
+    motion: bool = False
+
+    @property
+    def seen(self) -> int:
+        """Pictures that the network is given: frames before, oldest first, and last the one by motion."""
+        return self.frames + self.motion
 
 
 class TimedBlock(nn.Module):
@@ -41,7 +48,7 @@ class ConvolutionalNet(nn.Module):
         super().__init__()
         self.shape = shape
         first, second, third = shape.widths
-        self.fine = nn.Sequential(nn.Conv2d(3 * shape.frames, first, 3, padding=1), nn.ReLU())
+        self.fine = nn.Sequential(nn.Conv2d(3 * shape.seen, first, 3, padding=1), nn.ReLU())
         self.middle = nn.Sequential(
             nn.Conv2d(first, second, 4, 2, 1), nn.ReLU(), nn.Conv2d(second, second, 3, padding=1)
         )
@@ -53,22 +60,32 @@ class ConvolutionalNet(nn.Module):
             nn.PixelShuffle(2),
         )  # fmt: skip
         self.out = nn.Sequential(
-            nn.ReLU(), nn.Conv2d(first, first, 3, padding=1), nn.ReLU(), nn.Conv2d(first, 3, 3, padding=1)
+            nn.ReLU(),
+            nn.Conv2d(first, first, 3, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(first, 3 + shape.motion, 3, padding=1),
         )
-        nn.init.zeros_(self.out[-1].weight)  # a new network repeats the last frame
+        nn.init.zeros_(self.out[-1].weight)  # a new network repeats its last picture
         nn.init.zeros_(self.out[-1].bias)
 
     def forward(self, before: Tensor, times: Tensor) -> Tensor:
-        """before [B, frames, 3, 64, 64] in -1..1, oldest first; times [B, 2] of `times_ahead` -> [B, 3, 64, 64]: what
-        the last frame changes by is learnt."""
+        """before [B, seen, 3, 64, 64] in -1..1, oldest first; times [B, 2] of `times_ahead` -> [B, 3, 64, 64].
+
+        What the last frame changes by is learnt; or with motion, where its picture gives way to the last frame, and
+        what changes besides.
+        """
         fine = self.fine(before.flatten(1, 2))
         half = self.middle(fine)
         x = self.quarter(F.relu(half))
         for block in self.blocks:
             x = block(x, times)
-        return before[:, -1] + self.out(fine + self.to_fine(half + self.to_half(x)))
+        found = self.out(fine + self.to_fine(half + self.to_half(x)))
+        if not self.shape.motion:
+            return before[:, -1] + found
+        still = (found[:, 3:] - 3).sigmoid()  # a twentieth at first
+        return before[:, -1] * (1 - still) + before[:, -2] * still + found[:, :3]
 
     def predicted(self, frames: Tensor, times: Tensor) -> Tensor:
-        """frames [B, frames, 64, 64, 3], 0..255 -> float32 [B, 64, 64, 3], 0..255."""
+        """frames [B, seen, 64, 64, 3], 0..255 -> float32 [B, 64, 64, 3], 0..255."""
         before = scaled(frames.flatten(0, 1)).unflatten(0, frames.shape[:2])
         return ((self(before, times).float() + 1) * 127.5).permute(0, 2, 3, 1)

@@ -1,6 +1,8 @@
 """Trains the convolutional network that predicts frames without codes; goes on where it was stopped.
 
     python -m export.prediction.train_convolutional --sets pushing shapes --minutes 120
+    python -m export.prediction.codes --keep-pictures                                     # first, for the other one:
+    python -m export.prediction.train_convolutional --motion .data/prediction --out .data/runs/prediction-mender
 
 Writes checkpoint.pt, weights.pt, log.json and curves.png to --out. Figures are PSNR of held-out clips, dB, by frames
 ahead: `network H`, beside the last frame, `last H`.
@@ -11,6 +13,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -29,13 +32,19 @@ class Training(run.Training):
         net = ConvolutionalNet(shape).train().to(device)
         super().__init__(net, torch.optim.AdamW(net.parameters(), betas=(0.9, 0.99), weight_decay=0.01), bf16)
 
-    def advance(self, clips: Clips, count: int, rate: float) -> dict[str, Tensor]:
-        """One step on `count` frames at random, half of them mirrored, at that learning rate."""
+    def advance(self, clips: Clips, motion: Tensor | None, count: int, rate: float) -> dict[str, Tensor]:
+        """One step on `count` frames at random, half of them mirrored, at that learning rate. motion uint8 [N, T,
+        horizons, 64, 64, 3]: what motion predicts, where the network sees it."""
         device, total = self.device, clips.frames.shape[1]
+        horizon = torch.randint(len(HORIZONS), (count,), device=device)
         ahead = torch.randint(1, HORIZONS[-1] + 1, (count,), device=device)
+        if motion is not None:
+            ahead = torch.tensor(HORIZONS, device=device)[horizon]
         clip = torch.randint(len(clips), (count,), device=device)
-        now = (torch.rand(count, device=device) * (total - ahead)).long()
+        now = 1 + (torch.rand(count, device=device) * (total - 1 - ahead)).long()
         before, truth = frames_of(clips, clip, now, self.net.shape.frames), clips.frames[clip, now + ahead]
+        if motion is not None:
+            before = torch.cat([before, motion[clip, now, horizon][:, None]], 1)
         mirrored = torch.rand(count, 1, 1, 1, device=device) < 0.5
         before = torch.where(mirrored[:, None], before.flip(3), before)
         truth = torch.where(mirrored, truth.flip(2), truth)
@@ -54,11 +63,11 @@ def frames_of(clips: Clips, clip: Tensor, now: Tensor, count: int) -> Tensor:
 
 
 @torch.no_grad()
-def figures_of(net: ConvolutionalNet, clips: Clips, frames: int) -> dict[str, float]:
+def figures_of(net: ConvolutionalNet, clips: Clips, motion: Tensor | None, frames: int) -> dict[str, float]:
     """Of held-out clips, `frames` of them for each time ahead, spread evenly over clips and times."""
     figures: dict[str, float] = {}
     device, seen = clips.frames.device, net.shape.frames
-    for ahead in HORIZONS:
+    for h, ahead in enumerate(HORIZONS):
         times = clips.frames.shape[1] - ahead - seen
         chosen = torch.linspace(0, len(clips) * times - 1, min(frames, len(clips) * times), device=device).long()
         network, last = [], []
@@ -66,11 +75,17 @@ def figures_of(net: ConvolutionalNet, clips: Clips, frames: int) -> dict[str, fl
             clip, now = some // times, seen + some % times
             before, truth = frames_of(clips, clip, now, seen), clips.frames[clip, now + ahead]
             told = times_ahead(clips.fps[clip], torch.full((len(some),), float(ahead), device=device))
-            network.append(psnr_db(net.predicted(before, told), truth))
+            shown = before if motion is None else torch.cat([before, motion[clip, now, h][:, None]], 1)
+            network.append(psnr_db(net.predicted(shown, told), truth))
             last.append(psnr_db(before[:, -1], truth))
         figures[f"network {ahead}"] = float(torch.cat(network).mean())
         figures[f"last {ahead}"] = float(torch.cat(last).mean())
     return figures
+
+
+def motion_of(folder: Path | None, split: str, device: torch.device) -> Tensor | None:
+    """What motion predicts of all clips, as `codes --keep-pictures` wrote it."""
+    return None if folder is None else torch.from_numpy(np.load(folder / f"motion-{split}.npy", "r+")).to(device)
 
 
 def load_convolutional(path: Path) -> ConvolutionalNet:
@@ -86,6 +101,9 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, default=Path(".data/clips"))
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
     parser.add_argument("--out", type=Path, default=Path(".data/runs/prediction-convolutional"))
+    parser.add_argument(
+        "--motion", type=Path, help="folder of motion-*.npy: with the pictures that motion predicts, which it mends"
+    )
     parser.add_argument("--validate-frames", type=int, default=256, help="a time ahead (default %(default)s)")
     run.add_arguments(parser, minutes=120, batch=16, rate=1e-3)
     return parser.parse_args()
@@ -96,10 +114,11 @@ def train(arguments: argparse.Namespace) -> None:
     run.begin(arguments)
     device = torch.device(arguments.device)
     clips, held_out = (read_clips(arguments.data, arguments.sets, split).on(device) for split in ("train", "val"))
-    training = Training(ConvolutionalShape(), arguments.bf16, arguments.device)
+    motion, held_out_motion = (motion_of(arguments.motion, split, device) for split in ("train", "val"))
+    training = Training(ConvolutionalShape(motion=motion is not None), arguments.bf16, arguments.device)
     run.run(
-        training, arguments, lambda rate: training.advance(clips, arguments.batch, rate),
-        lambda: figures_of(training.net, held_out, arguments.validate_frames), "held out: PSNR, dB",
+        training, arguments, lambda rate: training.advance(clips, motion, arguments.batch, rate),
+        lambda: figures_of(training.net, held_out, held_out_motion, arguments.validate_frames), "held out: PSNR, dB",
     )  # fmt: skip
 
 

@@ -113,12 +113,30 @@ def test_a_new_convolutional_network_repeats_the_last_frame_and_then_learns():
     torch.manual_seed(0)
     shape = ConvolutionalShape(widths=(8, 16, 32), blocks=2)
     training = train_convolutional.Training(shape)
-    before = train_convolutional.figures_of(training.net.eval(), clips, 8)
+    before = train_convolutional.figures_of(training.net.eval(), clips, None, 8)
     assert before["network 4"] == pytest.approx(before["last 4"], abs=1e-3)
     training.net.train()
     for step in range(60):
         seed_step(0, step)
-        training.advance(clips, 4, 3e-3)
-    after = train_convolutional.figures_of(training.net.eval(), clips, 8)
+        training.advance(clips, None, 4, 3e-3)
+    after = train_convolutional.figures_of(training.net.eval(), clips, None, 8)
     assert after["network 8"] > after["last 8"] + 1
     assert ConvolutionalNet(shape).predicted(clips.frames[:1, :3], torch.zeros(1, 2)).shape == (1, 64, 64, 3)
+
+
+def test_a_mender_begins_with_motion_and_learns_where_it_is_wrong():
+    clips = moving_square()
+    motion = torch.full((2, 16, len(train_convolutional.HORIZONS), 64, 64, 3), 140, dtype=torch.uint8)
+    torch.manual_seed(0)
+    training = train_convolutional.Training(ConvolutionalShape(widths=(8, 16, 32), blocks=2, motion=True))
+    with torch.no_grad():
+        shown = torch.cat([clips.frames[:1, :3], motion[:1, 5, :1]], 1)
+        first = training.net.predicted(shown, torch.zeros(1, 2))
+    assert (first - 140).abs().max() < 0.1 * 80, "motion's picture, with a twentieth of the last frame"
+    before = train_convolutional.figures_of(training.net.eval(), clips, motion, 8)
+    training.net.train()
+    for step in range(60):
+        seed_step(0, step)
+        training.advance(clips, motion, 4, 3e-3)
+    after = train_convolutional.figures_of(training.net.eval(), clips, motion, 8)
+    assert after["network 1"] > before["network 1"] + 5

@@ -1,0 +1,127 @@
+"""How well the networks foresee pictures of held-out clips, by frames ahead, beside the last frame and motion alone.
+
+    python -m export.prediction.evaluate_pictures --sets pushing --split val
+
+PSNR in dB at 64 x 64, mean of frames spread over all clips. A network of codes gives its expected picture by the
+decoder (`plain`), or adds to a picture what that differs from what the decoder makes of the picture's own codes
+(`over last`, `over motion`). `best` is the better of the last frame and motion; the networks are to beat it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from export.prediction.autoencoder import Autoencoder
+from export.prediction.convolutional import ConvolutionalNet
+from export.prediction.data import Clips, read_clips
+from export.prediction.motion_pictures import HORIZONS, MotionJob, motion_pictures
+from export.prediction.parallel import ParallelTransformer, times_ahead
+from export.prediction.picture_error import psnr_db
+from export.prediction.train_autoencoder import load_autoencoder
+from export.prediction.train_convolutional import load_convolutional
+from export.prediction.train_parallel import expected_picture, load_parallel
+
+Rows = dict[str, dict[int, list[float]]]  # PSNR of each frame by method and frames ahead
+
+
+@dataclass(frozen=True, eq=False)
+class Networks:
+    """None: not there, and left out."""
+
+    autoencoder: Autoencoder
+    parallel: ParallelTransformer | None
+    convolutional: ConvolutionalNet | None
+    mender: ConvolutionalNet | None
+
+
+def over(base: Tensor, made: Tensor, autoencoder: Autoencoder) -> Tensor:
+    """base + (made - what the decoder makes of the codes of base); float32 [B, 64, 64, 3]."""
+    own = autoencoder.decode(autoencoder.encode(base.round().to(torch.uint8)))
+    return base + made - own
+
+
+@torch.no_grad()
+def pictures_of(
+    networks: Networks, frames: Tensor, by_motion: Tensor, fps: float, now: int, h: int
+) -> dict[str, Tensor]:
+    """What each method shows HORIZONS[h] frames after frame `now` of a clip uint8 [T, 64, 64, 3]."""
+    last, moved = frames[now][None].float(), by_motion[now, h][None].float()
+    found = {"last": last, "motion": moved}
+    times = times_ahead(torch.tensor([fps]), torch.tensor([float(HORIZONS[h])]))
+    for name, net in (("convolutional", networks.convolutional), ("mender", networks.mender)):
+        if net is not None:
+            shown = [
+                frames[now + 1 - net.shape.frames : now + 1],
+                *([by_motion[now, h][None]] if net.shape.motion else []),
+            ]
+            found[name] = net.predicted(torch.cat(shown)[None], times)
+    if networks.parallel is not None:
+        shape = networks.parallel.shape
+        shown = [frames[now + 1 - shape.frames : now + 1]]
+        if shape.motion:
+            shown.append(by_motion[now, h][None])
+        before = networks.autoencoder.encode(torch.cat(shown))[None]
+        made = expected_picture(networks.parallel, networks.autoencoder, before, times)
+        found["parallel, plain"] = made
+        found["parallel, over last"] = over(last, made, networks.autoencoder)
+        found["parallel, over motion"] = over(moved, made, networks.autoencoder)
+    return found
+
+
+def measured(networks: Networks, clips: Clips, stride: int) -> Rows:
+    rows: Rows = {}
+    for k in tqdm(range(len(clips)), unit="clip", leave=False):
+        frames, fps = clips.frames[k], float(clips.fps[k])
+        by_motion = torch.from_numpy(motion_pictures(MotionJob(k, frames.numpy(), fps)))
+        for now in range(3, len(frames) - 1, stride):
+            for h, horizon in enumerate(HORIZONS):
+                if now + horizon >= len(frames):
+                    continue
+                truth = frames[now + horizon][None]
+                found = {
+                    name: float(psnr_db(picture, truth)) for name, picture in
+                    pictures_of(networks, frames, by_motion, fps, now, h).items()
+                }  # fmt: skip
+                found["best"] = max(found["last"], found["motion"])
+                for name, decibels in found.items():
+                    rows.setdefault(name, {}).setdefault(horizon, []).append(decibels)
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=Path(".data/clips"))
+    parser.add_argument("--sets", nargs="+", default=["pushing"], help="default %(default)s")
+    parser.add_argument("--split", choices=("val", "test"), default="val")
+    parser.add_argument("--runs", type=Path, default=Path(".data/runs"), help="prediction-*/weights.pt in it")
+    parser.add_argument("--stride", type=int, default=5, help="frames between those predicted from")
+    options = parser.parse_args()
+
+    def there(name: str) -> Path | None:
+        path = options.runs / f"prediction-{name}" / "weights.pt"
+        return path if path.exists() else None
+
+    autoencoder, parallel = there("autoencoder"), there("parallel")
+    if autoencoder is None:
+        parser.error(f"{options.runs}/prediction-autoencoder/weights.pt is not there: train it first")
+    networks = Networks(
+        load_autoencoder(autoencoder),
+        load_parallel(parallel) if parallel else None,
+        *(load_convolutional(path) if (path := there(name)) else None for name in ("convolutional", "mender")),
+    )
+    rows = measured(networks, read_clips(options.data, options.sets, options.split), options.stride)
+    print("| dB | " + " | ".join(map(str, HORIZONS)) + " |")
+    print("| --- |" + " --- |" * len(HORIZONS))
+    for name, by_horizon in rows.items():
+        print(f"| {name} | " + " | ".join(f"{np.mean(by_horizon[h]):.2f}" for h in HORIZONS) + " |")
+
+
+if __name__ == "__main__":
+    main()

@@ -22,7 +22,7 @@ from export.densepose.graphs import session
 from export.prediction.bundle import CODES, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.data import read_clips
-from export.prediction.picture_error import psnr_db
+from export.prediction.pictures.picture_error import psnr_db
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings

@@ -24,7 +24,7 @@ from export.prediction.codes import CodedClips, read_codes
 from export.prediction.config import TRANSFORMERS, TransformerShape
 from export.prediction.motion_pictures import HORIZONS
 from export.prediction.parallel import ParallelTransformer, times_ahead
-from export.prediction.picture_error import psnr_db
+from export.prediction.pictures.picture_error import psnr_db
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.train_transformer import Examples, disturbed, examples, shape_for
 

@@ -7,13 +7,14 @@ pytest.importorskip("torch", reason="the extra `train` is not installed: scripts
 import numpy as np
 import torch
 
-from export.prediction import train_convolutional, train_parallel
+from export.prediction import train_parallel
 from export.prediction.autoencoder import Autoencoder
 from export.prediction.codes import CodedClips, write_codes
 from export.prediction.config import AutoencoderShape, TransformerShape
-from export.prediction.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.prediction.data import Clips
 from export.prediction.parallel import ParallelTransformer, times_ahead
+from export.prediction.pictures import train_convolutional
+from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.training import seed_step
 
 SMALL = TransformerShape(width=32, layers=1, heads=2, head_width=16, hidden=64, embedding=32, slices=2, entries=8)

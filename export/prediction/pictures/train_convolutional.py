@@ -1,8 +1,9 @@
 """Trains the convolutional network that predicts frames without codes; goes on where it was stopped.
 
-    python -m export.prediction.train_convolutional --sets pushing shapes --minutes 120
-    python -m export.prediction.codes --keep-pictures                                     # first, for the other one:
-    python -m export.prediction.train_convolutional --motion .data/prediction --out .data/runs/prediction-mender
+    python -m export.prediction.pictures.train_convolutional --sets pushing shapes --minutes 120
+    python -m export.prediction.codes --keep-pictures     # first, for the one that mends what motion predicts:
+    python -m export.prediction.pictures.train_convolutional --motion .data/prediction \\
+        --out .data/runs/prediction-mender
 
 Writes checkpoint.pt, weights.pt, log.json and curves.png to --out. Figures are PSNR of held-out clips, dB, by frames
 ahead: `network H`, beside the last frame, `last H`.
@@ -18,11 +19,11 @@ import torch
 from torch import Tensor
 
 from export.prediction import run
-from export.prediction.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.prediction.data import Clips, read_clips
 from export.prediction.motion_pictures import HORIZONS
 from export.prediction.parallel import times_ahead
-from export.prediction.picture_error import psnr_db
+from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
+from export.prediction.pictures.picture_error import psnr_db
 
 _BATCH = 64  # held-out frames at once
 

@@ -1,6 +1,6 @@
 """How well the networks foresee pictures of held-out clips, by frames ahead, beside the last frame and motion alone.
 
-    python -m export.prediction.evaluate_pictures --sets pushing --split val
+    python -m export.prediction.pictures.evaluate --sets pushing --split val
 
 PSNR in dB at 64 x 64, mean of frames spread over all clips. A network of codes gives its expected picture by the
 decoder (`plain`), or adds to a picture what that differs from what the decoder makes of the picture's own codes
@@ -19,13 +19,13 @@ from torch import Tensor
 from tqdm import tqdm
 
 from export.prediction.autoencoder import Autoencoder
-from export.prediction.convolutional import ConvolutionalNet
 from export.prediction.data import Clips, read_clips
 from export.prediction.motion_pictures import HORIZONS, MotionJob, motion_pictures
 from export.prediction.parallel import ParallelTransformer, times_ahead
-from export.prediction.picture_error import psnr_db
+from export.prediction.pictures.convolutional import ConvolutionalNet
+from export.prediction.pictures.picture_error import psnr_db
+from export.prediction.pictures.train_convolutional import load_convolutional
 from export.prediction.train_autoencoder import load_autoencoder
-from export.prediction.train_convolutional import load_convolutional
 from export.prediction.train_parallel import expected_picture, load_parallel
 
 Rows = dict[str, dict[int, list[float]]]  # PSNR of each frame by method and frames ahead

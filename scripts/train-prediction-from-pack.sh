@@ -4,12 +4,12 @@
 #
 #     scripts/train-prediction-from-pack.sh prediction.pack OUT
 #
-# The autoencoder first, beside it the convolutional network; then codes; then both transformers and the network that
-# mends what motion predicts, at once. Weights (half precision, but for the autoencoder), logs and curves are copied to
-# OUT.
+# Collages of its photographs are made first. Then the autoencoder, beside it the convolutional network; then codes; then
+# both transformers and the network that mends what motion predicts, at once. Weights (half precision, but for the
+# autoencoder), logs and curves are copied to OUT.
 #
-# Environment: WORK (/dev/shm/maquette-prediction), SECONDS_LEFT for all (560), PERCENT of the batches and of the
-# validation (100), PROCESSES for motion (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
+# Environment: WORK (/dev/shm/maquette-prediction), SECONDS_LEFT for all (560), PERCENT of the collages, the batches and
+# the validation (100), PROCESSES for motion (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
 set -eu
 [ $# = 2 ] || { sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//;p}' "$0"; exit 2; }
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -32,19 +32,24 @@ keep() { # RUN NAME
 }
 
 "$python" -m export.prediction.pack open "$pack"
+for counts in "train 2500" "val 32"; do
+  "$python" -m export.clips.dataset collages --split ${counts% *} --clips "$(part "${counts#* }")" \
+    --processes "${PROCESSES:-5}"
+done
+sets="pushing shapes collages"
 autoencoder=.data/runs/prediction-autoencoder/weights.pt
-"$python" -m export.prediction.pictures.train_convolutional --minutes "$(spare 0.55)" --bf16 --batch "$(part 256)" --rate 1e-3 \
+"$python" -m export.prediction.pictures.train_convolutional --sets $sets --minutes "$(spare 0.55)" --bf16 --batch "$(part 256)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3 >convolutional.log 2>&1 &
 convolutional=$!
-"$python" -m export.prediction.train_autoencoder --minutes "$(spare 0.24)" --batch "$(part 256)" --rate 1e-3 \
+"$python" -m export.prediction.train_autoencoder --sets $sets --minutes "$(spare 0.24)" --batch "$(part 256)" --rate 1e-3 \
   --stills .data/backgrounds/train --validate-minutes 100
 keep prediction-autoencoder autoencoder
-"$python" -m export.prediction.codes --keep-pictures --processes "${PROCESSES:-5}"
+"$python" -m export.prediction.codes --sets $sets --keep-pictures --processes "${PROCESSES:-5}"
 minutes=$(spare 0.95)
 "$python" -m export.prediction.train_parallel --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
   --autoencoder "$autoencoder" --validate-frames "$(part 64)" --validate-minutes 3 >parallel.log 2>&1 &
 parallel=$!
-"$python" -m export.prediction.pictures.train_convolutional --motion .data/prediction --out .data/runs/prediction-mender \
+"$python" -m export.prediction.pictures.train_convolutional --sets $sets --motion .data/prediction --out .data/runs/prediction-mender \
   --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
   >mender.log 2>&1 &
 mender=$!

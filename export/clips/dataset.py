@@ -22,7 +22,11 @@ from export.clips.clip import SPLITS, write_clip
 from export.jobs import Workers
 
 # Where each set's function lies; imported in the process that renders: pushing needs PyBullet, shapes does not.
-MAKERS = {"shapes": "export.clips.shapes:shapes_clip", "pushing": "export.clips.pushing:pushing_clip"}
+MAKERS = {
+    "shapes": "export.clips.shapes:shapes_clip",
+    "pushing": "export.clips.pushing:pushing_clip",
+    "collages": "export.clips.collages:collages_clip",
+}
 _MAX_S = 600
 
 

@@ -1,7 +1,7 @@
 """One file with the clips that prediction is trained on, for a machine with a GPU and without a network.
 
     python -m export.prediction.pack make prediction.pack     here, where clips and photographs are
-    python -m export.prediction.pack open prediction.pack     there: .data/clips and .data/backgrounds/train
+    python -m export.prediction.pack open prediction.pack     there: .data/clips and .data/backgrounds
 
 Frames are kept as H.264 without subsampled colours (39 dB and 10 kB a clip at the default quality), so they are not
 quite those that were rendered; motion and visibility are left out. `make` needs the program `ffmpeg`.
@@ -24,7 +24,7 @@ from export.clips.clip import FORMAT, FRAMES, SIDE_PX, clip_paths, read_rgb
 from export.pack_file import PackWriter, jpeg, shrunk
 
 DATA = Path(".data")
-_STILL_SIDE = 192  # of photographs, the longer one
+_STILL_SIDE = 384  # of photographs, the longer one; collages are made of them there
 
 
 def film(frames: np.ndarray, quality: int) -> bytes:
@@ -67,8 +67,9 @@ def make(path: Path, data: Path, sets: list[str], quality: int) -> dict[str, int
                 facts = {"names": [own.stem for own in paths], "fps": [fps for _, fps in read]}
                 pack.add(f"clips/{kind}-{split}.json", json.dumps(facts).encode())
                 pack.add(f"clips/{kind}-{split}.mp4", film(np.concatenate([rgb for rgb, _ in read]), quality))
-        for photo in sorted((data / "backgrounds/train").glob("*.jpg")):
-            pack.add(f"backgrounds/train/{photo.name}", jpeg(shrunk(cv2.imread(str(photo)), _STILL_SIDE)))
+        for split in ("train", "val"):
+            for photo in sorted((data / "backgrounds" / split).glob("*.jpg")):
+                pack.add(f"backgrounds/{split}/{photo.name}", jpeg(shrunk(cv2.imread(str(photo)), _STILL_SIDE)))
     return pack.bytes
 
 

@@ -3,12 +3,14 @@
 import subprocess
 import sys
 
+import cv2
 import numpy as np
 import pytest
 
 from export.camera import Camera
-from export.clips import shapes
+from export.clips import collages, shapes
 from export.clips.clip import ClipError, read_clip, read_rgb, write_clip
+from export.clips.collages import collages_clip
 from export.clips.motion import fetched_from_next
 from export.clips.shapes import shapes_clip
 
@@ -60,6 +62,35 @@ def test_shapes_lie_where_their_motion_says(number):
             # Whole pixels at 64 x 64: only borders, whose colour mixes with what lies behind, may differ.
             assert np.median(error) == 0
             assert (error > 8).mean() < (0.06 if exact else 0.03)
+
+
+@pytest.fixture
+def photographs(tmp_path, monkeypatch):
+    """Three photographs of soft patterns for training, and two others."""
+    monkeypatch.setattr(collages, "PHOTOGRAPHS", tmp_path)
+    rng = np.random.default_rng(0)
+    for split, count in (("train", 3), ("val", 2)):
+        (tmp_path / split).mkdir()
+        for k in range(count):
+            soft = cv2.resize(
+                rng.integers(0, 256, (9, 12, 3)).astype(np.uint8), (400, 300), interpolation=cv2.INTER_CUBIC
+            )
+            cv2.imwrite(str(tmp_path / split / f"{split}-{k}.jpg"), soft)
+
+
+def test_collages_move_as_their_motion_says_and_take_photographs_of_their_split(photographs):
+    errors = []
+    for number in range(8):
+        clip, again = (collages_clip("train", number, large=False) for _ in range(2))
+        assert np.array_equal(clip.small.rgb, again.small.rgb)
+        assert all(name.startswith("train-") for name in clip.facts["assets"])
+        errors += [error for t in (2, 14, 27) if (error := relative_error(clip.small, t)) is not None]
+    assert len(errors) >= 8
+    assert np.median(errors) < 0.25
+    large = collages_clip("val", 1, large=True).large
+    assert large.rgb.shape == (30, 240, 320, 3)
+    with pytest.raises(FileNotFoundError, match="photographs"):
+        collages_clip("test", 0, large=False)
 
 
 def test_the_entropy_of_shapes_is_what_their_information_comes_to_on_average():

@@ -74,6 +74,7 @@ class TrainingConfig:
     threads: int | None = None
     precision: str = "float32"
     batched_sensors: bool | None = None
+    made_fraction: float = 0.0
     validate_minutes: float = 15
     save_minutes: float = SAVE_EVERY_S / 60
 
@@ -134,7 +135,7 @@ def _batches(config: TrainingConfig, device: torch.device) -> Batches:
     kind = DeviceBatches if config.batched_sensors or (on_gpu and config.batched_sensors is None) else Batches
     source = config.pack or config.data / "train"
     batches = kind(source, config.crop, config.batch, config.seed, config.crops)
-    return batches.moved(device) if isinstance(batches, DeviceBatches) else batches
+    return batches.moved(device, config.made_fraction) if isinstance(batches, DeviceBatches) else batches
 
 
 def _drawn(batches: Batches, seed: int, step: int, device: torch.device) -> tuple[Tensor, Tensor, FieldTarget]:
@@ -190,7 +191,8 @@ def train(config: TrainingConfig) -> None:
         finished = bool(stopped) or schedule.finished(run.step, run.spent_s)
         schedule.advance(bar, run.step, run.spent_s)
         if run.step % 20 == 0 or finished:
-            run.log.append({"step": run.step, "loss": smoothed.loss, "terms": smoothed.values})
+            made = {"made_crops": batches.made_crops} if config.made_fraction else {}
+            run.log.append({"step": run.step, "loss": smoothed.loss, "terms": smoothed.values, **made})
             bar.set_postfix(step=run.step, loss=f"{smoothed.loss:.4f}", refresh=False)
         if check_due.due() and not finished:
             run.check(frames)
@@ -229,6 +231,10 @@ def parsed() -> TrainingConfig:
     parser.add_argument(
         "--batched-sensors", action=argparse.BooleanOptionalAction, help="sensors in torch; default: with a GPU"
     )
+    parser.add_argument(
+        "--made-fraction", type=float, default=default.made_fraction,
+        help="of a batch, with sensors in torch: crops of scenes that are made meanwhile (export.solids.ray_scenes)",
+    )  # fmt: skip
     parser.add_argument(
         "--validate-minutes", type=float, default=default.validate_minutes, help="0: never, and no val is needed"
     )

@@ -106,6 +106,24 @@ def test_batches_of_a_device_are_crops_mirrored_and_scaled_with_their_labels(mon
     assert len({(turn, name) for _, turn, name in found}) >= 6
 
 
+def test_a_share_of_a_batch_is_of_scenes_made_meanwhile(monkeypatch, crops, tmp_path):
+    for name, value in (("MADE_AT_ONCE", 2), ("FIRST_S", 0.01), ("MADE_CROPS", 8), ("drawn", lambda rng: clean)):
+        monkeypatch.setattr(f"export.edges.device_batches.{name}", value)
+    cpu = torch.device("cpu")
+    batches = DeviceBatches(crops / "train", 32, 4, seed=1).moved(cpu, 0.5)
+    assert batches.made_crops == 2
+    depth, focal_px, target = batches.draw(0, cpu)
+    assert focal_px[:2, 0].tolist() == [150, 150]
+    assert (focal_px[2:, 0] >= 180).all()
+    assert depth.shape == target.distance.shape == (4, 32, 32)
+    assert not (target.counts & (depth == 0)).any()
+    batches._next = 0
+    batches.draw(1, cpu)
+    assert batches.made_crops == 4
+    options = ("--batched-sensors", "--made-fraction", "0.5", "--steps", "2", "--validate-minutes", "0")
+    assert np.isfinite(run(monkeypatch, crops, tmp_path, *options)).all()
+
+
 def test_a_run_of_another_size_is_not_overwritten(monkeypatch, crops, tmp_path):
     run(monkeypatch, crops, tmp_path, "--steps", "1")
     with pytest.raises(SystemExit, match="another --out"):

@@ -1,5 +1,5 @@
-"""A bundle for prediction (docs/formats.md): the graphs that make a frame codes and codes a frame, and what codes stand
-for and how likely they are."""
+"""A bundle for prediction (docs/formats.md): the graphs that make a frame codes and codes a frame, what codes stand for
+and how likely they are, and where it has one the transformer that knows better."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from pathlib import Path
 
 from export.bundle import LICENCE, BundleInfo, Signature, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
-from export.prediction.code_file import read_code_file
+from export.prediction.code_file import FrameCodes, read_code_file
+from export.prediction.transformer_file import TransformerTables, read_transformer_file
+from export.prediction.transformer_graphs import CONTEXT, SLICES, head_name
 
 GRAPHS = ("encoder", "decoder")
-CODES = "codes.maqc"
+CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
+TRAINED_FPS = (10, 30)  # steps in time that the transformer was trained on
 CELL_PX = 4  # pixels of a place, both ways
 TRAINING_DATA = (
     {"name": "Maquette clips: shapes, pushing (export.clips)", "licence": LICENCE, "used_for": "training, calibration"},
@@ -34,10 +37,35 @@ def frame_side(graphs: dict[str, Signature], slices: int, width: int, side: int)
 
 
 def write_manifest(folder: Path, info: BundleInfo) -> dict:
-    """Describes the graphs and `codes.maqc` that lie in `folder`, and writes `manifest.json`, which it returns. Raises
-    ValueError where they do not belong together."""
+    """Describes the graphs, `codes.maqc` and where it is there `transformer.maqr` that lie in `folder`, and writes
+    `manifest.json`, which it returns. Raises ValueError where they do not belong together."""
     codes = read_code_file(folder / CODES)
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
     slices, _, width = codes.entries.shape
-    keys = {"frame_px": frame_side(graphs, slices, width, codes.side), "codes": {"file": CODES}}
-    return write_bundle_manifest(folder, "prediction", info, graphs, files=(CODES,), task_keys=keys)
+    keys: dict[str, object] = {"frame_px": frame_side(graphs, slices, width, codes.side), "codes": {"file": CODES}}
+    files = [CODES]
+    if (folder / TRANSFORMER).exists():
+        tables = read_transformer_file(folder / TRANSFORMER)
+        graphs |= {name: signature_of(folder / f"{name}.onnx") for name in transformer_graphs(slices)}
+        require_transformer(graphs, tables, codes)
+        keys["transformer"] = {"file": TRANSFORMER, "fps": list(TRAINED_FPS)}
+        files.append(TRANSFORMER)
+    return write_bundle_manifest(folder, "prediction", info, graphs, files=files, task_keys=keys)
+
+
+def transformer_graphs(slices: int) -> list[str]:
+    return [CONTEXT, SLICES, *(head_name(k) for k in range(slices))]
+
+
+def require_transformer(graphs: dict[str, Signature], tables: TransformerTables, codes: FrameCodes) -> None:
+    """Raises ValueError where graphs and tables are of other sizes than each other, or than the codes."""
+    slices, entries, _ = codes.entries.shape
+    places, width = codes.side**2, tables.earlier[-1][0].shape[1]
+    found = len(tables.earlier), len(tables.slice_rows), graphs[CONTEXT]["outputs"].get("context")
+    wanted = slices, slices * entries, [1, places, width]
+    if found != wanted:
+        raise ValueError(f"The transformer has {found} slices, rows and features; the codes ask for {wanted}.")
+    for name, channels in ((SLICES, "features"), *((head_name(k), "features") for k in range(slices))):
+        of_graph = {**graphs[name]["inputs"], **graphs[name]["outputs"]}[channels][-1]
+        if of_graph != width:
+            raise ValueError(f"{name} has features of {of_graph} numbers; the tables have {width}.")

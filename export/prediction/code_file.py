@@ -34,6 +34,13 @@ class FrameCodes:
     side: int
 
 
+def prior_of(codes: FrameCodes) -> np.ndarray:
+    """float32 [slices, K + 1, K]: natural logarithms of the probabilities of a code, by the one before; the last row is
+    of a code by itself."""
+    bits = np.concatenate([codes.after_bits, codes.frequency_bits[:, None]], 1)
+    return (bits * -np.log(2)).astype(np.float32)
+
+
 def stored_bits(log_probability: np.ndarray) -> np.ndarray:
     """Natural logarithms of probabilities as bytes. Raises CodeFileError for one that is no probability."""
     bits = -np.asarray(log_probability, np.float64) / np.log(2)

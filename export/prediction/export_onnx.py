@@ -2,6 +2,7 @@
 
     python -m export.prediction.codes                         # first: codes of clips, from which the table is counted
     python -m export.prediction.export_onnx --out .data/bundles/prediction-fp32
+    python -m export.prediction.export_onnx --transformer .data/runs/prediction-transformer/weights.pt    # with it
 
 `encoder.onnx`: image [1, 64, 64, 3], RGB, 0..255 -> features [1, 16, 16, slices * width], of which each slice is given
 the number of the nearest entry. `decoder.onnx`: entries in the place of features -> image [1, 64, 64, 3].
@@ -22,12 +23,16 @@ from export.checked_file import write_whole
 from export.densepose.graphs import session
 from export.onnx_graphs import channels_first, channels_last, largest_difference, write_graph
 from export.prediction.autoencoder import Autoencoder
-from export.prediction.bundle import CELL_PX, CODES, TRAINING_DATA, write_manifest
+from export.prediction.bundle import CELL_PX, CODES, TRAINING_DATA, TRANSFORMER, write_manifest
 from export.prediction.code_file import code_bytes
 from export.prediction.codes import read_codes
 from export.prediction.config import CODE_SIDE
+from export.prediction.export_transformer import export_transformer
 from export.prediction.table import CodeTable
 from export.prediction.train_autoencoder import load_autoencoder
+from export.prediction.train_transformer import load_transformer
+from export.prediction.transformer import LatentTransformer
+from export.prediction.transformer_file import TransformerTables, transformer_bytes
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the output's largest value
 HALF_RANGE = 127.5
@@ -81,10 +86,17 @@ def export_graphs(net: Autoencoder, folder: Path) -> dict[str, float]:
     return found
 
 
-def export_bundle(net: Autoencoder, table: CodeTable, folder: Path, info: BundleInfo) -> dict[str, float]:
-    """The whole bundle; returns what `export_graphs` does."""
+def export_bundle(
+    net: Autoencoder, table: CodeTable, folder: Path, info: BundleInfo, transformer: LatentTransformer | None = None
+) -> dict[str, float]:
+    """The whole bundle; returns how far each part is from torch. Raises ValueError where that is too far. table: the
+    transformer's own, where there is one."""
     folder.mkdir(parents=True, exist_ok=True)
     differences = export_graphs(net, folder)
+    (folder / TRANSFORMER).unlink(missing_ok=True)  # of an earlier export
+    if transformer is not None:
+        differences["transformer"] = export_transformer(transformer, folder)
+        write_whole(transformer_bytes(TransformerTables.of(transformer)), folder / TRANSFORMER)
     entries = net.codebook.entries.numpy()
     write_whole(code_bytes(entries, table.frequency.numpy(), table.after.numpy(), CODE_SIDE), folder / CODES)
     write_manifest(folder, info)
@@ -97,15 +109,20 @@ def main() -> None:
     parser.add_argument(
         "--codes", type=Path, default=Path(".data/prediction"), help="folder of export.prediction.codes"
     )
+    parser.add_argument("--transformer", type=Path, help="its weights, whose table is taken; default: without one")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/prediction-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
     options = parser.parse_args()
     if not options.autoencoder.exists():
         parser.error(f"{options.autoencoder} does not exist. Train it: python -m export.prediction.train_autoencoder")
     net = load_autoencoder(options.autoencoder)
-    table = CodeTable.counted(read_codes(options.codes, "train").codes, net.shape.entries)
+    transformer = load_transformer(options.transformer) if options.transformer else None
+    if transformer is None:
+        table = CodeTable.counted(read_codes(options.codes, "train").codes, net.shape.entries)
+    else:
+        table = CodeTable.of_stacked(transformer.table)
     info = BundleInfo(options.name or options.out.name, "fp32", training_data=TRAINING_DATA)
-    for name, difference in export_bundle(net, table, options.out, info).items():
+    for name, difference in export_bundle(net, table, options.out, info, transformer).items():
         print(f"{name}: within {difference:.1e} of torch")
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
 

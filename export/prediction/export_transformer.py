@@ -3,6 +3,7 @@
     python -m export.prediction.export_transformer --weights .data/runs/prediction-transformer/weights.pt
 
 The graphs are those of `transformer_graphs.py`; what a runtime does around them is in `graph_runtime.py`.
+`export_onnx --transformer` puts them into a bundle.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ import torch
 
 from export.onnx_graphs import largest_difference
 from export.prediction.config import CODE_SIDE
-from export.prediction.graph_runtime import GraphRuntime, TransformerTables
+from export.prediction.graph_runtime import GraphRuntime
 from export.prediction.train_transformer import load_transformer
 from export.prediction.transformer import LatentTransformer
+from export.prediction.transformer_file import TransformerTables
 from export.prediction.transformer_graphs import write_transformer_graphs
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the largest logit
@@ -29,11 +31,12 @@ def export_transformer(net: LatentTransformer, folder: Path) -> float:
     """Writes the graphs; returns how far their logits are from torch. Raises ValueError where that is too far."""
     shape = net.eval().float().shape
     write_transformer_graphs(net, folder)
+    tables = TransformerTables.of(net)
     rng = np.random.default_rng(0)
     codes = rng.integers(shape.entries, size=(shape.seen + 1, shape.slices, CODE_SIDE, CODE_SIDE))
     before, own = torch.from_numpy(codes[None, :-1]), torch.from_numpy(codes[None, -1])
     expected = net(before, own, torch.tensor([_FPS]))[0].numpy()
-    runtime = GraphRuntime(folder, TransformerTables.of(net), shape)
+    runtime = GraphRuntime(folder, tables, net.table.numpy(), shape)
     runtime.begin(codes[:-1], _FPS)
     error = largest_difference(expected, runtime.logits(codes[-1]))
     if not error <= TOLERANCE:

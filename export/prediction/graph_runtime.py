@@ -5,7 +5,6 @@ chooses."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,36 +12,9 @@ import numpy as np
 from export.densepose.graphs import session
 from export.prediction.attention import PLACES
 from export.prediction.config import CODE_SIDE, TransformerShape
-from export.prediction.transformer import UNSEEN, LatentTransformer
-from export.prediction.transformer_graphs import NEIGHBOURS, slice_names
-
-
-@dataclass(frozen=True, eq=False)
-class TransformerTables:
-    """float32. context_rows [seen * slices * K, embedding], of codes of the frames before, oldest first, and of the one
-    by motion; slice_rows
-    [slices * K, embedding], of the frame itself; earlier [slice][slice before] [K, width]; row_bias and column_bias
-    [layers, heads, 31], of the slice network, by query less key; prior [slices, K + 1, K], logits by the code before.
-    """
-
-    context_rows: np.ndarray
-    slice_rows: np.ndarray
-    earlier: list[list[np.ndarray]]
-    row_bias: np.ndarray
-    column_bias: np.ndarray
-    prior: np.ndarray
-
-    @staticmethod
-    def of(net: LatentTransformer) -> TransformerTables:
-        layers = net.slices.layers
-        return TransformerTables(
-            net.context.rows.weight.detach().numpy()[:-1],
-            net.slices.rows.weight.detach().numpy(),
-            [[table.weight.detach().numpy() for table in tables] for tables in net.heads.earlier],
-            np.stack([layer.rows.detach().numpy() for layer in layers]),
-            np.stack([layer.columns.detach().numpy() for layer in layers]),
-            net.table.numpy(),
-        )
+from export.prediction.transformer import UNSEEN
+from export.prediction.transformer_file import TransformerTables
+from export.prediction.transformer_graphs import CONTEXT, NEIGHBOURS, SLICES, head_name, slice_names
 
 
 # Logits [K] of slice k at a place -> the code.
@@ -50,12 +22,15 @@ Choice = Callable[[int, int, np.ndarray], int]
 
 
 class GraphRuntime:
-    """One frame at a time: `begin`, then `logits` of given codes, or `chosen` codes."""
+    """One frame at a time: `begin`, then `logits` of given codes, or `chosen` codes. prior float32 [slices, K + 1, K]:
+    log-probabilities by the code before (K: none), added to the logits."""
 
-    def __init__(self, folder: Path, tables: TransformerTables, shape: TransformerShape) -> None:
-        self.tables, self.shape = tables, shape
-        self.context_graph, self.slice_graph = session(folder / "context.onnx"), session(folder / "slices.onnx")
-        self.head_graphs = [session(folder / f"head_{k}.onnx") for k in range(shape.slices)]
+    def __init__(
+        self, folder: Path, tables: TransformerTables, prior: np.ndarray, shape: TransformerShape
+    ) -> None:
+        self.tables, self.priors, self.shape = tables, prior, shape
+        self.context_graph, self.slice_graph = (session(folder / f"{name}.onnx") for name in (CONTEXT, SLICES))
+        self.head_graphs = [session(folder / f"{head_name(k)}.onnx") for k in range(shape.slices)]
         row, column = np.divmod(np.arange(PLACES), CODE_SIDE)
         steps = [axis[:, None] - axis[None] + CODE_SIDE - 1 for axis in (row, column)]
         self.bias = tables.row_bias[:, :, steps[0]] + tables.column_bias[:, :, steps[1]]  # [layers, heads, 256, 256]
@@ -70,9 +45,9 @@ class GraphRuntime:
         summed = np.where((codes == UNSEEN)[..., None], 0, rows).sum(0, dtype=np.float32)
         step = np.array([[np.log2(10 / fps)]], np.float32)
         (self.context,) = self.context_graph.run(None, {"summed": summed[None], "time_step": step})
-        last = before[self.shape.frames - 1].reshape(-1, PLACES)
-        last = np.where(last == UNSEEN, entries, last)
-        self.prior = np.stack([self.tables.prior[k][own] for k, own in enumerate(last)])  # [slices, 256, K]
+        newest = before[self.shape.frames - 1]
+        last = np.where(newest == UNSEEN, entries, newest).reshape(-1, PLACES)
+        self.prior = np.stack([self.priors[k][own] for k, own in enumerate(last)])  # [slices, 256, K]
 
     def embedded(self, codes: np.ndarray) -> np.ndarray:
         """Codes [slices, 16, 16] -> [16, 16, embedding]."""
@@ -85,10 +60,8 @@ class GraphRuntime:
         near = np.concatenate(
             [padded[2 + y :, 1 + x :][:CODE_SIDE, :CODE_SIDE] for y, x in NEIGHBOURS], -1
         ).reshape(1, PLACES, -1)  # fmt: skip
-        heads, width = self.shape.heads, self.shape.head_width
-        unseen = np.zeros((heads, 1, width), np.float32)
-        hidden = np.full((heads, PLACES, 1), -np.inf, np.float32)
-        caches = [array for own in self.bias for array in (unseen, unseen, np.concatenate([hidden, own], -1))]
+        nothing = np.zeros((1, self.shape.heads, 0, self.shape.head_width), np.float32)
+        caches = [array for own in self.bias for array in (nothing, nothing, own)]
         features = self._slices(self.context, near, caches)[0]
         known, found = codes.reshape(len(codes), PLACES), []
         for k in range(len(codes)):
@@ -111,10 +84,10 @@ class GraphRuntime:
                 # What is kept is seen before this place; this place sees itself.
                 own = np.full((shape.heads, 1, PLACES + 1), -np.inf, np.float32)
                 own[:, 0, :place], own[:, 0, PLACES] = bias[:, place, :place], bias[:, place, place]
-                caches += [keys[layer], values[layer], own]
+                caches += [keys[layer][None], values[layer][None], own]
             features, *new = self._slices(self.context[:, place : place + 1], near[None, None], caches)
             for layer in range(shape.layers):
-                keys[layer, :, place], values[layer, :, place] = new[2 * layer][:, 0], new[2 * layer + 1][:, 0]
+                keys[layer, :, place], values[layer, :, place] = new[2 * layer][0, :, 0], new[2 * layer + 1][0, :, 0]
             for k in range(shape.slices):
                 logits = self._head(k, features, codes[:k, place : place + 1])[0] + self.prior[k, place]
                 codes[k, place] = choose(k, place, logits)

@@ -43,6 +43,13 @@ class CodeTable:
             after.append((smoothed / smoothed.sum(1, keepdim=True)).log())
         return CodeTable(torch.stack(frequency), torch.stack(after))
 
+    @staticmethod
+    def of_stacked(stacked: Tensor) -> CodeTable:
+        """The inverse of `stacked`. Raises ValueError where a row is not of probabilities."""
+        if not torch.allclose(stacked.double().logsumexp(-1).exp(), torch.ones(()).double(), atol=1e-3):
+            raise ValueError("The table's rows are not probabilities: the transformer was trained without it.")
+        return CodeTable(stacked[:, -1], stacked[:, :-1])
+
     def stacked(self) -> Tensor:
         """[slices, K + 1, K]: `after`, and as the last row what holds where no frame was seen before."""
         return torch.cat([self.after, self.frequency[:, None]], 1)
@@ -60,9 +67,11 @@ def bits_by_table(table: CodeTable, codes: Tensor) -> Tensor:
     return torch.stack(of).mean((0, 3, 4)) / math.log(2)
 
 
-def bits_of_stream(frequency_bits: np.ndarray, after_bits: np.ndarray, codes: np.ndarray) -> np.ndarray:
-    """Of one stream as the SDK has them (sdk/src/prediction/codes/code_surprise.h): each code either stays or follows
-    the table, and each place learns which from the frames so far: the posterior of two experts (Herbster and Warmuth,
+def bits_of_stream(
+    frequency_bits: np.ndarray, after_bits: np.ndarray, codes: np.ndarray, foreseen_bits: np.ndarray | None = None
+) -> np.ndarray:
+    """Of one stream as the SDK has them (sdk/src/prediction/surprise/code_surprise.h): each code either stays or follows
+    the table, or foreseen_bits [T - 1, slices, 16, 16] where these are given, and each place learns which from the frames so far: the posterior of two experts (Herbster and Warmuth,
     "Tracking the best expert", 1998). After a cut, a frame with at least as many bits as its codes have by themselves,
     places have learnt nothing.
 
@@ -72,9 +81,10 @@ def bits_of_stream(frequency_bits: np.ndarray, after_bits: np.ndarray, codes: np
     slices = np.arange(codes.shape[1])[:, None, None]
     at_first = np.full(codes.shape[1:], STAYS_AT_FIRST)
     stays, found = at_first, []
-    for before, now in pairwise(codes):
+    for number, (before, now) in enumerate(pairwise(codes)):
         own = np.where(now == before, stays, 0)
-        likely = own + (1 - stays) * np.exp2(-after_bits[slices, before, now].astype(np.float64))
+        moves = after_bits[slices, before, now] if foreseen_bits is None else foreseen_bits[number]
+        likely = own + (1 - stays) * np.exp2(-moves.astype(np.float64))
         found.append(-np.log2(likely))
         is_cut = found[-1].sum() >= frequency_bits[slices, now].sum()
         stays = at_first if is_cut else _RETURNS + (1 - 2 * _RETURNS) * own / likely

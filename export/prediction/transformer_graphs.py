@@ -1,16 +1,17 @@
 """The transformer as ONNX graphs for a runtime that keeps keys and values: what was computed for places before is not
-computed again. Look-ups, sums of embedded codes and the relative bias are the runtime's (`graph_runtime.py`).
+computed again. Look-ups, sums of embedded codes and the relative bias of the slice network are the runtime's
+(`graph_runtime.py`).
 
 `context.onnx`, once a frame: summed [1, 256, embedding], time_step [1, 1] (log2 of 10 / fps) -> context
 [1, 256, width].
 
-`slices.onnx`, for places of the frame that is made: context [1, R, width] of theirs; near [1, R, 7 * embedding], the
-embedded codes of two rows above, three wide, and of the left neighbour; of each layer keys_l and values_l
-[heads, C, head_width] of places before, and bias_l [heads, R, C + R], added to the scores of those and of the R places
-themselves, -infinity where a place is not seen -> features [1, R, width], and new_keys_l, new_values_l
-[heads, R, head_width]. One place at a time: R = 1, C = 256; a whole frame at once: R = 256, C = 1, unseen.
+`slices.onnx`, for R places of each of N samples of the frame that is made: context [N, R, width] of theirs; near
+[N, R, 7 * embedding], the embedded codes of two rows above, three wide, and of the left neighbour; of each layer keys_l
+and values_l [N, heads, C, head_width] of places before, and bias_l [heads, R, C + R], added to the scores of those and
+of the R places themselves, -infinity where a place is not seen -> features [N, R, width], and new_keys_l, new_values_l
+[N, heads, R, head_width]. One place at a time: R = 1, C = 256; a whole frame at once: R = 256, C = 0.
 
-`head_k.onnx`: features [1, R, width], earlier [1, R, width] (sum of the tables of slices before) -> logits [1, R, K].
+`head_k.onnx`: features [N, R, width], earlier [N, R, width] (sum of the tables of slices before) -> logits [N, R, K].
 """
 
 from __future__ import annotations
@@ -26,6 +27,12 @@ from export.prediction.attention import PLACES, AttentionLayer
 from export.prediction.transformer import LatentTransformer
 
 NEIGHBOURS = ((-2, -1), (-2, 0), (-2, 1), (-1, -1), (-1, 0), (-1, 1), (0, -1))  # row, column of each part of `near`
+CONTEXT, SLICES = "context", "slices"  # graphs
+
+
+def head_name(k: int) -> str:
+    """The graph that gives the logits of slice k."""
+    return f"head_{k}"
 
 
 class ContextGraph(nn.Module):
@@ -47,17 +54,23 @@ class CachedLayer(nn.Module):
 
     def __init__(self, layer: AttentionLayer) -> None:
         super().__init__()
-        self.layer, self.scale = layer, (layer.query_key_value.out_features // 3 // layer.heads) ** -0.5
+        self.layer, joint = layer, layer.query_key_value
+        # The scale of scores lies in the queries: there are fewer of these.
+        weight = joint.weight.detach().clone()
+        inner = len(weight) // 3
+        weight[:inner] *= (inner // layer.heads) ** -0.5
+        self.query_key_value = nn.Linear(joint.in_features, joint.out_features, bias=False)
+        self.query_key_value.weight.data = weight
 
     def forward(self, x: Tensor, keys: Tensor, values: Tensor, bias: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         layer = self.layer
-        parts = layer.query_key_value(layer.norm(x))[0].chunk(3, -1)
-        query, key, value = (part.unflatten(-1, (layer.heads, -1)).transpose(0, 1) for part in parts)
+        parts = self.query_key_value(layer.norm(x)).chunk(3, -1)
+        query, key, value = (part.unflatten(-1, (layer.heads, -1)).transpose(1, 2) for part in parts)
         # Two products instead of one over all keys: the kept ones are read where they lie.
-        scores = torch.cat([query @ keys.transpose(1, 2), query @ key.transpose(1, 2)], -1) * self.scale + bias
-        shares, kept = scores.softmax(-1), keys.shape[1]
-        seen = shares[..., :kept] @ values + shares[..., kept:] @ value
-        x = x + layer.project(seen.transpose(0, 1).flatten(1)[None])
+        scores = torch.cat([query @ keys.transpose(2, 3), query @ key.transpose(2, 3)], -1) + bias
+        attention, kept = scores.softmax(-1), keys.shape[2]
+        seen = attention[..., :kept] @ values + attention[..., kept:] @ value
+        x = x + layer.project(seen.transpose(1, 2).flatten(2))
         return x + layer.network(x), key, value
 
 
@@ -104,24 +117,26 @@ def write_transformer_graphs(net: LatentTransformer, folder: Path) -> None:
     net, shape = net.eval().float(), net.shape
     folder.mkdir(parents=True, exist_ok=True)
     summed = torch.zeros(1, PLACES, shape.embedding)
-    write_graph(
-        ContextGraph(net), [summed, torch.zeros(1, 1)], folder / "context.onnx", ["summed", "time_step"], ["context"]
-    )
-    rows, kept = 3, 5  # any sizes that differ: those of the graph stay open
+    names = ["summed", "time_step"], ["context"]
+    write_graph(ContextGraph(net), [summed, torch.zeros(1, 1)], folder / f"{CONTEXT}.onnx", *names)
+    samples, rows, kept = 2, 3, 5  # any sizes that differ: those of the graph stay open
+    kept_shape = (samples, shape.heads, kept, shape.head_width)
     caches = [
-        torch.zeros(shape.heads, *size)
+        torch.zeros(size)
         for _ in range(shape.layers)
-        for size in ((kept, shape.head_width), (kept, shape.head_width), (rows, kept + rows))
+        for size in (kept_shape, kept_shape, (shape.heads, rows, kept + rows))
     ]
-    given = [torch.zeros(1, rows, shape.width), torch.zeros(1, rows, len(NEIGHBOURS) * shape.embedding), *caches]
+    near = torch.zeros(samples, rows, len(NEIGHBOURS) * shape.embedding)
+    given = [torch.zeros(samples, rows, shape.width), near, *caches]
     inputs, outputs = slice_names(shape.layers)
-    axes = {name: {1: "rows"} for name in (*inputs, *outputs)}
+    axes: dict[str, dict[int, str]] = {name: {0: "samples", 1: "rows"} for name in ("context", "near", "features")}
     for k in range(shape.layers):
-        axes[f"keys_{k}"] = axes[f"values_{k}"] = {1: "kept"}
+        axes |= {f"{name}_{k}": {0: "samples", 2: "kept"} for name in ("keys", "values")}
+        axes |= {f"new_{name}_{k}": {0: "samples", 2: "rows"} for name in ("keys", "values")}
         axes[f"bias_{k}"] = {1: "rows", 2: "kept_and_rows"}
-    write_graph(SliceGraph(net), given, folder / "slices.onnx", inputs, outputs, axes)
+    write_graph(SliceGraph(net), given, folder / f"{SLICES}.onnx", inputs, outputs, axes)
     for k in range(shape.slices):
-        features = torch.zeros(1, rows, shape.width)
-        axes = {name: {1: "rows"} for name in ("features", "earlier", "logits")}
-        path = folder / f"head_{k}.onnx"
-        write_graph(HeadGraph(net, k), [features, features.clone()], path, ["features", "earlier"], ["logits"], axes)
+        features = torch.zeros(samples, rows, shape.width)
+        axes = {name: {0: "samples", 1: "rows"} for name in ("features", "earlier", "logits")}
+        names = ["features", "earlier"], ["logits"]
+        write_graph(HeadGraph(net, k), [features, features.clone()], folder / f"{head_name(k)}.onnx", *names, axes)

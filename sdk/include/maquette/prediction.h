@@ -86,10 +86,16 @@ MAQ_API maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_p
 
 /* How surprising each frame of a stream is after the one before, and where, in bits: to notice what stands out, such as
  * a cut, a frozen or a covered camera, or something that appears, without a list of what may happen. A network makes a
- * frame, squeezed to a small square, codes at columns * rows cells of a map; a table and what the stream has shown so
- * far say how likely each code is. */
+ * frame, squeezed to a small square, codes at columns * rows cells of a map; a table or a second network, and
+ * what the stream has shown so far, say how likely each code is. */
 
 typedef struct maq_surprise maq_surprise;
+
+/* Values never change meaning; new ones are added at the end. */
+typedef enum maq_surprise_method {
+  MAQ_SURPRISE_AUTO = 0, /* the transformer of the bundle, which sees three frames before, where it has one */
+  MAQ_SURPRISE_TABLE = 1 /* how often a code followed another: takes next to no time */
+} maq_surprise_method;
 
 typedef struct maq_surprise_config {
   uint32_t struct_size;
@@ -105,6 +111,8 @@ typedef struct maq_surprise_config {
                                           then, and frames of both are encoded one after the other. What is said above
                                           is not read. The other may be destroyed first. NULL (default): own networks */
   float event_ratio; /* a frame is an event from this ratio on, and from 1 / it down; above 1, at most 1e6; default 4 */
+  maq_surprise_method method; /* what says how likely codes are; default MAQ_SURPRISE_AUTO. With networks_of:
+                                 MAQ_SURPRISE_AUTO has the transformer where the other stream has it */
 } maq_surprise_config;
 
 /* Of one frame. */
@@ -135,6 +143,7 @@ typedef struct maq_surprise_stats {
   uint64_t pushed_count;
   uint64_t event_count;
   uint64_t start_count;
+  float transformer_ms; /* of the latest frame: how likely its codes are; 0 where the table said that */
 } maq_surprise_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_surprise_config) of the caller.

@@ -7,14 +7,27 @@
 #include "core/worker_threads.h"
 #include "maquette/prediction.h"
 #include "prediction/codes/frame_decoder.h"
-#include "prediction/codes/surprise.h"
+#include "prediction/surprise/surprise.h"
 
 using namespace maq;
 
+namespace {
+
+// What streams can share.
+struct SurpriseNetworks {
+  std::shared_ptr<FrameEncoder> encoder;
+  std::shared_ptr<FrameDecoder> decoder;
+  std::shared_ptr<CodeTransformer> transformer;  // null: the table instead
+};
+
+}  // namespace
+
 struct maq_surprise : HandleOf<HandleKind::kSurprise> {
-  maq_surprise(std::shared_ptr<ContextState> of, std::shared_ptr<FrameEncoder> encoder,
-               std::shared_ptr<FrameDecoder> to_pictures, float ratio)
-      : state(std::move(of)), surprise(std::move(encoder)), decoder(std::move(to_pictures)), event_ratio(ratio) {}
+  maq_surprise(std::shared_ptr<ContextState> of, SurpriseNetworks networks, float ratio)
+      : state(std::move(of)),
+        surprise(std::move(networks.encoder), std::move(networks.transformer)),
+        decoder(std::move(networks.decoder)),
+        event_ratio(ratio) {}
   std::shared_ptr<ContextState> state;
   Surprise surprise;
   std::shared_ptr<FrameDecoder> decoder;
@@ -39,22 +52,25 @@ maq_surprise_config default_surprise_config() {
   return config;
 }
 
-struct Networks {
-  std::shared_ptr<FrameEncoder> encoder;
-  std::shared_ptr<FrameDecoder> decoder;
-};
+void require_method(const maq_surprise_config& config) {
+  require_range("config.method", int(config.method), int(MAQ_SURPRISE_AUTO), int(MAQ_SURPRISE_TABLE));
+}
 
-Networks open_networks(ContextState& state, const maq_surprise_config& config) {
+SurpriseNetworks open_networks(ContextState& state, const maq_surprise_config& config) {
   require_threads("config.threads", config.threads, kMaxThreads);
   require_range("config.allow_spinning", config.allow_spinning, 0, 1);
+  require_method(config);
   SessionSettings settings;
   settings.threads = config.threads != 0 ? config.threads : default_threads();
   settings.spin = config.allow_spinning == 1;
   const CodeBundle bundle(read_bundle_argument(config, "config", kPredictionBundle));
-  Networks made;
+  SurpriseNetworks made;
   made.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, settings);
   settings.threads = made.encoder->threads();
   made.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, settings);
+  if (config.method == MAQ_SURPRISE_AUTO && TransformerBundle::is_in(bundle)) {
+    made.transformer = std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, settings);
+  }
   const Manifest& manifest = bundle.bundle.manifest;
   state.log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
                     ") loaded, ", settings.threads, " thread(s)");
@@ -76,15 +92,17 @@ maq_status maq_surprise_create(maq_context* context, const maq_surprise_config* 
     if (!(config.event_ratio > 1 && config.event_ratio <= 1e6f)) {
       throw ArgumentError("config.event_ratio is ", config.event_ratio, ", but must be above 1, and at most 1e6.");
     }
-    Networks networks;
+    SurpriseNetworks networks;
     if (config.networks_of != nullptr) {
       require_argument(config.networks_of, "config.networks_of");
-      networks = {config.networks_of->surprise.encoder(), config.networks_of->decoder};
+      const maq_surprise& other = *config.networks_of;
+      networks = {other.surprise.encoder(), other.decoder, other.surprise.transformer()};
+      require_method(config);
+      if (config.method == MAQ_SURPRISE_TABLE) networks.transformer = nullptr;
     } else {
       networks = open_networks(*context->state, config);
     }
-    *surprise =
-        new maq_surprise(context->state, std::move(networks.encoder), std::move(networks.decoder), config.event_ratio);
+    *surprise = new maq_surprise(context->state, std::move(networks), config.event_ratio);
     return MAQ_OK;
   });
 }
@@ -154,11 +172,11 @@ maq_status maq_surprise_reset(maq_surprise* surprise) {
 
 maq_status maq_surprise_get_stats(const maq_surprise* surprise, maq_surprise_stats* stats) {
   return guarded_alone(surprise, "surprise", __func__, [&] {
-    const EncoderTimes& times = surprise->surprise.times();
+    const SurpriseTimes& times = surprise->surprise.times();
     write_struct(stats, "stats",
-                 maq_surprise_stats{0, times.resize_ms, times.network_ms, times.nearest_ms, surprise->push_ms,
-                                    surprise->surprise.encoder()->threads(), surprise->pushed, surprise->events,
-                                    surprise->starts},
+                 maq_surprise_stats{0, times.encoder.resize_ms, times.encoder.network_ms, times.encoder.nearest_ms,
+                                    surprise->push_ms, surprise->surprise.encoder()->threads(), surprise->pushed,
+                                    surprise->events, surprise->starts, times.transformer_ms},
                  sizeof(maq_surprise_stats));
     return MAQ_OK;
   });

@@ -37,7 +37,8 @@ def picture(shift_px: float, width: int, height: int, seed: float = 0.0) -> np.n
     return np.rint(np.where(moving[..., None], np.stack(thing, -1), np.stack(back, -1))).clip(0, 255).astype(np.uint8)
 
 
-def main() -> None:
+def tiny() -> tuple[Autoencoder, np.ndarray, torch.Tensor]:
+    """The network, frames uint8 [6, 64, 64, 3], and their codes int64 [6, 2, 16, 16]."""
     torch.manual_seed(5)
     net = Autoencoder(SHAPE).eval()
     for layer in net.encoder:  # weights as they begin make nearly one colour of all
@@ -49,7 +50,11 @@ def main() -> None:
         vectors = net.codebook._vectors(net.encoder(scaled(given)))
         for k in range(SHAPE.slices):
             net.codebook.entries[k] = vectors[k, torch.randperm(vectors.shape[1])[: SHAPE.entries]]
-    codes = net.encode(given)
+    return net, frames, net.encode(given)
+
+
+def main() -> None:
+    net, frames, codes = tiny()
     table = CodeTable.counted(codes[None, :5], SHAPE.entries)
     (FOLDER / "bundle").mkdir(parents=True, exist_ok=True)
     export_bundle(net, table, FOLDER / "bundle", BundleInfo("tiny-prediction", "fp32"))

@@ -17,7 +17,7 @@ void use_codes(const void* bytes, size_t count) {
   nearest.run(features.data(), codes.places(), found.data());
   maq::CodeSurprise surprise(codes);
   std::vector<float> bits(codes.places());
-  for (int i = 0; i < 2; ++i) surprise.add(found.data(), bits.data());
+  for (int i = 0; i < 2; ++i) surprise.add(found.data(), nullptr, bits.data());
   for (const float of_place : bits) EXPECT_TRUE(of_place >= 0 && of_place < 17) << of_place;
 }
 

@@ -9,6 +9,7 @@
 #include "support/expect_error.h"
 #include "support/moving_texture.h"
 #include "support/tiny_prediction.h"
+#include "support/tiny_transformer.h"
 
 namespace {
 
@@ -64,6 +65,37 @@ TEST(Surprise, BitsAreThoseOfPython) {
     const float mean =
         std::accumulate(of_python, of_python + surprise.map().size(), 0.0f) / float(surprise.map().size());
     EXPECT_NEAR(score.bits, mean, 1e-4);
+  }
+}
+
+TEST(Surprise, WithATransformerBitsAreThoseOfTorch) {
+  maq::Surprise surprise(tiny_prediction::encoder(tiny_transformer::kBundle), tiny_transformer::open());
+  const std::vector<float> expected = tiny_transformer::floats_of("stream.f32");
+  for (int again = 0; again < 2; ++again) {
+    for (int number = 0; number < tiny_prediction::kFrames; ++number) {
+      const maq::SurpriseScore score = surprise.push(tiny_prediction::frame(number));
+      EXPECT_EQ(score.is_start, number == 0);
+      EXPECT_EQ(surprise.times().transformer_ms > 0, number > 0);
+      if (number == 0) continue;
+      for (size_t i = 0; i < 256; ++i) {
+        ASSERT_NEAR(surprise.map()[i], expected[size_t(number - 1) * 256 + i], 3e-4) << number << " " << i;
+      }
+    }
+  }
+}
+
+TEST(Surprise, WithATransformerNothingOfTheSceneBeforeACutIsKnownAfterIt) {
+  const auto transformer = tiny_transformer::open();
+  maq::Surprise cut(tiny(), transformer), fresh(tiny(), transformer);
+  const int64_t time_ns = show_motion(cut);
+  const maq::Frame other = noise_frame(7, time_ns);
+  ASSERT_TRUE(cut.push(other).is_cut);
+  fresh.push(other);
+  for (int i = 1; i < 8; ++i) {
+    const auto shown = [&] {
+      return moving_texture::frame(MAQ_PIXEL_BGR8, 320, 240, 900 - i, 700, time_ns + i * kStep_ns);
+    };
+    EXPECT_EQ(cut.push(shown()).bits, fresh.push(shown()).bits) << i;
   }
 }
 

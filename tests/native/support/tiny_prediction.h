@@ -8,7 +8,7 @@
 
 #include "core/log.h"
 #include "prediction/codes/frame_decoder.h"
-#include "prediction/codes/surprise.h"
+#include "prediction/surprise/surprise.h"
 #include "support/temp_folder.h"
 
 namespace tiny_prediction {

@@ -9,9 +9,10 @@ import torch
 
 from export.prediction.config import TransformerShape
 from export.prediction.export_transformer import export_transformer
-from export.prediction.graph_runtime import GraphRuntime, TransformerTables
+from export.prediction.graph_runtime import GraphRuntime
 from export.prediction.sampling import drawn_codes
 from export.prediction.transformer import UNSEEN, LatentTransformer
+from export.prediction.transformer_file import TransformerTables
 
 SHAPE = TransformerShape(width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=8, slices=3, entries=16)
 FPS = 15.0
@@ -33,7 +34,7 @@ def net():
 def runtime(net, tmp_path_factory):
     folder = tmp_path_factory.mktemp("graphs")
     assert export_transformer(net, folder) < 1e-4
-    return GraphRuntime(folder, TransformerTables.of(net), SHAPE)
+    return GraphRuntime(folder, TransformerTables.of(net), net.table.numpy(), SHAPE)
 
 
 @pytest.fixture(params=["all frames known", "none before the last"])

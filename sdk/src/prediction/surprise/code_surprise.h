@@ -10,7 +10,8 @@
 
 namespace maq {
 
-// Of a stream. Each code either stays as it is or follows the table of what follows which code; how likely staying is,
+// Of a stream. Each code either stays as it is or follows what was foreseen, by the table of what follows which code
+// where nothing else did; how likely staying is,
 // each place learns from the stream: a mixture of two experts whose weight is their posterior, of which a part returns
 // to both, so that each may come back (Herbster and Warmuth, "Tracking the best expert", 1998).
 class CodeSurprise {
@@ -20,10 +21,11 @@ class CodeSurprise {
   // Forgets the frames so far: the next one has the bits of codes by themselves.
   void reset() { has_frame_ = false; }
 
-  // `codes` of the next frame, [places][slices] -> bits [places]: a code's, the mean of its place. Where they follow
-  // from the frame before no better than any others would, as after a cut, what was learnt is forgotten, and this is
-  // true.
-  bool add(const uint16_t* codes, float* bits);
+  // `codes` of the next frame, [places][slices] -> bits [places]: a code's, the mean of its place. `foreseen`: bits of
+  // each code by something that knows better than the table, [places][slices], or null; not of a first frame. Where
+  // codes follow from the frame before no better than any others would, as after a cut, what was learnt is forgotten,
+  // and this is true.
+  bool add(const uint16_t* codes, const float* foreseen, float* bits);
 
  private:
   const FrameCodes& codes_;

@@ -1,4 +1,4 @@
-#include "prediction/codes/code_surprise.h"
+#include "prediction/surprise/code_surprise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ CodeSurprise::CodeSurprise(const FrameCodes& codes) : codes_(codes), before_(cod
   }
 }
 
-bool CodeSurprise::add(const uint16_t* codes, float* bits) {
+bool CodeSurprise::add(const uint16_t* codes, const float* foreseen, float* bits) {
   const size_t slices = codes_.slices, entries = codes_.entries;
   double of_frame = 0, by_themselves = 0;
   for (size_t place = 0; place < codes_.places(); ++place) {
@@ -30,7 +30,9 @@ bool CodeSurprise::add(const uint16_t* codes, float* bits) {
         sum += rare;
         continue;
       }
-      const float moves = probability_[codes_.after_bits[(slice * entries + before_[i]) * entries + code]];
+      const float moves = foreseen != nullptr
+                              ? std::exp2(-foreseen[i])
+                              : probability_[codes_.after_bits[(slice * entries + before_[i]) * entries + code]];
       const float stays = codes[i] == before_[i] ? stays_[i] : 0.0f;
       const float likely = std::min(1.0f, stays + (1 - stays_[i]) * moves);
       sum -= std::log2(likely);

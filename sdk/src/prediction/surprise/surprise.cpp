@@ -1,4 +1,4 @@
-#include "prediction/codes/surprise.h"
+#include "prediction/surprise/surprise.h"
 
 #include <algorithm>
 #include <array>
@@ -13,9 +13,12 @@ constexpr float kFloor_bits = 0.035f;  // what the noise of a picture that stand
 
 }  // namespace
 
-Surprise::Surprise(std::shared_ptr<FrameEncoder> encoder)
+Surprise::Surprise(std::shared_ptr<FrameEncoder> encoder, std::shared_ptr<CodeTransformer> transformer)
     : encoder_(std::move(encoder)),
+      transformer_(std::move(transformer)),
       code_surprise_(encoder_->codes()),
+      history_(encoder_->codes().count()),
+      foreseen_(encoder_->codes().count()),
       codes_(encoder_->codes().count()),
       coming_(codes_.size()) {
   map_.reserve(encoder_->codes().places());
@@ -24,6 +27,7 @@ Surprise::Surprise(std::shared_ptr<FrameEncoder> encoder)
 
 void Surprise::reset() {
   code_surprise_.reset();
+  history_.clear();
   before_.clear();
   map_.clear();
   has_frame_ = false;
@@ -48,19 +52,35 @@ float Surprise::ratio_of(float bits) const {
   return (bits + kFloor_bits) / (median + kFloor_bits);
 }
 
+const float* Surprise::foreseen(int64_t time_ns) {
+  if (transformer_ == nullptr || history_.size() == 0) return nullptr;
+  CodesBefore before;
+  before.newest = codes_.data();
+  history_.select(time_ns, transformer_->before(), before.frames.data());
+  before.step_s = float(double(time_ns - history_.newest_ns()) / 1e9);
+  transformer_->bits(before, coming_.data(), foreseen_.data());
+  return foreseen_.data();
+}
+
 SurpriseScore Surprise::push(const Frame& frame) {
-  times_ = encoder_->run(frame.image, coming_.data());
-  codes_.swap(coming_);
+  SurpriseTimes times;
+  times.encoder = encoder_->run(frame.image, coming_.data());
   SurpriseScore score;
   const bool is_of_other_kind = has_frame_ && !is_of_same_kind(frame);
   score.is_start = !has_frame_ || is_of_other_kind || !is_soon_after(frame);
+  Stopwatch stage;
+  const float* const by_network = score.is_start ? nullptr : foreseen(frame.timestamp_ns);
+  if (by_network != nullptr) times.transformer_ms = float(stage.lap_ms());
+  times_ = times;
+  codes_.swap(coming_);
   if (score.is_start) {
     code_surprise_.reset();
+    history_.clear();
     // Another kind of picture is compared with what was shown; after a pause nothing is known of what is usual.
     if (!is_of_other_kind) before_.clear();
   }
   map_.resize(encoder_->codes().places());
-  score.is_cut = code_surprise_.add(codes_.data(), map_.data());
+  score.is_cut = code_surprise_.add(codes_.data(), by_network, map_.data());
   for (const float bits : map_) score.bits += bits / float(map_.size());
   score.ratio = ratio_of(score.bits);
   if (score.is_start || score.is_cut) {
@@ -69,6 +89,8 @@ SurpriseScore Surprise::push(const Frame& frame) {
     before_.push_back(score.bits);
     if (before_.size() > kBefore) before_.erase(before_.begin());
   }
+  if (score.is_cut) history_.clear();
+  history_.add(codes_.data(), frame.timestamp_ns);
   has_frame_ = true;
   format_ = frame.image.format;
   width_px_ = frame.image.width_px;

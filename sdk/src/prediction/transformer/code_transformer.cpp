@@ -1,0 +1,99 @@
+#include "prediction/transformer/code_transformer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/error.h"
+#include "prediction/transformer/code_likelihood.h"
+
+namespace maq {
+namespace {
+
+// [layers][heads][places][places].
+std::vector<float> causal_bias(const TransformerTables& tables) {
+  const size_t side = tables.side, places = tables.places(), steps = 2 * side - 1;
+  std::vector<float> bias(tables.layers * tables.heads * places * places, -std::numeric_limits<float>::infinity());
+  float* to = bias.data();
+  for (size_t head = 0; head < tables.layers * tables.heads; ++head) {
+    const float *rows = tables.row_bias.data() + head * steps, *columns = tables.column_bias.data() + head * steps;
+    for (size_t query = 0; query < places; ++query, to += places) {
+      for (size_t key = 0; key <= query; ++key) {
+        const size_t down = query / side - key / side + side - 1, right = query % side + side - 1 - key % side;
+        to[key] = rows[down] + columns[right];
+      }
+    }
+  }
+  return bias;
+}
+
+}  // namespace
+
+CodeTransformer::CodeTransformer(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const CodeBundle& bundle,
+                                 const SessionSettings& settings)
+    : runtime_(std::move(runtime)), parts_(bundle), rows_(parts_.tables), bias_(causal_bias(parts_.tables)) {
+  const TransformerTables& tables = parts_.tables;
+  const auto places = int64_t(tables.places()), width = int64_t(tables.width), embedding = int64_t(tables.embedding),
+             heads = int64_t(tables.heads), of_head = int64_t(parts_.head_width), entries = int64_t(tables.entries);
+  SessionSettings whole = settings;
+  whole.fixed_sizes = {{"samples", 1}, {"rows", places}, {"kept", 0}, {"kept_and_rows", places}};
+  context_ = parts_.context.open(runtime_, settings);
+  slices_ = parts_.slices.open(runtime_, whole);
+  for (const TransformerBundle::Graph& head : parts_.heads) heads_.push_back(head.open(runtime_, whole));
+
+  summed_.resize(tables.places() * tables.embedding);
+  near_.resize(tables.places() * kNeighbours * tables.embedding);
+  earlier_.resize(tables.places() * tables.width);
+  logits_.resize(tables.entries);
+  context_inputs_ = {{summed_.data(), {1, places, embedding}}, {&time_step_, {1, 1}}};
+  context_outputs_ = {{1, places, width}};
+  slice_inputs_ = {{nullptr, {1, places, width}}, {near_.data(), {1, places, int64_t(kNeighbours) * embedding}}};
+  slice_outputs_ = {{1, places, width}};
+  for (size_t layer = 0; layer < tables.layers; ++layer) {
+    // No key is kept; where the memory of none lies does not matter.
+    for (int i = 0; i < 2; ++i) slice_inputs_.push_back({bias_.data(), {1, heads, 0, of_head}});
+    const size_t of_layer = tables.heads * tables.places() * tables.places();
+    slice_inputs_.push_back({bias_.data() + layer * of_layer, {heads, places, places}});
+    for (int i = 0; i < 2; ++i) slice_outputs_.push_back({1, heads, places, of_head});
+  }
+  head_inputs_ = {{nullptr, {1, places, width}}, {earlier_.data(), {1, places, width}}};
+  head_outputs_ = {{1, places, entries}};
+}
+
+void CodeTransformer::see_context(const CodesBefore& before) {
+  sum_context_rows(parts_.tables, before.frames, summed_.data());
+  const float fps = before.step_s > 0 ? 1 / before.step_s : parts_.max_fps;
+  time_step_ = std::log2(10 / std::clamp(fps, parts_.min_fps, parts_.max_fps));
+  slice_inputs_[0].data = context_->run(context_inputs_, context_outputs_)[0].data;
+}
+
+void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, float* bits) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const TransformerTables& tables = parts_.tables;
+  const FrameCodes& stored = *parts_.codes;
+  see_context(before);
+  for (size_t place = 0; place < tables.places(); ++place) rows_.set(place, codes + place * tables.slices);
+  for (size_t place = 0; place < tables.places(); ++place) {
+    rows_.near(place, near_.data() + place * kNeighbours * tables.embedding);
+  }
+  head_inputs_[0].data = slices_->run(slice_inputs_, slice_outputs_)[0].data;
+  for (size_t k = 0; k < tables.slices; ++k) {
+    for (size_t place = 0; place < tables.places(); ++place) {
+      sum_earlier_rows(tables, k, codes + place * tables.slices, earlier_.data() + place * tables.width);
+    }
+    const float* logits = heads_[k]->run(head_inputs_, head_outputs_)[0].data;
+    for (size_t place = 0; place < tables.places(); ++place, logits += tables.entries) {
+      const size_t i = place * tables.slices + k;
+      std::copy_n(logits, tables.entries, logits_.data());
+      add_stored_prior(stored.after_bits.data() + (k * stored.entries + before.newest[i]) * stored.entries,
+                       stored.entries, logits_.data());
+      bits[i] = bits_of_code(logits_.data(), tables.entries, codes[i]);
+      if (std::isnan(bits[i])) {
+        throw Error(MAQ_ERROR_INFERENCE, "The transformer gave numbers that are none. Install the bundle again.");
+      }
+    }
+  }
+}
+
+}  // namespace maq

@@ -1,0 +1,55 @@
+#include "prediction/transformer/row_sums.h"
+
+#include <algorithm>
+
+#include "core/simd_clones.h"
+
+namespace maq {
+namespace {
+
+MAQ_SIMD_CLONES void add_row(const float* row, size_t count, float* sum) {
+  for (size_t i = 0; i < count; ++i) sum[i] += row[i];
+}
+
+}  // namespace
+
+void sum_context_rows(const TransformerTables& tables, const ContextFrames& frames, float* summed) {
+  const size_t embedding = tables.embedding;
+  std::fill_n(summed, tables.places() * embedding, 0.0f);
+  for (size_t frame = 0; frame < tables.frames; ++frame) {
+    if (frames[frame] == nullptr) continue;
+    for (size_t i = 0; i < tables.places() * tables.slices; ++i) {
+      const size_t slice = frame * tables.slices + i % tables.slices;
+      const size_t row = slice * tables.entries + frames[frame][i];
+      add_row(tables.context_rows.data() + row * embedding, embedding, summed + i / tables.slices * embedding);
+    }
+  }
+}
+
+SliceRows::SliceRows(const TransformerTables& tables)
+    : tables_(tables), side_(tables.side), grid_((side_ + 2) * (side_ + 2) * tables.embedding, 0.0f) {}
+
+void SliceRows::set(size_t place, const uint16_t* codes) {
+  const size_t embedding = tables_.embedding;
+  float* const sum = grid_.data() + at(place) * embedding;
+  std::fill_n(sum, embedding, 0.0f);
+  for (size_t slice = 0; slice < tables_.slices; ++slice) {
+    add_row(tables_.slice_rows.data() + (slice * tables_.entries + codes[slice]) * embedding, embedding, sum);
+  }
+}
+
+void SliceRows::near(size_t place, float* near) const {
+  const size_t embedding = tables_.embedding, up = side_ + 2, here = at(place);
+  const size_t neighbours[kNeighbours] = {here - 2 * up - 1, here - 2 * up, here - 2 * up + 1, here - up - 1,
+                                          here - up,         here - up + 1, here - 1};
+  for (const size_t neighbour : neighbours) near = std::copy_n(grid_.data() + neighbour * embedding, embedding, near);
+}
+
+void sum_earlier_rows(const TransformerTables& tables, size_t of, const uint16_t* codes, float* sum) {
+  std::fill_n(sum, tables.width, 0.0f);
+  for (size_t k = 0; k < of; ++k) {
+    add_row(tables.earlier_rows(of, k).data() + codes[k] * tables.width, tables.width, sum);
+  }
+}
+
+}  // namespace maq

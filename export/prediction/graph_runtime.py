@@ -16,7 +16,6 @@ from export.prediction.transformer import UNSEEN
 from export.prediction.transformer_file import TransformerTables
 from export.prediction.transformer_graphs import CONTEXT, NEIGHBOURS, SLICES, head_name, slice_names
 
-
 # Logits [K] of slice k at a place -> the code.
 Choice = Callable[[int, int, np.ndarray], int]
 
@@ -25,9 +24,7 @@ class GraphRuntime:
     """One frame at a time: `begin`, then `logits` of given codes, or `chosen` codes. prior float32 [slices, K + 1, K]:
     log-probabilities by the code before (K: none), added to the logits."""
 
-    def __init__(
-        self, folder: Path, tables: TransformerTables, prior: np.ndarray, shape: TransformerShape
-    ) -> None:
+    def __init__(self, folder: Path, tables: TransformerTables, prior: np.ndarray, shape: TransformerShape) -> None:
         self.tables, self.priors, self.shape = tables, prior, shape
         self.context_graph, self.slice_graph = (session(folder / f"{name}.onnx") for name in (CONTEXT, SLICES))
         self.head_graphs = [session(folder / f"{head_name(k)}.onnx") for k in range(shape.slices)]

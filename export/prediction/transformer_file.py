@@ -113,7 +113,8 @@ def read_transformer_file(path: Path) -> TransformerTables:
     if len(left):
         raise RowFileError(f"{path.name} goes on after what its head claims.")
     tables = TransformerTables(before, context_rows, slice_rows, earlier, *biases)
-    if not all(np.isfinite(array).all() for array in (context_rows, slice_rows, *sum(earlier, []), *biases)):
+    groups = (context_rows, slice_rows, *(own for of_slice in earlier for own in of_slice), *biases)
+    if not all(np.isfinite(array).all() for array in groups):
         raise RowFileError(f"{path.name} has a number that is not finite.")
     return tables
 

@@ -13,6 +13,7 @@ from maquette.frames import Frame, Source, acquired_frame
 from maquette.native import NativeObject, native
 
 METHODS = ("auto", "last", "motion")  # of maq_prediction_method
+SURPRISE_METHODS = ("auto", "table")  # of maq_surprise_method
 
 
 class Predictor(NativeObject):
@@ -74,14 +75,16 @@ class SurpriseScore:
 class Surprise(NativeObject):
     """How surprising each frame of a stream is after the one before, and where, in bits.
 
-    networks_of: another stream, whose networks this one uses as well. settings: fields of maq_surprise_config by their
-    names, as event_ratio=6. Raises MaquetteError.
+    networks_of: another stream, whose networks this one uses as well. method: what says how likely codes are: "auto"
+    (the transformer, where the bundle has it), or "table", which takes next to no time. settings: fields of
+    maq_surprise_config by their names, as event_ratio=6. Raises MaquetteError.
     """
 
-    def __init__(self, networks_of: Surprise | None = None, **settings: Any) -> None:
+    def __init__(self, networks_of: Surprise | None = None, method: str = "auto", **settings: Any) -> None:
         n = native()
+        own = {"method": _method(method, SURPRISE_METHODS)}
         shared = {} if networks_of is None else {"networks_of": networks_of.handle}
-        config = n.config("maq_surprise_config", shared | settings)
+        config = n.config("maq_surprise_config", own | shared | settings)
         super().__init__(n.create("maq_surprise", n.context, config))
 
     def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> SurpriseScore:
@@ -143,10 +146,10 @@ class Concealer(NativeObject):
         return native().stats("maq_concealer_stats", "maq_concealer_get_stats", self.handle)
 
 
-def _method(name: str) -> int:
-    if name not in METHODS:
-        raise ValueError(f"no method {name!r}; there are {', '.join(METHODS)}")
-    return METHODS.index(name)
+def _method(name: str, methods: tuple[str, ...] = METHODS) -> int:
+    if name not in methods:
+        raise ValueError(f"no method {name!r}; there are {', '.join(methods)}")
+    return methods.index(name)
 
 
 def _timed_frame(image: Frame | np.ndarray, time_s: float | None) -> Frame:

@@ -175,6 +175,27 @@ TEST_F(ApiSurprise, WhatIsWrongIsTold) {
   maq_surprise_destroy(nullptr);
 }
 
+TEST_F(ApiSurprise, TheTransformerSaysBitsWhereTheBundleHasItUnlessTheTableIsAskedFor) {
+  maq_surprise_config config = surprise_config();
+  config.bundle_path = MAQ_TEST_DATA "/tiny_transformer/bundle";
+  maquette::Surprise by_transformer(context_, config);
+  config.networks_of = by_transformer.get();
+  maquette::Surprise sharing(context_, config);
+  config.method = MAQ_SURPRISE_TABLE;
+  maquette::Surprise sharing_table(context_, config);
+  config.networks_of = nullptr;
+  maquette::Surprise by_table(context_, config);
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=30&frames=6");
+  for (int i = 0; const auto frame = source.next(); ++i) {
+    const float bits = by_transformer.push(*frame).bits, of_table = by_table.push(*frame).bits;
+    EXPECT_EQ(bits, sharing.push(*frame).bits);
+    EXPECT_EQ(of_table, sharing_table.push(*frame).bits);
+    EXPECT_EQ(bits == of_table, i == 0) << i;
+    EXPECT_EQ(by_transformer.stats().transformer_ms > 0, i > 0);
+    EXPECT_EQ(by_table.stats().transformer_ms, 0);
+  }
+}
+
 TEST_F(ApiSurprise, ConfigsOutOfRangeAreRefused) {
   maq_surprise* made = nullptr;
   const auto refused = [&](const char* name, auto&& change, maq_status status = MAQ_ERROR_INVALID_ARGUMENT) {
@@ -191,6 +212,7 @@ TEST_F(ApiSurprise, ConfigsOutOfRangeAreRefused) {
     refused("config.threads", [&](maq_surprise_config& config) { config.threads = threads; });
   }
   refused("config.allow_spinning", [](maq_surprise_config& config) { config.allow_spinning = 2; });
+  refused("config.method", [](maq_surprise_config& config) { config.method = maq_surprise_method(2); });
   refused("config.struct_size", [](maq_surprise_config& config) { config.struct_size = 3; });
   refused("config.networks_of is a maq_context", [&](maq_surprise_config& config) {
     config.networks_of = reinterpret_cast<const maq_surprise*>(context_.get());

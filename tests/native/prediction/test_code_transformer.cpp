@@ -94,7 +94,8 @@ TEST(CodeTransformer, BitsOfACodeAreThoseOfFloat64) {
       for (size_t code = 0; code < entries; ++code) {
         const double bits = (std::log(sum) + largest - double(logits[code])) / std::log(2.0);
         const float found = maq::bits_of_code(logits.data(), entries, code);
-        EXPECT_NEAR(double(found), std::min(bits, double(maq::kMaxCodeBits)), 2e-6 * (1 + bits)) << entries << " " << scale;
+        EXPECT_NEAR(double(found), std::min(bits, double(maq::kMaxCodeBits)), 2e-6 * (1 + bits))
+            << entries << " " << scale;
       }
     }
   }

@@ -11,8 +11,8 @@
 
 namespace {
 
-using tiny_transformer::kBundle;
 using nlohmann::json;
+using tiny_transformer::kBundle;
 
 class TransformerBundles : public testing::Test {
  protected:
@@ -99,7 +99,8 @@ TEST_F(TransformerBundles, RowsThatAreDamagedOrMadeToDoHarmAreRefusedOrHarmless)
 }
 
 TEST_F(TransformerBundles, RowsInBytesAreNearThoseInFloats) {
-  const std::string wide = read_text(kBundle + "/transformer.maqr"), narrow = read_text(tiny_transformer::kFolder + "/rows_in_bytes.maqr");
+  const std::string wide = read_text(kBundle + "/transformer.maqr"),
+                    narrow = read_text(tiny_transformer::kFolder + "/rows_in_bytes.maqr");
   const maq::TransformerTables one = maq::read_row_file(wide.data(), wide.size(), "one"),
                                other = maq::read_row_file(narrow.data(), narrow.size(), "other");
   ASSERT_EQ(one.context_rows.size(), other.context_rows.size());

@@ -1,5 +1,6 @@
 #include "prediction/codes/frame_encoder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -29,7 +30,7 @@ FrameEncoder::FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, co
   session_ = std::make_unique<Session>(std::move(runtime), bytes, graph, name, settings);
 }
 
-EncoderTimes FrameEncoder::run(const ImageView& image, uint16_t* found) {
+EncoderTimes FrameEncoder::run(const ImageView& image, uint16_t* found, uint8_t* squeezed) {
   if (is_depth(image.format)) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no codes; give a picture.");
   }
@@ -43,6 +44,9 @@ EncoderTimes FrameEncoder::run(const ImageView& image, uint16_t* found) {
   image_.resize(3 * pixels);
   for (size_t i = 0; i < pixels; ++i) {
     for (size_t c = 0; c < 3; ++c) image_[3 * i + c] = std::floor(resized_.values[c * pixels + i] + 0.5f);
+  }
+  if (squeezed != nullptr) {
+    std::transform(image_.begin(), image_.end(), squeezed, [](float value) { return uint8_t(value); });
   }
   times.resize_ms = float(stage.lap_ms());
 

@@ -26,12 +26,14 @@ class FrameEncoder {
   FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const CodeBundle& bundle, SessionSettings settings);
 
   const FrameCodes& codes() const { return *codes_; }
+  int frame_px() const { return frame_px_; }
   int threads() const { return threads_; }  // in use
 
   // Squeezes the frame to a square, by area, in bytes as the network was trained on them, and writes codes().count()
-  // numbers: [places][slices]. Throws MAQ_ERROR_UNSUPPORTED for a depth image, MAQ_ERROR_INFERENCE, also where the
-  // network gives no finite numbers; `found` is then as before.
-  EncoderTimes run(const ImageView& image, uint16_t* found);
+  // numbers: [places][slices]; to `squeezed`, unless it is null, that square: R, G, B of [frame_px][frame_px]. Throws
+  // MAQ_ERROR_UNSUPPORTED for a depth image, MAQ_ERROR_INFERENCE, also where the network gives no finite numbers;
+  // `found` is then as before.
+  EncoderTimes run(const ImageView& image, uint16_t* found, uint8_t* squeezed = nullptr);
 
  private:
   const std::shared_ptr<const FrameCodes> codes_;

@@ -21,6 +21,10 @@ Surprise::Surprise(std::shared_ptr<FrameEncoder> encoder, std::shared_ptr<CodeTr
       foreseen_(encoder_->codes().count()),
       codes_(encoder_->codes().count()),
       coming_(codes_.size()) {
+  if (transformer_ != nullptr && transformer_->has_motion()) {
+    motion_.emplace(encoder_);
+    squeezed_.resize(size_t(encoder_->frame_px()) * size_t(encoder_->frame_px()) * 3);
+  }
   map_.reserve(encoder_->codes().places());
   before_.reserve(kBefore + 1);
 }
@@ -28,6 +32,7 @@ Surprise::Surprise(std::shared_ptr<FrameEncoder> encoder, std::shared_ptr<CodeTr
 void Surprise::reset() {
   code_surprise_.reset();
   history_.clear();
+  if (motion_) motion_->reset();
   before_.clear();
   map_.clear();
   has_frame_ = false;
@@ -57,6 +62,7 @@ const float* Surprise::foreseen(int64_t time_ns) {
   CodesBefore before;
   before.newest = codes_.data();
   history_.select(time_ns, transformer_->before(), before.frames.data());
+  if (motion_) before.frames[transformer_->before()] = motion_->at(time_ns, codes_.data());
   before.step_s = float(double(time_ns - history_.newest_ns()) / 1e9);
   transformer_->bits(before, coming_.data(), foreseen_.data());
   return foreseen_.data();
@@ -64,7 +70,7 @@ const float* Surprise::foreseen(int64_t time_ns) {
 
 SurpriseScore Surprise::push(const Frame& frame) {
   SurpriseTimes times;
-  times.encoder = encoder_->run(frame.image, coming_.data());
+  times.encoder = encoder_->run(frame.image, coming_.data(), motion_ ? squeezed_.data() : nullptr);
   SurpriseScore score;
   const bool is_of_other_kind = has_frame_ && !is_of_same_kind(frame);
   score.is_start = !has_frame_ || is_of_other_kind || !is_soon_after(frame);
@@ -76,6 +82,7 @@ SurpriseScore Surprise::push(const Frame& frame) {
   if (score.is_start) {
     code_surprise_.reset();
     history_.clear();
+    if (motion_) motion_->reset();
     // Another kind of picture is compared with what was shown; after a pause nothing is known of what is usual.
     if (!is_of_other_kind) before_.clear();
   }
@@ -89,8 +96,12 @@ SurpriseScore Surprise::push(const Frame& frame) {
     before_.push_back(score.bits);
     if (before_.size() > kBefore) before_.erase(before_.begin());
   }
-  if (score.is_cut) history_.clear();
+  if (score.is_cut) {
+    history_.clear();
+    if (motion_) motion_->reset();
+  }
   history_.add(codes_.data(), frame.timestamp_ns);
+  if (motion_) motion_->add(squeezed_.data(), frame.timestamp_ns);
   has_frame_ = true;
   format_ = frame.image.format;
   width_px_ = frame.image.width_px;

@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/frame.h"
 #include "prediction/codes/frame_encoder.h"
 #include "prediction/surprise/code_history.h"
 #include "prediction/surprise/code_surprise.h"
+#include "prediction/surprise/motion_codes.h"
 #include "prediction/transformer/code_transformer.h"
 
 namespace maq {
@@ -23,7 +25,7 @@ struct SurpriseScore {
 // Of the latest frame of a stream, in wall-clock milliseconds.
 struct SurpriseTimes {
   EncoderTimes encoder;
-  float transformer_ms = 0;  // 0 where it did not run
+  float transformer_ms = 0;  // with the picture that motion foresees; 0 where it did not run
 };
 
 // Of one stream; several share networks. Not for two threads at once.
@@ -63,7 +65,9 @@ class Surprise {
   std::shared_ptr<CodeTransformer> transformer_;
   CodeSurprise code_surprise_;
   CodeHistory history_;
-  std::vector<float> foreseen_;  // [places][slices]
+  std::optional<MotionCodes> motion_;  // where the transformer is shown it
+  std::vector<uint8_t> squeezed_;      // the latest frame, where motion is followed
+  std::vector<float> foreseen_;        // [places][slices]
   std::vector<uint16_t> codes_, coming_;
   std::vector<float> map_;
   std::vector<float> before_;  // bits of at most kBefore frames, the latest last

@@ -37,7 +37,8 @@ std::string text_of(const Tensors& side) {
     text += (text.empty() ? "" : ", ") + tensor.name + " [";
     for (const Dimension& size : tensor.shape) {
       const int64_t* const number = std::get_if<int64_t>(&size);
-      text += (text.back() == '[' ? "" : ", ") + (number != nullptr ? std::to_string(*number) : std::get<std::string>(size));
+      text += (text.back() == '[' ? "" : ", ") +
+              (number != nullptr ? std::to_string(*number) : std::get<std::string>(size));
     }
     text += "]";
   }

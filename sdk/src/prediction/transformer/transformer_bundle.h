@@ -33,8 +33,8 @@ struct TransformerBundle {
 
   std::shared_ptr<const FrameCodes> codes;
   TransformerTables tables;
-  size_t head_width = 0;            // of a key or value
-  float min_fps = 0, max_fps = 0;   // of the clips that it was trained on
+  size_t head_width = 0;           // of a key or value
+  float min_fps = 0, max_fps = 0;  // of the clips that it was trained on
   Graph context, slices;
   std::vector<Graph> heads;  // by slice
 };

@@ -79,13 +79,14 @@ MAQ_NATIVE_OF(NativePrediction, jlong, createSurprise)
  jlong networks_of) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const std::vector<jdouble> from = maq_jni::numbers(env, values, 3);
+    const std::vector<jdouble> from = maq_jni::numbers(env, values, 4);
     maq_surprise_config config;
     check(maq_surprise_config_init(&config, sizeof config));
     bundle.put_into(config);
     config.threads = int32_t(from[0]);
     config.allow_spinning = int32_t(from[1]);
     config.event_ratio = float(from[2]);
+    config.method = from[3] != 0 ? MAQ_SURPRISE_TABLE : MAQ_SURPRISE_AUTO;
     config.networks_of = object<maq_surprise>(networks_of);
     maq_surprise* surprise = nullptr;
     check(maq_surprise_create(object<maq_context>(context), &config, &surprise));
@@ -129,8 +130,9 @@ MAQ_NATIVE_OF(NativePrediction, jdoubleArray, statsOfSurprise)(JNIEnv* env, jcla
   return call(env, [&] {
     auto s = sized<maq_surprise_stats>();
     check(maq_surprise_get_stats(object<maq_surprise>(surprise), &s));
-    return maq_jni::doubles_of(env, {s.resize_ms, s.network_ms, s.nearest_ms, s.push_ms, double(s.threads),
-                                     double(s.pushed_count), double(s.event_count), double(s.start_count)});
+    return maq_jni::doubles_of(
+        env, {s.resize_ms, s.network_ms, s.nearest_ms, s.push_ms, double(s.threads), double(s.pushed_count),
+              double(s.event_count), double(s.start_count), s.transformer_ms});
   });
 }
 

@@ -151,14 +151,22 @@ class Surprise internal constructor(
      * @property threads as of [DensePose.Config].
      * @property allowSpinning as of [DensePose.Config].
      * @property eventRatio a frame is an event from this ratio on, and from 1 / it down; above 1, at most 1e6.
+     * @property usesTable a table says how likely codes are, which takes next to no time, also where the bundle has a
+     *   transformer, which sees three frames before.
      */
     data class Config(
         val threads: Int = 0,
         val allowSpinning: Boolean = false,
         val eventRatio: Float = 4f,
+        val usesTable: Boolean = false,
     ) {
         internal fun values() =
-            doubleArrayOf(threads.toDouble(), if (allowSpinning) 1.0 else 0.0, eventRatio.toDouble())
+            doubleArrayOf(
+                threads.toDouble(),
+                if (allowSpinning) 1.0 else 0.0,
+                eventRatio.toDouble(),
+                if (usesTable) 1.0 else 0.0,
+            )
     }
 
     /**
@@ -195,6 +203,7 @@ class Surprise internal constructor(
      * @property nearestMs codes of what the network says.
      * @property pushMs all of it, and the bits.
      * @property threads of the network.
+     * @property transformerMs how likely its codes are; 0 where the table said that.
      */
     data class Stats(
         val resizeMs: Double,
@@ -205,6 +214,7 @@ class Surprise internal constructor(
         val pushedCount: Long,
         val eventCount: Long,
         val startCount: Long,
+        val transformerMs: Double,
     )
 
     /**
@@ -236,7 +246,7 @@ class Surprise internal constructor(
     val stats: Stats
         get() {
             val s = handle.use(NativePrediction::statsOfSurprise)
-            return Stats(s[0], s[1], s[2], s[3], s[4].toInt(), s[5].toLong(), s[6].toLong(), s[7].toLong())
+            return Stats(s[0], s[1], s[2], s[3], s[4].toInt(), s[5].toLong(), s[6].toLong(), s[7].toLong(), s[8])
         }
 
     /** Pictures that it made, and streams with its networks, stay valid. */

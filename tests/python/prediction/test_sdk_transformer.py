@@ -1,0 +1,95 @@
+"""Bits of frames by the transformer through the C API are those of torch, with the picture that motion foresees."""
+
+import math
+from pathlib import Path
+
+import maquette
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="the extra `train` is not installed: scripts/make-venv.sh train,dev")
+if not maquette.library_path().exists():
+    pytest.skip(f"{maquette.library_path()} is not built: run `make build`", allow_module_level=True)
+
+import torch
+
+from export.bundle import BundleInfo
+from export.clips.shapes import shapes_clip
+from export.prediction.code_file import FrameCodes, prior_of, read_code_file
+from export.prediction.config import TransformerShape
+from export.prediction.export_onnx import export_bundle
+from export.prediction.motion_pictures import MotionJob, motion_pictures
+from export.prediction.table import CodeTable, bits_of_stream
+from export.prediction.train_autoencoder import load_autoencoder
+from export.prediction.transformer import UNSEEN, LatentTransformer
+
+WEIGHTS = Path("export/weights/prediction-autoencoder.pt")
+FPS = 15.0
+SHAPE = TransformerShape(width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=16, motion=True)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Bundle with a transformer of random weights, the networks, and frames of a clip with their codes."""
+    frames = shapes_clip("test", 0, large=False).small.rgb
+    autoencoder = load_autoencoder(WEIGHTS)
+    codes = autoencoder.encode(torch.from_numpy(frames))
+    table = CodeTable.counted(codes[None], autoencoder.shape.entries)
+    torch.manual_seed(2)
+    net = LatentTransformer(SHAPE).eval()
+    with torch.no_grad():
+        for parameter in net.parameters():  # heads and biases begin at zero
+            parameter.add_(0.1 * torch.randn_like(parameter))
+        net.context.rows.weight[-1] = 0
+        net.context.rows.weight[SHAPE.frames * SHAPE.slices * SHAPE.entries : -1] *= 6  # motion counts
+        net.table.copy_(table.stacked())
+    folder = tmp_path_factory.mktemp("bundle")
+    export_bundle(autoencoder, table, folder, BundleInfo("whole", "fp32"), net)
+    stored = read_code_file(folder / "codes.maqc")
+    net.table.copy_(torch.from_numpy(prior_of(stored)))  # as a runtime has it
+    return folder, autoencoder, net, stored, frames, codes
+
+
+@torch.no_grad()
+def stream_bits(net: LatentTransformer, stored: FrameCodes, codes: torch.Tensor, motion: torch.Tensor) -> np.ndarray:
+    """[T - 1, 16, 16]. motion [T, slices, 16, 16]: what motion foresees of each frame, UNSEEN where nothing."""
+    foreseen = []
+    for t in range(1, len(codes)):
+        seen = codes[max(0, t - 3) : t]
+        unseen = torch.full((3 - len(seen), *codes.shape[1:]), UNSEEN)
+        before = torch.cat([unseen, seen, motion[t : t + 1]])[None]
+        logits = net(before, codes[t : t + 1], torch.tensor([FPS]))[0]
+        likely = logits.double().log_softmax(-1).gather(-1, codes[t].flatten(1)[..., None])[..., 0]
+        foreseen.append(-likely.view(codes.shape[1:]).numpy() / math.log(2))
+    return bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy(), np.stack(foreseen)).mean(1)
+
+
+def bits_of(surprise: maquette.Surprise, frames: np.ndarray) -> np.ndarray:
+    """[T - 1, 16, 16]."""
+    return np.stack([surprise.push(np.ascontiguousarray(f), time_s=t / FPS).map for t, f in enumerate(frames)])[1:]
+
+
+def test_cells_have_the_bits_of_torch_with_what_motion_foresees(made):
+    folder, autoencoder, net, stored, frames, codes = made
+    pictures = motion_pictures(MotionJob(0, frames, FPS))[:, 0]
+    motion = torch.full_like(codes, UNSEEN)
+    motion[2:] = autoencoder.encode(torch.from_numpy(pictures[1:-1]))
+    expected = stream_bits(net, stored, codes, motion)
+    without = stream_bits(net, stored, codes, torch.full_like(codes, UNSEEN))
+    surprise = maquette.Surprise(bundle_path=folder, threads=1)
+    found = bits_of(surprise, frames)
+    # Every cell depends on all codes of three frames; one in a thousand of these may differ by a near tie.
+    assert np.median(np.abs(found - expected)) < 1e-3
+    assert np.mean(np.abs(found - expected) < 0.02) >= 0.99
+    assert np.median(np.abs(found - without)[2:]) > 0.01, "what motion foresees is seen"
+    assert surprise.stats["transformer_ms"] > 0
+
+
+def test_the_table_alone_can_be_asked_for(made):
+    folder, _, _, stored, frames, codes = made
+    surprise = maquette.Surprise(bundle_path=folder, threads=1, method="table")
+    expected = bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy()).mean(1)
+    assert np.mean(np.abs(bits_of(surprise, frames) - expected) < 1e-3) >= 0.99
+    assert surprise.stats["transformer_ms"] == 0
+    sharing = maquette.Surprise(networks_of=surprise)
+    assert np.mean(np.abs(bits_of(sharing, frames) - expected) < 1e-3) >= 0.99

@@ -2,8 +2,9 @@
 
     python -m quantization.prediction --fp32 .data/bundles/prediction-fp32 --out .data/bundles/prediction-int8
 
-What stays float is in `quantization/prediction.toml`. Prints sizes, each output's signal to noise ratio, and what int8
-costs on frames of validation clips: codes that stay the same, and PSNR of frames that were made codes and frames again.
+What stays float is in `quantization/prediction.toml`; a transformer is made int8 as `quantization/transformer.py` says.
+Prints sizes, each output's signal to noise ratio, and what int8 costs on frames of validation clips: codes that stay
+the same, PSNR of frames that were made codes and frames again, and bits a code by the transformer.
 """
 
 from __future__ import annotations
@@ -19,13 +20,15 @@ from tqdm import tqdm
 
 from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
-from export.prediction.bundle import CODES, write_manifest
+from export.prediction.bundle import CODES, TRANSFORMER, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
+from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
 from export.prediction.pictures.picture_error import psnr_db
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
+from quantization.transformer import quantize_transformer, transformer_cost
 
 
 def frames_of(data: Path, sets: Sequence[str], split: str, count: int) -> np.ndarray:
@@ -78,6 +81,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/prediction-int8"))
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--data", type=Path, default=Path(".data/clips"))
+    parser.add_argument("--codes", type=Path, default=Path(".data/prediction"), help="of clips, for the transformer")
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
     parser.add_argument("--settings", type=Path, default=PREDICTION)
     options = parser.parse_args()
@@ -91,6 +95,13 @@ def main() -> None:
     measured = cost(options.fp32, options.out, held_out, codes)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
+    (options.out / TRANSFORMER).unlink(missing_ok=True)  # of an earlier bundle
+    if (options.fp32 / TRANSFORMER).exists():
+        quantize_transformer(options.fp32, options.out)
+        clips = read_codes(options.codes, "val")
+        by_transformer = transformer_cost(options.fp32, options.out, clips, settings.held_out_frames)
+        print(", ".join(f"{name} {value}" for name, value in by_transformer.items()))
+        measured |= by_transformer
     info = int8_info(options.name or options.out.name, read_manifest(options.fp32), quality, int8_cost=measured)
     write_manifest(options.out, info)
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")

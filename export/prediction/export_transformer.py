@@ -36,7 +36,7 @@ def export_transformer(net: LatentTransformer, folder: Path) -> float:
     codes = rng.integers(shape.entries, size=(shape.seen + 1, shape.slices, CODE_SIDE, CODE_SIDE))
     before, own = torch.from_numpy(codes[None, :-1]), torch.from_numpy(codes[None, -1])
     expected = net(before, own, torch.tensor([_FPS]))[0].numpy()
-    runtime = GraphRuntime(folder, tables, net.table.numpy(), shape)
+    runtime = GraphRuntime(folder, tables, net.table.numpy())
     runtime.begin(codes[:-1], _FPS)
     error = largest_difference(expected, runtime.logits(codes[-1]))
     if not error <= TOLERANCE:

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <maquette/maquette.hpp>
 #include <string>
@@ -212,7 +213,10 @@ TEST_F(ApiSurprise, ConfigsOutOfRangeAreRefused) {
     refused("config.threads", [&](maq_surprise_config& config) { config.threads = threads; });
   }
   refused("config.allow_spinning", [](maq_surprise_config& config) { config.allow_spinning = 2; });
-  refused("config.method", [](maq_surprise_config& config) { config.method = maq_surprise_method(2); });
+  refused("config.method", [](maq_surprise_config& config) {
+    const int unknown = 2;
+    std::memcpy(&config.method, &unknown, sizeof unknown);
+  });
   refused("config.struct_size", [](maq_surprise_config& config) { config.struct_size = 3; });
   refused("config.networks_of is a maq_context", [&](maq_surprise_config& config) {
     config.networks_of = reinterpret_cast<const maq_surprise*>(context_.get());

@@ -54,7 +54,7 @@ def main() -> None:
     tables = TransformerTables.of(net)
     write_whole(transformer_bytes(tables, row_bytes=1), FOLDER / "rows_in_bytes.maqr")
     stored = read_code_file(bundle / "codes.maqc")
-    runtime = GraphRuntime(bundle, tables, prior_of(stored), SHAPE)
+    runtime = GraphRuntime(bundle, tables, prior_of(stored))
     net.table.copy_(torch.from_numpy(prior_of(stored)))  # as a runtime has it
     foreseen = []
     for t in range(1, len(codes)):

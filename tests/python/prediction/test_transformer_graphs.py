@@ -34,7 +34,7 @@ def net():
 def runtime(net, tmp_path_factory):
     folder = tmp_path_factory.mktemp("graphs")
     assert export_transformer(net, folder) < 1e-4
-    return GraphRuntime(folder, TransformerTables.of(net), net.table.numpy(), SHAPE)
+    return GraphRuntime(folder, TransformerTables.of(net), net.table.numpy())
 
 
 @pytest.fixture(params=["all frames known", "none before the last"])

@@ -12,16 +12,31 @@ from export.bundle import BundleInfo
 from export.clips.clip import write_clip
 from export.clips.shapes import shapes_clip
 from export.prediction.autoencoder import Autoencoder
-from export.prediction.bundle import CODES
-from export.prediction.config import AutoencoderShape
+from export.prediction.bundle import CODES, TRANSFORMER
+from export.prediction.codes import CodedClips, write_codes
+from export.prediction.config import AutoencoderShape, TransformerShape
 from export.prediction.export_onnx import export_bundle
 from export.prediction.table import CodeTable
+from export.prediction.transformer import LatentTransformer
 from quantization import prediction
 
 SMALL = AutoencoderShape(widths=(16, 32), residual=16, blocks=1, slices=2, entries=16)
 
 
-def test_int8_keeps_codes_and_pictures(tmp_path, monkeypatch):
+def transformer(table: CodeTable) -> LatentTransformer:
+    shape = TransformerShape(
+        width=32, layers=2, heads=2, head_width=16, hidden=64, embedding=16, slices=2, entries=16, motion=True
+    )
+    net = LatentTransformer(shape).eval()
+    with torch.no_grad():
+        for parameter in net.parameters():  # heads and biases begin at zero
+            parameter.add_(0.1 * torch.randn_like(parameter))
+        net.context.rows.weight[-1] = 0
+        net.table.copy_(table.stacked())
+    return net
+
+
+def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
     for split in ("train", "val"):
         folder = tmp_path / "clips/shapes" / split
         folder.mkdir(parents=True)
@@ -33,16 +48,25 @@ def test_int8_keeps_codes_and_pictures(tmp_path, monkeypatch):
     net.eval()
     table = CodeTable.counted(torch.randint(16, (3, 5, 2, 16, 16)), 16)
     fp32, int8 = tmp_path / "fp32", tmp_path / "int8"
-    export_bundle(net, table, fp32, BundleInfo("small", "fp32"))
+    export_bundle(net, table, fp32, BundleInfo("small", "fp32"), transformer(table))
+    codes = torch.randint(16, (2, 6, 2, 16, 16), dtype=torch.int16)
+    codes[:, 1:] = torch.where(torch.rand(codes[:, 1:].shape) < 0.7, codes[:, :1], codes[:, 1:])
+    motion = codes[:, :, None].expand(-1, -1, 5, -1, -1, -1)
+    (tmp_path / "codes").mkdir()
+    write_codes(CodedClips(codes, torch.tensor([10.0, 30.0]), ["a", "b"], motion), tmp_path / "codes/codes-val.npz")
     monkeypatch.setattr("sys.argv", [
         "prediction", "--fp32", str(fp32), "--out", str(int8), "--data", str(tmp_path / "clips"), "--sets", "shapes",
+        "--codes", str(tmp_path / "codes"),
     ])  # fmt: skip
     prediction.main()
     manifest = json.loads((int8 / "manifest.json").read_text())
     measured = manifest["measured"]["int8_cost"]
     assert measured["equal_codes"] > 0.9
     assert measured["psnr_db_int8"] == pytest.approx(measured["psnr_db_fp32"], abs=0.3)
+    assert measured["bits_int8"] == pytest.approx(measured["bits_fp32"], rel=0.02)
     assert manifest["precision"] == "int8"
+    assert manifest["transformer"] == {"file": TRANSFORMER, "fps": [10, 30]}
     assert (int8 / CODES).read_bytes() == (fp32 / CODES).read_bytes()
-    sizes = [(folder / "encoder.onnx").stat().st_size for folder in (fp32, int8)]
-    assert sizes[1] < sizes[0]
+    for name in ("encoder.onnx", TRANSFORMER):  # graphs of such small transformers are hardly weights
+        sizes = [(folder / name).stat().st_size for folder in (fp32, int8)]
+        assert sizes[1] < 0.8 * sizes[0], name

@@ -90,7 +90,7 @@ void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, flo
                        stored.entries, logits_.data());
       bits[i] = bits_of_code(logits_.data(), tables.entries, codes[i]);
       if (std::isnan(bits[i])) {
-        throw Error(MAQ_ERROR_INFERENCE, "The transformer gave numbers that are none. Install the bundle again.");
+        throw Error(MAQ_ERROR_INFERENCE, "The transformer gave NaN. Install the bundle again.");
       }
     }
   }

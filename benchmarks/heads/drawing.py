@@ -15,9 +15,9 @@ from benchmarks.heads.fitted import DM_PER_M
 from benchmarks.heads.other_heads import PEOPLE, load_head
 from export.camera import Camera
 from export.heads.made_heads import make_head
+from export.heads.sampling import Lamps, look_at, sample_camera, sample_extras, sample_lamps
 from export.heads.surface import HeadMaker, Place
-from export.heads.view_shards import sample_camera
-from export.heads.views import HeadViews, Lamps, Scene, Seen, look_at, sample_extras, sample_lamps
+from export.heads.views import HeadViews, Scene, Seen
 
 # Colours of vertices have the photo's light in them; so little more that nothing is cut off at 255.
 _DIM = 0.75

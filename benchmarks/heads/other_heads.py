@@ -18,12 +18,12 @@ import numpy as np
 import trimesh
 from tqdm import tqdm
 
-from export.heads.face import FACE_RADIUS_DM
-from export.heads.head_shards import HeadPictures
+from export.heads.head_shards import FACE_RADIUS_DM, HeadPictures
+from export.heads.sampling import look_at, sample_camera, sample_lamps
 from export.heads.shapes import vertex_normals
 from export.heads.surface import Place
-from export.heads.view_shards import picture_row, sample_camera
-from export.heads.views import Scene, look_at, sample_lamps
+from export.heads.view_shards import picture_row
+from export.heads.views import Scene
 from export.people.assets import Package, fetch
 
 PACKAGE = Package(

@@ -15,11 +15,10 @@ from benchmarks.heads.distances import MM_PER_DM, Triangles, TruePoints
 from benchmarks.heads.face_mesh import is_inner_face
 from benchmarks.heads.visible import seen_from, seen_from_outside
 from export.camera import Camera
-from export.heads.face import is_face
-from export.heads.head_shards import HeadPictures, read_pictures
+from export.heads.head_shards import HeadPictures, is_face, read_pictures
 from export.heads.made_heads import make_head
+from export.heads.sampling import sample_extras
 from export.heads.surface import Head, HeadMaker, cut_distance
-from export.heads.views import sample_extras
 
 HEAD = 255  # of masks
 MAX_YAW_DEG, MAX_PITCH_DEG = 45.0, 35.0

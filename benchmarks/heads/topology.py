@@ -21,9 +21,9 @@ from scipy.spatial import cKDTree
 from benchmarks.heads.distances import MM_PER_DM
 from benchmarks.heads.photos import PhotoBackgrounds, TrueHead, generator, photo_of, read_made_heads
 from benchmarks.heads.quality import BACKGROUNDS, BUNDLE, DATA
-from export.heads.face import is_face
 from export.heads.field import geometry, surface
 from export.heads.head_file import StoredHead, read_head
+from export.heads.head_shards import is_face
 from export.heads.shapes import HeadShapes
 from export.heads.template_file import Kind, Template, read_template
 

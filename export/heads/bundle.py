@@ -18,7 +18,7 @@ from pathlib import Path
 
 from export.bundle import LICENCE, BundleInfo, Signature, read_manifest, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
-from export.heads.face import FACE_RADIUS_DM, FACE_SIDES, NOSE_TIP
+from export.heads.head_shards import FACE_RADIUS_DM, FACE_SIDES, NOSE_TIP
 from export.heads.prior import Prior
 from export.heads.prior_file import bases_errors, prior_bytes, read_prior, write_prior
 from export.heads.template_file import read_template

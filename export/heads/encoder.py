@@ -14,7 +14,7 @@ from torch.nn import functional as F
 
 from export.densepose.config import NetworkConfig
 from export.densepose.data import MEAN, STD
-from export.densepose.network import BiFPN, ConvBn, MobileNetV2
+from export.densepose.network import BiFPN, ConvBn, InvertedResidual, MobileNetV2
 from export.training import save_atomically
 
 CROP_PX, CELL_PX = 192, 4
@@ -32,14 +32,23 @@ class HeadEncoder(nn.Module):
     Cell (i, j) stands for the crop's pixel (4 j + 1.5, 4 i + 1.5). Template points are the sum of an affine function of
     the cell's place, which the whole crop tells, and of what is seen there: convolutions alone, which do not know where
     they are, were off by 6 mm at the tip of the nose.
+
+    deep: whether there is a further block at the coarsest map and two at the finest. They begin as the identity, so
+    that an encoder without them can be gone on from.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, deep: bool = True) -> None:
         super().__init__()
         self.backbone = MobileNetV2()
         self.neck = BiFPN(NetworkConfig.BACKBONES["mobilenet_v2"], WIDTH)
         self.head = nn.Sequential(ConvBn(WIDTH + 2, WIDTH, 3), ConvBn(WIDTH, WIDTH, 3), nn.Conv2d(WIDTH, OUTPUTS, 1))
         coarsest = NetworkConfig.BACKBONES["mobilenet_v2"][-1]
+        self.deeper, self.refine = nn.Identity(), nn.Identity()
+        if deep:
+            self.deeper = InvertedResidual(coarsest, coarsest, 1, 3)
+            self.refine = nn.Sequential(*(InvertedResidual(WIDTH, WIDTH, 1, 4) for _ in range(2)))
+            for block in (self.deeper, *self.refine):
+                nn.init.zeros_(block.project.bn.weight)
         self.context = ConvBn(coarsest, CONTEXT_WIDTH, 1)
         self.context_hidden = nn.Linear(CONTEXT_WIDTH * (CROP_PX // STRIDE) ** 2, CONTEXT)
         self.affine, self.bias = nn.Linear(CONTEXT, 9), nn.Linear(CONTEXT, WIDTH)
@@ -54,15 +63,20 @@ class HeadEncoder(nn.Module):
 
     def forward(self, image: Tensor) -> Tensor:
         taps = self.backbone(((image - self.mean) * self.scale).permute(0, 3, 1, 2))
+        taps[-1] = self.deeper(taps[-1])
         context = F.relu(self.context_hidden(self.context(taps[-1]).flatten(1)))
         place = self.place.expand(len(image), -1, -1, -1)
         first, second, last = self.head
-        seen = first(torch.cat([self.neck.finest(taps), place], 1)) + self.bias(context)[..., None, None]
-        cells = last(second(seen)).permute(0, 2, 3, 1)
-        affine = self.affine(context).unflatten(1, (3, 3))  # of x, y and 1
-        points = (affine[..., :2] @ self.place.flatten(2) + affine[..., 2:]).transpose(1, 2)
-        points = points.unflatten(1, (CELLS, CELLS))
-        return torch.cat([cells[..., POINT] + points, cells[..., POINT.stop :]], -1)
+        finest = self.neck.finest(taps)
+        seen = first(torch.cat([finest, place.to(finest.dtype)], 1)) + self.bias(context)[..., None, None]
+        seen = second(self.refine(seen))
+        # Half a millimetre is one step of bfloat16 at the border of the face: what says places is float32.
+        with torch.autocast(image.device.type, enabled=False):
+            cells = last(seen.float()).permute(0, 2, 3, 1)
+            affine = self.affine(context.float()).unflatten(1, (3, 3))  # of x, y and 1
+            points = (affine[..., :2] @ self.place.flatten(2) + affine[..., 2:]).transpose(1, 2)
+            points = points.unflatten(1, (CELLS, CELLS))
+            return torch.cat([cells[..., POINT] + points, cells[..., POINT.stop :]], -1)
 
 
 def start_from_detector(encoder: HeadEncoder, path: Path) -> None:
@@ -163,9 +177,17 @@ def save_encoder(encoder: HeadEncoder, path: Path) -> None:
 def load_encoder(path: Path) -> HeadEncoder:
     """In evaluation mode. Raises FileNotFoundError, and what torch raises for other files."""
     state = torch.load(path, map_location="cpu", weights_only=True)["state"]
-    encoder = HeadEncoder()
+    encoder = HeadEncoder(deep=any(name.startswith("refine.") for name in state))
     encoder.load_state_dict(state)
     return encoder.eval()
+
+
+def start_from_encoder(encoder: HeadEncoder, path: Path) -> None:
+    """Takes the weights of an encoder, with or without the further blocks. Raises ValueError for other weights."""
+    state = load_encoder(path).state_dict()
+    missing, unexpected = encoder.load_state_dict(state, strict=False)
+    if unexpected or any(not name.startswith(("deeper.", "refine.")) for name in missing):
+        raise ValueError(f"{path} holds an encoder of another kind.")
 
 
 def run_encoder(encoder: HeadEncoder, crop: np.ndarray) -> np.ndarray:

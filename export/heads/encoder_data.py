@@ -11,8 +11,15 @@ import torch
 from torch.utils.data import IterableDataset
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX
-from export.heads.face import FACE_SIDES, is_face
-from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures, head_paths, read_pictures
+from export.heads.head_shards import (
+    FACE_SIDES,
+    LABEL_STEP,
+    POINT_SCALE,
+    HeadPictures,
+    head_paths,
+    is_face,
+    read_pictures,
+)
 from export.people.imaging import camera_faults
 
 MAX_BILINEAR_ZOOM = 1.25

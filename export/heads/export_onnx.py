@@ -72,6 +72,7 @@ class EncoderGraph(nn.Module):
         self.first.weight.data, self.first.bias.data = first.weight.data[:, :WIDTH], first.bias.data
         self.first_place.weight.data = first.weight.data[:, WIDTH:]
         self.second, self.predict = net.head[1], joined(net.head[2])
+        self.deeper, self.refine = net.deeper, net.refine
         self.context, self.context_hidden, self.bias = net.context, net.context_hidden, net.bias
         self.points = AffinePoints(net.affine, net.place)
         self.register_buffer("mean", net.mean)
@@ -80,10 +81,11 @@ class EncoderGraph(nn.Module):
 
     def forward(self, image: Tensor) -> Tensor:
         taps = self.backbone((image - self.mean).permute(0, 3, 1, 2))
+        taps[-1] = self.deeper(taps[-1])
         context = F.relu(self.context_hidden(self.context(taps[-1]).flatten(1)))
         seen = F.relu6(self.first(self.neck.finest(taps)) + self.first_place(self.place))
         seen = seen + self.bias(context)[..., None, None]
-        return self.points(self.predict(channels_last(self.second(seen))), context)
+        return self.points(self.predict(channels_last(self.second(self.refine(seen)))), context)
 
 
 class FieldGraph(nn.Module):

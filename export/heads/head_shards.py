@@ -14,7 +14,15 @@ SPLITS = ("train", "val", "test")
 SIDE = 512  # of a picture, px
 LABEL_STEP = 2  # template points and normals are stored for every second pixel of every second row
 POINT_SCALE = 8000.0  # int16 a dm
+NOSE_TIP = np.array([0.0, -1.24, -0.35])  # of the template, dm
+FACE_RADIUS_DM = 0.95
+FACE_SIDES = 1.3  # side of the encoder's closer look by the longer side of the face's box
 CROP_SIDES = 1.6  # side of a picture by the longer side of the head's box; a training cuts smaller ones out of it
+
+
+def is_face(template: np.ndarray) -> np.ndarray:
+    """Which points belong to the face, by their template points [..., 3]: what figures of faces are about."""
+    return np.linalg.norm(template - NOSE_TIP, axis=-1) < FACE_RADIUS_DM
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from export.heads.hair import Barber, Shell, Style, slow_noise
+from export.heads.sampling import sample_tones
 from export.heads.shapes import (
     CUT_NORMAL,
     CUT_POINT,
@@ -20,11 +21,6 @@ from export.heads.shapes import (
 )
 
 SKIN, EYE, HAIR = 0, 1, 2
-_TONES = np.array(
-    [(255, 222, 196), (244, 200, 165), (228, 176, 132), (200, 140, 98), (150, 95, 62), (100, 64, 44), (66, 42, 32)],
-    float,
-)  # fmt: skip
-_IRIS = np.array([(70, 45, 25), (95, 65, 35), (60, 85, 110), (75, 95, 65), (40, 28, 20)], float)
 
 
 @dataclass(frozen=True)
@@ -142,10 +138,7 @@ class Head:
         self._paint(rng)
 
     def _paint(self, rng: np.random.Generator) -> None:
-        tone = rng.uniform(0, len(_TONES) - 1)
-        self.tone = np.array([np.interp(tone, range(len(_TONES)), _TONES[:, c]) for c in range(3)])
-        self.tone = np.clip(self.tone * (1 + rng.normal(0, 0.025, 3)), 20, 255)
-        self.iris = _IRIS[rng.integers(len(_IRIS))] * rng.uniform(0.7, 1.2)
+        self.tone, self.iris = sample_tones(rng)
         self.seed = int(rng.integers(1 << 31))
         extra = len(self.positions) - len(self.style.shade)
         self._shade = np.concatenate([self.style.shade, np.zeros(extra)])[:, None]

@@ -26,13 +26,13 @@ from export.heads.encoder import (
     SCALES,
     HeadEncoder,
     figures,
-    load_encoder,
     losses,
     photo_figures,
     photo_losses,
     run_encoder,
     save_encoder,
     start_from_detector,
+    start_from_encoder,
 )
 from export.heads.encoder_data import Backgrounds, Crop, CropStream, batched, crop_of, face_box_of, read_heads
 from export.heads.photos.crops import MixedStream, PhotoCrop, batched_photos, crop_photo
@@ -181,7 +181,7 @@ def train(arguments: argparse.Namespace) -> None:
     encoder = HeadEncoder()
     start_from_detector(encoder, arguments.init)
     if arguments.start:
-        encoder.load_state_dict(load_encoder(arguments.start).state_dict())
+        start_from_encoder(encoder, arguments.start)
     encoder.to(memory_format=torch.channels_last)
     mean = Ema(encoder, 0.998)
     trained = [p for p in encoder.parameters() if p.requires_grad]

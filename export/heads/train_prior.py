@@ -19,9 +19,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from export.heads.face import is_face
 from export.heads.field import FieldBases, geometry, surface
-from export.heads.head_shards import HeadPoints, read_points
+from export.heads.head_shards import HeadPoints, is_face, read_points
 from export.heads.prior import FieldShape
 from export.training import (
     SAVE_EVERY_S,

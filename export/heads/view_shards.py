@@ -12,28 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from export.camera import Camera
-from export.heads.head_shards import CROP_SIDES, LABEL_STEP, POINT_SCALE, SIDE, HeadPictures
+from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures
 from export.heads.made_heads import shard_parser, write_shards
+from export.heads.sampling import sample_camera, sample_extras, sample_lamps
 from export.heads.surface import Head
-from export.heads.views import HeadViews, Seen, look_at, sample_extras, sample_lamps
-
-
-def sample_camera(points: np.ndarray, rng: np.random.Generator) -> Camera:
-    """Mostly of faces from the front and sides, from 35 cm to 3 m; the picture is a square around a head's points."""
-    u = rng.random()
-    yaw = rng.normal(0, 0.45) if u < 0.55 else rng.uniform(-1.9, 1.9) if u < 0.88 else rng.uniform(-np.pi, np.pi)
-    pitch, roll = np.clip(rng.normal(0, 0.22), -0.8, 0.8), np.clip(rng.normal(0, 0.22), -0.9, 0.9)
-    distance = float(np.exp(rng.uniform(np.log(3.5), np.log(30))))
-    camera = look_at(yaw, pitch, roll, distance, np.zeros(3), 100.0, SIDE)
-    pixels, _ = camera.projected(points)
-    low, high = pixels.min(0), pixels.max(0)
-    zoom = SIDE / (CROP_SIDES * (high - low).max() * rng.uniform(0.85, 1.15))
-    # Crops are seldom in the middle of the photos that they are cut from: the principal point is wherever it is.
-    middle = ((low + high) / 2 - camera.cx_px) * zoom + rng.normal(0, 0.04 * SIDE, 2)
-    centre = (SIDE - 1) / 2 - middle
-    intrinsics = np.array([[100.0 * zoom, 0, centre[0]], [0, 100.0 * zoom, centre[1]], [0, 0, 1]])
-    return Camera.of_intrinsics(SIDE, SIDE, intrinsics, camera.rotation, camera.centre)
+from export.heads.views import HeadViews, Seen
 
 
 def pictures_of(head: Head, count: int, rng: np.random.Generator) -> HeadPictures:

@@ -11,37 +11,9 @@ from embreex.rtcore_scene import EmbreeScene
 
 from export.camera import Camera
 from export.heads.hair import slow_noise
+from export.heads.sampling import Extras, Lamps, sample_extras
 from export.heads.shapes import vertex_normals
 from export.heads.surface import Head, Place, cut_distance
-
-
-@dataclass(frozen=True)
-class Lamps:
-    """Light in the head's frame: `ambient` RGB [3], `directions` [K, 3] towards the lights, their `colours` [K, 3]."""
-
-    ambient: np.ndarray
-    directions: np.ndarray
-    colours: np.ndarray
-    gloss: float = 0.1
-
-    def on(self, normals: np.ndarray, lit: np.ndarray | None = None) -> np.ndarray:
-        """RGB [N, 3] that reaches surfaces with these normals [N, 3]; `lit` [N, K] is 0 in the shadow of a lamp."""
-        cosine = np.maximum(normals @ self.directions.T, 0)
-        if lit is not None:
-            cosine = cosine * lit
-        # A little more from above than from below.
-        return self.ambient * (1 + 0.25 * normals[:, 2:]) + cosine @ self.colours
-
-
-def sample_lamps(rng: np.random.Generator) -> Lamps:
-    """From flat light to a hard lamp at one side."""
-    count = int(rng.integers(1, 3))
-    directions = rng.normal(size=(count, 3)) + [0, -0.8, 0.6]
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    share = rng.uniform(0.25, 0.85)
-    tint = np.exp(rng.normal(0, 0.035, (count + 1, 3)))
-    power = rng.dirichlet(np.ones(count))[:, None]
-    return Lamps(share * tint[0], directions, (1.25 - share) * power * tint[1:] * 1.3, float(rng.uniform(0, 0.3)))
 
 
 @dataclass(frozen=True)
@@ -57,33 +29,6 @@ class Seen:
     normal: np.ndarray
     template: np.ndarray
     camera: Camera
-
-
-@dataclass(frozen=True)
-class Extras:
-    """What a picture shows and the head does not have: clothes below it, glasses."""
-
-    cloth: np.ndarray  # RGB
-    collar: float  # dm: skin ends at this height of the template
-    seed: int
-    lens: float  # how much of the light glasses take, 0..1; 0: none are worn
-    rim: float  # half the width of their rims, dm; 0: no rims
-    frame: np.ndarray  # RGB
-    size: np.ndarray  # half sizes of a lens, dm
-
-
-def sample_extras(rng: np.random.Generator) -> Extras:
-    worn = rng.random() < 0.25
-    dark = rng.random() < 0.3
-    return Extras(
-        rng.uniform(10, 240, 3) * rng.uniform(0.3, 1),
-        float(rng.uniform(-2.9, -1.6)),
-        int(rng.integers(1 << 31)),
-        float(rng.uniform(0.5, 0.95) if dark else rng.uniform(0.02, 0.15)) if worn else 0.0,
-        float(rng.uniform(0.008, 0.04)) if worn else 0.0,
-        rng.uniform(0, 160, 3) * rng.uniform(0.1, 1),
-        np.array([rng.uniform(0.2, 0.29), rng.uniform(0.13, 0.24)]),
-    )
 
 
 class Scene:
@@ -191,18 +136,3 @@ class HeadViews:
             out[lens] *= 1 - extras.lens
             out[rim] = extras.frame
         return np.clip(out, 0, 255)
-
-
-def look_at(
-    yaw: float, pitch: float, roll: float, distance: float, aim: np.ndarray, focal_px: float, side_px: int
-) -> Camera:
-    """A camera at `distance` (dm) from `aim` (head frame): yaw 0 sees the face, positive from the person's left;
-    positive pitch from above (radians). Its picture is a square with `aim` in the middle."""
-    outward = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
-    forward = -outward
-    right = np.cross(forward, [0, 0, 1.0])
-    right /= np.linalg.norm(right)
-    down = np.cross(forward, right)
-    c, s = np.cos(roll), np.sin(roll)
-    rotation = np.stack([c * right + s * down, -s * right + c * down, forward])
-    return Camera.centred(side_px, side_px, focal_px, rotation, aim + distance * outward)

@@ -23,8 +23,9 @@ from benchmarks.heads.quality import BUNDLE
 from benchmarks.heads.tables import table
 from export.heads.made_heads import make_head, make_maker
 from export.heads.prior_file import read_prior
+from export.heads.sampling import look_at, sample_extras, sample_lamps
 from export.heads.surface import Head
-from export.heads.views import HeadViews, look_at, sample_extras, sample_lamps
+from export.heads.views import HeadViews
 
 SIDE_PX, FRAME_DM = 320, 3.6
 MM_PER_M, MM_PER_DM = 1000, 100

@@ -25,8 +25,9 @@ from benchmarks.heads.fitted import cameras_of
 from benchmarks.heads.quality import BUNDLE
 from benchmarks.heads.tables import table
 from export.heads.made_heads import make_head, make_maker
+from export.heads.sampling import Lamps, look_at, sample_extras, sample_lamps
 from export.heads.surface import HeadMaker
-from export.heads.views import HeadViews, Lamps, look_at, sample_extras, sample_lamps
+from export.heads.views import HeadViews
 
 SIDE_PX, TEXTURE_PX = 200, 512
 DISTANCE_DM, FRAME_DM = 8.0, 3.6

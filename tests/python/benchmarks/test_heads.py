@@ -22,7 +22,7 @@ from benchmarks.heads.photos import PhotoBackgrounds, photo_of
 from export.camera import Camera
 from export.heads.field import geometry
 from export.heads.head_shards import HeadPoints
-from export.heads.views import look_at
+from export.heads.sampling import look_at
 from export.people import assets
 
 TINY_HEAD = Path("tests/native/data/tiny_head/example.maqh")

@@ -37,7 +37,7 @@ from export.heads.fitting.anchor_fit import Observations
 from export.heads.head_shards import HeadPoints
 from export.heads.photos.face_points import read_face_points
 from export.heads.photos.faces import PhotoFaces
-from export.heads.views import look_at
+from export.heads.sampling import look_at
 from export.scenes.perceptual import Perceptual
 from export.teachers.faces import LEFT_EYE, RIGHT_EYE, Face
 

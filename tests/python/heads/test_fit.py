@@ -16,7 +16,6 @@ from export.bundle import BundleInfo  # noqa: E402
 from export.heads.bundle import write_manifest  # noqa: E402
 from export.heads.encoder import load_encoder  # noqa: E402
 from export.heads.export_onnx import export_encoder  # noqa: E402
-from export.heads.face import is_face  # noqa: E402
 from export.heads.field import bases_of, geometry, surface  # noqa: E402
 from export.heads.fit import main  # noqa: E402
 from export.heads.fitting.anchor_fit import fit_anchors, observations_of  # noqa: E402
@@ -24,6 +23,7 @@ from export.heads.fitting.photo import Encoder, NoHead, crop, look_at, square  #
 from export.heads.fitting.ray_terms import log_clear  # noqa: E402
 from export.heads.fitting.rays import Shuffle  # noqa: E402
 from export.heads.head_file import StoredHead, read_head  # noqa: E402
+from export.heads.head_shards import is_face  # noqa: E402
 from export.heads.prior_file import read_prior  # noqa: E402
 
 PROGRAM = Path("build/release/stage/bin/maquette")

@@ -90,7 +90,8 @@ def test_hair_lies_outside_of_the_skin(maker):
 
 def test_pictures_show_what_they_say(head):
     """Template points of a frontal picture: the nose in the middle, left to the right, up above; depth from points."""
-    from export.heads.views import HeadViews, look_at, sample_lamps
+    from export.heads.sampling import look_at, sample_lamps
+    from export.heads.views import HeadViews
 
     camera = look_at(0, 0, 0, 8.0, np.zeros(3), 300.0, 128)
     seen = HeadViews(head).seen(camera, sample_lamps(np.random.default_rng(0)))

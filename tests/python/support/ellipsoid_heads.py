@@ -9,7 +9,7 @@ from benchmarks.heads.mean_head import outwards
 from benchmarks.heads.photos import TrueHead
 from export.camera import Camera
 from export.heads.head_shards import HeadPictures
-from export.heads.views import look_at
+from export.heads.sampling import look_at
 
 RADII_MM = np.array([80.0, 100.0, 130.0])
 

@@ -1,0 +1,1 @@
+"""Pictures of made heads drawn, cropped and learnt from on one graphics processor, without files of pictures."""

@@ -78,7 +78,7 @@ class DeviceBatches(Batches):
     scenes that are made meanwhile, on how fast the device is, too."""
 
     def moved(self, device: torch.device, made_fraction: float = 0.0) -> DeviceBatches:
-        """Puts crops and sensors on a device; before the first batch. made_fraction: of a batch that is of new scenes."""
+        """Puts crops and sensors on a device; before the first batch. made_fraction: of a batch, of new scenes."""
         self._stock = _stock_of([frame_of(record) for record in self.records], device)
         rng = np.random.default_rng([self.seed, 3])
         self._deck = SensorDeck([drawn(rng) for _ in range(SENSORS)], device)

@@ -1,6 +1,7 @@
 """Makes an int8 bundle of heads from a fp32 one of export.heads, calibrated on pictures of made heads.
 
     python -m quantization.heads --fp32 .data/bundles/heads-fp32 --out sdk/models/heads-int8
+    python -m quantization.heads --keep sdk/models/heads-int8         a new encoder for the shipped prior
     python -m quantization.heads --fp32 .data/bundles/heads-fp32 --blocks
 
 What stays float and how the prior's bases are stored is in `quantization/heads.toml`. Prints sizes, the signal to noise
@@ -13,6 +14,7 @@ would take an hour.
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -29,7 +31,7 @@ from tqdm import tqdm
 
 from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
-from export.heads.bundle import PRIOR, write_manifest
+from export.heads.bundle import PRIOR, TEMPLATE, write_manifest
 from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, figures
 from export.heads.encoder_data import Backgrounds, Crop, batched, crop_of, read_heads
 from export.heads.export_onnx import ENCODER
@@ -167,6 +169,7 @@ def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fp32", type=Path, default=Path(".data/bundles/heads-fp32"))
     parser.add_argument("--out", type=Path, default=Path("sdk/models/heads-int8"))
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="int8 bundle whose prior and template are taken over")
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--data", type=Path, default=Path(".data/heads"), help="with the folders views and points")
     parser.add_argument(
@@ -182,7 +185,8 @@ def run(options: argparse.Namespace) -> None:
     if settings.bases not in FORMATS:
         raise ValueError(f"{options.settings}: bases {settings.bases!r} is not one of {', '.join(FORMATS)}")
     manifest, source = read_manifest(options.fp32), options.fp32 / ENCODER
-    prior = float_prior(options.fp32 / PRIOR)
+    kept = read_manifest(options.keep) if options.keep else None
+    prior = None if kept else float_prior(options.fp32 / PRIOR)
     views = options.data / "views"
     calibration = samples(training_crops(views, options.backgrounds, settings.crops))
     backgrounds = Backgrounds(options.backgrounds / "val")
@@ -199,13 +203,20 @@ def run(options: argparse.Namespace) -> None:
     print("  dB: " + ", ".join(f"{name} {quality['encoder'][name]:.1f}" for name in PARTS))
     encoder_cost = {name: figures_of(found, crops) for name, found in cells.items()}
     print_cost(encoder_cost, f"encoder, {len(crops)} crops")
-    heads = HeadTensors(read_points(options.data / "points", "val")[: settings.fitted_heads])
-    stored = bases_cost(prior, settings.bases, heads)
-    print_cost(stored, f"bases, {len(heads)} heads")
-    write_prior(prior, options.out / PRIOR, settings.bases)
+    if kept:
+        of_bases = kept["measured"]["bases_cost"]
+        for name in (PRIOR, TEMPLATE):
+            if (options.keep / name).exists() and options.keep.resolve() != options.out.resolve():
+                shutil.copyfile(options.keep / name, options.out / name)
+    else:
+        heads = HeadTensors(read_points(options.data / "points", "val")[: settings.fitted_heads])
+        of_bases = bases_cost(prior, settings.bases, heads)
+        print_cost(of_bases, f"bases, {len(heads)} heads")
+        of_bases |= {"stored_as": settings.bases, "heads": len(heads)}
+        write_prior(prior, options.out / PRIOR, settings.bases)
     info = int8_info(
         options.name or options.out.name, manifest, quality, int8_cost=encoder_cost | {"crops": len(crops)},
-        bases_cost=stored | {"stored_as": settings.bases, "heads": len(heads)},
+        bases_cost=of_bases,
     )  # fmt: skip
     write_manifest(options.out, info)
     print(f"{options.out}: {bytes_of(options.fp32) / 1e6:.2f} -> {bytes_of(options.out) / 1e6:.2f} MB")

@@ -124,6 +124,25 @@ def test_the_bundle_says_what_int8_costs(fp32, data, tmp_path, monkeypatch, caps
     assert "bases, 2 heads, head: float16_mm" in capsys.readouterr().out
 
 
+def test_a_new_encoder_takes_the_prior_of_a_bundle_over(fp32, data, tmp_path, monkeypatch, lively_encoder):
+    """Also where the float bundle has the prior in int8, and the old bundle is the one that is written."""
+    out, other = tmp_path / "heads-int8", tmp_path / "other"
+    command(monkeypatch, fp32, data, out)
+    before, prior, encoder = read_manifest(out), (out / "prior.maqp").read_bytes(), (out / "encoder.onnx").read_bytes()
+    shutil.copytree(fp32, other)
+    shutil.copy(out / "prior.maqp", other)
+    export_encoder(lively_encoder(1), other / "encoder.onnx")
+    write_manifest(other, BundleInfo("heads-fp32", "fp32", training_data=({"name": "cubes"},)))
+    for target in (tmp_path / "new", out):
+        command(monkeypatch, other, data, target, "--keep", str(out))
+        manifest = read_manifest(target)
+        assert (target / "prior.maqp").read_bytes() == prior
+        assert (target / "encoder.onnx").read_bytes() != encoder
+        assert manifest["measured"]["bases_cost"] == before["measured"]["bases_cost"]
+        assert manifest["measured"]["int8_cost"] != before["measured"]["int8_cost"]
+        assert manifest["training_data"] == [{"name": "cubes"}]
+
+
 def test_bases_that_are_int8_already_are_refused(fp32, data, tmp_path, monkeypatch):
     write_prior(small_prior(), tmp_path / "prior.maqp")
     with pytest.raises(PriorError, match="int8 already"):

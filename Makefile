@@ -64,6 +64,13 @@ test-hostile: packages-test build  ## some 4,000 hostile inputs to the built pro
 	@scripts/make-venv.sh
 	@.venv/bin/python -m tests.hostile --json build/hostile.json
 
+FUZZ_SECONDS ?= 60
+.PHONY: fuzz
+fuzz: packages-test  ## files of heads that nobody would write, FUZZ_SECONDS of each kind, with AddressSanitizer; not part of `test`
+	@cmake --preset fuzz >/dev/null
+	@cmake --build --preset fuzz -j $(JOBS)
+	@tests/native/fuzz/run.sh $(FUZZ_SECONDS)
+
 .PHONY: android
 android: build  ## the AAR for Android apps with its size report, into build/android; without the NDK, as a check (android/README.md)
 	@scripts/install-packages.sh android

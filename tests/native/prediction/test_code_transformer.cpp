@@ -81,6 +81,77 @@ TEST(CodeTransformer, StreamsOnSeveralThreadsDoNotDependOnEachOther) {
   for (std::thread& thread : threads) thread.join();
 }
 
+TEST(CodeTransformer, DrawnPlaceAfterPlaceTheLikeliestCodesAreThoseOfPython) {
+  const auto transformer = tiny_transformer::open();
+  const std::string expected = read_text(tiny_transformer::kFolder + "/likeliest.u8");
+  for (const size_t samples : {1u, 3u, 1u}) {
+    std::vector<uint16_t> found(samples * kCodes);
+    transformer->draw(before(3), {0, 0, 0}, 0, 0, samples, found.data());
+    for (size_t i = 0; i < found.size(); ++i) ASSERT_EQ(found[i], uint8_t(expected[i % kCodes])) << samples << " " << i;
+  }
+}
+
+TEST(CodeTransformer, DrawnCodesHaveTheBitsThatWereForeseen) {
+  const auto transformer = tiny_transformer::open();
+  std::vector<uint16_t> drawn(2 * kCodes), again(2 * kCodes);
+  std::vector<float> bits(kCodes);
+  double total = 0;
+  for (uint32_t frame = 0; frame < 4; ++frame) {
+    transformer->draw(before(3), {1, 0, 11}, 0, frame, 2, drawn.data());
+    transformer->draw(before(3), {1, 0, 11}, 0, frame, 2, again.data());
+    EXPECT_EQ(drawn, again);
+    EXPECT_FALSE(std::equal(drawn.begin(), drawn.begin() + kCodes, drawn.begin() + kCodes)) << "samples differ";
+    for (size_t sample = 0; sample < 2; ++sample) {
+      transformer->bits(before(3), drawn.data() + sample * kCodes, bits.data());
+      for (const float of_code : bits) total += double(of_code) / (8 * kCodes);
+    }
+    transformer->draw(before(3), {1, 0, 12}, 0, frame, 2, again.data());
+    EXPECT_NE(drawn, again) << "another seed";
+  }
+  // The mean of what is drawn is the entropy, which is near the bits of frames that were like those in training.
+  double uniform = 0;
+  std::vector<uint16_t> any(kCodes);
+  std::mt19937 random(1);
+  for (uint16_t& code : any) code = uint16_t(random() % 16);
+  transformer->bits(before(3), any.data(), bits.data());
+  for (const float of_code : bits) uniform += double(of_code) / kCodes;
+  EXPECT_LT(total, 4) << "entropy";
+  EXPECT_GT(uniform, total + 1) << "codes at random";
+}
+
+TEST(CodeTransformer, OfKeptKeysAndValuesNothingOldIsSeen) {
+  const maq::TransformerBundle parts{maq::CodeBundle(maq::read_bundle(kBundle))};
+  const maq::TransformerTables& tables = parts.tables;
+  const std::vector<float> bias = maq::causal_bias(tables), expected = floats_of("foreseen.f32");
+  const auto context = parts.context.open(tiny_prediction::runtime(), {});
+  std::vector<float> summed(tables.places() * tables.embedding);
+  const float time_step = 0;  // log2 of 10 / fps
+  const auto embedding = int64_t(tables.embedding), width = int64_t(tables.width);
+  maq::PlaceSteps steps(tiny_prediction::runtime(), parts, bias, 1, {});
+  for (int number = 1; number < 4; ++number) {
+    steps.fill_kept(kNoLogit);
+    steps.begin();
+    maq::sum_context_rows(tables, before(number).frames, summed.data());
+    const float* const seen =
+        context->run({{summed.data(), {1, 256, embedding}}, {&time_step, {1, 1}}}, {{1, 256, width}})[0].data;
+    for (size_t place = 0; place < 256; ++place) {
+      steps.see(place, seen + place * tables.width);
+      const uint16_t* const known = codes(number) + place * tables.slices;
+      for (size_t k = 0; k < tables.slices; ++k) {
+        const float* const logits = steps.logits(k, &known);
+        std::vector<float> with_prior(logits, logits + tables.entries);
+        const size_t i = place * tables.slices + k;
+        const size_t row = k * tables.entries + before(number).newest[i];
+        maq::add_stored_prior(parts.codes->after_bits.data() + row * tables.entries, tables.entries, with_prior.data());
+        ASSERT_NEAR(maq::bits_of_code(with_prior.data(), tables.entries, known[k]),
+                    expected[size_t(number - 1) * kCodes + i], 1.5e-4)
+            << number << " " << i;
+      }
+      steps.set(place, &known);
+    }
+  }
+}
+
 TEST(CodeTransformer, BitsOfACodeAreThoseOfFloat64) {
   std::mt19937 random(5);
   for (const size_t entries : {1u, 2u, 7u, 16u, 33u, 512u}) {

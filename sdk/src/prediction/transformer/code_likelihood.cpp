@@ -1,6 +1,7 @@
 #include "prediction/transformer/code_likelihood.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -42,19 +43,24 @@ MAQ_SIMD_CLONES float largest_of(const float* logits, size_t entries) {
   return found;
 }
 
-float weight(float logit, float largest) { return exp_of_negative(std::max(logit - largest, -87.0f)); }
-
-MAQ_SIMD_CLONES float sum_of_weights(const float* logits, size_t entries, float largest) {
-  float sums[kLanes] = {};
-  const size_t whole = entries - entries % kLanes;
-  for (size_t i = 0; i < whole; i += kLanes) {
-    for (size_t lane = 0; lane < kLanes; ++lane) {
-      const float below = logits[i + lane] - largest;
-      sums[lane] += exp_of_negative(below > -87.0f ? below : -87.0f);
-    }
+// exp of what each is below the largest. Two loops: in one, the compiler would branch at the limit, and make no
+// vectors.
+MAQ_SIMD_CLONES void weights_of(const float* logits, size_t entries, float largest, float* weights) {
+  for (size_t i = 0; i < entries; ++i) {
+    const float below = logits[i] - largest;
+    weights[i] = below > -87.0f ? below : -87.0f;
   }
-  for (size_t i = whole; i < entries; ++i) sums[0] += weight(logits[i], largest);
+  for (size_t i = 0; i < entries; ++i) weights[i] = exp_of_negative(weights[i]);
+}
+
+MAQ_SIMD_CLONES float sum_of(const float* values, size_t count) {
+  float sums[kLanes] = {};
+  const size_t whole = count - count % kLanes;
+  for (size_t i = 0; i < whole; i += kLanes) {
+    for (size_t lane = 0; lane < kLanes; ++lane) sums[lane] += values[i + lane];
+  }
   float sum = 0;
+  for (size_t i = whole; i < count; ++i) sum += values[i];
   for (const float own : sums) sum += own;
   return sum;
 }
@@ -72,7 +78,9 @@ float bits_of_code(const float* logits, size_t entries, size_t code) {
     if (logits[code] != largest) return kMaxCodeBits;
     return std::log2(float(std::count(logits, logits + entries, largest)));
   }
-  const float bits = std::log2(sum_of_weights(logits, entries, largest)) - (logits[code] - largest) * kLog2E;
+  std::array<float, kMaxCodeEntries> weights;
+  weights_of(logits, entries, largest, weights.data());
+  const float bits = std::log2(sum_of(weights.data(), entries)) - (logits[code] - largest) * kLog2E;
   return std::clamp(bits, 0.0f, kMaxCodeBits);
 }
 

@@ -1,38 +1,21 @@
 #include "prediction/transformer/code_transformer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/error.h"
 #include "prediction/transformer/code_likelihood.h"
 
 namespace maq {
-namespace {
-
-// [layers][heads][places][places].
-std::vector<float> causal_bias(const TransformerTables& tables) {
-  const size_t side = tables.side, places = tables.places(), steps = 2 * side - 1;
-  std::vector<float> bias(tables.layers * tables.heads * places * places, -std::numeric_limits<float>::infinity());
-  float* to = bias.data();
-  for (size_t head = 0; head < tables.layers * tables.heads; ++head) {
-    const float *rows = tables.row_bias.data() + head * steps, *columns = tables.column_bias.data() + head * steps;
-    for (size_t query = 0; query < places; ++query, to += places) {
-      for (size_t key = 0; key <= query; ++key) {
-        const size_t down = query / side - key / side + side - 1, right = query % side + side - 1 - key % side;
-        to[key] = rows[down] + columns[right];
-      }
-    }
-  }
-  return bias;
-}
-
-}  // namespace
-
 CodeTransformer::CodeTransformer(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const CodeBundle& bundle,
                                  const SessionSettings& settings)
-    : runtime_(std::move(runtime)), parts_(bundle), rows_(parts_.tables), bias_(causal_bias(parts_.tables)) {
+    : runtime_(std::move(runtime)),
+      parts_(bundle),
+      settings_(settings),
+      rows_(parts_.tables),
+      bias_(causal_bias(parts_.tables)) {
   const TransformerTables& tables = parts_.tables;
   const auto places = int64_t(tables.places()), width = int64_t(tables.width), embedding = int64_t(tables.embedding),
              heads = int64_t(tables.heads), of_head = int64_t(parts_.head_width), entries = int64_t(tables.entries);
@@ -68,10 +51,16 @@ void CodeTransformer::see_context(const CodesBefore& before) {
   slice_inputs_[0].data = context_->run(context_inputs_, context_outputs_)[0].data;
 }
 
+void CodeTransformer::add_prior(size_t slice, uint16_t code_before, const float* logits) {
+  const FrameCodes& stored = *parts_.codes;
+  std::copy_n(logits, stored.entries, logits_.data());
+  add_stored_prior(stored.after_bits.data() + (slice * stored.entries + code_before) * stored.entries, stored.entries,
+                   logits_.data());
+}
+
 void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, float* bits) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const TransformerTables& tables = parts_.tables;
-  const FrameCodes& stored = *parts_.codes;
   see_context(before);
   for (size_t place = 0; place < tables.places(); ++place) rows_.set(place, codes + place * tables.slices);
   for (size_t place = 0; place < tables.places(); ++place) {
@@ -85,15 +74,45 @@ void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, flo
     const float* logits = heads_[k]->run(head_inputs_, head_outputs_)[0].data;
     for (size_t place = 0; place < tables.places(); ++place, logits += tables.entries) {
       const size_t i = place * tables.slices + k;
-      std::copy_n(logits, tables.entries, logits_.data());
-      add_stored_prior(stored.after_bits.data() + (k * stored.entries + before.newest[i]) * stored.entries,
-                       stored.entries, logits_.data());
+      add_prior(k, before.newest[i], logits);
       bits[i] = bits_of_code(logits_.data(), tables.entries, codes[i]);
       if (std::isnan(bits[i])) {
         throw Error(MAQ_ERROR_INFERENCE, "The transformer gave NaN. Install the bundle again.");
       }
     }
   }
+}
+
+void CodeTransformer::draw(const CodesBefore& before, const SamplingSettings& sampling, uint32_t stream, uint32_t frame,
+                           size_t samples, uint16_t* codes) {
+  const TransformerTables& tables = parts_.tables;
+  CodeSampler sampler(sampling, tables.entries);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (steps_ == nullptr || steps_->samples() != samples) {
+    steps_ = nullptr;
+    steps_ = std::make_unique<PlaceSteps>(runtime_, parts_, bias_, samples, settings_);
+  }
+  see_context(before);
+  const float* context = slice_inputs_[0].data;
+  const size_t of_frame = tables.places() * tables.slices;
+  drawn_.resize(samples * of_frame);
+  std::array<const uint16_t*, kMaxSamples> at_place;
+  steps_->begin();
+  for (size_t place = 0; place < tables.places(); ++place, context += tables.width) {
+    steps_->see(place, context);
+    for (size_t s = 0; s < samples; ++s) at_place[s] = drawn_.data() + s * of_frame + place * tables.slices;
+    for (size_t k = 0; k < tables.slices; ++k) {
+      const float* logits = steps_->logits(k, at_place.data());
+      for (size_t s = 0; s < samples; ++s, logits += tables.entries) {
+        const size_t i = place * tables.slices + k;
+        add_prior(k, before.newest[i], logits);
+        drawn_[s * of_frame + i] =
+            sampler.draw(logits_.data(), {stream, frame, uint16_t(s), uint16_t(k), uint32_t(place)});
+      }
+    }
+    steps_->set(place, at_place.data());
+  }
+  std::copy(drawn_.begin(), drawn_.end(), codes);
 }
 
 }  // namespace maq

@@ -1,6 +1,7 @@
 #include "prediction/transformer/row_sums.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/simd_clones.h"
 
@@ -50,6 +51,22 @@ void sum_earlier_rows(const TransformerTables& tables, size_t of, const uint16_t
   for (size_t k = 0; k < of; ++k) {
     add_row(tables.earlier_rows(of, k).data() + codes[k] * tables.width, tables.width, sum);
   }
+}
+
+std::vector<float> causal_bias(const TransformerTables& tables) {
+  const size_t side = tables.side, places = tables.places(), steps = 2 * side - 1;
+  std::vector<float> bias(tables.layers * tables.heads * places * places, -std::numeric_limits<float>::infinity());
+  float* to = bias.data();
+  for (size_t head = 0; head < tables.layers * tables.heads; ++head) {
+    const float *rows = tables.row_bias.data() + head * steps, *columns = tables.column_bias.data() + head * steps;
+    for (size_t query = 0; query < places; ++query, to += places) {
+      for (size_t key = 0; key <= query; ++key) {
+        const size_t down = query / side - key / side + side - 1, right = query % side + side - 1 - key % side;
+        to[key] = rows[down] + columns[right];
+      }
+    }
+  }
+  return bias;
 }
 
 }  // namespace maq

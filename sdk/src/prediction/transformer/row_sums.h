@@ -42,4 +42,8 @@ class SliceRows {
 // What the head of slice `of` is given of the slices before, whose codes are `codes` [of]: [width].
 void sum_earlier_rows(const TransformerTables& tables, size_t of, const uint16_t* codes, float* sum);
 
+// What the slice network adds to the score of a query and a key, [layers][heads][places][places]: -infinity for keys
+// after the query.
+std::vector<float> causal_bias(const TransformerTables& tables);
+
 }  // namespace maq

@@ -1,0 +1,87 @@
+#include "prediction/transformer/code_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "core/error.h"
+#include "core/simd_clones.h"
+#include "prediction/transformer/philox.h"
+
+namespace maq {
+namespace {
+
+constexpr float kInfinite = std::numeric_limits<float>::infinity();
+constexpr float kUnit = 1 << 30;  // the weight of the likeliest
+
+// Two loops: in one, the compiler would branch at the limit, and make no vectors.
+MAQ_SIMD_CLONES void weigh(const float* logits, size_t entries, float largest, float temperature, float* weights) {
+  for (size_t i = 0; i < entries; ++i) {
+    const float below = (logits[i] - largest) / temperature;
+    weights[i] = below > -87.0f ? below : -87.0f;
+  }
+  for (size_t i = 0; i < entries; ++i) weights[i] = exp_of_negative(weights[i]) * kUnit;
+}
+
+}  // namespace
+
+CodeSampler::CodeSampler(const SamplingSettings& settings, size_t entries)
+    : settings_(settings), weights_(entries), sorted_(entries) {
+  if (!(settings.temperature >= 0)) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The temperature is ", settings.temperature, ", but must be 0 or more.");
+  }
+  if (settings.top_k > entries) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "top_k is ", settings.top_k, ", but must be 0 to ", entries, ".");
+  }
+}
+
+uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
+  const size_t entries = weights_.size();
+  if (std::any_of(logits, logits + entries, [](float logit) { return std::isnan(logit); })) {
+    throw Error(MAQ_ERROR_INFERENCE, "The transformer gave NaN. Install the bundle again.");
+  }
+  const float* const best = std::max_element(logits, logits + entries);  // the first of equals
+  const float largest = *best, temperature = settings_.temperature;
+  if (temperature == 0 || settings_.top_k == 1) return uint16_t(best - logits);
+
+  if (std::isinf(largest)) {  // of +infinite ones each; where all are -infinite, each of all
+    std::transform(logits, logits + entries, weights_.begin(), [&](float l) { return l == largest ? kUnit : 0.0f; });
+  } else if (std::isinf(temperature)) {
+    std::transform(logits, logits + entries, weights_.begin(), [](float l) { return l > -kInfinite ? kUnit : 0.0f; });
+  } else {
+    weigh(logits, entries, largest, temperature, weights_.data());
+  }
+  if (settings_.top_k > 1 && settings_.top_k < entries) {
+    std::copy_n(logits, entries, sorted_.begin());
+    const auto last = sorted_.begin() + std::ptrdiff_t(settings_.top_k - 1);
+    std::nth_element(sorted_.begin(), last, sorted_.end(), std::greater<>());
+    const float limit = *last;
+    size_t left = settings_.top_k - size_t(std::count_if(logits, logits + entries, [&](float l) { return l > limit; }));
+    for (size_t i = 0; i < entries; ++i) {
+      if (logits[i] > limit) continue;
+      if (logits[i] == limit && left > 0) {
+        --left;
+      } else {
+        weights_[i] = 0;
+      }
+    }
+  }
+
+  uint64_t total = 0;
+  for (const float weight : weights_) total += uint64_t(weight);
+  const std::array<uint32_t, 4> words =
+      philox({position.place, position.frame, position.stream, uint32_t(position.sample) << 16 | position.slice},
+             settings_.seed);
+  // 53 of the bits, as many as a double has, below 1; the product is rounded once, whatever the processor.
+  const uint64_t random = (uint64_t(words[0]) << 32 | words[1]) >> 11;
+  uint64_t left = std::min(uint64_t(double(random) * 0x1p-53 * double(total)), total - 1);
+  for (size_t i = 0; i < entries; ++i) {
+    const auto weight = uint64_t(weights_[i]);
+    if (left < weight) return uint16_t(i);
+    left -= weight;
+  }
+  return uint16_t(best - logits);  // not reached: the weights add up to the total
+}
+
+}  // namespace maq
